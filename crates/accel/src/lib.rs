@@ -1,0 +1,166 @@
+//! Closest hit and occlusion over a scene, a batch of rays at a time.
+//!
+//! Three backends answer to one trait, [`Accel`]:
+//!
+//! | backend | what it is | speed | exactness |
+//! |---|---|---|---|
+//! | [`embree`] | Intel's Embree finds, f64 measures | the fastest | of f64, watertight |
+//! | [`bvh`] | pure Rust, for machines without Embree | good | of f64, watertight |
+//! | [`exact`] | f64 throughout, exact edge predicates | slow | the reference |
+//!
+//! *Single precision finds, double precision measures*: a fast backend says **which** triangle a ray
+//! hits; [`solve`] then works out where, in f64 and relative to the ray's origin, so that distances
+//! are accurate to the coordinates the file gave, and stay so far from the origin.
+
+
+use std::fmt;
+use std::sync::Arc;
+use std::time::Duration;
+
+use etendue_geometry::{Geometry, HitBatch, RayBatch};
+
+/// Answers nearest-hit and visibility queries about one scene. Built once, then only read.
+pub trait Accel: Send + Sync + fmt::Debug {
+    /// The closest hit of each ray. `hits` is resized to the batch, and filled to its detail.
+    ///
+    /// Among hits at the very same distance the one of the lowest placement, then the lowest
+    /// triangle, wins.
+    fn closest(&self, rays: &RayBatch, hits: &mut HitBatch);
+
+    /// Whether anything lies between each ray's `t_min` and `t_max`. `blocked` is resized.
+    fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>);
+
+    /// How the build went.
+    fn report(&self) -> BuildReport;
+
+    /// What re-validation has done since the build.
+    fn counts(&self) -> Counts {
+        Counts::default()
+    }
+}
+
+/// How a structure was built.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BuildReport {
+    /// The backend with its mode, e.g. `embree 3.13.5 robust`.
+    pub backend: String,
+    /// The quality it was built with.
+    pub quality: Quality,
+    /// Wall time of the build.
+    pub time: Duration,
+    /// Bytes of the structure itself, without the geometry it shares.
+    pub bytes: u64,
+    /// Bytes of vertices and indices that had to be copied (baked, padded or moved).
+    pub copied_bytes: u64,
+}
+
+/// How often the f64 check of a fast backend's hits had something to do.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Rays looked at a second time.
+    pub rechecked: u64,
+    /// Rays whose answer changed by that.
+    pub corrected: u64,
+}
+
+/// How much time a build may spend to make traversal faster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quality {
+    /// Morton order: the quickest to build.
+    Low,
+    /// Binned surface-area heuristic.
+    #[default]
+    Medium,
+    /// With spatial splits.
+    High,
+}
+
+/// What a build is told.
+#[derive(Clone)]
+pub struct BuildOptions {
+    /// Worker threads of the build; 0 means all that the process may use.
+    pub threads: usize,
+    /// Time against traversal speed.
+    pub quality: Quality,
+    /// Smaller nodes, slower traversal (Embree's compact mode).
+    pub compact: bool,
+    /// Watertight answers: Embree's robust mode, and a second look at suspicious rays. Off is
+    /// faster and leaks at edges and vertices.
+    pub robust: bool,
+    /// Solve each hit again in f64. Off gives f32's distances.
+    pub refine: bool,
+    /// Give up when the structure would need more bytes than this.
+    pub memory_limit: Option<u64>,
+    /// Told the share done (0..=1) now and then; answering `false` stops the build.
+    pub progress: Option<Arc<dyn Fn(f64) -> bool + Send + Sync>>,
+}
+
+impl Default for BuildOptions {
+    fn default() -> Self {
+        Self {
+            threads: 0,
+            quality: Quality::default(),
+            compact: false,
+            robust: true,
+            refine: true,
+            memory_limit: None,
+            progress: None,
+        }
+    }
+}
+
+impl fmt::Debug for BuildOptions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("BuildOptions")
+            .field("threads", &self.threads)
+            .field("quality", &self.quality)
+            .field("compact", &self.compact)
+            .field("robust", &self.robust)
+            .field("refine", &self.refine)
+            .field("memory_limit", &self.memory_limit)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Why a structure could not be built.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// The build would pass the caller's memory limit.
+    #[error(
+        "building the {backend} structure needs more than the limit of {limit} bytes; raise \
+         --memory-limit, or place fewer or lighter meshes"
+    )]
+    MemoryLimit {
+        /// The backend that was building.
+        backend: &'static str,
+        /// The limit (bytes).
+        limit: u64,
+    },
+    /// More triangles or corners than the backend can number.
+    #[error("mesh \"{mesh}\": {what} is over the {backend} limit of {limit}; split the mesh")]
+    TooLarge {
+        /// The mesh's name.
+        mesh: String,
+        /// What there is too much of, with its number.
+        what: String,
+        /// The backend that was building.
+        backend: &'static str,
+        /// The most it takes.
+        limit: u64,
+    },
+    /// The caller's progress function asked to stop.
+    #[error("the build was stopped")]
+    Stopped,
+    /// The library below reported an error.
+    #[error("{call}: {message}")]
+    Library {
+        /// What was called.
+        call: &'static str,
+        /// The library's own message.
+        message: String,
+    },
+}
+
+/// The geometry that a backend was built on; backends keep it alive while they share its buffers.
+pub type SharedGeometry = Arc<Geometry>;

@@ -1,0 +1,41 @@
+//! What every other crate of etendue speaks: rays and hits in batches, bounds, transforms,
+//! triangle meshes and where they stand in the world.
+//!
+//! # Conventions
+//!
+//! * The world is right-handed, in metres, +Y up. A camera looks along its −Z (glTF).
+//! * Directions of rays are unit vectors, so a hit's `t` is a distance in metres.
+//! * A triangle's front is the side from which its corners run counter-clockwise; a transform of
+//!   negative determinant turns this over, as glTF 2.0 (section 3.7.4) prescribes, so a mirrored
+//!   closed mesh still has its outside outside.
+//! * Coordinates are stored as the file gives them (mostly f32) and computed with in f64.
+//!
+//! # Map
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`batch`] | [`RayBatch`] and [`HitBatch`], structures of arrays |
+//! | [`bounds`] | axis-aligned boxes |
+//! | [`buffer`] | plain values owned by a `Vec` or by a mapped file |
+//! | [`mapped`] | the one place that maps files |
+//! | [`mesh`] | a triangle mesh and its vertex attributes |
+//! | [`transform`] | affine maps whose translation keeps 106 bits |
+//! | [`world`] | meshes and their placements |
+
+pub mod batch;
+pub mod bounds;
+pub mod buffer;
+pub mod mapped;
+pub mod mesh;
+pub mod transform;
+pub mod world;
+
+pub use batch::{Detail, HitBatch, MISS, RayBatch};
+pub use bounds::Bounds;
+pub use buffer::Buffer;
+pub use mapped::MappedFile;
+pub use mesh::{Mesh, Positions, Vertices};
+pub use transform::Transform;
+pub use world::{Geometry, Placement};
+
+pub use glam;

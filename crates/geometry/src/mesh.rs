@@ -1,0 +1,165 @@
+//! A triangle mesh: corners, triangles and what is known at the corners.
+
+use glam::DVec3;
+
+use crate::{Bounds, Buffer};
+
+/// `N` f32 values a vertex, possibly interleaved with others.
+#[derive(Debug, Clone)]
+pub struct Vertices<const N: usize> {
+    floats: Buffer<f32>,
+    stride: usize,
+    count: usize,
+}
+
+impl<const N: usize> Vertices<N> {
+    /// `count` vertices that start `stride` floats apart.
+    ///
+    /// `None` when `floats` is too short for them or `stride` is less than `N`.
+    #[must_use]
+    pub fn new(floats: Buffer<f32>, stride: usize, count: usize) -> Option<Self> {
+        let needed = match count {
+            0 => 0,
+            _ => (count - 1).checked_mul(stride)?.checked_add(N)?,
+        };
+        (stride >= N && floats.len() >= needed).then_some(Self { floats, stride, count })
+    }
+
+    /// From one array a vertex, tightly packed, with 16 bytes of padding behind the last
+    /// (see [`Self::is_padded`]).
+    #[must_use]
+    pub fn from_arrays(values: &[[f32; N]]) -> Self {
+        let mut floats = Vec::with_capacity(values.len() * N + 4);
+        floats.extend(values.iter().flatten());
+        floats.extend([0.0; 4]);
+        Self { floats: floats.into(), stride: N, count: values.len() }
+    }
+
+    /// The number of vertices.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is no vertex.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// The values of vertex `i`.
+    #[must_use]
+    #[inline]
+    pub fn get(&self, i: usize) -> [f32; N] {
+        let start = i * self.stride;
+        std::array::from_fn(|k| self.floats[start + k])
+    }
+
+    /// The values behind the vertices, for a reader that keeps its own loop.
+    #[must_use]
+    pub fn floats(&self) -> &Buffer<f32> {
+        &self.floats
+    }
+
+    /// Floats from one vertex to the next.
+    #[must_use]
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// Whether 16 bytes can be read at the last vertex, as Embree does.
+    #[must_use]
+    pub fn is_padded(&self) -> bool {
+        self.count == 0 || self.floats.len() >= (self.count - 1) * self.stride + 4
+    }
+}
+
+/// The corners of a mesh, in its own frame (m).
+#[derive(Debug, Clone)]
+pub enum Positions {
+    /// As nearly every file has them.
+    F32(Vertices<3>),
+    /// For a text file whose coordinates f32 would move: far from the origin, say.
+    F64(Buffer<[f64; 3]>),
+}
+
+impl Positions {
+    /// The number of corners.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(vertices) => vertices.len(),
+            Self::F64(vertices) => vertices.len(),
+        }
+    }
+
+    /// Whether there is no corner.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Corner `i` (m), in the mesh's frame.
+    #[must_use]
+    #[inline]
+    pub fn get(&self, i: usize) -> DVec3 {
+        match self {
+            Self::F32(vertices) => {
+                let [x, y, z] = vertices.get(i);
+                DVec3::new(x.into(), y.into(), z.into())
+            }
+            Self::F64(vertices) => vertices[i].into(),
+        }
+    }
+}
+
+/// A triangle mesh in its own frame. Every index in `triangles` is less than the number of
+/// positions, and every position that a triangle uses is finite: loaders see to both.
+#[derive(Debug, Clone)]
+pub struct Mesh {
+    /// What the file calls it, for messages.
+    pub name: String,
+    /// Corners (m).
+    pub positions: Positions,
+    /// Three corners a triangle, counter-clockwise from the front.
+    pub triangles: Buffer<[u32; 3]>,
+    /// Shading normals a corner, when the file has them and somebody wants them.
+    pub normals: Option<Vertices<3>>,
+    /// Texture coordinates a corner (glTF's TEXCOORD sets by number; v runs down).
+    pub uvs: Vec<Vertices<2>>,
+    /// Linear colour a corner (RGBA, 0..=1).
+    pub colors: Option<Vertices<4>>,
+    /// The box of all positions that triangles use (m).
+    pub bounds: Bounds,
+}
+
+impl Mesh {
+    /// A mesh without attributes; the bounds are worked out here.
+    ///
+    /// # Panics
+    ///
+    /// When a triangle names a position that does not exist.
+    #[must_use]
+    pub fn new(name: impl Into<String>, positions: Positions, triangles: Buffer<[u32; 3]>) -> Self {
+        let mut bounds = Bounds::EMPTY;
+        for &i in triangles.iter().flatten() {
+            bounds.include(positions.get(i as usize));
+        }
+        Self {
+            name: name.into(),
+            positions,
+            triangles,
+            normals: None,
+            uvs: Vec::new(),
+            colors: None,
+            bounds,
+        }
+    }
+
+    /// The corners of triangle `i` (m), in the mesh's frame.
+    #[must_use]
+    #[inline]
+    pub fn corners(&self, i: usize) -> [DVec3; 3] {
+        self.triangles[i].map(|corner| self.positions.get(corner as usize))
+    }
+}

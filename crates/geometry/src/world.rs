@@ -1,0 +1,91 @@
+//! Meshes and where they stand: the geometry of a scene, without light or colour.
+
+use glam::DVec3;
+
+use crate::{Bounds, Mesh, Transform};
+
+/// One mesh at one place. A mesh placed twice is stored once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Placement {
+    /// Index into [`Geometry::meshes`].
+    pub mesh: u32,
+    /// Index of the scene's object that this belongs to (what `ids` writes).
+    pub object: u32,
+    /// Index into the scene's materials.
+    pub material: u32,
+    /// From the mesh's frame to the world (m).
+    pub world_from_mesh: Transform,
+}
+
+/// All meshes and placements of a scene.
+#[derive(Debug, Clone, Default)]
+pub struct Geometry {
+    /// Each mesh once.
+    pub meshes: Vec<Mesh>,
+    /// Each place of each mesh.
+    pub placements: Vec<Placement>,
+}
+
+impl Geometry {
+    /// Triangles, each stored one once.
+    #[must_use]
+    pub fn triangles_unique(&self) -> u64 {
+        self.meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum()
+    }
+
+    /// Triangles as often as they are placed.
+    #[must_use]
+    pub fn triangles(&self) -> u64 {
+        self.placements.iter().map(|p| self.mesh_of(p).triangles.len() as u64).sum()
+    }
+
+    /// The mesh that `placement` places.
+    #[must_use]
+    pub fn mesh_of(&self, placement: &Placement) -> &Mesh {
+        &self.meshes[placement.mesh as usize]
+    }
+
+    /// How often each mesh is placed.
+    #[must_use]
+    pub fn uses(&self) -> Vec<u32> {
+        let mut uses = vec![0; self.meshes.len()];
+        for placement in &self.placements {
+            uses[placement.mesh as usize] += 1;
+        }
+        uses
+    }
+
+    /// A box around all placements in world space (m): around the eight corners of each mesh's
+    /// own box, so it is loose where a placement turns its mesh.
+    #[must_use]
+    pub fn loose_bounds(&self) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        for placement in &self.placements {
+            let local = self.mesh_of(placement).bounds;
+            if !local.is_empty() {
+                for corner in local.corners() {
+                    bounds.include(placement.world_from_mesh.point(corner));
+                }
+            }
+        }
+        bounds
+    }
+
+    /// The tight box around all triangles in world space (m). Visits every corner.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        for placement in &self.placements {
+            let mesh = self.mesh_of(placement);
+            if placement.world_from_mesh.is_identity() {
+                bounds = bounds.union(mesh.bounds);
+                continue;
+            }
+            for &corner in mesh.triangles.iter().flatten() {
+                let local: DVec3 = mesh.positions.get(corner as usize);
+                bounds.include(placement.world_from_mesh.point(local));
+            }
+        }
+        bounds
+    }
+}
