@@ -1,0 +1,11 @@
+#![forbid(unsafe_code)]
+//! The camera kit: from a place on the sensor to a ray in the world.
+//!
+//! # Conventions
+//!
+//! * The camera's frame is right-handed: it looks along −Z, +Y is up, +X is right (glTF's camera).
+//!   Its origin is the **entrance pupil**: the pinhole, the thin lens' centre, the paraxial entrance
+//!   pupil of a real lens. Distances in the world are metres.
+//! * Inside a lens, lengths are millimetres, z = 0 is the first element's vertex and +z runs from the
+//!   object to the sensor, as lens designers write it.
+//! * Row 0 of an image is the top, column 0 the left; pictures are upright.
