@@ -43,7 +43,7 @@ pub struct Material {
     pub name: String,
     /// Base colour.
     pub base_color: Paint,
-    /// The mesh's vertex colours multiply the base colour (glTF's COLOR_0).
+    /// The mesh's vertex colours multiply the base colour (glTF's `COLOR_0`).
     pub vertex_colors: bool,
 }
 
