@@ -128,6 +128,15 @@ impl Curve {
         }
     }
 
+    /// 1 at every wavelength.
+    pub const ONE: Self = Self { shape: Shape::Flat(1.0) };
+
+    /// Samples that this crate makes and whose tests see to their order.
+    pub(crate) fn trusted(samples: Vec<[f64; 2]>) -> Self {
+        debug_assert!(Self::sampled(samples.clone()).is_ok(), "samples out of order");
+        Self { shape: Shape::Sampled(samples) }
+    }
+
     /// Equally spaced samples: `values[i]` is at `start + i·step` (nm).
     ///
     /// # Errors

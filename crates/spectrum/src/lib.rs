@@ -4,9 +4,26 @@
 //!
 //! # Conventions
 //!
-//! * Wavelengths are nanometres in air, photopic light lies in 380..=780.
+//! * Wavelengths are nanometres.
 //! * A curve says where it is known. What lies outside is not guessed: the caller chooses whether
 //!   it is nothing, or held at the curve's end.
+//! * RGB is linear sRGB. Its white, (1, 1, 1), is the flat spectrum, for lights and surfaces alike:
+//!   radiance 1 in every wavelength is radiance 1 in every lane of every sensor.
+//!
+//! # Example
+//!
+//! ```
+//! use etendue_spectrum::{Grid, Illuminant, Lanes, Outside};
+//!
+//! let lanes = Lanes::Bands(Grid::equal(400.0, 700.0, 30)?);
+//! let lamp = lanes.from_curve(&Illuminant::A.curve()?, Outside::Zero)?;
+//! let brick = [0.5, 0.2, 0.1];
+//! let paint: Vec<f64> =
+//!     lanes.from_rgb().iter().map(|w| w[0] * brick[0] + w[1] * brick[1] + w[2] * brick[2]).collect();
+//! assert_eq!(lanes.names()[0], "405nm");
+//! assert!(lamp[29] * paint[29] > 10.0 * lamp[0] * paint[0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! # Map
 //!
@@ -14,9 +31,30 @@
 //! |---|---|
 //! | [`curve`] | a function of wavelength, given by samples |
 //! | [`grid`] | consecutive bands of wavelengths |
+//! | [`illuminant`] | lights by name, and Planck's law |
+//! | [`colour`] | the CIE 1931 observer and sRGB |
+//! | [`rgb`] | from a colour to a spectrum and back |
+//! | [`lanes`] | the numbers that a ray of a render carries |
 
+mod cie;
+pub mod colour;
 pub mod curve;
 pub mod grid;
+pub mod illuminant;
+pub mod lanes;
+mod mallett_yuksel;
+pub mod rgb;
 
-pub use curve::{Curve, CurveError};
+pub use curve::{Curve, CurveError, integral};
 pub use grid::{Band, Grid, GridError};
+pub use illuminant::{Illuminant, IlluminantError};
+pub use lanes::{Lanes, NoOverlap, Outside, VISIBLE};
+
+/// Planck's constant (J·s), exact in the SI.
+pub const PLANCK: f64 = 6.626_070_15e-34;
+
+/// The speed of light in vacuum (m/s), exact in the SI.
+pub const SPEED_OF_LIGHT: f64 = 299_792_458.0;
+
+/// Boltzmann's constant (J/K), exact in the SI.
+pub const BOLTZMANN: f64 = 1.380_649e-23;

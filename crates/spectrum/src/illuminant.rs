@@ -1,0 +1,195 @@
+//! Light sources by name: the CIE's illuminants and black bodies.
+//!
+//! # Sources
+//!
+//! * A, D50, D65 and daylight: CIE 15:2018, "Colorimetry", sections 4.1.1 to 4.1.3.
+//! * Black body: Planck's law with the exact constants of the SI (2019).
+
+use serde::{Deserialize, Serialize};
+
+use crate::cie::{DAYLIGHT, DAYLIGHT_START, STEP};
+use crate::{BOLTZMANN, Curve, PLANCK, SPEED_OF_LIGHT};
+
+/// A relative spectral power distribution, 1 at 560 nm.
+///
+/// In JSON: `"equal_energy"`, `"a"`, `"d50"`, `"d65"`, `{ "daylight": 5600 }` or
+/// `{ "black_body": 3200 }` with temperatures in kelvin.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Illuminant {
+    /// The same power at every wavelength (CIE illuminant E).
+    EqualEnergy,
+    /// A tungsten lamp (CIE standard illuminant A, a black body near 2856 K).
+    A,
+    /// Daylight near the horizon (CIE illuminant D50).
+    D50,
+    /// Average daylight (CIE standard illuminant D65).
+    D65,
+    /// A phase of daylight of this correlated colour temperature (K, in 4000..=25000).
+    Daylight(f64),
+    /// Planck's radiator of this temperature (K).
+    BlackBody(f64),
+}
+
+/// Why an illuminant cannot be had.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum IlluminantError {
+    /// The CIE gives daylight for 4000..=25000 K alone.
+    #[error("daylight of {0} K asked for: the CIE defines it for 4000..=25000 K")]
+    Daylight(f64),
+    /// Too cold to shine between [`Illuminant::RANGE`], or no temperature at all.
+    #[error("a black body of {0} K asked for: temperatures of 500..=100000 K are possible")]
+    BlackBody(f64),
+}
+
+impl Illuminant {
+    /// The wavelengths at which all illuminants are known (nm): those of the CIE's daylight.
+    pub const RANGE: [f64; 2] = [300.0, 830.0];
+
+    /// Passes the illuminant on when its temperature is possible.
+    ///
+    /// # Errors
+    ///
+    /// When it is not, with what is.
+    pub fn checked(self) -> Result<Self, IlluminantError> {
+        match self {
+            Self::Daylight(kelvin) if !(4000.0..=25_000.0).contains(&kelvin) => {
+                Err(IlluminantError::Daylight(kelvin))
+            }
+            Self::BlackBody(kelvin) if !(500.0..=100_000.0).contains(&kelvin) => {
+                Err(IlluminantError::BlackBody(kelvin))
+            }
+            _ => Ok(self),
+        }
+    }
+
+    /// The power distribution, sampled every 5 nm: over [`Self::RANGE`] for daylight, over
+    /// 300..=1100 nm for those that a formula gives at any wavelength, flat for equal energy.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::checked`].
+    pub fn curve(self) -> Result<Curve, IlluminantError> {
+        let by_formula = |power: &dyn Fn(f64) -> f64| {
+            let nm = |i: u32| 300.0 + 5.0 * f64::from(i);
+            Curve::trusted((0..=160).map(|i| [nm(i), power(nm(i)) / power(560.0)]).collect())
+        };
+        Ok(match self.checked()? {
+            Self::EqualEnergy => Curve::ONE,
+            Self::A => by_formula(&illuminant_a),
+            // The CIE corrects the nominal temperatures for today's value of Planck's second
+            // constant: 1.4388 against 1.4380 cm·K (CIE 15:2018, section 4.1.3, note).
+            Self::D50 => daylight(5000.0 * 1.4388 / 1.4380),
+            Self::D65 => daylight(6500.0 * 1.4388 / 1.4380),
+            Self::Daylight(kelvin) => daylight(kelvin),
+            Self::BlackBody(kelvin) => by_formula(&|nm| planck(nm, kelvin)),
+        })
+    }
+}
+
+/// Spectral radiance of a black body (W·m⁻²·sr⁻¹·nm⁻¹) at `wavelength` (nm) and `kelvin`.
+#[must_use]
+pub fn planck(wavelength: f64, kelvin: f64) -> f64 {
+    let metres = wavelength * 1e-9;
+    let exponent = PLANCK * SPEED_OF_LIGHT / (metres * BOLTZMANN * kelvin);
+    let per_metre = 2.0 * PLANCK * SPEED_OF_LIGHT.powi(2) / metres.powi(5) / exponent.exp_m1();
+    per_metre * 1e-9
+}
+
+/// CIE 15:2018, equation 4.1: fixed by its own constants, whatever Planck's are today.
+fn illuminant_a(nm: f64) -> f64 {
+    let term = |nm: f64| (1.435e7 / (2848.0 * nm)).exp_m1();
+    (560.0 / nm).powi(5) * term(560.0) / term(nm)
+}
+
+/// CIE 15:2018, equations 4.8 to 4.13; M₁ and M₂ are rounded to three decimals as it demands.
+fn daylight(kelvin: f64) -> Curve {
+    let inverse = 1e3 / kelvin;
+    let cubic = |[a, b, c, d]: [f64; 4]| ((a * inverse + b) * inverse + c) * inverse + d;
+    let x = if kelvin <= 7000.0 {
+        cubic([-4.6070, 2.9678, 0.099_11, 0.244_063])
+    } else {
+        cubic([-2.0064, 1.9018, 0.247_48, 0.237_040])
+    };
+    let y = (-3.0 * x + 2.870) * x - 0.275;
+    let m = 0.0241 + 0.2562 * x - 0.7341 * y;
+    let rounded = |value: f64| (value * 1e3).round() * 1e-3;
+    let m1 = rounded((-1.3515 - 1.7703 * x + 5.9114 * y) / m);
+    let m2 = rounded((0.0300 - 31.4424 * x + 30.0717 * y) / m);
+    let sample = |(i, [s0, s1, s2]): (usize, &[f64; 3])| {
+        let power = 0.01 * (s0 + m1 * s1 + m2 * s2);
+        // The bluest skies come out a hair negative at the ends of the tables.
+        [DAYLIGHT_START + STEP * i as f64, power.max(0.0)]
+    };
+    Curve::trusted(DAYLIGHT.iter().enumerate().map(sample).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn daylight_agrees_with_the_published_tables() {
+        // ISO/CIE 11664-2, table 1 (D65) and CIE 15:2018, table 6 (D50), divided by 100.
+        let d65 = Illuminant::D65.curve().unwrap();
+        for (nm, power) in [
+            (300.0, 0.000_341),
+            (400.0, 0.827_549),
+            (560.0, 1.0),
+            (700.0, 0.716_091),
+            (780.0, 0.633_828),
+        ] {
+            // The tables carry six figures, the components four or five.
+            assert!((d65.at(nm).unwrap() - power).abs() < 1e-5, "{nm}: {:?}", d65.at(nm));
+        }
+        let d50 = Illuminant::D50.curve().unwrap();
+        for (nm, power) in [
+            (300.0, 0.000_19),
+            (400.0, 0.493_08),
+            (500.0, 0.957_24),
+            (700.0, 0.916_04),
+            (780.0, 0.782_74),
+        ] {
+            assert!((d50.at(nm).unwrap() - power).abs() < 1e-5, "{nm}: {:?}", d50.at(nm));
+        }
+    }
+
+    #[test]
+    fn illuminant_a_agrees_with_its_table_and_its_black_body() {
+        let a = Illuminant::A.curve().unwrap();
+        // CIE 15:2018, table 5.
+        for (nm, power) in [(300.0, 0.009_304_83), (400.0, 0.147_080), (700.0, 1.982_61)] {
+            assert!((a.at(nm).unwrap() / power - 1.0).abs() < 2e-5, "{nm}: {:?}", a.at(nm));
+        }
+        let body = Illuminant::BlackBody(2856.0).curve().unwrap();
+        for &[nm, power] in a.samples() {
+            // 2848 K · 1.4388/1.4350 is 2855.5 K: half a kelvin, which moves 300 nm by 3e-3.
+            assert!((body.at(nm).unwrap() / power - 1.0).abs() < 5e-3, "{nm}");
+        }
+    }
+
+    #[test]
+    fn planck_keeps_wien_and_stefan_boltzmann() {
+        let peak = (400_000..600_000)
+            .map(|i| f64::from(i) * 1e-3)
+            .max_by(|&a, &b| planck(a, 5772.0).total_cmp(&planck(b, 5772.0)));
+        // Wien: 2.897771955e6 nm·K (CODATA 2018), to the step of the search.
+        assert!((peak.unwrap() - 2.897_771_955e6 / 5772.0).abs() < 1e-3);
+        let total: f64 = (1..400_000).map(|i| planck(f64::from(i), 3000.0)).sum();
+        let law = 5.670_374_419e-8 * 3000f64.powi(4) / std::f64::consts::PI;
+        // Beyond 400 µm lie less than 1e-6 of the power.
+        assert!((total / law - 1.0).abs() < 2e-6, "{}", total / law);
+    }
+
+    #[test]
+    fn impossible_temperatures_are_refused() {
+        assert_eq!(Illuminant::Daylight(3000.0).curve(), Err(IlluminantError::Daylight(3000.0)));
+        for kelvin in [0.0, -1.0, f64::NAN, 1e9] {
+            assert!(Illuminant::BlackBody(kelvin).curve().is_err(), "{kelvin}");
+        }
+        let named: Illuminant = serde_json::from_str(r#"{ "black_body": 3200 }"#).unwrap();
+        assert_eq!(named, Illuminant::BlackBody(3200.0));
+        assert_eq!(serde_json::from_str::<Illuminant>("\"d65\"").unwrap(), Illuminant::D65);
+    }
+}

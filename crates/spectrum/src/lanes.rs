@@ -1,0 +1,323 @@
+//! The spectral lanes of a render: how many numbers a ray carries, and what each stands for.
+//!
+//! A lane is a weight of a fixed spectrum, its [shape](Lanes::shape): flat over visible light for
+//! the single grey lane, a sRGB primary for each of three, a box for each band. The light of a
+//! pixel is the sum of lanes times shapes, so a sensor integrates it against its quantum efficiency
+//! once and for all, and a flat sensor counts the same photons whatever the lanes.
+
+use std::sync::LazyLock;
+
+use crate::colour::OBSERVER;
+use crate::curve::integral;
+use crate::{Curve, Grid, rgb};
+
+/// Visible light (nm), where RGB assets are known.
+pub const VISIBLE: [f64; 2] = [380.0, 780.0];
+
+/// What the lanes of a render are.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Lanes {
+    /// One: the mean over [`VISIBLE`] by photons (weight λ), all that a sensor of flat quantum
+    /// efficiency without colour filters can tell.
+    Grey,
+    /// Three: linear sRGB (see [`rgb`]).
+    Rgb,
+    /// The means over bands of wavelengths.
+    Bands(Grid),
+}
+
+/// What a curve is taken for where it is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outside {
+    /// Nothing: an emission, a quantum efficiency.
+    Zero,
+    /// The value at its nearer end: a reflectance, a refractive index.
+    Held,
+}
+
+/// A curve says nothing about any lane.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "the curve covers {}..={} nm, the spectral lanes {}..={} nm: they do not overlap",
+    curve[0], curve[1], lanes[0], lanes[1]
+)]
+pub struct NoOverlap {
+    /// The curve's range (nm).
+    pub curve: [f64; 2],
+    /// The lanes' range (nm).
+    pub lanes: [f64; 2],
+}
+
+impl Lanes {
+    /// How many lanes.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Grey => 1,
+            Self::Rgb => 3,
+            Self::Bands(grid) => grid.len(),
+        }
+    }
+
+    /// The wavelengths that the lanes cover (nm).
+    #[must_use]
+    pub fn range(&self) -> [f64; 2] {
+        match self {
+            Self::Grey | Self::Rgb => VISIBLE,
+            Self::Bands(grid) => grid.range(),
+        }
+    }
+
+    /// Names for the channels of an image, one a lane: `Y`; `R`, `G`, `B`; or the bands' middles as
+    /// `450nm`, `452.5nm`.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        match self {
+            Self::Grey => vec!["Y".into()],
+            Self::Rgb => ["R", "G", "B"].map(String::from).into(),
+            Self::Bands(grid) => grid.centres().map(|nm| format!("{}nm", thousandth(nm))).collect(),
+        }
+    }
+
+    /// The wavelength that stands for lane `i` where only one can be traced (nm): a band's middle,
+    /// a primary's centroid, 555 nm for grey.
+    #[must_use]
+    pub fn wavelength(&self, i: usize) -> f64 {
+        match self {
+            Self::Grey => 555.0,
+            Self::Rgb => rgb::PRIMARY_WAVELENGTHS[i],
+            Self::Bands(grid) => 0.5 * (grid.edges()[i] + grid.edges()[i + 1]),
+        }
+    }
+
+    /// The spectrum that a value of 1 in lane `i` stands for.
+    #[must_use]
+    pub fn shape(&self, i: usize) -> Curve {
+        let one_over = |from, to| Curve::trusted(vec![[from, 1.0], [to, 1.0]]);
+        match self {
+            Self::Grey => one_over(VISIBLE[0], VISIBLE[1]),
+            Self::Rgb => rgb::PRIMARIES[i].clone(),
+            Self::Bands(grid) => one_over(grid.edges()[i], grid.edges()[i + 1]),
+        }
+    }
+
+    /// Weights of linear sRGB in each lane: lane `i` of a colour is the dot product with row `i`.
+    /// The weights of a row are ≥ 0 and sum to 1, so white is 1 in every lane.
+    #[must_use]
+    pub fn from_rgb(&self) -> Vec<[f64; 3]> {
+        match self {
+            Self::Grey => vec![*GREY_FROM_RGB],
+            Self::Rgb => vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            Self::Bands(grid) => {
+                let primary =
+                    |k: usize, from, to| mean(&rgb::PRIMARIES[k], from, to, Outside::Held);
+                let row = |e: &[f64]| std::array::from_fn(|k| primary(k, e[0], e[1]));
+                grid.edges().windows(2).map(row).map(normalised).collect()
+            }
+        }
+    }
+
+    /// Weights of each lane in linear sRGB, for looking: the colour of a pixel is the sum of lanes
+    /// times rows. 1 in every lane is white. Colours outside of sRGB have negative parts. Bands
+    /// that see too little of red, green or blue to tell colours apart come out grey.
+    #[must_use]
+    pub fn to_rgb(&self) -> Vec<[f64; 3]> {
+        let Self::Bands(grid) = self else {
+            return match self {
+                Self::Grey => vec![[1.0; 3]],
+                _ => self.from_rgb(),
+            };
+        };
+        let rows: Vec<[f64; 3]> = grid.bands().map(|b| rgb::colour_of_band(b.from, b.to)).collect();
+        let white: [f64; 3] = std::array::from_fn(|k| rows.iter().map(|row| row[k]).sum());
+        if grid.len() < 3 || white.iter().any(|&part| part < 0.05) {
+            return vec![[1.0 / grid.len() as f64; 3]; grid.len()];
+        }
+        let balanced = |row: [f64; 3]| std::array::from_fn(|k| row[k] / white[k]);
+        rows.into_iter().map(balanced).collect()
+    }
+
+    /// A spectrum in lanes: means over bands, or its colour with negative parts set to 0.
+    ///
+    /// # Errors
+    ///
+    /// When the spectrum is known at no wavelength of any lane.
+    pub fn from_curve(&self, curve: &Curve, outside: Outside) -> Result<Vec<f64>, NoOverlap> {
+        let [low, high] = curve.range();
+        let [from, to] = self.range();
+        if high <= from || low >= to {
+            return Err(NoOverlap { curve: [low, high], lanes: [from, to] });
+        }
+        if let Some(value) = curve.as_flat() {
+            return Ok(vec![value; self.count()]);
+        }
+        Ok(match self {
+            Self::Grey => {
+                let known = known_everywhere(curve, from, to, outside);
+                vec![integral(&[&known, &RAMP], from, to) / RAMP.integral(from, to)]
+            }
+            Self::Rgb => {
+                let [from, to] = OBSERVER[0].range();
+                let known = known_everywhere(curve, from, to, outside);
+                rgb::colour(&known).map(|part| part.max(0.0)).into()
+            }
+            Self::Bands(grid) => {
+                grid.bands().map(|band| mean(curve, band.from, band.to, outside)).collect()
+            }
+        })
+    }
+}
+
+/// λ itself over visible light: photons in a watt are proportional to it.
+static RAMP: LazyLock<Curve> =
+    LazyLock::new(|| Curve::trusted(vec![[VISIBLE[0], VISIBLE[0]], [VISIBLE[1], VISIBLE[1]]]));
+
+static GREY_FROM_RGB: LazyLock<[f64; 3]> = LazyLock::new(|| {
+    normalised(std::array::from_fn(|k| {
+        integral(&[&rgb::PRIMARIES[k], &RAMP], VISIBLE[0], VISIBLE[1])
+    }))
+});
+
+fn normalised(weights: [f64; 3]) -> [f64; 3] {
+    let sum: f64 = weights.iter().sum();
+    weights.map(|weight| weight / sum)
+}
+
+/// The mean of a curve over an interval (nm) that may reach beyond its range.
+fn mean(curve: &Curve, from: f64, to: f64, outside: Outside) -> f64 {
+    let [low, high] = curve.range();
+    let inside = curve.integral(from, to);
+    let held = match outside {
+        Outside::Zero => 0.0,
+        Outside::Held => {
+            let before = (low.min(to) - from).max(0.0);
+            let after = (to - high.max(from)).max(0.0);
+            before * curve.held(low) + after * curve.held(high)
+        }
+    };
+    (inside + held) / (to - from)
+}
+
+/// The curve with its ends held over `from..to` (nm), or itself where it is to be 0.
+fn known_everywhere(curve: &Curve, from: f64, to: f64, outside: Outside) -> Curve {
+    let [low, high] = curve.range();
+    if outside == Outside::Zero || curve.as_flat().is_some() {
+        return curve.clone();
+    }
+    let mut samples = curve.samples().to_vec();
+    if from < low {
+        samples.insert(0, [from, curve.held(low)]);
+    }
+    if to > high {
+        samples.push([to, curve.held(high)]);
+    }
+    Curve::trusted(samples)
+}
+
+/// To a thousandth, for names.
+fn thousandth(nm: f64) -> f64 {
+    (nm * 1e3).round() / 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Illuminant;
+
+    fn all() -> Vec<Lanes> {
+        let bands = |from, to, n| Lanes::Bands(Grid::equal(from, to, n).unwrap());
+        vec![
+            Lanes::Grey,
+            Lanes::Rgb,
+            bands(380.0, 780.0, 40),
+            bands(400.0, 700.0, 31),
+            bands(350.0, 1100.0, 75),
+            bands(400.0, 700.0, 3),
+            bands(800.0, 900.0, 10),
+            bands(525.0, 526.0, 1),
+        ]
+    }
+
+    #[test]
+    fn white_is_one_in_every_lane_and_white_again() {
+        for lanes in all() {
+            let weights = lanes.from_rgb();
+            assert_eq!(weights.len(), lanes.count());
+            assert_eq!(lanes.names().len(), lanes.count());
+            for row in &weights {
+                assert!(row.iter().all(|&w| w >= 0.0));
+                assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+            }
+            let back: [f64; 3] =
+                std::array::from_fn(|k| lanes.to_rgb().iter().map(|row| row[k]).sum());
+            assert!(back.iter().all(|part| (part - 1.0).abs() < 1e-12), "{lanes:?} {back:?}");
+            let flat = lanes.from_curve(&Curve::flat(0.3).unwrap(), Outside::Zero).unwrap();
+            assert!(flat.iter().all(|value| (value - 0.3).abs() < 1e-12));
+        }
+    }
+
+    #[test]
+    fn colours_survive_fine_bands() {
+        // Ten nanometres, the usual step of hyperspectral cameras, blur saturated primaries.
+        for (width, tolerance) in [(5.0, 6e-3), (10.0, 2e-2)] {
+            let lanes = Lanes::Bands(Grid::of_width(380.0, 780.0, width).unwrap());
+            for colour in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.2, 0.5, 0.8]] {
+                let mut back = [0.0; 3];
+                for (weights, row) in lanes.from_rgb().iter().zip(lanes.to_rgb()) {
+                    let lane: f64 = (0..3).map(|k| weights[k] * colour[k]).sum();
+                    back = std::array::from_fn(|k| back[k] + lane * row[k]);
+                }
+                let worst = (0..3).map(|k| (back[k] - colour[k]).abs()).fold(0.0, f64::max);
+                assert!(worst < tolerance, "{width} nm: {colour:?} came back as {back:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_flat_sensor_counts_the_same_photons_in_any_lanes() {
+        let photons = |lanes: &Lanes, values: &[f64]| -> f64 {
+            let of_lane =
+                |i: usize| values[i] * integral(&[&lanes.shape(i), &RAMP], VISIBLE[0], VISIBLE[1]);
+            (0..lanes.count()).map(of_lane).sum()
+        };
+        let colour = [0.9, 0.2, 0.4];
+        let of_colour = |lanes: &Lanes| -> f64 {
+            let dot = |row: &[f64; 3]| (0..3).map(|k| row[k] * colour[k]).sum();
+            let values: Vec<f64> = lanes.from_rgb().iter().map(dot).collect();
+            photons(lanes, &values)
+        };
+        let grey = of_colour(&Lanes::Grey);
+        assert!((of_colour(&Lanes::Rgb) / grey - 1.0).abs() < 1e-6);
+        let bands = Lanes::Bands(Grid::of_width(380.0, 780.0, 10.0).unwrap());
+        // A band's mean is taken by watts, the grey lane's by photons: 10 nm differ by 1e-4.
+        assert!((of_colour(&bands) / grey - 1.0).abs() < 2e-4);
+    }
+
+    #[test]
+    fn spectra_become_lanes() {
+        let lamp = Illuminant::A.curve().unwrap();
+        let rgb = Lanes::Rgb.from_curve(&lamp, Outside::Zero).unwrap();
+        assert!(rgb[0] > rgb[1] && rgb[1] > rgb[2], "tungsten is orange: {rgb:?}");
+        let step = Curve::sampled(vec![[500.0, 0.25], [600.0, 0.75]]).unwrap();
+        let lanes = Lanes::Bands(Grid::equal(400.0, 700.0, 3).unwrap());
+        let held = lanes.from_curve(&step, Outside::Held).unwrap();
+        let zero = lanes.from_curve(&step, Outside::Zero).unwrap();
+        for (value, expected) in held.iter().chain(&zero).zip([0.25, 0.5, 0.75, 0.0, 0.5, 0.0]) {
+            assert!((value - expected).abs() < 1e-14, "{held:?} {zero:?}");
+        }
+        let primary = Lanes::Rgb.from_curve(&rgb::PRIMARIES[1], Outside::Held).unwrap();
+        assert!((primary[1] - 1.0).abs() < 1e-9 && primary[0].abs() + primary[2].abs() < 1e-9);
+        let infrared = Curve::sampled(vec![[900.0, 1.0], [950.0, 1.0]]).unwrap();
+        for lanes in [Lanes::Grey, Lanes::Rgb, lanes] {
+            let error = lanes.from_curve(&infrared, Outside::Held).unwrap_err();
+            assert!(error.to_string().contains("900..=950 nm"), "{error}");
+        }
+    }
+
+    #[test]
+    fn channels_are_named_by_their_wavelength() {
+        let lanes = Lanes::Bands(Grid::from_edges(vec![400.0, 405.0, 500.0]).unwrap());
+        assert_eq!(lanes.names(), ["402.5nm", "452.5nm"]);
+        assert_eq!(lanes.wavelength(1), 452.5);
+    }
+}
