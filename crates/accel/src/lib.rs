@@ -4,20 +4,36 @@
 //!
 //! | backend | what it is | speed | exactness |
 //! |---|---|---|---|
-//! | [`embree`] | Intel's Embree finds, f64 measures | the fastest | of f64, watertight |
+//! | [`Embree`] | Intel's Embree finds, f64 measures | the fastest | of f64, watertight |
 //! | [`bvh`] | pure Rust, for machines without Embree | good | of f64, watertight |
 //! | [`exact`] | f64 throughout, exact edge predicates | slow | the reference |
 //!
 //! *Single precision finds, double precision measures*: a fast backend says **which** triangle a ray
-//! hits; [`solve`] then works out where, in f64 and relative to the ray's origin, so that distances
+//! hits; the f64
+//! solution then works out where, in f64 and relative to the ray's origin, so that distances
 //! are accurate to the coordinates the file gave, and stay so far from the origin.
 
+
+#[cfg(feature = "embree")]
+mod checked;
+#[cfg(feature = "embree")]
+mod embree;
+#[cfg(feature = "embree")]
+mod recheck;
+mod single;
+mod solve;
+pub mod watertight;
 
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
 use etendue_geometry::{Geometry, HitBatch, RayBatch};
+
+#[cfg(feature = "embree")]
+pub use checked::Embree;
+#[cfg(feature = "embree")]
+pub use embree::{Version, version as embree_version};
 
 /// Answers nearest-hit and visibility queries about one scene. Built once, then only read.
 pub trait Accel: Send + Sync + fmt::Debug {
@@ -89,6 +105,8 @@ pub struct BuildOptions {
     pub robust: bool,
     /// Solve each hit again in f64. Off gives f32's distances.
     pub refine: bool,
+    /// Force one of Embree's instruction sets (`sse2`, `sse4.2`, `avx`, `avx2`, `avx512`).
+    pub isa: Option<String>,
     /// Give up when the structure would need more bytes than this.
     pub memory_limit: Option<u64>,
     /// Told the share done (0..=1) now and then; answering `false` stops the build.
@@ -103,6 +121,7 @@ impl Default for BuildOptions {
             compact: false,
             robust: true,
             refine: true,
+            isa: None,
             memory_limit: None,
             progress: None,
         }

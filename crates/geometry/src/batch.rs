@@ -134,6 +134,18 @@ impl HitBatch {
         }
     }
 
+    /// Turns hit `i` into a miss.
+    pub fn clear_hit(&mut self, i: usize) {
+        self.t[i] = f64::INFINITY;
+        self.placement[i] = MISS;
+        self.triangle[i] = MISS;
+        if self.detail == Detail::Surface {
+            for array in [&mut self.u, &mut self.v].into_iter().chain(&mut self.normal) {
+                array[i] = 0.0;
+            }
+        }
+    }
+
     /// The number of hits and misses.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -7,8 +7,10 @@
 
 pub mod layer;
 pub mod material;
+pub mod reference;
 pub mod texture;
 
 pub use layer::{LayerSpec, NormalKind, Space};
 pub use material::{Color, Material, MaterialSpec, Paint};
-pub use texture::{ImageSource, Texture, TextureUse};
+pub use reference::{Needs, Surroundings, Traced, View};
+pub use texture::{Image, ImageSource, Texture, TextureUse};

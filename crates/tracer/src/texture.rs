@@ -63,3 +63,159 @@ impl TextureUse {
     /// The transform that changes nothing.
     pub const UNCHANGED: [[f64; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 }
+
+/// A decoded image: linear light, ready to be looked up.
+#[derive(Debug, Clone)]
+pub struct Image {
+    width: usize,
+    height: usize,
+    /// RGBA, sRGB-encoded as in the file, row 0 at the top.
+    texels: Vec<[u8; 4]>,
+    wrap: [Wrap; 2],
+    filter: Filter,
+}
+
+/// Why an image could not be decoded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImageError {
+    /// The file could not be read.
+    #[error("cannot read {path}: {source}", path = path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The bytes are no image that we read, or a broken one.
+    #[error("cannot decode {name}: {source}")]
+    Decode {
+        /// What the texture is called.
+        name: String,
+        /// Why.
+        source: image::ImageError,
+    },
+}
+
+/// Side of the largest image that is decoded (texels). Above it a file is taken for broken or hostile.
+const MAX_SIDE: u32 = 32_768;
+
+impl Texture {
+    /// Decodes the image.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be read or decoded, or is over 32 768 texels a side.
+    pub fn decode(&self) -> Result<Image, ImageError> {
+        let read;
+        let bytes: &[u8] = match &self.source {
+            ImageSource::Bytes(bytes) => bytes,
+            ImageSource::File(path) => {
+                read = std::fs::read(path)
+                    .map_err(|source| ImageError::Read { path: path.clone(), source })?;
+                &read
+            }
+        };
+        let decode = || {
+            let mut reader =
+                image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format()?;
+            let mut limits = image::Limits::default();
+            limits.max_image_width = Some(MAX_SIDE);
+            limits.max_image_height = Some(MAX_SIDE);
+            limits.max_alloc = Some(u64::from(MAX_SIDE) * u64::from(MAX_SIDE) * 4);
+            reader.limits(limits);
+            reader.decode()
+        };
+        let decoded = decode()
+            .map_err(|source| ImageError::Decode { name: self.name.clone(), source })?
+            .into_rgba8();
+        let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+        let texels = bytemuck::cast_vec::<u8, [u8; 4]>(decoded.into_raw());
+        Ok(Image { width, height, texels, wrap: self.wrap, filter: self.filter })
+    }
+}
+
+impl Image {
+    /// The magenta and black checker that stands in for an image that cannot be had.
+    #[must_use]
+    pub fn missing() -> Self {
+        let (magenta, black) = ([255, 0, 255, 255], [0, 0, 0, 255]);
+        Self {
+            width: 2,
+            height: 2,
+            texels: vec![magenta, black, black, magenta],
+            wrap: [Wrap::Repeat; 2],
+            filter: Filter::Nearest,
+        }
+    }
+
+    /// Bytes of the decoded texels.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.texels.len() * 4
+    }
+
+    /// Linear colour at (u, v): (0, 0) is the upper left corner of the upper left texel, as in glTF.
+    #[must_use]
+    pub fn sample(&self, u: f64, v: f64) -> [f64; 3] {
+        if !(u.is_finite() && v.is_finite()) || self.texels.is_empty() {
+            return [0.0; 3];
+        }
+        let (x, y) = (u * self.width as f64, v * self.height as f64);
+        match self.filter {
+            Filter::Nearest => self.texel(x.floor(), y.floor()),
+            Filter::Bilinear => {
+                let (x0, y0) = ((x - 0.5).floor(), (y - 0.5).floor());
+                let (fx, fy) = (x - 0.5 - x0, y - 0.5 - y0);
+                let (a, b) = (self.texel(x0, y0), self.texel(x0 + 1.0, y0));
+                let (c, d) = (self.texel(x0, y0 + 1.0), self.texel(x0 + 1.0, y0 + 1.0));
+                std::array::from_fn(|k| {
+                    let top = a[k] + (b[k] - a[k]) * fx;
+                    let bottom = c[k] + (d[k] - c[k]) * fx;
+                    top + (bottom - top) * fy
+                })
+            }
+        }
+    }
+
+    /// The texel in column `x` and row `y`, wrapped.
+    fn texel(&self, x: f64, y: f64) -> [f64; 3] {
+        let column = self.wrap[0].apply(x, self.width);
+        let row = self.wrap[1].apply(y, self.height);
+        let [r, g, b, _] = self.texels[row * self.width + column];
+        [r, g, b].map(linear_from_srgb)
+    }
+}
+
+impl Wrap {
+    /// Column or row `x` (a whole number) of `size` after wrapping.
+    fn apply(self, x: f64, size: usize) -> usize {
+        let n = size as f64;
+        let wrapped = match self {
+            Self::Repeat => x.rem_euclid(n),
+            Self::MirroredRepeat => {
+                let m = x.rem_euclid(2.0 * n);
+                if m < n { m } else { 2.0 * n - 1.0 - m }
+            }
+            Self::ClampToEdge => x,
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to the image; the cast saturates"
+        )]
+        let index = wrapped.clamp(0.0, n - 1.0) as usize;
+        index.min(size - 1)
+    }
+}
+
+/// Linear light of an 8-bit sRGB value (IEC 61966-2-1, section 5.2).
+fn linear_from_srgb(encoded: u8) -> f64 {
+    static TABLE: std::sync::LazyLock<[f64; 256]> = std::sync::LazyLock::new(|| {
+        std::array::from_fn(|i| {
+            let c = i as f64 / 255.0;
+            if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        })
+    });
+    TABLE[usize::from(encoded)]
+}

@@ -1,0 +1,793 @@
+#![expect(unsafe_code, reason = "Embree's C interface; the rest of the workspace has none")]
+//! Embree behind four owners, each of one handle that it releases itself: [`Device`], [`Shape`],
+//! [`SceneBuilder`] and [`Scene`].
+//!
+//! * `SceneBuilder` can be changed and not traced, `Scene` traced and not changed: Embree wants
+//!   modifying, committing and tracing strictly one after the other (manual, `rtcCommitScene`), and
+//!   moving the one into the other proves it.
+//! * Vertex and index buffers are shared, not copied, where they stand as Embree wants them; a
+//!   `Scene` keeps the [`Geometry`] that owns them alive.
+//! * Errors come through the device's error function, with Embree's own words. Tracing reports none.
+//! * Masks, ids and the 16 bytes behind the last vertex are seen to here and nowhere else.
+
+use std::ffi::{CStr, CString, c_char, c_void};
+use std::fmt;
+use std::ptr::{self, NonNull};
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use embree4_sys as sys;
+use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{Geometry, MISS, Mesh, Positions, Transform};
+
+use crate::single::Rays32;
+use crate::{BuildError, BuildOptions, Quality};
+
+type ProgressFn = dyn Fn(f64) -> bool + Send + Sync;
+
+/// What Embree's callbacks write to while a device lives.
+#[derive(Default)]
+struct Watch {
+    /// The first error since it was last taken.
+    error: Mutex<Option<String>>,
+    /// Bytes that Embree holds now, and the most it held.
+    bytes: AtomicI64,
+    peak: AtomicI64,
+    limit: Option<i64>,
+    over_limit: AtomicBool,
+}
+
+/// An Embree device: its threads, its memory and its errors.
+pub(crate) struct Device {
+    handle: NonNull<sys::RTCDeviceTy>,
+    watch: Box<Watch>,
+    /// Rays per packet: 16, 8, 4, or 1 where the processor has no packets worth it.
+    width: usize,
+}
+
+// SAFETY: the handle is reference-counted atomically by Embree, its functions may be called from any
+// thread, and everything in `Watch` is atomic or locked.
+unsafe impl Send for Device {}
+// SAFETY: as above.
+unsafe impl Sync for Device {}
+
+impl Device {
+    /// Opens a device for `options`.
+    pub(crate) fn new(options: &BuildOptions) -> Result<Self, BuildError> {
+        let mut config = format!("threads={}", options.threads);
+        if let Some(isa) = &options.isa {
+            config.push_str(",isa=");
+            config.push_str(check_isa(isa)?);
+        }
+        let config = CString::new(config).unwrap_or_default();
+        // SAFETY: the string is terminated and lives through the call.
+        let handle = unsafe { sys::rtcNewDevice(config.as_ptr()) };
+        let Some(handle) = NonNull::new(handle) else {
+            // SAFETY: the null device reports the error of the failed creation on this thread.
+            let code = unsafe { sys::rtcGetDeviceError(ptr::null_mut()) };
+            return Err(BuildError::Library {
+                call: "rtcNewDevice",
+                message: format!("Embree could not open a device (error {})", code.0),
+            });
+        };
+        let limit = options.memory_limit.map(|bytes| i64::try_from(bytes).unwrap_or(i64::MAX));
+        let watch = Box::new(Watch { limit, ..Watch::default() });
+        let user: *mut c_void = ptr::from_ref(&*watch).cast_mut().cast();
+        // SAFETY: `watch` is boxed, so its address holds for as long as the device, which is
+        // released in `drop` before it. The callbacks only read it, through atomics and a lock.
+        unsafe {
+            sys::rtcSetDeviceErrorFunction(handle.as_ptr(), Some(on_error), user);
+            sys::rtcSetDeviceMemoryMonitorFunction(handle.as_ptr(), Some(on_memory), user);
+        }
+        let mut device = Self { handle, watch, width: 1 };
+        device.width = device.native_width();
+        Ok(device)
+    }
+
+    fn property(&self, property: sys::RTCDeviceProperty) -> isize {
+        // SAFETY: the handle is live; unknown properties return 0 and set an error.
+        unsafe { sys::rtcGetDeviceProperty(self.handle.as_ptr(), property) as isize }
+    }
+
+    fn native_width(&self) -> usize {
+        if self.property(sys::RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0 {
+            16
+        } else if self.property(sys::RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0 {
+            8
+        } else if self.property(sys::RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED) != 0 {
+            4
+        } else {
+            1
+        }
+    }
+
+    /// Bytes that Embree holds now.
+    pub(crate) fn bytes(&self) -> u64 {
+        u64::try_from(self.watch.bytes.load(Ordering::Relaxed)).unwrap_or(0)
+    }
+
+    /// Fails with what Embree reported since the last call, if anything.
+    fn check(&self, call: &'static str) -> Result<(), BuildError> {
+        let message = self.watch.error.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let Some(message) = message else { return Ok(()) };
+        if self.watch.over_limit.load(Ordering::Relaxed) {
+            let limit = u64::try_from(self.watch.limit.unwrap_or(0)).unwrap_or(0);
+            return Err(BuildError::MemoryLimit { backend: "Embree", limit });
+        }
+        if message.starts_with(STOPPED) {
+            return Err(BuildError::Stopped);
+        }
+        Err(BuildError::Library { call, message })
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: this is the one reference that `new` was given; scenes hold their own.
+        unsafe {
+            sys::rtcSetDeviceErrorFunction(self.handle.as_ptr(), None, ptr::null_mut());
+            sys::rtcSetDeviceMemoryMonitorFunction(self.handle.as_ptr(), None, ptr::null_mut());
+            sys::rtcReleaseDevice(self.handle.as_ptr());
+        }
+    }
+}
+
+impl fmt::Debug for Device {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Device").field("width", &self.width).field("bytes", &self.bytes()).finish()
+    }
+}
+
+const STOPPED: &str = "cancelled";
+
+unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError, text: *const c_char) {
+    // SAFETY: `user` is the `Watch` that `Device::new` registered; the text is a C string or null.
+    let (watch, text) = unsafe {
+        let text = if text.is_null() { c"" } else { CStr::from_ptr(text) };
+        (&*user.cast::<Watch>(), text.to_string_lossy())
+    };
+    let name = match code {
+        sys::RTC_ERROR_INVALID_ARGUMENT => "invalid argument",
+        sys::RTC_ERROR_INVALID_OPERATION => "invalid operation",
+        sys::RTC_ERROR_OUT_OF_MEMORY => "out of memory",
+        sys::RTC_ERROR_UNSUPPORTED_CPU => "unsupported CPU",
+        sys::RTC_ERROR_CANCELLED => STOPPED,
+        _ => "unknown error",
+    };
+    let mut slot = watch.error.lock().unwrap_or_else(PoisonError::into_inner);
+    slot.get_or_insert_with(|| {
+        if text.is_empty() { name.to_owned() } else { format!("{name}: {text}") }
+    });
+}
+
+unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, post: bool) -> bool {
+    // SAFETY: `user` is the `Watch` that `Device::new` registered.
+    let watch = unsafe { &*user.cast::<Watch>() };
+    let now = watch.bytes.fetch_add(bytes as i64, Ordering::Relaxed) + bytes as i64;
+    watch.peak.fetch_max(now, Ordering::Relaxed);
+    // Embree only lets an allocation be refused before it is made.
+    let refuse = bytes > 0 && !post && watch.limit.is_some_and(|limit| now > limit);
+    if refuse {
+        watch.over_limit.store(true, Ordering::Relaxed);
+        watch.bytes.fetch_sub(bytes as i64, Ordering::Relaxed);
+    }
+    !refuse
+}
+
+unsafe extern "C" fn on_progress(user: *mut c_void, done: f64) -> bool {
+    // SAFETY: `user` points to the reference that `SceneBuilder::commit` keeps on its stack for as
+    // long as the callback is registered.
+    let progress = unsafe { *user.cast::<&ProgressFn>() };
+    progress(done)
+}
+
+/// An instruction set's name as Embree's `isa=` takes it, when this processor has it.
+fn check_isa(isa: &str) -> Result<&str, BuildError> {
+    #[cfg(target_arch = "x86_64")]
+    let known = [
+        ("sse2", true),
+        ("sse4.2", is_x86_feature_detected!("sse4.2")),
+        ("avx", is_x86_feature_detected!("avx")),
+        ("avx2", is_x86_feature_detected!("avx2")),
+        ("avx512", is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl")),
+    ];
+    #[cfg(not(target_arch = "x86_64"))]
+    let known: [(&str, bool); 0] = [];
+    let refuse = |message: String| Err(BuildError::Library { call: "isa", message });
+    match known.iter().find(|(name, _)| *name == isa) {
+        Some((_, true)) => Ok(isa),
+        Some((_, false)) => refuse(format!("this processor has no {isa}; leave `isa` out")),
+        None => refuse(format!(
+            "unknown instruction set \"{isa}\"; known here: {}",
+            known.map(|(name, _)| name).join(", ")
+        )),
+    }
+}
+
+/// What Embree there is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Version {
+    /// `3.13.5`
+    pub version: String,
+    /// The widest instruction set its kernels use here.
+    pub isa: &'static str,
+    /// What runs its tasks.
+    pub tasks: &'static str,
+}
+
+impl fmt::Display for Version {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Embree {} ({}, {})", self.version, self.isa, self.tasks)
+    }
+}
+
+/// Asks the installed Embree for its version, instruction set and task system.
+///
+/// # Errors
+///
+/// When no device can be opened.
+pub fn version() -> Result<Version, BuildError> {
+    let device = Device::new(&BuildOptions { threads: 1, ..BuildOptions::default() })?;
+    let number = |property| device.property(property);
+    let isa = match device.width {
+        16 => "AVX-512",
+        8 if cpu_has_avx2() => "AVX2",
+        8 => "AVX",
+        4 => "SSE or NEON",
+        _ => "unknown instruction set",
+    };
+    let tasks = match number(sys::RTC_DEVICE_PROPERTY_TASKING_SYSTEM) {
+        0 => "internal tasks",
+        1 => "TBB",
+        2 => "PPL",
+        _ => "unknown tasks",
+    };
+    let version = format!(
+        "{}.{}.{}",
+        number(sys::RTC_DEVICE_PROPERTY_VERSION_MAJOR),
+        number(sys::RTC_DEVICE_PROPERTY_VERSION_MINOR),
+        number(sys::RTC_DEVICE_PROPERTY_VERSION_PATCH)
+    );
+    Ok(Version { version, isa, tasks })
+}
+
+fn cpu_has_avx2() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return is_x86_feature_detected!("avx2");
+    #[cfg(not(target_arch = "x86_64"))]
+    return false;
+}
+
+/// One mesh or instance, before it is attached to a scene.
+struct Shape {
+    handle: NonNull<sys::RTCGeometryTy>,
+    copied_bytes: u64,
+}
+
+impl Shape {
+    fn new(
+        device: &Device,
+        kind: sys::RTCGeometryType,
+        options: &BuildOptions,
+    ) -> Result<Self, BuildError> {
+        // SAFETY: the device is live.
+        let handle = unsafe { sys::rtcNewGeometry(device.handle.as_ptr(), kind) };
+        device.check("rtcNewGeometry")?;
+        let Some(handle) = NonNull::new(handle) else {
+            return Err(BuildError::Library {
+                call: "rtcNewGeometry",
+                message: "no geometry".to_owned(),
+            });
+        };
+        // SAFETY: the geometry was just made and is ours alone.
+        unsafe { sys::rtcSetGeometryBuildQuality(handle.as_ptr(), options.quality.to_embree()) };
+        Ok(Self { handle, copied_bytes: 0 })
+    }
+
+    /// The triangles of `mesh`, moved by `to_frame`; the buffers are shared when nothing moves them.
+    /// `mesh` must outlive the scene that this is attached to.
+    fn mesh(
+        device: &Device,
+        mesh: &Mesh,
+        to_frame: &Transform,
+        options: &BuildOptions,
+    ) -> Result<Self, BuildError> {
+        check_size(mesh)?;
+        let mut shape = Self::new(device, sys::RTC_GEOMETRY_TYPE_TRIANGLE, options)?;
+        let triangles: &[[u32; 3]] = &mesh.triangles;
+        // SAFETY: the indices stand behind `mesh`, which outlives the scene (`Scene` keeps the
+        // geometry alive, `Buffer` never moves its values), three u32 a triangle; each is less than
+        // the number of positions, as `Mesh` promises.
+        unsafe {
+            sys::rtcSetSharedGeometryBuffer(
+                shape.handle.as_ptr(),
+                sys::RTC_BUFFER_TYPE_INDEX,
+                0,
+                sys::RTC_FORMAT_UINT3,
+                triangles.as_ptr().cast(),
+                0,
+                size_of::<[u32; 3]>(),
+                triangles.len(),
+            );
+        }
+        match &mesh.positions {
+            Positions::F32(vertices) if to_frame.is_identity() && vertices.is_padded() => {
+                let floats: &[f32] = vertices.floats();
+                // SAFETY: as for the indices; `is_padded` says that 16 bytes can be read at the
+                // last vertex, and `Vertices` that all vertices lie inside the floats.
+                unsafe {
+                    sys::rtcSetSharedGeometryBuffer(
+                        shape.handle.as_ptr(),
+                        sys::RTC_BUFFER_TYPE_VERTEX,
+                        0,
+                        sys::RTC_FORMAT_FLOAT3,
+                        floats.as_ptr().cast(),
+                        0,
+                        vertices.stride() * size_of::<f32>(),
+                        vertices.len(),
+                    );
+                }
+            }
+            positions => shape.copy_positions(device, positions, to_frame)?,
+        }
+        device.check("rtcSetGeometryBuffer")?;
+        // SAFETY: the geometry is complete and not yet in use.
+        unsafe { sys::rtcCommitGeometry(shape.handle.as_ptr()) };
+        device.check("rtcCommitGeometry")?;
+        Ok(shape)
+    }
+
+    /// Moves the positions into a buffer of Embree's own, which it pads itself.
+    fn copy_positions(
+        &mut self,
+        device: &Device,
+        positions: &Positions,
+        to_frame: &Transform,
+    ) -> Result<(), BuildError> {
+        use rayon::prelude::*;
+        let count = positions.len();
+        // SAFETY: the geometry is ours; Embree allocates `count` items of 12 bytes and padding.
+        let data = unsafe {
+            sys::rtcSetNewGeometryBuffer(
+                self.handle.as_ptr(),
+                sys::RTC_BUFFER_TYPE_VERTEX,
+                0,
+                sys::RTC_FORMAT_FLOAT3,
+                size_of::<[f32; 3]>(),
+                count,
+            )
+        };
+        device.check("rtcSetNewGeometryBuffer")?;
+        if data.is_null() || count == 0 {
+            return Ok(());
+        }
+        // SAFETY: the buffer is `count` times three floats, aligned to 16 bytes, written by nobody
+        // else until the geometry is committed.
+        let out = unsafe { std::slice::from_raw_parts_mut(data.cast::<[f32; 3]>(), count) };
+        out.par_iter_mut().with_min_len(4096).enumerate().for_each(|(i, corner)| {
+            *corner = to_frame.point(positions.get(i)).as_vec3().to_array();
+        });
+        self.copied_bytes = (count * size_of::<[f32; 3]>()) as u64;
+        Ok(())
+    }
+
+    /// `scene` once more, moved by `to_frame`.
+    fn instance(
+        device: &Device,
+        scene: &SceneHandle,
+        to_frame: &Transform,
+        options: &BuildOptions,
+    ) -> Result<Self, BuildError> {
+        let shape = Self::new(device, sys::RTC_GEOMETRY_TYPE_INSTANCE, options)?;
+        let linear = to_frame.linear.as_mat3().to_cols_array();
+        let moved = to_frame.point(DVec3::ZERO).as_vec3();
+        let mut columns = [0.0f32; 12];
+        columns[..9].copy_from_slice(&linear);
+        columns[9..].copy_from_slice(&moved.to_array());
+        // SAFETY: both handles are live; Embree copies the twelve floats and retains the scene.
+        unsafe {
+            sys::rtcSetGeometryInstancedScene(shape.handle.as_ptr(), scene.0.as_ptr());
+            sys::rtcSetGeometryTransform(
+                shape.handle.as_ptr(),
+                0,
+                sys::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR,
+                columns.as_ptr().cast(),
+            );
+            sys::rtcCommitGeometry(shape.handle.as_ptr());
+        }
+        device.check("rtcSetGeometryInstancedScene")?;
+        Ok(shape)
+    }
+}
+
+impl Drop for Shape {
+    fn drop(&mut self) {
+        // SAFETY: releases the reference that `rtcNewGeometry` gave; scenes hold their own.
+        unsafe { sys::rtcReleaseGeometry(self.handle.as_ptr()) };
+    }
+}
+
+fn check_size(mesh: &Mesh) -> Result<(), BuildError> {
+    let limit = u64::from(u32::MAX) - 1;
+    let (triangles, corners) = (mesh.triangles.len() as u64, mesh.positions.len() as u64);
+    let what = if triangles > limit {
+        format!("{triangles} triangles")
+    } else if corners > limit {
+        format!("{corners} vertices")
+    } else {
+        return Ok(());
+    };
+    Err(BuildError::TooLarge { mesh: mesh.name.clone(), what, backend: "Embree", limit })
+}
+
+impl Quality {
+    fn to_embree(self) -> sys::RTCBuildQuality {
+        match self {
+            Self::Low => sys::RTC_BUILD_QUALITY_LOW,
+            Self::Medium => sys::RTC_BUILD_QUALITY_MEDIUM,
+            Self::High => sys::RTC_BUILD_QUALITY_HIGH,
+        }
+    }
+}
+
+/// One reference to an Embree scene.
+struct SceneHandle(NonNull<sys::RTCSceneTy>);
+
+impl Drop for SceneHandle {
+    fn drop(&mut self) {
+        // SAFETY: releases the reference that `rtcNewScene` gave.
+        unsafe { sys::rtcReleaseScene(self.0.as_ptr()) };
+    }
+}
+
+/// A scene that takes shapes and cannot be traced yet.
+struct SceneBuilder<'a> {
+    device: &'a Device,
+    handle: SceneHandle,
+}
+
+impl<'a> SceneBuilder<'a> {
+    fn new(device: &'a Device, options: &BuildOptions) -> Result<Self, BuildError> {
+        // SAFETY: the device is live.
+        let handle = unsafe { sys::rtcNewScene(device.handle.as_ptr()) };
+        device.check("rtcNewScene")?;
+        let Some(handle) = NonNull::new(handle) else {
+            return Err(BuildError::Library {
+                call: "rtcNewScene",
+                message: "no scene".to_owned(),
+            });
+        };
+        let handle = SceneHandle(handle);
+        let mut flags = sys::RTC_SCENE_FLAG_NONE;
+        if options.robust {
+            flags = sys::RTCSceneFlags(flags.0 | sys::RTC_SCENE_FLAG_ROBUST.0);
+        }
+        if options.compact {
+            flags = sys::RTCSceneFlags(flags.0 | sys::RTC_SCENE_FLAG_COMPACT.0);
+        }
+        // SAFETY: the scene is live and ours alone.
+        unsafe {
+            sys::rtcSetSceneFlags(handle.0.as_ptr(), flags);
+            sys::rtcSetSceneBuildQuality(handle.0.as_ptr(), options.quality.to_embree());
+        }
+        Ok(Self { device, handle })
+    }
+
+    fn attach(&mut self, shape: &Shape, id: u32) {
+        // SAFETY: both are live; the scene retains the geometry.
+        unsafe {
+            sys::rtcAttachGeometryByID(self.handle.0.as_ptr(), shape.handle.as_ptr(), id);
+        }
+    }
+
+    /// Builds the acceleration structure.
+    fn commit(self, progress: Option<&ProgressFn>) -> Result<SceneHandle, BuildError> {
+        let scene = self.handle.0.as_ptr();
+        if let Some(progress) = progress {
+            let user: *mut c_void = ptr::from_ref(&progress).cast_mut().cast();
+            // SAFETY: `progress` outlives the commit; the callback is taken off right after.
+            unsafe {
+                sys::rtcSetSceneProgressMonitorFunction(scene, Some(on_progress), user);
+                sys::rtcCommitScene(scene);
+                sys::rtcSetSceneProgressMonitorFunction(scene, None, ptr::null_mut());
+            }
+        } else {
+            // SAFETY: the scene is live and ours alone.
+            unsafe { sys::rtcCommitScene(scene) };
+        }
+        self.device.check("rtcCommitScene")?;
+        Ok(self.handle)
+    }
+}
+
+/// A committed scene: nothing changes it any more, so any number of threads may trace it.
+pub(crate) struct Scene {
+    // The order matters: the scene lets go of the buffers, then the device, then the geometry.
+    handle: SceneHandle,
+    device: Device,
+    geometry: Arc<Geometry>,
+    /// Bytes of vertices that had to be copied.
+    pub(crate) copied_bytes: u64,
+}
+
+// SAFETY: after the commit the scene is read only; Embree's queries are re-entrant.
+unsafe impl Send for Scene {}
+// SAFETY: as above.
+unsafe impl Sync for Scene {}
+
+impl fmt::Debug for Scene {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Scene").field("device", &self.device).finish_non_exhaustive()
+    }
+}
+
+/// What single precision found for a batch of rays.
+#[derive(Debug, Default)]
+pub(crate) struct Found {
+    /// Placement of each hit, or [`MISS`].
+    pub(crate) placement: Vec<u32>,
+    /// Triangle of each hit, or [`MISS`].
+    pub(crate) triangle: Vec<u32>,
+    /// Single-precision distance from the moved origin.
+    pub(crate) t: Vec<f32>,
+}
+
+impl Found {
+    fn resize(&mut self, len: usize) {
+        self.placement.resize(len, MISS);
+        self.triangle.resize(len, MISS);
+        self.t.resize(len, f32::INFINITY);
+    }
+}
+
+impl Scene {
+    /// Builds the scene of `geometry` with coordinates relative to `origin`.
+    pub(crate) fn build(
+        geometry: Arc<Geometry>,
+        origin: DVec3,
+        options: &BuildOptions,
+    ) -> Result<Self, BuildError> {
+        let device = Device::new(options)?;
+        let mut copied_bytes = 0;
+        let uses = geometry.uses();
+        let mut shared: Vec<Option<SceneHandle>> = Vec::with_capacity(uses.len());
+        for (mesh, &uses) in geometry.meshes.iter().zip(&uses) {
+            let scene = if uses > 1 && !mesh.triangles.is_empty() {
+                let mut builder = SceneBuilder::new(&device, options)?;
+                let to_frame = Transform::new(DMat3::IDENTITY, -mesh_origin(mesh));
+                let shape = Shape::mesh(&device, mesh, &to_frame, options)?;
+                copied_bytes += shape.copied_bytes;
+                builder.attach(&shape, 0);
+                Some(builder.commit(options.progress.as_deref())?)
+            } else {
+                None
+            };
+            shared.push(scene);
+        }
+        let mut builder = SceneBuilder::new(&device, options)?;
+        for (id, placement) in (0..).zip(&geometry.placements) {
+            let mesh = geometry.mesh_of(placement);
+            if mesh.triangles.is_empty() {
+                continue;
+            }
+            let mut to_frame = placement.world_from_mesh;
+            to_frame.translation -= origin;
+            let shape = match &shared[placement.mesh as usize] {
+                Some(scene) => {
+                    let back = Transform::new(DMat3::IDENTITY, mesh_origin(mesh));
+                    Shape::instance(&device, scene, &to_frame.then_inner(&back), options)?
+                }
+                None => Shape::mesh(&device, mesh, &to_frame, options)?,
+            };
+            copied_bytes += shape.copied_bytes;
+            builder.attach(&shape, id);
+        }
+        device.check("rtcAttachGeometry")?;
+        let handle = builder.commit(options.progress.as_deref())?;
+        Ok(Self { handle, device, geometry, copied_bytes })
+    }
+
+    /// The geometry whose buffers are shared.
+    pub(crate) fn geometry(&self) -> &Arc<Geometry> {
+        &self.geometry
+    }
+
+    /// Bytes that Embree holds.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.device.bytes()
+    }
+
+    /// Rays per packet of coherent batches.
+    pub(crate) fn packet_width(&self) -> usize {
+        self.device.width
+    }
+
+    /// The closest hit of each ray in single precision.
+    pub(crate) fn closest(&self, rays: &Rays32, coherent: bool, found: &mut Found) {
+        found.resize(rays.len());
+        match (coherent, self.device.width) {
+            (true, 16) => self.closest16(rays, found),
+            (true, 8) => self.closest8(rays, found),
+            (true, 4) => self.closest4(rays, found),
+            _ => self.closest1(rays, found),
+        }
+    }
+
+    /// Whether anything lies between each ray's ends, in single precision.
+    pub(crate) fn occluded(&self, rays: &Rays32, coherent: bool, blocked: &mut [bool]) {
+        match (coherent, self.device.width) {
+            (true, 16) => self.occluded16(rays, blocked),
+            (true, 8) => self.occluded8(rays, blocked),
+            (true, 4) => self.occluded4(rays, blocked),
+            _ => self.occluded1(rays, blocked),
+        }
+    }
+
+    fn closest1(&self, rays: &Rays32, found: &mut Found) {
+        let mut arguments = intersect_arguments(false);
+        for i in 0..rays.len() {
+            let mut query = sys::RTCRayHit { ray: single_ray(rays, i), ..Default::default() };
+            query.hit.geomID = MISS;
+            query.hit.primID = MISS;
+            query.hit.instID[0] = MISS;
+            // SAFETY: the scene is committed; the query is of the C type, aligned by it, with ids
+            // and mask set; Embree keeps no pointer to it.
+            unsafe { sys::rtcIntersect1(self.handle.0.as_ptr(), &mut query, &mut arguments) };
+            let hit = &query.hit;
+            found.placement[i] = if hit.instID[0] == MISS { hit.geomID } else { hit.instID[0] };
+            found.triangle[i] = hit.primID;
+            found.t[i] = query.ray.tfar;
+        }
+    }
+
+    fn occluded1(&self, rays: &Rays32, blocked: &mut [bool]) {
+        let mut arguments = occluded_arguments(false);
+        for (i, blocked) in blocked.iter_mut().enumerate() {
+            let mut ray = single_ray(rays, i);
+            // SAFETY: as in `closest1`.
+            unsafe { sys::rtcOccluded1(self.handle.0.as_ptr(), &mut ray, &mut arguments) };
+            *blocked = ray.tfar < 0.0;
+        }
+    }
+}
+
+fn single_ray(rays: &Rays32, i: usize) -> sys::RTCRay {
+    sys::RTCRay {
+        org_x: rays.origin[0][i],
+        org_y: rays.origin[1][i],
+        org_z: rays.origin[2][i],
+        dir_x: rays.direction[0][i],
+        dir_y: rays.direction[1][i],
+        dir_z: rays.direction[2][i],
+        tnear: rays.t_near[i],
+        tfar: rays.t_far[i],
+        mask: u32::MAX,
+        ..Default::default()
+    }
+}
+
+fn intersect_arguments(coherent: bool) -> sys::RTCIntersectArguments {
+    let mut arguments = sys::RTCIntersectArguments::default();
+    // SAFETY: a plain C initialiser of a struct of ours.
+    unsafe { sys::rtcInitIntersectArguments(&mut arguments) };
+    arguments.flags = if coherent {
+        sys::RTC_RAY_QUERY_FLAG_COHERENT
+    } else {
+        sys::RTC_RAY_QUERY_FLAG_INCOHERENT
+    };
+    arguments
+}
+
+fn occluded_arguments(coherent: bool) -> sys::RTCOccludedArguments {
+    let mut arguments = sys::RTCOccludedArguments::default();
+    // SAFETY: a plain C initialiser of a struct of ours.
+    unsafe { sys::rtcInitOccludedArguments(&mut arguments) };
+    arguments.flags = if coherent {
+        sys::RTC_RAY_QUERY_FLAG_COHERENT
+    } else {
+        sys::RTC_RAY_QUERY_FLAG_INCOHERENT
+    };
+    arguments
+}
+
+/// Packets of one width: the same code on C types of another size.
+macro_rules! packets {
+    ($closest:ident, $occluded:ident, $width:literal, $rayhit:ident, $ray:ident, $intersect:ident,
+     $occlude:ident) => {
+        impl Scene {
+            fn $closest(&self, rays: &Rays32, found: &mut Found) {
+                let mut arguments = intersect_arguments(true);
+                let mut query = Aligned(sys::$rayhit::default());
+                let mut start = 0;
+                while start < rays.len() {
+                    let count = $width.min(rays.len() - start);
+                    let valid = Aligned(std::array::from_fn::<i32, $width, _>(|lane| {
+                        if lane < count { -1 } else { 0 }
+                    }));
+                    fill_packet!(query.0.ray, rays, start, count);
+                    query.0.hit.geomID = [MISS; $width];
+                    query.0.hit.primID = [MISS; $width];
+                    query.0.hit.instID[0] = [MISS; $width];
+                    // SAFETY: the scene is committed; packet and mask have the C types' layout and
+                    // are aligned to 64 bytes by `Aligned`; lanes past `count` are masked off.
+                    unsafe {
+                        sys::$intersect(
+                            valid.0.as_ptr(),
+                            self.handle.0.as_ptr(),
+                            &mut query.0,
+                            &mut arguments,
+                        );
+                    }
+                    let hit = &query.0.hit;
+                    let range = start..start + count;
+                    for (lane, placement) in found.placement[range.clone()].iter_mut().enumerate() {
+                        let instance = hit.instID[0][lane];
+                        *placement = if instance == MISS { hit.geomID[lane] } else { instance };
+                    }
+                    found.triangle[range.clone()].copy_from_slice(&hit.primID[..count]);
+                    found.t[range].copy_from_slice(&query.0.ray.tfar[..count]);
+                    start += count;
+                }
+            }
+
+            fn $occluded(&self, rays: &Rays32, blocked: &mut [bool]) {
+                let mut arguments = occluded_arguments(true);
+                let mut query = Aligned(sys::$ray::default());
+                let mut start = 0;
+                while start < rays.len() {
+                    let count = $width.min(rays.len() - start);
+                    let valid = Aligned(std::array::from_fn::<i32, $width, _>(|lane| {
+                        if lane < count { -1 } else { 0 }
+                    }));
+                    fill_packet!(query.0, rays, start, count);
+                    // SAFETY: as above.
+                    unsafe {
+                        sys::$occlude(
+                            valid.0.as_ptr(),
+                            self.handle.0.as_ptr(),
+                            &mut query.0,
+                            &mut arguments,
+                        );
+                    }
+                    for (lane, blocked) in blocked[start..start + count].iter_mut().enumerate() {
+                        *blocked = query.0.tfar[lane] < 0.0;
+                    }
+                    start += count;
+                }
+            }
+        }
+    };
+}
+
+/// Copies `count` rays from `start` into a packet.
+macro_rules! fill_packet {
+    ($ray:expr, $rays:expr, $start:expr, $count:expr) => {{
+        let range = $start..$start + $count;
+        let ray = &mut $ray;
+        ray.org_x[..$count].copy_from_slice(&$rays.origin[0][range.clone()]);
+        ray.org_y[..$count].copy_from_slice(&$rays.origin[1][range.clone()]);
+        ray.org_z[..$count].copy_from_slice(&$rays.origin[2][range.clone()]);
+        ray.dir_x[..$count].copy_from_slice(&$rays.direction[0][range.clone()]);
+        ray.dir_y[..$count].copy_from_slice(&$rays.direction[1][range.clone()]);
+        ray.dir_z[..$count].copy_from_slice(&$rays.direction[2][range.clone()]);
+        ray.tnear[..$count].copy_from_slice(&$rays.t_near[range.clone()]);
+        ray.tfar[..$count].copy_from_slice(&$rays.t_far[range]);
+        ray.mask = [u32::MAX; _];
+    }};
+}
+
+/// The alignment of the widest packet, for all of them.
+#[repr(C, align(64))]
+struct Aligned<T>(T);
+
+packets!(closest4, occluded4, 4, RTCRayHit4, RTCRay4, rtcIntersect4, rtcOccluded4);
+packets!(closest8, occluded8, 8, RTCRayHit8, RTCRay8, rtcIntersect8, rtcOccluded8);
+packets!(closest16, occluded16, 16, RTCRayHit16, RTCRay16, rtcIntersect16, rtcOccluded16);
+
+/// The origin that an instanced mesh is traced relative to: its own, unless its coordinates need f64.
+fn mesh_origin(mesh: &Mesh) -> DVec3 {
+    match mesh.positions {
+        Positions::F32(_) => DVec3::ZERO,
+        Positions::F64(_) => mesh.bounds.centre(),
+    }
+}
