@@ -9,3 +9,24 @@
 //! * Inside a lens, lengths are millimetres, z = 0 is the first element's vertex and +z runs from the
 //!   object to the sensor, as lens designers write it.
 //! * Row 0 of an image is the top, column 0 the left; pictures are upright.
+
+pub mod camera;
+pub mod camera_file;
+pub mod error;
+mod framing;
+pub mod glass;
+pub mod intrinsics;
+pub mod length;
+pub mod orthographic;
+pub mod pinhole;
+pub mod pose;
+pub mod sensor;
+
+pub use camera::{Camera, CameraSpec, PixelBlock, Projection};
+pub use camera_file::CameraFile;
+pub use error::CameraError;
+pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin};
+pub use orthographic::{Orthographic, OrthographicSpec};
+pub use pinhole::{Pinhole, PinholeSpec};
+pub use pose::{Convention, Maps, Pose, PoseSpec};
+pub use sensor::SensorSpec;

@@ -1,0 +1,226 @@
+//! The closed set of cameras, and what all of them can do.
+
+use etendue_geometry::{Bounds, RayBatch};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::length::{Degrees, Metres};
+use crate::{
+    CameraError, Orthographic, OrthographicSpec, Pinhole, PinholeSpec, Pose, PoseSpec, SensorSpec,
+};
+
+/// Rows of the picture of a camera that comes without a resolution.
+const DEFAULT_ROWS: u32 = 1024;
+
+/// A camera as the scene file writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum CameraSpec {
+    /// Every ray passes through one point.
+    Pinhole(PinholeSpec),
+    /// All rays are parallel.
+    Orthographic(OrthographicSpec),
+}
+
+/// A camera ready to send rays.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    pose: Pose,
+    sensor: SensorSpec,
+    projection: Projection,
+}
+
+/// How a camera's rays run in its own frame.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Projection {
+    /// Through one point.
+    Pinhole(Pinhole),
+    /// In parallel.
+    Orthographic(Orthographic),
+}
+
+/// A rectangle of pixels. Rays of a block run row by row from its top left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PixelBlock {
+    /// The leftmost column.
+    pub x: u32,
+    /// The topmost row.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl PixelBlock {
+    /// The number of pixels.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// Whether there is no pixel.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.width == 0 || self.height == 0
+    }
+
+    /// The columns and rows of the pixels, in the order of their rays.
+    pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let Self { x, y, width, height } = *self;
+        (y..y + height).flat_map(move |row| (x..x + width).map(move |column| (column, row)))
+    }
+}
+
+impl Default for CameraSpec {
+    /// A pinhole that frames the scene.
+    fn default() -> Self {
+        Self::Pinhole(PinholeSpec::default())
+    }
+}
+
+impl CameraSpec {
+    /// A perspective camera by its vertical field of view (radians) and width-to-height ratio:
+    /// 1024 rows, as many columns as the ratio asks for.
+    #[must_use]
+    pub fn perspective(pose: Pose, fov: f64, aspect: f64) -> Self {
+        Self::Pinhole(PinholeSpec {
+            fov: Some(Degrees(fov.to_degrees())),
+            intrinsics: None,
+            pose: Some(PoseSpec::from(pose)),
+            sensor: SensorSpec::new(resolution_of(aspect)),
+        })
+    }
+
+    /// An orthographic camera by the height of its picture (m) and width-to-height ratio: 1024
+    /// rows, as many columns as the ratio asks for.
+    #[must_use]
+    pub fn orthographic(pose: Pose, height: f64, aspect: f64) -> Self {
+        Self::Orthographic(OrthographicSpec {
+            height: Some(Metres(height)),
+            pose: Some(PoseSpec::from(pose)),
+            sensor: SensorSpec::new(resolution_of(aspect)),
+        })
+    }
+
+    /// The sensor.
+    #[must_use]
+    pub fn sensor(&self) -> &SensorSpec {
+        match self {
+            Self::Pinhole(spec) => &spec.sensor,
+            Self::Orthographic(spec) => &spec.sensor,
+        }
+    }
+
+    /// The sensor, to be changed.
+    pub fn sensor_mut(&mut self) -> &mut SensorSpec {
+        match self {
+            Self::Pinhole(spec) => &mut spec.sensor,
+            Self::Orthographic(spec) => &mut spec.sensor,
+        }
+    }
+
+    /// The camera. `bounds` is the box of what it may have to frame (m), asked for only when the
+    /// file leaves the pose or the field to us.
+    ///
+    /// # Errors
+    ///
+    /// When the description makes no camera: the error names the key.
+    pub fn build(&self, bounds: impl FnOnce() -> Bounds) -> Result<Camera, CameraError> {
+        self.sensor().check()?;
+        let (pose, projection) = match self {
+            Self::Pinhole(spec) => {
+                let (pose, pinhole) = spec.build(bounds)?;
+                (pose, Projection::Pinhole(pinhole))
+            }
+            Self::Orthographic(spec) => {
+                let (pose, orthographic) = spec.build(bounds)?;
+                (pose, Projection::Orthographic(orthographic))
+            }
+        };
+        if !pose.is_finite() {
+            return Err(CameraError::new("pose", "no finite place frames a scene of this size"));
+        }
+        Ok(Camera { pose, sensor: self.sensor().clone(), projection })
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "rounded and clamped to what a sensor may have"
+)]
+fn resolution_of(aspect: f64) -> [u32; 2] {
+    let columns = (f64::from(DEFAULT_ROWS) * aspect).round().clamp(1.0, 16_384.0);
+    [columns as u32, DEFAULT_ROWS]
+}
+
+impl Camera {
+    /// Columns and rows of the picture.
+    #[must_use]
+    pub fn resolution(&self) -> [u32; 2] {
+        self.sensor.resolution
+    }
+
+    /// From one pixel's centre to the next (µm), when the file says so.
+    #[must_use]
+    pub fn pixel_pitch(&self) -> Option<f64> {
+        self.sensor.pixel_pitch.map(|pitch| pitch.0)
+    }
+
+    /// Place and axes. `z` depths are measured from its position along its forward axis.
+    #[must_use]
+    pub fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
+    /// How the rays run.
+    #[must_use]
+    pub fn projection(&self) -> &Projection {
+        &self.projection
+    }
+
+    /// The chief rays of the centres of a block of pixels, row by row: `rays` is refilled.
+    ///
+    /// Directions have length 1; origins are the entrance pupil, or lie in the plane through the
+    /// camera's origin for parallel rays.
+    pub fn chief_rays(&self, block: PixelBlock, rays: &mut RayBatch) {
+        reset(rays, block.len());
+        let [columns, rows, _] = &mut rays.direction;
+        for (((column, row), u), v) in block.pixels().zip(columns).zip(rows) {
+            *u = f64::from(column) + 0.5;
+            *v = f64::from(row) + 0.5;
+        }
+        self.aim(rays);
+    }
+
+    /// The chief rays of given places on the sensor: column and row coordinates (pixels) counted
+    /// from the outer corner of the top left pixel, whose centre is (0.5, 0.5). `rays` is refilled;
+    /// a longer array's surplus is left out.
+    pub fn rays_through(&self, columns: &[f64], rows: &[f64], rays: &mut RayBatch) {
+        let len = columns.len().min(rows.len());
+        reset(rays, len);
+        rays.direction[0].copy_from_slice(&columns[..len]);
+        rays.direction[1].copy_from_slice(&rows[..len]);
+        self.aim(rays);
+    }
+
+    fn aim(&self, rays: &mut RayBatch) {
+        match &self.projection {
+            Projection::Pinhole(pinhole) => pinhole.aim(&self.pose, rays),
+            Projection::Orthographic(orthographic) => orthographic.aim(&self.pose, rays),
+        }
+    }
+}
+
+/// Makes room for `len` coherent rays without limits, whose origins and directions are to be set.
+fn reset(rays: &mut RayBatch, len: usize) {
+    for array in rays.origin.iter_mut().chain(&mut rays.direction) {
+        array.resize(len, 0.0);
+    }
+    rays.t_min.clear();
+    rays.t_min.resize(len, 0.0);
+    rays.t_max.clear();
+    rays.t_max.resize(len, f64::INFINITY);
+    rays.coherent = true;
+}

@@ -1,0 +1,196 @@
+//! A sensible place for a camera that was given none: the whole model in the picture, upright.
+
+use etendue_geometry::Bounds;
+use glam::DVec3;
+
+use crate::Pose;
+
+/// Free border on each side, as a share of the picture.
+const MARGIN: f64 = 0.04;
+
+/// A box thinner than this share of its second-smallest side is looked at face on: from the corner,
+/// a sheet of paper shows its edge.
+const FLAT: f64 = 0.02;
+
+/// From the model towards the camera: in front (+Z, where glTF's models look), a little to the right
+/// and above.
+const THREE_QUARTER: DVec3 = DVec3::new(0.6, 0.45, 1.0);
+
+/// How far a picture reaches to each side of the axis: tangents for a perspective picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Reach {
+    pub(crate) left: f64,
+    pub(crate) right: f64,
+    pub(crate) down: f64,
+    pub(crate) up: f64,
+}
+
+impl Reach {
+    /// The same picture without its margin; `None` when an edge is on the wrong side of the axis
+    /// by so much that nothing is left.
+    fn inside_margin(self) -> Option<Self> {
+        let (x, y) = ((self.left + self.right) * MARGIN, (self.down + self.up) * MARGIN);
+        let inner = Self {
+            left: self.left - x,
+            right: self.right - x,
+            down: self.down - y,
+            up: self.up - y,
+        };
+        let open = inner.left + inner.right > 0.0 && inner.down + inner.up > 0.0;
+        open.then_some(inner)
+    }
+}
+
+/// Which way to look at a box: from the front right above, or face on when it is flat.
+fn view(bounds: Bounds) -> Pose {
+    let size = bounds.max - bounds.min;
+    let mut axes = [0, 1, 2];
+    axes.sort_by(|&a, &b| size[a].total_cmp(&size[b]));
+    let [thin, middle, _] = axes;
+    let is_flat = size[middle] > 0.0 && size[thin] < FLAT * size[middle];
+    let (towards, up) = match (is_flat, thin) {
+        (true, 0) => (DVec3::X, DVec3::Y),
+        (true, 1) => (DVec3::Y, DVec3::NEG_Z),
+        (true, _) => (DVec3::Z, DVec3::Y),
+        (false, _) => (THREE_QUARTER, DVec3::Y),
+    };
+    Pose::look_at(towards, DVec3::ZERO, up).unwrap_or(Pose::IDENTITY)
+}
+
+/// The nearest pose of a perspective camera that has the whole of `bounds` in its picture.
+///
+/// With the view's direction fixed, each side of the picture is a plane that all corners of the box
+/// must lie inside of, which is linear in the camera's place: the two planes of an axis give the
+/// least distance and the middle. An empty box is looked at from 3 m.
+pub(crate) fn perspective(bounds: Bounds, reach: Reach) -> Pose {
+    let Some(reach) = usable(bounds).and_then(|()| reach.inside_margin()) else {
+        return Pose { position: bounds.centre() + DVec3::Z * 3.0, ..Pose::IDENTITY };
+    };
+    let view = view(bounds);
+    let centre = bounds.centre();
+    let seen = bounds.corners().map(|corner| view.rotation.transpose() * (corner - centre));
+    let (near_x, x) = fit(seen.map(|p| (p.x, p.z)), reach.left, reach.right);
+    let (near_y, y) = fit(seen.map(|p| (p.y, p.z)), reach.down, reach.up);
+    let mut distance = near_x.max(near_y);
+    if bounds.diagonal() == 0.0 {
+        distance = 1.0;
+    }
+    let offset = DVec3::new(x(distance), y(distance), distance);
+    Pose { position: centre + view.rotation * offset, ..view }
+}
+
+/// Along one axis of the picture: the least distance from which all points `(across, towards)` are
+/// inside, and where across the camera then stands at a given distance.
+fn fit(points: [(f64, f64); 8], low: f64, high: f64) -> (f64, impl Fn(f64) -> f64) {
+    let largest = points.iter().fold(f64::NEG_INFINITY, |m, (a, z)| m.max(a + z * high));
+    let smallest = points.iter().fold(f64::INFINITY, |m, (a, z)| m.min(a - z * low));
+    let distance = (largest - smallest) / (low + high);
+    (distance, move |d| 0.5 * ((largest - d * high) + (smallest + d * low)))
+}
+
+/// A pose of an orthographic camera outside `bounds`, and the height (m) of a picture of this
+/// width-to-height ratio that holds the whole box.
+pub(crate) fn orthographic(bounds: Bounds, aspect: f64) -> (Pose, f64) {
+    let Some(()) = usable(bounds) else {
+        return (Pose { position: bounds.centre() + DVec3::Z * 3.0, ..Pose::IDENTITY }, 2.0);
+    };
+    let view = view(bounds);
+    let pose =
+        Pose { position: bounds.centre() - view.forward() * bounds.diagonal().max(1e-3), ..view };
+    (pose, orthographic_height(bounds, &pose, aspect))
+}
+
+/// The height (m) of an orthographic picture from `pose` that holds the whole box; 2 m for no box.
+pub(crate) fn orthographic_height(bounds: Bounds, pose: &Pose, aspect: f64) -> f64 {
+    let mut half = 0.0_f64;
+    if usable(bounds).is_some() {
+        for corner in bounds.corners() {
+            let seen = pose.rotation.transpose() * (corner - pose.position);
+            half = half.max(seen.y.abs()).max(seen.x.abs() / aspect);
+        }
+    }
+    if half > 0.0 { 2.0 * half / (1.0 - 2.0 * MARGIN) } else { 2.0 }
+}
+
+fn usable(bounds: Bounds) -> Option<()> {
+    (!bounds.is_empty() && bounds.min.is_finite() && bounds.max.is_finite()).then_some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const REACH: Reach = Reach { left: 0.5, right: 0.5, down: 0.4, up: 0.4 };
+
+    fn boxes() -> [Bounds; 5] {
+        let from = |min: [f64; 3], max: [f64; 3]| Bounds { min: min.into(), max: max.into() };
+        [
+            from([-1.0; 3], [1.0; 3]),
+            from([0.0, 0.0, -0.7], [1.0, 0.7, 0.0]),
+            from([1e7, 1e7, 1e7], [1e7 + 2.0, 1e7 + 50.0, 1e7 + 1.0]),
+            from([-3.0, 0.0, -3.0], [3.0, 0.0, 3.0]),
+            from([-1e-3, -1e-3, 0.0], [1e-3, 2e-3, 0.0]),
+        ]
+    }
+
+    #[test]
+    fn the_whole_box_is_inside_and_touches_the_margin() {
+        for bounds in boxes() {
+            for reach in [REACH, Reach { left: 0.1, right: 0.9, ..REACH }] {
+                let pose = perspective(bounds, reach);
+                let mut fullest = 0.0_f64;
+                for corner in bounds.corners() {
+                    let p = pose.rotation.transpose() * (corner - pose.position);
+                    assert!(p.z < 0.0, "in front of the camera: {p}");
+                    let (x, y) = (p.x / -p.z, p.y / -p.z);
+                    // Shares of the picture, 0 and 1 at its edges.
+                    let across = (x + reach.left) / (reach.left + reach.right);
+                    let upwards = (y + reach.down) / (reach.down + reach.up);
+                    for share in [across, upwards] {
+                        assert!((MARGIN - 1e-6..=1.0 - MARGIN + 1e-6).contains(&share), "{share}");
+                        fullest = fullest.max((share - 0.5).abs());
+                    }
+                }
+                // 1e-6: the box at 10⁷ m has corners rounded to 2·10⁻⁹ of its 1 m.
+                assert!((fullest - (0.5 - MARGIN)).abs() < 1e-6, "no nearer place: {fullest}");
+            }
+        }
+    }
+
+    #[test]
+    fn solid_boxes_are_seen_from_the_front_right_above() {
+        let pose = perspective(boxes()[0], REACH);
+        assert!(pose.position.cmpgt(DVec3::ZERO).all(), "{}", pose.position);
+        assert!(pose.up().y > 0.5 && pose.right().y == 0.0, "upright");
+    }
+
+    #[test]
+    fn flat_boxes_are_seen_face_on() {
+        let floor = perspective(boxes()[3], REACH);
+        assert_eq!((floor.forward(), floor.up()), (DVec3::NEG_Y, DVec3::NEG_Z));
+        let wall = perspective(boxes()[4], REACH);
+        assert_eq!((wall.forward(), wall.up()), (DVec3::NEG_Z, DVec3::Y));
+    }
+
+    #[test]
+    fn orthographic_pictures_hold_the_box_too() {
+        for bounds in boxes() {
+            let (pose, height) = orthographic(bounds, 1.5);
+            for corner in bounds.corners() {
+                let p = pose.rotation.transpose() * (corner - pose.position);
+                assert!(p.z < 0.0, "in front of the camera: {p}");
+                assert!(p.x.abs() <= 0.75 * height && p.y.abs() <= 0.5 * height, "{p} {height}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_and_a_point_have_a_finite_camera() {
+        assert!(perspective(Bounds::EMPTY, REACH).is_finite());
+        let point = Bounds { min: DVec3::ONE, max: DVec3::ONE };
+        assert!((perspective(point, REACH).position - DVec3::ONE).length() > 0.5);
+        let huge = Bounds { min: DVec3::splat(-f64::MAX), max: DVec3::splat(f64::MAX) };
+        assert!(orthographic(Bounds::EMPTY, 1.0).0.is_finite());
+        let _ = perspective(huge, REACH);
+    }
+}
