@@ -1,0 +1,282 @@
+//! Files that are whole or not there: written beside their place, under `.NAME.XXXXXX.part`, and
+//! renamed when complete. What stood there before stays until that moment.
+//!
+//! The random middle of the name keeps two processes that write the same file apart; the last to
+//! finish wins. The rename is atomic for everyone who looks at the folder; data may still be on its
+//! way to the disk when it happens, so a power cut within seconds can lose it.
+
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::{Builder, NamedTempFile};
+
+use super::OutputError;
+
+/// The part files of this process, for a signal handler: what a signal ends is not dropped.
+static OPEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn open_set() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    OPEN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The files that this process has begun and not finished.
+#[must_use]
+pub fn open_parts() -> Vec<PathBuf> {
+    open_set().iter().cloned().collect()
+}
+
+/// Removes the files that this process has begun and not finished, as far as the system lets it.
+/// For a signal handler, which ends the process right after.
+pub fn remove_open_parts() {
+    for path in open_parts() {
+        // Nobody is left to tell, and the next path deserves its turn.
+        let _ = fs::remove_file(path);
+    }
+}
+
+/// Makes `folder` and checks that files can be made in it, so that a render does not find out in
+/// the end.
+///
+/// # Errors
+///
+/// [`OutputError::Io`] when it cannot be made or written to.
+pub fn prepare_folder(folder: &Path) -> Result<(), OutputError> {
+    fs::create_dir_all(folder).map_err(|source| OutputError::io(folder, source))?;
+    let probe = open_beside(&folder.join("etendue"));
+    probe.map(drop).map_err(|source| OutputError::io(folder, source))
+}
+
+/// Writes `target` with `write`; nothing changes there unless that and all else succeeds.
+///
+/// # Errors
+///
+/// [`OutputError::Io`] when the file cannot be made, written or renamed.
+pub fn write_whole(
+    target: &Path,
+    write: impl FnOnce(&mut PartFile) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    let mut part = PartFile::create(target)?;
+    write(&mut part).map_err(|source| OutputError::io(target, source))?;
+    part.finish()
+}
+
+/// A file on its way. Dropped without [`Self::finish`], it leaves nothing behind.
+#[derive(Debug)]
+pub struct PartFile {
+    file: NamedTempFile,
+    // After the file, so that the entry outlives it: a signal in between finds a path too many
+    // rather than a file too many.
+    _entry: Entry,
+    target: PathBuf,
+}
+
+impl PartFile {
+    /// Opens a part file beside `target`. Its permissions are those of any new file.
+    ///
+    /// # Errors
+    ///
+    /// [`OutputError::Io`] when the folder does not exist or cannot be written to, or when a
+    /// folder already has that name.
+    pub fn create(target: &Path) -> Result<Self, OutputError> {
+        let refuse = |source| OutputError::io(target, source);
+        if target.is_dir() || target.file_name().is_none() {
+            return Err(refuse(io::ErrorKind::IsADirectory.into()));
+        }
+        // The set is locked until the new file is in it: a handler that reads it misses none.
+        let mut open = open_set();
+        let file = open_beside(target).map_err(refuse)?;
+        open.insert(file.path().to_owned());
+        drop(open);
+        let entry = Entry(file.path().to_owned());
+        Ok(Self { file, _entry: entry, target: target.to_owned() })
+    }
+
+    /// Where the file is until it is finished.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.file.path()
+    }
+
+    /// Gives the file its name, in place of what had it before.
+    ///
+    /// # Errors
+    ///
+    /// [`OutputError::Io`] when it cannot be renamed; the part file is removed then.
+    pub fn finish(self) -> Result<(), OutputError> {
+        let Self { file, _entry, target } = self;
+        let renamed = file.persist(&target).map_err(|failed| failed.error);
+        renamed.map(drop).map_err(|source| OutputError::io(&target, source))
+    }
+}
+
+impl Write for PartFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.as_file_mut().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.as_file_mut().flush()
+    }
+}
+
+impl Seek for PartFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.as_file_mut().seek(to)
+    }
+}
+
+/// A path in [`OPEN`], for as long as this lives.
+#[derive(Debug)]
+struct Entry(PathBuf);
+
+impl Drop for Entry {
+    fn drop(&mut self) {
+        open_set().remove(&self.0);
+    }
+}
+
+/// A new file beside `target`, as readable as any new file is (`tempfile`'s own are private).
+fn open_beside(target: &Path) -> io::Result<NamedTempFile> {
+    let mut prefix = OsString::from(".");
+    prefix.push(target.file_name().unwrap_or_default());
+    prefix.push(".");
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let mut refusal = None;
+    let made = Builder::new().prefix(&prefix).suffix(".part").make_in(
+        folder.unwrap_or(Path::new(".")),
+        |path| {
+            let opened = File::options().read(true).write(true).create_new(true).open(path);
+            opened.inspect_err(|error| refusal = error.raw_os_error())
+        },
+    );
+    // The system's own answer, without the hidden name that `tempfile` adds to it.
+    made.map_err(|error| refusal.map_or(error, io::Error::from_raw_os_error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn the_old_file_stays_until_the_new_one_is_complete() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("depth.exr");
+        fs::write(&target, "old").unwrap();
+        let mut part = PartFile::create(&target).unwrap();
+        part.write_all(b"new").unwrap();
+        assert_eq!(fs::read(&target).unwrap(), b"old");
+        assert_eq!(open_parts().iter().filter(|path| *path == part.path()).count(), 1);
+        let hidden = part.path().file_name().unwrap().to_str().unwrap().to_owned();
+        assert!(hidden.starts_with(".depth.exr.") && hidden.ends_with(".part"), "{hidden}");
+        let path = part.path().to_owned();
+        part.finish().unwrap();
+        assert_eq!(fs::read(&target).unwrap(), b"new");
+        assert_eq!(names(folder.path()), ["depth.exr"]);
+        assert!(!open_parts().contains(&path));
+    }
+
+    #[test]
+    fn an_interrupted_write_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("depth.exr");
+        fs::write(&target, "old").unwrap();
+        let error = write_whole(&target, |part| {
+            part.write_all(b"half of the n")?;
+            Err(io::ErrorKind::StorageFull.into())
+        })
+        .unwrap_err();
+        assert!(error.to_string().contains("free some space"), "{error}");
+        assert_eq!(fs::read(&target).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["depth.exr"]);
+        assert!(open_parts().iter().all(|path| !path.starts_with(folder.path())));
+    }
+
+    #[test]
+    fn a_panic_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("depth.exr");
+        let panicked = std::panic::catch_unwind(|| write_whole(&target, |_| panic!("on purpose")));
+        assert!(panicked.is_err());
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn a_signal_handler_finds_and_removes_what_is_open() {
+        let folder = tempfile::tempdir().unwrap();
+        let part = PartFile::create(&folder.path().join("a.exr")).unwrap();
+        // As `remove_open_parts` does, but only here: other tests have files open too.
+        for path in open_parts().into_iter().filter(|path| path.starts_with(folder.path())) {
+            fs::remove_file(path).unwrap();
+        }
+        assert!(names(folder.path()).is_empty());
+        assert!(part.finish().is_err(), "there is nothing left to rename");
+    }
+
+    #[test]
+    fn a_folder_that_refuses_is_named_with_a_remedy() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("missing").join("a.exr");
+        let message = PartFile::create(&missing).unwrap_err().to_string();
+        assert!(message.contains("missing/a.exr"), "{message}");
+        assert!(message.contains("create the folder first"), "{message}");
+
+        let file = folder.path().join("file");
+        fs::write(&file, "").unwrap();
+        let message = PartFile::create(&file.join("a.exr")).unwrap_err().to_string();
+        assert!(message.contains("file/a.exr"), "{message}");
+        assert!(message.contains("a part of the path is a file"), "{message}");
+        assert!(prepare_folder(&file).is_err(), "a file is no folder");
+
+        let message = PartFile::create(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("a folder has this name"), "{message}");
+        assert_eq!(names(folder.path()), ["file"], "no attempt may leave anything");
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn an_unwritable_folder_is_named_with_a_remedy() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o555)).unwrap();
+        // The superuser may write anywhere but into the kernel's own folders.
+        let superuser = fs::write(folder.path().join("probe"), "").is_ok();
+        let refusing = if superuser { Path::new("/sys/kernel") } else { folder.path() };
+        if !refusing.is_dir() {
+            println!("skipped: this user may write everywhere, and there is no /sys/kernel");
+            return;
+        }
+        for error in [
+            PartFile::create(&refusing.join("a.exr")).unwrap_err(),
+            prepare_folder(refusing).unwrap_err(),
+        ] {
+            let message = error.to_string();
+            assert!(message.contains(&*refusing.to_string_lossy()), "{message}");
+            assert!(message.contains("make the folder writable"), "{message}");
+            assert!(!message.contains(".part"), "the hidden name is of no interest: {message}");
+        }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_finished_file_is_as_readable_as_any_new_one() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("plain"), "").unwrap();
+        write_whole(&folder.path().join("ours"), |_| Ok(())).unwrap();
+        let mode = |name| fs::metadata(folder.path().join(name)).unwrap().permissions().mode();
+        assert_eq!(mode("ours"), mode("plain"));
+    }
+}

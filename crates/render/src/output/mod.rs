@@ -1,0 +1,51 @@
+//! Images on disk: a [`Picture`] of named layers goes out as EXR, PNG, NPY and JSON.
+//!
+//! | file | what it is for | what it holds |
+//! |---|---|---|
+//! | EXR | the data | all layers in one part, `Layer.Channel`, 32-bit, lossless |
+//! | NPY | the data, for numpy | one layer, `[h, w]` or `[h, w, c]`, little-endian, f64 too |
+//! | PNG | looking, and a sensor's digital numbers | one layer, 8 or 16 bits |
+//! | JSON | what the others mean | definition, unit, frame, miss … of each layer |
+//!
+//! Conventions of all of them:
+//!
+//! * Row 0 is the top, pixels of a row run from left to right.
+//! * A miss is `+inf` in a float layer, 0 in an integer layer and the zero vector in a direction.
+//! * A NaN is never written: [`Picture::new`] refuses it, with the layer and the pixel.
+//! * Data passes no colour transform. PNG previews do, and say so in their text.
+//! * A file appears under its name when it is complete, and not before ([`PartFile`]).
+//!
+//! ```
+//! use etendue_render::output::{Channel, Layer, Look, Picture, Values, exr};
+//!
+//! let depth = Layer {
+//!     name: "Depth".into(),
+//!     look: Look::Distance,
+//!     channels: vec![Channel { name: "Z".into(), values: Values::F32(vec![1.0, f32::INFINITY]) }],
+//!     meaning: vec![("unit".into(), "m".into()), ("miss".into(), "+inf".into())],
+//! };
+//! let picture = Picture::new(2, 1, vec![depth], vec![("seed".into(), "0".into())])?;
+//! let folder = tempfile::tempdir()?;
+//! exr::write(&folder.path().join("picture.exr"), &picture, &exr::Options::default())?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod exr;
+pub mod npy;
+pub mod png;
+pub mod sidecar;
+
+mod atomic;
+mod error;
+mod hash;
+mod look;
+mod picture;
+
+pub use atomic::{PartFile, open_parts, prepare_folder, remove_open_parts, write_whole};
+pub use error::{OutputError, PictureError};
+pub use hash::ImageHash;
+pub use look::Look;
+pub use picture::{Channel, Layer, Picture, Values};
+
+/// What wrote a file, for its header.
+pub const SOFTWARE: &str = concat!("etendue ", env!("CARGO_PKG_VERSION"));

@@ -1,0 +1,105 @@
+//! JSON beside the images: what an NPY cannot say about itself.
+
+use std::io::Write;
+use std::path::Path;
+
+use serde::{Serialize, Serializer};
+
+use super::{OutputError, Picture, SOFTWARE, write_whole};
+
+/// Names and texts as a JSON object, in their own order.
+#[derive(Debug)]
+pub(super) struct Entries<'a>(pub(super) &'a [(String, String)]);
+
+impl Serialize for Entries<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(key, text)| (key, text)))
+    }
+}
+
+/// What a picture holds, without its values.
+#[derive(Debug, Serialize)]
+struct Description<'a> {
+    software: &'static str,
+    width: usize,
+    height: usize,
+    rows: &'static str,
+    header: Entries<'a>,
+    layers: Vec<LayerDescription<'a>>,
+}
+
+#[derive(Debug, Serialize)]
+struct LayerDescription<'a> {
+    name: String,
+    channels: Vec<String>,
+    #[serde(rename = "type")]
+    type_name: &'static str,
+    meaning: Entries<'a>,
+}
+
+/// Writes what `picture` holds to `path`: size, header entries, and of each layer the name, the
+/// channels (by their full names), numpy's type and the meaning.
+///
+/// # Errors
+///
+/// When the file cannot be written.
+pub fn write(path: &Path, picture: &Picture) -> Result<(), OutputError> {
+    let layers = picture.layers().iter().map(|layer| LayerDescription {
+        name: layer.title(),
+        channels: layer.channels.iter().map(|channel| layer.full_name(channel)).collect(),
+        type_name: layer.type_name(),
+        meaning: Entries(&layer.meaning),
+    });
+    let description = Description {
+        software: SOFTWARE,
+        width: picture.width(),
+        height: picture.height(),
+        rows: "row 0 is the top, pixels run from left to right",
+        header: Entries(picture.header()),
+        layers: layers.collect(),
+    };
+    write_json(path, &description)
+}
+
+/// Writes `value` to `path` as indented JSON: reports, camera files and the like.
+///
+/// # Errors
+///
+/// When the file cannot be written, or when `value` has no form in JSON.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), OutputError> {
+    let mut json =
+        serde_json::to_vec_pretty(value).map_err(|error| OutputError::format(path, error))?;
+    json.push(b'\n');
+    write_whole(path, |part| part.write_all(&json))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::super::{Channel, Layer, Look, Values};
+    use super::*;
+
+    #[test]
+    fn says_what_the_layers_are() {
+        let depth = Layer {
+            name: "Depth".into(),
+            look: Look::Distance,
+            channels: vec![Channel { name: "Z".into(), values: Values::F32(vec![1.0, 2.0]) }],
+            meaning: vec![("unit".into(), "m".into()), ("miss".into(), "+inf".into())],
+        };
+        let header = vec![("seed".to_owned(), "3 \"quoted\"".to_owned())];
+        let picture = Picture::new(2, 1, vec![depth], header).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("layers.json");
+        write(&path, &picture).unwrap();
+        let read = fs::read_to_string(path).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&read).unwrap();
+        assert_eq!(json["width"], 2);
+        assert_eq!(json["header"]["seed"], "3 \"quoted\"");
+        assert_eq!(json["layers"][0]["channels"][0], "Depth.Z");
+        assert_eq!(json["layers"][0]["type"], "f4");
+        let (unit, miss) = (read.find("\"unit\"").unwrap(), read.find("\"miss\"").unwrap());
+        assert!(unit < miss, "the order given is kept");
+    }
+}
