@@ -1,0 +1,36 @@
+# The words that README and CI use. Each may be run again at any time, and is quick when nothing changed.
+
+# Reference data for tests, where it lies beside the checkout and nothing else was named.
+ASSETS := $(shell cd ../shared 2>/dev/null && pwd)
+ifneq ($(ASSETS),)
+export ETENDUE_ASSETS ?= $(ASSETS)
+endif
+
+.PHONY: help setup render test test-embree4 bench clean
+
+help:
+	@echo "make render        install what is missing, build, render scenes/first-light.json"
+	@echo "make test          install what is missing, run everything that CI runs"
+	@echo "make test-embree4  run the tests that touch Embree against Embree 4, in a Debian 13 root"
+	@echo "make bench         run the benches"
+	@echo "make clean         remove target/ and out/"
+
+setup:
+	@scripts/setup.sh
+
+render: setup
+	cargo run --release -p etendue -- render scenes/first-light.json -o out/first-light
+	@echo "The files are in $(CURDIR)/out/first-light:"
+	@ls -lh out/first-light
+
+test: setup
+	@scripts/test.sh
+
+test-embree4: setup
+	@scripts/test-embree4.sh
+
+bench: setup
+	cargo bench --manifest-path benches/Cargo.toml
+
+clean:
+	rm -rf target out

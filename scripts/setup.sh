@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Installs what the build needs and this machine lacks. Says what and why first; does nothing, and
+# asks no server, when all is there.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+# shellcheck source=scripts/packages.sh
+. scripts/packages.sh
+
+missing=()
+
+# need REASON PACKAGE...: notes the packages and says why.
+need() {
+    local reason=$1
+    shift
+    echo "missing: $* ($reason)"
+    missing+=("$@")
+}
+
+any_file() {
+    compgen -G "$1" >/dev/null
+}
+
+has_embree() {
+    [ -n "${EMBREE_DIR:-}" ] || any_file "/usr/include/embree[34]/rtcore.h" ||
+        any_file "/usr/local/include/embree[34]/rtcore.h"
+}
+
+# The library and the headers of its compiler (stddef.h), which come in packages of their own.
+has_libclang() {
+    [ -n "${LIBCLANG_PATH:-}" ] || { any_file "/usr/lib/llvm-*/lib/libclang*.so*" &&
+        any_file "/usr/lib/llvm-*/lib/clang/*/include/stddef.h"; }
+}
+
+command -v cc >/dev/null || need "the C compiler that links Rust programs" gcc libc6-dev
+has_embree || need "Embree, which intersects rays with meshes" libembree-dev
+has_libclang || need "reads Embree's header, for the bindings" libclang-dev
+[ -e /etc/ssl/certs/ca-certificates.crt ] || need "cargo fetches crates over TLS" ca-certificates
+
+if [ ${#missing[@]} -gt 0 ]; then
+    install_packages "${missing[@]}"
+fi
+
+if ! command -v cargo >/dev/null; then
+    echo "Rust is missing. Install it, open a new shell, and try again:" >&2
+    echo "  curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh" >&2
+    exit 1
+fi
+wanted=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+found=$(rustc --version | cut -d' ' -f2)
+if [ "$(printf '%s\n' "$wanted" "$found" | sort -V | head -n 1)" != "$wanted" ]; then
+    echo "Rust $found is here, but etendue needs $wanted or newer. Update it: rustup update stable" >&2
+    exit 1
+fi

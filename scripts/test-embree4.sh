@@ -1,0 +1,67 @@
+#!/usr/bin/env bash
+# Runs the tests that touch Embree against Embree 4, in a Debian 13 root below target/.
+#
+# The root is made once (a minute) and kept, and so is what cargo builds in it. All mounts live in a
+# mount namespace of their own: they end with the process, however it ends, and nobody else sees them.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+# shellcheck source=scripts/packages.sh
+. scripts/packages.sh
+
+PATH=$PATH:/usr/sbin:/sbin
+root=target/trixie
+packages=libembree-dev,libclang-dev,gcc,libc6-dev,ca-certificates
+
+# Without CI, not being able to is no failure, but is said.
+skip() {
+    echo "Embree 4 is not tested: $1" >&2
+    [ -z "${CI:-}" ] && exit 0
+    exit 1
+}
+
+# in_namespace SCRIPT ARGUMENT...: as root, where mounts are private; paths arrive as arguments.
+in_namespace() {
+    as_root unshare --mount --propagation private bash -euc "$1" in_namespace "${@:2}"
+}
+
+make_root() {
+    echo "Making a Debian 13 root with Embree 4 in $root, by debootstrap."
+    if ! command -v debootstrap >/dev/null; then
+        echo "missing: debootstrap (unpacks a Debian 13 root)"
+        install_packages debootstrap || return
+    fi
+    as_root rm -rf "$root.part"
+    mkdir -p "$root.part"
+    # By way of /mnt, because debootstrap cannot live with a space in the path.
+    # shellcheck disable=SC2016
+    in_namespace 'mount --bind "$1" /mnt; debootstrap --variant=minbase --include="$2" trixie /mnt' \
+        "$PWD/$root.part" "$packages" &&
+        as_root mkdir -p "$root.part"/{assets,cargo,checkout,target,toolchain} &&
+        as_root chown "$(id -u):$(id -g)" "$root.part/target" &&
+        mv "$root.part" "$root"
+}
+
+if [ -e /usr/include/embree4/rtcore.h ] && [ -z "${EMBREE_DIR:-}" ]; then
+    echo "Embree 4 is this machine's own, and the workspace's tests use it."
+    exit
+fi
+may_be_root || skip "making a Debian 13 root and entering it takes root, or sudo."
+in_namespace true 2>/dev/null || skip "this system lets nobody mount, not even root (a container?)."
+[ -d "$root" ] || make_root || skip "debootstrap could not make the Debian 13 root; see above."
+
+# Everything from here on is offline. The toolchain is entered directly: rustup stays outside.
+cargo fetch --locked --target "$(rustc --version --verbose | sed -n 's/^host: //p')"
+# shellcheck disable=SC2016
+in_namespace '
+    root=$1 cargo=$2 toolchain=$3 assets=$4 user=$5
+    mount --bind "$root" /mnt
+    for system in proc sys dev; do mount --rbind "/$system" "/mnt/$system"; done
+    mount --bind -o ro . /mnt/checkout
+    mount --bind -o ro "$cargo" /mnt/cargo
+    mount --bind -o ro "$toolchain" /mnt/toolchain
+    [ -z "$assets" ] || mount --bind -o ro "$assets" /mnt/assets
+    exec chroot --userspec="$user" /mnt env -i HOME=/tmp LANG=C.UTF-8 PATH=/toolchain/bin:/usr/bin:/bin \
+        CARGO_HOME=/cargo CARGO_TARGET_DIR=/target ${assets:+ETENDUE_ASSETS=/assets} \
+        sh -c "cd /checkout; exec cargo test --offline --locked -p embree4-sys -p etendue-accel -p etendue"
+' "$PWD/$root" "${CARGO_HOME:-$HOME/.cargo}" "$(rustc --print sysroot)" "${ETENDUE_ASSETS:-}" \
+    "$(id -u):$(id -g)"

@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# Everything that CI runs, cheapest first; the tests of the whole workspace close.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+step() {
+    printf '\n==> %s\n' "$1"
+}
+
+# run_tests CARGO-ARGUMENT...: with nextest when it is installed, else with cargo's own runner.
+run_tests() {
+    if cargo nextest --version >/dev/null 2>&1; then
+        cargo nextest run "$@"
+    else
+        cargo test --lib --bins --tests "$@"
+    fi
+}
+
+# Rustup's minimal profile comes without these two.
+for component in rustfmt clippy; do
+    "cargo-${component/rustfmt/fmt}" --version >/dev/null 2>&1 || rustup component add "$component"
+done
+
+step "format"
+cargo fmt --all --check
+
+step "lints"
+cargo clippy --workspace --all-targets -- -D warnings
+
+# An empty EMBREE_DIR would stop the bindings' build, so this also shows that nothing asks for them.
+step "lints without Embree"
+EMBREE_DIR=/nonexistent cargo clippy -p etendue-accel -p etendue --no-default-features \
+    --all-targets -- -D warnings
+
+step "documentation"
+RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+cargo test --workspace --doc
+
+if cargo deny --version >/dev/null 2>&1; then
+    step "licences and sources of dependencies"
+    cargo deny check bans licenses sources
+fi
+
+step "tests without Embree"
+EMBREE_DIR=/nonexistent run_tests -p etendue-accel -p etendue --no-default-features
+
+step "tests against Embree 4"
+scripts/test-embree4.sh
+
+step "tests"
+run_tests --workspace
