@@ -13,6 +13,12 @@ use crate::single::{Frame, Rays32};
 use crate::solve::{self, Lanes, Solved};
 use crate::{Accel, BuildError, BuildOptions, BuildReport, Counts};
 
+/// Bundles around one place before a second look moves on behind it.
+const TURNS: usize = 4;
+
+/// Places along one ray that a second look tries.
+const STEPS: usize = 64;
+
 /// The Embree backend.
 #[derive(Debug)]
 pub struct Embree {
@@ -90,11 +96,7 @@ impl Embree {
             recheck::minority_sides(hits, &solved.front, suspects);
         }
         suspects.retain(|&i| solved.valid[i as usize]);
-        for i in 0..rays.len() {
-            if hits.placement[i] == MISS && rays32.in_box[i] {
-                suspects.push(i as u32);
-            }
-        }
+        recheck::lonely_misses(hits, &rays32.in_box, suspects);
         // First a cheap second opinion, from one ray beside each.
         again.clear();
         for &i in suspects.iter() {
@@ -154,34 +156,42 @@ impl Embree {
         if hits.placement[i] != MISS {
             candidates.push((hits.placement[i], hits.triangle[i]));
         }
-        let shifts = recheck::bundle(rays.direction(i), self.frame.blur());
         let mut behind = rays32.t_near[i];
-        // A ray along a surface grazes many triangles that it does not hit; each round starts
-        // behind the nearest of the last, so rounds are bounded by what lies along the ray.
-        for _ in 0..64 {
-            again.clear();
-            for shift in shifts {
-                again.push_shifted(rays32, i, shift);
-            }
-            again.t_near.fill(behind);
-            self.scene.closest(again, true, found);
+        // A ray along a surface grazes many triangles that it does not hit. Each step starts behind
+        // the nearest of the last, so what lies along the ray bounds them.
+        for _ in 0..STEPS {
             let mut nearest = f32::INFINITY;
-            for k in 0..BUNDLE {
-                if found.placement[k] != MISS {
-                    let candidate = (found.placement[k], found.triangle[k]);
-                    if !candidates.contains(&candidate) {
-                        candidates.push(candidate);
+            for turn in 0..TURNS {
+                again.clear();
+                for shift in recheck::bundle(rays.direction(i), self.frame.blur(), turn) {
+                    again.push_shifted(rays32, i, shift);
+                }
+                again.t_near.fill(behind);
+                self.scene.closest(again, true, found);
+                for k in 0..BUNDLE {
+                    if found.placement[k] != MISS {
+                        let candidate = (found.placement[k], found.triangle[k]);
+                        if !candidates.contains(&candidate) {
+                            candidates.push(candidate);
+                        }
+                        nearest = nearest.min(found.t[k]);
                     }
-                    nearest = nearest.min(found.t[k]);
+                }
+                if nearest == f32::INFINITY {
+                    break;
+                }
+                let decided = recheck::decide(self.scene.geometry(), rays, i, candidates, hits);
+                let t = hits.t[i] - rays32.advance[i];
+                if decided && t <= f64::from(nearest) + self.slack(nearest) {
+                    return;
                 }
             }
-            let decided = recheck::decide(self.scene.geometry(), rays, i, candidates, hits);
-            let decided_t = hits.t[i] - rays32.advance[i];
-            if nearest == f32::INFINITY || (decided && decided_t <= f64::from(nearest) + self.slack(nearest)) {
+            if nearest == f32::INFINITY {
                 break;
             }
             behind = nearest.next_up().max(nearest + (4.0 * self.frame.blur()) as f32);
         }
+        recheck::decide(self.scene.geometry(), rays, i, candidates, hits);
     }
 
     fn slack(&self, t: f32) -> f64 {

@@ -1,18 +1,18 @@
 //! Which of single precision's answers deserve a second look, and what decides then.
 //!
-//! Embree's robust mode is watertight along edges, but a ray aimed within rounding error of a vertex
-//! slips between its triangles in about one of a hundred cases, and single precision takes the wrong
-//! neighbour when a ray passes within about 10⁻⁷ of an edge. Three signs betray both:
+//! Rays are nudged aside before they are rounded (`Frame::nudge`), so that vertices are never aimed
+//! at exactly, and single precision takes the wrong neighbour when a ray passes within about 10⁻⁶ of
+//! an edge. What is wrong after that betrays itself:
 //!
 //! * the f64 solution lies outside the triangle that was found (*invalid*);
-//! * nothing was found although the ray's line crosses the scene's box;
+//! * nothing was found within the scene's box, where nearly all of the batch found something;
 //! * the ray met a mesh from the other side than most of its batch: rays that slip into a closed
 //!   mesh meet it next from within.
 //!
-//! A ray under suspicion for its miss or its side is traced once more, moved sideways by no more than
-//! what single precision blurs anyway ([`Frame::blur`]); if the answer is of the same kind, it
-//! stands. Otherwise, and for an invalid hit, a bundle of sixteen such rays collects the triangles
-//! thereabouts, and the exact test of [`crate::watertight`] on each in f64 decides.
+//! A ray under suspicion for its miss or its side is traced once more, a little further aside; if
+//! nothing nearer is found, the answer stands. Otherwise, and for an invalid hit, a bundle of sixteen
+//! such rays collects the triangles thereabouts, and the exact test of [`crate::watertight`] on each
+//! in f64 decides.
 
 use std::f64::consts::TAU;
 
@@ -25,15 +25,17 @@ use crate::watertight;
 pub(crate) const BUNDLE: usize = 16;
 
 /// Sideways offsets (m) of the rays of a bundle around `direction`, within `radius` (m): the ray
-/// itself first, then two rings turned against each other.
-pub(crate) fn bundle(direction: DVec3, radius: f64) -> [DVec3; BUNDLE] {
+/// itself first, then two rings. Bundles of another `turn` fill the gaps of the others, for slivers
+/// that lie between their rays.
+pub(crate) fn bundle(direction: DVec3, radius: f64, turn: usize) -> [DVec3; BUNDLE] {
     let (x, y) = direction.any_orthonormal_pair();
     std::array::from_fn(|k| {
         if k == 0 {
             return DVec3::ZERO;
         }
-        let ring = if k < 8 { 0.25 } else { 1.0 };
-        let angle = TAU * (k as f64 * 0.127 + 0.05);
+        let (ring, step) = if k < 8 { (0.25, k as f64 / 7.0) } else { (1.0, k as f64 / 8.0) };
+        // The golden ratio spreads any number of turns evenly.
+        let angle = TAU * (step + turn as f64 * 0.618_033_988_75 / 8.0);
         (x * angle.cos() + y * angle.sin()) * (radius * ring)
     })
 }
@@ -47,8 +49,12 @@ pub(crate) fn nudge(direction: DVec3, radius: f64) -> DVec3 {
 /// A triangle that a ray may hit: placement and triangle.
 pub(crate) type Candidate = (u32, u32);
 
-/// The nearest of `candidates` that ray `i` hits by the exact test, written to `hits`; a miss when
-/// there is none. Returns whether there was one.
+/// A triangle that a ray passes outside of by no more than this many roundings of f64 is hit: the ray
+/// itself is not known better.
+const ROUNDINGS: f64 = 4.0;
+
+/// The nearest of `candidates` that ray `i` hits, written to `hits`; a miss when there is none.
+/// Returns whether there was one.
 pub(crate) fn decide(
     geometry: &Geometry,
     rays: &RayBatch,
@@ -62,12 +68,16 @@ pub(crate) fn decide(
         let placement = &geometry.placements[index as usize];
         let corners = geometry.mesh_of(placement).corners(triangle as usize);
         let [a, b, c] = corners.map(|p| placement.world_from_mesh.point_from(p, origin));
-        if let Some(hit) = watertight::intersect(a, b, c, direction)
-            && hit.t >= rays.t_min[i]
-            && hit.t <= rays.t_max[i]
-            && (hit.t, (index, triangle)) < best
-        {
-            best = (hit.t, (index, triangle));
+        let t = if let Some(hit) = watertight::intersect(a, b, c, direction) {
+            hit.t
+        } else if watertight::margin(a, b, c, direction) > -ROUNDINGS {
+            let normal = (b - a).cross(c - a);
+            normal.dot(a) / normal.dot(direction)
+        } else {
+            continue;
+        };
+        if t >= rays.t_min[i] && t <= rays.t_max[i] && (t, (index, triangle)) < best {
+            best = (t, (index, triangle));
         }
     }
     let (t, (placement, triangle)) = best;
@@ -75,6 +85,17 @@ pub(crate) fn decide(
     hits.placement[i] = placement;
     hits.triangle[i] = triangle;
     placement != MISS
+}
+
+/// The misses within the scene's box (`in_box`) of a batch that mostly hits: rays that slip through
+/// are rare, so they are few among many, and the sky around an object is not looked at twice.
+pub(crate) fn lonely_misses(hits: &HitBatch, in_box: &[bool], suspects: &mut Vec<u32>) {
+    let missed = |i: &usize| hits.placement[*i] == MISS && in_box[*i];
+    let misses = (0..hits.len()).filter(missed).count();
+    if misses * 8 <= hits.len() || hits.len() < 16 {
+        #[expect(clippy::cast_possible_truncation, reason = "batches are small")]
+        suspects.extend((0..hits.len()).filter(missed).map(|i| i as u32));
+    }
 }
 
 /// For each placement met by the batch, the rays that met the side that fewer of the others met.
