@@ -20,6 +20,7 @@ pub mod length;
 pub mod orthographic;
 pub mod pinhole;
 pub mod pose;
+pub mod sampler;
 pub mod sensor;
 
 pub use camera::{Camera, CameraSpec, PixelBlock, Projection};
@@ -29,4 +30,5 @@ pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin};
 pub use orthographic::{Orthographic, OrthographicSpec};
 pub use pinhole::{Pinhole, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};
+pub use sampler::{PixelSamples, Sampler};
 pub use sensor::SensorSpec;
