@@ -5,8 +5,8 @@
 //! | backend | what it is | speed | exactness |
 //! |---|---|---|---|
 //! | [`Embree`] | Intel's Embree finds, f64 measures | the fastest | of f64, watertight |
-//! | [`bvh`] | pure Rust, for machines without Embree | good | of f64, watertight |
-//! | [`exact`] | f64 throughout, exact edge predicates | slow | the reference |
+//! | [`Bvh`] | pure Rust, for machines without Embree | good | of f64, watertight |
+//! | [`Exact`] | f64 throughout, exact edge predicates | slow | the reference |
 //!
 //! *Single precision finds, double precision measures*: a fast backend says **which** triangle a ray
 //! hits; the f64
@@ -14,14 +14,20 @@
 //! are accurate to the coordinates the file gave, and stay so far from the origin.
 
 
+mod bvh;
 #[cfg(feature = "embree")]
 mod checked;
 #[cfg(feature = "embree")]
 mod embree;
+mod exact;
+mod nearest;
+mod parts;
 #[cfg(feature = "embree")]
 mod recheck;
 mod single;
 mod solve;
+mod tree;
+mod watch;
 pub mod watertight;
 
 use std::fmt;
@@ -30,10 +36,12 @@ use std::time::Duration;
 
 use etendue_geometry::{Geometry, HitBatch, RayBatch};
 
+pub use bvh::Bvh;
 #[cfg(feature = "embree")]
 pub use checked::Embree;
 #[cfg(feature = "embree")]
 pub use embree::{Version, version as embree_version};
+pub use exact::Exact;
 
 /// Answers nearest-hit and visibility queries about one scene. Built once, then only read.
 pub trait Accel: Send + Sync + fmt::Debug {

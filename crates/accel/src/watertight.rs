@@ -186,10 +186,11 @@ fn locate(a: DVec3, b: DVec3, c: DVec3, d: DVec3, front: bool) -> Hit {
 /// As [`locate`] for needles, grazed triangles and extreme sizes: works from the corner with the
 /// largest angle, at unit scale, and keeps the distance within the triangle.
 #[cold]
+#[expect(clippy::cast_possible_truncation, reason = "an exponent of f64 has 11 bits")]
 fn locate_carefully(corners: [DVec3; 3], d: DVec3, front: bool) -> Hit {
     let largest = corners.iter().fold(0.0_f64, |most, p| most.max(p.abs().max_element()));
-    // A power of two, except that the top of f64's range stays within it.
-    let scale = 2f64.powi((largest.log2() as i32).clamp(-1000, 1000));
+    // A power of two whose reciprocal is one too.
+    let scale = 2f64.powi(largest.log2().clamp(-1000.0, 1000.0) as i32);
     let corners = corners.map(|p| p / scale);
     let edge = |i: usize| (corners[(i + 2) % 3] - corners[(i + 1) % 3]).length_squared();
     let first = if edge(0) >= edge(1) && edge(0) >= edge(2) {

@@ -1,0 +1,328 @@
+//! The reference backend: f64 throughout, hits decided by exact signs. Slow and right; every other
+//! backend is measured against it.
+//!
+//! Two levels of binary trees: one a mesh, in the mesh's frame, and one over the placements. The
+//! trees only ever narrow down which triangles are looked at; their boxes are f64, and every ray
+//! widens them by what rounding may have moved it, so that a triangle which
+//! [`watertight::intersect`](crate::watertight::intersect) would hit is always looked at. The
+//! answer is the same as without trees, to the bit.
+
+#![forbid(unsafe_code)]
+
+use std::fmt;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
+use rayon::prelude::*;
+
+use crate::nearest::{Nearest, Query};
+use crate::parts::{Baking, Instance, Layout, LocalRay, Part, outward};
+use crate::tree::{LeafSize, MAX_DEPTH, Node, Ref, Tree};
+use crate::watch::{Watch, with_threads};
+use crate::{Accel, BuildError, BuildOptions, BuildReport, Quality};
+
+/// The exact f64 backend.
+pub struct Exact {
+    geometry: Arc<Geometry>,
+    layout: Layout,
+    parts: Vec<Boxes>,
+    top: Boxes,
+    time: Duration,
+}
+
+/// A tree with f64 boxes.
+#[derive(Debug, Default)]
+struct Boxes {
+    nodes: Vec<WideNode>,
+    /// In leaf order: placement and triangle, or a number of an instance twice.
+    items: Vec<[u32; 2]>,
+}
+
+/// A node of [`Tree`] with its box in f64.
+#[derive(Debug)]
+struct WideNode {
+    bounds: Bounds,
+    node: Node,
+}
+
+const LEAF: LeafSize = LeafSize { most: 4, block: 1 };
+
+/// Bytes a triangle at the height of a build: refs twice, nodes (at most one and a half with this
+/// leaf size), items.
+const BYTES_PER_TRIANGLE: u64 = 2 * size_of::<Ref>() as u64
+    + 3 * (size_of::<WideNode>() + size_of::<Node>()) as u64 / 2
+    + size_of::<[u32; 2]>() as u64;
+const BYTES_PER_INSTANCE: u64 = BYTES_PER_TRIANGLE + size_of::<Instance>() as u64;
+
+impl Exact {
+    /// Builds the trees over `geometry`. Of the options, threads, memory limit and progress are
+    /// heeded; the others make no difference here.
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::TooLarge`]
+    /// for a mesh of more than 2³¹ triangles; [`BuildError::Stopped`] when the progress function
+    /// answered `false`; [`BuildError::Library`] when threads cannot be had.
+    pub fn build(geometry: Arc<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
+        let start = Instant::now();
+        let layout = Layout::new(&geometry, Baking::Singular);
+        layout.check_size(&geometry, options, "exact", [BYTES_PER_TRIANGLE, BYTES_PER_INSTANCE])?;
+        let total = layout.triangles(&geometry) + layout.instances.len() as u64;
+        let watch = Watch::new(options, total);
+        let (parts, top) = with_threads(options, || {
+            let mut parts = Vec::with_capacity(layout.parts.len());
+            for part in &layout.parts {
+                parts.push(Boxes::over_part(part, &geometry, &watch)?);
+            }
+            let top = Boxes::over_instances(&layout, &geometry, &parts, &watch)?;
+            Ok((parts, top))
+        })?;
+        Ok(Self { geometry, layout, parts, top, time: start.elapsed() })
+    }
+
+    /// The closest hit of one ray.
+    fn nearest(&self, query: &Query, stack: &mut Stack) -> Nearest {
+        let mut nearest = Nearest::none(query.t_max);
+        self.visit(query, stack, &mut |placement, triangle| {
+            if let Some(hit) = self.test(query, placement, triangle) {
+                nearest.offer(hit, placement, triangle);
+            }
+            Some(nearest.t)
+        });
+        nearest
+    }
+
+    fn test(&self, query: &Query, placement: u32, triangle: u32) -> Option<crate::watertight::Hit> {
+        let placement = &self.geometry.placements[placement as usize];
+        let corners = self.geometry.mesh_of(placement).corners(triangle as usize);
+        query.test(placement, corners)
+    }
+
+    /// Shows every triangle near the ray to `see`, roughly from near to far, which answers how far
+    /// it still looks, or `None` when it has seen enough.
+    fn visit(
+        &self,
+        query: &Query,
+        stack: &mut Stack,
+        see: &mut impl FnMut(u32, u32) -> Option<f64>,
+    ) {
+        let world = self.layout.world.ray(query.origin, query.direction);
+        let mut t_max = query.t_max;
+        let mut enough = false;
+        let [outer, inner] = &mut stack.0;
+        self.top.visit(&world, query.t_min, &mut t_max, outer, &mut |[i, _], t_max| {
+            let instance = &self.layout.instances[i as usize];
+            let ray = instance.ray(query.origin, query.direction);
+            let part = &self.parts[instance.part as usize];
+            part.visit(&ray, query.t_min, t_max, inner, &mut |[placement, triangle], t_max| {
+                let placement = if placement == MISS { instance.placement } else { placement };
+                match see(placement, triangle) {
+                    Some(limit) => *t_max = limit,
+                    None => enough = true,
+                }
+                !enough
+            });
+            !enough
+        });
+    }
+}
+
+/// Nodes still to visit with the distance at which the ray enters them, one list a level.
+#[derive(Default)]
+struct Stack([Vec<(u32, f64)>; 2]);
+
+impl Stack {
+    fn new() -> Self {
+        Self([(); 2].map(|()| Vec::with_capacity(MAX_DEPTH)))
+    }
+}
+
+impl Accel for Exact {
+    fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
+        hits.reset(rays.len());
+        let mut stack = Stack::new();
+        for i in 0..rays.len() {
+            if let Some(query) = Query::of(rays, i) {
+                self.nearest(&query, &mut stack).write(&self.geometry, hits, i);
+            }
+        }
+    }
+
+    fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {
+        blocked.clear();
+        let mut stack = Stack::new();
+        blocked.extend((0..rays.len()).map(|i| {
+            let Some(query) = Query::of(rays, i) else { return false };
+            let mut found = false;
+            self.visit(&query, &mut stack, &mut |placement, triangle| {
+                found = self.test(&query, placement, triangle).is_some();
+                (!found).then_some(query.t_max)
+            });
+            found
+        }));
+    }
+
+    fn report(&self) -> BuildReport {
+        let trees = self.parts.iter().chain([&self.top]);
+        let instances = self.layout.instances.capacity() * size_of::<Instance>();
+        BuildReport {
+            backend: "exact f64".to_owned(),
+            quality: Quality::Medium,
+            time: self.time,
+            bytes: (trees.map(Boxes::bytes).sum::<usize>() + instances) as u64,
+            copied_bytes: 0,
+        }
+    }
+}
+
+impl fmt::Debug for Exact {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Exact")
+            .field("parts", &self.parts.len())
+            .field("instances", &self.layout.instances.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Boxes {
+    fn over_part(part: &Part, geometry: &Geometry, watch: &Watch<'_>) -> Result<Self, BuildError> {
+        let tree = Tree::build(part.refs(geometry), LEAF, watch)?;
+        Ok(Self::around(tree, |[placement, triangle]| {
+            let mut bounds = Bounds::EMPTY;
+            part.corners(geometry, placement, triangle).into_iter().for_each(|p| bounds.include(p));
+            bounds
+        }))
+    }
+
+    fn over_instances(
+        layout: &Layout,
+        geometry: &Geometry,
+        parts: &[Self],
+        watch: &Watch<'_>,
+    ) -> Result<Self, BuildError> {
+        let bounds = |i: u32| {
+            let instance = &layout.instances[i as usize];
+            let local = parts[instance.part as usize].bounds();
+            instance.world_bounds(layout, geometry, local)
+        };
+        let count = u32::try_from(layout.instances.len()).unwrap_or(u32::MAX);
+        let refs = (0..count).into_par_iter().map(|i| {
+            let bounds = bounds(i);
+            let (lo, hi) = outward([bounds.min, bounds.max]);
+            Ref { lo, first: i, hi, second: i }
+        });
+        let tree = Tree::build(refs.collect(), LEAF, watch)?;
+        Ok(Self::around(tree, |[i, _]| bounds(i)))
+    }
+
+    /// The same tree, with boxes from the leaves up.
+    fn around(tree: Tree, bounds: impl Fn([u32; 2]) -> Bounds + Sync) -> Self {
+        let items: Vec<[u32; 2]> = tree.refs.par_iter().map(|r| [r.first, r.second]).collect();
+        drop(tree.refs);
+        let leaf = |node: &Node| {
+            let range = node.leaf().unwrap_or(0..0);
+            items[range].iter().fold(Bounds::EMPTY, |all, &item| all.union(bounds(item)))
+        };
+        let nodes = tree.nodes.into_par_iter();
+        let mut nodes: Vec<WideNode> =
+            nodes.map(|node| WideNode { bounds: leaf(&node), node }).collect();
+        // Children stand after their parents.
+        for i in (0..nodes.len()).rev() {
+            if nodes[i].node.leaf().is_none() {
+                let right = i + nodes[i].node.right();
+                nodes[i].bounds = nodes[i + 1].bounds.union(nodes[right].bounds);
+            }
+        }
+        Self { nodes, items }
+    }
+
+    fn bounds(&self) -> Bounds {
+        self.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds)
+    }
+
+    fn bytes(&self) -> usize {
+        self.nodes.capacity() * size_of::<WideNode>()
+            + self.items.capacity() * size_of::<[u32; 2]>()
+    }
+
+    /// Shows the items of all leaves whose box the ray meets between `t_min` and `t_max`, which
+    /// `see` may lower, until `see` answers `false`.
+    fn visit(
+        &self,
+        ray: &LocalRay,
+        t_min: f64,
+        t_max: &mut f64,
+        stack: &mut Vec<(u32, f64)>,
+        see: &mut impl FnMut([u32; 2], &mut f64) -> bool,
+    ) {
+        let slabs = Slabs::new(ray, t_min);
+        stack.clear();
+        if let Some(root) = self.nodes.first()
+            && let Some(near) = slabs.enter(root.bounds, *t_max)
+        {
+            stack.push((0, near));
+        }
+        while let Some((i, near)) = stack.pop() {
+            if near > *t_max {
+                continue;
+            }
+            let i = i as usize;
+            let node = &self.nodes[i].node;
+            if let Some(range) = node.leaf() {
+                for &item in &self.items[range] {
+                    if !see(item, t_max) {
+                        return;
+                    }
+                }
+                continue;
+            }
+            let children = [i + 1, i + node.right()];
+            let [a, b] = children.map(|child| {
+                let near = slabs.enter(self.nodes[child].bounds, *t_max);
+                // Nodes are numbered in u32.
+                #[expect(clippy::cast_possible_truncation, reason = "nodes are numbered in u32")]
+                near.map(|near| (child as u32, near))
+            });
+            let a_first = matches!((a, b), (Some(a), Some(b)) if a.1 < b.1);
+            let (far, close) = if a_first { (b, a) } else { (a, b) };
+            stack.extend(far);
+            stack.extend(close);
+        }
+    }
+}
+
+/// A ray prepared for box tests.
+struct Slabs {
+    origin: DVec3,
+    inverse: DVec3,
+    pad: DVec3,
+    t_min: f64,
+}
+
+impl Slabs {
+    fn new(ray: &LocalRay, t_min: f64) -> Self {
+        // Small enough to move no point of a box by a rounding, and its reciprocal times any
+        // coordinate of a frame is finite.
+        let least = 1e-150 * ray.direction.abs().max_element();
+        let steer = |d: f64| if d.abs() < least { least.copysign(d) } else { d };
+        let direction = DVec3::from_array(ray.direction.to_array().map(steer));
+        // The test's own roundings are relative to coordinates and the origin, a few each.
+        let pad = ray.pad + 8.0 * f64::EPSILON * (1.0 + ray.origin.abs().max_element());
+        Self { origin: ray.origin, inverse: direction.recip(), pad: DVec3::splat(pad), t_min }
+    }
+
+    /// The distance at which the ray enters the widened box; `None` when it misses it, or only
+    /// meets it outside `t_min..=t_max`.
+    #[inline]
+    fn enter(&self, bounds: Bounds, t_max: f64) -> Option<f64> {
+        let a = (bounds.min - self.pad - self.origin) * self.inverse;
+        let b = (bounds.max + self.pad - self.origin) * self.inverse;
+        let near = a.min(b).max_element().max(self.t_min);
+        let far = a.max(b).min_element().min(t_max);
+        // Distances are rounded too; the next box may begin where this one ends.
+        let slack = 8.0 * f64::EPSILON * far.abs();
+        (near <= far + slack).then_some(near - slack)
+    }
+}

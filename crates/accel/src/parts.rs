@@ -1,0 +1,427 @@
+//! What a tree is built over, and how a ray gets there.
+//!
+//! A *part* is a set of triangles in one frame: a mesh in its own frame, shared by all its
+//! placements, or several placements *baked* into a frame that is parallel to the world's. An
+//! *instance* is a part at a place. Every frame has its origin among its triangles and a power of
+//! two as its scale, so that coordinates in it are at most about 1 and single precision is spent on
+//! what matters.
+//!
+//! Rays reach a frame in f64, as seen from the instance, and know how far rounding may have moved
+//! them against the triangles (see [`LocalRay::pad`]): boxes are widened by that, so nothing is
+//! culled that the exact test would hit.
+
+use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{Bounds, Geometry, MISS, Placement};
+
+use crate::tree::Ref;
+use crate::{BuildError, BuildOptions};
+
+/// Origin and scale of a part: `p ↦ (p − origin) · scale`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frame {
+    pub(crate) origin: DVec3,
+    /// A power of two.
+    pub(crate) scale: f64,
+}
+
+impl Frame {
+    /// A frame in which `bounds` lies within about −1..1. The origin stays where it is unless it is
+    /// far away, because f32 coordinates stay exact then.
+    pub(crate) fn around(bounds: Bounds) -> Self {
+        if bounds.is_empty() {
+            return Self { origin: DVec3::ZERO, scale: 1.0 };
+        }
+        let centre = bounds.min * 0.5 + bounds.max * 0.5;
+        let half = bounds.max * 0.5 - bounds.min * 0.5;
+        let far = centre.abs().max_element() > 4.0 * half.max_element();
+        let origin = if far { centre } else { DVec3::ZERO };
+        let reach = (bounds.max - origin).abs().max((bounds.min - origin).abs()).max_element();
+        let origin = if origin.is_finite() { origin } else { DVec3::ZERO };
+        Self { origin, scale: reciprocal_power(reach) }
+    }
+}
+
+/// The power of two that brings `size` to at most 1 (1 for a size of 0), within f64's range.
+#[expect(clippy::cast_possible_truncation, reason = "an exponent of f64 has 11 bits")]
+fn reciprocal_power(size: f64) -> f64 {
+    if size > 0.0 { 2f64.powi(-(size.log2().ceil().clamp(-1000.0, 1000.0) as i32)) } else { 1.0 }
+}
+
+/// Whose triangles a part holds.
+#[derive(Debug, Clone)]
+pub(crate) enum Members {
+    /// One mesh, in its own frame, for any number of placements.
+    Mesh(u32),
+    /// These placements, parallel to the world.
+    Baked(Vec<u32>),
+}
+
+/// A set of triangles in one frame.
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    pub(crate) frame: Frame,
+    pub(crate) members: Members,
+}
+
+/// A part at a place.
+#[derive(Debug, Clone)]
+pub(crate) struct Instance {
+    pub(crate) part: u32,
+    /// The placement, or [`MISS`] for a baked part, which knows its triangles' placements.
+    pub(crate) placement: u32,
+    /// From world directions to the part's frame, with its scale.
+    linear: DMat3,
+    translation: DVec3,
+    translation_low: DVec3,
+    /// The frame's origin in its own scaled units: what is left to subtract.
+    origin: DVec3,
+    pad: f64,
+    pad_per_distance: f64,
+}
+
+/// A ray in a part's frame. It has the same distances as in the world: its direction is not unit.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LocalRay {
+    pub(crate) origin: DVec3,
+    pub(crate) direction: DVec3,
+    /// How far f64 rounding may have moved the ray against any triangle near it, along an axis.
+    pub(crate) pad: f64,
+}
+
+/// All parts and instances of a scene, and the frame of the tree over the instances.
+#[derive(Debug)]
+pub(crate) struct Layout {
+    pub(crate) parts: Vec<Part>,
+    pub(crate) instances: Vec<Instance>,
+    /// Where the whole scene lies, parallel to the world.
+    pub(crate) world: Instance,
+    pub(crate) world_frame: Frame,
+}
+
+/// What is baked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Baking {
+    /// Meshes used once that are not too fine for the scene's single precision, in one part.
+    UsedOnce,
+    /// Only what has no inverse.
+    Singular,
+}
+
+/// Half the distance from 1 to the next f64.
+const ROUNDING: f64 = f64::EPSILON / 2.0;
+
+/// Roundings, each of at most one [`ROUNDING`] of the magnitudes involved, that box tests allow for.
+/// On a ray's or a corner's way into a frame there are about fifty:
+/// inverting a 3 × 3 matrix (about 14 per condition number), applying it twice
+/// (4 each), the sums of the offset (3), and the box test itself (4). The rest is for a distance
+/// that [`crate::watertight::intersect`] rounds to before its box begins.
+const ROUNDINGS: f64 = 1024.0;
+
+/// A worse conditioned placement is baked: its inverse would eat into single precision's slack.
+const WORST_CONDITION: f64 = 1e5;
+
+/// A mesh is baked with others while its typical triangle is this much larger than what single
+/// precision resolves in the scene's frame.
+const BAKED_RESOLUTION: f64 = 64.0;
+
+/// Triangles of one part: what a tree can number.
+const MOST_TRIANGLES: usize = 1 << 31;
+
+impl Layout {
+    pub(crate) fn new(geometry: &Geometry, baking: Baking) -> Self {
+        let world_frame = Frame::around(geometry.loose_bounds());
+        let uses = geometry.uses();
+        let mut layout = Self {
+            parts: Vec::new(),
+            instances: Vec::new(),
+            world: Instance::parallel(MISS, world_frame, 0.0),
+            world_frame,
+        };
+        let mut part_of_mesh = vec![None; geometry.meshes.len()];
+        let mut baked = Vec::new();
+        for (i, placement) in geometry.placements.iter().enumerate() {
+            let i = index(i);
+            let mesh = geometry.mesh_of(placement);
+            if mesh.triangles.is_empty() || !placement.world_from_mesh.is_finite() {
+                continue;
+            }
+            let once = baking == Baking::UsedOnce && uses[placement.mesh as usize] == 1;
+            if once && is_coarse(geometry, placement, world_frame) {
+                baked.push(i);
+                continue;
+            }
+            let frame = Frame::around(mesh.bounds);
+            let Some(instance) = Instance::placed(placement, i, frame, mesh.bounds) else {
+                layout.bake(geometry, vec![i]);
+                continue;
+            };
+            let part = *part_of_mesh[placement.mesh as usize].get_or_insert_with(|| {
+                let members = Members::Mesh(placement.mesh);
+                layout.parts.push(Part { frame, members });
+                index(layout.parts.len() - 1)
+            });
+            layout.instances.push(Instance { part, ..instance });
+        }
+        if !baked.is_empty() {
+            layout.bake(geometry, baked);
+        }
+        let reach = geometry.placements.iter().map(|p| baked_reach(geometry, p, world_frame));
+        layout.world = Instance::parallel(MISS, world_frame, reach.fold(0.0, f64::max));
+        layout
+    }
+
+    /// Triangles of all parts: each shared mesh once, and what is baked.
+    pub(crate) fn triangles(&self, geometry: &Geometry) -> u64 {
+        self.parts.iter().map(|part| part.len(geometry) as u64).sum()
+    }
+
+    /// Refuses what cannot be numbered, and what would take more than the caller's memory limit at
+    /// so many bytes a triangle and an instance.
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError::TooLarge`] and [`BuildError::MemoryLimit`].
+    pub(crate) fn check_size(
+        &self,
+        geometry: &Geometry,
+        options: &BuildOptions,
+        backend: &'static str,
+        [per_triangle, per_instance]: [u64; 2],
+    ) -> Result<(), BuildError> {
+        for part in &self.parts {
+            let triangles = part.len(geometry);
+            if triangles > MOST_TRIANGLES {
+                return Err(BuildError::TooLarge {
+                    mesh: part.name(geometry).to_owned(),
+                    what: format!("its number of triangles, {triangles},"),
+                    backend,
+                    limit: MOST_TRIANGLES as u64,
+                });
+            }
+        }
+        let bytes = self
+            .triangles(geometry)
+            .saturating_mul(per_triangle)
+            .saturating_add((self.instances.len() as u64).saturating_mul(per_instance));
+        match options.memory_limit {
+            Some(limit) if bytes > limit => Err(BuildError::MemoryLimit { backend, limit }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Adds a part for `placements`, parallel to the world.
+    fn bake(&mut self, geometry: &Geometry, placements: Vec<u32>) {
+        let members = || placements.iter().map(|&i| &geometry.placements[i as usize]);
+        let bounds = members().fold(Bounds::EMPTY, |all, p| all.union(loose_bounds(geometry, p)));
+        let frame = Frame::around(bounds);
+        let reach = members().map(|p| baked_reach(geometry, p, frame)).fold(0.0, f64::max);
+        let part = index(self.parts.len());
+        self.parts.push(Part { frame, members: Members::Baked(placements) });
+        self.instances.push(Instance::parallel(part, frame, reach));
+    }
+}
+
+/// Placements, parts and triangles are counted in u32 by the contract.
+#[expect(clippy::cast_possible_truncation, reason = "counted in u32 by the contract")]
+fn index(i: usize) -> u32 {
+    i as u32
+}
+
+fn largest(bounds: Bounds) -> f64 {
+    if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() }
+}
+
+fn loose_bounds(geometry: &Geometry, placement: &Placement) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    let local = geometry.mesh_of(placement).bounds;
+    if !local.is_empty() {
+        for corner in local.corners() {
+            bounds.include(placement.world_from_mesh.point(corner));
+        }
+    }
+    bounds
+}
+
+/// The magnitudes that a placement's corners are summed from in `frame`.
+fn baked_reach(geometry: &Geometry, placement: &Placement, frame: Frame) -> f64 {
+    let transform = &placement.world_from_mesh;
+    let local = largest(geometry.mesh_of(placement).bounds);
+    let offset = transform.offset_from(frame.origin).abs().max_element();
+    (norm(&transform.linear) * local + offset) * frame.scale
+}
+
+/// Whether a placed mesh's typical triangle is large against what f32 resolves in `frame`.
+fn is_coarse(geometry: &Geometry, placement: &Placement, frame: Frame) -> bool {
+    let triangles = geometry.mesh_of(placement).triangles.len() as f64;
+    let size = loose_bounds(geometry, placement).diagonal() / triangles.sqrt();
+    size * frame.scale > BAKED_RESOLUTION * f64::from(f32::EPSILON)
+}
+
+/// The Frobenius norm.
+fn norm(matrix: &DMat3) -> f64 {
+    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+    (x.length_squared() + y.length_squared() + z.length_squared()).sqrt()
+}
+
+impl Instance {
+    /// A frame parallel to the world.
+    fn parallel(part: u32, frame: Frame, reach: f64) -> Self {
+        Self {
+            part,
+            placement: MISS,
+            linear: DMat3::from_diagonal(DVec3::splat(frame.scale)),
+            translation: frame.origin,
+            translation_low: DVec3::ZERO,
+            origin: DVec3::ZERO,
+            pad: ROUNDINGS * ROUNDING * (1.0 + reach),
+            pad_per_distance: ROUNDINGS * ROUNDING * frame.scale,
+        }
+    }
+
+    /// The mesh's own frame at `placement`; `None` when that has no good inverse.
+    fn placed(placement: &Placement, i: u32, frame: Frame, bounds: Bounds) -> Option<Self> {
+        let transform = &placement.world_from_mesh;
+        // At unit scale, so that a determinant of 10⁻³⁰⁰ is not mistaken for 0.
+        let unit = reciprocal_power(norm(&transform.linear));
+        let scaled = transform.linear * unit;
+        if scaled.determinant() == 0.0 {
+            return None;
+        }
+        let inverse = scaled.inverse();
+        let condition = norm(&scaled) * norm(&inverse);
+        let linear = inverse * (unit * frame.scale);
+        if !(condition <= WORST_CONDITION && linear.is_finite() && transform.is_finite()) {
+            return None;
+        }
+        let error = ROUNDINGS * ROUNDING * condition;
+        Some(Self {
+            part: 0,
+            placement: i,
+            linear,
+            translation: transform.translation,
+            translation_low: transform.translation_low,
+            origin: frame.origin * frame.scale,
+            pad: error * (1.0 + largest(bounds) * frame.scale),
+            pad_per_distance: error * norm(&linear),
+        })
+    }
+
+    /// A world ray in the part's frame.
+    #[inline]
+    pub(crate) fn ray(&self, origin: DVec3, direction: DVec3) -> LocalRay {
+        let offset = (self.translation - origin) + self.translation_low;
+        let distance = offset.abs();
+        LocalRay {
+            origin: -(self.linear * offset) - self.origin,
+            direction: self.linear * direction,
+            pad: self.pad + self.pad_per_distance * (distance.x + distance.y + distance.z),
+        }
+    }
+
+    /// A box around the box `lo..hi` of this instance's part, in `world` coordinates.
+    pub(crate) fn world_bounds(
+        &self,
+        layout: &Layout,
+        geometry: &Geometry,
+        local: Bounds,
+    ) -> Bounds {
+        let part = &layout.parts[self.part as usize];
+        let frame = layout.world_frame;
+        let mut bounds = Bounds::EMPTY;
+        for corner in local.corners() {
+            let corner = corner / part.frame.scale + part.frame.origin;
+            let point = match geometry.placements.get(self.placement as usize) {
+                Some(placement) => placement.world_from_mesh.point_from(corner, frame.origin),
+                None => corner - frame.origin,
+            };
+            bounds.include(point * frame.scale);
+        }
+        bounds
+    }
+}
+
+impl Part {
+    /// The number of triangles.
+    pub(crate) fn len(&self, geometry: &Geometry) -> usize {
+        match &self.members {
+            Members::Mesh(mesh) => geometry.meshes[*mesh as usize].triangles.len(),
+            Members::Baked(placements) => {
+                let mesh = |&i: &u32| geometry.mesh_of(&geometry.placements[i as usize]);
+                placements.iter().map(|i| mesh(i).triangles.len()).sum()
+            }
+        }
+    }
+
+    /// The name of the (first) mesh, for messages.
+    fn name<'a>(&self, geometry: &'a Geometry) -> &'a str {
+        let mesh = match &self.members {
+            Members::Mesh(mesh) => Some(*mesh),
+            Members::Baked(list) => list.first().map(|&i| geometry.placements[i as usize].mesh),
+        };
+        mesh.map_or("", |mesh| &geometry.meshes[mesh as usize].name)
+    }
+
+    /// The corners of a triangle in this part's frame.
+    #[inline]
+    pub(crate) fn corners(&self, geometry: &Geometry, placement: u32, triangle: u32) -> [DVec3; 3] {
+        let Frame { origin, scale } = self.frame;
+        match &self.members {
+            Members::Mesh(mesh) => geometry.meshes[*mesh as usize]
+                .corners(triangle as usize)
+                .map(|corner| (corner - origin) * scale),
+            Members::Baked(_) => {
+                let placement = &geometry.placements[placement as usize];
+                let corners = geometry.mesh_of(placement).corners(triangle as usize);
+                corners.map(|p| placement.world_from_mesh.point_from(p, origin) * scale)
+            }
+        }
+    }
+
+    /// A ref for every triangle: its box in this frame, its placement ([`MISS`] for a shared
+    /// mesh) and its number.
+    pub(crate) fn refs(&self, geometry: &Geometry) -> Vec<Ref> {
+        use rayon::prelude::*;
+        let mut refs = Vec::new();
+        let mut append = |placement: u32, mesh: u32| {
+            let count = geometry.meshes[mesh as usize].triangles.len();
+            refs.par_extend((0..index(count)).into_par_iter().map(|triangle| {
+                let corners = self.corners(geometry, placement, triangle);
+                let (lo, hi) = outward(corners);
+                Ref { lo, first: placement, hi, second: triangle }
+            }));
+        };
+        match &self.members {
+            Members::Mesh(mesh) => append(MISS, *mesh),
+            Members::Baked(placements) => {
+                for &i in placements {
+                    append(i, geometry.placements[i as usize].mesh);
+                }
+            }
+        }
+        refs
+    }
+}
+
+/// The single-precision box around `points`, rounded outward.
+#[inline]
+pub(crate) fn outward<const N: usize>(points: [DVec3; N]) -> ([f32; 3], [f32; 3]) {
+    let mut bounds = Bounds::EMPTY;
+    for point in points {
+        bounds.include(point);
+    }
+    (bounds.min.to_array().map(round_down), bounds.max.to_array().map(round_up))
+}
+
+/// The largest f32 not above `x`.
+#[inline]
+#[expect(clippy::cast_possible_truncation, reason = "rounding is the point")]
+pub(crate) fn round_down(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) > x { near.next_down() } else { near }
+}
+
+/// The smallest f32 not below `x`.
+#[inline]
+pub(crate) fn round_up(x: f64) -> f32 {
+    -round_down(-x)
+}

@@ -1,0 +1,551 @@
+//! What every backend promises, asked of each: the answers of `exact`, whatever the scene.
+
+#![expect(clippy::cast_possible_truncation, reason = "meshes and batches here are small")]
+
+#[path = "contract/meshes.rs"]
+mod meshes;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use etendue_accel::{Accel, BuildError, BuildOptions, Bvh, Exact, watertight};
+use etendue_geometry::glam::{DMat3, DQuat, DVec3};
+use etendue_geometry::{Detail, Geometry, HitBatch, MISS, Positions, RayBatch, Transform};
+use meshes::{Random, at, blob, mesh, placed, rays, scene, soup};
+
+type Build = fn(Arc<Geometry>, &BuildOptions) -> Result<Box<dyn Accel>, BuildError>;
+
+/// All backends, by name.
+const BACKENDS: &[(&str, Build)] = &[
+    ("exact", |geometry, options| Ok(Box::new(Exact::build(geometry, options)?))),
+    ("bvh", |geometry, options| Ok(Box::new(Bvh::build(geometry, options)?))),
+];
+
+/// Each backend over `geometry`.
+fn each(geometry: &Arc<Geometry>) -> Vec<(&'static str, Box<dyn Accel>)> {
+    let options = BuildOptions::default();
+    let build = |&(name, build): &(&'static str, Build)| {
+        (name, build(Arc::clone(geometry), &options).expect("the scene is sound"))
+    };
+    BACKENDS.iter().map(build).collect()
+}
+
+fn closest(accel: &dyn Accel, rays: &RayBatch) -> HitBatch {
+    let mut hits = HitBatch::new(Detail::Surface);
+    accel.closest(rays, &mut hits);
+    hits
+}
+
+/// What the exact test says without any tree.
+fn brute_force(geometry: &Geometry, rays: &RayBatch) -> Vec<(f64, u32, u32)> {
+    let nearest = |i: usize| {
+        let mut best = (f64::INFINITY, MISS, MISS);
+        for (p, placement) in geometry.placements.iter().enumerate() {
+            let mesh = geometry.mesh_of(placement);
+            for triangle in 0..mesh.triangles.len() {
+                let to = |corner| placement.world_from_mesh.point_from(corner, rays.origin(i));
+                let [a, b, c] = mesh.corners(triangle).map(to);
+                if let Some(hit) = watertight::intersect(a, b, c, rays.direction(i))
+                    && hit.t >= rays.t_min[i]
+                    && hit.t <= rays.t_max[i]
+                {
+                    let found = (hit.t, p as u32, triangle as u32);
+                    best = if found < best { found } else { best };
+                }
+            }
+        }
+        best
+    };
+    (0..rays.len()).map(nearest).collect()
+}
+
+/// Every backend, as scattered rays and as packets, gives `exact`'s hits. Distances may differ in
+/// the last digits where a backend sums in another order; 1e-12 is what the contract promises.
+fn assert_all_agree(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str) {
+    let options = BuildOptions::default();
+    let exact = Exact::build(Arc::clone(geometry), &options).expect("the scene is sound");
+    let truth = closest(&exact, rays);
+    for (name, accel) in each(geometry) {
+        for coherent in [false, true] {
+            let rays = RayBatch { coherent, ..rays.clone() };
+            let hits = closest(&*accel, &rays);
+            assert_eq!(hits.len(), rays.len());
+            for i in 0..rays.len() {
+                let context = || {
+                    let ray = (rays.origin(i), rays.direction(i), rays.t_min[i], rays.t_max[i]);
+                    format!("{what}, {name}, coherent {coherent}: ray {i} {ray:?}")
+                };
+                let ours = (hits.t[i], hits.placement[i], hits.triangle[i]);
+                let theirs = (truth.t[i], truth.placement[i], truth.triangle[i]);
+                if truth.placement[i] == MISS {
+                    assert_eq!(ours, theirs, "{}", context());
+                    continue;
+                }
+                let error = (ours.0 - theirs.0).abs() / theirs.0.abs().max(f64::MIN_POSITIVE);
+                assert!(error <= 1e-12, "{}: {ours:?} is not {theirs:?}", context());
+                // Where two triangles meet, either may come first by the last digit.
+                if ours == theirs {
+                    let turned = hits.normal(i).distance(truth.normal(i));
+                    assert!(turned < 1e-8, "{}: normal", context());
+                    let moved = (hits.u[i] - truth.u[i]).abs() + (hits.v[i] - truth.v[i]).abs();
+                    assert!(moved < 1e-6, "{}: weights", context());
+                }
+            }
+            let mut blocked = Vec::new();
+            accel.occluded(&rays, &mut blocked);
+            assert_eq!(blocked.len(), rays.len());
+            for (i, blocked) in blocked.into_iter().enumerate() {
+                assert_eq!(blocked, truth.is_hit(i), "{what}, {name}: occlusion of ray {i}");
+            }
+        }
+    }
+}
+
+/// `bvh` measures with the same arithmetic as `exact`, so its answers are the same bits.
+fn assert_bvh_equals_exact(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str) {
+    let options = BuildOptions::default();
+    let exact = Exact::build(Arc::clone(geometry), &options).expect("sound");
+    let bvh = Bvh::build(Arc::clone(geometry), &options).expect("sound");
+    let truth = closest(&exact, rays);
+    for coherent in [false, true] {
+        let hits = closest(&bvh, &RayBatch { coherent, ..rays.clone() });
+        for i in 0..rays.len() {
+            let all = |h: &HitBatch| {
+                (h.t[i], h.placement[i], h.triangle[i], h.u[i], h.v[i], h.normal(i).to_array())
+            };
+            assert_eq!(all(&hits), all(&truth), "{what}, coherent {coherent}: ray {i}");
+        }
+    }
+}
+
+#[test]
+fn exact_is_what_testing_every_triangle_gives() {
+    let mut random = Random(5);
+    let scenes = [
+        ("blob", scene(vec![blob(6)])),
+        ("soup", scene(vec![soup(300, 0.4, 1)])),
+        ("instances", instances(&mut random, 6)),
+    ];
+    for (name, geometry) in scenes {
+        let rays = rays(2000, DVec3::ZERO, 1.0, 9);
+        let exact = Exact::build(Arc::clone(&geometry), &BuildOptions::default()).expect("sound");
+        let hits = closest(&exact, &rays);
+        for (i, truth) in brute_force(&geometry, &rays).into_iter().enumerate() {
+            let ours = (hits.t[i], hits.placement[i], hits.triangle[i]);
+            assert_eq!(ours, truth, "{name}: ray {i}");
+        }
+        assert!((0..rays.len()).filter(|&i| hits.is_hit(i)).count() > 500, "{name} is hit at all");
+    }
+}
+
+/// A blob and a soup, placed several times each: turned, stretched, mirrored; and a blob once.
+fn instances(random: &mut Random, count: usize) -> Arc<Geometry> {
+    let mut placements = vec![placed(2, Transform::IDENTITY)];
+    for i in 0..count {
+        let stretch = DVec3::new(1.0, if i % 2 == 0 { -0.5 } else { 0.7 }, 1.3) * 0.5;
+        let transform = Transform::from_trs(random.cube(), random.rotation(), stretch);
+        placements.push(placed(i as u32 % 2, transform));
+    }
+    at(vec![blob(5), soup(100, 0.3, 2), blob(4)], placements)
+}
+
+#[test]
+fn backends_agree_on_blobs_soups_and_instances() {
+    let mut random = Random(17);
+    let cases = [
+        ("blob", scene(vec![blob(40)])),
+        ("soup", scene(vec![soup(5000, 0.1, 3)])),
+        ("dense soup", scene(vec![soup(300, 0.9, 4)])),
+        ("two meshes", scene(vec![blob(10), soup(200, 0.2, 6)])),
+        ("instances", instances(&mut random, 40)),
+    ];
+    for (name, geometry) in cases {
+        let rays = rays(6000, DVec3::ZERO, 1.0, 23);
+        assert_all_agree(&geometry, &rays, name);
+        assert_bvh_equals_exact(&geometry, &rays, name);
+    }
+}
+
+#[test]
+fn far_placements_lose_nothing() {
+    let here = scene(vec![blob(20)]);
+    let near_rays = rays(3000, DVec3::ZERO, 1.0, 31);
+    let near = Exact::build(Arc::clone(&here), &BuildOptions::default()).expect("sound");
+    let near = closest(&near, &near_rays);
+    for distance in [1e4, 1e6, 1e7] {
+        // A whole number of metres, so the rays' origins can follow exactly to 2⁻²⁹ m.
+        let place = DVec3::new(distance, -distance, distance + 3.0);
+        let there = at(vec![blob(20)], vec![placed(0, Transform::new(DMat3::IDENTITY, place))]);
+        let mut far_rays = RayBatch::with_capacity(near_rays.len());
+        for i in 0..near_rays.len() {
+            let (t_min, t_max) = (near_rays.t_min[i], near_rays.t_max[i]);
+            let origin = near_rays.origin(i) + place;
+            far_rays.push_between(origin, near_rays.direction(i), t_min, t_max);
+        }
+        assert_all_agree(&there, &far_rays, &format!("at {distance:e} m"));
+        for (name, accel) in each(&there) {
+            let far = closest(&*accel, &far_rays);
+            for i in (0..far_rays.len()).filter(|&i| near.is_hit(i) && far.is_hit(i)) {
+                // The near ray from the very place the far ray starts at.
+                let moved = far_rays.origin(i) - place;
+                let exact = closest_on(&near, &near_rays, i, moved, &here.meshes[0]);
+                let error = exact.map_or(0.0, |t| (t - far.t[i]).abs());
+                assert!(error <= 1e-9, "{name} at {distance:e} m: ray {i} is off by {error:e} m");
+            }
+        }
+    }
+}
+
+/// The distance from `origin` to the triangle that ray `i` hit.
+fn closest_on(
+    hits: &HitBatch,
+    rays: &RayBatch,
+    i: usize,
+    origin: DVec3,
+    mesh: &etendue_geometry::Mesh,
+) -> Option<f64> {
+    let corners = mesh.corners(hits.triangle[i] as usize);
+    let [a, b, c] = corners.map(|corner| corner - origin);
+    watertight::intersect(a, b, c, rays.direction(i)).map(|hit| hit.t)
+}
+
+#[test]
+fn far_instances_and_scattered_scenes_agree() {
+    let mut random = Random(41);
+    let place = |p: DVec3, random: &mut Random| {
+        Transform::from_trs(p, random.rotation(), DVec3::new(1.0, 1.0, -1.0))
+    };
+    let centre = DVec3::new(1e7, 2e6, -3e6);
+    let geometry = at(
+        vec![blob(20), soup(100, 0.2, 8)],
+        vec![
+            placed(0, place(centre, &mut random)),
+            placed(0, place(DVec3::ZERO, &mut random)),
+            placed(1, place(centre + 0.5, &mut random)),
+            placed(0, place(centre + 1.5, &mut random)),
+        ],
+    );
+    for seen in [centre, DVec3::ZERO] {
+        let rays = rays(3000, seen, 1.0, 43);
+        assert_all_agree(&geometry, &rays, "scattered");
+        assert_bvh_equals_exact(&geometry, &rays, "scattered");
+    }
+}
+
+#[test]
+fn sizes_from_micrometres_to_megametres_agree() {
+    for size in [1e-6, 1e-3, 1e3, 1e6] {
+        let transform = Transform::from_trs(DVec3::ZERO, DQuat::IDENTITY, DVec3::splat(size));
+        let geometry = at(vec![blob(20)], vec![placed(0, transform)]);
+        assert_all_agree(&geometry, &rays(2000, DVec3::ZERO, size, 47), &format!("size {size:e}"));
+        let twice = at(vec![blob(20)], vec![placed(0, transform), placed(0, transform)]);
+        assert_all_agree(&twice, &rays(2000, DVec3::ZERO, size, 48), &format!("twice {size:e}"));
+    }
+}
+
+#[test]
+fn rays_along_axes_with_zeros_of_either_sign_hit() {
+    let geometry = scene(vec![blob(12)]);
+    let mut batch = RayBatch::default();
+    for zero in [0.0, -0.0, 1e-300, -1e-42] {
+        for k in 0..40 {
+            let s = f64::from(k) / 40.0 - 0.5;
+            batch.push(DVec3::new(s, 0.0, 3.0), DVec3::new(zero, zero, -1.0));
+            batch.push(DVec3::new(s, s, -3.0), DVec3::new(zero, -zero, 1.0));
+            batch.push(DVec3::new(-3.0, 0.0, s), DVec3::new(1.0, zero, zero));
+            batch.push(DVec3::new(0.0, 3.0, s), DVec3::new(-zero, -1.0, zero));
+        }
+    }
+    assert_all_agree(&geometry, &batch, "axes");
+    let hits = closest(&*each(&geometry)[1].1, &batch);
+    assert!((0..batch.len()).all(|i| hits.is_hit(i)), "all of them aim at the inside");
+}
+
+/// From a hit onwards: without a limit the same place again, at a distance of a rounding or none;
+/// behind a small limit the next surface.
+#[test]
+fn rays_that_start_on_a_surface_agree() {
+    let geometry = scene(vec![blob(15)]);
+    let first = rays(2000, DVec3::ZERO, 1.0, 53);
+    let exact = Exact::build(Arc::clone(&geometry), &BuildOptions::default()).expect("sound");
+    let hits = closest(&exact, &first);
+    let mut second = RayBatch::default();
+    for i in (0..first.len()).filter(|&i| hits.is_hit(i)) {
+        let at = first.origin(i) + first.direction(i) * hits.t[i];
+        second.push_between(at, first.direction(i), 1e-9, f64::INFINITY);
+        second.push_between(at, hits.normal(i), 1e-9, 10.0);
+    }
+    assert_all_agree(&geometry, &second, "from the surface");
+}
+
+#[test]
+fn limits_are_inclusive() {
+    let square = mesh("square", &[[-1., -1., 2.], [3., -1., 2.], [-1., 3., 2.]], vec![[0, 1, 2]]);
+    for (name, accel) in each(&scene(vec![square])) {
+        let mut batch = RayBatch::default();
+        let above = 2f64.next_up();
+        for (t_min, t_max) in [(2.0, 2.0), (0.0, 2.0), (2.0, 9.0), (above, 9.0), (0.0, 1.0)] {
+            batch.push_between(DVec3::ZERO, DVec3::Z, t_min, t_max);
+        }
+        let hits = closest(&*accel, &batch);
+        let hit: Vec<bool> = (0..batch.len()).map(|i| hits.is_hit(i)).collect();
+        assert_eq!(hit, [true, true, true, false, false], "{name}");
+    }
+}
+
+/// Triangles a million times as long as wide, and some without any area at all.
+#[test]
+fn needles_and_degenerate_triangles_agree() {
+    let mut random = Random(59);
+    let mut positions = Vec::new();
+    for i in 0..2000 {
+        let tip = random.cube();
+        let along = random.direction();
+        let across = random.direction().cross(along).normalize() * 1e-6;
+        let corners = match i % 10 {
+            0 => [tip, tip, tip],
+            1 => [tip, tip + along, tip + along],
+            2 => [tip, tip + along, tip + along * 0.5],
+            _ => [tip, tip + along + across, tip + along - across],
+        };
+        positions.extend(corners.map(|p| p.to_array().map(|c| c as f32)));
+    }
+    let triangles: Vec<[u32; 3]> = (0..2000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let needles = mesh("needles", &positions, triangles.clone());
+    // Aimed at, because by chance no ray would meet a needle.
+    let mut batch = RayBatch::default();
+    for triangle in 0..2000 {
+        let [a, b, c] = needles.corners(triangle);
+        let origin = random.direction() * 4.0;
+        batch.push(origin, ((a + b * 2.0 + c * 2.0) / 5.0 - origin).normalize());
+    }
+    let geometry = scene(vec![needles, blob(8)]);
+    assert_all_agree(&geometry, &batch, "needles");
+    assert_bvh_equals_exact(&geometry, &batch, "needles");
+}
+
+#[test]
+fn ties_go_to_the_lowest_placement_and_triangle() {
+    // Each triangle three times in the mesh, and the mesh three times in the same place.
+    let once = blob(6);
+    let Positions::F32(vertices) = &once.positions else { unreachable!() };
+    let positions: Vec<[f32; 3]> = (0..vertices.len()).map(|i| vertices.get(i)).collect();
+    let count = once.triangles.len() as u32;
+    let thrice: Vec<[u32; 3]> = (0..3).flat_map(|_| once.triangles.iter().copied()).collect();
+    let thrice = mesh("thrice", &positions, thrice);
+    let turned = Transform::from_trs(DVec3::X, DQuat::from_rotation_y(0.3), DVec3::splat(0.7));
+    for transform in [Transform::IDENTITY, turned] {
+        let placements = vec![placed(0, transform); 3];
+        let geometry = at(vec![thrice.clone()], placements);
+        let batch = rays(1000, transform.translation, 1.0, 61);
+        assert_all_agree(&geometry, &batch, "thrice in one place");
+        for (name, accel) in each(&geometry) {
+            let hits = closest(&*accel, &batch);
+            for i in (0..batch.len()).filter(|&i| hits.is_hit(i)) {
+                assert_eq!(hits.placement[i], 0, "{name}: ray {i}");
+                assert!(hits.triangle[i] < count, "{name}: ray {i}");
+            }
+        }
+    }
+}
+
+#[test]
+fn mirrored_and_flattened_placements_agree() {
+    let mut random = Random(67);
+    let placements = [
+        DVec3::new(-1.0, 1.0, 1.0),
+        DVec3::new(-1.0, -1.0, -1.0),
+        DVec3::new(1.0, 1.0, 0.0),
+        DVec3::new(0.0, 1.0, 0.0),
+        DVec3::new(1e-7, 1.0, 1.0),
+        DVec3::ZERO,
+    ]
+    .map(|scale| placed(0, Transform::from_trs(random.cube(), random.rotation(), scale)));
+    for placements in [placements.to_vec(), placements[..1].to_vec(), placements[2..3].to_vec()] {
+        let geometry = at(vec![blob(12)], placements);
+        let rays = rays(3000, DVec3::ZERO, 1.5, 71);
+        assert_all_agree(&geometry, &rays, "mirrored and flattened");
+        assert_bvh_equals_exact(&geometry, &rays, "mirrored and flattened");
+    }
+}
+
+/// The outside of a closed mesh stays outside under mirrors: seen from outside, normals face the
+/// viewer.
+#[test]
+fn normals_lie_on_the_front() {
+    for scale in [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, -2.0, 1.0)] {
+        for copies in [1, 2] {
+            let transform = Transform::from_trs(DVec3::ONE, DQuat::from_rotation_x(1.0), scale);
+            let geometry = at(vec![blob(12)], vec![placed(0, transform); copies]);
+            let mut batch = RayBatch::default();
+            let mut random = Random(73);
+            for _ in 0..500 {
+                let away = random.direction();
+                batch.push(DVec3::ONE + away * 5.0, -away);
+            }
+            for (name, accel) in each(&geometry) {
+                let hits = closest(&*accel, &batch);
+                for i in 0..batch.len() {
+                    let facing = hits.normal(i).dot(batch.direction(i));
+                    assert!(facing < 0.0, "{name}, {scale}: ray {i} sees the back");
+                    assert!((hits.normal(i).length() - 1.0).abs() < 1e-14, "{name}: unit");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn empty_things_and_batches_of_every_length_work() {
+    let nothing = mesh("nothing", &[], vec![]);
+    let one = mesh("one", &[[-1., -1., 1.], [1., -1., 1.], [0., 1., 1.]], vec![[0, 1, 2]]);
+    let point = mesh("point", &[[1.0, 1.0, 1.0]], vec![[0, 0, 0]]);
+    for (what, geometry) in [
+        ("no geometry", Arc::new(Geometry::default())),
+        ("mesh without triangles", scene(vec![nothing.clone()])),
+        ("mesh that is not placed", at(vec![one.clone()], vec![])),
+        ("one triangle", scene(vec![one.clone()])),
+        ("one point", scene(vec![point])),
+        ("one triangle among nothing", scene(vec![nothing, one])),
+    ] {
+        for count in [0, 1, 7, 16, 17, 300] {
+            assert_all_agree(&geometry, &rays(count, DVec3::ZERO, 1.0, 79), what);
+        }
+    }
+}
+
+/// Rays that make no sense miss; they do not disturb their neighbours.
+#[test]
+fn senseless_rays_miss() {
+    let geometry = scene(vec![blob(8)]);
+    let mut batch = RayBatch::default();
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        batch.push(DVec3::ZERO, DVec3::X);
+        batch.push(DVec3::new(bad, 0.0, 0.0), DVec3::X);
+        batch.push(DVec3::ZERO, DVec3::new(0.0, bad, 0.0));
+    }
+    batch.push(DVec3::ZERO, DVec3::ZERO);
+    batch.push_between(DVec3::ZERO, DVec3::X, 5.0, 1.0);
+    batch.push_between(DVec3::ZERO, DVec3::X, f64::NAN, f64::NAN);
+    batch.push(DVec3::splat(1e30), DVec3::X);
+    batch.push(DVec3::splat(1e300), DVec3::NEG_Y);
+    batch.push(DVec3::ZERO, DVec3::X);
+    assert_all_agree(&geometry, &batch, "senseless");
+    for (name, accel) in each(&geometry) {
+        let hits = closest(&*accel, &batch);
+        let hit: Vec<usize> = (0..batch.len()).filter(|&i| hits.is_hit(i)).collect();
+        assert_eq!(hit, [0, 3, 6, batch.len() - 1], "{name}");
+    }
+}
+
+/// No ray aimed exactly at a corner or an edge of a closed mesh gets through, from outside or from
+/// inside, wherever the mesh stands.
+#[test]
+fn closed_meshes_do_not_leak() {
+    let closed = blob(12);
+    let turned = Transform::from_trs(
+        DVec3::new(1e5, 3.0, -7e6),
+        DQuat::from_rotation_y(0.7),
+        DVec3::new(1.0, -1.5, 0.8),
+    );
+    let mut random = Random(83);
+    for transform in [Transform::IDENTITY, turned] {
+        for copies in [1, 2] {
+            let geometry = at(vec![closed.clone()], vec![placed(0, transform); copies]);
+            let mut batch = RayBatch::default();
+            for triangle in 0..closed.triangles.len() {
+                let corners = closed.corners(triangle).map(|p| transform.point(p));
+                let away = random.direction();
+                for k in 0..3 {
+                    let middle = (corners[k] + corners[(k + 1) % 3]) / 2.0;
+                    for target in [corners[k], middle] {
+                        let inside = transform.point(away * 0.3);
+                        batch.push(inside, (target - inside).normalize());
+                        // From ahead, so that the target is no silhouette.
+                        let local = closed.corners(triangle)[k];
+                        let outside = transform.point(local * 4.0 + away * 0.3);
+                        batch.push(outside, (target - outside).normalize());
+                    }
+                }
+            }
+            for (name, accel) in each(&geometry) {
+                for coherent in [false, true] {
+                    batch.coherent = coherent;
+                    let hits = closest(&*accel, &batch);
+                    let leaks = (0..batch.len()).filter(|&i| !hits.is_hit(i)).count();
+                    assert_eq!(leaks, 0, "{name}, coherent {coherent}, of {} rays", batch.len());
+                    let mut blocked = Vec::new();
+                    accel.occluded(&batch, &mut blocked);
+                    assert!(blocked.iter().all(|&b| b), "{name}, coherent {coherent}: occlusion");
+                }
+            }
+        }
+    }
+}
+
+/// Neighbouring rays of a small picture, as packets get them, against the same one by one.
+#[test]
+fn packets_agree_with_single_rays() {
+    let mut random = Random(89);
+    for (what, geometry) in [
+        ("blob", scene(vec![blob(60)])),
+        ("soup", scene(vec![soup(3000, 0.1, 10)])),
+        ("instances", instances(&mut random, 20)),
+    ] {
+        for (eye, width) in [(DVec3::new(0.0, 0.0, 4.0), 0.8), (DVec3::splat(0.02), 3.0)] {
+            let mut batch = RayBatch { coherent: true, ..RayBatch::default() };
+            for block in 0..64 {
+                for pixel in 0..64 {
+                    let x = f64::from(block % 8 * 8 + pixel % 8) / 32.0 - 1.0;
+                    let y = f64::from(block / 8 * 8 + pixel / 8) / 32.0 - 1.0;
+                    batch.push(eye, DVec3::new(x * width, y * width, -2.0).normalize());
+                }
+            }
+            assert_all_agree(&geometry, &batch, what);
+            assert_bvh_equals_exact(&geometry, &batch, what);
+        }
+    }
+}
+
+#[test]
+fn builds_do_not_depend_on_threads() {
+    let geometry = scene(vec![soup(200_000, 0.01, 11)]);
+    let batch = rays(3000, DVec3::ZERO, 1.0, 97);
+    let build = |threads| {
+        let options = BuildOptions { threads, ..BuildOptions::default() };
+        Bvh::build(Arc::clone(&geometry), &options).expect("sound")
+    };
+    let (one, four) = (build(1), build(4));
+    assert_eq!(one.fingerprint(), four.fingerprint());
+    assert_bvh_equals_exact(&geometry, &batch, "200 000 triangles");
+}
+
+#[test]
+fn memory_limits_and_progress_are_heeded() {
+    let geometry = scene(vec![soup(20_000, 0.1, 12)]);
+    for (name, build) in BACKENDS {
+        let tight = BuildOptions { memory_limit: Some(10_000), ..BuildOptions::default() };
+        let refused = build(Arc::clone(&geometry), &tight);
+        assert!(matches!(refused, Err(BuildError::MemoryLimit { .. })), "{name}");
+        let roomy = BuildOptions { memory_limit: Some(1 << 30), ..BuildOptions::default() };
+        assert!(build(Arc::clone(&geometry), &roomy).is_ok(), "{name}");
+
+        let stop = BuildOptions { progress: Some(Arc::new(|_| false)), ..BuildOptions::default() };
+        let stopped = build(Arc::clone(&geometry), &stop);
+        assert!(matches!(stopped, Err(BuildError::Stopped)), "{name}");
+
+        let calls = Arc::new(AtomicUsize::new(0));
+        let count = Arc::clone(&calls);
+        let watched = BuildOptions {
+            progress: Some(Arc::new(move |share| {
+                assert!((0.0..=1.0).contains(&share), "{share}");
+                count.fetch_add(1, Ordering::Relaxed);
+                true
+            })),
+            ..BuildOptions::default()
+        };
+        let built = build(Arc::clone(&geometry), &watched).expect("nothing stops it");
+        assert!(calls.load(Ordering::Relaxed) > 0, "{name}");
+        assert!(built.report().bytes > 0, "{name}");
+    }
+}
