@@ -96,7 +96,7 @@ impl Embree {
             recheck::minority_sides(hits, &solved.front, suspects);
         }
         suspects.retain(|&i| solved.valid[i as usize]);
-        recheck::lonely_misses(hits, &rays32.in_box, suspects);
+        recheck::lonely_misses(hits, |i| self.frame.may_meet(rays, i), suspects);
         // First a cheap second opinion, from one ray beside each.
         again.clear();
         for &i in suspects.iter() {

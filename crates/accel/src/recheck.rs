@@ -87,15 +87,20 @@ pub(crate) fn decide(
     placement != MISS
 }
 
-/// The misses within the scene's box (`in_box`) of a batch that mostly hits: rays that slip through
-/// are rare, so they are few among many, and the sky around an object is not looked at twice.
-pub(crate) fn lonely_misses(hits: &HitBatch, in_box: &[bool], suspects: &mut Vec<u32>) {
-    let missed = |i: &usize| hits.placement[*i] == MISS && in_box[*i];
-    let misses = (0..hits.len()).filter(missed).count();
-    if misses * 8 <= hits.len() || hits.len() < 16 {
-        #[expect(clippy::cast_possible_truncation, reason = "batches are small")]
-        suspects.extend((0..hits.len()).filter(missed).map(|i| i as u32));
+/// The misses of a batch that mostly hits, where `in_box` says that the ray crosses the scene's box:
+/// rays that slip through are rare, so they are few among many, and the sky around an object is not
+/// looked at twice.
+pub(crate) fn lonely_misses(
+    hits: &HitBatch,
+    in_box: impl Fn(usize) -> bool,
+    suspects: &mut Vec<u32>,
+) {
+    let misses = hits.placement.iter().filter(|&&placement| placement == MISS).count();
+    if misses == 0 || (misses * 8 > hits.len() && hits.len() >= 16) {
+        return;
     }
+    let missed = (0..).zip(&hits.placement).filter(|&(_, &placement)| placement == MISS);
+    suspects.extend(missed.map(|(i, _)| i).filter(|&i: &u32| in_box(i as usize)));
 }
 
 /// For each placement met by the batch, the rays that met the side that fewer of the others met.

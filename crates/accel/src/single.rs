@@ -51,6 +51,16 @@ impl Frame {
         2.0 * f64::from(f32::EPSILON) * (self.centre.length() + FAR * self.radius)
     }
 
+    /// Whether ray `i`'s line may meet the scene's box: separating axes along the cross products of
+    /// the line with the box's axes. Safe rather than tight.
+    pub(crate) fn may_meet(&self, rays: &RayBatch, i: usize) -> bool {
+        let d = rays.direction(i);
+        let moment = (self.centre - (rays.origin(i) - self.origin)).cross(d).abs();
+        let (h, a) = (self.half, d.abs());
+        let reach = DVec3::new(h.y * a.z + h.z * a.y, h.z * a.x + h.x * a.z, h.x * a.y + h.y * a.x);
+        moment.cmple(reach).all()
+    }
+
     /// Lateral distance (m) by which single precision may misplace a ray against the scene: a few
     /// units in the last place of the largest coordinate there is.
     pub(crate) fn blur(&self) -> f64 {
@@ -67,8 +77,6 @@ pub(crate) struct Rays32 {
     pub(crate) t_far: Vec<f32>,
     /// How far (m) each ray was moved ahead of its true origin.
     pub(crate) advance: Vec<f64>,
-    /// Whether the ray's line comes near the scene's box at all.
-    pub(crate) in_box: Vec<bool>,
 }
 
 impl Rays32 {
@@ -83,7 +91,6 @@ impl Rays32 {
         self.t_near.resize(len, 0.0);
         self.t_far.resize(len, 0.0);
         self.advance.resize(len, 0.0);
-        self.in_box.resize(len, false);
     }
 
     /// Converts `rays` for a scene in `frame`.
@@ -101,7 +108,6 @@ impl Rays32 {
         self.t_near.push(from.t_near[i]);
         self.t_far.push(from.t_far[i]);
         self.advance.push(from.advance[i]);
-        self.in_box.push(from.in_box[i]);
     }
 
     pub(crate) fn clear(&mut self) {
@@ -128,7 +134,7 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
     let [px, py, pz] = out.origin.each_mut().map(|array| &mut array[..n]);
     let [qx, qy, qz] = out.direction.each_mut().map(|array| &mut array[..n]);
     let (t_near, t_far) = (&mut out.t_near[..n], &mut out.t_far[..n]);
-    let (advance, in_box) = (&mut out.advance[..n], &mut out.in_box[..n]);
+    let advance = &mut out.advance[..n];
     let far = FAR * frame.radius;
     let pull = frame.nudge() / frame.radius;
     let push = 0.5 * frame.nudge();
@@ -155,12 +161,5 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
         qz[i] = round(dz[i]);
         t_near[i] = round((t_min[i] - ahead).max(0.0) * (1.0 - 1e-6));
         t_far[i] = round((t_max[i] - ahead) * (1.0 + 1e-6));
-        // Separating axes between the ray's line and the box: the three cross products with the
-        // box's axes. The box's own axes are not tried; this only has to be safe and cheap.
-        let (sx, sy, sz) = (frame.half.x, frame.half.y, frame.half.z);
-        let (ax, ay, az) = (dx[i].abs(), dy[i].abs(), dz[i].abs());
-        in_box[i] = (cy * dz[i] - cz * dy[i]).abs() <= sy * az + sz * ay
-            && (cz * dx[i] - cx * dz[i]).abs() <= sz * ax + sx * az
-            && (cx * dy[i] - cy * dx[i]).abs() <= sx * ay + sy * ax;
     }
 }

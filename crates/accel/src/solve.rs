@@ -17,8 +17,10 @@
 //! error. Single precision picks the wrong one of two neighbours when a ray passes within about 10⁻⁷
 //! of their edge; such a hit comes out invalid here and is looked at again by the backend.
 
-use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, Geometry, HitBatch, MISS, Mesh, Placement, Positions, RayBatch};
+use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{
+    Detail, Geometry, HitBatch, MISS, Mesh, Placement, Positions, RayBatch, Transform,
+};
 
 /// Rays worked on side by side: long enough to vectorise, short enough to stay in the first cache.
 const LANES: usize = 64;
@@ -160,48 +162,69 @@ fn gather_run(
     lanes: &mut Lanes,
 ) {
     let triangles: &[[u32; 3]] = &mesh.triangles;
-    let transform = &placement.world_from_mesh;
-    let handedness = transform.handedness();
-    let identity = transform.linear == etendue_geometry::glam::DMat3::IDENTITY;
-    let mut put = |i: usize, [p0, p1, p2]: [DVec3; 3]| {
-        let lane = i - first;
-        let offset = transform.offset_from(rays.origin(i));
-        let (p0, e1, e2) = if identity {
-            (p0, p1 - p0, p2 - p0)
-        } else {
-            let linear = &transform.linear;
-            (*linear * p0, *linear * (p1 - p0), *linear * (p2 - p0))
-        };
-        let a = p0 + offset;
-        for axis in 0..3 {
-            lanes.a[axis][lane] = a[axis];
-            lanes.e1[axis][lane] = e1[axis];
-            lanes.e2[axis][lane] = e2[axis];
-        }
-        lanes.magnitude[lane] = l1(p0) + l1(offset);
-        lanes.handedness[lane] = handedness;
-    };
+    let place = Place::of(&placement.world_from_mesh);
+    let corners = |i: usize| triangles[hits.triangle[i] as usize].map(|corner| corner as usize);
     match &mesh.positions {
-        Positions::F32(vertices) => {
-            let (floats, stride) = (&vertices.floats()[..], vertices.stride());
+        Positions::F32(vertices) if vertices.stride() == 3 => {
+            // The usual layout, with one bounds check a corner.
+            let (floats, _) = vertices.floats().as_chunks::<3>();
             for i in run {
-                put(i, triangles[hits.triangle[i] as usize].map(|corner| {
-                    let at = corner as usize * stride;
-                    let [x, y, z] = [floats[at], floats[at + 1], floats[at + 2]];
-                    DVec3::new(x.into(), y.into(), z.into())
-                }));
+                let [p, q, r] = corners(i);
+                let corners = [wide(floats[p]), wide(floats[q]), wide(floats[r])];
+                lanes.put(i - first, &place, rays.origin(i), corners);
             }
         }
-        Positions::F64(vertices) => {
-            let vertices: &[[f64; 3]] = vertices;
+        positions => {
             for i in run {
-                let corners = triangles[hits.triangle[i] as usize];
-                put(i, corners.map(|corner| vertices[corner as usize].into()));
+                let corners = corners(i).map(|corner| positions.get(corner));
+                lanes.put(i - first, &place, rays.origin(i), corners);
             }
         }
     }
 }
 
+/// A placement's transform with what is asked of it for every hit.
+struct Place<'a> {
+    transform: &'a Transform,
+    handedness: f64,
+    /// Nothing to multiply.
+    moved_only: bool,
+}
+
+impl<'a> Place<'a> {
+    fn of(transform: &'a Transform) -> Self {
+        let moved_only = transform.linear == DMat3::IDENTITY;
+        Self { transform, handedness: transform.handedness(), moved_only }
+    }
+}
+
+impl Lanes {
+    /// Puts a triangle of local corners, seen from `origin`, into a lane.
+    #[inline]
+    fn put(&mut self, lane: usize, place: &Place<'_>, origin: DVec3, [p0, p1, p2]: [DVec3; 3]) {
+        let offset = place.transform.offset_from(origin);
+        let (mut p0, mut e1, mut e2) = (p0, p1 - p0, p2 - p0);
+        if !place.moved_only {
+            let linear = &place.transform.linear;
+            (p0, e1, e2) = (*linear * p0, *linear * e1, *linear * e2);
+        }
+        let a = p0 + offset;
+        for axis in 0..3 {
+            self.a[axis][lane] = a[axis];
+            self.e1[axis][lane] = e1[axis];
+            self.e2[axis][lane] = e2[axis];
+        }
+        self.magnitude[lane] = l1(p0) + l1(offset);
+        self.handedness[lane] = place.handedness;
+    }
+}
+
+#[inline]
+fn wide([x, y, z]: [f32; 3]) -> DVec3 {
+    DVec3::new(x.into(), y.into(), z.into())
+}
+
+#[inline]
 fn l1(v: DVec3) -> f64 {
     v.x.abs() + v.y.abs() + v.z.abs()
 }
@@ -265,8 +288,7 @@ fn scatter(
         }
         let t = lanes.t[lane];
         // Written so that NaN, from a triangle seen edge-on, is invalid.
-        solved.valid[i] =
-            lanes.excess[lane] <= 0.0 && t >= rays.t_min[i] && t <= rays.t_max[i];
+        solved.valid[i] = lanes.excess[lane] <= 0.0 && t >= rays.t_min[i] && t <= rays.t_max[i];
         solved.front[i] = lanes.front[lane] > 0.0;
         hits.t[i] = t;
         if surface {
