@@ -75,7 +75,7 @@ pub enum QuantityError {
         /// The string.
         text: String,
         /// The unit of a bare number.
-        unit: &'static str,
+        unit: String,
     },
     /// A unit that is not in the table.
     #[error("\"{text}\": unknown unit `{unit}`, known: {}", known.join(", "))]
@@ -125,7 +125,7 @@ impl Dimension {
     /// # Errors
     ///
     /// When the number or the unit is missing, unknown or not finite.
-    pub fn parse(self, text: &str, target: &'static str) -> Result<f64, QuantityError> {
+    pub fn parse(self, text: &str, target: &str) -> Result<f64, QuantityError> {
         let trimmed = text.trim();
         let (number, unit) = split_number(trimmed);
         let Ok(value) = number.parse::<f64>() else {
@@ -133,7 +133,7 @@ impl Dimension {
             return Err(QuantityError::NoNumber { text: text.to_owned(), example });
         };
         if unit.is_empty() {
-            return Err(QuantityError::NoUnit { text: trimmed.to_owned(), unit: target });
+            return Err(QuantityError::NoUnit { text: trimmed.to_owned(), unit: target.to_owned() });
         }
         let of = |name: &str| self.units().iter().find(|(known, ..)| *known == name);
         let (Some(&(_, up, down)), Some(&(_, target_up, target_down))) = (of(unit), of(target))
@@ -246,6 +246,7 @@ macro_rules! quantity {
                 json_schema!({
                     "description": concat!("A number in ", $unit, ", or a string with a unit."),
                     "x-quantity": $dimension.name(),
+                    "x-unit": $unit,
                     "anyOf": [{ "type": "number" }, { "type": "string" }]
                 })
             }

@@ -1,0 +1,251 @@
+//! A JSON text, its values, and where in the text each of them stands.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+/// A place in a text, both counted from 1; the column in characters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// The line.
+    pub line: usize,
+    /// The column.
+    pub column: usize,
+}
+
+/// Why a text is no JSON document for us.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Fault {
+    pub(crate) place: Place,
+    pub(crate) reason: String,
+}
+
+/// A parsed text.
+#[derive(Debug, Clone)]
+pub(crate) struct Document {
+    text: String,
+    /// The byte where each value's key (or the value, in an array) starts.
+    starts: BTreeMap<String, usize>,
+    pub(crate) value: Value,
+}
+
+impl Document {
+    /// Parses `text`.
+    ///
+    /// # Errors
+    ///
+    /// When it is not JSON, or an object has a key twice.
+    pub(crate) fn parse(text: String) -> Result<Self, Fault> {
+        let value: Value = serde_json::from_str(&text).map_err(|error| {
+            let reason = error.to_string();
+            // serde_json puts the place behind its sentence; ours stands in front.
+            let reason = reason.rsplit_once(" at line ").map_or(&*reason, |(head, _)| head);
+            let place = character_place(&text, error.line(), error.column());
+            Fault { place, reason: reason.to_owned() }
+        })?;
+        let mut scanner = Scanner { text: &text, at: 0, starts: BTreeMap::new() };
+        if let Err((at, path)) = scanner.value("") {
+            let reason = format!("the key {path} stands here a second time; remove one of them");
+            return Err(Fault { place: place_of(&text, at), reason });
+        }
+        let starts = scanner.starts;
+        Ok(Self { starts, value, text })
+    }
+
+    /// Where the value at `path` stands in the text.
+    pub(crate) fn place(&self, path: &str) -> Option<Place> {
+        self.starts.get(path).map(|&at| place_of(&self.text, at))
+    }
+}
+
+/// A JSON path one step longer: `objects[2]` and `transform` give `objects[2].transform`.
+pub(crate) fn join(path: &str, key: &str) -> String {
+    let plain = !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
+    match (path.is_empty(), plain) {
+        (true, true) => key.to_owned(),
+        (false, true) => format!("{path}.{key}"),
+        (_, false) => format!("{path}[{key:?}]"),
+    }
+}
+
+/// A JSON path one step longer, into an array.
+pub(crate) fn join_index(path: &str, index: usize) -> String {
+    format!("{path}[{index}]")
+}
+
+/// The line at `place` with its number, and a caret below the column.
+pub(crate) fn excerpt(text: &str, place: Place) -> String {
+    const BEFORE: usize = 60;
+    const SHOWN: usize = 100;
+    let line: Vec<char> = text.lines().nth(place.line - 1).unwrap_or_default().chars().collect();
+    // A file without line breaks is one very long line: show the part around the place.
+    let start = (place.column - 1).saturating_sub(BEFORE);
+    let shown: String = line
+        .iter()
+        .skip(start)
+        .take(SHOWN)
+        .map(|&c| if c.is_control() { ' ' } else { c })
+        .collect();
+    let number = place.line.to_string();
+    let margin = " ".repeat(number.len());
+    let indent = " ".repeat(place.column - 1 - start);
+    format!("  {number} | {shown}\n  {margin} | {indent}^")
+}
+
+/// The place of serde_json's line and byte column.
+fn character_place(text: &str, line: usize, column: usize) -> Place {
+    let content = text.split('\n').nth(line.saturating_sub(1)).unwrap_or_default();
+    let mut end = column.saturating_sub(1).min(content.len());
+    while !content.is_char_boundary(end) {
+        end -= 1;
+    }
+    Place { line: line.max(1), column: content[..end].chars().count() + 1 }
+}
+
+fn place_of(text: &str, at: usize) -> Place {
+    let before = text.get(..at).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+    Place {
+        line: before.matches('\n').count() + 1,
+        column: before[line_start..].chars().count() + 1,
+    }
+}
+
+/// Walks over a text that is known to be JSON.
+struct Scanner<'a> {
+    text: &'a str,
+    at: usize,
+    starts: BTreeMap<String, usize>,
+}
+
+/// The byte and path of a key that its object already had.
+type Twice = (usize, String);
+
+impl Scanner<'_> {
+    fn peek(&mut self) -> u8 {
+        let bytes = self.text.as_bytes();
+        while bytes.get(self.at).is_some_and(u8::is_ascii_whitespace) {
+            self.at += 1;
+        }
+        bytes.get(self.at).copied().unwrap_or(b'\0')
+    }
+
+    fn value(&mut self, path: &str) -> Result<(), Twice> {
+        match self.peek() {
+            b'{' => self.object(path),
+            b'[' => self.array(path),
+            b'"' => {
+                self.string();
+                Ok(())
+            }
+            _ => {
+                let rest = &self.text[self.at..];
+                let end = rest.find([',', ']', '}']).unwrap_or(rest.len());
+                self.at += end;
+                Ok(())
+            }
+        }
+    }
+
+    fn object(&mut self, path: &str) -> Result<(), Twice> {
+        self.at += 1;
+        while self.peek() != b'}' && self.at < self.text.len() {
+            if self.peek() == b',' {
+                self.at += 1;
+                continue;
+            }
+            let start = self.at;
+            let member = join(path, &self.string());
+            if self.starts.insert(member.clone(), start).is_some() {
+                return Err((start, member));
+            }
+            if self.peek() == b':' {
+                self.at += 1;
+            }
+            self.value(&member)?;
+        }
+        self.at += 1;
+        Ok(())
+    }
+
+    fn array(&mut self, path: &str) -> Result<(), Twice> {
+        self.at += 1;
+        let mut index = 0;
+        while self.peek() != b']' && self.at < self.text.len() {
+            if self.peek() == b',' {
+                self.at += 1;
+                continue;
+            }
+            let element = join_index(path, index);
+            self.starts.insert(element.clone(), self.at);
+            self.value(&element)?;
+            index += 1;
+        }
+        self.at += 1;
+        Ok(())
+    }
+
+    /// Passes over a string and gives what it says.
+    fn string(&mut self) -> String {
+        let start = self.at;
+        self.at += 1;
+        let bytes = self.text.as_bytes();
+        while let Some(&byte) = bytes.get(self.at) {
+            self.at += if byte == b'\\' { 2 } else { 1 };
+            if byte == b'"' {
+                break;
+            }
+        }
+        let raw = self.text.get(start..self.at).unwrap_or_default();
+        serde_json::from_str(raw).unwrap_or_else(|_| raw.to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_value_knows_its_place() {
+        let text = "{\n  \"a\": [1, {\"b\": \"}\\\"\"}],\n  \"é\": 2, \"x y\": {\"c\": null}\n}";
+        let document = Document::parse(text.to_owned()).unwrap();
+        let place = |path| document.place(path).map(|p| (p.line, p.column));
+        assert_eq!(place("a"), Some((2, 3)));
+        assert_eq!(place("a[0]"), Some((2, 9)));
+        assert_eq!(place("a[1].b"), Some((2, 13)));
+        assert_eq!(place("é"), Some((3, 3)));
+        assert_eq!(place("[\"x y\"].c"), Some((3, 19)), "columns count characters, not bytes");
+        assert_eq!(place("b"), None);
+    }
+
+    #[test]
+    fn broken_text_says_where() {
+        let text = "{\n  \"fov\": 30\n  \"x\": 1\n}";
+        let fault = Document::parse(text.to_owned()).unwrap_err();
+        assert_eq!(fault.place, Place { line: 3, column: 3 });
+        assert!(fault.reason.contains("expected `,` or `}`"), "{}", fault.reason);
+        assert_eq!(excerpt(text, fault.place), "  3 |   \"x\": 1\n    |   ^");
+        let end = Document::parse("{\"a\": ".to_owned()).unwrap_err();
+        assert!(end.reason.contains("EOF"), "{}", end.reason);
+        let wide = Document::parse("{\"é\": tru }".to_owned()).unwrap_err();
+        assert_eq!(wide.place.line, 1);
+        assert!(Document::parse(String::new()).is_err());
+        let deep = "[".repeat(100_000);
+        assert!(Document::parse(deep).unwrap_err().reason.contains("recursion"));
+    }
+
+    #[test]
+    fn a_key_given_twice_is_refused() {
+        let fault = Document::parse("{\"a\": {\"b\": 1,\n\"b\": 2}}".to_owned()).unwrap_err();
+        assert_eq!(fault.place, Place { line: 2, column: 1 });
+        assert!(fault.reason.contains("a.b"), "{}", fault.reason);
+    }
+
+    #[test]
+    fn a_long_line_is_shown_around_the_place() {
+        let text = "x".repeat(5000);
+        let shown = excerpt(&text, Place { line: 1, column: 3000 });
+        assert!(shown.lines().all(|line| line.len() < 120), "{shown}");
+        assert!(shown.ends_with('^'));
+    }
+}

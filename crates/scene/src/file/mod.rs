@@ -1,0 +1,213 @@
+//! The JSON scene format, version 1: read, changed by settings from the command line, checked.
+
+mod check;
+mod document;
+mod object;
+mod overrides;
+mod schema;
+mod settings;
+mod spec;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+pub use document::Place;
+pub use object::{ObjectSpec, Scale, Source, TransformSpec};
+pub use overrides::OverrideError;
+pub use schema::scene_schema;
+pub use settings::{AccelName, RenderSpec, TracerSpec};
+pub use spec::{SceneSpec, Version};
+
+pub(crate) use check::{nearest, suggest};
+pub(crate) use document::{join, join_index};
+
+use crate::SceneError;
+use document::{Document, excerpt};
+
+/// The endings of models that may stand in for a scene file.
+const MODELS: [&str; 4] = ["gltf", "glb", "obj", "ply"];
+
+/// The longest text that is read as a scene (bytes): scenes name their meshes, they do not hold
+/// them.
+const LONGEST: u64 = 64 << 20;
+
+/// A scene file, read and checked for itself; nothing it names has been opened.
+#[derive(Debug, Clone)]
+pub struct SceneFile {
+    path: PathBuf,
+    kind: FileKind,
+    /// The text, to say where in it something is wrong; none for a model.
+    document: Option<Document>,
+    /// All values with the settings applied.
+    value: Value,
+    /// Which paths the command line set, and how it was written there.
+    settings: BTreeMap<String, String>,
+    /// What the file says.
+    pub spec: SceneSpec,
+}
+
+/// What kind of file stands for the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileKind {
+    /// A JSON scene.
+    Scene,
+    /// A model, rendered as a scene of its own.
+    Model,
+}
+
+impl SceneFile {
+    /// Reads the scene at `path`, or makes a scene of the model there (`.gltf`, `.glb`, `.obj`,
+    /// `.ply`), and applies `overrides`: pairs such as (`camera.fov`, `30`), whose second part is
+    /// JSON or else a plain string.
+    ///
+    /// # Errors
+    ///
+    /// When the file is missing, not JSON, or says something that the format does not know; the
+    /// message names the place.
+    pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, SceneError> {
+        let kind = if is_model(path) { FileKind::Model } else { FileKind::Scene };
+        let (document, mut value) = match kind {
+            FileKind::Model => {
+                // Only the name: the model's own folder is the scene's.
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                (None, json!({ "etendue": 1, "objects": [{ "file": name }] }))
+            }
+            FileKind::Scene => {
+                let document = read_document(path)?;
+                let value = document.value.clone();
+                (Some(document), value)
+            }
+        };
+        // A camera that nobody describes is this one, and settings may go on from it.
+        if let Value::Object(members) = &mut value {
+            members.entry("camera").or_insert_with(|| json!({ "type": "pinhole" }));
+        }
+        let mut settings = BTreeMap::new();
+        for (key, text) in overrides {
+            let setting = format!("{key}={text}");
+            let applied = overrides::apply(&mut value, key, text)
+                .map_err(|source| SceneError::Override { setting: setting.clone(), source })?;
+            settings.insert(applied, setting);
+        }
+        let mut file = Self {
+            path: path.to_owned(),
+            kind,
+            document,
+            value,
+            settings,
+            spec: SceneSpec::default(),
+        };
+        file.spec = file.check()?;
+        Ok(file)
+    }
+
+    fn check(&self) -> Result<SceneSpec, SceneError> {
+        check::check(&schema::SCENE, &self.value)
+            .map_err(|problem| self.fault(&problem.path, problem.reason))?;
+        serde_path_to_error::deserialize(&self.value).map_err(|error| {
+            let path = error.path().to_string();
+            let path = if path == "." { String::new() } else { path };
+            self.fault(&path, error.into_inner().to_string())
+        })
+    }
+
+    /// The error that the value at the JSON path `path` is wrong because of `reason`.
+    pub(crate) fn fault(&self, path: &str, reason: impl Into<String>) -> SceneError {
+        SceneError::Invalid {
+            file: self.path.clone(),
+            path: path.to_owned(),
+            place: self.place(path),
+            reason: reason.into(),
+        }
+    }
+
+    /// Where the value at `path`, or the nearest that holds it, was written.
+    fn place(&self, path: &str) -> Origin {
+        let holders = || {
+            std::iter::successors(Some(path), |path| path.rfind(['.', '[']).map(|end| &path[..end]))
+        };
+        // A setting replaces all that the text has below it.
+        let setting = holders().find_map(|path| self.settings.get(path));
+        let place = holders().find_map(|path| self.document.as_ref()?.place(path));
+        match (setting, place) {
+            (Some(setting), _) => Origin::Setting(setting.clone()),
+            (None, Some(place)) => Origin::Text(place),
+            (None, None) => Origin::Nowhere,
+        }
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The folder that the file's own paths start at.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        match self.path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        }
+    }
+
+    /// Whether it is a JSON scene or a model.
+    #[must_use]
+    pub fn kind(&self) -> FileKind {
+        self.kind
+    }
+
+    /// All values, with the settings applied.
+    #[must_use]
+    pub fn value(&self) -> &Value {
+        &self.value
+    }
+}
+
+/// Where a value was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Origin {
+    /// In the file's text.
+    Text(Place),
+    /// On the command line, as it was written there.
+    Setting(String),
+    /// Nowhere: it is missing, or the file is a model.
+    Nowhere,
+}
+
+fn is_model(path: &Path) -> bool {
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    MODELS.iter().any(|model| ending.eq_ignore_ascii_case(model))
+}
+
+fn read_document(path: &Path) -> Result<Document, SceneError> {
+    let unreadable = |source| SceneError::unreadable(path, source);
+    let metadata = fs::metadata(path).map_err(unreadable)?;
+    if !metadata.is_file() {
+        return Err(SceneError::NotAScene {
+            file: path.to_owned(),
+            reason: "is not a regular file".to_owned(),
+        });
+    }
+    if metadata.len() > LONGEST {
+        return Err(SceneError::NotAScene {
+            file: path.to_owned(),
+            reason: format!("has {} bytes, too many for a JSON scene", metadata.len()),
+        });
+    }
+    let bytes = fs::read(path).map_err(unreadable)?;
+    let text = String::from_utf8(bytes).map_err(|error| SceneError::NotAScene {
+        file: path.to_owned(),
+        reason: format!("is not UTF-8 text (byte {})", error.utf8_error().valid_up_to()),
+    })?;
+    let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
+    Document::parse(text.clone()).map_err(|fault| SceneError::Syntax {
+        file: path.to_owned(),
+        place: fault.place,
+        excerpt: excerpt(&text, fault.place),
+        reason: fault.reason,
+    })
+}

@@ -1,0 +1,293 @@
+//! The objects of a scene file: models and shapes, and where they stand.
+
+use std::borrow::Cow;
+
+use etendue_geometry::Transform;
+use glam::{DMat3, DQuat, DVec3};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Map, Value};
+
+use crate::shape::ShapeSpec;
+
+/// One entry of `objects`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObjectSpec {
+    /// Where its triangles come from.
+    pub source: Source,
+    /// What the rest of the file and the outputs call it.
+    pub name: Option<String>,
+    /// The name of a material, which replaces those of the model.
+    pub material: Option<String>,
+    /// Where it stands.
+    pub transform: TransformSpec,
+}
+
+/// Where an object's triangles come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Source {
+    /// A glTF, OBJ or PLY file, as the scene writes its path.
+    File(String),
+    /// A shape made on load.
+    Shape(ShapeSpec),
+}
+
+/// The keys that every object may have.
+#[derive(Deserialize, JsonSchema)]
+struct Common {
+    /// What the outputs call this object.
+    #[serde(default)]
+    name: Option<String>,
+    /// The name of one of `materials`; replaces those of the model.
+    #[serde(default)]
+    material: Option<String>,
+    /// Where it stands.
+    #[serde(default)]
+    transform: TransformSpec,
+}
+
+/// A model.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Model {
+    /// A glTF, GLB, OBJ or PLY file, relative to the scene file.
+    #[serde(rename = "file")]
+    _file: String,
+}
+
+impl ObjectSpec {
+    /// What to call the object: its name, else its file's or shape's.
+    #[must_use]
+    pub fn title(&self) -> String {
+        match (&self.name, &self.source) {
+            (Some(name), _) => name.clone(),
+            (None, Source::File(path)) => path.clone(),
+            (None, Source::Shape(shape)) => shape.name().to_owned(),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for ObjectSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut own = Map::<String, Value>::deserialize(deserializer)?;
+        let mut common = Map::new();
+        for key in ["name", "material", "transform"] {
+            if let Some(value) = own.remove(key) {
+                common.insert(key.to_owned(), value);
+            }
+        }
+        let Common { name, material, transform } =
+            serde_json::from_value(Value::Object(common)).map_err(D::Error::custom)?;
+        let source = match own.remove("file") {
+            Some(Value::String(path)) if own.is_empty() => Source::File(path),
+            Some(Value::String(_)) => {
+                return Err(D::Error::custom("a model with a `file` has no keys of a shape"));
+            }
+            Some(_) => return Err(D::Error::custom("`file` is not a string")),
+            None => {
+                let shape = serde_json::from_value(Value::Object(own));
+                Source::Shape(shape.map_err(D::Error::custom)?)
+            }
+        };
+        Ok(Self { source, name, material, transform })
+    }
+}
+
+impl JsonSchema for ObjectSpec {
+    fn schema_name() -> Cow<'static, str> {
+        "Object".into()
+    }
+
+    /// The model and each shape, all with the common keys: serde cannot both flatten and refuse
+    /// unknown keys, so the parts are joined here.
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let common = Common::json_schema(generator);
+        let mut kinds = vec![Model::json_schema(generator).to_value()];
+        match ShapeSpec::json_schema(generator).get("oneOf") {
+            Some(Value::Array(shapes)) => kinds.extend(shapes.iter().cloned()),
+            _ => kinds.push(ShapeSpec::json_schema(generator).to_value()),
+        }
+        for kind in &mut kinds {
+            let keys = kind.get_mut("properties").and_then(Value::as_object_mut);
+            if let (Some(keys), Some(Value::Object(shared))) = (keys, common.get("properties")) {
+                keys.extend(shared.clone());
+            }
+        }
+        json_schema!({ "description": "A model or a shape.", "oneOf": kinds })
+    }
+}
+
+/// Where an object stands: scaled, then rotated, then translated; or one matrix.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TransformSpec {
+    /// Moves by this much (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub translate: Option<[f64; 3]>,
+    /// Turns about the axis (x, y, z) by an angle: `[x, y, z, degrees]`, counter-clockwise when
+    /// looked at against the axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate: Option<[f64; 4]>,
+    /// Turns by a quaternion `[x, y, z, w]`; normalised here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quaternion: Option<[f64; 4]>,
+    /// Scales alike along all axes, or by one factor an axis; negative factors mirror.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale: Option<Scale>,
+    /// Four rows, translation in the last column (m), instead of the others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub matrix: Option<[[f64; 4]; 4]>,
+}
+
+/// A scale.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Scale {
+    /// The same along all axes.
+    Uniform(f64),
+    /// One factor an axis.
+    PerAxis([f64; 3]),
+}
+
+/// What is wrong with a transform: the key and the reason.
+pub(crate) type TransformFault = (&'static str, String);
+
+impl TransformSpec {
+    /// The map from the object's frame to the world (m); the error when it is singular or not
+    /// finite, an axis has no length, or two keys contradict.
+    pub(crate) fn build(&self) -> Result<Transform, TransformFault> {
+        let transform = match &self.matrix {
+            Some(rows) => self.from_matrix(rows)?,
+            None => {
+                let rotation = self.rotation()?;
+                let linear = rotation * DMat3::from_diagonal(self.scale_factors()?);
+                Transform::new(linear, DVec3::from(self.translate.unwrap_or_default()))
+            }
+        };
+        if transform.is_finite() {
+            Ok(transform)
+        } else {
+            Err(("", "a number is too large or not finite".to_owned()))
+        }
+    }
+
+    fn from_matrix(&self, rows: &[[f64; 4]; 4]) -> Result<Transform, TransformFault> {
+        let others = [
+            ("translate", self.translate.is_some()),
+            ("rotate", self.rotate.is_some()),
+            ("quaternion", self.quaternion.is_some()),
+            ("scale", self.scale.is_some()),
+        ];
+        if let Some((key, _)) = others.into_iter().find(|(_, given)| *given) {
+            return Err((key, "is given beside `matrix`; give one or the other".to_owned()));
+        }
+        if rows[3] != [0.0, 0.0, 0.0, 1.0] {
+            let why = format!(
+                "the last row is {:?} instead of [0, 0, 0, 1]; the matrix is given by rows, with \
+                 the translation in the last column",
+                rows[3]
+            );
+            return Err(("matrix", why));
+        }
+        let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
+        let linear = DMat3::from_cols(column(0), column(1), column(2));
+        // Relative to its columns' lengths the determinant is a volume without unit.
+        let volume: f64 = (0..3).map(|k| column(k).length()).product();
+        if !(linear.determinant().abs() > 1e-12 * volume) {
+            let why = "is singular: it flattens the object; check the rows".to_owned();
+            return Err(("matrix", why));
+        }
+        Ok(Transform::new(linear, column(3)))
+    }
+
+    fn rotation(&self) -> Result<DMat3, TransformFault> {
+        match (self.rotate, self.quaternion) {
+            (Some(_), Some(_)) => {
+                Err(("quaternion", "is given beside `rotate`; give one or the other".to_owned()))
+            }
+            (Some([x, y, z, degrees]), None) => match DVec3::new(x, y, z).try_normalize() {
+                Some(axis) => Ok(turn(axis, degrees)),
+                None => Err((
+                    "rotate",
+                    format!("the axis [{x}, {y}, {z}] has no length; about +Y it is [0, 1, 0, …]"),
+                )),
+            },
+            (None, Some(quaternion)) => {
+                let rotation = DQuat::from_array(quaternion);
+                if rotation.length() > 1e-9 {
+                    Ok(DMat3::from_quat(rotation.normalize()))
+                } else {
+                    let why = "has no direction; no rotation is [0, 0, 0, 1]".to_owned();
+                    Err(("quaternion", why))
+                }
+            }
+            (None, None) => Ok(DMat3::IDENTITY),
+        }
+    }
+
+    fn scale_factors(&self) -> Result<DVec3, TransformFault> {
+        let factors = match self.scale {
+            None => DVec3::ONE,
+            Some(Scale::Uniform(factor)) => DVec3::splat(factor),
+            Some(Scale::PerAxis(factors)) => factors.into(),
+        };
+        if factors.cmpeq(DVec3::ZERO).any() {
+            return Err(("scale", "is zero, which flattens the object".to_owned()));
+        }
+        Ok(factors)
+    }
+}
+
+/// The rotation about a unit axis (Rodrigues), exact for quarter turns about the coordinate axes.
+fn turn(axis: DVec3, degrees: f64) -> DMat3 {
+    let (sin, cos) = match degrees.rem_euclid(360.0) {
+        0.0 => (0.0, 1.0),
+        90.0 => (1.0, 0.0),
+        180.0 => (0.0, -1.0),
+        270.0 => (-1.0, 0.0),
+        other => other.to_radians().sin_cos(),
+    };
+    let column = |e: DVec3| e * cos + axis.cross(e) * sin + axis * (axis.dot(e) * (1.0 - cos));
+    DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn build(json: &str) -> Result<Transform, TransformFault> {
+        serde_json::from_str::<TransformSpec>(json).unwrap().build()
+    }
+
+    #[test]
+    fn scales_then_turns_then_moves() {
+        let map =
+            build(r#"{"translate": [1, 2, 3], "rotate": [0, 2, 0, 90], "scale": 2}"#).unwrap();
+        assert_eq!(map.point(DVec3::X), DVec3::new(1.0, 2.0, 1.0), "+X turns to −Z about +Y");
+        let map = build(r#"{"quaternion": [0, 0, 1, 0], "scale": [1, 2, 3]}"#).unwrap();
+        assert_eq!(map.point(DVec3::ONE), DVec3::new(-1.0, -2.0, 3.0));
+        let rows = r#"{"matrix": [[0,0,2,1],[0,2,0,2],[-2,0,0,3],[0,0,0,1]]}"#;
+        assert_eq!(build(rows).unwrap().point(DVec3::X), DVec3::new(1.0, 2.0, 1.0));
+        assert!(build("{}").unwrap().is_identity());
+        // A third of a turn about the diagonal swaps the axes around; sin and cos round once each.
+        let around = build(r#"{"rotate": [1, 1, 1, 120]}"#).unwrap().point(DVec3::X);
+        assert!((around - DVec3::Y).length() < 1e-15, "{around}");
+    }
+
+    #[test]
+    fn what_cannot_be_undone_is_refused() {
+        let fault = |json| build(json).unwrap_err();
+        assert_eq!(fault(r#"{"scale": 0}"#).0, "scale");
+        assert_eq!(fault(r#"{"scale": [1, 0, 1]}"#).0, "scale");
+        assert_eq!(fault(r#"{"rotate": [0, 0, 0, 30]}"#).0, "rotate");
+        assert_eq!(fault(r#"{"quaternion": [0, 0, 0, 0]}"#).0, "quaternion");
+        assert_eq!(fault(r#"{"quaternion": [0,0,0,1], "rotate": [1,0,0,1]}"#).0, "quaternion");
+        let flat = r#"{"matrix": [[1,2,0,0],[2,4,0,0],[0,0,1,0],[0,0,0,1]]}"#;
+        assert!(fault(flat).1.contains("singular"));
+        let turned_over = r#"{"matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[1,2,3,1]]}"#;
+        assert!(fault(turned_over).1.contains("last row"));
+        let both = r#"{"matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]], "scale": 2}"#;
+        assert_eq!(fault(both).0, "scale");
+    }
+}

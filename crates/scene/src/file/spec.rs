@@ -1,0 +1,101 @@
+//! A scene file's top level.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use etendue_camera::CameraSpec;
+use etendue_tracer::{LayerSpec, MaterialSpec};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::{ObjectSpec, RenderSpec, TracerSpec};
+
+/// A scene as the file writes it.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSpec {
+    /// The version of the format.
+    pub etendue: Version,
+    /// The camera; a pinhole that frames the scene when absent.
+    #[serde(default)]
+    pub camera: Option<CameraSpec>,
+    /// What the picture shows. When absent there is one only if there are no `layers` either, and
+    /// it shows `facing`.
+    #[serde(default)]
+    pub tracer: Option<TracerSpec>,
+    /// The layers to write beside the picture.
+    #[serde(default)]
+    pub layers: Vec<LayerSpec>,
+    /// What is in the scene; may be empty.
+    #[serde(default)]
+    pub objects: Vec<ObjectSpec>,
+    /// Materials by name, for `objects` to use.
+    #[serde(default)]
+    pub materials: BTreeMap<String, MaterialSpec>,
+    /// How it is rendered.
+    #[serde(default)]
+    pub render: RenderSpec,
+}
+
+impl SceneSpec {
+    /// The layer that holds the picture, if there is to be one.
+    #[must_use]
+    pub fn picture(&self) -> Option<LayerSpec> {
+        match (self.tracer, self.layers.is_empty()) {
+            (Some(tracer), _) => Some(tracer.layer()),
+            (None, true) => Some(LayerSpec::Facing),
+            (None, false) => None,
+        }
+    }
+
+    /// All layers, each once: the picture first.
+    #[must_use]
+    pub fn all_layers(&self) -> Vec<LayerSpec> {
+        let mut all = Vec::new();
+        for layer in self.picture().into_iter().chain(self.layers.iter().copied()) {
+            if !all.contains(&layer) {
+                all.push(layer);
+            }
+        }
+        all
+    }
+}
+
+/// The number 1: the version of the format that this program reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Version;
+
+impl Version {
+    /// The number.
+    pub const NUMBER: u64 = 1;
+}
+
+impl Serialize for Version {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_u64(Self::NUMBER)
+    }
+}
+
+impl<'de> Deserialize<'de> for Version {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match u64::deserialize(deserializer)? {
+            Self::NUMBER => Ok(Self),
+            other => Err(D::Error::custom(format!("version {other} is not version 1"))),
+        }
+    }
+}
+
+impl JsonSchema for Version {
+    fn schema_name() -> Cow<'static, str> {
+        "Version".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "The version of the format: 1.",
+            "type": "integer",
+            "const": Self::NUMBER
+        })
+    }
+}

@@ -1,0 +1,86 @@
+//! A number that tells whether two renders were of the same scene.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use etendue_geometry::MappedFile;
+use serde_json::Value;
+use xxhash_rust::xxh3::Xxh3Default;
+
+use crate::SceneError;
+
+/// The identity of a scene: XXH3-128 (Collet, *xxHash fast digest algorithm*, 2020) of
+///
+/// 1. the scene's JSON after all settings, with sorted keys and no blanks,
+/// 2. the camera as it was built, in the words of `camera.json`,
+/// 3. name (relative to the scene's folder), length and **contents** of every file that was read.
+///
+/// Comments on what it does not see: files that the render did not want (an image no layer shows).
+/// Formatting, machine, folder and time do not change it. It is no protection against forgery.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct SceneHash(pub u128);
+
+impl fmt::Display for SceneHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:032x}", self.0)
+    }
+}
+
+/// What a scene was made of.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Ingredients {
+    /// The scene's JSON.
+    pub(crate) value: Value,
+    /// Files by the name that the scene's folder gives them, sorted.
+    pub(crate) files: Vec<(String, PathBuf)>,
+}
+
+impl Ingredients {
+    pub(crate) fn hash(&self, camera: &str) -> Result<SceneHash, SceneError> {
+        let mut hash = Xxh3Default::new();
+        let mut json = String::new();
+        canonical(&self.value, &mut json);
+        add(&mut hash, json.as_bytes());
+        add(&mut hash, camera.as_bytes());
+        for (name, path) in &self.files {
+            add(&mut hash, name.as_bytes());
+            let file =
+                MappedFile::open(path).map_err(|source| SceneError::unreadable(path, source))?;
+            add(&mut hash, file.bytes());
+        }
+        Ok(SceneHash(hash.digest128()))
+    }
+}
+
+/// Adds a part behind its length, so that parts cannot run into each other.
+fn add(hash: &mut Xxh3Default, part: &[u8]) {
+    hash.update(&(part.len() as u64).to_le_bytes());
+    hash.update(part);
+}
+
+/// JSON with sorted keys, whatever order the map keeps.
+fn canonical(value: &Value, text: &mut String) {
+    match value {
+        Value::Object(members) => {
+            let mut members: Vec<_> = members.iter().collect();
+            members.sort_by_key(|(key, _)| key.as_str());
+            text.push('{');
+            for (key, member) in members {
+                text.push_str(&Value::from(key.as_str()).to_string());
+                text.push(':');
+                canonical(member, text);
+                text.push(',');
+            }
+            text.push('}');
+        }
+        Value::Array(elements) => {
+            text.push('[');
+            for element in elements {
+                canonical(element, text);
+                text.push(',');
+            }
+            text.push(']');
+        }
+        leaf => text.push_str(&leaf.to_string()),
+    }
+}

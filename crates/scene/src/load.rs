@@ -1,0 +1,439 @@
+//! From a scene file to a scene: each model once, in parallel, then put together.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use etendue_camera::{Camera, CameraError, CameraSpec, PoseSpec};
+use etendue_geometry::{Bounds, Geometry, Mesh, Placement, Positions, Transform};
+use etendue_tracer::{Material, Paint, Texture};
+use rayon::prelude::*;
+
+use crate::cameras::{self, CameraOrigin, SceneCamera};
+use crate::file::{FileKind, SceneFile, Source, join, join_index, suggest};
+use crate::identity::Ingredients;
+use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Wanted};
+use crate::paths::{Folder, Found};
+use crate::scene::{LoadOptions, LoadProgress, LoadStats, Scene};
+use crate::shape::{ShapeError, ShapeSpec};
+use crate::{SceneError, bounds};
+
+/// Where triangles come from, once for all objects that share them.
+enum Origin {
+    File(PathBuf),
+    Shape(ShapeSpec),
+}
+
+/// An object, checked; its triangles are still to come.
+struct Object {
+    title: String,
+    origin: usize,
+    world_from_object: Transform,
+    material: Option<u32>,
+}
+
+impl SceneFile {
+    /// Opens all that the scene names and puts it together. Of the models only what is `wanted` is
+    /// read.
+    ///
+    /// # Errors
+    ///
+    /// When a value makes no sense, a file is missing, leaves the scene's folder or cannot be
+    /// imported; the message names the place.
+    pub fn load(&self, wanted: Wanted, options: &LoadOptions<'_>) -> Result<Scene, SceneError> {
+        let folder = Folder::open(self.folder(), options.reach)?;
+        let materials = self.named_materials()?;
+        // What can be checked without the models is; a bad camera need not wait for them.
+        self.camera_spec().build(Bounds::default).map_err(|error| self.camera_fault(&error))?;
+        let (origins, objects) = self.resolve_objects(&folder, &materials)?;
+        let imports = self.import_all(&origins, &objects, &folder, wanted, options)?;
+        let mut parts = Parts { materials, ..Parts::default() };
+        let split_nodes = self.kind() == FileKind::Model;
+        for import in imports {
+            parts.add_import(import);
+        }
+        for (index, object) in objects.iter().enumerate() {
+            parts.place(object, split_nodes, index).map_err(|what| self.too_many(what))?;
+        }
+        self.finish(parts, &folder, options)
+    }
+
+    fn too_many(&self, what: &'static str) -> SceneError {
+        SceneError::TooMany { file: self.path().to_owned(), what, limit: u32::MAX.into() }
+    }
+
+    fn camera_spec(&self) -> CameraSpec {
+        self.spec.camera.clone().unwrap_or_default()
+    }
+
+    fn camera_fault(&self, error: &CameraError) -> SceneError {
+        self.fault(&format!("camera.{}", error.at), error.why.as_str())
+    }
+
+    /// The scene's own materials in the order of their names.
+    fn named_materials(&self) -> Result<Vec<Material>, SceneError> {
+        let mut materials = Vec::new();
+        for (name, spec) in &self.spec.materials {
+            let material = spec.resolve(name);
+            let at = |key: &str| join(&join("materials", name), key);
+            match &material.base_color {
+                Paint::Plain(color) if !color.iter().all(|c| (0.0..=1.0).contains(c)) => {
+                    let why = format!("{color:?} is outside 0 to 1; a surface reflects no more");
+                    return Err(self.fault(&at("color"), why));
+                }
+                Paint::Checker { colors, .. }
+                    if !colors.iter().flatten().all(|c| (0.0..=1.0).contains(c)) =>
+                {
+                    let why = "a value is outside 0 to 1; a surface reflects no more";
+                    return Err(self.fault(&at("colors"), why));
+                }
+                Paint::Checker { squares, .. } if !(*squares > 0.0) => {
+                    let why = format!("{squares} is not above zero");
+                    return Err(self.fault(&at("squares"), why));
+                }
+                _ => {}
+            }
+            materials.push(material);
+        }
+        Ok(materials)
+    }
+
+    fn resolve_objects(
+        &self,
+        folder: &Folder,
+        materials: &[Material],
+    ) -> Result<(Vec<Origin>, Vec<Object>), SceneError> {
+        let mut origins = Vec::new();
+        let mut files: BTreeMap<PathBuf, usize> = BTreeMap::new();
+        let mut objects = Vec::new();
+        for (index, spec) in self.spec.objects.iter().enumerate() {
+            let at = join_index("objects", index);
+            let origin = match &spec.source {
+                Source::File(written) => {
+                    let found = self.find(folder, index, written)?;
+                    *files.entry(found.real).or_insert_with(|| {
+                        origins.push(Origin::File(found.path));
+                        origins.len() - 1
+                    })
+                }
+                Source::Shape(shape) => {
+                    let same = |o: &Origin| matches!(o, Origin::Shape(known) if known == shape);
+                    origins.iter().position(same).unwrap_or_else(|| {
+                        origins.push(Origin::Shape(shape.clone()));
+                        origins.len() - 1
+                    })
+                }
+            };
+            let world_from_object = spec.transform.build().map_err(|(key, why)| {
+                let at = join(&at, "transform");
+                self.fault(&if key.is_empty() { at } else { join(&at, key) }, why)
+            })?;
+            let material = match &spec.material {
+                Some(name) => Some(self.material_index(name, materials, &at)?),
+                None => None,
+            };
+            objects.push(Object { title: spec.title(), origin, world_from_object, material });
+        }
+        Ok((origins, objects))
+    }
+
+    /// The file of an object. A model that stands for the scene is where the user said it is.
+    fn find(&self, folder: &Folder, index: usize, written: &str) -> Result<Found, SceneError> {
+        let own_name = self.path().file_name().unwrap_or_default().to_string_lossy();
+        if self.kind() == FileKind::Model && written == own_name {
+            let path = self.path().to_owned();
+            let real =
+                path.canonicalize().map_err(|source| SceneError::unreadable(&path, source))?;
+            return Ok(Found { path, real });
+        }
+        let at = join(&join_index("objects", index), "file");
+        folder.find(written).map_err(|why| self.fault(&at, why))
+    }
+
+    fn material_index(
+        &self,
+        name: &str,
+        materials: &[Material],
+        at: &str,
+    ) -> Result<u32, SceneError> {
+        let position = materials.iter().position(|material| material.name == name);
+        match position.and_then(|position| u32::try_from(position).ok()) {
+            Some(position) => Ok(position),
+            None => {
+                let known = materials.iter().map(|material| material.name.as_str());
+                let why = match materials {
+                    [] => format!("unknown material \"{name}\"; the scene has no `materials`"),
+                    _ => format!("unknown material \"{name}\"{}", suggest(name, known)),
+                };
+                Err(self.fault(&join(at, "material"), why))
+            }
+        }
+    }
+
+    fn import_all(
+        &self,
+        origins: &[Origin],
+        objects: &[Object],
+        folder: &Folder,
+        wanted: Wanted,
+        options: &LoadOptions<'_>,
+    ) -> Result<Vec<Import>, SceneError> {
+        let done = AtomicUsize::new(0);
+        let settings = import::Options {
+            strictness: options.strictness,
+            root: folder.limit().map(std::path::Path::to_owned),
+            count_degenerate: options.count_degenerate,
+        };
+        // All are waited for, so that the first fault in the file's order is the one reported.
+        let imports: Vec<Result<Import, SceneError>> = origins
+            .par_iter()
+            .enumerate()
+            .map(|(index, origin)| {
+                let user = objects.iter().position(|object| object.origin == index);
+                let title = user.map_or("", |user| objects[user].title.as_str());
+                let at = user.map_or_else(String::new, |user| join_index("objects", user));
+                let import = match origin {
+                    Origin::File(path) => import::import(path, wanted, &settings)
+                        .map_err(|source| self.import_fault(at, source))?,
+                    Origin::Shape(shape) => of_shape(shape, wanted)
+                        .map_err(|fault| self.fault(&join(&at, fault.key), fault.reason))?,
+                };
+                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                let step = LoadProgress { name: title, done, total: origins.len() };
+                match options.progress {
+                    Some(progress) if !progress(step) => Err(SceneError::Stopped),
+                    _ => Ok(import),
+                }
+            })
+            .collect();
+        imports.into_iter().collect()
+    }
+
+    fn import_fault(&self, at: String, source: import::ImportError) -> SceneError {
+        let path = match self.kind() {
+            FileKind::Model => String::new(),
+            FileKind::Scene => at,
+        };
+        SceneError::Import { file: self.path().to_owned(), path, source }
+    }
+
+    fn finish(
+        &self,
+        parts: Parts,
+        folder: &Folder,
+        options: &LoadOptions<'_>,
+    ) -> Result<Scene, SceneError> {
+        let geometry = Arc::new(parts.geometry);
+        let (camera, camera_origin) = self.camera(&geometry, &parts.cameras, options)?;
+        let mut files: Vec<(String, PathBuf)> = parts
+            .stats
+            .files
+            .iter()
+            .map(|(path, _)| (folder.relative(path), path.clone()))
+            .collect();
+        files.sort();
+        let mut notes = parts.notes;
+        notes.extend(self.unused_materials());
+        Ok(Scene {
+            path: self.path().to_owned(),
+            geometry,
+            objects: parts.objects,
+            materials: parts.materials,
+            textures: parts.textures,
+            camera,
+            camera_origin,
+            cameras: parts.cameras,
+            picture: self.spec.picture(),
+            layers: self.spec.all_layers(),
+            render: self.spec.render.clone(),
+            notes,
+            stats: parts.stats,
+            ingredients: Ingredients { value: self.value().clone(), files },
+        })
+    }
+
+    fn camera(
+        &self,
+        geometry: &Geometry,
+        cameras: &[SceneCamera],
+        options: &LoadOptions<'_>,
+    ) -> Result<(Camera, CameraOrigin), SceneError> {
+        let own = self.camera_spec();
+        let (spec, origin) = match options.camera {
+            Some(wanted) => {
+                let (index, camera) = cameras::pick(cameras, wanted).map_err(|reason| {
+                    SceneError::NoSuchCamera { wanted: wanted.to_owned(), reason }
+                })?;
+                let mut spec = camera.spec.clone();
+                if self.value().pointer("/camera/sensor/resolution").is_some() {
+                    *spec.sensor_mut() = own.sensor().clone();
+                }
+                let name = match &camera.name {
+                    name if name.is_empty() => index.to_string(),
+                    name => name.clone(),
+                };
+                (spec, CameraOrigin::Model(name))
+            }
+            None if pose_of(&own).is_some() => (own, CameraOrigin::Scene),
+            None => (own, CameraOrigin::Framed),
+        };
+        let camera =
+            spec.build(|| bounds::tight(geometry)).map_err(|error| self.camera_fault(&error))?;
+        Ok((camera, origin))
+    }
+
+    fn unused_materials(&self) -> impl Iterator<Item = Note> + '_ {
+        let is_used =
+            |name: &String| self.spec.objects.iter().any(|o| o.material.as_ref() == Some(name));
+        self.spec.materials.keys().filter(move |name| !is_used(name)).map(|name| Note {
+            kind: NoteKind::Unused,
+            subject: name.clone(),
+            message: "no object uses this material".to_owned(),
+            count: 1,
+        })
+    }
+}
+
+fn pose_of(spec: &CameraSpec) -> Option<&PoseSpec> {
+    match spec {
+        CameraSpec::Pinhole(spec) => spec.pose.as_ref(),
+        CameraSpec::Orthographic(spec) => spec.pose.as_ref(),
+    }
+}
+
+/// A shape as if it had been imported.
+fn of_shape(shape: &ShapeSpec, wanted: Wanted) -> Result<Import, ShapeError> {
+    let mesh = shape.build(wanted)?;
+    let stats = import::Stats { bytes_copied: heap_bytes(&mesh) as u64, ..Default::default() };
+    Ok(Import {
+        placements: vec![ImportedPlacement {
+            mesh: 0,
+            material: 0,
+            model_from_mesh: Transform::IDENTITY,
+            name: String::new(),
+        }],
+        meshes: vec![mesh],
+        materials: vec![Material::unnamed()],
+        stats,
+        ..Import::default()
+    })
+}
+
+/// Bytes of a mesh's vertices and indices that are in no mapped file.
+pub(crate) fn heap_bytes(mesh: &Mesh) -> usize {
+    let positions = match &mesh.positions {
+        Positions::F32(vertices) => vertices.floats().heap_bytes(),
+        Positions::F64(vertices) => vertices.heap_bytes(),
+    };
+    let attributes = mesh.normals.iter().map(|normals| normals.floats().heap_bytes()).chain(
+        mesh.uvs
+            .iter()
+            .map(|uvs| uvs.floats().heap_bytes())
+            .chain(mesh.colors.iter().map(|colors| colors.floats().heap_bytes())),
+    );
+    positions + mesh.triangles.heap_bytes() + attributes.sum::<usize>()
+}
+
+/// Where the contents of one import went.
+struct Home {
+    placements: Vec<ImportedPlacement>,
+    cameras: Vec<import::ImportedCamera>,
+    meshes: usize,
+    materials: usize,
+}
+
+/// A scene being put together.
+#[derive(Default)]
+struct Parts {
+    geometry: Geometry,
+    objects: Vec<String>,
+    materials: Vec<Material>,
+    textures: Vec<Texture>,
+    cameras: Vec<SceneCamera>,
+    notes: Vec<Note>,
+    stats: LoadStats,
+    homes: Vec<Home>,
+}
+
+impl Parts {
+    fn add_import(&mut self, import: Import) {
+        self.homes.push(Home {
+            placements: import.placements,
+            cameras: import.cameras,
+            meshes: self.geometry.meshes.len(),
+            materials: self.materials.len(),
+        });
+        self.geometry.meshes.extend(import.meshes);
+        let first_texture = u32::try_from(self.textures.len()).unwrap_or(u32::MAX);
+        self.materials.extend(import.materials.into_iter().map(|mut material| {
+            if let Paint::Image { image, .. } = &mut material.base_color {
+                image.texture = image.texture.saturating_add(first_texture);
+            }
+            material
+        }));
+        self.textures.extend(import.textures);
+        self.notes.extend(import.notes);
+        let stats = import.stats;
+        for (path, bytes) in stats.files {
+            if !self.stats.files.iter().any(|(known, _)| *known == path) {
+                self.stats.files.push((path, bytes));
+            }
+        }
+        self.stats.bytes_mapped += stats.bytes_mapped;
+        self.stats.bytes_copied += stats.bytes_copied;
+        self.stats.dropped += stats.dropped;
+        if let Some(degenerate) = stats.degenerate {
+            self.stats.degenerate = Some(self.stats.degenerate.unwrap_or(0) + degenerate);
+        }
+    }
+
+    /// Places an object. A model that stands for a scene has an object for each of its nodes.
+    /// The error names what there is too much of.
+    fn place(
+        &mut self,
+        object: &Object,
+        split_nodes: bool,
+        index: usize,
+    ) -> Result<(), &'static str> {
+        let home = &self.homes[object.origin];
+        let sum = |offset: usize, index: u32| u32::try_from(offset + index as usize).ok();
+        if !split_nodes {
+            self.objects.push(object.title.clone());
+        }
+        let mut last: Option<&ImportedPlacement> = None;
+        for placement in &home.placements {
+            let starts_node = last.is_none_or(|last| !is_same_node(last, placement));
+            if split_nodes && starts_node {
+                let named = !placement.name.is_empty();
+                let name = if named { &placement.name } else { &object.title };
+                self.objects.push(name.clone());
+            }
+            last = Some(placement);
+            let number = if split_nodes { self.objects.len() - 1 } else { index };
+            let material = match object.material {
+                Some(material) => Some(material),
+                None => sum(home.materials, placement.material),
+            };
+            self.geometry.placements.push(Placement {
+                mesh: sum(home.meshes, placement.mesh).ok_or("meshes")?,
+                object: u32::try_from(number).map_err(|_| "objects")?,
+                material: material.ok_or("materials")?,
+                world_from_mesh: object.world_from_object.then_inner(&placement.model_from_mesh),
+            });
+        }
+        if u32::try_from(self.geometry.placements.len()).is_err() {
+            return Err("placements");
+        }
+        let number = u32::try_from(index).map_err(|_| "objects")?;
+        let cameras = home.cameras.iter();
+        let placed = cameras.filter_map(|c| SceneCamera::new(c, number, &object.world_from_object));
+        self.cameras.extend(placed);
+        Ok(())
+    }
+}
+
+/// Whether two placements in a row are primitives of one node's mesh.
+fn is_same_node(a: &ImportedPlacement, b: &ImportedPlacement) -> bool {
+    a.name == b.name && a.mesh != b.mesh && a.model_from_mesh == b.model_from_mesh
+}

@@ -1,0 +1,112 @@
+//! A scene, loaded and validated: all that a render needs.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use etendue_camera::Camera;
+use etendue_geometry::Geometry;
+use etendue_tracer::{LayerSpec, Material, Texture};
+
+use crate::file::RenderSpec;
+use crate::identity::Ingredients;
+use crate::import::{Note, Strictness};
+use crate::paths::Reach;
+use crate::{CameraOrigin, SceneCamera, SceneError, SceneHash};
+
+/// A scene ready to be rendered.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The scene file, or the model that stands for one.
+    pub path: PathBuf,
+    /// Meshes and where they stand.
+    pub geometry: Arc<Geometry>,
+    /// What each object is called; placements point here.
+    pub objects: Vec<String>,
+    /// Materials; placements point here.
+    pub materials: Vec<Material>,
+    /// Images that materials use, still encoded; empty unless wanted.
+    pub textures: Vec<Texture>,
+    /// The camera.
+    pub camera: Camera,
+    /// Where the camera came from.
+    pub camera_origin: CameraOrigin,
+    /// Cameras that came with the models.
+    pub cameras: Vec<SceneCamera>,
+    /// The layer that holds the picture, if there is to be one.
+    pub picture: Option<LayerSpec>,
+    /// All layers to render, each once: the picture first.
+    pub layers: Vec<LayerSpec>,
+    /// How to render.
+    pub render: RenderSpec,
+    /// What was dropped, ignored or missing on the way.
+    pub notes: Vec<Note>,
+    /// What loading cost.
+    pub stats: LoadStats,
+    pub(crate) ingredients: Ingredients,
+}
+
+impl Scene {
+    /// The scene's identity. Reads every file of the scene once more, from the system's cache as a
+    /// rule.
+    ///
+    /// # Errors
+    ///
+    /// When a file has gone.
+    pub fn hash(&self) -> Result<SceneHash, SceneError> {
+        // A camera is made of numbers and words only, which always serialise.
+        let camera = serde_json::to_string(&self.camera.opencv()).unwrap_or_default();
+        self.ingredients.hash(&camera)
+    }
+}
+
+/// What loading a scene found and cost.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct LoadStats {
+    /// Files that were opened, with their sizes in bytes.
+    pub files: Vec<(PathBuf, u64)>,
+    /// Bytes of vertices and indices used where they are in mapped files.
+    pub bytes_mapped: u64,
+    /// Bytes of vertices and indices on the heap.
+    pub bytes_copied: u64,
+    /// Triangles dropped because a corner is not finite.
+    pub dropped: u64,
+    /// Triangles of zero area, when they were to be counted.
+    pub degenerate: Option<u64>,
+}
+
+/// How to load.
+#[derive(Clone, Copy, Default)]
+pub struct LoadOptions<'a> {
+    /// What becomes of defects in the data.
+    pub strictness: Strictness,
+    /// Whether files outside the scene's folder may be read.
+    pub reach: Reach,
+    /// A camera of one of the models by name or number, instead of the scene's.
+    pub camera: Option<&'a str>,
+    /// Count triangles of zero area.
+    pub count_degenerate: bool,
+    /// Told now and then how far loading is; answering `false` stops it.
+    pub progress: Option<&'a (dyn Fn(LoadProgress<'_>) -> bool + Sync)>,
+}
+
+impl std::fmt::Debug for LoadOptions<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LoadOptions")
+            .field("strictness", &self.strictness)
+            .field("reach", &self.reach)
+            .field("camera", &self.camera)
+            .field("count_degenerate", &self.count_degenerate)
+            .finish_non_exhaustive()
+    }
+}
+
+/// How far loading is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LoadProgress<'a> {
+    /// The model or shape that has just been loaded.
+    pub name: &'a str,
+    /// How many are.
+    pub done: usize,
+    /// Of how many.
+    pub total: usize,
+}
