@@ -44,7 +44,7 @@ pub enum PictureError {
     /// A name that some file format or file system cannot take.
     #[error(
         "\"{name}\" cannot name a {what}; use 1 to 64 of the characters A-Z a-z 0-9 _ - \
-         (and dots inside the name of a layer)"
+         (inside, a layer may have dots and an entry spaces)"
     )]
     Name {
         /// Layer, channel, header entry …

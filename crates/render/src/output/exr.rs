@@ -39,8 +39,8 @@ use super::{OutputError, PartFile, Picture, SOFTWARE, Values};
 pub enum Compression {
     /// As they are: the quickest to write, four bytes a value.
     None,
-    /// Deflated in blocks of 16 rows (EXR's ZIP) at the quickest level. `cargo run --release
-    /// --example image_files` shows what both cost.
+    /// Deflated in blocks of 16 rows (EXR's ZIP) at the quickest level. What both cost:
+    /// `cargo run --release -p etendue-render --example image_files`.
     #[default]
     Zip,
 }

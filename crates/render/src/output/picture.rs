@@ -332,8 +332,9 @@ fn check_name(what: &'static str, part: &str, name: &str) -> Result<(), PictureE
     Ok(())
 }
 
+/// The keys of entries are PNG keywords too, so they may have single spaces inside.
 fn check_entry(what: &'static str, key: &str, text: &str) -> Result<(), PictureError> {
-    check_name(what, key, key)?;
+    key.split(' ').try_for_each(|part| check_name(what, part, key))?;
     if text.contains('\0') {
         return Err(PictureError::ZeroByte { name: key.to_owned() });
     }
@@ -410,6 +411,11 @@ mod tests {
                 Picture::new(1, 1, vec![layer(name, "Z", Values::F32(vec![1.0]))], Vec::new())
                     .unwrap_err();
             assert!(matches!(error, PictureError::Name { .. }), "{name}: {error}");
+        }
+        for (key, fits) in [("taken along", true), (" a", false), ("a  b", false), ("a:b", false)] {
+            let mut depth = depth(vec![1.0]);
+            depth.meaning = vec![(key.into(), "text".into())];
+            assert_eq!(Picture::new(1, 1, vec![depth], Vec::new()).is_ok(), fits, "{key}");
         }
         let dotted = layer("View.3_4", "Z", Values::F32(vec![1.0]));
         assert!(Picture::new(1, 1, vec![dotted], Vec::new()).is_ok());
