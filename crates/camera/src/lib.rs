@@ -12,6 +12,7 @@
 
 pub mod camera;
 pub mod camera_file;
+pub mod element;
 pub mod error;
 mod framing;
 pub mod glass;

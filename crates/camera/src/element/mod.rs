@@ -1,0 +1,191 @@
+//! The parts of a lens. Each file holds one part: how a lens file writes it, and what it does.
+//!
+//! To add a part: its own file, and here a variant of [`PartSpec`].
+
+mod aperture;
+mod asphere;
+mod filter;
+mod frame;
+mod picture;
+mod rays;
+mod refract;
+mod step;
+mod surface;
+mod thin_lens;
+
+use schemars::JsonSchema;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Map, Value};
+
+use crate::length::{Degrees, Millimetres};
+
+pub use aperture::{ApertureSpec, CircularSpec, MaskSpec, Opening, PolygonSpec};
+pub use filter::{Filter, FilterSpec};
+pub use frame::Frame;
+pub use picture::{Picture, Resolve};
+pub use rays::{Fate, FateCounts, LensRays};
+pub use step::Clip;
+pub use surface::{Surface, SurfaceSpec};
+pub use thin_lens::{ThinLens, ThinLensSpec};
+
+pub(crate) use rays::{Block, Ray};
+pub(crate) use refract::Refraction;
+pub(crate) use step::{Action, Step};
+
+/// An element of a lens file: a part, and how it is mounted.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ElementSpec {
+    /// What it is.
+    #[serde(flatten)]
+    pub part: PartSpec,
+    /// How it is mounted.
+    #[serde(flatten)]
+    pub mount: Mount,
+}
+
+/// The closed set of parts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum PartSpec {
+    /// A refracting surface.
+    Surface(SurfaceSpec),
+    /// An ideal thin lens.
+    ThinLens(ThinLensSpec),
+    /// An opening in an opaque sheet.
+    Aperture(ApertureSpec),
+    /// A sheet that absorbs.
+    Filter(FilterSpec),
+}
+
+/// How an element is mounted.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Mount {
+    /// From this element's vertex to the next one's along the axis (mm); behind the last element,
+    /// to the sensor.
+    #[serde(skip_serializing_if = "is_default")]
+    pub thickness: Millimetres,
+    /// Whether this is the aperture stop, which chief rays pass in the middle.
+    #[serde(skip_serializing_if = "is_default")]
+    pub stop: bool,
+    /// Turns about the x axis and then about the element's own y axis (degrees), right-handed,
+    /// around its vertex. The elements behind are not moved.
+    #[serde(skip_serializing_if = "is_default")]
+    pub tilt: [Degrees; 2],
+    /// Moved across the axis by x and y (mm). The elements behind are not moved.
+    #[serde(skip_serializing_if = "is_default")]
+    pub decentre: [Millimetres; 2],
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// The keys of [`Mount`].
+const MOUNT_KEYS: [&str; 4] = ["thickness", "stop", "tilt", "decentre"];
+
+impl ElementSpec {
+    /// A part on the axis, `thickness` (mm) before the next one.
+    #[must_use]
+    pub fn new(part: PartSpec, thickness: f64) -> Self {
+        let mount = Mount { thickness: Millimetres(thickness), ..Mount::default() };
+        Self { part, mount }
+    }
+
+    /// The same as the aperture stop.
+    #[must_use]
+    pub fn as_stop(mut self) -> Self {
+        self.mount.stop = true;
+        self
+    }
+}
+
+// Parts and mounts both refuse unknown keys, which serde cannot combine with flattening: so the
+// mount's keys are taken out by hand, and the part sees all others.
+impl<'de> Deserialize<'de> for ElementSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut keys = Map::deserialize(deserializer)?;
+        let mut mount = Map::new();
+        for key in MOUNT_KEYS {
+            if let Some(value) = keys.remove(key) {
+                mount.insert(key.to_owned(), value);
+            }
+        }
+        let read_mount = Mount::deserialize(Value::Object(mount)).map_err(D::Error::custom);
+        let part = PartSpec::deserialize(Value::Object(keys)).map_err(D::Error::custom)?;
+        Ok(Self { part, mount: read_mount? })
+    }
+}
+
+impl From<SurfaceSpec> for PartSpec {
+    fn from(spec: SurfaceSpec) -> Self {
+        Self::Surface(spec)
+    }
+}
+
+impl PartSpec {
+    /// A round aperture of the given radius (mm).
+    #[must_use]
+    pub fn circular(radius: f64) -> Self {
+        Self::Aperture(ApertureSpec::Circular(CircularSpec { radius: Millimetres(radius) }))
+    }
+
+    /// A spherical surface: radius (mm, infinite for a plane), what follows it, semi-diameter (mm).
+    #[must_use]
+    pub fn spherical(
+        radius: f64,
+        glass: Option<crate::glass::GlassSpec>,
+        semi_diameter: f64,
+    ) -> Self {
+        let radius = radius.is_finite().then_some(Millimetres(radius));
+        let semi_diameter = semi_diameter.is_finite().then_some(Millimetres(semi_diameter));
+        Self::Surface(SurfaceSpec { radius, glass, semi_diameter, ..SurfaceSpec::default() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(json: &str) -> Result<ElementSpec, String> {
+        let spec: ElementSpec = serde_json::from_str(json).map_err(|e| e.to_string())?;
+        let text = serde_json::to_string(&spec).unwrap();
+        let again: ElementSpec = serde_json::from_str(&text).unwrap();
+        assert_eq!(spec, again, "{text}");
+        Ok(spec)
+    }
+
+    #[test]
+    fn elements_read_as_the_design_writes_them() {
+        let surface = read(
+            r#"{ "type": "surface", "radius": 84.83, "thickness": 0.12, "semi_diameter": 12.6,
+                 "conic": -0.5, "aspheric": { "4": 1e-6 }, "tilt": [1, "30 arcmin"] }"#,
+        )
+        .unwrap();
+        assert_eq!(surface.mount.thickness, Millimetres(0.12));
+        assert_eq!(surface.mount.tilt, [Degrees(1.0), Degrees(0.5)]);
+        let PartSpec::Surface(spec) = &surface.part else { panic!("{surface:?}") };
+        assert_eq!(spec.aspheric["4"], 1e-6);
+        let stop = read(
+            r#"{ "type": "aperture", "shape": "circular", "radius": 8.55, "thickness": 4.5,
+                 "stop": true }"#,
+        );
+        assert_eq!(stop.unwrap(), ElementSpec::new(PartSpec::circular(8.55), 4.5).as_stop());
+        assert!(read(r#"{"type": "thin_lens", "focal_length": "50 mm"}"#).is_ok());
+        assert!(read(r#"{"type": "filter", "transmission": [[400, 0.1], [700, 0.9]]}"#).is_ok());
+    }
+
+    #[test]
+    fn unknown_keys_and_types_are_refused_by_name() {
+        let error = |json| read(json).unwrap_err();
+        assert!(error(r#"{"type": "surface", "radios": 3}"#).contains("unknown field `radios`"));
+        assert!(error(r#"{"type": "mirror"}"#).contains("unknown variant `mirror`"));
+        assert!(error(r#"{"radius": 3}"#).contains("missing field `type`"));
+        let stop = r#"{"type": "surface", "stop": "yes"}"#;
+        assert!(error(stop).contains("invalid type: string \"yes\""), "{}", error(stop));
+        let thick = r#"{"type": "surface", "thickness": "3 mn"}"#;
+        assert!(error(thick).contains("unknown unit `mn`"), "{}", error(thick));
+    }
+}

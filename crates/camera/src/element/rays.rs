@@ -1,0 +1,351 @@
+//! Rays inside a lens: a structure of arrays in blocks of a few vector registers, and what became
+//! of each ray.
+
+use glam::DVec3;
+
+/// Rays of one block. A block is 2 kB and stays in the first-level cache from the first element to
+/// the last.
+pub(crate) const LANES: usize = 32;
+
+/// What became of a ray. Elements count from 0 on the object side.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Fate {
+    /// It left the train.
+    Exited,
+    /// It does not meet the element, or its image by a thin lens is not in front of it.
+    Missed {
+        /// Which.
+        element: usize,
+    },
+    /// It met the element's surface from the denser side at too small an angle.
+    TotalInternalReflection {
+        /// Which.
+        element: usize,
+    },
+    /// It met the element where it is opaque: outside its clear aperture.
+    Vignetted {
+        /// Which.
+        element: usize,
+    },
+}
+
+const EXITED: u64 = 0;
+const MISSED: u64 = 1 << 32;
+const REFLECTED: u64 = 2 << 32;
+const VIGNETTED: u64 = 3 << 32;
+const IDLE: u64 = 4 << 32;
+/// Left by a vector kernel for the scalar one to decide; never seen outside of a trace.
+pub(crate) const PENDING: u64 = 5 << 32;
+
+impl Fate {
+    /// The element at which the ray ended; `None` when it left.
+    #[must_use]
+    pub fn element(self) -> Option<usize> {
+        match self {
+            Self::Exited => None,
+            Self::Missed { element }
+            | Self::TotalInternalReflection { element }
+            | Self::Vignetted { element } => Some(element),
+        }
+    }
+
+    pub(crate) fn code(self) -> u64 {
+        match self {
+            Self::Exited => EXITED,
+            Self::Missed { element } => MISSED | element as u64,
+            Self::TotalInternalReflection { element } => REFLECTED | element as u64,
+            Self::Vignetted { element } => VIGNETTED | element as u64,
+        }
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "the low half is an element's index")]
+    fn from_code(code: u64) -> Self {
+        let element = (code & 0xffff_ffff) as usize;
+        match code & !0xffff_ffff {
+            EXITED => Self::Exited,
+            REFLECTED => Self::TotalInternalReflection { element },
+            VIGNETTED => Self::Vignetted { element },
+            _ => Self::Missed { element },
+        }
+    }
+}
+
+/// How many rays ended in which way.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct FateCounts {
+    /// Rays that left the train.
+    pub exited: u64,
+    /// Rays that missed element `i`.
+    pub missed: Vec<u64>,
+    /// Rays totally reflected at element `i`.
+    pub reflected: Vec<u64>,
+    /// Rays stopped by element `i`.
+    pub vignetted: Vec<u64>,
+}
+
+impl FateCounts {
+    /// Counts for a train of `elements` elements, all 0.
+    #[must_use]
+    pub fn new(elements: usize) -> Self {
+        let zeros = || vec![0; elements];
+        Self { exited: 0, missed: zeros(), reflected: zeros(), vignetted: zeros() }
+    }
+
+    /// Counts one ray.
+    pub fn add(&mut self, fate: Fate) {
+        let (counts, element) = match fate {
+            Fate::Exited => {
+                self.exited += 1;
+                return;
+            }
+            Fate::Missed { element } => (&mut self.missed, element),
+            Fate::TotalInternalReflection { element } => (&mut self.reflected, element),
+            Fate::Vignetted { element } => (&mut self.vignetted, element),
+        };
+        if counts.len() <= element {
+            counts.resize(element + 1, 0);
+        }
+        counts[element] += 1;
+    }
+
+    /// Counts every ray of a batch.
+    pub fn add_all(&mut self, rays: &LensRays) {
+        for i in 0..rays.len() {
+            self.add(rays.fate(i));
+        }
+    }
+
+    /// All rays.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        let lost = self.missed.iter().chain(&self.reflected).chain(&self.vignetted);
+        self.exited + lost.sum::<u64>()
+    }
+
+    /// The element at which most rays ended; `None` when none did.
+    #[must_use]
+    pub fn worst_element(&self) -> Option<usize> {
+        let at = |counts: &[u64], i: usize| counts.get(i).copied().unwrap_or(0);
+        let lost = |i: usize| at(&self.missed, i) + at(&self.reflected, i) + at(&self.vignetted, i);
+        let elements = self.missed.len().max(self.reflected.len()).max(self.vignetted.len());
+        (0..elements).filter(|&i| lost(i) > 0).max_by_key(|&i| lost(i))
+    }
+
+    /// What was lost where, as `vignetted at element 3: 12 %`, the greatest loss first.
+    #[must_use]
+    pub fn losses(&self) -> Vec<String> {
+        let ways = [
+            ("vignetted at", &self.vignetted),
+            ("missed", &self.missed),
+            ("totally reflected at", &self.reflected),
+        ];
+        let mut losses: Vec<(u64, String)> = Vec::new();
+        for (way, counts) in ways {
+            for (element, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+                #[expect(clippy::cast_precision_loss, reason = "a percentage to read")]
+                let share = 100.0 * count as f64 / self.total() as f64;
+                losses.push((count, format!("{way} element {element}: {share:.3} %")));
+            }
+        }
+        losses.sort_by(|a, b| b.0.cmp(&a.0));
+        losses.into_iter().map(|(_, text)| text).collect()
+    }
+}
+
+/// Rays by axis; `[[f64; LANES]; 3]` is one array an axis. Lengths in mm.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub(crate) struct Block {
+    pub(crate) position: [[f64; LANES]; 3],
+    pub(crate) direction: [[f64; LANES]; 3],
+    pub(crate) throughput: [f64; LANES],
+    pub(crate) outcome: [u64; LANES],
+}
+
+impl Block {
+    const EMPTY: Self = Self {
+        position: [[0.0; LANES]; 3],
+        direction: [[0.0; LANES]; 3],
+        throughput: [0.0; LANES],
+        outcome: [IDLE; LANES],
+    };
+
+    #[inline(always)]
+    pub(crate) fn ray(&self, lane: usize) -> Ray {
+        Ray {
+            position: self.position.map(|axis| axis[lane]),
+            direction: self.direction.map(|axis| axis[lane]),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_ray(&mut self, lane: usize, ray: Ray) {
+        for axis in 0..3 {
+            self.position[axis][lane] = ray.position[axis];
+            self.direction[axis][lane] = ray.direction[axis];
+        }
+    }
+}
+
+/// One ray (mm), by components so that vector kernels see plain numbers.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ray {
+    pub(crate) position: [f64; 3],
+    pub(crate) direction: [f64; 3],
+}
+
+impl Ray {
+    /// With a direction of any length but 0; `None` unless all numbers are finite.
+    pub(crate) fn new(position: DVec3, direction: DVec3) -> Option<Self> {
+        let unit = direction.try_normalize().or_else(|| {
+            // Squares overflow or vanish long before the direction does.
+            (direction / direction.abs().max_element()).try_normalize()
+        })?;
+        (position.is_finite() && unit.is_finite())
+            .then(|| Self { position: position.to_array(), direction: unit.to_array() })
+    }
+
+    /// The ray `distance` further on.
+    #[inline(always)]
+    pub(crate) fn advanced(self, distance: f64) -> Self {
+        let Self { position: [x, y, z], direction: [u, v, w] } = self;
+        Self { position: [x + distance * u, y + distance * v, z + distance * w], ..self }
+    }
+}
+
+/// A batch of rays in lens coordinates: millimetres, z = 0 at the first element's vertex, +z from
+/// the object to the sensor.
+#[derive(Debug, Clone, Default)]
+pub struct LensRays {
+    pub(crate) blocks: Vec<Block>,
+    len: usize,
+}
+
+impl LensRays {
+    /// An empty batch with room for `capacity` rays.
+    #[must_use]
+    pub fn with_capacity(capacity: usize) -> Self {
+        Self { blocks: Vec::with_capacity(capacity.div_ceil(LANES)), len: 0 }
+    }
+
+    /// The number of rays.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is no ray.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Removes all rays and keeps the memory.
+    pub fn clear(&mut self) {
+        self.blocks.clear();
+        self.len = 0;
+    }
+
+    /// Appends a ray of throughput 1. A direction of another length is scaled to 1; a ray that has
+    /// no direction or no finite place counts as having missed element 0.
+    pub fn push(&mut self, position: DVec3, direction: DVec3) {
+        self.push_weighted(position, direction, 1.0);
+    }
+
+    /// Appends a ray of the given throughput, as [`Self::push`] does.
+    pub fn push_weighted(&mut self, position: DVec3, direction: DVec3, throughput: f64) {
+        let ray = Ray::new(position, direction);
+        self.push_ray(ray, throughput);
+    }
+
+    pub(crate) fn push_ray(&mut self, ray: Option<Ray>, throughput: f64) {
+        let lane = self.len % LANES;
+        if lane == 0 {
+            self.blocks.push(Block::EMPTY);
+        }
+        let last = self.blocks.len() - 1;
+        let block = &mut self.blocks[last];
+        match ray {
+            Some(ray) => {
+                block.set_ray(lane, ray);
+                block.outcome[lane] = EXITED;
+            }
+            None => block.outcome[lane] = Fate::Missed { element: 0 }.code(),
+        }
+        block.throughput[lane] = throughput;
+        self.len += 1;
+    }
+
+    /// Where ray `i` is (mm): at the last refracting element that it reached.
+    #[must_use]
+    pub fn position(&self, i: usize) -> DVec3 {
+        self.blocks[i / LANES].position.map(|axis| axis[i % LANES]).into()
+    }
+
+    /// Where ray `i` goes: a unit vector.
+    #[must_use]
+    pub fn direction(&self, i: usize) -> DVec3 {
+        self.blocks[i / LANES].direction.map(|axis| axis[i % LANES]).into()
+    }
+
+    /// Which share of its radiance ray `i` keeps, times the weight that it was given.
+    #[must_use]
+    pub fn throughput(&self, i: usize) -> f64 {
+        self.blocks[i / LANES].throughput[i % LANES]
+    }
+
+    /// What became of ray `i`; [`Fate::Exited`] as long as nothing ended it.
+    #[must_use]
+    pub fn fate(&self, i: usize) -> Fate {
+        Fate::from_code(self.blocks[i / LANES].outcome[i % LANES])
+    }
+
+    /// Ends ray `i` in the given way; [`Fate::Exited`] revives it.
+    pub fn set_fate(&mut self, i: usize, fate: Fate) {
+        self.blocks[i / LANES].outcome[i % LANES] = fate.code();
+    }
+
+    /// How many rays left.
+    #[must_use]
+    pub fn exited(&self) -> usize {
+        self.blocks.iter().flat_map(|b| b.outcome).filter(|&code| code == EXITED).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_come_back_as_they_went_in_across_blocks() {
+        let mut rays = LensRays::with_capacity(3);
+        for i in 0..LANES + 3 {
+            rays.push(DVec3::new(i as f64, 1.0, 2.0), DVec3::new(0.0, 0.0, 1.0 + i as f64));
+        }
+        assert_eq!((rays.len(), rays.exited()), (LANES + 3, LANES + 3));
+        assert_eq!(rays.position(LANES + 1), DVec3::new(33.0, 1.0, 2.0));
+        assert_eq!(rays.direction(7), DVec3::Z);
+        rays.set_fate(33, Fate::Vignetted { element: 4 });
+        rays.set_fate(34, Fate::TotalInternalReflection { element: 70_000 });
+        assert_eq!(rays.fate(33), Fate::Vignetted { element: 4 });
+        assert_eq!(rays.fate(34), Fate::TotalInternalReflection { element: 70_000 });
+        let mut counts = FateCounts::new(5);
+        counts.add_all(&rays);
+        assert_eq!((counts.exited, counts.total()), (33, 35));
+        assert_eq!(counts.losses()[0], "vignetted at element 4: 2.857 %");
+    }
+
+    #[test]
+    fn what_is_no_ray_is_dead_and_holds_no_nan() {
+        let mut rays = LensRays::default();
+        rays.push(DVec3::NAN, DVec3::Z);
+        rays.push(DVec3::ZERO, DVec3::ZERO);
+        rays.push(DVec3::ZERO, DVec3::new(0.0, f64::INFINITY, 1.0));
+        for i in 0..3 {
+            assert_eq!(rays.fate(i), Fate::Missed { element: 0 });
+            assert!(rays.position(i).is_finite() && rays.direction(i).is_finite());
+        }
+        rays.push(DVec3::ZERO, DVec3::new(0.0, 3e-300, 4e-300));
+        assert!((rays.direction(3) - DVec3::new(0.0, 0.6, 0.8)).length() < 1e-15);
+    }
+}

@@ -1,0 +1,304 @@
+//! One element at one wavelength, met from one side: what a ray does there.
+//!
+//! Two ways through the same arithmetic. [`Step::run`] takes a block of rays, decides the ordinary
+//! cases in vector registers and leaves the others marked; [`Step::run_one`] takes a single ray and
+//! decides everything. Both give the same bits.
+
+use std::sync::Arc;
+
+use super::aperture::Opening;
+use super::filter::Filter;
+use super::frame::Frame;
+use super::rays::{Block, Fate, LANES, PENDING, Ray};
+use super::refract::{Crossing, Refraction, each_lane};
+use super::thin_lens::at_thin_lens;
+
+/// Whether clear apertures stop rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Clip {
+    /// Semi-diameters, apertures and opaque parts of filters end a ray.
+    #[default]
+    On,
+    /// Only missed surfaces and total reflection end a ray.
+    Off,
+}
+
+/// An element as one ray meets it.
+#[derive(Debug, Clone)]
+pub(crate) struct Step {
+    /// The element's index from the object side.
+    pub(crate) element: usize,
+    pub(crate) frame: Frame,
+    pub(crate) axial: bool,
+    pub(crate) action: Action,
+}
+
+/// What an element does.
+#[derive(Debug, Clone)]
+pub(crate) enum Action {
+    Plane(Refraction),
+    Sphere(Refraction),
+    Conic(Refraction),
+    Asphere(Refraction),
+    ThinLens { power: f64, semi_diameter: f64 },
+    Opening(Arc<Opening>),
+    Filter { filter: Arc<Filter>, transmissions: Vec<f64> },
+}
+
+impl Action {
+    /// The kernel that a surface needs.
+    pub(crate) fn refract(refraction: Refraction) -> Self {
+        let surface = &refraction.surface;
+        if !surface.aspheric.is_empty() {
+            Self::Asphere(refraction)
+        } else if surface.curvature == 0.0 {
+            Self::Plane(refraction)
+        } else if surface.conic == 0.0 {
+            Self::Sphere(refraction)
+        } else {
+            Self::Conic(refraction)
+        }
+    }
+}
+
+/// What became of a single ray at an element.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Passage {
+    pub(crate) fate: Fate,
+    /// The ray as it goes on; as it came unless [`Fate::Exited`].
+    pub(crate) ray: Ray,
+    /// Where it met the element, in lens coordinates; `None` when it missed.
+    pub(crate) point: Option<[f64; 3]>,
+    /// The share of light that goes on.
+    pub(crate) transmission: f64,
+}
+
+#[inline(always)]
+fn limit(semi_diameter: f64, clip: Clip) -> f64 {
+    match clip {
+        Clip::On => semi_diameter * semi_diameter,
+        Clip::Off => f64::INFINITY,
+    }
+}
+
+impl Step {
+    /// Takes a block of rays through the element.
+    #[inline(always)]
+    pub(crate) fn run(&self, block: &mut Block, clip: Clip) {
+        if self.axial {
+            self.run_at(block, clip, self.frame.vertex.z);
+        } else {
+            self.run_placed(block, clip);
+        }
+    }
+
+    /// For an element off the axis: in its own frame, and back.
+    #[inline(never)]
+    fn run_placed(&self, block: &mut Block, clip: Clip) {
+        for lane in 0..LANES {
+            if block.outcome[lane] == 0 {
+                block.outcome[lane] = PENDING;
+            }
+        }
+        self.decide(block, clip);
+    }
+
+    #[inline(always)]
+    fn run_at(&self, block: &mut Block, clip: Clip, z: f64) {
+        let pending = match &self.action {
+            Action::Plane(refraction) => {
+                let clip2 = limit(refraction.surface.semi_diameter, clip);
+                each_lane(block, self.element, z, |ray| refraction.at_plane(ray, clip2))
+            }
+            Action::Sphere(refraction) => {
+                let clip2 = limit(refraction.surface.semi_diameter, clip);
+                let near = |ray| refraction.at_near_root::<true>(ray, clip2);
+                each_lane(block, self.element, z, near)
+            }
+            Action::Conic(refraction) => {
+                let clip2 = limit(refraction.surface.semi_diameter, clip);
+                let near = |ray| refraction.at_near_root::<false>(ray, clip2);
+                each_lane(block, self.element, z, near)
+            }
+            Action::Asphere(refraction) => {
+                let clip2 = limit(refraction.surface.semi_diameter, clip);
+                refraction.asphere_lanes(block, self.element, z, clip2)
+            }
+            Action::ThinLens { power, semi_diameter } => {
+                let clip2 = limit(*semi_diameter, clip);
+                each_lane(block, self.element, z, |ray| at_thin_lens(*power, ray, clip2))
+            }
+            Action::Opening(opening) => {
+                self.open(block, opening, clip, z);
+                false
+            }
+            Action::Filter { filter, transmissions } if filter.is_uniform() => {
+                self.dim(block, transmissions[0], limit(filter.semi_diameter, clip), clip, z);
+                false
+            }
+            Action::Filter { .. } => {
+                self.run_placed(block, clip);
+                false
+            }
+        };
+        if pending {
+            self.decide(block, clip);
+        }
+    }
+
+    /// A sheet with an opening, on the axis.
+    #[inline(always)]
+    fn open(&self, block: &mut Block, opening: &Opening, clip: Clip, z: f64) {
+        if clip == Clip::Off {
+            return;
+        }
+        match opening {
+            Opening::Circle { radius } => {
+                let radius2 = radius * radius;
+                self.sheet(block, z, |x, y| x * x + y * y <= radius2);
+            }
+            Opening::Polygon { normals, apothem, .. } => {
+                self.sheet(block, z, |x, y| {
+                    let beyond = |n: &[f64; 2]| x * n[0] + y * n[1] - apothem;
+                    normals.iter().fold(f64::NEG_INFINITY, |worst, n| worst.max(beyond(n))) <= 0.0
+                });
+            }
+            Opening::Image(_) => self.run_placed(block, clip),
+        }
+    }
+
+    /// A filter of one curve, on the axis.
+    #[inline(always)]
+    fn dim(&self, block: &mut Block, transmission: f64, clip2: f64, clip: Clip, z: f64) {
+        for lane in 0..LANES {
+            let alive = block.outcome[lane] == 0;
+            block.throughput[lane] *= if alive { transmission } else { 1.0 };
+        }
+        let opaque = transmission <= 0.0 && clip == Clip::On;
+        self.sheet(block, z, |x, y| (x * x + y * y <= clip2) & !opaque);
+    }
+
+    #[inline(always)]
+    fn sheet(&self, block: &mut Block, z: f64, open: impl Fn(f64, f64) -> bool) {
+        let vignetted = Fate::Vignetted { element: self.element }.code();
+        let missed = Fate::Missed { element: self.element }.code();
+        for lane in 0..LANES {
+            let Ray { position, direction } = block.ray(lane);
+            let t = (z - position[2]) / direction[2];
+            let passes = open(position[0] + t * direction[0], position[1] + t * direction[1]);
+            let met = t.abs() < f64::INFINITY;
+            let ended = if met { vignetted } else { missed };
+            let outcome = block.outcome[lane];
+            block.outcome[lane] = if (outcome == 0) & !(passes & met) { ended } else { outcome };
+        }
+    }
+
+    /// Decides the rays that a vector kernel has marked.
+    #[cold]
+    #[inline(never)]
+    fn decide(&self, block: &mut Block, clip: Clip) {
+        for lane in 0..LANES {
+            if block.outcome[lane] == PENDING {
+                let passage = self.run_one(block.ray(lane), clip);
+                let mut ray = passage.ray;
+                if let (Fate::Vignetted { .. }, Some(point)) = (passage.fate, passage.point)
+                    && self.moves()
+                {
+                    ray.position = point;
+                }
+                block.set_ray(lane, ray);
+                block.throughput[lane] *= passage.transmission;
+                block.outcome[lane] = passage.fate.code();
+            }
+        }
+    }
+
+    /// Whether the element moves rays to itself; sheets only look at them.
+    fn moves(&self) -> bool {
+        !matches!(self.action, Action::Opening(_) | Action::Filter { .. })
+    }
+
+    /// Takes one ray through the element.
+    #[inline]
+    pub(crate) fn run_one(&self, ray: Ray, clip: Clip) -> Passage {
+        if self.axial {
+            let z = self.frame.vertex.z;
+            let mut local = ray;
+            local.position[2] -= z;
+            let mut passage = self.local(local, clip);
+            passage.ray.position[2] += z;
+            if let Some(point) = &mut passage.point {
+                point[2] += z;
+            }
+            return self.settle(ray, passage);
+        }
+        let mut passage = self.local(self.frame.enter(ray), clip);
+        passage.ray = self.frame.leave(passage.ray);
+        passage.point = passage.point.map(|p| self.frame.point(p.into()).to_array());
+        self.settle(ray, passage)
+    }
+
+    /// Rays that end, and rays that only pass a sheet, stay as they came to the last bit.
+    fn settle(&self, ray: Ray, passage: Passage) -> Passage {
+        if passage.fate == Fate::Exited && self.moves() {
+            passage
+        } else {
+            Passage { ray, ..passage }
+        }
+    }
+
+    fn local(&self, ray: Ray, clip: Clip) -> Passage {
+        match &self.action {
+            Action::Plane(refraction) | Action::Sphere(refraction) | Action::Conic(refraction) => {
+                let clip2 = limit(refraction.surface.semi_diameter, clip);
+                self.crossed(refraction.exactly(ray, clip2))
+            }
+            Action::Asphere(refraction) => {
+                let clip2 = limit(refraction.surface.semi_diameter, clip);
+                self.crossed(refraction.at_asphere(ray, clip2))
+            }
+            Action::ThinLens { power, semi_diameter } => {
+                self.crossed(at_thin_lens(*power, ray, limit(*semi_diameter, clip)))
+            }
+            Action::Opening(opening) => self.sheet_crossed(ray, clip, |[x, y]| {
+                let transmission = opening.transmission(x, y);
+                if clip == Clip::On { transmission } else { 1.0 }
+            }),
+            Action::Filter { filter, transmissions } => self.sheet_crossed(ray, clip, |[x, y]| {
+                let inside = x * x + y * y <= limit(filter.semi_diameter, clip);
+                filter.curve_at(x, y).filter(|_| inside).map_or(0.0, |i| transmissions[i])
+            }),
+        }
+    }
+
+    fn crossed(&self, crossing: Crossing) -> Passage {
+        let element = self.element;
+        let fate = match crossing {
+            Crossing { hit: false, .. } => Fate::Missed { element },
+            Crossing { clear: false, .. } => Fate::Vignetted { element },
+            Crossing { through: false, .. } => Fate::TotalInternalReflection { element },
+            _ => Fate::Exited,
+        };
+        let point = crossing.hit.then_some(crossing.ray.position);
+        Passage { fate, ray: crossing.ray, point, transmission: 1.0 }
+    }
+
+    fn sheet_crossed(
+        &self,
+        ray: Ray,
+        clip: Clip,
+        transmission: impl Fn([f64; 2]) -> f64,
+    ) -> Passage {
+        let element = self.element;
+        let t = -ray.position[2] / ray.direction[2];
+        if !t.is_finite() {
+            return Passage { fate: Fate::Missed { element }, ray, point: None, transmission: 0.0 };
+        }
+        let mut point = ray.advanced(t).position;
+        point[2] = 0.0;
+        let transmission = transmission([point[0], point[1]]);
+        let passes = transmission > 0.0 || clip == Clip::Off;
+        let fate = if passes { Fate::Exited } else { Fate::Vignetted { element } };
+        Passage { fate, ray, point: Some(point), transmission }
+    }
+}

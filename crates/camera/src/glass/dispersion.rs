@@ -1,0 +1,94 @@
+//! The formulas that give a refractive index from a wavelength.
+//!
+//! # Sources
+//!
+//! W. Sellmeier, *Annalen der Physik* 219 (1871); A.-L. Cauchy, *Sur la réfraction et la réflexion
+//! de la lumière* (1830); the power series is the one glass makers publish.
+
+/// Hydrogen's F line (nm).
+pub const FRAUNHOFER_F: f64 = 486.1327;
+/// Helium's d line (nm), at which `nd` is measured.
+pub const FRAUNHOFER_D: f64 = 587.5618;
+/// Hydrogen's C line (nm).
+pub const FRAUNHOFER_C: f64 = 656.2725;
+
+/// A dispersion formula; wavelengths inside it are in micrometres.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Dispersion {
+    /// The same index everywhere.
+    Constant(f64),
+    /// `[b, c]`: n² = 1 + Σ b λ²/(λ² − c).
+    Sellmeier(Vec<[f64; 2]>),
+    /// `[a, p]`: n² = Σ a λᵖ.
+    Power(Vec<[f64; 2]>),
+    /// `[a, p]`: n = Σ a λᵖ.
+    Index(Vec<[f64; 2]>),
+}
+
+impl Dispersion {
+    /// n = A + B/λ² + C/λ⁴ + …
+    #[must_use]
+    pub fn cauchy(coefficients: &[f64]) -> Self {
+        let powers = (0..).map(|i: i32| -2.0 * f64::from(i));
+        Self::Index(coefficients.iter().zip(powers).map(|(&a, p)| [a, p]).collect())
+    }
+
+    /// The two-term Cauchy formula through `nd` at the d line whose difference between the F and C
+    /// lines is (nd − 1)/vd.
+    #[must_use]
+    pub fn from_abbe(nd: f64, vd: f64) -> Self {
+        let inverse_square = |nm: f64| (nm * 1e-3).powi(-2);
+        let b = (nd - 1.0) / vd / (inverse_square(FRAUNHOFER_F) - inverse_square(FRAUNHOFER_C));
+        Self::Index(vec![[nd - b * inverse_square(FRAUNHOFER_D), 0.0], [b, -2.0]])
+    }
+
+    /// The index at `wavelength` (nm); `None` when the formula gives no positive finite number.
+    #[must_use]
+    pub fn index(&self, wavelength: f64) -> Option<f64> {
+        let l = wavelength * 1e-3;
+        let series = |terms: &[[f64; 2]]| terms.iter().map(|&[a, p]| a * power(l, p)).sum::<f64>();
+        let n = match self {
+            Self::Constant(n) => *n,
+            Self::Sellmeier(terms) => {
+                let l2 = l * l;
+                (1.0 + terms.iter().map(|&[b, c]| b * l2 / (l2 - c)).sum::<f64>()).sqrt()
+            }
+            Self::Power(terms) => series(terms).sqrt(),
+            Self::Index(terms) => series(terms),
+        };
+        (n > 0.0 && n.is_finite() && wavelength > 0.0).then_some(n)
+    }
+
+    /// Whether the index depends on the wavelength.
+    #[must_use]
+    pub fn varies(&self) -> bool {
+        match self {
+            Self::Constant(_) => false,
+            Self::Sellmeier(terms) => terms.iter().any(|&[b, c]| b != 0.0 && c != 0.0),
+            Self::Power(terms) | Self::Index(terms) => {
+                terms.iter().any(|&[a, p]| a != 0.0 && p != 0.0)
+            }
+        }
+    }
+}
+
+/// λᵖ; the published powers are whole, and multiplications round less than a logarithm.
+fn power(l: f64, p: f64) -> f64 {
+    #[expect(clippy::cast_possible_truncation, reason = "checked to be whole and small")]
+    if p.fract() == 0.0 && p.abs() < 1e3 { l.powi(p as i32) } else { l.powf(p) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_abbe_form_meets_its_numbers_and_falls_with_wavelength() {
+        let glass = Dispersion::from_abbe(1.62, 36.37);
+        let at = |nm| glass.index(nm).unwrap();
+        let vd = (at(FRAUNHOFER_D) - 1.0) / (at(FRAUNHOFER_F) - at(FRAUNHOFER_C));
+        assert!((vd - 36.37).abs() < 1e-10, "two roundings in a difference of 0.017");
+        assert!(at(450.0) > at(550.0) && at(550.0) > at(700.0));
+        assert!(glass.varies() && !Dispersion::Constant(1.5).varies());
+    }
+}
