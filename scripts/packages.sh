@@ -27,7 +27,7 @@ install_packages() {
         echo "This is not Debian: install what $* give there, with your system's own means." >&2
         return 1
     fi
-    if may_be_root && as_root apt-get update -q &&
+    if may_be_root && echo "Installing with apt: $*" && as_root apt-get update -q &&
         as_root env DEBIAN_FRONTEND=noninteractive \
             apt-get install -qy --no-install-recommends -o DPkg::Lock::Timeout=300 "$@"; then
         return

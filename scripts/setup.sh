@@ -31,10 +31,10 @@ has_libclang() {
         any_file "/usr/lib/llvm-*/lib/clang/*/include/stddef.h"; }
 }
 
-command -v cc >/dev/null || need "the C compiler that links Rust programs" gcc libc6-dev
-has_embree || need "Embree, which intersects rays with meshes" libembree-dev
-has_libclang || need "reads Embree's header, for the bindings" libclang-dev
-[ -e /etc/ssl/certs/ca-certificates.crt ] || need "cargo fetches crates over TLS" ca-certificates
+command -v cc >/dev/null || need "to link Rust programs" gcc libc6-dev
+has_embree || need "to intersect rays with meshes: Embree" libembree-dev
+has_libclang || need "to read Embree's header" libclang-dev
+[ -e /etc/ssl/certs/ca-certificates.crt ] || need "for cargo to fetch crates over TLS" ca-certificates
 
 if [ ${#missing[@]} -gt 0 ]; then
     install_packages "${missing[@]}"

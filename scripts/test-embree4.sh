@@ -27,7 +27,7 @@ in_namespace() {
 make_root() {
     echo "Making a Debian 13 root with Embree 4 in $root, by debootstrap."
     if ! command -v debootstrap >/dev/null; then
-        echo "missing: debootstrap (unpacks a Debian 13 root)"
+        echo "missing: debootstrap (to unpack a Debian 13 root)"
         install_packages debootstrap || return
     fi
     as_root rm -rf "$root.part"
@@ -46,7 +46,7 @@ if [ -e /usr/include/embree4/rtcore.h ] && [ -z "${EMBREE_DIR:-}" ]; then
     exit
 fi
 may_be_root || skip "making a Debian 13 root and entering it takes root, or sudo."
-in_namespace true 2>/dev/null || skip "this system lets nobody mount, not even root (a container?)."
+why=$(in_namespace true 2>&1) || skip "this system lets not even root mount ($why)."
 [ -d "$root" ] || make_root || skip "debootstrap could not make the Debian 13 root; see above."
 
 # Everything from here on is offline. The toolchain is entered directly: rustup stays outside.

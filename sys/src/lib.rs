@@ -1,8 +1,8 @@
 //! Bindings to Intel's Embree, speaking **Embree 4's API**.
 //!
 //! The bindings are generated from the installed header. On Embree 4 every name here is Embree's
-//! own. On Embree 3 (Debian 12) a shim that compiles to nothing but Embree 3's calls gives the
-//! queries, their arguments and their flags the names and signatures of Embree 4:
+//! own. On Embree 3 (Debian 12) a shim of inlined functions gives the queries, their arguments and
+//! their flags the names and signatures of Embree 4:
 //!
 //! | names | on Embree 3 |
 //! |---|---|
