@@ -156,12 +156,11 @@ fn unit(value: f64) -> f32 {
     value as f32
 }
 
-/// The sRGB curve (IEC 61966-2-1:1999, 5.2).
+/// The sRGB curve (IEC 61966-2-1:1999, 5.2), in f32: its error of some 10⁻⁷ is far below a step of
+/// 16 bits, and every value of a picture passes here.
 fn srgb(linear: f64) -> f32 {
-    let linear = linear.clamp(0.0, 1.0);
-    let encoded =
-        if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
-    unit(encoded)
+    let linear = unit(linear.clamp(0.0, 1.0));
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 fn color(planes: &[&Values], bits: Bits) -> Shown {
