@@ -23,7 +23,8 @@ render: setup
 	@echo "The files are in $(CURDIR)/out/first-light:"
 	@ls -lh out/first-light
 
-test: setup
+test:
+	@scripts/setup.sh test
 	@scripts/test.sh
 
 test-embree4: setup

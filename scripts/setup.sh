@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what the build needs and this machine lacks. Says what and why first; does nothing, and
-# asks no server, when all is there.
+# setup.sh [test]: installs what the build (or also the tests) needs and this machine lacks. Says
+# what and why first; does nothing, and asks no server, when all is there.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/packages.sh
@@ -35,6 +35,11 @@ command -v cc >/dev/null || need "to link Rust programs" gcc libc6-dev
 has_embree || need "to intersect rays with meshes: Embree" libembree-dev
 has_libclang || need "to read Embree's header" libclang-dev
 [ -e /etc/ssl/certs/ca-certificates.crt ] || need "for cargo to fetch crates over TLS" ca-certificates
+if [ "${1:-}" = test ]; then
+    command -v exrheader >/dev/null || need "to read images back with OpenEXR's own tool" openexr
+    python3 -c "import ensurepip, venv" 2>/dev/null ||
+        need "to read images back with Python's OpenEXR and numpy" python3-venv
+fi
 
 if [ ${#missing[@]} -gt 0 ]; then
     install_packages "${missing[@]}"
@@ -50,4 +55,12 @@ found=$(rustc --version | cut -d' ' -f2)
 if [ "$(printf '%s\n' "$wanted" "$found" | sort -V | head -n 1)" != "$wanted" ]; then
     echo "Rust $found is here, but etendue needs $wanted or newer. Update it: rustup update stable" >&2
     exit 1
+fi
+
+# Rustup's minimal profile comes without these two.
+if [ "${1:-}" = test ]; then
+    for component in rustfmt clippy; do
+        "cargo-${component/rustfmt/fmt}" --version >/dev/null 2>&1 ||
+            rustup component add "$component"
+    done
 fi

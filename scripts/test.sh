@@ -16,11 +16,6 @@ run_tests() {
     fi
 }
 
-# Rustup's minimal profile comes without these two.
-for component in rustfmt clippy; do
-    "cargo-${component/rustfmt/fmt}" --version >/dev/null 2>&1 || rustup component add "$component"
-done
-
 step "format"
 cargo fmt --all --check
 
