@@ -1,0 +1,272 @@
+//! The chain of EMVA 1288 (Release 4.0, linear model), from mean electrons to digital numbers, a
+//! block of neighbouring pixels of a row at a time.
+//!
+//! | stage | symbols |
+//! |---|---|
+//! | [`photo_response`] | `μₑ ← μₑ·(1 + PRNU·z)` |
+//! | [`dark_signal`] | `μ = μₑ + μ_I·T` |
+//! | [`shot_noise`] | `n ~ Poisson(μ)`, or its approximation |
+//! | [`full_well`] | `n ← min(n, capacity)` |
+//! | [`read_out`] | `n + σ_read·z + DSNU·z′ + row + column` |
+//! | [`convert`] | `y = clip(round(K·n + black), 0, 2ᵇ − 1)` |
+//!
+//! DSNU is an offset of the read-out, as the standard measures it: inside the Poisson distribution
+//! it could not be negative, so that a sensor with little dark current would lose half of it.
+//!
+//! # The paper's approximation
+//!
+//! [`NoiseModel::Normal`] is the one of the paper this program follows: `n ~ N(μₑ, μₑ)` (its Eq. 5)
+//! plus `N(μ_I·T, μ_I·T + σ_read²)` (its Eq. 6). Eq. (5) prints the variance as K²·g; that is DN² only
+//! if g counts electrons. With g as a grey value in DN, μₑ = g/K and the variance is K·g, which is what
+//! happens here: the draw is in electrons and K comes after.
+
+use crate::clipping::clipped;
+use crate::normal::{ln, pair};
+use crate::philox::{Key, Site, Stage, unit32, unit52};
+use crate::poisson::{FINISHED_TOGETHER, Open, PD_FROM, finish, first_try, small_means};
+use crate::spec::NoiseModel;
+
+/// Pixels of a block: enough to fill vectors, few enough to stay in the nearest cache.
+pub(crate) const BLOCK: usize = 128;
+
+/// Pixels whose special cases are looked at together.
+const GROUP: usize = 32;
+
+/// One number a pixel of a block.
+pub(crate) type Lane = [f64; BLOCK];
+
+/// 2⁵²: a number below 2³², added to it, is rounded to an integer (half to even) that stands in the
+/// low bits.
+const TO_INTEGER: f64 = 4_503_599_627_370_496.0;
+
+/// All that the chain needs to know of a sensor and an exposure.
+#[derive(Debug, Clone)]
+pub(crate) struct Chain {
+    pub(crate) noise: NoiseModel,
+    /// `μ_I·T` (e⁻).
+    pub(crate) dark: f64,
+    /// Capacity (e⁻), +inf when nothing but the converter saturates.
+    pub(crate) full_well: f64,
+    /// `σ_read` (e⁻).
+    pub(crate) read_noise: f64,
+    /// K (DN/e⁻).
+    pub(crate) gain: f64,
+    /// Black level (DN).
+    pub(crate) black: f64,
+    /// 2ᵇ − 1 (DN).
+    pub(crate) white: f64,
+    /// Standard deviation of the relative sensitivity.
+    pub(crate) prnu: f64,
+    /// Standard deviation of the offset (e⁻).
+    pub(crate) dsnu: f64,
+    /// Share of hot pixels, and the mean of their extra dark signal (e⁻).
+    pub(crate) hot: Option<[f64; 2]>,
+    /// The seed of temporal noise.
+    pub(crate) temporal: Key,
+    /// The serial number.
+    pub(crate) pattern: Key,
+}
+
+/// A block's place: `site` and its first column.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    pub(crate) site: Site,
+    pub(crate) column: u32,
+}
+
+impl Place {
+    /// The column of pixel `i` of the block.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "less than a block")]
+    fn at(self, i: usize) -> u32 {
+        self.column.wrapping_add(i as u32)
+    }
+}
+
+/// Exposes one block: mean photo-electrons in, digital numbers out. `offset` holds what rows and
+/// columns add (e⁻) and is used up.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+bmi1+bmi2",
+    "x86_64+avx2+fma+bmi1+bmi2",
+    "aarch64+neon"
+))]
+pub(crate) fn expose(
+    chain: &Chain,
+    place: Place,
+    mean: &mut Lane,
+    offset: &mut Lane,
+    out: &mut [u16; BLOCK],
+) {
+    if chain.noise == NoiseModel::None {
+        dark_signal(chain.dark, mean);
+        full_well(chain.full_well, mean);
+        return convert(chain, mean, out);
+    }
+    if chain.has_pattern() {
+        pattern(chain, place, mean, offset);
+    }
+    dark_signal(chain.dark, mean);
+    let mut normals = [[0.0; BLOCK]; 2];
+    let mut units = [0.0; BLOCK];
+    deviates(&chain.temporal, place, &mut normals, &mut units);
+    match chain.noise {
+        NoiseModel::Poisson => shot_noise(chain, place, mean, &normals[0], &units),
+        _ => normal_shot_noise(mean, &normals[0]),
+    }
+    full_well(chain.full_well, mean);
+    read_out(chain.read_noise, &normals[1], offset, mean);
+    convert(chain, mean, out);
+}
+
+/// Mean and variance over frames (DN, DN²) of a block: mean photo-electrons in, mean out. `shared` is
+/// the variance of row and column offsets (e⁻²).
+pub(crate) fn moments(
+    chain: &Chain,
+    shared: f64,
+    place: Place,
+    mean: &mut Lane,
+    variance: &mut Lane,
+) {
+    let mut offset = [0.0; BLOCK];
+    if chain.has_pattern() {
+        pattern(chain, place, mean, &mut offset);
+    }
+    dark_signal(chain.dark, mean);
+    for i in 0..BLOCK {
+        let charge = clipped([mean[i], mean[i]], f64::NEG_INFINITY, chain.full_well);
+        let read = chain.read_noise * chain.read_noise + shared;
+        let level = chain.gain * (charge[0] + offset[i]) + chain.black;
+        let spread = chain.gain * chain.gain * (charge[1] + read) + 1.0 / 12.0;
+        [mean[i], variance[i]] = clipped([level, spread], 0.0, chain.white);
+    }
+}
+
+impl Chain {
+    fn has_pattern(&self) -> bool {
+        self.prnu > 0.0 || self.dsnu > 0.0 || self.hot.is_some()
+    }
+}
+
+/// Two normal deviates and a uniform one a pixel.
+#[inline(always)]
+fn deviates(key: &Key, place: Place, normals: &mut [Lane; 2], units: &mut Lane) {
+    for i in 0..BLOCK {
+        let counter = place.site.counter(place.at(i), Stage::Temporal, 0);
+        let [a, b, c, d] = key.words(counter);
+        [normals[0][i], normals[1][i]] = pair([a, b, c]);
+        units[i] = unit32(d);
+    }
+}
+
+/// PRNU, DSNU and hot pixels: the same in every frame of a sensor.
+#[inline(always)]
+fn pattern(chain: &Chain, place: Place, mean: &mut Lane, offset: &mut Lane) {
+    let site = Site { frame: 0, ..place.site };
+    let mut chance = [0.0; BLOCK];
+    for i in 0..BLOCK {
+        let [a, b, c, d] = chain.pattern.words(site.counter(place.at(i), Stage::Pattern, 0));
+        let [response, dark] = pair([a, b, c]);
+        mean[i] = photo_response(chain.prnu, response, mean[i]);
+        offset[i] += chain.dsnu * dark;
+        chance[i] = unit32(d);
+    }
+    if let Some([share, extra]) = chain.hot {
+        for (i, mean) in mean.iter_mut().enumerate() {
+            if chance[i] < share {
+                let words = chain.pattern.words(site.counter(place.at(i), Stage::HotPixel, 0));
+                *mean -= extra * ln(unit52(words[0], words[1]));
+            }
+        }
+    }
+}
+
+/// μₑ·(1 + PRNU·z); a sensitivity cannot be negative.
+#[inline(always)]
+fn photo_response(prnu: f64, z: f64, mean: f64) -> f64 {
+    mean * (1.0 + prnu * z).max(0.0)
+}
+
+/// `μ = μₑ + μ_I·T`.
+#[inline(always)]
+fn dark_signal(dark: f64, mean: &mut Lane) {
+    for mean in mean {
+        *mean += dark;
+    }
+}
+
+/// n ~ Poisson(μ): electrons of light and of heat together, for a sum of Poisson variables is one.
+#[inline(always)]
+fn shot_noise(chain: &Chain, place: Place, mean: &mut Lane, normals: &Lane, units: &Lane) {
+    let mut electrons = [0.0; BLOCK];
+    for i in 0..BLOCK {
+        electrons[i] = first_try(mean[i], normals[i], units[i]);
+    }
+    let mut open = [0; BLOCK];
+    let mut count = 0;
+    let parts = electrons.as_chunks_mut::<GROUP>().0.iter_mut();
+    let means = mean.as_chunks::<GROUP>().0.iter().zip(units.as_chunks::<GROUP>().0);
+    for (group, (electrons, (mean, units))) in parts.zip(means).enumerate() {
+        if any(mean, |mean| mean < PD_FROM) {
+            small_means(mean, units, electrons);
+        }
+        if any(electrons, |n| n < 0.0) {
+            for (i, n) in electrons.iter().enumerate() {
+                open[count] = group * GROUP + i;
+                count += usize::from(*n < 0.0);
+            }
+        }
+    }
+    for chosen in open[..count].chunks(FINISHED_TOGETHER) {
+        let pixel = |i: usize| Open {
+            mean: mean[i],
+            normal: normals[i],
+            unit: units[i],
+            column: place.at(i),
+        };
+        let pixels = std::array::from_fn(|j| pixel(chosen[j.min(chosen.len() - 1)]));
+        for (&i, n) in chosen.iter().zip(finish(&pixels, &chain.temporal, place.site)) {
+            electrons[i] = n;
+        }
+    }
+    *mean = electrons;
+}
+
+/// Whether a condition holds somewhere, without a branch a pixel.
+#[inline(always)]
+fn any(values: &[f64; GROUP], condition: impl Fn(f64) -> bool) -> bool {
+    values.iter().fold(false, |any, &value| any | condition(value))
+}
+
+/// n ~ N(μ, μ), the approximation.
+#[inline(always)]
+fn normal_shot_noise(mean: &mut Lane, normals: &Lane) {
+    for (mean, z) in mean.iter_mut().zip(normals) {
+        *mean += mean.sqrt() * z;
+    }
+}
+
+/// No more electrons than the pixel holds.
+#[inline(always)]
+fn full_well(capacity: f64, electrons: &mut Lane) {
+    for electrons in electrons {
+        *electrons = electrons.min(capacity);
+    }
+}
+
+/// `n + σ_read·z` + offsets (e⁻).
+#[inline(always)]
+fn read_out(sigma: f64, normals: &Lane, offset: &Lane, electrons: &mut Lane) {
+    for i in 0..BLOCK {
+        electrons[i] += sigma * normals[i] + offset[i];
+    }
+}
+
+/// y = clip(round(K·n + black), 0, 2ᵇ − 1), half to even.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "at most 2¹⁶ − 1 after clipping")]
+fn convert(chain: &Chain, electrons: &Lane, out: &mut [u16; BLOCK]) {
+    for i in 0..BLOCK {
+        let level = (chain.gain * electrons[i] + chain.black).clamp(0.0, chain.white);
+        out[i] = (level + TO_INTEGER).to_bits() as u16;
+    }
+}

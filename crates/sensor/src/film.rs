@@ -1,0 +1,84 @@
+//! What a sensor is given, and what it gives back.
+
+use serde::Serialize;
+
+/// The light of a render, as the sensor's [`lanes`](crate::Sensor::lanes) want it.
+#[derive(Debug, Clone, Copy)]
+pub struct Film<'a> {
+    /// `[row][column][lane]`: intensities (1 is full scale) or irradiances (W·m⁻²·nm⁻¹).
+    pub values: &'a [f32],
+}
+
+/// One exposure of a film.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Shot {
+    /// Exposure time T (s).
+    pub exposure: f64,
+    /// Number of the frame: temporal noise differs from frame to frame.
+    pub frame: u32,
+}
+
+/// What the converter gave: digital numbers as they are, nothing scaled or subtracted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RawImage {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Numbers a pixel.
+    pub depth: usize,
+    /// `[row][column][channel]` (DN).
+    pub values: Vec<u16>,
+    /// What of the film was no light.
+    pub flaws: Flaws,
+}
+
+/// The expected value and the variance of every pixel over frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Moments {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Numbers a pixel.
+    pub depth: usize,
+    /// `[row][column][channel]` (DN).
+    pub mean: Vec<f32>,
+    /// `[row][column][channel]` (DN²).
+    pub variance: Vec<f32>,
+    /// What of the film was no light.
+    pub flaws: Flaws,
+}
+
+/// Values of a film that are no light and were taken for none.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Flaws {
+    /// Negative values.
+    pub negative: u64,
+    /// Values that are NaN or infinite.
+    pub not_finite: u64,
+}
+
+impl Flaws {
+    /// Whether there are any.
+    #[must_use]
+    pub fn any(self) -> bool {
+        self.negative + self.not_finite > 0
+    }
+
+    /// A value as light: itself, or 0 and counted.
+    #[inline]
+    pub(crate) fn light(&mut self, value: f32) -> f64 {
+        let finite = value.is_finite();
+        self.not_finite += u64::from(!finite);
+        self.negative += u64::from(finite & (value < 0.0));
+        if finite && value > 0.0 { f64::from(value) } else { 0.0 }
+    }
+
+    pub(crate) fn sum(self, other: Self) -> Self {
+        Self {
+            negative: self.negative + other.negative,
+            not_finite: self.not_finite + other.not_finite,
+        }
+    }
+}

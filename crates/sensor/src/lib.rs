@@ -1,0 +1,63 @@
+#![forbid(unsafe_code)]
+//! Image sensors after EMVA 1288 (Release 4.0, linear model), in electrons: from the light of a
+//! render to the digital numbers that a real camera would have written.
+//!
+//! # Conventions
+//!
+//! * Numbers carry EMVA's names and units: electrons (e⁻), digital numbers (DN), seconds,
+//!   micrometres of pixel pitch, nanometres of wavelength, kelvin.
+//! * The system gain K is in DN/e⁻; what data sheets call e⁻/DN is its inverse.
+//! * A film is `[row][column][lane]`, an image `[row][column][channel]`; row 0 is the top.
+//! * Fixed patterns follow from the serial number and the pixel, temporal noise from the seed, the
+//!   frame and the pixel: the same image for any number of threads, and a crop is a crop.
+//!
+//! # Example
+//!
+//! ```
+//! use etendue_sensor::{Film, Sensor, SensorSpec};
+//!
+//! let spec: SensorSpec = serde_json::from_str(
+//!     r#"{ "type": "raw", "model": "imx183", "quantum_efficiency": 0.8, "resolution": [64, 48] }"#,
+//! )?;
+//! let sensor = Sensor::new(&spec)?;
+//! let grey = vec![0.18; 64 * 48 * sensor.lanes().count()];
+//! for shot in sensor.shots() {
+//!     let image = sensor.expose(Film { values: &grey }, shot, 0)?;
+//!     let mean = image.values.iter().map(|&y| f64::from(y)).sum::<f64>() / (64.0 * 48.0);
+//!     // 18 % of the way from black (38 DN) to white (4095 DN), to within its noise.
+//!     assert!((mean - (38.0 + 0.18 * 4057.0)).abs() < 4.0);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Map
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`spec`] | the sensor as a scene file writes it |
+//! | [`preset`] | sensors of the trade |
+//! | [`cfa`] | colour filter arrays |
+//! | [`film`] | what a sensor is given and gives back |
+//! | [`sensor`] | a sensor ready to expose |
+
+pub mod cfa;
+mod chain;
+mod clipping;
+mod error;
+pub mod film;
+mod normal;
+mod philox;
+mod poisson;
+pub mod preset;
+mod presets;
+mod response;
+pub mod sensor;
+mod settings;
+pub mod spec;
+
+pub use cfa::CfaSpec;
+pub use error::SensorError;
+pub use film::{Film, Flaws, Moments, RawImage, Shot};
+pub use preset::{Model, Preset};
+pub use sensor::Sensor;
+pub use spec::{NoiseModel, Radiometry, SensorKind, SensorSpec};

@@ -1,0 +1,381 @@
+//! A sensor ready to expose films.
+
+use etendue_spectrum::{Curve, Lanes};
+use rayon::prelude::*;
+
+use crate::chain::{self, BLOCK, Chain, Lane, Place};
+use crate::film::{Film, Flaws, Moments, RawImage, Shot};
+use crate::normal::pair;
+use crate::philox::{Key, Site, Stage};
+use crate::response::Response;
+use crate::settings::Settings;
+use crate::spec::{HotPixels, NoiseModel, Radiometry, SensorSpec};
+use crate::{CfaSpec, SensorError};
+
+/// A sensor whose numbers hold together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    settings: Settings,
+    response: Response,
+    cfa: Option<CfaSpec>,
+}
+
+impl Sensor {
+    /// Checks a spec and works out what each channel makes of light.
+    ///
+    /// # Errors
+    ///
+    /// [`SensorError`] for any number or curve that is none, and for a channel that would be black.
+    pub fn new(spec: &SensorSpec) -> Result<Self, SensorError> {
+        let settings = Settings::new(spec)?;
+        let response = Response::new(spec, &settings)?;
+        Ok(Self { settings, response, cfa: spec.cfa.clone() })
+    }
+
+    /// Columns and rows.
+    #[must_use]
+    pub fn resolution(&self) -> [u32; 2] {
+        self.settings.resolution
+    }
+
+    /// The same sensor with other columns and rows. The fixed pattern keeps its pixels.
+    #[must_use]
+    pub fn with_resolution(mut self, resolution: [u32; 2]) -> Self {
+        self.settings.resolution = resolution.map(|side| side.max(1));
+        self
+    }
+
+    /// From one pixel's centre to the next (µm).
+    #[must_use]
+    pub fn pixel_pitch(&self) -> f64 {
+        self.settings.pixel_pitch
+    }
+
+    /// The spectral lanes that a film for this sensor has.
+    #[must_use]
+    pub fn lanes(&self) -> &Lanes {
+        &self.response.lanes
+    }
+
+    /// What the film's values mean.
+    #[must_use]
+    pub fn radiometry(&self) -> Radiometry {
+        self.settings.radiometry
+    }
+
+    /// How electrons are drawn.
+    #[must_use]
+    pub fn noise(&self) -> NoiseModel {
+        self.settings.noise
+    }
+
+    /// Names of the kinds of photosites: filters, or the channels of each pixel.
+    pub fn channels(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.response.channels.iter().map(|channel| channel.name.as_str())
+    }
+
+    /// Numbers a pixel of an image: 1 for a raw sensor.
+    #[must_use]
+    pub fn depth(&self) -> usize {
+        self.response.depth()
+    }
+
+    /// The colour filter array of a raw sensor that has one.
+    #[must_use]
+    pub fn cfa(&self) -> Option<&CfaSpec> {
+        self.cfa.as_ref()
+    }
+
+    /// Which channel a pixel of a raw sensor has, an index into [`Self::channels`].
+    #[must_use]
+    pub fn channel_at(&self, row: usize, column: usize) -> usize {
+        let Some(pattern) = &self.response.pattern else { return 0 };
+        let channels = &pattern[row % pattern.len()];
+        channels[column % channels.len()]
+    }
+
+    /// Mean photo-electrons that a unit of each lane makes in a channel: a second in physical mode,
+    /// in all in digital mode (e⁻).
+    #[must_use]
+    pub fn electrons_per_unit(&self, channel: usize) -> &[f64] {
+        &self.response.channels[channel].electrons
+    }
+
+    /// η without colour filters.
+    #[must_use]
+    pub fn quantum_efficiency(&self) -> &Curve {
+        &self.settings.efficiency
+    }
+
+    /// K (DN/e⁻).
+    #[must_use]
+    pub fn system_gain(&self) -> f64 {
+        self.settings.gain
+    }
+
+    /// `σ_read` (e⁻).
+    #[must_use]
+    pub fn read_noise(&self) -> f64 {
+        self.settings.read_noise
+    }
+
+    /// `μ_I` at the sensor's temperature (e⁻/s).
+    #[must_use]
+    pub fn dark_current(&self) -> f64 {
+        self.settings.dark_current
+    }
+
+    /// Electrons a pixel holds, +inf when only the converter saturates.
+    #[must_use]
+    pub fn full_well(&self) -> f64 {
+        self.settings.full_well
+    }
+
+    /// Electrons from black to saturation, of the well or the converter (e⁻).
+    #[must_use]
+    pub fn saturation(&self) -> f64 {
+        let converter = (self.settings.white() - self.settings.black) / self.settings.gain;
+        self.settings.full_well.min(converter)
+    }
+
+    /// What no light reads as (DN).
+    #[must_use]
+    pub fn black_level(&self) -> f64 {
+        self.settings.black
+    }
+
+    /// The greatest digital number, 2ᵇ − 1.
+    #[must_use]
+    pub fn white_level(&self) -> f64 {
+        self.settings.white()
+    }
+
+    /// Bits of the converter.
+    #[must_use]
+    pub fn bit_depth(&self) -> u32 {
+        self.settings.bit_depth
+    }
+
+    /// PRNU as a fraction, DSNU in electrons.
+    #[must_use]
+    pub fn non_uniformity(&self) -> [f64; 2] {
+        [self.settings.prnu, self.settings.dsnu]
+    }
+
+    /// What a user should know: keys that have no effect, values that look like a slip.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.settings.notes
+    }
+
+    /// What the scene asks for: every frame of every exposure, numbered through.
+    pub fn shots(&self) -> impl Iterator<Item = Shot> + '_ {
+        let exposures = self.settings.exposures.iter();
+        let each = exposures.flat_map(|&exposure| (0..self.settings.frames).map(move |_| exposure));
+        each.zip(0..).map(|(exposure, frame)| Shot { exposure, frame })
+    }
+
+    /// The same sensor drawing its electrons another way.
+    #[must_use]
+    pub fn with_noise(mut self, noise: NoiseModel) -> Self {
+        self.settings.noise = noise;
+        self
+    }
+
+    /// Exposes a film. The result depends on the film, the shot, the seed and the serial number
+    /// alone: not on threads, nor on other frames.
+    ///
+    /// # Errors
+    ///
+    /// [`SensorError::Film`] when the film is not of the sensor's size and lanes.
+    pub fn expose(&self, film: Film<'_>, shot: Shot, seed: u64) -> Result<RawImage, SensorError> {
+        let (width, height, depth) = self.check(film)?;
+        let exposing = Exposing::new(self, film, shot, seed);
+        let mut values = vec![0; width * height * depth];
+        let rows = values.par_chunks_mut(width * depth).enumerate();
+        let flaws =
+            rows.map(|(row, out)| exposing.row(row, out)).reduce(Flaws::default, Flaws::sum);
+        Ok(RawImage { width, height, depth, values, flaws })
+    }
+
+    /// The expected value and the variance of every pixel over frames of this very sensor, fixed
+    /// pattern included. Clipping by well and converter is that of normal distributions; rounding
+    /// adds 1/12 DN².
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::expose`].
+    pub fn moments(&self, film: Film<'_>, shot: Shot) -> Result<Moments, SensorError> {
+        let (width, height, depth) = self.check(film)?;
+        let exposing = Exposing::new(self, film, shot, 0);
+        let mut mean = vec![0.0; width * height * depth];
+        let mut variance = vec![0.0; width * height * depth];
+        let rows = mean.par_chunks_mut(width * depth).zip(variance.par_chunks_mut(width * depth));
+        let flaws = rows
+            .enumerate()
+            .map(|(row, (mean, variance))| exposing.moments_of_row(row, mean, variance))
+            .reduce(Flaws::default, Flaws::sum);
+        Ok(Moments { width, height, depth, mean, variance, flaws })
+    }
+
+    fn check(&self, film: Film<'_>) -> Result<(usize, usize, usize), SensorError> {
+        let [width, height] = self.settings.resolution.map(|side| side as usize);
+        let lanes = self.response.lanes.count();
+        if film.values.len() != width * height * lanes {
+            return Err(SensorError::Film { film: film.values.len(), width, height, lanes });
+        }
+        Ok((width, height, self.depth()))
+    }
+
+    fn chain(&self, exposure: f64, seed: u64) -> Chain {
+        let s = &self.settings;
+        let hot = |hot: HotPixels| [hot.share, hot.dark_current * exposure];
+        Chain {
+            noise: s.noise,
+            dark: s.dark_current * exposure,
+            full_well: s.full_well,
+            read_noise: s.read_noise,
+            gain: s.gain,
+            black: s.black,
+            white: s.white(),
+            prnu: s.prnu,
+            dsnu: s.dsnu,
+            hot: s.hot_pixels.map(hot),
+            temporal: Key::new(seed),
+            pattern: Key::new(s.serial),
+        }
+    }
+}
+
+/// A film in the course of an exposure.
+struct Exposing<'a> {
+    sensor: &'a Sensor,
+    film: Film<'a>,
+    frame: u32,
+    chain: Chain,
+    /// What lanes are worth are multiplied by this: T in physical mode.
+    factor: f64,
+    /// What each column adds in this frame (e⁻); empty when nothing.
+    columns: Vec<f64>,
+}
+
+impl<'a> Exposing<'a> {
+    fn new(sensor: &'a Sensor, film: Film<'a>, shot: Shot, seed: u64) -> Self {
+        let chain = sensor.chain(shot.exposure, seed);
+        let factor = match sensor.settings.radiometry {
+            Radiometry::Digital => 1.0,
+            Radiometry::Physical => shot.exposure,
+        };
+        let sigma = sensor.settings.column_noise;
+        let noisy = sigma > 0.0 && chain.noise != NoiseModel::None;
+        let site = Site { row: 0, channel: 0, frame: shot.frame };
+        let offset = |column| sigma * one_normal(&chain.temporal, site, column, Stage::Column);
+        let width = if noisy { sensor.settings.resolution[0] } else { 0 };
+        let columns = (0..width).map(offset).collect();
+        Self { sensor, film, frame: shot.frame, factor, columns, chain }
+    }
+
+    fn row(&self, row: usize, out: &mut [u16]) -> Flaws {
+        let depth = self.sensor.depth();
+        let row_offset = self.row_offset(row);
+        let mut numbers = [0; BLOCK];
+        self.blocks(row, |place, start, channel, count, mean| {
+            let mut offset = [row_offset; BLOCK];
+            for (offset, column) in offset.iter_mut().zip(self.columns.iter().skip(start)) {
+                *offset += column;
+            }
+            chain::expose(&self.chain, place, mean, &mut offset, &mut numbers);
+            let out = out[start * depth + channel..].iter_mut().step_by(depth);
+            out.zip(&numbers[..count]).for_each(|(out, number)| *out = *number);
+        })
+    }
+
+    fn moments_of_row(&self, row: usize, mean_out: &mut [f32], variance_out: &mut [f32]) -> Flaws {
+        let depth = self.sensor.depth();
+        let s = &self.sensor.settings;
+        let shared = s.row_noise * s.row_noise + s.column_noise * s.column_noise;
+        let mut variance = [0.0; BLOCK];
+        self.blocks(row, |place, start, channel, count, mean| {
+            chain::moments(&self.chain, shared, place, mean, &mut variance);
+            let at = start * depth + channel;
+            #[expect(clippy::cast_possible_truncation, reason = "DN need not more than f32")]
+            for i in 0..count {
+                mean_out[at + i * depth] = mean[i] as f32;
+                variance_out[at + i * depth] = variance[i] as f32;
+            }
+        })
+    }
+
+    /// Calls `each` with the mean photo-electrons of every block of a row: its place, first column,
+    /// channel of the image and number of pixels.
+    fn blocks(
+        &self,
+        row: usize,
+        mut each: impl FnMut(Place, usize, usize, usize, &mut Lane),
+    ) -> Flaws {
+        let width = self.sensor.settings.resolution[0] as usize;
+        let depth = self.sensor.depth();
+        let mut flaws = Flaws::default();
+        let mut mean = [0.0; BLOCK];
+        for start in (0..width).step_by(BLOCK) {
+            let count = BLOCK.min(width - start);
+            for channel in 0..depth {
+                let seen = self.light(row, start, count, channel, &mut mean);
+                if channel == 0 {
+                    flaws = flaws.sum(seen);
+                }
+                // What is left of a short block repeats its last pixel and is thrown away.
+                let last = mean[count - 1];
+                mean[count..].fill(last);
+                #[expect(clippy::cast_possible_truncation, reason = "sides have 16 bits")]
+                let site = Site { row: row as u32, channel: channel as u16, frame: self.frame };
+                #[expect(clippy::cast_possible_truncation, reason = "sides have 16 bits")]
+                each(Place { site, column: start as u32 }, start, channel, count, &mut mean);
+            }
+        }
+        flaws
+    }
+
+    /// Mean photo-electrons of `count` pixels from column `start` on.
+    fn light(
+        &self,
+        row: usize,
+        start: usize,
+        count: usize,
+        channel: usize,
+        mean: &mut Lane,
+    ) -> Flaws {
+        let lanes = self.sensor.response.lanes.count();
+        let width = self.sensor.settings.resolution[0] as usize;
+        let mut flaws = Flaws::default();
+        let from = (row * width + start) * lanes;
+        let pixels = self.film.values[from..from + count * lanes].chunks_exact(lanes);
+        for (i, (pixel, mean)) in pixels.zip(mean.iter_mut()).enumerate() {
+            let channel = match self.sensor.response.pattern {
+                Some(_) => self.sensor.channel_at(row, start + i),
+                None => channel,
+            };
+            let electrons = &self.sensor.response.channels[channel].electrons;
+            let sum: f64 =
+                pixel.iter().zip(electrons).map(|(&lane, worth)| flaws.light(lane) * worth).sum();
+            *mean = self.factor * sum;
+        }
+        flaws
+    }
+
+    /// What the row adds in this frame (e⁻).
+    fn row_offset(&self, row: usize) -> f64 {
+        let sigma = self.sensor.settings.row_noise;
+        if sigma <= 0.0 || self.chain.noise == NoiseModel::None {
+            return 0.0;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "sides have 16 bits")]
+        let site = Site { row: row as u32, channel: 0, frame: self.frame };
+        sigma * one_normal(&self.chain.temporal, site, 0, Stage::Row)
+    }
+}
+
+fn one_normal(key: &Key, site: Site, column: u32, stage: Stage) -> f64 {
+    let [a, b, c, _] = key.words(site.counter(column, stage, 0));
+    pair([a, b, c])[0]
+}

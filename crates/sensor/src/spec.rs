@@ -1,0 +1,263 @@
+//! The sensor as a scene file writes it.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use etendue_spectrum::{Curve, Grid};
+use schemars::JsonSchema;
+use serde::de::{self, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::{CfaSpec, Model};
+
+/// A scene file's `sensor`. What is absent comes from the `model`, or is ideal.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SensorSpec {
+    /// What a pixel measures.
+    #[serde(rename = "type")]
+    pub kind: SensorKind,
+    /// A sensor of the trade, whose published figures fill in for absent keys.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<Model>,
+    /// Columns and rows (default: the model's, or 1024 × 1024).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resolution: Option<[u32; 2]>,
+    /// From one pixel's centre to the next (µm, > 0; default 5).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pixel_pitch: Option<f64>,
+    /// Electrons a photon frees, η (0..=1; default 1).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quantum_efficiency: Option<Curve>,
+    /// System gain K (DN/e⁻, > 0). Without it there are no electrons to count: `noise` must be
+    /// `none` and radiometry `digital`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub system_gain: Option<f64>,
+    /// Standard deviation of the read-out, `σ_read` (e⁻, ≥ 0; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub read_noise: Option<f64>,
+    /// Dark current `μ_I` at `dark_current_temperature` (e⁻/s, ≥ 0; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dark_current: Option<f64>,
+    /// Warming by this much doubles the dark current (K, > 0; absent: it stays as it is).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dark_current_doubling: Option<f64>,
+    /// Where the dark current was measured (K; default 293.15).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dark_current_temperature: Option<f64>,
+    /// How warm the sensor is (K, ≥ 0; default `dark_current_temperature`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<f64>,
+    /// Electrons a pixel holds (e⁻, > 0; absent: only the converter saturates).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub full_well: Option<f64>,
+    /// What no light reads as (DN, 0 .. 2ᵇ − 1; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub black_level: Option<f64>,
+    /// Bits of the converter (1..=16; default 16).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bit_depth: Option<u32>,
+    /// Photo response non-uniformity: relative standard deviation of sensitivity (0..=1; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prnu: Option<f64>,
+    /// Dark signal non-uniformity: standard deviation of the pixels' offsets (e⁻, ≥ 0; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dsnu: Option<f64>,
+    /// Standard deviation of an offset that every row draws anew each frame (e⁻, ≥ 0; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub row_noise: Option<f64>,
+    /// The same for columns (e⁻, ≥ 0; default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column_noise: Option<f64>,
+    /// Pixels with much more dark current than the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hot_pixels: Option<HotPixels>,
+    /// Exposure time T (s, > 0; default 0.01).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposure: Option<f64>,
+    /// Several exposure times (s): the light is rendered once and exposed for each.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposures: Option<Vec<f64>>,
+    /// Frames of each exposure (≥ 1; default 1). They share the fixed pattern, not the noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frames: Option<u32>,
+    /// How electrons are drawn (default: `poisson` with a model or a gain, else `none`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseModel>,
+    /// Serial number: which copy of the sensor, hence which fixed pattern (default 0).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub serial: Option<u64>,
+    /// What the light means (default `digital`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radiometry: Option<Radiometry>,
+    /// Colour filter array of a `raw` sensor: `rggb` or another two-by-two word read row by row, or
+    /// a list of rows. Absent: monochrome.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cfa: Option<CfaSpec>,
+    /// Transmissions of the filters by letter, or the name of a set. Letters without a curve are
+    /// ideal: r, g and b each see one of the render's colours, w sees all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub filters: Option<Filters>,
+    /// Bands of wavelengths (nm): the channels of a `multispectral` sensor, or how finely other
+    /// sensors divide the light.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bands: Option<Grid>,
+    /// Channels of a `multispectral` sensor by curves instead of bands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channels: Option<Vec<ChannelSpec>>,
+}
+
+/// What a pixel measures.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SensorKind {
+    /// One number, behind a colour filter or none: a real sensor.
+    Raw,
+    /// Red, green and blue at every pixel.
+    #[default]
+    Rgb,
+    /// Any number of bands at every pixel.
+    Multispectral,
+}
+
+/// How electrons are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseModel {
+    /// As nature does.
+    Poisson,
+    /// By a normal distribution of the same mean and variance, the paper's approximation.
+    Normal,
+    /// Not at all: every pixel has its expected value, fixed patterns are left out.
+    None,
+}
+
+/// What the light of a render means to the sensor.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Radiometry {
+    /// Intensities: 1 is full scale, and the grey value fixes the electrons. The exposure time moves
+    /// the dark signal alone. Of the quantum efficiency only the shape matters.
+    #[default]
+    Digital,
+    /// Spectral irradiance (W·m⁻²·nm⁻¹): exposure time, pixel area, photon energy and quantum
+    /// efficiency make electrons.
+    Physical,
+}
+
+/// Hot pixels, the same in every frame of a sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HotPixels {
+    /// The share of pixels that are hot (0..=1).
+    pub share: f64,
+    /// The mean of their extra dark current, which is distributed exponentially (e⁻/s, ≥ 0).
+    pub dark_current: f64,
+}
+
+/// A channel of a multispectral sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelSpec {
+    /// What it is called in files.
+    pub name: String,
+    /// Its transmission (0..=1), which the quantum efficiency multiplies.
+    pub curve: Curve,
+}
+
+/// Transmissions of colour filters.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Filters {
+    /// A set of curves by name.
+    Set(FilterSet),
+    /// A curve for each letter.
+    Curves(BTreeMap<char, Curve>),
+}
+
+/// Sets of colour filters that come with the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FilterSet {
+    /// r, g and b each see one of the render's colours.
+    Ideal,
+    /// r, g and b of the Nikon D5100 as measured by NPL, relative to their peaks. They include the
+    /// silicon, so `quantum_efficiency` should be a number beside them.
+    NikonD5100,
+}
+
+impl Serialize for Filters {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Set(set) => set.serialize(serializer),
+            Self::Curves(curves) => curves.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Filters {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(FiltersVisitor)
+    }
+}
+
+/// Reads either form, so that an error speaks of the filters and not of "no variant matched".
+struct FiltersVisitor;
+
+impl<'de> Visitor<'de> for FiltersVisitor {
+    type Value = Filters;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the name of a filter set, or an object with a curve for each letter")
+    }
+
+    fn visit_str<E: de::Error>(self, name: &str) -> Result<Filters, E> {
+        FilterSet::deserialize(de::value::StrDeserializer::new(name)).map(Filters::Set)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Filters, A::Error> {
+        BTreeMap::deserialize(de::value::MapAccessDeserializer::new(map)).map(Filters::Curves)
+    }
+}
+
+impl JsonSchema for Filters {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Filters".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let set = generator.subschema_for::<FilterSet>();
+        let curves = generator.subschema_for::<BTreeMap<String, Curve>>();
+        schemars::json_schema!({ "anyOf": [set, curves] })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_those_of_the_design_and_unknown_ones_are_refused() {
+        let spec: SensorSpec = serde_json::from_str(
+            r#"{ "type": "raw", "model": "imx183", "resolution": [640, 480], "exposure": 0.01,
+                 "cfa": "rggb", "filters": { "r": [[580, 0], [600, 1], [700, 1]] },
+                 "quantum_efficiency": [[400, 0.2], [700, 0.5]], "noise": "normal" }"#,
+        )
+        .unwrap();
+        assert_eq!(spec.kind, SensorKind::Raw);
+        assert_eq!(spec.noise, Some(NoiseModel::Normal));
+        let back = serde_json::to_value(&spec).unwrap();
+        assert_eq!(serde_json::from_value::<SensorSpec>(back).unwrap(), spec);
+        for (text, word) in [
+            (r#"{ "red_noise": 1 }"#, "unknown field `red_noise`"),
+            (r#"{ "type": "bayer" }"#, "unknown variant `bayer`"),
+            (r#"{ "model": "imx999" }"#, "unknown variant `imx999`"),
+            (r#"{ "filters": "kodak" }"#, "unknown variant `kodak`"),
+            (r#"{ "filters": 3 }"#, "the name of a filter set"),
+            (r#"{ "filters": { "red": 1 } }"#, "a character"),
+            (r#"{ "hot_pixels": { "share": 0.1 } }"#, "missing field `dark_current`"),
+        ] {
+            let error = serde_json::from_str::<SensorSpec>(text).unwrap_err().to_string();
+            assert!(error.contains(word), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! What is no sensor, no light or no film is refused, with the key and the remedy.
+
+use etendue_sensor::{Film, Flaws, Sensor, SensorError, SensorSpec};
+use serde_json::{Value, json};
+
+fn refused(spec: Value) -> SensorError {
+    let spec: SensorSpec =
+        serde_json::from_value(spec.clone()).unwrap_or_else(|e| panic!("{spec}: {e}"));
+    match Sensor::new(&spec) {
+        Ok(_) => panic!("accepted: {spec:?}"),
+        Err(error) => error,
+    }
+}
+
+#[test]
+fn numbers_out_of_range() {
+    for (keys, word) in [
+        (json!({ "quantum_efficiency": 1.01 }), "quantum_efficiency: the curve is 1.01"),
+        (json!({ "quantum_efficiency": -0.1 }), "must lie in 0..=1"),
+        (json!({ "quantum_efficiency": [[400, 0.5], [500, 1.5]] }), "1.5 at 500 nm"),
+        (json!({ "system_gain": 0 }), "sensor.system_gain is 0"),
+        (json!({ "system_gain": -1 }), "above 0"),
+        (json!({ "system_gain": 1e-300 }), "so small"),
+        (json!({ "full_well": 50, "black_level": 100 }), "black level's worth of 100 e⁻"),
+        (json!({ "full_well": 0 }), "sensor.full_well is 0"),
+        (json!({ "full_well": -5 }), "sensor.full_well is -5"),
+        (json!({ "bit_depth": 0 }), "1 to 16 bits"),
+        (json!({ "bit_depth": 17 }), "sensor.bit_depth is 17"),
+        (json!({ "black_level": -1 }), "sensor.black_level is -1"),
+        (json!({ "black_level": 255, "bit_depth": 8 }), "below full scale"),
+        (json!({ "exposure": 0 }), "sensor.exposure is 0"),
+        (json!({ "exposure": -1 }), "seconds, above 0"),
+        (json!({ "exposures": [0.1, 0] }), "sensor.exposures is 0"),
+        (json!({ "exposures": [] }), "name one"),
+        (json!({ "exposure": 1, "exposures": [1] }), "of no use"),
+        (json!({ "frames": 0 }), "sensor.frames is 0"),
+        (json!({ "temperature": -1 }), "kelvin, 0 or more"),
+        (json!({ "temperature": 1e6, "dark_current_doubling": 1 }), "beyond all measure"),
+        (json!({ "dark_current_doubling": 0 }), "kelvin, above 0"),
+        (json!({ "dark_current": -1 }), "sensor.dark_current is -1"),
+        (json!({ "read_noise": -1 }), "sensor.read_noise is -1"),
+        (json!({ "prnu": 1.5 }), "a fraction"),
+        (json!({ "dsnu": -1 }), "sensor.dsnu is -1"),
+        (json!({ "row_noise": -1 }), "sensor.row_noise is -1"),
+        (json!({ "hot_pixels": { "share": 2, "dark_current": 1 } }), "hot_pixels.share is 2"),
+        (json!({ "resolution": [0, 5] }), "sensor.resolution is 0"),
+        (json!({ "resolution": [70000, 5] }), "1 to 65535"),
+        (json!({ "pixel_pitch": 0 }), "sensor.pixel_pitch is 0"),
+    ] {
+        let mut spec = json!({ "type": "raw", "system_gain": 1.0 });
+        for (key, value) in keys.as_object().unwrap() {
+            spec[key] = value.clone();
+        }
+        let text = refused(spec).to_string();
+        assert!(text.contains(word), "{keys}: {text}");
+    }
+}
+
+#[test]
+fn curves_that_are_none() {
+    for (text, word) in [
+        (r#"{ "quantum_efficiency": [] }"#, "empty"),
+        (r#"{ "quantum_efficiency": [[500, 0.5], [400, 0.5]] }"#, "sort the samples"),
+        (r#"{ "cfa": "rggx" }"#, "the filter `x`"),
+        (r#"{ "cfa": "rggb", "filters": { "g": [[500, 2], [600, 0]] } }"#, "sensor.filters.g"),
+    ] {
+        let text = match serde_json::from_str::<SensorSpec>(text) {
+            Err(error) => error.to_string(),
+            Ok(spec) => {
+                let spec = SensorSpec { kind: etendue_sensor::SensorKind::Raw, ..spec };
+                Sensor::new(&spec).unwrap_err().to_string()
+            }
+        };
+        assert!(text.contains(word), "{text}");
+    }
+}
+
+#[test]
+fn blind_sensors_are_errors_and_never_black_images() {
+    for (keys, word) in [
+        (
+            json!({ "quantum_efficiency": [[900, 0.5], [1000, 0.5]] }),
+            "sees nothing of 380..=780 nm",
+        ),
+        (
+            json!({ "quantum_efficiency": [[400, 0.5], [500, 0.5]], "bands": [600, 700] }),
+            "sees nothing of 600..=700 nm",
+        ),
+        (json!({ "quantum_efficiency": 0 }), "sees nothing"),
+        (
+            json!({ "cfa": "rggb", "filters": { "r": [[800, 0.5], [900, 0.5]] } }),
+            "the channel `R` sees nothing",
+        ),
+        (
+            json!({ "type": "multispectral", "channels":
+                [{ "name": "nir", "curve": [[800, 0.5], [900, 0.5]] }] }),
+            "the channel `nir` sees nothing",
+        ),
+    ] {
+        let mut spec = json!({ "type": "raw" });
+        for (key, value) in keys.as_object().unwrap() {
+            spec[key] = value.clone();
+        }
+        let text = refused(spec).to_string();
+        assert!(text.contains(word), "{keys}: {text}");
+    }
+}
+
+#[test]
+fn keys_that_would_do_nothing() {
+    for (spec, word) in [
+        (json!({ "type": "rgb", "cfa": "rggb" }), "sensor.cfa is of no use"),
+        (json!({ "type": "raw", "filters": "nikon_d5100" }), "sensor.cfa is missing"),
+        (json!({ "type": "multispectral" }), "sensor.bands is missing"),
+        (json!({ "type": "multispectral", "channels": [] }), "sensor.channels is missing"),
+        (json!({ "type": "multispectral", "bands": [1, 2], "filters": "ideal" }), "of no use"),
+        (json!({ "type": "rgb", "channels": [] }), "sensor.channels is of no use"),
+        (json!({ "noise": "poisson" }), "sensor.system_gain is missing"),
+        (json!({ "read_noise": 3 }), "sensor.system_gain is missing"),
+        (json!({ "radiometry": "physical" }), "sensor.system_gain is missing"),
+    ] {
+        let text = refused(spec.clone()).to_string();
+        assert!(text.contains(word), "{spec}: {text}");
+    }
+}
+
+#[test]
+fn what_looks_like_a_slip_is_said() {
+    let notes = |spec: Value| {
+        let spec: SensorSpec = serde_json::from_value(spec).unwrap();
+        Sensor::new(&spec).unwrap().notes().join("\n")
+    };
+    let celsius = notes(json!({ "model": "imx183", "temperature": 20 }));
+    assert!(celsius.contains("was °C meant?"), "{celsius}");
+    let idle = notes(json!({ "system_gain": 1, "dark_current": 1, "temperature": 300 }));
+    assert!(idle.contains("dark_current_doubling is not given"), "{idle}");
+    assert_eq!(notes(json!({ "model": "imx183", "temperature": 300 })), "");
+}
+
+#[test]
+fn light_that_is_none_is_counted_and_dark() {
+    let spec = json!({ "type": "rgb", "resolution": [2, 1] });
+    let sensor = Sensor::new(&serde_json::from_value(spec).unwrap()).unwrap();
+    let shot = sensor.shots().next().unwrap();
+    let film = [f32::NAN, -1.0, 1.0, f32::INFINITY, f32::NEG_INFINITY, -0.0];
+    let image = sensor.expose(Film { values: &film }, shot, 0).unwrap();
+    assert_eq!(image.values, [0, 0, 65535, 0, 0, 0]);
+    assert_eq!(image.flaws, Flaws { negative: 1, not_finite: 3 });
+    assert_eq!(sensor.moments(Film { values: &film }, shot).unwrap().flaws, image.flaws);
+    let short = sensor.expose(Film { values: &film[..5] }, shot, 0).unwrap_err();
+    assert!(short.to_string().contains("has 5 values, 2 × 1 pixels of 3 spectral lanes need 6"));
+}
