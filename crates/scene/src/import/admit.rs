@@ -1,0 +1,252 @@
+//! The gate that every imported mesh passes: indices exist, positions that triangles use are
+//! finite, attributes are finite. Bounds are found in the same pass, in parallel.
+
+use std::path::Path;
+
+use bytemuck::AnyBitPattern;
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Bounds, Buffer, Mesh, Positions, Vertices};
+use rayon::prelude::*;
+
+use super::{ImportError, Note, NoteKind, Options, Strictness};
+
+/// Triangles that one task looks at: large enough to forget the cost of a task, small enough to
+/// share 100 000 triangles among many cores.
+const CHUNK: usize = 1 << 14;
+
+/// A mesh as a file has it, before anything is known of it.
+#[derive(Debug)]
+pub(super) struct Candidate {
+    /// What the file calls it.
+    pub name: String,
+    /// Where it is in the file, for messages.
+    pub place: String,
+    pub positions: Positions,
+    pub triangles: Buffer<[u32; 3]>,
+    pub normals: Option<Vertices<3>>,
+    pub uvs: Vec<Vertices<2>>,
+    pub colors: Option<Vertices<4>>,
+}
+
+/// A mesh that passed.
+#[derive(Debug)]
+pub(super) struct Admitted {
+    pub mesh: Mesh,
+    /// Triangles dropped because a corner is not finite.
+    pub dropped: u64,
+    /// Triangles of zero area, when they are to be counted.
+    pub degenerate: u64,
+    pub notes: Vec<Note>,
+}
+
+/// Checks `candidate`, drops what is not finite, and works out the bounds.
+///
+/// # Errors
+///
+/// When a triangle names a vertex that does not exist; under [`Strictness::Strict`] also when a
+/// value is not finite.
+pub(super) fn admit(
+    candidate: Candidate,
+    file: &Path,
+    options: &Options,
+) -> Result<Admitted, ImportError> {
+    let mut gate =
+        Gate { file, place: &candidate.place, strictness: options.strictness, notes: Vec::new() };
+    let survey = gate.survey(&candidate.positions, &candidate.triangles)?;
+    let (triangles, bounds) = if survey.broken == 0 {
+        (candidate.triangles, survey.bounds)
+    } else {
+        gate.defect(
+            survey.broken,
+            "triangle",
+            "with a corner that is not a finite number",
+            "dropped",
+        )?;
+        let kept = finite_triangles(&candidate.positions, &candidate.triangles);
+        let bounds = bounds_of(&candidate.positions, &kept);
+        (kept.into(), bounds)
+    };
+    let degenerate = if options.count_degenerate {
+        count_degenerate(&candidate.positions, &triangles)
+    } else {
+        0
+    };
+    let mesh = Mesh {
+        normals: candidate.normals.map(|v| gate.finite(v, "normal", 0.0)).transpose()?,
+        uvs: candidate
+            .uvs
+            .into_iter()
+            .map(|v| gate.finite(v, "texture coordinate", 0.0))
+            .collect::<Result<_, _>>()?,
+        colors: candidate.colors.map(|v| gate.finite(v, "vertex colour", 1.0)).transpose()?,
+        name: candidate.name,
+        positions: candidate.positions,
+        triangles,
+        bounds,
+    };
+    Ok(Admitted { mesh, dropped: survey.broken, degenerate, notes: gate.notes })
+}
+
+/// What one look at all triangles tells.
+#[derive(Clone, Copy)]
+struct Survey {
+    bounds: Bounds,
+    /// Triangles with a corner that is not finite.
+    broken: u64,
+}
+
+struct Gate<'a> {
+    file: &'a Path,
+    place: &'a str,
+    strictness: Strictness,
+    notes: Vec<Note>,
+}
+
+impl Gate<'_> {
+    fn survey(&self, positions: &Positions, triangles: &[[u32; 3]]) -> Result<Survey, ImportError> {
+        match positions {
+            Positions::F32(vertices) => {
+                let (floats, stride): (&[f32], _) = (vertices.floats(), vertices.stride());
+                self.survey_by(vertices.len(), triangles, |corner| {
+                    let at = corner as usize * stride;
+                    let [x, y, z] = [floats[at], floats[at + 1], floats[at + 2]];
+                    DVec3::new(x.into(), y.into(), z.into())
+                })
+            }
+            Positions::F64(vertices) => {
+                let vertices: &[[f64; 3]] = vertices;
+                self.survey_by(vertices.len(), triangles, |corner| vertices[corner as usize].into())
+            }
+        }
+    }
+
+    fn survey_by(
+        &self,
+        vertices: usize,
+        triangles: &[[u32; 3]],
+        position: impl Fn(u32) -> DVec3 + Sync,
+    ) -> Result<Survey, ImportError> {
+        let parts: Vec<Option<Survey>> = triangles
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let highest = chunk.as_flattened().iter().copied().max().unwrap_or(0);
+                ((highest as usize) < vertices).then(|| survey_chunk(chunk, &position))
+            })
+            .collect();
+        let mut survey = Survey { bounds: Bounds::EMPTY, broken: 0 };
+        for (number, part) in parts.into_iter().enumerate() {
+            let Some(part) = part else {
+                return Err(self.out_of_range(vertices, triangles, number * CHUNK));
+            };
+            survey.bounds = survey.bounds.union(part.bounds);
+            survey.broken += part.broken;
+        }
+        Ok(survey)
+    }
+
+    fn out_of_range(&self, vertices: usize, triangles: &[[u32; 3]], from: usize) -> ImportError {
+        let found = triangles[from..]
+            .iter()
+            .enumerate()
+            .find_map(|(i, t)| Some((i, *t.iter().find(|&&corner| corner as usize >= vertices)?)));
+        let (i, corner) = found.unwrap_or_default();
+        self.damaged(format!(
+            "triangle {} names vertex {corner}, but there are only {vertices} vertices; \
+             export the file again",
+            from + i
+        ))
+    }
+
+    /// `vertices` with every value finite; whole vertices are replaced by `instead`.
+    fn finite<const N: usize>(
+        &mut self,
+        vertices: Vertices<N>,
+        what: &str,
+        instead: f32,
+    ) -> Result<Vertices<N>, ImportError> {
+        let is_finite = |i: usize| vertices.get(i).iter().all(|value| value.is_finite());
+        let bad = (0..vertices.len()).into_par_iter().filter(|&i| !is_finite(i)).count() as u64;
+        if bad == 0 {
+            return Ok(vertices);
+        }
+        self.defect(bad, what, "that is not a finite number", &format!("replaced by {instead}"))?;
+        let values: Vec<[f32; N]> = (0..vertices.len())
+            .into_par_iter()
+            .map(|i| if is_finite(i) { vertices.get(i) } else { [instead; N] })
+            .collect();
+        Ok(Vertices::from_arrays(&values))
+    }
+
+    /// Notes `count` defects, or refuses the file for them.
+    fn defect(
+        &mut self,
+        count: u64,
+        what: &str,
+        wrong: &str,
+        done: &str,
+    ) -> Result<(), ImportError> {
+        let plural = if count == 1 { "" } else { "s" };
+        if self.strictness == Strictness::Strict {
+            return Err(self.damaged(format!(
+                "{count} {what}{plural} {wrong}; without --strict they are {done}"
+            )));
+        }
+        let message = format!("{what}s {wrong} are {done}");
+        self.notes.push(Note::new(NoteKind::NotFinite, self.place, message).counted(count));
+        Ok(())
+    }
+
+    fn damaged(&self, reason: String) -> ImportError {
+        ImportError::Damaged { file: self.file.to_owned(), place: self.place.to_owned(), reason }
+    }
+}
+
+/// The bounds and broken triangles of a chunk whose indices are known to exist.
+fn survey_chunk(chunk: &[[u32; 3]], position: &impl Fn(u32) -> DVec3) -> Survey {
+    let mut bounds = Bounds::EMPTY;
+    // 0 as long as everything is finite, NaN from then on: cheaper than a test a corner.
+    let mut taint = DVec3::ZERO;
+    for &corner in chunk.as_flattened() {
+        let p = position(corner);
+        bounds.include(p);
+        taint += p * 0.0;
+    }
+    if taint == DVec3::ZERO {
+        return Survey { bounds, broken: 0 };
+    }
+    let broken =
+        chunk.iter().filter(|t| !t.iter().all(|&corner| position(corner).is_finite())).count();
+    Survey { bounds, broken: broken as u64 }
+}
+
+fn finite_triangles(positions: &Positions, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let is_finite = |t: &[u32; 3]| t.iter().all(|&c| positions.get(c as usize).is_finite());
+    triangles.par_iter().copied().filter(is_finite).collect()
+}
+
+/// The box of all positions that `triangles`, whose indices exist, use.
+pub(crate) fn bounds_of(positions: &Positions, triangles: &[[u32; 3]]) -> Bounds {
+    let of_chunk = |chunk: &[[u32; 3]]| {
+        let mut bounds = Bounds::EMPTY;
+        for &corner in chunk.as_flattened() {
+            bounds.include(positions.get(corner as usize));
+        }
+        bounds
+    };
+    triangles.par_chunks(CHUNK).map(of_chunk).reduce(|| Bounds::EMPTY, Bounds::union)
+}
+
+/// Triangles without area: two corners equal, or all on a line to the precision of f64.
+fn count_degenerate(positions: &Positions, triangles: &[[u32; 3]]) -> u64 {
+    let is_degenerate = |t: &&[u32; 3]| {
+        let [a, b, c] = t.map(|corner| positions.get(corner as usize));
+        (b - a).cross(c - a) == DVec3::ZERO
+    };
+    triangles.par_iter().filter(is_degenerate).count() as u64
+}
+
+/// Bytes that `buffer` holds in memory of its own and in a mapped file.
+pub(super) fn cost<T: AnyBitPattern>(buffer: &Buffer<T>, used: usize) -> (u64, u64) {
+    let bytes = used as u64 * size_of::<T>() as u64;
+    if buffer.is_mapped() { (0, bytes) } else { (bytes, 0) }
+}

@@ -1,0 +1,76 @@
+//! Why a model could not be read.
+
+use std::io;
+use std::path::PathBuf;
+
+/// Why a model could not be read. The message names the file, the place in it, and what to do.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// A file cannot be opened.
+    #[error("cannot read {}: {source}", file.display())]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The ending is none that is known.
+    #[error("{}: not a format that can be read; use .gltf, .glb, .obj or .ply", file.display())]
+    UnknownFormat {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A path inside the model leads out of the allowed folder.
+    #[error(
+        "{}: \"{written}\" leads out of the folder {}; move the file there, or pass --allow-outside",
+        file.display(), root.display()
+    )]
+    Outside {
+        /// The file that names the path.
+        file: PathBuf,
+        /// The path as the file has it.
+        written: String,
+        /// The folder it may not leave.
+        root: PathBuf,
+    },
+    /// The text is not what its format prescribes.
+    #[error("{}, line {line}, column {column}: {reason}{}", file.display(), excerpt(text))]
+    Text {
+        /// The file.
+        file: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// The column, from 1.
+        column: usize,
+        /// What is wrong.
+        reason: String,
+        /// The line itself, shortened where it is long; may be empty.
+        text: String,
+    },
+    /// Something in the file contradicts its format or itself.
+    #[error("{}: {place}: {reason}", file.display())]
+    Damaged {
+        /// The file.
+        file: PathBuf,
+        /// Where in the file.
+        place: String,
+        /// What is wrong and what to do about it.
+        reason: String,
+    },
+    /// The file needs an extension that is not supported.
+    #[error("{}: needs the extension {name}, which is not supported; {remedy}", file.display())]
+    UnsupportedExtension {
+        /// The file.
+        file: PathBuf,
+        /// The extension.
+        name: String,
+        /// What to do about it.
+        remedy: String,
+    },
+}
+
+/// The offending line below the message.
+fn excerpt(text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!("\n    {text}") }
+}

@@ -1,0 +1,136 @@
+//! The JSON of a glTF file.
+
+use std::path::Path;
+
+use gltf::json;
+use serde::Deserialize;
+use serde_json::{Map, Value};
+
+use crate::import::ImportError;
+
+/// A glTF document: crate `gltf`'s types, but for what is read in f64 here.
+pub(super) struct Document {
+    pub root: json::Root,
+    pub nodes: Vec<Node>,
+    pub scenes: Vec<Scene>,
+    pub cameras: Vec<Camera>,
+}
+
+/// A node. A mesh, a camera, both or neither, below its parent by a matrix or by TRS.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Node {
+    pub name: Option<String>,
+    pub children: Vec<usize>,
+    pub matrix: Option<[f64; 16]>,
+    pub translation: Option<[f64; 3]>,
+    pub rotation: Option<[f64; 4]>,
+    pub scale: Option<[f64; 3]>,
+    pub mesh: Option<usize>,
+    pub camera: Option<usize>,
+    pub skin: Option<usize>,
+    pub extensions: Map<String, Value>,
+}
+
+/// The roots of a hierarchy.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Scene {
+    pub nodes: Vec<usize>,
+}
+
+/// A camera.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Camera {
+    pub name: Option<String>,
+    pub perspective: Option<Perspective>,
+    pub orthographic: Option<Orthographic>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Perspective {
+    pub yfov: f64,
+    pub aspect_ratio: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct Orthographic {
+    pub xmag: f64,
+    pub ymag: f64,
+}
+
+/// The arrays that crate `gltf` would read in f32.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct InF64 {
+    nodes: Vec<Node>,
+    scenes: Vec<Scene>,
+    cameras: Vec<Camera>,
+}
+
+/// Reads the JSON of the glTF file at `path`.
+pub(super) fn parse(path: &Path, json: &[u8]) -> Result<Document, ImportError> {
+    let mut rest: Map<String, Value> = serde_json::from_slice(json).map_err(|error| {
+        let line = json.split(|&byte| byte == b'\n').nth(error.line().saturating_sub(1));
+        ImportError::Text {
+            file: path.to_owned(),
+            line: error.line(),
+            column: error.column(),
+            reason: format!("this is not the JSON of a glTF file: {}", reason(&error)),
+            text: excerpt(line.unwrap_or_default(), error.column()),
+        }
+    })?;
+    require_version_2(path, &rest)?;
+    let mut taken = Map::new();
+    for key in ["nodes", "scenes", "cameras"] {
+        if let Some((key, value)) = rest.remove_entry(key) {
+            taken.insert(key, value);
+        }
+    }
+    let InF64 { nodes, scenes, cameras } = typed(path, Value::Object(taken))?;
+    let root = typed(path, Value::Object(rest))?;
+    Ok(Document { root, nodes, scenes, cameras })
+}
+
+fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), ImportError> {
+    let asset = document.get("asset");
+    let text = |key| asset.and_then(|a| a.get(key)).and_then(Value::as_str);
+    let version = text("minVersion").or(text("version"));
+    match version {
+        Some("2.0") => Ok(()),
+        Some(other) => Err(super::damaged(
+            path,
+            "asset.version",
+            format!("glTF {other} is not supported; export it as glTF 2.0"),
+        )),
+        None => Err(super::damaged(
+            path,
+            "asset.version",
+            "missing; this is not a glTF 2.0 file, or it is damaged",
+        )),
+    }
+}
+
+/// `value` as a `T`, or where in the document it is not one.
+fn typed<T: for<'de> Deserialize<'de>>(path: &Path, value: Value) -> Result<T, ImportError> {
+    serde_path_to_error::deserialize(value)
+        .map_err(|error| super::damaged(path, error.path().to_string(), reason(error.inner())))
+}
+
+/// The error's sentence without its position, which is said elsewhere.
+fn reason(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    match text.rfind(" at line ") {
+        Some(end) => text[..end].to_owned(),
+        None => text,
+    }
+}
+
+/// At most 80 characters of a line around `column`.
+fn excerpt(line: &[u8], column: usize) -> String {
+    let from = column.saturating_sub(50);
+    let part = line.get(from..).unwrap_or_default();
+    String::from_utf8_lossy(&part[..part.len().min(80)]).trim().to_owned()
+}

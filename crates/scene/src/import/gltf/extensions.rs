@@ -1,0 +1,157 @@
+//! What becomes of each extension: done, left out with a note, or refused with the command that
+//! converts the file.
+
+use std::path::Path;
+
+use gltf::json;
+
+use super::document::Document;
+use crate::import::note::{self, Note, NoteKind};
+use crate::import::{ImportError, Wanted};
+
+/// How far an extension is supported.
+enum Support {
+    /// Done.
+    Full,
+    /// Read without it; what that means.
+    Without(&'static str),
+    /// Its data cannot be decoded; the command that converts the file, with `IN` for its name.
+    Encoded(&'static str),
+}
+
+const DECOMPRESS: &str = "decompress it: npx @gltf-transform/cli copy IN decompressed.glb";
+const TO_PNG: &str = "convert its textures: npx @gltf-transform/cli ktxdecompress IN converted.glb (needs KTX-Software)";
+const FROM_WEBP: &str = "convert its textures: npx @gltf-transform/cli png IN converted.glb";
+const LOOK: &str = "surfaces are shown without it";
+
+/// What is known of an extension by its name; `None` for one that nobody has heard of here.
+fn support(name: &str) -> Option<Support> {
+    Some(match name {
+        "KHR_mesh_quantization"
+        | "EXT_mesh_gpu_instancing"
+        | "KHR_texture_transform"
+        | "KHR_node_visibility" => Support::Full,
+        "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+            Support::Encoded(DECOMPRESS)
+        }
+        "KHR_texture_basisu" => Support::Encoded(TO_PNG),
+        "EXT_texture_webp" | "EXT_texture_avif" => Support::Encoded(FROM_WEBP),
+        "KHR_lights_punctual" => {
+            Support::Without("its lights are not used; name lights in the scene")
+        }
+        "KHR_materials_unlit" => Support::Without(
+            "its surfaces are treated as any other; the flat layer shows them unlit",
+        ),
+        "KHR_materials_variants" => Support::Without("the default variant is shown"),
+        "KHR_materials_pbrSpecularGlossiness" => {
+            Support::Without("the metallic-roughness values beside it are used")
+        }
+        "KHR_animation_pointer"
+        | "KHR_interactivity"
+        | "KHR_node_selectability"
+        | "KHR_node_hoverability" => Support::Without("a still picture has no use for it"),
+        "KHR_xmp_json_ld" | "KHR_xmp" => Support::Without("it holds descriptions only"),
+        _ if name.starts_with("KHR_materials_") || name.starts_with("EXT_materials_") => {
+            Support::Without(LOOK)
+        }
+        _ => return None,
+    })
+}
+
+/// Refuses what the document requires and is not supported, and notes what it merely uses.
+pub(super) fn check(
+    path: &Path,
+    document: &Document,
+    notes: &mut Vec<Note>,
+) -> Result<(), ImportError> {
+    for name in &document.root.extensions_required {
+        match support(name) {
+            // A required look (a sheen, say) changes no geometry: a note says what is missing.
+            Some(Support::Full | Support::Without(_)) => {}
+            // Draco's and meshopt's users often keep a plain copy that the primitives name.
+            Some(Support::Encoded(command)) => return Err(refused(path, name, command)),
+            None => return Err(refused(path, name, "export the file without it")),
+        }
+    }
+    for name in &document.root.extensions_used {
+        let message = match support(name) {
+            Some(Support::Full) => continue,
+            Some(Support::Without(meaning)) => format!("not supported: {meaning}"),
+            Some(Support::Encoded(command)) => {
+                format!(
+                    "not supported: its plain fallback is read; else {}",
+                    with_name(path, command)
+                )
+            }
+            None => "not supported: it is ignored".to_owned(),
+        };
+        note::push(notes, Note::new(NoteKind::Extension, name, message));
+    }
+    Ok(())
+}
+
+/// Refuses a primitive whose vertices exist in compressed form only.
+pub(super) fn refuse_compressed_primitive(
+    path: &Path,
+    primitive: &json::mesh::Primitive,
+) -> Result<(), ImportError> {
+    let name = "KHR_draco_mesh_compression";
+    match primitive.extensions.as_ref().is_some_and(|e| e.others.contains_key(name)) {
+        true => Err(refused(path, name, DECOMPRESS)),
+        false => Ok(()),
+    }
+}
+
+/// Refuses a buffer view whose bytes are compressed and that has no fallback: meshopt's extension
+/// says which buffer holds the compressed bytes, the view's own buffer is then a placeholder.
+pub(super) fn refuse_compressed_view(
+    path: &Path,
+    view: &json::buffer::View,
+    has_fallback: bool,
+) -> Result<(), ImportError> {
+    if has_fallback {
+        return Ok(());
+    }
+    for name in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
+        if view.extensions.as_ref().is_some_and(|e| e.others.contains_key(name)) {
+            return Err(refused(path, name, DECOMPRESS));
+        }
+    }
+    Ok(())
+}
+
+/// What a texture without a plain image asks for: refused when its pixels are wanted.
+pub(super) fn encoded_texture(
+    path: &Path,
+    texture: &json::Texture,
+    wanted: Wanted,
+) -> Result<Option<Note>, ImportError> {
+    for name in ["KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif"] {
+        if !texture.extensions.as_ref().is_some_and(|e| e.others.contains_key(name)) {
+            continue;
+        }
+        let command = if name == "KHR_texture_basisu" { TO_PNG } else { FROM_WEBP };
+        if wanted.textures {
+            return Err(refused(path, name, command));
+        }
+        return Ok(Some(Note::new(NoteKind::Extension, name, with_name(path, command))));
+    }
+    Ok(None)
+}
+
+fn refused(path: &Path, name: &str, command: &str) -> ImportError {
+    ImportError::UnsupportedExtension {
+        file: path.to_owned(),
+        name: name.to_owned(),
+        remedy: with_name(path, command),
+    }
+}
+
+/// The command with the file's own name in it, quoted for a shell where it has blanks.
+fn with_name(path: &Path, command: &str) -> String {
+    let name = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "._-/+=:@%".contains(c);
+    let quoted =
+        if name.chars().all(plain) { name } else { format!("'{}'", name.replace('\'', r"'\''")) };
+    command.replace("IN", &quoted)
+}

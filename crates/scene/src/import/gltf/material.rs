@@ -1,0 +1,200 @@
+//! Materials: base colour, its texture and vertex colours.
+//!
+//! Factors are linear (glTF 2.0, section 3.9.2). Materials keep the document's numbers; what names
+//! none gets one more at the end.
+
+use etendue_tracer::texture::{Filter, Wrap};
+use etendue_tracer::{ImageSource, Material, Paint, Texture, TextureUse};
+use gltf::json;
+use json::extensions::texture::TextureTransform;
+use json::material::AlphaMode;
+use json::texture::{MagFilter, WrappingMode};
+use json::validation::Checked;
+
+use super::buffers::{Bytes, data_uri, percent_decoded};
+use super::{Reader, extensions};
+use crate::import::note::{self, Note, NoteKind};
+use crate::import::{Import, ImportError, Strictness};
+
+/// The number of the material of `primitive`.
+pub(super) fn number(
+    reader: &Reader<'_>,
+    primitive: &json::mesh::Primitive,
+) -> Result<u32, ImportError> {
+    let materials = reader.document.root.materials.len();
+    let index = primitive.material.map_or(materials, |material| material.value());
+    match u32::try_from(index) {
+        Ok(number) if index < materials || primitive.material.is_none() => Ok(number),
+        _ => Err(reader.damaged(
+            format!("materials[{index}]"),
+            format!("there is no such material; the file has {materials}"),
+        )),
+    }
+}
+
+/// Reads the document's materials into `import`, and the nameless one behind them.
+pub(super) fn load(reader: &Reader<'_>, import: &mut Import) -> Result<(), ImportError> {
+    let mut images = Images { reader, of_texture: vec![None; reader.document.root.textures.len()] };
+    for material in &reader.document.root.materials {
+        let material = read(&mut images, material, import)?;
+        import.materials.push(material);
+    }
+    import.materials.push(Material::unnamed());
+    Ok(())
+}
+
+fn read(
+    images: &mut Images<'_>,
+    material: &json::Material,
+    import: &mut Import,
+) -> Result<Material, ImportError> {
+    let name = material.name.clone().unwrap_or_default();
+    if let Checked::Valid(AlphaMode::Mask | AlphaMode::Blend) = material.alpha_mode {
+        let message = "transparency is not supported: the surface is opaque";
+        note::push(&mut import.notes, Note::new(NoteKind::Unsupported, &name, message));
+    }
+    let surface = &material.pbr_metallic_roughness;
+    let [red, green, blue, _] = surface.base_color_factor.0.map(f64::from);
+    let factor = [red, green, blue];
+    let image = match &surface.base_color_texture {
+        Some(info) if images.reader.wanted.textures => images.use_of(info, import)?,
+        _ => None,
+    };
+    let base_color = match image {
+        Some(image) => Paint::Image { factor, image },
+        None => Paint::Plain(factor),
+    };
+    Ok(Material { name, base_color, vertex_colors: true })
+}
+
+/// The textures that materials name, each located once.
+struct Images<'a> {
+    reader: &'a Reader<'a>,
+    /// For each texture of the document: unseen, unusable, or its index in the import.
+    of_texture: Vec<Option<Option<u32>>>,
+}
+
+impl Images<'_> {
+    fn use_of(
+        &mut self,
+        info: &json::texture::Info,
+        import: &mut Import,
+    ) -> Result<Option<TextureUse>, ImportError> {
+        let index = info.index.value();
+        let known = self.of_texture.get(index).copied().flatten();
+        let texture = match known {
+            Some(texture) => texture,
+            None => {
+                let located = self.locate(index, import)?;
+                if let Some(known) = self.of_texture.get_mut(index) {
+                    *known = Some(located);
+                }
+                located
+            }
+        };
+        let Some(texture) = texture else { return Ok(None) };
+        let moved = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+        Ok(Some(TextureUse {
+            texture,
+            uv_set: moved.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord),
+            transform: moved.map_or(TextureUse::UNCHANGED, matrix),
+        }))
+    }
+
+    /// Finds the image of texture `index`; `None`, with a note, when it cannot be used.
+    fn locate(&self, index: usize, import: &mut Import) -> Result<Option<u32>, ImportError> {
+        let reader = self.reader;
+        let root = &reader.document.root;
+        let place = || format!("textures[{index}]");
+        let Some(texture) = root.textures.get(index) else {
+            return Err(reader.damaged(place(), "there is no such texture; export the file again"));
+        };
+        let Some(image) = root.images.get(texture.source.value()) else {
+            // Extensions put the image elsewhere and leave the plain one out.
+            if let Some(note) = extensions::encoded_texture(reader.file, texture, reader.wanted)? {
+                note::push(&mut import.notes, note);
+                return Ok(None);
+            }
+            return Err(reader.damaged(place(), "it has no image; export the file again"));
+        };
+        let Some(source) = self.source(texture.source.value(), image, import)? else {
+            return Ok(None);
+        };
+        let number = u32::try_from(import.textures.len())
+            .map_err(|_| reader.damaged(place(), "there are more than 32 bits can count"))?;
+        let sampler = texture.sampler.and_then(|sampler| root.samplers.get(sampler.value()));
+        import.textures.push(Texture {
+            name: label(texture, image, index),
+            source,
+            wrap: sampler.map_or([Wrap::Repeat; 2], |s| [wrap(&s.wrap_s), wrap(&s.wrap_t)]),
+            filter: match sampler.and_then(|s| s.mag_filter.as_ref()) {
+                Some(Checked::Valid(MagFilter::Nearest)) => Filter::Nearest,
+                _ => Filter::Bilinear,
+            },
+        });
+        Ok(Some(number))
+    }
+
+    fn source(
+        &self,
+        index: usize,
+        image: &json::Image,
+        import: &mut Import,
+    ) -> Result<Option<ImageSource>, ImportError> {
+        let reader = self.reader;
+        let place = || format!("images[{index}]");
+        if let Some(view) = image.buffer_view {
+            let view = reader.view(view.value())?;
+            let bytes = match view.bytes {
+                Bytes::Mapped { .. } => view.bytes.view(view.start, view.len),
+                Bytes::Memory(_) => None,
+            };
+            let copied =
+                || view.bytes.as_slice()[view.start..view.start + view.len].to_vec().into();
+            return Ok(Some(ImageSource::Bytes(bytes.unwrap_or_else(copied))));
+        }
+        let Some(uri) = &image.uri else {
+            return Err(reader.damaged(place(), "it has neither a uri nor a bufferView"));
+        };
+        if let Some(data) = data_uri(uri) {
+            let bytes = data.map_err(|reason| reader.damaged(place(), reason))?;
+            return Ok(Some(ImageSource::Bytes(bytes.into())));
+        }
+        let written = percent_decoded(uri);
+        match reader.files.locate(&written)? {
+            Some(file) => Ok(Some(ImageSource::File(file))),
+            None if reader.options.strictness == Strictness::Strict => {
+                Err(reader.damaged(place(), format!("\"{written}\" does not exist")))
+            }
+            None => {
+                let message = "the image does not exist; the surface has its plain colour";
+                note::push(&mut import.notes, Note::new(NoteKind::MissingFile, written, message));
+                Ok(None)
+            }
+        }
+    }
+}
+
+/// What to call a texture in messages.
+fn label(texture: &json::Texture, image: &json::Image, index: usize) -> String {
+    let named = texture.name.as_ref().or(image.name.as_ref());
+    let file = || image.uri.as_ref().filter(|uri| !uri.starts_with("data:"));
+    named.or_else(file).cloned().unwrap_or_else(|| format!("textures[{index}]"))
+}
+
+fn wrap(mode: &Checked<WrappingMode>) -> Wrap {
+    match mode {
+        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::ClampToEdge,
+        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::MirroredRepeat,
+        Checked::Valid(WrappingMode::Repeat) | Checked::Invalid => Wrap::Repeat,
+    }
+}
+
+/// `KHR_texture_transform`: translation · rotation · scale, with v downwards, so that a positive
+/// rotation turns the coordinates clockwise as numbers go.
+fn matrix(transform: &TextureTransform) -> [[f64; 3]; 2] {
+    let [x, y] = transform.offset.0.map(f64::from);
+    let [scale_u, scale_v] = transform.scale.0.map(f64::from);
+    let (sin, cos) = f64::from(transform.rotation.0).sin_cos();
+    [[cos * scale_u, sin * scale_v, x], [-sin * scale_u, cos * scale_v, y]]
+}

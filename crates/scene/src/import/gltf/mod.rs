@@ -1,0 +1,82 @@
+//! glTF 2.0, as text with buffers beside it or as one binary file.
+//!
+//! Crate `gltf`'s types describe the document; nodes, scenes and cameras are read here because
+//! their numbers are wanted in f64 and the crate keeps f32, and bytes are read here because they
+//! are to stay where they are mapped.
+//!
+//! # Sources
+//!
+//! The Khronos Group, *glTF 2.0 Specification*, version 2.0.1 (2021); its registry of extensions.
+
+mod accessor;
+mod buffers;
+mod document;
+mod extensions;
+mod glb;
+mod hierarchy;
+mod instancing;
+mod material;
+mod primitive;
+
+use std::path::Path;
+
+use super::files::Files;
+use super::{Import, ImportError, Options, Wanted, note};
+use buffers::Buffers;
+use document::Document;
+
+/// What the parts of the reader share.
+pub(super) struct Reader<'a> {
+    /// The model, for messages.
+    file: &'a Path,
+    files: &'a Files,
+    document: &'a Document,
+    buffers: &'a Buffers,
+    wanted: Wanted,
+    options: &'a Options,
+}
+
+impl Reader<'_> {
+    /// An error that names the file, `place` and `reason`.
+    fn damaged(&self, place: impl Into<String>, reason: impl Into<String>) -> ImportError {
+        damaged(self.file, place, reason)
+    }
+}
+
+fn damaged(file: &Path, place: impl Into<String>, reason: impl Into<String>) -> ImportError {
+    ImportError::Damaged { file: file.to_owned(), place: place.into(), reason: reason.into() }
+}
+
+/// Reads the glTF or GLB file at `path`.
+pub(super) fn import(
+    path: &Path,
+    files: &Files,
+    wanted: Wanted,
+    options: &Options,
+) -> Result<Import, ImportError> {
+    let map = files.map(path)?;
+    let container = glb::open(path, &map)?;
+    let document = document::parse(path, container.json)?;
+    let mut import = Import::default();
+    extensions::check(path, &document, &mut import.notes)?;
+
+    let scene = hierarchy::walk(path, &document, &mut import.notes)?;
+    let buffers = Buffers::open(path, files, &document, container.binary)?;
+    let reader =
+        Reader { file: path, files, document: &document, buffers: &buffers, wanted, options };
+    let primitives = primitive::load(&reader, &scene, &mut import)?;
+    material::load(&reader, &mut import)?;
+    hierarchy::place(&reader, &scene, &primitives, &mut import)?;
+    import.cameras = scene.cameras;
+    if !document.root.animations.is_empty() {
+        note::push(
+            &mut import.notes,
+            note::Note::new(
+                note::NoteKind::Unsupported,
+                "animations",
+                "animations are not played: nodes stand as the file has them at rest",
+            ),
+        );
+    }
+    Ok(import)
+}

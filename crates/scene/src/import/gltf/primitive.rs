@@ -1,0 +1,313 @@
+//! Primitives: the meshes of a glTF file, each loaded once and only when the scene shows it.
+
+use etendue_geometry::{Buffer, Positions, Vertices};
+use gltf::json;
+use json::mesh::{Mode, Primitive, Semantic};
+use json::validation::Checked;
+use rayon::prelude::*;
+
+use super::accessor::Accessor;
+use super::hierarchy::Scene;
+use super::{Reader, extensions};
+use crate::import::admit::{Admitted, Candidate, admit, cost};
+use crate::import::note::{self, Note, NoteKind};
+use crate::import::{Import, ImportError, Strictness};
+
+/// A primitive that became a mesh.
+pub(super) struct Loaded {
+    /// Index into the import's meshes.
+    pub mesh: u32,
+    /// Index into the import's materials.
+    pub material: u32,
+}
+
+/// A primitive on its way in.
+struct Read {
+    admitted: Admitted,
+    copied: u64,
+    mapped: u64,
+    notes: Vec<Note>,
+}
+
+/// Loads the meshes that `scene` shows: for each mesh of the document its primitives, `None` for
+/// those without triangles. Materials are numbered as in the document.
+pub(super) fn load(
+    reader: &Reader<'_>,
+    scene: &Scene,
+    import: &mut Import,
+) -> Result<Vec<Vec<Option<Loaded>>>, ImportError> {
+    let meshes = &reader.document.root.meshes;
+    let mut shown = vec![false; meshes.len()];
+    for placed in &scene.meshes {
+        let Some(shown) = shown.get_mut(placed.mesh) else {
+            return Err(reader.damaged(
+                format!("nodes[{}].mesh", placed.node),
+                format!("there is no mesh {}; the file has {}", placed.mesh, meshes.len()),
+            ));
+        };
+        *shown = true;
+    }
+    note_unused(&shown, &mut import.notes);
+    let wanted: Vec<(usize, usize, &Primitive)> = (meshes.iter().enumerate())
+        .filter(|&(m, _)| shown[m])
+        .flat_map(|(m, mesh)| mesh.primitives.iter().enumerate().map(move |(p, prim)| (m, p, prim)))
+        .collect();
+    let read: Vec<Option<Read>> = wanted
+        .par_iter()
+        .map(|&(mesh, number, primitive)| read(reader, mesh, number, primitive))
+        .collect::<Result<_, _>>()?;
+    let mut loaded: Vec<Vec<Option<Loaded>>> = Vec::new();
+    loaded.resize_with(meshes.len(), Vec::new);
+    for ((mesh, _, primitive), read) in wanted.into_iter().zip(read) {
+        let entry = match read {
+            Some(read) => Some(Loaded {
+                mesh: take(read, import, reader)?,
+                material: super::material::number(reader, primitive)?,
+            }),
+            None => {
+                note_no_triangles(&mut import.notes);
+                None
+            }
+        };
+        loaded[mesh].push(entry);
+    }
+    Ok(loaded)
+}
+
+/// Adds a mesh to `import`; its index.
+fn take(read: Read, import: &mut Import, reader: &Reader<'_>) -> Result<u32, ImportError> {
+    let index = u32::try_from(import.meshes.len())
+        .map_err(|_| reader.damaged("meshes", "there are more than 32 bits can count"))?;
+    import.stats.bytes_copied += read.copied;
+    import.stats.bytes_mapped += read.mapped;
+    import.stats.dropped += read.admitted.dropped;
+    if reader.options.count_degenerate {
+        *import.stats.degenerate.get_or_insert(0) += read.admitted.degenerate;
+    }
+    for note in read.notes.into_iter().chain(read.admitted.notes) {
+        note::push(&mut import.notes, note);
+    }
+    import.meshes.push(read.admitted.mesh);
+    Ok(index)
+}
+
+fn note_unused(shown: &[bool], notes: &mut Vec<Note>) {
+    let unused = shown.iter().filter(|&&shown| !shown).count() as u64;
+    if unused > 0 {
+        let message = "meshes that no node of the default scene shows are not read";
+        note::push(notes, Note::new(NoteKind::Unused, "meshes", message).counted(unused));
+    }
+}
+
+fn note_no_triangles(notes: &mut Vec<Note>) {
+    let message = "points and lines have no surface and are left out";
+    note::push(notes, Note::new(NoteKind::Unsupported, "primitives", message));
+}
+
+/// Reads and checks one primitive; `None` for points and lines.
+fn read(
+    reader: &Reader<'_>,
+    mesh: usize,
+    number: usize,
+    primitive: &Primitive,
+) -> Result<Option<Read>, ImportError> {
+    let name = reader.document.root.meshes[mesh].name.clone().unwrap_or_default();
+    let place = if name.is_empty() {
+        format!("meshes[{mesh}].primitives[{number}]")
+    } else {
+        format!("meshes[{mesh}].primitives[{number}] (\"{name}\")")
+    };
+    let Checked::Valid(mode) = primitive.mode else {
+        return Err(reader.damaged(place, "its mode is none that glTF knows"));
+    };
+    if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+        return Ok(None);
+    }
+    let mut part = Part { reader, primitive, place, notes: Vec::new() };
+    let Some(positions) = part.attribute::<3>(&Semantic::Positions, 0.0)? else {
+        extensions::refuse_compressed_primitive(reader.file, primitive)?;
+        part.note(NoteKind::Irregular, "a primitive without positions is left out");
+        return Ok(Some(part.empty(name)));
+    };
+    let triangles = part.triangles(mode, positions.len())?;
+    let wanted = reader.wanted;
+    let normals =
+        if wanted.normals { part.vertex_data(&Semantic::Normals, 0.0, &positions)? } else { None };
+    let uvs = if wanted.uvs { part.uvs(&positions)? } else { Vec::new() };
+    let colors =
+        if wanted.colors { part.vertex_data(&Semantic::Colors(0), 1.0, &positions)? } else { None };
+    if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
+        part.note(NoteKind::Unsupported, "morph targets are not applied");
+    }
+    let (mut copied, mut mapped) = cost(&triangles, triangles.len());
+    let mut add = |(c, m): (u64, u64)| {
+        copied += c;
+        mapped += m;
+    };
+    add(cost(positions.floats(), positions.len() * 3));
+    normals.iter().for_each(|v| add(cost(v.floats(), v.len() * 3)));
+    uvs.iter().for_each(|v| add(cost(v.floats(), v.len() * 2)));
+    colors.iter().for_each(|v| add(cost(v.floats(), v.len() * 4)));
+    let positions = Positions::F32(positions);
+    let candidate =
+        Candidate { name, place: part.place, positions, triangles, normals, uvs, colors };
+    let admitted = admit(candidate, reader.file, reader.options)?;
+    Ok(Some(Read { admitted, copied, mapped, notes: part.notes }))
+}
+
+/// A primitive being read.
+struct Part<'a> {
+    reader: &'a Reader<'a>,
+    primitive: &'a Primitive,
+    place: String,
+    notes: Vec<Note>,
+}
+
+impl<'a> Part<'a> {
+    /// The floats of an attribute; `None` when the primitive has none.
+    fn attribute<const N: usize>(
+        &self,
+        semantic: &Semantic,
+        fill: f32,
+    ) -> Result<Option<Vertices<N>>, ImportError> {
+        let Some((accessor, place)) = self.accessor(semantic)? else { return Ok(None) };
+        match accessor.floats(fill) {
+            Some(floats) => Ok(Some(floats)),
+            None => Err(self.reader.damaged(
+                place,
+                format!(
+                    "it has {} components, not {N}; export the file again",
+                    accessor.components
+                ),
+            )),
+        }
+    }
+
+    /// As [`Self::attribute`], one for each position; an attribute of another length is left out
+    /// with a note, or refused under strict rules.
+    fn vertex_data<const N: usize>(
+        &mut self,
+        semantic: &Semantic,
+        fill: f32,
+        positions: &Vertices<3>,
+    ) -> Result<Option<Vertices<N>>, ImportError> {
+        let Some(values) = self.attribute(semantic, fill)? else { return Ok(None) };
+        if values.len() == positions.len() {
+            return Ok(Some(values));
+        }
+        let reason = format!(
+            "{} has {} values for {} positions",
+            semantic.to_string(),
+            values.len(),
+            positions.len()
+        );
+        self.irregular(&reason, "left out")?;
+        Ok(None)
+    }
+
+    fn uvs(&mut self, positions: &Vertices<3>) -> Result<Vec<Vertices<2>>, ImportError> {
+        let mut sets = Vec::new();
+        // glTF numbers sets without gaps.
+        while let Ok(set) = u32::try_from(sets.len()) {
+            match self.vertex_data(&Semantic::TexCoords(set), 0.0, positions)? {
+                Some(uvs) => sets.push(uvs),
+                None => break,
+            }
+        }
+        Ok(sets)
+    }
+
+    fn accessor(&self, semantic: &Semantic) -> Result<Option<(Accessor<'a>, String)>, ImportError> {
+        let wanted = semantic.to_string();
+        let found = self.primitive.attributes.iter().find(|(known, _)| match known {
+            Checked::Valid(known) => known.to_string() == wanted,
+            Checked::Invalid => false,
+        });
+        let Some((_, index)) = found else { return Ok(None) };
+        self.refuse_without_data(index.value())?;
+        let place = format!("{}, {wanted}", self.place);
+        let accessor = self.reader.accessor(index.value(), &place)?;
+        Ok(Some((accessor, place)))
+    }
+
+    /// Draco leaves the accessors without bytes, unless the file keeps a plain copy too.
+    fn refuse_without_data(&self, accessor: usize) -> Result<(), ImportError> {
+        match self.reader.document.root.accessors.get(accessor) {
+            Some(accessor) if accessor.buffer_view.is_none() && accessor.sparse.is_none() => {
+                extensions::refuse_compressed_primitive(self.reader.file, self.primitive)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn triangles(&mut self, mode: Mode, vertices: usize) -> Result<Buffer<[u32; 3]>, ImportError> {
+        let Some(index) = self.primitive.indices else {
+            let count = u32::try_from(vertices).unwrap_or(u32::MAX);
+            self.whole_triangles(mode, vertices)?;
+            return Ok(assemble(mode, vertices, |i| u32::try_from(i).unwrap_or(count)).into());
+        };
+        self.refuse_without_data(index.value())?;
+        let place = format!("{}, indices", self.place);
+        let accessor = self.reader.accessor(index.value(), &place)?;
+        if !accessor.is_index() {
+            return Err(self.reader.damaged(place, "they are not u8, u16 or u32 scalars"));
+        }
+        self.whole_triangles(mode, accessor.count)?;
+        if mode == Mode::Triangles
+            && let Some(mapped) = accessor.mapped_triangles()
+        {
+            return Ok(mapped);
+        }
+        let corners = accessor.integers();
+        let corners: &[u32] = &corners;
+        Ok(assemble(mode, corners.len(), |i| corners[i]).into())
+    }
+
+    fn whole_triangles(&mut self, mode: Mode, corners: usize) -> Result<(), ImportError> {
+        match corners % 3 {
+            left @ 1.. if mode == Mode::Triangles => self.irregular(
+                &format!("{left} of {corners} corners make no whole triangle"),
+                "left out",
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    fn irregular(&mut self, reason: &str, done: &str) -> Result<(), ImportError> {
+        if self.reader.options.strictness == Strictness::Strict {
+            return Err(self.reader.damaged(
+                self.place.clone(),
+                format!("{reason}; without --strict they are {done}"),
+            ));
+        }
+        self.note(NoteKind::Irregular, &format!("{reason}; they are {done}"));
+        Ok(())
+    }
+
+    fn note(&mut self, kind: NoteKind, message: &str) {
+        self.notes.push(Note::new(kind, self.place.clone(), message));
+    }
+
+    /// A mesh of nothing.
+    fn empty(self, name: String) -> Read {
+        let positions = Positions::F32(Vertices::from_arrays(&[]));
+        let mesh = etendue_geometry::Mesh::new(name, positions, Vec::new().into());
+        let admitted = Admitted { mesh, dropped: 0, degenerate: 0, notes: Vec::new() };
+        Read { admitted, copied: 0, mapped: 0, notes: self.notes }
+    }
+}
+
+/// Triangles from `len` corners (glTF 2.0, section 3.7.2.1): in strips, every other triangle is
+/// turned round so that all fronts are on one side.
+fn assemble(mode: Mode, len: usize, corner: impl Fn(usize) -> u32 + Sync) -> Vec<[u32; 3]> {
+    let count = match mode {
+        Mode::Triangles => len / 3,
+        _ => len.saturating_sub(2),
+    };
+    let triangle = |i: usize| match mode {
+        Mode::Triangles => [3 * i, 3 * i + 1, 3 * i + 2],
+        Mode::TriangleStrip => [i, i + 1 + i % 2, i + 2 - i % 2],
+        _ => [i + 1, i + 2, 0],
+    };
+    (0..count).into_par_iter().map(|i| triangle(i).map(&corner)).collect()
+}

@@ -1,0 +1,170 @@
+//! Meshes from other programs: glTF 2.0, Wavefront OBJ and PLY.
+//!
+//! All three give the same [`Import`]: meshes in their own frames, where each of them stands,
+//! materials, textures (still encoded) and cameras. What the plan does not want is not read:
+//! a depth map costs no texture and no normal.
+//!
+//! Vertices and indices of a glTF or binary PLY file stay in the mapped file wherever their layout
+//! is one that a ray tracer takes ([`Stats::bytes_copied`] counts what had to be converted).
+//!
+//! Nothing is guessed silently: what a file asks for and is not done, and what is dropped, becomes
+//! a [`Note`]; under [`Strictness::Strict`] defects of the data are errors instead.
+
+mod admit;
+mod error;
+mod files;
+mod gltf;
+mod note;
+mod obj;
+mod polygon;
+mod text;
+
+use std::path::{Path, PathBuf};
+
+use etendue_geometry::{Mesh, Transform};
+use etendue_tracer::{Material, Texture};
+
+pub use error::ImportError;
+pub use note::{Note, NoteKind};
+
+use files::Files;
+
+/// What the render will look at; the rest of the file is left alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Wanted {
+    /// Shading normals.
+    pub normals: bool,
+    /// Texture coordinates.
+    pub uvs: bool,
+    /// Vertex colours.
+    pub colors: bool,
+    /// Images of materials. They are located, not decoded.
+    pub textures: bool,
+}
+
+impl Wanted {
+    /// Geometry alone.
+    pub const NOTHING: Self = Self { normals: false, uvs: false, colors: false, textures: false };
+    /// All that is understood.
+    pub const EVERYTHING: Self = Self { normals: true, uvs: true, colors: true, textures: true };
+}
+
+/// What becomes of defects in the data, such as a NaN position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Strictness {
+    /// The triangle (or value) is dropped and a note counts it.
+    #[default]
+    Tolerant,
+    /// The file is refused.
+    Strict,
+}
+
+/// How to import.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// What becomes of defects in the data.
+    pub strictness: Strictness,
+    /// The folder that the files named inside the model may not leave (after links are followed);
+    /// `None` allows any place.
+    pub root: Option<PathBuf>,
+    /// Count triangles of zero area ([`Stats::degenerate`]). They are kept either way.
+    pub count_degenerate: bool,
+}
+
+/// What a model file holds.
+#[derive(Debug, Clone, Default)]
+pub struct Import {
+    /// Each mesh (a glTF primitive, an OBJ group of one material) once.
+    pub meshes: Vec<Mesh>,
+    /// Where they stand.
+    pub placements: Vec<ImportedPlacement>,
+    /// The materials that placements name.
+    pub materials: Vec<Material>,
+    /// The images that materials name; empty unless wanted.
+    pub textures: Vec<Texture>,
+    /// Cameras of the default scene, in the order of their nodes.
+    pub cameras: Vec<ImportedCamera>,
+    /// What was dropped, ignored or missing.
+    pub notes: Vec<Note>,
+    /// What reading cost.
+    pub stats: Stats,
+}
+
+/// One mesh at one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedPlacement {
+    /// Index into [`Import::meshes`].
+    pub mesh: u32,
+    /// Index into [`Import::materials`].
+    pub material: u32,
+    /// From the mesh's frame to the model's (m).
+    pub model_from_mesh: Transform,
+    /// The node's or group's name; may be empty.
+    pub name: String,
+}
+
+/// A camera of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedCamera {
+    /// The node's name, else the camera's; may be empty.
+    pub name: String,
+    /// From the camera's frame (looking along −Z, +Y up) to the model's (m). Its linear part may
+    /// hold the scale of the nodes above, which glTF tells readers to leave out of the view.
+    pub model_from_camera: Transform,
+    /// What it sees.
+    pub projection: Projection,
+}
+
+/// What a glTF camera sees. Clip planes are not kept: rays have none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// A pinhole.
+    Perspective {
+        /// Full vertical field of view (rad).
+        yfov: f64,
+        /// Width over height; the image's own when the file has none.
+        aspect_ratio: Option<f64>,
+    },
+    /// Parallel rays.
+    Orthographic {
+        /// Half the width of the view (m).
+        xmag: f64,
+        /// Half the height of the view (m).
+        ymag: f64,
+    },
+}
+
+/// What reading a model cost and found.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Stats {
+    /// Files that were opened, with their sizes in bytes.
+    pub files: Vec<(PathBuf, u64)>,
+    /// Bytes of vertices and indices used where they are in the mapped file.
+    pub bytes_mapped: u64,
+    /// Bytes of vertices and indices converted into memory of their own.
+    pub bytes_copied: u64,
+    /// Triangles dropped because a corner is not finite.
+    pub dropped: u64,
+    /// Triangles of zero area, when they were to be counted.
+    pub degenerate: Option<u64>,
+}
+
+/// Reads the model at `path`; its ending tells the format: `gltf`, `glb`, `obj` or `ply`.
+///
+/// # Errors
+///
+/// When the file, or one that it names, cannot be read, is damaged, leaves [`Options::root`], or
+/// needs an extension that is not supported; under [`Strictness::Strict`] also for defective data.
+pub fn import(path: &Path, wanted: Wanted, options: &Options) -> Result<Import, ImportError> {
+    let files = Files::beside(path, options.root.as_deref())?;
+    let extension =
+        path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let mut import = match extension.as_str() {
+        "gltf" | "glb" => gltf::import(path, &files, wanted, options),
+        "obj" => obj::import(path, &files, wanted, options),
+
+        _ => Err(ImportError::UnknownFormat { file: path.to_owned() }),
+    }?;
+    import.stats.files = files.opened();
+    Ok(import)
+}

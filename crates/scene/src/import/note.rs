@@ -1,0 +1,62 @@
+//! What an import has to say without refusing the file.
+
+use serde::Serialize;
+
+/// Something that the file has or asks for and the picture will not show.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Note {
+    /// What kind of thing.
+    pub kind: NoteKind,
+    /// What it is about: an extension, a file, a mesh, a material.
+    pub subject: String,
+    /// What happens, and what to do about it.
+    pub message: String,
+    /// How often.
+    pub count: u64,
+}
+
+/// Kinds of notes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoteKind {
+    /// An extension that is not, or not wholly, supported.
+    Extension,
+    /// A part of the format that is not supported.
+    Unsupported,
+    /// A file that is named and not there.
+    MissingFile,
+    /// Data that was dropped because it is not finite, or replaced.
+    NotFinite,
+    /// A part of the file that nothing uses.
+    Unused,
+    /// Data that breaks the format's rules and could be read all the same.
+    Irregular,
+}
+
+impl Note {
+    /// A note about one thing.
+    pub(super) fn new(
+        kind: NoteKind,
+        subject: impl Into<String>,
+        message: impl Into<String>,
+    ) -> Self {
+        Self { kind, subject: subject.into(), message: message.into(), count: 1 }
+    }
+
+    /// The same, `count` times.
+    pub(super) fn counted(mut self, count: u64) -> Self {
+        self.count = count;
+        self
+    }
+}
+
+/// Adds `note`, or counts it to one that says the same of the same subject.
+pub(super) fn push(notes: &mut Vec<Note>, note: Note) {
+    let same = |n: &&mut Note| {
+        n.kind == note.kind && n.subject == note.subject && n.message == note.message
+    };
+    match notes.iter_mut().find(same) {
+        Some(known) => known.count += note.count,
+        None => notes.push(note),
+    }
+}

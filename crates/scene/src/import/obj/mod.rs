@@ -1,0 +1,126 @@
+//! Wavefront OBJ, in parallel from the mapped file.
+//!
+//! The file is cut into pieces of whole lines that are read side by side; indices that count
+//! backwards, material changes and groups are settled afterwards. Crate `tobj` reads the material
+//! files, and the tests compare all meshes with its own.
+//!
+//! Own reading, because of what `tobj` 4.0 does not do: one thread takes many times as long, errors
+//! do not know their line, lines (`l`) become faces, polygons are fanned whatever their shape, and
+//! a material without its file loses its name.
+//!
+//! # Sources
+//!
+//! Wavefront Technologies, *Object Files (.obj)*, appendix B1 of the Advanced Visualizer manual.
+
+mod chunk;
+mod mtl;
+mod pool;
+mod segment;
+mod weld;
+
+use std::path::Path;
+
+use etendue_geometry::{Mesh, Transform};
+use rayon::prelude::*;
+
+use super::admit::{self, Admitted};
+use super::files::Files;
+use super::note::{self, Note, NoteKind};
+use super::text::{Fault, pieces};
+use super::{Import, ImportError, ImportedPlacement, Options, Wanted};
+use chunk::{Chunk, Wish};
+use pool::Pool;
+use segment::Segment;
+
+/// Bytes that one task reads.
+const PIECE: usize = 1 << 20;
+
+/// Reads the OBJ file at `path`.
+pub(super) fn import(
+    path: &Path,
+    files: &Files,
+    wanted: Wanted,
+    options: &Options,
+) -> Result<Import, ImportError> {
+    let map = files.map(path)?;
+    let text = map.bytes().strip_prefix(b"\xEF\xBB\xBF").unwrap_or(map.bytes());
+    let fault = |fault: Fault| fault.locate(path, text);
+    let wish = Wish { uvs: wanted.uvs, normals: wanted.normals, colors: wanted.colors };
+    let pieces = pieces(text, PIECE);
+    let mut chunks: Vec<Chunk> = pieces
+        .par_iter()
+        .map(|&(start, piece)| {
+            Chunk::parse(piece, wish)
+                .map_err(|Fault { at, reason }| Fault { at: start + at, reason })
+        })
+        .collect::<Result<_, _>>()
+        .map_err(fault)?;
+    pool::settle(&mut chunks)
+        .map_err(|chunk| pool::find_bad_index(&pieces, chunk, &chunks))
+        .map_err(fault)?;
+    let mut import = Import::default();
+    note_leftovers(&chunks, &mut import.notes);
+    let segments = segment::divide(&chunks);
+    let pool = Pool::gather(&mut chunks);
+    let libraries = segment::libraries(&chunks);
+    let numbers = mtl::load(&libraries, &segments, files, wanted, &mut import)?;
+    let mut welder = weld::Welder::new(&pool, &chunks);
+    let single = segments.len() == 1;
+    for (segment, material) in segments.iter().zip(numbers) {
+        let candidate = welder.mesh(segment, path, single);
+        let admitted = admit::admit(candidate, path, options)?;
+        place(admitted, segment, material, options, &mut import)?;
+    }
+    Ok(import)
+}
+
+/// Adds a mesh where the file has it.
+fn place(
+    admitted: Admitted,
+    segment: &Segment,
+    material: u32,
+    options: &Options,
+    import: &mut Import,
+) -> Result<(), ImportError> {
+    import.stats.bytes_copied += heap_bytes(&admitted.mesh);
+    import.stats.dropped += admitted.dropped;
+    if options.count_degenerate {
+        *import.stats.degenerate.get_or_insert(0) += admitted.degenerate;
+    }
+    for note in admitted.notes {
+        note::push(&mut import.notes, note);
+    }
+    import.placements.push(ImportedPlacement {
+        // Fewer meshes than corners, and those are counted in 32 bits.
+        mesh: u32::try_from(import.meshes.len()).unwrap_or(u32::MAX),
+        material,
+        model_from_mesh: Transform::IDENTITY,
+        name: segment.name.clone(),
+    });
+    import.meshes.push(admitted.mesh);
+    Ok(())
+}
+
+fn heap_bytes(mesh: &Mesh) -> u64 {
+    let positions = match &mesh.positions {
+        etendue_geometry::Positions::F32(vertices) => vertices.floats().heap_bytes(),
+        etendue_geometry::Positions::F64(vertices) => vertices.heap_bytes(),
+    };
+    let uvs: usize = mesh.uvs.iter().map(|uvs| uvs.floats().heap_bytes()).sum();
+    let normals = mesh.normals.as_ref().map_or(0, |normals| normals.floats().heap_bytes());
+    let colors = mesh.colors.as_ref().map_or(0, |colors| colors.floats().heap_bytes());
+    (positions + mesh.triangles.heap_bytes() + uvs + normals + colors) as u64
+}
+
+fn note_leftovers(chunks: &[Chunk], notes: &mut Vec<Note>) {
+    let lines: u64 = chunks.iter().map(|chunk| chunk.without_surface).sum();
+    if lines > 0 {
+        let message = "points and lines have no surface and are left out";
+        note::push(notes, Note::new(NoteKind::Unsupported, "l, p", message).counted(lines));
+    }
+    let small: u64 = chunks.iter().map(|chunk| chunk.too_small).sum();
+    if small > 0 {
+        let message = "faces of fewer than three corners are left out";
+        note::push(notes, Note::new(NoteKind::Irregular, "f", message).counted(small));
+    }
+}

@@ -1,0 +1,319 @@
+//! Material files: `tobj` reads them, line by line made fit for it.
+//!
+//! Here are the library files found, lines that `tobj` 4.0 would refuse the whole file for (or end
+//! the process over, as `Kd 1`) put right or dropped with a note, and what it leaves unparsed (the
+//! options of a map) taken apart.
+//!
+//! Colours are taken as linear.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use etendue_tracer::texture::{Filter, Wrap};
+use etendue_tracer::{ImageSource, Material, Paint, Texture, TextureUse};
+
+use super::segment::Segment;
+use crate::import::files::Files;
+use crate::import::note::{self, Note, NoteKind};
+use crate::import::{Import, ImportError, Wanted};
+
+/// A material and the file that defines it.
+struct Defined {
+    material: tobj::Material,
+    file: PathBuf,
+}
+
+/// Reads the libraries and gives each segment the number of its material in `import`.
+pub(super) fn load(
+    libraries: &[&str],
+    segments: &[Segment],
+    files: &Files,
+    wanted: Wanted,
+    import: &mut Import,
+) -> Result<Vec<u32>, ImportError> {
+    let mut defined: HashMap<String, Defined> = HashMap::new();
+    for file in find(libraries, files, &mut import.notes)? {
+        for material in read(&file, files, &mut import.notes)? {
+            let name = material.name.clone();
+            defined.insert(name, Defined { material, file: file.clone() });
+        }
+    }
+    let mut known: HashMap<Option<&str>, u32> = HashMap::new();
+    let mut maps = Maps { files, numbers: HashMap::new() };
+    let mut numbers = Vec::with_capacity(segments.len());
+    for segment in segments {
+        let name = segment.material.as_deref();
+        let number = match known.get(&name) {
+            Some(&number) => number,
+            None => {
+                let material = match (name, name.and_then(|name| defined.get(name))) {
+                    (_, Some(defined)) => resolve(defined, &mut maps, wanted, import)?,
+                    (name, None) => undefined(name, &mut import.notes),
+                };
+                import.materials.push(material);
+                let number = u32::try_from(import.materials.len() - 1).unwrap_or(u32::MAX);
+                known.insert(name, number);
+                number
+            }
+        };
+        numbers.push(number);
+    }
+    Ok(numbers)
+}
+
+/// The files that `mtllib` lines name: each line is one name, or several with blanks between them
+/// and `\ ` for a blank inside one.
+fn find(
+    libraries: &[&str],
+    files: &Files,
+    notes: &mut Vec<Note>,
+) -> Result<Vec<PathBuf>, ImportError> {
+    let mut found: Vec<PathBuf> = Vec::new();
+    for line in libraries {
+        let names = match files.locate(line)? {
+            Some(_) => vec![(*line).to_owned()],
+            None => split_names(line),
+        };
+        for name in names {
+            match files.locate(&name)? {
+                Some(file) if !found.contains(&file) => found.push(file),
+                Some(_) => {}
+                None => {
+                    let message = "the material file does not exist; its materials are light grey";
+                    note::push(notes, Note::new(NoteKind::MissingFile, name, message));
+                }
+            }
+        }
+    }
+    Ok(found)
+}
+
+fn split_names(line: &str) -> Vec<String> {
+    let mut names = Vec::new();
+    let mut name = String::new();
+    let mut characters = line.chars().peekable();
+    while let Some(character) = characters.next() {
+        match character {
+            '\\' if characters.next_if_eq(&' ').is_some() => name.push(' '),
+            blank if blank.is_whitespace() => {
+                if !name.is_empty() {
+                    names.push(std::mem::take(&mut name));
+                }
+            }
+            other => name.push(other),
+        }
+    }
+    if !name.is_empty() {
+        names.push(name);
+    }
+    names
+}
+
+fn read(
+    file: &Path,
+    files: &Files,
+    notes: &mut Vec<Note>,
+) -> Result<Vec<tobj::Material>, ImportError> {
+    let map = files.map(file)?;
+    let mut text = String::new();
+    for (number, line) in String::from_utf8_lossy(map.bytes()).lines().enumerate() {
+        match fit(line.trim_start_matches('\u{feff}').trim()) {
+            Some(line) => {
+                text.push_str(&line);
+                text.push('\n');
+            }
+            None => {
+                let message = format!("line {}, \"{}\", is left out", number + 1, line.trim());
+                let subject = file.display().to_string();
+                note::push(notes, Note::new(NoteKind::Irregular, subject, message));
+            }
+        }
+    }
+    match tobj::load_mtl_buf(&mut text.as_bytes()) {
+        Ok((materials, _)) => Ok(materials),
+        Err(error) => Err(ImportError::Damaged {
+            file: file.to_owned(),
+            place: "material file".to_owned(),
+            reason: error.to_string(),
+        }),
+    }
+}
+
+/// The line as `tobj` can read it; `None` when its value makes no sense.
+fn fit(line: &str) -> Option<String> {
+    let (key, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+    let rest = rest.trim();
+    let numbers: Vec<f64> = rest.split_whitespace().map_while(|word| word.parse().ok()).collect();
+    match key {
+        "Ka" | "Kd" | "Ks" | "Ke" => match *numbers.as_slice() {
+            // The format's rule: green and blue are as red when they are not given.
+            [grey] => Some(format!("{key} {grey} {grey} {grey}")),
+            [red, green, blue, ..] => Some(format!("{key} {red} {green} {blue}")),
+            _ => None,
+        },
+        "Ns" | "Ni" => numbers.first().map(|number| format!("{key} {number}")),
+        // `d -halo 0.5` ends with its number.
+        "d" => rest.split_whitespace().last()?.parse::<f64>().ok().map(|d| format!("d {d}")),
+        "illum" => rest.parse::<u8>().ok().map(|model| format!("illum {model}")),
+        "newmtl" => (!rest.is_empty()).then(|| format!("newmtl {rest}")),
+        "map_kd" => (!rest.is_empty()).then(|| format!("map_Kd {rest}")),
+        _ if key.starts_with("map_") || key.eq_ignore_ascii_case("bump") => {
+            (!rest.is_empty()).then(|| format!("{key} {rest}"))
+        }
+        _ => Some(line.to_owned()),
+    }
+}
+
+/// What stands for a material that no file defines.
+fn undefined(name: Option<&str>, notes: &mut Vec<Note>) -> Material {
+    let Some(name) = name else { return Material::unnamed() };
+    let message = "no material file defines it; it is light grey";
+    note::push(notes, Note::new(NoteKind::Irregular, format!("usemtl {name}"), message));
+    Material { name: name.to_owned(), ..Material::unnamed() }
+}
+
+fn resolve(
+    defined: &Defined,
+    maps: &mut Maps<'_>,
+    wanted: Wanted,
+    import: &mut Import,
+) -> Result<Material, ImportError> {
+    let material = &defined.material;
+    let image = match &material.diffuse_texture {
+        Some(map) if wanted.textures => maps.use_of(map, &defined.file, import)?,
+        _ => None,
+    };
+    let finite = material.diffuse.filter(|color| color.iter().all(|value| value.is_finite()));
+    let base_color = match image {
+        Some(image) => Paint::Image { factor: finite.unwrap_or([1.0; 3]), image },
+        None => finite.map_or(Material::unnamed().base_color, Paint::Plain),
+    };
+    Ok(Material { name: material.name.clone(), base_color, ..Material::unnamed() })
+}
+
+/// The images that maps name, each once.
+struct Maps<'a> {
+    files: &'a Files,
+    numbers: HashMap<(PathBuf, bool), u32>,
+}
+
+impl Maps<'_> {
+    fn use_of(
+        &mut self,
+        written: &str,
+        library: &Path,
+        import: &mut Import,
+    ) -> Result<Option<TextureUse>, ImportError> {
+        let map = Map::parse(written);
+        let Some(file) = self.files.locate_beside(library, &map.name)? else {
+            let message = "the image does not exist; the surface has its plain colour";
+            note::push(&mut import.notes, Note::new(NoteKind::MissingFile, map.name, message));
+            return Ok(None);
+        };
+        let next = u32::try_from(import.textures.len()).unwrap_or(u32::MAX);
+        let texture = *self.numbers.entry((file.clone(), map.clamp)).or_insert_with(|| {
+            let wrap = if map.clamp { Wrap::ClampToEdge } else { Wrap::Repeat };
+            import.textures.push(Texture {
+                name: map.name.clone(),
+                source: ImageSource::File(file),
+                wrap: [wrap; 2],
+                filter: Filter::Bilinear,
+            });
+            next
+        });
+        let ([su, sv], [ou, ov]) = (map.scale, map.offset);
+        // The map's v runs up and ours down: 1 − (sv·(1 − v) + ov).
+        let transform = [[su, 0.0, ou], [0.0, sv, 1.0 - sv - ov]];
+        Ok(Some(TextureUse { texture, uv_set: 0, transform }))
+    }
+}
+
+/// A `map_Kd` line taken apart.
+#[derive(Debug, PartialEq)]
+struct Map {
+    name: String,
+    scale: [f64; 2],
+    offset: [f64; 2],
+    clamp: bool,
+}
+
+impl Map {
+    fn parse(written: &str) -> Self {
+        let mut map = Self { name: String::new(), scale: [1.0; 2], offset: [0.0; 2], clamp: false };
+        let mut words = written.split_whitespace().peekable();
+        while let Some(option) = words.next_if(|word| word.starts_with('-')) {
+            let most = match option {
+                "-s" | "-o" | "-t" => 3,
+                "-mm" => 2,
+                "-blendu" | "-blendv" | "-cc" | "-clamp" | "-texres" | "-bm" | "-boost"
+                | "-imfchan" | "-type" => 1,
+                // A file whose name starts so.
+                _ => {
+                    map.name = option.to_owned();
+                    break;
+                }
+            };
+            let mut numbers = Vec::new();
+            for _ in 0..most {
+                let word = match most {
+                    1 => words.next(),
+                    _ => words.next_if(|word| word.parse::<f64>().is_ok()),
+                };
+                map.clamp |= option == "-clamp" && word == Some("on");
+                numbers.extend(word.and_then(|word| word.parse::<f64>().ok()));
+            }
+            let target = match option {
+                "-s" => &mut map.scale,
+                "-o" => &mut map.offset,
+                _ => continue,
+            };
+            for (value, number) in target.iter_mut().zip(numbers) {
+                *value = number;
+            }
+        }
+        let rest: Vec<&str> = words.collect();
+        let rest = rest.join(" ");
+        map.name = [map.name, rest]
+            .into_iter()
+            .filter(|part| !part.is_empty())
+            .collect::<Vec<_>>()
+            .join(" ");
+        map
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_are_taken_apart() {
+        let map = Map::parse("-s 2 3 1 -o 0.5 -clamp on my wood.png");
+        let expected = Map {
+            name: "my wood.png".to_owned(),
+            scale: [2.0, 3.0],
+            offset: [0.5, 0.0],
+            clamp: true,
+        };
+        assert_eq!(map, expected);
+        assert_eq!(Map::parse("-odd name.png").name, "-odd name.png");
+        assert_eq!(Map::parse("2 3.png").name, "2 3.png");
+    }
+
+    #[test]
+    fn names_with_blanks_are_told_apart() {
+        assert_eq!(split_names(r"a.mtl b\ c.mtl  d\e.mtl"), ["a.mtl", "b c.mtl", r"d\e.mtl"]);
+    }
+
+    #[test]
+    fn lines_that_would_end_the_process_are_put_right() {
+        assert_eq!(fit("Kd 0.5").as_deref(), Some("Kd 0.5 0.5 0.5"));
+        assert_eq!(fit("Kd 0.5 0.5"), None);
+        assert_eq!(fit("Kd spectral a.rfl"), None);
+        assert_eq!(fit("Ks 1 2 3 4").as_deref(), Some("Ks 1 2 3"));
+        assert_eq!(fit("d -halo 0.5").as_deref(), Some("d 0.5"));
+        assert_eq!(fit("newmtl"), None);
+        assert_eq!(fit("map_Kd"), None);
+        assert_eq!(fit("").as_deref(), Some(""));
+    }
+}
