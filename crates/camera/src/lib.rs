@@ -23,6 +23,7 @@ pub mod pinhole;
 pub mod pose;
 pub mod sampler;
 pub mod sensor;
+pub mod train;
 
 pub use camera::{Camera, CameraSpec, PixelBlock, Projection};
 pub use camera_file::CameraFile;

@@ -105,17 +105,6 @@ impl ApertureSpec {
             }
         }
     }
-
-    /// The same with another radius (mm); `None` for a mask.
-    #[must_use]
-    pub fn with_radius(&self, radius: f64) -> Option<Self> {
-        let radius = Millimetres(radius);
-        match self {
-            Self::Circular(_) => Some(Self::Circular(CircularSpec { radius })),
-            Self::Polygon(spec) => Some(Self::Polygon(PolygonSpec { radius, ..spec.clone() })),
-            Self::Image(_) => None,
-        }
-    }
 }
 
 impl Opening {
@@ -128,6 +117,26 @@ impl Opening {
             .map(|angle| [angle.cos(), angle.sin()])
             .collect();
         Self::Polygon { radius, normals, apothem: radius * (0.5 * step).cos() }
+    }
+
+    /// The same with another radius (mm); `None` for a mask.
+    #[must_use]
+    pub fn with_radius(&self, radius: f64) -> Option<Self> {
+        match self {
+            Self::Circle { .. } => Some(Self::Circle { radius }),
+            Self::Polygon { normals, radius: old, apothem } => {
+                let shape = if *old > 0.0 {
+                    apothem / old
+                } else {
+                    // A closed iris keeps its blades: half the angle between two of them.
+                    #[expect(clippy::cast_precision_loss, reason = "at most 1024 blades")]
+                    (std::f64::consts::PI / normals.len() as f64).cos()
+                };
+                let normals = normals.clone();
+                Some(Self::Polygon { normals, radius, apothem: radius * shape })
+            }
+            Self::Image(_) => None,
+        }
     }
 
     /// The share of light that passes at `x`, `y` (mm).

@@ -62,13 +62,10 @@ impl Refraction {
             let clear = u2 <= clip2;
             let moved = alive & hit & (!clear | through);
             let passed = moved & clear;
-            let point = [x, y, depth + z];
-            for axis in 0..3 {
-                let old = block.position[axis][lane];
-                block.position[axis][lane] = if moved { point[axis] } else { old };
-                let old = block.direction[axis][lane];
-                block.direction[axis][lane] = if passed { out.direction[axis] } else { old };
-            }
+            let old = block.ray(lane);
+            let position = if moved { [x, y, depth + z] } else { old.position };
+            let direction = if passed { out.direction } else { old.direction };
+            block.set_ray(lane, Ray { position, direction });
             let ended = if hit & !clear { vignetted } else { PENDING };
             let outcome = if alive & !passed { ended } else { outcome };
             block.outcome[lane] = outcome;
@@ -233,7 +230,8 @@ impl Newton {
             self.travel[lane] = if active { self.travel[lane] + step } else { self.travel[lane] };
             self.last[lane] = if active { step } else { self.last[lane] };
             self.slope[lane] = if active { slope } else { self.slope[lane] };
-            let still = u64::from(active & !(step.abs() <= SETTLED));
+            let settled = step.abs() <= SETTLED;
+            let still = u64::from(active & !settled);
             self.active[lane] = still;
             moving |= still;
         }
@@ -281,7 +279,7 @@ mod tests {
         let r: f64 = 10.0;
         let binomial = [0.5, 0.125, 0.0625, 0.0390625, 0.02734375, 0.0205078125, 0.01611328125];
         let series: Vec<f64> =
-            binomial.iter().enumerate().map(|(i, b)| b * r.powi(-(2 * i as i32 + 1))).collect();
+            binomial.iter().zip(0..).map(|(b, i)| b * r.powi(-(2 * i + 1))).collect();
         let flat = asphere(0.0, 0.0, &series);
         let sphere = Refraction::new(Surface::sphere(0.1), 1.0, 1.5);
         let start = ray([0.8, 0.5, -4.0], [0.02, 0.01, 1.0]);

@@ -52,6 +52,12 @@ impl Picture {
         Ok(Self { size: [width, height], pixels, values, levels })
     }
 
+    /// A white picture of the same size.
+    #[must_use]
+    pub fn blank(&self) -> Self {
+        Self { size: self.size, pixels: [1, 1], values: vec![1.0], levels: 1.0 }
+    }
+
     /// The index of the pixel that covers the point `x`, `y` (mm); `None` outside of the picture.
     #[must_use]
     pub fn pixel(&self, x: f64, y: f64) -> Option<usize> {

@@ -58,7 +58,6 @@ impl Fate {
         }
     }
 
-    #[expect(clippy::cast_possible_truncation, reason = "the low half is an element's index")]
     fn from_code(code: u64) -> Self {
         let element = (code & 0xffff_ffff) as usize;
         match code & !0xffff_ffff {
@@ -147,7 +146,7 @@ impl FateCounts {
                 losses.push((count, format!("{way} element {element}: {share:.3} %")));
             }
         }
-        losses.sort_by(|a, b| b.0.cmp(&a.0));
+        losses.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
         losses.into_iter().map(|(_, text)| text).collect()
     }
 }
@@ -303,6 +302,13 @@ impl LensRays {
     /// Ends ray `i` in the given way; [`Fate::Exited`] revives it.
     pub fn set_fate(&mut self, i: usize, fate: Fate) {
         self.blocks[i / LANES].outcome[i % LANES] = fate.code();
+    }
+
+    /// The sum of the throughputs of the rays that left.
+    #[must_use]
+    pub fn passed_throughput(&self) -> f64 {
+        let lanes = self.blocks.iter().flat_map(|b| b.outcome.iter().zip(&b.throughput));
+        lanes.filter(|(code, _)| **code == EXITED).map(|(_, throughput)| throughput).sum()
     }
 
     /// How many rays left.

@@ -227,12 +227,9 @@ pub(crate) fn each_lane(
         let alive = outcome == 0;
         let moved = alive & new.hit & (!new.clear | new.through);
         let passed = moved & new.clear;
-        for axis in 0..3 {
-            block.position[axis][lane] =
-                if moved { new.ray.position[axis] } else { old.position[axis] };
-            block.direction[axis][lane] =
-                if passed { new.ray.direction[axis] } else { old.direction[axis] };
-        }
+        let position = if moved { new.ray.position } else { old.position };
+        let direction = if passed { new.ray.direction } else { old.direction };
+        block.set_ray(lane, Ray { position, direction });
         let ended = if new.hit & !new.clear { vignetted } else { PENDING };
         let outcome = if alive & !passed { ended } else { outcome };
         block.outcome[lane] = outcome;

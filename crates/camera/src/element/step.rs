@@ -214,7 +214,7 @@ impl Step {
     }
 
     /// Whether the element moves rays to itself; sheets only look at them.
-    fn moves(&self) -> bool {
+    pub(crate) fn moves(&self) -> bool {
         !matches!(self.action, Action::Opening(_) | Action::Filter { .. })
     }
 

@@ -84,18 +84,16 @@ mod tests {
             assert!(out.hit && out.clear && out.through);
             let t = image / out.ray.direction[2];
             let magnification = image / s;
-            for axis in 0..2 {
-                let at = out.ray.position[axis] + t * out.ray.direction[axis];
-                assert!((at - object[axis] * magnification).abs() < 1e-11, "{x} {y}: {at}");
-            }
+            let at = out.ray.advanced(t).position;
+            assert!((at[0] - object[0] * magnification).abs() < 1e-11, "{x} {y}: {at:?}");
+            assert!((at[1] - object[1] * magnification).abs() < 1e-11, "{x} {y}: {at:?}");
             // Back from the image to the object.
             let mut back = out.ray.advanced(t);
             back.direction = back.direction.map(|c| -c);
             let home = at_thin_lens(-1.0 / f, back, f64::INFINITY).ray;
             let home = home.advanced((s - home.position[2]) / home.direction[2]);
-            for axis in 0..2 {
-                assert!((home.position[axis] - object[axis]).abs() < 1e-10);
-            }
+            assert!((home.position[0] - object[0]).abs() < 1e-10);
+            assert!((home.position[1] - object[1]).abs() < 1e-10);
         }
     }
 

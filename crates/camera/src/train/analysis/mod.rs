@@ -1,0 +1,11 @@
+//! What a lens does to a picture, measured with real rays.
+
+mod colour;
+mod distortion;
+mod illumination;
+mod spots;
+
+pub use colour::{ColourShift, colour_shifts};
+pub use distortion::{Distortion, distortion};
+pub use illumination::{Illumination, illumination, image_circle};
+pub use spots::{Spot, spot};

@@ -1,0 +1,142 @@
+//! Where the sensor goes.
+
+use super::{OpticalTrain, SensorMount};
+use crate::element::Frame;
+use crate::glass::GlassError;
+
+/// How a lens is focused.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Focus {
+    /// The sensor stands where the file puts it, by the last element's thickness; at the image of
+    /// infinity when that is 0.
+    #[default]
+    AsWritten,
+    /// At the paraxial image of infinity.
+    Infinity,
+    /// At the paraxial image of a plane this far (m) in front of the entrance pupil.
+    Distance(f64),
+    /// This far (mm) behind the last element's vertex.
+    Sensor(f64),
+}
+
+/// Why there is no place for the sensor.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FocusError {
+    /// A distance that is none.
+    #[error("the {what} is {value}; it must be a positive number")]
+    NotPositive {
+        /// Which.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// An afocal lens and an object at infinity.
+    #[error("the lens is afocal: it images infinity to infinity; give sensor_distance")]
+    Afocal,
+    /// The object plane lies behind the lens' front.
+    #[error(
+        "focus_distance {distance} m lies inside the lens: its entrance pupil is {depth} mm behind \
+         the front"
+    )]
+    Inside {
+        /// The distance asked for (m).
+        distance: f64,
+        /// How far behind the first vertex the entrance pupil is (mm).
+        depth: f64,
+    },
+    /// At the front focal point, or so near it that the image is farther than any camera.
+    #[error(
+        "an object at {distance} m is at the front focal point: its image is at infinity; the \
+         focus distance must exceed {least} m"
+    )]
+    AtFocalPoint {
+        /// The distance asked for (m).
+        distance: f64,
+        /// The distance of the front focal point (m).
+        least: f64,
+    },
+    /// Inside the focal length, or the lens diverges.
+    #[error(
+        "an object at {distance} m has no real image behind the lens: it would be at z = {image} mm"
+    )]
+    Virtual {
+        /// The distance asked for (m); infinite for infinity.
+        distance: f64,
+        /// Where the virtual image is (mm).
+        image: f64,
+    },
+    /// A glass without index.
+    #[error(transparent)]
+    Glass(#[from] GlassError),
+}
+
+/// Images farther behind the lens than this many focal lengths are said to be at infinity.
+const FARTHEST: f64 = 1e9;
+
+impl OpticalTrain {
+    /// z of the sensor (mm), at the design wavelength.
+    ///
+    /// # Errors
+    ///
+    /// When there is no image to stand at.
+    pub fn sensor_z(&self, focus: Focus) -> Result<f64, FocusError> {
+        let last = self.last_vertex();
+        match focus {
+            Focus::AsWritten if self.end > last => Ok(self.end),
+            Focus::AsWritten | Focus::Infinity => self.image_of_infinity(),
+            Focus::Sensor(distance) if distance > 0.0 && distance.is_finite() => {
+                Ok(last + distance)
+            }
+            Focus::Sensor(value) => {
+                Err(FocusError::NotPositive { what: "sensor_distance (mm)", value })
+            }
+            Focus::Distance(distance) if distance == f64::INFINITY => self.image_of_infinity(),
+            Focus::Distance(distance) if distance > 0.0 => self.image_of(distance),
+            Focus::Distance(value) => {
+                Err(FocusError::NotPositive { what: "focus_distance (m)", value })
+            }
+        }
+    }
+
+    fn image_of_infinity(&self) -> Result<f64, FocusError> {
+        let paraxial = self.paraxial(self.wavelength)?;
+        let image = paraxial.image_z.ok_or(FocusError::Afocal)?;
+        if image <= self.last_vertex() {
+            return Err(FocusError::Virtual { distance: f64::INFINITY, image });
+        }
+        Ok(image)
+    }
+
+    fn image_of(&self, distance: f64) -> Result<f64, FocusError> {
+        let indices = self.indices(self.wavelength)?;
+        let all = self.matrix(&indices, 0, self.elements.len());
+        let (before, behind) = (indices[0], indices[indices.len() - 1]);
+        let paraxial = self.paraxial(self.wavelength)?;
+        // A lens that is telecentric towards the object has no finite entrance pupil; its front
+        // vertex stands in.
+        let pupil = paraxial.entrance_pupil.z.unwrap_or(0.0);
+        let object = distance * 1e3 - pupil;
+        if object <= 0.0 {
+            return Err(FocusError::Inside { distance, depth: pupil });
+        }
+        let (height, slope) = (all.a * object + all.b * before, all.c * object + all.d * before);
+        let image = -behind * height / slope;
+        let reach = paraxial.efl.map_or(f64::INFINITY, |efl| FARTHEST * efl.abs());
+        if !image.is_finite() || image.abs() > reach {
+            let least = (pupil - paraxial.ffl.unwrap_or(0.0)) * 1e-3;
+            return Err(FocusError::AtFocalPoint { distance, least });
+        }
+        if image <= 0.0 {
+            return Err(FocusError::Virtual { distance, image: self.last_vertex() + image });
+        }
+        Ok(self.last_vertex() + image)
+    }
+
+    /// The sensor's frame with its centre at `z` (mm), tilted and decentred as the file says.
+    #[must_use]
+    pub fn sensor_frame(&self, z: f64) -> Frame {
+        let SensorMount { tilt, decentre } = self.sensor;
+        Frame::placed(z, decentre.map(|length| length.0), tilt.map(|angle| angle.0))
+    }
+}

@@ -1,0 +1,362 @@
+//! Elements one behind the other: a lens.
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`file`] | the lens file |
+//! | [`trace`] | rays through the train, in batches or one by one |
+//! | [`paraxial`] | focal lengths, principal planes and pupils |
+//! | [`focus`] | where the sensor goes |
+//! | [`aim`] | chief rays: aimed at the stop's centre |
+//! | [`analysis`] | spots, distortion, relative illumination, colour |
+//! | [`pupil`] | the exit pupil as seen from the sensor, and samples of it |
+
+pub mod aim;
+pub mod analysis;
+pub mod file;
+pub mod focus;
+pub mod paraxial;
+pub mod pupil;
+mod pupil_search;
+pub mod trace;
+
+use std::sync::Arc;
+
+use crate::element::{Filter, Frame, Opening, Surface, ThinLens};
+use crate::glass::{Glass, GlassError};
+
+pub use aim::ChiefRay;
+pub use file::{LensFile, SensorMount};
+pub use focus::{Focus, FocusError};
+pub use paraxial::{Paraxial, Pupil};
+pub use pupil::{ExitPupil, ExitPupilError, PupilSample};
+pub use trace::{RayPath, Side, TrainAt};
+
+/// Why a lens file makes no lens.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LensError {
+    /// No JSON, or not that of a lens.
+    #[error("{0}")]
+    Json(String),
+    /// No element at all.
+    #[error("the lens has no elements")]
+    Empty,
+    /// A part that cannot be made.
+    #[error("elements[{index}]: {why}")]
+    Element {
+        /// Which, from 0 on the object side.
+        index: usize,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A glass that is not known.
+    #[error("elements[{index}].glass: {source}")]
+    Glass {
+        /// The surface in front of it.
+        index: usize,
+        /// Why.
+        source: GlassError,
+    },
+    /// Two elements marked as the stop.
+    #[error("elements[{second}].stop: elements[{first}] is the stop already")]
+    Stops {
+        /// The first.
+        first: usize,
+        /// The second.
+        second: usize,
+    },
+    /// A design wavelength that is none.
+    #[error("wavelength is {0} nm; it must be a positive length")]
+    Wavelength(f64),
+    /// A stop whose size cannot be set.
+    #[error("elements[{index}] is the stop and its opening cannot be set: {why}")]
+    Stop {
+        /// Which.
+        index: usize,
+        /// Why.
+        why: String,
+    },
+}
+
+/// What an element is, ready to be traced.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Part {
+    /// A refracting surface between the media before and behind it.
+    Surface(Surface),
+    /// An ideal thin lens.
+    ThinLens(ThinLens),
+    /// An opening in an opaque sheet.
+    Aperture(Arc<Opening>),
+    /// A sheet that absorbs.
+    Filter(Arc<Filter>),
+}
+
+/// A part at its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Element {
+    /// What it is.
+    pub part: Part,
+    /// Where it stands, in lens coordinates (mm).
+    pub frame: Frame,
+}
+
+/// A lens. Lengths are millimetres, z = 0 is the first element's vertex and +z runs from the object
+/// to the sensor; elements count from 0 on the object side.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpticalTrain {
+    pub(crate) name: String,
+    pub(crate) source: String,
+    pub(crate) elements: Vec<Element>,
+    /// One more than elements: `media[i]` is before element `i`.
+    pub(crate) media: Vec<Glass>,
+    pub(crate) stop: usize,
+    pub(crate) wavelength: f64,
+    pub(crate) end: f64,
+    pub(crate) sensor: SensorMount,
+    pub(crate) notes: Vec<String>,
+}
+
+impl OpticalTrain {
+    /// What the lens is called; empty when the file does not say.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Where the numbers come from; empty when the file does not say.
+    #[must_use]
+    pub fn source(&self) -> &str {
+        &self.source
+    }
+
+    /// The elements.
+    #[must_use]
+    pub fn elements(&self) -> &[Element] {
+        &self.elements
+    }
+
+    /// The medium before element `i`; `media()[elements().len()]` is before the sensor.
+    #[must_use]
+    pub fn media(&self) -> &[Glass] {
+        &self.media
+    }
+
+    /// The index of the aperture stop.
+    #[must_use]
+    pub fn stop(&self) -> usize {
+        self.stop
+    }
+
+    /// The wavelength at which the lens is focused and its stop is set (nm).
+    #[must_use]
+    pub fn wavelength(&self) -> f64 {
+        self.wavelength
+    }
+
+    /// What is odd about the lens, in sentences: glasses with namesakes, elements that cross, parts
+    /// that the paraxial analysis leaves out.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// z of the last element's vertex (mm).
+    #[must_use]
+    pub fn last_vertex(&self) -> f64 {
+        self.elements.last().map_or(0.0, |e| e.frame.vertex.z)
+    }
+
+    /// Whether a turn about the axis changes nothing: everything centred, untilted and round.
+    #[must_use]
+    pub fn is_rotationally_symmetric(&self) -> bool {
+        self.sensor == SensorMount::default() && self.elements.iter().all(Element::is_symmetric)
+    }
+
+    /// Whether rays of different wavelengths run differently.
+    #[must_use]
+    pub fn is_dispersive(&self) -> bool {
+        self.media.iter().any(Glass::is_dispersive)
+    }
+
+    /// Sentences on glasses and filters that are not known at `wavelength` (nm): what is traced
+    /// there is their formula or their last value held.
+    #[must_use]
+    pub fn outside_of_range(&self, wavelength: f64) -> Vec<String> {
+        let mut notes = Vec::new();
+        for glass in &self.media {
+            let [from, to] = glass.range;
+            let note = format!(
+                "glass {} is known from {from} to {to} nm, and {wavelength} nm lies outside",
+                glass.name
+            );
+            if !glass.covers(wavelength) && !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+        for (i, element) in self.elements.iter().enumerate() {
+            if let Part::Filter(filter) = &element.part {
+                let [from, to] = filter.range();
+                if wavelength < from || wavelength > to {
+                    notes.push(format!(
+                        "the filter elements[{i}] is known from {from} to {to} nm, and \
+                         {wavelength} nm lies outside"
+                    ));
+                }
+            }
+        }
+        notes
+    }
+
+    /// The radius of the stop's opening (mm): of the circle around it when it is not round;
+    /// infinite when nothing limits it.
+    #[must_use]
+    pub fn stop_radius(&self) -> f64 {
+        self.elements[self.stop].clear_radius()
+    }
+
+    /// The same lens with the stop opened or closed to `radius` (mm). An iris stays the polygon
+    /// that it is.
+    ///
+    /// # Errors
+    ///
+    /// When the radius is negative, or the stop is a mask.
+    pub fn with_stop_radius(mut self, radius: f64) -> Result<Self, LensError> {
+        let index = self.stop;
+        let error = |why: &str| LensError::Stop { index, why: why.to_owned() };
+        if !(radius >= 0.0 && radius.is_finite()) {
+            return Err(error("the radius must be a length from 0 on"));
+        }
+        match &mut self.elements[index].part {
+            Part::Surface(surface) => surface.semi_diameter = radius,
+            Part::ThinLens(lens) => lens.semi_diameter = radius,
+            Part::Filter(filter) => Arc::make_mut(filter).semi_diameter = radius,
+            Part::Aperture(opening) => {
+                let opening = Arc::make_mut(opening);
+                *opening = opening.with_radius(radius).ok_or_else(|| error("it is a mask"))?;
+            }
+        }
+        Ok(self)
+    }
+
+    /// The same lens with the stop set so that the paraxial f-number at the design wavelength is
+    /// `f_number`: focal length over the entrance pupil's diameter.
+    ///
+    /// # Errors
+    ///
+    /// When the lens has no focal length or no finite entrance pupil, or as
+    /// [`Self::with_stop_radius`].
+    pub fn with_f_number(self, f_number: f64) -> Result<Self, LensError> {
+        let error = |why: &str| LensError::Stop { index: self.stop, why: why.to_owned() };
+        let paraxial = self.paraxial(self.wavelength).map_err(|e| error(&e.to_string()))?;
+        let (Some(efl), Some(magnification)) = (paraxial.efl, paraxial.stop_magnification) else {
+            return Err(error("a lens without focal length or entrance pupil has no f-number"));
+        };
+        if !(f_number > 0.0 && f_number.is_finite()) {
+            return Err(error("the f-number must be positive"));
+        }
+        let radius = 0.5 * efl.abs() / f_number * magnification.abs();
+        self.with_stop_radius(radius)
+    }
+
+    /// Sets the stop, or finds the element that limits the beam from infinity on the axis, and
+    /// gathers the notes.
+    pub(crate) fn with_stop(mut self, stop: Option<usize>) -> Result<Self, LensError> {
+        self.stop = match stop {
+            Some(stop) => stop,
+            None => self
+                .limiting_element()
+                .map_err(|(index, source)| LensError::Glass { index, source })?,
+        };
+        self.notes = self.oddities();
+        Ok(self)
+    }
+
+    /// The element whose clear radius is the least share of the height at which a paraxial ray
+    /// from infinity passes.
+    fn limiting_element(&self) -> Result<usize, (usize, GlassError)> {
+        let heights = self.heights_from_infinity(self.wavelength)?;
+        let share = |i: usize| self.elements[i].clear_radius() / heights[i].abs();
+        Ok((0..self.elements.len()).min_by(|&a, &b| share(a).total_cmp(&share(b))).unwrap_or(0))
+    }
+
+    fn oddities(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        for glass in self.media.iter().filter(|g| !g.namesakes.is_empty()) {
+            let others = glass.namesakes.join(" and ");
+            let note = format!(
+                "glass {} is taken from {}; {others} also makes one (write \"{others}:{}\")",
+                glass.name, glass.source, glass.name
+            );
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+        for (i, element) in self.elements.iter().enumerate() {
+            if let Part::Surface(surface) = &element.part
+                && surface.semi_diameter.is_finite()
+                && surface.semi_diameter > surface.domain()
+            {
+                notes.push(format!(
+                    "elements[{i}] has a semi_diameter of {} mm, and its surface ends {} mm from \
+                     the axis: rays beyond miss it",
+                    surface.semi_diameter,
+                    surface.domain()
+                ));
+            }
+        }
+        notes.extend(self.crossings());
+        if !self.elements.iter().all(|e| e.frame.is_axial()) {
+            notes.push(
+                "the paraxial analysis leaves tilts and decentrings out; rays do not".to_owned(),
+            );
+        }
+        notes
+    }
+
+    /// Neighbouring surfaces that cut through each other inside their clear apertures.
+    fn crossings(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        for (i, pair) in self.elements.windows(2).enumerate() {
+            let (Part::Surface(a), Part::Surface(b)) = (&pair[0].part, &pair[1].part) else {
+                continue;
+            };
+            let reach = a.semi_diameter.min(b.semi_diameter);
+            if !reach.is_finite() || !pair.iter().all(|e| e.frame.is_axial()) {
+                continue;
+            }
+            let thickness = pair[1].frame.vertex.z - pair[0].frame.vertex.z;
+            let gap = |r: f64| Some(thickness + b.sag(r)? - a.sag(r)?);
+            let heights = (0..=64).map(|step| reach * f64::from(step) / 64.0);
+            if let Some(r) = heights.into_iter().find(|&r| gap(r).is_some_and(|g| g < 0.0)) {
+                notes.push(format!(
+                    "elements[{i}] and elements[{}] cut through each other {r:.3} mm from the \
+                     axis: rays beyond miss the second",
+                    i + 1
+                ));
+            }
+        }
+        notes
+    }
+}
+
+impl Element {
+    /// How far from its axis the element lets light pass (mm); infinite when unlimited.
+    #[must_use]
+    pub fn clear_radius(&self) -> f64 {
+        match &self.part {
+            Part::Surface(surface) => surface.semi_diameter,
+            Part::ThinLens(lens) => lens.semi_diameter,
+            Part::Aperture(opening) => opening.radius(),
+            Part::Filter(filter) => filter.radius(),
+        }
+    }
+
+    fn is_symmetric(&self) -> bool {
+        let round = match &self.part {
+            Part::Surface(_) | Part::ThinLens(_) => true,
+            Part::Aperture(opening) => opening.is_round(),
+            Part::Filter(filter) => filter.is_uniform(),
+        };
+        round && self.frame.is_axial()
+    }
+}

@@ -1,0 +1,222 @@
+//! Rays through a lens at one wavelength.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use multiversion::multiversion;
+use serde::{Deserialize, Serialize};
+
+use super::{OpticalTrain, Part};
+use crate::element::{Action, Block, Clip, Fate, LensRays, Ray, Refraction, Step};
+use crate::glass::GlassError;
+
+/// Where rays come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// From the object towards the sensor: elements in their order.
+    Object,
+    /// From the sensor towards the object: the last element first.
+    Sensor,
+}
+
+/// A lens at one wavelength.
+#[derive(Debug, Clone)]
+pub struct TrainAt {
+    wavelength: f64,
+    indices: Vec<f64>,
+    forward: Vec<Step>,
+    backward: Vec<Step>,
+}
+
+/// One ray's way through a lens.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RayPath {
+    /// What became of it.
+    pub fate: Fate,
+    /// Where it met each element that it reached (mm), in the order in which it met them. The last
+    /// one is where it was vignetted or totally reflected, if it was.
+    pub points: Vec<DVec3>,
+    /// Its direction behind the last element; `None` unless it left.
+    pub direction: Option<DVec3>,
+    /// The share of light that passes apertures and filters.
+    pub throughput: f64,
+}
+
+impl OpticalTrain {
+    /// The lens at `wavelength` (nm).
+    ///
+    /// # Errors
+    ///
+    /// When a glass has no index there. Being outside of a glass' stated range is no error here;
+    /// see [`Self::outside_of_range`].
+    pub fn at(&self, wavelength: f64) -> Result<TrainAt, GlassError> {
+        let indices = self.indices(wavelength)?;
+        let (mut forward, mut backward) = (Vec::new(), Vec::new());
+        for (element, placed) in self.elements.iter().enumerate() {
+            let [before, behind] = [indices[element], indices[element + 1]];
+            let [towards_sensor, towards_object] =
+                actions(&placed.part, before, behind, wavelength);
+            let (frame, axial) = (placed.frame, placed.frame.is_axial());
+            forward.push(Step { element, frame, axial, action: towards_sensor });
+            backward.push(Step { element, frame, axial, action: towards_object });
+        }
+        backward.reverse();
+        Ok(TrainAt { wavelength, indices, forward, backward })
+    }
+
+    /// The index of each medium at `wavelength` (nm), from the object's to the sensor's.
+    pub(crate) fn indices(&self, wavelength: f64) -> Result<Vec<f64>, GlassError> {
+        self.media.iter().map(|glass| glass.index(wavelength)).collect()
+    }
+}
+
+/// What a part does to light from the object, and to light traced from the sensor.
+fn actions(part: &Part, before: f64, behind: f64, wavelength: f64) -> [Action; 2] {
+    let both = |action: Action| [action.clone(), action];
+    match part {
+        Part::Surface(surface) => [
+            Action::refract(Refraction::new(surface.clone(), before, behind)),
+            Action::refract(Refraction::new(surface.clone(), behind, before)),
+        ],
+        Part::ThinLens(lens) => [lens.power, -lens.power]
+            .map(|power| Action::ThinLens { power, semi_diameter: lens.semi_diameter }),
+        Part::Aperture(opening) => both(Action::Opening(Arc::clone(opening))),
+        Part::Filter(filter) => {
+            let transmissions = filter.curves.iter().map(|c| c.held(wavelength)).collect();
+            both(Action::Filter { filter: Arc::clone(filter), transmissions })
+        }
+    }
+}
+
+impl TrainAt {
+    /// The wavelength (nm).
+    #[must_use]
+    pub fn wavelength(&self) -> f64 {
+        self.wavelength
+    }
+
+    /// The index of the medium between the last element and the sensor.
+    #[must_use]
+    pub fn index_before_sensor(&self) -> f64 {
+        self.indices[self.indices.len() - 1]
+    }
+
+    fn steps(&self, from: Side) -> &[Step] {
+        match from {
+            Side::Object => &self.forward,
+            Side::Sensor => &self.backward,
+        }
+    }
+
+    /// Takes a batch through the lens: positions end on the last refracting element, directions are
+    /// those behind it, throughputs are multiplied by what apertures and filters pass, and fates say
+    /// who left. Rays that ended already stay as they are.
+    ///
+    /// The same ray gives the same bits in any batch, and on any processor: the arithmetic is
+    /// without fused operations, whatever the width of the registers.
+    pub fn trace(&self, from: Side, clip: Clip, rays: &mut LensRays) {
+        trace_blocks(&mut rays.blocks, self.steps(from), clip);
+    }
+
+    /// As [`Self::trace`], ray by ray through the single-ray code: the yardstick for what batches
+    /// gain, and the check that they change nothing.
+    pub fn trace_singly(&self, from: Side, clip: Clip, rays: &mut LensRays) {
+        for block in &mut rays.blocks {
+            for lane in 0..block.outcome.len() {
+                if block.outcome[lane] == Fate::Exited.code() {
+                    let end = self.run(from, clip, block.ray(lane));
+                    block.set_ray(lane, end.ray);
+                    block.throughput[lane] *= end.throughput;
+                    block.outcome[lane] = end.fate.code();
+                }
+            }
+        }
+    }
+
+    /// One ray's way, point by point.
+    #[must_use]
+    pub fn path(&self, from: Side, clip: Clip, position: DVec3, direction: DVec3) -> RayPath {
+        let mut path = RayPath {
+            fate: Fate::Missed { element: 0 },
+            points: Vec::new(),
+            direction: None,
+            throughput: 1.0,
+        };
+        let Some(mut ray) = Ray::new(position, direction) else { return path };
+        for step in self.steps(from) {
+            let passage = step.run_one(ray, clip);
+            path.points.extend(passage.point.map(DVec3::from));
+            path.throughput *= passage.transmission;
+            path.fate = passage.fate;
+            ray = passage.ray;
+            if passage.fate != Fate::Exited {
+                return path;
+            }
+        }
+        path.fate = Fate::Exited;
+        path.direction = Some(ray.direction.into());
+        path
+    }
+
+    /// One ray to its end.
+    #[inline]
+    pub(crate) fn run(&self, from: Side, clip: Clip, ray: Ray) -> End {
+        let mut end = End { fate: Fate::Exited, ray, throughput: 1.0 };
+        for step in self.steps(from) {
+            let passage = step.run_one(end.ray, clip);
+            end.throughput *= passage.transmission;
+            end.fate = passage.fate;
+            end.ray = passage.ray;
+            if passage.fate != Fate::Exited {
+                if let (Fate::Vignetted { .. }, Some(point)) = (passage.fate, passage.point)
+                    && step.moves()
+                {
+                    end.ray.position = point;
+                }
+                break;
+            }
+        }
+        end
+    }
+
+    /// Where a ray crosses an element, in the element's own frame and without any clipping; `None`
+    /// when it does not get there.
+    pub(crate) fn crossing(&self, from: Side, element: usize, mut ray: Ray) -> Option<[f64; 2]> {
+        for step in self.steps(from) {
+            let passage = step.run_one(ray, Clip::Off);
+            if step.element == element {
+                let local = step.frame.rotation.transpose()
+                    * (DVec3::from(passage.point?) - step.frame.vertex);
+                return Some([local.x, local.y]);
+            }
+            if passage.fate != Fate::Exited {
+                return None;
+            }
+            ray = passage.ray;
+        }
+        None
+    }
+}
+
+/// A single ray at its end.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct End {
+    pub(crate) fate: Fate,
+    pub(crate) ray: Ray,
+    pub(crate) throughput: f64,
+}
+
+// Widest first: the first set that the processor has is taken, at run time.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+avx512bw",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn trace_blocks(blocks: &mut [Block], steps: &[Step], clip: Clip) {
+    for block in blocks {
+        for step in steps {
+            step.run(block, clip);
+        }
+    }
+}
