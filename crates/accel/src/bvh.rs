@@ -14,23 +14,23 @@
 
 mod lanes;
 mod ray;
+mod single;
 mod traverse;
 mod wide;
 
 use std::fmt;
+use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_geometry::glam::Vec3;
 use etendue_geometry::{Bounds, Geometry, HitBatch, RayBatch};
-use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
 use self::lanes::{Lanes, Portable};
-use self::ray::{BoxTest, NarrowRay, TriangleTest};
-use self::traverse::{Stack, traverse};
-use self::wide::{Instances, Triangles, WideTree};
-use crate::nearest::{Nearest, Query};
+use self::single::{AnyHit, Batch, Sink};
+use self::wide::{Instances, Triangles, Units, WideTree};
+use crate::nearest::Nearest;
 use crate::parts::{Baking, Instance, Layout, Members, Part, outward};
 use crate::tree::{LeafSize, Ref, Tree};
 use crate::watch::{Watch, with_threads};
@@ -53,6 +53,9 @@ struct Shape {
     tree: WideTree,
     /// Whose triangles these are.
     owner: Owner,
+    /// How the meshes' own coordinates follow from those in the leaves, when they do to the bit:
+    /// then a hit needs nothing but the leaf.
+    units: Option<Units>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -71,10 +74,16 @@ enum Isa {
     Portable,
     #[cfg(target_arch = "x86_64")]
     Avx2(pulp::x86::V3),
+    #[cfg(target_arch = "x86_64")]
+    Avx512(pulp::x86::V4),
 }
 
 impl Isa {
     fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(token) = pulp::x86::V4::try_new() {
+            return Self::Avx512(token);
+        }
         #[cfg(target_arch = "x86_64")]
         if let Some(token) = pulp::x86::V3::try_new() {
             return Self::Avx2(token);
@@ -87,6 +96,8 @@ impl Isa {
             Self::Portable => Portable::NAME,
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(_) => <pulp::x86::V3 as Lanes>::NAME,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => <pulp::x86::V4 as Lanes>::NAME,
         }
     }
 }
@@ -143,9 +154,26 @@ impl Shape {
             Members::Baked(placements) if placements.len() == 1 => Owner::Placement(placements[0]),
             Members::Baked(_) => Owner::Leaf,
         };
-        let placements = matches!(owner, Owner::Leaf);
-        let tree = WideTree::fold(&tree, &Triangles { part, geometry, placements });
-        Ok(Self { tree, owner })
+        let leaf = Triangles {
+            part,
+            geometry,
+            placements: matches!(owner, Owner::Leaf),
+            units: Units::of(part.frame),
+            is_exact: part.is_unturned(geometry).into(),
+        };
+        let tree = WideTree::fold(&tree, &leaf);
+        let units = leaf.is_exact.into_inner().then_some(leaf.units);
+        Ok(Self { tree, owner, units })
+    }
+
+    /// The placement of all triangles as part of `instance`, where it is the same.
+    #[inline(always)]
+    fn only(&self, instance: &Instance) -> Option<u32> {
+        match self.owner {
+            Owner::Placement(placement) => Some(placement),
+            Owner::Instance => Some(instance.placement),
+            Owner::Leaf => None,
+        }
     }
 
     fn bounds(&self) -> Bounds {
@@ -176,196 +204,32 @@ fn top_tree(
     Ok(WideTree::fold(&tree, &Instances))
 }
 
-/// What a traversal needs besides the ray.
-struct Scratch {
-    outer: Stack,
-    inner: Stack,
-}
-
-/// A batch of rays and what becomes of each.
-struct Batch<'a, L, F> {
-    lanes: L,
-    bvh: &'a Bvh,
-    rays: &'a RayBatch,
-    /// Called for every ray with its number, when it can hit at all.
-    each: F,
-}
-
-impl<L: Lanes, F: FnMut(&Finder<'_, L>, usize, &Query, &mut Scratch)> NullaryFnOnce
-    for Batch<'_, L, F>
-{
-    type Output = ();
-
-    #[inline(always)]
-    fn call(mut self) {
-        let finder = Finder { lanes: self.lanes, bvh: self.bvh };
-        let mut scratch = Scratch { outer: Stack::new(), inner: Stack::new() };
-        for i in 0..self.rays.len() {
-            if let Some(query) = Query::of(self.rays, i) {
-                (self.each)(&finder, i, &query, &mut scratch);
-            }
-        }
-    }
-}
-
-struct Finder<'a, L> {
-    lanes: L,
-    bvh: &'a Bvh,
-}
-
-impl<L: Lanes> Finder<'_, L> {
-    #[inline(always)]
-    fn nearest(&self, query: &Query, scratch: &mut Scratch) -> Nearest {
-        let mut nearest = Nearest::none(query.t_max);
-        self.visit(query, query.t_max, scratch, |hit, placement, triangle| {
-            nearest.offer(hit, placement, triangle);
-            Some(nearest.t)
-        });
-        nearest
-    }
-
-    #[inline(always)]
-    fn is_blocked(&self, query: &Query, scratch: &mut Scratch) -> bool {
-        let mut blocked = false;
-        self.visit(query, query.t_max, scratch, |_, _, _| {
-            blocked = true;
-            None
-        });
-        blocked
-    }
-
-    /// Shows hits to `see`, roughly from near to far, which answers how far to look on.
-    #[inline(always)]
-    fn visit(
-        &self,
-        query: &Query,
-        t_max: f64,
-        scratch: &mut Scratch,
-        mut see: impl FnMut(crate::watertight::Hit, u32, u32) -> Option<f64>,
-    ) {
-        let Scratch { outer, inner } = scratch;
-        let mut t_max = t_max;
-        if let [instance] = &self.bvh.layout.instances[..] {
-            self.visit_instance(instance, query, &mut t_max, inner, &mut see);
-            return;
-        }
-        if self.bvh.top.is_empty() {
-            return;
-        }
-        let world = self.bvh.layout.world.ray(query.origin, query.direction);
-        let world = NarrowRay::new(&world, query.t_min);
-        let test = BoxTest::new(self.lanes, &world);
-        let top = &self.bvh.top;
-        traverse(self.lanes, &top.nodes, &test, world.far(t_max), outer, |leaf, _| {
-            let place = leaf.place();
-            for number in &top.numbers[place..place + leaf.count()] {
-                let instance = &self.bvh.layout.instances[number.to_bits() as usize];
-                if !self.visit_instance(instance, query, &mut t_max, inner, &mut see) {
-                    return None;
-                }
-            }
-            Some(world.far(t_max))
-        });
-    }
-
-    /// As [`Self::visit`], within one instance; `false` when `see` has seen enough.
-    #[inline(always)]
-    fn visit_instance(
-        &self,
-        instance: &Instance,
-        query: &Query,
-        t_max: &mut f64,
-        stack: &mut Stack,
-        see: &mut impl FnMut(crate::watertight::Hit, u32, u32) -> Option<f64>,
-    ) -> bool {
-        let shape = &self.bvh.parts[instance.part as usize];
-        let local = instance.ray(query.origin, query.direction);
-        let ray = NarrowRay::new(&local, query.t_min);
-        let boxes = BoxTest::new(self.lanes, &ray);
-        let triangles = TriangleTest::new(self.lanes, &ray);
-        let mut go_on = true;
-        let far = ray.far(*t_max);
-        traverse(self.lanes, &shape.tree.nodes, &boxes, far, stack, |leaf, far| {
-            let (n, place) = (leaf.count(), leaf.place());
-            let numbers = shape.tree.numbers.get(place..place + 96)?;
-            let mut maybe = triangles.maybe(self.lanes, numbers, n, far);
-            if maybe == 0 {
-                return Some(far);
-            }
-            while maybe != 0 {
-                let i = maybe.trailing_zeros() as usize;
-                maybe &= maybe - 1;
-                let triangle = numbers[9 * n + i].to_bits();
-                let placement = match shape.owner {
-                    Owner::Placement(placement) => placement,
-                    Owner::Instance => instance.placement,
-                    Owner::Leaf => numbers[10 * n + i].to_bits(),
-                };
-                if let Some(hit) = self.bvh.test(query, placement, triangle) {
-                    match see(hit, placement, triangle) {
-                        Some(limit) => *t_max = limit,
-                        None => {
-                            go_on = false;
-                            return None;
-                        }
-                    }
-                }
-            }
-            Some(ray.far(*t_max))
-        });
-        go_on
-    }
-}
-
 impl Bvh {
-    #[inline]
-    fn test(&self, query: &Query, placement: u32, triangle: u32) -> Option<crate::watertight::Hit> {
-        let placement = &self.geometry.placements[placement as usize];
-        let corners = self.geometry.mesh_of(placement).corners(triangle as usize);
-        query.test(placement, corners)
+    fn run<L: Lanes, S: Sink>(&self, lanes: L, rays: &RayBatch, sink: impl FnMut(usize, S)) {
+        lanes.run(Batch { lanes, bvh: self, rays, sink, seen: PhantomData });
     }
 
-    fn closest_by<L: Lanes>(&self, lanes: L, rays: &RayBatch, hits: &mut HitBatch) {
-        lanes.run(Batch {
-            lanes,
-            bvh: self,
-            rays,
-            each: |finder: &Finder<'_, L>, i, query: &Query, scratch: &mut Scratch| {
-                finder.nearest(query, scratch).write(&self.geometry, hits, i);
-            },
-        });
-    }
-
-    fn occluded_by<L: Lanes>(&self, lanes: L, rays: &RayBatch, blocked: &mut [bool]) {
-        lanes.run(Batch {
-            lanes,
-            bvh: self,
-            rays,
-            each: |finder: &Finder<'_, L>, i, query: &Query, scratch: &mut Scratch| {
-                blocked[i] = finder.is_blocked(query, scratch);
-            },
-        });
+    fn dispatch<S: Sink>(&self, rays: &RayBatch, sink: impl FnMut(usize, S)) {
+        match self.isa {
+            Isa::Portable => self.run(Portable, rays, sink),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2(token) => self.run(token, rays, sink),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx512(token) => self.run(token, rays, sink),
+        }
     }
 }
 
 impl Accel for Bvh {
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
         hits.reset(rays.len());
-        match self.isa {
-            Isa::Portable => self.closest_by(Portable, rays, hits),
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx2(token) => self.closest_by(token, rays, hits),
-        }
+        self.dispatch(rays, |i, nearest: Nearest| nearest.write(&self.geometry, hits, i));
     }
 
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {
         blocked.clear();
         blocked.resize(rays.len(), false);
-        match self.isa {
-            Isa::Portable => self.occluded_by(Portable, rays, blocked),
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx2(token) => self.occluded_by(token, rays, blocked),
-        }
+        self.dispatch(rays, |i, found: AnyHit| blocked[i] = found.found);
     }
 
     fn report(&self) -> BuildReport {

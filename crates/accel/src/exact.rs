@@ -17,7 +17,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
 use rayon::prelude::*;
 
-use crate::nearest::{Nearest, Query};
+use crate::nearest::{Nearest, Query, View};
 use crate::parts::{Baking, Instance, Layout, LocalRay, Part, outward};
 use crate::tree::{LeafSize, MAX_DEPTH, Node, Ref, Tree};
 use crate::watch::{Watch, with_threads};
@@ -97,7 +97,7 @@ impl Exact {
     fn test(&self, query: &Query, placement: u32, triangle: u32) -> Option<crate::watertight::Hit> {
         let placement = &self.geometry.placements[placement as usize];
         let corners = self.geometry.mesh_of(placement).corners(triangle as usize);
-        query.test(placement, corners)
+        query.test(&View::new(&placement.world_from_mesh, query.origin), corners)
     }
 
     /// Shows every triangle near the ray to `see`, roughly from near to far, which answers how far

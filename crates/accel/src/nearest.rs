@@ -1,7 +1,7 @@
 //! One ray's question and the best answer so far: the rules about limits and ties, in one place.
 
-use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, Geometry, HitBatch, MISS, Placement, RayBatch};
+use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{Detail, Geometry, HitBatch, MISS, Placement, RayBatch, Transform};
 
 use crate::watertight;
 
@@ -16,7 +16,7 @@ pub(crate) struct Query {
 
 impl Query {
     /// Ray `i` of a batch; `None` when it cannot hit anything, as when a number is NaN.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of(rays: &RayBatch, i: usize) -> Option<Self> {
         let query = Self {
             origin: rays.origin(i),
@@ -32,16 +32,37 @@ impl Query {
     }
 
     /// The exact answer for one triangle, given by its corners in the mesh's frame.
-    #[inline]
-    pub(crate) fn test(
-        &self,
-        placement: &Placement,
-        corners: [DVec3; 3],
-    ) -> Option<watertight::Hit> {
-        let transform = &placement.world_from_mesh;
-        let [a, b, c] = corners.map(|corner| transform.point_from(corner, self.origin));
+    #[inline(always)]
+    pub(crate) fn test(&self, view: &View, [a, b, c]: [DVec3; 3]) -> Option<watertight::Hit> {
+        let [a, b, c] = [view.corner(a), view.corner(b), view.corner(c)];
         let hit = watertight::intersect(a, b, c, self.direction)?;
         (hit.t >= self.t_min && hit.t <= self.t_max).then_some(hit)
+    }
+}
+
+/// A placement as seen from a ray's origin: [`Transform::point_from`] with what all corners share
+/// worked out.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct View {
+    linear: DMat3,
+    offset: DVec3,
+    is_parallel: bool,
+}
+
+impl View {
+    #[inline(always)]
+    pub(crate) fn new(transform: &Transform, origin: DVec3) -> Self {
+        let linear = transform.linear;
+        let is_parallel = linear == DMat3::IDENTITY;
+        Self { linear, offset: transform.offset_from(origin), is_parallel }
+    }
+
+    /// A corner of the mesh, from the ray's origin (m).
+    #[inline(always)]
+    fn corner(&self, corner: DVec3) -> DVec3 {
+        // Multiplying by ones and adding zeros is exact.
+        let turned = if self.is_parallel { corner } else { self.linear * corner };
+        turned + self.offset
     }
 }
 
@@ -63,7 +84,7 @@ impl Nearest {
     }
 
     /// Takes `hit` when it is closer, or as close and of a lower placement, then triangle.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn offer(&mut self, hit: watertight::Hit, placement: u32, triangle: u32) {
         let closer = hit.t < self.t
             || (hit.t == self.t && (placement, triangle) < (self.placement, self.triangle));
@@ -73,7 +94,7 @@ impl Nearest {
     }
 
     /// Writes the answer into place `i` of a batch that has been reset to misses.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn write(&self, geometry: &Geometry, hits: &mut HitBatch, i: usize) {
         if self.placement == MISS {
             return;
@@ -82,14 +103,18 @@ impl Nearest {
         hits.placement[i] = self.placement;
         hits.triangle[i] = self.triangle;
         if hits.detail == Detail::Surface {
-            hits.u[i] = self.u;
-            hits.v[i] = self.v;
-            let placement = &geometry.placements[self.placement as usize];
-            let corners = geometry.mesh_of(placement).corners(self.triangle as usize);
-            let normal = front_normal(placement, corners);
-            for axis in 0..3 {
-                hits.normal[axis][i] = normal[axis];
-            }
+            self.write_surface(geometry, hits, i);
+        }
+    }
+
+    fn write_surface(&self, geometry: &Geometry, hits: &mut HitBatch, i: usize) {
+        hits.u[i] = self.u;
+        hits.v[i] = self.v;
+        let placement = &geometry.placements[self.placement as usize];
+        let corners = geometry.mesh_of(placement).corners(self.triangle as usize);
+        let normal = front_normal(placement, corners);
+        for axis in 0..3 {
+            hits.normal[axis][i] = normal[axis];
         }
     }
 }

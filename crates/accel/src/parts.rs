@@ -69,6 +69,8 @@ pub(crate) struct Instance {
     pub(crate) part: u32,
     /// The placement, or [`MISS`] for a baked part, which knows its triangles' placements.
     pub(crate) placement: u32,
+    /// The frame's scale where the frame is parallel to the world, else 0.
+    pub(crate) parallel_scale: f64,
     /// From world directions to the part's frame, with its scale.
     linear: DMat3,
     translation: DVec3,
@@ -269,6 +271,7 @@ impl Instance {
         Self {
             part,
             placement: MISS,
+            parallel_scale: frame.scale,
             linear: DMat3::from_diagonal(DVec3::splat(frame.scale)),
             translation: frame.origin,
             translation_low: DVec3::ZERO,
@@ -297,6 +300,7 @@ impl Instance {
         Some(Self {
             part: 0,
             placement: i,
+            parallel_scale: 0.0,
             linear,
             translation: transform.translation,
             translation_low: transform.translation_low,
@@ -307,15 +311,17 @@ impl Instance {
     }
 
     /// A world ray in the part's frame.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn ray(&self, origin: DVec3, direction: DVec3) -> LocalRay {
         let offset = (self.translation - origin) + self.translation_low;
         let distance = offset.abs();
-        LocalRay {
-            origin: -(self.linear * offset) - self.origin,
-            direction: self.linear * direction,
-            pad: self.pad + self.pad_per_distance * (distance.x + distance.y + distance.z),
+        let pad = self.pad + self.pad_per_distance * (distance.x + distance.y + distance.z);
+        if self.parallel_scale > 0.0 {
+            let scale = self.parallel_scale;
+            return LocalRay { origin: -offset * scale, direction: direction * scale, pad };
         }
+        let origin = -(self.linear * offset) - self.origin;
+        LocalRay { origin, direction: self.linear * direction, pad }
     }
 
     /// A box around the box `lo..hi` of this instance's part, in `world` coordinates.
@@ -374,6 +380,30 @@ impl Part {
                 let corners = geometry.mesh_of(placement).corners(triangle as usize);
                 corners.map(|p| placement.world_from_mesh.point_from(p, origin) * scale)
             }
+        }
+    }
+
+    /// The corners of a triangle in its mesh's frame.
+    pub(crate) fn local_corners(
+        &self,
+        geometry: &Geometry,
+        placement: u32,
+        triangle: u32,
+    ) -> [DVec3; 3] {
+        let mesh = match &self.members {
+            Members::Mesh(mesh) => *mesh,
+            Members::Baked(_) => geometry.placements[placement as usize].mesh,
+        };
+        geometry.meshes[mesh as usize].corners(triangle as usize)
+    }
+
+    /// Whether all corners go into this part's frame without being turned or stretched.
+    pub(crate) fn is_unturned(&self, geometry: &Geometry) -> bool {
+        match &self.members {
+            Members::Mesh(_) => true,
+            Members::Baked(placements) => placements
+                .iter()
+                .all(|&i| geometry.placements[i as usize].world_from_mesh.is_identity()),
         }
     }
 

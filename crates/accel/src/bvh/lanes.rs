@@ -120,81 +120,88 @@ impl Lanes for Portable {
 mod x86 {
     use std::arch::x86_64::{__m256, _CMP_LE_OQ};
 
-    use pulp::x86::V3;
+    use pulp::x86::{V3, V4};
     use pulp::{NullaryFnOnce, cast};
 
     use super::Lanes;
 
-    /// AVX2 and fused multiply-add.
-    impl Lanes for V3 {
-        type F = __m256;
+    macro_rules! eight_lanes {
+        ($Token:ty, $name:literal) => {
+            impl Lanes for $Token {
+                type F = __m256;
 
-        const NAME: &'static str = "avx2";
+                const NAME: &'static str = $name;
 
-        #[inline(always)]
-        fn run<F: NullaryFnOnce>(self, f: F) -> F::Output {
-            self.vectorize(f)
-        }
+                #[inline(always)]
+                fn run<F: NullaryFnOnce>(self, f: F) -> F::Output {
+                    self.vectorize(f)
+                }
 
-        #[inline(always)]
-        fn load(self, values: &[f32; 8]) -> __m256 {
-            cast(*values)
-        }
+                #[inline(always)]
+                fn load(self, values: &[f32; 8]) -> __m256 {
+                    cast(*values)
+                }
 
-        #[inline(always)]
-        fn store(self, values: __m256) -> [f32; 8] {
-            cast(values)
-        }
+                #[inline(always)]
+                fn store(self, values: __m256) -> [f32; 8] {
+                    cast(values)
+                }
 
-        #[inline(always)]
-        fn splat(self, value: f32) -> __m256 {
-            self.avx._mm256_set1_ps(value)
-        }
+                #[inline(always)]
+                fn splat(self, value: f32) -> __m256 {
+                    self.avx._mm256_set1_ps(value)
+                }
 
-        #[inline(always)]
-        fn add(self, a: __m256, b: __m256) -> __m256 {
-            self.avx._mm256_add_ps(a, b)
-        }
+                #[inline(always)]
+                fn add(self, a: __m256, b: __m256) -> __m256 {
+                    self.avx._mm256_add_ps(a, b)
+                }
 
-        #[inline(always)]
-        fn sub(self, a: __m256, b: __m256) -> __m256 {
-            self.avx._mm256_sub_ps(a, b)
-        }
+                #[inline(always)]
+                fn sub(self, a: __m256, b: __m256) -> __m256 {
+                    self.avx._mm256_sub_ps(a, b)
+                }
 
-        #[inline(always)]
-        fn mul(self, a: __m256, b: __m256) -> __m256 {
-            self.avx._mm256_mul_ps(a, b)
-        }
+                #[inline(always)]
+                fn mul(self, a: __m256, b: __m256) -> __m256 {
+                    self.avx._mm256_mul_ps(a, b)
+                }
 
-        #[inline(always)]
-        fn mul_sub(self, a: __m256, b: __m256, c: __m256) -> __m256 {
-            self.fma._mm256_fmsub_ps(a, b, c)
-        }
+                #[inline(always)]
+                fn mul_sub(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+                    self.fma._mm256_fmsub_ps(a, b, c)
+                }
 
-        #[inline(always)]
-        fn neg_mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
-            self.fma._mm256_fnmadd_ps(a, b, c)
-        }
+                #[inline(always)]
+                fn neg_mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+                    self.fma._mm256_fnmadd_ps(a, b, c)
+                }
 
-        #[inline(always)]
-        fn min(self, a: __m256, b: __m256) -> __m256 {
-            self.avx._mm256_min_ps(a, b)
-        }
+                #[inline(always)]
+                fn min(self, a: __m256, b: __m256) -> __m256 {
+                    self.avx._mm256_min_ps(a, b)
+                }
 
-        #[inline(always)]
-        fn max(self, a: __m256, b: __m256) -> __m256 {
-            self.avx._mm256_max_ps(a, b)
-        }
+                #[inline(always)]
+                fn max(self, a: __m256, b: __m256) -> __m256 {
+                    self.avx._mm256_max_ps(a, b)
+                }
 
-        #[inline(always)]
-        fn abs(self, a: __m256) -> __m256 {
-            self.avx._mm256_andnot_ps(self.avx._mm256_set1_ps(-0.0), a)
-        }
+                #[inline(always)]
+                fn abs(self, a: __m256) -> __m256 {
+                    self.avx._mm256_andnot_ps(self.avx._mm256_set1_ps(-0.0), a)
+                }
 
-        #[inline(always)]
-        fn le(self, a: __m256, b: __m256) -> u32 {
-            let mask = self.avx._mm256_cmp_ps::<_CMP_LE_OQ>(a, b);
-            self.avx._mm256_movemask_ps(mask).cast_unsigned()
-        }
+                #[inline(always)]
+                fn le(self, a: __m256, b: __m256) -> u32 {
+                    let mask = self.avx._mm256_cmp_ps::<_CMP_LE_OQ>(a, b);
+                    self.avx._mm256_movemask_ps(mask).cast_unsigned()
+                }
+            }
+        };
     }
+
+    eight_lanes!(V3, "avx2");
+    // The same instructions on twice the registers.
+    eight_lanes!(V4, "avx512");
 }

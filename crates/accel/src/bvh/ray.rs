@@ -6,10 +6,11 @@
 //! ever culled that f64 would hit; the widening is about 10⁻⁶ of the frame, which costs next to
 //! nothing as long as triangles are larger than that.
 
-use etendue_geometry::glam::Vec3;
+use etendue_geometry::glam::{DVec3, Vec3};
 
 use super::lanes::Lanes;
-use crate::parts::{LocalRay, round_down, round_up};
+use crate::nearest::Query;
+use crate::parts::{Instance, LocalRay};
 
 /// A ray in a frame's single-precision coordinates, with unit direction; its own distance τ is
 /// (t · `length`) − `skipped`.
@@ -36,20 +37,48 @@ const FAR: f64 = 4.0;
 const LEAST: f32 = 1e-12;
 
 impl NarrowRay {
+    /// The world's ray in `instance`'s frame.
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
-    pub(super) fn new(ray: &LocalRay, t_min: f64) -> Self {
+    pub(super) fn new(instance: &Instance, query: &Query) -> Self {
+        let local = instance.ray(query.origin, query.direction);
+        // Nearly always a frame parallel to the world, a unit direction and an origin nearby.
+        let scale = instance.parallel_scale;
+        let is_near = local.origin.length_squared() <= FAR * FAR;
+        let is_unit = (query.direction.length_squared() - 1.0).abs() < 0.1;
+        if scale > 0.0 && is_near && is_unit {
+            Self::rounded(local.origin, query.direction, local.pad, query.t_min, scale, 0.0)
+        } else {
+            Self::of_any_length(&local, query.t_min)
+        }
+    }
+
+    fn of_any_length(ray: &LocalRay, t_min: f64) -> Self {
         let length = ray.direction.length();
         let direction = ray.direction / length;
         let distance = ray.origin.length();
         let skipped = if distance > FAR { distance - 2.0 } else { 0.0 };
         let origin = ray.origin + direction * skipped;
-        let origin_size = origin.abs().max_element();
+        Self::rounded(origin, direction, ray.pad, t_min, length, skipped)
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
+    fn rounded(
+        origin: DVec3,
+        direction: DVec3,
+        pad: f64,
+        t_min: f64,
+        length: f64,
+        skipped: f64,
+    ) -> Self {
+        let near = (t_min * length - skipped) as f32;
+        let origin = origin.as_vec3();
+        let error = f32::EPSILON * (8.0 * origin.abs().max_element() + 6.0) + 5.0 * pad as f32;
         Self {
-            origin: origin.as_vec3(),
+            origin,
             direction: direction.as_vec3(),
-            error: f32::EPSILON * (8.0 * origin_size as f32 + 6.0) + 4.0 * round_up(ray.pad),
-            near: round_down(t_min * length - skipped).max(0.0),
+            error,
+            near: (near - near * f32::EPSILON).max(0.0),
             length,
             skipped,
         }
@@ -57,17 +86,32 @@ impl NarrowRay {
 
     /// The ray's own distance for `t`, rounded up with room for the error of either.
     #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
     pub(super) fn far(&self, t: f64) -> f32 {
-        let far = round_up(t * self.length - self.skipped);
-        far + (far.abs() * 4.0 * f32::EPSILON + self.error)
+        let far = (t * self.length - self.skipped) as f32;
+        far + (far.abs() * (4.0 * f32::EPSILON) + self.error)
     }
 }
 
 /// The reciprocal of a direction, finite and not zero.
 #[inline(always)]
 pub(super) fn safe_reciprocal(direction: Vec3) -> Vec3 {
-    let steer = |d: f32| if d.abs() < LEAST { LEAST.copysign(d) } else { d };
-    Vec3::from_array(direction.to_array().map(steer)).recip()
+    Vec3::new(steer(direction.x), steer(direction.y), steer(direction.z)).recip()
+}
+
+#[inline(always)]
+fn steer(d: f32) -> f32 {
+    if d.abs() < LEAST { LEAST.copysign(d) } else { d }
+}
+
+#[inline(always)]
+fn splat<L: Lanes>(lanes: L, v: Vec3) -> [L::F; 3] {
+    [lanes.splat(v.x), lanes.splat(v.y), lanes.splat(v.z)]
+}
+
+#[inline(always)]
+fn backwards(d: f32) -> usize {
+    usize::from(d < 0.0)
 }
 
 /// A ray, or a bundle of them, against eight boxes: for each axis, *near* plane · `inverse_near` −
@@ -89,17 +133,19 @@ impl<L: Lanes> BoxTest<L> {
         let inverse = safe_reciprocal(ray.direction);
         let offset = ray.origin * inverse;
         let widening = inverse.abs() * ray.error;
-        let splat = |v: Vec3| v.to_array().map(|x| lanes.splat(x));
         Self {
-            backwards: inverse.to_array().map(|x| usize::from(x < 0.0)),
-            inverse_near: splat(inverse),
-            inverse_far: splat(inverse),
-            near_offset: splat(offset + widening),
-            far_offset: splat(offset - widening),
+            backwards: [backwards(inverse.x), backwards(inverse.y), backwards(inverse.z)],
+            inverse_near: splat(lanes, inverse),
+            inverse_far: splat(lanes, inverse),
+            near_offset: splat(lanes, offset + widening),
+            far_offset: splat(lanes, offset - widening),
             near: lanes.splat(ray.near),
         }
     }
 }
+
+/// The axis after each.
+const NEXT: [usize; 3] = [1, 2, 0];
 
 /// A ray against eight triangles, by S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle
 /// intersection", 2013: a shear that makes the ray the z axis, in which edges are lines past the
@@ -127,12 +173,13 @@ impl<L: Lanes> TriangleTest<L> {
         } else {
             2
         };
-        let axes = [(z + 1) % 3, (z + 2) % 3, z];
-        let origin = ray.origin.to_array();
+        let [x, y] = [NEXT[z], NEXT[NEXT[z]]];
+        let inverse = 1.0 / d[z];
+        let o = ray.origin.to_array();
         Self {
-            axes,
-            origin: axes.map(|axis| lanes.splat(origin[axis])),
-            shear: [d[axes[0]] / d[z], d[axes[1]] / d[z], 1.0 / d[z]].map(|x| lanes.splat(x)),
+            axes: [x, y, z],
+            origin: splat(lanes, Vec3::new(o[x], o[y], o[z])),
+            shear: splat(lanes, Vec3::new(d[x] * inverse, d[y] * inverse, inverse)),
             error: lanes.splat(4.0 * ray.error),
             near: lanes.splat(ray.near - 4.0 * ray.error),
         }
@@ -143,36 +190,59 @@ impl<L: Lanes> TriangleTest<L> {
     #[inline(always)]
     pub(super) fn maybe(&self, lanes: L, corners: &[f32], n: usize, far: f32) -> u32 {
         let l = lanes;
-        let coordinate = |corner: usize, axis: usize| {
-            let start = (3 * corner + axis) * n;
-            match corners.get(start..).and_then(|rest| rest.first_chunk::<8>()) {
-                Some(run) => l.load(run),
-                None => l.splat(0.0),
-            }
-        };
-        let sheared = [0, 1, 2].map(|corner| {
-            let z = l.sub(coordinate(corner, self.axes[2]), self.origin[2]);
-            let x = l.sub(coordinate(corner, self.axes[0]), self.origin[0]);
-            let y = l.sub(coordinate(corner, self.axes[1]), self.origin[1]);
-            [l.neg_mul_add(self.shear[0], z, x), l.neg_mul_add(self.shear[1], z, y), z]
-        });
-        let edge =
-            |[px, py, _]: [L::F; 3], [qx, qy, _]: [L::F; 3]| l.mul_sub(px, qy, l.mul(py, qx));
-        let [a, b, c] = sheared;
-        let [u, v, w] = [edge(c, b), edge(a, c), edge(b, a)];
+        let a = self.shear(l, corners, 0, n);
+        let b = self.shear(l, corners, 3, n);
+        let c = self.shear(l, corners, 6, n);
+        let (u, v, w) = (edge(l, c, b), edge(l, a, c), edge(l, b, a));
         // Each product has two coordinates that are off by at most half the error.
-        let size = |[x, y, _]: [L::F; 3]| l.add(l.abs(x), l.abs(y));
-        let sizes = l.add(l.add(size(a), size(b)), l.add(size(c), self.error));
+        let sizes = l.add(l.add(size(l, a), size(l, b)), l.add(size(l, c), self.error));
         let error = l.mul(sizes, self.error);
         let least = l.min(l.min(u, v), w);
         let most = l.max(l.max(u, v), w);
-        let zero = l.splat(0.0);
-        let inside = l.le(l.sub(zero, least), error) | l.le(most, error);
+        let inside = l.le(l.sub(l.splat(0.0), error), least) | l.le(most, error);
 
-        let z = [a[2], b[2], c[2]].map(|z| l.mul(z, self.shear[2]));
-        let closest = l.min(l.min(z[0], z[1]), z[2]);
-        let farthest = l.max(l.max(z[0], z[1]), z[2]);
+        let (az, bz, cz) = (l.mul(a.z, self.shear[2]), l.mul(b.z, self.shear[2]), l.mul(c.z, self.shear[2]));
+        let closest = l.min(l.min(az, bz), cz);
+        let farthest = l.max(l.max(az, bz), cz);
         let within = l.le(closest, l.add(l.splat(far), self.error)) & l.le(self.near, farthest);
         inside & within & ((1 << n) - 1)
     }
+
+    /// The corners whose coordinates begin with run `first`, as the ray sees them.
+    #[inline(always)]
+    fn shear(&self, l: L, corners: &[f32], first: usize, n: usize) -> Sheared<L> {
+        let x = l.sub(run(l, corners, (first + self.axes[0]) * n), self.origin[0]);
+        let y = l.sub(run(l, corners, (first + self.axes[1]) * n), self.origin[1]);
+        let z = l.sub(run(l, corners, (first + self.axes[2]) * n), self.origin[2]);
+        let x = l.neg_mul_add(self.shear[0], z, x);
+        Sheared { x, y: l.neg_mul_add(self.shear[1], z, y), z }
+    }
+}
+
+/// Eight corners in the frame of which the ray is the z axis, but for the scale of z.
+#[derive(Clone, Copy)]
+struct Sheared<L: Lanes> {
+    x: L::F,
+    y: L::F,
+    z: L::F,
+}
+
+/// Eight numbers from `start` on; all callers' leaves are that long.
+#[inline(always)]
+fn run<L: Lanes>(l: L, numbers: &[f32], start: usize) -> L::F {
+    match numbers.get(start..start + 8).and_then(|run| run.first_chunk()) {
+        Some(run) => l.load(run),
+        None => l.splat(0.0),
+    }
+}
+
+/// Twice the signed area of the origin and an edge from `p` to `q`.
+#[inline(always)]
+fn edge<L: Lanes>(l: L, p: Sheared<L>, q: Sheared<L>) -> L::F {
+    l.mul_sub(p.x, q.y, l.mul(p.y, q.x))
+}
+
+#[inline(always)]
+fn size<L: Lanes>(l: L, p: Sheared<L>) -> L::F {
+    l.add(l.abs(p.x), l.abs(p.y))
 }

@@ -23,6 +23,12 @@ fn entry(near: f32, child: Child) -> u64 {
     u64::from(near.to_bits()) << 32 | u64::from(child.0)
 }
 
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the lower half")]
+fn child(entry: u64) -> Child {
+    Child(entry as u32)
+}
+
 /// Which of the eight boxes of a node the ray meets before `far`, and where.
 #[inline(always)]
 pub(super) fn meet<L: Lanes>(
@@ -32,22 +38,40 @@ pub(super) fn meet<L: Lanes>(
     far: L::F,
 ) -> (u32, L::F) {
     let l = lanes;
-    let plane = |axis: usize, side: usize| l.load(&node.bounds[axis][side & 1]);
-    let near = |axis: usize| {
-        let plane = plane(axis, test.backwards[axis]);
-        l.mul_sub(plane, test.inverse_near[axis], test.near_offset[axis])
-    };
-    let end = |axis: usize| {
-        let plane = plane(axis, 1 - test.backwards[axis]);
-        l.mul_sub(plane, test.inverse_far[axis], test.far_offset[axis])
-    };
-    let enter = l.max(l.max(near(0), near(1)), l.max(near(2), test.near));
-    let leave = l.min(l.min(end(0), end(1)), l.min(end(2), far));
+    let [x, y, z] = [0, 1, 2];
+    let enter = l.max(
+        l.max(near(l, node, test, x), near(l, node, test, y)),
+        l.max(near(l, node, test, z), test.near),
+    );
+    let leave = l.min(
+        l.min(end(l, node, test, x), end(l, node, test, y)),
+        l.min(end(l, node, test, z), far),
+    );
     (l.le(enter, leave), enter)
 }
 
-/// Shows every leaf that the ray meets before `far` to `see`, near ones first, which answers how
-/// far to look from there on, or `None` to end.
+/// Where the ray passes the eight near planes across `axis`, or before.
+#[inline(always)]
+fn near<L: Lanes>(l: L, node: &WideNode, test: &BoxTest<L>, axis: usize) -> L::F {
+    let plane = l.load(&node.bounds[axis][test.backwards[axis] & 1]);
+    l.mul_sub(plane, test.inverse_near[axis], test.near_offset[axis])
+}
+
+/// Where the ray passes the eight far planes across `axis`, or behind.
+#[inline(always)]
+fn end<L: Lanes>(l: L, node: &WideNode, test: &BoxTest<L>, axis: usize) -> L::F {
+    let plane = l.load(&node.bounds[axis][!test.backwards[axis] & 1]);
+    l.mul_sub(plane, test.inverse_far[axis], test.far_offset[axis])
+}
+
+/// What is done at a leaf. (A trait and no closure, because only what is marked so is inlined, and
+/// only what is inlined may use the lanes.)
+pub(super) trait Leaves {
+    /// Looks into `leaf`; answers how far to look from there on, or `None` to end.
+    fn see(&mut self, leaf: Child, far: f32) -> Option<f32>;
+}
+
+/// Shows every leaf that the ray meets before `far`, near ones first.
 #[inline(always)]
 pub(super) fn traverse<L: Lanes>(
     lanes: L,
@@ -55,7 +79,7 @@ pub(super) fn traverse<L: Lanes>(
     test: &BoxTest<L>,
     mut far: f32,
     stack: &mut Stack,
-    mut see: impl FnMut(Child, f32) -> Option<f32>,
+    leaves: &mut impl Leaves,
 ) {
     let stack = &mut *stack.0;
     let mut height = 0;
@@ -63,7 +87,7 @@ pub(super) fn traverse<L: Lanes>(
     let mut far_lanes = lanes.splat(far);
     loop {
         if current.count() > 0 {
-            match see(current, far) {
+            match leaves.see(current, far) {
                 Some(limit) => far = limit,
                 None => return,
             }
@@ -72,34 +96,31 @@ pub(super) fn traverse<L: Lanes>(
             let Some(node) = nodes.get(current.node()) else { return };
             let (mut met, near) = meet(lanes, node, test, far_lanes);
             if met != 0 {
+                let slot = met.trailing_zeros() as usize & 7;
+                met &= met - 1;
+                if met == 0 {
+                    current = node.child[slot];
+                    continue;
+                }
                 let near = lanes.store(near);
-                let mut next = || {
+                let mut closest = entry(near[slot], node.child[slot]);
+                let base = height;
+                while met != 0 {
                     let slot = met.trailing_zeros() as usize & 7;
                     met &= met - 1;
-                    (entry(near[slot], node.child[slot]), met != 0)
-                };
-                let (mut closest, more) = next();
-                if more {
-                    let base = height;
-                    let mut more = true;
-                    while more {
-                        let other;
-                        (other, more) = next();
-                        let farther = closest.max(other);
-                        closest = closest.min(other);
-                        // Keep what is pushed in order, the nearest on top.
-                        let mut place = height;
-                        while place > base && stack[(place - 1) % STACK] < farther {
-                            stack[place % STACK] = stack[(place - 1) % STACK];
-                            place -= 1;
-                        }
-                        stack[place % STACK] = farther;
-                        height += 1;
+                    let other = entry(near[slot], node.child[slot]);
+                    let farther = closest.max(other);
+                    closest = closest.min(other);
+                    // Keep what is pushed in order, the nearest on top.
+                    let mut place = height;
+                    while place > base && stack[(place - 1) % STACK] < farther {
+                        stack[place % STACK] = stack[(place - 1) % STACK];
+                        place -= 1;
                     }
+                    stack[place % STACK] = farther;
+                    height += 1;
                 }
-                #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
-                let child = Child(closest as u32);
-                current = child;
+                current = child(closest);
                 continue;
             }
         }
@@ -110,9 +131,7 @@ pub(super) fn traverse<L: Lanes>(
             height -= 1;
             let top = stack[height % STACK];
             if f32::from_bits((top >> 32) as u32) <= far {
-                #[expect(clippy::cast_possible_truncation, reason = "the lower half")]
-                let child = Child(top as u32);
-                break child;
+                break child(top);
             }
         };
     }

@@ -5,10 +5,13 @@
 //! in one long array: the corners of up to eight triangles, coordinate by coordinate so that they
 //! load into lanes, and who they are.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use etendue_geometry::Geometry;
+use etendue_geometry::glam::DVec3;
 use rayon::prelude::*;
 
-use crate::parts::Part;
+use crate::parts::{Frame, Part};
 use crate::tree::{Node, Ref, Tree};
 
 /// Eight children with their boxes. Unused ones have boxes that no ray meets.
@@ -83,6 +86,37 @@ pub(super) struct WideTree {
     pub(super) hi: [f32; 3],
 }
 
+/// How a leaf's coordinates relate to the mesh's: `p / scale + origin`, exactly.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Units {
+    pub(super) frame: Frame,
+    inverse_scale: f64,
+}
+
+impl Units {
+    pub(super) fn of(frame: Frame) -> Self {
+        Self { frame, inverse_scale: 1.0 / frame.scale }
+    }
+
+    #[inline(always)]
+    fn coordinate(&self, number: f32, origin: f64) -> f64 {
+        f64::from(number) * self.inverse_scale + origin
+    }
+
+    /// The corners, in the mesh's frame, of triangle `i` of the `n` in a leaf with these numbers.
+    #[inline(always)]
+    pub(super) fn corners(&self, numbers: &[f32], n: usize, i: usize) -> Option<[DVec3; 3]> {
+        let numbers = numbers.get(..72)?;
+        let origin = self.frame.origin;
+        let corner = |k: usize| {
+            let at = |axis: usize| numbers.get((3 * k + axis) * n + i).copied();
+            let (x, y) = (self.coordinate(at(0)?, origin.x), self.coordinate(at(1)?, origin.y));
+            Some(DVec3::new(x, y, self.coordinate(at(2)?, origin.z)))
+        };
+        Some([corner(0)?, corner(1)?, corner(2)?])
+    }
+}
+
 /// How a thing's numbers are laid out in a leaf of `n`: nine runs of `n` coordinates, corner by
 /// corner and axis by axis, then the `n` triangles, and then, where a part has several placements,
 /// the `n` placements. Leaves of instances have only their numbers.
@@ -92,7 +126,7 @@ pub(super) trait Leaf: Sync {
 }
 
 /// Numbers that may be read past a leaf's own: eight lanes from the last place of any.
-const OVERRUN: usize = 72 + 16;
+const OVERRUN: usize = 96;
 
 /// Subtrees of about this many nodes are folded side by side.
 const PARALLEL_NODES: usize = 1 << 14;
@@ -229,19 +263,31 @@ pub(super) struct Triangles<'a> {
     pub(super) geometry: &'a Geometry,
     /// Whether placements have to be told apart.
     pub(super) placements: bool,
+    /// How the mesh's coordinates would follow from the leaves', and whether they all do.
+    pub(super) units: Units,
+    pub(super) is_exact: AtomicBool,
 }
 
 impl Leaf for Triangles<'_> {
     #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
     fn write(&self, refs: &[Ref], numbers: &mut Vec<f32>) {
         let (n, start) = (refs.len(), numbers.len());
-        numbers.resize(start + 9 * n, 0.0);
+        numbers.resize(start + 72, 0.0);
+        let mut is_exact = self.is_exact.load(Ordering::Relaxed);
         for (i, r) in refs.iter().enumerate() {
             let corners = self.part.corners(self.geometry, r.first, r.second);
             for (k, coordinate) in corners.iter().flat_map(|c| c.to_array()).enumerate() {
                 numbers[start + k * n + i] = coordinate as f32;
             }
+            if is_exact {
+                let original = self.part.local_corners(self.geometry, r.first, r.second);
+                is_exact = self.units.corners(&numbers[start..], n, i) == Some(original);
+            }
         }
+        if !is_exact {
+            self.is_exact.store(false, Ordering::Relaxed);
+        }
+        numbers.truncate(start + 9 * n);
         numbers.extend(refs.iter().map(|r| f32::from_bits(r.second)));
         if self.placements {
             numbers.extend(refs.iter().map(|r| f32::from_bits(r.first)));

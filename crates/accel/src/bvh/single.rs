@@ -1,0 +1,247 @@
+//! Rays one by one: through the tree over the instances, then through each instance's own.
+
+use std::marker::PhantomData;
+
+use etendue_geometry::{Mesh, RayBatch};
+use pulp::NullaryFnOnce;
+
+use super::lanes::Lanes;
+use super::ray::{BoxTest, NarrowRay, TriangleTest};
+use super::traverse::{Leaves, Stack, traverse};
+use super::wide::Child;
+use super::{Bvh, Shape};
+use crate::nearest::{Nearest, Query, View};
+use crate::parts::Instance;
+use crate::watertight;
+
+/// What becomes of the hits of one ray.
+pub(super) trait Sink {
+    fn new(query: &Query) -> Self;
+
+    /// Takes a hit within the limits; answers how far to look on, or `None` to end.
+    fn take(&mut self, hit: watertight::Hit, placement: u32, triangle: u32) -> Option<f64>;
+}
+
+impl Sink for Nearest {
+    #[inline(always)]
+    fn new(query: &Query) -> Self {
+        Self::none(query.t_max)
+    }
+
+    #[inline(always)]
+    fn take(&mut self, hit: watertight::Hit, placement: u32, triangle: u32) -> Option<f64> {
+        self.offer(hit, placement, triangle);
+        Some(self.t)
+    }
+}
+
+/// Whether there is any hit.
+pub(super) struct AnyHit {
+    pub(super) found: bool,
+}
+
+impl Sink for AnyHit {
+    #[inline(always)]
+    fn new(_: &Query) -> Self {
+        Self { found: false }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, _: watertight::Hit, _: u32, _: u32) -> Option<f64> {
+        self.found = true;
+        None
+    }
+}
+
+/// A batch of rays, with the instruction set to trace it by.
+pub(super) struct Batch<'a, L, S, F> {
+    pub(super) lanes: L,
+    pub(super) bvh: &'a Bvh,
+    pub(super) rays: &'a RayBatch,
+    /// Called with the number and the answer of every ray that can hit at all.
+    pub(super) sink: F,
+    pub(super) seen: PhantomData<S>,
+}
+
+impl<L: Lanes, S: Sink, F: FnMut(usize, S)> NullaryFnOnce for Batch<'_, L, S, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(mut self) {
+        let (mut outer, mut inner) = (Stack::new(), Stack::new());
+        for i in 0..self.rays.len() {
+            if let Some(query) = Query::of(self.rays, i) {
+                let mut sink = S::new(&query);
+                let mut search = Search {
+                    lanes: self.lanes,
+                    bvh: self.bvh,
+                    query: &query,
+                    t_max: query.t_max,
+                    sink: &mut sink,
+                    stack: &mut inner,
+                };
+                search.run(&mut outer);
+                (self.sink)(i, sink);
+            }
+        }
+    }
+}
+
+/// One ray on its way through the scene.
+struct Search<'a, L, S> {
+    lanes: L,
+    bvh: &'a Bvh,
+    query: &'a Query,
+    /// How far to look.
+    t_max: f64,
+    sink: &'a mut S,
+    stack: &'a mut Stack,
+}
+
+impl<L: Lanes, S: Sink> Search<'_, L, S> {
+    #[inline(always)]
+    fn run(&mut self, outer: &mut Stack) {
+        if let [instance] = &self.bvh.layout.instances[..] {
+            self.lanes.run(Visit { search: self, instance });
+        } else if !self.bvh.top.is_empty() {
+            let ray = NarrowRay::new(&self.bvh.layout.world, self.query);
+            let test = BoxTest::new(self.lanes, &ray);
+            let (nodes, far) = (&self.bvh.top.nodes, ray.far(self.t_max));
+            let mut leaves = InstanceLeaves { search: self, ray };
+            traverse(leaves.search.lanes, nodes, &test, far, outer, &mut leaves);
+        }
+    }
+}
+
+/// Leaves of the tree over the instances.
+struct InstanceLeaves<'a, 'b, L, S> {
+    search: &'a mut Search<'b, L, S>,
+    ray: NarrowRay,
+}
+
+impl<L: Lanes, S: Sink> Leaves for InstanceLeaves<'_, '_, L, S> {
+    #[inline(always)]
+    fn see(&mut self, leaf: Child, _: f32) -> Option<f32> {
+        let bvh = self.search.bvh;
+        let place = leaf.place();
+        for number in bvh.top.numbers.get(place..place + leaf.count())? {
+            let instance = bvh.layout.instances.get(number.to_bits() as usize)?;
+            if !self.search.lanes.run(Visit { search: self.search, instance }) {
+                return None;
+            }
+        }
+        Some(self.ray.far(self.search.t_max))
+    }
+}
+
+/// A ray's visit to one instance; answers whether to look on. Run by [`Lanes::run`], so that it need
+/// not be inlined twice.
+struct Visit<'a, 'b, L, S> {
+    search: &'a mut Search<'b, L, S>,
+    instance: &'a Instance,
+}
+
+impl<L: Lanes, S: Sink> NullaryFnOnce for Visit<'_, '_, L, S> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn call(self) -> bool {
+        let Self { search, instance } = self;
+        let lanes = search.lanes;
+        let shape = &search.bvh.parts[instance.part as usize];
+        let ray = NarrowRay::new(instance, search.query);
+        let boxes = BoxTest::new(lanes, &ray);
+        let mut leaves = TriangleLeaves {
+            test: TriangleTest::new(lanes, &ray),
+            lanes,
+            bvh: search.bvh,
+            shape,
+            only: shape.only(instance).map(|placement| Placed::new(search.bvh, placement, search.query)),
+            query: search.query,
+            ray,
+            t_max: search.t_max,
+            sink: &mut *search.sink,
+            go_on: true,
+        };
+        let far = ray.far(search.t_max);
+        traverse(lanes, &shape.tree.nodes, &boxes, far, search.stack, &mut leaves);
+        search.t_max = leaves.t_max;
+        leaves.go_on
+    }
+}
+
+/// A placement as the ray sees it.
+struct Placed<'a> {
+    placement: u32,
+    mesh: &'a Mesh,
+    view: View,
+}
+
+impl<'a> Placed<'a> {
+    #[inline(always)]
+    fn new(bvh: &'a Bvh, placement: u32, query: &Query) -> Self {
+        let place = &bvh.geometry.placements[placement as usize];
+        let view = View::new(&place.world_from_mesh, query.origin);
+        Self { placement, mesh: bvh.geometry.mesh_of(place), view }
+    }
+}
+
+/// Leaves of a part.
+struct TriangleLeaves<'a, L: Lanes, S> {
+    lanes: L,
+    bvh: &'a Bvh,
+    shape: &'a Shape,
+    /// The placement, where there is but one.
+    only: Option<Placed<'a>>,
+    query: &'a Query,
+    ray: NarrowRay,
+    test: TriangleTest<L>,
+    t_max: f64,
+    sink: &'a mut S,
+    go_on: bool,
+}
+
+/// Numbers that a leaf of eight may have, and lanes read past them.
+const LEAF_NUMBERS: usize = 96;
+
+impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, L, S> {
+    #[inline(always)]
+    fn see(&mut self, leaf: Child, far: f32) -> Option<f32> {
+        let (n, place) = (leaf.count(), leaf.place());
+        let numbers = self.shape.tree.numbers.get(place..place + LEAF_NUMBERS)?;
+        let mut maybe = self.test.maybe(self.lanes, numbers, n, far);
+        if maybe == 0 {
+            return Some(far);
+        }
+        while maybe != 0 {
+            let i = maybe.trailing_zeros() as usize;
+            maybe &= maybe - 1;
+            let triangle = numbers.get(9 * n + i)?.to_bits();
+            let several;
+            let placed = match &self.only {
+                Some(placed) => placed,
+                None => {
+                    let placement = numbers.get(10 * n + i)?.to_bits();
+                    several = Placed::new(self.bvh, placement, self.query);
+                    &several
+                }
+            };
+            let corners = match self.shape.units {
+                Some(units) => units.corners(numbers, n, i)?,
+                None => placed.mesh.corners(triangle as usize),
+            };
+            if let Some(hit) = self.query.test(&placed.view, corners)
+                && hit.t <= self.t_max
+            {
+                match self.sink.take(hit, placed.placement, triangle) {
+                    Some(limit) => self.t_max = limit,
+                    None => {
+                        self.go_on = false;
+                        return None;
+                    }
+                }
+            }
+        }
+        Some(self.ray.far(self.t_max))
+    }
+}
