@@ -5,6 +5,19 @@
 //!
 //! | module | idea |
 //! |---|---|
+//! | [`plan`] | what a scene needs, decided in one place, with reasons |
+//! | [`render`](mod@render) | build, decode, trace: from a loaded scene to a picture |
 //! | [`output`] | the named layers of a render, and EXR, PNG, NPY and JSON files of them |
+//! | [`report`] | what a render did and what it cost |
 
+mod film;
 pub mod output;
+pub mod plan;
+pub mod render;
+pub mod report;
+mod tiles;
+
+pub use film::Precision;
+pub use plan::{Decision, Plan};
+pub use render::{Images, Progress, RenderError, Rendered, accelerators, build, render};
+pub use report::{Report, Seconds};

@@ -39,12 +39,14 @@ mod atomic;
 mod error;
 mod hash;
 mod look;
+mod outputs;
 mod picture;
 
 pub use atomic::{PartFile, open_parts, prepare_folder, remove_open_parts, write_whole};
 pub use error::{OutputError, PictureError};
 pub use hash::ImageHash;
 pub use look::Look;
+pub use outputs::Outputs;
 pub use picture::{Channel, Layer, Picture, Values};
 
 /// What wrote a file, for its header.

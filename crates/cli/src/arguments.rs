@@ -1,0 +1,212 @@
+//! What can be asked for on the command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use etendue_tracer::LayerSpec;
+
+/// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
+/// it.
+#[derive(Debug, Parser)]
+#[command(
+    name = "etendue",
+    arg_required_else_help = true,
+    after_help = "Exit code: 0 done, 2 the input was refused, 1 something else failed.\n\
+                  Results go to standard output, everything else to standard error."
+)]
+pub(crate) struct Cli {
+    /// Print the versions of etendue and of the Embree it runs on
+    #[arg(short = 'V', long)]
+    pub(crate) version: bool,
+    #[command(subcommand)]
+    pub(crate) command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Render a scene file or a model into a folder
+    #[command(after_help = RENDER_HELP)]
+    Render(RenderArguments),
+    /// Examine a scene or model without rendering it
+    #[command(after_help = "Example:\n  etendue check scenes/first-light.json\n  \
+                            etendue check model.glb --json")]
+    Check(CheckArguments),
+    /// Say what a render would do, and why
+    #[command(after_help = "Example:\n  etendue plan scenes/first-light.json")]
+    Plan(PlanArguments),
+    /// Print the JSON Schema of scene files
+    #[command(after_help = "Example:\n  etendue schema > scene.schema.json")]
+    Schema,
+}
+
+const RENDER_HELP: &str = "\
+Files in the folder:
+  layers.exr         every layer, Layer.Channel, 32-bit float (ids: 32-bit integers)
+  NAME.npy           each layer as an array for numpy, 64-bit float where it is data
+  picture.png        the picture, 8 bits, sRGB
+  NAME.preview.png   each layer to look at; not data
+  camera.json        K, distortion and pose in OpenCV's convention
+  layers.json        what each layer means: definition, unit, frame, miss
+
+Examples:
+  etendue render scenes/first-light.json -o out/first-light
+  etendue render model.glb -o out/model --layers depth,normal,ids
+  etendue render scenes/cube.json -o out/cube --set camera.fov=30 --samples 16";
+
+/// A scene, and what of it is overridden.
+#[derive(Debug, Args)]
+pub(crate) struct SceneArguments {
+    /// A scene (.json), or a model (.gltf, .glb, .obj, .ply) to frame by itself
+    #[arg(value_name = "SCENE|MODEL")]
+    pub(crate) scene: PathBuf,
+    /// Set any value of the scene, e.g. camera.fov=30 or objects[0].transform.scale=2
+    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_setting)]
+    pub(crate) settings: Vec<(String, String)>,
+    /// Look through one of the models' own cameras, by its name or number (from 0)
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) camera: Option<String>,
+    /// Layers to write: depth, distance, normal, position, ids, coverage, flat, facing
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_layer)]
+    pub(crate) layers: Option<Vec<String>>,
+    /// Samples a pixel of colours; data layers take the pixel's centre
+    #[arg(long, value_name = "N")]
+    pub(crate) samples: Option<u32>,
+    /// Seed of the samples
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// What finds the hits
+    #[arg(long, value_enum)]
+    pub(crate) accel: Option<AccelArgument>,
+    /// Refuse defects of the data (NaN positions, broken images) instead of dropping them
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// Let the scene name files outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AccelArgument {
+    /// Intel's Embree
+    Embree,
+    /// Pure Rust
+    Bvh,
+    /// The f64 reference: slow and right
+    Exact,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RenderArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+    /// The folder to write into; made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Kinds of file to write
+    #[arg(long, value_name = "LIST", default_value = "exr,png,npy")]
+    pub(crate) outputs: String,
+    /// Threads of build and render; 0 takes all that this process may use
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+    /// Stop a build whose structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    pub(crate) memory_limit: Option<u64>,
+    /// Write times, rays, memory and fingerprints as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) report: Option<PathBuf>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CheckArguments {
+    /// A scene (.json) or a model (.gltf, .glb, .obj, .ply)
+    #[arg(value_name = "FILE")]
+    pub(crate) file: PathBuf,
+    /// Print JSON for machines
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Refuse defects of the data instead of counting them
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// Let the scene name files outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct PlanArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+    /// Print JSON for machines
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl SceneArguments {
+    /// The settings and options as overrides of the scene's values, the later the stronger.
+    pub(crate) fn overrides(&self) -> Vec<(String, String)> {
+        let mut overrides = self.settings.clone();
+        let mut set = |key: &str, value: String| overrides.push((key.to_owned(), value));
+        if let Some(layers) = &self.layers {
+            let names: Vec<String> = layers.iter().map(|name| format!("\"{name}\"")).collect();
+            set("layers", format!("[{}]", names.join(",")));
+        }
+        if let Some(samples) = self.samples {
+            set("render.samples", samples.to_string());
+        }
+        if let Some(seed) = self.seed {
+            set("render.seed", seed.to_string());
+        }
+        if let Some(accel) = self.accel {
+            let name = match accel {
+                AccelArgument::Embree => "embree",
+                AccelArgument::Bvh => "bvh",
+                AccelArgument::Exact => "exact",
+            };
+            set("render.accel", name.to_owned());
+        }
+        overrides
+    }
+}
+
+fn parse_setting(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((path, value)) if !path.trim().is_empty() => {
+            Ok((path.trim().to_owned(), value.to_owned()))
+        }
+        _ => Err("expected PATH=VALUE, such as camera.fov=30".to_owned()),
+    }
+}
+
+fn parse_layer(name: &str) -> Result<String, String> {
+    match LayerSpec::from_name(name) {
+        Some(_) => Ok(name.to_owned()),
+        None => Err(format!("known layers: {}", LayerSpec::NAMES.join(", "))),
+    }
+}
+
+fn parse_bytes(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let shift = match text[digits.len()..].to_ascii_uppercase().trim_end_matches("IB") {
+        "" | "B" => 0,
+        "K" | "KB" => 10,
+        "M" | "MB" => 20,
+        "G" | "GB" => 30,
+        "T" | "TB" => 40,
+        unit => return Err(format!("unknown unit \"{unit}\"; known: K, M, G, T")),
+    };
+    let number: f64 =
+        digits.trim().parse().map_err(|_| "expected a number of bytes, such as 4G")?;
+    let bytes = number * f64::from(2u32).powi(shift);
+    if !(0.0..=9e18).contains(&bytes) {
+        return Err("not a number of bytes".to_owned());
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "in range, and a fraction of a byte does not matter"
+    )]
+    Ok(bytes as u64)
+}

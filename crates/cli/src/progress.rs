@@ -1,0 +1,56 @@
+//! Progress bars on a terminal, and nothing in a pipe.
+
+use std::io::IsTerminal;
+use std::sync::Arc;
+
+use etendue_render::Progress;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::stop;
+
+/// Steps of a bar: finer than any terminal is wide.
+const STEPS: u64 = 1000;
+
+/// Shows how far each stage is, one bar a stage.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stages {
+    shown: bool,
+}
+
+impl Stages {
+    pub(crate) fn new(quiet: bool) -> Self {
+        Self { shown: !quiet && std::io::stderr().is_terminal() }
+    }
+
+    /// Begins a stage. The function is told the share done and answers whether to go on; the bar
+    /// goes away with the last of its owners.
+    pub(crate) fn begin(self, name: &'static str) -> Progress {
+        let bar = Bar(if self.shown {
+            let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
+            let style =
+                ProgressStyle::with_template("{prefix:>7} {wide_bar} {percent:>3} %  {eta}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar.set_prefix(name);
+            bar
+        } else {
+            ProgressBar::hidden()
+        });
+        Arc::new(move |share| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "clamped to 0..=STEPS"
+            )]
+            bar.0.set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
+            !stop::asked()
+        })
+    }
+}
+
+struct Bar(ProgressBar);
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

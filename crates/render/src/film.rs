@@ -1,0 +1,236 @@
+//! The film: the planes that a render fills, and the bands of rows that threads fill side by side.
+
+use std::sync::Mutex;
+
+use etendue_tracer::{LayerSpec, NormalKind, Space};
+
+use crate::output::{Channel, Layer, Look, Values};
+
+/// How finely data layers are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Precision {
+    /// 32 bits, as an EXR stores them.
+    Single,
+    /// 64 bits, as an NPY may: accurate to the input's own coordinates.
+    Double,
+}
+
+/// The planes of one layer while it is filled.
+#[derive(Debug)]
+pub(crate) struct FilmLayer {
+    pub(crate) spec: LayerSpec,
+    planes: Vec<Values>,
+}
+
+/// Rows of one plane, lent to one thread.
+#[derive(Debug)]
+pub(crate) enum Rows<'a> {
+    F32(&'a mut [f32]),
+    F64(&'a mut [f64]),
+    U32(&'a mut [u32]),
+}
+
+impl Rows<'_> {
+    /// Writes a number to the pixel at `index` of the rows.
+    #[expect(clippy::cast_possible_truncation, reason = "single precision was asked for")]
+    pub(crate) fn put(&mut self, index: usize, value: f64) {
+        match self {
+            Self::F32(rows) => rows[index] = value as f32,
+            Self::F64(rows) => rows[index] = value,
+            Self::U32(rows) => rows[index] = value as u32,
+        }
+    }
+}
+
+/// The rows that one thread fills: a band of all planes of all layers, layer by layer.
+#[derive(Debug)]
+pub(crate) struct Band<'a> {
+    /// The topmost row.
+    pub(crate) top: u32,
+    /// Rows.
+    pub(crate) height: u32,
+    /// Each layer's planes.
+    pub(crate) layers: Vec<(LayerSpec, Vec<Rows<'a>>)>,
+}
+
+/// What is known of a layer without rendering it.
+struct Description {
+    name: &'static str,
+    channels: &'static [&'static str],
+    look: Look,
+    meaning: Vec<(&'static str, &'static str)>,
+}
+
+impl FilmLayer {
+    pub(crate) fn new(spec: LayerSpec, pixels: usize, precision: Precision) -> Self {
+        let plane = || match (spec, precision) {
+            (LayerSpec::Ids, _) => Values::U32(vec![0; pixels]),
+            (LayerSpec::Flat | LayerSpec::Facing | LayerSpec::Coverage, _)
+            | (_, Precision::Single) => Values::F32(vec![0.0; pixels]),
+            (_, Precision::Double) => Values::F64(vec![0.0; pixels]),
+        };
+        let planes = describe(spec).channels.iter().map(|_| plane()).collect();
+        Self { spec, planes }
+    }
+
+    /// The layer as it is written; `root` puts it at the root of the file, without a name.
+    pub(crate) fn into_layer(self, root: bool) -> Layer {
+        let Description { name, channels, look, meaning } = describe(self.spec);
+        let channels = channels
+            .iter()
+            .zip(self.planes)
+            .map(|(name, values)| Channel { name: (*name).to_owned(), values })
+            .collect();
+        let meaning = meaning.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+        Layer { name: if root { String::new() } else { name.to_owned() }, look, channels, meaning }
+    }
+}
+
+/// Bands of `band_height` rows over all `layers`, each to be taken by one thread.
+pub(crate) fn bands(
+    layers: &mut [FilmLayer],
+    [width, height]: [u32; 2],
+    band_height: u32,
+) -> Vec<Mutex<Option<Band<'_>>>> {
+    let mut bands: Vec<Band<'_>> = (0..height.div_ceil(band_height))
+        .map(|k| {
+            let top = k * band_height;
+            Band { top, height: band_height.min(height - top), layers: Vec::new() }
+        })
+        .collect();
+    let chunk = width as usize * band_height as usize;
+    for layer in layers {
+        for band in &mut bands {
+            band.layers.push((layer.spec, Vec::new()));
+        }
+        for plane in &mut layer.planes {
+            let rows: Vec<Rows<'_>> = match plane {
+                Values::F32(values) => values.chunks_mut(chunk).map(Rows::F32).collect(),
+                Values::F64(values) => values.chunks_mut(chunk).map(Rows::F64).collect(),
+                Values::U32(values) => values.chunks_mut(chunk).map(Rows::U32).collect(),
+                Values::U16(_) => Vec::new(),
+            };
+            for (band, rows) in bands.iter_mut().zip(rows) {
+                if let Some((_, planes)) = band.layers.last_mut() {
+                    planes.push(rows);
+                }
+            }
+        }
+    }
+    bands.into_iter().map(|band| Mutex::new(Some(band))).collect()
+}
+
+/// Rays and places that all layers share.
+const CHIEF_RAY: (&str, &str) = ("taken along", "the chief ray of the pixel's centre");
+
+fn describe(spec: LayerSpec) -> Description {
+    let world = ("frame", "world: right-handed, +Y up");
+    let camera = ("frame", "camera: right-handed, looking along -Z, +Y up, +X right");
+    let frame = |space| if space == Space::World { world } else { camera };
+    match spec {
+        LayerSpec::Depth => Description {
+            name: "Depth",
+            channels: &["Z"],
+            look: Look::Distance,
+            meaning: vec![
+                ("definition", "distance along the camera's axis from the entrance pupil"),
+                ("unit", "m"),
+                CHIEF_RAY,
+                ("miss", "+inf"),
+            ],
+        },
+        LayerSpec::Distance => Description {
+            name: "Distance",
+            channels: &["Z"],
+            look: Look::Distance,
+            meaning: vec![
+                ("definition", "distance along the ray from the entrance pupil"),
+                ("unit", "m"),
+                CHIEF_RAY,
+                ("miss", "+inf"),
+            ],
+        },
+        LayerSpec::Normal { space, kind } => Description {
+            name: match (space, kind) {
+                (Space::World, NormalKind::Geometric) => "Normal",
+                (Space::Camera, NormalKind::Geometric) => "NormalCamera",
+                (Space::World, NormalKind::Shading) => "NormalShading",
+                (Space::Camera, NormalKind::Shading) => "NormalShadingCamera",
+            },
+            channels: &["X", "Y", "Z"],
+            look: Look::Direction,
+            meaning: vec![
+                match kind {
+                    NormalKind::Geometric => {
+                        ("definition", "unit normal of the triangle, on the viewer's side")
+                    }
+                    NormalKind::Shading => (
+                        "definition",
+                        "unit normal interpolated from the file's vertex normals (the triangle's \
+                         where there are none), on the viewer's side",
+                    ),
+                },
+                ("unit", "1"),
+                frame(space),
+                CHIEF_RAY,
+                ("miss", "0 0 0"),
+            ],
+        },
+        LayerSpec::Position { space } => Description {
+            name: if space == Space::World { "Position" } else { "PositionCamera" },
+            channels: &["X", "Y", "Z"],
+            look: Look::Extent,
+            meaning: vec![
+                ("definition", "the point that was hit"),
+                ("unit", "m"),
+                frame(space),
+                CHIEF_RAY,
+                ("miss", "+inf"),
+            ],
+        },
+        LayerSpec::Ids => Description {
+            name: "Id",
+            channels: &["object", "primitive"],
+            look: Look::Ids,
+            meaning: vec![
+                (
+                    "definition",
+                    "number of the object in the scene, and of the triangle in its mesh, both \
+                     counted from 1",
+                ),
+                CHIEF_RAY,
+                ("miss", "0"),
+            ],
+        },
+        LayerSpec::Coverage => Description {
+            name: "Coverage",
+            channels: &["A"],
+            look: Look::Share,
+            meaning: vec![("definition", "1 where something was hit, else 0"), CHIEF_RAY],
+        },
+        LayerSpec::Flat => Description {
+            name: "Flat",
+            channels: &["R", "G", "B"],
+            look: Look::Color,
+            meaning: vec![
+                ("definition", "base colour without light, mean over the pixel's samples"),
+                ("unit", "1 (linear light, sRGB primaries)"),
+                ("miss", "0 0 0"),
+            ],
+        },
+        LayerSpec::Facing => Description {
+            name: "Facing",
+            channels: &["R", "G", "B"],
+            look: Look::Color,
+            meaning: vec![
+                (
+                    "definition",
+                    "base colour under a headlight, mean over the pixel's samples: to look at, not \
+                     a measurement",
+                ),
+                ("unit", "1 (linear light, sRGB primaries)"),
+                ("miss", "0 0 0"),
+            ],
+        },
+    }
+}

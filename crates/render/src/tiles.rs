@@ -1,0 +1,286 @@
+//! The tile loop: batches of rays from the camera, through the accelerator, onto the film.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use etendue_accel::Accel;
+use etendue_camera::{Camera, PixelSamples, Sampler};
+use etendue_geometry::{Detail, HitBatch, RayBatch};
+use etendue_tracer::{LayerSpec, Surroundings, Traced};
+use rayon::prelude::*;
+
+use crate::film::{Band, FilmLayer, Rows, bands};
+
+/// Side of a tile (pixels): its rays are one batch.
+const TILE: u32 = 16;
+
+/// Rays a batch when several go through each pixel.
+const BATCH: u32 = TILE * TILE;
+
+/// How pixels are sampled.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sampling {
+    /// Rays a pixel of coloured layers.
+    pub(crate) samples: u32,
+    pub(crate) sampler: Sampler,
+    pub(crate) seed: u64,
+}
+
+/// What rendering needs; nothing of it changes on the way.
+pub(crate) struct Job<'a> {
+    pub(crate) accel: &'a dyn Accel,
+    pub(crate) camera: &'a Camera,
+    pub(crate) surroundings: Surroundings<'a>,
+    pub(crate) detail: Detail,
+    pub(crate) sampling: Sampling,
+    /// Told the share done; answering `false` stops.
+    pub(crate) progress: &'a (dyn Fn(f64) -> bool + Sync),
+}
+
+/// The render was stopped before it was done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Stopped;
+
+impl Job<'_> {
+    /// Fills `layers` and returns the number of rays that were traced.
+    pub(crate) fn run(&self, layers: &mut [FilmLayer]) -> Result<u64, Stopped> {
+        let [width, height] = self.camera.resolution();
+        let bands = bands(layers, [width, height], TILE);
+        let total = bands.len() as f64;
+        let (done, rays) = (AtomicU64::new(0), AtomicU64::new(0));
+        bands
+            .par_iter()
+            .try_for_each(|band| {
+                let Some(mut band) = take(band) else { return Some(()) };
+                let mut batch = Batch::new(self.detail);
+                self.fill(&mut band, width, &mut batch);
+                rays.fetch_add(batch.traced, Ordering::Relaxed);
+                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                (self.progress)(done as f64 / total).then_some(())
+            })
+            .ok_or(Stopped)?;
+        Ok(rays.into_inner())
+    }
+
+    fn fill(&self, band: &mut Band<'_>, width: u32, batch: &mut Batch) {
+        let (mut centre, mut mean): (Vec<_>, Vec<_>) = std::mem::take(&mut band.layers)
+            .into_iter()
+            .partition(|(layer, _)| self.sampling.samples == 1 || !is_colored(*layer));
+        for left in (0..width).step_by(TILE as usize) {
+            let tile =
+                Tile { left, top: band.top, width: TILE.min(width - left), height: band.height };
+            if !centre.is_empty() {
+                batch.aim_at_centres(self.camera, tile);
+                self.trace(batch);
+                for (layer, planes) in &mut centre {
+                    self.write(*layer, planes, batch, tile, width);
+                }
+            }
+            if !mean.is_empty() {
+                self.average(&mut mean, tile, width, batch);
+            }
+        }
+    }
+
+    fn trace(&self, batch: &mut Batch) {
+        self.accel.closest(&batch.rays, &mut batch.hits);
+        batch.traced += batch.rays.len() as u64;
+    }
+
+    /// Means of coloured layers over the samples of each pixel of a tile.
+    fn average(
+        &self,
+        layers: &mut [(LayerSpec, Vec<Rows<'_>>)],
+        tile: Tile,
+        width: u32,
+        batch: &mut Batch,
+    ) {
+        let Sampling { samples, sampler, seed } = self.sampling;
+        let at_once = samples.min(BATCH);
+        let pixels_at_once = (BATCH / at_once) as usize;
+        let pixels: Vec<(u32, u32)> = tile.pixels().collect();
+        for pixels in pixels.chunks(pixels_at_once) {
+            let mut sums = vec![[0.0; 3]; pixels.len() * layers.len()];
+            for first in (0..samples).step_by(at_once as usize) {
+                let range = first..samples.min(first + at_once);
+                batch.aim_at_samples(self.camera, tile, pixels, range.clone(), |x, y| {
+                    sampler.pixel(seed, x, y, samples)
+                });
+                self.trace(batch);
+                let traced = Traced { rays: &batch.rays, hits: &batch.hits };
+                for i in 0..batch.rays.len() {
+                    let pixel = i / range.len();
+                    for (k, (layer, _)) in layers.iter().enumerate() {
+                        let color = self.color(*layer, traced, i);
+                        let sum = &mut sums[pixel * layers.len() + k];
+                        *sum = std::array::from_fn(|c| sum[c] + color[c]);
+                    }
+                }
+            }
+            for (p, &(x, y)) in pixels.iter().enumerate() {
+                let index = tile.index(x, y, width);
+                let count = layers.len();
+                for (k, (_, planes)) in layers.iter_mut().enumerate() {
+                    for (plane, sum) in planes.iter_mut().zip(sums[p * count + k]) {
+                        plane.put(index, sum / f64::from(samples));
+                    }
+                }
+            }
+        }
+    }
+
+    fn color(&self, layer: LayerSpec, traced: Traced<'_>, i: usize) -> [f64; 3] {
+        match layer {
+            LayerSpec::Facing => self.surroundings.facing(traced, i),
+            _ => self.surroundings.flat(traced.hits, i),
+        }
+    }
+
+    /// Writes one layer of a tile whose chief rays were traced.
+    fn write(
+        &self,
+        layer: LayerSpec,
+        planes: &mut [Rows<'_>],
+        batch: &Batch,
+        tile: Tile,
+        width: u32,
+    ) {
+        let traced = Traced { rays: &batch.rays, hits: &batch.hits };
+        let around = &self.surroundings;
+        let index = |i: usize| {
+            let (x, y) = batch.pixels[i];
+            tile.index(x, y, width)
+        };
+        match layer {
+            LayerSpec::Depth => {
+                each(planes, batch, index, |i| [around.depth(traced, i)]);
+            }
+            LayerSpec::Distance => each(planes, batch, index, |i| [batch.hits.t[i]]),
+            LayerSpec::Normal { space, kind } => {
+                each(planes, batch, index, |i| around.normal(traced, i, kind, space).to_array())
+            }
+            LayerSpec::Position { space } => {
+                each(planes, batch, index, |i| around.position(traced, i, space).to_array());
+            }
+            LayerSpec::Ids => {
+                each(planes, batch, index, |i| around.ids(&batch.hits, i).map(f64::from));
+            }
+            LayerSpec::Coverage => {
+                each(planes, batch, index, |i| [f64::from(u8::from(batch.hits.is_hit(i)))]);
+            }
+            LayerSpec::Flat | LayerSpec::Facing => {
+                each(planes, batch, index, |i| self.color(layer, traced, i));
+            }
+        }
+    }
+}
+
+/// Puts `value` of each ray at its pixel.
+fn each<const N: usize>(
+    planes: &mut [Rows<'_>],
+    batch: &Batch,
+    index: impl Fn(usize) -> usize,
+    value: impl Fn(usize) -> [f64; N],
+) {
+    for i in 0..batch.rays.len() {
+        let index = index(i);
+        for (plane, value) in planes.iter_mut().zip(value(i)) {
+            plane.put(index, value);
+        }
+    }
+}
+
+/// Whether a layer is a colour, which is averaged over a pixel; the others are taken at its centre.
+fn is_colored(layer: LayerSpec) -> bool {
+    matches!(layer, LayerSpec::Flat | LayerSpec::Facing)
+}
+
+fn take<'a>(band: &Mutex<Option<Band<'a>>>) -> Option<Band<'a>> {
+    band.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
+/// A rectangle of the picture, at most [`TILE`] a side.
+#[derive(Debug, Clone, Copy)]
+struct Tile {
+    left: u32,
+    top: u32,
+    width: u32,
+    height: u32,
+}
+
+impl Tile {
+    /// Pixels from the tile's corner along a Z-order curve, so that any 4, 8 or 16 of them in a row,
+    /// as many as go into a packet, are a block.
+    fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
+        (0..TILE * TILE)
+            .map(|k| (even_bits(k), even_bits(k >> 1)))
+            .filter(move |&(x, y)| x < self.width && y < self.height)
+    }
+
+    /// Where a pixel of the tile stands in the rows of its band.
+    fn index(self, x: u32, y: u32, width: u32) -> usize {
+        y as usize * width as usize + (self.left + x) as usize
+    }
+}
+
+/// Bits 0, 2, 4 and 6 of `k`, put together.
+fn even_bits(k: u32) -> u32 {
+    k & 1 | k >> 1 & 2 | k >> 2 & 4 | k >> 3 & 8
+}
+
+/// One thread's rays and hits.
+struct Batch {
+    rays: RayBatch,
+    hits: HitBatch,
+    columns: Vec<f64>,
+    rows: Vec<f64>,
+    /// The pixel of each chief ray, from the tile's corner.
+    pixels: Vec<(u32, u32)>,
+    traced: u64,
+}
+
+impl Batch {
+    fn new(detail: Detail) -> Self {
+        Self {
+            rays: RayBatch::default(),
+            hits: HitBatch::new(detail),
+            columns: Vec::new(),
+            rows: Vec::new(),
+            pixels: Vec::new(),
+            traced: 0,
+        }
+    }
+
+    fn aim_at_centres(&mut self, camera: &Camera, tile: Tile) {
+        self.pixels.clear();
+        self.pixels.extend(tile.pixels());
+        self.columns.clear();
+        self.columns.extend(self.pixels.iter().map(|&(x, _)| f64::from(tile.left + x) + 0.5));
+        self.rows.clear();
+        self.rows.extend(self.pixels.iter().map(|&(_, y)| f64::from(tile.top + y) + 0.5));
+        camera.rays_through(&self.columns, &self.rows, &mut self.rays);
+    }
+
+    /// Rays through samples `range` of each of `pixels`, those of one pixel side by side.
+    fn aim_at_samples(
+        &mut self,
+        camera: &Camera,
+        tile: Tile,
+        pixels: &[(u32, u32)],
+        range: std::ops::Range<u32>,
+        samples: impl Fn(u32, u32) -> PixelSamples,
+    ) {
+        self.columns.clear();
+        self.rows.clear();
+        for &(x, y) in pixels {
+            let (x, y) = (tile.left + x, tile.top + y);
+            let samples = samples(x, y);
+            for index in range.clone() {
+                let [u, v] = samples.square(index, 0);
+                self.columns.push(f64::from(x) + u);
+                self.rows.push(f64::from(y) + v);
+            }
+        }
+        camera.rays_through(&self.columns, &self.rows, &mut self.rays);
+    }
+}
