@@ -12,6 +12,8 @@
 
 #![forbid(unsafe_code)]
 
+mod arena;
+mod fold;
 mod lanes;
 mod ray;
 mod single;
@@ -27,9 +29,10 @@ use etendue_geometry::glam::Vec3;
 use etendue_geometry::{Bounds, Geometry, HitBatch, RayBatch};
 use rayon::prelude::*;
 
+use self::fold::{Instances, Triangles, fold};
 use self::lanes::{Lanes, Portable};
 use self::single::{AnyHit, Batch, Sink};
-use self::wide::{Instances, Triangles, Units, WideTree};
+use self::wide::{MOST_IN_LEAF, Units, WideTree};
 use crate::nearest::Nearest;
 use crate::parts::{Baking, Instance, Layout, Members, Part, outward};
 use crate::tree::{LeafSize, Ref, Tree};
@@ -102,8 +105,11 @@ impl Isa {
     }
 }
 
-const LEAF: LeafSize = LeafSize { most: 8, block: 4 };
+const LEAF: LeafSize = LeafSize { most: MOST_IN_LEAF, block: 4 };
 const INSTANCE_LEAF: LeafSize = LeafSize { most: 1, block: 1 };
+
+/// Instances that the cells of a tree can certainly number: one each and a node for every few.
+const MOST_INSTANCES: u64 = 1 << 26;
 
 /// Bytes a triangle at the height of a build: refs twice, binary nodes (one for every two
 /// triangles, twice while they are joined), then leaves of 13 numbers and an eighth of a node,
@@ -161,7 +167,7 @@ impl Shape {
             units: Units::of(part.frame),
             is_exact: part.is_unturned(geometry).into(),
         };
-        let tree = WideTree::fold(&tree, &leaf);
+        let tree = fold(&tree, &leaf).ok_or_else(|| part.too_large(geometry, "bvh"))?;
         let units = leaf.is_exact.into_inner().then_some(leaf.units);
         Ok(Self { tree, owner, units })
     }
@@ -201,7 +207,12 @@ fn top_tree(
         Ref { lo, first: i, hi, second: i }
     });
     let tree = Tree::build(refs.collect(), INSTANCE_LEAF, watch)?;
-    Ok(WideTree::fold(&tree, &Instances))
+    fold(&tree, &Instances).ok_or_else(|| BuildError::TooLarge {
+        mesh: "all".to_owned(),
+        what: format!("the number of instances, {count},"),
+        backend: "bvh",
+        limit: MOST_INSTANCES,
+    })
 }
 
 impl Bvh {

@@ -126,8 +126,9 @@ const WORST_CONDITION: f64 = 1e5;
 /// precision resolves in the scene's frame.
 const BAKED_RESOLUTION: f64 = 64.0;
 
-/// Triangles of one part: what a tree can number.
-const MOST_TRIANGLES: usize = 1 << 31;
+/// Triangles of one part that a tree can certainly number: the fast backend has 2²⁸ cells, of which
+/// a triangle takes two to three.
+const MOST_TRIANGLES: usize = 90_000_000;
 
 impl Layout {
     pub(crate) fn new(geometry: &Geometry, baking: Baking) -> Self {
@@ -164,8 +165,19 @@ impl Layout {
             });
             layout.instances.push(Instance { part, ..instance });
         }
-        if !baked.is_empty() {
-            layout.bake(geometry, baked);
+        let mut together = Vec::new();
+        let mut triangles = 0;
+        for i in baked {
+            let more = geometry.mesh_of(&geometry.placements[i as usize]).triangles.len();
+            if triangles + more > MOST_TRIANGLES && !together.is_empty() {
+                layout.bake(geometry, std::mem::take(&mut together));
+                triangles = 0;
+            }
+            together.push(i);
+            triangles += more;
+        }
+        if !together.is_empty() {
+            layout.bake(geometry, together);
         }
         let reach = geometry.placements.iter().map(|p| baked_reach(geometry, p, world_frame));
         layout.world = Instance::parallel(MISS, world_frame, reach.fold(0.0, f64::max));
@@ -191,14 +203,8 @@ impl Layout {
         [per_triangle, per_instance]: [u64; 2],
     ) -> Result<(), BuildError> {
         for part in &self.parts {
-            let triangles = part.len(geometry);
-            if triangles > MOST_TRIANGLES {
-                return Err(BuildError::TooLarge {
-                    mesh: part.name(geometry).to_owned(),
-                    what: format!("its number of triangles, {triangles},"),
-                    backend,
-                    limit: MOST_TRIANGLES as u64,
-                });
+            if part.len(geometry) > MOST_TRIANGLES {
+                return Err(part.too_large(geometry, backend));
             }
         }
         let bytes = self
@@ -355,6 +361,16 @@ impl Part {
                 let mesh = |&i: &u32| geometry.mesh_of(&geometry.placements[i as usize]);
                 placements.iter().map(|i| mesh(i).triangles.len()).sum()
             }
+        }
+    }
+
+    /// The error that says so.
+    pub(crate) fn too_large(&self, geometry: &Geometry, backend: &'static str) -> BuildError {
+        BuildError::TooLarge {
+            mesh: self.name(geometry).to_owned(),
+            what: format!("its number of triangles, {},", self.len(geometry)),
+            backend,
+            limit: MOST_TRIANGLES as u64,
         }
     }
 

@@ -6,6 +6,8 @@
 
 use pulp::NullaryFnOnce;
 
+use super::wide::Cell;
+
 /// An instruction set with eight lanes of f32.
 pub(super) trait Lanes: Copy + Send + Sync {
     /// Eight numbers.
@@ -17,6 +19,8 @@ pub(super) trait Lanes: Copy + Send + Sync {
     /// Runs `f` with these instructions switched on, as far as it is inlined.
     fn run<F: NullaryFnOnce>(self, f: F) -> F::Output;
 
+    /// Begins to fetch the cells from `place` on that a node or a leaf may have.
+    fn prefetch(self, cells: &[Cell], place: usize);
     fn load(self, values: &[f32; 8]) -> Self::F;
     fn store(self, values: Self::F) -> [f32; 8];
     fn splat(self, value: f32) -> Self::F;
@@ -54,6 +58,9 @@ impl Lanes for Portable {
     fn run<F: NullaryFnOnce>(self, f: F) -> F::Output {
         f.call()
     }
+
+    #[inline(always)]
+    fn prefetch(self, _: &[Cell], _: usize) {}
 
     #[inline(always)]
     fn load(self, values: &[f32; 8]) -> [f32; 8] {
@@ -118,12 +125,12 @@ impl Lanes for Portable {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use std::arch::x86_64::{__m256, _CMP_LE_OQ};
+    use std::arch::x86_64::{__m256, _CMP_LE_OQ, _MM_HINT_T0};
 
     use pulp::x86::{V3, V4};
     use pulp::{NullaryFnOnce, cast};
 
-    use super::Lanes;
+    use super::{Cell, Lanes};
 
     macro_rules! eight_lanes {
         ($Token:ty, $name:literal) => {
@@ -135,6 +142,16 @@ mod x86 {
                 #[inline(always)]
                 fn run<F: NullaryFnOnce>(self, f: F) -> F::Output {
                     self.vectorize(f)
+                }
+
+                #[inline(always)]
+                fn prefetch(self, cells: &[Cell], place: usize) {
+                    // Only a hint: nothing is read through the pointer.
+                    let line = cells.as_ptr().wrapping_add(place).cast::<i8>();
+                    self.sse._mm_prefetch::<_MM_HINT_T0>(line);
+                    self.sse._mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(64));
+                    self.sse._mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(128));
+                    self.sse._mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(192));
                 }
 
                 #[inline(always)]

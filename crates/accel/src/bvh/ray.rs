@@ -201,7 +201,8 @@ impl<L: Lanes> TriangleTest<L> {
         let most = l.max(l.max(u, v), w);
         let inside = l.le(l.sub(l.splat(0.0), error), least) | l.le(most, error);
 
-        let (az, bz, cz) = (l.mul(a.z, self.shear[2]), l.mul(b.z, self.shear[2]), l.mul(c.z, self.shear[2]));
+        let (az, bz, cz) =
+            (l.mul(a.z, self.shear[2]), l.mul(b.z, self.shear[2]), l.mul(c.z, self.shear[2]));
         let closest = l.min(l.min(az, bz), cz);
         let farthest = l.max(l.max(az, bz), cz);
         let within = l.le(closest, l.add(l.splat(far), self.error)) & l.le(self.near, farthest);

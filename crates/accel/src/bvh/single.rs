@@ -8,7 +8,7 @@ use pulp::NullaryFnOnce;
 use super::lanes::Lanes;
 use super::ray::{BoxTest, NarrowRay, TriangleTest};
 use super::traverse::{Leaves, Stack, traverse};
-use super::wide::Child;
+use super::wide::{Cell, Child, leaf_numbers};
 use super::{Bvh, Shape};
 use crate::nearest::{Nearest, Query, View};
 use crate::parts::Instance;
@@ -103,12 +103,12 @@ impl<L: Lanes, S: Sink> Search<'_, L, S> {
     fn run(&mut self, outer: &mut Stack) {
         if let [instance] = &self.bvh.layout.instances[..] {
             self.lanes.run(Visit { search: self, instance });
-        } else if !self.bvh.top.is_empty() {
+        } else if !self.bvh.top.cells.is_empty() {
             let ray = NarrowRay::new(&self.bvh.layout.world, self.query);
             let test = BoxTest::new(self.lanes, &ray);
-            let (nodes, far) = (&self.bvh.top.nodes, ray.far(self.t_max));
+            let (cells, far) = (&self.bvh.top.cells, ray.far(self.t_max));
             let mut leaves = InstanceLeaves { search: self, ray };
-            traverse(leaves.search.lanes, nodes, &test, far, outer, &mut leaves);
+            traverse(leaves.search.lanes, cells, &test, far, outer, &mut leaves);
         }
     }
 }
@@ -123,8 +123,7 @@ impl<L: Lanes, S: Sink> Leaves for InstanceLeaves<'_, '_, L, S> {
     #[inline(always)]
     fn see(&mut self, leaf: Child, _: f32) -> Option<f32> {
         let bvh = self.search.bvh;
-        let place = leaf.place();
-        for number in bvh.top.numbers.get(place..place + leaf.count())? {
+        for number in leaf_numbers(&bvh.top.cells, leaf)?.get(..leaf.count())? {
             let instance = bvh.layout.instances.get(number.to_bits() as usize)?;
             if !self.search.lanes.run(Visit { search: self.search, instance }) {
                 return None;
@@ -151,12 +150,16 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for Visit<'_, '_, L, S> {
         let shape = &search.bvh.parts[instance.part as usize];
         let ray = NarrowRay::new(instance, search.query);
         let boxes = BoxTest::new(lanes, &ray);
+        let cells: &[Cell] = &shape.tree.cells;
         let mut leaves = TriangleLeaves {
+            cells,
             test: TriangleTest::new(lanes, &ray),
             lanes,
             bvh: search.bvh,
             shape,
-            only: shape.only(instance).map(|placement| Placed::new(search.bvh, placement, search.query)),
+            only: shape
+                .only(instance)
+                .map(|placement| Placed::new(search.bvh, placement, search.query)),
             query: search.query,
             ray,
             t_max: search.t_max,
@@ -164,7 +167,7 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for Visit<'_, '_, L, S> {
             go_on: true,
         };
         let far = ray.far(search.t_max);
-        traverse(lanes, &shape.tree.nodes, &boxes, far, search.stack, &mut leaves);
+        traverse(lanes, cells, &boxes, far, search.stack, &mut leaves);
         search.t_max = leaves.t_max;
         leaves.go_on
     }
@@ -191,6 +194,7 @@ struct TriangleLeaves<'a, L: Lanes, S> {
     lanes: L,
     bvh: &'a Bvh,
     shape: &'a Shape,
+    cells: &'a [Cell],
     /// The placement, where there is but one.
     only: Option<Placed<'a>>,
     query: &'a Query,
@@ -201,14 +205,11 @@ struct TriangleLeaves<'a, L: Lanes, S> {
     go_on: bool,
 }
 
-/// Numbers that a leaf of eight may have, and lanes read past them.
-const LEAF_NUMBERS: usize = 96;
-
 impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, L, S> {
     #[inline(always)]
     fn see(&mut self, leaf: Child, far: f32) -> Option<f32> {
-        let (n, place) = (leaf.count(), leaf.place());
-        let numbers = self.shape.tree.numbers.get(place..place + LEAF_NUMBERS)?;
+        let n = leaf.count();
+        let numbers = leaf_numbers(self.cells, leaf)?;
         let mut maybe = self.test.maybe(self.lanes, numbers, n, far);
         if maybe == 0 {
             return Some(far);
@@ -227,7 +228,7 @@ impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, L, S> {
                 }
             };
             let corners = match self.shape.units {
-                Some(units) => units.corners(numbers, n, i)?,
+                Some(units) => units.corners(numbers, n, i),
                 None => placed.mesh.corners(triangle as usize),
             };
             if let Some(hit) = self.query.test(&placed.view, corners)

@@ -2,7 +2,7 @@
 
 use super::lanes::Lanes;
 use super::ray::BoxTest;
-use super::wide::{Child, WideNode};
+use super::wide::{Cell, Child, WideNode};
 use crate::tree::MAX_DEPTH;
 
 /// Children still to visit, each with the distance at which the ray enters it in the upper half
@@ -19,8 +19,13 @@ impl Stack {
 }
 
 #[inline(always)]
-fn entry(near: f32, child: Child) -> u64 {
-    u64::from(near.to_bits()) << 32 | u64::from(child.0)
+fn entry(near: f32, child: f32) -> u64 {
+    u64::from(near.to_bits()) << 32 | u64::from(child.to_bits())
+}
+
+#[inline(always)]
+fn node_at(cells: &[Cell], child: Child) -> Option<&WideNode> {
+    cells.get(child.place()..child.place() + 7)?.first_chunk()
 }
 
 #[inline(always)]
@@ -53,14 +58,14 @@ pub(super) fn meet<L: Lanes>(
 /// Where the ray passes the eight near planes across `axis`, or before.
 #[inline(always)]
 fn near<L: Lanes>(l: L, node: &WideNode, test: &BoxTest<L>, axis: usize) -> L::F {
-    let plane = l.load(&node.bounds[axis][test.backwards[axis] & 1]);
+    let plane = l.load(&node[2 * axis + (test.backwards[axis] & 1)].0);
     l.mul_sub(plane, test.inverse_near[axis], test.near_offset[axis])
 }
 
 /// Where the ray passes the eight far planes across `axis`, or behind.
 #[inline(always)]
 fn end<L: Lanes>(l: L, node: &WideNode, test: &BoxTest<L>, axis: usize) -> L::F {
-    let plane = l.load(&node.bounds[axis][!test.backwards[axis] & 1]);
+    let plane = l.load(&node[2 * axis + (!test.backwards[axis] & 1)].0);
     l.mul_sub(plane, test.inverse_far[axis], test.far_offset[axis])
 }
 
@@ -75,7 +80,7 @@ pub(super) trait Leaves {
 #[inline(always)]
 pub(super) fn traverse<L: Lanes>(
     lanes: L,
-    nodes: &[WideNode],
+    cells: &[Cell],
     test: &BoxTest<L>,
     mut far: f32,
     stack: &mut Stack,
@@ -83,7 +88,7 @@ pub(super) fn traverse<L: Lanes>(
 ) {
     let stack = &mut *stack.0;
     let mut height = 0;
-    let mut current = Child(0);
+    let mut current = Child::ROOT;
     let mut far_lanes = lanes.splat(far);
     loop {
         if current.count() > 0 {
@@ -93,22 +98,23 @@ pub(super) fn traverse<L: Lanes>(
             }
             far_lanes = lanes.splat(far);
         } else {
-            let Some(node) = nodes.get(current.node()) else { return };
+            let Some(node) = node_at(cells, current) else { return };
             let (mut met, near) = meet(lanes, node, test, far_lanes);
             if met != 0 {
                 let slot = met.trailing_zeros() as usize & 7;
                 met &= met - 1;
                 if met == 0 {
-                    current = node.child[slot];
+                    current = Child(node[6].0[slot].to_bits());
                     continue;
                 }
                 let near = lanes.store(near);
-                let mut closest = entry(near[slot], node.child[slot]);
+                let mut closest = entry(near[slot], node[6].0[slot]);
                 let base = height;
                 while met != 0 {
                     let slot = met.trailing_zeros() as usize & 7;
                     met &= met - 1;
-                    let other = entry(near[slot], node.child[slot]);
+                    let other = entry(near[slot], node[6].0[slot]);
+                    lanes.prefetch(cells, child(other).place());
                     let farther = closest.max(other);
                     closest = closest.min(other);
                     // Keep what is pushed in order, the nearest on top.
