@@ -66,13 +66,14 @@ impl Flaws {
         self.negative + self.not_finite > 0
     }
 
-    /// A value as light: itself, or 0 and counted.
-    #[inline]
-    pub(crate) fn light(&mut self, value: f32) -> f64 {
-        let finite = value.is_finite();
-        self.not_finite += u64::from(!finite);
-        self.negative += u64::from(finite & (value < 0.0));
-        if finite && value > 0.0 { f64::from(value) } else { 0.0 }
+    /// The flaws of these values.
+    pub(crate) fn of(values: &[f32]) -> Self {
+        let count =
+            |flaw: &dyn Fn(f32) -> bool| values.iter().filter(|value| flaw(**value)).count() as u64;
+        Self {
+            negative: count(&|value| value.is_finite() && value < 0.0),
+            not_finite: count(&|value| !value.is_finite()),
+        }
     }
 
     pub(crate) fn sum(self, other: Self) -> Self {

@@ -38,18 +38,24 @@
 //! | [`preset`] | sensors of the trade |
 //! | [`cfa`] | colour filter arrays |
 //! | [`film`] | what a sensor is given and gives back |
-//! | [`sensor`] | a sensor ready to expose |
+//! | [`sensor`] | a sensor ready to expose, and pictures of what it saw |
+//! | [`demosaic`] | missing colours |
+//! | [`dng`] | raw files |
 
 pub mod cfa;
 mod chain;
 mod clipping;
+pub mod demosaic;
+pub mod dng;
 mod error;
 pub mod film;
+mod light;
 mod normal;
 mod philox;
 mod poisson;
 pub mod preset;
 mod presets;
+mod preview;
 mod response;
 pub mod sensor;
 mod settings;

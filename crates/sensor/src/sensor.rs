@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::chain::{self, BLOCK, Chain, Lane, Place};
 use crate::film::{Film, Flaws, Moments, RawImage, Shot};
+use crate::light::Worth;
 use crate::normal::pair;
 use crate::philox::{Key, Site, Stage};
 use crate::response::Response;
@@ -314,21 +315,24 @@ impl<'a> Exposing<'a> {
         mut each: impl FnMut(Place, usize, usize, usize, &mut Lane),
     ) -> Flaws {
         let width = self.sensor.settings.resolution[0] as usize;
-        let depth = self.sensor.depth();
+        let lanes = self.sensor.response.lanes.count();
+        let film = &self.film.values[row * width * lanes..][..width * lanes];
+        let worths: Vec<Worth> =
+            (0..self.sensor.depth()).map(|channel| self.worth(row, channel)).collect();
         let mut flaws = Flaws::default();
         let mut mean = [0.0; BLOCK];
         for start in (0..width).step_by(BLOCK) {
             let count = BLOCK.min(width - start);
-            for channel in 0..depth {
-                let seen = self.light(row, start, count, channel, &mut mean);
+            let values = &film[start * lanes..][..count * lanes];
+            for (channel, worth) in worths.iter().enumerate() {
+                let seen = worth.gather(values, start, &mut mean[..count]);
                 if channel == 0 {
                     flaws = flaws.sum(seen);
                 }
                 // What is left of a short block repeats its last pixel and is thrown away.
                 let last = mean[count - 1];
                 mean[count..].fill(last);
-                #[expect(clippy::cast_possible_truncation, reason = "sides have 16 bits")]
-                let site = Site { row: row as u32, channel: channel as u16, frame: self.frame };
+                let site = self.site(row, channel);
                 #[expect(clippy::cast_possible_truncation, reason = "sides have 16 bits")]
                 each(Place { site, column: start as u32 }, start, channel, count, &mut mean);
             }
@@ -336,31 +340,21 @@ impl<'a> Exposing<'a> {
         flaws
     }
 
-    /// Mean photo-electrons of `count` pixels from column `start` on.
-    fn light(
-        &self,
-        row: usize,
-        start: usize,
-        count: usize,
-        channel: usize,
-        mean: &mut Lane,
-    ) -> Flaws {
-        let lanes = self.sensor.response.lanes.count();
-        let width = self.sensor.settings.resolution[0] as usize;
-        let mut flaws = Flaws::default();
-        let from = (row * width + start) * lanes;
-        let pixels = self.film.values[from..from + count * lanes].chunks_exact(lanes);
-        for (i, (pixel, mean)) in pixels.zip(mean.iter_mut()).enumerate() {
-            let channel = match self.sensor.response.pattern {
-                Some(_) => self.sensor.channel_at(row, start + i),
-                None => channel,
-            };
-            let electrons = &self.sensor.response.channels[channel].electrons;
-            let sum: f64 =
-                pixel.iter().zip(electrons).map(|(&lane, worth)| flaws.light(lane) * worth).sum();
-            *mean = self.factor * sum;
-        }
-        flaws
+    /// What lanes are worth along a row: by the filters' turns, or in one channel of the image.
+    fn worth(&self, row: usize, channel: usize) -> Worth {
+        let response = &self.sensor.response;
+        let channels = match &response.pattern {
+            Some(pattern) => pattern[row % pattern.len()].as_slice(),
+            None => &[channel],
+        };
+        let electrons = channels.iter().flat_map(|&channel| &response.channels[channel].electrons);
+        let electrons = electrons.map(|electrons| electrons * self.factor).collect();
+        Worth { lanes: response.lanes.count(), electrons }
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "sides have 16 bits, channels 12")]
+    fn site(&self, row: usize, channel: usize) -> Site {
+        Site { row: row as u32, channel: channel as u16, frame: self.frame }
     }
 
     /// What the row adds in this frame (e⁻).
@@ -369,9 +363,7 @@ impl<'a> Exposing<'a> {
         if sigma <= 0.0 || self.chain.noise == NoiseModel::None {
             return 0.0;
         }
-        #[expect(clippy::cast_possible_truncation, reason = "sides have 16 bits")]
-        let site = Site { row: row as u32, channel: 0, frame: self.frame };
-        sigma * one_normal(&self.chain.temporal, site, 0, Stage::Row)
+        sigma * one_normal(&self.chain.temporal, self.site(row, 0), 0, Stage::Row)
     }
 }
 

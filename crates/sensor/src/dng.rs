@@ -1,0 +1,153 @@
+//! Raw images as Adobe's DNG, which raw converters open: one number a pixel, with pattern, black and
+//! white level, and what the channels make of colours.
+//!
+//! # Sources
+//!
+//! "Digital Negative (DNG) Specification", version 1.4.0.0, Adobe 2012; tag numbers are its.
+
+use std::io::{Seek, Write};
+
+use etendue_spectrum::colour::{Matrix3, SRGB_FROM_XYZ};
+use tiff::encoder::{Rational, SRational, TiffEncoder};
+use tiff::tags::Tag;
+
+use crate::{RawImage, Sensor};
+
+/// Why there is no DNG.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DngError {
+    /// A sensor of several numbers a pixel, or of filters that DNG has no name for.
+    #[error("{0}: write it as PNG or NPY instead")]
+    NotRaw(String),
+    /// The file could not be written.
+    #[error("cannot write the DNG: {0}")]
+    Write(#[from] tiff::TiffError),
+}
+
+/// Colour filter array, of the photometric interpretations.
+const CFA: u16 = 32_803;
+/// Linear raw, for monochrome sensors.
+const LINEAR_RAW: u16 = 34_892;
+/// D65, of EXIF's light sources.
+const D65: u16 = 21;
+
+impl Sensor {
+    /// Writes an image of this sensor, a `raw` one, as DNG. `model` is what the file calls the camera.
+    ///
+    /// # Errors
+    ///
+    /// [`DngError`] when the sensor has several numbers a pixel or filters other than r, g, b, or
+    /// when writing fails.
+    pub fn write_dng(
+        &self,
+        image: &RawImage,
+        model: &str,
+        out: impl Write + Seek,
+    ) -> Result<(), DngError> {
+        if image.depth != 1 {
+            return Err(DngError::NotRaw(format!(
+                "an image of {} channels is no raw",
+                image.depth
+            )));
+        }
+        let pattern = self.pattern_codes()?;
+        let mut encoder = TiffEncoder::new(out)?;
+        let mut directory = encoder.image_directory()?;
+        let too_large = || DngError::NotRaw("the image is too large for DNG".into());
+        let [width, height] = [image.width, image.height].map(u32::try_from);
+        let (width, height) = (width.map_err(|_| too_large())?, height.map_err(|_| too_large())?);
+        let bytes = u32::try_from(2 * image.values.len()).map_err(|_| too_large())?;
+        let photometric = if pattern.is_some() { CFA } else { LINEAR_RAW };
+        directory.write_tag(Tag::NewSubfileType, 0u32)?;
+        directory.write_tag(Tag::ImageWidth, width)?;
+        directory.write_tag(Tag::ImageLength, height)?;
+        directory.write_tag(Tag::BitsPerSample, 16u16)?;
+        directory.write_tag(Tag::Compression, 1u16)?;
+        directory.write_tag(Tag::PhotometricInterpretation, photometric)?;
+        directory.write_tag(Tag::Orientation, 1u16)?;
+        directory.write_tag(Tag::SamplesPerPixel, 1u16)?;
+        directory.write_tag(Tag::PlanarConfiguration, 1u16)?;
+        directory.write_tag(Tag::Make, "etendue")?;
+        directory.write_tag(Tag::Model, model)?;
+        let offset = directory.write_data(image.values.as_slice())?;
+        let offset = u32::try_from(offset).map_err(|_| too_large())?;
+        directory.write_tag(Tag::StripOffsets, offset)?;
+        directory.write_tag(Tag::RowsPerStrip, height)?;
+        directory.write_tag(Tag::StripByteCounts, bytes)?;
+        let unknown = Tag::Unknown;
+        directory.write_tag(unknown(50_706), [1u8, 4, 0, 0].as_slice())?;
+        directory.write_tag(unknown(50_708), model)?;
+        directory.write_tag(unknown(50_714), rational(self.black_level()))?;
+        directory.write_tag(unknown(50_717), self.white_level_of_file())?;
+        if let Some([rows, columns, codes @ ..]) = pattern.as_deref() {
+            let period = [u16::from(*rows), u16::from(*columns)];
+            directory.write_tag(unknown(33_421), period.as_slice())?;
+            directory.write_tag(unknown(33_422), codes)?;
+            directory.write_tag(unknown(50_711), 1u16)?;
+            let [matrix, neutral] = self.colour_tags();
+            directory.write_tag(unknown(50_721), matrix.as_slice())?;
+            let neutral: Vec<Rational> = neutral
+                .iter()
+                .map(|entry| Rational { n: entry.n.unsigned_abs(), d: 10_000 })
+                .collect();
+            directory.write_tag(unknown(50_728), neutral.as_slice())?;
+            directory.write_tag(unknown(50_778), D65)?;
+        }
+        directory.finish()?;
+        Ok(())
+    }
+
+    /// The period and then TIFF/EP's numbers for the filters: red 0, green 1, blue 2; nothing for a
+    /// monochrome sensor.
+    fn pattern_codes(&self) -> Result<Option<Vec<u8>>, DngError> {
+        let Some(cfa) = self.cfa() else { return Ok(None) };
+        let [rows, columns] = cfa.period();
+        #[expect(clippy::cast_possible_truncation, reason = "patterns have at most 64 a side")]
+        let mut codes = vec![rows as u8, columns as u8];
+        for row in 0..rows {
+            for column in 0..columns {
+                let letter = cfa.at(row, column);
+                codes.push(match letter.to_ascii_lowercase() {
+                    'r' => 0,
+                    'g' => 1,
+                    'b' => 2,
+                    _ => return Err(DngError::NotRaw(format!("DNG has no filter `{letter}`"))),
+                });
+            }
+        }
+        Ok(Some(codes))
+    }
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "2ᵇ − 1")]
+    fn white_level_of_file(&self) -> u16 {
+        self.white_level() as u16
+    }
+
+    /// `ColorMatrix1` (XYZ to channels, rows red, green, blue) and `AsShotNeutral`.
+    fn colour_tags(&self) -> [Vec<SRational>; 2] {
+        let names: Vec<&str> = self.channels().collect();
+        let response = self.response_to_primaries();
+        let of = |name: &str| {
+            let found = names.iter().position(|other| other.eq_ignore_ascii_case(name));
+            found.map_or([0.0; 3], |k| response[k])
+        };
+        let camera: Matrix3 = ["R", "G", "B"].map(of);
+        let from_xyz = |row: [f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|k| (0..3).map(|i| row[i] * SRGB_FROM_XYZ[i][k]).sum())
+        };
+        let matrix = camera.map(from_xyz).into_iter().flatten().map(signed).collect();
+        let neutral = camera.map(|row| signed(row.iter().sum())).into();
+        [matrix, neutral]
+    }
+}
+
+fn rational(value: f64) -> Rational {
+    let SRational { n, .. } = signed(value);
+    Rational { n: n.unsigned_abs(), d: 10_000 }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a cast saturates; levels are below 65536")]
+fn signed(value: f64) -> SRational {
+    SRational { n: (value * 1e4).round() as i32, d: 10_000 }
+}

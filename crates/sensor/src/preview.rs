@@ -1,0 +1,131 @@
+//! Pictures to look at: black taken away, missing colours found, white balanced, in sRGB. The raw
+//! image stays as it is.
+
+use etendue_spectrum::Lanes;
+use etendue_spectrum::colour::srgb_encode;
+use rayon::prelude::*;
+
+use crate::demosaic::{Method, Mosaic};
+use crate::{RawImage, Sensor};
+
+impl Sensor {
+    /// What every channel makes of white light (1 in all lanes), the most sensitive being 1.
+    #[must_use]
+    pub fn white_response(&self) -> Vec<f64> {
+        let white = |channel: usize| self.electrons_per_unit(channel).iter().sum::<f64>();
+        let all: Vec<f64> = (0..self.channels().len()).map(white).collect();
+        let most = all.iter().copied().fold(0.0, f64::max);
+        all.into_iter().map(|value| value / most).collect()
+    }
+
+    /// Factors that make white light equal in all channels, none below 1.
+    #[must_use]
+    pub fn white_balance(&self) -> Vec<f64> {
+        self.white_response().into_iter().map(|response| 1.0 / response).collect()
+    }
+
+    /// Weights of each channel in linear sRGB, one row a channel: white light becomes (1, 1, 1) when
+    /// the most sensitive channel is 1. For three and more channels the colours of the render's RGB
+    /// assets come back exactly (the least-squares inverse of the response to them); fewer are grey.
+    #[must_use]
+    pub fn srgb_from_channels(&self) -> Vec<[f64; 3]> {
+        let white = self.white_response();
+        if let Lanes::Bands(_) = self.lanes()
+            && self.channels().len() == self.lanes().count()
+            && self.is_one_lane_a_channel()
+        {
+            let rows = self.lanes().to_rgb();
+            return rows
+                .iter()
+                .zip(white)
+                .map(|(row, white)| row.map(|part| part / white))
+                .collect();
+        }
+        let response = self.response_to_primaries();
+        pseudo_inverse(&response).unwrap_or_else(|| {
+            let count = white.len() as f64;
+            white.iter().map(|white| [1.0 / (white * count); 3]).collect()
+        })
+    }
+
+    /// `[channel][primary]`: each channel's response to the sRGB primaries, on the scale of
+    /// [`Self::white_response`].
+    #[must_use]
+    pub fn response_to_primaries(&self) -> Vec<[f64; 3]> {
+        let from_rgb = self.lanes().from_rgb();
+        let all = (0..self.channels().len()).map(|channel| {
+            let electrons = self.electrons_per_unit(channel);
+            let of = |k: usize| from_rgb.iter().zip(electrons).map(|(row, e)| row[k] * e).sum();
+            std::array::from_fn::<f64, 3, _>(of)
+        });
+        let rows: Vec<[f64; 3]> = all.collect();
+        let most = rows.iter().map(|row| row.iter().sum::<f64>()).fold(0.0, f64::max);
+        rows.into_iter().map(|row| row.map(|value| value / most)).collect()
+    }
+
+    fn is_one_lane_a_channel(&self) -> bool {
+        (0..self.channels().len()).all(|channel| {
+            let electrons = self.electrons_per_unit(channel).iter().enumerate();
+            electrons.filter(|(lane, value)| *lane != channel && **value > 0.0).count() == 0
+        })
+    }
+
+    /// Numbers of an image as parts of full scale, black at 0, every channel at every pixel:
+    /// `[row][column][channel]`.
+    #[must_use]
+    pub fn linear(&self, image: &RawImage, method: Method) -> Vec<f32> {
+        let range = self.white_level() - self.black_level();
+        #[expect(clippy::cast_possible_truncation, reason = "16 bits fit")]
+        let part = |&y: &u16| ((f64::from(y) - self.black_level()) / range) as f32;
+        let values: Vec<f32> = image.values.par_iter().map(part).collect();
+        match self.cfa() {
+            Some(pattern) => {
+                let RawImage { width, height, .. } = *image;
+                Mosaic { width, height, values: &values, pattern }.demosaiced(method)
+            }
+            None => values,
+        }
+    }
+
+    /// An image as 8-bit sRGB, `[row][column][red, green, blue]`; `exposure` multiplies the light.
+    #[must_use]
+    pub fn preview(&self, image: &RawImage, method: Method, exposure: f64) -> Vec<u8> {
+        let weights = self.srgb_from_channels();
+        let linear = self.linear(image, method);
+        let pixels = linear.par_chunks_exact(weights.len());
+        let encoded = pixels.map(|channels| {
+            let of = |k: usize| {
+                let pairs = channels.iter().zip(&weights);
+                pairs.map(|(&value, weight)| f64::from(value) * weight[k]).sum::<f64>()
+            };
+            std::array::from_fn::<u8, 3, _>(|k| to_byte(srgb_encode(exposure * of(k))))
+        });
+        encoded.collect::<Vec<_>>().into_iter().flatten().collect()
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255")]
+fn to_byte(display: f64) -> u8 {
+    (255.0 * display + 0.5) as u8
+}
+
+/// (AᵀA)⁻¹Aᵀ of a matrix by rows, returned column by column; `None` when the columns of A are not
+/// independent, to within 1e-6.
+fn pseudo_inverse(rows: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
+    let dot = |i: usize, k: usize| rows.iter().map(|row| row[i] * row[k]).sum::<f64>();
+    let square: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|k| dot(i, k)));
+    let cofactor = |i: usize, k: usize| {
+        let (a, b, c, d) = ((i + 1) % 3, (i + 2) % 3, (k + 1) % 3, (k + 2) % 3);
+        square[a][c] * square[b][d] - square[a][d] * square[b][c]
+    };
+    let determinant: f64 = (0..3).map(|k| square[0][k] * cofactor(0, k)).sum();
+    let scale = (0..3).map(|k| square[k][k]).product::<f64>();
+    if determinant.is_nan() || determinant <= 1e-12 * scale {
+        return None;
+    }
+    // The square is symmetric, and so are its cofactors.
+    let column = |row: &[f64; 3]| {
+        std::array::from_fn(|i| (0..3).map(|k| cofactor(i, k) * row[k]).sum::<f64>() / determinant)
+    };
+    Some(rows.iter().map(column).collect())
+}
