@@ -87,6 +87,7 @@ impl CameraSpec {
         Self::Pinhole(PinholeSpec {
             fov: Some(Degrees(fov.to_degrees())),
             intrinsics: None,
+            distortion: None,
             pose: Some(PoseSpec::from(pose)),
             sensor: SensorSpec::new(resolution_of(aspect)),
         })
@@ -101,6 +102,24 @@ impl CameraSpec {
             pose: Some(PoseSpec::from(pose)),
             sensor: SensorSpec::new(resolution_of(aspect)),
         })
+    }
+
+    /// The word behind `type` in the file.
+    #[must_use]
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Self::Pinhole(_) => "pinhole",
+            Self::Orthographic(_) => "orthographic",
+        }
+    }
+
+    /// Whether the file says where the camera stands.
+    #[must_use]
+    pub fn has_pose(&self) -> bool {
+        match self {
+            Self::Pinhole(spec) => spec.pose.is_some(),
+            Self::Orthographic(spec) => spec.pose.is_some(),
+        }
     }
 
     /// The sensor.

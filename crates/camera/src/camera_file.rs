@@ -3,6 +3,7 @@
 use glam::DMat4;
 use serde::{Deserialize, Serialize};
 
+use crate::distortion::{Distortion, DistortionSpec};
 use crate::{Camera, Convention, PixelOrigin, Projection};
 
 /// A camera's projection and pose in OpenCV's convention: x right, y down, z forward, metres.
@@ -42,6 +43,8 @@ pub struct CameraFile {
 pub enum ProjectionName {
     /// Through one point.
     Perspective,
+    /// Through one point, with OpenCV's fisheye model.
+    Fisheye,
     /// In parallel.
     Orthographic,
 }
@@ -49,7 +52,7 @@ pub enum ProjectionName {
 /// Lens distortion for OpenCV.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DistortionFile {
-    /// `none`.
+    /// `none`, `brown_conrady` or `fisheye` (for OpenCV's functions of that name).
     pub model: String,
     /// `distCoeffs` in OpenCV's order; empty for no distortion.
     pub coefficients: Vec<f64>,
@@ -85,8 +88,14 @@ impl Camera {
             Projection::Pinhole(pinhole) => {
                 file.pixel_origin = pinhole.pixel_origin();
                 file.k = Some(pinhole.intrinsics().matrix(file.pixel_origin));
-                file.distortion =
-                    Some(DistortionFile { model: "none".to_owned(), coefficients: Vec::new() });
+                let spec = pinhole.distortion().map(Distortion::spec);
+                if matches!(spec, Some(DistortionSpec::Fisheye(_))) {
+                    file.projection = ProjectionName::Fisheye;
+                }
+                file.distortion = Some(DistortionFile {
+                    model: spec.map_or("none", DistortionSpec::name).to_owned(),
+                    coefficients: spec.map(DistortionSpec::coefficients).unwrap_or_default(),
+                });
                 file.focal_length_mm =
                     self.pixel_pitch().map(|um| um * 1e-3 * pinhole.intrinsics().focal[1]);
             }

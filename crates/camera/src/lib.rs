@@ -12,6 +12,7 @@
 
 pub mod camera;
 pub mod camera_file;
+pub mod distortion;
 pub mod element;
 pub mod error;
 mod framing;
@@ -27,6 +28,7 @@ pub mod train;
 
 pub use camera::{Camera, CameraSpec, PixelBlock, Projection};
 pub use camera_file::CameraFile;
+pub use distortion::{Distortion, DistortionSpec};
 pub use error::CameraError;
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin};
 pub use orthographic::{Orthographic, OrthographicSpec};

@@ -4,6 +4,7 @@ use etendue_geometry::{Bounds, RayBatch};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::distortion::{Distortion, DistortionSpec};
 use crate::framing::{self, Reach};
 use crate::length::Degrees;
 use crate::{CameraError, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec, SensorSpec};
@@ -22,6 +23,9 @@ pub struct PinholeSpec {
     /// OpenCV's K instead of `fov`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics: Option<IntrinsicsSpec>,
+    /// Lens distortion, beside `intrinsics`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<DistortionSpec>,
     /// Where the camera stands; when absent, the whole scene is framed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseSpec>,
@@ -34,6 +38,7 @@ pub struct PinholeSpec {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pinhole {
     intrinsics: Intrinsics,
+    distortion: Option<Distortion>,
     pixel_origin: PixelOrigin,
 }
 
@@ -60,17 +65,43 @@ impl PinholeSpec {
                 Intrinsics::from_fov(fov.to_radians(), self.sensor.resolution)
             }
         };
+        let distortion = self.build_distortion(&intrinsics)?;
         let pixel_origin = match &self.intrinsics {
             Some(spec) => spec.pixel_origin,
             None => PixelOrigin::Center,
         };
-        let pinhole = Pinhole { intrinsics, pixel_origin };
+        let pinhole = Pinhole { intrinsics, distortion, pixel_origin };
         let pose = match &self.pose {
             Some(pose) => pose.build()?,
             None => framing::perspective(bounds(), pinhole.reach(self.sensor.resolution)),
         };
         Ok((pose, pinhole))
     }
+
+    fn build_distortion(&self, intrinsics: &Intrinsics) -> Result<Option<Distortion>, CameraError> {
+        match (&self.distortion, &self.intrinsics) {
+            (None, _) => Ok(None),
+            (Some(_), None) => Err(CameraError::new(
+                "distortion",
+                "has coefficients that hold for one K only; give `intrinsics` instead of `fov`",
+            )),
+            (Some(spec), Some(_)) => {
+                let border = border(self.sensor.resolution);
+                spec.build(border.map(|[u, v]| intrinsics.tangents(u, v))).map(Some)
+            }
+        }
+    }
+}
+
+/// Places on the outer edge of the sensor (pixels from the corner), the four corners among them.
+fn border([width, height]: [u32; 2]) -> impl Iterator<Item = [f64; 2]> {
+    // Between two of these places no distortion in use bends by more than a fraction of a pixel.
+    const PLACES: u32 = 64;
+    let (width, height) = (f64::from(width), f64::from(height));
+    (0..=PLACES).map(|i| f64::from(i) / f64::from(PLACES)).flat_map(move |share| {
+        let (u, v) = (share * width, share * height);
+        [[u, 0.0], [u, height], [0.0, v], [width, v]]
+    })
 }
 
 impl Pinhole {
@@ -80,17 +111,42 @@ impl Pinhole {
         self.intrinsics
     }
 
+    /// The lens distortion.
+    #[must_use]
+    pub fn distortion(&self) -> Option<&Distortion> {
+        self.distortion.as_ref()
+    }
+
     /// What the file counted the principal point from; the centre when it gave a field of view.
     #[must_use]
     pub fn pixel_origin(&self) -> PixelOrigin {
         self.pixel_origin
     }
 
-    /// The tangents of the picture's edges.
+    /// The tangents up to which a framed scene may reach: of the picture's edges, or of what is
+    /// seen at their middles and corners, at most 60° from the axis.
     fn reach(&self, [width, height]: [u32; 2]) -> Reach {
-        let [left, up] = self.intrinsics.tangents(0.0, 0.0);
-        let [right, down] = self.intrinsics.tangents(width.into(), height.into());
-        Reach { left: -left, right, down, up: -up }
+        let (width, height) = (f64::from(width), f64::from(height));
+        let tangents = |u: f64, v: f64| {
+            let seen = self.intrinsics.tangents(u, v);
+            let Some(distortion) = &self.distortion else { return seen };
+            match distortion.undistort(seen) {
+                Some([x, y, z]) if z > 0.0 => [x / z, y / z],
+                _ => seen.map(|x| x.signum() * f64::INFINITY),
+            }
+        };
+        let widest = if self.distortion.is_some() { 3_f64.sqrt() } else { f64::INFINITY };
+        let corners = [tangents(0.0, 0.0), tangents(width, 0.0), tangents(0.0, height)];
+        let far = tangents(width, height);
+        let [cu, cv] = self.intrinsics.centre.map(|c| c.max(0.0));
+        let (cu, cv) = (cu.min(width), cv.min(height));
+        let least = |a: f64, b: f64, c: f64| a.min(b).min(c).min(widest);
+        Reach {
+            left: least(-corners[0][0], -corners[2][0], -tangents(0.0, cv)[0]),
+            right: least(corners[1][0], far[0], tangents(width, cv)[0]),
+            up: least(-corners[0][1], -corners[1][1], -tangents(cu, 0.0)[1]),
+            down: least(corners[2][1], far[1], tangents(cu, height)[1]),
+        }
     }
 
     /// Turns places on the sensor (pixels from the corner), which stand in the first two arrays of
@@ -99,6 +155,13 @@ impl Pinhole {
         for (axis, origins) in rays.origin.iter_mut().enumerate() {
             origins.fill(pose.position[axis]);
         }
+        match &self.distortion {
+            None => self.aim_straight(pose, rays),
+            Some(distortion) => self.aim_distorted(distortion, pose, rays),
+        }
+    }
+
+    fn aim_straight(&self, pose: &Pose, rays: &mut RayBatch) {
         let (right, down, forward) = (pose.right(), -pose.up(), pose.forward());
         let intrinsics = self.intrinsics;
         let [dx, dy, dz] = &mut rays.direction;
@@ -110,6 +173,23 @@ impl Pinhole {
             *dx = right.x * x + down.x * y + forward.x * z;
             *dy = right.y * x + down.y * y + forward.y * z;
             *dz = right.z * x + down.z * y + forward.z * z;
+        }
+    }
+
+    fn aim_distorted(&self, distortion: &Distortion, pose: &Pose, rays: &mut RayBatch) {
+        for i in 0..rays.len() {
+            let seen = self.intrinsics.tangents(rays.direction[0][i], rays.direction[1][i]);
+            let (direction, sees) = match distortion.undistort(seen) {
+                Some([x, y, z]) => (pose.right() * x - pose.up() * y + pose.forward() * z, true),
+                None => (pose.forward(), false),
+            };
+            for axis in 0..3 {
+                rays.direction[axis][i] = direction[axis];
+            }
+            if !sees {
+                // Nothing lies before a negative distance: the ray hits nothing.
+                rays.t_max[i] = -1.0;
+            }
         }
     }
 }

@@ -39,10 +39,39 @@ fn cameras() -> Vec<Camera> {
                 {pose}}}"#
         ),
         r#"{"type": "orthographic", "sensor": {"resolution": [640, 480]}}"#.into(),
+        format!(
+            r#"{{"type": "pinhole", "intrinsics": {{{k}, "pixel_origin": "center"}},
+                "distortion": {{"type": "brown_conrady", "k1": -0.3, "k2": 0.12, "p1": 0.001}},
+                "sensor": {{"resolution": [640, 480]}}, {pose}}}"#
+        ),
+        format!(
+            r#"{{"type": "pinhole", "intrinsics": {{{k}, "pixel_origin": "center"}},
+                "distortion": {{"type": "fisheye", "k1": 0.05, "k2": -0.01}},
+                "sensor": {{"resolution": [640, 480]}}, {pose}}}"#
+        ),
     ]
     .iter()
     .map(|json| camera(json))
     .collect()
+}
+
+/// The three coefficients that the cameras here use, by OpenCV's formulas.
+fn distort(file: &CameraFile, [x, y]: [f64; 2]) -> [f64; 2] {
+    let distortion = file.distortion.as_ref().unwrap();
+    let r = x.hypot(y);
+    match (&*distortion.model, &distortion.coefficients[..]) {
+        ("brown_conrady", &[k1, k2, p1, p2, k3]) => {
+            assert_eq!((p2, k3), (0.0, 0.0));
+            let radial = 1.0 + k1 * r.powi(2) + k2 * r.powi(4);
+            [x * radial + 2.0 * p1 * x * y, y * radial + p1 * (r * r + 2.0 * y * y)]
+        }
+        ("fisheye", &[k1, k2, ..]) if r > 0.0 => {
+            let theta = r.atan();
+            let scale = theta * (1.0 + k1 * theta.powi(2) + k2 * theta.powi(4)) / r;
+            [x * scale, y * scale]
+        }
+        _ => [x, y],
+    }
 }
 
 /// Pixel coordinates counted from the corner, by the textbook and the numbers in the file.
@@ -51,10 +80,10 @@ fn project(file: &CameraFile, point: DVec3) -> [f64; 2] {
     let [x, y, z] =
         [0, 1, 2].map(|r| m[r][0] * point.x + m[r][1] * point.y + m[r][2] * point.z + m[r][3]);
     let [u, v] = match (&file.k, &file.orthographic) {
-        (Some(k), None) => [
-            (k[0][0] * x + k[0][1] * y + k[0][2] * z) / z,
-            (k[1][0] * x + k[1][1] * y + k[1][2] * z) / z,
-        ],
+        (Some(k), None) => {
+            let [x, y] = distort(file, [x / z, y / z]);
+            [k[0][0] * x + k[0][1] * y + k[0][2], k[1][0] * x + k[1][1] * y + k[1][2]]
+        }
         (None, Some(o)) => [
             x / o.metres_per_pixel + o.principal_point[0],
             y / o.metres_per_pixel + o.principal_point[1],
@@ -201,6 +230,24 @@ fn a_pinhole_starts_at_its_pupil_and_parallel_rays_in_its_plane() {
 }
 
 #[test]
+fn beyond_a_fisheyes_circle_rays_hit_nothing() {
+    let camera = camera(
+        r#"{"type": "pinhole", "intrinsics": {"fx": 10, "fy": 10, "cx": 50, "cy": 50,
+            "pixel_origin": "corner"}, "distortion": {"type": "fisheye"},
+            "sensor": {"resolution": [100, 100]}}"#,
+    );
+    let mut rays = RayBatch::default();
+    camera.chief_rays(PixelBlock { x: 0, y: 0, width: 100, height: 100 }, &mut rays);
+    for i in 0..rays.len() {
+        let (x, y) = ((i % 100) as f64 - 49.5, (i / 100) as f64 - 49.5);
+        // 10 px a radian: half a turn is at 31.4 px.
+        let inside = x.hypot(y) <= 10.0 * std::f64::consts::PI;
+        assert_eq!(rays.t_max[i] > rays.t_min[i], inside, "pixel {x}, {y}");
+        assert!((rays.direction(i).length() - 1.0).abs() < 1e-15, "finite all the same");
+    }
+}
+
+#[test]
 fn bad_cameras_are_refused_by_key() {
     let k = r#""fy": 1, "cx": 0, "cy": 0, "pixel_origin": "center""#;
     let cases = [
@@ -210,6 +257,17 @@ fn bad_cameras_are_refused_by_key() {
         (format!(r#"{{"type": "pinhole", "intrinsics": {{"fx": 0, {k}}}}}"#), "intrinsics.fx"),
         (format!(r#"{{"type": "pinhole", "fov": 3, "intrinsics": {{"fx": 1, {k}}}}}"#), "fov"),
         (r#"{"type": "orthographic", "height": 0}"#.to_owned(), "height"),
+        (
+            format!(
+                r#"{{"type": "pinhole", "intrinsics": {{"fx": 500, {k}}},
+                    "distortion": {{"type": "brown_conrady", "k1": -0.3}}}}"#
+            ),
+            "distortion",
+        ),
+        (
+            r#"{"type": "pinhole", "distortion": {"type": "fisheye", "k1": 0.1}}"#.to_owned(),
+            "distortion",
+        ),
         (
             r#"{"type": "orthographic", "sensor": {"resolution": [0, 4]}}"#.to_owned(),
             "sensor.resolution",
