@@ -86,3 +86,116 @@ fn gltf_assets_have_their_triangles_and_boxes() {
         assert_box(path, bounds, printed);
     }
 }
+
+const OBJ: [(&str, u64); 14] = [
+    ("koala.obj", 99_994),
+    ("spot.obj", 23_062),
+    ("tricky/cornell_box.obj", 36),
+    ("tricky/missing_material_file.obj", 36),
+    ("tricky/negative_indices.obj", 12),
+    ("tricky/smoothing-group-two-squares.obj", 3),
+    ("tricky/cube-vertexcol.obj", 12),
+    ("tricky/mtl filename with whitespace issue46.obj", 12),
+    ("tricky/usemtl-issue-68.obj", 400),
+    ("tricky/map-bump.obj", 400),
+    ("tricky/leading-decimal-dot-issue-201.obj", 1),
+    ("tricky/polygonfaces.obj", 3),
+    ("tricky/concave_polygon.obj", 64),
+    ("tricky/box_without_lineending.obj", 12),
+];
+
+#[test]
+fn obj_assets_have_their_triangles_and_boxes() {
+    let Some(folder) = assets() else { return };
+    for (path, triangles) in OBJ {
+        let import = load(&folder.join("obj").join(path));
+        let (has, bounds) = measure(&import);
+        println!("{path}: {has} triangles, {:?}", import.stats);
+        for note in &import.notes {
+            println!("    {note:?}");
+        }
+        assert_eq!(has, triangles, "{path}");
+        match path {
+            "koala.obj" => assert_box(path, bounds, KOALA),
+            "spot.obj" => {
+                assert_box(path, bounds, "-0.46343 -0.73023 -0.69957 0.46419 1.01738 1.0776");
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Corners of all triangles in the model's frame, rounded to f32 as a GLB holds them.
+fn corners(import: &Import) -> Vec<[f32; 3]> {
+    let geometry = geometry(import);
+    let of_placement = |placement: &Placement| {
+        let mesh = geometry.mesh_of(placement);
+        let point = |&corner: &u32| {
+            let p = mesh.positions.get(corner as usize);
+            placement.world_from_mesh.point(p).as_vec3().to_array()
+        };
+        mesh.triangles.iter().flatten().map(point).collect::<Vec<_>>()
+    };
+    geometry.placements.iter().flat_map(of_placement).collect()
+}
+
+#[test]
+fn the_koala_is_the_same_as_obj_and_glb() {
+    let Some(folder) = assets() else { return };
+    let (obj, glb) = (load(&folder.join("obj/koala.obj")), load(&folder.join("gltf/koala.glb")));
+    assert_eq!(corners(&obj), corners(&glb));
+    assert_eq!(glb.stats.bytes_copied, 0, "a plain GLB is used where it is mapped");
+    assert_eq!(glb.stats.bytes_mapped, 1_799_916, "12 bytes a triangle and 12 a vertex");
+}
+
+#[test]
+fn a_face_that_bends_back_on_itself_keeps_its_area() {
+    let Some(folder) = assets() else { return };
+    let import = load(&folder.join("obj/tricky/concave_polygon.obj"));
+    let (mut vector, mut total) = (etendue_geometry::glam::DVec3::ZERO, 0.0);
+    for corners in corners(&import).chunks_exact(3) {
+        let [a, b, c] =
+            [0, 1, 2].map(|i| etendue_geometry::glam::Vec3::from(corners[i]).as_dvec3());
+        let area = (b - a).cross(c - a) * 0.5;
+        vector += area;
+        total += area.length();
+    }
+    // By the shoelace formula over the 66 corners as the file has them; here they are in f32.
+    let expected = 0.245_496_687;
+    assert!((vector.length() - expected).abs() < 1e-6 * expected, "{vector}");
+    // Where triangles overlapped or stuck out, the sum of areas would be more.
+    assert!((total - expected).abs() < 1e-6 * expected, "{total}");
+}
+
+/// Triangles as sorted corner positions, sorted: the same for any order of meshes.
+fn sorted(corners: &[[f32; 3]]) -> Vec<[[u32; 3]; 3]> {
+    let mut triangles: Vec<[[u32; 3]; 3]> = corners
+        .chunks_exact(3)
+        .map(|triangle| [0, 1, 2].map(|i| triangle[i].map(|x| (x + 0.0).to_bits())))
+        .collect();
+    triangles.sort_unstable();
+    triangles
+}
+
+#[test]
+#[expect(clippy::cast_possible_truncation, reason = "the same rounding as ours")]
+fn obj_meshes_are_those_that_tobj_reads() {
+    let Some(folder) = assets() else { return };
+    // tobj fans the concave face and refuses normals that do not exist.
+    let cannot = ["tricky/concave_polygon.obj", "tricky/smoothing-group-two-squares.obj"];
+    for (path, _) in OBJ.iter().filter(|(path, _)| !cannot.contains(path)) {
+        let path = folder.join("obj").join(path);
+        let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+        let mut reader = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
+        let none = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+        let (models, _) = tobj::load_obj_buf(&mut reader, &options, none).unwrap();
+        let point = |mesh: &tobj::Mesh, i: u32| {
+            [0, 1, 2].map(|axis| mesh.positions[3 * i as usize + axis] as f32)
+        };
+        let theirs: Vec<[f32; 3]> = models
+            .iter()
+            .flat_map(|model| model.mesh.indices.iter().map(|&i| point(&model.mesh, i)))
+            .collect();
+        assert_eq!(sorted(&corners(&load(&path))), sorted(&theirs), "{}", path.display());
+    }
+}

@@ -16,7 +16,9 @@ mod files;
 mod gltf;
 mod note;
 mod obj;
+mod ply;
 mod polygon;
+mod precision;
 mod text;
 
 use std::path::{Path, PathBuf};
@@ -162,6 +164,7 @@ pub fn import(path: &Path, wanted: Wanted, options: &Options) -> Result<Import, 
     let mut import = match extension.as_str() {
         "gltf" | "glb" => gltf::import(path, &files, wanted, options),
         "obj" => obj::import(path, &files, wanted, options),
+        "ply" => ply::import(path, &files, wanted, options),
 
         _ => Err(ImportError::UnknownFormat { file: path.to_owned() }),
     }?;

@@ -200,7 +200,7 @@ mod tests {
             for start in 0..4 {
                 let mut turned = arrow.map(plane);
                 turned.rotate_left(start);
-                check(&turned, 1.5);
+                check(&turned, 0.5);
             }
             check(&comb.map(plane), 11.0);
         }

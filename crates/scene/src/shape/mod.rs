@@ -177,3 +177,191 @@ fn in_range(triangles: u64) -> Result<u64, ShapeError> {
         Err(ShapeError { key: "triangles", reason })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use etendue_geometry::Positions;
+    use etendue_geometry::glam::DVec3;
+
+    use super::*;
+
+    fn blob(triangles: u64, seed: u64) -> ShapeSpec {
+        ShapeSpec::Blob { radius: Metres(0.5), triangles, seed, amplitude: 0.25 }
+    }
+
+    /// Edges by direction: on a closed surface of one orientation each is used once each way.
+    fn assert_closed(mesh: &Mesh) {
+        let mut uses: HashMap<(u32, u32), i32> = HashMap::new();
+        for &[a, b, c] in mesh.triangles.iter() {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                assert_ne!(from, to);
+                *uses.entry((from, to)).or_default() += 1;
+            }
+        }
+        for (&(from, to), &count) in &uses {
+            assert_eq!((count, uses.get(&(to, from))), (1, Some(&1)), "edge {from} to {to}");
+        }
+    }
+
+    fn volume(mesh: &Mesh) -> f64 {
+        let signed = |i: usize| {
+            let [a, b, c] = mesh.corners(i);
+            a.dot(b.cross(c)) / 6.0
+        };
+        (0..mesh.triangles.len()).map(signed).sum()
+    }
+
+    #[test]
+    fn blobs_have_the_triangles_asked_for_and_are_closed() {
+        for triangles in [128, 130, 199, 200, 1_000, 1_024, 9_998, 10_000, 100_000] {
+            let mesh = blob(triangles, 7).build(Wanted::NOTHING).unwrap();
+            let expected = usize::try_from(triangles.next_multiple_of(2)).unwrap();
+            assert_eq!(mesh.triangles.len(), expected);
+            assert_eq!(mesh.positions.len(), expected / 2 + 2, "Euler's formula");
+            assert_closed(&mesh);
+        }
+        for (asked, has) in [(1, 8), (8, 8), (9, 32), (33, 72), (100, 128)] {
+            let mesh = blob(asked, 7).build(Wanted::NOTHING).unwrap();
+            assert_eq!(mesh.triangles.len(), has, "{asked}");
+            assert_closed(&mesh);
+        }
+    }
+
+    #[test]
+    fn a_sphere_is_round_and_faces_outwards() {
+        let sphere = ShapeSpec::Sphere { radius: Metres(2.0), triangles: 20_000 };
+        let mesh = sphere.build(Wanted::EVERYTHING).unwrap();
+        let normals = mesh.normals.as_ref().unwrap();
+        for i in 0..mesh.positions.len() {
+            let p = mesh.positions.get(i);
+            assert!((p.length() - 2.0).abs() < 3e-7, "rounded to f32: {p}");
+            let normal = DVec3::from(normals.get(i).map(f64::from));
+            assert!((normal - p / 2.0).length() < 3e-7, "{normal} at {p}");
+        }
+        let exact = 4.0 / 3.0 * std::f64::consts::PI * 8.0;
+        // A facet of edge h ≈ √(16π r²/√3/20000) = 0.076 lies up to h²/6r below the sphere.
+        let missing = 1.0 - volume(&mesh) / exact;
+        assert!((0.0..1.5e-3).contains(&missing), "{missing}");
+        let small = (0..mesh.triangles.len()).map(|i| {
+            let [a, b, c] = mesh.corners(i);
+            (b - a).cross(c - a).length() / 2.0
+        });
+        let (low, high) = small.fold((f64::INFINITY, 0.0_f64), |(l, h), a| (l.min(a), h.max(a)));
+        // A cut halves a triangle; rings differ in area by π/2 over 4/π.
+        assert!(high / low < 5.0, "{low} to {high}");
+    }
+
+    #[test]
+    fn normals_of_a_blob_are_those_of_its_surface() {
+        let mesh = blob(200_000, 3).build(Wanted::EVERYTHING).unwrap();
+        assert!(volume(&mesh) > 0.0);
+        let normals = mesh.normals.as_ref().unwrap();
+        let mut worst: f64 = 1.0;
+        for (i, triangle) in mesh.triangles.iter().enumerate() {
+            let [a, b, c] = mesh.corners(i);
+            let flat = (b - a).cross(c - a).normalize();
+            let mean: DVec3 =
+                triangle.iter().map(|&v| DVec3::from(normals.get(v as usize).map(f64::from))).sum();
+            worst = worst.min(flat.dot(mean.normalize()));
+        }
+        // Edges of 2.5 mm on waves of 4 cm and more bend by a few degrees at most.
+        assert!(worst > 5.0_f64.to_radians().cos(), "{worst}");
+    }
+
+    #[test]
+    fn texture_coordinates_run_around_once_and_down() {
+        let sphere = ShapeSpec::Sphere { radius: Metres(1.0), triangles: 1_000 };
+        let mesh = sphere.build(Wanted::EVERYTHING).unwrap();
+        let plain = sphere.build(Wanted::NOTHING).unwrap();
+        assert_eq!(mesh.triangles.len(), plain.triangles.len());
+        let uvs = &mesh.uvs[0];
+        for (triangle, bare) in mesh.triangles.iter().zip(plain.triangles.iter()) {
+            let us = triangle.map(|v| uvs.get(v as usize)[0]);
+            let (low, high) = us.iter().fold((1.0_f32, 0.0_f32), |(l, h), &u| (l.min(u), h.max(u)));
+            let span = high - low;
+            assert!(span <= 0.51, "no triangle runs back over the seam: {us:?}");
+            let at = |mesh: &Mesh, t: &[u32; 3]| t.map(|v| mesh.positions.get(v as usize));
+            assert_eq!(at(&mesh, triangle), at(&plain, bare), "the seam's doubles are in place");
+        }
+        assert_eq!(uvs.get(0), [0.5, 0.0], "the north pole");
+    }
+
+    #[test]
+    fn flat_shapes_face_as_documented() {
+        let mesh = ShapeSpec::Rectangle { width: Metres(4.0), height: Metres(2.0) }
+            .build(Wanted::EVERYTHING)
+            .unwrap();
+        assert_eq!(mesh.bounds.min, DVec3::new(-2.0, -1.0, 0.0));
+        assert_eq!(mesh.bounds.max, DVec3::new(2.0, 1.0, 0.0));
+        for i in 0..2 {
+            let [a, b, c] = mesh.corners(i);
+            assert_eq!((b - a).cross(c - a), DVec3::Z * 8.0);
+        }
+        let upper_left = (0..4).find(|&i| mesh.positions.get(i) == DVec3::new(-2.0, 1.0, 0.0));
+        assert_eq!(mesh.uvs[0].get(upper_left.unwrap()), [0.0, 0.0]);
+
+        let size = [Metres(1.0), Metres(2.0), Metres(3.0)];
+        let mesh = ShapeSpec::Box { size }.build(Wanted::EVERYTHING).unwrap();
+        assert_eq!((mesh.triangles.len(), volume(&mesh)), (12, 6.0));
+        let normals = mesh.normals.as_ref().unwrap();
+        for (i, triangle) in mesh.triangles.iter().enumerate() {
+            let [a, b, c] = mesh.corners(i);
+            let normal = DVec3::from(normals.get(triangle[0] as usize).map(f64::from));
+            assert_eq!((b - a).cross(c - a).normalize(), normal);
+        }
+
+        let disk = ShapeSpec::Disk { radius: Metres(2.0), triangles: 4_096 };
+        let mesh = disk.build(Wanted::EVERYTHING).unwrap();
+        assert_eq!(mesh.triangles.len(), 4_096);
+        let area: f64 = (0..mesh.triangles.len())
+            .map(|i| mesh.corners(i))
+            .map(|[a, b, c]| (b - a).cross(c - a).z / 2.0)
+            .sum();
+        // A polygon of 128 corners: (n/2) r² sin(2π/n), and coordinates rounded to f32.
+        let polygon = 256.0 * (std::f64::consts::TAU / 128.0).sin();
+        assert!((area - polygon).abs() < 1e-6, "{area} {polygon}");
+    }
+
+    #[test]
+    fn seeds_differ_and_threads_do_not() {
+        let bits = |spec: &ShapeSpec| {
+            let mesh = spec.build(Wanted::EVERYTHING).unwrap();
+            let Positions::F32(v) = &mesh.positions else { panic!("shapes are f32") };
+            let normals = mesh.normals.unwrap();
+            v.floats()
+                .iter()
+                .chain(normals.floats().iter())
+                .map(|x| x.to_bits())
+                .collect::<Vec<_>>()
+        };
+        let one = bits(&blob(50_000, 1));
+        assert_ne!(one, bits(&blob(50_000, 2)));
+        for threads in [1, 3, 7] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert!(pool.install(|| bits(&blob(50_000, 1))) == one, "{threads} threads");
+        }
+    }
+
+    #[test]
+    fn files_name_shapes_and_impossible_ones_are_refused() {
+        let read = |json: &str| serde_json::from_str::<ShapeSpec>(json);
+        let spec = read(r#"{"shape": "blob", "triangles": 1000, "seed": 7, "radius": "50 cm"}"#);
+        let expected =
+            ShapeSpec::Blob { radius: Metres(0.5), triangles: 1000, seed: 7, amplitude: 0.25 };
+        assert_eq!(spec.unwrap(), expected);
+        assert!(read(r#"{"shape": "box", "sizes": [1, 2, 3]}"#).is_err());
+        for (json, key) in [
+            (r#"{"shape": "sphere", "radius": 0}"#, "radius"),
+            (r#"{"shape": "sphere", "radius": -1}"#, "radius"),
+            (r#"{"shape": "disk", "triangles": 0}"#, "triangles"),
+            (r#"{"shape": "blob", "triangles": 99999999999}"#, "triangles"),
+            (r#"{"shape": "blob", "amplitude": 1}"#, "amplitude"),
+            (r#"{"shape": "box", "size": [1, 0, 1]}"#, "size"),
+            (r#"{"shape": "rectangle", "width": 1e30}"#, "width"),
+        ] {
+            assert_eq!(read(json).unwrap().build(Wanted::NOTHING).unwrap_err().key, key, "{json}");
+        }
+    }
+}

@@ -14,7 +14,25 @@ pub(super) struct Document {
     pub nodes: Vec<Node>,
     pub scenes: Vec<Scene>,
     pub cameras: Vec<Camera>,
+    pub has_animations: bool,
 }
+
+/// What crate `gltf` reads of the document.
+const READ: [&str; 13] = [
+    "asset",
+    "accessors",
+    "buffers",
+    "bufferViews",
+    "extensions",
+    "extensionsRequired",
+    "extensionsUsed",
+    "images",
+    "materials",
+    "meshes",
+    "samplers",
+    "scene",
+    "textures",
+];
 
 /// A node. A mesh, a camera, both or neither, below its parent by a matrix or by TRS.
 #[derive(Debug, Default, Deserialize)]
@@ -83,6 +101,7 @@ pub(super) fn parse(path: &Path, json: &[u8]) -> Result<Document, ImportError> {
         }
     })?;
     require_version_2(path, &rest)?;
+    let has_animations = rest.contains_key("animations");
     let mut taken = Map::new();
     for key in ["nodes", "scenes", "cameras"] {
         if let Some((key, value)) = rest.remove_entry(key) {
@@ -90,8 +109,11 @@ pub(super) fn parse(path: &Path, json: &[u8]) -> Result<Document, ImportError> {
         }
     }
     let InF64 { nodes, scenes, cameras } = typed(path, Value::Object(taken))?;
+    // The crate refuses documents for parts that are not wanted, as animations that extensions
+    // point elsewhere than to nodes.
+    rest.retain(|key, _| READ.contains(&key.as_str()));
     let root = typed(path, Value::Object(rest))?;
-    Ok(Document { root, nodes, scenes, cameras })
+    Ok(Document { root, nodes, scenes, cameras, has_animations })
 }
 
 fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), ImportError> {

@@ -27,10 +27,9 @@ const LOOK: &str = "surfaces are shown without it";
 /// What is known of an extension by its name; `None` for one that nobody has heard of here.
 fn support(name: &str) -> Option<Support> {
     Some(match name {
-        "KHR_mesh_quantization"
-        | "EXT_mesh_gpu_instancing"
-        | "KHR_texture_transform"
-        | "KHR_node_visibility" => Support::Full,
+        "KHR_mesh_quantization" | "EXT_mesh_gpu_instancing" | "KHR_texture_transform" => {
+            Support::Full
+        }
         "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
             Support::Encoded(DECOMPRESS)
         }
@@ -42,6 +41,7 @@ fn support(name: &str) -> Option<Support> {
         "KHR_materials_unlit" => Support::Without(
             "its surfaces are treated as any other; the flat layer shows them unlit",
         ),
+        "KHR_node_visibility" => Support::Without("nodes that it hides are shown"),
         "KHR_materials_variants" => Support::Without("the default variant is shown"),
         "KHR_materials_pbrSpecularGlossiness" => {
             Support::Without("the metallic-roughness values beside it are used")

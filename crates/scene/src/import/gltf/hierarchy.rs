@@ -4,7 +4,6 @@ use std::path::Path;
 
 use etendue_geometry::Transform;
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
-use serde_json::Value;
 
 use super::document::{Document, Node};
 use super::{Reader, damaged, instancing};
@@ -52,17 +51,6 @@ pub(super) fn walk(
                 "it has two parents or is its own ancestor; export the file again",
             ));
         }
-        if !is_visible(node) {
-            note::push(
-                notes,
-                Note::new(
-                    NoteKind::Extension,
-                    "KHR_node_visibility",
-                    "nodes that the file hides are left out, with all below them",
-                ),
-            );
-            continue;
-        }
         let model_from_node = model_from_parent.then_inner(&local(path, node, index)?);
         if let Some(mesh) = node.mesh {
             let model_from_node = if node.skin.is_some() {
@@ -101,12 +89,6 @@ fn roots(path: &Path, document: &Document) -> Result<Vec<usize>, ImportError> {
             format!("there is no scene {default}; the file has {}", document.scenes.len()),
         )),
     }
-}
-
-/// `KHR_node_visibility`: visible unless it says otherwise.
-fn is_visible(node: &Node) -> bool {
-    let visible = node.extensions.get("KHR_node_visibility").and_then(|e| e.get("visible"));
-    visible.and_then(Value::as_bool).unwrap_or(true)
 }
 
 fn note_skin(notes: &mut Vec<Note>) {

@@ -68,7 +68,7 @@ pub(super) fn import(
     material::load(&reader, &mut import)?;
     hierarchy::place(&reader, &scene, &primitives, &mut import)?;
     import.cameras = scene.cameras;
-    if !document.root.animations.is_empty() {
+    if document.has_animations {
         note::push(
             &mut import.notes,
             note::Note::new(

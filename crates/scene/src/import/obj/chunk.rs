@@ -1,6 +1,7 @@
 //! One piece of an OBJ file: its vertices, faces and statements, with indices that are absolute
 //! already or still relative to the piece.
 
+use crate::import::precision::single;
 use crate::import::text::{Fault, Words, number, whole};
 
 /// The index of a corner that has none.
@@ -238,9 +239,4 @@ fn floats<const N: usize>(words: &mut Words<'_>, needed: usize) -> Result<[f64; 
 /// Text as UTF-8; what is not (older files are Latin-1) is replaced by signs that show it.
 fn string(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "rounded to f32, infinite where too large")]
-pub(super) fn single(value: f64) -> f32 {
-    value as f32
 }

@@ -55,11 +55,11 @@ pub(super) fn import(
         })
         .collect::<Result<_, _>>()
         .map_err(fault)?;
-    pool::settle(&mut chunks)
-        .map_err(|chunk| pool::find_bad_index(&pieces, chunk, &chunks))
+    let missing = pool::settle(&mut chunks, options.strictness)
+        .map_err(|chunk| pool::find_bad_index(&pieces, chunk, &chunks, options.strictness))
         .map_err(fault)?;
     let mut import = Import::default();
-    note_leftovers(&chunks, &mut import.notes);
+    note_leftovers(&chunks, missing, &mut import.notes);
     let segments = segment::divide(&chunks);
     let pool = Pool::gather(&mut chunks);
     let libraries = segment::libraries(&chunks);
@@ -112,7 +112,11 @@ fn heap_bytes(mesh: &Mesh) -> u64 {
     (positions + mesh.triangles.heap_bytes() + uvs + normals + colors) as u64
 }
 
-fn note_leftovers(chunks: &[Chunk], notes: &mut Vec<Note>) {
+fn note_leftovers(chunks: &[Chunk], missing: u64, notes: &mut Vec<Note>) {
+    if missing > 0 {
+        let message = "texture coordinates and normals that do not exist are left out";
+        note::push(notes, Note::new(NoteKind::Irregular, "f", message).counted(missing));
+    }
     let lines: u64 = chunks.iter().map(|chunk| chunk.without_surface).sum();
     if lines > 0 {
         let message = "points and lines have no surface and are left out";

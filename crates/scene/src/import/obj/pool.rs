@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::chunk::{Chunk, KINDS, NONE, V, VN, VT};
+use crate::import::Strictness;
 use crate::import::text::{Fault, Words, whole};
 
 /// Everything that corners name, in the order of the file.
@@ -59,35 +60,49 @@ fn bases(chunks: &[Chunk]) -> (Vec<[usize; KINDS]>, [usize; KINDS]) {
 }
 
 /// Makes all indices absolute and checks that what they name exists; on failure, a chunk that names
-/// what does not.
-pub(super) fn settle(chunks: &mut [Chunk]) -> Result<(), usize> {
+/// what does not. Texture coordinates and normals that do not exist are left out unless under
+/// strict rules; so many there were.
+pub(super) fn settle(chunks: &mut [Chunk], strictness: Strictness) -> Result<u64, usize> {
     let (bases, total) = bases(chunks);
     let settle_chunk = |(chunk, base): (&mut Chunk, &[usize; KINDS])| {
         for (kind, corner, local) in std::mem::take(&mut chunk.relative) {
             let index = i64::try_from(base[kind]).ok().and_then(|base| base.checked_add(local));
             let index = index.and_then(|index| u32::try_from(index).ok());
-            chunk.corners[kind][corner] = index.filter(|&index| index != NONE)?;
+            // As large as an index can be: it names nothing either.
+            chunk.corners[kind][corner] = index.unwrap_or(NONE - 1);
         }
+        let mut missing = 0;
         for (kind, indices) in chunk.corners.iter_mut().enumerate() {
-            if kind != V && !indices.is_empty() {
-                indices.resize(indices.len().max(0), NONE);
+            let is_missing = |&index: &u32| index != NONE && index as usize >= total[kind];
+            if !indices.par_iter().any(is_missing) {
+                continue;
             }
-            let highest = indices.iter().copied().filter(|&index| index != NONE).max();
-            if highest.is_some_and(|highest| highest as usize >= total[kind]) {
+            if kind == V || strictness == Strictness::Strict {
                 return None;
             }
+            for index in indices.iter_mut().filter(|index| is_missing(index)) {
+                *index = NONE;
+                missing += 1;
+            }
         }
-        Some(())
+        Some(missing)
     };
-    let settled: Vec<Option<()>> = chunks.par_iter_mut().zip(&bases).map(settle_chunk).collect();
-    match settled.iter().position(Option::is_none) {
-        Some(chunk) => Err(chunk),
-        None => Ok(()),
+    let settled: Vec<Option<u64>> = chunks.par_iter_mut().zip(&bases).map(settle_chunk).collect();
+    let mut missing = 0;
+    for (chunk, settled) in settled.into_iter().enumerate() {
+        missing += settled.ok_or(chunk)?;
     }
+    Ok(missing)
 }
 
 /// Where in chunk number `chunk` an index names what does not exist.
-pub(super) fn find_bad_index(pieces: &[(usize, &[u8])], chunk: usize, chunks: &[Chunk]) -> Fault {
+pub(super) fn find_bad_index(
+    pieces: &[(usize, &[u8])],
+    chunk: usize,
+    chunks: &[Chunk],
+    strictness: Strictness,
+) -> Fault {
+    let kinds = if strictness == Strictness::Strict { KINDS } else { V + 1 };
     let (bases, total) = bases(chunks);
     let (start, text) = pieces[chunk];
     let mut defined = bases[chunk];
@@ -99,7 +114,7 @@ pub(super) fn find_bad_index(pieces: &[(usize, &[u8])], chunk: usize, chunks: &[
             Some(b"vn") => defined[VN] += 1,
             Some(b"f" | b"fo") => {
                 while let Some(word) = words.word() {
-                    if let Some(reason) = bad_corner(word, defined, total) {
+                    if let Some(reason) = bad_corner(word, kinds, defined, total) {
                         return Fault::new(start + words.at() - word.len(), reason);
                     }
                 }
@@ -111,9 +126,14 @@ pub(super) fn find_bad_index(pieces: &[(usize, &[u8])], chunk: usize, chunks: &[
     Fault::new(start, "a face names a vertex that does not exist")
 }
 
-fn bad_corner(word: &[u8], defined: [usize; KINDS], total: [usize; KINDS]) -> Option<String> {
+fn bad_corner(
+    word: &[u8],
+    kinds: usize,
+    defined: [usize; KINDS],
+    total: [usize; KINDS],
+) -> Option<String> {
     let names = ["vertices", "texture coordinates", "normals"];
-    for (kind, part) in word.split(|&byte| byte == b'/').enumerate().take(KINDS) {
+    for (kind, part) in word.split(|&byte| byte == b'/').enumerate().take(kinds) {
         let Some(index) = whole(part) else { continue };
         let count = i64::try_from(total[kind]).ok()?;
         let before = i64::try_from(defined[kind]).ok()?;

@@ -3,19 +3,16 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use etendue_geometry::Vertices;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Positions, Vertices};
 use rayon::prelude::*;
 
-use super::chunk::{Chunk, NONE, Polygon, V, VN, VT, single};
+use super::chunk::{Chunk, NONE, Polygon, V, VN, VT};
 use super::pool::Pool;
 use super::segment::Segment;
 use crate::import::admit::Candidate;
 use crate::import::polygon;
-
-/// Rounding to f32 may move a vertex by this fraction of the mesh's diagonal; farther, and the
-/// mesh keeps f64.
-const MOST_ROUNDING: f64 = 1e-7;
+use crate::import::precision::precise_enough;
 
 /// Makes meshes from segments.
 pub(super) struct Welder<'a> {
@@ -36,7 +33,11 @@ impl<'a> Welder<'a> {
     pub(super) fn mesh(&mut self, segment: &Segment, path: &Path, only: bool) -> Candidate {
         let corners = self.corners(segment);
         let has = |kind: usize| {
-            segment.runs.iter().any(|(chunk, _)| !self.chunks[*chunk].corners[kind].is_empty())
+            segment.runs.iter().any(|(chunk, range)| {
+                let indices = &self.chunks[*chunk].corners[kind];
+                let end = range.end.min(indices.len());
+                indices.get(range.start..end).is_some_and(|run| run.iter().any(|&i| i != NONE))
+            })
         };
         let (has_uvs, has_normals) = (has(VT), has(VN));
         let in_order = only && !has_uvs && !has_normals;
@@ -48,11 +49,11 @@ impl<'a> Welder<'a> {
         };
         let pool = self.pool;
         let positions = match &keys {
-            None => precise_enough(&pool.positions),
+            None => precise_enough(pool.positions.clone()),
             Some(keys) => {
                 let used: Vec<[f64; 3]> =
                     keys.iter().map(|key| pool.positions[key[V] as usize]).collect();
-                precise_enough(&used)
+                precise_enough(used)
             }
         };
         let keys = keys.as_deref();
@@ -150,29 +151,6 @@ fn pick<const N: usize>(
         .map(|key| values.get(key[kind] as usize).copied().unwrap_or(instead))
         .collect();
     Vertices::from_arrays(&picked)
-}
-
-/// The positions in f32, or in f64 where rounding would move one too far.
-fn precise_enough(positions: &[[f64; 3]]) -> Positions {
-    let finite = |p: &&[f64; 3]| p.iter().all(|x| x.is_finite());
-    let bounds = positions
-        .par_chunks(1 << 14)
-        .map(|chunk| {
-            let mut bounds = Bounds::EMPTY;
-            chunk.iter().filter(finite).for_each(|&p| bounds.include(p.into()));
-            bounds
-        })
-        .reduce(|| Bounds::EMPTY, Bounds::union);
-    let most = MOST_ROUNDING * bounds.diagonal();
-    let moved = |p: &[f64; 3]| {
-        let rounded = p.map(|x| f64::from(single(x)));
-        DVec3::from(rounded).distance(DVec3::from(*p))
-    };
-    if positions.par_iter().filter(finite).any(|p| moved(p) > most) {
-        return Positions::F64(positions.to_vec().into());
-    }
-    let rounded: Vec<[f32; 3]> = positions.par_iter().map(|p| p.map(single)).collect();
-    Positions::F32(Vertices::from_arrays(&rounded))
 }
 
 /// The file's name without its ending.

@@ -1,0 +1,178 @@
+//! The header: what elements follow, and how they are written.
+
+use crate::import::text::{Fault, Words, whole};
+
+/// How the data is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Format {
+    Text,
+    Binary(Order),
+}
+
+/// Byte order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Order {
+    Little,
+    Big,
+}
+
+/// A type of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Type {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+/// A property: one number, or a list of them behind its length.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Property {
+    pub name: String,
+    /// The type of a list's length.
+    pub list: Option<Type>,
+    pub kind: Type,
+}
+
+/// Rows of the same properties.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Element {
+    pub name: String,
+    pub count: usize,
+    pub properties: Vec<Property>,
+}
+
+/// What the file says of itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Header {
+    pub format: Format,
+    pub elements: Vec<Element>,
+    /// Where the data starts (bytes).
+    pub data: usize,
+}
+
+impl Type {
+    fn parse(word: &[u8]) -> Option<Self> {
+        Some(match word {
+            b"char" | b"int8" => Self::I8,
+            b"uchar" | b"uint8" => Self::U8,
+            b"short" | b"int16" => Self::I16,
+            b"ushort" | b"uint16" => Self::U16,
+            b"int" | b"int32" => Self::I32,
+            b"uint" | b"uint32" => Self::U32,
+            b"float" | b"float32" => Self::F32,
+            b"double" | b"float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    /// Its size (bytes).
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+impl Element {
+    /// The number of the property with one of these names.
+    pub(super) fn find(&self, names: &[&str]) -> Option<usize> {
+        self.properties.iter().position(|property| names.contains(&property.name.as_str()))
+    }
+
+    /// The size of a row without lists (bytes); `None` where there is a list.
+    pub(super) fn fixed_size(&self) -> Option<usize> {
+        self.properties
+            .iter()
+            .map(|property| property.list.is_none().then(|| property.kind.size()))
+            .sum()
+    }
+}
+
+impl Header {
+    /// Reads the header at the start of `file`.
+    pub(super) fn parse(file: &[u8]) -> Result<Self, Fault> {
+        let mut words = Words::new(file);
+        if words.word() != Some(b"ply") {
+            return Err(Fault::new(0, "a PLY file starts with the line `ply`; this one does not"));
+        }
+        words.end_line();
+        let (mut format, mut elements) = (None, Vec::new());
+        while !words.is_done() {
+            let start = words.at();
+            match words.word() {
+                Some(b"format") => format = Some(parse_format(&mut words, start)?),
+                Some(b"element") => elements.push(parse_element(&mut words, start)?),
+                Some(b"property") => {
+                    let property = parse_property(&mut words, start)?;
+                    match elements.last_mut() {
+                        Some(Element { properties, .. }) => properties.push(property),
+                        None => return Err(Fault::new(start, "a property before any element")),
+                    }
+                }
+                Some(b"end_header") => {
+                    words.end_line();
+                    let Some(format) = format else {
+                        return Err(Fault::new(start, "the header has no `format` line"));
+                    };
+                    return Ok(Self { format, elements, data: words.at() });
+                }
+                Some(b"comment" | b"obj_info") | None => {}
+                Some(other) => {
+                    let text = String::from_utf8_lossy(&other[..other.len().min(20)]);
+                    return Err(Fault::new(
+                        start,
+                        format!("unknown word \"{text}\" in the header"),
+                    ));
+                }
+            }
+            words.end_line();
+        }
+        Err(Fault::new(file.len(), "the file ends inside its header; copy or export it again"))
+    }
+}
+
+fn parse_format(words: &mut Words<'_>, start: usize) -> Result<Format, Fault> {
+    match words.word() {
+        Some(b"ascii") => Ok(Format::Text),
+        Some(b"binary_little_endian") => Ok(Format::Binary(Order::Little)),
+        Some(b"binary_big_endian") => Ok(Format::Binary(Order::Big)),
+        _ => Err(Fault::new(
+            start,
+            "the format is none of ascii, binary_little_endian and binary_big_endian",
+        )),
+    }
+}
+
+fn parse_element(words: &mut Words<'_>, start: usize) -> Result<Element, Fault> {
+    let name = words.word();
+    let count = words.word().and_then(whole).and_then(|count| usize::try_from(count).ok());
+    match (name, count) {
+        (Some(name), Some(count)) => Ok(Element {
+            name: String::from_utf8_lossy(name).into_owned(),
+            count,
+            properties: Vec::new(),
+        }),
+        _ => Err(Fault::new(start, "an element needs a name and a whole number")),
+    }
+}
+
+fn parse_property(words: &mut Words<'_>, start: usize) -> Result<Property, Fault> {
+    let unknown = || Fault::new(start, "a property needs a type and a name");
+    let first = words.word().ok_or_else(unknown)?;
+    let (list, kind) = if first == b"list" {
+        let length = words.word().and_then(Type::parse).ok_or_else(unknown)?;
+        (Some(length), words.word().and_then(Type::parse).ok_or_else(unknown)?)
+    } else {
+        (None, Type::parse(first).ok_or_else(unknown)?)
+    };
+    let name = words.word().ok_or_else(unknown)?;
+    Ok(Property { name: String::from_utf8_lossy(name).into_owned(), list, kind })
+}

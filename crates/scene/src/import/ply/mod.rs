@@ -1,0 +1,86 @@
+//! PLY, the Stanford polygon format: binary of either byte order, or text.
+//!
+//! Little-endian f32 positions are used where they are mapped when the header's length happens to
+//! be a multiple of four; everything else is converted in parallel.
+//!
+//! Byte colours are taken as sRGB, as scanners write them, and float colours as linear. Texture
+//! coordinates are turned over, as in OBJ.
+//!
+//! # Sources
+//!
+//! Greg Turk, *The PLY polygon file format* (1994).
+
+mod binary;
+mod faces;
+mod header;
+mod text;
+mod vertices;
+
+use std::path::Path;
+
+use etendue_geometry::{Positions, Transform};
+use etendue_tracer::Material;
+
+use super::admit::{self, Candidate, cost};
+use super::files::Files;
+use super::text::Fault;
+use super::{Import, ImportError, ImportedPlacement, Options, Wanted};
+use header::{Format, Header};
+
+/// Reads the PLY file at `path`.
+pub(super) fn import(
+    path: &Path,
+    files: &Files,
+    wanted: Wanted,
+    options: &Options,
+) -> Result<Import, ImportError> {
+    let map = files.map(path)?;
+    let fault = |fault: Fault| fault.locate(path, map.bytes());
+    let header = Header::parse(map.bytes()).map_err(fault)?;
+    let damaged = |reason: String| ImportError::Damaged {
+        file: path.to_owned(),
+        place: "PLY data".to_owned(),
+        reason,
+    };
+    let (vertices, faces) = match header.format {
+        Format::Text => text::read(&map, &header, wanted).map_err(fault)?,
+        Format::Binary(order) => binary::read(&map, &header, order, wanted).map_err(damaged)?,
+    };
+    let triangles = faces.triangles(&vertices.positions);
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut import = Import::default();
+    let mut add = |(copied, mapped): (u64, u64)| {
+        import.stats.bytes_copied += copied;
+        import.stats.bytes_mapped += mapped;
+    };
+    match &vertices.positions {
+        Positions::F32(v) => add(cost(v.floats(), v.len() * 3)),
+        Positions::F64(v) => add(cost(v, v.len())),
+    }
+    add(cost(&triangles, triangles.len()));
+    vertices.normals.iter().for_each(|v| add(cost(v.floats(), v.len() * 3)));
+    vertices.uvs.iter().for_each(|v| add(cost(v.floats(), v.len() * 2)));
+    vertices.colors.iter().for_each(|v| add(cost(v.floats(), v.len() * 4)));
+    let candidate = Candidate {
+        place: format!("\"{name}\""),
+        name: name.clone(),
+        positions: vertices.positions,
+        triangles,
+        normals: vertices.normals,
+        uvs: vertices.uvs.into_iter().collect(),
+        colors: vertices.colors,
+    };
+    let admitted = admit::admit(candidate, path, options)?;
+    import.stats.dropped = admitted.dropped;
+    import.stats.degenerate = options.count_degenerate.then_some(admitted.degenerate);
+    import.notes.extend(admitted.notes);
+    import.meshes.push(admitted.mesh);
+    import.materials.push(Material::unnamed());
+    import.placements.push(ImportedPlacement {
+        mesh: 0,
+        material: 0,
+        model_from_mesh: Transform::IDENTITY,
+        name,
+    });
+    Ok(import)
+}
