@@ -15,6 +15,8 @@
 mod arena;
 mod fold;
 mod lanes;
+mod packet;
+mod placed;
 mod ray;
 mod single;
 mod traverse;
@@ -26,7 +28,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_geometry::glam::Vec3;
-use etendue_geometry::{Bounds, Geometry, HitBatch, RayBatch};
+use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
 use rayon::prelude::*;
 
 use self::fold::{Instances, Triangles, fold};
@@ -163,23 +165,17 @@ impl Shape {
         let leaf = Triangles {
             part,
             geometry,
-            placements: matches!(owner, Owner::Leaf),
+            only: match owner {
+                Owner::Placement(placement) => Some(part.source(geometry, placement)),
+                Owner::Instance => Some(part.source(geometry, MISS)),
+                Owner::Leaf => None,
+            },
             units: Units::of(part.frame),
             is_exact: part.is_unturned(geometry).into(),
         };
         let tree = fold(&tree, &leaf).ok_or_else(|| part.too_large(geometry, "bvh"))?;
         let units = leaf.is_exact.into_inner().then_some(leaf.units);
         Ok(Self { tree, owner, units })
-    }
-
-    /// The placement of all triangles as part of `instance`, where it is the same.
-    #[inline(always)]
-    fn only(&self, instance: &Instance) -> Option<u32> {
-        match self.owner {
-            Owner::Placement(placement) => Some(placement),
-            Owner::Instance => Some(instance.placement),
-            Owner::Leaf => None,
-        }
     }
 
     fn bounds(&self) -> Bounds {

@@ -97,7 +97,7 @@ impl Exact {
     fn test(&self, query: &Query, placement: u32, triangle: u32) -> Option<crate::watertight::Hit> {
         let placement = &self.geometry.placements[placement as usize];
         let corners = self.geometry.mesh_of(placement).corners(triangle as usize);
-        query.test(&View::new(&placement.world_from_mesh, query.origin), corners)
+        query.test(&View::new(&placement.world_from_mesh), corners)
     }
 
     /// Shows every triangle near the ray to `see`, roughly from near to far, which answers how far

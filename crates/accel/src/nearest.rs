@@ -33,36 +33,31 @@ impl Query {
 
     /// The exact answer for one triangle, given by its corners in the mesh's frame.
     #[inline(always)]
-    pub(crate) fn test(&self, view: &View, [a, b, c]: [DVec3; 3]) -> Option<watertight::Hit> {
-        let [a, b, c] = [view.corner(a), view.corner(b), view.corner(c)];
+    pub(crate) fn test(&self, view: &View<'_>, [a, b, c]: [DVec3; 3]) -> Option<watertight::Hit> {
+        let offset = view.transform.offset_from(self.origin);
+        let [a, b, c] = [view.turned(a) + offset, view.turned(b) + offset, view.turned(c) + offset];
         let hit = watertight::intersect(a, b, c, self.direction)?;
         (hit.t >= self.t_min && hit.t <= self.t_max).then_some(hit)
     }
 }
 
-/// A placement as seen from a ray's origin: [`Transform::point_from`] with what all corners share
-/// worked out.
+/// A placement's transform, applied as [`Transform::point_from`] does but once for all corners.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct View {
-    linear: DMat3,
-    offset: DVec3,
+pub(crate) struct View<'a> {
+    transform: &'a Transform,
     is_parallel: bool,
 }
 
-impl View {
+impl<'a> View<'a> {
     #[inline(always)]
-    pub(crate) fn new(transform: &Transform, origin: DVec3) -> Self {
-        let linear = transform.linear;
-        let is_parallel = linear == DMat3::IDENTITY;
-        Self { linear, offset: transform.offset_from(origin), is_parallel }
+    pub(crate) fn new(transform: &'a Transform) -> Self {
+        Self { transform, is_parallel: transform.linear == DMat3::IDENTITY }
     }
 
-    /// A corner of the mesh, from the ray's origin (m).
     #[inline(always)]
-    fn corner(&self, corner: DVec3) -> DVec3 {
+    fn turned(&self, corner: DVec3) -> DVec3 {
         // Multiplying by ones and adding zeros is exact.
-        let turned = if self.is_parallel { corner } else { self.linear * corner };
-        turned + self.offset
+        if self.is_parallel { corner } else { self.transform.linear * corner }
     }
 }
 

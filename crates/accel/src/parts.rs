@@ -11,7 +11,7 @@
 //! culled that the exact test would hit.
 
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Bounds, Geometry, MISS, Placement};
+use etendue_geometry::{Bounds, Geometry, MISS, Placement, Positions, Transform};
 
 use crate::tree::Ref;
 use crate::{BuildError, BuildOptions};
@@ -38,6 +38,20 @@ impl Frame {
         let reach = (bounds.max - origin).abs().max((bounds.min - origin).abs()).max_element();
         let origin = if origin.is_finite() { origin } else { DVec3::ZERO };
         Self { origin, scale: reciprocal_power(reach) }
+    }
+}
+
+impl Frame {
+    /// A point of the mesh whose frame this is.
+    #[inline(always)]
+    fn local(&self, point: DVec3) -> DVec3 {
+        (point - self.origin) * self.scale
+    }
+
+    /// A point of a mesh that `transform` places in the world.
+    #[inline(always)]
+    fn baked(&self, transform: &Transform, point: DVec3) -> DVec3 {
+        transform.point_from(point, self.origin) * self.scale
     }
 }
 
@@ -384,33 +398,40 @@ impl Part {
     }
 
     /// The corners of a triangle in this part's frame.
-    #[inline]
     pub(crate) fn corners(&self, geometry: &Geometry, placement: u32, triangle: u32) -> [DVec3; 3] {
-        let Frame { origin, scale } = self.frame;
         match &self.members {
-            Members::Mesh(mesh) => geometry.meshes[*mesh as usize]
-                .corners(triangle as usize)
-                .map(|corner| (corner - origin) * scale),
+            Members::Mesh(mesh) => {
+                let corners = geometry.meshes[*mesh as usize].corners(triangle as usize);
+                corners.map(|corner| self.frame.local(corner))
+            }
             Members::Baked(_) => {
                 let placement = &geometry.placements[placement as usize];
                 let corners = geometry.mesh_of(placement).corners(triangle as usize);
-                corners.map(|p| placement.world_from_mesh.point_from(p, origin) * scale)
+                corners.map(|corner| self.frame.baked(&placement.world_from_mesh, corner))
             }
         }
     }
 
-    /// The corners of a triangle in its mesh's frame.
-    pub(crate) fn local_corners(
-        &self,
-        geometry: &Geometry,
-        placement: u32,
-        triangle: u32,
-    ) -> [DVec3; 3] {
-        let mesh = match &self.members {
-            Members::Mesh(mesh) => *mesh,
-            Members::Baked(_) => geometry.placements[placement as usize].mesh,
+    /// Where the triangles of one of this part's meshes are.
+    pub(crate) fn source<'a>(&self, geometry: &'a Geometry, placement: u32) -> Source<'a> {
+        let (mesh, transform) = match &self.members {
+            Members::Mesh(mesh) => (*mesh, None),
+            Members::Baked(_) => {
+                let placement = &geometry.placements[placement as usize];
+                let transform = &placement.world_from_mesh;
+                (placement.mesh, (!transform.is_identity()).then_some(transform))
+            }
         };
-        geometry.meshes[mesh as usize].corners(triangle as usize)
+        let mesh = &geometry.meshes[mesh as usize];
+        Source {
+            frame: self.frame,
+            transform,
+            triangles: &mesh.triangles,
+            positions: match &mesh.positions {
+                Positions::F32(vertices) => Slice::F32(vertices.floats(), vertices.stride()),
+                Positions::F64(vertices) => Slice::F64(vertices),
+            },
+        }
     }
 
     /// Whether all corners go into this part's frame without being turned or stretched.
@@ -427,24 +448,67 @@ impl Part {
     /// mesh) and its number.
     pub(crate) fn refs(&self, geometry: &Geometry) -> Vec<Ref> {
         use rayon::prelude::*;
-        let mut refs = Vec::new();
-        let mut append = |placement: u32, mesh: u32| {
-            let count = geometry.meshes[mesh as usize].triangles.len();
-            refs.par_extend((0..index(count)).into_par_iter().map(|triangle| {
-                let corners = self.corners(geometry, placement, triangle);
-                let (lo, hi) = outward(corners);
+        let mut refs = Vec::with_capacity(self.len(geometry));
+        let mut append = |placement: u32| {
+            let source = self.source(geometry, placement);
+            let count = index(source.triangles.len());
+            refs.par_extend((0..count).into_par_iter().with_min_len(1 << 12).map(|triangle| {
+                let (lo, hi) = outward(source.corners(triangle));
                 Ref { lo, first: placement, hi, second: triangle }
             }));
         };
         match &self.members {
-            Members::Mesh(mesh) => append(MISS, *mesh),
-            Members::Baked(placements) => {
-                for &i in placements {
-                    append(i, geometry.placements[i as usize].mesh);
-                }
-            }
+            Members::Mesh(_) => append(MISS),
+            Members::Baked(placements) => placements.iter().copied().for_each(append),
         }
         refs
+    }
+}
+
+/// The triangles of one mesh on their way into a frame, for loops over many.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Source<'a> {
+    frame: Frame,
+    /// `None` when it changes nothing, or when the frame is the mesh's own.
+    transform: Option<&'a Transform>,
+    triangles: &'a [[u32; 3]],
+    positions: Slice<'a>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Slice<'a> {
+    F32(&'a [f32], usize),
+    F64(&'a [[f64; 3]]),
+}
+
+impl Source<'_> {
+    /// The corners of a triangle in the mesh's frame.
+    #[inline(always)]
+    pub(crate) fn local_corners(&self, triangle: u32) -> [DVec3; 3] {
+        let [a, b, c] = self.triangles[triangle as usize];
+        [self.position(a), self.position(b), self.position(c)]
+    }
+
+    /// The corners of a triangle in the part's frame.
+    #[inline(always)]
+    pub(crate) fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        let [a, b, c] = self.local_corners(triangle);
+        match self.transform {
+            None => [self.frame.local(a), self.frame.local(b), self.frame.local(c)],
+            Some(t) => [self.frame.baked(t, a), self.frame.baked(t, b), self.frame.baked(t, c)],
+        }
+    }
+
+    #[inline(always)]
+    fn position(&self, i: u32) -> DVec3 {
+        match self.positions {
+            Slice::F32(floats, stride) => {
+                let start = i as usize * stride;
+                let p = &floats[start..start + 3];
+                DVec3::new(p[0].into(), p[1].into(), p[2].into())
+            }
+            Slice::F64(positions) => positions[i as usize].into(),
+        }
     }
 }
 

@@ -109,7 +109,7 @@ impl Tree {
         if refs.is_empty() {
             return Ok(Self { nodes: Vec::new(), refs });
         }
-        let mut spare = if refs.len() >= WIDE_NODE { refs.clone() } else { Vec::new() };
+        let mut spare = vec![Ref::zeroed(); if refs.len() >= WIDE_NODE { refs.len() } else { 0 }];
         let extent = Extent::of(&refs);
         let grown = Task { leaf, watch }.grow(&mut refs, &mut spare, 0, 0, extent)?;
         drop(spare);
@@ -159,6 +159,14 @@ impl Extent {
         self.hi = self.hi.max(hi);
         self.centroid_lo = self.centroid_lo.min(centroid);
         self.centroid_hi = self.centroid_hi.max(centroid);
+    }
+
+    fn include_centroids(&mut self, refs: &[Ref]) {
+        for r in refs {
+            let [lo, hi] = r.corners();
+            self.centroid_lo = self.centroid_lo.min(lo + hi);
+            self.centroid_hi = self.centroid_hi.max(lo + hi);
+        }
     }
 
     fn union(self, other: Self) -> Self {
@@ -233,11 +241,14 @@ impl Task<'_> {
     ) -> Result<Grown, BuildError> {
         if refs.len() < PARALLEL_NODE {
             let mut nodes = Vec::with_capacity(refs.len());
-            self.grow_alone(refs, first, depth, extent, &mut nodes);
+            let mut bins = Bins::EMPTY;
+            self.grow_alone(refs, first, depth, extent, &mut (&mut nodes, &mut bins));
             self.watch.advance(refs.len() as u64)?;
             return Ok(Grown::Nodes(nodes));
         }
-        let [left, right] = self.divide(refs, spare, depth, &extent).unwrap_or_else(|| halve(refs));
+        let mut bins = Bins::EMPTY;
+        let sides = self.divide(refs, spare, depth, &extent, &mut bins);
+        let [left, right] = sides.unwrap_or_else(|| halve(refs));
         let spare_middle = if spare.is_empty() { 0 } else { left.len };
         let (a, b) = refs.split_at_mut(left.len);
         let (spare_a, spare_b) = spare.split_at_mut(spare_middle);
@@ -255,9 +266,10 @@ impl Task<'_> {
         first: usize,
         depth: usize,
         extent: Extent,
-        nodes: &mut Vec<Node>,
+        work: &mut (&mut Vec<Node>, &mut Bins),
     ) {
-        let sides = match self.divide(refs, &mut [], depth, &extent) {
+        let (nodes, bins) = work;
+        let sides = match self.divide(refs, &mut [], depth, &extent, bins) {
             None if refs.len() <= self.leaf.most => {
                 nodes.push(extent.node(index(first), index(refs.len())));
                 return;
@@ -269,9 +281,9 @@ impl Task<'_> {
         nodes.push(extent.node(0, 0));
         let [left, right] = sides;
         let (a, b) = refs.split_at_mut(left.len);
-        self.grow_alone(a, first, depth + 1, left.extent, nodes);
-        nodes[at].link = index(nodes.len() - at);
-        self.grow_alone(b, first + left.len, depth + 1, right.extent, nodes);
+        self.grow_alone(a, first, depth + 1, left.extent, work);
+        work.0[at].link = index(work.0.len() - at);
+        self.grow_alone(b, first + left.len, depth + 1, right.extent, work);
     }
 
     /// Splits by the surface-area heuristic and moves `refs` accordingly. `None` when a leaf is
@@ -282,6 +294,7 @@ impl Task<'_> {
         spare: &mut [Ref],
         depth: usize,
         extent: &Extent,
+        bins: &mut Bins,
     ) -> Option<[Side; 2]> {
         let smallest = self.leaf.block.min(self.leaf.most);
         if refs.len() <= smallest || depth >= SAH_DEPTH {
@@ -289,12 +302,12 @@ impl Task<'_> {
         }
         let grid = Grid::new(extent, refs.len());
         let wide = refs.len() >= WIDE_NODE;
-        let bins = if wide {
-            let bin = |chunk: &[Ref]| Bins::fill(&grid, chunk);
-            refs.par_chunks(CHUNK).map(bin).reduce_with(|a, b| a.merge(&b, &grid))?
+        if wide {
+            let bin = |chunk: &[Ref]| Bins::EMPTY.filled(&grid, chunk);
+            *bins = refs.par_chunks(CHUNK).map(bin).reduce_with(|a, b| a.merge(&b, &grid))?;
         } else {
-            Bins::fill(&grid, refs)
-        };
+            bins.fill(&grid, refs);
+        }
         let split = bins.cheapest(&grid, self.leaf.block)?;
         let blocks = refs.len().div_ceil(self.leaf.block) as f32;
         if refs.len() <= self.leaf.most {
@@ -307,7 +320,7 @@ impl Task<'_> {
         Some(if wide {
             partition_wide(refs, spare, &grid, split)
         } else {
-            partition(refs, &grid, split)
+            partition(refs, &grid, split, bins)
         })
     }
 }
@@ -329,7 +342,7 @@ struct Grid {
     start: Vec4,
     /// Bins per length; 0 along an axis without extent.
     scale: Vec4,
-    last: i32,
+    last: usize,
 }
 
 #[derive(Clone, Copy)]
@@ -344,23 +357,24 @@ impl Grid {
     fn new(extent: &Extent, len: usize) -> Self {
         let bins = (4 + len / 20).min(BINS);
         let size = extent.centroid_hi - extent.centroid_lo;
-        // A little less than the number of bins, so that rounding never leads past the last.
-        let scale = size.to_array().map(|size| {
-            let scale = 0.99 * bins as f32 / size;
+        let scale = |size: f32| {
+            let scale = (bins - 1) as f32 / size;
             if size > 0.0 && scale.is_finite() { scale } else { 0.0 }
-        });
-        let last = i32::try_from(bins).unwrap_or(i32::MAX) - 1;
-        Self { start: extent.centroid_lo, scale: Vec4::from_array(scale), last }
+        };
+        let scale = Vec4::new(scale(size.x), scale(size.y), scale(size.z), 0.0);
+        Self { start: extent.centroid_lo, scale, last: bins - 1 }
     }
 
-    #[inline]
-    #[expect(clippy::cast_possible_truncation, reason = "bins are few, and the cast saturates")]
+    /// The bins along the three axes, 0 to `last`.
+    #[inline(always)]
     fn bins(&self, [lo, hi]: [Vec4; 2]) -> [usize; 3] {
-        let place = (lo + hi - self.start) * self.scale;
-        [place.x, place.y, place.z].map(|p| (p as i32).clamp(0, self.last) as usize)
+        // Added to 2²³, a number is rounded to a whole one, in the lowest bits.
+        let place = (lo + hi - self.start) * self.scale + Vec4::splat(8_388_608.0);
+        let [x, y, z, _] = place.to_array().map(|p| p.to_bits() as usize % BINS);
+        [x, y, z]
     }
 
-    #[inline]
+    #[inline(always)]
     fn is_left(&self, corners: [Vec4; 2], split: Split) -> bool {
         self.bins(corners)[split.axis] < split.bin
     }
@@ -375,29 +389,49 @@ struct Bins {
 }
 
 impl Bins {
-    fn fill(grid: &Grid, refs: &[Ref]) -> Self {
-        let mut bins = Self {
-            lo: [[Vec4::INFINITY; BINS]; 3],
-            hi: [[Vec4::NEG_INFINITY; BINS]; 3],
-            count: [[0; BINS]; 3],
-        };
+    const EMPTY: Self = Self {
+        lo: [[Vec4::INFINITY; BINS]; 3],
+        hi: [[Vec4::NEG_INFINITY; BINS]; 3],
+        count: [[0; BINS]; 3],
+    };
+
+    fn filled(mut self, grid: &Grid, refs: &[Ref]) -> Self {
+        self.fill(grid, refs);
+        self
+    }
+
+    /// Fills the bins of `grid` with `refs`; what was in them before is forgotten.
+    fn fill(&mut self, grid: &Grid, refs: &[Ref]) {
+        for axis in 0..3 {
+            self.lo[axis][..=grid.last].fill(Vec4::INFINITY);
+            self.hi[axis][..=grid.last].fill(Vec4::NEG_INFINITY);
+            self.count[axis][..=grid.last].fill(0);
+        }
         for r in refs {
             let corners = r.corners();
-            let places = grid.bins(corners);
-            for (axis, bin) in places.into_iter().enumerate() {
-                // Below BINS already; this tells the compiler.
-                let bin = bin % BINS;
-                bins.lo[axis][bin] = bins.lo[axis][bin].min(corners[0]);
-                bins.hi[axis][bin] = bins.hi[axis][bin].max(corners[1]);
-                bins.count[axis][bin] += 1;
+            for (axis, bin) in grid.bins(corners).into_iter().enumerate() {
+                self.lo[axis][bin] = self.lo[axis][bin].min(corners[0]);
+                self.hi[axis][bin] = self.hi[axis][bin].max(corners[1]);
+                self.count[axis][bin] += 1;
             }
         }
-        bins
+    }
+
+    /// The boxes of what lies in bins below and from `split` on.
+    fn sides(&self, grid: &Grid, split: Split) -> [Extent; 2] {
+        let union = |bins: std::ops::Range<usize>| {
+            bins.fold(Extent::EMPTY, |all, bin| Extent {
+                lo: all.lo.min(self.lo[split.axis][bin]),
+                hi: all.hi.max(self.hi[split.axis][bin]),
+                ..all
+            })
+        };
+        [union(0..split.bin), union(split.bin..grid.last + 1)]
     }
 
     fn merge(mut self, other: &Self, grid: &Grid) -> Self {
         for axis in 0..3 {
-            for bin in 0..=grid.last as usize {
+            for bin in 0..=grid.last {
                 self.lo[axis][bin] = self.lo[axis][bin].min(other.lo[axis][bin]);
                 self.hi[axis][bin] = self.hi[axis][bin].max(other.hi[axis][bin]);
                 self.count[axis][bin] += other.count[axis][bin];
@@ -409,7 +443,7 @@ impl Bins {
     /// The border with the least sum of areas, each times the blocks of refs on its side.
     fn cheapest(&self, grid: &Grid, block: usize) -> Option<Split> {
         let mut best: Option<Split> = None;
-        let last = grid.last as usize;
+        let last = grid.last;
         for axis in (0..3).filter(|&axis| grid.scale[axis] > 0.0) {
             let mut right_cost = [0.0_f32; BINS];
             let (mut lo, mut hi, mut count) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
@@ -443,21 +477,19 @@ fn cost(edges: Vec4, count: u32, block: usize) -> f32 {
 }
 
 /// Brings the left refs to the front, in place.
-fn partition(refs: &mut [Ref], grid: &Grid, split: Split) -> [Side; 2] {
-    let (mut left, mut right) = (Extent::EMPTY, Extent::EMPTY);
-    let (mut begin, mut end) = (0, refs.len());
-    while begin < end {
-        let corners = refs[begin].corners();
-        if grid.is_left(corners, split) {
-            left.include(corners);
-            begin += 1;
-        } else {
-            right.include(corners);
-            end -= 1;
-            refs.swap(begin, end);
-        }
+fn partition(refs: &mut [Ref], grid: &Grid, split: Split, bins: &Bins) -> [Side; 2] {
+    let mut len = 0;
+    // Swaps whether it must or not: which side a ref goes to cannot be predicted.
+    for i in 0..refs.len() {
+        let is_left = grid.is_left(refs[i].corners(), split);
+        refs.swap(len, i);
+        len += usize::from(is_left);
     }
-    [Side { len: begin, extent: left }, Side { len: refs.len() - begin, extent: right }]
+    let [mut left, mut right] = bins.sides(grid, split);
+    let (left_refs, right_refs) = refs.split_at(len);
+    left.include_centroids(left_refs);
+    right.include_centroids(right_refs);
+    [Side { len, extent: left }, Side { len: right_refs.len(), extent: right }]
 }
 
 /// As [`partition`], in parallel: every chunk is told where its left and right refs go.

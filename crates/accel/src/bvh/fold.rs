@@ -10,7 +10,7 @@ use super::arena::Arena;
 use super::wide::{
     Cell, Child, LEAF_CELLS, MOST_CELLS, MOST_IN_LEAF, NO_CHILDREN, Units, WideTree,
 };
-use crate::parts::Part;
+use crate::parts::{Part, Source};
 use crate::tree::{Ref, Tree};
 
 /// Writes the numbers of a leaf.
@@ -198,8 +198,8 @@ impl<'a, L: WriteLeaf> Fold<'a, L> {
 pub(super) struct Triangles<'a> {
     pub(super) part: &'a Part,
     pub(super) geometry: &'a Geometry,
-    /// Whether placements have to be told apart.
-    pub(super) placements: bool,
+    /// Where all triangles come from; `None` where placements have to be told apart.
+    pub(super) only: Option<Source<'a>>,
     /// How the mesh's coordinates would follow from the leaves', and whether they all do.
     pub(super) units: Units,
     pub(super) is_exact: AtomicBool,
@@ -212,25 +212,25 @@ impl WriteLeaf for Triangles<'_> {
         let was_exact = self.is_exact.load(Ordering::Relaxed);
         let mut is_exact = was_exact;
         for (i, r) in refs.iter().take(n).enumerate() {
-            let corners = self.part.corners(self.geometry, r.first, r.second);
-            for (k, corner) in corners.into_iter().enumerate() {
+            let source = match &self.only {
+                Some(source) => *source,
+                None => self.part.source(self.geometry, r.first),
+            };
+            for (k, corner) in source.corners(r.second).into_iter().enumerate() {
                 for (axis, coordinate) in corner.to_array().into_iter().enumerate() {
                     numbers[(3 * k + axis) * n + i] = coordinate as f32;
                 }
             }
             numbers[9 * n + i] = f32::from_bits(r.second);
-            if self.placements {
+            if self.only.is_none() {
                 numbers[10 * n + i] = f32::from_bits(r.first);
             }
-            if is_exact {
-                let original = self.part.local_corners(self.geometry, r.first, r.second);
-                is_exact = self.units.corners(numbers, n, i) == original;
-            }
+            is_exact &= self.units.corners(numbers, n, i) == source.local_corners(r.second);
         }
         if was_exact && !is_exact {
             self.is_exact.store(false, Ordering::Relaxed);
         }
-        if self.placements { 11 * n } else { 10 * n }
+        if self.only.is_some() { 10 * n } else { 11 * n }
     }
 }
 

@@ -147,6 +147,20 @@ impl<L: Lanes> BoxTest<L> {
 /// The axis after each.
 const NEXT: [usize; 3] = [1, 2, 0];
 
+/// The axes, with the longest of `direction` last.
+#[inline(always)]
+pub(super) fn axes(direction: Vec3) -> [usize; 3] {
+    let size = direction.abs();
+    let z = if size.x > size.y && size.x > size.z {
+        0
+    } else if size.y > size.z {
+        1
+    } else {
+        2
+    };
+    [NEXT[z], NEXT[NEXT[z]], z]
+}
+
 /// A ray against eight triangles, by S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle
 /// intersection", 2013: a shear that makes the ray the z axis, in which edges are lines past the
 /// origin. Here only to *reject*: what is kept is decided in f64.
@@ -165,15 +179,7 @@ impl<L: Lanes> TriangleTest<L> {
     #[inline(always)]
     pub(super) fn new(lanes: L, ray: &NarrowRay) -> Self {
         let d = ray.direction.to_array();
-        let size = ray.direction.abs();
-        let z = if size.x > size.y && size.x > size.z {
-            0
-        } else if size.y > size.z {
-            1
-        } else {
-            2
-        };
-        let [x, y] = [NEXT[z], NEXT[NEXT[z]]];
+        let [x, y, z] = axes(ray.direction);
         let inverse = 1.0 / d[z];
         let o = ray.origin.to_array();
         Self {
@@ -189,10 +195,31 @@ impl<L: Lanes> TriangleTest<L> {
     /// of `n` triangles, in runs of `n`.
     #[inline(always)]
     pub(super) fn maybe(&self, lanes: L, corners: &[f32], n: usize, far: f32) -> u32 {
-        let l = lanes;
-        let a = self.shear(l, corners, 0, n);
-        let b = self.shear(l, corners, 3, n);
-        let c = self.shear(l, corners, 6, n);
+        let a = self.shear(lanes, self.runs(lanes, corners, 0, n));
+        let b = self.shear(lanes, self.runs(lanes, corners, 3, n));
+        let c = self.shear(lanes, self.runs(lanes, corners, 6, n));
+        self.decide(lanes, [a, b, c], lanes.splat(far)) & ((1 << n) - 1)
+    }
+
+    /// Which of eight rays (this test being that of a different ray in each lane) may hit triangle
+    /// `i` of the `n` in `corners` before `far`.
+    #[inline(always)]
+    pub(super) fn maybe_rays(
+        &self,
+        lanes: L,
+        corners: &[f32],
+        n: usize,
+        i: usize,
+        far: L::F,
+    ) -> u32 {
+        let a = self.shear(lanes, self.copies(lanes, corners, 0, n, i));
+        let b = self.shear(lanes, self.copies(lanes, corners, 3, n, i));
+        let c = self.shear(lanes, self.copies(lanes, corners, 6, n, i));
+        self.decide(lanes, [a, b, c], far)
+    }
+
+    #[inline(always)]
+    fn decide(&self, l: L, [a, b, c]: [Sheared<L>; 3], far: L::F) -> u32 {
         let (u, v, w) = (edge(l, c, b), edge(l, a, c), edge(l, b, a));
         // Each product has two coordinates that are off by at most half the error.
         let sizes = l.add(l.add(size(l, a), size(l, b)), l.add(size(l, c), self.error));
@@ -205,18 +232,36 @@ impl<L: Lanes> TriangleTest<L> {
             (l.mul(a.z, self.shear[2]), l.mul(b.z, self.shear[2]), l.mul(c.z, self.shear[2]));
         let closest = l.min(l.min(az, bz), cz);
         let farthest = l.max(l.max(az, bz), cz);
-        let within = l.le(closest, l.add(l.splat(far), self.error)) & l.le(self.near, farthest);
-        inside & within & ((1 << n) - 1)
+        inside & l.le(closest, l.add(far, self.error)) & l.le(self.near, farthest)
     }
 
-    /// The corners whose coordinates begin with run `first`, as the ray sees them.
+    /// The coordinates of eight corners that begin with run `first`, along this test's axes.
     #[inline(always)]
-    fn shear(&self, l: L, corners: &[f32], first: usize, n: usize) -> Sheared<L> {
-        let x = l.sub(run(l, corners, (first + self.axes[0]) * n), self.origin[0]);
-        let y = l.sub(run(l, corners, (first + self.axes[1]) * n), self.origin[1]);
-        let z = l.sub(run(l, corners, (first + self.axes[2]) * n), self.origin[2]);
-        let x = l.neg_mul_add(self.shear[0], z, x);
-        Sheared { x, y: l.neg_mul_add(self.shear[1], z, y), z }
+    fn runs(&self, l: L, corners: &[f32], first: usize, n: usize) -> [L::F; 3] {
+        [
+            run(l, corners, (first + self.axes[0]) * n),
+            run(l, corners, (first + self.axes[1]) * n),
+            run(l, corners, (first + self.axes[2]) * n),
+        ]
+    }
+
+    /// The same for one of them in all lanes.
+    #[inline(always)]
+    fn copies(&self, l: L, corners: &[f32], first: usize, n: usize, i: usize) -> [L::F; 3] {
+        [
+            copies(l, corners, (first + self.axes[0]) * n + i),
+            copies(l, corners, (first + self.axes[1]) * n + i),
+            copies(l, corners, (first + self.axes[2]) * n + i),
+        ]
+    }
+
+    /// Corners as the ray sees them.
+    #[inline(always)]
+    fn shear(&self, l: L, [x, y, z]: [L::F; 3]) -> Sheared<L> {
+        let z = l.sub(z, self.origin[2]);
+        let x = l.neg_mul_add(self.shear[0], z, l.sub(x, self.origin[0]));
+        let y = l.neg_mul_add(self.shear[1], z, l.sub(y, self.origin[1]));
+        Sheared { x, y, z }
     }
 }
 
@@ -235,6 +280,12 @@ fn run<L: Lanes>(l: L, numbers: &[f32], start: usize) -> L::F {
         Some(run) => l.load(run),
         None => l.splat(0.0),
     }
+}
+
+/// Number `at` in all lanes.
+#[inline(always)]
+fn copies<L: Lanes>(l: L, numbers: &[f32], at: usize) -> L::F {
+    l.splat(numbers.get(at).copied().unwrap_or(0.0))
 }
 
 /// Twice the signed area of the origin and an edge from `p` to `q`.

@@ -2,15 +2,17 @@
 
 use std::marker::PhantomData;
 
-use etendue_geometry::{Mesh, RayBatch};
+use etendue_geometry::RayBatch;
 use pulp::NullaryFnOnce;
 
+use super::Bvh;
 use super::lanes::Lanes;
+use super::packet::{PACKET, Packet};
+use super::placed::PlacedTriangles;
 use super::ray::{BoxTest, NarrowRay, TriangleTest};
 use super::traverse::{Leaves, Stack, traverse};
 use super::wide::{Cell, Child, leaf_numbers};
-use super::{Bvh, Shape};
-use crate::nearest::{Nearest, Query, View};
+use crate::nearest::{Nearest, Query};
 use crate::parts::Instance;
 use crate::watertight;
 
@@ -68,8 +70,9 @@ impl<L: Lanes, S: Sink, F: FnMut(usize, S)> NullaryFnOnce for Batch<'_, L, S, F>
 
     #[inline(always)]
     fn call(mut self) {
-        let (mut outer, mut inner) = (Stack::new(), Stack::new());
-        for i in 0..self.rays.len() {
+        let mut stacks = Stacks::new();
+        let alone = if self.rays.coherent { self.packets(&mut stacks) } else { 0 };
+        for i in alone..self.rays.len() {
             if let Some(query) = Query::of(self.rays, i) {
                 let mut sink = S::new(&query);
                 let mut search = Search {
@@ -78,29 +81,55 @@ impl<L: Lanes, S: Sink, F: FnMut(usize, S)> NullaryFnOnce for Batch<'_, L, S, F>
                     query: &query,
                     t_max: query.t_max,
                     sink: &mut sink,
-                    stack: &mut inner,
+                    stack: &mut stacks.inner,
                 };
-                search.run(&mut outer);
+                search.run(&mut stacks.outer);
                 (self.sink)(i, sink);
             }
         }
     }
 }
 
+impl<L: Lanes, S: Sink, F: FnMut(usize, S)> Batch<'_, L, S, F> {
+    /// Traces as many whole packets as there are; answers how many rays that were.
+    #[inline(always)]
+    fn packets(&mut self, stacks: &mut Stacks) -> usize {
+        let whole = self.rays.len() / PACKET * PACKET;
+        for first in (0..whole).step_by(PACKET) {
+            let mut packet = Packet::<S>::of(self.rays, first);
+            packet.trace(self.lanes, self.bvh, stacks);
+            packet.finish(|lane, sink| (self.sink)(first + lane, sink));
+        }
+        whole
+    }
+}
+
+/// The stacks of the tree over the instances and of the instances' own.
+pub(super) struct Stacks {
+    pub(super) outer: Stack,
+    pub(super) inner: Stack,
+}
+
+impl Stacks {
+    fn new() -> Self {
+        Self { outer: Stack::new(), inner: Stack::new() }
+    }
+}
+
 /// One ray on its way through the scene.
-struct Search<'a, L, S> {
-    lanes: L,
-    bvh: &'a Bvh,
-    query: &'a Query,
+pub(super) struct Search<'a, L, S> {
+    pub(super) lanes: L,
+    pub(super) bvh: &'a Bvh,
+    pub(super) query: &'a Query,
     /// How far to look.
-    t_max: f64,
-    sink: &'a mut S,
-    stack: &'a mut Stack,
+    pub(super) t_max: f64,
+    pub(super) sink: &'a mut S,
+    pub(super) stack: &'a mut Stack,
 }
 
 impl<L: Lanes, S: Sink> Search<'_, L, S> {
     #[inline(always)]
-    fn run(&mut self, outer: &mut Stack) {
+    pub(super) fn run(&mut self, outer: &mut Stack) {
         if let [instance] = &self.bvh.layout.instances[..] {
             self.lanes.run(Visit { search: self, instance });
         } else if !self.bvh.top.cells.is_empty() {
@@ -135,9 +164,9 @@ impl<L: Lanes, S: Sink> Leaves for InstanceLeaves<'_, '_, L, S> {
 
 /// A ray's visit to one instance; answers whether to look on. Run by [`Lanes::run`], so that it need
 /// not be inlined twice.
-struct Visit<'a, 'b, L, S> {
-    search: &'a mut Search<'b, L, S>,
-    instance: &'a Instance,
+pub(super) struct Visit<'a, 'b, L, S> {
+    pub(super) search: &'a mut Search<'b, L, S>,
+    pub(super) instance: &'a Instance,
 }
 
 impl<L: Lanes, S: Sink> NullaryFnOnce for Visit<'_, '_, L, S> {
@@ -155,11 +184,7 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for Visit<'_, '_, L, S> {
             cells,
             test: TriangleTest::new(lanes, &ray),
             lanes,
-            bvh: search.bvh,
-            shape,
-            only: shape
-                .only(instance)
-                .map(|placement| Placed::new(search.bvh, placement, search.query)),
+            triangles: PlacedTriangles::new(search.bvh, instance),
             query: search.query,
             ray,
             t_max: search.t_max,
@@ -173,30 +198,11 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for Visit<'_, '_, L, S> {
     }
 }
 
-/// A placement as the ray sees it.
-struct Placed<'a> {
-    placement: u32,
-    mesh: &'a Mesh,
-    view: View,
-}
-
-impl<'a> Placed<'a> {
-    #[inline(always)]
-    fn new(bvh: &'a Bvh, placement: u32, query: &Query) -> Self {
-        let place = &bvh.geometry.placements[placement as usize];
-        let view = View::new(&place.world_from_mesh, query.origin);
-        Self { placement, mesh: bvh.geometry.mesh_of(place), view }
-    }
-}
-
 /// Leaves of a part.
 struct TriangleLeaves<'a, L: Lanes, S> {
     lanes: L,
-    bvh: &'a Bvh,
-    shape: &'a Shape,
     cells: &'a [Cell],
-    /// The placement, where there is but one.
-    only: Option<Placed<'a>>,
+    triangles: PlacedTriangles<'a>,
     query: &'a Query,
     ray: NarrowRay,
     test: TriangleTest<L>,
@@ -217,20 +223,7 @@ impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, L, S> {
         while maybe != 0 {
             let i = maybe.trailing_zeros() as usize;
             maybe &= maybe - 1;
-            let triangle = numbers.get(9 * n + i)?.to_bits();
-            let several;
-            let placed = match &self.only {
-                Some(placed) => placed,
-                None => {
-                    let placement = numbers.get(10 * n + i)?.to_bits();
-                    several = Placed::new(self.bvh, placement, self.query);
-                    &several
-                }
-            };
-            let corners = match self.shape.units {
-                Some(units) => units.corners(numbers, n, i),
-                None => placed.mesh.corners(triangle as usize),
-            };
+            let (placed, triangle, corners) = self.triangles.get(numbers, n, i)?;
             if let Some(hit) = self.query.test(&placed.view, corners)
                 && hit.t <= self.t_max
             {

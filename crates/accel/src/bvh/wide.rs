@@ -20,7 +20,8 @@ pub(super) struct Cell(pub(super) [f32; 8]);
 pub(super) type WideNode = [Cell; 7];
 
 pub(super) const NO_CHILDREN: WideNode = {
-    let (lower, upper) = (Cell([f32::INFINITY; 8]), Cell([f32::NEG_INFINITY; 8]));
+    // Far outside of any frame, and finite, so that a product with 0 is 0.
+    let (lower, upper) = (Cell([1e30; 8]), Cell([-1e30; 8]));
     [lower, upper, lower, upper, lower, upper, Cell([0.0; 8])]
 };
 

@@ -1,0 +1,68 @@
+//! From a place in a leaf to a triangle's corners in its mesh's frame, for the exact test.
+
+use etendue_geometry::Mesh;
+use etendue_geometry::glam::DVec3;
+
+use super::wide::{LEAF_CELLS, Units};
+use super::{Bvh, Owner};
+use crate::nearest::View;
+use crate::parts::Instance;
+
+/// A placement with what the exact test needs of it.
+#[derive(Clone, Copy)]
+pub(super) struct Placed<'a> {
+    pub(super) placement: u32,
+    pub(super) view: View<'a>,
+    mesh: &'a Mesh,
+}
+
+impl<'a> Placed<'a> {
+    #[inline(always)]
+    fn new(bvh: &'a Bvh, placement: u32) -> Self {
+        let place = &bvh.geometry.placements[placement as usize];
+        let view = View::new(&place.world_from_mesh);
+        Self { placement, view, mesh: bvh.geometry.mesh_of(place) }
+    }
+}
+
+/// The triangles of an instance.
+pub(super) struct PlacedTriangles<'a> {
+    bvh: &'a Bvh,
+    /// The placement, where there is but one.
+    only: Option<Placed<'a>>,
+    units: Option<Units>,
+}
+
+impl<'a> PlacedTriangles<'a> {
+    #[inline(always)]
+    pub(super) fn new(bvh: &'a Bvh, instance: &Instance) -> Self {
+        let shape = &bvh.parts[instance.part as usize];
+        let only = match shape.owner {
+            Owner::Placement(placement) => Some(Placed::new(bvh, placement)),
+            Owner::Instance => Some(Placed::new(bvh, instance.placement)),
+            Owner::Leaf => None,
+        };
+        Self { bvh, only, units: shape.units }
+    }
+
+    /// Triangle `i` of the `n` in a leaf with these numbers: its placement, its number and its
+    /// corners in the mesh's frame.
+    #[inline(always)]
+    pub(super) fn get(
+        &self,
+        numbers: &[f32; 8 * LEAF_CELLS],
+        n: usize,
+        i: usize,
+    ) -> Option<(Placed<'a>, u32, [DVec3; 3])> {
+        let triangle = numbers.get(9 * n + i)?.to_bits();
+        let placed = match self.only {
+            Some(placed) => placed,
+            None => Placed::new(self.bvh, numbers.get(10 * n + i)?.to_bits()),
+        };
+        let corners = match self.units {
+            Some(units) => units.corners(numbers, n, i),
+            None => placed.mesh.corners(triangle as usize),
+        };
+        Some((placed, triangle, corners))
+    }
+}
