@@ -78,7 +78,7 @@ pub enum SceneError {
         /// The JSON path of the object that names the model; empty when the model was given itself.
         path: String,
         /// Why.
-        source: ImportError,
+        source: Box<ImportError>,
     },
     /// A camera that no model of the scene has.
     #[error("--camera {wanted}: {reason}")]

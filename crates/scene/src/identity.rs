@@ -15,7 +15,7 @@ use crate::SceneError;
 /// 2. the camera as it was built, in the words of `camera.json`,
 /// 3. name (relative to the scene's folder), length and **contents** of every file that was read.
 ///
-/// Comments on what it does not see: files that the render did not want (an image no layer shows).
+/// It does not see files that the render did not want, such as an image that no layer shows.
 /// Formatting, machine, folder and time do not change it. It is no protection against forgery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SceneHash(pub u128);
@@ -29,18 +29,23 @@ impl fmt::Display for SceneHash {
 /// What a scene was made of.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Ingredients {
-    /// The scene's JSON.
-    pub(crate) value: Value,
+    /// The scene's JSON with sorted keys and no blanks.
+    json: String,
     /// Files by the name that the scene's folder gives them, sorted.
-    pub(crate) files: Vec<(String, PathBuf)>,
+    files: Vec<(String, PathBuf)>,
 }
 
 impl Ingredients {
+    pub(crate) fn new(value: &Value, mut files: Vec<(String, PathBuf)>) -> Self {
+        files.sort();
+        let mut json = String::new();
+        canonical(value, &mut json);
+        Self { json, files }
+    }
+
     pub(crate) fn hash(&self, camera: &str) -> Result<SceneHash, SceneError> {
         let mut hash = Xxh3Default::new();
-        let mut json = String::new();
-        canonical(&self.value, &mut json);
-        add(&mut hash, json.as_bytes());
+        add(&mut hash, self.json.as_bytes());
         add(&mut hash, camera.as_bytes());
         for (name, path) in &self.files {
             add(&mut hash, name.as_bytes());

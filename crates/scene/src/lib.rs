@@ -1,3 +1,41 @@
 #![forbid(unsafe_code)]
 //! Scenes from files: the JSON format, glTF, OBJ and PLY meshes, procedural shapes; a validated
-//! `Scene` out.
+//! [`Scene`] out.
+//!
+//! Two steps, so that a plan can be made between them:
+//!
+//! 1. [`SceneFile::read`] reads the text, applies settings from the command line and checks every
+//!    key and value; nothing else is opened. What it says tells what a render will want.
+//! 2. [`SceneFile::load`] opens the models (each once, in parallel), makes the shapes, and puts all
+//!    together, leaving out what is not wanted.
+//!
+//! # Map
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`file`] | the JSON format: types, schema, errors with their place, settings |
+//! | [`import`] | glTF, OBJ and PLY |
+//! | [`shape`] | shapes made on load |
+//! | [`scene`] | the loaded scene |
+//! | [`doctor`] | what a scene holds and what is wrong with it, without rendering |
+
+mod bounds;
+pub mod cameras;
+pub mod doctor;
+pub mod error;
+pub mod file;
+mod identity;
+pub mod import;
+mod load;
+mod paths;
+pub mod scene;
+pub mod shape;
+
+pub use cameras::{CameraOrigin, SceneCamera};
+pub use doctor::Diagnosis;
+pub use error::SceneError;
+pub use file::{FileKind, SceneFile, SceneSpec, scene_schema};
+pub use identity::SceneHash;
+pub use import::{Import, ImportError, Note, NoteKind, Strictness, Wanted};
+pub use paths::Reach;
+pub use scene::{LoadOptions, LoadProgress, LoadStats, Scene};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use etendue_camera::{Camera, CameraError, CameraSpec, PoseSpec};
+use etendue_camera::{Camera, CameraError, CameraSpec};
 use etendue_geometry::{Bounds, Geometry, Mesh, Placement, Positions, Transform};
 use etendue_tracer::{Material, Paint, Texture};
 use rayon::prelude::*;
@@ -20,7 +20,14 @@ use crate::shape::{ShapeError, ShapeSpec};
 use crate::{SceneError, bounds};
 
 /// Where triangles come from, once for all objects that share them.
-enum Origin {
+struct Origin {
+    kind: OriginKind,
+    /// The first object that uses it, for messages.
+    user: usize,
+}
+
+#[derive(PartialEq)]
+enum OriginKind {
     File(PathBuf),
     Shape(ShapeSpec),
 }
@@ -88,7 +95,7 @@ impl SceneFile {
                     let why = "a value is outside 0 to 1; a surface reflects no more";
                     return Err(self.fault(&at("colors"), why));
                 }
-                Paint::Checker { squares, .. } if !(*squares > 0.0) => {
+                Paint::Checker { squares, .. } if squares.is_nan() || *squares <= 0.0 => {
                     let why = format!("{squares} is not above zero");
                     return Err(self.fault(&at("squares"), why));
                 }
@@ -104,7 +111,7 @@ impl SceneFile {
         folder: &Folder,
         materials: &[Material],
     ) -> Result<(Vec<Origin>, Vec<Object>), SceneError> {
-        let mut origins = Vec::new();
+        let mut origins: Vec<Origin> = Vec::new();
         let mut files: BTreeMap<PathBuf, usize> = BTreeMap::new();
         let mut objects = Vec::new();
         for (index, spec) in self.spec.objects.iter().enumerate() {
@@ -113,14 +120,14 @@ impl SceneFile {
                 Source::File(written) => {
                     let found = self.find(folder, index, written)?;
                     *files.entry(found.real).or_insert_with(|| {
-                        origins.push(Origin::File(found.path));
+                        origins.push(Origin { kind: OriginKind::File(found.path), user: index });
                         origins.len() - 1
                     })
                 }
                 Source::Shape(shape) => {
-                    let same = |o: &Origin| matches!(o, Origin::Shape(known) if known == shape);
-                    origins.iter().position(same).unwrap_or_else(|| {
-                        origins.push(Origin::Shape(shape.clone()));
+                    let kind = OriginKind::Shape(shape.clone());
+                    origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
+                        origins.push(Origin { kind, user: index });
                         origins.len() - 1
                     })
                 }
@@ -188,17 +195,15 @@ impl SceneFile {
         // All are waited for, so that the first fault in the file's order is the one reported.
         let imports: Vec<Result<Import, SceneError>> = origins
             .par_iter()
-            .enumerate()
-            .map(|(index, origin)| {
-                let user = objects.iter().position(|object| object.origin == index);
-                let title = user.map_or("", |user| objects[user].title.as_str());
-                let at = user.map_or_else(String::new, |user| join_index("objects", user));
-                let import = match origin {
-                    Origin::File(path) => import::import(path, wanted, &settings)
+            .map(|origin| {
+                let at = join_index("objects", origin.user);
+                let import = match &origin.kind {
+                    OriginKind::File(path) => import::import(path, wanted, &settings)
                         .map_err(|source| self.import_fault(at, source))?,
-                    Origin::Shape(shape) => of_shape(shape, wanted)
+                    OriginKind::Shape(shape) => of_shape(shape, wanted)
                         .map_err(|fault| self.fault(&join(&at, fault.key), fault.reason))?,
                 };
+                let title = &objects[origin.user].title;
                 let done = done.fetch_add(1, Ordering::Relaxed) + 1;
                 let step = LoadProgress { name: title, done, total: origins.len() };
                 match options.progress {
@@ -215,7 +220,7 @@ impl SceneFile {
             FileKind::Model => String::new(),
             FileKind::Scene => at,
         };
-        SceneError::Import { file: self.path().to_owned(), path, source }
+        SceneError::Import { file: self.path().to_owned(), path, source: Box::new(source) }
     }
 
     fn finish(
@@ -226,13 +231,8 @@ impl SceneFile {
     ) -> Result<Scene, SceneError> {
         let geometry = Arc::new(parts.geometry);
         let (camera, camera_origin) = self.camera(&geometry, &parts.cameras, options)?;
-        let mut files: Vec<(String, PathBuf)> = parts
-            .stats
-            .files
-            .iter()
-            .map(|(path, _)| (folder.relative(path), path.clone()))
-            .collect();
-        files.sort();
+        let opened = parts.stats.files.iter();
+        let files = opened.map(|(path, _)| (folder.relative(path), path.clone())).collect();
         let mut notes = parts.notes;
         notes.extend(self.unused_materials());
         Ok(Scene {
@@ -249,7 +249,7 @@ impl SceneFile {
             render: self.spec.render.clone(),
             notes,
             stats: parts.stats,
-            ingredients: Ingredients { value: self.value().clone(), files },
+            ingredients: Ingredients::new(self.value(), files),
         })
     }
 
@@ -275,7 +275,7 @@ impl SceneFile {
                 };
                 (spec, CameraOrigin::Model(name))
             }
-            None if pose_of(&own).is_some() => (own, CameraOrigin::Scene),
+            None if own.has_pose() => (own, CameraOrigin::Scene),
             None => (own, CameraOrigin::Framed),
         };
         let camera =
@@ -292,13 +292,6 @@ impl SceneFile {
             message: "no object uses this material".to_owned(),
             count: 1,
         })
-    }
-}
-
-fn pose_of(spec: &CameraSpec) -> Option<&PoseSpec> {
-    match spec {
-        CameraSpec::Pinhole(spec) => spec.pose.as_ref(),
-        CameraSpec::Orthographic(spec) => spec.pose.as_ref(),
     }
 }
 

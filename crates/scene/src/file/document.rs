@@ -20,22 +20,18 @@ pub(crate) struct Fault {
     pub(crate) reason: String,
 }
 
-/// A parsed text.
+/// A parsed text, without its values.
 #[derive(Debug, Clone)]
 pub(crate) struct Document {
     text: String,
     /// The byte where each value's key (or the value, in an array) starts.
     starts: BTreeMap<String, usize>,
-    pub(crate) value: Value,
 }
 
 impl Document {
-    /// Parses `text`.
-    ///
-    /// # Errors
-    ///
-    /// When it is not JSON, or an object has a key twice.
-    pub(crate) fn parse(text: String) -> Result<Self, Fault> {
+    /// Parses `text` into the document and its values; refused when it is not JSON, or an object
+    /// has a key twice.
+    pub(crate) fn parse(text: String) -> Result<(Self, Value), Fault> {
         let value: Value = serde_json::from_str(&text).map_err(|error| {
             let reason = error.to_string();
             // serde_json puts the place behind its sentence; ours stands in front.
@@ -49,7 +45,7 @@ impl Document {
             return Err(Fault { place: place_of(&text, at), reason });
         }
         let starts = scanner.starts;
-        Ok(Self { starts, value, text })
+        Ok((Self { starts, text }, value))
     }
 
     /// Where the value at `path` stands in the text.
@@ -92,7 +88,7 @@ pub(crate) fn excerpt(text: &str, place: Place) -> String {
     format!("  {number} | {shown}\n  {margin} | {indent}^")
 }
 
-/// The place of serde_json's line and byte column.
+/// The place of `serde_json`'s line and byte column.
 fn character_place(text: &str, line: usize, column: usize) -> Place {
     let content = text.split('\n').nth(line.saturating_sub(1)).unwrap_or_default();
     let mut end = column.saturating_sub(1).min(content.len());
@@ -208,7 +204,7 @@ mod tests {
     #[test]
     fn every_value_knows_its_place() {
         let text = "{\n  \"a\": [1, {\"b\": \"}\\\"\"}],\n  \"é\": 2, \"x y\": {\"c\": null}\n}";
-        let document = Document::parse(text.to_owned()).unwrap();
+        let (document, _) = Document::parse(text.to_owned()).unwrap();
         let place = |path| document.place(path).map(|p| (p.line, p.column));
         assert_eq!(place("a"), Some((2, 3)));
         assert_eq!(place("a[0]"), Some((2, 9)));

@@ -76,8 +76,7 @@ impl SceneFile {
                 (None, json!({ "etendue": 1, "objects": [{ "file": name }] }))
             }
             FileKind::Scene => {
-                let document = read_document(path)?;
-                let value = document.value.clone();
+                let (document, value) = read_document(path)?;
                 (Some(document), value)
             }
         };
@@ -183,7 +182,7 @@ fn is_model(path: &Path) -> bool {
     MODELS.iter().any(|model| ending.eq_ignore_ascii_case(model))
 }
 
-fn read_document(path: &Path) -> Result<Document, SceneError> {
+fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
     let unreadable = |source| SceneError::unreadable(path, source);
     let metadata = fs::metadata(path).map_err(unreadable)?;
     if !metadata.is_file() {

@@ -158,7 +158,7 @@ impl TransformSpec {
     /// finite, an axis has no length, or two keys contradict.
     pub(crate) fn build(&self) -> Result<Transform, TransformFault> {
         let transform = match &self.matrix {
-            Some(rows) => self.from_matrix(rows)?,
+            Some(rows) => self.affine(rows)?,
             None => {
                 let rotation = self.rotation()?;
                 let linear = rotation * DMat3::from_diagonal(self.scale_factors()?);
@@ -172,7 +172,7 @@ impl TransformSpec {
         }
     }
 
-    fn from_matrix(&self, rows: &[[f64; 4]; 4]) -> Result<Transform, TransformFault> {
+    fn affine(&self, rows: &[[f64; 4]; 4]) -> Result<Transform, TransformFault> {
         let others = [
             ("translate", self.translate.is_some()),
             ("rotate", self.rotate.is_some()),
@@ -194,7 +194,8 @@ impl TransformSpec {
         let linear = DMat3::from_cols(column(0), column(1), column(2));
         // Relative to its columns' lengths the determinant is a volume without unit.
         let volume: f64 = (0..3).map(|k| column(k).length()).product();
-        if !(linear.determinant().abs() > 1e-12 * volume) {
+        let determinant = linear.determinant().abs();
+        if determinant.is_nan() || determinant <= 1e-12 * volume {
             let why = "is singular: it flattens the object; check the rows".to_owned();
             return Err(("matrix", why));
         }

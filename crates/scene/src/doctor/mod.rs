@@ -1,0 +1,234 @@
+//! The scene doctor: what a scene or model holds, what is wrong with it, what it will cost; without
+//! rendering.
+
+mod duplicates;
+mod leftovers;
+mod lights;
+mod memory;
+mod precision;
+mod text;
+
+use std::path::{Path, PathBuf};
+
+use etendue_camera::CameraFile;
+use etendue_geometry::Geometry;
+use serde::Serialize;
+
+use crate::import::{NoteKind, Wanted};
+use crate::{CameraOrigin, FileKind, LoadOptions, Note, Scene, SceneError, SceneFile, bounds};
+
+pub use memory::MemoryForecast;
+pub use precision::Precision;
+
+/// What `etendue check` tells of a scene or model. Serialises to what `--json` prints.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// The file.
+    pub file: PathBuf,
+    /// Triangles, counted as often as they are placed.
+    pub triangles: u64,
+    /// Triangles, each stored one once.
+    pub triangles_unique: u64,
+    /// Meshes, each once.
+    pub meshes: usize,
+    /// Meshes, as often as they are placed.
+    pub placements: usize,
+    /// The tight box around everything in world space (m); null when there is no triangle.
+    pub bounds: Option<Extent>,
+    /// Whether the size looks like metres, and what to do when not.
+    pub units: Units,
+    /// The objects.
+    pub objects: Vec<ObjectReport>,
+    /// Triangles that are no good.
+    pub defects: Defects,
+    /// How exactly places can be told.
+    pub precision: Option<Precision>,
+    /// The camera that a render would use, as `camera.json` tells it.
+    pub camera: CameraFile,
+    /// Where that camera came from, in words.
+    pub camera_origin: String,
+    /// Cameras that the models bring along; `--camera` takes their name or number.
+    pub cameras: Vec<CameraReport>,
+    /// Lights that the glTF models bring along (`KHR_lights_punctual`).
+    pub lights: u64,
+    /// What a render will need.
+    pub memory: MemoryForecast,
+    /// glTF extensions that are not, or not wholly, supported, and what to do.
+    pub extensions: Vec<Finding>,
+    /// Files beside the models that no model, material or scene there names: images, buffers and
+    /// material files.
+    pub unused_files: Vec<PathBuf>,
+    /// All else that was dropped, ignored or missing.
+    pub findings: Vec<Finding>,
+}
+
+/// A box.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Extent {
+    /// The lower corner (m).
+    pub min: [f64; 3],
+    /// The upper corner (m).
+    pub max: [f64; 3],
+}
+
+/// Whether coordinates look like metres.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Units {
+    /// Whether the longest side is between a millimetre and a kilometre.
+    pub plausible: bool,
+    /// What is assumed, and what to do when it is wrong.
+    pub remark: String,
+}
+
+/// One object.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ObjectReport {
+    /// Its name.
+    pub name: String,
+    /// Its triangles, as often as they are placed.
+    pub triangles: u64,
+}
+
+/// Triangles that are no good.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Defects {
+    /// Dropped because a corner is NaN or infinite; under `--strict` the file is refused.
+    pub not_finite: u64,
+    /// Without area. They are kept and never hit.
+    pub degenerate: u64,
+    /// With the same three corners as another one of their mesh.
+    pub duplicate: u64,
+    /// With a corner that does not exist. Always 0: such a file is refused.
+    pub out_of_range: u64,
+}
+
+/// A camera of a model.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct CameraReport {
+    /// The number that `--camera` takes.
+    pub index: usize,
+    /// Its name; may be empty.
+    pub name: String,
+    /// `pinhole` or `orthographic`.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+}
+
+/// Something to know about.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// What kind of thing.
+    pub kind: NoteKind,
+    /// What it is about.
+    pub subject: String,
+    /// What happens, and what to do.
+    pub message: String,
+    /// How often.
+    pub count: u64,
+}
+
+impl From<&Note> for Finding {
+    fn from(note: &Note) -> Self {
+        let Note { kind, subject, message, count } = note.clone();
+        Self { kind, subject, message, count }
+    }
+}
+
+/// Examines the scene or model at `path` as a render with the same `overrides` and `options` would
+/// load it.
+///
+/// # Errors
+///
+/// When it cannot be loaded.
+pub fn check(
+    path: &Path,
+    overrides: &[(String, String)],
+    options: &LoadOptions<'_>,
+) -> Result<Diagnosis, SceneError> {
+    let file = SceneFile::read(path, overrides)?;
+    let options = LoadOptions { count_degenerate: true, ..*options };
+    let scene = file.load(Wanted::EVERYTHING, &options)?;
+    Ok(Diagnosis::of(&scene, file.kind()))
+}
+
+impl Diagnosis {
+    fn of(scene: &Scene, kind: FileKind) -> Self {
+        let geometry = &*scene.geometry;
+        let around = bounds::tight(geometry);
+        let is_extension = |note: &&Note| note.kind == NoteKind::Extension;
+        let models: Vec<&Path> = scene.stats.files.iter().map(|(path, _)| path.as_path()).collect();
+        Self {
+            file: scene.path.clone(),
+            triangles: geometry.triangles(),
+            triangles_unique: geometry.triangles_unique(),
+            meshes: geometry.meshes.len(),
+            placements: geometry.placements.len(),
+            bounds: (!around.is_empty())
+                .then(|| Extent { min: around.min.to_array(), max: around.max.to_array() }),
+            units: units(&around, kind, &scene.path),
+            objects: objects(scene),
+            defects: Defects {
+                not_finite: scene.stats.dropped,
+                degenerate: scene.stats.degenerate.unwrap_or(0),
+                duplicate: geometry.meshes.iter().map(duplicates::count).sum(),
+                out_of_range: 0,
+            },
+            precision: Precision::of(geometry, around),
+            camera: scene.camera.opencv(),
+            camera_origin: match &scene.camera_origin {
+                CameraOrigin::Scene => "the scene file".to_owned(),
+                CameraOrigin::Framed => "placed to frame the whole scene".to_owned(),
+                CameraOrigin::Model(name) => format!("the model's camera {name}"),
+            },
+            cameras: cameras(scene),
+            lights: models.iter().map(|path| lights::count(path)).sum(),
+            memory: MemoryForecast::of(scene),
+            extensions: scene.notes.iter().filter(is_extension).map(Finding::from).collect(),
+            unused_files: leftovers::find(&models, &scene.path),
+            findings: scene.notes.iter().filter(|n| !is_extension(n)).map(Finding::from).collect(),
+        }
+    }
+}
+
+fn cameras(scene: &Scene) -> Vec<CameraReport> {
+    let report = |(index, camera): (usize, &crate::SceneCamera)| CameraReport {
+        index,
+        name: camera.name.clone(),
+        kind: camera.spec.type_name(),
+    };
+    scene.cameras.iter().enumerate().map(report).collect()
+}
+
+fn objects(scene: &Scene) -> Vec<ObjectReport> {
+    let geometry: &Geometry = &scene.geometry;
+    let mut triangles = vec![0; scene.objects.len()];
+    for placement in &geometry.placements {
+        triangles[placement.object as usize] += geometry.mesh_of(placement).triangles.len() as u64;
+    }
+    let names = scene.objects.iter().cloned();
+    names.zip(triangles).map(|(name, triangles)| ObjectReport { name, triangles }).collect()
+}
+
+/// Scenes between a millimetre and a kilometre are taken to be in metres.
+fn units(around: &etendue_geometry::Bounds, kind: FileKind, path: &Path) -> Units {
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    let assumed = match (kind, &*ending) {
+        (FileKind::Model, "obj" | "ply") => "metres are assumed, the format names no unit",
+        _ => "metres",
+    };
+    let longest = if around.is_empty() { 1.0 } else { (around.max - around.min).max_element() };
+    let remark = if longest > 1e3 {
+        format!(
+            "{assumed}; {longest:.4} m is large: if the file is in millimetres, give its object \
+             \"transform\": {{\"scale\": 0.001}}"
+        )
+    } else if longest < 1e-3 {
+        format!(
+            "{assumed}; {longest:.3e} m is small: if the file is in kilometres, give its object \
+             \"transform\": {{\"scale\": 1000}}"
+        )
+    } else {
+        assumed.to_owned()
+    };
+    Units { plausible: (1e-3..=1e3).contains(&longest), remark }
+}

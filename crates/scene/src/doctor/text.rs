@@ -1,0 +1,130 @@
+//! A diagnosis as a table for people.
+
+use std::fmt;
+
+use super::{Diagnosis, Finding};
+
+/// The most objects and files that are listed by name.
+const LISTED: usize = 20;
+
+impl fmt::Display for Diagnosis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let row = |f: &mut fmt::Formatter<'_>, name: &str, value: &dyn fmt::Display| {
+            writeln!(f, "{name:<13} {value}")
+        };
+        row(f, "file", &self.file.display())?;
+        row(f, "triangles", &self.count())?;
+        match &self.bounds {
+            Some(extent) => {
+                row(f, "bounds", &format!("{} to {} m", point(extent.min), point(extent.max)))?;
+                let size: [f64; 3] = std::array::from_fn(|k| extent.max[k] - extent.min[k]);
+                row(f, "size", &format!("{} m", point(size)))?;
+            }
+            None => row(f, "bounds", &"empty: a render shows no hit")?,
+        }
+        row(f, "units", &self.units.remark)?;
+        self.list_objects(f)?;
+        row(f, "defects", &self.defects_in_words())?;
+        if let Some(p) = &self.precision {
+            let text = format!(
+                "files {:.1e} m; f32 {:.1e} m in the world, {:.1e} m from the scene's centre; \
+                 f64 {:.1e} m",
+                p.input_step, p.f32_step_in_world, p.f32_step_from_centre, p.f64_step
+            );
+            row(f, "precision", &text)?;
+        }
+        let [width, height] = self.camera.resolution;
+        row(f, "camera", &format!("{width} × {height}, {}", self.camera_origin))?;
+        if let Some(k) = self.camera.k {
+            let [fx, fy, cx, cy] = [k[0][0], k[1][1], k[0][2], k[1][2]];
+            let text =
+                format!("fx {fx:.4} fy {fy:.4} cx {cx:.4} cy {cy:.4} skew {:.4} px", k[0][1]);
+            row(f, "", &text)?;
+        }
+        for camera in &self.cameras {
+            let text = format!("--camera {} \"{}\" ({})", camera.index, camera.name, camera.kind);
+            row(f, "", &text)?;
+        }
+        if self.lights > 0 {
+            row(f, "lights", &format!("{} in the models, not used", self.lights))?;
+        }
+        row(f, "memory", &self.memory)?;
+        for path in self.unused_files.iter().take(LISTED) {
+            row(f, "unused file", &path.display())?;
+        }
+        for finding in self.extensions.iter().chain(&self.findings) {
+            row(f, finding.word(), finding)?;
+        }
+        Ok(())
+    }
+}
+
+impl Diagnosis {
+    fn count(&self) -> String {
+        let Self { triangles, triangles_unique, meshes, placements, .. } = self;
+        if triangles == triangles_unique {
+            format!("{triangles} in {meshes} meshes")
+        } else {
+            format!(
+                "{triangles} in {placements} placements; {triangles_unique} unique in {meshes} \
+                 meshes"
+            )
+        }
+    }
+
+    fn defects_in_words(&self) -> String {
+        let named = [
+            (self.defects.not_finite, "not finite (dropped)"),
+            (self.defects.degenerate, "without area (never hit)"),
+            (self.defects.duplicate, "twice there"),
+        ];
+        let found: Vec<String> = named
+            .iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, what)| format!("{count} {what}"))
+            .collect();
+        if found.is_empty() { "none".to_owned() } else { found.join(", ") }
+    }
+
+    fn list_objects(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, object) in self.objects.iter().take(LISTED).enumerate() {
+            let label = if index == 0 { "objects" } else { "" };
+            writeln!(f, "{label:<13} {index} \"{}\": {} triangles", object.name, object.triangles)?;
+        }
+        match self.objects.len().checked_sub(LISTED) {
+            Some(more) if more > 0 => writeln!(f, "{:<13} … and {more} more", ""),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Finding {
+    fn word(&self) -> &'static str {
+        use crate::NoteKind as Kind;
+        match self.kind {
+            Kind::Extension => "extension",
+            Kind::Unsupported => "unsupported",
+            Kind::MissingFile => "missing file",
+            Kind::NotFinite => "not finite",
+            Kind::Unused => "unused",
+            Kind::Irregular => "irregular",
+        }
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.subject, self.message)?;
+        if self.count > 1 { write!(f, " ({} times)", self.count) } else { Ok(()) }
+    }
+}
+
+/// A point with six digits; nothing hides behind an exponent that need not be there.
+fn point(p: [f64; 3]) -> String {
+    let [x, y, z] = p.map(|x| {
+        // Rounded to six significant digits, then printed as short as that allows.
+        let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+        rounded.to_string()
+    });
+    format!("[{x}, {y}, {z}]")
+}

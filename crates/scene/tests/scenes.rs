@@ -1,0 +1,172 @@
+//! Scenes that are right: what they load as.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use etendue_geometry::glam::DVec3;
+use etendue_scene::{CameraOrigin, LoadOptions, Scene, SceneFile, Wanted, scene_schema};
+use etendue_tracer::LayerSpec;
+
+fn load(path: &Path, settings: &[(&str, &str)]) -> Scene {
+    let settings: Vec<(String, String)> =
+        settings.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    let file = SceneFile::read(path, &settings).unwrap_or_else(|error| panic!("{error}"));
+    let scene = file.load(Wanted::EVERYTHING, &LoadOptions::default());
+    scene.unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn from_text(text: &str, settings: &[(&str, &str)]) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.json");
+    fs::write(&path, text).unwrap();
+    load(&path, settings)
+}
+
+fn examples() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let mut scenes: Vec<PathBuf> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "json"))
+        .collect();
+    scenes.sort();
+    scenes
+}
+
+#[test]
+fn every_example_scene_reads_and_loads() {
+    let scenes = examples();
+    assert!(scenes.len() >= 5, "{scenes:?}");
+    for path in scenes {
+        let scene = load(&path, &[]);
+        assert!(scene.geometry.triangles() > 0, "{}", path.display());
+        assert!(scene.notes.is_empty(), "{}: {:?}", path.display(), scene.notes);
+    }
+}
+
+#[test]
+fn first_light_is_a_million_triangles() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/first-light.json");
+    let scene = load(&path, &[]);
+    assert_eq!(scene.geometry.meshes[0].triangles.len(), 1_000_000);
+    assert_eq!(scene.camera.resolution(), [1024, 1024]);
+    assert_eq!(scene.picture, Some(LayerSpec::Facing));
+    assert_eq!(scene.layers.len(), 3, "{:?}", scene.layers);
+    assert_eq!(scene.objects, ["blob", "ground"]);
+}
+
+#[test]
+fn an_empty_scene_is_a_scene() {
+    let scene = from_text(r#"{"etendue": 1}"#, &[]);
+    assert_eq!(scene.geometry.triangles(), 0);
+    assert_eq!(scene.layers, [LayerSpec::Facing], "a picture when nothing is said");
+    assert_eq!(scene.camera_origin, CameraOrigin::Framed);
+    let depth = from_text(r#"{"etendue": 1, "layers": ["depth", "depth"], "objects": []}"#, &[]);
+    assert_eq!((depth.picture, depth.layers), (None, vec![LayerSpec::Depth]));
+}
+
+#[test]
+fn a_byte_order_mark_is_no_error() {
+    assert!(from_text("\u{feff}{\"etendue\": 1}", &[]).objects.is_empty());
+}
+
+#[test]
+fn shapes_alike_are_one_mesh_and_stand_where_they_are_told() {
+    let text = r#"{"etendue": 1, "objects": [
+        {"shape": "box", "transform": {"translate": [5, 0, 0], "scale": [-1, 2, 1]}},
+        {"shape": "box", "material": "m", "name": "second"},
+        {"shape": "box", "size": [2, 1, 1]}
+    ], "materials": {"m": {"type": "matte", "color": [0.1, 0.2, 0.3]}}}"#;
+    let scene = from_text(text, &[]);
+    let geometry = &scene.geometry;
+    assert_eq!((geometry.meshes.len(), geometry.placements.len()), (2, 3));
+    assert_eq!((geometry.triangles_unique(), geometry.triangles()), (24, 36));
+    let first = &geometry.placements[0].world_from_mesh;
+    assert_eq!(first.point(DVec3::ONE), DVec3::new(4.0, 2.0, 1.0));
+    assert_eq!(first.handedness(), -1.0);
+    assert_eq!(scene.objects, ["box", "second", "box"]);
+    let material = &scene.materials[geometry.placements[1].material as usize];
+    assert_eq!(material.name, "m");
+}
+
+#[test]
+fn a_camera_without_pose_frames_what_is_there() {
+    let text = r#"{"etendue": 1, "camera": {"type": "pinhole", "fov": 30},
+        "objects": [{"shape": "sphere", "transform": {"translate": [100, 200, 300]}}]}"#;
+    let scene = from_text(text, &[]);
+    let offset = scene.camera.pose().position - DVec3::new(100.0, 200.0, 300.0);
+    assert!(offset.length() < 15.0 && offset.min_element() > 0.0, "{offset}");
+    assert!(scene.camera.pose().forward().dot(-offset.normalize()) > 0.999);
+}
+
+#[test]
+fn settings_change_the_scene() {
+    let text = r#"{"etendue": 1, "camera": {"type": "pinhole", "fov": 30,
+        "sensor": {"resolution": [8, 6]}}, "objects": [{"shape": "box"}]}"#;
+    let fy = |scene: &Scene| scene.camera.opencv().k.unwrap()[1][1];
+    let plain = from_text(text, &[]);
+    let wide = from_text(text, &[("camera.fov", "90")]);
+    assert!(fy(&wide) < fy(&plain));
+    assert!((fy(&wide) - 3.0).abs() < 1e-14, "half of 6 rows over tan 45°, one rounding");
+    let sharp = from_text(text, &[("camera.sensor.resolution", "[4, 3]")]);
+    assert_eq!(sharp.camera.resolution(), [4, 3]);
+    let two = from_text(text, &[("objects[0].shape", "sphere"), ("layers", "[\"ids\"]")]);
+    assert_eq!((two.objects, two.layers), (vec!["sphere".to_owned()], vec![LayerSpec::Ids]));
+}
+
+#[test]
+fn the_hash_is_of_the_contents() {
+    let text = r#"{"etendue": 1, "camera": {"type": "pinhole", "fov": 30}, "objects": []}"#;
+    let same = r#"{ "objects": [],
+        "camera": {"fov": 30, "type": "pinhole"}, "etendue": 1 }"#;
+    let hash = |scene: Scene| scene.hash().unwrap();
+    let first = hash(from_text(text, &[]));
+    assert_eq!(first, hash(from_text(same, &[])), "layout and place do not count");
+    assert_ne!(first, hash(from_text(text, &[("camera.fov", "31")])));
+    assert_eq!(first.to_string().len(), 32);
+
+    let folder = tempfile::tempdir().unwrap();
+    let (path, model) = (folder.path().join("s.json"), folder.path().join("m.obj"));
+    fs::write(&path, r#"{"etendue": 1, "objects": [{"file": "m.obj"}]}"#).unwrap();
+    fs::write(&model, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let before = hash(load(&path, &[]));
+    fs::write(&model, "v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n").unwrap();
+    assert_ne!(before, hash(load(&path, &[])), "one digit of the model");
+}
+
+#[test]
+fn a_model_is_a_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("one model.obj");
+    fs::write(&model, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let scene = load(&model, &[("camera.sensor.resolution", "[64, 48]")]);
+    assert_eq!(scene.geometry.triangles(), 1);
+    assert_eq!(scene.camera.resolution(), [64, 48]);
+    assert_eq!(scene.camera_origin, CameraOrigin::Framed);
+    assert_eq!(scene.camera.pose().forward(), DVec3::NEG_Z, "a flat model is seen face on");
+}
+
+#[test]
+fn one_file_used_twice_is_read_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.json");
+    fs::write(folder.path().join("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let text = r#"{"etendue": 1, "objects": [{"file": "m.obj"},
+        {"file": "./m.obj", "transform": {"translate": [0, 0, 1]}}]}"#;
+    fs::write(&path, text).unwrap();
+    let scene = load(&path, &[]);
+    assert_eq!(scene.geometry.meshes.len(), 1);
+    assert_eq!(scene.geometry.uses(), [2]);
+    assert_eq!(scene.stats.files.len(), 1);
+}
+
+#[test]
+fn the_schema_is_a_schema() {
+    let schema = scene_schema();
+    assert_eq!(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
+    let keys: Vec<&String> = schema["properties"].as_object().unwrap().keys().collect();
+    for key in ["etendue", "camera", "tracer", "layers", "objects", "materials", "render"] {
+        assert!(keys.contains(&&key.to_owned()), "{key} in {keys:?}");
+    }
+    assert_eq!(schema["additionalProperties"], false);
+}
