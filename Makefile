@@ -6,13 +6,14 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render test test-embree4 bench clean
+.PHONY: help setup render test test-embree4 bench docs-figures clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
 	@echo "make test          install what is missing, run everything that CI runs"
 	@echo "make test-embree4  run the tests that touch Embree against Embree 4, in a Debian 13 root"
 	@echo "make bench         run the benches"
+	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make clean         remove target/ and out/"
 
 setup:
@@ -32,6 +33,11 @@ test-embree4: setup
 
 bench: setup
 	cargo bench --manifest-path benches/Cargo.toml
+
+docs-figures: setup
+	cargo run --release -p etendue -- render scenes/first-light.json -o out/docs-figures \
+		--set 'camera.sensor.resolution=[640,640]' --samples 16 --outputs png
+	install -D -m 644 out/docs-figures/picture.png docs/images/first-light.png
 
 clean:
 	rm -rf target out
