@@ -41,17 +41,25 @@
 //! | [`sensor`] | a sensor ready to expose, and pictures of what it saw |
 //! | [`demosaic`] | missing colours |
 //! | [`dng`] | raw files |
+//! | [`emva`] | the image series of a characterisation |
+//! | [`photon_transfer`] | photon-transfer and SNR curves |
+//! | [`approximation`] | where the normal distribution is no substitute |
 
+pub mod approximation;
 pub mod cfa;
 mod chain;
+mod chart;
 mod clipping;
 pub mod demosaic;
 pub mod dng;
+pub mod emva;
 mod error;
+mod even_light;
 pub mod film;
 mod light;
 mod normal;
 mod philox;
+pub mod photon_transfer;
 mod poisson;
 pub mod preset;
 mod presets;

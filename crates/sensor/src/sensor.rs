@@ -16,9 +16,9 @@ use crate::{CfaSpec, SensorError};
 /// A sensor whose numbers hold together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
-    settings: Settings,
-    response: Response,
-    cfa: Option<CfaSpec>,
+    pub(crate) settings: Settings,
+    pub(crate) response: Response,
+    pub(crate) cfa: Option<CfaSpec>,
 }
 
 impl Sensor {

@@ -17,6 +17,8 @@ pub(crate) struct Settings {
     pub(crate) resolution: [u32; 2],
     pub(crate) pixel_pitch: f64,
     pub(crate) efficiency: Curve,
+    /// Whether anybody said how many electrons there are.
+    pub(crate) counts: bool,
     /// 1 DN/e⁻ when nobody counts electrons.
     pub(crate) gain: f64,
     pub(crate) read_noise: f64,
@@ -62,6 +64,7 @@ impl Settings {
                 Some(curve) => curve.clone(),
                 None => preset.map_or(Curve::ONE, crate::preset::Preset::efficiency),
             },
+            counts,
             gain: spec.system_gain.or(preset.map(|p| p.system_gain.value)).unwrap_or(1.0),
             read_noise: spec.read_noise.or(preset.map(|p| p.read_noise.value)).unwrap_or(0.0),
             dark_current: spec.dark_current.or(preset.map(|p| p.dark_current.value)).unwrap_or(0.0),
@@ -87,7 +90,7 @@ impl Settings {
         settings.check_electrons()?;
         settings.check_converter(spec.full_well)?;
         settings.check_exposures(spec)?;
-        settings.check_use(spec, counts)?;
+        settings.check_use(spec)?;
         settings.warm(spec)?;
         Ok(settings)
     }
@@ -171,7 +174,7 @@ impl Settings {
     }
 
     /// Refuses keys that would silently do nothing.
-    fn check_use(&self, spec: &SensorSpec, counts: bool) -> Result<(), SensorError> {
+    fn check_use(&self, spec: &SensorSpec) -> Result<(), SensorError> {
         let raw = spec.kind == SensorKind::Raw;
         if spec.cfa.is_some() && !raw {
             let why = "only a `raw` sensor has a colour filter array";
@@ -201,7 +204,7 @@ impl Settings {
         let wants_electrons = self.noise != NoiseModel::None
             || self.radiometry == Radiometry::Physical
             || electrons.iter().flatten().any(|&value| value > 0.0);
-        if wants_electrons && !counts {
+        if wants_electrons && !self.counts {
             let why = "noise, dark signal, full well and physical radiometry count electrons, and \
                 without the gain K (DN/e⁻) nobody knows how many there are";
             return Err(SensorError::Missing { key: "system_gain", why });

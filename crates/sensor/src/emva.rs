@@ -1,0 +1,301 @@
+//! The image series that a characterisation after EMVA 1288 wants, as files.
+//!
+//! Exposure times rise in equal steps to past saturation under a constant light, each with a pair of
+//! bright and a pair of dark frames (the standard's method 1); then 16 bright and 16 dark frames at
+//! half saturation, for what differs between pixels. Sixteen-bit PNGs hold digital numbers as they
+//! are; beside them stand the descriptor of the reference implementation (`emva1288` of Python's package index) and
+//! `manifest.json`, which is written last.
+//!
+//! Times are chosen so that the dark signal can be measured: at the longest it is 1.5 times the
+//! variance of the read-out (at least 1 e⁻, at most a tenth of saturation). A sensor without dark
+//! current takes its own exposure time as the longest.
+//!
+//! A sensor with colour filters is characterised without them.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::even_light::EvenLight;
+use crate::film::Shot;
+use crate::{NoiseModel, RawImage, Sensor, SensorError};
+
+/// Frames of each kind at half saturation.
+const SPATIAL: u32 = 16;
+
+/// Where the steps end, in parts of saturation.
+const PAST_SATURATION: f64 = 1.15;
+
+/// What the descriptor of the reference implementation is called.
+pub const DESCRIPTOR: &str = "emva1288.txt";
+
+/// What the manifest is called.
+pub const MANIFEST: &str = "manifest.json";
+
+/// How a series is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Wavelength of the light (nm).
+    pub wavelength: f64,
+    /// Exposure times, 20 or more.
+    pub steps: usize,
+    /// The largest images, in columns and rows: a corner of the sensor. `None`: as many pixels as a
+    /// linearity error of 0.02 % wants (four standard errors of a mean at a tenth of saturation), 256
+    /// to 1024 a side.
+    pub size: Option<[u32; 2]>,
+    /// The seed of the noise.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { wavelength: 525.0, steps: 25, size: None, seed: 0 }
+    }
+}
+
+impl Options {
+    fn light(&self, sensor: &Sensor) -> Result<EvenLight, SensorError> {
+        EvenLight::new(sensor, self.wavelength, self.size.unwrap_or([side(sensor); 2]))
+    }
+}
+
+/// The content of `manifest.json`: files by name, in the manifest's own folder.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Bits of the converter.
+    pub bits: u32,
+    /// Two bright and two dark files at each exposure time, ascending.
+    pub steps: Vec<Step>,
+    /// Sixteen bright and sixteen dark files at half saturation.
+    pub spatial: Step,
+}
+
+/// The files of one exposure time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// Exposure time (s).
+    pub exposure_s: f64,
+    /// Mean photons a pixel in the bright files.
+    pub photons: f64,
+    /// Files with light.
+    pub bright: Vec<String>,
+    /// Files without.
+    pub dark: Vec<String>,
+}
+
+/// Why there is no series.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EmvaError {
+    /// The sensor cannot be characterised so.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// A file could not be written.
+    #[error("cannot write {path}: {source}")]
+    Write {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+}
+
+/// Exposure times, photons and file names of a series, before any image is made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// What will be written.
+    pub manifest: Manifest,
+    /// Columns and rows of the images.
+    pub size: [u32; 2],
+    /// Exposure times as the descriptor names them (ns), one a step and the spatial one last.
+    nanoseconds: Vec<u64>,
+}
+
+/// One image to be made.
+struct Picture<'a> {
+    name: &'a str,
+    photons: f64,
+    shot: Shot,
+}
+
+impl Series {
+    /// Plans a series.
+    ///
+    /// # Errors
+    ///
+    /// [`SensorError::Steps`] for fewer than 20 steps, [`SensorError::BlindAt`] when the sensor does
+    /// not see the wavelength, others when it has no gain or no noise.
+    pub fn plan(sensor: &Sensor, options: &Options) -> Result<Self, SensorError> {
+        if !(20..=10_000).contains(&options.steps) {
+            return Err(SensorError::Steps { steps: options.steps });
+        }
+        if sensor.noise() == NoiseModel::None {
+            let why = "what has no noise cannot be characterised by it";
+            return Err(SensorError::Misplaced { key: "noise", why });
+        }
+        let light = options.light(sensor)?;
+        let longest = longest_exposure(sensor, options.steps);
+        let photons_a_second = PAST_SATURATION * sensor.saturation() / (light.efficiency * longest);
+        let step = |time: f64, prefix: &str, frames: u32| {
+            let nanoseconds = nanoseconds(time);
+            let exposure_s = nanoseconds as f64 * 1e-9;
+            let files = |kind: &str| {
+                (0..frames).map(|frame| format!("{kind}_{prefix}_{frame:02}.png")).collect()
+            };
+            let photons = light.rounded(photons_a_second * exposure_s);
+            let step = Step { exposure_s, photons, bright: files("bright"), dark: files("dark") };
+            (step, nanoseconds)
+        };
+        let count = options.steps;
+        let each = |i: usize| step(longest * i as f64 / count as f64, &format!("{i:03}"), 2);
+        let (steps, mut times): (Vec<Step>, Vec<u64>) = (1..=count).map(each).unzip();
+        let (spatial, time) = step(longest * 0.5 / PAST_SATURATION, "spatial", SPATIAL);
+        times.push(time);
+        let manifest = Manifest { bits: sensor.bit_depth(), steps, spatial };
+        Ok(Self { manifest, size: light.size(), nanoseconds: times })
+    }
+
+    /// How many images there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.pictures().len()
+    }
+
+    /// Never: a series has images.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Makes the images and writes everything into `folder`, which is made if need be. `done` is
+    /// called with the number of images finished so far.
+    ///
+    /// Every file appears under its name when it is complete; the manifest comes last.
+    ///
+    /// # Errors
+    ///
+    /// [`EmvaError`] when the sensor does not see the wavelength or a file cannot be written.
+    pub fn write(
+        &self,
+        sensor: &Sensor,
+        options: &Options,
+        folder: &Path,
+        done: impl Fn(usize) + Sync,
+    ) -> Result<(), EmvaError> {
+        let light = options.light(sensor)?;
+        fs::create_dir_all(folder).map_err(failed(folder))?;
+        let finished = AtomicUsize::new(0);
+        self.pictures().into_par_iter().try_for_each(|picture| {
+            let image = light.frame(picture.photons, picture.shot, options.seed)?;
+            write_whole(&folder.join(picture.name), &png(&image).map_err(failed(folder))?)?;
+            done(finished.fetch_add(1, Ordering::Relaxed) + 1);
+            Ok::<(), EmvaError>(())
+        })?;
+        write_whole(&folder.join(DESCRIPTOR), self.descriptor().as_bytes())?;
+        let json = serde_json::to_vec_pretty(&self.manifest).map_err(io::Error::from);
+        write_whole(&folder.join(MANIFEST), &json.map_err(failed(folder))?)
+    }
+
+    /// The descriptor of the reference implementation.
+    #[must_use]
+    pub fn descriptor(&self) -> String {
+        let [width, height] = self.size;
+        let mut text = format!("v 4.0\nn {} {width} {height}\n", self.manifest.bits);
+        let mut add = |line: &str| {
+            text.push_str(line);
+            text.push('\n');
+        };
+        for (step, nanoseconds) in self.steps().zip(&self.nanoseconds) {
+            let mut bright = String::new();
+            let _ = write!(bright, "b {nanoseconds} {}", step.photons);
+            add(&bright);
+            step.bright.iter().for_each(|file| add(&format!("i {file}")));
+            add(&format!("d {nanoseconds}"));
+            step.dark.iter().for_each(|file| add(&format!("i {file}")));
+        }
+        text
+    }
+
+    fn steps(&self) -> impl Iterator<Item = &Step> {
+        self.manifest.steps.iter().chain([&self.manifest.spatial])
+    }
+
+    /// All images; every one is a frame of its own.
+    fn pictures(&self) -> Vec<Picture<'_>> {
+        let named = self.steps().flat_map(|step| {
+            let bright = step.bright.iter().map(|name| (step.photons, name));
+            let dark = step.dark.iter().map(|name| (0.0, name));
+            bright.chain(dark).map(|(photons, name)| (step.exposure_s, photons, name))
+        });
+        let numbered = named.zip(0..).map(|((exposure, photons, name), frame)| Picture {
+            name,
+            photons,
+            shot: Shot { exposure, frame },
+        });
+        numbered.collect()
+    }
+}
+
+/// Pixels a side of the images; see [`Options::size`].
+fn side(sensor: &Sensor) -> u32 {
+    let electrons = 0.1 * sensor.saturation();
+    let relative = (electrons + sensor.read_noise().powi(2)) / electrons.powi(2);
+    // Each mean is that of two frames.
+    let pixels = 0.5 * relative * (4.0f64 / 2e-4).powi(2);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cast saturates")]
+    let side = pixels.sqrt().ceil() as u32;
+    side.clamp(256, 1024)
+}
+
+/// The longest exposure time (s); see the head of this file.
+fn longest_exposure(sensor: &Sensor, steps: usize) -> f64 {
+    let read_out = sensor.read_noise().powi(2) + 1.0 / (12.0 * sensor.system_gain().powi(2));
+    let dark = (1.5 * read_out).max(1.0).min(0.1 * sensor.saturation());
+    let own = sensor.shots().map(|shot| shot.exposure).fold(0.0, f64::max);
+    let longest = if sensor.dark_current() > 0.0 { dark / sensor.dark_current() } else { own };
+    // Steps must differ by many nanoseconds, and nanoseconds must be countable.
+    longest.clamp(1e-7 * steps as f64, 1e9)
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 1e18")]
+fn nanoseconds(seconds: f64) -> u64 {
+    (seconds * 1e9).round().max(1.0) as u64
+}
+
+fn failed(path: &Path) -> impl Fn(io::Error) -> EmvaError {
+    move |source| EmvaError::Write { path: path.to_owned(), source }
+}
+
+/// A grey 16-bit PNG of an image's first channel.
+fn png(image: &RawImage) -> Result<Vec<u8>, io::Error> {
+    let too_large = |_| io::Error::other("the image is too large for PNG");
+    let width = u32::try_from(image.width).map_err(too_large)?;
+    let height = u32::try_from(image.height).map_err(too_large)?;
+    let bytes: Vec<u8> = image.values.iter().flat_map(|y| y.to_ne_bytes()).collect();
+    let mut out = Vec::new();
+    // Noise hardly compresses: what more effort saves is not worth the time.
+    PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Up)
+        .write_image(&bytes, width, height, ExtendedColorType::L16)
+        .map_err(io::Error::other)?;
+    Ok(out)
+}
+
+/// Writes beside the name and renames, so that nobody sees half a file.
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), EmvaError> {
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    let beside = PathBuf::from(beside);
+    let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
+    written.map_err(|source| {
+        // Best effort: the error that matters is the one returned.
+        let _ = fs::remove_file(&beside);
+        EmvaError::Write { path: path.to_owned(), source }
+    })
+}

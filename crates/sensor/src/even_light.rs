@@ -1,0 +1,84 @@
+//! A sensor before an even light of known photons: what a characterisation looks at.
+
+use etendue_spectrum::Lanes;
+
+use crate::film::{Film, RawImage, Shot};
+use crate::response::{Channel, Response};
+use crate::spec::Radiometry;
+use crate::{Sensor, SensorError};
+
+/// The silicon of a sensor without its colour filters, lit by photons of one wavelength.
+#[derive(Debug, Clone)]
+pub(crate) struct EvenLight {
+    sensor: Sensor,
+    /// η at the wavelength.
+    pub(crate) efficiency: f64,
+}
+
+impl EvenLight {
+    /// A corner of `size` (columns, rows) of the sensor, at most all of it, under `wavelength` (nm).
+    pub(crate) fn new(
+        sensor: &Sensor,
+        wavelength: f64,
+        size: [u32; 2],
+    ) -> Result<Self, SensorError> {
+        if !sensor.settings.counts {
+            let why = "a characterisation counts electrons";
+            return Err(SensorError::Missing { key: "system_gain", why });
+        }
+        let efficiency = sensor.quantum_efficiency().at(wavelength).unwrap_or(0.0);
+        if efficiency <= 0.0 {
+            return Err(SensorError::BlindAt { wavelength });
+        }
+        let [width, height] = sensor.resolution();
+        let mut corner = sensor.clone().with_resolution([width.min(size[0]), height.min(size[1])]);
+        corner.replace_response(Response {
+            lanes: Lanes::Grey,
+            channels: vec![Channel { name: "Y".into(), electrons: vec![1.0] }],
+            pattern: Some(vec![vec![0]]),
+        });
+        Ok(Self { sensor: corner, efficiency })
+    }
+
+    /// Columns and rows.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        self.sensor.resolution()
+    }
+
+    /// The sensor that draws its electrons another way.
+    pub(crate) fn with_noise(&self, noise: crate::NoiseModel) -> Self {
+        Self { sensor: self.sensor.clone().with_noise(noise), efficiency: self.efficiency }
+    }
+
+    /// A frame in which every pixel gets `photons` on average.
+    pub(crate) fn frame(
+        &self,
+        photons: f64,
+        shot: Shot,
+        seed: u64,
+    ) -> Result<RawImage, SensorError> {
+        let [width, height] = self.size().map(|side| side as usize);
+        let film = vec![self.film_value(photons); width * height];
+        self.sensor.expose(Film { values: &film }, shot, seed)
+    }
+
+    /// The photons that a frame really gets: films hold f32.
+    pub(crate) fn rounded(&self, photons: f64) -> f64 {
+        f64::from(self.film_value(photons)) / self.efficiency
+    }
+
+    /// Electrons: one lane of light is worth one.
+    #[expect(clippy::cast_possible_truncation, reason = "films hold f32; `rounded` tells")]
+    fn film_value(&self, photons: f64) -> f32 {
+        (photons * self.efficiency).min(f64::from(f32::MAX)) as f32
+    }
+}
+
+impl Sensor {
+    /// Electrons straight from the film: lanes are worth what `response` says, whatever the exposure.
+    fn replace_response(&mut self, response: Response) {
+        self.response = response;
+        self.cfa = None;
+        self.settings.radiometry = Radiometry::Digital;
+    }
+}

@@ -1,0 +1,362 @@
+//! Photon-transfer and signal-to-noise curves of a sensor: simulated, after theory, and with the
+//! paper's normal approximation.
+//!
+//! # Sources
+//!
+//! EMVA Standard 1288, Release 4.0 Linear: the linear model's variance, signal-to-noise ratio,
+//! saturation, absolute sensitivity threshold and dynamic range.
+
+use std::fmt::Write as _;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::approximation::electrons_needed;
+use crate::chart::{Chart, Line, svg};
+use crate::even_light::EvenLight;
+use crate::film::{RawImage, Shot};
+use crate::{NoiseModel, Sensor, SensorError};
+
+/// How curves are taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Wavelength of the light (nm); `None`: where the quantum efficiency is greatest.
+    pub wavelength: Option<f64>,
+    /// Points of a curve, 2 or more.
+    pub points: usize,
+    /// Columns and rows of a frame, of which two are taken at each point.
+    pub size: [u32; 2],
+    /// The seed of the noise.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { wavelength: None, points: 40, size: [256, 256], seed: 0 }
+    }
+}
+
+/// The curves of a sensor and what follows from them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PhotonTransfer {
+    /// Wavelength of the light (nm).
+    pub wavelength: f64,
+    /// Exposure time of all points (s).
+    pub exposure: f64,
+    /// η at the wavelength.
+    pub quantum_efficiency: f64,
+    /// K as the slope of the simulated variances up to 70 % of saturation (DN/e⁻).
+    pub system_gain: f64,
+    /// Temporal dark noise `σ_d`: read-out and dark current (e⁻).
+    pub dark_noise: f64,
+    /// Saturation (e⁻ and photons).
+    pub saturation_electrons: f64,
+    /// Saturation (photons).
+    pub saturation_photons: f64,
+    /// The greatest signal-to-noise ratio, √(saturation).
+    pub snr_max: f64,
+    /// Photons at which the signal-to-noise ratio is 1.
+    pub threshold_photons: f64,
+    /// Saturation over threshold.
+    pub dynamic_range: f64,
+    /// Electrons below which the normal approximation is off by more than 1 % (Kolmogorov's
+    /// distance); `None` when it never is.
+    pub normal_fails_below: Option<f64>,
+    /// The curves, by rising photons.
+    pub points: Vec<Point>,
+}
+
+/// A point of the curves. Signals are above the dark one; variances are temporal.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Point {
+    /// Mean photons a pixel.
+    pub photons: f64,
+    /// Mean photo-electrons a pixel (e⁻).
+    pub electrons: f64,
+    /// Simulated signal (DN).
+    pub signal: f64,
+    /// Simulated variance (DN²).
+    pub variance: f64,
+    /// The linear model's variance (DN²): `K²·(σ_d² + μₑ) + 1/12`.
+    pub variance_expected: f64,
+    /// The simulated variance under the normal approximation (DN²).
+    pub variance_normal: f64,
+    /// Simulated signal over noise.
+    pub snr: f64,
+    /// The linear model's.
+    pub snr_expected: f64,
+    /// The normal approximation's, simulated.
+    pub snr_normal: f64,
+    /// That of a sensor which counts every photon, √photons.
+    pub snr_ideal: f64,
+}
+
+impl PhotonTransfer {
+    /// Exposes frames from a tenth of an electron to past saturation.
+    ///
+    /// # Errors
+    ///
+    /// [`SensorError::BlindAt`] when the sensor does not see the wavelength.
+    pub fn measure(sensor: &Sensor, options: &Options) -> Result<Self, SensorError> {
+        let peak = || sensor.quantum_efficiency().peak().unwrap_or(550.0);
+        let wavelength = options.wavelength.unwrap_or_else(peak);
+        let light = EvenLight::new(sensor, wavelength, options.size)?;
+        let exposure = sensor.shots().next().map_or(0.01, |shot| shot.exposure);
+        let bench = Bench { sensor, light, exposure, seed: options.seed };
+        let most = 1.3 * sensor.saturation();
+        let count = options.points.max(2);
+        let electrons = |i: usize| {
+            let part = i as f64 / (count - 1) as f64;
+            0.1f64.min(most * 1e-3).powf(1.0 - part) * most.powf(part)
+        };
+        let points: Vec<Point> = (0..count)
+            .into_par_iter()
+            .map(|i| bench.point(i, electrons(i)))
+            .collect::<Result<_, _>>()?;
+        Ok(bench.summed_up(wavelength, points))
+    }
+
+    /// The figures and curves as text.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut text = String::new();
+        let decibel = |ratio: f64| 20.0 * ratio.log10();
+        let fails = match self.normal_fails_below {
+            Some(electrons) => {
+                format!("below {electrons:.3} e⁻ the normal approximation is over 1 % off")
+            }
+            None => "the normal approximation is never 1 % off".into(),
+        };
+        let _ = writeln!(
+            text,
+            "wavelength {} nm, quantum efficiency {:.4}, exposure {} s\n\
+             system gain {:.5} DN/e⁻, dark noise {:.3} e⁻\n\
+             saturation {:.0} e⁻ ({:.0} photons), SNR at most {:.1} ({:.1} dB)\n\
+             threshold {:.2} photons, dynamic range {:.0} ({:.1} dB)\n{fails}\n",
+            self.wavelength,
+            self.quantum_efficiency,
+            self.exposure,
+            self.system_gain,
+            self.dark_noise,
+            self.saturation_electrons,
+            self.saturation_photons,
+            self.snr_max,
+            decibel(self.snr_max),
+            self.threshold_photons,
+            self.dynamic_range,
+            decibel(self.dynamic_range),
+        );
+        let _ = writeln!(
+            text,
+            "{:>12} {:>12} {:>12} {:>12} {:>12} {:>12} {:>10} {:>10} {:>10} {:>10}",
+            "photons",
+            "electrons",
+            "signal DN",
+            "var DN²",
+            "theory",
+            "normal",
+            "SNR",
+            "theory",
+            "normal",
+            "ideal"
+        );
+        for p in &self.points {
+            let _ = writeln!(
+                text,
+                "{:>12.4} {:>12.4} {:>12.4} {:>12.4} {:>12.4} {:>12.4} {:>10.4} {:>10.4} {:>10.4} {:>10.4}",
+                p.photons,
+                p.electrons,
+                p.signal,
+                p.variance,
+                p.variance_expected,
+                p.variance_normal,
+                p.snr,
+                p.snr_expected,
+                p.snr_normal,
+                p.snr_ideal
+            );
+        }
+        text
+    }
+
+    /// Both curves as SVG.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        let line = |name, colour, dashes, f: &dyn Fn(&Point) -> [f64; 2]| Line {
+            name,
+            colour,
+            dashes,
+            points: self.points.iter().map(f).collect(),
+        };
+        let transfer = Chart {
+            title: "Photon transfer",
+            axes: ["signal (DN)", "temporal variance (DN²)"],
+            lines: vec![
+                line("exact Poisson", "#1f5fa8", "", &|p| [p.signal, p.variance]),
+                line("normal approximation", "#c0392b", "5 3", &|p| [p.signal, p.variance_normal]),
+                line("linear model", "#555555", "2 3", &|p| {
+                    [p.electrons * self.system_gain, p.variance_expected]
+                }),
+            ],
+        };
+        let ratio = Chart {
+            title: "Signal to noise",
+            axes: ["photons a pixel", "SNR"],
+            lines: vec![
+                line("exact Poisson", "#1f5fa8", "", &|p| [p.photons, p.snr]),
+                line("normal approximation", "#c0392b", "5 3", &|p| [p.photons, p.snr_normal]),
+                line("linear model", "#555555", "2 3", &|p| [p.photons, p.snr_expected]),
+                line("ideal sensor", "#2e8b57", "8 3 2 3", &|p| [p.photons, p.snr_ideal]),
+            ],
+        };
+        svg(&[transfer, ratio])
+    }
+}
+
+/// A sensor on the bench.
+struct Bench<'a> {
+    sensor: &'a Sensor,
+    light: EvenLight,
+    exposure: f64,
+    seed: u64,
+}
+
+impl Bench<'_> {
+    fn point(&self, index: usize, electrons: f64) -> Result<Point, SensorError> {
+        let photons = self.light.rounded(electrons / self.light.efficiency);
+        let electrons = photons * self.light.efficiency;
+        let [signal, variance] = self.pair(index, photons, NoiseModel::Poisson)?;
+        let [signal_normal, variance_normal] = self.pair(index, photons, NoiseModel::Normal)?;
+        let gain = self.sensor.system_gain();
+        let variance_expected = gain * gain * (self.dark_variance() + electrons) + 1.0 / 12.0;
+        let ratio = |signal: f64, variance: f64| {
+            if variance > 0.0 { signal.max(0.0) / variance.sqrt() } else { 0.0 }
+        };
+        Ok(Point {
+            photons,
+            electrons,
+            signal,
+            variance,
+            variance_expected,
+            variance_normal,
+            snr: ratio(signal, variance),
+            snr_expected: ratio(gain * electrons, variance_expected),
+            snr_normal: ratio(signal_normal, variance_normal),
+            snr_ideal: photons.sqrt(),
+        })
+    }
+
+    /// `[signal above the dark one, temporal variance]` of two frames: their mean, and half of the
+    /// variance of their difference.
+    fn pair(&self, index: usize, photons: f64, noise: NoiseModel) -> Result<[f64; 2], SensorError> {
+        let light = self.light.with_noise(noise);
+        let frame = |photons, number: usize| {
+            #[expect(clippy::cast_possible_truncation, reason = "four frames a point")]
+            let shot = Shot { exposure: self.exposure, frame: (4 * index + number) as u32 };
+            light.frame(photons, shot, self.seed)
+        };
+        let [first, second] = [frame(photons, 0)?, frame(photons, 1)?];
+        let dark = 0.5 * (mean(&frame(0.0, 2)?) + mean(&frame(0.0, 3)?));
+        let count = first.values.len() as f64;
+        let pairs = || first.values.iter().zip(&second.values);
+        let difference = |(a, b): (&u16, &u16)| f64::from(*a) - f64::from(*b);
+        let shift = pairs().map(difference).sum::<f64>() / count;
+        let squares: f64 = pairs().map(|pair| (difference(pair) - shift).powi(2)).sum();
+        Ok([0.5 * (mean(&first) + mean(&second)) - dark, squares / (2.0 * (count - 1.0).max(1.0))])
+    }
+
+    /// `σ_d²` (e⁻²).
+    fn dark_variance(&self) -> f64 {
+        self.sensor.read_noise().powi(2) + self.sensor.dark_current() * self.exposure
+    }
+
+    fn summed_up(&self, wavelength: f64, points: Vec<Point>) -> PhotonTransfer {
+        let efficiency = self.light.efficiency;
+        let gain = self.sensor.system_gain();
+        let saturation = self.sensor.saturation();
+        let dark = self.dark_variance();
+        // Where η·μ = √(σ_d² + σ_q²/K² + η·μ), the standard's absolute sensitivity threshold.
+        let threshold = ((dark + 1.0 / (12.0 * gain * gain) + 0.25).sqrt() + 0.5) / efficiency;
+        // Variance = dark + K·signal, weighted by the inverse of the variance's own scatter.
+        let fitted = points.iter().filter(|p| p.electrons <= 0.7 * saturation);
+        let dark_dn = gain * gain * dark + 1.0 / 12.0;
+        let (mut product, mut square) = (0.0, 0.0);
+        for p in fitted {
+            let weight = 1.0 / p.variance_expected.powi(2);
+            product += weight * p.signal * (p.variance - dark_dn);
+            square += weight * p.signal * p.signal;
+        }
+        PhotonTransfer {
+            wavelength,
+            exposure: self.exposure,
+            quantum_efficiency: efficiency,
+            system_gain: if square > 0.0 { product / square } else { gain },
+            dark_noise: dark.sqrt(),
+            saturation_electrons: saturation,
+            saturation_photons: saturation / efficiency,
+            snr_max: saturation.sqrt(),
+            threshold_photons: threshold,
+            dynamic_range: saturation / efficiency / threshold,
+            normal_fails_below: electrons_needed(self.sensor.read_noise(), 0.01),
+            points,
+        }
+    }
+}
+
+fn mean(image: &RawImage) -> f64 {
+    image.values.iter().map(|&y| f64::from(y)).sum::<f64>() / image.values.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn measured(model: &str) -> (Sensor, PhotonTransfer) {
+        let spec = serde_json::json!({ "type": "raw", "model": model });
+        let sensor = Sensor::new(&serde_json::from_value(spec).unwrap()).unwrap();
+        let curves = PhotonTransfer::measure(&sensor, &Options::default()).unwrap();
+        (sensor, curves)
+    }
+
+    #[test]
+    fn curves_give_back_gain_and_noise() {
+        for model in ["imx183", "kaf50100", "mt9m031"] {
+            let (sensor, curves) = measured(model);
+            // Forty variances of 65 536 pixels each: 0.1 % of the slope.
+            let error = curves.system_gain / sensor.system_gain() - 1.0;
+            assert!(error.abs() < 4e-3, "{model}: K off by {error}");
+            for p in curves.points.iter().filter(|p| p.electrons < 0.8 * sensor.saturation()) {
+                let scatter = 5.0 * p.variance_expected * (2.0f64 / 65_536.0).sqrt();
+                assert!((p.variance - p.variance_expected).abs() < scatter, "{model}: {p:?}");
+                assert!(p.snr < p.snr_ideal, "{model}: {p:?}");
+            }
+            let last = curves.points.last().unwrap();
+            // Where the well saturates before the converter, some read noise is left.
+            assert!(last.variance < 0.02 * last.variance_expected, "{model}: {last:?}");
+            assert!(curves.points.windows(2).all(|p| p[0].photons < p[1].photons));
+        }
+    }
+
+    #[test]
+    fn figures_are_those_of_the_standard() {
+        let (sensor, curves) = measured("imx183");
+        assert!((curves.snr_max.powi(2) - sensor.saturation()).abs() < 1e-9);
+        // At the threshold, signal and noise are equal: η·μ = √(σ_d² + σ_q²/K² + η·μ).
+        let electrons = curves.threshold_photons * curves.quantum_efficiency;
+        let gain = sensor.system_gain();
+        let noise = curves.dark_noise.powi(2) + 1.0 / (12.0 * gain * gain) + electrons;
+        assert!((electrons - noise.sqrt()).abs() < 1e-9);
+        assert_eq!(curves.wavelength, sensor.quantum_efficiency().peak().unwrap());
+        let table = curves.table();
+        assert_eq!(table.lines().count(), 7 + curves.points.len(), "{table}");
+        assert!(curves.svg().matches("<polyline").count() == 7);
+    }
+
+    #[test]
+    fn a_wavelength_that_is_not_seen_is_refused() {
+        let (sensor, _) = measured("imx183");
+        let options = Options { wavelength: Some(200.0), ..Options::default() };
+        let error = PhotonTransfer::measure(&sensor, &options).unwrap_err();
+        assert_eq!(error, SensorError::BlindAt { wavelength: 200.0 });
+    }
+}

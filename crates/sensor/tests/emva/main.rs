@@ -1,0 +1,94 @@
+//! The standard's own characterisation, run on our images, gives back the parameters that went in.
+
+mod reference;
+
+use std::collections::BTreeSet;
+
+use etendue_sensor::emva::{DESCRIPTOR, MANIFEST, Manifest, Options, Series};
+use etendue_sensor::{Sensor, SensorSpec};
+use serde_json::{Value, json};
+
+pub(crate) fn sensor(spec: Value) -> Sensor {
+    let spec: SensorSpec = serde_json::from_value(spec).unwrap();
+    Sensor::new(&spec).unwrap()
+}
+
+#[test]
+fn a_series_is_what_a_characterisation_wants() {
+    let sensor = sensor(json!({
+        "type": "raw", "model": "kaf8300", "resolution": [48, 32], "cfa": "rggb", "serial": 3,
+    }));
+    let options = Options { steps: 20, ..Options::default() };
+    let series = Series::plan(&sensor, &options).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    series.write(&sensor, &options, folder.path(), |done| assert!(done <= series.len())).unwrap();
+
+    let text = std::fs::read_to_string(folder.path().join(MANIFEST)).unwrap();
+    let manifest: Manifest = serde_json::from_str(&text).unwrap();
+    assert_eq!(manifest, series.manifest);
+    let keys: Value = serde_json::from_str(&text).unwrap();
+    let names = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<BTreeSet<_>>();
+    let set = |keys: &[&str]| keys.iter().map(|key| (*key).to_owned()).collect::<BTreeSet<_>>();
+    assert_eq!(names(&keys), set(&["bits", "steps", "spatial"]));
+    assert_eq!(names(&keys["spatial"]), set(&["exposure_s", "photons", "bright", "dark"]));
+    assert_eq!(names(&keys["steps"][0]), names(&keys["spatial"]));
+
+    assert_eq!((manifest.bits, manifest.steps.len()), (16, 20));
+    assert!(manifest.steps.iter().all(|step| step.bright.len() == 2 && step.dark.len() == 2));
+    assert_eq!((manifest.spatial.bright.len(), manifest.spatial.dark.len()), (16, 16));
+    let flux: Vec<f64> = manifest.steps.iter().map(|s| s.photons / s.exposure_s).collect();
+    // The film rounds photons to 24 bits.
+    assert!(flux.iter().all(|f| (f / flux[0] - 1.0).abs() < 1e-6), "constant light");
+    let efficiency = sensor.quantum_efficiency().at(525.0).unwrap();
+    let most = manifest.steps[19].photons * efficiency / sensor.saturation();
+    assert!((most - 1.15).abs() < 1e-6, "ends at {most} of saturation");
+    let half = manifest.spatial.photons * efficiency / sensor.saturation();
+    assert!((half - 0.5).abs() < 1e-6, "{half}");
+
+    let descriptor = std::fs::read_to_string(folder.path().join(DESCRIPTOR)).unwrap();
+    assert!(descriptor.lines().any(|line| line == "n 16 48 32"));
+    assert_eq!(descriptor.lines().filter(|line| line.starts_with("i ")).count(), 20 * 4 + 32);
+    for name in descriptor.lines().filter_map(|line| line.strip_prefix("i ")) {
+        let image = image::open(folder.path().join(name)).unwrap();
+        assert_eq!(image.color(), image::ColorType::L16, "{name}");
+        assert_eq!((image.width(), image.height()), (48, 32));
+    }
+    let files = std::fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(files, series.len() + 2, "nothing half-written is left");
+    // The last step is saturated: the converter clips.
+    let last = image::open(folder.path().join(&manifest.steps[19].bright[0])).unwrap().to_luma16();
+    assert!(last.iter().all(|&y| y == 65_535));
+}
+
+#[test]
+fn a_series_comes_out_the_same_twice() {
+    let sensor = sensor(json!({ "type": "raw", "model": "imx250", "resolution": [20, 10] }));
+    let options = Options { steps: 20, ..Options::default() };
+    let series = Series::plan(&sensor, &options).unwrap();
+    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    for folder in &folders {
+        series.write(&sensor, &options, folder.path(), |_| ()).unwrap();
+    }
+    for entry in std::fs::read_dir(folders[0].path()).unwrap() {
+        let name = entry.unwrap().file_name();
+        let [a, b] = [0, 1].map(|i| std::fs::read(folders[i].path().join(&name)).unwrap());
+        assert!(a == b, "{} differs", name.display());
+    }
+}
+
+#[test]
+fn what_cannot_be_characterised_is_refused() {
+    let seen = sensor(json!({ "type": "raw", "model": "imx183" }));
+    let plan = |options: Options| Series::plan(&seen, &options).unwrap_err().to_string();
+    let few = plan(Options { steps: 19, ..Options::default() });
+    assert!(few.contains("19 exposure steps"), "{few}");
+    let blind = plan(Options { wavelength: 1500.0, ..Options::default() });
+    assert!(blind.contains("no quantum efficiency at 1500 nm"), "{blind}");
+    for (spec, word) in [
+        (json!({ "type": "raw" }), "sensor.noise is of no use"),
+        (json!({ "type": "raw", "model": "imx183", "noise": "none" }), "what has no noise"),
+    ] {
+        let error = Series::plan(&sensor(spec), &Options::default()).unwrap_err().to_string();
+        assert!(error.contains(word), "{error}");
+    }
+}
