@@ -106,7 +106,7 @@ pub(crate) struct RenderArguments {
     #[arg(long, value_name = "LIST", default_value = "exr,png,npy")]
     pub(crate) outputs: String,
     /// Threads of build and render; 0 takes all that this process may use
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     pub(crate) threads: usize,
     /// Stop a build whose structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
@@ -184,6 +184,16 @@ fn parse_layer(name: &str) -> Result<String, String> {
     match LayerSpec::from_name(name) {
         Some(_) => Ok(name.to_owned()),
         None => Err(format!("known layers: {}", LayerSpec::NAMES.join(", "))),
+    }
+}
+
+/// More threads than any machine has cores only make a machine unusable.
+const MOST_THREADS: usize = 1024;
+
+fn parse_threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(threads) if threads <= MOST_THREADS => Ok(threads),
+        _ => Err(format!("expected a whole number from 0 to {MOST_THREADS}")),
     }
 }
 

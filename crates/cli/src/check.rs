@@ -13,6 +13,6 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
         reach: if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder },
         ..LoadOptions::default()
     };
-    let diagnosis = doctor::check(&arguments.file, &options)?;
+    let diagnosis = doctor::check(&arguments.file, &[], &options)?;
     if arguments.json { print_json(&diagnosis) } else { print_text(&diagnosis.to_string()) }
 }

@@ -3,7 +3,6 @@
 
 mod arguments;
 mod check;
-
 mod fault;
 mod plan;
 mod progress;

@@ -1,0 +1,258 @@
+//! Every refusal: exit code 2, one message that names the file and the place, and no output.
+
+use crate::run::{Bench, text};
+
+/// Renders `scene.json` with `more` arguments, which must be refused in words that hold each of
+/// `words`, with nothing left behind.
+fn refused(bench: &Bench, more: &[&str], words: &[&str]) {
+    let arguments = [&["render", "scene.json", "-o", "out"], more].concat();
+    refused_command(bench, &arguments, words);
+}
+
+fn refused_command(bench: &Bench, arguments: &[&str], words: &[&str]) {
+    let output = bench.run(arguments);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    assert!(!message.contains("panicked"), "{message}");
+    for word in words {
+        assert!(message.contains(word), "expected \"{word}\" in: {message}");
+    }
+    let left = std::fs::read_dir(bench.path("out")).map_or(0, Iterator::count);
+    assert_eq!(left, 0, "something was left behind: {message}");
+}
+
+fn refused_scene(scene: &str, words: &[&str]) {
+    refused(&Bench::with_scene(scene), &[], words);
+}
+
+#[test]
+fn broken_json_shows_line_column_and_the_line() {
+    refused_scene(
+        "{\n  \"etendue\": 1,\n  \"objects\": [ { \"shape\": \"box\" ]\n}\n",
+        &["scene.json", "line 3", "\"objects\": [ { \"shape\": \"box\" ]"],
+    );
+    refused_scene("", &["scene.json", "line 1"]);
+    refused_scene("[1, 2]", &["scene.json"]);
+}
+
+#[test]
+fn unknown_keys_name_the_nearest_known_one() {
+    refused_scene(r#"{"etendue": 1, "camra": {}}"#, &["camra", "`camera`"]);
+    refused_scene(
+        r#"{"etendue": 1, "camera": {"type": "pinhole", "fof": 30}}"#,
+        &["camera", "fof", "`fov`"],
+    );
+    refused_scene(
+        r#"{"etendue": 1, "objects": [{"shape": "box", "materiel": "x"}]}"#,
+        &["objects[0]", "materiel", "`material`"],
+    );
+}
+
+#[test]
+fn wrong_types_and_versions_say_what_was_expected() {
+    refused_scene(r#"{"etendue": 2}"#, &["etendue", "2"]);
+    refused_scene(r#"{"etendue": 1, "objects": 3}"#, &["objects"]);
+    refused_scene(r#"{"etendue": 1, "layers": ["dept"]}"#, &["layers[0]", "depth"]);
+    refused_scene(
+        r#"{"etendue": 1, "objects": [{"shape": "sphere", "radius": "1 parsec"}]}"#,
+        &["objects[0]", "radius", "parsec"],
+    );
+    refused_scene(r#"{"etendue": 1, "objects": [{"shape": "pyramid"}]}"#, &["pyramid"]);
+}
+
+#[test]
+fn impossible_cameras_are_named() {
+    let camera = |keys: &str| {
+        format!(r#"{{"etendue": 1, "camera": {{"type": "pinhole", {keys}}}, "objects": []}}"#)
+    };
+    refused_scene(&camera(r#""sensor": {"resolution": [0, 100]}"#), &["resolution"]);
+    refused_scene(&camera(r#""sensor": {"resolution": [100000, 100000]}"#), &["resolution"]);
+    refused_scene(&camera(r#""fov": 180"#), &["fov"]);
+    refused_scene(&camera(r#""fov": -3"#), &["fov"]);
+    refused_scene(&camera(r#""pose": {"from": [0, 0, 1], "look_at": [0, 0, 1]}"#), &["pose"]);
+    refused_scene(
+        &camera(r#""pose": {"from": [0, 5, 0], "look_at": [0, 0, 0], "up": [0, 1, 0]}"#),
+        &["pose"],
+    );
+}
+
+#[test]
+fn missing_files_and_materials_name_what_there_is() {
+    let bench = Bench::with_scene(r#"{"etendue": 1, "objects": [{"file": "bunny.obj"}]}"#);
+    bench.write("bunnny.obj", b"");
+    refused(&bench, &[], &["bunny.obj", "bunnny.obj"]);
+    refused_command(&bench, &["render", "nothing.json", "-o", "out"], &["nothing.json"]);
+    refused_scene(
+        r#"{"etendue": 1, "objects": [{"shape": "box", "material": "cly"}],
+            "materials": {"clay": {"type": "matte", "color": [0.5, 0.5, 0.5]}}}"#,
+        &["cly", "clay"],
+    );
+}
+
+#[test]
+fn paths_stay_in_the_scenes_folder_unless_allowed() {
+    let bench = Bench::new();
+    std::fs::create_dir(bench.path("inner")).unwrap();
+    bench.write("mesh.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    bench.write("inner/scene.json", br#"{"etendue": 1, "objects": [{"file": "../mesh.obj"}]}"#);
+    let scene = ["render", "inner/scene.json", "-o", "out"];
+    refused_command(&bench, &scene, &["../mesh.obj", "--allow-outside"]);
+    std::os::unix::fs::symlink(bench.path("mesh.obj"), bench.path("inner/link.obj")).unwrap();
+    bench.write("inner/scene.json", br#"{"etendue": 1, "objects": [{"file": "link.obj"}]}"#);
+    refused_command(&bench, &scene, &["link.obj", "--allow-outside"]);
+    let allowed = bench.run(&[&scene[..], &["--allow-outside"]].concat());
+    assert!(allowed.status.success(), "{}", text(&allowed.stderr));
+}
+
+/// A GLB of one triangle with the given positions and indices.
+fn glb(positions: &[[f32; 3]], indices: &[u32], extension: &str) -> Vec<u8> {
+    let mut binary: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
+    let offset = binary.len();
+    binary.extend(positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    let finite = |f: fn(f32, f32) -> f32, start: f32| {
+        [0, 1, 2].map(|k| positions.iter().map(|p| p[k]).fold(start, f))
+    };
+    let required = match extension {
+        "" => String::new(),
+        name => format!(r#""extensionsUsed": ["{name}"], "extensionsRequired": ["{name}"],"#),
+    };
+    let on_primitive = match extension {
+        "KHR_draco_mesh_compression" => {
+            r#", "extensions": {"KHR_draco_mesh_compression": {"bufferView": 0,
+               "attributes": {"POSITION": 0}}}"#
+        }
+        _ => "",
+    };
+    let json = format!(
+        r#"{{"asset": {{"version": "2.0"}}, {required}
+        "scenes": [{{"nodes": [0]}}], "scene": 0, "nodes": [{{"mesh": 0}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 1}}, "indices": 0
+            {on_primitive}}}]}}],
+        "buffers": [{{"byteLength": {length}}}],
+        "bufferViews": [{{"buffer": 0, "byteOffset": 0, "byteLength": {offset}}},
+            {{"buffer": 0, "byteOffset": {offset}, "byteLength": {rest}}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5125, "count": {ni}, "type": "SCALAR"}},
+            {{"bufferView": 1, "componentType": 5126, "count": {np}, "type": "VEC3",
+              "min": {min:?}, "max": {max:?}}}]}}"#,
+        length = binary.len(),
+        rest = binary.len() - offset,
+        ni = indices.len(),
+        np = positions.len(),
+        min = finite(f32::min, 1e30),
+        max = finite(f32::max, -1e30),
+    );
+    let mut json = json.into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut file = b"glTF\x02\0\0\0".to_vec();
+    let total = 12 + 8 + json.len() + 8 + binary.len();
+    let size = |n: usize| u32::try_from(n).unwrap().to_le_bytes();
+    file.extend(size(total));
+    file.extend(size(json.len()));
+    file.extend(b"JSON");
+    file.extend(&json);
+    file.extend(size(binary.len()));
+    file.extend(b"BIN\0");
+    file.extend(&binary);
+    file
+}
+
+const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+fn refused_model(bytes: &[u8], more: &[&str], words: &[&str]) {
+    let bench = Bench::new();
+    bench.write("model.glb", bytes);
+    let arguments = [&["render", "model.glb", "-o", "out"], more].concat();
+    refused_command(&bench, &arguments, words);
+}
+
+#[test]
+fn a_sound_glb_is_taken() {
+    // So that the refusals below are for the reason they name.
+    let bench = Bench::new();
+    bench.write("model.glb", &glb(&CORNERS, &[0, 1, 2], ""));
+    let output = bench.run(&["render", "model.glb", "-o", "out"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+}
+
+#[test]
+fn truncated_models_are_refused_at_any_length() {
+    let whole = glb(&CORNERS, &[0, 1, 2], "");
+    for length in [0, 3, 12, 19, 20, whole.len() / 2, whole.len() - 1] {
+        refused_model(&whole[..length], &[], &["model.glb"]);
+    }
+}
+
+#[test]
+fn indices_out_of_range_are_refused() {
+    refused_model(&glb(&CORNERS, &[0, 1, 3], ""), &[], &["model.glb", "3"]);
+}
+
+#[test]
+fn unfinite_positions_are_dropped_and_counted_or_refused() {
+    let corners = [[f32::NAN, 0.0, 0.0], CORNERS[1], CORNERS[2], [1.0, 1.0, 0.0]];
+    let model = glb(&corners, &[0, 1, 2, 1, 3, 2], "");
+    let bench = Bench::new();
+    bench.write("model.glb", &model);
+    let output = bench.run(&["render", "model.glb", "-o", "out", "--report", "report.json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let report = bench.json("report.json");
+    assert_eq!(report["triangles"], 1);
+    assert!(report["notes"].to_string().contains("model"), "{report}");
+    refused_model(&model, &["--strict"], &["model.glb"]);
+}
+
+#[test]
+fn compressed_models_are_named_with_the_command_that_converts_them() {
+    refused_model(
+        &glb(&CORNERS, &[0, 1, 2], "KHR_draco_mesh_compression"),
+        &[],
+        &["KHR_draco_mesh_compression", "gltf"],
+    );
+    refused_model(&glb(&CORNERS, &[0, 1, 2], "ACME_unheard_of"), &[], &["ACME_unheard_of"]);
+}
+
+#[test]
+fn an_empty_scene_is_a_picture_without_hits() {
+    for scene in [
+        r#"{"etendue": 1, "layers": ["depth", "ids", "normal"]}"#,
+        r#"{"etendue": 1, "objects": [{"file": "empty.obj"}], "layers": ["depth", "ids", "normal"]}"#,
+    ] {
+        let bench = Bench::with_scene(scene);
+        bench.write("empty.obj", b"# nothing\n");
+        bench.render(&["--set", "camera.type=pinhole", "--set", "camera.sensor.resolution=[9,5]"]);
+        assert!(bench.array("depth").iter().all(|z| *z == f64::INFINITY));
+        assert!(bench.array("id").iter().all(|id| *id == 0.0));
+        assert!(bench.array("normal").iter().all(|n| *n == 0.0));
+    }
+}
+
+#[test]
+fn folders_that_cannot_be_written_to_are_refused_before_rendering() {
+    let bench = Bench::with_scene(r#"{"etendue": 1}"#);
+    bench.write("file", b"");
+    refused_command(&bench, &["render", "scene.json", "-o", "file/out"], &["file/out"]);
+    refused_command(&bench, &["render", "scene.json", "-o", "file"], &["file"]);
+}
+
+#[test]
+fn a_memory_limit_that_the_build_would_pass_stops_it() {
+    let bench =
+        Bench::with_scene(r#"{"etendue": 1, "objects": [{"shape": "blob", "triangles": 200000}]}"#);
+    for accel in ["embree", "bvh", "exact"] {
+        if accel == "embree" && !cfg!(feature = "embree") {
+            continue;
+        }
+        refused(&bench, &["--memory-limit", "1M", "--accel", accel], &["--memory-limit"]);
+    }
+}
+
+#[test]
+fn options_that_mean_nothing_are_refused() {
+    let bench = Bench::with_scene(r#"{"etendue": 1}"#);
+    refused(&bench, &["--outputs", "gif"], &["gif", "exr"]);
+    refused(&bench, &["--layers", "dept"], &["dept", "depth"]);
+    refused(&bench, &["--set", "camera"], &["PATH=VALUE"]);
+    refused(&bench, &["--set", "render.samples=0"], &["samples"]);
+    refused(&bench, &["--memory-limit", "4 elephants"], &["memory-limit"]);
+    refused(&bench, &["--camera", "front"], &["front"]);
+}

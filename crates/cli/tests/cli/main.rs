@@ -1,0 +1,7 @@
+//! The built command, as a user runs it.
+
+mod assets; // real models from outside the repository
+mod bad_input; // refused with exit code 2, one message, and nothing written
+mod render; // pictures with a closed-form answer
+mod run; // running the command and reading what it left
+mod tools; // check, plan, schema, version

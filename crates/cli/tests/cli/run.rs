@@ -1,0 +1,89 @@
+//! Running the command and reading what it left.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder of its own for one test, with a scene in it.
+pub(crate) struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    pub(crate) fn new() -> Self {
+        Self { folder: tempfile::tempdir().expect("a temporary folder") }
+    }
+
+    /// A bench whose `scene.json` is `scene`.
+    pub(crate) fn with_scene(scene: &str) -> Self {
+        let bench = Self::new();
+        bench.write("scene.json", scene.as_bytes());
+        bench
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, bytes: &[u8]) {
+        std::fs::write(self.path(name), bytes).expect("a writable folder");
+    }
+
+    /// Runs `etendue` in the folder.
+    pub(crate) fn run(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_etendue"))
+            .args(arguments)
+            .current_dir(self.folder.path())
+            .output()
+            .expect("the command runs")
+    }
+
+    /// Renders `scene.json` into `out` and panics with the command's words when that fails.
+    pub(crate) fn render(&self, more: &[&str]) {
+        let arguments = [&["render", "scene.json", "-o", "out", "--quiet"], more].concat();
+        let output = self.run(&arguments);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    }
+
+    /// The numbers of `out/NAME.npy`, row by row, whatever their type.
+    pub(crate) fn array(&self, name: &str) -> Vec<f64> {
+        read_npy(&self.path("out").join(format!("{name}.npy")))
+    }
+
+    /// A JSON file of the folder.
+    pub(crate) fn json(&self, name: &str) -> serde_json::Value {
+        let text = std::fs::read(self.path(name)).expect("a JSON file");
+        serde_json::from_slice(&text).expect("JSON")
+    }
+}
+
+pub(crate) fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// The format of numpy's NEP 1, as far as the command writes it.
+fn read_npy(path: &Path) -> Vec<f64> {
+    let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    assert_eq!(&bytes[..6], b"\x93NUMPY");
+    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = text(&bytes[10..start]);
+    let values = &bytes[start..];
+    if header.contains("<f8") {
+        values.as_chunks().0.iter().map(|&b| f64::from_le_bytes(b)).collect()
+    } else if header.contains("<f4") {
+        values.as_chunks().0.iter().map(|&b| f64::from(f32::from_le_bytes(b))).collect()
+    } else {
+        assert!(header.contains("<u4"), "{header}");
+        values.as_chunks().0.iter().map(|&b| f64::from(u32::from_le_bytes(b))).collect()
+    }
+}
+
+/// The folder of reference data, or `None` with a word about it.
+pub(crate) fn assets(test: &str) -> Option<PathBuf> {
+    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared");
+    let folder = std::env::var_os("ETENDUE_ASSETS").map_or_else(|| beside.into(), PathBuf::from);
+    let found = folder.join("data").is_dir();
+    if !found {
+        println!("{test} is skipped: ETENDUE_ASSETS names no folder with `data` in it");
+    }
+    found.then_some(folder)
+}

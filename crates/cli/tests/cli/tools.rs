@@ -1,0 +1,70 @@
+//! check, plan, schema, version.
+
+use crate::run::{Bench, text};
+
+#[test]
+fn version_names_the_program_and_what_traces() {
+    let output = Bench::new().run(&["--version"]);
+    let version = text(&output.stdout);
+    assert!(version.starts_with(concat!("etendue ", env!("CARGO_PKG_VERSION"))), "{version}");
+    assert_eq!(version.contains("Embree"), true, "{version}");
+}
+
+#[test]
+fn help_exists_for_every_command_and_shows_an_example() {
+    let bench = Bench::new();
+    for command in ["render", "check", "plan", "schema"] {
+        let output = bench.run(&[command, "--help"]);
+        assert!(output.status.success());
+        assert!(text(&output.stdout).contains("Example"), "{command}");
+    }
+    assert_eq!(bench.run(&[]).status.code(), Some(2), "nothing asked for is no success");
+}
+
+#[test]
+fn the_schema_is_json_and_knows_the_keys() {
+    let output = Bench::new().run(&["schema"]);
+    let schema: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    for key in ["etendue", "camera", "layers", "objects", "materials", "render"] {
+        assert!(schema["properties"][key].is_object(), "{key}");
+    }
+}
+
+#[test]
+fn check_counts_and_measures() {
+    let bench = Bench::with_scene(
+        r#"{"etendue": 1, "objects": [
+            {"shape": "box", "size": [2, 4, 6]},
+            {"shape": "box", "size": [2, 4, 6], "transform": {"translate": [10, 0, 0]}}]}"#,
+    );
+    let output = bench.run(&["check", "scene.json", "--json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!((&found["triangles"], &found["triangles_unique"]), (&24.into(), &12.into()));
+    let corner = |which: &str| -> Vec<f64> {
+        found["bounds"][which].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    assert_eq!((corner("min"), corner("max")), (vec![-1.0, -2.0, -3.0], vec![11.0, 2.0, 3.0]));
+}
+
+#[test]
+fn a_plan_says_what_is_off_and_why() {
+    let bench =
+        Bench::with_scene(r#"{"etendue": 1, "layers": ["depth"], "objects": [{"shape": "box"}]}"#);
+    let plan = text(&bench.run(&["plan", "scene.json"]).stdout);
+    assert!(plan.contains("vertex normals") && plan.contains("off"), "{plan}");
+    let json = bench.run(&["plan", "scene.json", "--json"]);
+    let decisions: Vec<serde_json::Value> = serde_json::from_slice(&json.stdout).expect("JSON");
+    let surface = decisions.iter().find(|d| d["what"] == "surface").expect("a decision");
+    assert_eq!(surface["choice"], "off", "depth needs no normals");
+}
+
+#[test]
+fn nothing_but_results_goes_to_standard_output() {
+    let bench = Bench::with_scene(r#"{"etendue": 1, "objects": [{"shape": "box"}]}"#);
+    let output = bench.run(&["render", "scene.json", "-o", "out", "--outputs", "exr"]);
+    let out = text(&output.stdout);
+    assert!(out.lines().all(|line| bench.path(line).is_file()), "{out}");
+    let quiet = bench.run(&["render", "scene.json", "-o", "out", "--quiet"]);
+    assert!(quiet.stderr.is_empty(), "{}", text(&quiet.stderr));
+}
