@@ -52,7 +52,7 @@ fn wall(camera: &str, at: [f64; 3]) -> Bench {
             "pose": {{"from": {at:?}, "look_at": {target:?}, "up": [0, 1, 0]}},
             "sensor": {{"resolution": [33, 21]}}}},
         "layers": ["depth", "distance", "ids", "coverage"],
-        "objects": [{{"shape": "rectangle", "size": [8, 8],
+        "objects": [{{"shape": "rectangle", "width": 8, "height": 8,
             "transform": {{"translate": {target:?}}}}}]}}"#
     ))
 }
@@ -89,7 +89,7 @@ fn the_top_row_is_up_and_the_first_column_left() {
             "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0], "up": [0, 1, 0]},
             "sensor": {"resolution": [20, 20]}},
         "layers": ["position", {"type": "position", "space": "camera"}],
-        "objects": [{"shape": "rectangle", "size": [9, 9]}]}"#,
+        "objects": [{"shape": "rectangle", "width": 9, "height": 9}]}"#,
     );
     bench.render(&[]);
     let position = bench.array("position");
@@ -109,7 +109,7 @@ const MANY: &str = r#"{"etendue": 1,
          "transform": {"translate": [-1, 0, 0]}},
         {"shape": "blob", "triangles": 20000, "seed": 3,
          "transform": {"translate": [1, 0.2, 0], "rotate": [0, 1, 0, 40], "scale": [1, -1, 1]}},
-        {"shape": "rectangle", "size": [20, 20],
+        {"shape": "rectangle", "width": 20, "height": 20,
          "transform": {"translate": [0, -1, 0], "rotate": [1, 0, 0, -90]}}],
     "materials": {"squares": {"type": "checker"}},
     "render": {"samples": 5, "seed": 11}}"#;
