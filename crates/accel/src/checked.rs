@@ -9,7 +9,7 @@ use etendue_geometry::{Geometry, HitBatch, MISS, RayBatch};
 
 use crate::embree::{Found, Scene, version};
 use crate::recheck::{self, BUNDLE, Candidate};
-use crate::single::{Frame, Rays32};
+use crate::single::{self, Frame, Rays32};
 use crate::solve::{self, Lanes, Solved};
 use crate::{Accel, BuildError, BuildOptions, BuildReport, Counts};
 
@@ -189,7 +189,8 @@ impl Embree {
             if nearest == f32::INFINITY {
                 break;
             }
-            behind = nearest.next_up().max(nearest + (4.0 * self.frame.blur()) as f32);
+            let ahead = f64::from(nearest) + 4.0 * self.frame.blur();
+            behind = nearest.next_up().max(single::round(ahead));
         }
         recheck::decide(self.scene.geometry(), rays, i, candidates, hits);
     }

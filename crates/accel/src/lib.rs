@@ -13,7 +13,6 @@
 //! solution then works out where, in f64 and relative to the ray's origin, so that distances
 //! are accurate to the coordinates the file gave, and stay so far from the origin.
 
-
 mod bvh;
 #[cfg(feature = "embree")]
 mod checked;

@@ -117,7 +117,7 @@ impl Rays32 {
 
 #[expect(clippy::cast_possible_truncation, reason = "rounding to single precision is the purpose")]
 #[inline]
-fn round(x: f64) -> f32 {
+pub(crate) fn round(x: f64) -> f32 {
     x as f32
 }
 

@@ -133,7 +133,10 @@ impl Dimension {
             return Err(QuantityError::NoNumber { text: text.to_owned(), example });
         };
         if unit.is_empty() {
-            return Err(QuantityError::NoUnit { text: trimmed.to_owned(), unit: target.to_owned() });
+            return Err(QuantityError::NoUnit {
+                text: trimmed.to_owned(),
+                unit: target.to_owned(),
+            });
         }
         let of = |name: &str| self.units().iter().find(|(known, ..)| *known == name);
         let (Some(&(_, up, down)), Some(&(_, target_up, target_down))) = (of(unit), of(target))

@@ -20,11 +20,8 @@ pub struct Transform {
 
 impl Transform {
     /// The map that changes nothing.
-    pub const IDENTITY: Self = Self {
-        linear: DMat3::IDENTITY,
-        translation: DVec3::ZERO,
-        translation_low: DVec3::ZERO,
-    };
+    pub const IDENTITY: Self =
+        Self { linear: DMat3::IDENTITY, translation: DVec3::ZERO, translation_low: DVec3::ZERO };
 
     /// From a linear part and a translation (m).
     #[must_use]
