@@ -25,7 +25,7 @@ impl Files {
             Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
             _ => PathBuf::from("."),
         };
-        let root = root.map(|root| canonical(root)).transpose()?;
+        let root = root.map(canonical).transpose()?;
         Ok(Self { model: path.to_owned(), folder, root, opened: Mutex::default() })
     }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 const MOST_ROUNDING: f64 = 1e-7;
 
 /// `positions` in f32, or in f64 where rounding would move one too far.
-pub(super) fn precise_enough(positions: Vec<[f64; 3]>) -> Positions {
+pub(super) fn precise_enough(positions: &[[f64; 3]]) -> Positions {
     let finite = |p: &&[f64; 3]| p.iter().all(|x| x.is_finite());
     let of_chunk = |chunk: &[[f64; 3]]| {
         let mut bounds = Bounds::EMPTY;
@@ -24,15 +24,15 @@ pub(super) fn precise_enough(positions: Vec<[f64; 3]>) -> Positions {
         DVec3::from(rounded).distance(DVec3::from(*p))
     };
     if positions.par_iter().filter(finite).any(|p| moved(p) > most) {
-        return Positions::F64(positions.into());
+        return Positions::F64(positions.to_vec().into());
     }
     let mut floats = vec![0.0; positions.len() * 3 + 4];
-    floats.par_chunks_exact_mut(3).zip(&positions).for_each(|(to, from)| {
+    floats.par_chunks_exact_mut(3).zip(positions).for_each(|(to, from)| {
         to.copy_from_slice(&from.map(single));
     });
     match Vertices::new(floats.into(), 3, positions.len()) {
         Some(vertices) => Positions::F32(vertices),
-        None => Positions::F64(positions.into()),
+        None => Positions::F64(positions.to_vec().into()),
     }
 }
 
@@ -51,10 +51,10 @@ mod tests {
         let square = |at: f64| {
             vec![[at + 0.1, 0.0, 0.0], [at + 1.1, 0.0, 0.0], [at + 0.1, 1.3, 0.0], [f64::NAN; 3]]
         };
-        assert!(matches!(precise_enough(square(0.0)), Positions::F32(_)));
-        assert!(matches!(precise_enough(square(1e6)), Positions::F64(_)));
+        assert!(matches!(precise_enough(&square(0.0)), Positions::F32(_)));
+        assert!(matches!(precise_enough(&square(1e6)), Positions::F64(_)));
         // Whole numbers are exact however far.
         let far = vec![[1e6, 0.0, 0.0], [1e6 + 1.0, 0.0, 0.0], [1e6, 1.0, 0.0]];
-        assert!(matches!(precise_enough(far), Positions::F32(_)));
+        assert!(matches!(precise_enough(&far), Positions::F32(_)));
     }
 }

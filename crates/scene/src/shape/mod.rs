@@ -180,7 +180,7 @@ fn in_range(triangles: u64) -> Result<u64, ShapeError> {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::HashMap;
+    use std::collections::BTreeMap;
 
     use etendue_geometry::Positions;
     use etendue_geometry::glam::DVec3;
@@ -193,7 +193,7 @@ mod tests {
 
     /// Edges by direction: on a closed surface of one orientation each is used once each way.
     fn assert_closed(mesh: &Mesh) {
-        let mut uses: HashMap<(u32, u32), i32> = HashMap::new();
+        let mut uses: BTreeMap<(u32, u32), i32> = BTreeMap::new();
         for &[a, b, c] in mesh.triangles.iter() {
             for (from, to) in [(a, b), (b, c), (c, a)] {
                 assert_ne!(from, to);

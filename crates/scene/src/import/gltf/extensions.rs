@@ -21,7 +21,8 @@ enum Support {
 
 const DECOMPRESS: &str = "decompress it: npx @gltf-transform/cli copy IN decompressed.glb";
 const TO_PNG: &str = "convert its textures: npx @gltf-transform/cli ktxdecompress IN converted.glb (needs KTX-Software)";
-const FROM_WEBP: &str = "convert its textures: npx @gltf-transform/cli png IN converted.glb";
+const FROM_WEBP: &str =
+    "convert its textures: npx @gltf-transform/cli png IN converted.glb --formats '*'";
 const LOOK: &str = "surfaces are shown without it";
 
 /// What is known of an extension by its name; `None` for one that nobody has heard of here.

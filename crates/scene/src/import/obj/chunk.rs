@@ -141,8 +141,7 @@ impl Chunk {
 
     fn face(&mut self, words: &mut Words<'_>, wish: Wish) -> Result<(), Fault> {
         let first = self.corners[V].len();
-        loop {
-            let Some(word) = words.word() else { break };
+        while let Some(word) = words.word() {
             let at = words.at() - word.len();
             if word[0] == b'#' {
                 break;

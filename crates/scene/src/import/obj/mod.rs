@@ -4,9 +4,9 @@
 //! backwards, material changes and groups are settled afterwards. Crate `tobj` reads the material
 //! files, and the tests compare all meshes with its own.
 //!
-//! Own reading, because of what `tobj` 4.0 does not do: one thread takes many times as long, errors
-//! do not know their line, lines (`l`) become faces, polygons are fanned whatever their shape, and
-//! a material without its file loses its name.
+//! Why not all of it through `tobj` 4.0: it reads on one thread, its errors do not know their line,
+//! it takes lines (`l`) for faces, fans polygons whatever their shape, and forgets the names of
+//! materials whose file is missing.
 //!
 //! # Sources
 //!

@@ -1,6 +1,6 @@
 //! From corners with three indices to vertices with one.
 
-use std::collections::HashMap;
+use std::ops::Range;
 use std::path::Path;
 
 use etendue_geometry::Vertices;
@@ -18,6 +18,8 @@ use crate::import::precision::precise_enough;
 pub(super) struct Welder<'a> {
     pool: &'a Pool,
     chunks: &'a [Chunk],
+    /// For each position the last vertex at it, [`NONE`] before there is one.
+    heads: Vec<u32>,
 }
 
 /// A vertex: the indices of its position, texture coordinates and normal.
@@ -25,89 +27,88 @@ type Key = [u32; 3];
 
 impl<'a> Welder<'a> {
     pub(super) fn new(pool: &'a Pool, chunks: &'a [Chunk]) -> Self {
-        Self { pool, chunks }
+        Self { pool, chunks, heads: Vec::new() }
     }
 
-    /// The mesh of `segment`. The `only` one of a file may use all vertices of the file in their
-    /// order, which saves the looking up.
+    /// The mesh of `segment`. The `only` one of a file uses all vertices of the file in their order
+    /// where corners have nothing but a position, which saves the looking up.
     pub(super) fn mesh(&mut self, segment: &Segment, path: &Path, only: bool) -> Candidate {
-        let corners = self.corners(segment);
-        let has = |kind: usize| {
-            segment.runs.iter().any(|(chunk, range)| {
-                let indices = &self.chunks[*chunk].corners[kind];
-                let end = range.end.min(indices.len());
-                indices.get(range.start..end).is_some_and(|run| run.iter().any(|&i| i != NONE))
-            })
-        };
-        let (has_uvs, has_normals) = (has(VT), has(VN));
-        let in_order = only && !has_uvs && !has_normals;
-        let (triangles, keys) = if in_order {
-            (corners.par_iter().map(|t| t.map(|[v, ..]| v)).collect(), None)
-        } else {
-            let (triangles, keys) = weld(&corners);
-            (triangles, Some(keys))
+        let (has_uvs, has_normals) = (self.has(segment, VT), self.has(segment, VN));
+        let title = if segment.name.is_empty() { stem(path) } else { segment.name.clone() };
+        let place = match &segment.material {
+            Some(material) => format!("\"{title}\" of material \"{material}\""),
+            None => format!("\"{title}\""),
         };
         let pool = self.pool;
-        let positions = match &keys {
-            None => precise_enough(pool.positions.clone()),
-            Some(keys) => {
-                let used: Vec<[f64; 3]> =
-                    keys.iter().map(|key| pool.positions[key[V] as usize]).collect();
-                precise_enough(used)
-            }
+        if only && !has_uvs && !has_normals {
+            let triangles = self.corners(segment, |chunk, corner| chunk.corners[V][corner]);
+            return Candidate {
+                name: title,
+                place,
+                positions: precise_enough(&pool.positions),
+                triangles: triangles.into(),
+                normals: None,
+                uvs: Vec::new(),
+                colors: opaque(pool.colors.iter()),
+            };
+        }
+        let index = |chunk: &Chunk, kind: usize, corner: usize| {
+            chunk.corners[kind].get(corner).copied().unwrap_or(NONE)
         };
-        let keys = keys.as_deref();
-        let title = if segment.name.is_empty() { stem(path) } else { segment.name.clone() };
+        let corners = self
+            .corners(segment, |chunk, corner| [V, VT, VN].map(|kind| index(chunk, kind, corner)));
+        let (triangles, keys) = self.weld(&corners);
+        let positions: Vec<[f64; 3]> =
+            keys.par_iter().map(|key| pool.positions[key[V] as usize]).collect();
         Candidate {
-            place: match &segment.material {
-                Some(material) => format!("\"{title}\" of material \"{material}\""),
-                None => format!("\"{title}\""),
-            },
             name: title,
-            positions,
+            place,
+            positions: precise_enough(&positions),
             triangles: triangles.into(),
-            normals: has_normals.then(|| pick(keys, VN, &pool.normals, [0.0; 3])),
-            uvs: if has_uvs { vec![pick(keys, VT, &pool.uvs, [0.0; 2])] } else { Vec::new() },
-            colors: (!pool.colors.is_empty()).then(|| {
-                let rgba: Vec<[f32; 4]> = match keys {
-                    None => pool.colors.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect(),
-                    Some(keys) => keys
-                        .iter()
-                        .map(|key| pool.colors[key[V] as usize])
-                        .map(|[r, g, b]| [r, g, b, 1.0])
-                        .collect(),
-                };
-                Vertices::from_arrays(&rgba)
-            }),
+            normals: has_normals.then(|| pick(&keys, VN, &pool.normals)),
+            uvs: if has_uvs { vec![pick(&keys, VT, &pool.uvs)] } else { Vec::new() },
+            colors: opaque(keys.iter().filter_map(|key| pool.colors.get(key[V] as usize))),
         }
     }
 
-    /// The triangles of a segment, corner by corner with all indices.
-    fn corners(&self, segment: &Segment) -> Vec<[Key; 3]> {
-        let of_run = |(chunk, range): &(usize, std::ops::Range<usize>)| {
+    /// Whether any corner of `segment` has an index of this kind.
+    fn has(&self, segment: &Segment, kind: usize) -> bool {
+        segment.runs.iter().any(|(chunk, range)| {
+            let indices = &self.chunks[*chunk].corners[kind];
+            let end = range.end.min(indices.len());
+            indices.get(range.start..end).is_some_and(|run| run.iter().any(|&i| i != NONE))
+        })
+    }
+
+    /// The triangles of a segment, with what `key` gives for each corner of a chunk.
+    fn corners<K: Copy + Send>(
+        &self,
+        segment: &Segment,
+        key: impl Fn(&Chunk, usize) -> K + Sync,
+    ) -> Vec<[K; 3]> {
+        let of_run = |(chunk, range): &(usize, Range<usize>)| {
             let chunk = &self.chunks[*chunk];
-            let index = |kind: usize, corner: usize| {
-                chunk.corners[kind].get(corner).copied().unwrap_or(NONE)
-            };
-            let key = |corner: usize| [V, VT, VN].map(|kind| index(kind, corner));
+            let key = |corner: usize| key(chunk, corner);
             let first = chunk.polygons.partition_point(|polygon| polygon.first < range.start);
+            let polygons = chunk.polygons[first..].iter().take_while(|p| p.first < range.end);
             let mut triangles = Vec::with_capacity(range.len() / 3);
             let mut at = range.start;
-            let polygons = chunk.polygons[first..].iter().take_while(|p| p.first < range.end);
             for polygon in polygons {
-                triangles
-                    .extend((at..polygon.first).step_by(3).map(|i| [i, i + 1, i + 2].map(key)));
+                triangles.extend(in_threes(at..polygon.first).map(|t| t.map(key)));
                 let cut = self.cut(chunk, polygon);
-                triangles.extend(
-                    cut.iter().map(|t| t.map(|corner| key(polygon.first + corner as usize))),
-                );
+                let whole = |corner: u32| key(polygon.first + corner as usize);
+                triangles.extend(cut.iter().map(|t| t.map(whole)));
                 at = polygon.first + polygon.corners;
             }
-            triangles.extend((at..range.end).step_by(3).map(|i| [i, i + 1, i + 2].map(key)));
+            triangles.extend(in_threes(at..range.end).map(|t| t.map(key)));
             triangles
         };
-        let parts: Vec<Vec<[Key; 3]>> = segment.runs.par_iter().map(of_run).collect();
-        parts.concat()
+        let parts: Vec<Vec<[K; 3]>> = segment.runs.par_iter().map(of_run).collect();
+        let mut triangles = Vec::with_capacity(parts.iter().map(Vec::len).sum());
+        for mut part in parts {
+            triangles.append(&mut part);
+        }
+        triangles
     }
 
     fn cut(&self, chunk: &Chunk, polygon: &Polygon) -> Vec<[u32; 3]> {
@@ -120,37 +121,55 @@ impl<'a> Welder<'a> {
         polygon::triangulate(&points, &mut triangles);
         triangles
     }
+
+    /// Numbers the different corners in the order of their first use. Those at one position are
+    /// chained, which takes no hashing: few differ.
+    fn weld(&mut self, corners: &[[Key; 3]]) -> (Vec<[u32; 3]>, Vec<Key>) {
+        self.heads.resize(self.pool.positions.len(), NONE);
+        let mut keys: Vec<Key> = Vec::new();
+        // For each vertex the one before it at its position.
+        let mut earlier: Vec<u32> = Vec::new();
+        let heads = &mut self.heads;
+        let mut vertex = |key: Key| {
+            let head = &mut heads[key[V] as usize];
+            let mut at = *head;
+            while at != NONE {
+                if keys[at as usize] == key {
+                    return at;
+                }
+                at = earlier[at as usize];
+            }
+            let new = u32::try_from(keys.len()).unwrap_or(NONE);
+            keys.push(key);
+            earlier.push(std::mem::replace(head, new));
+            new
+        };
+        let triangles = corners.iter().map(|triangle| triangle.map(&mut vertex)).collect();
+        for key in &keys {
+            self.heads[key[V] as usize] = NONE;
+        }
+        (triangles, keys)
+    }
 }
 
-/// Numbers the different corners in the order of their first use.
-fn weld(corners: &[[Key; 3]]) -> (Vec<[u32; 3]>, Vec<Key>) {
-    let mut keys: Vec<Key> = Vec::new();
-    let mut known: HashMap<Key, u32> = HashMap::with_capacity(corners.len());
-    let triangles = corners
-        .iter()
-        .map(|triangle| {
-            triangle.map(|key| {
-                *known.entry(key).or_insert_with(|| {
-                    keys.push(key);
-                    u32::try_from(keys.len() - 1).unwrap_or(u32::MAX)
-                })
-            })
-        })
-        .collect();
-    (triangles, keys)
+/// The corners of `range`, three by three.
+fn in_threes(range: Range<usize>) -> impl Iterator<Item = [usize; 3]> {
+    range.step_by(3).map(|i| [i, i + 1, i + 2])
 }
 
-/// The values of `kind` for each key, `instead` where it has none.
-fn pick<const N: usize>(
-    keys: Option<&[Key]>,
-    kind: usize,
-    values: &[[f32; N]],
-    instead: [f32; N],
-) -> Vertices<N> {
-    let picked: Vec<[f32; N]> = (keys.unwrap_or_default().iter())
-        .map(|key| values.get(key[kind] as usize).copied().unwrap_or(instead))
+/// The values of `kind` for each key, zeros where it has none.
+fn pick<const N: usize>(keys: &[Key], kind: usize, values: &[[f32; N]]) -> Vertices<N> {
+    let picked: Vec<[f32; N]> = keys
+        .par_iter()
+        .map(|key| values.get(key[kind] as usize).copied().unwrap_or([0.0; N]))
         .collect();
     Vertices::from_arrays(&picked)
+}
+
+/// RGBA from RGB; nothing from nothing.
+fn opaque<'c>(colors: impl Iterator<Item = &'c [f32; 3]>) -> Option<Vertices<4>> {
+    let rgba: Vec<[f32; 4]> = colors.map(|&[r, g, b]| [r, g, b, 1.0]).collect();
+    (!rgba.is_empty()).then(|| Vertices::from_arrays(&rgba))
 }
 
 /// The file's name without its ending.

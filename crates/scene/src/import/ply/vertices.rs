@@ -93,7 +93,8 @@ impl Columns {
             return Positions::F32(singles(table, self.xyz));
         }
         let point = |row: usize| self.xyz.map(|column| table.get(row, column));
-        precise_enough((0..table.rows()).into_par_iter().map(point).collect())
+        let points: Vec<[f64; 3]> = (0..table.rows()).into_par_iter().map(point).collect();
+        precise_enough(&points)
     }
 
     fn colors(&self, table: &impl Table, columns: [usize; 3]) -> Vertices<4> {
