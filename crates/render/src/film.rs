@@ -32,14 +32,32 @@ pub(crate) enum Rows<'a> {
 
 impl Rows<'_> {
     /// Writes a number to the pixel at `index` of the rows.
-    #[expect(clippy::cast_possible_truncation, reason = "single precision was asked for")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "integer layers are given the u32 that they hold"
+    )]
     pub(crate) fn put(&mut self, index: usize, value: f64) {
         match self {
-            Self::F32(rows) => rows[index] = value as f32,
+            Self::F32(rows) => rows[index] = single(value),
             Self::F64(rows) => rows[index] = value,
             Self::U32(rows) => rows[index] = value as u32,
         }
     }
+
+    pub(crate) fn f32(&mut self) -> Option<&mut [f32]> {
+        if let Self::F32(rows) = self { Some(rows) } else { None }
+    }
+
+    pub(crate) fn f64(&mut self) -> Option<&mut [f64]> {
+        if let Self::F64(rows) = self { Some(rows) } else { None }
+    }
+}
+
+/// The nearest f32.
+#[expect(clippy::cast_possible_truncation, reason = "single precision was asked for")]
+pub(crate) fn single(value: f64) -> f32 {
+    value as f32
 }
 
 /// The rows that one thread fills: a band of all planes of all layers, layer by layer.

@@ -9,7 +9,7 @@ use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_tracer::{LayerSpec, Surroundings, Traced};
 use rayon::prelude::*;
 
-use crate::film::{Band, FilmLayer, Rows, bands};
+use crate::film::{Band, FilmLayer, Rows, bands, single};
 
 /// Side of a tile (pixels): its rays are one batch.
 const TILE: u32 = 16;
@@ -175,17 +175,41 @@ impl Job<'_> {
     }
 }
 
-/// Puts `value` of each ray at its pixel.
+/// Puts `value` of each ray at its pixel. All planes of a layer are of one type, so it is asked for
+/// once a batch.
 fn each<const N: usize>(
     planes: &mut [Rows<'_>],
     batch: &Batch,
     index: impl Fn(usize) -> usize,
     value: impl Fn(usize) -> [f64; N],
 ) {
-    for i in 0..batch.rays.len() {
-        let index = index(i);
-        for (plane, value) in planes.iter_mut().zip(value(i)) {
-            plane.put(index, value);
+    let rays = 0..batch.rays.len();
+    match planes.first() {
+        Some(Rows::F64(_)) => {
+            let mut planes: Vec<&mut [f64]> = planes.iter_mut().filter_map(Rows::f64).collect();
+            for i in rays {
+                let index = index(i);
+                for (plane, value) in planes.iter_mut().zip(value(i)) {
+                    plane[index] = value;
+                }
+            }
+        }
+        Some(Rows::F32(_)) => {
+            let mut planes: Vec<&mut [f32]> = planes.iter_mut().filter_map(Rows::f32).collect();
+            for i in rays {
+                let index = index(i);
+                for (plane, value) in planes.iter_mut().zip(value(i)) {
+                    plane[index] = single(value);
+                }
+            }
+        }
+        _ => {
+            for i in rays {
+                let index = index(i);
+                for (plane, value) in planes.iter_mut().zip(value(i)) {
+                    plane.put(index, value);
+                }
+            }
         }
     }
 }

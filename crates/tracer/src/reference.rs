@@ -104,7 +104,9 @@ impl Surroundings<'_> {
         });
         let (u, v) = (hits.u[i], hits.v[i]);
         let local = a * (1.0 - u - v) + b * u + c * v;
-        let world = placement.world_from_mesh.normal_matrix() * local;
+        let place = &placement.world_from_mesh;
+        let unmoved = place.linear == DMat3::IDENTITY;
+        let world = if unmoved { local } else { place.normal_matrix() * local };
         let world = world.try_normalize()?;
         // Some files' normals point inwards; the triangle's winding decides.
         let geometric = hits.normal(i);
@@ -137,9 +139,11 @@ impl Surroundings<'_> {
             Paint::Plain(color) => *color,
             Paint::Checker { colors, squares } => {
                 let [u, v] = self.uv(hits, i, placement, 0);
-                // Square numbers, so that their sum's parity alternates on both sides of 0.
-                let odd = ((u * squares).floor() + (v * squares).floor()).rem_euclid(2.0) >= 1.0;
-                colors[usize::from(odd)]
+                // The last bit of the square numbers' sum alternates on both sides of 0. The cast
+                // saturates, so absurd coordinates give one colour and no fault.
+                #[expect(clippy::cast_possible_truncation, reason = "see above")]
+                let number = ((u * squares).floor() + (v * squares).floor()) as i64;
+                colors[usize::from(number & 1 != 0)]
             }
             Paint::Image { factor, image } => {
                 let texel = self.texel(hits, i, placement, image);
