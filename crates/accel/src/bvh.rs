@@ -13,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 mod arena;
+mod bundle;
 mod fold;
 mod lanes;
 mod packet;

@@ -34,8 +34,7 @@ impl Query {
     /// The exact answer for one triangle, given by its corners in the mesh's frame.
     #[inline(always)]
     pub(crate) fn test(&self, view: &View<'_>, [a, b, c]: [DVec3; 3]) -> Option<watertight::Hit> {
-        let offset = view.transform.offset_from(self.origin);
-        let [a, b, c] = [view.turned(a) + offset, view.turned(b) + offset, view.turned(c) + offset];
+        let [a, b, c] = view.seen_from(self.origin, [a, b, c]);
         let hit = watertight::intersect(a, b, c, self.direction)?;
         (hit.t >= self.t_min && hit.t <= self.t_max).then_some(hit)
     }
@@ -52,6 +51,13 @@ impl<'a> View<'a> {
     #[inline(always)]
     pub(crate) fn new(transform: &'a Transform) -> Self {
         Self { transform, is_parallel: transform.linear == DMat3::IDENTITY }
+    }
+
+    /// The corners in the world, from `origin` (m).
+    #[inline(always)]
+    pub(crate) fn seen_from(&self, origin: DVec3, [a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
+        let offset = self.transform.offset_from(origin);
+        [self.turned(a) + offset, self.turned(b) + offset, self.turned(c) + offset]
     }
 
     #[inline(always)]

@@ -104,6 +104,14 @@ pub(crate) struct LocalRay {
     pub(crate) pad: f64,
 }
 
+/// As [`LocalRay`], many.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LocalRays<const N: usize> {
+    pub(crate) origin: [[f64; N]; 3],
+    pub(crate) direction: [[f64; N]; 3],
+    pub(crate) pad: [f64; N],
+}
+
 /// All parts and instances of a scene, and the frame of the tree over the instances.
 #[derive(Debug)]
 pub(crate) struct Layout {
@@ -342,6 +350,33 @@ impl Instance {
         }
         let origin = -(self.linear * offset) - self.origin;
         LocalRay { origin, direction: self.linear * direction, pad }
+    }
+
+    /// World rays in the part's frame, as [`Self::ray`] has them, side by side.
+    #[inline(always)]
+    pub(crate) fn rays<const N: usize>(
+        &self,
+        origin: [&[f64; N]; 3],
+        direction: [&[f64; N]; 3],
+    ) -> LocalRays<N> {
+        let zero = [0.0; N];
+        let mut rays = LocalRays { origin: [zero; 3], direction: [zero; 3], pad: zero };
+        let [lx, ly, lz] = [self.linear.x_axis, self.linear.y_axis, self.linear.z_axis];
+        let (high, low) = (self.translation, self.translation_low);
+        for i in 0..N {
+            let x = (high.x - origin[0][i]) + low.x;
+            let y = (high.y - origin[1][i]) + low.y;
+            let z = (high.z - origin[2][i]) + low.z;
+            rays.origin[0][i] = -(lx.x * x + ly.x * y + lz.x * z) - self.origin.x;
+            rays.origin[1][i] = -(lx.y * x + ly.y * y + lz.y * z) - self.origin.y;
+            rays.origin[2][i] = -(lx.z * x + ly.z * y + lz.z * z) - self.origin.z;
+            rays.pad[i] = self.pad + self.pad_per_distance * (x.abs() + y.abs() + z.abs());
+            let (x, y, z) = (direction[0][i], direction[1][i], direction[2][i]);
+            rays.direction[0][i] = lx.x * x + ly.x * y + lz.x * z;
+            rays.direction[1][i] = lx.y * x + ly.y * y + lz.y * z;
+            rays.direction[2][i] = lx.z * x + ly.z * y + lz.z * z;
+        }
+        rays
     }
 
     /// A box around the box `lo..hi` of this instance's part, in `world` coordinates.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::arena::Arena;
 use super::wide::{
-    Cell, Child, LEAF_CELLS, MOST_CELLS, MOST_IN_LEAF, NO_CHILDREN, Units, WideTree,
+    Cell, Child, LEAF_CELLS, LeafNumbers, MOST_CELLS, MOST_IN_LEAF, NO_CHILDREN, Units, WideTree,
 };
 use crate::parts::{Part, Source};
 use crate::tree::{Ref, Tree};
@@ -16,7 +16,7 @@ use crate::tree::{Ref, Tree};
 /// Writes the numbers of a leaf.
 pub(super) trait WriteLeaf: Sync {
     /// Into `numbers`, which are zeros; answers how many are used.
-    fn write(&self, refs: &[Ref], numbers: &mut [f32; 8 * LEAF_CELLS]) -> usize;
+    fn write(&self, refs: &[Ref], numbers: &mut LeafNumbers) -> usize;
 }
 
 /// Subtrees of about this many binary nodes are folded side by side.
@@ -185,7 +185,7 @@ impl<'a, L: WriteLeaf> Fold<'a, L> {
 
     fn write_leaf(&mut self, node: usize, slot: usize, range: std::ops::Range<usize>) {
         let mut cells = [Cell([0.0; 8]); LEAF_CELLS];
-        let numbers: &mut [[f32; 8 * LEAF_CELLS]; 1] = bytemuck::cast_mut(&mut cells);
+        let numbers: &mut [LeafNumbers; 1] = bytemuck::cast_mut(&mut cells);
         let refs = &self.tree.refs[range];
         let used = self.leaf.write(refs, &mut numbers[0]);
         let place = self.piece.cells.len();
@@ -207,7 +207,7 @@ pub(super) struct Triangles<'a> {
 
 impl WriteLeaf for Triangles<'_> {
     #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
-    fn write(&self, refs: &[Ref], numbers: &mut [f32; 8 * LEAF_CELLS]) -> usize {
+    fn write(&self, refs: &[Ref], numbers: &mut LeafNumbers) -> usize {
         let n = refs.len().min(MOST_IN_LEAF);
         let was_exact = self.is_exact.load(Ordering::Relaxed);
         let mut is_exact = was_exact;
@@ -238,7 +238,7 @@ impl WriteLeaf for Triangles<'_> {
 pub(super) struct Instances;
 
 impl WriteLeaf for Instances {
-    fn write(&self, refs: &[Ref], numbers: &mut [f32; 8 * LEAF_CELLS]) -> usize {
+    fn write(&self, refs: &[Ref], numbers: &mut LeafNumbers) -> usize {
         for (number, r) in numbers.iter_mut().zip(refs) {
             *number = f32::from_bits(r.first);
         }

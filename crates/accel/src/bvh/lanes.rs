@@ -1,4 +1,4 @@
-//! Eight single-precision numbers at a time, on whatever the processor has.
+//! Eight or sixteen single-precision numbers at a time, on whatever the processor has.
 //!
 //! A [`Lanes`] is a token that can only be had where its instructions exist, so everything here is
 //! safe code. The compiler sees through all of it as long as it is inlined into
@@ -8,21 +8,11 @@ use pulp::NullaryFnOnce;
 
 use super::wide::Cell;
 
-/// An instruction set with eight lanes of f32.
-pub(super) trait Lanes: Copy + Send + Sync {
-    /// Eight numbers.
+/// Arithmetic on some numbers side by side.
+pub(super) trait Arithmetic: Copy {
+    /// The numbers.
     type F: Copy;
 
-    /// The name for reports.
-    const NAME: &'static str;
-
-    /// Runs `f` with these instructions switched on, as far as it is inlined.
-    fn run<F: NullaryFnOnce>(self, f: F) -> F::Output;
-
-    /// Begins to fetch the cells from `place` on that a node or a leaf may have.
-    fn prefetch(self, cells: &[Cell], place: usize);
-    fn load(self, values: &[f32; 8]) -> Self::F;
-    fn store(self, values: Self::F) -> [f32; 8];
     fn splat(self, value: f32) -> Self::F;
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
     fn sub(self, a: Self::F, b: Self::F) -> Self::F;
@@ -38,6 +28,120 @@ pub(super) trait Lanes: Copy + Send + Sync {
     fn abs(self, a: Self::F) -> Self::F;
     /// Bit i: whether `a ≤ b` in lane i.
     fn le(self, a: Self::F, b: Self::F) -> u32;
+    /// `a` in the lanes whose bits are set, `b` in the others; all their bits, whatever they mean.
+    fn select(self, mask: u32, a: Self::F, b: Self::F) -> Self::F;
+    /// The least of all lanes. None may be NaN.
+    fn least(self, a: Self::F) -> f32;
+    /// The greatest of all lanes. None may be NaN.
+    fn greatest(self, a: Self::F) -> f32;
+}
+
+/// An instruction set: eight lanes, and a way to have sixteen.
+pub(super) trait Lanes: Arithmetic + Send + Sync {
+    /// Arithmetic on sixteen numbers.
+    type Sixteen: Arithmetic;
+
+    /// The name for reports.
+    const NAME: &'static str;
+
+    /// Runs `f` with these instructions switched on, as far as it is inlined.
+    fn run<F: NullaryFnOnce>(self, f: F) -> F::Output;
+
+    /// Begins to fetch the cells from `place` on that a node or a leaf may have.
+    fn prefetch(self, cells: &[Cell], place: usize);
+    fn load(self, values: &[f32; 8]) -> Self::F;
+    fn store(self, values: Self::F) -> [f32; 8];
+
+    fn sixteen(self) -> Self::Sixteen;
+    fn load_sixteen(self, values: &[f32; 16]) -> <Self::Sixteen as Arithmetic>::F;
+    fn store_sixteen(self, values: <Self::Sixteen as Arithmetic>::F) -> [f32; 16];
+}
+
+/// Sixteen lanes as two times eight.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Twice<L>(L);
+
+impl<L: Arithmetic> Arithmetic for Twice<L> {
+    type F = [L::F; 2];
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> [L::F; 2] {
+        [self.0.splat(value); 2]
+    }
+
+    #[inline(always)]
+    fn add(self, [a, b]: [L::F; 2], [c, d]: [L::F; 2]) -> [L::F; 2] {
+        [self.0.add(a, c), self.0.add(b, d)]
+    }
+
+    #[inline(always)]
+    fn sub(self, [a, b]: [L::F; 2], [c, d]: [L::F; 2]) -> [L::F; 2] {
+        [self.0.sub(a, c), self.0.sub(b, d)]
+    }
+
+    #[inline(always)]
+    fn mul(self, [a, b]: [L::F; 2], [c, d]: [L::F; 2]) -> [L::F; 2] {
+        [self.0.mul(a, c), self.0.mul(b, d)]
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, [a, b]: [L::F; 2], [c, d]: [L::F; 2], [e, f]: [L::F; 2]) -> [L::F; 2] {
+        [self.0.mul_sub(a, c, e), self.0.mul_sub(b, d, f)]
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, [a, b]: [L::F; 2], [c, d]: [L::F; 2], [e, f]: [L::F; 2]) -> [L::F; 2] {
+        [self.0.neg_mul_add(a, c, e), self.0.neg_mul_add(b, d, f)]
+    }
+
+    #[inline(always)]
+    fn min(self, [a, b]: [L::F; 2], [c, d]: [L::F; 2]) -> [L::F; 2] {
+        [self.0.min(a, c), self.0.min(b, d)]
+    }
+
+    #[inline(always)]
+    fn max(self, [a, b]: [L::F; 2], [c, d]: [L::F; 2]) -> [L::F; 2] {
+        [self.0.max(a, c), self.0.max(b, d)]
+    }
+
+    #[inline(always)]
+    fn abs(self, [a, b]: [L::F; 2]) -> [L::F; 2] {
+        [self.0.abs(a), self.0.abs(b)]
+    }
+
+    #[inline(always)]
+    fn le(self, [a, b]: [L::F; 2], [c, d]: [L::F; 2]) -> u32 {
+        self.0.le(a, c) | self.0.le(b, d) << 8
+    }
+
+    #[inline(always)]
+    fn select(self, mask: u32, [a, b]: [L::F; 2], [c, d]: [L::F; 2]) -> [L::F; 2] {
+        [self.0.select(mask, a, c), self.0.select(mask >> 8, b, d)]
+    }
+
+    #[inline(always)]
+    fn least(self, [a, b]: [L::F; 2]) -> f32 {
+        self.0.least(self.0.min(a, b))
+    }
+
+    #[inline(always)]
+    fn greatest(self, [a, b]: [L::F; 2]) -> f32 {
+        self.0.greatest(self.0.max(a, b))
+    }
+}
+
+/// By halves, so that four steps are not eight.
+#[inline(always)]
+fn least(a: [f32; 8]) -> f32 {
+    let min = |a: f32, b: f32| if a < b { a } else { b };
+    let [a, b, c, d] = [min(a[0], a[4]), min(a[1], a[5]), min(a[2], a[6]), min(a[3], a[7])];
+    min(min(a, c), min(b, d))
+}
+
+/// The two halves of sixteen numbers.
+#[inline(always)]
+fn halves(values: &[f32; 16]) -> [[f32; 8]; 2] {
+    bytemuck::cast(*values)
 }
 
 /// Plain Rust, which the compiler turns into what every processor of the target has.
@@ -49,28 +153,8 @@ fn each(f: impl Fn(usize) -> f32) -> [f32; 8] {
     std::array::from_fn(f)
 }
 
-impl Lanes for Portable {
+impl Arithmetic for Portable {
     type F = [f32; 8];
-
-    const NAME: &'static str = "portable";
-
-    #[inline(always)]
-    fn run<F: NullaryFnOnce>(self, f: F) -> F::Output {
-        f.call()
-    }
-
-    #[inline(always)]
-    fn prefetch(self, _: &[Cell], _: usize) {}
-
-    #[inline(always)]
-    fn load(self, values: &[f32; 8]) -> [f32; 8] {
-        *values
-    }
-
-    #[inline(always)]
-    fn store(self, values: [f32; 8]) -> [f32; 8] {
-        values
-    }
 
     #[inline(always)]
     fn splat(self, value: f32) -> [f32; 8] {
@@ -114,55 +198,82 @@ impl Lanes for Portable {
 
     #[inline(always)]
     fn abs(self, a: [f32; 8]) -> [f32; 8] {
-        a.map(f32::abs)
+        each(|i| a[i].abs())
     }
 
     #[inline(always)]
     fn le(self, a: [f32; 8], b: [f32; 8]) -> u32 {
         (0..8).fold(0, |mask, i| mask | u32::from(a[i] <= b[i]) << i)
     }
+
+    #[inline(always)]
+    fn select(self, mask: u32, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        each(|i| if mask >> i & 1 != 0 { a[i] } else { b[i] })
+    }
+
+    #[inline(always)]
+    fn least(self, a: [f32; 8]) -> f32 {
+        least(a)
+    }
+
+    #[inline(always)]
+    fn greatest(self, a: [f32; 8]) -> f32 {
+        -least(self.sub([0.0; 8], a))
+    }
+}
+
+impl Lanes for Portable {
+    type Sixteen = Twice<Self>;
+
+    const NAME: &'static str = "portable";
+
+    #[inline(always)]
+    fn run<F: NullaryFnOnce>(self, f: F) -> F::Output {
+        f.call()
+    }
+
+    #[inline(always)]
+    fn prefetch(self, _: &[Cell], _: usize) {}
+
+    #[inline(always)]
+    fn load(self, values: &[f32; 8]) -> [f32; 8] {
+        *values
+    }
+
+    #[inline(always)]
+    fn store(self, values: [f32; 8]) -> [f32; 8] {
+        values
+    }
+
+    #[inline(always)]
+    fn sixteen(self) -> Twice<Self> {
+        Twice(self)
+    }
+
+    #[inline(always)]
+    fn load_sixteen(self, values: &[f32; 16]) -> [[f32; 8]; 2] {
+        halves(values)
+    }
+
+    #[inline(always)]
+    fn store_sixteen(self, values: [[f32; 8]; 2]) -> [f32; 16] {
+        bytemuck::cast(values)
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use std::arch::x86_64::{__m256, _CMP_LE_OQ, _MM_HINT_T0};
+    use std::arch::x86_64::{__m256, __m512, _CMP_LE_OQ, _MM_HINT_T0};
 
     use pulp::x86::{V3, V4};
     use pulp::{NullaryFnOnce, cast};
 
-    use super::{Cell, Lanes};
+    use super::{Arithmetic, Cell, Lanes, Twice, halves, least};
 
     macro_rules! eight_lanes {
-        ($Token:ty, $name:literal) => {
-            impl Lanes for $Token {
+        ($Token:ty) => {
+            impl Arithmetic for $Token {
                 type F = __m256;
-
-                const NAME: &'static str = $name;
-
-                #[inline(always)]
-                fn run<F: NullaryFnOnce>(self, f: F) -> F::Output {
-                    self.vectorize(f)
-                }
-
-                #[inline(always)]
-                fn prefetch(self, cells: &[Cell], place: usize) {
-                    // Only a hint: nothing is read through the pointer.
-                    let line = cells.as_ptr().wrapping_add(place).cast::<i8>();
-                    self.sse._mm_prefetch::<_MM_HINT_T0>(line);
-                    self.sse._mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(64));
-                    self.sse._mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(128));
-                    self.sse._mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(192));
-                }
-
-                #[inline(always)]
-                fn load(self, values: &[f32; 8]) -> __m256 {
-                    cast(*values)
-                }
-
-                #[inline(always)]
-                fn store(self, values: __m256) -> [f32; 8] {
-                    cast(values)
-                }
 
                 #[inline(always)]
                 fn splat(self, value: f32) -> __m256 {
@@ -214,11 +325,182 @@ mod x86 {
                     let mask = self.avx._mm256_cmp_ps::<_CMP_LE_OQ>(a, b);
                     self.avx._mm256_movemask_ps(mask).cast_unsigned()
                 }
+
+                #[inline(always)]
+                fn select(self, mask: u32, a: __m256, b: __m256) -> __m256 {
+                    // Moves each lane's bit of the mask to where the blend looks: its sign.
+                    let bits = self.avx._mm256_set1_epi32(mask.cast_signed());
+                    let up = self.avx._mm256_setr_epi32(31, 30, 29, 28, 27, 26, 25, 24);
+                    let signs = self.avx2._mm256_sllv_epi32(bits, up);
+                    self.avx._mm256_blendv_ps(b, a, self.avx._mm256_castsi256_ps(signs))
+                }
+
+                #[inline(always)]
+                fn least(self, a: __m256) -> f32 {
+                    least(cast(a))
+                }
+
+                #[inline(always)]
+                fn greatest(self, a: __m256) -> f32 {
+                    -least(cast(self.sub(self.splat(0.0), a)))
+                }
             }
         };
     }
 
-    eight_lanes!(V3, "avx2");
-    // The same instructions on twice the registers.
-    eight_lanes!(V4, "avx512");
+    macro_rules! lanes {
+        () => {
+            #[inline(always)]
+            fn run<F: NullaryFnOnce>(self, f: F) -> F::Output {
+                self.vectorize(f)
+            }
+
+            #[inline(always)]
+            fn prefetch(self, cells: &[Cell], place: usize) {
+                // Only a hint: nothing is read through the pointer.
+                let line = cells.as_ptr().wrapping_add(place).cast::<i8>();
+                self.sse._mm_prefetch::<_MM_HINT_T0>(line);
+                self.sse._mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(64));
+                self.sse._mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(128));
+                self.sse._mm_prefetch::<_MM_HINT_T0>(line.wrapping_add(192));
+            }
+
+            #[inline(always)]
+            fn load(self, values: &[f32; 8]) -> __m256 {
+                cast(*values)
+            }
+
+            #[inline(always)]
+            fn store(self, values: __m256) -> [f32; 8] {
+                cast(values)
+            }
+        };
+    }
+
+    eight_lanes!(V3);
+    eight_lanes!(V4);
+
+    /// AVX2 and fused multiply-add.
+    impl Lanes for V3 {
+        type Sixteen = Twice<Self>;
+
+        const NAME: &'static str = "avx2";
+
+        lanes!();
+
+        #[inline(always)]
+        fn sixteen(self) -> Twice<Self> {
+            Twice(self)
+        }
+
+        #[inline(always)]
+        fn load_sixteen(self, values: &[f32; 16]) -> [__m256; 2] {
+            let [a, b] = halves(values);
+            [cast(a), cast(b)]
+        }
+
+        #[inline(always)]
+        fn store_sixteen(self, values: [__m256; 2]) -> [f32; 16] {
+            let halves: [[f32; 8]; 2] = [cast(values[0]), cast(values[1])];
+            bytemuck::cast(halves)
+        }
+    }
+
+    /// AVX-512: the same eight lanes on twice the registers, and sixteen in one.
+    impl Lanes for V4 {
+        type Sixteen = Sixteen;
+
+        const NAME: &'static str = "avx512";
+
+        lanes!();
+
+        #[inline(always)]
+        fn sixteen(self) -> Sixteen {
+            Sixteen(self)
+        }
+
+        #[inline(always)]
+        fn load_sixteen(self, values: &[f32; 16]) -> __m512 {
+            cast(*values)
+        }
+
+        #[inline(always)]
+        fn store_sixteen(self, values: __m512) -> [f32; 16] {
+            cast(values)
+        }
+    }
+
+    /// Sixteen lanes of AVX-512.
+    #[derive(Debug, Clone, Copy)]
+    pub(in crate::bvh) struct Sixteen(V4);
+
+    impl Arithmetic for Sixteen {
+        type F = __m512;
+
+        #[inline(always)]
+        fn splat(self, value: f32) -> __m512 {
+            self.0.avx512f._mm512_set1_ps(value)
+        }
+
+        #[inline(always)]
+        fn add(self, a: __m512, b: __m512) -> __m512 {
+            self.0.avx512f._mm512_add_ps(a, b)
+        }
+
+        #[inline(always)]
+        fn sub(self, a: __m512, b: __m512) -> __m512 {
+            self.0.avx512f._mm512_sub_ps(a, b)
+        }
+
+        #[inline(always)]
+        fn mul(self, a: __m512, b: __m512) -> __m512 {
+            self.0.avx512f._mm512_mul_ps(a, b)
+        }
+
+        #[inline(always)]
+        fn mul_sub(self, a: __m512, b: __m512, c: __m512) -> __m512 {
+            self.0.avx512f._mm512_fmsub_ps(a, b, c)
+        }
+
+        #[inline(always)]
+        fn neg_mul_add(self, a: __m512, b: __m512, c: __m512) -> __m512 {
+            self.0.avx512f._mm512_fnmadd_ps(a, b, c)
+        }
+
+        #[inline(always)]
+        fn min(self, a: __m512, b: __m512) -> __m512 {
+            self.0.avx512f._mm512_min_ps(a, b)
+        }
+
+        #[inline(always)]
+        fn max(self, a: __m512, b: __m512) -> __m512 {
+            self.0.avx512f._mm512_max_ps(a, b)
+        }
+
+        #[inline(always)]
+        fn abs(self, a: __m512) -> __m512 {
+            self.0.avx512f._mm512_abs_ps(a)
+        }
+
+        #[inline(always)]
+        fn le(self, a: __m512, b: __m512) -> u32 {
+            self.0.avx512f._mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b).into()
+        }
+
+        #[inline(always)]
+        #[expect(clippy::cast_possible_truncation, reason = "sixteen lanes")]
+        fn select(self, mask: u32, a: __m512, b: __m512) -> __m512 {
+            self.0.avx512f._mm512_mask_blend_ps(mask as u16, b, a)
+        }
+
+        #[inline(always)]
+        fn least(self, a: __m512) -> f32 {
+            self.0.avx512f._mm512_reduce_min_ps(a)
+        }
+
+        #[inline(always)]
+        fn greatest(self, a: __m512) -> f32 {
+            self.0.avx512f._mm512_reduce_max_ps(a)
+        }
+    }
 }

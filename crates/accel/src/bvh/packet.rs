@@ -6,93 +6,72 @@
 //! bundle what it costs one ray (interval arithmetic, after S. Boulos et al., "Packet-based Whitted and
 //! distribution ray tracing", 2007). For bounds to exist the rays must run towards the same octant;
 //! a packet that does not is taken apart into bundles that do.
+//!
+//! Where single precision is sure that a ray passes inside a triangle, and that the triangle lies
+//! wholly before all others so far, the hit is *pending*: it is measured in f64 at the end, with those
+//! of the other rays side by side. Whatever it is not sure of goes through the exact test at once.
 
 use etendue_geometry::RayBatch;
-use etendue_geometry::glam::{DVec3, Vec3};
+use etendue_geometry::glam::DVec3;
 use pulp::NullaryFnOnce;
 
 use super::Bvh;
-use super::lanes::Lanes;
+use super::bundle::{Bundle, FrameRays, PACKET, bits};
+use super::lanes::{Arithmetic, Lanes};
 use super::placed::PlacedTriangles;
-use super::ray::{BoxTest, NarrowRay, TriangleTest, axes, safe_reciprocal};
+use super::ray::TriangleTest;
 use super::single::{Search, Sink, Stacks, Visit};
 use super::traverse::{Leaves, Stack, traverse};
-use super::wide::{Cell, Child, leaf_numbers};
+use super::wide::{Cell, Child, LeafNumbers, leaf_numbers};
 use crate::nearest::Query;
 use crate::parts::Instance;
-
-/// Rays of a packet: two times eight lanes.
-pub(super) const PACKET: usize = 16;
-
-/// Fewer rays than this are traced one by one.
-const FEWEST: u32 = 4;
-
-/// Rays whose directions differ by more than this along an axis are traced one by one.
-const WIDEST: f32 = 0.25;
+use crate::watertight::{self, Lines};
 
 /// Sixteen rays and what has become of them.
-pub(super) struct Packet<S> {
-    queries: [Query; PACKET],
-    sinks: [S; PACKET],
+pub(super) struct Packet<'a, S> {
+    /// `[axis][ray]`, in the world.
+    origin: [&'a [f64; PACKET]; 3],
+    direction: [&'a [f64; PACKET]; 3],
+    t_min: &'a [f64; PACKET],
     /// How far each looks.
     t_max: [f64; PACKET],
+    sinks: [S; PACKET],
     /// A bit for every ray that may still hit something.
     active: u32,
     /// A bit for every ray that could at first.
     sound: u32,
 }
 
-/// The numbers of the set bits of `mask`.
-#[inline(always)]
-fn bits(mask: u32) -> Bits {
-    Bits(mask)
-}
-
-struct Bits(u32);
-
-impl Iterator for Bits {
-    type Item = usize;
-
+impl<'a, S: Sink> Packet<'a, S> {
+    /// The rays of a batch from `first` on; `None` when there are not enough.
     #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        let bit = self.0.trailing_zeros() as usize;
-        self.0 &= self.0.wrapping_sub(1);
-        (bit < 32).then_some(bit)
-    }
-}
-
-impl<S: Sink> Packet<S> {
-    /// The rays of a batch from `first` on.
-    #[inline(always)]
-    pub(super) fn of(rays: &RayBatch, first: usize) -> Self {
-        let mut sound = 0;
-        let queries: [Query; PACKET] = std::array::from_fn(|lane| {
-            if let Some(query) = Query::of(rays, first + lane) {
-                sound |= 1 << lane;
-                query
-            } else {
-                Query { origin: DVec3::ZERO, direction: DVec3::X, t_min: 0.0, t_max: -1.0 }
-            }
-        });
-        let sinks = std::array::from_fn(|lane| S::new(&queries[lane]));
-        let t_max = std::array::from_fn(|lane| queries[lane].t_max);
-        Self { queries, sinks, t_max, active: sound, sound }
+    pub(super) fn of(rays: &'a RayBatch, first: usize) -> Option<Self> {
+        let [x, y, z] = &rays.origin;
+        let origin = [chunk(x, first)?, chunk(y, first)?, chunk(z, first)?];
+        let [x, y, z] = &rays.direction;
+        let direction = [chunk(x, first)?, chunk(y, first)?, chunk(z, first)?];
+        let t_min = chunk(&rays.t_min, first)?;
+        let t_max = *chunk(&rays.t_max, first)?;
+        let sound = soundness(origin, direction, t_min, &t_max);
+        let sinks = t_max.map(S::new);
+        Some(Self { origin, direction, t_min, t_max, sinks, active: sound, sound })
     }
 
     #[inline(always)]
     pub(super) fn trace<L: Lanes>(&mut self, lanes: L, bvh: &Bvh, stacks: &mut Stacks) {
+        if self.active == 0 {
+            return;
+        }
         if let [instance] = &bvh.layout.instances[..] {
-            let group = self.active;
-            let stack = &mut stacks.inner;
+            let (group, stack) = (self.active, &mut stacks.inner);
             lanes.run(VisitTogether { lanes, bvh, packet: self, instance, group, stack });
         } else if !bvh.top.cells.is_empty() {
-            let world = &bvh.layout.world;
-            let narrow = self.narrow(world, self.active);
+            let rays = self.in_frame(&bvh.layout.world);
             let mut rest = self.active;
             while rest != 0 {
-                let group = octant(&narrow, rest);
+                let group = rays.same_octant(rest);
                 rest &= !group;
-                self.trace_instances(lanes, bvh, &narrow, group, stacks);
+                self.trace_instances(lanes, bvh, &rays, group, stacks);
             }
         }
     }
@@ -107,15 +86,21 @@ impl<S: Sink> Packet<S> {
         }
     }
 
-    /// The rays of `group` in `instance`'s frame, and copies of one of them elsewhere.
     #[inline(always)]
-    fn narrow(&self, instance: &Instance, group: u32) -> [NarrowRay; PACKET] {
-        let some = group.trailing_zeros() as usize % PACKET;
-        let mut narrow = [NarrowRay::new(instance, &self.queries[some]); PACKET];
-        for lane in bits(group) {
-            narrow[lane] = NarrowRay::new(instance, &self.queries[lane]);
+    fn in_frame(&self, instance: &Instance) -> FrameRays {
+        FrameRays::new(&instance.rays(self.origin, self.direction), self.t_min)
+    }
+
+    #[inline(always)]
+    fn query(&self, lane: usize) -> Query {
+        let at =
+            |axes: [&[f64; PACKET]; 3]| DVec3::new(axes[0][lane], axes[1][lane], axes[2][lane]);
+        Query {
+            origin: at(self.origin),
+            direction: at(self.direction),
+            t_min: self.t_min[lane],
+            t_max: self.t_max[lane],
         }
-        narrow
     }
 
     #[inline(always)]
@@ -123,200 +108,81 @@ impl<S: Sink> Packet<S> {
         &mut self,
         lanes: L,
         bvh: &Bvh,
-        narrow: &[NarrowRay; PACKET],
+        rays: &FrameRays,
         group: u32,
         stacks: &mut Stacks,
     ) {
-        let Some(bundle) = Bundle::new(lanes, narrow, group) else {
+        let Some(bundle) = Bundle::new(lanes, rays, group) else {
             for lane in bits(group) {
-                let mut search = self.search(lanes, bvh, lane, &mut stacks.inner);
-                search.run(&mut stacks.outer);
+                let query = self.query(lane);
+                self.search(lanes, bvh, lane, &query, &mut stacks.inner).run(&mut stacks.outer);
             }
             return;
         };
         let stack = &mut stacks.inner;
-        let far = self.farthest(narrow, group);
-        let mut leaves = InstanceLeaves { lanes, bvh, packet: self, narrow, group, stack };
+        let far = self.farthest(lanes, rays, group);
+        let mut leaves = InstanceLeaves { lanes, bvh, packet: self, rays, group, stack };
         traverse(lanes, &bvh.top.cells, &bundle.boxes, far, &mut stacks.outer, &mut leaves);
     }
 
     #[inline(always)]
-    fn search<'a, L: Lanes>(
-        &'a mut self,
+    fn search<'b, L: Lanes>(
+        &'b mut self,
         lanes: L,
-        bvh: &'a Bvh,
+        bvh: &'b Bvh,
         lane: usize,
-        stack: &'a mut Stack,
-    ) -> Search<'a, L, S> {
+        query: &'b Query,
+        stack: &'b mut Stack,
+    ) -> Search<'b, L, S> {
         let t_max = self.t_max[lane];
-        Search { lanes, bvh, query: &self.queries[lane], t_max, sink: &mut self.sinks[lane], stack }
+        Search { lanes, bvh, query, t_max, sink: &mut self.sinks[lane], stack }
     }
 
     /// The farthest that any active ray of `group` looks.
     #[inline(always)]
-    fn farthest(&self, narrow: &[NarrowRay; PACKET], group: u32) -> f32 {
-        bits(group & self.active)
-            .fold(f32::NEG_INFINITY, |far, lane| far.max(narrow[lane].far(self.t_max[lane])))
+    fn farthest<L: Lanes>(&self, lanes: L, rays: &FrameRays, group: u32) -> f32 {
+        let l = lanes.sixteen();
+        let far = lanes.load_sixteen(&rays.far(&self.t_max));
+        l.greatest(l.select(group & self.active, far, l.splat(f32::NEG_INFINITY)))
     }
 }
 
-/// The rays of `group` that run towards the same octant as its first.
 #[inline(always)]
-fn octant(narrow: &[NarrowRay; PACKET], group: u32) -> u32 {
-    let signs = |lane: usize| {
-        let d = narrow[lane % PACKET].direction;
-        [d.x.is_sign_negative(), d.y.is_sign_negative(), d.z.is_sign_negative()]
-    };
-    let first = signs(group.trailing_zeros() as usize);
-    bits(group).filter(|&lane| signs(lane) == first).fold(0, |mask, lane| mask | 1 << lane)
+fn chunk(numbers: &[f64], first: usize) -> Option<&[f64; PACKET]> {
+    numbers.get(first..)?.first_chunk()
 }
 
-/// Bounds of a group of rays, and the rays side by side.
-struct Bundle<L: Lanes> {
-    boxes: BoxTest<L>,
-    triangles: [TriangleTest<L>; 2],
-}
-
-impl<L: Lanes> Bundle<L> {
-    /// `None` when the rays are too few or run too far apart to be worth it.
-    #[inline(always)]
-    fn new(lanes: L, narrow: &[NarrowRay; PACKET], group: u32) -> Option<Self> {
-        if group.count_ones() < FEWEST {
-            return None;
-        }
-        let first = narrow[group.trailing_zeros() as usize % PACKET];
-        let mut bounds = RayBounds::new(&first);
-        for lane in bits(group) {
-            bounds.include(&narrow[lane % PACKET]);
-        }
-        if (bounds.direction[1] - bounds.direction[0]).max_element() > WIDEST {
-            return None;
-        }
-        Some(Self {
-            boxes: bounds.box_test(lanes),
-            triangles: [
-                bounds.triangle_test(lanes, narrow, group, 0),
-                bounds.triangle_test(lanes, narrow, group, 8),
-            ],
-        })
+/// A bit for every ray that can hit something, as [`Query::of`] has it.
+#[inline(always)]
+fn soundness(
+    origin: [&[f64; PACKET]; 3],
+    direction: [&[f64; PACKET]; 3],
+    t_min: &[f64; PACKET],
+    t_max: &[f64; PACKET],
+) -> u32 {
+    let mut sound = 0;
+    for i in 0..PACKET {
+        // 0 unless one of them is not finite.
+        let origin = origin[0][i] * 0.0 + origin[1][i] * 0.0 + origin[2][i] * 0.0;
+        let [x, y, z] = [direction[0][i], direction[1][i], direction[2][i]];
+        let is_finite = origin + (x * 0.0 + y * 0.0 + z * 0.0) == 0.0;
+        let runs = (x != 0.0) | (y != 0.0) | (z != 0.0);
+        sound |= u32::from(is_finite & runs & (t_min[i] <= t_max[i])) << i;
     }
-}
-
-/// What the numbers of some rays lie between.
-struct RayBounds {
-    /// Least and greatest.
-    origin: [Vec3; 2],
-    direction: [Vec3; 2],
-    /// Sizes of the reciprocals of directions.
-    inverse: [Vec3; 2],
-    error: f32,
-    near: f32,
-    first: Vec3,
-}
-
-impl RayBounds {
-    #[inline(always)]
-    fn new(ray: &NarrowRay) -> Self {
-        let inverse = safe_reciprocal(ray.direction).abs();
-        Self {
-            origin: [ray.origin; 2],
-            direction: [ray.direction; 2],
-            inverse: [inverse; 2],
-            error: ray.error,
-            near: ray.near,
-            first: ray.direction,
-        }
-    }
-
-    #[inline(always)]
-    fn include(&mut self, ray: &NarrowRay) {
-        let inverse = safe_reciprocal(ray.direction).abs();
-        self.origin = [self.origin[0].min(ray.origin), self.origin[1].max(ray.origin)];
-        self.direction =
-            [self.direction[0].min(ray.direction), self.direction[1].max(ray.direction)];
-        self.inverse = [self.inverse[0].min(inverse), self.inverse[1].max(inverse)];
-        self.error = self.error.max(ray.error);
-        self.near = self.near.min(ray.near);
-    }
-
-    /// A distance to a near plane is at least that from the origin closest to it, at the highest
-    /// speed; where that is negative it does not matter, for rays begin at 0 or later. Likewise far.
-    #[inline(always)]
-    fn box_test<L: Lanes>(&self, l: L) -> BoxTest<L> {
-        let [least, most] = self.origin;
-        let (least, most) = (least - self.error, most + self.error);
-        let zero = l.splat(0.0);
-        let mut test = BoxTest {
-            backwards: [0; 3],
-            inverse_near: [zero; 3],
-            inverse_far: [zero; 3],
-            near_offset: [zero; 3],
-            far_offset: [zero; 3],
-            near: l.splat(self.near),
-        };
-        for axis in 0..3 {
-            let backwards = self.first[axis].is_sign_negative();
-            let (sign, near_origin, far_origin) = if backwards {
-                (-1.0, least[axis], most[axis])
-            } else {
-                (1.0, most[axis], least[axis])
-            };
-            let (slow, fast) = (sign * self.inverse[0][axis], sign * self.inverse[1][axis]);
-            test.backwards[axis] = usize::from(backwards);
-            test.inverse_near[axis] = l.splat(slow);
-            test.inverse_far[axis] = l.splat(fast);
-            test.near_offset[axis] = l.splat(near_origin * slow);
-            test.far_offset[axis] = l.splat(far_origin * fast);
-        }
-        test
-    }
-
-    /// Eight rays from `first` on, all sheared along the same axes. No direction is much longer along
-    /// the others, because the rays differ by at most [`WIDEST`].
-    #[inline(always)]
-    fn triangle_test<L: Lanes>(
-        &self,
-        l: L,
-        narrow: &[NarrowRay; PACKET],
-        group: u32,
-        first: usize,
-    ) -> TriangleTest<L> {
-        let axes = axes(self.first);
-        let mut origin = [[0.0; 8]; 3];
-        let mut shear = [[0.0; 8]; 3];
-        let mut near = [f32::INFINITY; 8];
-        for lane in 0..8 {
-            let ray = &narrow[(first + lane) % PACKET];
-            let inverse = 1.0 / ray.direction[axes[2]];
-            for k in 0..3 {
-                origin[k][lane] = ray.origin[axes[k]];
-                shear[k][lane] = if k == 2 { inverse } else { ray.direction[axes[k]] * inverse };
-            }
-            if group & 1 << (first + lane) != 0 {
-                near[lane] = ray.near - 8.0 * self.error;
-            }
-        }
-        TriangleTest {
-            axes,
-            origin: [l.load(&origin[0]), l.load(&origin[1]), l.load(&origin[2])],
-            shear: [l.load(&shear[0]), l.load(&shear[1]), l.load(&shear[2])],
-            error: l.splat(8.0 * self.error),
-            near: l.load(&near),
-        }
-    }
+    sound
 }
 
 /// Leaves of the tree over the instances.
-struct InstanceLeaves<'a, L, S> {
+struct InstanceLeaves<'a, 'b, L, S> {
     lanes: L,
     bvh: &'a Bvh,
-    packet: &'a mut Packet<S>,
-    narrow: &'a [NarrowRay; PACKET],
+    packet: &'a mut Packet<'b, S>,
+    rays: &'a FrameRays,
     group: u32,
     stack: &'a mut Stack,
 }
 
-impl<L: Lanes, S: Sink> Leaves for InstanceLeaves<'_, L, S> {
+impl<L: Lanes, S: Sink> Leaves for InstanceLeaves<'_, '_, L, S> {
     #[inline(always)]
     fn see(&mut self, leaf: Child, _: f32) -> Option<f32> {
         let (lanes, bvh) = (self.lanes, self.bvh);
@@ -329,39 +195,43 @@ impl<L: Lanes, S: Sink> Leaves for InstanceLeaves<'_, L, S> {
         if self.group & self.packet.active == 0 {
             return None;
         }
-        Some(self.packet.farthest(self.narrow, self.group))
+        Some(self.packet.farthest(self.lanes, self.rays, self.group))
     }
 }
 
 /// The visit of the rays of `group` to one instance.
-struct VisitTogether<'a, L, S> {
+struct VisitTogether<'a, 'b, L, S> {
     lanes: L,
     bvh: &'a Bvh,
-    packet: &'a mut Packet<S>,
+    packet: &'a mut Packet<'b, S>,
     instance: &'a Instance,
     group: u32,
     stack: &'a mut Stack,
 }
 
-impl<L: Lanes, S: Sink> NullaryFnOnce for VisitTogether<'_, L, S> {
+impl<L: Lanes, S: Sink> NullaryFnOnce for VisitTogether<'_, '_, L, S> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
         let Self { lanes, bvh, packet, instance, mut group, stack } = self;
-        if group == 0 {
-            return;
-        }
-        let narrow = packet.narrow(instance, group);
+        let rays = packet.in_frame(instance);
         while group != 0 {
-            let together = octant(&narrow, group);
+            let together = rays.same_octant(group);
             group &= !together;
-            if let Some(bundle) = Bundle::new(lanes, &narrow, together) {
-                trace_bundle(lanes, bvh, packet, instance, &narrow, (bundle, together), stack);
+            if let Some(bundle) = Bundle::new(lanes, &rays, together) {
+                let cells: &[Cell] = &bvh.parts[instance.part as usize].tree.cells;
+                let triangles = PlacedTriangles::new(bvh, instance);
+                let mut leaves =
+                    TriangleLeaves::new(lanes, cells, triangles, packet, &rays, together, &bundle);
+                let far = leaves.farthest();
+                traverse(lanes, cells, &bundle.boxes, far, stack, &mut leaves);
+                leaves.measure_pending();
                 continue;
             }
             for lane in bits(together) {
-                let mut search = packet.search(lanes, bvh, lane, stack);
+                let query = packet.query(lane);
+                let mut search = packet.search(lanes, bvh, lane, &query, stack);
                 let go_on = lanes.run(Visit { search: &mut search, instance });
                 packet.t_max[lane] = search.t_max;
                 if !go_on {
@@ -372,97 +242,182 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for VisitTogether<'_, L, S> {
     }
 }
 
-#[inline(always)]
-fn trace_bundle<L: Lanes, S: Sink>(
-    lanes: L,
-    bvh: &Bvh,
-    packet: &mut Packet<S>,
-    instance: &Instance,
-    narrow: &[NarrowRay; PACKET],
-    (bundle, group): (Bundle<L>, u32),
-    stack: &mut Stack,
-) {
-    let cells: &[Cell] = &bvh.parts[instance.part as usize].tree.cells;
-    let mut far = [f32::NEG_INFINITY; PACKET];
-    for lane in bits(group) {
-        far[lane] = narrow[lane].far(packet.t_max[lane]);
-    }
-    let farthest = packet.farthest(narrow, group);
-    let triangles = PlacedTriangles::new(bvh, instance);
-    let Bundle { boxes, triangles: tests } = bundle;
-    let mut leaves = TriangleLeaves { lanes, cells, triangles, packet, narrow, group, far, tests };
-    traverse(lanes, cells, &boxes, farthest, stack, &mut leaves);
-}
-
-/// Leaves of a part.
-struct TriangleLeaves<'a, L: Lanes, S> {
+/// Leaves of a part, for a bundle of rays.
+struct TriangleLeaves<'a, 'b, L: Lanes, S> {
     lanes: L,
     cells: &'a [Cell],
     triangles: PlacedTriangles<'a>,
-    packet: &'a mut Packet<S>,
-    narrow: &'a [NarrowRay; PACKET],
+    packet: &'a mut Packet<'b, S>,
+    rays: &'a FrameRays,
     group: u32,
+    test: TriangleTest<L::Sixteen>,
+    /// From where on limits are certainly kept.
+    surely_near: Wide<L>,
     /// How far each ray looks in this frame; −∞ for rays of no concern.
-    far: [f32; PACKET],
-    tests: [TriangleTest<L>; 2],
+    far: Wide<L>,
+    /// Triangles that end before this come before all others.
+    surely_first: Wide<L>,
+    /// Rays with a hit that is still to be measured,
+    pending: u32,
+    /// and where: the bits of the [`Child`] and of the place in it.
+    leaf: Wide<L>,
+    place: Wide<L>,
 }
 
-impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, L, S> {
+type Wide<L> = <<L as Lanes>::Sixteen as Arithmetic>::F;
+
+impl<'a, 'b, L: Lanes, S: Sink> TriangleLeaves<'a, 'b, L, S> {
     #[inline(always)]
-    fn see(&mut self, leaf: Child, far: f32) -> Option<f32> {
-        let n = leaf.count();
-        let numbers = leaf_numbers(self.cells, leaf)?;
-        let mut any = false;
-        for i in 0..n {
-            let (low, high) = (self.far.first_chunk()?, self.far.last_chunk()?);
-            let [a, b] = &self.tests;
-            let low = a.maybe_rays(self.lanes, numbers, n, i, self.lanes.load(low));
-            let high = b.maybe_rays(self.lanes, numbers, n, i, self.lanes.load(high));
-            let maybe = low | high << 8;
-            if maybe != 0 {
-                any = true;
-                self.test(numbers, n, i, maybe)?;
+    fn new(
+        lanes: L,
+        cells: &'a [Cell],
+        triangles: PlacedTriangles<'a>,
+        packet: &'a mut Packet<'b, S>,
+        rays: &'a FrameRays,
+        group: u32,
+        bundle: &Bundle<L>,
+    ) -> Self {
+        let l = lanes.sixteen();
+        let far = lanes.load_sixteen(&rays.far(&packet.t_max));
+        let zero = l.splat(0.0);
+        Self {
+            lanes,
+            cells,
+            triangles,
+            rays,
+            group,
+            test: bundle.triangles,
+            surely_near: lanes.load_sixteen(&rays.surely_near(packet.t_min)),
+            far: l.select(group & packet.active, far, l.splat(f32::NEG_INFINITY)),
+            surely_first: lanes.load_sixteen(&rays.surely_far(&packet.t_max)),
+            pending: 0,
+            leaf: zero,
+            place: zero,
+            packet,
+        }
+    }
+
+    #[inline(always)]
+    fn farthest(&self) -> f32 {
+        self.lanes.sixteen().greatest(self.far)
+    }
+
+    /// The exact test of triangle `i` of the `n` of a leaf for the rays of `maybe`.
+    #[inline(never)]
+    fn test_exactly(&mut self, numbers: &LeafNumbers, n: usize, i: usize, maybe: u32) {
+        let mut far = self.lanes.store_sixteen(self.far);
+        let mut surely_first = self.lanes.store_sixteen(self.surely_first);
+        for lane in bits(maybe) {
+            if self.pending & 1 << lane != 0 {
+                self.pending &= !(1 << lane);
+                let leaf = Child(self.lanes.store_sixteen(self.leaf)[lane].to_bits());
+                let place = self.lanes.store_sixteen(self.place)[lane].to_bits();
+                if let Some(numbers) = leaf_numbers(self.cells, leaf) {
+                    self.test_one(numbers, leaf.count(), place as usize, lane);
+                }
+            }
+            self.test_one(numbers, n, i, lane);
+            let t_max = self.packet.t_max[lane];
+            let is_active = self.packet.active & 1 << lane != 0;
+            far[lane] = if is_active { self.rays.far_one(lane, t_max) } else { f32::NEG_INFINITY };
+            surely_first[lane] = self.rays.surely_far_one(lane, t_max);
+        }
+        self.far = self.lanes.load_sixteen(&far);
+        self.surely_first = self.lanes.load_sixteen(&surely_first);
+    }
+
+    fn test_one(&mut self, numbers: &LeafNumbers, n: usize, i: usize, lane: usize) {
+        let Some((placed, triangle, corners)) = self.triangles.get(numbers, n, i) else { return };
+        let Some(hit) = self.packet.query(lane).test(&placed.view, corners) else { return };
+        match self.packet.sinks[lane].take(hit, placed.placement, triangle) {
+            Some(limit) => self.packet.t_max[lane] = limit,
+            None => self.packet.active &= !(1 << lane),
+        }
+    }
+
+    /// Works out all pending hits.
+    #[inline(always)]
+    fn measure_pending(&mut self) {
+        if self.pending == 0 {
+            return;
+        }
+        let (leaf, place) =
+            (self.lanes.store_sixteen(self.leaf), self.lanes.store_sixteen(self.place));
+        let zero = [0.0; PACKET];
+        let mut lines =
+            Lines { corners: [[zero; 3]; 3], direction: self.packet.direction.map(|d| *d) };
+        let mut whose = [(0, 0); PACKET];
+        for lane in bits(self.pending) {
+            let leaf = Child(leaf[lane].to_bits());
+            let Some((placed, triangle, corners)) =
+                leaf_numbers(self.cells, leaf).and_then(|numbers| {
+                    self.triangles.get(numbers, leaf.count(), place[lane].to_bits() as usize)
+                })
+            else {
+                continue;
+            };
+            let origin = self.packet.origin;
+            let origin = DVec3::new(origin[0][lane], origin[1][lane], origin[2][lane]);
+            let corners = placed.view.seen_from(origin, corners);
+            for (k, corner) in corners.into_iter().enumerate() {
+                lines.corners[k][0][lane] = corner.x;
+                lines.corners[k][1][lane] = corner.y;
+                lines.corners[k][2][lane] = corner.z;
+            }
+            whose[lane] = (placed.placement, triangle);
+        }
+        let [t, u, v] = watertight::locate_many(&lines, self.pending);
+        for lane in bits(self.pending) {
+            let hit = watertight::Hit { t: t[lane], u: u[lane], v: v[lane], front: true };
+            let (placement, triangle) = whose[lane];
+            if let Some(limit) = self.packet.sinks[lane].take(hit, placement, triangle) {
+                self.packet.t_max[lane] = limit;
             }
         }
-        if !any {
+    }
+}
+
+impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, '_, L, S> {
+    #[inline(always)]
+    fn see(&mut self, leaf: Child, far: f32) -> Option<f32> {
+        let l = self.lanes.sixteen();
+        let n = leaf.count();
+        let numbers = leaf_numbers(self.cells, leaf)?;
+        let mut any = 0;
+        for i in 0..n {
+            let look = self.test.look(l, numbers, n, i, self.far);
+            if look.maybe == 0 {
+                continue;
+            }
+            any |= look.maybe;
+            let sure = look.maybe
+                & look.inside
+                & l.le(self.surely_near, look.closest)
+                & l.le(look.farthest, self.surely_first);
+            if S::ANY_WILL_DO {
+                for lane in bits(sure) {
+                    self.packet.sinks[lane].find();
+                }
+                self.packet.active &= !sure;
+                self.far = l.select(sure, l.splat(f32::NEG_INFINITY), self.far);
+            } else {
+                self.pending |= sure;
+                self.far = l.select(sure, look.farthest, self.far);
+                self.surely_first = l.select(sure, look.closest, self.surely_first);
+                self.leaf = l.select(sure, l.splat(f32::from_bits(leaf.0)), self.leaf);
+                let place = f32::from_bits(u32::from(i.to_le_bytes()[0]));
+                self.place = l.select(sure, l.splat(place), self.place);
+            }
+            if look.maybe != sure {
+                self.test_exactly(numbers, n, i, look.maybe & !sure);
+            }
+        }
+        if any == 0 {
             return Some(far);
         }
         if self.group & self.packet.active == 0 {
             return None;
         }
-        Some(self.far.iter().fold(f32::NEG_INFINITY, |most, &far| most.max(far)))
-    }
-}
-
-impl<L: Lanes, S: Sink> TriangleLeaves<'_, L, S> {
-    /// The exact test of triangle `i` of a leaf for some rays.
-    #[inline(always)]
-    fn test(
-        &mut self,
-        numbers: &[f32; 8 * super::wide::LEAF_CELLS],
-        n: usize,
-        i: usize,
-        maybe: u32,
-    ) -> Option<()> {
-        let (placed, triangle, corners) = self.triangles.get(numbers, n, i)?;
-        for lane in bits(maybe) {
-            let lane = lane % PACKET;
-            let t_max = &mut self.packet.t_max[lane];
-            let Some(hit) = self.packet.queries[lane].test(&placed.view, corners) else { continue };
-            if hit.t > *t_max {
-                continue;
-            }
-            match self.packet.sinks[lane].take(hit, placed.placement, triangle) {
-                Some(limit) => {
-                    *t_max = limit;
-                    self.far[lane] = self.narrow[lane].far(limit);
-                }
-                None => {
-                    self.packet.active &= !(1 << lane);
-                    self.far[lane] = f32::NEG_INFINITY;
-                }
-            }
-        }
-        Some(())
+        Some(self.farthest())
     }
 }

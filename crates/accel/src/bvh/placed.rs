@@ -3,7 +3,7 @@
 use etendue_geometry::Mesh;
 use etendue_geometry::glam::DVec3;
 
-use super::wide::{LEAF_CELLS, Units};
+use super::wide::{LeafNumbers, Units};
 use super::{Bvh, Owner};
 use crate::nearest::View;
 use crate::parts::Instance;
@@ -50,7 +50,7 @@ impl<'a> PlacedTriangles<'a> {
     #[inline(always)]
     pub(super) fn get(
         &self,
-        numbers: &[f32; 8 * LEAF_CELLS],
+        numbers: &LeafNumbers,
         n: usize,
         i: usize,
     ) -> Option<(Placed<'a>, u32, [DVec3; 3])> {

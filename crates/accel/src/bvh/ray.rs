@@ -8,7 +8,8 @@
 
 use etendue_geometry::glam::{DVec3, Vec3};
 
-use super::lanes::Lanes;
+use super::lanes::{Arithmetic, Lanes};
+use super::wide::LeafNumbers;
 use crate::nearest::Query;
 use crate::parts::{Instance, LocalRay};
 
@@ -30,11 +31,11 @@ pub(super) struct NarrowRay {
 
 /// Farther from the frame's origin than this, the ray is moved closer before it is rounded. All
 /// triangles are within √3 of it.
-const FAR: f64 = 4.0;
+pub(super) const FAR: f64 = 4.0;
 
 /// The least component that a reciprocal is taken of. In place of a smaller one it moves no point
 /// of a ray inside the frame by more than a rounding.
-const LEAST: f32 = 1e-12;
+pub(super) const LEAST: f32 = 1e-12;
 
 impl NarrowRay {
     /// The world's ray in `instance`'s frame.
@@ -105,7 +106,7 @@ fn steer(d: f32) -> f32 {
 }
 
 #[inline(always)]
-fn splat<L: Lanes>(lanes: L, v: Vec3) -> [L::F; 3] {
+fn splat<L: Arithmetic>(lanes: L, v: Vec3) -> [L::F; 3] {
     [lanes.splat(v.x), lanes.splat(v.y), lanes.splat(v.z)]
 }
 
@@ -165,12 +166,12 @@ pub(super) fn axes(direction: Vec3) -> [usize; 3] {
 /// intersection", 2013: a shear that makes the ray the z axis, in which edges are lines past the
 /// origin. Here only to *reject*: what is kept is decided in f64.
 #[derive(Clone, Copy)]
-pub(super) struct TriangleTest<L: Lanes> {
+pub(super) struct TriangleTest<L: Arithmetic> {
     /// Numbers of the axes: the ray's longest last.
     pub(super) axes: [usize; 3],
     pub(super) origin: [L::F; 3],
     pub(super) shear: [L::F; 3],
-    /// A sheared coordinate is off by no more than half of this.
+    /// A sheared coordinate is off by no more than half of this, and so is a distance.
     pub(super) error: L::F,
     pub(super) near: L::F,
 }
@@ -187,72 +188,79 @@ impl<L: Lanes> TriangleTest<L> {
             origin: splat(lanes, Vec3::new(o[x], o[y], o[z])),
             shear: splat(lanes, Vec3::new(d[x] * inverse, d[y] * inverse, inverse)),
             error: lanes.splat(4.0 * ray.error),
-            near: lanes.splat(ray.near - 4.0 * ray.error),
+            near: lanes.splat(ray.near),
         }
     }
 
-    /// Which of up to eight triangles the ray may hit before `far`. `corners` has the coordinates
-    /// of `n` triangles, in runs of `n`.
+    /// Which of the `n` triangles of a leaf the ray may hit before `far`.
     #[inline(always)]
-    pub(super) fn maybe(&self, lanes: L, corners: &[f32], n: usize, far: f32) -> u32 {
-        let a = self.shear(lanes, self.runs(lanes, corners, 0, n));
-        let b = self.shear(lanes, self.runs(lanes, corners, 3, n));
-        let c = self.shear(lanes, self.runs(lanes, corners, 6, n));
-        self.decide(lanes, [a, b, c], lanes.splat(far)) & ((1 << n) - 1)
+    pub(super) fn maybe(&self, l: L, numbers: &LeafNumbers, n: usize, far: f32) -> u32 {
+        let a = self.shear(l, self.runs(l, numbers, 0, n));
+        let b = self.shear(l, self.runs(l, numbers, 3, n));
+        let c = self.shear(l, self.runs(l, numbers, 6, n));
+        self.decide(l, [a, b, c], l.splat(far)).maybe & ((1 << n) - 1)
     }
 
-    /// Which of eight rays (this test being that of a different ray in each lane) may hit triangle
-    /// `i` of the `n` in `corners` before `far`.
+    /// The coordinates of eight corners that begin with run `first`, along this test's axes.
     #[inline(always)]
-    pub(super) fn maybe_rays(
+    fn runs(&self, l: L, numbers: &LeafNumbers, first: usize, n: usize) -> [L::F; 3] {
+        [
+            run(l, numbers, (first + self.axes[0]) * n),
+            run(l, numbers, (first + self.axes[1]) * n),
+            run(l, numbers, (first + self.axes[2]) * n),
+        ]
+    }
+}
+
+impl<L: Arithmetic> TriangleTest<L> {
+    /// What some rays (this test being that of a different ray in each lane) make of triangle `i` of
+    /// the `n` of a leaf before `far`.
+    #[inline(always)]
+    pub(super) fn look(
         &self,
-        lanes: L,
-        corners: &[f32],
+        l: L,
+        numbers: &LeafNumbers,
         n: usize,
         i: usize,
         far: L::F,
-    ) -> u32 {
-        let a = self.shear(lanes, self.copies(lanes, corners, 0, n, i));
-        let b = self.shear(lanes, self.copies(lanes, corners, 3, n, i));
-        let c = self.shear(lanes, self.copies(lanes, corners, 6, n, i));
-        self.decide(lanes, [a, b, c], far)
+    ) -> Look<L> {
+        let a = self.shear(l, self.copies(l, numbers, 0, n, i));
+        let b = self.shear(l, self.copies(l, numbers, 3, n, i));
+        let c = self.shear(l, self.copies(l, numbers, 6, n, i));
+        self.decide(l, [a, b, c], far)
+    }
+
+    /// The coordinates of one corner, along this test's axes, in all lanes.
+    #[inline(always)]
+    fn copies(&self, l: L, numbers: &LeafNumbers, first: usize, n: usize, i: usize) -> [L::F; 3] {
+        [
+            copies(l, numbers, (first + self.axes[0]) * n + i),
+            copies(l, numbers, (first + self.axes[1]) * n + i),
+            copies(l, numbers, (first + self.axes[2]) * n + i),
+        ]
     }
 
     #[inline(always)]
-    fn decide(&self, l: L, [a, b, c]: [Sheared<L>; 3], far: L::F) -> u32 {
+    fn decide(&self, l: L, [a, b, c]: [Sheared<L>; 3], far: L::F) -> Look<L> {
         let (u, v, w) = (edge(l, c, b), edge(l, a, c), edge(l, b, a));
         // Each product has two coordinates that are off by at most half the error.
         let sizes = l.add(l.add(size(l, a), size(l, b)), l.add(size(l, c), self.error));
         let error = l.mul(sizes, self.error);
         let least = l.min(l.min(u, v), w);
         let most = l.max(l.max(u, v), w);
-        let inside = l.le(l.sub(l.splat(0.0), error), least) | l.le(most, error);
+        let negative = l.sub(l.splat(0.0), error);
+        let inside = l.le(negative, least) | l.le(most, error);
 
         let (az, bz, cz) =
             (l.mul(a.z, self.shear[2]), l.mul(b.z, self.shear[2]), l.mul(c.z, self.shear[2]));
-        let closest = l.min(l.min(az, bz), cz);
-        let farthest = l.max(l.max(az, bz), cz);
-        inside & l.le(closest, l.add(far, self.error)) & l.le(self.near, farthest)
-    }
-
-    /// The coordinates of eight corners that begin with run `first`, along this test's axes.
-    #[inline(always)]
-    fn runs(&self, l: L, corners: &[f32], first: usize, n: usize) -> [L::F; 3] {
-        [
-            run(l, corners, (first + self.axes[0]) * n),
-            run(l, corners, (first + self.axes[1]) * n),
-            run(l, corners, (first + self.axes[2]) * n),
-        ]
-    }
-
-    /// The same for one of them in all lanes.
-    #[inline(always)]
-    fn copies(&self, l: L, corners: &[f32], first: usize, n: usize, i: usize) -> [L::F; 3] {
-        [
-            copies(l, corners, (first + self.axes[0]) * n + i),
-            copies(l, corners, (first + self.axes[1]) * n + i),
-            copies(l, corners, (first + self.axes[2]) * n + i),
-        ]
+        let closest = l.sub(l.min(l.min(az, bz), cz), self.error);
+        let farthest = l.add(l.max(l.max(az, bz), cz), self.error);
+        Look {
+            maybe: inside & l.le(closest, far) & l.le(self.near, farthest),
+            inside: l.le(error, least) | l.le(most, negative),
+            closest,
+            farthest,
+        }
     }
 
     /// Corners as the ray sees them.
@@ -265,17 +273,29 @@ impl<L: Lanes> TriangleTest<L> {
     }
 }
 
-/// Eight corners in the frame of which the ray is the z axis, but for the scale of z.
+/// What single precision can tell about rays and a triangle.
 #[derive(Clone, Copy)]
-struct Sheared<L: Lanes> {
+pub(super) struct Look<L: Arithmetic> {
+    /// The lanes that f64 might call a hit within the limits.
+    pub(super) maybe: u32,
+    /// The lanes that f64 will certainly call inside.
+    pub(super) inside: u32,
+    /// Hits are no closer and no farther than this.
+    pub(super) closest: L::F,
+    pub(super) farthest: L::F,
+}
+
+/// Corners in the frame of which the ray is the z axis, but for the scale of z.
+#[derive(Clone, Copy)]
+struct Sheared<L: Arithmetic> {
     x: L::F,
     y: L::F,
     z: L::F,
 }
 
-/// Eight numbers from `start` on; all callers' leaves are that long.
+/// Eight numbers from `start` on, one of a leaf's runs.
 #[inline(always)]
-fn run<L: Lanes>(l: L, numbers: &[f32], start: usize) -> L::F {
+fn run<L: Lanes>(l: L, numbers: &LeafNumbers, start: usize) -> L::F {
     match numbers.get(start..start + 8).and_then(|run| run.first_chunk()) {
         Some(run) => l.load(run),
         None => l.splat(0.0),
@@ -284,17 +304,17 @@ fn run<L: Lanes>(l: L, numbers: &[f32], start: usize) -> L::F {
 
 /// Number `at` in all lanes.
 #[inline(always)]
-fn copies<L: Lanes>(l: L, numbers: &[f32], at: usize) -> L::F {
-    l.splat(numbers.get(at).copied().unwrap_or(0.0))
+fn copies<L: Arithmetic>(l: L, numbers: &LeafNumbers, at: usize) -> L::F {
+    l.splat(numbers[at % numbers.len()])
 }
 
 /// Twice the signed area of the origin and an edge from `p` to `q`.
 #[inline(always)]
-fn edge<L: Lanes>(l: L, p: Sheared<L>, q: Sheared<L>) -> L::F {
+fn edge<L: Arithmetic>(l: L, p: Sheared<L>, q: Sheared<L>) -> L::F {
     l.mul_sub(p.x, q.y, l.mul(p.y, q.x))
 }
 
 #[inline(always)]
-fn size<L: Lanes>(l: L, p: Sheared<L>) -> L::F {
+fn size<L: Arithmetic>(l: L, p: Sheared<L>) -> L::F {
     l.add(l.abs(p.x), l.abs(p.y))
 }

@@ -6,8 +6,9 @@ use etendue_geometry::RayBatch;
 use pulp::NullaryFnOnce;
 
 use super::Bvh;
+use super::bundle::PACKET;
 use super::lanes::Lanes;
-use super::packet::{PACKET, Packet};
+use super::packet::Packet;
 use super::placed::PlacedTriangles;
 use super::ray::{BoxTest, NarrowRay, TriangleTest};
 use super::traverse::{Leaves, Stack, traverse};
@@ -18,17 +19,27 @@ use crate::watertight;
 
 /// What becomes of the hits of one ray.
 pub(super) trait Sink {
-    fn new(query: &Query) -> Self;
+    /// Whether one hit is as good as another.
+    const ANY_WILL_DO: bool;
+
+    fn new(t_max: f64) -> Self;
+
+    /// There is a hit, whichever; only where any will do.
+    fn find(&mut self);
 
     /// Takes a hit within the limits; answers how far to look on, or `None` to end.
     fn take(&mut self, hit: watertight::Hit, placement: u32, triangle: u32) -> Option<f64>;
 }
 
 impl Sink for Nearest {
+    const ANY_WILL_DO: bool = false;
+
     #[inline(always)]
-    fn new(query: &Query) -> Self {
-        Self::none(query.t_max)
+    fn new(t_max: f64) -> Self {
+        Self::none(t_max)
     }
+
+    fn find(&mut self) {}
 
     #[inline(always)]
     fn take(&mut self, hit: watertight::Hit, placement: u32, triangle: u32) -> Option<f64> {
@@ -43,9 +54,16 @@ pub(super) struct AnyHit {
 }
 
 impl Sink for AnyHit {
+    const ANY_WILL_DO: bool = true;
+
     #[inline(always)]
-    fn new(_: &Query) -> Self {
+    fn new(_: f64) -> Self {
         Self { found: false }
+    }
+
+    #[inline(always)]
+    fn find(&mut self) {
+        self.found = true;
     }
 
     #[inline(always)]
@@ -74,7 +92,7 @@ impl<L: Lanes, S: Sink, F: FnMut(usize, S)> NullaryFnOnce for Batch<'_, L, S, F>
         let alone = if self.rays.coherent { self.packets(&mut stacks) } else { 0 };
         for i in alone..self.rays.len() {
             if let Some(query) = Query::of(self.rays, i) {
-                let mut sink = S::new(&query);
+                let mut sink = S::new(query.t_max);
                 let mut search = Search {
                     lanes: self.lanes,
                     bvh: self.bvh,
@@ -94,13 +112,13 @@ impl<L: Lanes, S: Sink, F: FnMut(usize, S)> Batch<'_, L, S, F> {
     /// Traces as many whole packets as there are; answers how many rays that were.
     #[inline(always)]
     fn packets(&mut self, stacks: &mut Stacks) -> usize {
-        let whole = self.rays.len() / PACKET * PACKET;
-        for first in (0..whole).step_by(PACKET) {
-            let mut packet = Packet::<S>::of(self.rays, first);
+        let mut first = 0;
+        while let Some(mut packet) = Packet::<S>::of(self.rays, first) {
             packet.trace(self.lanes, self.bvh, stacks);
             packet.finish(|lane, sink| (self.sink)(first + lane, sink));
+            first += PACKET;
         }
-        whole
+        first
     }
 }
 

@@ -70,12 +70,15 @@ pub(super) struct WideTree {
     pub(super) hi: [f32; 3],
 }
 
-/// Cells that may be read from the first of any leaf: eight lanes from the last run of eight.
-pub(super) const LEAF_CELLS: usize = 12;
+/// Cells that may be read from the first of any leaf: more than eight lanes from the last run of
+/// eight, and a power of two, so that a remainder is all it takes to stay within.
+pub(super) const LEAF_CELLS: usize = 16;
 
 /// The numbers of a leaf, and others behind.
+pub(super) type LeafNumbers = [f32; 8 * LEAF_CELLS];
+
 #[inline(always)]
-pub(super) fn leaf_numbers(cells: &[Cell], leaf: Child) -> Option<&[f32; 8 * LEAF_CELLS]> {
+pub(super) fn leaf_numbers(cells: &[Cell], leaf: Child) -> Option<&LeafNumbers> {
     let cells = cells.get(leaf.place()..leaf.place() + LEAF_CELLS)?;
     bytemuck::cast_slice(cells).first_chunk()
 }
@@ -108,12 +111,7 @@ impl Units {
 
     /// The corners, in the mesh's frame, of triangle `i` of the `n` in a leaf.
     #[inline(always)]
-    pub(super) fn corners(
-        &self,
-        numbers: &[f32; 8 * LEAF_CELLS],
-        n: usize,
-        i: usize,
-    ) -> [DVec3; 3] {
+    pub(super) fn corners(&self, numbers: &LeafNumbers, n: usize, i: usize) -> [DVec3; 3] {
         [
             self.corner(numbers, n, i),
             self.corner(numbers, n, 3 * n + i),
@@ -122,8 +120,8 @@ impl Units {
     }
 
     #[inline(always)]
-    fn corner(&self, numbers: &[f32; 8 * LEAF_CELLS], n: usize, first: usize) -> DVec3 {
-        let at = |i: usize| numbers.get(i).copied().map_or(0.0, f64::from);
+    fn corner(&self, numbers: &LeafNumbers, n: usize, first: usize) -> DVec3 {
+        let at = |i: usize| f64::from(numbers[i % numbers.len()]);
         DVec3::new(at(first), at(first + n), at(first + 2 * n)) * self.inverse_scale + self.origin
     }
 }

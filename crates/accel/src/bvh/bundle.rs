@@ -1,0 +1,268 @@
+//! Rays side by side in one frame, and bounds of those that run the same way.
+
+use etendue_geometry::glam::Vec3;
+
+use super::lanes::{Arithmetic, Lanes};
+use super::ray::{BoxTest, FAR, LEAST, TriangleTest, axes};
+use crate::parts::LocalRays;
+
+/// Rays of a packet: as many as there are lanes.
+pub(super) const PACKET: usize = 16;
+
+/// Fewer rays than this are traced one by one.
+const FEWEST: u32 = 4;
+
+/// Rays whose directions differ by more than this along an axis are traced one by one.
+const WIDEST: f32 = 0.25;
+
+/// The numbers of the set bits of `mask`, which are below [`PACKET`].
+#[inline(always)]
+pub(super) fn bits(mask: u32) -> Bits {
+    Bits(mask)
+}
+
+pub(super) struct Bits(u32);
+
+impl Iterator for Bits {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let bit = self.0.trailing_zeros() as usize;
+        if self.0 == 0 {
+            return None;
+        }
+        self.0 &= self.0 - 1;
+        Some(bit % PACKET)
+    }
+}
+
+/// What [`NarrowRay`](super::ray::NarrowRay) is for one ray.
+pub(super) struct FrameRays {
+    origin: [[f32; PACKET]; 3],
+    direction: [[f32; PACKET]; 3],
+    /// Finite and not zero.
+    inverse: [[f32; PACKET]; 3],
+    error: [f32; PACKET],
+    near: [f32; PACKET],
+    length: [f64; PACKET],
+    skipped: [f64; PACKET],
+    /// Bit by bit: which run backwards along each axis.
+    backwards: [u32; 3],
+}
+
+impl FrameRays {
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
+    pub(super) fn new(local: &LocalRays<PACKET>, t_min: &[f64; PACKET]) -> Self {
+        let zero = [[0.0; PACKET]; 3];
+        let mut rays = Self {
+            origin: zero,
+            direction: zero,
+            inverse: zero,
+            error: [0.0; PACKET],
+            near: [0.0; PACKET],
+            length: [0.0; PACKET],
+            skipped: [0.0; PACKET],
+            backwards: [0; 3],
+        };
+        for i in 0..PACKET {
+            let [ox, oy, oz] = [local.origin[0][i], local.origin[1][i], local.origin[2][i]];
+            let [dx, dy, dz] =
+                [local.direction[0][i], local.direction[1][i], local.direction[2][i]];
+            let length = (dx * dx + dy * dy + dz * dz).sqrt();
+            let inverse = 1.0 / length;
+            let distance = (ox * ox + oy * oy + oz * oz).sqrt();
+            let skipped = if distance > FAR { distance - 2.0 } else { 0.0 };
+            let [dx, dy, dz] = [dx * inverse, dy * inverse, dz * inverse];
+            let [ox, oy, oz] = [ox + dx * skipped, oy + dy * skipped, oz + dz * skipped];
+            let near = (t_min[i] * length - skipped) as f32;
+            let near = near - near.abs() * f32::EPSILON;
+            rays.near[i] = if near > 0.0 { near } else { 0.0 };
+            rays.length[i] = length;
+            rays.skipped[i] = skipped;
+            let size = ox.abs() + oy.abs() + oz.abs();
+            rays.error[i] = f32::EPSILON * (8.0 * size as f32 + 6.0) + 5.0 * local.pad[i] as f32;
+            (rays.origin[0][i], rays.direction[0][i]) = (ox as f32, dx as f32);
+            (rays.origin[1][i], rays.direction[1][i]) = (oy as f32, dy as f32);
+            (rays.origin[2][i], rays.direction[2][i]) = (oz as f32, dz as f32);
+        }
+        for axis in 0..3 {
+            for i in 0..PACKET {
+                let d = rays.direction[axis][i];
+                let steered = if d.abs() < LEAST { LEAST.copysign(d) } else { d };
+                rays.inverse[axis][i] = 1.0 / steered;
+                rays.backwards[axis] |= u32::from(d.is_sign_negative()) << i;
+            }
+        }
+        rays
+    }
+
+    /// The rays of `group` that run towards the same octant as its first.
+    #[inline(always)]
+    pub(super) fn same_octant(&self, group: u32) -> u32 {
+        let first = group.trailing_zeros();
+        let mut same = group;
+        for backwards in self.backwards {
+            same &= if backwards >> first & 1 != 0 { backwards } else { !backwards };
+        }
+        same
+    }
+
+    /// The rays' own distances for `t`, rounded up with room for the error of either.
+    #[inline(always)]
+    pub(super) fn far(&self, t: &[f64; PACKET]) -> [f32; PACKET] {
+        let mut far = [0.0; PACKET];
+        for i in 0..PACKET {
+            far[i] = self.far_one(i, t[i]);
+        }
+        far
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
+    pub(super) fn far_one(&self, i: usize, t: f64) -> f32 {
+        let far = (t * self.length[i] - self.skipped[i]) as f32;
+        far + (far.abs() * (4.0 * f32::EPSILON) + self.error[i])
+    }
+
+    /// A triangle that ends before this ends before `t`.
+    #[inline(always)]
+    pub(super) fn surely_far(&self, t: &[f64; PACKET]) -> [f32; PACKET] {
+        let mut far = [0.0; PACKET];
+        for i in 0..PACKET {
+            far[i] = self.surely_far_one(i, t[i]);
+        }
+        far
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
+    pub(super) fn surely_far_one(&self, i: usize, t: f64) -> f32 {
+        let far = (t * self.length[i] - self.skipped[i]) as f32;
+        // Infinity less infinity is no number; everything ends before infinity.
+        if far == f32::INFINITY {
+            return far;
+        }
+        far - (far.abs() * (4.0 * f32::EPSILON) + self.error[i])
+    }
+
+    /// A triangle that begins behind this begins behind `t`.
+    #[inline(always)]
+    pub(super) fn surely_near(&self, t: &[f64; PACKET]) -> [f32; PACKET] {
+        self.far(t)
+    }
+}
+
+/// Bounds of some of the rays, and the rays side by side.
+pub(super) struct Bundle<L: Lanes> {
+    pub(super) boxes: BoxTest<L>,
+    pub(super) triangles: TriangleTest<L::Sixteen>,
+}
+
+impl<L: Lanes> Bundle<L> {
+    /// Of the rays of `group`, which run towards the same octant. `None` when they are too few or run
+    /// too far apart to be worth it.
+    #[inline(always)]
+    pub(super) fn new(lanes: L, rays: &FrameRays, group: u32) -> Option<Self> {
+        if group.count_ones() < FEWEST {
+            return None;
+        }
+        let first = group.trailing_zeros() as usize % PACKET;
+        let direction = [
+            range(lanes, &rays.direction[0], group, first),
+            range(lanes, &rays.direction[1], group, first),
+            range(lanes, &rays.direction[2], group, first),
+        ];
+        for [least, most] in direction {
+            if most - least > WIDEST {
+                return None;
+            }
+        }
+        let error = range(lanes, &rays.error, group, first)[1];
+        Some(Self {
+            boxes: box_test(lanes, rays, group, first, error),
+            triangles: triangle_test(lanes, rays, group, first, error),
+        })
+    }
+}
+
+/// The least and the greatest of the numbers of `group`, of which `first` is one.
+#[inline(always)]
+fn range<L: Lanes>(lanes: L, numbers: &[f32; PACKET], group: u32, first: usize) -> [f32; 2] {
+    let l = lanes.sixteen();
+    let numbers = l.select(group, lanes.load_sixteen(numbers), l.splat(numbers[first]));
+    [l.least(numbers), l.greatest(numbers)]
+}
+
+/// A distance to a near plane is at least that from the origin closest to it, at the highest speed;
+/// where that is negative it does not matter, for rays begin at 0 or later. Likewise far.
+#[inline(always)]
+fn box_test<L: Lanes>(
+    lanes: L,
+    rays: &FrameRays,
+    group: u32,
+    first: usize,
+    error: f32,
+) -> BoxTest<L> {
+    let zero = lanes.splat(0.0);
+    let mut test = BoxTest {
+        backwards: [0; 3],
+        inverse_near: [zero; 3],
+        inverse_far: [zero; 3],
+        near_offset: [zero; 3],
+        far_offset: [zero; 3],
+        near: lanes.splat(range(lanes, &rays.near, group, first)[0]),
+    };
+    for axis in 0..3 {
+        let [least, most] = range(lanes, &rays.origin[axis], group, first);
+        let (least, most) = (least - error, most + error);
+        let inverse = range(lanes, &rays.inverse[axis], group, first);
+        let backwards = rays.backwards[axis] >> first & 1 != 0;
+        // All of one sign: the slowest reciprocal is that closest to 0.
+        let (slow, fast, near, far) = if backwards {
+            (inverse[1], inverse[0], least, most)
+        } else {
+            (inverse[0], inverse[1], most, least)
+        };
+        test.backwards[axis] = usize::from(backwards);
+        test.inverse_near[axis] = lanes.splat(slow);
+        test.inverse_far[axis] = lanes.splat(fast);
+        test.near_offset[axis] = lanes.splat(near * slow);
+        test.far_offset[axis] = lanes.splat(far * fast);
+    }
+    test
+}
+
+/// All rays sheared along the same axes. No direction is much longer along the others, because the
+/// rays differ by at most [`WIDEST`].
+#[inline(always)]
+fn triangle_test<L: Lanes>(
+    lanes: L,
+    rays: &FrameRays,
+    group: u32,
+    first: usize,
+    error: f32,
+) -> TriangleTest<L::Sixteen> {
+    let l = lanes.sixteen();
+    let direction = &rays.direction;
+    let axes = axes(Vec3::new(direction[0][first], direction[1][first], direction[2][first]));
+    let [x, y, z] = axes;
+    let inverse = lanes.load_sixteen(&rays.inverse[z]);
+    let near = l.select(group, lanes.load_sixteen(&rays.near), l.splat(f32::INFINITY));
+    TriangleTest {
+        axes,
+        origin: [
+            lanes.load_sixteen(&rays.origin[x]),
+            lanes.load_sixteen(&rays.origin[y]),
+            lanes.load_sixteen(&rays.origin[z]),
+        ],
+        shear: [
+            l.mul(lanes.load_sixteen(&direction[x]), inverse),
+            l.mul(lanes.load_sixteen(&direction[y]), inverse),
+            inverse,
+        ],
+        error: l.splat(8.0 * error),
+        near,
+    }
+}
