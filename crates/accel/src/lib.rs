@@ -23,7 +23,9 @@ mod nearest;
 mod parts;
 #[cfg(feature = "embree")]
 mod recheck;
+#[cfg(feature = "embree")]
 mod single;
+#[cfg(feature = "embree")]
 mod solve;
 mod tree;
 mod watch;

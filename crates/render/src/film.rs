@@ -2,9 +2,10 @@
 
 use std::sync::Mutex;
 
-use etendue_tracer::{LayerSpec, NormalKind, Space};
+use etendue_tracer::LayerSpec;
 
-use crate::output::{Channel, Layer, Look, Values};
+use crate::description::{Description, describe};
+use crate::output::{Channel, Layer, Values};
 
 /// How finely data layers are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,14 +72,6 @@ pub(crate) struct Band<'a> {
     pub(crate) layers: Vec<(LayerSpec, Vec<Rows<'a>>)>,
 }
 
-/// What is known of a layer without rendering it.
-struct Description {
-    name: &'static str,
-    channels: &'static [&'static str],
-    look: Look,
-    meaning: Vec<(&'static str, &'static str)>,
-}
-
 impl FilmLayer {
     pub(crate) fn new(spec: LayerSpec, pixels: usize, precision: Precision) -> Self {
         let plane = || match (spec, precision) {
@@ -136,119 +129,4 @@ pub(crate) fn bands(
         }
     }
     bands.into_iter().map(|band| Mutex::new(Some(band))).collect()
-}
-
-/// Rays and places that all layers share.
-const CHIEF_RAY: (&str, &str) = ("taken along", "the chief ray of the pixel's centre");
-
-fn describe(spec: LayerSpec) -> Description {
-    let world = ("frame", "world: right-handed, +Y up");
-    let camera = ("frame", "camera: right-handed, looking along -Z, +Y up, +X right");
-    let frame = |space| if space == Space::World { world } else { camera };
-    match spec {
-        LayerSpec::Depth => Description {
-            name: "Depth",
-            channels: &["Z"],
-            look: Look::Distance,
-            meaning: vec![
-                ("definition", "distance along the camera's axis from the entrance pupil"),
-                ("unit", "m"),
-                CHIEF_RAY,
-                ("miss", "+inf"),
-            ],
-        },
-        LayerSpec::Distance => Description {
-            name: "Distance",
-            channels: &["Z"],
-            look: Look::Distance,
-            meaning: vec![
-                ("definition", "distance along the ray from the entrance pupil"),
-                ("unit", "m"),
-                CHIEF_RAY,
-                ("miss", "+inf"),
-            ],
-        },
-        LayerSpec::Normal { space, kind } => Description {
-            name: match (space, kind) {
-                (Space::World, NormalKind::Geometric) => "Normal",
-                (Space::Camera, NormalKind::Geometric) => "NormalCamera",
-                (Space::World, NormalKind::Shading) => "NormalShading",
-                (Space::Camera, NormalKind::Shading) => "NormalShadingCamera",
-            },
-            channels: &["X", "Y", "Z"],
-            look: Look::Direction,
-            meaning: vec![
-                match kind {
-                    NormalKind::Geometric => {
-                        ("definition", "unit normal of the triangle, on the viewer's side")
-                    }
-                    NormalKind::Shading => (
-                        "definition",
-                        "unit normal interpolated from the file's vertex normals (the triangle's \
-                         where there are none), on the viewer's side",
-                    ),
-                },
-                ("unit", "1"),
-                frame(space),
-                CHIEF_RAY,
-                ("miss", "0 0 0"),
-            ],
-        },
-        LayerSpec::Position { space } => Description {
-            name: if space == Space::World { "Position" } else { "PositionCamera" },
-            channels: &["X", "Y", "Z"],
-            look: Look::Extent,
-            meaning: vec![
-                ("definition", "the point that was hit"),
-                ("unit", "m"),
-                frame(space),
-                CHIEF_RAY,
-                ("miss", "+inf"),
-            ],
-        },
-        LayerSpec::Ids => Description {
-            name: "Id",
-            channels: &["object", "primitive"],
-            look: Look::Ids,
-            meaning: vec![
-                (
-                    "definition",
-                    "number of the object in the scene, and of the triangle in its mesh, both \
-                     counted from 1",
-                ),
-                CHIEF_RAY,
-                ("miss", "0"),
-            ],
-        },
-        LayerSpec::Coverage => Description {
-            name: "Coverage",
-            channels: &["A"],
-            look: Look::Share,
-            meaning: vec![("definition", "1 where something was hit, else 0"), CHIEF_RAY],
-        },
-        LayerSpec::Flat => Description {
-            name: "Flat",
-            channels: &["R", "G", "B"],
-            look: Look::Color,
-            meaning: vec![
-                ("definition", "base colour without light, mean over the pixel's samples"),
-                ("unit", "1 (linear light, sRGB primaries)"),
-                ("miss", "0 0 0"),
-            ],
-        },
-        LayerSpec::Facing => Description {
-            name: "Facing",
-            channels: &["R", "G", "B"],
-            look: Look::Color,
-            meaning: vec![
-                (
-                    "definition",
-                    "base colour under a headlight, mean over the pixel's samples: to look at, not \
-                     a measurement",
-                ),
-                ("unit", "1 (linear light, sRGB primaries)"),
-                ("miss", "0 0 0"),
-            ],
-        },
-    }
 }

@@ -10,6 +10,7 @@
 //! | [`output`] | the named layers of a render, and EXR, PNG, NPY and JSON files of them |
 //! | [`report`] | what a render did and what it cost |
 
+mod description;
 mod film;
 pub mod output;
 pub mod plan;

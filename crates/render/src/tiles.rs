@@ -157,7 +157,7 @@ impl Job<'_> {
             }
             LayerSpec::Distance => each(planes, batch, index, |i| [batch.hits.t[i]]),
             LayerSpec::Normal { space, kind } => {
-                each(planes, batch, index, |i| around.normal(traced, i, kind, space).to_array())
+                each(planes, batch, index, |i| around.normal(traced, i, kind, space).to_array());
             }
             LayerSpec::Position { space } => {
                 each(planes, batch, index, |i| around.position(traced, i, space).to_array());

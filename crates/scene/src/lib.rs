@@ -13,7 +13,7 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`file`] | the JSON format: types, schema, errors with their place, settings |
+//! | [`file`](mod@file) | the JSON format: types, schema, errors with their place, settings |
 //! | [`import`] | glTF, OBJ and PLY |
 //! | [`shape`] | shapes made on load |
 //! | [`scene`] | the loaded scene |

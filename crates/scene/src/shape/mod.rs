@@ -1,7 +1,7 @@
 //! Shapes that need no file: tessellated on load, the same on every machine and for any number of
 //! threads.
 //!
-//! Round shapes are made of rings ([`globe`]) and have shared vertices, so they are closed. With
+//! Round shapes are made of rings (`globe.rs`) and have shared vertices, so they are closed. With
 //! texture coordinates the vertices of one meridian exist twice, at the same place to the bit.
 
 mod flat;
