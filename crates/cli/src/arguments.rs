@@ -59,8 +59,13 @@ pub(crate) struct SceneArguments {
     /// A scene (.json), or a model (.gltf, .glb, .obj, .ply) to frame by itself
     #[arg(value_name = "SCENE|MODEL")]
     pub(crate) scene: PathBuf,
-    /// Set any value of the scene, e.g. camera.fov=30 or objects[0].transform.scale=2
-    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_setting)]
+    // Not a comment of documentation, whose brackets would be a link.
+    #[arg(
+        long = "set",
+        value_name = "PATH=VALUE",
+        value_parser = parse_setting,
+        help = "Set any value of the scene, e.g. camera.fov=30 or objects[0].transform.scale=2"
+    )]
     pub(crate) settings: Vec<(String, String)>,
     /// Look through one of the models' own cameras, by its name or number (from 0)
     #[arg(long, value_name = "NAME|INDEX")]
