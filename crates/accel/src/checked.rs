@@ -104,6 +104,7 @@ impl Embree {
             again.push_shifted(rays32, i as usize, shift);
         }
         let mut rechecked = again.len() as u64;
+        rechecked += solved.valid.iter().filter(|valid| !**valid).count() as u64;
         self.scene.closest(again, rays.coherent, found);
         let mut kept = 0;
         for k in 0..suspects.len() {
@@ -120,7 +121,6 @@ impl Embree {
         suspects.extend((0..).zip(&solved.valid).filter(|(_, valid)| !**valid).map(|(i, _)| i));
         let mut corrected = 0;
         for &i in suspects.iter() {
-            rechecked += BUNDLE as u64;
             let before = (hits.placement[i as usize], hits.triangle[i as usize]);
             self.ask_bundle(rays, hits, i as usize, rays32, again, found, candidates);
             let after = (hits.placement[i as usize], hits.triangle[i as usize]);

@@ -119,7 +119,7 @@ pub(crate) struct RenderArguments {
     /// Write times, rays, memory and fingerprints as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
-    /// Say nothing but errors
+    /// Show no progress and no summary; the list of files and errors remain
     #[arg(short, long)]
     pub(crate) quiet: bool,
 }

@@ -1,11 +1,12 @@
 //! `etendue render`: from a file to a folder of images.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_render::output::{
-    ImageHash, Look, Outputs, Picture, SOFTWARE, exr, npy, png, prepare_folder, sidecar,
+    ImageHash, Look, Outputs, PartFile, Picture, SOFTWARE, exr, npy, png, prepare_folder, sidecar,
 };
 use etendue_render::report::{memory, seconds};
 use etendue_render::{Images, Plan, Rendered, Report, Seconds, plan};
@@ -26,7 +27,13 @@ pub(crate) fn run(arguments: &RenderArguments) -> Result<(), Fault> {
         .num_threads(arguments.threads)
         .build()
         .map_err(|error| Fault::refused(format!("--threads {}: {error}", arguments.threads)))?;
-    pool.install(|| render(arguments, outputs))
+    let folder_is_new = !arguments.output.exists();
+    let done = pool.install(|| render(arguments, outputs));
+    if done.is_err() && folder_is_new {
+        // Goes only when nothing was written into it.
+        let _ = std::fs::remove_dir(&arguments.output);
+    }
+    done
 }
 
 /// Reads a scene and all that its layers want of the models.
@@ -56,6 +63,10 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let mut lap = Lap(start);
     let stages = Stages::new(arguments.quiet);
     prepare_folder(&arguments.output)?;
+    if let Some(path) = &arguments.report {
+        // Whether it can be written is better known now than after the render.
+        drop(PartFile::create(path)?);
+    }
     let scene = load(&arguments.scene, stages)?;
     let plan = Plan::new(&scene, outputs);
     time.load = lap.take();
@@ -240,23 +251,22 @@ fn in_words(note: &Note) -> String {
     }
 }
 
-/// A few lines for a person, on standard error.
+/// A few lines for a person, on standard error. When nobody reads it, nobody is told.
 fn say(report: &Report) {
-    for note in &report.notes {
-        eprintln!("note: {note}");
-    }
+    let mut lines: Vec<String> = report.notes.iter().map(|note| format!("note: {note}")).collect();
     let Seconds { load, build, decode, render, write, total } = report.seconds;
-    eprintln!(
+    lines.push(format!(
         "{} triangles ({} stored), {} rays at {:.1} Mrays/s through {}",
         report.triangles,
         report.triangles_unique,
         report.rays,
         report.mrays_per_second,
         report.accel
-    );
-    eprintln!(
+    ));
+    lines.push(format!(
         "load {load:.2} s, build {build:.2} s, decode {decode:.2} s, render {render:.2} s, write \
          {write:.2} s; {total:.2} s in all, {} MiB at most",
         report.peak_memory_bytes >> 20
-    );
+    ));
+    let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
 }

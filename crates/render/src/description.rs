@@ -39,7 +39,11 @@ pub(crate) fn describe(spec: LayerSpec) -> Description {
             channels: &["Z"],
             look: Look::Distance,
             meaning: vec![
-                ("definition", "distance along the ray from the entrance pupil"),
+                (
+                    "definition",
+                    "distance along the ray from the entrance pupil (parallel rays: from the plane \
+                     through the camera's origin)",
+                ),
                 ("unit", "m"),
                 CHIEF_RAY,
                 ("miss", "+inf"),

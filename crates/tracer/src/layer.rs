@@ -35,7 +35,8 @@ pub enum NormalKind {
 pub enum LayerSpec {
     /// `Depth.Z`: distance along the camera's axis from the entrance pupil (m).
     Depth,
-    /// `Distance.Z`: distance along the ray from the entrance pupil (m).
+    /// `Distance.Z`: distance along the ray from the entrance pupil, or for parallel rays from the
+    /// plane through the camera's origin (m).
     Distance,
     /// `Normal.X Y Z`: unit normal that faces the viewer.
     Normal {
