@@ -8,9 +8,10 @@ use crate::Pose;
 /// Free border on each side, as a share of the picture.
 const MARGIN: f64 = 0.04;
 
-/// A box thinner than this share of its second-smallest side is looked at face on: from the corner,
-/// a sheet of paper shows its edge.
-const FLAT: f64 = 0.02;
+/// A box thinner than this share of its second-smallest side is looked at face on, for each axis it
+/// may be thin along: from the corner, a sheet of paper shows its edge. Land lies along Y, and is
+/// better seen from the side as long as it has any hills.
+const FLAT: [f64; 3] = [0.1, 0.02, 0.1];
 
 /// From the model towards the camera: in front (+Z, where glTF's models look), a little to the right
 /// and above.
@@ -47,7 +48,7 @@ fn view(bounds: Bounds) -> Pose {
     let mut axes = [0, 1, 2];
     axes.sort_by(|&a, &b| size[a].total_cmp(&size[b]));
     let [thin, middle, _] = axes;
-    let is_flat = size[middle] > 0.0 && size[thin] < FLAT * size[middle];
+    let is_flat = size[middle] > 0.0 && size[thin] < FLAT[thin] * size[middle];
     let (towards, up) = match (is_flat, thin) {
         (true, 0) => (DVec3::X, DVec3::Y),
         (true, 1) => (DVec3::Y, DVec3::NEG_Z),
@@ -170,6 +171,10 @@ mod tests {
         assert_eq!((floor.forward(), floor.up()), (DVec3::NEG_Y, DVec3::NEG_Z));
         let wall = perspective(boxes()[4], REACH);
         assert_eq!((wall.forward(), wall.up()), (DVec3::NEG_Z, DVec3::Y));
+        let sliver = Bounds { min: DVec3::ZERO, max: DVec3::new(0.9, 70.0, 11.0) };
+        assert_eq!(perspective(sliver, REACH).forward(), DVec3::NEG_X);
+        let land = Bounds { min: DVec3::ZERO, max: DVec3::new(100.0, 5.0, 120.0) };
+        assert!(perspective(land, REACH).forward().z < -0.5, "hills are seen from the side");
     }
 
     #[test]

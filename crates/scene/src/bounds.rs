@@ -51,3 +51,48 @@ fn exact(geometry: &Geometry, placement: &Placement) -> Bounds {
     });
     boxes.reduce(Bounds::default, Bounds::union)
 }
+
+#[cfg(test)]
+mod tests {
+    use etendue_geometry::glam::{DMat3, DQuat, DVec3};
+    use etendue_geometry::{Mesh, Positions, Transform, Vertices};
+
+    use super::*;
+
+    /// Needles along the diagonal, whose own boxes are far from tight once they are turned.
+    fn needles(count: u32) -> Geometry {
+        let corners = [[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0], [1.0, 1.0, 0.9]];
+        let positions = Positions::F32(Vertices::from_arrays(&corners));
+        let place = |i: u32| {
+            let i = f64::from(i);
+            let turned = DMat3::from_quat(DQuat::from_euler(
+                etendue_geometry::glam::EulerRot::XYZ,
+                0.7 * i,
+                1.3 * i,
+                2.1 * i,
+            ));
+            let at = DVec3::new((37.0 * i) % 11.0, (53.0 * i) % 7.0, (71.0 * i) % 5.0);
+            Placement {
+                mesh: 0,
+                object: 0,
+                material: 0,
+                world_from_mesh: Transform::new(turned, at),
+            }
+        };
+        Geometry {
+            meshes: vec![Mesh::new("", positions, vec![[0, 1, 2]].into())],
+            placements: (0..count).map(place).collect(),
+        }
+    }
+
+    #[test]
+    fn passing_over_placements_changes_nothing() {
+        for count in [0, 1, 2, 500] {
+            let geometry = needles(count);
+            assert_eq!(tight(&geometry), geometry.bounds(), "{count} placements");
+        }
+        let geometry = needles(500);
+        let loose = geometry.loose_bounds();
+        assert!(loose.diagonal() > tight(&geometry).diagonal(), "the test can tell them apart");
+    }
+}

@@ -22,6 +22,18 @@ fn from_text(text: &str, settings: &[(&str, &str)]) -> Scene {
     load(&path, settings)
 }
 
+/// The folder of shared test data, if this machine has it.
+fn assets() -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let folder = std::env::var_os("ETENDUE_ASSETS").map_or(beside, PathBuf::from);
+    if folder.join("data").is_dir() {
+        Some(folder.join("data"))
+    } else {
+        println!("skipped: no test data; name their folder in ETENDUE_ASSETS");
+        None
+    }
+}
+
 fn examples() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let mut scenes: Vec<PathBuf> = fs::read_dir(folder)
@@ -169,4 +181,54 @@ fn the_schema_is_a_schema() {
         assert!(keys.contains(&&key.to_owned()), "{key} in {keys:?}");
     }
     assert_eq!(schema["additionalProperties"], false);
+}
+
+#[test]
+fn a_model_has_an_object_for_each_of_its_nodes() {
+    let Some(data) = assets() else { return };
+    let scene = load(&data.join("gltf/SharedMesh/02_shared_mesh.gltf"), &[]);
+    assert_eq!(scene.objects.len(), 2, "{:?}", scene.objects);
+    assert_eq!(scene.geometry.uses(), [2], "two nodes, one mesh");
+    let objects: Vec<u32> = scene.geometry.placements.iter().map(|p| p.object).collect();
+    assert_eq!(objects, [0, 1]);
+}
+
+#[test]
+fn a_models_camera_moves_with_its_object_and_keeps_the_scenes_resolution() {
+    let Some(data) = assets() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(data.join("gltf/Cameras/Cameras.gltf"), folder.path().join("c.gltf")).unwrap();
+    let path = folder.path().join("s.json");
+    let text = r#"{"etendue": 1, "camera": {"type": "pinhole", "sensor": {"resolution": [32, 16]}},
+        "objects": [{"file": "c.gltf", "transform": {"translate": [0, 10, 0], "scale": 2}}]}"#;
+    fs::write(&path, text).unwrap();
+    let options = LoadOptions { camera: Some("0"), ..LoadOptions::default() };
+    let scene = SceneFile::read(&path, &[]).unwrap().load(Wanted::NOTHING, &options).unwrap();
+    assert_eq!(scene.camera_origin, CameraOrigin::Model("0".to_owned()));
+    assert_eq!(scene.camera.resolution(), [32, 16]);
+    assert_eq!(scene.camera.pose().position, DVec3::new(1.0, 11.0, 6.0), "(0.5, 0.5, 3) twice, up");
+    assert_eq!(scene.camera.pose().forward(), DVec3::NEG_Z);
+    assert_eq!(scene.cameras.len(), 2);
+}
+
+#[test]
+fn loading_tells_how_far_it_is_and_can_be_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.json");
+    fs::write(&path, r#"{"etendue": 1, "objects": [{"shape": "box"}, {"shape": "disk"}]}"#)
+        .unwrap();
+    let file = SceneFile::read(&path, &[]).unwrap();
+    let told = std::sync::Mutex::new(Vec::new());
+    let tell = |step: etendue_scene::LoadProgress<'_>| {
+        told.lock().unwrap().push((step.done, step.total));
+        true
+    };
+    let options = LoadOptions { progress: Some(&tell), ..LoadOptions::default() };
+    file.load(Wanted::NOTHING, &options).unwrap();
+    let mut told = told.lock().unwrap().clone();
+    told.sort_unstable();
+    assert_eq!(told, [(1, 2), (2, 2)]);
+    let options = LoadOptions { progress: Some(&|_| false), ..LoadOptions::default() };
+    let error = file.load(Wanted::NOTHING, &options).unwrap_err();
+    assert!(matches!(error, etendue_scene::SceneError::Stopped), "{error}");
 }
