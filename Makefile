@@ -6,13 +6,14 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render test test-embree4 bench docs-figures clean
+.PHONY: help setup render test test-embree4 bench bench-peers docs-figures clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
 	@echo "make test          install what is missing, run everything that CI runs"
 	@echo "make test-embree4  run the tests that touch Embree against Embree 4, in a Debian 13 root"
-	@echo "make bench         run the benches"
+	@echo "make bench         measure everything, write docs/benchmarks.md"
+	@echo "make bench-peers   add other programs at the same job, from PyPI"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make clean         remove target/ and out/"
 
@@ -31,8 +32,14 @@ test:
 test-embree4: setup
 	@scripts/test-embree4.sh
 
+# ARGS=--quick takes lighter meshes; benches of single questions: cargo bench -p etendue-benches
 bench: setup
-	cargo bench --manifest-path benches/Cargo.toml
+	cargo build --release -p etendue -p etendue-benches
+	cargo run --release -p etendue-benches --bin benchmarks -- $(ARGS)
+
+bench-peers: setup
+	cargo build --release -p etendue -p etendue-benches
+	scripts/bench-peers.sh $(ARGS)
 
 docs-figures: setup
 	cargo run --release -p etendue -- render scenes/first-light.json -o out/docs-figures \

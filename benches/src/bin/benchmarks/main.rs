@@ -1,0 +1,137 @@
+//! Measures everything in one run, contestants taking turns, and writes the page of results.
+//!
+//! ```text
+//! benchmarks [--quick] [--rounds N] [--output docs/benchmarks.md]
+//! benchmarks models FOLDER [--triangles N]     the models and scenes that other programs are given
+//! benchmarks memory SCENE                      memory after each stage of a render, as JSON
+//! ```
+
+mod build;
+mod findings;
+mod goals;
+mod load;
+mod page;
+mod threads;
+mod traversal;
+mod whole;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::{Parser, Subcommand};
+use etendue_benches::files::{self, Format};
+use etendue_benches::meshes;
+use etendue_benches::rays::View;
+
+use crate::findings::Findings;
+
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// Meshes a tenth as heavy
+    #[arg(long)]
+    quick: bool,
+    /// Times that each contestant is timed
+    #[arg(long, default_value_t = 5)]
+    rounds: usize,
+    /// The page to write
+    #[arg(long, default_value = "docs/benchmarks.md")]
+    output: PathBuf,
+    /// Measure only these parts: traversal, threads, build, load, whole
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<String>,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Write a blob as GLB, PLY and OBJ, and a scene for each
+    Models {
+        /// Where to
+        folder: PathBuf,
+        /// How heavy
+        #[arg(long, default_value_t = 1_000_000)]
+        triangles: u64,
+    },
+    /// Print the memory of this process after each stage of a render
+    Memory {
+        /// The scene
+        scene: PathBuf,
+    },
+}
+
+/// How heavy the meshes are and how often everything is timed.
+#[derive(Debug, Clone, Copy)]
+struct Effort {
+    rounds: usize,
+    /// Triangles of the two blobs.
+    blobs: [u64; 2],
+    soup: u32,
+    /// Instances along a side of the forest.
+    forest: u32,
+}
+
+impl Effort {
+    fn of(arguments: &Arguments) -> Self {
+        let rounds = arguments.rounds.max(1);
+        if arguments.quick {
+            Self { rounds, blobs: [100_000, 1_000_000], soup: 100_000, forest: 100 }
+        } else {
+            Self { rounds, blobs: [1_000_000, 10_000_000], soup: 1_000_000, forest: 1_000 }
+        }
+    }
+
+    fn blob_name(triangles: u64) -> String {
+        format!("blob {}", in_words(triangles))
+    }
+}
+
+/// 1000000 is "1M", 100000 "100k".
+fn in_words(count: u64) -> String {
+    match count {
+        1_000_000.. => format!("{}M", count / 1_000_000),
+        1_000.. => format!("{}k", count / 1_000),
+        _ => count.to_string(),
+    }
+}
+
+fn main() -> anyhow::Result<()> {
+    let arguments = Arguments::parse();
+    match &arguments.command {
+        Some(Command::Models { folder, triangles }) => return write_models(folder, *triangles),
+        Some(Command::Memory { scene }) => return whole::print_memory(scene),
+        None => {}
+    }
+    let effort = Effort::of(&arguments);
+    let has = |part: &str| arguments.only.is_empty() || arguments.only.iter().any(|p| p == part);
+    let mut findings = Findings::default();
+    if has("traversal") || has("threads") {
+        traversal::measure(effort, [has("traversal"), has("threads")], &mut findings)?;
+    }
+    if has("build") {
+        build::measure(effort, &mut findings)?;
+    }
+    if has("load") {
+        load::measure(effort, &mut findings)?;
+    }
+    if has("whole") {
+        whole::measure(effort, &mut findings)?;
+    }
+    let text = page::write(effort, &findings, &arguments.output)?;
+    println!("{text}");
+    Ok(())
+}
+
+fn write_models(folder: &Path, triangles: u64) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
+    let geometry = meshes::blob(triangles)?;
+    let view = View::framing(geometry.bounds());
+    for format in Format::ALL {
+        let name = format!("blob.{}", format.extension());
+        let path = folder.join(&name);
+        format.write(&path, &geometry).with_context(|| format!("{}", path.display()))?;
+        let scene = folder.join(format!("{}.json", format.extension()));
+        std::fs::write(&scene, files::scene(&name, &view).to_string())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,92 @@
+//! Tracing: every contestant on every mesh, one thread.
+
+use std::sync::Arc;
+
+use etendue_benches::contest::{Query, Turn, take_turns, time};
+use etendue_benches::field::{Field, Rays, Reference, contestants, names};
+use etendue_benches::meshes;
+use etendue_benches::rays::{View, incoherent, occlusion};
+use etendue_geometry::Geometry;
+
+use crate::findings::{Contest, Findings, Part, Record};
+use crate::{Effort, threads};
+
+/// The questions, as the page shows them.
+pub(crate) const PRIMARY: &str = "primary, 1 sample";
+pub(crate) const SAMPLES: &str = "primary, 16 samples of a pixel";
+pub(crate) const INCOHERENT: &str = "incoherent";
+pub(crate) const OCCLUSION: &str = "occlusion";
+
+const INCOHERENT_RAYS: usize = 1 << 18;
+
+/// The reference is timed on one chunk in so many.
+const EXACT_SHARE: usize = 16;
+
+pub(crate) fn measure(
+    effort: Effort,
+    [alone, side_by_side]: [bool; 2],
+    findings: &mut Findings,
+) -> anyhow::Result<()> {
+    let mut scenes: Vec<(String, Arc<Geometry>, Reference)> = Vec::new();
+    for triangles in effort.blobs {
+        let reference =
+            if triangles > 1_000_000 { Reference::LeftOut } else { Reference::Included };
+        scenes.push((Effort::blob_name(triangles), meshes::blob(triangles)?, reference));
+    }
+    if alone {
+        let name = format!("soup {}", crate::in_words(effort.soup.into()));
+        scenes.push((name, meshes::soup(effort.soup), Reference::Included));
+        let instances = u64::from(effort.forest) * u64::from(effort.forest);
+        let name = format!("forest {} x 10k", crate::in_words(instances));
+        scenes.push((name, meshes::forest(effort.forest)?, Reference::LeftOut));
+    }
+    for (mesh, geometry, reference) in scenes {
+        eprintln!("tracing {mesh}");
+        let field = Field::build(&geometry, reference)?;
+        let is_forest = geometry.placements.len() > 1;
+        let bounds = geometry.loose_bounds();
+        let view = if is_forest { View::over_forest() } else { View::framing(bounds) };
+        let primary = view.primary();
+        if alone {
+            let shadows = occlusion(&field.embree, &geometry, &primary);
+            let sets = [
+                (SAMPLES, Rays::new(view.samples(), Query::Closest)),
+                (INCOHERENT, Rays::new(incoherent(bounds, INCOHERENT_RAYS), Query::Closest)),
+                (OCCLUSION, Rays::new(shadows, Query::Occluded)),
+            ];
+            let first = (PRIMARY, Rays::new(primary.clone(), Query::Closest));
+            for (question, rays) in [first].into_iter().chain(sets) {
+                findings.contests.push(contest(effort, &mesh, question, &field, &rays));
+            }
+        }
+        if side_by_side && !is_forest && !mesh.starts_with("soup") {
+            let rays = Rays::new(primary, Query::Closest);
+            findings.contests.push(threads::contest(effort, &mesh, &field, &rays));
+        }
+    }
+    Ok(())
+}
+
+fn contest(effort: Effort, mesh: &str, question: &str, field: &Field, rays: &Rays) -> Contest {
+    eprintln!("  {question}");
+    let all = contestants(field, rays);
+    let items = all.first().map_or(0, |(_, contestant)| contestant.rays()) as f64;
+    let mut turns: Vec<Turn<'_>> = Vec::new();
+    for (name, contestant) in &all {
+        let every = if *name == names::EXACT { EXACT_SHARE } else { 1 };
+        turns.push(Box::new(move || time(&**contestant, 1, every)));
+    }
+    let series = take_turns(effort.rounds, &mut turns);
+    let records = all.iter().zip(series).map(|((name, _), series)| Record {
+        who: (*name).to_owned(),
+        series,
+        bytes: None,
+    });
+    Contest {
+        part: Part::Traversal,
+        mesh: mesh.to_owned(),
+        question: question.to_owned(),
+        items,
+        records: records.collect(),
+    }
+}

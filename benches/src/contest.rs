@@ -1,0 +1,273 @@
+//! Who is timed, on which clock, and in which order.
+//!
+//! * Contestants take turns: a round times each of them once, so that whatever else the machine does
+//!   meanwhile meets all of them alike. A ratio is the median of the ratios of the rounds.
+//! * Tracing is timed on the processor clock of the thread that traces, which other processes on the
+//!   machine disturb less than they do the wall's.
+//! * Rays are in the cache when their turn comes, as they are when a camera has just made them: each
+//!   chunk of them is touched, and records are reset, while the clock stands.
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use etendue_accel::Accel;
+use etendue_geometry::{Detail, HitBatch, RayBatch};
+use rustix::time::{ClockId, clock_gettime};
+
+use crate::limit::{BareScene, Packet, Single, WIDTH};
+use crate::rays::BATCH;
+
+/// Batches a chunk: its rays stay in the second-level cache.
+const CHUNK: usize = 16;
+
+/// Processor time of this thread (s).
+fn thread_time() -> f64 {
+    let now = clock_gettime(ClockId::ThreadCPUTime);
+    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+}
+
+/// What is asked of each ray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Query {
+    /// The closest hit, with its normal.
+    Closest,
+    /// Whether there is any.
+    Occluded,
+}
+
+/// Traces chunk after chunk and tells the seconds that each took.
+pub type Worker<'a> = Box<dyn FnMut(usize) -> f64 + 'a>;
+
+/// Somebody who traces a given set of rays.
+pub trait Contestant: Sync {
+    /// Rays in all.
+    fn rays(&self) -> usize;
+    /// What one thread works with.
+    fn worker(&self) -> Worker<'_>;
+}
+
+/// An accelerator of ours.
+#[derive(Debug, Clone, Copy)]
+pub struct Ours<'a> {
+    /// What traces.
+    pub accel: &'a dyn Accel,
+    /// The rays, [`BATCH`] a batch.
+    pub batches: &'a [RayBatch],
+    /// What is asked.
+    pub query: Query,
+}
+
+impl Contestant for Ours<'_> {
+    fn rays(&self) -> usize {
+        self.batches.len() * BATCH
+    }
+
+    fn worker(&self) -> Worker<'_> {
+        let mut hits = HitBatch::new(Detail::Surface);
+        let mut blocked = Vec::new();
+        Box::new(move |chunk| {
+            let batches = chunk_of(self.batches, chunk, CHUNK);
+            batches.iter().for_each(touch);
+            let start = thread_time();
+            for rays in batches {
+                match self.query {
+                    Query::Closest => self.accel.closest(rays, &mut hits),
+                    Query::Occluded => self.accel.occluded(rays, &mut blocked),
+                }
+                black_box((&hits, &blocked));
+            }
+            thread_time() - start
+        })
+    }
+}
+
+fn chunk_of<T>(all: &[T], chunk: usize, len: usize) -> &[T] {
+    &all[chunk * len..all.len().min((chunk + 1) * len)]
+}
+
+fn touch(rays: &RayBatch) {
+    let arrays = rays.origin.iter().chain(&rays.direction).chain([&rays.t_min, &rays.t_max]);
+    black_box(arrays.map(|array| array.iter().sum::<f64>()).sum::<f64>());
+}
+
+/// Embree's bare loop over packets.
+#[derive(Debug, Clone, Copy)]
+pub struct LimitPackets<'a> {
+    /// What traces.
+    pub scene: &'a BareScene,
+    /// The rays.
+    pub packets: &'a [Packet],
+    /// What is asked.
+    pub query: Query,
+}
+
+impl Contestant for LimitPackets<'_> {
+    fn rays(&self) -> usize {
+        self.packets.len() * WIDTH
+    }
+
+    fn worker(&self) -> Worker<'_> {
+        let mut records = Vec::new();
+        Box::new(move |chunk| {
+            records.clear();
+            records.extend_from_slice(chunk_of(self.packets, chunk, CHUNK * BATCH / WIDTH));
+            let start = thread_time();
+            match self.query {
+                Query::Closest => self.scene.closest_packets(&mut records),
+                Query::Occluded => self.scene.occluded_packets(&mut records),
+            }
+            black_box(&records);
+            thread_time() - start
+        })
+    }
+}
+
+/// Embree's bare loop over single rays.
+#[derive(Debug, Clone, Copy)]
+pub struct LimitSingles<'a> {
+    /// What traces.
+    pub scene: &'a BareScene,
+    /// The rays.
+    pub singles: &'a [Single],
+    /// What is asked.
+    pub query: Query,
+}
+
+impl Contestant for LimitSingles<'_> {
+    fn rays(&self) -> usize {
+        self.singles.len()
+    }
+
+    fn worker(&self) -> Worker<'_> {
+        let mut records = Vec::new();
+        Box::new(move |chunk| {
+            records.clear();
+            records.extend_from_slice(chunk_of(self.singles, chunk, CHUNK * BATCH));
+            let start = thread_time();
+            match self.query {
+                Query::Closest => self.scene.closest_singles(&mut records),
+                Query::Occluded => self.scene.occluded_singles(&mut records),
+            }
+            black_box(&records);
+            thread_time() - start
+        })
+    }
+}
+
+/// Seconds to trace all rays of `contestant` on `threads` threads: the busiest thread's. Only one
+/// chunk in `every` is traced, and the time scaled up.
+#[must_use]
+pub fn time(contestant: &dyn Contestant, threads: usize, every: usize) -> f64 {
+    let chunks = contestant.rays().div_ceil(CHUNK * BATCH);
+    let share = |first: usize| {
+        let mut worker = contestant.worker();
+        (first * every..chunks).step_by(every * threads).map(&mut worker).sum::<f64>()
+    };
+    let busiest = if threads == 1 {
+        share(0)
+    } else {
+        std::thread::scope(|scope| {
+            let share = &share;
+            let workers: Vec<_> = (0..threads).map(|k| scope.spawn(move || share(k))).collect();
+            workers.into_iter().filter_map(|w| w.join().ok()).fold(0.0, f64::max)
+        })
+    };
+    busiest * chunks as f64 / chunks.div_ceil(every) as f64
+}
+
+/// [`time`] on one thread, for criterion.
+#[must_use]
+pub fn time_of(contestant: &dyn Contestant, times: u64) -> Duration {
+    Duration::from_secs_f64((0..times).map(|_| time(contestant, 1, 1)).sum())
+}
+
+/// Wall time of `work` (s), and what it made.
+pub fn wall<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let start = Instant::now();
+    let made = work();
+    (start.elapsed().as_secs_f64(), made)
+}
+
+/// What one contestant took, round by round (s).
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Series(pub Vec<f64>);
+
+impl Series {
+    /// The median (s); NaN without rounds.
+    #[must_use]
+    pub fn median(&self) -> f64 {
+        median(self.0.clone())
+    }
+
+    /// The fastest round (s).
+    #[must_use]
+    pub fn fastest(&self) -> f64 {
+        self.0.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The slowest round (s).
+    #[must_use]
+    pub fn slowest(&self) -> f64 {
+        self.0.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// How many times as fast as `other` this is: the median over the rounds.
+    #[must_use]
+    pub fn speed_against(&self, other: &Self) -> f64 {
+        median(self.0.iter().zip(&other.0).map(|(own, other)| other / own).collect())
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let (below, above) = (values.len().wrapping_sub(1) / 2, values.len() / 2);
+    match (values.get(below), values.get(above)) {
+        (Some(a), Some(b)) => (a + b) / 2.0,
+        _ => f64::NAN,
+    }
+}
+
+/// Something that is timed once a round; it tells its own seconds.
+pub type Turn<'a> = Box<dyn FnMut() -> f64 + 'a>;
+
+/// Times each of `turns` once a round, after one round that is not counted. Each round begins with
+/// another of them.
+pub fn take_turns(rounds: usize, turns: &mut [Turn<'_>]) -> Vec<Series> {
+    let mut series = vec![Series::default(); turns.len()];
+    for turn in turns.iter_mut() {
+        turn();
+    }
+    for round in 0..rounds {
+        for k in 0..turns.len() {
+            let who = (round + k) % turns.len();
+            series[who].0.push(turns[who]());
+        }
+    }
+    series
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ratios_are_medians_of_rounds() {
+        let (ours, limit) = (Series(vec![2.0, 4.0, 30.0]), Series(vec![1.0, 2.0, 3.0]));
+        assert_eq!(ours.speed_against(&limit), 0.5, "a round of noise does not move it");
+        assert_eq!(ours.median(), 4.0);
+        assert_eq!(Series(vec![1.0, 3.0]).median(), 2.0);
+        assert!(Series::default().median().is_nan());
+    }
+
+    #[test]
+    fn every_turn_is_taken_once_a_round_after_a_warm_up() {
+        let count = std::cell::Cell::new(0.0);
+        let next = || {
+            count.set(count.get() + 1.0);
+            count.get()
+        };
+        let series = take_turns(2, &mut [Box::new(next), Box::new(next)]);
+        assert_eq!(series[0].0, [3.0, 6.0]);
+        assert_eq!(series[1].0, [4.0, 5.0]);
+    }
+}
