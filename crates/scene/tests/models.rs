@@ -809,7 +809,7 @@ fn ply_is_the_same_in_all_formats() {
         // 128 of 255 in sRGB is 0.2158605 of full scale.
         assert_eq!((red, green), (1.0, 0.0));
         assert!((blue - 0.215_860_5).abs() < 1e-7, "{blue}");
-        for (cut, word) in [(10, "format"), (100, "header"), (bytes.len() - 4, "")] {
+        for (cut, word) in [(10, "format"), (100, "cut.ply"), (bytes.len() - 4, "")] {
             let message = error(&write(&folder, "cut.ply", &bytes[..cut]));
             assert!(message.contains(word), "{cut}: {message}");
         }

@@ -4,7 +4,7 @@ use etendue_geometry::glam::DVec3;
 
 use super::turn::sin_cos_turns;
 
-/// How many waves. Their wavelengths fall from about the radius to a tenth of it.
+/// How many waves, from 0.4 on a radius to 7.2, each 1.3 times as many as the one before.
 const WAVES: usize = 12;
 
 /// The distance of the surface from the centre, by direction.
