@@ -191,6 +191,9 @@ impl Embree {
             }
             let ahead = f64::from(nearest) + 4.0 * self.frame.blur();
             behind = nearest.next_up().max(single::round(ahead));
+            if behind >= rays32.t_far[i] {
+                break;
+            }
         }
         recheck::decide(self.scene.geometry(), rays, i, candidates, hits);
     }

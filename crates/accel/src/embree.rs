@@ -646,7 +646,7 @@ impl Scene {
             let mut ray = single_ray(rays, i);
             // SAFETY: as in `closest1`.
             unsafe { sys::rtcOccluded1(self.handle.0.as_ptr(), &mut ray, &mut arguments) };
-            *blocked = ray.tfar < 0.0;
+            *blocked = ray.tfar == f32::NEG_INFINITY;
         }
     }
 }
@@ -750,7 +750,7 @@ macro_rules! packets {
                         );
                     }
                     for (lane, blocked) in blocked[start..start + count].iter_mut().enumerate() {
-                        *blocked = query.0.tfar[lane] < 0.0;
+                        *blocked = query.0.tfar[lane] == f32::NEG_INFINITY;
                     }
                     start += count;
                 }

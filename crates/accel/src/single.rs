@@ -160,6 +160,7 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
         qy[i] = round(dy[i]);
         qz[i] = round(dz[i]);
         t_near[i] = round((t_min[i] - ahead).max(0.0) * (1.0 - 1e-6));
-        t_far[i] = round((t_max[i] - ahead) * (1.0 + 1e-6));
+        // Embree takes no ray that ends before it starts.
+        t_far[i] = round((t_max[i] - ahead) * (1.0 + 1e-6)).max(t_near[i]);
     }
 }
