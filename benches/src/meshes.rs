@@ -9,7 +9,7 @@ use etendue_scene::import::Wanted;
 use etendue_scene::shape::{ShapeError, ShapeSpec};
 
 /// Numbers that look random and are the same on every machine (Steele, Lea and Flood 2014,
-/// "Fast splittable pseudorandom number generators": SplitMix64).
+/// "Fast splittable pseudorandom number generators": `SplitMix64`).
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 

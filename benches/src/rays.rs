@@ -80,7 +80,7 @@ impl View {
         for (index, (left, top)) in (0u32..).zip(tiles()) {
             // A diagonal pattern, so that all parts of the picture have their share.
             let row = index / (SIDE / 16);
-            if (index + 5 * row) % TILES_PER_SAMPLED != 0 {
+            if !(index + 5 * row).is_multiple_of(TILES_PER_SAMPLED) {
                 continue;
             }
             let mut rays = coherent();

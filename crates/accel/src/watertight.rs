@@ -199,7 +199,7 @@ pub(crate) fn locate_many<const N: usize>(lines: &Lines<N>, wanted: u32) -> [[f6
         v[i] = (-mx * px + -my * py + -mz * pz) * scale;
     }
     for i in 0..N {
-        u[i] = u[i].max(0.0).min(1.0);
+        u[i] = u[i].clamp(0.0, 1.0);
         v[i] = v[i].max(0.0).min(1.0 - u[i]);
     }
     careful &= wanted;

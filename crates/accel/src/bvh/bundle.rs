@@ -54,6 +54,7 @@ pub(super) struct FrameRays {
 impl FrameRays {
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
+    #[expect(clippy::needless_range_loop, reason = "one lane of many arrays")]
     pub(super) fn new(local: &LocalRays<PACKET>, t_min: &[f64; PACKET]) -> Self {
         let zero = [[0.0; PACKET]; 3];
         let mut rays = Self {
