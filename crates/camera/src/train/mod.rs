@@ -2,7 +2,7 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`file`] | the lens file |
+//! | [`file`](mod@file) | the lens file |
 //! | [`trace`] | rays through the train, in batches or one by one |
 //! | [`paraxial`] | focal lengths, principal planes and pupils |
 //! | [`focus`] | where the sensor goes |
