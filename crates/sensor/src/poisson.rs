@@ -5,7 +5,8 @@
 //! it after one comparison. The few that the comparison refuses go through the full test. Below, the
 //! distribution is summed until it passes a random number.
 //!
-//! "Exact" means: to the precision of the random numbers (steps of 2⁻³² in probability, finer in the
+//! A test shows that what the algorithm assumes of the two distributions is true from a mean of ten
+//! on. "Exact" means: to the precision of the random numbers (steps of 2⁻³² in probability, finer in the
 //! tails) and of the series for ln k! (1e-13); nothing is approximated by a normal distribution.
 //!
 //! # Sources
@@ -20,6 +21,18 @@ use crate::philox::{Key, Site, Stage, unit32, unit52};
 
 /// Mean from which algorithm PD holds.
 pub(crate) const PD_FROM: f64 = 10.0;
+
+/// Deviates no further below the mean than this, rounded down, are accepted at once (step I).
+const IMMEDIATE: f64 = 1.1484;
+
+/// Deviates further below are accepted when `SQUEEZE·μ²·u` is at least the cube of how far (step S).
+const SQUEEZE: f64 = 6.0;
+
+/// The double exponential times `HAT/μ` covers all that the normal distribution lacks (step H).
+const HAT: f64 = 0.1069;
+
+/// Deviations above which the normal distribution may lack something (step E).
+const LACKING_FROM: f64 = -0.6744;
 
 /// Mean from which f64 cannot count single electrons any more: there the rounding of a normal
 /// deviate is coarser than its distance from the Poisson distribution.
@@ -38,8 +51,8 @@ pub(crate) const OPEN: f64 = -1.0;
 pub(crate) fn first_try(mean: f64, normal: f64, unit: f64) -> f64 {
     let k = floor((mean + mean.sqrt() * normal).max(0.0));
     let below = mean - k;
-    let immediate = below < 1.1484;
-    let squeezed = 6.0 * mean * mean * unit >= below * below * below;
+    let immediate = below < IMMEDIATE;
+    let squeezed = SQUEEZE * mean * mean * unit >= below * below * below;
     let in_range = (PD_FROM..=UNCOUNTABLE).contains(&mean);
     if in_range & (immediate | squeezed) { k } else { OPEN }
 }
@@ -144,8 +157,7 @@ fn tail_of_small_mean(mean: f64, above: f64) -> f64 {
 }
 
 /// Steps Q, E and H: the quotient test of the first try, then double exponential deviates until one
-/// is accepted (1.6 tries on average at 16 electrons; the bound on tries is a guard that is never
-/// met). Means out of range give numbers without meaning.
+/// is accepted (the bound on tries is a guard that is never met). Means out of range give numbers without meaning.
 #[inline(always)]
 fn full_tests(open: &[Open; FINISHED_TOGETHER], key: &Key, site: Site) -> [f64; FINISHED_TOGETHER] {
     let mean = open.map(|open| open.mean.clamp(PD_FROM, UNCOUNTABLE));
@@ -194,7 +206,7 @@ fn exponential_tries<const N: usize>(
         let k = floor((mean[i] + mean[i].sqrt() * t).max(0.0));
         let [px, py, fx, fy] = masses(k, mean[i]);
         let gap = py * exp(px + exponential) - fy * exp(fx + exponential);
-        let accepted = (t > -0.6744) & (0.1069 / mean[i] * signed.abs() <= gap);
+        let accepted = (t > LACKING_FROM) & (HAT / mean[i] * signed.abs() <= gap);
         electrons[i] = if (electrons[i] < 0.0) & accepted { k } else { electrons[i] };
     }
 }
@@ -259,3 +271,76 @@ const SMALL_STIRLING: [f64; 16] = [
     0.009255462182712733,
     0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::SQRT_2;
+
+    /// The Poisson probability of `k`, from `libm`.
+    fn poisson(k: f64, mean: f64) -> f64 {
+        (k * mean.ln() - mean - libm::lgamma(k + 1.0)).exp()
+    }
+
+    /// The probability that a normal variable of that mean and variance lies in k..k + 1, from `libm`.
+    fn normal_mass(k: f64, mean: f64) -> f64 {
+        let upper_tail = |x: f64| 0.5 * libm::erfc((x - mean) / mean.sqrt() / SQRT_2);
+        // The smaller tails cancel less.
+        if k < mean {
+            upper_tail(2.0 * mean - k - 1.0) - upper_tail(2.0 * mean - k)
+        } else {
+            upper_tail(k) - upper_tail(k + 1.0)
+        }
+    }
+
+    /// Means from ten on, and all `k` within six deviations.
+    fn cases() -> impl Iterator<Item = (f64, f64)> {
+        let means = (0..400).map(|i| 10.0 * 1.012f64.powi(i)).chain([10.5, 11.999, 1e4, 1e5]);
+        means.flat_map(|mean| {
+            let reach = 6.0 * mean.sqrt();
+            let first = (mean - reach).max(0.0).floor();
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "some thousands"
+            )]
+            let count = (2.0 * reach).ceil() as u32;
+            (0..count).map(move |i| (mean, first + f64::from(i)))
+        })
+    }
+
+    /// Algorithm PD is exact if what it assumes of the two distributions is true.
+    #[test]
+    fn the_assumptions_of_the_algorithm_hold() {
+        let (mut worst_p, mut worst_f, mut most_hat) = (0.0f64, 0.0f64, 0.0f64);
+        for (mean, k) in cases() {
+            let (p, f) = (poisson(k, mean), normal_mass(k, mean));
+            let [px, py, fx, fy] = masses(k, mean);
+            let at = format!("mean {mean}, k {k}: p {p:e}, f {f:e}");
+            worst_p = worst_p.max((py * px.exp() / p - 1.0).abs());
+            worst_f = worst_f.max((fy * fx.exp() - f).abs());
+            // Rounding of the references, relative to the largest mass.
+            let slack = 1e-10 / mean.sqrt();
+            if mean - k < IMMEDIATE {
+                assert!(p >= f - slack, "immediate acceptance is wrong: {at}");
+            } else {
+                let squeeze = (mean - k).powi(3) / (SQUEEZE * mean * mean);
+                assert!(f * (1.0 - squeeze) <= p + slack, "the squeeze is wrong: {at}");
+            }
+            // The double exponential must cover what the normal distribution lacks, for any
+            // deviate that is rounded down to k, and nothing must be lacking where it is not tried.
+            for t in [k - mean, k + 1.0 - mean].map(|x| x / mean.sqrt()) {
+                let needed = (p - f) * (t - 1.8).abs().exp() * mean;
+                if t > LACKING_FROM {
+                    most_hat = most_hat.max(needed);
+                }
+            }
+            if (k + 1.0 - mean) / mean.sqrt() <= LACKING_FROM {
+                assert!(p <= f + slack, "mass is lacking where no try is made: {at}");
+            }
+        }
+        assert!(worst_p < 1e-9, "Poisson masses are {worst_p:e} off");
+        assert!(worst_f < 1e-9, "normal masses are {worst_f:e} off");
+        assert!(most_hat < HAT, "the hat must be {most_hat}");
+    }
+}

@@ -52,6 +52,15 @@ impl Model {
         Self::Mt9m031,
     ];
 
+    /// The model of this name, written in any case and with or without hyphens and spaces.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        let plain = |name: &str| -> String {
+            name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+        };
+        Self::ALL.into_iter().find(|model| plain(model.preset().name) == plain(name))
+    }
+
     /// What is known of it.
     #[must_use]
     pub fn preset(self) -> &'static Preset {
@@ -272,12 +281,15 @@ mod tests {
 
     #[test]
     fn presets_hold_together() {
+        assert_eq!(Model::from_name("kaf 8300"), Some(Model::Kaf8300));
+        assert_eq!(Model::from_name("imx999"), None);
         assert_eq!(PRESETS.len(), Model::ALL.len());
         for model in Model::ALL {
             let preset = model.preset();
             let plain: String =
                 preset.name.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
             assert_eq!(serde_json::to_value(model).unwrap(), plain, "table out of order");
+            assert_eq!(Model::from_name(preset.name), Some(model));
             let curve = preset.efficiency();
             assert_ne!(curve, Curve::ONE, "{}: the curve was not read", preset.name);
             assert!(curve.within(0.0, 1.0).is_ok(), "{}", preset.name);

@@ -54,7 +54,12 @@ enum Filter {
 }
 
 impl Response {
-    pub(crate) fn new(spec: &SensorSpec, settings: &Settings) -> Result<Self, SensorError> {
+    /// For the fewest lanes that the sensor can tell apart, or for given ones.
+    pub(crate) fn new(
+        spec: &SensorSpec,
+        settings: &Settings,
+        given: Option<Lanes>,
+    ) -> Result<Self, SensorError> {
         let (names, filters, pattern) = match spec.kind {
             SensorKind::Raw => raw(spec)?,
             SensorKind::Rgb => {
@@ -64,7 +69,16 @@ impl Response {
             }
             SensorKind::Multispectral => multispectral(spec)?,
         };
-        let lanes = lanes(spec, settings, &filters)?;
+        let lanes = match given {
+            Some(lanes) => lanes,
+            None => fewest_lanes(spec, settings, &filters)?,
+        };
+        if filters.iter().any(|f| matches!(f, Filter::Band(_)))
+            && spec.bands.as_ref() != lanes.grid()
+        {
+            let why = "the bands of a multispectral sensor are the lanes of its render";
+            return Err(SensorError::Misplaced { key: "bands", why });
+        }
         let names = match (spec.kind, &spec.channels) {
             (SensorKind::Multispectral, None) => lanes.names(),
             _ => names,
@@ -161,7 +175,11 @@ fn transmission(curve: &Curve, key: impl Fn() -> String) -> Result<Curve, Sensor
 }
 
 /// The fewest lanes that the sensor can tell apart.
-fn lanes(spec: &SensorSpec, settings: &Settings, filters: &[Filter]) -> Result<Lanes, SensorError> {
+fn fewest_lanes(
+    spec: &SensorSpec,
+    settings: &Settings,
+    filters: &[Filter],
+) -> Result<Lanes, SensorError> {
     if let Some(bands) = &spec.bands {
         return Ok(Lanes::Bands(bands.clone()));
     }

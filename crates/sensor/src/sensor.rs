@@ -16,6 +16,7 @@ use crate::{CfaSpec, SensorError};
 /// A sensor whose numbers hold together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
+    spec: SensorSpec,
     pub(crate) settings: Settings,
     pub(crate) response: Response,
     pub(crate) cfa: Option<CfaSpec>,
@@ -29,8 +30,8 @@ impl Sensor {
     /// [`SensorError`] for any number or curve that is none, and for a channel that would be black.
     pub fn new(spec: &SensorSpec) -> Result<Self, SensorError> {
         let settings = Settings::new(spec)?;
-        let response = Response::new(spec, &settings)?;
-        Ok(Self { settings, response, cfa: spec.cfa.clone() })
+        let response = Response::new(spec, &settings, None)?;
+        Ok(Self { spec: spec.clone(), settings, response, cfa: spec.cfa.clone() })
     }
 
     /// Columns and rows.
@@ -44,6 +45,17 @@ impl Sensor {
     pub fn with_resolution(mut self, resolution: [u32; 2]) -> Self {
         self.settings.resolution = resolution.map(|side| side.max(1));
         self
+    }
+
+    /// The same sensor for a render in other lanes than it asks for: in three, say, where nothing in
+    /// the scene has a spectrum of its own.
+    ///
+    /// # Errors
+    ///
+    /// When a channel sees none of the lanes, or they are not the bands of a multispectral sensor.
+    pub fn in_lanes(mut self, lanes: Lanes) -> Result<Self, SensorError> {
+        self.response = Response::new(&self.spec, &self.settings, Some(lanes))?;
+        Ok(self)
     }
 
     /// From one pixel's centre to the next (µm).

@@ -140,6 +140,22 @@ fn ten_nanometres_are_fine_enough_for_every_preset() {
 }
 
 #[test]
+fn a_sensor_may_be_asked_to_make_do_with_other_lanes() {
+    let spec = json!({ "type": "raw", "model": "imx183", "cfa": "rggb", "filters": "nikon_d5100" });
+    let own = sensor(spec);
+    let three = own.clone().in_lanes(Lanes::Rgb).unwrap();
+    assert_eq!(three.lanes(), &Lanes::Rgb);
+    let [own, three] = [own.response_to_primaries(), three.response_to_primaries()];
+    for (own, three) in own.iter().flatten().zip(three.iter().flatten()) {
+        // As far as bands of 10 nm blur the primaries, and the silicon's curve ends at 404 nm.
+        assert!((own - three).abs() < 3e-3, "{own} {three}");
+    }
+    let bands = sensor(json!({ "type": "multispectral", "bands": [400, 500, 600] }));
+    let error = bands.in_lanes(Lanes::Rgb).unwrap_err().to_string();
+    assert!(error.contains("are the lanes of its render"), "{error}");
+}
+
+#[test]
 fn channels_of_a_multispectral_sensor_may_be_curves() {
     let sensor = sensor(json!({
         "type": "multispectral", "quantum_efficiency": 0.5, "radiometry": "physical",

@@ -68,6 +68,15 @@ impl Lanes {
         }
     }
 
+    /// The bands, if the lanes are some.
+    #[must_use]
+    pub fn grid(&self) -> Option<&Grid> {
+        match self {
+            Self::Bands(grid) => Some(grid),
+            Self::Grey | Self::Rgb => None,
+        }
+    }
+
     /// Names for the channels of an image, one a lane: `Y`; `R`, `G`, `B`; or the bands' middles as
     /// `450nm`, `452.5nm`.
     #[must_use]
