@@ -61,10 +61,8 @@ pub struct Plan {
     pub decisions: Vec<Decision>,
 }
 
-/// Rays per triangle from which a better structure pays for its longer build.
-///
-/// Measured by `make bench` (docs/benchmarks.md): per triangle Embree's medium build takes about
-/// 0.26 µs longer than its low one; per ray its traversal saves about 5 ns.
+/// Rays per triangle from which a better structure pays for its longer build: a rule of thumb, which
+/// `make bench` measures both sides of (build time a triangle, traversal time a ray).
 const RAYS_PER_TRIANGLE: u64 = 50;
 
 impl Plan {

@@ -51,7 +51,7 @@ pub(crate) fn all(effort: Effort, findings: &Findings) -> Vec<Goal> {
     goals
 }
 
-const REFINING: &str = "reasons";
+const REFINING: &str = "not looked into yet";
 
 fn tracing(mesh: &str, findings: &Findings, goals: &mut Vec<Goal>) {
     let speed =
@@ -91,9 +91,9 @@ fn tracing(mesh: &str, findings: &Findings, goals: &mut Vec<Goal>) {
     ));
 }
 
-const INCOHERENT: &str = "reasons";
-const BVH: &str = "reasons";
-const BVH_PACKETS: &str = "reasons";
+const INCOHERENT: &str = "not looked into yet";
+const BVH: &str = "not looked into yet";
+const BVH_PACKETS: &str = "not looked into yet";
 
 fn building(mesh: &str, findings: &Findings, goals: &mut Vec<Goal>) {
     let contest = findings.contest(Part::Build, mesh, build::QUESTION);
@@ -107,7 +107,7 @@ fn building(mesh: &str, findings: &Findings, goals: &mut Vec<Goal>) {
     ));
 }
 
-const BUILD: &str = "reasons";
+const BUILD: &str = "not looked into yet";
 
 fn scaling(mesh: &str, findings: &Findings, goals: &mut Vec<Goal>) {
     let contest = findings.contest(Part::Threads, mesh, "two threads");
@@ -122,7 +122,7 @@ fn scaling(mesh: &str, findings: &Findings, goals: &mut Vec<Goal>) {
     ));
 }
 
-const SCALING: &str = "reasons";
+const SCALING: &str = "not looked into yet";
 
 fn whole_process(mesh: &str, findings: &Findings, goals: &mut Vec<Goal>) {
     let contest = findings.contest(Part::Whole, mesh, whole::QUESTION);
@@ -154,5 +154,5 @@ fn whole_process(mesh: &str, findings: &Findings, goals: &mut Vec<Goal>) {
     ));
 }
 
-const WHOLE: &str = "reasons";
-const MEMORY: &str = "reasons";
+const WHOLE: &str = "not looked into yet";
+const MEMORY: &str = "not looked into yet";
