@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::length::{Degrees, Metres};
 use crate::{
-    CameraError, Orthographic, OrthographicSpec, Pinhole, PinholeSpec, Pose, PoseSpec, SensorSpec,
+    CameraError, CameraRays, FilmSamples, Orthographic, OrthographicSpec, Pinhole, PinholeSpec,
+    Pose, PoseSpec, SensorSpec,
 };
 
 /// Rows of the picture of a camera that comes without a resolution.
@@ -222,6 +223,18 @@ impl Camera {
         rays.direction[0].copy_from_slice(&columns[..len]);
         rays.direction[1].copy_from_slice(&rows[..len]);
         self.aim(rays);
+    }
+
+    /// The rays of `samples` that leave the camera, each with its weight: `out` is refilled.
+    ///
+    /// Places that a distorted camera does not see have no ray.
+    pub fn sample_rays(&self, samples: &FilmSamples, out: &mut CameraRays) {
+        self.rays_through(&samples.columns, &samples.rows, &mut out.rays);
+        out.sample.clear();
+        out.sample.extend(0..u32::try_from(samples.len()).unwrap_or(u32::MAX));
+        out.drop_unseen();
+        out.weight.clear();
+        out.weight.resize(out.rays.len(), 1.0);
     }
 
     fn aim(&self, rays: &mut RayBatch) {

@@ -23,6 +23,7 @@ pub mod orthographic;
 pub mod pinhole;
 pub mod pose;
 pub mod sampler;
+pub mod samples;
 pub mod sensor;
 pub mod train;
 
@@ -35,4 +36,5 @@ pub use orthographic::{Orthographic, OrthographicSpec};
 pub use pinhole::{Pinhole, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};
 pub use sampler::{PixelSamples, Sampler};
+pub use samples::{CameraRays, FilmSamples};
 pub use sensor::SensorSpec;

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use etendue_accel::Accel;
-use etendue_camera::{Camera, PixelSamples, Sampler};
+use etendue_camera::{Camera, CameraRays, FilmSamples, PixelSamples, Sampler};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_tracer::{LayerSpec, Surroundings, Traced};
 use rayon::prelude::*;
@@ -106,14 +106,16 @@ impl Job<'_> {
                 batch.aim_at_samples(self.camera, tile, pixels, range.clone(), |x, y| {
                     sampler.pixel(seed, x, y, samples)
                 });
-                self.trace(batch);
-                let traced = Traced { rays: &batch.rays, hits: &batch.hits };
-                for i in 0..batch.rays.len() {
-                    let pixel = i / range.len();
+                let CameraRays { rays, weight, sample } = &batch.camera_rays;
+                self.accel.closest(rays, &mut batch.hits);
+                batch.traced += rays.len() as u64;
+                let traced = Traced { rays, hits: &batch.hits };
+                for (i, (&weight, &sample)) in weight.iter().zip(sample).enumerate() {
+                    let pixel = sample as usize / range.len();
                     for (k, (layer, _)) in layers.iter().enumerate() {
                         let color = self.color(*layer, traced, i);
                         let sum = &mut sums[pixel * layers.len() + k];
-                        *sum = std::array::from_fn(|c| sum[c] + color[c]);
+                        *sum = std::array::from_fn(|c| sum[c] + weight * color[c]);
                     }
                 }
             }
@@ -258,6 +260,8 @@ struct Batch {
     hits: HitBatch,
     columns: Vec<f64>,
     rows: Vec<f64>,
+    samples: FilmSamples,
+    camera_rays: CameraRays,
     /// The pixel of each chief ray, from the tile's corner.
     pixels: Vec<(u32, u32)>,
     traced: u64,
@@ -270,6 +274,8 @@ impl Batch {
             hits: HitBatch::new(detail),
             columns: Vec::new(),
             rows: Vec::new(),
+            samples: FilmSamples::default(),
+            camera_rays: CameraRays::default(),
             pixels: Vec::new(),
             traced: 0,
         }
@@ -294,17 +300,16 @@ impl Batch {
         range: std::ops::Range<u32>,
         samples: impl Fn(u32, u32) -> PixelSamples,
     ) {
-        self.columns.clear();
-        self.rows.clear();
+        self.samples.clear();
         for &(x, y) in pixels {
             let (x, y) = (tile.left + x, tile.top + y);
             let samples = samples(x, y);
             for index in range.clone() {
                 let [u, v] = samples.square(index, 0);
-                self.columns.push(f64::from(x) + u);
-                self.rows.push(f64::from(y) + v);
+                let pupil = samples.square(index, 1);
+                self.samples.push(f64::from(x) + u, f64::from(y) + v, pupil);
             }
         }
-        camera.rays_through(&self.columns, &self.rows, &mut self.rays);
+        camera.sample_rays(&self.samples, &mut self.camera_rays);
     }
 }

@@ -1,0 +1,85 @@
+//! Samples of a camera's film, and the rays that they become.
+
+use etendue_geometry::RayBatch;
+
+/// Where a batch of samples lies: on the film, in the pupil, and at which wavelength. The arrays have
+/// one entry a sample.
+#[derive(Debug, Clone, Default)]
+pub struct FilmSamples {
+    /// Columns (pixels) from the outer corner of the top left pixel, whose centre is (0.5, 0.5).
+    pub columns: Vec<f64>,
+    /// Rows (pixels) from the same corner.
+    pub rows: Vec<f64>,
+    /// Places in the unit square that the camera maps to its pupil; cameras without one do not look.
+    pub pupil: Vec<[f64; 2]>,
+    /// The wavelength of the rays (nm); `None` where one ray serves all.
+    pub wavelength: Option<f64>,
+}
+
+/// The rays of a batch of samples that leave the camera. Samples whose rays are blocked on the way
+/// have none: they count as zero.
+#[derive(Debug, Clone, Default)]
+pub struct CameraRays {
+    /// The rays, in the order of their samples.
+    pub rays: RayBatch,
+    /// What the radiance of each ray counts in the mean over its pixel's samples: relative to a pixel
+    /// that sees through an unvignetted pupil on the axis.
+    pub weight: Vec<f64>,
+    /// The sample of each ray.
+    pub sample: Vec<u32>,
+}
+
+impl FilmSamples {
+    /// The number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Whether there is no sample.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// Removes all samples and keeps the memory.
+    pub fn clear(&mut self) {
+        self.columns.clear();
+        self.rows.clear();
+        self.pupil.clear();
+    }
+
+    /// Appends a sample.
+    pub fn push(&mut self, column: f64, row: f64, pupil: [f64; 2]) {
+        self.columns.push(column);
+        self.rows.push(row);
+        self.pupil.push(pupil);
+    }
+}
+
+impl CameraRays {
+    /// Leaves out rays that were ended before they began: they see nothing.
+    pub(crate) fn drop_unseen(&mut self) {
+        if self.rays.t_max.iter().all(|&t_max| t_max >= 0.0) {
+            return;
+        }
+        let mut kept = 0;
+        for i in 0..self.rays.len() {
+            if self.rays.t_max[i] >= 0.0 {
+                for array in self.rays.origin.iter_mut().chain(&mut self.rays.direction) {
+                    array[kept] = array[i];
+                }
+                self.rays.t_min[kept] = self.rays.t_min[i];
+                self.rays.t_max[kept] = self.rays.t_max[i];
+                self.sample[kept] = self.sample[i];
+                kept += 1;
+            }
+        }
+        for array in self.rays.origin.iter_mut().chain(&mut self.rays.direction) {
+            array.truncate(kept);
+        }
+        self.rays.t_min.truncate(kept);
+        self.rays.t_max.truncate(kept);
+        self.sample.truncate(kept);
+    }
+}
