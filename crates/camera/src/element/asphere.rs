@@ -6,7 +6,7 @@
 //! crosses from behind, or one that Newton does not find, is looked for again by bisection of the
 //! part of the ray that runs near the surface, from its start on.
 
-use super::rays::{Block, Fate, LANES, PENDING, Ray};
+use super::rays::{Block, Fate, LANES, PENDING, Ray, at_lane};
 use super::refract::{Crossing, Refraction, Root, TOUCH, meet_conic};
 
 const SETTLED: f64 = 1e-10;
@@ -240,10 +240,7 @@ impl Newton {
 
     #[inline(always)]
     fn ray(&self, lane: usize) -> Ray {
-        Ray {
-            position: self.position.map(|axis| axis[lane]),
-            direction: self.direction.map(|axis| axis[lane]),
-        }
+        Ray { position: at_lane(&self.position, lane), direction: at_lane(&self.direction, lane) }
     }
 }
 

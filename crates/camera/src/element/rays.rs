@@ -121,13 +121,12 @@ impl FateCounts {
         self.exited + lost.sum::<u64>()
     }
 
-    /// The element at which most rays ended; `None` when none did.
+    /// The element nearest to the object at which rays ended: when rays come from the sensor and
+    /// none leaves, the one that nothing gets past. `None` when no ray ended.
     #[must_use]
-    pub fn worst_element(&self) -> Option<usize> {
-        let at = |counts: &[u64], i: usize| counts.get(i).copied().unwrap_or(0);
-        let lost = |i: usize| at(&self.missed, i) + at(&self.reflected, i) + at(&self.vignetted, i);
-        let elements = self.missed.len().max(self.reflected.len()).max(self.vignetted.len());
-        (0..elements).filter(|&i| lost(i) > 0).max_by_key(|&i| lost(i))
+    pub fn farthest_from_sensor(&self) -> Option<usize> {
+        let lost = |counts: &[u64]| counts.iter().position(|&count| count > 0);
+        [&self.missed, &self.reflected, &self.vignetted].into_iter().filter_map(|c| lost(c)).min()
     }
 
     /// What was lost where, as `vignetted at element 3: 12 %`, the greatest loss first.
@@ -171,10 +170,7 @@ impl Block {
 
     #[inline(always)]
     pub(crate) fn ray(&self, lane: usize) -> Ray {
-        Ray {
-            position: self.position.map(|axis| axis[lane]),
-            direction: self.direction.map(|axis| axis[lane]),
-        }
+        Ray { position: at_lane(&self.position, lane), direction: at_lane(&self.direction, lane) }
     }
 
     #[inline(always)]
@@ -184,6 +180,12 @@ impl Block {
             self.direction[axis][lane] = ray.direction[axis];
         }
     }
+}
+
+/// One lane of three arrays; `map` would copy the arrays and keep loops from being vectorised.
+#[inline(always)]
+pub(crate) fn at_lane(axes: &[[f64; LANES]; 3], lane: usize) -> [f64; 3] {
+    [axes[0][lane], axes[1][lane], axes[2][lane]]
 }
 
 /// One ray (mm), by components so that vector kernels see plain numbers.
@@ -196,10 +198,14 @@ pub(crate) struct Ray {
 impl Ray {
     /// With a direction of any length but 0; `None` unless all numbers are finite.
     pub(crate) fn new(position: DVec3, direction: DVec3) -> Option<Self> {
-        let unit = direction.try_normalize().or_else(|| {
-            // Squares overflow or vanish long before the direction does.
-            (direction / direction.abs().max_element()).try_normalize()
-        })?;
+        // Within a rounding or two of 1 there is nothing to scale.
+        if (direction.length_squared() - 1.0).abs() < 1e-15 && position.is_finite() {
+            return Some(Self { position: position.into(), direction: direction.into() });
+        }
+        // Squares overflow or lose digits long before the direction does.
+        let ordinary = (1e-100..1e100).contains(&direction.length_squared());
+        let scale = if ordinary { 1.0 } else { direction.abs().max_element() };
+        let unit = (direction / scale).try_normalize()?;
         (position.is_finite() && unit.is_finite())
             .then(|| Self { position: position.to_array(), direction: unit.to_array() })
     }
@@ -278,13 +284,13 @@ impl LensRays {
     /// Where ray `i` is (mm): at the last refracting element that it reached.
     #[must_use]
     pub fn position(&self, i: usize) -> DVec3 {
-        self.blocks[i / LANES].position.map(|axis| axis[i % LANES]).into()
+        at_lane(&self.blocks[i / LANES].position, i % LANES).into()
     }
 
     /// Where ray `i` goes: a unit vector.
     #[must_use]
     pub fn direction(&self, i: usize) -> DVec3 {
-        self.blocks[i / LANES].direction.map(|axis| axis[i % LANES]).into()
+        at_lane(&self.blocks[i / LANES].direction, i % LANES).into()
     }
 
     /// Which share of its radiance ray `i` keeps, times the weight that it was given.
@@ -308,7 +314,8 @@ impl LensRays {
     #[must_use]
     pub fn passed_throughput(&self) -> f64 {
         let lanes = self.blocks.iter().flat_map(|b| b.outcome.iter().zip(&b.throughput));
-        lanes.filter(|(code, _)| **code == EXITED).map(|(_, throughput)| throughput).sum()
+        lanes.filter(|(code, _)| **code == EXITED).map(|(_, throughput)| throughput).sum::<f64>()
+            + 0.0
     }
 
     /// How many rays left.

@@ -75,7 +75,7 @@ impl Refraction {
             self.ratio * ray.direction[1] + g * m[1],
             self.ratio * ray.direction[2] + g * m[2],
         ];
-        (Ray { direction, ..ray }, behind2 >= 0.0)
+        (Ray { direction, ..ray }, (0.0..f64::INFINITY).contains(&behind2))
     }
 
     /// A ray in the surface's frame at a plane.
@@ -106,21 +106,29 @@ impl Refraction {
         let (stretch, length2) = if SPHERE { (1.0, 1.0) } else { (1.0 + k, 1.0 - k * c * c * r2) };
         let m = [-c * x, -c * y, 1.0 - stretch * c * z];
         let (out, through) = self.bend(met.ray, m, length2, met.along2, met.along);
-        let hit = (met.along2 >= 0.0) & (met.t > -TOUCH) & (met.t < f64::INFINITY) & (m[2] >= 0.0);
+        // A ray that misses has a NaN for a root, which is not greater than anything.
+        let hit = (met.t > -TOUCH) & (met.t < f64::INFINITY) & (m[2] >= 0.0);
         Crossing { ray: out, t: met.t, hit, clear: r2 <= clip2, through }
     }
 
     /// A ray in the frame of any surface but an asphere, exactly by the rule.
     pub(crate) fn exactly(&self, ray: Ray, clip2: f64) -> Crossing {
-        let at = |which| {
-            if self.surface.is_plane() {
-                self.at_plane(ray, clip2)
-            } else if self.surface.conic == 0.0 {
-                self.at_conic::<true>(ray, clip2, which)
-            } else {
-                self.at_conic::<false>(ray, clip2, which)
-            }
-        };
+        if self.surface.is_plane() {
+            self.at_plane(ray, clip2)
+        } else if self.surface.conic == 0.0 {
+            self.at_nearest::<true>(ray, clip2)
+        } else {
+            self.at_nearest::<false>(ray, clip2)
+        }
+    }
+
+    #[inline(always)]
+    fn at_nearest<const SPHERE: bool>(&self, ray: Ray, clip2: f64) -> Crossing {
+        let near = self.at_near_root::<SPHERE>(ray, clip2);
+        if near.hit {
+            return near;
+        }
+        let at = |which| self.at_conic::<SPHERE>(ray, clip2, which);
         let (near, far) = (at(Root::Near), at(Root::Far));
         if far.hit && (!near.hit || far.t < near.t) { far } else { near }
     }

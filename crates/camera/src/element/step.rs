@@ -150,7 +150,7 @@ impl Step {
     #[inline(always)]
     fn open(&self, block: &mut Block, opening: &Opening, clip: Clip, z: f64) {
         if clip == Clip::Off {
-            return;
+            return self.sheet(block, z, |_, _| true);
         }
         match opening {
             Opening::Circle { radius } => {

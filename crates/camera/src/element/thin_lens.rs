@@ -64,7 +64,7 @@ pub(crate) fn at_thin_lens(power: f64, ray: Ray, clip2: f64) -> Crossing {
     let length = (u * u + v * v + w * w).sqrt();
     let scale = if power == 0.0 { 1.0 } else { 1.0 / length };
     there.direction = [u * scale, v * scale, w * scale];
-    let hit = (t > -TOUCH) & (t < f64::INFINITY);
+    let hit = (t > -TOUCH) & (t < f64::INFINITY) & (length < f64::INFINITY);
     Crossing { ray: there, t, hit, clear: x * x + y * y <= clip2, through: true }
 }
 

@@ -16,7 +16,6 @@ pub mod file;
 pub mod focus;
 pub mod paraxial;
 pub mod pupil;
-mod pupil_search;
 pub mod trace;
 
 use std::sync::Arc;
@@ -29,7 +28,7 @@ pub use file::{LensFile, SensorMount};
 pub use focus::{Focus, FocusError};
 pub use paraxial::{Paraxial, Pupil};
 pub use pupil::{ExitPupil, ExitPupilError, PupilSample};
-pub use trace::{RayPath, Side, TrainAt};
+pub use trace::{RayPath, Registers, Side, TrainAt};
 
 /// Why a lens file makes no lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -119,6 +119,17 @@ impl TrainAt {
         trace_blocks(&mut rays.blocks, self.steps(from), clip);
     }
 
+    /// As [`Self::trace`] on registers of a stated width, to measure what width gains; a width that
+    /// the processor lacks is replaced by the widest that it has.
+    pub fn trace_on(&self, registers: Registers, from: Side, clip: Clip, rays: &mut LensRays) {
+        let (blocks, steps) = (&mut rays.blocks, self.steps(from));
+        match registers {
+            Registers::Widest => trace_blocks(blocks, steps, clip),
+            Registers::FourLanes => trace_blocks_of_four(blocks, steps, clip),
+            Registers::Baseline => all_blocks(blocks, steps, clip),
+        }
+    }
+
     /// As [`Self::trace`], ray by ray through the single-ray code: the yardstick for what batches
     /// gain, and the check that they change nothing.
     pub fn trace_singly(&self, from: Side, clip: Clip, rays: &mut LensRays) {
@@ -207,6 +218,18 @@ pub(crate) struct End {
     pub(crate) throughput: f64,
 }
 
+/// Vector registers to trace with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Registers {
+    /// The widest that the processor has, found at run time.
+    #[default]
+    Widest,
+    /// Four lanes of f64 (AVX2).
+    FourLanes,
+    /// What the program was compiled for, without a look at the processor.
+    Baseline,
+}
+
 // Widest first: the first set that the processor has is taken, at run time.
 #[multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512vl+avx512bw",
@@ -214,6 +237,16 @@ pub(crate) struct End {
     "aarch64+neon"
 ))]
 fn trace_blocks(blocks: &mut [Block], steps: &[Step], clip: Clip) {
+    all_blocks(blocks, steps, clip);
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn trace_blocks_of_four(blocks: &mut [Block], steps: &[Step], clip: Clip) {
+    all_blocks(blocks, steps, clip);
+}
+
+#[inline(always)]
+fn all_blocks(blocks: &mut [Block], steps: &[Step], clip: Clip) {
     for block in blocks {
         for step in steps {
             step.run(block, clip);

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::distortion::chief_height;
 use crate::element::{Clip, LensRays};
 use crate::train::aim::towards_lens;
-use crate::train::pupil_search::Window;
+use crate::train::pupil::Window;
 use crate::train::{OpticalTrain, Side, TrainAt};
 
 /// Cells a side over the rectangle of passing directions.
@@ -55,7 +55,7 @@ pub fn illumination(
 /// ∫ cos θ dΩ over the directions in which rays from `film` (mm) leave the lens, weighted with what
 /// apertures and filters pass, for a sensor square to the axis.
 #[must_use]
-pub(crate) fn projected_solid_angle(train: &OpticalTrain, at: &TrainAt, film: DVec3) -> f64 {
+pub fn projected_solid_angle(train: &OpticalTrain, at: &TrainAt, film: DVec3) -> f64 {
     let Some(window) = Window::find(train, at, film) else { return 0.0 };
     let size = (window.max - window.min) / f64::from(GRID);
     let mut rays = LensRays::with_capacity(GRID as usize);

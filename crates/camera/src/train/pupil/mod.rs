@@ -25,13 +25,17 @@
 //! The bounds that this replaces: C. Kolb, D. Mitchell, P. Hanrahan, "A realistic camera model for
 //! computer graphics", 1995; M. Pharr, W. Jakob, G. Humphreys, *Physically Based Rendering*, 6.4.5.
 
+mod measure;
+mod search;
+
 use glam::{DVec2, DVec3};
 
 use super::aim::towards_lens;
-use super::pupil_search::Window;
 use super::{OpticalTrain, Part, Side, TrainAt};
 use crate::element::{Clip, Fate, FateCounts, Frame, LensRays, Opening};
 use crate::glass::GlassError;
+
+pub(crate) use search::Window;
 
 /// Angles in the table of a node.
 const ANGLES: usize = 128;
@@ -42,25 +46,17 @@ const RADIAL_INTERVALS: usize = 40;
 /// Intervals between nodes over each side of the sensor for other lenses.
 const PLANAR_INTERVALS: usize = 8;
 
-/// Added to every radius, as a share of it: what rays measured on a grid may be short of.
-const MARGIN: f64 = 0.004;
-
-/// How far outside of the bound the closing check looks, as a share of the radius.
-const CHECKED: f64 = 0.35;
-
-/// Random rays of the closing check.
-const CHECKS: u32 = 1 << 16;
-
 /// Why there is no exit pupil to sample.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExitPupilError {
     /// Not one ray leaves the lens.
     #[error(
-        "no light passes the lens: elements[{element}] blocks most of it ({})", losses.join(", ")
+        "no light passes the lens: nothing gets from the sensor past elements[{element}] ({})",
+        losses.join(", ")
     )]
     Dark {
-        /// The element that ends most rays.
+        /// The element on which the rays end that got farthest.
         element: usize,
         /// Where rays from the sensor's centre end.
         losses: Vec<String>,
@@ -97,6 +93,7 @@ pub struct ExitPupil {
     layout: Layout,
     nodes: Vec<Outline>,
     index2: f64,
+    /// How far from the sensor's centre the nodes of a radial layout reach (mm).
     radius: f64,
 }
 
@@ -307,177 +304,6 @@ impl ExitPupil {
         ];
         Some(Place { axis: DVec2::X, nodes })
     }
-
-    /// The sensor's point at a node of the grid that is twice as fine.
-    fn fine_film(&self, column: usize, row: usize) -> DVec2 {
-        #[expect(clippy::cast_precision_loss, reason = "a few dozen nodes")]
-        let share = |i: usize, intervals: usize| i as f64 / (2 * intervals) as f64;
-        match self.layout {
-            Layout::Radial => DVec2::new(self.radius * share(column, RADIAL_INTERVALS), 0.0),
-            Layout::Planar => {
-                let across =
-                    DVec2::new(share(column, PLANAR_INTERVALS), share(row, PLANAR_INTERVALS));
-                (2.0 * across - 1.0) * self.half_size
-            }
-        }
-    }
-
-    /// Intervals between nodes along both directions.
-    fn intervals(&self) -> [usize; 2] {
-        match self.layout {
-            Layout::Radial => [RADIAL_INTERVALS, 0],
-            Layout::Planar => [PLANAR_INTERVALS, PLANAR_INTERVALS],
-        }
-    }
-
-    fn measure(&mut self, train: &OpticalTrain, lenses: &[TrainAt]) {
-        let [columns, rows] = self.intervals();
-        for row in 0..=rows {
-            for column in 0..=columns {
-                let film = self.film_point(self.fine_film(2 * column, 2 * row));
-                let previous = self.nodes.last().filter(|_| column > 0);
-                let node = frame_at(train, lenses, film, previous);
-                self.nodes.push(node);
-            }
-        }
-        self.continue_frames();
-        let fine = self.measure_fine(lenses);
-        let [fine_columns, fine_rows] = [2 * columns + 1, 2 * rows + 1];
-        for row in 0..=rows {
-            for column in 0..=columns {
-                let near = |at: usize, count: usize| {
-                    (2 * at).saturating_sub(1)..=(2 * at + 1).min(count - 1)
-                };
-                let node = &mut self.nodes[row * (columns + 1) + column];
-                if node.is_dark() {
-                    continue;
-                }
-                for (i, reach) in node.reach.iter_mut().enumerate() {
-                    let mut widest = 0.0_f64;
-                    for r in near(row, fine_rows) {
-                        for c in near(column, fine_columns) {
-                            let radii = &fine[r * fine_columns + c];
-                            for step in [2 * ANGLES - 1, 0, 1] {
-                                widest = widest.max(radii[(2 * i + step) % (2 * ANGLES)]);
-                            }
-                        }
-                    }
-                    *reach = widest * (1.0 + MARGIN);
-                }
-            }
-        }
-    }
-
-    /// Gives dark nodes beside lit ones a frame, so that light between the two is not cut off.
-    fn continue_frames(&mut self) {
-        let [columns, rows] = self.intervals();
-        let lit = self.nodes.clone();
-        let index = |column: usize, row: usize| row * (columns + 1) + column;
-        for row in 0..=rows {
-            for column in 0..=columns {
-                if !lit[index(column, row)].is_dark() {
-                    continue;
-                }
-                let mut frames = Vec::new();
-                for (dc, dr) in
-                    [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
-                {
-                    let step = |times: isize| {
-                        let c = column.checked_add_signed(dc * times).filter(|c| *c <= columns)?;
-                        let r = row.checked_add_signed(dr * times).filter(|r| *r <= rows)?;
-                        Some(&lit[index(c, r)]).filter(|node| !node.is_dark())
-                    };
-                    if let Some(next) = step(1) {
-                        let drift = step(2).map_or(DVec2::ZERO, |far| next.centre - far.centre);
-                        frames.push((next.centre + drift, next.half));
-                    }
-                }
-                let Some(&(centre, half)) = frames.first() else { continue };
-                let node = &mut self.nodes[index(column, row)];
-                (node.centre, node.half) = (centre, half);
-            }
-        }
-    }
-
-    /// Radii at all nodes of the fine grid, each in the frame that the bound has there.
-    fn measure_fine(&self, lenses: &[TrainAt]) -> Vec<[f64; 2 * ANGLES]> {
-        let [columns, rows] = self.intervals();
-        let mut fine = Vec::new();
-        for row in 0..=2 * rows {
-            for column in 0..=2 * columns {
-                let film = self.fine_film(column, row);
-                let mut radii = [0.0; 2 * ANGLES];
-                if let Some(frame) = self.frame(film) {
-                    let at = self.film_point(film);
-                    for lens in lenses {
-                        widen(&mut radii, lens, at, frame);
-                    }
-                }
-                fine.push(radii);
-            }
-        }
-        fine
-    }
-
-    /// The interpolated centre and half axes; `None` in the dark.
-    fn frame(&self, film: DVec2) -> Option<[DVec2; 2]> {
-        let place = self.place(film)?;
-        let mut frame = [DVec2::ZERO; 2];
-        for (node, weight) in place.nodes {
-            frame[0] += self.nodes[node].centre * weight;
-            frame[1] += self.nodes[node].half * weight;
-        }
-        (frame[1].min_element() > 0.0).then_some(frame)
-    }
-
-    /// Looks for rays that pass just outside of the bound, and widens it until there are none.
-    fn widen_until_tight(&mut self, lenses: &[TrainAt]) {
-        for _ in 0..4 {
-            let mut needed = 1.0_f64;
-            for lens in lenses {
-                needed = needed.max(self.outermost(lens));
-            }
-            if needed <= 1.0 {
-                return;
-            }
-            for reach in self.nodes.iter_mut().flat_map(|node| &mut node.reach) {
-                *reach *= needed * (1.0 + MARGIN);
-            }
-        }
-    }
-
-    /// The greatest radius, in units of the bound's, at which a random ray outside of the bound
-    /// passes; 1 when none does.
-    fn outermost(&self, lens: &TrainAt) -> f64 {
-        let mut rays = LensRays::with_capacity(CHECKS as usize);
-        let mut radii = Vec::with_capacity(CHECKS as usize);
-        for i in 0..CHECKS {
-            // The additive recurrence of the plastic number in four dimensions (M. Roberts, 2018).
-            let u = [
-                0.856_674_883_854_503,
-                0.733_891_856_627_126,
-                0.628_706_721_037_806,
-                0.538_597_270_645_735,
-            ]
-            .map(|alpha: f64| (0.5 + alpha * f64::from(i)).fract());
-            let film = match self.layout {
-                Layout::Radial => DVec2::new(self.radius * u[0].sqrt(), 0.0),
-                Layout::Planar => (2.0 * DVec2::new(u[0], u[3]) - 1.0) * self.half_size,
-            };
-            let Some([centre, half]) = self.frame(film) else { continue };
-            let Some(place) = self.place(film) else { continue };
-            let reach: f64 =
-                place.nodes.iter().map(|&(n, w)| between(&self.nodes[n].reach, u[1]) * w).sum();
-            let radius = 1.0 + CHECKED * u[2];
-            let angle = DVec2::from_angle(u[1] * std::f64::consts::TAU);
-            let slopes = centre + angle * half * (reach * radius);
-            rays.push(self.film_point(film), towards_lens(slopes));
-            radii.push(radius);
-        }
-        lens.trace(Side::Sensor, Clip::On, &mut rays);
-        let passed = (0..rays.len()).filter(|&i| rays.fate(i) == Fate::Exited);
-        passed.map(|i| radii[i]).fold(1.0, f64::max)
-    }
 }
 
 /// Which nodes a point of the sensor lies between, and how it is turned against them.
@@ -544,82 +370,6 @@ fn concentric(u: [f64; 2]) -> (f64, f64) {
     (radius.abs(), turn.rem_euclid(1.0))
 }
 
-/// The frame around what passes at any of the wavelengths, begun from the node before.
-fn frame_at(
-    train: &OpticalTrain,
-    lenses: &[TrainAt],
-    film: DVec3,
-    previous: Option<&Outline>,
-) -> Outline {
-    let mut window: Option<Window> = None;
-    let mut chief = None;
-    for lens in lenses {
-        let near = previous
-            .filter(|node| !node.is_dark())
-            .and_then(|node| Window::near(node.centre, node.half * 1.5, lens, film));
-        let Some(found) = near.or_else(|| Window::find(train, lens, film)) else { continue };
-        window =
-            Some(window.map_or(found, |w| Window {
-                min: w.min.min(found.min),
-                max: w.max.max(found.max),
-            }));
-        chief = chief.or_else(|| {
-            let start = previous.and_then(|node| node.chief);
-            let direction = train.chief_direction_from(lens, film, start)?;
-            Some(-direction.truncate() / direction.z)
-        });
-    }
-    match window {
-        Some(window) => {
-            Outline { centre: window.centre(), half: window.half(), chief, ..Outline::DARK }
-        }
-        None => Outline::DARK,
-    }
-}
-
-/// Raises `radii` to the outermost passing ray of each angle from `film` in the frame.
-fn widen(radii: &mut [f64; 2 * ANGLES], lens: &TrainAt, film: DVec3, [centre, half]: [DVec2; 2]) {
-    const SCANNED: u32 = 32;
-    const HALVINGS: u32 = 12;
-    // The frame's corners are √2 from its centre.
-    const OUTERMOST: f64 = 1.6;
-    let angle = |i: usize| DVec2::from_angle(0.5 * turn_of(i) * std::f64::consts::TAU) * half;
-    let directions: Vec<DVec2> = (0..2 * ANGLES).map(angle).collect();
-    let passes = |places: &[(usize, f64)]| -> Vec<bool> {
-        let mut rays = LensRays::with_capacity(places.len());
-        for &(i, radius) in places {
-            rays.push(film, towards_lens(centre + directions[i] * radius));
-        }
-        lens.trace(Side::Sensor, Clip::On, &mut rays);
-        (0..rays.len()).map(|i| rays.fate(i) == Fate::Exited).collect()
-    };
-    let step = OUTERMOST / f64::from(SCANNED);
-    let scan: Vec<(usize, f64)> =
-        (0..2 * ANGLES).flat_map(|i| (0..SCANNED).map(move |s| (i, step * f64::from(s)))).collect();
-    let mut outermost = [None; 2 * ANGLES];
-    for (&(i, radius), passed) in scan.iter().zip(passes(&scan)) {
-        if passed {
-            outermost[i] = Some(radius);
-        }
-    }
-    let mut brackets: Vec<(usize, f64)> =
-        (0..2 * ANGLES).filter_map(|i| outermost[i].map(|radius| (i, radius))).collect();
-    let mut width = step;
-    for _ in 0..HALVINGS {
-        width *= 0.5;
-        let middles: Vec<(usize, f64)> =
-            brackets.iter().map(|&(i, low)| (i, low + width)).collect();
-        for (bracket, passed) in brackets.iter_mut().zip(passes(&middles)) {
-            if passed {
-                bracket.1 += width;
-            }
-        }
-    }
-    for (i, low) in brackets {
-        radii[i] = radii[i].max(low + width);
-    }
-}
-
 /// The same lens with masks and filter pictures clear: the bound goes around their whole rectangle.
 fn without_masks(train: &OpticalTrain) -> OpticalTrain {
     let mut train = train.clone();
@@ -640,6 +390,83 @@ fn blocked(train: &OpticalTrain, lens: &TrainAt, film: DVec3) -> ExitPupilError 
         lens.trace(Side::Sensor, Clip::On, &mut rays);
         counts.add_all(&rays);
     }
-    let element = counts.worst_element().unwrap_or(train.stop);
+    // Where the last rays end: nothing gets past it.
+    let element = counts.farthest_from_sensor().unwrap_or(train.stop);
     ExitPupilError::Dark { element, losses: counts.losses() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::measure::CHECKS;
+    use super::*;
+    use crate::train::{Focus, LensFile};
+
+    fn preset(name: &str) -> OpticalTrain {
+        let path = format!("{}/../../scenes/lenses/{name}.json", env!("CARGO_MANIFEST_DIR"));
+        let file = LensFile::from_json(&std::fs::read_to_string(path).unwrap()).unwrap();
+        file.build(&|name| Err(format!("{name}: presets have no files"))).unwrap()
+    }
+
+    #[test]
+    fn the_map_from_the_square_keeps_areas_and_neighbours() {
+        let mut inside = 0;
+        for i in 0..10_000 {
+            let u = [f64::from(i % 100) / 100.0 + 0.005, f64::from(i / 100) / 100.0 + 0.005];
+            let (radius, turn) = concentric(u);
+            assert!((0.0..=1.0).contains(&radius) && (0.0..1.0).contains(&turn));
+            inside += u32::from(radius <= 0.5);
+        }
+        assert_eq!(inside, 2500, "a quarter of the disc's area is a quarter of the square's");
+        assert_eq!(concentric([0.5, 0.5]), (0.0, 0.0));
+        assert_eq!(concentric([1.0, 0.5]), (1.0, 0.0));
+        assert_eq!(concentric([0.5, 1.0]), (1.0, 0.25));
+        assert_eq!(concentric([0.0, 0.5]), (1.0, 0.5));
+    }
+
+    /// The proof of the margin: the bound was closed with rays of the first rounds, and of the
+    /// rounds after them, with which it had nothing to do, none passes outside of it.
+    #[test]
+    fn of_a_million_rays_just_outside_of_the_bound_none_passes() {
+        for name in ["double-gauss", "fisheye", "telephoto", "asphere"] {
+            let train = preset(name);
+            let z = train.sensor_z(Focus::Infinity).unwrap();
+            let lens = train.at(587.56).unwrap();
+            let pupil = ExitPupil::new(&train, &[587.56], z, [18.0, 12.0]).unwrap();
+            let (mut looked_at, mut passed) = (0, 0);
+            for round in 16..32 {
+                passed += pupil.strays(&lens, round * CHECKS).len();
+                looked_at += CHECKS;
+            }
+            assert_eq!(passed, 0, "{name}: of {looked_at}");
+        }
+    }
+
+    #[test]
+    fn a_bound_drawn_too_tight_is_widened() {
+        let train = preset("double-gauss");
+        let z = train.sensor_z(Focus::Infinity).unwrap();
+        let lens = train.at(587.56).unwrap();
+        let mut pupil = ExitPupil::new(&train, &[587.56], z, [18.0, 12.0]).unwrap();
+        for reach in pupil.nodes.iter_mut().flat_map(|node| &mut node.reach) {
+            *reach *= 0.95;
+        }
+        let before = pupil.strays(&lens, 0).len();
+        pupil.widen_until_tight(std::slice::from_ref(&lens));
+        let after = pupil.strays(&lens, 20 * CHECKS).len();
+        assert!(before > 1000 && after * 100 < before, "{before} and then {after}");
+    }
+
+    #[test]
+    fn an_error_names_what_blocks_the_light() {
+        let closed = preset("double-gauss").with_stop_radius(0.0).unwrap();
+        let z = closed.sensor_z(Focus::Infinity).unwrap();
+        let error = ExitPupil::new(&closed, &[587.56], z, [18.0, 12.0]).unwrap_err();
+        assert!(matches!(error, ExitPupilError::Dark { element: 5, .. }), "{error}");
+        assert!(error.to_string().contains("vignetted at element 5"), "{error}");
+        let open =
+            LensFile::from_json(r#"{"elements": [{"type": "thin_lens", "focal_length": 9}]}"#);
+        let open = open.unwrap().build(&|_| Err(String::new())).unwrap();
+        let error = ExitPupil::new(&open, &[587.56], 9.0, [1.0, 1.0]).unwrap_err();
+        assert_eq!(error, ExitPupilError::Unbounded);
+    }
 }

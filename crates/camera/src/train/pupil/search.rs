@@ -3,9 +3,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::aim::towards_lens;
-use super::{OpticalTrain, Side, TrainAt};
 use crate::element::{Clip, Fate, LensRays};
+use crate::train::aim::towards_lens;
+use crate::train::{OpticalTrain, Side, TrainAt};
 
 /// Cells a side of a search grid.
 const GRID: u32 = 48;
