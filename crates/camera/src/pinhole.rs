@@ -66,7 +66,8 @@ impl PinholeSpec {
                     return Err(CameraError::new("fov", why));
                 }
                 if fov < NARROWEST_FOV {
-                    let why = format!("{fov} is under {NARROWEST_FOV} degrees; no ray bends so little");
+                    let why =
+                        format!("{fov} is under {NARROWEST_FOV} degrees; no ray bends so little");
                     return Err(CameraError::new("fov", why));
                 }
                 Intrinsics::from_fov(fov.to_radians(), self.sensor.resolution)
