@@ -3,8 +3,6 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use etendue_scene::import::Strictness;
-use etendue_scene::{LoadOptions, Reach};
 use etendue_tracer::LayerSpec;
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
@@ -36,6 +34,9 @@ pub(crate) enum Command {
     /// Say what a render would do, and why
     #[command(after_help = "Example:\n  etendue plan scenes/first-light.json")]
     Plan(PlanArguments),
+    /// Show what a sensor makes of light, or make the images that EMVA 1288 characterises it by
+    #[command(after_help = SENSOR_HELP)]
+    Sensor(SensorArguments),
     /// Print the JSON Schema of scene files
     #[command(after_help = "Example:\n  etendue schema > scene.schema.json")]
     Schema,
@@ -54,6 +55,21 @@ Examples:
   etendue render scenes/first-light.json -o out/first-light
   etendue render model.glb -o out/model --layers depth,normal,ids
   etendue render scenes/cube.json -o out/cube --set camera.fov=30 --samples 16";
+
+const SENSOR_HELP: &str = "\
+Without a sensor, lists the presets. With one, exposes frames of even light from a tenth of an
+electron to past saturation and prints the photon-transfer and signal-to-noise curves: simulated,
+by the linear model of EMVA 1288, under the normal approximation, and of an ideal sensor.
+
+With --emva, writes bright and dark pairs over exposure times to past saturation and 16 + 16 frames
+at half saturation as 16-bit PNG, emva1288.txt (the descriptor of the reference implementation,
+emva1288 on PyPI) and manifest.json.
+
+Examples:
+  etendue sensor
+  etendue sensor imx183 -o out/imx183
+  etendue sensor imx183 --set temperature=313.15 --set exposure=10 --json
+  etendue sensor kaf8300 --emva out/kaf8300 --wavelength 525 --steps 25";
 
 /// A scene, and what of it is overridden.
 #[derive(Debug, Args)]
@@ -76,7 +92,7 @@ pub(crate) struct SceneArguments {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_layer)]
     pub(crate) layers: Option<Vec<String>>,
     /// Samples a pixel of colours; data layers take the pixel's centre
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576))]
+    #[arg(long, value_name = "N")]
     pub(crate) samples: Option<u32>,
     /// Seed of the samples
     #[arg(long, value_name = "N")]
@@ -128,11 +144,18 @@ pub(crate) struct RenderArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct CheckArguments {
-    #[command(flatten)]
-    pub(crate) scene: SceneArguments,
+    /// A scene (.json) or a model (.gltf, .glb, .obj, .ply)
+    #[arg(value_name = "FILE")]
+    pub(crate) file: PathBuf,
     /// Print JSON for machines
     #[arg(long)]
     pub(crate) json: bool,
+    /// Refuse defects of the data instead of counting them
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// Let the scene name files outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
 }
 
 #[derive(Debug, Args)]
@@ -144,17 +167,42 @@ pub(crate) struct PlanArguments {
     pub(crate) json: bool,
 }
 
-impl SceneArguments {
-    /// How the scene is to be loaded.
-    pub(crate) fn load_options(&self) -> LoadOptions<'_> {
-        LoadOptions {
-            strictness: if self.strict { Strictness::Strict } else { Strictness::Tolerant },
-            reach: if self.allow_outside { Reach::Anywhere } else { Reach::OwnFolder },
-            camera: self.camera.as_deref(),
-            ..LoadOptions::default()
-        }
-    }
+#[derive(Debug, Args)]
+pub(crate) struct SensorArguments {
+    /// A preset's name, a scene, or a file with a scene's `sensor` object; lists presets when absent
+    #[arg(value_name = "NAME|SENSOR.json|SCENE")]
+    pub(crate) sensor: Option<String>,
+    #[arg(
+        long = "set",
+        value_name = "PATH=VALUE",
+        value_parser = parse_setting,
+        help = "Set any value of the file, e.g. read_noise=3, or camera.sensor.read_noise=3 of a scene"
+    )]
+    pub(crate) settings: Vec<(String, String)>,
+    /// Also write the curves into this folder, as curves.svg and curves.json
+    #[arg(short, long, value_name = "DIR", requires = "sensor")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write the image series of a characterisation into this folder instead
+    #[arg(long, value_name = "OUT", requires = "sensor", conflicts_with = "output")]
+    pub(crate) emva: Option<PathBuf>,
+    /// Wavelength of the light (nm) [default: where the sensor sees best; 525 with --emva]
+    #[arg(long, value_name = "NM", requires = "sensor", allow_negative_numbers = true, value_parser = parse_wavelength)]
+    pub(crate) wavelength: Option<f64>,
+    /// Exposure times of the series, 20 or more
+    #[arg(long, value_name = "N", default_value_t = 25, requires = "emva")]
+    pub(crate) steps: usize,
+    /// Seed of the noise
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Print JSON for machines
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Show no progress and no summary
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
 
+impl SceneArguments {
     /// The settings and options as overrides of the scene's values, the later the stronger.
     pub(crate) fn overrides(&self) -> Vec<(String, String)> {
         let mut overrides = self.settings.clone();
@@ -187,6 +235,13 @@ fn parse_setting(text: &str) -> Result<(String, String), String> {
             Ok((path.trim().to_owned(), value.to_owned()))
         }
         _ => Err("expected PATH=VALUE, such as camera.fov=30".to_owned()),
+    }
+}
+
+fn parse_wavelength(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(nanometres) if nanometres > 0.0 && f64::is_finite(nanometres) => Ok(nanometres),
+        _ => Err("expected nanometres, such as 525".to_owned()),
     }
 }
 

@@ -7,6 +7,7 @@ use etendue_accel::BuildError;
 use etendue_render::RenderError;
 use etendue_render::output::OutputError;
 use etendue_scene::SceneError;
+use etendue_sensor::emva::EmvaError;
 
 /// Why a command failed.
 #[derive(Debug)]
@@ -34,7 +35,7 @@ impl Fault {
             }
         }
         // When standard error is gone there is nobody to tell.
-        let _ = writeln!(std::io::stderr(), "error: {}", printable(&message));
+        let _ = writeln!(std::io::stderr(), "error: {message}");
     }
 
     pub(crate) fn exit_code(&self) -> ExitCode {
@@ -73,18 +74,13 @@ impl From<OutputError> for Fault {
     }
 }
 
-/// `text` without what a damaged file might tell the terminal to do: control characters are spelled
-/// out.
-fn printable(text: &str) -> String {
-    let mut printable = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '\n' | '\t' => printable.push(c),
-            c if c.is_control() => printable.extend(c.escape_unicode()),
-            c => printable.push(c),
+impl From<EmvaError> for Fault {
+    fn from(error: EmvaError) -> Self {
+        match error {
+            EmvaError::Stopped => Self::Failed(anyhow::Error::msg(STOPPED)),
+            error => Self::Refused(error.into()),
         }
     }
-    printable
 }
 
 const STOPPED: &str = "stopped; no unfinished file was left";

@@ -7,6 +7,7 @@ mod fault;
 mod plan;
 mod progress;
 mod render;
+mod sensor;
 mod stop;
 mod version;
 
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         Some(Command::Render(arguments)) => render::run(&arguments),
         Some(Command::Check(arguments)) => check::run(&arguments),
         Some(Command::Plan(arguments)) => plan::run(&arguments),
+        Some(Command::Sensor(arguments)) => sensor::run(&arguments),
         Some(Command::Schema) => print_schema(),
         None => {
             // Nothing was asked for: say what can be.

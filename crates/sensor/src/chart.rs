@@ -151,7 +151,18 @@ impl Chart<'_> {
 fn power(decade: i32) -> String {
     match decade {
         0..=3 => format!("{}", 10i32.pow(decade.unsigned_abs())),
-        _ => format!("10<tspan dy=\"-5\" font-size=\"9\">{decade}</tspan>"),
+        // Characters, not shifted text: programs that draw SVG disagree about where that goes.
+        _ => format!("10{decade}").chars().enumerate().map(|(i, c)| raised(i, c)).collect(),
+    }
+}
+
+/// A character of an exponent, which starts after `10`.
+fn raised(place: usize, c: char) -> char {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    match (place, c) {
+        (0 | 1, _) => c,
+        (_, '-') => '⁻',
+        _ => c.to_digit(10).map_or(c, |digit| DIGITS[digit as usize]),
     }
 }
 
@@ -173,6 +184,7 @@ mod tests {
         // One decade wide and two high: its corners are the ends of the line.
         assert!(text.contains("points=\"64.0,312.0 444.0,34.0\""), "{text}");
         assert!(text.contains("a &lt; b") && !text.contains("NaN") && !text.contains("inf"));
+        assert_eq!([power(-12), power(3), power(6)], ["10⁻¹²", "1000", "10⁶"]);
         assert!(text.starts_with("<svg") && text.ends_with("</svg>\n"));
     }
 }

@@ -97,6 +97,9 @@ pub enum EmvaError {
     /// The sensor cannot be characterised so.
     #[error(transparent)]
     Sensor(#[from] SensorError),
+    /// The caller's progress function asked to stop.
+    #[error("writing the series was stopped")]
+    Stopped,
     /// A file could not be written.
     #[error("cannot write {path}: {source}")]
     Write {
@@ -175,19 +178,20 @@ impl Series {
     }
 
     /// Makes the images and writes everything into `folder`, which is made if need be. `done` is
-    /// called with the number of images finished so far.
+    /// called with the number of images finished so far, and answers whether to go on.
     ///
     /// Every file appears under its name when it is complete; the manifest comes last.
     ///
     /// # Errors
     ///
-    /// [`EmvaError`] when the sensor does not see the wavelength or a file cannot be written.
+    /// [`EmvaError`] when the sensor does not see the wavelength, a file cannot be written, or `done`
+    /// says stop.
     pub fn write(
         &self,
         sensor: &Sensor,
         options: &Options,
         folder: &Path,
-        done: impl Fn(usize) + Sync,
+        done: impl Fn(usize) -> bool + Sync,
     ) -> Result<(), EmvaError> {
         let light = options.light(sensor)?;
         fs::create_dir_all(folder).map_err(failed(folder))?;
@@ -195,8 +199,8 @@ impl Series {
         self.pictures().into_par_iter().try_for_each(|picture| {
             let image = light.frame(picture.photons, picture.shot, options.seed)?;
             write_whole(&folder.join(picture.name), &png(&image).map_err(failed(folder))?)?;
-            done(finished.fetch_add(1, Ordering::Relaxed) + 1);
-            Ok::<(), EmvaError>(())
+            let go_on = done(finished.fetch_add(1, Ordering::Relaxed) + 1);
+            if go_on { Ok(()) } else { Err(EmvaError::Stopped) }
         })?;
         write_whole(&folder.join(DESCRIPTOR), self.descriptor().as_bytes())?;
         let json = serde_json::to_vec_pretty(&self.manifest).map_err(io::Error::from);

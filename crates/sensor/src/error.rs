@@ -1,13 +1,17 @@
 //! Why a sensor is refused.
 
+use std::fmt;
+
 use etendue_spectrum::CurveError;
 
 /// Why a sensor is refused, or cannot do what is asked.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+///
+/// Its message is `sensor.KEY: reason`, or the reason alone; [`Self::at`] and [`Self::why`] give the
+/// two apart, for those who know where in a file the sensor stands.
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum SensorError {
     /// A number that its meaning does not allow.
-    #[error("sensor.{key} is {value}: {demand}")]
     Value {
         /// Which key.
         key: &'static str,
@@ -17,7 +21,6 @@ pub enum SensorError {
         demand: &'static str,
     },
     /// A key that is needed here and absent.
-    #[error("sensor.{key} is missing: {why}")]
     Missing {
         /// Which key.
         key: &'static str,
@@ -25,7 +28,6 @@ pub enum SensorError {
         why: &'static str,
     },
     /// A key that means nothing here.
-    #[error("sensor.{key} is of no use here: {why}")]
     Misplaced {
         /// Which key.
         key: &'static str,
@@ -33,7 +35,6 @@ pub enum SensorError {
         why: &'static str,
     },
     /// A curve that is none, or leaves its bounds.
-    #[error("sensor.{key}: {fault}")]
     Curve {
         /// Which key.
         key: String,
@@ -41,10 +42,6 @@ pub enum SensorError {
         fault: CurveError,
     },
     /// The full well holds less than the black level stands for.
-    #[error(
-        "sensor.full_well is {full_well} e⁻, less than the black level's worth of {black} e⁻ \
-         (black_level / system_gain): every pixel would be black"
-    )]
     FullWell {
         /// The full well (e⁻).
         full_well: f64,
@@ -52,39 +49,27 @@ pub enum SensorError {
         black: f64,
     },
     /// A colour filter array that is not a rectangle of letters.
-    #[error("sensor.cfa: {0}")]
     Pattern(String),
     /// A letter of the colour filter array without a curve.
-    #[error(
-        "sensor.cfa names the filter `{letter}`, for which there is no curve: add it to \
-         sensor.filters, or use r, g, b or w"
-    )]
     UnknownFilter {
         /// The letter.
         letter: char,
     },
     /// A channel that sees nothing of the spectral lanes.
-    #[error(
-        "the channel `{channel}` sees nothing of {}..={} nm, the wavelengths of the render's \
-         spectral lanes: the image would be black", lanes[0], lanes[1]
-    )]
     Blind {
+        /// Which key holds the curve.
+        key: &'static str,
         /// Which channel.
         channel: String,
         /// The range of the lanes (nm).
         lanes: [f64; 2],
     },
     /// A quantum efficiency of nothing at the wavelength of a characterisation.
-    #[error("the sensor has no quantum efficiency at {wavelength} nm: choose another --wavelength")]
     BlindAt {
         /// The wavelength (nm).
         wavelength: f64,
     },
     /// A film that is not this sensor's.
-    #[error(
-        "the film has {film} values, {width} × {height} pixels of {lanes} spectral lanes need {}",
-        width * height * lanes
-    )]
     Film {
         /// How many values it has.
         film: usize,
@@ -96,7 +81,6 @@ pub enum SensorError {
         lanes: usize,
     },
     /// A series that is too short to be characterised, or too long.
-    #[error("{steps} exposure steps asked for: a characterisation needs 20 to 10000")]
     Steps {
         /// How many were asked for.
         steps: usize,
@@ -113,4 +97,66 @@ impl SensorError {
     ) -> Result<(), Self> {
         if allowed { Ok(()) } else { Err(Self::Value { key, value, demand }) }
     }
+
+    /// The key at fault inside of the sensor (`system_gain`, `filters.r`); empty when it is the
+    /// sensor as a whole, or not the sensor.
+    #[must_use]
+    pub fn at(&self) -> &str {
+        match self {
+            Self::Value { key, .. }
+            | Self::Missing { key, .. }
+            | Self::Misplaced { key, .. }
+            | Self::Blind { key, .. } => key,
+            Self::Curve { key, .. } => key,
+            Self::FullWell { .. } => "full_well",
+            Self::Pattern(_) | Self::UnknownFilter { .. } => "cfa",
+            Self::BlindAt { .. } | Self::Film { .. } | Self::Steps { .. } => "",
+        }
+    }
+
+    /// What is wrong and what would do, without the key.
+    #[must_use]
+    pub fn why(&self) -> String {
+        match self {
+            Self::Value { value, demand, .. } => format!("expected {demand}, found {value}"),
+            Self::Missing { why, .. } => format!("is missing: {why}"),
+            Self::Misplaced { why, .. } => format!("is of no use here: {why}"),
+            Self::Curve { fault, .. } => fault.to_string(),
+            Self::FullWell { full_well, black } => format!(
+                "{full_well} e⁻ is less than the black level's worth of {black} e⁻ (black_level / \
+                 system_gain): every pixel would be black"
+            ),
+            Self::Pattern(why) => why.clone(),
+            Self::UnknownFilter { letter } => format!(
+                "names the filter `{letter}`, for which there is no curve: add it to `filters`, or \
+                 use r, g, b or w"
+            ),
+            Self::Blind { channel, lanes: [from, to], .. } => format!(
+                "the channel `{channel}` sees nothing of {from}..={to} nm, the wavelengths of the \
+                 render's spectral lanes: the image would be black; give a curve or bands inside"
+            ),
+            Self::BlindAt { wavelength } => format!(
+                "the sensor has no quantum efficiency at {wavelength} nm: choose another --wavelength"
+            ),
+            Self::Film { film, width, height, lanes } => format!(
+                "the film has {film} values, {width} × {height} pixels of {lanes} spectral lanes \
+                 need {}",
+                width * height * lanes
+            ),
+            Self::Steps { steps } => {
+                format!("{steps} exposure steps asked for: a characterisation needs 20 to 10000")
+            }
+        }
+    }
 }
+
+impl fmt::Display for SensorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.at() {
+            "" => f.write_str(&self.why()),
+            key => write!(f, "sensor.{key}: {}", self.why()),
+        }
+    }
+}
+
+impl std::error::Error for SensorError {}

@@ -129,7 +129,7 @@ impl PhotonTransfer {
         };
         let _ = writeln!(
             text,
-            "wavelength {} nm, quantum efficiency {:.4}, exposure {} s\n\
+            "wavelength {:.1} nm, quantum efficiency {:.4}, exposure {} s\n\
              system gain {:.5} DN/e⁻, dark noise {:.3} e⁻\n\
              saturation {:.0} e⁻ ({:.0} photons), SNR at most {:.1} ({:.1} dB)\n\
              threshold {:.2} photons, dynamic range {:.0} ({:.1} dB)\n{fails}\n",

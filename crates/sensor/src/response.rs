@@ -87,10 +87,14 @@ impl Response {
         // primary is less than all light.
         let own = |filter: &Filter| matches!(filter, Filter::Band(_) | Filter::Primary(_));
         let alone = filters.iter().all(own);
+        let holder = match spec.kind {
+            SensorKind::Multispectral => "channels",
+            _ => "filters",
+        };
         let mut channels = Vec::with_capacity(filters.len());
         for (name, filter) in names.into_iter().zip(&filters) {
             let ideal = if alone { filter } else { &Filter::Clear };
-            channels.push(channel(name, [filter, ideal], &lanes, settings)?);
+            channels.push(channel(name, holder, [filter, ideal], &lanes, settings)?);
         }
         if settings.radiometry == Radiometry::Digital {
             to_full_scale(&mut channels, settings);
@@ -135,7 +139,7 @@ fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
             let why = "name one channel at least";
             return Err(SensorError::Missing { key: "channels", why });
         }
-        let demand = "a sensor has at most 4096 channels";
+        let demand = "4096 channels at most";
         let count = channels.len();
         SensorError::unless(count <= MOST_CHANNELS, "channels", count as f64, demand)?;
         let mut filters = Vec::new();
@@ -191,7 +195,8 @@ fn fewest_lanes(
     // Where the silicon is sensitive, within visible light: render's colours are known there only.
     let [from, to] = settings.efficiency.range();
     let [from, to] = [from.max(VISIBLE[0]), to.min(VISIBLE[1])];
-    let blind = || SensorError::Blind { channel: "all".into(), lanes: VISIBLE };
+    let blind =
+        || SensorError::Blind { key: "quantum_efficiency", channel: "all".into(), lanes: VISIBLE };
     if from >= to {
         return Err(blind());
     }
@@ -199,8 +204,10 @@ fn fewest_lanes(
 }
 
 /// A channel's electrons: a second for physical light, else as a part of what the ideal one catches.
+/// `holder` is the key that holds the curves of filters.
 fn channel(
     name: String,
+    holder: &'static str,
     [filter, ideal]: [&Filter; 2],
     lanes: &Lanes,
     settings: &Settings,
@@ -209,7 +216,11 @@ fn channel(
     let caught = |i: usize| photons_caught(lanes, i, filter, &settings.efficiency);
     let mut electrons: Vec<f64> = (0..count).map(caught).collect();
     if electrons.iter().all(|&value| value <= 0.0) {
-        return Err(SensorError::Blind { channel: name, lanes: lanes.range() });
+        let key = match filter {
+            Filter::Curve(_) => holder,
+            _ => "quantum_efficiency",
+        };
+        return Err(SensorError::Blind { key, channel: name, lanes: lanes.range() });
     }
     let factor = match settings.radiometry {
         Radiometry::Physical => {

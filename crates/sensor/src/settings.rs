@@ -101,7 +101,7 @@ impl Settings {
                 (1..=LONGEST_SIDE).contains(&side),
                 "resolution",
                 f64::from(side),
-                "a side has 1 to 65535 pixels",
+                "1 to 65535 pixels a side",
             )?;
         }
         positive("pixel_pitch", self.pixel_pitch, "micrometres, above 0")?;
@@ -137,10 +137,10 @@ impl Settings {
 
     fn check_converter(&self, full_well: Option<f64>) -> Result<(), SensorError> {
         let bits = f64::from(self.bit_depth);
-        let demand = "a converter has 1 to 16 bits";
+        let demand = "a converter of 1 to 16 bits";
         SensorError::unless((1..=16).contains(&self.bit_depth), "bit_depth", bits, demand)?;
         positive("system_gain", self.gain, "DN per electron, above 0")?;
-        let demand = "so small that a full pixel would hold more electrons than can be counted";
+        let demand = "a gain at which the electrons of a full pixel can be counted";
         SensorError::unless(self.white() / self.gain < 1e300, "system_gain", self.gain, demand)?;
         let demand = "DN, 0 or more and below full scale, 2^bit_depth - 1";
         let inside = (0.0..self.white()).contains(&self.black);
@@ -163,7 +163,12 @@ impl Settings {
         for &exposure in &self.exposures {
             positive("exposures", exposure, demand)?;
         }
-        SensorError::unless(!self.exposures.is_empty(), "exposures", 0.0, "name one at least")?;
+        SensorError::unless(
+            !self.exposures.is_empty(),
+            "exposures",
+            0.0,
+            "one exposure time at least",
+        )?;
         let frames = f64::from(self.frames);
         SensorError::unless((1..=100_000).contains(&self.frames), "frames", frames, "1 to 100000")?;
         if spec.exposure.is_some() && spec.exposures.is_some() {
@@ -240,7 +245,7 @@ impl Settings {
         };
         positive("dark_current_doubling", doubling, "kelvin, above 0")?;
         let factor = ((temperature - reference) / doubling).exp2();
-        let demand = "so hot that the dark current is beyond all measure";
+        let demand = "a temperature at which the dark current can be counted";
         SensorError::unless(factor < 1e100, "temperature", temperature, demand)?;
         self.dark_current *= factor;
         if let Some(hot) = &mut self.hot_pixels {

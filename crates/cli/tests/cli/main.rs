@@ -4,4 +4,5 @@ mod assets; // real models from outside the repository
 mod bad_input; // refused with exit code 2, one message, and nothing written
 mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
+mod sensor; // presets, curves, series of a characterisation
 mod tools; // check, plan, schema, version

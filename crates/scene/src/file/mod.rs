@@ -5,6 +5,7 @@ mod document;
 mod object;
 mod overrides;
 mod schema;
+mod sensor;
 mod settings;
 mod spec;
 
@@ -18,6 +19,7 @@ pub use document::Place;
 pub use object::{ObjectSpec, Scale, Source, TransformSpec};
 pub use overrides::OverrideError;
 pub use schema::scene_schema;
+pub use sensor::SensorFile;
 pub use settings::{AccelName, RenderSpec, TracerSpec};
 pub use spec::{SceneSpec, Version};
 
@@ -37,16 +39,22 @@ const LONGEST: u64 = 64 << 20;
 /// A scene file, read and checked for itself; nothing it names has been opened.
 #[derive(Debug, Clone)]
 pub struct SceneFile {
-    path: PathBuf,
+    written: Written,
     kind: FileKind,
-    /// The text, to say where in it something is wrong; none for a model.
-    document: Option<Document>,
     /// All values with the settings applied.
     value: Value,
-    /// Which paths the command line set, and how it was written there.
-    settings: BTreeMap<String, String>,
     /// What the file says.
     pub spec: SceneSpec,
+}
+
+/// Where the values of a file were written, to say where something is wrong.
+#[derive(Debug, Clone)]
+struct Written {
+    path: PathBuf,
+    /// The text; none for a model.
+    document: Option<Document>,
+    /// Which paths the command line set, and how it was written there.
+    settings: BTreeMap<String, String>,
 }
 
 /// What kind of file stands for the scene.
@@ -84,21 +92,9 @@ impl SceneFile {
         if let Value::Object(members) = &mut value {
             members.entry("camera").or_insert_with(|| json!({ "type": "pinhole" }));
         }
-        let mut settings = BTreeMap::new();
-        for (key, text) in overrides {
-            let setting = format!("{key}={text}");
-            let applied = overrides::apply(&mut value, key, text)
-                .map_err(|source| SceneError::Override { setting: setting.clone(), source })?;
-            settings.insert(applied, setting);
-        }
-        let mut file = Self {
-            path: path.to_owned(),
-            kind,
-            document,
-            value,
-            settings,
-            spec: SceneSpec::default(),
-        };
+        let mut written = Written::new(path, document);
+        written.set(&mut value, overrides)?;
+        let mut file = Self { written, kind, value, spec: SceneSpec::default() };
         file.spec = file.check()?;
         Ok(file)
     }
@@ -115,6 +111,55 @@ impl SceneFile {
 
     /// The error that the value at the JSON path `path` is wrong because of `reason`.
     pub(crate) fn fault(&self, path: &str, reason: impl Into<String>) -> SceneError {
+        self.written.fault(path, reason)
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.written.path
+    }
+
+    /// The folder that the file's own paths start at.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        match self.written.path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        }
+    }
+
+    /// Whether it is a JSON scene or a model.
+    #[must_use]
+    pub fn kind(&self) -> FileKind {
+        self.kind
+    }
+
+    /// All values, with the settings applied.
+    #[must_use]
+    pub fn value(&self) -> &Value {
+        &self.value
+    }
+}
+
+impl Written {
+    fn new(path: &Path, document: Option<Document>) -> Self {
+        Self { path: path.to_owned(), document, settings: BTreeMap::new() }
+    }
+
+    /// Applies settings of the command line to the file's values, the later the stronger.
+    fn set(&mut self, value: &mut Value, all: &[(String, String)]) -> Result<(), SceneError> {
+        for (key, text) in all {
+            let setting = format!("{key}={text}");
+            let applied = overrides::apply(value, key, text)
+                .map_err(|source| SceneError::Override { setting: setting.clone(), source })?;
+            self.settings.insert(applied, setting);
+        }
+        Ok(())
+    }
+
+    /// The error that the value at the JSON path `path` is wrong because of `reason`.
+    fn fault(&self, path: &str, reason: impl Into<String>) -> SceneError {
         SceneError::Invalid {
             file: self.path.clone(),
             path: path.to_owned(),
@@ -136,33 +181,6 @@ impl SceneFile {
             (None, Some(place)) => Origin::Text(place),
             (None, None) => Origin::Nowhere,
         }
-    }
-
-    /// The file.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The folder that the file's own paths start at.
-    #[must_use]
-    pub fn folder(&self) -> &Path {
-        match self.path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        }
-    }
-
-    /// Whether it is a JSON scene or a model.
-    #[must_use]
-    pub fn kind(&self) -> FileKind {
-        self.kind
-    }
-
-    /// All values, with the settings applied.
-    #[must_use]
-    pub fn value(&self) -> &Value {
-        &self.value
     }
 }
 

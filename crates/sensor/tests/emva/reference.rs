@@ -36,7 +36,7 @@ fn characterised(python: &Path, spec: Value) -> Value {
     let options = Options { seed: 1, ..Options::default() };
     let series = Series::plan(&sensor, &options).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    series.write(&sensor, &options, folder.path(), |_| ()).unwrap();
+    series.write(&sensor, &options, folder.path(), |_| true).unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/emva/characterise.py");
     let descriptor = folder.path().join(DESCRIPTOR);
     let out = Command::new(python).arg(script).arg(descriptor).output().unwrap();

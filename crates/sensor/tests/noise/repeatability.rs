@@ -67,3 +67,28 @@ fn channels_have_their_own_noise() {
     // Noise of ±25 DN: two of three numbers agree in a few pixels of a hundred.
     assert!(equal < 331 * 97 / 10, "{equal} of {}", 331 * 97);
 }
+
+/// FNV-1a of the numbers, low byte first.
+fn fingerprint(values: &[u16]) -> u64 {
+    values.iter().flat_map(|y| y.to_le_bytes()).fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+#[test]
+fn any_machine_gives_the_same_bits() {
+    // Vector units of any width, and none, have to agree with what was once drawn.
+    for (keys, expected) in [
+        (json!({ "type": "raw", "quantum_efficiency": 0.6 }), 0x1c19_7153_30e3_673e),
+        (
+            json!({ "type": "raw", "quantum_efficiency": 0.6, "noise": "normal" }),
+            0x9caa_18bb_30b8_3be0,
+        ),
+    ] {
+        let sensor = busy(keys);
+        let film = ramp(&sensor);
+        let shot = Shot { exposure: 0.02, frame: 3 };
+        let image = sensor.expose(Film { values: &film }, shot, 2026).unwrap();
+        assert_eq!(fingerprint(&image.values), expected, "{:#x}", fingerprint(&image.values));
+    }
+}

@@ -1,0 +1,228 @@
+//! `etendue sensor`: presets, the curves of a sensor, and the image series of its characterisation.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+
+use etendue_render::output::{prepare_folder, sidecar, write_whole};
+use etendue_scene::file::SensorFile;
+use etendue_sensor::emva::{DESCRIPTOR, EmvaError, MANIFEST, Options, Series};
+use etendue_sensor::photon_transfer::{self, PhotonTransfer};
+use etendue_sensor::preset::Origin;
+use etendue_sensor::{Model, Preset, SensorSpec};
+use serde::Serialize;
+use serde_json::json;
+
+use crate::arguments::SensorArguments;
+use crate::fault::{Fault, print_json, print_text};
+use crate::progress::Stages;
+use crate::stop;
+
+pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
+    stop::listen();
+    let Some(name) = &arguments.sensor else {
+        return list(arguments.json);
+    };
+    let file = find(name, &arguments.settings)?;
+    if !arguments.quiet {
+        say(file.sensor.notes().iter().map(|note| format!("note: {note}")));
+    }
+    match &arguments.emva {
+        Some(folder) => series(arguments, &file, folder),
+        None => curves(arguments, name, &file),
+    }
+}
+
+/// A file when there is one, else a preset.
+fn find(name: &str, settings: &[(String, String)]) -> Result<SensorFile, Fault> {
+    let path = Path::new(name);
+    if path.exists() || path.extension().is_some_and(|ending| ending == "json") {
+        return Ok(SensorFile::read(path, settings)?);
+    }
+    let Some(model) = Model::from_name(name) else {
+        let known: Vec<&str> = Model::ALL.iter().map(|model| model.preset().name).collect();
+        let known = known.join(", ");
+        return Err(Fault::refused(format!(
+            "{name}: neither a file nor a preset; name a scene, a sensor's JSON file, or one of {known}"
+        )));
+    };
+    let value = json!({ "type": "raw", "model": model });
+    Ok(SensorFile::of_value(path, value, settings)?)
+}
+
+/// A preset, for machines.
+#[derive(Debug, Serialize)]
+struct Card {
+    name: &'static str,
+    kind: &'static str,
+    facts: Vec<Figure>,
+    sources: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct Figure {
+    key: &'static str,
+    value: String,
+    origin: Origin,
+}
+
+impl Card {
+    fn new(preset: &'static Preset) -> Self {
+        let figure = |(key, value, origin)| Figure { key, value, origin };
+        let facts = preset.facts().into_iter().map(figure).collect();
+        Self { name: preset.name, kind: preset.kind, facts, sources: preset.sources }
+    }
+
+    /// The preset as a paragraph, its sources wrapped.
+    fn text(&self) -> String {
+        let mut text = format!("{}: {}\n", self.name, self.kind);
+        for Figure { key, value, origin } in &self.facts {
+            let _ = writeln!(text, "  {key:<26} {value:<28} {}", word(*origin));
+        }
+        let mut line = String::from(" ");
+        for word in self.sources.split_whitespace() {
+            if line.chars().count() + word.chars().count() >= 100 {
+                let _ = writeln!(text, "{line}");
+                line = " ".to_owned();
+            }
+            line.push(' ');
+            line.push_str(word);
+        }
+        text + &line + "\n\n"
+    }
+}
+
+fn word(origin: Origin) -> &'static str {
+    match origin {
+        Origin::Published => "published",
+        Origin::Measured => "measured",
+        Origin::Derived => "derived",
+        Origin::Estimated => "estimated",
+    }
+}
+
+/// How origins are marked in the list.
+fn mark(origin: Origin) -> &'static str {
+    match origin {
+        Origin::Published => "p",
+        Origin::Measured => "m",
+        Origin::Derived => "d",
+        Origin::Estimated => "e",
+    }
+}
+
+fn list(as_json: bool) -> Result<(), Fault> {
+    let cards: Vec<Card> = Model::ALL.iter().map(|model| Card::new(model.preset())).collect();
+    if as_json {
+        return print_json(&cards);
+    }
+    let columns: [(&str, &str, usize); 7] = [
+        ("resolution", "pixels", 15),
+        ("pixel_pitch", "µm", 7),
+        ("bit_depth", "bits", 6),
+        ("system_gain", "DN/e⁻", 12),
+        ("read_noise", "noise e⁻", 10),
+        ("dark_current", "dark e⁻/s", 12),
+        ("full_well", "well e⁻", 10),
+    ];
+    let mut text = format!("{:<11}", "preset");
+    for (_, title, width) in columns {
+        let _ = write!(text, "{title:>width$}");
+    }
+    text.push_str("  kind\n");
+    for card in &cards {
+        let _ = write!(text, "{:<11}", card.name);
+        for (key, _, width) in columns {
+            let found = card.facts.iter().find(|figure| figure.key == key);
+            let cell =
+                found.map_or_else(String::new, |f| format!("{} {}", f.value, mark(f.origin)));
+            let _ = write!(text, "{cell:>width$}");
+        }
+        let _ = writeln!(text, "  {}", card.kind);
+    }
+    text.push_str(
+        "p published, m measured, d derived, e estimated; etendue sensor NAME shows more",
+    );
+    print_text(&text)
+}
+
+/// The curves of a sensor, for machines.
+#[derive(Debug, Serialize)]
+struct Curves<'a> {
+    sensor: &'a SensorSpec,
+    preset: Option<Card>,
+    notes: &'a [String],
+    curves: PhotonTransfer,
+}
+
+fn curves(arguments: &SensorArguments, name: &str, file: &SensorFile) -> Result<(), Fault> {
+    let options = photon_transfer::Options {
+        wavelength: arguments.wavelength,
+        seed: arguments.seed,
+        ..photon_transfer::Options::default()
+    };
+    if let Some(folder) = &arguments.output {
+        prepare_folder(folder)?;
+    }
+    let curves =
+        PhotonTransfer::measure(&file.sensor, &options).map_err(|error| file.fault(&error))?;
+    let preset = file.spec.model.map(|model| Card::new(model.preset()));
+    let found = Curves { sensor: &file.spec, preset, notes: file.sensor.notes(), curves };
+    if let Some(folder) = &arguments.output {
+        let [svg, data] = ["curves.svg", "curves.json"].map(|name| folder.join(name));
+        let drawn = found.curves.svg();
+        write_whole(&svg, |part| part.write_all(drawn.as_bytes()))?;
+        sidecar::write_json(&data, &found)?;
+        if !arguments.quiet {
+            say([svg, data].map(|path| path.display().to_string()));
+        }
+    }
+    if arguments.json {
+        return print_json(&found);
+    }
+    let heading = match &found.preset {
+        Some(card) => card.text(),
+        None => format!("{name}\n"),
+    };
+    print_text(&(heading + &found.curves.table()))
+}
+
+fn series(arguments: &SensorArguments, file: &SensorFile, folder: &Path) -> Result<(), Fault> {
+    let options = Options {
+        steps: arguments.steps,
+        seed: arguments.seed,
+        wavelength: arguments.wavelength.unwrap_or(Options::default().wavelength),
+        ..Options::default()
+    };
+    let series = Series::plan(&file.sensor, &options).map_err(|error| file.fault(&error))?;
+    prepare_folder(folder)?;
+    let total = series.len();
+    let progress = Stages::new(arguments.quiet).begin("expose");
+    series
+        .write(&file.sensor, &options, folder, |done| progress(done as f64 / total as f64))
+        .map_err(|error| match error {
+            EmvaError::Sensor(error) => Fault::from(file.fault(&error)),
+            error => error.into(),
+        })?;
+    drop(progress);
+    if !arguments.quiet {
+        let [width, height] = series.size;
+        let longest = series.manifest.steps.last().map_or(0.0, |step| step.exposure_s);
+        say([format!(
+            "{total} images of {width} x {height} pixels at {} nm, exposed for up to {longest} s",
+            options.wavelength
+        )]);
+    }
+    if arguments.json {
+        return print_json(&series.manifest);
+    }
+    let files = [MANIFEST, DESCRIPTOR].map(|name| folder.join(name).display().to_string());
+    print_text(&files.join("\n"))
+}
+
+/// Lines for a person, on standard error. When nobody reads it, nobody is told.
+fn say(lines: impl IntoIterator<Item = String>) {
+    for line in lines {
+        let _ = writeln!(std::io::stderr(), "{line}");
+    }
+}

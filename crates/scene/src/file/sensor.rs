@@ -1,0 +1,99 @@
+//! A sensor alone: what `etendue sensor` reads.
+
+use std::path::Path;
+use std::sync::LazyLock;
+
+use etendue_sensor::{Sensor, SensorError, SensorSpec};
+use schemars::generate::SchemaSettings;
+use serde_json::Value;
+
+use super::{Written, check, read_document};
+use crate::SceneError;
+
+/// Where a scene keeps its sensor.
+const IN_SCENE: &str = "camera.sensor";
+
+/// The schema of a sensor, made once.
+static SENSOR: LazyLock<Value> = LazyLock::new(|| {
+    SchemaSettings::draft2020_12().into_generator().into_root_schema_for::<SensorSpec>().to_value()
+});
+
+/// A sensor that was read and checked: a scene's `camera.sensor`, or the same object in a file of
+/// its own.
+#[derive(Debug, Clone)]
+pub struct SensorFile {
+    /// What was written.
+    pub spec: SensorSpec,
+    /// The sensor of it.
+    pub sensor: Sensor,
+    written: Written,
+    /// The path of the sensor's object; empty when the file is the sensor.
+    place: &'static str,
+}
+
+impl SensorFile {
+    /// Reads the sensor at `path`. A file with a key `etendue` or `camera` is taken for a scene, of
+    /// which nothing but the sensor is looked at. `overrides` are paths from the file's top and
+    /// values, as in [`SceneFile::read`](super::SceneFile::read).
+    ///
+    /// # Errors
+    ///
+    /// When the file is missing or not JSON, has no sensor, or its sensor is refused; the message
+    /// names the file, the place and the remedy.
+    pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, SceneError> {
+        let (document, value) = read_document(path)?;
+        Self::of(Written::new(path, Some(document)), value, overrides)
+    }
+
+    /// A sensor given by its values, such as those of a preset; `name` stands for the file.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`].
+    pub fn of_value(
+        name: &Path,
+        value: Value,
+        overrides: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        Self::of(Written::new(name, None), value, overrides)
+    }
+
+    fn of(
+        mut written: Written,
+        mut value: Value,
+        overrides: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        written.set(&mut value, overrides)?;
+        let in_scene = value.get("etendue").is_some() || value.get("camera").is_some();
+        let place = if in_scene { IN_SCENE } else { "" };
+        let object = if in_scene { value.pointer("/camera/sensor") } else { Some(&value) };
+        let object = object.ok_or_else(|| {
+            let why = "the scene has no sensor; give it one, such as { \"type\": \"raw\", \
+                       \"model\": \"imx183\" }";
+            written.fault(IN_SCENE, why)
+        })?;
+        check::check(&SENSOR, object)
+            .map_err(|problem| written.fault(&inside(place, &problem.path), problem.reason))?;
+        let spec: SensorSpec = serde_path_to_error::deserialize(object).map_err(|error| {
+            let path = inside(place, &error.path().to_string());
+            written.fault(&path, error.into_inner().to_string())
+        })?;
+        let sensor = Sensor::new(&spec)
+            .map_err(|error| written.fault(&inside(place, error.at()), error.why()))?;
+        Ok(Self { spec, sensor, written, place })
+    }
+
+    /// The error with the place in the file that it is about.
+    #[must_use]
+    pub fn fault(&self, error: &SensorError) -> SceneError {
+        self.written.fault(&inside(self.place, error.at()), error.why())
+    }
+}
+
+fn inside(place: &str, key: &str) -> String {
+    match (place, key) {
+        (_, "" | ".") => place.to_owned(),
+        ("", _) => key.to_owned(),
+        _ => format!("{place}.{key}"),
+    }
+}
