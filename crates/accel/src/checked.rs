@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use etendue_geometry::{Geometry, HitBatch, MISS, RayBatch};
+use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
 
 use crate::embree::{Found, Scene, version};
 use crate::recheck::{self, BUNDLE, Candidate};
@@ -56,7 +56,9 @@ impl Embree {
     /// numbers, or the progress function stops it.
     pub fn build(geometry: Arc<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
         let start = Instant::now();
-        let frame = Frame::of(geometry.loose_bounds());
+        let bounds = geometry.loose_bounds();
+        check_scale(bounds)?;
+        let frame = Frame::of(bounds);
         let scene = Scene::build(geometry, frame.origin, options)?;
         let mode = match (options.robust, options.refine) {
             (true, true) => "robust + f64",
@@ -201,6 +203,17 @@ impl Embree {
     fn slack(&self, t: f32) -> f64 {
         64.0 * (self.frame.blur() + f64::from(t) * f64::from(f32::EPSILON))
     }
+}
+
+/// Embree multiplies three lengths of a triangle, which have to stay in single precision.
+fn check_scale(bounds: Bounds) -> Result<(), BuildError> {
+    const LEAST: f64 = 1e-12;
+    const MOST: f64 = 1e12;
+    let extent = if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).max_element() };
+    if extent == 0.0 || (LEAST..=MOST).contains(&extent) {
+        return Ok(());
+    }
+    Err(BuildError::Scale { backend: "Embree", extent, least: LEAST, most: MOST })
 }
 
 impl Accel for Embree {

@@ -177,6 +177,21 @@ pub enum BuildError {
         /// The most it takes.
         limit: u64,
     },
+    /// A scene so large or so small that the backend's single-precision numbers cannot hold it.
+    #[error(
+        "the scene measures {extent:.1e} m, and the {backend} structure holds {least:.0e} to \
+         {most:.0e} m; scale its objects, or use --accel bvh"
+    )]
+    Scale {
+        /// The backend that was asked to build.
+        backend: &'static str,
+        /// The scene's longest side (m).
+        extent: f64,
+        /// The shortest that the backend holds (m).
+        least: f64,
+        /// The longest that the backend holds (m).
+        most: f64,
+    },
     /// The caller's progress function asked to stop.
     #[error("the build was stopped")]
     Stopped,

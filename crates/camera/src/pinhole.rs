@@ -12,6 +12,9 @@ use crate::{CameraError, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec
 /// The vertical field of view of a pinhole that says nothing about it.
 const DEFAULT_FOV: Degrees = Degrees(40.0);
 
+/// The narrowest field of view (degrees): 4 micrometres at a kilometre.
+const NARROWEST_FOV: f64 = 2e-7;
+
 /// A pinhole camera as the scene file writes it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -60,6 +63,11 @@ impl PinholeSpec {
                 let Degrees(fov) = fov.unwrap_or(DEFAULT_FOV);
                 if !(fov > 0.0 && fov < 180.0) {
                     let why = format!("{fov} is outside 0 to 180 degrees (both excluded)");
+                    return Err(CameraError::new("fov", why));
+                }
+                if fov < NARROWEST_FOV {
+                    let why =
+                        format!("{fov} is under {NARROWEST_FOV} degrees; no ray bends so little");
                     return Err(CameraError::new("fov", why));
                 }
                 Intrinsics::from_fov(fov.to_radians(), self.sensor.resolution)

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use etendue_scene::import::Strictness;
+use etendue_scene::{LoadOptions, Reach};
 use etendue_tracer::LayerSpec;
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
@@ -92,7 +94,7 @@ pub(crate) struct SceneArguments {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_layer)]
     pub(crate) layers: Option<Vec<String>>,
     /// Samples a pixel of colours; data layers take the pixel's centre
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576))]
     pub(crate) samples: Option<u32>,
     /// Seed of the samples
     #[arg(long, value_name = "N")]
@@ -144,18 +146,11 @@ pub(crate) struct RenderArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct CheckArguments {
-    /// A scene (.json) or a model (.gltf, .glb, .obj, .ply)
-    #[arg(value_name = "FILE")]
-    pub(crate) file: PathBuf,
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
     /// Print JSON for machines
     #[arg(long)]
     pub(crate) json: bool,
-    /// Refuse defects of the data instead of counting them
-    #[arg(long)]
-    pub(crate) strict: bool,
-    /// Let the scene name files outside its own folder
-    #[arg(long)]
-    pub(crate) allow_outside: bool,
 }
 
 #[derive(Debug, Args)]
@@ -203,6 +198,16 @@ pub(crate) struct SensorArguments {
 }
 
 impl SceneArguments {
+    /// How the scene is to be loaded.
+    pub(crate) fn load_options(&self) -> LoadOptions<'_> {
+        LoadOptions {
+            strictness: if self.strict { Strictness::Strict } else { Strictness::Tolerant },
+            reach: if self.allow_outside { Reach::Anywhere } else { Reach::OwnFolder },
+            camera: self.camera.as_deref(),
+            ..LoadOptions::default()
+        }
+    }
+
     /// The settings and options as overrides of the scene's values, the later the stronger.
     pub(crate) fn overrides(&self) -> Vec<(String, String)> {
         let mut overrides = self.settings.clone();

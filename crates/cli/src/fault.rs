@@ -35,7 +35,7 @@ impl Fault {
             }
         }
         // When standard error is gone there is nobody to tell.
-        let _ = writeln!(std::io::stderr(), "error: {message}");
+        let _ = writeln!(std::io::stderr(), "error: {}", printable(&message));
     }
 
     pub(crate) fn exit_code(&self) -> ExitCode {
@@ -72,6 +72,20 @@ impl From<OutputError> for Fault {
         // A folder that cannot be written to is the caller's to mend.
         Self::Refused(error.into())
     }
+}
+
+/// `text` without what a damaged file might tell the terminal to do: control characters are spelled
+/// out.
+fn printable(text: &str) -> String {
+    let mut printable = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\n' | '\t' => printable.push(c),
+            c if c.is_control() => printable.extend(c.escape_unicode()),
+            c => printable.push(c),
+        }
+    }
+    printable
 }
 
 impl From<EmvaError> for Fault {

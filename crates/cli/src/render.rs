@@ -11,8 +11,8 @@ use etendue_render::output::{
 use etendue_render::report::{memory, seconds};
 use etendue_render::{Images, Plan, Rendered, Report, Seconds, plan};
 use etendue_scene::file::{FileKind, SceneFile};
-use etendue_scene::import::{Note, Strictness};
-use etendue_scene::{LoadOptions, Reach, Scene};
+use etendue_scene::import::Note;
+use etendue_scene::{LoadOptions, Scene};
 
 use crate::arguments::{RenderArguments, SceneArguments};
 use crate::fault::{Fault, print_text};
@@ -48,11 +48,8 @@ pub(crate) fn load(arguments: &SceneArguments, stages: Stages) -> Result<Scene, 
     }
     let progress = stages.begin("load");
     let options = LoadOptions {
-        strictness: if arguments.strict { Strictness::Strict } else { Strictness::Tolerant },
-        reach: if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder },
-        camera: arguments.camera.as_deref(),
         progress: Some(&|step| progress(step.done as f64 / step.total.max(1) as f64)),
-        ..LoadOptions::default()
+        ..arguments.load_options()
     };
     Ok(file.load(plan::wanted(&file.spec.all_layers()), &options)?)
 }

@@ -158,12 +158,16 @@ impl Surroundings<'_> {
         color
     }
 
-    /// Base colour under a headlight at hit `i`: something to look at, not light transport.
+    /// Base colour under a headlight at hit `i`: something to look at, not light transport. A little
+    /// of it does not depend on the colour, so that black things show their shape as well.
     #[must_use]
     pub fn facing(&self, traced: Traced<'_>, i: usize) -> Color {
+        if !traced.hits.is_hit(i) {
+            return [0.0; 3];
+        }
         let normal = self.normal(traced, i, NormalKind::Shading, Space::World);
         let cosine = normal.dot(-traced.rays.direction(i)).max(0.0);
-        self.flat(traced.hits, i).map(|c| c * (0.15 + 0.85 * cosine))
+        self.flat(traced.hits, i).map(|c| (0.08 + 0.92 * c) * (0.15 + 0.85 * cosine))
     }
 
     fn texel(&self, hits: &HitBatch, i: usize, placement: &Placement, image: &TextureUse) -> Color {

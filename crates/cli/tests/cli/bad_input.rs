@@ -104,6 +104,41 @@ fn paths_stay_in_the_scenes_folder_unless_allowed() {
     assert!(allowed.status.success(), "{}", text(&allowed.stderr));
 }
 
+#[cfg(feature = "embree")]
+#[test]
+fn scenes_beyond_single_precision_are_named() {
+    for scale in ["1e25", "1e13", "1e-13", "1e-30"] {
+        let scene = format!(
+            r#"{{"etendue": 1, "objects": [{{"shape": "box", "transform": {{"scale": {scale}}}}}]}}"#
+        );
+        refused(&Bench::with_scene(&scene), &["--accel", "embree"], &["m", "scale its objects"]);
+    }
+}
+
+#[test]
+fn settings_and_folders_that_cannot_be_say_why() {
+    let bench = Bench::with_scene(r#"{"etendue": 1, "objects": []}"#);
+    refused(&bench, &["--set", "camera.fov=1e400"], &["1e400", "1.8e308"]);
+    refused(&bench, &["--set", "camera.fov=1e-320"], &["fov"]);
+    refused(&bench, &["--samples", "99999999999"], &["1048576"]);
+    bench.write("taken", b"");
+    let into_a_file = ["render", "scene.json", "-o", "taken"];
+    refused_command(&bench, &into_a_file, &["taken", "it is a file; choose another folder"]);
+}
+
+#[test]
+fn bytes_of_other_files_are_no_models_and_never_reach_the_terminal() {
+    let bench = Bench::new();
+    bench.write("noise.obj", b"\x7fELF\0\0\0\n\0\xff\n");
+    refused_command(&bench, &["render", "noise.obj", "-o", "out"], &["noise.obj", "line 1"]);
+    bench.write("colour.obj", b"v 1 2 \x1b[31mred\n");
+    let output = bench.run(&["render", "colour.obj", "-o", "out"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!output.stderr.contains(&0x1b), "{}", text(&output.stderr));
+    bench.write("empty.glb", b"");
+    refused_command(&bench, &["render", "empty.glb", "-o", "out"], &["empty.glb", "it is empty"]);
+}
+
 /// A GLB of one triangle with the given positions and indices.
 fn glb(positions: &[[f32; 3]], indices: &[u32], extension: &str) -> Vec<u8> {
     let mut binary: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
@@ -209,6 +244,9 @@ fn compressed_models_are_named_with_the_command_that_converts_them() {
         &["KHR_draco_mesh_compression", "gltf"],
     );
     refused_model(&glb(&CORNERS, &[0, 1, 2], "ACME_unheard_of"), &[], &["ACME_unheard_of"]);
+    let both = "ACME_unheard_of\", \"KHR_texture_basisu";
+    let words = ["ACME_unheard_of", "KHR_texture_basisu", "ktxdecompress"];
+    refused_model(&glb(&CORNERS, &[0, 1, 2], both), &[], &words);
 }
 
 #[test]

@@ -150,6 +150,7 @@ impl OutputError {
                 "make the folder writable or choose another one"
             }
             io::ErrorKind::NotFound => "create the folder first or choose another one",
+            io::ErrorKind::AlreadyExists => "it is a file; choose another folder",
             io::ErrorKind::NotADirectory => "a part of the path is a file; choose another folder",
             io::ErrorKind::IsADirectory => "a folder has this name; choose another name",
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {

@@ -19,10 +19,14 @@ const MASTERS: [&str; 5] = ["gltf", "glb", "obj", "mtl", "json"];
 /// The rule is narrow on purpose: names are looked for as text, so a file is listed only when
 /// nothing there can mean it.
 pub(super) fn find(opened: &[&Path], scene: &Path) -> Vec<PathBuf> {
-    let folders: BTreeSet<&Path> = opened.iter().filter_map(|path| path.parent()).collect();
+    let folder_of = |path: &&'_ Path| match path.parent() {
+        Some(folder) if folder.as_os_str().is_empty() => Some(PathBuf::from(".")),
+        folder => Some(folder?.to_owned()),
+    };
+    let folders: BTreeSet<PathBuf> = opened.iter().filter_map(folder_of).collect();
     let mut unused = Vec::new();
     for folder in folders {
-        let files = files_in(folder);
+        let files = files_in(&folder);
         let mut candidates: Vec<&PathBuf> =
             files.iter().filter(|path| has_ending(path, &SERVANTS)).collect();
         let masters = files.iter().filter(|path| has_ending(path, &MASTERS));
@@ -42,7 +46,6 @@ pub(super) fn find(opened: &[&Path], scene: &Path) -> Vec<PathBuf> {
 }
 
 fn files_in(folder: &Path) -> Vec<PathBuf> {
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
     paths.filter(|path| path.is_file()).collect()
@@ -53,10 +56,10 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
     endings.iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
-/// Whether `text` has the file's name, as it is or with its blanks as URIs write them.
+/// Whether `text` has the file's name, as it is or with its blanks as URIs or shells write them.
 fn names(text: &str, file: &Path) -> bool {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
-    text.contains(&*name) || text.contains(&name.replace(' ', "%20"))
+    [" ", "%20", "\\ "].iter().any(|blank| text.contains(&name.replace(' ', blank)))
 }
 
 /// The part of a file that may name others: of a GLB its JSON chunk.

@@ -27,6 +27,12 @@ pub enum OverrideError {
         /// The index asked for.
         index: String,
     },
+    /// A number that 64 bits do not hold.
+    #[error("{text} is beyond the numbers that a computer holds (1.8e308)")]
+    TooLarge {
+        /// The number as given.
+        text: String,
+    },
     /// A value on the way that has nothing inside.
     #[error("{parent} is {found}, which has no `{step}`")]
     Leaf {
@@ -75,7 +81,14 @@ pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<String, 
             }
         };
     }
-    *here = serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned()));
+    let is_number = text.trim_start().starts_with(|c: char| c.is_ascii_digit() || c == '-');
+    *here = match serde_json::from_str(text) {
+        Ok(value) => value,
+        Err(_) if is_number && text.trim().parse().is_ok_and(f64::is_infinite) => {
+            return Err(OverrideError::TooLarge { text: text.trim().to_owned() });
+        }
+        Err(_) => Value::String(text.to_owned()),
+    };
     Ok(walked)
 }
 

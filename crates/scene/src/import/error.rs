@@ -59,7 +59,7 @@ pub enum ImportError {
         reason: String,
     },
     /// The file needs an extension that is not supported.
-    #[error("{}: needs the extension {name}, which is not supported; {remedy}", file.display())]
+    #[error("{}: needs {name}, not supported: {remedy}", file.display())]
     UnsupportedExtension {
         /// The file.
         file: PathBuf,
@@ -68,6 +68,20 @@ pub enum ImportError {
         /// What to do about it.
         remedy: String,
     },
+}
+
+impl ImportError {
+    /// Two unsupported extensions of one file as one error; of other errors the first.
+    pub(crate) fn and(mut self, other: Self) -> Self {
+        if let (
+            Self::UnsupportedExtension { remedy, .. },
+            Self::UnsupportedExtension { name, remedy: other, .. },
+        ) = (&mut self, other)
+        {
+            *remedy = format!("{remedy}\n    and {name}, not supported: {other}");
+        }
+        self
+    }
 }
 
 /// The offending line below the message.

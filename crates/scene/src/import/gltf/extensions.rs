@@ -65,14 +65,17 @@ pub(super) fn check(
     document: &Document,
     notes: &mut Vec<Note>,
 ) -> Result<(), ImportError> {
-    for name in &document.root.extensions_required {
+    let mut missing = document.root.extensions_required.iter().filter_map(|name| {
         match support(name) {
             // A required look (a sheen, say) changes no geometry: a note says what is missing.
-            Some(Support::Full | Support::Without(_)) => {}
+            Some(Support::Full | Support::Without(_)) => None,
             // Draco's and meshopt's users often keep a plain copy that the primitives name.
-            Some(Support::Encoded(command)) => return Err(refused(path, name, command)),
-            None => return Err(refused(path, name, "export the file without it")),
+            Some(Support::Encoded(command)) => Some(refused(path, name, command)),
+            None => Some(refused(path, name, "export the file without it")),
         }
+    });
+    if let Some(first) = missing.next() {
+        return Err(missing.fold(first, ImportError::and));
     }
     for name in &document.root.extensions_used {
         let message = match support(name) {

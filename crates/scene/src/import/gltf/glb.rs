@@ -26,6 +26,9 @@ pub(super) fn open<'a>(
     map: &'a Arc<MappedFile>,
 ) -> Result<Container<'a>, ImportError> {
     let bytes = map.bytes();
+    if bytes.is_empty() {
+        return Err(damaged(path, "the file", "it is empty; copy or export it again"));
+    }
     if !bytes.starts_with(MAGIC) {
         return Ok(Container { json: bytes, binary: None });
     }

@@ -50,7 +50,8 @@ pub(super) fn import(
     let mut chunks: Vec<Chunk> = pieces
         .par_iter()
         .map(|&(start, piece)| {
-            Chunk::parse(piece, wish)
+            refuse_zero_bytes(piece)
+                .and_then(|()| Chunk::parse(piece, wish))
                 .map_err(|Fault { at, reason }| Fault { at: start + at, reason })
         })
         .collect::<Result<_, _>>()
@@ -72,6 +73,15 @@ pub(super) fn import(
         place(admitted, segment, material, options, &mut import)?;
     }
     Ok(import)
+}
+
+/// Files of other formats would else pass for models of lines that mean nothing.
+fn refuse_zero_bytes(text: &[u8]) -> Result<(), Fault> {
+    if !text.contains(&0) {
+        return Ok(());
+    }
+    let at = text.iter().position(|&byte| byte == 0).unwrap_or_default();
+    Err(Fault::new(at, "a zero byte: this is no text, hence no OBJ; export the model again"))
 }
 
 /// Adds a mesh where the file has it.
