@@ -7,17 +7,15 @@ use std::time::Instant;
 
 use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
 
-use crate::embree::{Found, Scene, version};
-use crate::recheck::{self, BUNDLE, Candidate};
-use crate::single::{self, Frame, Rays32};
+use crate::embree::{Found, Judged, Scene, Search, version};
+use crate::nearest::{Nearest, Query};
+use crate::recheck;
+use crate::single::{Frame, Rays32};
 use crate::solve::{self, Lanes, Solved};
 use crate::{Accel, BuildError, BuildOptions, BuildReport, Counts};
 
-/// Bundles around one place before a second look moves on behind it.
+/// Bundles around a ray before it is believed to miss.
 const TURNS: usize = 4;
-
-/// Places along one ray that a second look tries.
-const STEPS: usize = 64;
 
 /// The Embree backend.
 #[derive(Debug)]
@@ -40,7 +38,7 @@ struct Scratch {
     solved: Solved,
     lanes: Box<Lanes>,
     suspects: Vec<u32>,
-    candidates: Vec<Candidate>,
+    doubtful: Vec<u32>,
 }
 
 thread_local! {
@@ -90,61 +88,84 @@ impl Embree {
         self.scene.packet_width()
     }
 
-    /// Looks again at what [`recheck`] suspects.
+    /// Whether answers are looked at a second time.
+    fn checks(&self) -> bool {
+        self.robust && self.refine
+    }
+
+    /// Whether the rays are to be decided in f64 where they start: those of surfaces.
+    fn start_on_surfaces(rays: &RayBatch) -> bool {
+        !rays.coherent && rays.t_min.iter().any(|&t_min| t_min > 0.0)
+    }
+
+    /// Looks again at what is wrong, and at what [`recheck`] suspects.
     fn look_again(&self, rays: &RayBatch, hits: &mut HitBatch, scratch: &mut Scratch) {
-        let Scratch { rays: rays32, again, found, solved, lanes, suspects, candidates } = scratch;
+        let Scratch { rays: rays32, again, found, solved, suspects, doubtful, .. } = scratch;
         suspects.clear();
         if rays.len() > 1 {
             recheck::minority_sides(hits, &solved.front, suspects);
         }
         suspects.retain(|&i| solved.valid[i as usize]);
-        recheck::lonely_misses(hits, |i| self.frame.may_meet(rays, i), suspects);
-        // First a cheap second opinion, from one ray beside each.
-        again.clear();
-        for &i in suspects.iter() {
-            let shift = recheck::nudge(rays.direction(i as usize), self.frame.blur());
-            again.push_shifted(rays32, i as usize, shift);
-        }
-        let mut rechecked = again.len() as u64;
-        rechecked += solved.valid.iter().filter(|valid| !**valid).count() as u64;
-        self.scene.closest(again, rays.coherent, found);
-        let mut kept = 0;
-        for k in 0..suspects.len() {
-            let i = suspects[k] as usize;
-            // A nearer hit contradicts the first answer, or any hit a miss.
-            let t = f64::from(found.t[k]) + again.advance[k];
-            let slack = 1e-4 * self.frame.radius;
-            if found.placement[k] != MISS && t < hits.t[i] - slack {
-                suspects[kept] = suspects[k];
-                kept += 1;
-            }
-        }
-        suspects.truncate(kept);
+        let could_hit = |i| rays32.can_hit(i) && self.frame.may_meet(rays, i);
+        recheck::lonely_misses(hits, could_hit, suspects);
+        let mut rechecked = suspects.len() as u64;
+        self.ask_beside(rays, hits, rays32, again, found, suspects);
+        suspects.append(doubtful);
         suspects.extend((0..).zip(&solved.valid).filter(|(_, valid)| !**valid).map(|(i, _)| i));
+        suspects.sort_unstable();
+        suspects.dedup();
+        if suspects.is_empty() {
+            self.count(rechecked, 0);
+            return;
+        }
+        rechecked += suspects.len() as u64;
         let mut corrected = 0;
         for &i in suspects.iter() {
-            let before = (hits.placement[i as usize], hits.triangle[i as usize]);
-            self.ask_bundle(rays, hits, i as usize, rays32, again, found, candidates);
-            let after = (hits.placement[i as usize], hits.triangle[i as usize]);
-            if before != after {
-                corrected += 1;
-            }
-            if after.0 != MISS {
-                solve::solve_one(self.scene.geometry(), rays, hits, i as usize, lanes);
-            } else {
-                hits.clear_hit(i as usize);
-            }
+            let i = i as usize;
+            let before = (hits.placement[i], hits.triangle[i]);
+            self.decide(rays, hits, i, rays32, again, found);
+            corrected += u64::from(before != (hits.placement[i], hits.triangle[i]));
         }
+        self.count(rechecked, corrected);
+    }
+
+    fn count(&self, rechecked: u64, corrected: u64) {
         if rechecked > 0 {
             self.rechecked.fetch_add(rechecked, Ordering::Relaxed);
             self.corrected.fetch_add(corrected, Ordering::Relaxed);
         }
     }
 
-    /// Decides ray `i` by the exact test on all triangles that a bundle of rays around it meets,
-    /// first near the answer at hand, then behind it.
-    #[expect(clippy::too_many_arguments, reason = "scratch memory, passed down once")]
-    fn ask_bundle(
+    /// A cheap second opinion, from one ray beside each suspect: drops those that it confirms.
+    fn ask_beside(
+        &self,
+        rays: &RayBatch,
+        hits: &HitBatch,
+        rays32: &Rays32,
+        again: &mut Rays32,
+        found: &mut Found,
+        suspects: &mut Vec<u32>,
+    ) {
+        again.clear();
+        for &i in suspects.iter() {
+            let shift = recheck::nudge(rays.direction(i as usize), self.frame.blur());
+            again.push_shifted(rays32, i as usize, shift);
+        }
+        self.scene.closest(again, rays.coherent, found);
+        let mut k = 0;
+        suspects.retain(|&i| {
+            // A nearer hit contradicts the first answer, or any hit a miss.
+            let t = f64::from(found.t[k]) + again.advance[k];
+            let contradicts = found.placement[k] != MISS
+                && t < hits.t[i as usize] - self.frame.slack(f64::from(found.t[k]));
+            k += 1;
+            contradicts
+        });
+    }
+
+    /// Decides ray `i` by the exact test on all triangles that single precision meets along it, and
+    /// along rays around it.
+    fn decide(
         &self,
         rays: &RayBatch,
         hits: &mut HitBatch,
@@ -152,56 +173,43 @@ impl Embree {
         rays32: &Rays32,
         again: &mut Rays32,
         found: &mut Found,
-        candidates: &mut Vec<Candidate>,
     ) {
-        candidates.clear();
-        if hits.placement[i] != MISS {
-            candidates.push((hits.placement[i], hits.triangle[i]));
-        }
-        let mut behind = rays32.t_near[i];
-        // A ray along a surface grazes many triangles that it does not hit. Each step starts behind
-        // the nearest of the last, so what lies along the ray bounds them.
-        for _ in 0..STEPS {
-            let mut nearest = f32::INFINITY;
-            for turn in 0..TURNS {
-                again.clear();
-                for shift in recheck::bundle(rays.direction(i), self.frame.blur(), turn) {
-                    again.push_shifted(rays32, i, shift);
-                }
-                again.t_near.fill(behind);
-                self.scene.closest(again, true, found);
-                for k in 0..BUNDLE {
-                    if found.placement[k] != MISS {
-                        let candidate = (found.placement[k], found.triangle[k]);
-                        if !candidates.contains(&candidate) {
-                            candidates.push(candidate);
-                        }
-                        nearest = nearest.min(found.t[k]);
-                    }
-                }
-                if nearest == f32::INFINITY {
-                    break;
-                }
-                let decided = recheck::decide(self.scene.geometry(), rays, i, candidates, hits);
-                let t = hits.t[i] - rays32.advance[i];
-                if decided && t <= f64::from(nearest) + self.slack(nearest) {
-                    return;
-                }
-            }
-            if nearest == f32::INFINITY {
-                break;
-            }
-            let ahead = f64::from(nearest) + 4.0 * self.frame.blur();
-            behind = nearest.next_up().max(single::round(ahead));
-            if behind >= rays32.t_far[i] {
-                break;
-            }
-        }
-        recheck::decide(self.scene.geometry(), rays, i, candidates, hits);
+        let first = (hits.placement[i] != MISS).then_some(hits.t[i]);
+        hits.clear_hit(i);
+        let nearest = self.nearest(rays, i, rays32, again, found, first);
+        nearest.write(self.scene.geometry(), hits, i);
     }
 
-    fn slack(&self, t: f32) -> f64 {
-        64.0 * (self.frame.blur() + f64::from(t) * f64::from(f32::EPSILON))
+    /// The nearest exact hit of ray `i`, of which single precision says that it is at `first`.
+    fn nearest(
+        &self,
+        rays: &RayBatch,
+        i: usize,
+        rays32: &Rays32,
+        again: &mut Rays32,
+        found: &mut Found,
+        first: Option<f64>,
+    ) -> Nearest {
+        let Some(query) = Query::of(rays, i) else { return Nearest::none(0.0) };
+        let advance = rays32.advance[i];
+        let slack = |t: f64| self.frame.slack(t - advance);
+        let farthest = slack(first.unwrap_or(advance + 4.0 * self.frame.radius));
+        let mut search = Search::new(self.scene.geometry(), query, advance, farthest);
+        // Where it should be, as rounding has it: mostly the neighbour of what was found first.
+        again.clear();
+        again.push_unmoved(rays, &self.frame, rays32, i);
+        self.scene.search(again, &mut search, found);
+        let is_neighbour = first.is_some_and(|t| (search.nearest.t - t).abs() <= slack(t));
+        let mut turn = 0;
+        while !is_neighbour && turn < TURNS {
+            again.clear();
+            for shift in recheck::bundle(rays.direction(i), self.frame.blur(), turn) {
+                again.push_shifted(rays32, i, shift);
+            }
+            self.scene.search(again, &mut search, found);
+            turn = if search.nearest.placement == MISS { turn + 1 } else { TURNS };
+        }
+        search.nearest
     }
 }
 
@@ -220,25 +228,26 @@ impl Accel for Embree {
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
         hits.reset(rays.len());
         SCRATCH.with_borrow_mut(|scratch| {
+            let geometry = self.scene.geometry();
+            scratch.doubtful.clear();
             scratch.rays.convert(rays, &self.frame);
-            self.scene.closest(&scratch.rays, rays.coherent, &mut scratch.found);
+            if self.checks() && Self::start_on_surfaces(rays) {
+                let slack = |t| 2.0 * self.frame.slack(t);
+                let trusted = [slack(0.0), slack(1.0) - slack(0.0)];
+                let mut judged = Judged::new(geometry, rays, trusted, &mut scratch.doubtful);
+                self.scene.closest_from_surfaces(&scratch.rays, &mut judged, &mut scratch.found);
+            } else {
+                self.scene.closest(&scratch.rays, rays.coherent, &mut scratch.found);
+            }
             hits.placement.copy_from_slice(&scratch.found.placement);
             hits.triangle.copy_from_slice(&scratch.found.triangle);
-            solve::solve(
-                self.scene.geometry(),
-                rays,
-                hits,
-                &mut scratch.lanes,
-                &mut scratch.solved,
-            );
-            if !self.refine {
-                for i in 0..rays.len() {
-                    if hits.placement[i] != MISS {
-                        hits.t[i] = f64::from(scratch.found.t[i]) + scratch.rays.advance[i];
-                    }
-                }
-            } else if self.robust {
+            solve::solve(geometry, rays, hits, &mut scratch.lanes, &mut scratch.solved);
+            if self.checks() {
                 self.look_again(rays, hits, scratch);
+            } else if !self.refine {
+                for i in (0..rays.len()).filter(|&i| hits.placement[i] != MISS) {
+                    hits.t[i] = f64::from(scratch.found.t[i]) + scratch.rays.advance[i];
+                }
             }
         });
     }
@@ -247,8 +256,25 @@ impl Accel for Embree {
         blocked.clear();
         blocked.resize(rays.len(), false);
         SCRATCH.with_borrow_mut(|scratch| {
-            scratch.rays.convert(rays, &self.frame);
-            self.scene.occluded(&scratch.rays, rays.coherent, blocked);
+            let Scratch { rays: rays32, again, found, doubtful, .. } = scratch;
+            rays32.convert(rays, &self.frame);
+            if !self.checks() {
+                self.scene.occluded(rays32, rays.coherent, blocked);
+                return;
+            }
+            doubtful.clear();
+            let geometry = self.scene.geometry();
+            let mut judged = Judged::new(geometry, rays, [0.0; 2], doubtful);
+            self.scene.occluded_exactly(rays32, rays.coherent, &mut judged, blocked);
+            doubtful.retain(|&i| !blocked[i as usize]);
+            doubtful.dedup();
+            let mut corrected = 0;
+            for &i in doubtful.iter() {
+                let i = i as usize;
+                blocked[i] = self.nearest(rays, i, rays32, again, found, None).placement != MISS;
+                corrected += u64::from(blocked[i]);
+            }
+            self.count(doubtful.len() as u64, corrected);
         });
     }
 

@@ -10,6 +10,10 @@
 //! * Errors come through the device's error function, with Embree's own words. Tracing reports none.
 //! * Masks, ids and the 16 bytes behind the last vertex are seen to here and nowhere else.
 
+mod filter;
+mod trace;
+
+use std::collections::HashSet;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::fmt;
 use std::ptr::{self, NonNull};
@@ -18,10 +22,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use embree4_sys as sys;
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Geometry, MISS, Mesh, Positions, Transform};
+use etendue_geometry::{Geometry, Mesh, Placement, Positions, Transform};
 
-use crate::single::Rays32;
+use crate::single;
 use crate::{BuildError, BuildOptions, Quality};
+
+pub(crate) use self::filter::{Judged, Search};
+pub(crate) use self::trace::Found;
 
 type ProgressFn = dyn Fn(f64) -> bool + Send + Sync;
 
@@ -462,6 +469,10 @@ impl<'a> SceneBuilder<'a> {
         if options.robust {
             flags = sys::RTCSceneFlags(flags.0 | sys::RTC_SCENE_FLAG_ROBUST.0);
         }
+        if options.robust && options.refine {
+            flags =
+                sys::RTCSceneFlags(flags.0 | sys::RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS.0);
+        }
         if options.compact {
             flags = sys::RTCSceneFlags(flags.0 | sys::RTC_SCENE_FLAG_COMPACT.0);
         }
@@ -521,25 +532,6 @@ impl fmt::Debug for Scene {
     }
 }
 
-/// What single precision found for a batch of rays.
-#[derive(Debug, Default)]
-pub(crate) struct Found {
-    /// Placement of each hit, or [`MISS`].
-    pub(crate) placement: Vec<u32>,
-    /// Triangle of each hit, or [`MISS`].
-    pub(crate) triangle: Vec<u32>,
-    /// Single-precision distance from the moved origin.
-    pub(crate) t: Vec<f32>,
-}
-
-impl Found {
-    fn resize(&mut self, len: usize) {
-        self.placement.resize(len, MISS);
-        self.triangle.resize(len, MISS);
-        self.t.resize(len, f32::INFINITY);
-    }
-}
-
 impl Scene {
     /// Builds the scene of `geometry` with coordinates relative to `origin`.
     pub(crate) fn build(
@@ -549,10 +541,10 @@ impl Scene {
     ) -> Result<Self, BuildError> {
         let device = Device::new(options)?;
         let mut copied_bytes = 0;
-        let uses = geometry.uses();
-        let mut shared: Vec<Option<SceneHandle>> = Vec::with_capacity(uses.len());
-        for (mesh, &uses) in geometry.meshes.iter().zip(&uses) {
-            let scene = if uses > 1 && !mesh.triangles.is_empty() {
+        let instanced = Instanced::of(&geometry);
+        let mut shared: Vec<Option<SceneHandle>> = Vec::with_capacity(geometry.meshes.len());
+        for (mesh, &wanted) in geometry.meshes.iter().zip(&instanced.meshes) {
+            let scene = if wanted {
                 let mut builder = SceneBuilder::new(&device, options)?;
                 let to_frame = Transform::new(DMat3::IDENTITY, -mesh_origin(mesh));
                 let shape = Shape::mesh(&device, mesh, &to_frame, options)?;
@@ -565,19 +557,18 @@ impl Scene {
             shared.push(scene);
         }
         let mut builder = SceneBuilder::new(&device, options)?;
-        for (id, placement) in (0..).zip(&geometry.placements) {
+        for (id, kind) in (0..).zip(&instanced.placements) {
+            let placement = &geometry.placements[id as usize];
             let mesh = geometry.mesh_of(placement);
-            if mesh.triangles.is_empty() {
-                continue;
-            }
             let mut to_frame = placement.world_from_mesh;
             to_frame.translation -= origin;
-            let shape = match &shared[placement.mesh as usize] {
-                Some(scene) => {
+            let shape = match (kind, &shared[placement.mesh as usize]) {
+                (Kind::LeftOut, _) => continue,
+                (Kind::Instance, Some(scene)) => {
                     let back = Transform::new(DMat3::IDENTITY, mesh_origin(mesh));
                     Shape::instance(&device, scene, &to_frame.then_inner(&back), options)?
                 }
-                None => Shape::mesh(&device, mesh, &to_frame, options)?,
+                _ => Shape::mesh(&device, mesh, &to_frame, options)?,
             };
             copied_bytes += shape.copied_bytes;
             builder.attach(&shape, id);
@@ -601,193 +592,82 @@ impl Scene {
     pub(crate) fn packet_width(&self) -> usize {
         self.device.width
     }
-
-    /// The closest hit of each ray in single precision.
-    pub(crate) fn closest(&self, rays: &Rays32, coherent: bool, found: &mut Found) {
-        found.resize(rays.len());
-        match (coherent, self.device.width) {
-            (true, 16) => self.closest16(rays, found),
-            (true, 8) => self.closest8(rays, found),
-            (true, 4) => self.closest4(rays, found),
-            _ => self.closest1(rays, found),
-        }
-    }
-
-    /// Whether anything lies between each ray's ends, in single precision.
-    pub(crate) fn occluded(&self, rays: &Rays32, coherent: bool, blocked: &mut [bool]) {
-        match (coherent, self.device.width) {
-            (true, 16) => self.occluded16(rays, blocked),
-            (true, 8) => self.occluded8(rays, blocked),
-            (true, 4) => self.occluded4(rays, blocked),
-            _ => self.occluded1(rays, blocked),
-        }
-    }
-
-    fn closest1(&self, rays: &Rays32, found: &mut Found) {
-        let mut arguments = intersect_arguments(false);
-        for i in 0..rays.len() {
-            let mut query = sys::RTCRayHit { ray: single_ray(rays, i), ..Default::default() };
-            query.hit.geomID = MISS;
-            query.hit.primID = MISS;
-            query.hit.instID[0] = MISS;
-            // SAFETY: the scene is committed; the query is of the C type, aligned by it, with ids
-            // and mask set; Embree keeps no pointer to it.
-            unsafe { sys::rtcIntersect1(self.handle.0.as_ptr(), &mut query, &mut arguments) };
-            let hit = &query.hit;
-            found.placement[i] = if hit.instID[0] == MISS { hit.geomID } else { hit.instID[0] };
-            found.triangle[i] = hit.primID;
-            found.t[i] = query.ray.tfar;
-        }
-    }
-
-    fn occluded1(&self, rays: &Rays32, blocked: &mut [bool]) {
-        let mut arguments = occluded_arguments(false);
-        for (i, blocked) in blocked.iter_mut().enumerate() {
-            let mut ray = single_ray(rays, i);
-            // SAFETY: as in `closest1`.
-            unsafe { sys::rtcOccluded1(self.handle.0.as_ptr(), &mut ray, &mut arguments) };
-            *blocked = ray.tfar == f32::NEG_INFINITY;
-        }
-    }
 }
 
-fn single_ray(rays: &Rays32, i: usize) -> sys::RTCRay {
-    sys::RTCRay {
-        org_x: rays.origin[0][i],
-        org_y: rays.origin[1][i],
-        org_z: rays.origin[2][i],
-        dir_x: rays.direction[0][i],
-        dir_y: rays.direction[1][i],
-        dir_z: rays.direction[2][i],
-        tnear: rays.t_near[i],
-        tfar: rays.t_far[i],
-        mask: u32::MAX,
-        ..Default::default()
-    }
-}
-
-fn intersect_arguments(coherent: bool) -> sys::RTCIntersectArguments {
-    let mut arguments = sys::RTCIntersectArguments::default();
-    // SAFETY: a plain C initialiser of a struct of ours.
-    unsafe { sys::rtcInitIntersectArguments(&mut arguments) };
-    arguments.flags = if coherent {
-        sys::RTC_RAY_QUERY_FLAG_COHERENT
-    } else {
-        sys::RTC_RAY_QUERY_FLAG_INCOHERENT
-    };
-    arguments
-}
-
-fn occluded_arguments(coherent: bool) -> sys::RTCOccludedArguments {
-    let mut arguments = sys::RTCOccludedArguments::default();
-    // SAFETY: a plain C initialiser of a struct of ours.
-    unsafe { sys::rtcInitOccludedArguments(&mut arguments) };
-    arguments.flags = if coherent {
-        sys::RTC_RAY_QUERY_FLAG_COHERENT
-    } else {
-        sys::RTC_RAY_QUERY_FLAG_INCOHERENT
-    };
-    arguments
-}
-
-/// Packets of one width: the same code on C types of another size.
-macro_rules! packets {
-    ($closest:ident, $occluded:ident, $width:literal, $rayhit:ident, $ray:ident, $intersect:ident,
-     $occlude:ident) => {
-        impl Scene {
-            fn $closest(&self, rays: &Rays32, found: &mut Found) {
-                let mut arguments = intersect_arguments(true);
-                let mut query = Aligned(sys::$rayhit::default());
-                let mut start = 0;
-                while start < rays.len() {
-                    let count = $width.min(rays.len() - start);
-                    let valid = Aligned(std::array::from_fn::<i32, $width, _>(|lane| {
-                        if lane < count { -1 } else { 0 }
-                    }));
-                    fill_packet!(query.0.ray, rays, start, count);
-                    query.0.hit.geomID = [MISS; $width];
-                    query.0.hit.primID = [MISS; $width];
-                    query.0.hit.instID[0] = [MISS; $width];
-                    // SAFETY: the scene is committed; packet and mask have the C types' layout and
-                    // are aligned to 64 bytes by `Aligned`; lanes past `count` are masked off.
-                    unsafe {
-                        sys::$intersect(
-                            valid.0.as_ptr(),
-                            self.handle.0.as_ptr(),
-                            &mut query.0,
-                            &mut arguments,
-                        );
-                    }
-                    let hit = &query.0.hit;
-                    let range = start..start + count;
-                    for (lane, placement) in found.placement[range.clone()].iter_mut().enumerate() {
-                        let instance = hit.instID[0][lane];
-                        *placement = if instance == MISS { hit.geomID[lane] } else { instance };
-                    }
-                    found.triangle[range.clone()].copy_from_slice(&hit.primID[..count]);
-                    found.t[range].copy_from_slice(&query.0.ray.tfar[..count]);
-                    start += count;
-                }
-            }
-
-            fn $occluded(&self, rays: &Rays32, blocked: &mut [bool]) {
-                let mut arguments = occluded_arguments(true);
-                let mut query = Aligned(sys::$ray::default());
-                let mut start = 0;
-                while start < rays.len() {
-                    let count = $width.min(rays.len() - start);
-                    let valid = Aligned(std::array::from_fn::<i32, $width, _>(|lane| {
-                        if lane < count { -1 } else { 0 }
-                    }));
-                    fill_packet!(query.0, rays, start, count);
-                    // SAFETY: as above.
-                    unsafe {
-                        sys::$occlude(
-                            valid.0.as_ptr(),
-                            self.handle.0.as_ptr(),
-                            &mut query.0,
-                            &mut arguments,
-                        );
-                    }
-                    for (lane, blocked) in blocked[start..start + count].iter_mut().enumerate() {
-                        *blocked = query.0.tfar[lane] == f32::NEG_INFINITY;
-                    }
-                    start += count;
-                }
-            }
-        }
-    };
-}
-
-/// Copies `count` rays from `start` into a packet.
-macro_rules! fill_packet {
-    ($ray:expr, $rays:expr, $start:expr, $count:expr) => {{
-        let range = $start..$start + $count;
-        let ray = &mut $ray;
-        ray.org_x[..$count].copy_from_slice(&$rays.origin[0][range.clone()]);
-        ray.org_y[..$count].copy_from_slice(&$rays.origin[1][range.clone()]);
-        ray.org_z[..$count].copy_from_slice(&$rays.origin[2][range.clone()]);
-        ray.dir_x[..$count].copy_from_slice(&$rays.direction[0][range.clone()]);
-        ray.dir_y[..$count].copy_from_slice(&$rays.direction[1][range.clone()]);
-        ray.dir_z[..$count].copy_from_slice(&$rays.direction[2][range.clone()]);
-        ray.tnear[..$count].copy_from_slice(&$rays.t_near[range.clone()]);
-        ray.tfar[..$count].copy_from_slice(&$rays.t_far[range]);
-        ray.mask = [u32::MAX; _];
-    }};
-}
-
-/// The alignment of the widest packet, for all of them.
-#[repr(C, align(64))]
-struct Aligned<T>(T);
-
-packets!(closest4, occluded4, 4, RTCRayHit4, RTCRay4, rtcIntersect4, rtcOccluded4);
-packets!(closest8, occluded8, 8, RTCRayHit8, RTCRay8, rtcIntersect8, rtcOccluded8);
-packets!(closest16, occluded16, 16, RTCRayHit16, RTCRay16, rtcIntersect16, rtcOccluded16);
-
-/// The origin that an instanced mesh is traced relative to: its own, unless its coordinates need f64.
+/// The origin that an instanced mesh is traced relative to: its own, unless it lies far from it.
 fn mesh_origin(mesh: &Mesh) -> DVec3 {
-    match mesh.positions {
-        Positions::F32(_) => DVec3::ZERO,
-        Positions::F64(_) => mesh.bounds.centre(),
+    single::Frame::of(mesh.bounds).origin
+}
+
+/// What becomes of a placement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Nothing to see, or another stands in the same place.
+    LeftOut,
+    /// Its triangles are moved.
+    Baked,
+    /// Its mesh's own scene, moved.
+    Instance,
+}
+
+/// What becomes of each placement, and which meshes get a scene of their own.
+struct Instanced {
+    placements: Vec<Kind>,
+    meshes: Vec<bool>,
+}
+
+/// Rays are moved into a worse conditioned placement with an error that single precision cannot bear.
+const WORST_CONDITION: f64 = 1e3;
+
+impl Instanced {
+    fn of(geometry: &Geometry) -> Self {
+        let uses = geometry.uses();
+        let mut seen = HashSet::new();
+        let mut meshes = vec![false; geometry.meshes.len()];
+        let kind = |placement: &Placement| {
+            let (mesh, transform) = (placement.mesh as usize, &placement.world_from_mesh);
+            if geometry.meshes[mesh].triangles.is_empty() || !transform.is_finite() {
+                return Kind::LeftOut;
+            }
+            if uses[mesh] < 2 {
+                return Kind::Baked;
+            }
+            // Of several in the very same place the first is the one that is seen.
+            if !seen.insert((mesh, bits_of(transform))) {
+                return Kind::LeftOut;
+            }
+            if !is_sound(&transform.linear) {
+                return Kind::Baked;
+            }
+            meshes[mesh] = true;
+            Kind::Instance
+        };
+        let placements = geometry.placements.iter().map(kind).collect();
+        Self { placements, meshes }
     }
+}
+
+fn bits_of(transform: &Transform) -> [u64; 15] {
+    let mut bits = [0; 15];
+    let [x, y, z] = [transform.linear.x_axis, transform.linear.y_axis, transform.linear.z_axis];
+    let columns = [x, y, z, transform.translation, transform.translation_low];
+    for (k, column) in columns.into_iter().enumerate() {
+        // Adding zero turns −0 into 0.
+        bits[3 * k..3 * k + 3].copy_from_slice(&(column + 0.0).to_array().map(f64::to_bits));
+    }
+    bits
+}
+
+/// Whether single precision can invert `linear`.
+fn is_sound(linear: &DMat3) -> bool {
+    let norm = |m: &DMat3| {
+        let squares = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length_squared);
+        squares.into_iter().sum::<f64>().sqrt()
+    };
+    let size = norm(linear);
+    // At unit scale, so that a small determinant is not mistaken for 0; Embree works out f32's.
+    let unit = *linear * (1.0 / size);
+    (1e-12..1e12).contains(&size)
+        && unit.determinant() != 0.0
+        && norm(&unit.inverse()) <= WORST_CONDITION
 }

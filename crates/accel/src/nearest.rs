@@ -38,6 +38,29 @@ impl Query {
         let hit = watertight::intersect(a, b, c, self.direction)?;
         (hit.t >= self.t_min && hit.t <= self.t_max).then_some(hit)
     }
+
+    /// As [`Self::test`], with the reason.
+    #[cfg(feature = "embree")]
+    pub(crate) fn judge(&self, view: &View<'_>, corners: [DVec3; 3]) -> Verdict {
+        let [a, b, c] = view.seen_from(self.origin, corners);
+        match watertight::intersect(a, b, c, self.direction) {
+            Some(hit) if hit.t >= self.t_min && hit.t <= self.t_max => Verdict::Hit(hit),
+            Some(_) => Verdict::OutOfRange,
+            None => Verdict::Beside,
+        }
+    }
+}
+
+/// What the exact test says of a ray and a triangle.
+#[cfg(feature = "embree")]
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Verdict {
+    /// The ray hits it.
+    Hit(watertight::Hit),
+    /// Its line does, nearer or farther than counts.
+    OutOfRange,
+    /// Its line passes beside it.
+    Beside,
 }
 
 /// A placement's transform, applied as [`Transform::point_from`] does but once for all corners.

@@ -10,16 +10,14 @@
 //!   mesh meet it next from within.
 //!
 //! A ray under suspicion for its miss or its side is traced once more, a little further aside; if
-//! nothing nearer is found, the answer stands. Otherwise, and for an invalid hit, a bundle of sixteen
-//! such rays collects the triangles thereabouts, and the exact test of [`crate::watertight`] on each
-//! in f64 decides.
+//! nothing nearer is found, the answer stands. Otherwise, and for an invalid hit, the exact test of
+//! [`crate::watertight`] decides on every triangle that single precision meets along the ray, and, if
+//! that does not confirm where the hit was, along a bundle of sixteen rays around it.
 
 use std::f64::consts::TAU;
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Geometry, HitBatch, MISS, RayBatch};
-
-use crate::watertight;
+use etendue_geometry::{HitBatch, MISS};
 
 /// Rays in a bundle.
 pub(crate) const BUNDLE: usize = 16;
@@ -44,47 +42,6 @@ pub(crate) fn bundle(direction: DVec3, radius: f64, turn: usize) -> [DVec3; BUND
 pub(crate) fn nudge(direction: DVec3, radius: f64) -> DVec3 {
     let (x, y) = direction.any_orthonormal_pair();
     (x * 0.6 + y * 0.8) * radius
-}
-
-/// A triangle that a ray may hit: placement and triangle.
-pub(crate) type Candidate = (u32, u32);
-
-/// A triangle that a ray passes outside of by no more than this many roundings of f64 is hit: the ray
-/// itself is not known better.
-const ROUNDINGS: f64 = 4.0;
-
-/// The nearest of `candidates` that ray `i` hits, written to `hits`; a miss when there is none.
-/// Returns whether there was one.
-pub(crate) fn decide(
-    geometry: &Geometry,
-    rays: &RayBatch,
-    i: usize,
-    candidates: &[Candidate],
-    hits: &mut HitBatch,
-) -> bool {
-    let mut best = (f64::INFINITY, (MISS, MISS));
-    let (origin, direction) = (rays.origin(i), rays.direction(i));
-    for &(index, triangle) in candidates {
-        let placement = &geometry.placements[index as usize];
-        let corners = geometry.mesh_of(placement).corners(triangle as usize);
-        let [a, b, c] = corners.map(|p| placement.world_from_mesh.point_from(p, origin));
-        let t = if let Some(hit) = watertight::intersect(a, b, c, direction) {
-            hit.t
-        } else if watertight::margin(a, b, c, direction) > -ROUNDINGS {
-            let normal = (b - a).cross(c - a);
-            normal.dot(a) / normal.dot(direction)
-        } else {
-            continue;
-        };
-        if t >= rays.t_min[i] && t <= rays.t_max[i] && (t, (index, triangle)) < best {
-            best = (t, (index, triangle));
-        }
-    }
-    let (t, (placement, triangle)) = best;
-    hits.t[i] = t;
-    hits.placement[i] = placement;
-    hits.triangle[i] = triangle;
-    placement != MISS
 }
 
 /// The misses of a batch that mostly hits, where `in_box` says that the ray crosses the scene's box:

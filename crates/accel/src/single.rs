@@ -25,7 +25,19 @@ const NEAR: f64 = 4.0;
 const ODD_AXIS: [f64; 3] = [0.48, 0.6, 0.64];
 
 /// Rays that start farther from the box than this many half-diagonals are started nearer.
-const FAR: f64 = 4.0;
+const FAR: f64 = 1.5;
+
+/// Single precision's distances are trusted to this many times its lateral error: up to a cosine of
+/// incidence of one in so many.
+const SLOPE: f64 = 32.0;
+
+/// Rays that start farther from the scene's centre than this many half-diagonals miss it: f64 could
+/// not tell where they pass.
+const MOST_RADII: f64 = 1e12;
+
+/// How much larger than the scene's box the sphere is that a ray must meet to be traced: f64's
+/// rounding in telling so, at distances of up to 10¹² radii.
+const SPHERE_SLACK: f64 = 1e-3;
 
 impl Frame {
     pub(crate) fn of(bounds: Bounds) -> Self {
@@ -66,6 +78,12 @@ impl Frame {
     pub(crate) fn blur(&self) -> f64 {
         8.0 * f64::from(f32::EPSILON) * (self.centre.length() + (1.0 + FAR) * self.radius)
     }
+
+    /// By how much (m) single precision's distance `t` may be off. What counts at a limit of a ray
+    /// within this is decided in f64.
+    pub(crate) fn slack(&self, t: f64) -> f64 {
+        SLOPE * (self.blur() + f64::from(f32::EPSILON) * t.max(0.0))
+    }
 }
 
 /// A batch of rays in single precision.
@@ -73,15 +91,23 @@ impl Frame {
 pub(crate) struct Rays32 {
     pub(crate) origin: [Vec<f32>; 3],
     pub(crate) direction: [Vec<f32>; 3],
+    /// Before the nearest distance that counts, and behind the farthest, by what single precision
+    /// may be off.
     pub(crate) t_near: Vec<f32>,
     pub(crate) t_far: Vec<f32>,
-    /// How far (m) each ray was moved ahead of its true origin.
+    /// How far (m) each ray was moved ahead of its true origin. Rays that start within the scene are
+    /// moved back a little, so that what they start on lies ahead of them whichever way it rounds.
     pub(crate) advance: Vec<f64>,
 }
 
 impl Rays32 {
     pub(crate) fn len(&self) -> usize {
         self.t_near.len()
+    }
+
+    /// Whether ray `i` is sound and ends behind the scene's beginning.
+    pub(crate) fn can_hit(&self, i: usize) -> bool {
+        self.t_far[i] > 0.0
     }
 
     fn resize(&mut self, len: usize) {
@@ -108,6 +134,18 @@ impl Rays32 {
         self.t_near.push(from.t_near[i]);
         self.t_far.push(from.t_far[i]);
         self.advance.push(from.advance[i]);
+    }
+
+    /// Appends ray `i` of `rays` without moving it sideways, ahead as `from` has it.
+    pub(crate) fn push_unmoved(&mut self, rays: &RayBatch, frame: &Frame, from: &Self, i: usize) {
+        let ahead = rays.direction(i) * from.advance[i];
+        let origin = (rays.origin(i) - frame.origin) + ahead;
+        self.push_shifted(from, i, DVec3::ZERO);
+        for axis in 0..3 {
+            if let Some(last) = self.origin[axis].last_mut() {
+                *last = round(origin[axis]);
+            }
+        }
     }
 
     pub(crate) fn clear(&mut self) {
@@ -138,6 +176,8 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
     let far = FAR * frame.radius;
     let pull = frame.nudge() / frame.radius;
     let push = 0.5 * frame.nudge();
+    let [pad, pad_per_distance] = [frame.slack(0.0), frame.slack(1.0) - frame.slack(0.0)];
+    let sphere = (1.0 + SPHERE_SLACK) * frame.radius + pad;
     for i in 0..n {
         let x = ox[i] - frame.origin.x;
         let y = oy[i] - frame.origin.y;
@@ -146,21 +186,35 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
         // the box's sphere.
         let (cx, cy, cz) = (frame.centre.x - x, frame.centre.y - y, frame.centre.z - z);
         let foot = cx * dx[i] + cy * dy[i] + cz * dz[i];
+        let (fx, fy, fz) = (cx - foot * dx[i], cy - foot * dy[i], cz - foot * dz[i]);
+        let distance = cx.abs() + cy.abs() + cz.abs();
+        let reach = sphere + f64::EPSILON * 4.0 * distance;
+        // Embree wants finite numbers below 10¹⁸. Any comparison with NaN is false.
+        let meets = fx * fx + fy * fy + fz * fz <= reach * reach && foot >= -reach;
+        let unit = dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i] > 0.5;
+        let sound = unit && distance <= frame.radius * MOST_RADII && t_min[i] <= t_max[i];
         // Only a far ray is moved ahead, to `far` before the foot.
-        let ahead = (foot - far).max(0.0);
-        advance[i] = ahead;
+        let ahead = (foot - far).max(-pad);
         // Sideways: towards the box's centre, the more the farther out, and a little across.
-        let sx = pull * (cx - foot * dx[i]) + push * (ODD_AXIS[1] * dz[i] - ODD_AXIS[2] * dy[i]);
-        let sy = pull * (cy - foot * dy[i]) + push * (ODD_AXIS[2] * dx[i] - ODD_AXIS[0] * dz[i]);
-        let sz = pull * (cz - foot * dz[i]) + push * (ODD_AXIS[0] * dy[i] - ODD_AXIS[1] * dx[i]);
-        px[i] = round(x + dx[i] * ahead + sx);
-        py[i] = round(y + dy[i] * ahead + sy);
-        pz[i] = round(z + dz[i] * ahead + sz);
-        qx[i] = round(dx[i]);
-        qy[i] = round(dy[i]);
-        qz[i] = round(dz[i]);
-        t_near[i] = round((t_min[i] - ahead).max(0.0) * (1.0 - 1e-6));
+        let sx = pull * fx + push * (ODD_AXIS[1] * dz[i] - ODD_AXIS[2] * dy[i]);
+        let sy = pull * fy + push * (ODD_AXIS[2] * dx[i] - ODD_AXIS[0] * dz[i]);
+        let sz = pull * fz + push * (ODD_AXIS[0] * dy[i] - ODD_AXIS[1] * dx[i]);
+        let near = t_min[i] - ahead;
+        let near = (near - (pad + pad_per_distance * near)).max(0.0);
+        let end = t_max[i] - ahead;
+        let end = (end + (pad + pad_per_distance * end.max(0.0))).max(near);
+        // A ray that cannot hit is put beside the scene, pointing away.
+        let traced = meets && sound;
+        let choose = |value: f64, otherwise: f64| round(if traced { value } else { otherwise });
+        advance[i] = ahead;
+        px[i] = choose(x + dx[i] * ahead + sx, frame.centre.x + 2.0 * far);
+        py[i] = choose(y + dy[i] * ahead + sy, frame.centre.y);
+        pz[i] = choose(z + dz[i] * ahead + sz, frame.centre.z);
+        qx[i] = choose(dx[i], 1.0);
+        qy[i] = choose(dy[i], 0.0);
+        qz[i] = choose(dz[i], 0.0);
+        t_near[i] = choose(near, 0.0);
         // Embree takes no ray that ends before it starts.
-        t_far[i] = round((t_max[i] - ahead) * (1.0 + 1e-6)).max(t_near[i]);
+        t_far[i] = choose(end, 0.0).max(t_near[i]);
     }
 }

@@ -108,20 +108,6 @@ pub(crate) fn solve(
     }
 }
 
-/// The same for one ray whose triangle is known to be right.
-pub(crate) fn solve_one(
-    geometry: &Geometry,
-    rays: &RayBatch,
-    hits: &mut HitBatch,
-    i: usize,
-    lanes: &mut Lanes,
-) {
-    let mut solved = Solved { valid: vec![true; i + 1], front: vec![false; i + 1] };
-    gather(geometry, rays, hits, i..i + 1, lanes);
-    measure(lanes, hits.detail == Detail::Surface);
-    scatter(rays, hits, i, i..i + 1, lanes, &mut solved);
-}
-
 /// Fills the lanes with the triangles of one chunk; `false` when no ray of it hit anything.
 fn gather(
     geometry: &Geometry,

@@ -1,0 +1,239 @@
+//! Filters: what Embree asks about each hit that single precision finds, decided in f64.
+//!
+//! A filter sees every triangle that the single-precision ray meets on its way, not only the
+//! nearest, and Embree looks on behind what it refuses. So *whether* a triangle counts is the exact
+//! test's word, and single precision only has to come near it.
+
+use std::ffi::c_int;
+
+use embree4_sys as sys;
+use etendue_geometry::{Geometry, MISS, RayBatch};
+
+use crate::nearest::{Nearest, Query, Verdict, View};
+use crate::single;
+
+/// The hits that a filter is asked about: one for each lane of a packet.
+struct Lanes {
+    valid: *mut c_int,
+    ray: *mut f32,
+    hit: *const u32,
+    width: usize,
+}
+
+// Which of the arrays of `RTCRayN` and `RTCHitN` holds what (rtcore_ray.h).
+const RAY_TNEAR: usize = 3;
+const RAY_TFAR: usize = 8;
+const RAY_ID: usize = 10;
+const HIT_PRIMITIVE: usize = 5;
+const HIT_GEOMETRY: usize = 6;
+const HIT_INSTANCE: usize = 7;
+
+impl Lanes {
+    /// # Safety
+    ///
+    /// `args` must be what Embree passed to a filter, and not outlive the call.
+    unsafe fn of(args: *const sys::RTCFilterFunctionNArguments) -> Self {
+        // SAFETY: the caller vouches for `args`.
+        let args = unsafe { &*args };
+        Self {
+            valid: args.valid,
+            ray: args.ray.cast(),
+            hit: args.hit.cast_const().cast(),
+            width: args.N as usize,
+        }
+    }
+
+    /// Calls `keep` for every hit there is, and refuses those for which it answers `false`.
+    fn judge(&self, mut keep: impl FnMut(Hit<'_>) -> bool) {
+        for lane in 0..self.width {
+            // SAFETY: Embree gives `width` flags, and as many of each number of rays and hits.
+            unsafe {
+                if *self.valid.add(lane) != 0 && !keep(Hit { lanes: self, lane }) {
+                    *self.valid.add(lane) = 0;
+                }
+            }
+        }
+    }
+}
+
+/// One lane.
+struct Hit<'a> {
+    lanes: &'a Lanes,
+    lane: usize,
+}
+
+impl Hit<'_> {
+    fn of_ray(&self, array: usize) -> f32 {
+        // SAFETY: the arrays of a ray stand behind each other, `width` numbers of four bytes each.
+        unsafe { *self.lanes.ray.add(array * self.lanes.width + self.lane) }
+    }
+
+    fn of_hit(&self, array: usize) -> u32 {
+        // SAFETY: as above.
+        unsafe { *self.lanes.hit.add(array * self.lanes.width + self.lane) }
+    }
+
+    /// The number that the query gave its ray.
+    fn id(&self) -> usize {
+        self.of_ray(RAY_ID).to_bits() as usize
+    }
+
+    fn t_near(&self) -> f32 {
+        self.of_ray(RAY_TNEAR)
+    }
+
+    fn t(&self) -> f32 {
+        self.of_ray(RAY_TFAR)
+    }
+
+    /// Makes Embree look as far as `t` from here on. "Intersection filters may modify tfar", say
+    /// Embree's kernels.
+    fn look_to(&self, t: f32) {
+        // SAFETY: as above; Embree lets filters write here.
+        unsafe { *self.lanes.ray.add(RAY_TFAR * self.lanes.width + self.lane) = t }
+    }
+
+    /// Placement and triangle.
+    fn what(&self) -> (u32, u32) {
+        let instance = self.of_hit(HIT_INSTANCE);
+        let placement = if instance == MISS { self.of_hit(HIT_GEOMETRY) } else { instance };
+        (placement, self.of_hit(HIT_PRIMITIVE))
+    }
+}
+
+/// What the exact test says of a ray and a triangle.
+fn verdict(geometry: &Geometry, query: &Query, (placement, triangle): (u32, u32)) -> Verdict {
+    let placement = &geometry.placements[placement as usize];
+    let corners = geometry.mesh_of(placement).corners(triangle as usize);
+    query.judge(&View::new(&placement.world_from_mesh), corners)
+}
+
+/// The rays of a query whose hits are decided one by one.
+#[repr(C)]
+pub(crate) struct Judged<'a> {
+    /// First, because this is what Embree hands on.
+    context: sys::RTCRayQueryContext,
+    geometry: &'a Geometry,
+    rays: &'a RayBatch,
+    /// Hits this far behind a ray's start are taken as they are: at 0 and a unit farther.
+    trusted: [f32; 2],
+    /// Rays that met a triangle in single precision and pass beside it in f64: they may have hit its
+    /// neighbour.
+    pub(super) doubtful: &'a mut Vec<u32>,
+}
+
+impl<'a> Judged<'a> {
+    pub(crate) fn new(
+        geometry: &'a Geometry,
+        rays: &'a RayBatch,
+        trusted: [f64; 2],
+        doubtful: &'a mut Vec<u32>,
+    ) -> Self {
+        let trusted = trusted.map(single::round);
+        Self { context: sys::RTCRayQueryContext::default(), geometry, rays, trusted, doubtful }
+    }
+
+    fn keeps(&mut self, hit: &Hit<'_>) -> bool {
+        let i = hit.id();
+        let Some(query) = Query::of(self.rays, i) else { return false };
+        match verdict(self.geometry, &query, hit.what()) {
+            Verdict::Hit(_) => true,
+            Verdict::OutOfRange => false,
+            Verdict::Beside => {
+                #[expect(clippy::cast_possible_truncation, reason = "batches are small")]
+                self.doubtful.push(i as u32);
+                false
+            }
+        }
+    }
+
+    pub(super) fn context(&mut self) -> *mut sys::RTCRayQueryContext {
+        std::ptr::from_mut(self).cast()
+    }
+}
+
+/// Keeps what the exact test says is hit.
+///
+/// # Safety
+///
+/// For Embree, in queries whose context is a [`Judged`].
+pub(super) unsafe extern "C" fn keep_exact(args: *const sys::RTCFilterFunctionNArguments) {
+    // SAFETY: Embree's own arguments, and the query's context, which nobody else uses meanwhile.
+    let (lanes, judged) =
+        unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<Judged<'_>>()) };
+    lanes.judge(|hit| judged.keeps(&hit));
+}
+
+/// As [`keep_exact`] near the start of a ray; keeps whatever lies well clear of it.
+///
+/// # Safety
+///
+/// As for [`keep_exact`].
+pub(super) unsafe extern "C" fn keep_clear(args: *const sys::RTCFilterFunctionNArguments) {
+    // SAFETY: as in `keep_exact`.
+    let (lanes, judged) =
+        unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<Judged<'_>>()) };
+    lanes.judge(|hit| {
+        let near = hit.t_near();
+        let clear = near + judged.trusted[0] + judged.trusted[1] * near;
+        hit.t() > clear || judged.keeps(&hit)
+    });
+}
+
+/// The nearest of the triangles that a bundle of rays around one ray meets and that one ray hits.
+#[repr(C)]
+pub(crate) struct Search<'a> {
+    /// First, because this is what Embree hands on.
+    context: sys::RTCRayQueryContext,
+    geometry: &'a Geometry,
+    query: Query,
+    pub(crate) nearest: Nearest,
+    /// How far the bundle's rays were moved ahead (m).
+    advance: f64,
+    /// How far the bundle looks, from there: behind the nearest by what single precision may be off.
+    limit: f32,
+    slack: f64,
+}
+
+impl<'a> Search<'a> {
+    /// For a ray of which nothing is known, moved `advance` ahead; distances may be off by `slack`.
+    pub(crate) fn new(geometry: &'a Geometry, query: Query, advance: f64, slack: f64) -> Self {
+        Self {
+            context: sys::RTCRayQueryContext::default(),
+            geometry,
+            nearest: Nearest::none(query.t_max),
+            query,
+            advance,
+            limit: f32::INFINITY,
+            slack,
+        }
+    }
+
+    pub(super) fn context(&mut self) -> *mut sys::RTCRayQueryContext {
+        std::ptr::from_mut(self).cast()
+    }
+
+    fn keeps(&mut self, hit: &Hit<'_>) -> bool {
+        let (placement, triangle) = hit.what();
+        let Verdict::Hit(exact) = verdict(self.geometry, &self.query, (placement, triangle)) else {
+            return false;
+        };
+        self.nearest.offer(exact, placement, triangle);
+        let end = self.nearest.t - self.advance + self.slack;
+        self.limit = self.limit.min(single::round(end));
+        hit.look_to(self.limit);
+        true
+    }
+}
+
+/// Notes the nearest exact hit in a [`Search`].
+///
+/// # Safety
+///
+/// For Embree, in closest-hit queries whose context is a [`Search`].
+pub(super) unsafe extern "C" fn search(args: *const sys::RTCFilterFunctionNArguments) {
+    // SAFETY: as in `keep_exact`.
+    let (lanes, search) =
+        unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<Search<'_>>()) };
+    lanes.judge(|hit| search.keeps(&hit));
+}

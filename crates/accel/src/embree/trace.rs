@@ -1,0 +1,293 @@
+//! Tracing a committed scene: one by one, or in packets of the width that the processor has.
+
+use embree4_sys as sys;
+use etendue_geometry::MISS;
+
+use super::Scene;
+use super::filter::{self, Judged, Search};
+use crate::single::Rays32;
+
+/// What single precision found for a batch of rays.
+#[derive(Debug, Default)]
+pub(crate) struct Found {
+    /// Placement of each hit, or [`MISS`].
+    pub(crate) placement: Vec<u32>,
+    /// Triangle of each hit, or [`MISS`].
+    pub(crate) triangle: Vec<u32>,
+    /// Single-precision distance from the moved origin.
+    pub(crate) t: Vec<f32>,
+}
+
+impl Found {
+    fn resize(&mut self, len: usize) {
+        self.placement.resize(len, MISS);
+        self.triangle.resize(len, MISS);
+        self.t.resize(len, f32::INFINITY);
+    }
+}
+
+impl Scene {
+    /// The closest hit of each ray in single precision.
+    pub(crate) fn closest(&self, rays: &Rays32, coherent: bool, found: &mut Found) {
+        self.intersect(rays, coherent, &mut intersect_arguments(coherent), found);
+    }
+
+    /// As [`Self::closest`], one by one, for rays that start on surfaces: hits near the start are
+    /// decided in f64.
+    pub(crate) fn closest_from_surfaces(
+        &self,
+        rays: &Rays32,
+        judged: &mut Judged<'_>,
+        found: &mut Found,
+    ) {
+        let mut arguments = intersect_arguments(false);
+        arguments.flags |= sys::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+        arguments.filter = Some(filter::keep_clear);
+        arguments.context = judged.context();
+        self.intersect(rays, false, &mut arguments, found);
+    }
+
+    /// Looks with all of `rays`, which stand for one, for the nearest exact hit.
+    pub(crate) fn search(&self, rays: &Rays32, search: &mut Search<'_>, found: &mut Found) {
+        let coherent = rays.len() > 1;
+        let mut arguments = intersect_arguments(coherent);
+        arguments.flags |= sys::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+        arguments.filter = Some(filter::search);
+        arguments.context = search.context();
+        self.intersect(rays, coherent, &mut arguments, found);
+    }
+
+    fn intersect(
+        &self,
+        rays: &Rays32,
+        coherent: bool,
+        arguments: &mut sys::RTCIntersectArguments,
+        found: &mut Found,
+    ) {
+        found.resize(rays.len());
+        match (coherent, self.device.width) {
+            (true, 16) => self.closest16(rays, arguments, found),
+            (true, 8) => self.closest8(rays, arguments, found),
+            (true, 4) => self.closest4(rays, arguments, found),
+            _ => self.closest1(rays, arguments, found),
+        }
+    }
+
+    /// Whether anything lies between each ray's ends, in single precision.
+    pub(crate) fn occluded(&self, rays: &Rays32, coherent: bool, blocked: &mut [bool]) {
+        self.occlude(rays, coherent, &mut occluded_arguments(coherent), blocked);
+    }
+
+    /// Whether anything lies between each ray's ends by the exact test.
+    pub(crate) fn occluded_exactly(
+        &self,
+        rays: &Rays32,
+        coherent: bool,
+        judged: &mut Judged<'_>,
+        blocked: &mut [bool],
+    ) {
+        let mut arguments = occluded_arguments(coherent);
+        arguments.flags |= sys::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+        arguments.filter = Some(filter::keep_exact);
+        arguments.context = judged.context();
+        self.occlude(rays, coherent, &mut arguments, blocked);
+    }
+
+    fn occlude(
+        &self,
+        rays: &Rays32,
+        coherent: bool,
+        arguments: &mut sys::RTCOccludedArguments,
+        blocked: &mut [bool],
+    ) {
+        match (coherent, self.device.width) {
+            (true, 16) => self.occluded16(rays, arguments, blocked),
+            (true, 8) => self.occluded8(rays, arguments, blocked),
+            (true, 4) => self.occluded4(rays, arguments, blocked),
+            _ => self.occluded1(rays, arguments, blocked),
+        }
+    }
+
+    fn closest1(
+        &self,
+        rays: &Rays32,
+        arguments: &mut sys::RTCIntersectArguments,
+        found: &mut Found,
+    ) {
+        for i in 0..rays.len() {
+            let mut query = sys::RTCRayHit { ray: single_ray(rays, i), ..Default::default() };
+            query.hit.geomID = MISS;
+            query.hit.primID = MISS;
+            query.hit.instID[0] = MISS;
+            // SAFETY: the scene is committed; the query is of the C type, aligned by it, with ids
+            // and mask set; Embree keeps no pointer to it.
+            unsafe { sys::rtcIntersect1(self.handle.0.as_ptr(), &mut query, arguments) };
+            let hit = &query.hit;
+            found.placement[i] = if hit.instID[0] == MISS { hit.geomID } else { hit.instID[0] };
+            found.triangle[i] = hit.primID;
+            found.t[i] = query.ray.tfar;
+        }
+    }
+
+    fn occluded1(
+        &self,
+        rays: &Rays32,
+        arguments: &mut sys::RTCOccludedArguments,
+        blocked: &mut [bool],
+    ) {
+        for (i, blocked) in blocked.iter_mut().enumerate() {
+            let mut ray = single_ray(rays, i);
+            // SAFETY: as in `closest1`.
+            unsafe { sys::rtcOccluded1(self.handle.0.as_ptr(), &mut ray, arguments) };
+            *blocked = ray.tfar == f32::NEG_INFINITY;
+        }
+    }
+}
+
+fn single_ray(rays: &Rays32, i: usize) -> sys::RTCRay {
+    sys::RTCRay {
+        org_x: rays.origin[0][i],
+        org_y: rays.origin[1][i],
+        org_z: rays.origin[2][i],
+        dir_x: rays.direction[0][i],
+        dir_y: rays.direction[1][i],
+        dir_z: rays.direction[2][i],
+        tnear: rays.t_near[i],
+        tfar: rays.t_far[i],
+        mask: u32::MAX,
+        id: number(i),
+        ..Default::default()
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "batches are small")]
+fn number(i: usize) -> u32 {
+    i as u32
+}
+
+fn intersect_arguments(coherent: bool) -> sys::RTCIntersectArguments {
+    let mut arguments = sys::RTCIntersectArguments::default();
+    // SAFETY: a plain C initialiser of a struct of ours.
+    unsafe { sys::rtcInitIntersectArguments(&mut arguments) };
+    arguments.flags = if coherent {
+        sys::RTC_RAY_QUERY_FLAG_COHERENT
+    } else {
+        sys::RTC_RAY_QUERY_FLAG_INCOHERENT
+    };
+    arguments
+}
+
+fn occluded_arguments(coherent: bool) -> sys::RTCOccludedArguments {
+    let mut arguments = sys::RTCOccludedArguments::default();
+    // SAFETY: a plain C initialiser of a struct of ours.
+    unsafe { sys::rtcInitOccludedArguments(&mut arguments) };
+    arguments.flags = if coherent {
+        sys::RTC_RAY_QUERY_FLAG_COHERENT
+    } else {
+        sys::RTC_RAY_QUERY_FLAG_INCOHERENT
+    };
+    arguments
+}
+
+/// Packets of one width: the same code on C types of another size.
+macro_rules! packets {
+    ($closest:ident, $occluded:ident, $width:literal, $rayhit:ident, $ray:ident, $intersect:ident,
+     $occlude:ident) => {
+        impl Scene {
+            fn $closest(
+                &self,
+                rays: &Rays32,
+                arguments: &mut sys::RTCIntersectArguments,
+                found: &mut Found,
+            ) {
+                let mut query = Aligned(sys::$rayhit::default());
+                let mut start = 0;
+                while start < rays.len() {
+                    let count = $width.min(rays.len() - start);
+                    let valid = Aligned(std::array::from_fn::<i32, $width, _>(|lane| {
+                        if lane < count { -1 } else { 0 }
+                    }));
+                    fill_packet!(query.0.ray, rays, start, count);
+                    query.0.hit.geomID = [MISS; $width];
+                    query.0.hit.primID = [MISS; $width];
+                    query.0.hit.instID[0] = [MISS; $width];
+                    // SAFETY: the scene is committed; packet and mask have the C types' layout and
+                    // are aligned to 64 bytes by `Aligned`; lanes past `count` are masked off.
+                    unsafe {
+                        sys::$intersect(
+                            valid.0.as_ptr(),
+                            self.handle.0.as_ptr(),
+                            &mut query.0,
+                            arguments,
+                        );
+                    }
+                    let hit = &query.0.hit;
+                    let range = start..start + count;
+                    for (lane, placement) in found.placement[range.clone()].iter_mut().enumerate() {
+                        let instance = hit.instID[0][lane];
+                        *placement = if instance == MISS { hit.geomID[lane] } else { instance };
+                    }
+                    found.triangle[range.clone()].copy_from_slice(&hit.primID[..count]);
+                    found.t[range].copy_from_slice(&query.0.ray.tfar[..count]);
+                    start += count;
+                }
+            }
+
+            fn $occluded(
+                &self,
+                rays: &Rays32,
+                arguments: &mut sys::RTCOccludedArguments,
+                blocked: &mut [bool],
+            ) {
+                let mut query = Aligned(sys::$ray::default());
+                let mut start = 0;
+                while start < rays.len() {
+                    let count = $width.min(rays.len() - start);
+                    let valid = Aligned(std::array::from_fn::<i32, $width, _>(|lane| {
+                        if lane < count { -1 } else { 0 }
+                    }));
+                    fill_packet!(query.0, rays, start, count);
+                    // SAFETY: as above.
+                    unsafe {
+                        sys::$occlude(
+                            valid.0.as_ptr(),
+                            self.handle.0.as_ptr(),
+                            &mut query.0,
+                            arguments,
+                        );
+                    }
+                    for (lane, blocked) in blocked[start..start + count].iter_mut().enumerate() {
+                        *blocked = query.0.tfar[lane] == f32::NEG_INFINITY;
+                    }
+                    start += count;
+                }
+            }
+        }
+    };
+}
+
+/// Copies `count` rays from `start` into a packet.
+macro_rules! fill_packet {
+    ($ray:expr, $rays:expr, $start:expr, $count:expr) => {{
+        let range = $start..$start + $count;
+        let ray = &mut $ray;
+        ray.org_x[..$count].copy_from_slice(&$rays.origin[0][range.clone()]);
+        ray.org_y[..$count].copy_from_slice(&$rays.origin[1][range.clone()]);
+        ray.org_z[..$count].copy_from_slice(&$rays.origin[2][range.clone()]);
+        ray.dir_x[..$count].copy_from_slice(&$rays.direction[0][range.clone()]);
+        ray.dir_y[..$count].copy_from_slice(&$rays.direction[1][range.clone()]);
+        ray.dir_z[..$count].copy_from_slice(&$rays.direction[2][range.clone()]);
+        ray.tnear[..$count].copy_from_slice(&$rays.t_near[range.clone()]);
+        ray.tfar[..$count].copy_from_slice(&$rays.t_far[range]);
+        ray.mask = [u32::MAX; _];
+        ray.id = std::array::from_fn(|lane| number($start + lane));
+    }};
+}
+
+/// The alignment of the widest packet, for all of them.
+#[repr(C, align(64))]
+struct Aligned<T>(T);
+
+packets!(closest4, occluded4, 4, RTCRayHit4, RTCRay4, rtcIntersect4, rtcOccluded4);
+packets!(closest8, occluded8, 8, RTCRayHit8, RTCRay8, rtcIntersect8, rtcOccluded8);
+packets!(closest16, occluded16, 16, RTCRayHit16, RTCRay16, rtcIntersect16, rtcOccluded16);
