@@ -3,9 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use etendue_camera::train::Focus;
 use etendue_scene::import::Strictness;
 use etendue_scene::{LoadOptions, Reach};
 use etendue_tracer::LayerSpec;
+
+use crate::lens::parse_focus;
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
 /// it.
@@ -39,9 +42,17 @@ pub(crate) enum Command {
     /// Show what a sensor makes of light, or make the images that EMVA 1288 characterises it by
     #[command(after_help = SENSOR_HELP)]
     Sensor(SensorArguments),
-    /// Print the JSON Schema of scene files
-    #[command(after_help = "Example:\n  etendue schema > scene.schema.json")]
-    Schema,
+    /// Analyse a lens, or trace given rays through it
+    #[command(after_help = LENS_HELP)]
+    Lens(LensArguments),
+    /// Print the JSON Schema of scene files, lens files, or files of rays
+    #[command(after_help = "Example:\n  etendue schema > scene.schema.json\n  \
+                            etendue schema lens > lens.schema.json")]
+    Schema {
+        /// Of what
+        #[arg(value_enum, default_value_t = SchemaArgument::Scene)]
+        of: SchemaArgument,
+    },
 }
 
 const RENDER_HELP: &str = "\
@@ -72,6 +83,49 @@ Examples:
   etendue sensor imx183 -o out/imx183
   etendue sensor imx183 --set temperature=313.15 --set exposure=10 --json
   etendue sensor kaf8300 --emva out/kaf8300 --wavelength 525 --steps 25";
+
+const LENS_HELP: &str = "\
+All lengths are millimetres; z = 0 is the first element's vertex, +z runs from the object to the
+sensor, and elements count from 0 on the object side.
+
+RAYS.json: {\"from\": \"object\" or \"sensor\", \"clip\": true or false, \"rays\": [
+  {\"origin\": [x, y, z], \"direction\": [x, y, z], \"wavelength\": 587.56}]}
+
+Examples:
+  etendue lens scenes/lenses/double-gauss.json
+  etendue lens scenes/lenses/achromat.json --json --fields 0,5,10
+  etendue lens scenes/lenses/double-gauss.json --rays rays.json --json";
+
+#[derive(Debug, Args)]
+pub(crate) struct LensArguments {
+    /// A lens file (.json), or a scene whose camera is a lens
+    #[arg(value_name = "LENS|SCENE")]
+    pub(crate) lens: PathBuf,
+    /// Print JSON for machines, with all digits
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Trace the rays of a file instead, and print every intersection and how each ray ends
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rays: Option<PathBuf>,
+    /// Field angles in degrees; shares of the field of view when absent
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) fields: Option<Vec<f64>>,
+    /// Wavelengths in nm, the main one first; the lens' own and the F, d and C lines when absent
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) wavelengths: Option<Vec<f64>>,
+    /// Put the sensor where a plane at this distance is sharp: "1.2 m", or infinity
+    #[arg(long, value_name = "DISTANCE", value_parser = parse_focus, allow_hyphen_values = true)]
+    pub(crate) focus: Option<Focus>,
+    /// Open or close the stop to this f-number
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) f_number: Option<f64>,
+    /// Refuse wavelengths outside of what the glasses are stated for instead of warning
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// Let the file name files outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+}
 
 /// A scene, and what of it is overridden.
 #[derive(Debug, Args)]
@@ -108,6 +162,16 @@ pub(crate) struct SceneArguments {
     /// Let the scene name files outside its own folder
     #[arg(long)]
     pub(crate) allow_outside: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SchemaArgument {
+    /// Scene files
+    Scene,
+    /// Lens files
+    Lens,
+    /// Rays for `etendue lens --rays`
+    Rays,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -4,6 +4,7 @@
 mod arguments;
 mod check;
 mod fault;
+mod lens;
 mod plan;
 mod progress;
 mod render;
@@ -15,7 +16,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser};
 
-use arguments::{Cli, Command};
+use arguments::{Cli, Command, SchemaArgument};
 use fault::Fault;
 
 fn main() -> ExitCode {
@@ -29,7 +30,8 @@ fn main() -> ExitCode {
         Some(Command::Check(arguments)) => check::run(&arguments),
         Some(Command::Plan(arguments)) => plan::run(&arguments),
         Some(Command::Sensor(arguments)) => sensor::run(&arguments),
-        Some(Command::Schema) => print_schema(),
+        Some(Command::Lens(arguments)) => lens::run(&arguments),
+        Some(Command::Schema { of }) => print_schema(of),
         None => {
             // Nothing was asked for: say what can be.
             let _ = Cli::command().print_help();
@@ -45,7 +47,10 @@ fn main() -> ExitCode {
     }
 }
 
-fn print_schema() -> Result<(), Fault> {
-    let schema = etendue_scene::file::scene_schema();
-    fault::print_json(&schema)
+fn print_schema(of: SchemaArgument) -> Result<(), Fault> {
+    fault::print_json(&match of {
+        SchemaArgument::Scene => etendue_scene::file::scene_schema(),
+        SchemaArgument::Lens => etendue_scene::file::lens_schema(),
+        SchemaArgument::Rays => etendue_scene::file::rays_schema(),
+    })
 }

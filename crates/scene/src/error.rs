@@ -37,6 +37,18 @@ pub enum SceneError {
         /// What it is instead.
         reason: String,
     },
+    /// A file that holds no lens.
+    #[error(
+        "{}: {reason}; give a lens file (.json), a Zemax file (.zmx), or a scene whose camera is a \
+         lens",
+        file.display()
+    )]
+    NotALens {
+        /// The file.
+        file: PathBuf,
+        /// What it is instead.
+        reason: String,
+    },
     /// Broken JSON.
     #[error("{}, line {}, column {}: broken JSON: {reason}\n{excerpt}",
         file.display(), place.line, place.column)]

@@ -14,7 +14,7 @@ mod surface;
 mod thin_lens;
 
 use schemars::JsonSchema;
-use serde::de::Error as _;
+use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
@@ -113,10 +113,19 @@ impl<'de> Deserialize<'de> for ElementSpec {
                 mount.insert(key.to_owned(), value);
             }
         }
-        let read_mount = Mount::deserialize(Value::Object(mount)).map_err(D::Error::custom);
-        let part = PartSpec::deserialize(Value::Object(keys)).map_err(D::Error::custom)?;
-        Ok(Self { part, mount: read_mount? })
+        let mount = read::<Mount>(mount);
+        let part = read::<PartSpec>(keys).map_err(D::Error::custom)?;
+        Ok(Self { part, mount: mount.map_err(D::Error::custom)? })
     }
+}
+
+/// Reads an object; the error names the key that is wrong.
+fn read<T: DeserializeOwned>(keys: Map<String, Value>) -> Result<T, String> {
+    serde_path_to_error::deserialize(Value::Object(keys)).map_err(|error| {
+        let path = error.path().to_string();
+        let why = error.into_inner().to_string();
+        if path == "." { why } else { format!("{path}: {why}") }
+    })
 }
 
 impl From<SurfaceSpec> for PartSpec {

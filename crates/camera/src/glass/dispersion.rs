@@ -5,12 +5,15 @@
 //! W. Sellmeier, *Annalen der Physik* 219 (1871); A.-L. Cauchy, *Sur la réfraction et la réflexion
 //! de la lumière* (1830); the power series is the one glass makers publish.
 
+// Two decimals, as lens data is written: a lens analysed at "587.56 nm" here and elsewhere is the same
+// lens to the last digit, and `nd` is its index there.
+
 /// Hydrogen's F line (nm).
-pub const FRAUNHOFER_F: f64 = 486.1327;
+pub const FRAUNHOFER_F: f64 = 486.13;
 /// Helium's d line (nm), at which `nd` is measured.
-pub const FRAUNHOFER_D: f64 = 587.5618;
+pub const FRAUNHOFER_D: f64 = 587.56;
 /// Hydrogen's C line (nm).
-pub const FRAUNHOFER_C: f64 = 656.2725;
+pub const FRAUNHOFER_C: f64 = 656.27;
 
 /// A dispersion formula; wavelengths inside it are in micrometres.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,6 +9,8 @@
 //! | [`aim`] | chief rays: aimed at the stop's centre |
 //! | [`analysis`] | spots, distortion, relative illumination, colour |
 //! | [`pupil`] | the exit pupil as seen from the sensor, and samples of it |
+//! | [`report`] | all of it in one piece |
+//! | [`rays_file`] | given rays, point by point |
 
 pub mod aim;
 pub mod analysis;
@@ -16,6 +18,8 @@ pub mod file;
 pub mod focus;
 pub mod paraxial;
 pub mod pupil;
+pub mod rays_file;
+pub mod report;
 pub mod trace;
 
 use std::sync::Arc;
@@ -28,6 +32,8 @@ pub use file::{LensFile, SensorMount};
 pub use focus::{Focus, FocusError};
 pub use paraxial::{Paraxial, Pupil};
 pub use pupil::{ExitPupil, ExitPupilError, PupilSample};
+pub use rays_file::{GivenRay, RayError, RaysFile, TracedRays};
+pub use report::{Inquiry, LensReport, ReportError};
 pub use trace::{RayPath, Registers, Side, TrainAt};
 
 /// Why a lens file makes no lens.
@@ -255,6 +261,19 @@ impl OpticalTrain {
         }
         let radius = 0.5 * efl.abs() / f_number * magnification.abs();
         self.with_stop_radius(radius)
+    }
+
+    /// The same lens analysed, focused and its stop set at another wavelength (nm).
+    ///
+    /// # Errors
+    ///
+    /// When it is no wavelength.
+    pub fn with_wavelength(mut self, wavelength: f64) -> Result<Self, LensError> {
+        if !(wavelength > 0.0 && wavelength.is_finite()) {
+            return Err(LensError::Wavelength(wavelength));
+        }
+        self.wavelength = wavelength;
+        Ok(self)
     }
 
     /// Sets the stop, or finds the element that limits the beam from infinity on the axis, and

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use multiversion::multiversion;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{OpticalTrain, Part};
@@ -11,7 +12,7 @@ use crate::element::{Action, Block, Clip, Fate, LensRays, Ray, Refraction, Step}
 use crate::glass::GlassError;
 
 /// Where rays come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
     /// From the object towards the sensor: elements in their order.
@@ -100,6 +101,11 @@ impl TrainAt {
     #[must_use]
     pub fn index_before_sensor(&self) -> f64 {
         self.indices[self.indices.len() - 1]
+    }
+
+    /// The index of the medium behind element `i`.
+    pub(crate) fn index_behind(&self, i: usize) -> f64 {
+        self.indices[i + 1]
     }
 
     fn steps(&self, from: Side) -> &[Step] {

@@ -2,6 +2,7 @@
 
 mod check;
 mod document;
+mod lens;
 mod object;
 mod overrides;
 mod schema;
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 pub use document::Place;
+pub use lens::{lens_schema, rays_schema, read_lens, trace_rays};
 pub use object::{ObjectSpec, Scale, Source, TransformSpec};
 pub use overrides::OverrideError;
 pub use schema::scene_schema;

@@ -89,3 +89,19 @@ pub fn image_circle(train: &OpticalTrain, at: &TrainAt, sensor_z: f64, limit: f6
     }
     Some(low)
 }
+
+/// The angle from the axis (degrees) of the light that reaches a point of the sensor `radius` (mm)
+/// from its centre: half the field of view when that is the image circle's edge. It is that of the
+/// ray in the middle of the beam; `None` when there is no light.
+#[must_use]
+pub fn half_field(train: &OpticalTrain, at: &TrainAt, sensor_z: f64, radius: f64) -> Option<f64> {
+    let film = DVec3::new(0.0, radius, sensor_z);
+    let window = Window::find(train, at, film)?;
+    let outside = |slopes: DVec2| {
+        let path = at.path(Side::Sensor, Clip::Off, film, towards_lens(slopes));
+        path.direction.map(|d| d.truncate().length().atan2(-d.z).to_degrees())
+    };
+    // The middle of a crescent may run past the lens altogether.
+    let corners = [window.min, window.max].map(|corner| 0.5 * (corner + window.centre()));
+    [window.centre(), corners[0], corners[1]].into_iter().find_map(outside)
+}

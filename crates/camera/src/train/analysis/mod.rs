@@ -7,5 +7,7 @@ mod spots;
 
 pub use colour::{ColourShift, colour_shifts};
 pub use distortion::{Distortion, distortion};
-pub use illumination::{Illumination, illumination, image_circle, projected_solid_angle};
+pub use illumination::{
+    Illumination, half_field, illumination, image_circle, projected_solid_angle,
+};
 pub use spots::{Spot, spot};

@@ -1,0 +1,344 @@
+//! Everything that is known about a lens, in one piece: for tables, JSON and drawings.
+
+mod table;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::analysis::{
+    Distortion, Illumination, Spot, colour_shifts, distortion, half_field, illumination,
+    image_circle, spot,
+};
+use super::{Focus, OpticalTrain, Paraxial, Part, TrainAt};
+use crate::element::Opening;
+use crate::glass::{FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F, GlassError};
+
+/// Field angles of a lens whose image circle has no end (degrees).
+const FIELDS: [f64; 5] = [0.0, 5.0, 10.0, 15.0, 20.0];
+
+/// Shares of the field of view at which a lens is looked at. On its edge there is no light left.
+const SHARES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 0.9];
+
+/// Field angles from here on come from behind (degrees).
+const WIDEST: f64 = 180.0;
+
+/// What a report is about.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Inquiry {
+    /// Wavelengths of the chromatic shifts (nm); the F, d and C lines, where the glasses have an
+    /// index, and the design wavelength when absent.
+    pub wavelengths: Option<Vec<f64>>,
+    /// Field angles (degrees); shares of the field of view when absent.
+    pub fields: Option<Vec<f64>>,
+    /// Where the sensor stands.
+    pub focus: Focus,
+}
+
+/// Why there is no report.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    /// A wavelength that is none.
+    #[error("the wavelength {0} nm is none; it must be positive")]
+    Wavelength(f64),
+    /// A field angle out of range.
+    #[error("the field angle {0} degrees must lie between -180 and 180")]
+    Field(f64),
+    /// A focus that was asked for and cannot be had.
+    #[error(transparent)]
+    Focus(#[from] super::FocusError),
+    /// A glass without index.
+    #[error(transparent)]
+    Glass(#[from] GlassError),
+}
+
+/// What is known about a lens.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LensReport {
+    /// What the lens is called; empty when its file does not say.
+    pub name: String,
+    /// Where its numbers come from; empty when its file does not say.
+    pub source: String,
+    /// The units of all that follows.
+    pub units: Units,
+    /// The wavelength of all that names no other (nm).
+    pub wavelength: f64,
+    /// The elements from the object side.
+    pub elements: Vec<ElementRow>,
+    /// The index of the aperture stop.
+    pub stop: usize,
+    /// First-order data.
+    pub paraxial: Paraxial,
+    /// z of the plane of the spots, distortion and illumination: the sensor's, square to the axis
+    /// (mm); `null` when there is no image.
+    pub sensor_z: Option<f64>,
+    /// Diameter of the circle on the sensor that light reaches (mm); `null` when it has no end.
+    pub image_circle: Option<f64>,
+    /// Full angle of the light that reaches the image circle's edge (degrees); `null` as above.
+    pub field_of_view: Option<f64>,
+    /// Field angles (degrees).
+    pub fields: Vec<f64>,
+    /// Spots at those fields that light reaches.
+    pub spots: Vec<Spot>,
+    /// Distortion at those fields whose chief ray arrives.
+    pub distortion: Vec<Distortion>,
+    /// Relative illumination at those fields whose chief ray arrives.
+    pub relative_illumination: Vec<Illumination>,
+    /// Each wavelength against the design's.
+    pub colour: Vec<ColourRow>,
+    /// Glasses and filters that are not stated for one of the wavelengths, in sentences.
+    pub out_of_range: Vec<String>,
+    /// What else is odd about the lens, in sentences.
+    pub notes: Vec<String>,
+}
+
+/// Units of a report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Units {
+    length: &'static str,
+    wavelength: &'static str,
+    angle: &'static str,
+    distortion: &'static str,
+    projected_solid_angle: &'static str,
+}
+
+const UNITS: Units = Units {
+    length: "mm",
+    wavelength: "nm",
+    angle: "degree",
+    distortion: "percent",
+    projected_solid_angle: "sr",
+};
+
+/// An element in a report.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ElementRow {
+    /// What it is, as in a lens file.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// z of its vertex (mm).
+    pub z: f64,
+    /// Its radius of curvature (mm), for a thin lens its focal length; `null` when flat.
+    pub radius: Option<f64>,
+    /// How it differs from a centred sphere or a round hole, in words; empty when it does not.
+    pub shape: String,
+    /// To the next element's vertex, behind the last one to the sensor when there is an image (mm).
+    pub thickness: Option<f64>,
+    /// What is behind it.
+    pub medium: String,
+    /// The index of that at the report's wavelength.
+    pub index: f64,
+    /// How far from its axis it lets light pass (mm); `null` when unlimited.
+    pub semi_diameter: Option<f64>,
+}
+
+/// A wavelength against the design's.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ColourRow {
+    /// The wavelength (nm).
+    pub wavelength: f64,
+    /// Its back focal length less that of the design wavelength (mm).
+    pub longitudinal: Option<f64>,
+    /// Its chief ray's height less that of the design wavelength (mm), one for each of the report's
+    /// fields; `null` where a chief ray does not arrive.
+    pub lateral: Vec<Option<f64>>,
+    /// First-order data.
+    pub paraxial: Paraxial,
+}
+
+impl LensReport {
+    /// Looks at a lens from all sides.
+    ///
+    /// # Errors
+    ///
+    /// When a wavelength or field is none, a focus asked for cannot be had, or a glass has no index
+    /// at a wavelength asked for. A lens without image is no error: `notes` say what is missing.
+    pub fn new(train: &OpticalTrain, inquiry: &Inquiry) -> Result<Self, ReportError> {
+        let at = train.at(train.wavelength())?;
+        let paraxial = train.paraxial(train.wavelength())?;
+        let wavelengths = inquiry.wavelengths(train)?;
+        let mut notes = train.notes().to_vec();
+        let sensor_z = match (train.sensor_z(inquiry.focus), inquiry.focus) {
+            (Ok(z), _) => Some(z),
+            (Err(error), Focus::AsWritten) => {
+                notes.push(format!("no spots, distortion or illumination: {error}"));
+                None
+            }
+            (Err(error), _) => return Err(error.into()),
+        };
+        let circle = sensor_z.and_then(|z| image_circle(train, &at, z, farthest(train, z)));
+        let half_field = sensor_z.zip(circle).and_then(|(z, r)| half_field(train, &at, z, r));
+        let fields = inquiry.fields(half_field)?;
+        let mut report = Self {
+            name: train.name().to_owned(),
+            source: train.source().to_owned(),
+            units: UNITS,
+            wavelength: train.wavelength(),
+            elements: rows(train, &at, sensor_z),
+            stop: train.stop(),
+            paraxial,
+            sensor_z,
+            image_circle: circle.map(|radius| 2.0 * radius),
+            field_of_view: half_field.map(|half| 2.0 * half),
+            colour: colour(train, &wavelengths, &fields, sensor_z)?,
+            fields,
+            spots: Vec::new(),
+            distortion: Vec::new(),
+            relative_illumination: Vec::new(),
+            out_of_range: out_of_range(train, &wavelengths),
+            notes,
+        };
+        if let Some(z) = sensor_z {
+            report.look_at_fields(train, &at, z);
+        }
+        report.note_missing_spots();
+        Ok(report)
+    }
+
+    fn look_at_fields(&mut self, train: &OpticalTrain, at: &TrainAt, z: f64) {
+        for &field in &self.fields {
+            self.spots.extend(spot(train, at, field, z));
+            self.distortion.extend(distortion(train, at, field, z));
+        }
+        self.relative_illumination = illumination(train, at, &self.fields, z);
+    }
+
+    fn note_missing_spots(&mut self) {
+        if self.paraxial.entrance_pupil.diameter.is_none() && self.sensor_z.is_some() {
+            self.notes.push(match self.paraxial.entrance_pupil.z {
+                Some(_) => "no spots: nothing limits the beam; give the stop a radius, or a \
+                            surface a semi_diameter"
+                    .to_owned(),
+                None => "no spots: the entrance pupil is at infinity, and they are taken over its \
+                         plane"
+                    .to_owned(),
+            });
+        }
+    }
+}
+
+impl Inquiry {
+    fn wavelengths(&self, train: &OpticalTrain) -> Result<Vec<f64>, ReportError> {
+        let design = train.wavelength();
+        let Some(wavelengths) = &self.wavelengths else {
+            let has_index = |nm: f64| train.media().iter().all(|glass| glass.index(nm).is_ok());
+            let mut lines = vec![FRAUNHOFER_F, FRAUNHOFER_D, FRAUNHOFER_C];
+            if !lines.contains(&design) {
+                lines.push(design);
+            }
+            lines.retain(|&nm| has_index(nm));
+            lines.sort_by(f64::total_cmp);
+            return Ok(lines);
+        };
+        match wavelengths.iter().find(|nm| !(**nm > 0.0 && nm.is_finite())) {
+            Some(&wrong) => Err(ReportError::Wavelength(wrong)),
+            None => Ok(wavelengths.clone()),
+        }
+    }
+
+    fn fields(&self, half_field: Option<f64>) -> Result<Vec<f64>, ReportError> {
+        let Some(fields) = &self.fields else {
+            return Ok(match half_field {
+                Some(half) => SHARES.map(|share| rounded(share * half)).to_vec(),
+                None => FIELDS.to_vec(),
+            });
+        };
+        match fields.iter().find(|field| field.is_nan() || field.abs() >= WIDEST) {
+            Some(&wrong) => Err(ReportError::Field(wrong)),
+            None => Ok(fields.clone()),
+        }
+    }
+}
+
+/// Three significant digits: angles that are chosen need no more.
+fn rounded(angle: f64) -> f64 {
+    format!("{angle:.2e}").parse().unwrap_or(angle)
+}
+
+/// A radius on the sensor that no sensible image circle has (mm).
+fn farthest(train: &OpticalTrain, sensor_z: f64) -> f64 {
+    let behind = (sensor_z - train.last_vertex()).abs();
+    4.0 * (behind + train.last_vertex().abs() + train.lateral_scale())
+}
+
+/// What is not stated for the design wavelength, or for another one.
+fn out_of_range(train: &OpticalTrain, wavelengths: &[f64]) -> Vec<String> {
+    let others = wavelengths.iter().copied().filter(|&nm| nm != train.wavelength());
+    let all = std::iter::once(train.wavelength()).chain(others);
+    all.flat_map(|wavelength| train.outside_of_range(wavelength)).collect()
+}
+
+fn colour(
+    train: &OpticalTrain,
+    wavelengths: &[f64],
+    fields: &[f64],
+    sensor_z: Option<f64>,
+) -> Result<Vec<ColourRow>, ReportError> {
+    let (seen, z) = match sensor_z {
+        Some(z) => (fields, z),
+        None => (&[][..], 0.0),
+    };
+    let shifts = colour_shifts(train, wavelengths, seen, z)?;
+    let row = |shift: super::analysis::ColourShift| {
+        Ok(ColourRow {
+            wavelength: shift.wavelength,
+            longitudinal: shift.longitudinal,
+            lateral: shift.lateral,
+            paraxial: train.paraxial(shift.wavelength)?,
+        })
+    };
+    shifts.into_iter().map(row).collect()
+}
+
+fn rows(train: &OpticalTrain, at: &TrainAt, sensor_z: Option<f64>) -> Vec<ElementRow> {
+    let finite = |length: f64| length.is_finite().then_some(length);
+    let elements = train.elements();
+    let row = |(i, element): (usize, &super::Element)| {
+        let z = element.frame.vertex.z;
+        let next = elements.get(i + 1).map(|next| next.frame.vertex.z).or(sensor_z);
+        let (kind, radius) = match &element.part {
+            Part::Surface(surface) => ("surface", finite(1.0 / surface.curvature)),
+            Part::ThinLens(lens) => ("thin_lens", finite(1.0 / lens.power)),
+            Part::Aperture(_) => ("aperture", None),
+            Part::Filter(_) => ("filter", None),
+        };
+        ElementRow {
+            kind,
+            z,
+            radius,
+            shape: shape_of(element),
+            thickness: next.map(|next| next - z),
+            medium: train.media()[i + 1].name.clone(),
+            index: at.index_behind(i),
+            semi_diameter: finite(element.clear_radius()),
+        }
+    };
+    elements.iter().enumerate().map(row).collect()
+}
+
+/// A word on how an element differs from a centred sphere or a round hole; empty when it does not.
+fn shape_of(element: &super::Element) -> String {
+    let mut words = Vec::new();
+    match &element.part {
+        Part::Surface(surface) => {
+            if surface.conic != 0.0 {
+                words.push(format!("conic {}", surface.conic));
+            }
+            if !surface.aspheric.is_empty() {
+                words.push(format!("aspheric to r^{}", 2 * surface.aspheric.len()));
+            }
+        }
+        Part::Aperture(opening) => match &**opening {
+            Opening::Circle { .. } => {}
+            Opening::Polygon { normals, .. } => words.push(format!("{} blades", normals.len())),
+            Opening::Image(picture) => {
+                words.push(format!("mask of {} x {} pixels", picture.pixels[0], picture.pixels[1]));
+            }
+        },
+        Part::ThinLens(_) | Part::Filter(_) => {}
+    }
+    if !element.frame.is_axial() {
+        words.push("tilted or decentred".to_owned());
+    }
+    words.join(", ")
+}

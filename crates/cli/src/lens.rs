@@ -1,0 +1,96 @@
+//! `etendue lens`: what a lens does, and where given rays go in it.
+
+use std::io::Write;
+
+use etendue_camera::length::Dimension;
+use etendue_camera::train::{Focus, Inquiry, LensReport, OpticalTrain};
+use etendue_scene::Reach;
+use etendue_scene::file::{read_lens, trace_rays};
+
+use crate::arguments::LensArguments;
+use crate::fault::{Fault, print_json, print_text};
+
+pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
+    let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
+    let train = adjusted(read_lens(&arguments.lens, reach)?, arguments)?;
+    match &arguments.rays {
+        Some(rays) => {
+            let traced = trace_rays(&train, rays)?;
+            warn(&traced.out_of_range, arguments)?;
+            match arguments.json {
+                // On one line: there may be millions of them.
+                true => print_text(
+                    &serde_json::to_string(&traced).map_err(|error| Fault::Failed(error.into()))?,
+                ),
+                false => print_text(&traced.to_string()),
+            }
+        }
+        None => report(&train, arguments),
+    }
+}
+
+/// The lens at the wavelength and opening asked for.
+fn adjusted(mut train: OpticalTrain, arguments: &LensArguments) -> Result<OpticalTrain, Fault> {
+    let refused = |option: &str, why: String| Fault::refused(format!("{option}: {why}"));
+    if let Some(&wavelength) = arguments.wavelengths.as_ref().and_then(|list| list.first()) {
+        train = train
+            .with_wavelength(wavelength)
+            .map_err(|error| refused("--wavelengths", error.to_string()))?;
+    }
+    if let Some(f_number) = arguments.f_number {
+        train = train
+            .with_f_number(f_number)
+            .map_err(|error| refused("--f-number", error.to_string()))?;
+    }
+    Ok(train)
+}
+
+fn report(train: &OpticalTrain, arguments: &LensArguments) -> Result<(), Fault> {
+    let inquiry = Inquiry {
+        wavelengths: arguments.wavelengths.clone(),
+        fields: arguments.fields.clone(),
+        focus: arguments.focus.unwrap_or_default(),
+    };
+    let report = LensReport::new(train, &inquiry)
+        .map_err(|error| Fault::refused(format!("{}: {error}", arguments.lens.display())))?;
+    if arguments.json {
+        warn(&report.out_of_range, arguments)?;
+        print_json(&report)
+    } else {
+        if arguments.strict {
+            warn(&report.out_of_range, arguments)?;
+        }
+        print_text(&report.to_string())
+    }
+}
+
+/// Says on standard error that wavelengths are out of range, or refuses them.
+fn warn(out_of_range: &[String], arguments: &LensArguments) -> Result<(), Fault> {
+    if arguments.strict
+        && let Some(note) = out_of_range.first()
+    {
+        return Err(Fault::refused(format!("{}: {note}", arguments.lens.display())));
+    }
+    for note in out_of_range {
+        // When standard error is gone there is nobody to tell.
+        let _ = writeln!(std::io::stderr(), "warning: {note}");
+    }
+    Ok(())
+}
+
+/// `1.2 m`, a plain number of metres, or `infinity`.
+pub(crate) fn parse_focus(text: &str) -> Result<Focus, String> {
+    let text = text.trim();
+    if ["infinity", "inf"].contains(&text) {
+        return Ok(Focus::Infinity);
+    }
+    let metres = match text.parse::<f64>() {
+        Ok(number) => number,
+        Err(_) => Dimension::Length.parse(text, "m").map_err(|error| error.to_string())?,
+    };
+    if metres > 0.0 && metres.is_finite() {
+        Ok(Focus::Distance(metres))
+    } else {
+        Err("expected a distance above 0, such as \"1.2 m\", or infinity".to_owned())
+    }
+}

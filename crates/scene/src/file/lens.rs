@@ -1,0 +1,132 @@
+//! Lenses from files, and rays to trace through them: what `etendue lens` reads.
+
+use std::path::Path;
+use std::sync::LazyLock;
+
+use etendue_camera::train::{LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays};
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use super::{Written, check, read_document};
+use crate::SceneError;
+use crate::paths::{Folder, Reach};
+
+/// The keys of a scene that no lens file has.
+const SCENE_KEYS: [&str; 3] = ["etendue", "camera", "objects"];
+
+/// The schemas of lens files and of files of rays, made once.
+static LENS: LazyLock<Value> = LazyLock::new(lens_schema);
+static RAYS: LazyLock<Value> = LazyLock::new(rays_schema);
+
+/// The JSON Schema (2020-12) of a lens file.
+#[must_use]
+pub fn lens_schema() -> Value {
+    schema_of::<LensFile>("etendue lens")
+}
+
+/// The JSON Schema (2020-12) of a file of rays.
+#[must_use]
+pub fn rays_schema() -> Value {
+    schema_of::<RaysFile>("rays for etendue lens")
+}
+
+fn schema_of<T: JsonSchema>(title: &str) -> Value {
+    let mut schema = SchemaSettings::draft2020_12().into_generator().into_root_schema_for::<T>();
+    schema.insert("title".to_owned(), title.into());
+    schema.to_value()
+}
+
+/// Reads the lens of a lens file (`.json`), or that of the camera of a scene. The lens' own files
+/// (masks) must lie in its folder, and the scene's lens in the scene's, unless `reach` says
+/// otherwise.
+///
+/// # Errors
+///
+/// When the file is missing, holds no lens, or the lens makes no sense; the message names the place.
+pub fn read_lens(path: &Path, reach: Reach) -> Result<OpticalTrain, SceneError> {
+    let (written, value) = read(path)?;
+    if !SCENE_KEYS.iter().any(|key| value.get(key).is_some()) {
+        return build(&written, &value, reach);
+    }
+    let kind = value.pointer("/camera/type").and_then(Value::as_str).unwrap_or("pinhole");
+    match value.pointer("/camera/lens").and_then(Value::as_str) {
+        Some(file) if kind == "lens" => {
+            let found = folder(path, reach)?.find(file);
+            let found = found.map_err(|why| written.fault("camera.lens", why))?;
+            let (written, value) = read(&found.path)?;
+            build(&written, &value, reach)
+        }
+        _ => {
+            let why = format!("a \"{kind}\" has no lens to look at; give a scene whose camera has");
+            Err(written.fault("camera.type", why))
+        }
+    }
+}
+
+/// Reads rays and traces them through a lens.
+///
+/// # Errors
+///
+/// When the file is missing, is not what the format says, or has a ray that cannot be traced; the
+/// message names the place.
+pub fn trace_rays(lens: &OpticalTrain, path: &Path) -> Result<TracedRays, SceneError> {
+    let (written, value) = read(path)?;
+    let file: RaysFile = read_as(&RAYS, &written, &value)?;
+    lens.trace_file(&file)
+        .map_err(|RayError { index, key, why }| written.fault(&format!("rays[{index}].{key}"), why))
+}
+
+fn read(path: &Path) -> Result<(Written, Value), SceneError> {
+    let (document, value) = read_document(path).map_err(|error| match error {
+        SceneError::NotAScene { file, reason } => SceneError::NotALens { file, reason },
+        error => error,
+    })?;
+    Ok((Written::new(path, Some(document)), value))
+}
+
+fn read_as<T: DeserializeOwned>(
+    schema: &Value,
+    written: &Written,
+    value: &Value,
+) -> Result<T, SceneError> {
+    check::check(schema, value).map_err(|problem| written.fault(&problem.path, problem.reason))?;
+    serde_path_to_error::deserialize(value).map_err(|error| {
+        let path = error.path().to_string();
+        let path = if path == "." { "" } else { &path };
+        written.fault(path, error.inner().to_string())
+    })
+}
+
+fn folder(file: &Path, reach: Reach) -> Result<Folder, SceneError> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    Folder::open(folder.unwrap_or(Path::new(".")), reach)
+}
+
+fn build(written: &Written, value: &Value, reach: Reach) -> Result<OpticalTrain, SceneError> {
+    let file: LensFile = read_as(&LENS, written, value)?;
+    let folder = folder(&written.path, reach)?;
+    file.build(&|name| folder.find(name).map(|found| found.path))
+        .map_err(|error| fault(written, &error))
+}
+
+/// The error with the place in the file that it is about.
+fn fault(written: &Written, error: &LensError) -> SceneError {
+    let element = |index: &usize| format!("elements[{index}]");
+    match error {
+        LensError::Empty => written.fault("elements", "has no element; a lens needs at least one"),
+        LensError::Element { index, why } | LensError::Stop { index, why } => {
+            written.fault(&element(index), why)
+        }
+        LensError::Glass { index, source } => {
+            written.fault(&format!("{}.glass", element(index)), source.to_string())
+        }
+        LensError::Stops { first, second } => {
+            let why = format!("{} is the stop already; mark one of them", element(first));
+            written.fault(&format!("{}.stop", element(second)), why)
+        }
+        LensError::Wavelength(_) => written.fault("wavelength", error.to_string()),
+        _ => written.fault("", error.to_string()),
+    }
+}
