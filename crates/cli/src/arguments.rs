@@ -63,6 +63,10 @@ Files in the folder:
   NAME.preview.png   each layer to look at; not data
   camera.json        K, distortion and pose in OpenCV's convention
   layers.json        what each layer means: definition, unit, frame, miss
+and with a camera.sensor that is more than a grid of pixels, for each exposure:
+  raw.png, .npy, .dng   digital numbers as the sensor's converter gave them
+  raw.preview.png       the same to look at; not data
+  sensor.json           what the numbers mean, and which file is which exposure
 
 Examples:
   etendue render scenes/first-light.json -o out/first-light
@@ -192,7 +196,7 @@ pub(crate) struct RenderArguments {
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
     /// Kinds of file to write
-    #[arg(long, value_name = "LIST", default_value = "exr,png,npy")]
+    #[arg(long, value_name = "LIST", default_value = "exr,png,npy,dng")]
     pub(crate) outputs: String,
     /// Threads of build and render; 0 takes all that this process may use
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use etendue_accel::BuildError;
 use etendue_render::RenderError;
+use etendue_render::expose::ExposeError;
 use etendue_render::output::OutputError;
 use etendue_scene::SceneError;
 use etendue_sensor::emva::EmvaError;
@@ -69,8 +70,21 @@ impl From<RenderError> for Fault {
 
 impl From<OutputError> for Fault {
     fn from(error: OutputError) -> Self {
-        // A folder that cannot be written to is the caller's to mend.
-        Self::Refused(error.into())
+        match error {
+            OutputError::Stopped { .. } => Self::Failed(anyhow::Error::msg(STOPPED)),
+            // A folder that cannot be written to is the caller's to mend.
+            error => Self::Refused(error.into()),
+        }
+    }
+}
+
+impl From<ExposeError> for Fault {
+    fn from(error: ExposeError) -> Self {
+        match error {
+            ExposeError::Output(error) => error.into(),
+            ExposeError::Stopped => Self::Failed(anyhow::Error::msg(STOPPED)),
+            error => Self::Failed(error.into()),
+        }
     }
 }
 

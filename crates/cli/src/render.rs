@@ -9,7 +9,7 @@ use etendue_render::output::{
     ImageHash, Look, Outputs, PartFile, Picture, SOFTWARE, exr, npy, png, prepare_folder, sidecar,
 };
 use etendue_render::report::{memory, seconds};
-use etendue_render::{Images, Plan, Rendered, Report, Seconds, plan};
+use etendue_render::{Images, Plan, Rendered, Report, Seconds, expose, plan};
 use etendue_scene::file::{FileKind, SceneFile};
 use etendue_scene::import::Note;
 use etendue_scene::{LoadOptions, Scene};
@@ -88,10 +88,16 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let rendered = etendue_render::render(&scene, &plan, &*accel, &images, header, &*progress)?;
     drop(progress);
     time.render = lap.take();
-    let files = write(&arguments.output, &scene, &rendered.picture, outputs, stages)?;
+    let mut files = write(&arguments.output, &scene, &rendered.picture, outputs, stages)?;
+    let progress = stages.begin("expose");
+    let folder = &arguments.output;
+    let exposed = expose::write(&scene, &rendered.picture, folder, outputs, &*progress)?;
+    drop(progress);
+    files.extend(exposed.files);
     time.write = lap.take();
     time.total = seconds(start.elapsed());
-    let report = report(&scene, &*accel, &images, &rendered, time, &files)?;
+    let mut report = report(&scene, &*accel, &images, &rendered, time, &files)?;
+    report.notes.extend(exposed.notes);
     if let Some(path) = &arguments.report {
         sidecar::write_json(path, &report)?;
     }

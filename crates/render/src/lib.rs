@@ -7,10 +7,12 @@
 //! |---|---|
 //! | [`plan`] | what a scene needs, decided in one place, with reasons |
 //! | [`render`](mod@render) | build, decode, trace: from a loaded scene to a picture |
+//! | [`expose`] | what the camera's sensor makes of the light |
 //! | [`output`] | the named layers of a render, and EXR, PNG, NPY and JSON files of them |
 //! | [`report`] | what a render did and what it cost |
 
 mod description;
+pub mod expose;
 mod film;
 pub mod output;
 pub mod plan;

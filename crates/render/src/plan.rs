@@ -7,9 +7,11 @@ use etendue_accel::Quality;
 use etendue_geometry::Detail;
 use etendue_scene::Scene;
 use etendue_scene::import::Wanted;
+use etendue_spectrum::Lanes;
 use etendue_tracer::{LayerSpec, Needs};
 use serde::Serialize;
 
+use crate::expose;
 use crate::film::Precision;
 use crate::output::Outputs;
 
@@ -57,6 +59,8 @@ pub struct Plan {
     pub quality: Quality,
     /// How finely data layers are kept.
     pub precision: Precision,
+    /// What the numbers are that the picture's light is kept in.
+    pub lanes: Lanes,
     /// The decisions, in words.
     pub decisions: Vec<Decision>,
 }
@@ -90,6 +94,7 @@ impl Plan {
             rays,
             quality,
             precision,
+            lanes: expose::lanes(scene),
             decisions: Vec::new(),
         };
         plan.decisions = plan.explain(scene, needs, centre, mean, triangles);
@@ -119,11 +124,11 @@ impl Plan {
             _ => format!("the chief ray of each pixel serves all {count} layers"),
         };
         decide("rays", &self.rays.to_string(), rays_of);
-        decide(
-            "wavelengths",
-            "3 (RGB)",
-            "no sensor or glass in the scene tells more apart".to_owned(),
-        );
+        let (lanes, because) = expose::explain_lanes(scene, &self.lanes);
+        decide("wavelengths", &lanes, because);
+        if let Some((choice, because)) = expose::explain_sensor(scene) {
+            decide("sensor", &choice, because);
+        }
         decide("pupil", "off", "the camera has no aperture: every ray is a chief ray".to_owned());
         decide("shadows and bounces", "off", "no layer looks at light".to_owned());
         decide(

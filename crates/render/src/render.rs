@@ -9,10 +9,10 @@ use etendue_scene::file::AccelName;
 use etendue_tracer::{Image, Surroundings, Texture, View};
 use rayon::prelude::*;
 
-use crate::Plan;
 use crate::film::FilmLayer;
-use crate::output::{Picture, PictureError};
+use crate::output::{Layer, Picture, PictureError};
 use crate::tiles::{Job, Sampling, Stopped};
+use crate::{Plan, expose};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
 pub type Progress = Arc<dyn Fn(f64) -> bool + Send + Sync>;
@@ -142,13 +142,14 @@ pub fn render(
     let start = Instant::now();
     let rays = job(scene, plan, accel, images, progress).run(&mut film)?;
     let trace_time = start.elapsed();
-    let layers = film
+    let mut layers: Vec<Layer> = film
         .into_iter()
         .map(|layer| {
             let root = Some(layer.spec) == scene.picture;
             layer.into_layer(root)
         })
         .collect();
+    layers.extend(expose::spectrum(scene, &layers));
     let picture = Picture::new(width, height, layers, header)?;
     Ok(Rendered { picture, rays, trace_time })
 }

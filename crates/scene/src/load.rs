@@ -235,6 +235,7 @@ impl SceneFile {
         let files = opened.map(|(path, _)| (folder.relative(path), path.clone())).collect();
         let mut notes = parts.notes;
         notes.extend(self.unused_materials());
+        let sensor = self.sensor.clone().map(|s| s.with_resolution(camera.resolution()));
         Ok(Scene {
             path: self.path().to_owned(),
             geometry,
@@ -242,6 +243,7 @@ impl SceneFile {
             materials: parts.materials,
             textures: parts.textures,
             camera,
+            sensor,
             camera_origin,
             cameras: parts.cameras,
             picture: self.spec.picture(),
@@ -266,7 +268,8 @@ impl SceneFile {
                     SceneError::NoSuchCamera { wanted: wanted.to_owned(), reason }
                 })?;
                 let mut spec = camera.spec.clone();
-                if self.value().pointer("/camera/sensor/resolution").is_some() {
+                let given = |key| self.value().pointer("/camera/sensor")?.get(key);
+                if given("resolution").or_else(|| given("model")).is_some() {
                     *spec.sensor_mut() = own.sensor().clone();
                 }
                 let name = match &camera.name {

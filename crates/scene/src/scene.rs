@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use etendue_camera::Camera;
 use etendue_geometry::Geometry;
+use etendue_sensor::Sensor;
 use etendue_tracer::{LayerSpec, Material, Texture};
 
 use crate::file::RenderSpec;
@@ -28,6 +29,9 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// The camera.
     pub camera: Camera,
+    /// The camera's sensor, of the camera's resolution; `None` when it is ideal: then the picture is
+    /// all there is.
+    pub sensor: Option<Sensor>,
     /// Where the camera came from.
     pub camera_origin: CameraOrigin,
     /// Cameras that came with the models.

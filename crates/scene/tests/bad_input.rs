@@ -189,7 +189,7 @@ fn impossible_cameras_are_refused_by_path() {
     let cases = [
         (
             r#""sensor": {"resolution": [0, 480]}"#,
-            "camera.sensor.resolution: [0, 480] has no pixels",
+            "camera.sensor.resolution: expected 1 to 65535 pixels a side, found 0",
         ),
         (r#""sensor": {"resolution": [70000, 4]}"#, "camera.sensor.resolution"),
         (r#""sensor": {"resolution": [65535, 65535]}"#, "over 2147483648 pixels in all"),

@@ -10,12 +10,13 @@
 //! Beyond its edges the image is mirrored about its outermost pixels, which keeps the pattern's turns.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::CfaSpec;
 
 /// How missing colours are found.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// From the same filter alone; any pattern.

@@ -87,20 +87,30 @@ impl Sensor {
         }
     }
 
-    /// An image as 8-bit sRGB, `[row][column][red, green, blue]`; `exposure` multiplies the light.
+    /// An image in linear sRGB, white balanced: a pixel at full scale of a white light is (1, 1, 1).
     #[must_use]
-    pub fn preview(&self, image: &RawImage, method: Method, exposure: f64) -> Vec<u8> {
+    pub fn developed(&self, image: &RawImage, method: Method) -> Vec<[f32; 3]> {
         let weights = self.srgb_from_channels();
         let linear = self.linear(image, method);
         let pixels = linear.par_chunks_exact(weights.len());
-        let encoded = pixels.map(|channels| {
-            let of = |k: usize| {
+        let colours = pixels.map(|channels| {
+            std::array::from_fn(|k| {
                 let pairs = channels.iter().zip(&weights);
-                pairs.map(|(&value, weight)| f64::from(value) * weight[k]).sum::<f64>()
-            };
-            std::array::from_fn::<u8, 3, _>(|k| to_byte(srgb_encode(exposure * of(k))))
+                #[expect(clippy::cast_possible_truncation, reason = "to look at")]
+                let sum =
+                    pairs.map(|(&value, weight)| f64::from(value) * weight[k]).sum::<f64>() as f32;
+                sum
+            })
         });
-        encoded.collect::<Vec<_>>().into_iter().flatten().collect()
+        colours.collect()
+    }
+
+    /// An image as 8-bit sRGB, `[row][column][red, green, blue]`; `exposure` multiplies the light.
+    #[must_use]
+    pub fn preview(&self, image: &RawImage, method: Method, exposure: f64) -> Vec<u8> {
+        let developed = self.developed(image, method);
+        let byte = |part: f32| to_byte(srgb_encode(exposure * f64::from(part)));
+        developed.into_par_iter().flat_map_iter(|colour| colour.map(byte)).collect()
     }
 }
 

@@ -34,6 +34,12 @@ impl Sensor {
         Ok(Self { spec: spec.clone(), settings, response, cfa: spec.cfa.clone() })
     }
 
+    /// What it was made of.
+    #[must_use]
+    pub fn spec(&self) -> &SensorSpec {
+        &self.spec
+    }
+
     /// Columns and rows.
     #[must_use]
     pub fn resolution(&self) -> [u32; 2] {

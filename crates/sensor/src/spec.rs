@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::demosaic::Method;
 use crate::{CfaSpec, Model};
 
 /// A scene file's `sensor`. What is absent comes from the `model`, or is ideal.
@@ -105,6 +106,22 @@ pub struct SensorSpec {
     /// Channels of a `multispectral` sensor by curves instead of bands.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<ChannelSpec>>,
+    /// How the preview of a `raw` sensor finds missing colours (default `malvar`).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub demosaic: Option<Method>,
+    /// Also write the expected value and the variance of every pixel (default false).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moments: Option<bool>,
+}
+
+impl SensorSpec {
+    /// Whether it asks for images of its own, that is for more than a grid of pixels.
+    #[must_use]
+    pub fn exposes(&self) -> bool {
+        let grid =
+            Self { resolution: self.resolution, pixel_pitch: self.pixel_pitch, ..Self::default() };
+        *self != grid
+    }
 }
 
 /// What a pixel measures.

@@ -71,6 +71,8 @@ fn read_npy(path: &Path) -> Vec<f64> {
         values.as_chunks().0.iter().map(|&b| f64::from_le_bytes(b)).collect()
     } else if header.contains("<f4") {
         values.as_chunks().0.iter().map(|&b| f64::from(f32::from_le_bytes(b))).collect()
+    } else if header.contains("<u2") {
+        values.as_chunks().0.iter().map(|&b| f64::from(u16::from_le_bytes(b))).collect()
     } else {
         assert!(header.contains("<u4"), "{header}");
         values.as_chunks().0.iter().map(|&b| f64::from(u32::from_le_bytes(b))).collect()

@@ -24,8 +24,10 @@ pub enum Look {
     Ids,
     /// One channel of shares in 0..=1, linear grey: coverage, vignetting.
     Share,
+    /// Any number of channels of linear light, shown as the grey of their mean.
+    Cube,
     /// One channel or three of a sensor's digital numbers of so many bits. Not a preview: a PNG
-    /// holds the numbers themselves, unscaled, in 8 bits or 16.
+    /// holds the numbers themselves, unscaled, in 16 bits.
     Counts {
         /// Bits of a number, 1 to 16.
         bits: u8,
@@ -41,6 +43,7 @@ impl Look {
             Self::Distance | Self::Share => (channels == 1, "one channel"),
             Self::Direction => (channels == 3, "three channels"),
             Self::Extent => ((1..=3).contains(&channels), "one to three channels"),
+            Self::Cube => (true, ""),
             Self::Ids => (matches!(layer.type_name(), "u2" | "u4"), "integers"),
             Self::Counts { bits } => (
                 (channels == 1 || channels == 3)
@@ -102,6 +105,12 @@ pub(super) fn show(layer: &Layer, bits: Bits) -> Shown {
             let note = "linear grey: black is 0, white is 1".into();
             let grey = |i| [unit(planes[0].at(i))];
             Shown::new(Channels::Grey, bits, planes, grey, note)
+        }
+        Look::Cube => {
+            let note = "grey: the channels' mean through the sRGB curve".into();
+            let mean =
+                |i| planes.iter().map(|plane| plane.at(i)).sum::<f64>() / planes.len() as f64;
+            Shown::new(Channels::Grey, bits, planes, |i| [srgb(mean(i))], note)
         }
         Look::Counts { bits } => counts(planes, bits),
     }
@@ -300,23 +309,16 @@ fn id_color(id: f64) -> [f32; 3] {
 
 fn counts(planes: &[&Values], bits: u8) -> Shown {
     // `Look::lacks` has seen to the type.
-    fn both(plane: &Values, i: usize) -> [u8; 2] {
+    fn number(plane: &Values, i: usize) -> [u8; 2] {
         let Values::U16(values) = plane else { return [0; 2] };
         values[i].to_be_bytes()
     }
-    fn low(plane: &Values, i: usize) -> [u8; 1] {
-        [both(plane, i)[1]]
-    }
-    let wide = bits > 8;
     let (channels, bytes) = match *planes {
-        [r, g, b] if wide => (Channels::Rgb, fill(planes, |i| [r, g, b].map(|p| both(p, i)))),
-        [r, g, b] => (Channels::Rgb, fill(planes, |i| [r, g, b].map(|p| low(p, i)))),
-        _ if wide => (Channels::Grey, fill(planes, |i| [both(planes[0], i)])),
-        _ => (Channels::Grey, fill(planes, |i| [low(planes[0], i)])),
+        [r, g, b] => (Channels::Rgb, fill(planes, |i| [r, g, b].map(|p| number(p, i)))),
+        _ => (Channels::Grey, fill(planes, |i| [number(planes[0], i)])),
     };
-    let bits_shown = if wide { Bits::Sixteen } else { Bits::Eight };
     let note = format!("digital numbers (DN), 0 to {}, not scaled", (1_u32 << bits) - 1);
-    Shown { channels, bits: bits_shown, bytes, note }
+    Shown { channels, bits: Bits::Sixteen, bytes, note }
 }
 
 #[cfg(test)]
@@ -429,8 +431,8 @@ mod tests {
         assert_eq!(shown.bytes, [0, 0, 0, 1, 0x0f, 0xff]);
         let planes = vec![Values::U16(vec![1]), Values::U16(vec![2]), Values::U16(vec![255])];
         let shown = show(&layer(Look::Counts { bits: 8 }, planes), Bits::Sixteen);
-        assert_eq!((shown.channels, shown.bits), (Channels::Rgb, Bits::Eight));
-        assert_eq!(shown.bytes, [1, 2, 255]);
+        assert_eq!((shown.channels, shown.bits), (Channels::Rgb, Bits::Sixteen));
+        assert_eq!(shown.bytes, [0, 1, 0, 2, 0, 255]);
     }
 
     #[test]

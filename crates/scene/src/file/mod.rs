@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use etendue_sensor::Sensor;
 use serde_json::{Value, json};
 
 pub use document::Place;
@@ -45,8 +46,10 @@ pub struct SceneFile {
     kind: FileKind,
     /// All values with the settings applied.
     value: Value,
-    /// What the file says.
+    /// What the file says; of the sensor the camera's part.
     pub spec: SceneSpec,
+    /// The camera's sensor, when the file says more of it than its grid of pixels.
+    pub sensor: Option<Sensor>,
 }
 
 /// Where the values of a file were written, to say where something is wrong.
@@ -96,19 +99,22 @@ impl SceneFile {
         }
         let mut written = Written::new(path, document);
         written.set(&mut value, overrides)?;
-        let mut file = Self { written, kind, value, spec: SceneSpec::default() };
-        file.spec = file.check()?;
+        let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
+        (file.spec, file.sensor) = file.check()?;
         Ok(file)
     }
 
-    fn check(&self) -> Result<SceneSpec, SceneError> {
+    fn check(&self) -> Result<(SceneSpec, Option<Sensor>), SceneError> {
         check::check(&schema::SCENE, &self.value)
             .map_err(|problem| self.fault(&problem.path, problem.reason))?;
-        serde_path_to_error::deserialize(&self.value).map_err(|error| {
+        let mut value = self.value.clone();
+        let sensor = sensor::split(&mut value, &self.written)?;
+        let spec = serde_path_to_error::deserialize(&value).map_err(|error| {
             let path = error.path().to_string();
             let path = if path == "." { String::new() } else { path };
             self.fault(&path, error.into_inner().to_string())
-        })
+        })?;
+        Ok((spec, sensor))
     }
 
     /// The error that the value at the JSON path `path` is wrong because of `reason`.

@@ -2,8 +2,10 @@
 
 use std::sync::LazyLock;
 
+use etendue_camera::length::Micrometres;
+use etendue_sensor::SensorSpec;
 use schemars::generate::SchemaSettings;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::SceneSpec;
 
@@ -16,8 +18,37 @@ pub fn scene_schema() -> Value {
     let mut schema =
         SchemaSettings::draft2020_12().into_generator().into_root_schema_for::<SceneSpec>();
     schema.insert("title".to_owned(), "etendue scene, version 1".into());
-    schema.to_value()
+    let mut schema = schema.to_value();
+    // The camera knows of its sensor no more than the grid of pixels; a scene says all of it.
+    if let Some(definitions) = schema.get_mut("$defs").and_then(Value::as_object_mut)
+        && let Value::Object(mut sensor) = SENSOR.clone()
+    {
+        sensor.remove("$schema");
+        if let Some(Value::Object(more)) = sensor.remove("$defs") {
+            more.into_iter().for_each(|(name, schema)| {
+                definitions.entry(name).or_insert(schema);
+            });
+        }
+        definitions.insert("SensorSpec".to_owned(), Value::Object(sensor));
+    }
+    schema
 }
 
 /// The same, made once.
 pub(crate) static SCENE: LazyLock<Value> = LazyLock::new(scene_schema);
+
+/// The schema of a scene's `sensor`, made once. Its pixel pitch may have a unit, like all lengths.
+pub(crate) static SENSOR: LazyLock<Value> = LazyLock::new(|| {
+    let mut generator = SchemaSettings::draft2020_12().into_generator();
+    let pitch = generator.subschema_for::<Option<Micrometres>>().to_value();
+    let mut schema = generator.into_root_schema_for::<SensorSpec>().to_value();
+    if let Some(member) = schema.pointer_mut("/properties/pixel_pitch")
+        && let Value::Object(members) = pitch
+    {
+        let about = member.get("description").cloned().unwrap_or_default();
+        let mut pitch = Map::from_iter([("description".to_owned(), about)]);
+        pitch.extend(members);
+        *member = Value::Object(pitch);
+    }
+    schema
+});

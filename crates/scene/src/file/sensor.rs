@@ -1,22 +1,17 @@
 //! A sensor alone: what `etendue sensor` reads.
 
 use std::path::Path;
-use std::sync::LazyLock;
 
+use etendue_camera::length::Micrometres;
 use etendue_sensor::{Sensor, SensorError, SensorSpec};
-use schemars::generate::SchemaSettings;
-use serde_json::Value;
+use serde::Deserialize;
+use serde_json::{Value, json};
 
-use super::{Written, check, read_document};
+use super::{Written, check, read_document, schema};
 use crate::SceneError;
 
 /// Where a scene keeps its sensor.
 const IN_SCENE: &str = "camera.sensor";
-
-/// The schema of a sensor, made once.
-static SENSOR: LazyLock<Value> = LazyLock::new(|| {
-    SchemaSettings::draft2020_12().into_generator().into_root_schema_for::<SensorSpec>().to_value()
-});
 
 /// A sensor that was read and checked: a scene's `camera.sensor`, or the same object in a file of
 /// its own.
@@ -72,14 +67,9 @@ impl SensorFile {
                        \"model\": \"imx183\" }";
             written.fault(IN_SCENE, why)
         })?;
-        check::check(&SENSOR, object)
+        check::check(&schema::SENSOR, object)
             .map_err(|problem| written.fault(&inside(place, &problem.path), problem.reason))?;
-        let spec: SensorSpec = serde_path_to_error::deserialize(object).map_err(|error| {
-            let path = inside(place, &error.path().to_string());
-            written.fault(&path, error.into_inner().to_string())
-        })?;
-        let sensor = Sensor::new(&spec)
-            .map_err(|error| written.fault(&inside(place, error.at()), error.why()))?;
+        let (spec, sensor) = built(object, place, &written)?;
         Ok(Self { spec, sensor, written, place })
     }
 
@@ -88,6 +78,46 @@ impl SensorFile {
     pub fn fault(&self, error: &SensorError) -> SceneError {
         self.written.fault(&inside(self.place, error.at()), error.why())
     }
+}
+
+/// The sensor that `object`, which fits the schema, describes; it stands at `place`.
+fn built(
+    object: &Value,
+    place: &str,
+    written: &Written,
+) -> Result<(SensorSpec, Sensor), SceneError> {
+    let mut object = object.clone();
+    if let Some(pitch) = object.get_mut("pixel_pitch").filter(|pitch| pitch.is_string()) {
+        let Micrometres(number) = Micrometres::deserialize(&*pitch)
+            .map_err(|error| written.fault(&inside(place, "pixel_pitch"), error.to_string()))?;
+        *pitch = number.into();
+    }
+    let spec: SensorSpec = serde_path_to_error::deserialize(&object).map_err(|error| {
+        let path = inside(place, &error.path().to_string());
+        written.fault(&path, error.into_inner().to_string())
+    })?;
+    let sensor = Sensor::new(&spec)
+        .map_err(|error| written.fault(&inside(place, error.at()), error.why()))?;
+    Ok((spec, sensor))
+}
+
+/// Takes the sensor out of a scene that fits the schema, and leaves the camera its grid of pixels.
+/// The sensor is `None` when it is no more than that grid.
+pub(super) fn split(scene: &mut Value, written: &Written) -> Result<Option<Sensor>, SceneError> {
+    let Some(object) = scene.pointer_mut("/camera/sensor").filter(|object| object.is_object())
+    else {
+        return Ok(None);
+    };
+    let (spec, sensor) = built(object, IN_SCENE, written)?;
+    let mut grid = json!({});
+    if spec.resolution.is_some() || spec.model.is_some() {
+        grid["resolution"] = json!(sensor.resolution());
+    }
+    if spec.pixel_pitch.is_some() || spec.model.is_some() {
+        grid["pixel_pitch"] = json!(sensor.pixel_pitch());
+    }
+    *object = grid;
+    Ok(spec.exposes().then_some(sensor))
 }
 
 fn inside(place: &str, key: &str) -> String {

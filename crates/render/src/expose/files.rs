@@ -1,0 +1,283 @@
+//! The files of each exposure.
+
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use etendue_sensor::dng::DngError;
+use etendue_sensor::{Film, Flaws, RawImage, Sensor, SensorKind, SensorSpec, Shot};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{ExposeError, Exposed, LaneFilm};
+use crate::output::{
+    Channel, Layer, Look, Outputs, Picture, PictureError, SOFTWARE, Values, npy, png, write_whole,
+};
+
+/// A name fit for all formats: `452.5nm` becomes `452_5nm`.
+pub(super) fn plain(name: &str) -> String {
+    let fit = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+    name.chars().map(fit).collect()
+}
+
+/// Writes one exposure after the other.
+pub(super) struct Writer<'a> {
+    pub(super) sensor: &'a Sensor,
+    pub(super) film: LaneFilm,
+    pub(super) folder: &'a Path,
+    pub(super) outputs: Outputs,
+    pub(super) seed: u64,
+    pub(super) header: &'a [(String, String)],
+    /// Digits of a shot's number in names; 0 for none.
+    pub(super) digits: usize,
+    pub(super) flaws: Flaws,
+    pub(super) exposed: Exposed,
+}
+
+impl Writer<'_> {
+    fn film(&self) -> Film<'_> {
+        Film { values: &self.film.values }
+    }
+
+    pub(super) fn place(&mut self, name: &str) -> PathBuf {
+        let path = self.folder.join(name);
+        self.exposed.files.push(path.clone());
+        path
+    }
+
+    /// `raw_003.png` of `raw` and `png` when there are several shots.
+    fn name(&self, stem: &str, number: u32, ending: &str) -> String {
+        match self.digits {
+            0 => format!("{stem}.{ending}"),
+            digits => format!("{stem}_{number:0digits$}.{ending}"),
+        }
+    }
+
+    pub(super) fn shot(&mut self, shot: Shot) -> Result<ShotFiles, ExposeError> {
+        let image = self.sensor.expose(self.film(), shot, self.seed)?;
+        let mut files = ShotFiles::new(shot);
+        // Every shot sees the same film, so once is enough.
+        self.flaws = image.flaws;
+        let preview = self.preview(&image, shot)?;
+        if self.outputs.dng && self.sensor.spec().kind == SensorKind::Raw {
+            files.dng = self.dng(&image, shot)?;
+        }
+        let many = image.depth != 1 && image.depth != 3;
+        let raw = self.raw(image, shot)?;
+        if self.outputs.png {
+            if !many {
+                let name = self.name("raw", shot.frame, "png");
+                png::write(&self.place(&name), &raw, "Raw", png::Bits::Sixteen)?;
+                files.png = Some(name);
+            }
+            let name = self.name("raw", shot.frame, "preview.png");
+            png::write(&self.place(&name), &preview, "", png::Bits::Eight)?;
+            files.preview = Some(name);
+        }
+        // Without PNG of that many channels, the numbers still have to go somewhere.
+        if self.outputs.npy || many {
+            let name = self.name("raw", shot.frame, "npy");
+            npy::write(&self.place(&name), &raw, "Raw")?;
+            files.npy = Some(name);
+        }
+        if self.sensor.spec().moments == Some(true) {
+            self.moments(shot, &mut files)?;
+        }
+        Ok(files)
+    }
+
+    /// The numbers as a picture of one layer.
+    fn raw(&self, image: RawImage, shot: Shot) -> Result<Picture, PictureError> {
+        let RawImage { width, height, depth, values, .. } = image;
+        let planes = if depth == 1 {
+            vec![Values::U16(values)]
+        } else {
+            let plane = |k: usize| values.iter().skip(k).step_by(depth).copied().collect();
+            (0..depth).into_par_iter().map(|k| Values::U16(plane(k))).collect()
+        };
+        let look = match depth {
+            1 | 3 => Look::Counts { bits: u8::try_from(self.sensor.bit_depth()).unwrap_or(16) },
+            _ => Look::Cube,
+        };
+        let layer = Layer {
+            name: "Raw".to_owned(),
+            look,
+            channels: self.named(planes),
+            meaning: self.meaning("digital numbers as the converter gave them", "DN", shot),
+        };
+        Picture::new(width, height, vec![layer], self.header.to_vec())
+    }
+
+    fn named(&self, planes: Vec<Values>) -> Vec<Channel> {
+        let names: Vec<String> = match planes.len() {
+            1 => vec!["Y".to_owned()],
+            _ => self.sensor.channels().map(plain).collect(),
+        };
+        names.into_iter().zip(planes).map(|(name, values)| Channel { name, values }).collect()
+    }
+
+    fn meaning(&self, definition: &str, unit: &str, shot: Shot) -> Vec<(String, String)> {
+        let sensor = self.sensor;
+        [
+            ("definition", definition.to_owned()),
+            ("unit", unit.to_owned()),
+            ("black level", format!("{} DN", sensor.black_level())),
+            ("white level", format!("{} DN", sensor.white_level())),
+            ("exposure", format!("{} s", shot.exposure)),
+            ("frame", shot.frame.to_string()),
+        ]
+        .map(|(key, text)| (key.to_owned(), text))
+        .into()
+    }
+
+    fn preview(&self, image: &RawImage, shot: Shot) -> Result<Picture, PictureError> {
+        let method = self.sensor.spec().demosaic.unwrap_or_default();
+        let developed = if self.outputs.png {
+            self.sensor.developed(image, method)
+        } else {
+            vec![[0.0; 3]; image.width * image.height]
+        };
+        let plane = |k: usize| Values::F32(developed.iter().map(|color| color[k]).collect());
+        let channels = ["R", "G", "B"]
+            .into_iter()
+            .enumerate()
+            .map(|(k, name)| Channel { name: name.to_owned(), values: plane(k) })
+            .collect();
+        let meaning = self.meaning("demosaiced and white balanced", "1", shot);
+        let layer = Layer { name: String::new(), look: Look::Color, channels, meaning };
+        Picture::new(image.width, image.height, vec![layer], self.header.to_vec())
+    }
+
+    /// A DNG where the format has words for the sensor; else a note, once.
+    fn dng(&mut self, image: &RawImage, shot: Shot) -> Result<Option<String>, ExposeError> {
+        let name = self.name("raw", shot.frame, "dng");
+        let path = self.folder.join(&name);
+        let model = self.sensor.spec().model.map_or("etendue", |model| model.preset().name);
+        let mut refused = None;
+        let written = write_whole(&path, |part| {
+            let mut out = BufWriter::new(part);
+            match self.sensor.write_dng(image, model, &mut out) {
+                Ok(()) => out.flush(),
+                Err(DngError::NotRaw(why)) => {
+                    refused = Some(why);
+                    Err(io::ErrorKind::Unsupported.into())
+                }
+                Err(error) => Err(io::Error::other(error)),
+            }
+        });
+        match (refused, written) {
+            (Some(why), _) => {
+                let note = format!("no DNG is written: {why}");
+                if !self.exposed.notes.contains(&note) {
+                    self.exposed.notes.push(note);
+                }
+                Ok(None)
+            }
+            (None, Err(error)) => Err(error.into()),
+            (None, Ok(())) => {
+                self.exposed.files.push(path);
+                Ok(Some(name))
+            }
+        }
+    }
+
+    fn moments(&mut self, shot: Shot, files: &mut ShotFiles) -> Result<(), ExposeError> {
+        let moments = self.sensor.moments(self.film(), shot)?;
+        let depth = moments.depth;
+        for (stem, definition, unit, values) in [
+            ("mean", "expected digital number", "DN", moments.mean),
+            ("variance", "variance over frames, quantisation included", "DN^2", moments.variance),
+        ] {
+            let plane = |k: usize| values.iter().skip(k).step_by(depth).copied().collect();
+            let planes = (0..depth).map(|k| Values::F32(plane(k))).collect();
+            let layer = Layer {
+                name: stem.to_owned(),
+                look: Look::Cube,
+                channels: self.named(planes),
+                meaning: self.meaning(definition, unit, shot),
+            };
+            let header = self.header.to_vec();
+            let picture = Picture::new(moments.width, moments.height, vec![layer], header)?;
+            let name = self.name(stem, shot.frame, "npy");
+            npy::write(&self.place(&name), &picture, stem)?;
+            match stem {
+                "mean" => files.mean = Some(name),
+                _ => files.variance = Some(name),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// `sensor.json`.
+#[derive(Debug, Serialize)]
+pub(super) struct Sidecar<'a> {
+    software: &'static str,
+    sensor: &'a SensorSpec,
+    resolution: [u32; 2],
+    bits: u32,
+    black_level_dn: f64,
+    white_level_dn: f64,
+    system_gain_dn_per_electron: f64,
+    channels: Vec<&'a str>,
+    white_balance: Vec<f64>,
+    lanes: Vec<String>,
+    seed: u64,
+    pub(super) flaws: Flaws,
+    pub(super) notes: Vec<String>,
+    pub(super) shots: Vec<ShotFiles>,
+}
+
+impl<'a> Sidecar<'a> {
+    pub(super) fn new(sensor: &'a Sensor, seed: u64) -> Self {
+        Self {
+            software: SOFTWARE,
+            sensor: sensor.spec(),
+            resolution: sensor.resolution(),
+            bits: sensor.bit_depth(),
+            black_level_dn: sensor.black_level(),
+            white_level_dn: sensor.white_level(),
+            system_gain_dn_per_electron: sensor.system_gain(),
+            channels: sensor.channels().collect(),
+            white_balance: sensor.white_balance(),
+            lanes: sensor.lanes().names(),
+            seed,
+            flaws: Flaws::default(),
+            notes: Vec::new(),
+            shots: Vec::new(),
+        }
+    }
+}
+
+/// The files of one exposure, by name.
+#[derive(Debug, Serialize)]
+pub(super) struct ShotFiles {
+    exposure_s: f64,
+    frame: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    png: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    npy: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dng: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    preview: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mean: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    variance: Option<String>,
+}
+
+impl ShotFiles {
+    fn new(Shot { exposure, frame }: Shot) -> Self {
+        Self {
+            exposure_s: exposure,
+            frame,
+            png: None,
+            npy: None,
+            dng: None,
+            preview: None,
+            mean: None,
+            variance: None,
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! The light of a picture in the lanes of a sensor.
+
+use etendue_scene::Scene;
+use etendue_sensor::SensorKind;
+use etendue_spectrum::Lanes;
+use rayon::prelude::*;
+
+use super::files::plain;
+use crate::output::{Channel, Layer, Look, Values};
+
+/// Light in spectral lanes, as a sensor is given it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LaneFilm {
+    /// What the lanes are.
+    pub lanes: Lanes,
+    /// `[row][column][lane]`.
+    pub values: Vec<f32>,
+}
+
+impl LaneFilm {
+    /// One plane a lane, woven together.
+    #[must_use]
+    pub fn woven(lanes: Lanes, planes: &[&[f32]]) -> Self {
+        let pixels = planes.first().map_or(0, |plane| plane.len());
+        let mut values = vec![0.0; pixels * planes.len()];
+        values.par_chunks_mut(planes.len().max(1)).enumerate().for_each(|(i, pixel)| {
+            for (value, plane) in pixel.iter_mut().zip(planes) {
+                *value = plane[i];
+            }
+        });
+        Self { lanes, values }
+    }
+
+    /// A picture's linear sRGB in other lanes. Exact for colours that were not mixed by light on
+    /// their way: a lane is linear in the colour.
+    #[must_use]
+    pub fn from_rgb(lanes: Lanes, colors: &[&[f32]; 3]) -> Self {
+        if lanes == Lanes::Rgb {
+            return Self::woven(lanes, colors);
+        }
+        let rows = lanes.from_rgb();
+        let mut values = vec![0.0; colors[0].len() * rows.len()];
+        values.par_chunks_mut(rows.len().max(1)).enumerate().for_each(|(i, pixel)| {
+            let color = colors.map(|plane| f64::from(plane[i]));
+            for (value, row) in pixel.iter_mut().zip(&rows) {
+                #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+                let lane = row.iter().zip(color).map(|(w, c)| w * c).sum::<f64>() as f32;
+                *value = lane;
+            }
+        });
+        Self { lanes, values }
+    }
+}
+
+/// The planes of a picture's linear sRGB.
+pub(super) fn colors(layers: &[Layer]) -> Option<[&[f32]; 3]> {
+    let root = layers.iter().find(|layer| layer.name.is_empty())?;
+    match root.channels.as_slice() {
+        [r, g, b] => match (&r.values, &g.values, &b.values) {
+            (Values::F32(r), Values::F32(g), Values::F32(b)) => Some([r, g, b]),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// The hyperspectral cube of a multispectral sensor's picture, channels named by wavelength.
+pub(crate) fn spectrum(scene: &Scene, layers: &[Layer]) -> Option<Layer> {
+    let sensor = scene.sensor.as_ref()?;
+    let lanes = sensor.lanes();
+    if sensor.spec().kind != SensorKind::Multispectral || lanes.grid().is_none() {
+        return None;
+    }
+    let colors = colors(layers)?;
+    let planes: Vec<Vec<f32>> = lanes
+        .from_rgb()
+        .par_iter()
+        .map(|row| {
+            let value = |i: usize| (0..3).map(|k| row[k] * f64::from(colors[k][i])).sum::<f64>();
+            #[expect(clippy::cast_possible_truncation, reason = "light is kept in f32")]
+            let plane = (0..colors[0].len()).map(|i| value(i) as f32).collect();
+            plane
+        })
+        .collect();
+    Some(cube(lanes, planes))
+}
+
+/// A layer of one plane a lane.
+fn cube(lanes: &Lanes, planes: Vec<Vec<f32>>) -> Layer {
+    let channels = lanes
+        .names()
+        .iter()
+        .zip(planes)
+        .map(|(name, plane)| Channel { name: plain(name), values: Values::F32(plane) })
+        .collect();
+    let edges = lanes.grid().map(|grid| format!("{:?}", grid.edges())).unwrap_or_default();
+    let meaning = [
+        ("definition", "mean light of each band of wavelengths, over the pixel's samples"),
+        ("unit", "as the picture's"),
+        ("band edges nm", edges.as_str()),
+    ];
+    let meaning = meaning.map(|(key, text)| (key.to_owned(), text.to_owned())).into();
+    Layer { name: "Spectrum".to_owned(), look: Look::Cube, channels, meaning }
+}

@@ -1,0 +1,182 @@
+//! What the camera's sensor makes of the light: the film is rendered once and exposed as often as
+//! the scene says. Raw numbers, previews, moments and a sidecar go out as files.
+//!
+//! | file | what it is |
+//! |---|---|
+//! | `raw.png` | digital numbers, 16 bits a channel, unscaled (one channel or three) |
+//! | `raw.npy` | the same, `[h, w]` or `[h, w, channels]`, `u2` |
+//! | `raw.dng` | the same for raw converters, with pattern and levels (`raw` sensors of r, g, b or none) |
+//! | `raw.preview.png` | demosaiced, white balanced, sRGB; not data |
+//! | `mean.npy`, `variance.npy` | the expected value and variance of every pixel, when asked for |
+//! | `sensor.json` | what the numbers mean, and which file is which exposure |
+//!
+//! Several exposures or frames are numbered: `raw_000.png`, `raw_001.png`, …
+
+mod files;
+mod film;
+
+use std::path::{Path, PathBuf};
+
+use etendue_scene::Scene;
+use etendue_sensor::{Flaws, NoiseModel, Sensor, SensorError, SensorKind, Shot};
+use etendue_spectrum::Lanes;
+use etendue_tracer::LayerSpec;
+
+pub use film::LaneFilm;
+pub(crate) use film::spectrum;
+
+use crate::output::{OutputError, Outputs, Picture, PictureError, sidecar};
+use files::{Sidecar, Writer};
+use film::colors;
+
+/// Why an exposure came to nothing.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExposeError {
+    /// A file could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The film is not the sensor's; a fault of this program.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// An image is no picture; a fault of this program.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// The caller asked to stop.
+    #[error("stopped")]
+    Stopped,
+}
+
+/// The lanes that the picture of `scene` is rendered in: base colours have three parts and no more,
+/// light has as many as the sensor tells apart.
+pub(crate) fn lanes(scene: &Scene) -> Lanes {
+    match (&scene.sensor, scene.picture) {
+        (None, _) | (_, None | Some(LayerSpec::Flat | LayerSpec::Facing)) => Lanes::Rgb,
+        (Some(sensor), _) => sensor.lanes().clone(),
+    }
+}
+
+/// How many lanes there are, and why.
+pub(crate) fn explain_lanes(scene: &Scene, lanes: &Lanes) -> (String, String) {
+    let choice = match lanes {
+        Lanes::Grey => "1".to_owned(),
+        Lanes::Rgb => "3 (RGB)".to_owned(),
+        Lanes::Bands(grid) => {
+            let [from, to] = grid.range();
+            format!("{} ({from} to {to} nm)", grid.len())
+        }
+    };
+    let because = match (&scene.sensor, scene.picture) {
+        (None, _) => "no sensor or glass in the scene tells more apart".to_owned(),
+        (Some(_), None | Some(LayerSpec::Flat | LayerSpec::Facing)) => {
+            "the picture is base colour, which has three parts".to_owned()
+        }
+        (Some(_), _) => "as many as the sensor can tell apart".to_owned(),
+    };
+    (choice, because)
+}
+
+/// What the sensor will do, and why.
+pub(crate) fn explain_sensor(scene: &Scene) -> Option<(String, String)> {
+    let sensor = scene.sensor.as_ref()?;
+    if scene.picture.is_none() {
+        return Some(("off".into(), NOTHING_TO_EXPOSE.into()));
+    }
+    let noise = match sensor.noise() {
+        NoiseModel::Poisson => "exact Poisson noise",
+        NoiseModel::Normal => "normal approximation of noise",
+        NoiseModel::None => "no noise",
+    };
+    let shots = sensor.shots().count();
+    let because = format!(
+        "camera.sensor says more than its grid of pixels; the light is rendered once and exposed \
+         {shots} time{}",
+        if shots == 1 { "" } else { "s" }
+    );
+    Some((format!("{}, {} bit, {noise}", name(sensor), sensor.bit_depth()), because))
+}
+
+const NOTHING_TO_EXPOSE: &str =
+    "the scene has layers and no tracer: there is no picture for the sensor to expose";
+
+fn name(sensor: &Sensor) -> String {
+    let kind = match sensor.spec().kind {
+        SensorKind::Raw => "raw",
+        SensorKind::Rgb => "rgb",
+        SensorKind::Multispectral => "multispectral",
+    };
+    match sensor.spec().model {
+        Some(model) => format!("{kind} {}", model.preset().name),
+        None => kind.to_owned(),
+    }
+}
+
+/// What was written.
+#[derive(Debug, Default)]
+pub struct Exposed {
+    /// The files, in the order they were written.
+    pub files: Vec<PathBuf>,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// Exposes the picture of `scene` and writes what its sensor gives into `folder`; nothing when the
+/// scene has no sensor. Told the share done, `progress` answers whether to go on.
+///
+/// # Errors
+///
+/// When a file cannot be written, or `progress` says stop.
+pub fn write(
+    scene: &Scene,
+    picture: &Picture,
+    folder: &Path,
+    outputs: Outputs,
+    progress: &dyn Fn(f64) -> bool,
+) -> Result<Exposed, ExposeError> {
+    let mut exposed = Exposed::default();
+    let Some(sensor) = &scene.sensor else { return Ok(exposed) };
+    exposed.notes.extend_from_slice(sensor.notes());
+    let Some(colors) = colors(picture.layers()) else {
+        exposed.notes.push(format!("camera.sensor is not used: {NOTHING_TO_EXPOSE}"));
+        return Ok(exposed);
+    };
+    // In the picture's own three lanes where the sensor can: the same numbers from less memory.
+    let in_rgb = sensor.clone().in_lanes(Lanes::Rgb);
+    let sensor = in_rgb.as_ref().unwrap_or(sensor);
+    let film = LaneFilm::from_rgb(sensor.lanes().clone(), &colors);
+    let shots: Vec<Shot> = sensor.shots().collect();
+    let digits = match shots.len() {
+        1 => 0,
+        count => (count - 1).to_string().len().max(3),
+    };
+    let mut writer = Writer {
+        sensor,
+        film,
+        folder,
+        outputs,
+        seed: scene.render.seed,
+        header: picture.header(),
+        digits,
+        flaws: Flaws::default(),
+        exposed,
+    };
+    let mut sidecar = Sidecar::new(sensor, scene.render.seed);
+    for (done, shot) in shots.iter().enumerate() {
+        if !progress(done as f64 / shots.len() as f64) {
+            return Err(ExposeError::Stopped);
+        }
+        sidecar.shots.push(writer.shot(*shot)?);
+    }
+    sidecar.flaws = writer.flaws;
+    if sidecar.flaws.any() {
+        let Flaws { negative, not_finite } = sidecar.flaws;
+        writer.exposed.notes.push(format!(
+            "{negative} negative and {not_finite} infinite or NaN values of the film are no light \
+             and were taken for none"
+        ));
+    }
+    sidecar.notes.clone_from(&writer.exposed.notes);
+    let path = writer.place("sensor.json");
+    sidecar::write_json(&path, &sidecar)?;
+    Ok(writer.exposed)
+}
