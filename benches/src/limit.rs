@@ -26,12 +26,19 @@ pub enum LimitError {
     Layout(String),
 }
 
+/// What Embree holds by its own count.
+#[derive(Debug, Default)]
+struct Bytes {
+    now: AtomicI64,
+    peak: AtomicI64,
+}
+
 /// A scene of Embree's, and nothing around it.
 pub struct BareScene {
     scene: sys::RTCScene,
     parts: Vec<sys::RTCScene>,
     device: sys::RTCDevice,
-    bytes: Box<AtomicI64>,
+    bytes: Box<Bytes>,
     /// Owns the buffers that Embree reads.
     _geometry: Arc<Geometry>,
 }
@@ -80,7 +87,7 @@ impl BareScene {
         // geometry whose buffers they share is kept beside them.
         unsafe {
             let device = sys::rtcNewDevice(config.as_ptr());
-            let bytes = Box::<AtomicI64>::default();
+            let bytes = Box::<Bytes>::default();
             let counter: *mut c_void = ptr::from_ref(&*bytes).cast_mut().cast();
             sys::rtcSetDeviceMemoryMonitorFunction(device, Some(count_bytes), counter);
             let scene = new_scene(device, mode);
@@ -136,7 +143,13 @@ impl BareScene {
     /// Bytes that Embree holds.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        u64::try_from(self.bytes.load(Ordering::Relaxed)).unwrap_or(0)
+        u64::try_from(self.bytes.now.load(Ordering::Relaxed)).unwrap_or(0)
+    }
+
+    /// The most bytes that Embree held while it built.
+    #[must_use]
+    pub fn peak_bytes(&self) -> u64 {
+        u64::try_from(self.bytes.peak.load(Ordering::Relaxed)).unwrap_or(0)
     }
 
     /// Finds the closest hits of packets of coherent rays.
@@ -205,8 +218,9 @@ impl Drop for BareScene {
 
 unsafe extern "C" fn count_bytes(user: *mut c_void, bytes: isize, _post: bool) -> bool {
     // SAFETY: `user` is the counter that `build` registered.
-    let counter = unsafe { &*user.cast::<AtomicI64>() };
-    counter.fetch_add(bytes as i64, Ordering::Relaxed);
+    let counter = unsafe { &*user.cast::<Bytes>() };
+    let now = counter.now.fetch_add(bytes as i64, Ordering::Relaxed) + bytes as i64;
+    counter.peak.fetch_max(now, Ordering::Relaxed);
     true
 }
 

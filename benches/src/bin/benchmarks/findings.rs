@@ -29,6 +29,7 @@ pub(crate) struct Contest {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Part {
     Traversal,
+    FirstLight,
     Threads,
     Build,
     Load,

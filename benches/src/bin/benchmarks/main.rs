@@ -8,6 +8,7 @@
 
 mod build;
 mod findings;
+mod first_light;
 mod goals;
 mod load;
 mod page;
@@ -36,7 +37,7 @@ struct Arguments {
     /// The page to write
     #[arg(long, default_value = "docs/benchmarks.md")]
     output: PathBuf,
-    /// Measure only these parts: traversal, threads, build, load, whole
+    /// Measure only these parts: traversal, threads, first-light, build, load, whole
     #[arg(long, value_delimiter = ',')]
     only: Vec<String>,
     #[command(subcommand)]
@@ -104,15 +105,23 @@ fn main() -> anyhow::Result<()> {
     }
     let effort = Effort::of(&arguments);
     let has = |part: &str| arguments.only.is_empty() || arguments.only.iter().any(|p| p == part);
+    // The page is written after each part, so that a run that is stopped leaves what it has.
     let mut findings = Findings::default();
     if has("traversal") || has("threads") {
         traversal::measure(effort, [has("traversal"), has("threads")], &mut findings)?;
+        page::write(effort, &findings, &arguments.output)?;
+    }
+    if has("first-light") {
+        first_light::measure(effort, &mut findings)?;
+        page::write(effort, &findings, &arguments.output)?;
     }
     if has("build") {
         build::measure(effort, &mut findings)?;
+        page::write(effort, &findings, &arguments.output)?;
     }
     if has("load") {
         load::measure(effort, &mut findings)?;
+        page::write(effort, &findings, &arguments.output)?;
     }
     if has("whole") {
         whole::measure(effort, &mut findings)?;

@@ -10,7 +10,7 @@ use etendue_benches::machine;
 
 use crate::findings::{Contest, Findings, Part, Record};
 use crate::goals::{self, Goal};
-use crate::{Effort, build, load, threads, whole};
+use crate::{Effort, build, first_light, load, threads, whole};
 
 /// Between these, another script writes what other programs take; it is kept.
 const PEERS: [&str; 2] = ["<!-- peers: begin -->", "<!-- peers: end -->"];
@@ -47,6 +47,10 @@ fn compose(effort: Effort, findings: &Findings, peers: &str) -> String {
     }
     text.push_str(THREADS);
     threads_table(&mut text, findings);
+    text.push_str(RENDERING);
+    for contest in findings.of(Part::FirstLight) {
+        first_light_table(&mut text, contest);
+    }
     text.push_str(BUILD);
     for contest in findings.of(Part::Build) {
         build_table(&mut text, contest);
@@ -101,6 +105,14 @@ const THREADS: &str = "
 
 How many times as fast two threads are as one, on primary rays. The threads' own processor time shows what they cost
 each other (caches, memory, locks); wall time also what else the machine was doing.
+
+";
+
+const RENDERING: &str = "
+## The whole render loop
+
+`scenes/first-light.json` from camera to film, without loading, building and writing; wall time. The bare loop traces the
+same rays in a scene of the same build quality.
 
 ";
 
@@ -173,6 +185,19 @@ fn threads_table(text: &mut String, findings: &Findings) {
     }
 }
 
+fn first_light_table(text: &mut String, contest: &Contest) {
+    text.push_str("| | Mrays/s | times the bare loop's time |\n|---|---|---|\n");
+    for threads in [1, 2] {
+        let limit = first_light::title(first_light::LIMIT, threads);
+        for who in [first_light::LIMIT, first_light::DATA, first_light::PICTURE] {
+            let who = first_light::title(who, threads);
+            let Some(record) = contest.find(&who) else { continue };
+            let times = ratio(contest.speed(&limit, &who));
+            push(text, &format!("| {who} | {} | {times} |", rates(&record.series, contest.items)));
+        }
+    }
+}
+
 fn build_table(text: &mut String, contest: &Contest) {
     heading(text, contest);
     text.push_str("| | s | times the limit | bytes a triangle | MB |\n|---|---|---|---|---|\n");
@@ -221,10 +246,12 @@ fn whole_table(text: &mut String, contest: &Contest, findings: &Findings) {
     }
     let _ = write!(
         text,
-        "\nThe file has {:.0} MB and the BVH {:.0} MB; the process held {:.0} MB at its peak.\n",
+        "\nThe file has {:.0} MB and the BVH {:.0} MB; the process held {:.0} MB at its peak. Embree's bare \
+         loop, built in low quality, holds {:.0} MB at its peak by its own count.\n",
         megabytes("file"),
         megabytes("bvh_bytes"),
-        megabytes("peak_memory_bytes")
+        megabytes("peak_memory_bytes"),
+        megabytes(whole::EMBREE_PEAK)
     );
 }
 

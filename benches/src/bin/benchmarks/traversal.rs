@@ -22,6 +22,9 @@ const INCOHERENT_RAYS: usize = 1 << 18;
 /// The reference is timed on one chunk in so many.
 const EXACT_SHARE: usize = 16;
 
+/// Rays cross many instances: one chunk in so many is enough.
+const FOREST_SHARE: usize = 8;
+
 pub(crate) fn measure(
     effort: Effort,
     [alone, side_by_side]: [bool; 2],
@@ -69,11 +72,13 @@ pub(crate) fn measure(
 
 fn contest(effort: Effort, mesh: &str, question: &str, field: &Field, rays: &Rays) -> Contest {
     eprintln!("  {question}");
+    let is_forest = field.geometry.placements.len() > 1;
+    let share = if is_forest { FOREST_SHARE } else { 1 };
     let all = contestants(field, rays);
     let items = all.first().map_or(0, |(_, contestant)| contestant.rays()) as f64;
     let mut turns: Vec<Turn<'_>> = Vec::new();
     for (name, contestant) in &all {
-        let every = if *name == names::EXACT { EXACT_SHARE } else { 1 };
+        let every = if *name == names::EXACT { EXACT_SHARE } else { share };
         turns.push(Box::new(move || time(&**contestant, 1, every)));
     }
     let series = take_turns(effort.rounds, &mut turns);

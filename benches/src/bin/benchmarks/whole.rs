@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, ensure};
-use etendue_accel::BuildOptions;
+use etendue_accel::{BuildOptions, Quality};
 use etendue_benches::contest::{LimitPackets, Query, Turn, take_turns, time, wall};
 use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_benches::machine::Memory;
@@ -26,6 +26,9 @@ pub(crate) const LEAST: &str = "read + default build + limit's traversal";
 pub(crate) const SAMPLED: &str = "`etendue render --samples 16`, whole process";
 
 pub(crate) const QUESTION: &str = "GLB to EXR";
+
+/// The most that Embree holds by its own count while it builds in low quality (bytes).
+pub(crate) const EMBREE_PEAK: &str = "embree peak";
 
 /// The stages of a report, in order.
 pub(crate) const STAGES: [&str; 5] = ["load", "build", "render", "write", "total"];
@@ -51,6 +54,9 @@ pub(crate) fn measure(effort: Effort, findings: &mut Findings) -> anyhow::Result
         for (name, value) in job.memory()? {
             findings.numbers.insert(format!("{mesh}: {name}"), value);
         }
+        let mode = Mode { quality: Quality::Low, compact: false };
+        let bare = BareScene::build(meshes::blob(triangles)?, mode, 0)?;
+        findings.numbers.insert(format!("{mesh}: {EMBREE_PEAK}"), bare.peak_bytes() as f64);
     }
     Ok(())
 }
