@@ -1,5 +1,6 @@
 //! The pinhole: every ray of the picture passes through one point.
 
+use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, RayBatch};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -164,23 +165,11 @@ impl Pinhole {
             origins.fill(pose.position[axis]);
         }
         match &self.distortion {
-            None => self.aim_straight(pose, rays),
+            None => {
+                let axes = [pose.right(), -pose.up(), pose.forward()];
+                aim_straight(&self.intrinsics, axes, &mut rays.direction);
+            }
             Some(distortion) => self.aim_distorted(distortion, pose, rays),
-        }
-    }
-
-    fn aim_straight(&self, pose: &Pose, rays: &mut RayBatch) {
-        let (right, down, forward) = (pose.right(), -pose.up(), pose.forward());
-        let intrinsics = self.intrinsics;
-        let [dx, dy, dz] = &mut rays.direction;
-        // The three arrays walk in step, so that the loop has no bounds to check and vectorises.
-        for ((dx, dy), dz) in dx.iter_mut().zip(dy).zip(dz) {
-            let [x, y] = intrinsics.tangents(*dx, *dy);
-            let shorten = 1.0 / (x * x + y * y + 1.0).sqrt();
-            let (x, y, z) = (x * shorten, y * shorten, shorten);
-            *dx = right.x * x + down.x * y + forward.x * z;
-            *dy = right.y * x + down.y * y + forward.y * z;
-            *dz = right.z * x + down.z * y + forward.z * z;
         }
     }
 
@@ -199,5 +188,29 @@ impl Pinhole {
                 rays.t_max[i] = -1.0;
             }
         }
+    }
+}
+
+/// Directions through places on the sensor, which stand in the first two arrays, along the axes that
+/// point right, down and forward.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn aim_straight(
+    intrinsics: &Intrinsics,
+    [right, down, forward]: [DVec3; 3],
+    directions: &mut [Vec<f64>; 3],
+) {
+    let [dx, dy, dz] = directions;
+    // The three arrays walk in step, so that the loop has no bounds to check and vectorises.
+    for ((dx, dy), dz) in dx.iter_mut().zip(dy).zip(dz) {
+        let [x, y] = intrinsics.tangents(*dx, *dy);
+        let shorten = 1.0 / (x * x + y * y + 1.0).sqrt();
+        let (x, y, z) = (x * shorten, y * shorten, shorten);
+        *dx = right.x * x + down.x * y + forward.x * z;
+        *dy = right.y * x + down.y * y + forward.y * z;
+        *dz = right.z * x + down.z * y + forward.z * z;
     }
 }

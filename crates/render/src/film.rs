@@ -46,6 +46,21 @@ impl Rows<'_> {
         }
     }
 
+    /// Writes `values` to the pixels at `places` of the rows.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "integer layers are given the u32 that they hold"
+    )]
+    pub(crate) fn scatter(&mut self, places: &[u32], values: &[f64]) {
+        let pairs = places.iter().zip(values);
+        match self {
+            Self::F32(rows) => pairs.for_each(|(&at, &value)| rows[at as usize] = single(value)),
+            Self::F64(rows) => pairs.for_each(|(&at, &value)| rows[at as usize] = value),
+            Self::U32(rows) => pairs.for_each(|(&at, &value)| rows[at as usize] = value as u32),
+        }
+    }
+
     pub(crate) fn f32(&mut self) -> Option<&mut [f32]> {
         if let Self::F32(rows) = self { Some(rows) } else { None }
     }

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use etendue_accel::Accel;
 use etendue_camera::{Camera, CameraRays, FilmSamples, PixelSamples, Sampler};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
-use etendue_tracer::{LayerSpec, Surroundings, Traced};
+use etendue_tracer::{LayerSpec, NormalKind, Surroundings, Traced};
 use rayon::prelude::*;
 
 use crate::film::{Band, FilmLayer, Rows, bands, single};
@@ -73,7 +73,9 @@ impl Job<'_> {
                 batch.aim_at_centres(self.camera, tile);
                 self.trace(batch);
                 for (layer, planes) in &mut centre {
-                    self.write(*layer, planes, batch, tile, width);
+                    if !self.write_batch(*layer, planes, batch) {
+                        self.write(*layer, planes, batch, tile, width);
+                    }
                 }
             }
             if !mean.is_empty() {
@@ -138,6 +140,27 @@ impl Job<'_> {
         }
     }
 
+    /// Writes the layers that most renders have, a whole batch at a time; `false` for others.
+    fn write_batch(&self, layer: LayerSpec, planes: &mut [Rows<'_>], batch: &mut Batch) -> bool {
+        let Batch { rays, hits, places, numbers, .. } = batch;
+        let traced = Traced { rays, hits };
+        match layer {
+            LayerSpec::Distance => planes[0].scatter(places, &hits.t),
+            LayerSpec::Depth => {
+                self.surroundings.depths(traced, &mut numbers[0]);
+                planes[0].scatter(places, &numbers[0]);
+            }
+            LayerSpec::Normal { space, kind: NormalKind::Geometric } => {
+                self.surroundings.geometric_normals(traced, space, numbers);
+                for (plane, values) in planes.iter_mut().zip(numbers) {
+                    plane.scatter(places, values);
+                }
+            }
+            _ => return false,
+        }
+        true
+    }
+
     /// Writes one layer of a tile whose chief rays were traced.
     fn write(
         &self,
@@ -154,10 +177,7 @@ impl Job<'_> {
             tile.index(x, y, width)
         };
         match layer {
-            LayerSpec::Depth => {
-                each(planes, batch, index, |i| [around.depth(traced, i)]);
-            }
-            LayerSpec::Distance => each(planes, batch, index, |i| [batch.hits.t[i]]),
+            LayerSpec::Depth | LayerSpec::Distance => {}
             LayerSpec::Normal { space, kind } => {
                 each(planes, batch, index, |i| around.normal(traced, i, kind, space).to_array());
             }
@@ -262,8 +282,13 @@ struct Batch {
     rows: Vec<f64>,
     samples: FilmSamples,
     camera_rays: CameraRays,
-    /// The pixel of each chief ray, from the tile's corner.
+    /// The tile of the chief rays.
+    tile: Option<Tile>,
+    /// The pixel of each chief ray, from the tile's corner, and its place in the band's rows.
     pixels: Vec<(u32, u32)>,
+    places: Vec<u32>,
+    /// One number of each ray, three times.
+    numbers: [Vec<f64>; 3],
     traced: u64,
 }
 
@@ -276,14 +301,24 @@ impl Batch {
             rows: Vec::new(),
             samples: FilmSamples::default(),
             camera_rays: CameraRays::default(),
+            tile: None,
             pixels: Vec::new(),
+            places: Vec::new(),
+            numbers: Default::default(),
             traced: 0,
         }
     }
 
     fn aim_at_centres(&mut self, camera: &Camera, tile: Tile) {
-        self.pixels.clear();
-        self.pixels.extend(tile.pixels());
+        // Most tiles of a band are of one size, and their pixels stand in the same order.
+        if self.tile.is_none_or(|last| (last.width, last.height) != (tile.width, tile.height)) {
+            self.pixels.clear();
+            self.pixels.extend(tile.pixels());
+        }
+        self.tile = Some(tile);
+        let [width, _] = camera.resolution();
+        self.places.clear();
+        self.places.extend(self.pixels.iter().map(|&(x, y)| y * width + tile.left + x));
         self.columns.clear();
         self.columns.extend(self.pixels.iter().map(|&(x, _)| f64::from(tile.left + x) + 0.5));
         self.rows.clear();

@@ -5,6 +5,7 @@
 //! Colours are linear light with the sRGB primaries (ITU-R BT.709), 1 being full scale; only files
 //! and pictures to look at carry the sRGB transfer curve.
 
+mod batches;
 pub mod layer;
 pub mod material;
 pub mod reference;
