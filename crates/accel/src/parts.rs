@@ -343,13 +343,26 @@ impl Instance {
     pub(crate) fn ray(&self, origin: DVec3, direction: DVec3) -> LocalRay {
         let offset = (self.translation - origin) + self.translation_low;
         let distance = offset.abs();
-        let pad = self.pad + self.pad_per_distance * (distance.x + distance.y + distance.z);
+        let pad = self.pad_at(distance.x + distance.y + distance.z);
         if self.parallel_scale > 0.0 {
             let scale = self.parallel_scale;
             return LocalRay { origin: -offset * scale, direction: direction * scale, pad };
         }
         let origin = -(self.linear * offset) - self.origin;
         LocalRay { origin, direction: self.linear * direction, pad }
+    }
+
+    /// The frame's translation as seen from a place in the world.
+    #[inline(always)]
+    pub(crate) fn offset(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let (high, low) = (self.translation, self.translation_low);
+        [(high.x - x) + low.x, (high.y - y) + low.y, (high.z - z) + low.z]
+    }
+
+    /// The pad of a ray that begins at an offset whose components' sizes sum up to `distance`.
+    #[inline(always)]
+    pub(crate) fn pad_at(&self, distance: f64) -> f64 {
+        self.pad + self.pad_per_distance * distance
     }
 
     /// World rays in the part's frame, as [`Self::ray`] has them, side by side.
@@ -362,15 +375,12 @@ impl Instance {
         let zero = [0.0; N];
         let mut rays = LocalRays { origin: [zero; 3], direction: [zero; 3], pad: zero };
         let [lx, ly, lz] = [self.linear.x_axis, self.linear.y_axis, self.linear.z_axis];
-        let (high, low) = (self.translation, self.translation_low);
         for i in 0..N {
-            let x = (high.x - origin[0][i]) + low.x;
-            let y = (high.y - origin[1][i]) + low.y;
-            let z = (high.z - origin[2][i]) + low.z;
+            let [x, y, z] = self.offset([origin[0][i], origin[1][i], origin[2][i]]);
             rays.origin[0][i] = -(lx.x * x + ly.x * y + lz.x * z) - self.origin.x;
             rays.origin[1][i] = -(lx.y * x + ly.y * y + lz.y * z) - self.origin.y;
             rays.origin[2][i] = -(lx.z * x + ly.z * y + lz.z * z) - self.origin.z;
-            rays.pad[i] = self.pad + self.pad_per_distance * (x.abs() + y.abs() + z.abs());
+            rays.pad[i] = self.pad_at(x.abs() + y.abs() + z.abs());
             let (x, y, z) = (direction[0][i], direction[1][i], direction[2][i]);
             rays.direction[0][i] = lx.x * x + ly.x * y + lz.x * z;
             rays.direction[1][i] = lx.y * x + ly.y * y + lz.y * z;

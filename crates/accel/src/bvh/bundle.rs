@@ -3,8 +3,8 @@
 use etendue_geometry::glam::Vec3;
 
 use super::lanes::{Arithmetic, Lanes};
-use super::ray::{BoxTest, FAR, LEAST, TriangleTest, axes};
-use crate::parts::LocalRays;
+use super::ray::{BoxTest, FAR, SKEW_TRIANGLE_ERROR, TriangleTest, axes, box_error, steer};
+use crate::parts::{Instance, LocalRays};
 
 /// Rays of a packet: as many as there are lanes.
 pub(super) const PACKET: usize = 16;
@@ -13,7 +13,7 @@ pub(super) const PACKET: usize = 16;
 const FEWEST: u32 = 4;
 
 /// Rays whose directions differ by more than this along an axis are traced one by one.
-const WIDEST: f32 = 0.25;
+const WIDEST: f32 = 0.1;
 
 /// The numbers of the set bits of `mask`, which are below [`PACKET`].
 #[inline(always)]
@@ -41,8 +41,6 @@ impl Iterator for Bits {
 pub(super) struct FrameRays {
     origin: [[f32; PACKET]; 3],
     direction: [[f32; PACKET]; 3],
-    /// Finite and not zero.
-    inverse: [[f32; PACKET]; 3],
     error: [f32; PACKET],
     near: [f32; PACKET],
     length: [f64; PACKET],
@@ -52,21 +50,59 @@ pub(super) struct FrameRays {
 }
 
 impl FrameRays {
+    const ZERO: Self = Self {
+        origin: [[0.0; PACKET]; 3],
+        direction: [[0.0; PACKET]; 3],
+        error: [0.0; PACKET],
+        near: [0.0; PACKET],
+        length: [0.0; PACKET],
+        skipped: [0.0; PACKET],
+        backwards: [0; 3],
+    };
+
+    /// The world's rays in a frame parallel to the world's, when they begin nearby and their directions
+    /// are unit; `None` otherwise.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
+    pub(super) fn parallel(
+        instance: &Instance,
+        origin: [&[f64; PACKET]; 3],
+        direction: [&[f64; PACKET]; 3],
+        t_min: &[f64; PACKET],
+    ) -> Option<Self> {
+        let scale = instance.parallel_scale;
+        if scale == 0.0 {
+            return None;
+        }
+        let mut rays = Self::ZERO;
+        let mut odd = 0_u32;
+        for i in 0..PACKET {
+            let [x, y, z] = instance.offset([origin[0][i], origin[1][i], origin[2][i]]);
+            let distance = x.abs() + y.abs() + z.abs();
+            let [dx, dy, dz] = [direction[0][i], direction[1][i], direction[2][i]];
+            let stretch = dx * dx + dy * dy + dz * dz - 1.0;
+            odd |= u32::from(!((distance * scale <= FAR) & (stretch.abs() < 0.1))) << i;
+            let near = (t_min[i] * scale) as f32;
+            rays.near[i] = near - near.abs() * f32::EPSILON;
+            let size = largest(x.abs(), y.abs(), z.abs()) * scale;
+            rays.error[i] = box_error(size as f32, instance.pad_at(distance) as f32);
+            rays.origin[0][i] = (-x * scale) as f32;
+            rays.origin[1][i] = (-y * scale) as f32;
+            rays.origin[2][i] = (-z * scale) as f32;
+            rays.direction[0][i] = dx as f32;
+            rays.direction[1][i] = dy as f32;
+            rays.direction[2][i] = dz as f32;
+            rays.length[i] = scale;
+        }
+        rays.turn();
+        (odd == 0).then_some(rays)
+    }
+
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
     #[expect(clippy::needless_range_loop, reason = "one lane of many arrays")]
     pub(super) fn new(local: &LocalRays<PACKET>, t_min: &[f64; PACKET]) -> Self {
-        let zero = [[0.0; PACKET]; 3];
-        let mut rays = Self {
-            origin: zero,
-            direction: zero,
-            inverse: zero,
-            error: [0.0; PACKET],
-            near: [0.0; PACKET],
-            length: [0.0; PACKET],
-            skipped: [0.0; PACKET],
-            backwards: [0; 3],
-        };
+        let mut rays = Self::ZERO;
         for i in 0..PACKET {
             let [ox, oy, oz] = [local.origin[0][i], local.origin[1][i], local.origin[2][i]];
             let [dx, dy, dz] =
@@ -82,21 +118,25 @@ impl FrameRays {
             rays.near[i] = if near > 0.0 { near } else { 0.0 };
             rays.length[i] = length;
             rays.skipped[i] = skipped;
-            let size = ox.abs() + oy.abs() + oz.abs();
-            rays.error[i] = f32::EPSILON * (8.0 * size as f32 + 6.0) + 5.0 * local.pad[i] as f32;
+            let size = largest(ox.abs(), oy.abs(), oz.abs());
+            rays.error[i] = box_error(size as f32, local.pad[i] as f32);
             (rays.origin[0][i], rays.direction[0][i]) = (ox as f32, dx as f32);
             (rays.origin[1][i], rays.direction[1][i]) = (oy as f32, dy as f32);
             (rays.origin[2][i], rays.direction[2][i]) = (oz as f32, dz as f32);
         }
+        rays.turn();
+        rays
+    }
+
+    /// Works out what follows from the directions.
+    #[inline(always)]
+    fn turn(&mut self) {
         for axis in 0..3 {
             for i in 0..PACKET {
-                let d = rays.direction[axis][i];
-                let steered = if d.abs() < LEAST { LEAST.copysign(d) } else { d };
-                rays.inverse[axis][i] = 1.0 / steered;
-                rays.backwards[axis] |= u32::from(d.is_sign_negative()) << i;
+                let backwards = self.direction[axis][i].is_sign_negative();
+                self.backwards[axis] |= u32::from(backwards) << i;
             }
         }
-        rays
     }
 
     /// The rays of `group` that run towards the same octant as its first.
@@ -155,6 +195,12 @@ impl FrameRays {
     }
 }
 
+#[inline(always)]
+fn largest(a: f64, b: f64, c: f64) -> f64 {
+    let ab = if a > b { a } else { b };
+    if ab > c { ab } else { c }
+}
+
 /// Bounds of some of the rays, and the rays side by side.
 pub(super) struct Bundle<L: Lanes> {
     pub(super) boxes: BoxTest<L>,
@@ -182,7 +228,7 @@ impl<L: Lanes> Bundle<L> {
         }
         let error = range(lanes, &rays.error, group, first)[1];
         Some(Self {
-            boxes: box_test(lanes, rays, group, first, error),
+            boxes: box_test(lanes, rays, group, direction, error),
             triangles: triangle_test(lanes, rays, group, first, error),
         })
     }
@@ -203,9 +249,10 @@ fn box_test<L: Lanes>(
     lanes: L,
     rays: &FrameRays,
     group: u32,
-    first: usize,
+    direction: [[f32; 2]; 3],
     error: f32,
 ) -> BoxTest<L> {
+    let first = group.trailing_zeros() as usize % PACKET;
     let zero = lanes.splat(0.0);
     let mut test = BoxTest {
         backwards: [0; 3],
@@ -215,17 +262,14 @@ fn box_test<L: Lanes>(
         far_offset: [zero; 3],
         near: lanes.splat(range(lanes, &rays.near, group, first)[0]),
     };
-    for axis in 0..3 {
+    for (axis, [a, b]) in direction.into_iter().enumerate() {
         let [least, most] = range(lanes, &rays.origin[axis], group, first);
         let (least, most) = (least - error, most + error);
-        let inverse = range(lanes, &rays.inverse[axis], group, first);
         let backwards = rays.backwards[axis] >> first & 1 != 0;
-        // All of one sign: the slowest reciprocal is that closest to 0.
-        let (slow, fast, near, far) = if backwards {
-            (inverse[1], inverse[0], least, most)
-        } else {
-            (inverse[0], inverse[1], most, least)
-        };
+        // All of one sign: the slowest reciprocal is that of the longest direction.
+        let (slow, fast, near, far) =
+            if backwards { (a, b, least, most) } else { (b, a, most, least) };
+        let (slow, fast) = (1.0 / steer(slow), 1.0 / steer(fast));
         test.backwards[axis] = usize::from(backwards);
         test.inverse_near[axis] = lanes.splat(slow);
         test.inverse_far[axis] = lanes.splat(fast);
@@ -235,8 +279,8 @@ fn box_test<L: Lanes>(
     test
 }
 
-/// All rays sheared along the same axes. No direction is much longer along the others, because the
-/// rays differ by at most [`WIDEST`].
+/// All rays sheared along the same axes. The first ray's longest component is at least 1/√3, and the
+/// others' differ by at most [`WIDEST`], so no shear is more than 2.1.
 #[inline(always)]
 fn triangle_test<L: Lanes>(
     lanes: L,
@@ -249,7 +293,7 @@ fn triangle_test<L: Lanes>(
     let direction = &rays.direction;
     let axes = axes(Vec3::new(direction[0][first], direction[1][first], direction[2][first]));
     let [x, y, z] = axes;
-    let inverse = lanes.load_sixteen(&rays.inverse[z]);
+    let inverse = l.div(l.splat(1.0), lanes.load_sixteen(&direction[z]));
     let near = l.select(group, lanes.load_sixteen(&rays.near), l.splat(f32::INFINITY));
     TriangleTest {
         axes,
@@ -263,7 +307,7 @@ fn triangle_test<L: Lanes>(
             l.mul(lanes.load_sixteen(&direction[y]), inverse),
             inverse,
         ],
-        error: l.splat(8.0 * error),
+        error: l.splat(SKEW_TRIANGLE_ERROR * error),
         near,
     }
 }

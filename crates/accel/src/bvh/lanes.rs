@@ -17,6 +17,7 @@ pub(super) trait Arithmetic: Copy {
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
     fn sub(self, a: Self::F, b: Self::F) -> Self::F;
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn div(self, a: Self::F, b: Self::F) -> Self::F;
     /// `a b − c`
     fn mul_sub(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// `c − a b`
@@ -82,6 +83,11 @@ impl<L: Arithmetic> Arithmetic for Twice<L> {
     #[inline(always)]
     fn mul(self, [a, b]: [L::F; 2], [c, d]: [L::F; 2]) -> [L::F; 2] {
         [self.0.mul(a, c), self.0.mul(b, d)]
+    }
+
+    #[inline(always)]
+    fn div(self, [a, b]: [L::F; 2], [c, d]: [L::F; 2]) -> [L::F; 2] {
+        [self.0.div(a, c), self.0.div(b, d)]
     }
 
     #[inline(always)]
@@ -174,6 +180,11 @@ impl Arithmetic for Portable {
     #[inline(always)]
     fn mul(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
         each(|i| a[i] * b[i])
+    }
+
+    #[inline(always)]
+    fn div(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        each(|i| a[i] / b[i])
     }
 
     #[inline(always)]
@@ -293,6 +304,11 @@ mod x86 {
                 #[inline(always)]
                 fn mul(self, a: __m256, b: __m256) -> __m256 {
                     self.avx._mm256_mul_ps(a, b)
+                }
+
+                #[inline(always)]
+                fn div(self, a: __m256, b: __m256) -> __m256 {
+                    self.avx._mm256_div_ps(a, b)
                 }
 
                 #[inline(always)]
@@ -455,6 +471,11 @@ mod x86 {
         #[inline(always)]
         fn mul(self, a: __m512, b: __m512) -> __m512 {
             self.0.avx512f._mm512_mul_ps(a, b)
+        }
+
+        #[inline(always)]
+        fn div(self, a: __m512, b: __m512) -> __m512 {
+            self.0.avx512f._mm512_div_ps(a, b)
         }
 
         #[inline(always)]

@@ -19,7 +19,7 @@ use super::Bvh;
 use super::bundle::{Bundle, FrameRays, PACKET, bits};
 use super::lanes::{Arithmetic, Lanes};
 use super::placed::PlacedTriangles;
-use super::ray::TriangleTest;
+use super::ray::{BoxTest, Runs, TriangleTest, meet_triangles};
 use super::single::{Search, Sink, Stacks, Visit};
 use super::traverse::{Leaves, Stack, traverse};
 use super::wide::{Cell, Child, LeafNumbers, leaf_numbers};
@@ -88,7 +88,10 @@ impl<'a, S: Sink> Packet<'a, S> {
 
     #[inline(always)]
     fn in_frame(&self, instance: &Instance) -> FrameRays {
-        FrameRays::new(&instance.rays(self.origin, self.direction), self.t_min)
+        let parallel = FrameRays::parallel(instance, self.origin, self.direction, self.t_min);
+        parallel.unwrap_or_else(|| {
+            FrameRays::new(&instance.rays(self.origin, self.direction), self.t_min)
+        })
     }
 
     #[inline(always)]
@@ -250,6 +253,7 @@ struct TriangleLeaves<'a, 'b, L: Lanes, S> {
     packet: &'a mut Packet<'b, S>,
     rays: &'a FrameRays,
     group: u32,
+    boxes: BoxTest<L>,
     test: TriangleTest<L::Sixteen>,
     /// From where on limits are certainly kept.
     surely_near: Wide<L>,
@@ -286,6 +290,7 @@ impl<'a, 'b, L: Lanes, S: Sink> TriangleLeaves<'a, 'b, L, S> {
             triangles,
             rays,
             group,
+            boxes: bundle.boxes,
             test: bundle.triangles,
             surely_near: lanes.load_sixteen(&rays.surely_near(packet.t_min)),
             far: l.select(group & packet.active, far, l.splat(f32::NEG_INFINITY)),
@@ -383,9 +388,11 @@ impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, '_, L, S> {
         let l = self.lanes.sixteen();
         let n = leaf.count();
         let numbers = leaf_numbers(self.cells, leaf)?;
+        let runs = Runs::new(numbers, n, self.test.axes)?;
         let mut any = 0;
-        for i in 0..n {
-            let look = self.test.look(l, numbers, n, i, self.far);
+        for i in bits(meet_triangles(self.lanes, numbers, n, &self.boxes, far)) {
+            let i = i.min(n - 1);
+            let look = self.test.look(l, &runs, i, self.far);
             if look.maybe == 0 {
                 continue;
             }

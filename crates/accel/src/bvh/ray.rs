@@ -29,13 +29,32 @@ pub(super) struct NarrowRay {
     skipped: f64,
 }
 
+/// What no plane of a box, against a ray that begins within `origin` of the frame's origin along each
+/// axis, is off by along its axis: with ε = 2⁻²⁴ and planes within 1, the plane is rounded (ε), the
+/// origin is (ε · `origin`), and so are its product with the reciprocal and the sum with this error
+/// (twice that); the direction, its reciprocal and the last sum are relative to their distance
+/// (3 ε (1 + `origin`)). Then there is what f64 did before.
+#[inline(always)]
+pub(super) fn box_error(origin: f32, pad: f32) -> f32 {
+    f32::EPSILON / 2.0 * (7.0 * origin + 5.0) + 2.0 * pad
+}
+
+/// In units of [`box_error`], what edge tests and distances of triangles allow for. A coordinate
+/// relative to the origin is off by 2 ε (1 + `origin`); after a shear by at most s, itself off by 4 ε s,
+/// by (4 + 8 s) ε (1 + `origin`); an edge's determinant by 1.7 times that per length, with the
+/// rounding of its own products. That is 20 for s = 1, where the box's error is 5 or more.
+pub(super) const TRIANGLE_ERROR: f32 = 4.0;
+
+/// The same for shears by up to 2.1.
+pub(super) const SKEW_TRIANGLE_ERROR: f32 = 7.0;
+
 /// Farther from the frame's origin than this, the ray is moved closer before it is rounded. All
 /// triangles are within √3 of it.
 pub(super) const FAR: f64 = 4.0;
 
 /// The least component that a reciprocal is taken of. In place of a smaller one it moves no point
 /// of a ray inside the frame by more than a rounding.
-pub(super) const LEAST: f32 = 1e-12;
+const LEAST: f32 = 1e-12;
 
 impl NarrowRay {
     /// The world's ray in `instance`'s frame.
@@ -74,7 +93,7 @@ impl NarrowRay {
     ) -> Self {
         let near = (t_min * length - skipped) as f32;
         let origin = origin.as_vec3();
-        let error = f32::EPSILON * (8.0 * origin.abs().max_element() + 6.0) + 5.0 * pad as f32;
+        let error = box_error(origin.abs().max_element(), pad as f32);
         Self {
             origin,
             direction: direction.as_vec3(),
@@ -100,8 +119,9 @@ pub(super) fn safe_reciprocal(direction: Vec3) -> Vec3 {
     Vec3::new(steer(direction.x), steer(direction.y), steer(direction.z)).recip()
 }
 
+/// A component of a direction that has a finite reciprocal.
 #[inline(always)]
-fn steer(d: f32) -> f32 {
+pub(super) fn steer(d: f32) -> f32 {
     if d.abs() < LEAST { LEAST.copysign(d) } else { d }
 }
 
@@ -171,7 +191,7 @@ pub(super) struct TriangleTest<L: Arithmetic> {
     pub(super) axes: [usize; 3],
     pub(super) origin: [L::F; 3],
     pub(super) shear: [L::F; 3],
-    /// A sheared coordinate is off by no more than half of this, and so is a distance.
+    /// What a distance, or an edge's determinant per length, is off by at most.
     pub(super) error: L::F,
     pub(super) near: L::F,
 }
@@ -187,7 +207,7 @@ impl<L: Lanes> TriangleTest<L> {
             axes: [x, y, z],
             origin: splat(lanes, Vec3::new(o[x], o[y], o[z])),
             shear: splat(lanes, Vec3::new(d[x] * inverse, d[y] * inverse, inverse)),
-            error: lanes.splat(4.0 * ray.error),
+            error: lanes.splat(TRIANGLE_ERROR * ray.error),
             near: lanes.splat(ray.near),
         }
     }
@@ -214,36 +234,19 @@ impl<L: Lanes> TriangleTest<L> {
 
 impl<L: Arithmetic> TriangleTest<L> {
     /// What some rays (this test being that of a different ray in each lane) make of triangle `i` of
-    /// the `n` of a leaf before `far`.
+    /// a leaf before `far`.
     #[inline(always)]
-    pub(super) fn look(
-        &self,
-        l: L,
-        numbers: &LeafNumbers,
-        n: usize,
-        i: usize,
-        far: L::F,
-    ) -> Look<L> {
-        let a = self.shear(l, self.copies(l, numbers, 0, n, i));
-        let b = self.shear(l, self.copies(l, numbers, 3, n, i));
-        let c = self.shear(l, self.copies(l, numbers, 6, n, i));
+    pub(super) fn look(&self, l: L, runs: &Runs<'_>, i: usize, far: L::F) -> Look<L> {
+        let [a, b, c] = runs.corners;
+        let a = self.shear(l, [l.splat(a[0][i]), l.splat(a[1][i]), l.splat(a[2][i])]);
+        let b = self.shear(l, [l.splat(b[0][i]), l.splat(b[1][i]), l.splat(b[2][i])]);
+        let c = self.shear(l, [l.splat(c[0][i]), l.splat(c[1][i]), l.splat(c[2][i])]);
         self.decide(l, [a, b, c], far)
-    }
-
-    /// The coordinates of one corner, along this test's axes, in all lanes.
-    #[inline(always)]
-    fn copies(&self, l: L, numbers: &LeafNumbers, first: usize, n: usize, i: usize) -> [L::F; 3] {
-        [
-            copies(l, numbers, (first + self.axes[0]) * n + i),
-            copies(l, numbers, (first + self.axes[1]) * n + i),
-            copies(l, numbers, (first + self.axes[2]) * n + i),
-        ]
     }
 
     #[inline(always)]
     fn decide(&self, l: L, [a, b, c]: [Sheared<L>; 3], far: L::F) -> Look<L> {
         let (u, v, w) = (edge(l, c, b), edge(l, a, c), edge(l, b, a));
-        // Each product has two coordinates that are off by at most half the error.
         let sizes = l.add(l.add(size(l, a), size(l, b)), l.add(size(l, c), self.error));
         let error = l.mul(sizes, self.error);
         let least = l.min(l.min(u, v), w);
@@ -302,10 +305,55 @@ fn run<L: Lanes>(l: L, numbers: &LeafNumbers, start: usize) -> L::F {
     }
 }
 
-/// Number `at` in all lanes.
+/// Which of the boxes around the `n` triangles of a leaf the rays of a box test meet before `far`.
 #[inline(always)]
-fn copies<L: Arithmetic>(l: L, numbers: &LeafNumbers, at: usize) -> L::F {
-    l.splat(numbers[at % numbers.len()])
+pub(super) fn meet_triangles<L: Lanes>(
+    l: L,
+    numbers: &LeafNumbers,
+    n: usize,
+    test: &BoxTest<L>,
+    far: f32,
+) -> u32 {
+    let (x0, x1) = meet_slabs(l, numbers, n, test, 0);
+    let (y0, y1) = meet_slabs(l, numbers, n, test, 1);
+    let (z0, z1) = meet_slabs(l, numbers, n, test, 2);
+    let enter = l.max(l.max(x0, y0), l.max(z0, test.near));
+    let leave = l.min(l.min(x1, y1), l.min(z1, l.splat(far)));
+    l.le(enter, leave) & ((1 << n) - 1)
+}
+
+#[inline(always)]
+fn meet_slabs<L: Lanes>(
+    l: L,
+    numbers: &LeafNumbers,
+    n: usize,
+    test: &BoxTest<L>,
+    axis: usize,
+) -> (L::F, L::F) {
+    let a = run(l, numbers, axis * n);
+    let b = run(l, numbers, (3 + axis) * n);
+    let c = run(l, numbers, (6 + axis) * n);
+    let (lower, upper) = (l.min(l.min(a, b), c), l.max(l.max(a, b), c));
+    let (near, far) = if test.backwards[axis] == 0 { (lower, upper) } else { (upper, lower) };
+    (
+        l.mul_sub(near, test.inverse_near[axis], test.near_offset[axis]),
+        l.mul_sub(far, test.inverse_far[axis], test.far_offset[axis]),
+    )
+}
+
+/// The coordinates of a leaf's triangles: a run for each corner and axis, along a test's axes.
+pub(super) struct Runs<'a> {
+    corners: [[&'a [f32]; 3]; 3],
+}
+
+impl<'a> Runs<'a> {
+    #[inline(always)]
+    pub(super) fn new(numbers: &'a LeafNumbers, n: usize, axes: [usize; 3]) -> Option<Self> {
+        let [x, y, z] = [axes[0] * n, axes[1] * n, axes[2] * n];
+        let run = |start: usize| numbers.get(start..start + n);
+        let corner = |start: usize| Some([run(start + x)?, run(start + y)?, run(start + z)?]);
+        Some(Self { corners: [corner(0)?, corner(3 * n)?, corner(6 * n)?] })
+    }
 }
 
 /// Twice the signed area of the origin and an edge from `p` to `q`.
