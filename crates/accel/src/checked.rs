@@ -102,16 +102,21 @@ impl Embree {
     fn look_again(&self, rays: &RayBatch, hits: &mut HitBatch, scratch: &mut Scratch) {
         let Scratch { rays: rays32, again, found, solved, suspects, doubtful, .. } = scratch;
         suspects.clear();
-        if rays.len() > 1 {
+        if solved.both_sides {
             recheck::minority_sides(hits, &solved.front, suspects);
         }
         suspects.retain(|&i| solved.valid[i as usize]);
         let could_hit = |i| rays32.can_hit(i) && self.frame.may_meet(rays, i);
         recheck::lonely_misses(hits, could_hit, suspects);
         let mut rechecked = suspects.len() as u64;
-        self.ask_beside(rays, hits, rays32, again, found, suspects);
+        if !suspects.is_empty() {
+            self.ask_beside(rays, hits, rays32, again, found, suspects);
+        }
         suspects.append(doubtful);
-        suspects.extend((0..).zip(&solved.valid).filter(|(_, valid)| !**valid).map(|(i, _)| i));
+        if !solved.all_valid {
+            let invalid = (0..).zip(&solved.valid).filter(|(_, valid)| !**valid);
+            suspects.extend(invalid.map(|(i, _)| i));
+        }
         suspects.sort_unstable();
         suspects.dedup();
         if suspects.is_empty() {
@@ -226,7 +231,7 @@ fn check_scale(bounds: Bounds) -> Result<(), BuildError> {
 
 impl Accel for Embree {
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
-        hits.reset(rays.len());
+        hits.resize(rays.len());
         SCRATCH.with_borrow_mut(|scratch| {
             let geometry = self.scene.geometry();
             scratch.doubtful.clear();
@@ -239,8 +244,8 @@ impl Accel for Embree {
             } else {
                 self.scene.closest(&scratch.rays, rays.coherent, &mut scratch.found);
             }
-            hits.placement.copy_from_slice(&scratch.found.placement);
-            hits.triangle.copy_from_slice(&scratch.found.triangle);
+            std::mem::swap(&mut hits.placement, &mut scratch.found.placement);
+            std::mem::swap(&mut hits.triangle, &mut scratch.found.triangle);
             solve::solve(geometry, rays, hits, &mut scratch.lanes, &mut scratch.solved);
             if self.checks() {
                 self.look_again(rays, hits, scratch);

@@ -299,7 +299,7 @@ impl Shape {
         to_frame: &Transform,
         options: &BuildOptions,
     ) -> Result<Self, BuildError> {
-        check_size(mesh)?;
+        check_size(&mesh.name, mesh.triangles.len(), mesh.positions.len())?;
         let mut shape = Self::new(device, sys::RTC_GEOMETRY_TYPE_TRIANGLE, options)?;
         let triangles: &[[u32; 3]] = &mesh.triangles;
         // SAFETY: the indices stand behind `mesh`, which outlives the scene (`Scene` keeps the
@@ -414,9 +414,10 @@ impl Drop for Shape {
     }
 }
 
-fn check_size(mesh: &Mesh) -> Result<(), BuildError> {
+/// Refuses what Embree's 32-bit numbers cannot count.
+fn check_size(name: &str, triangles: usize, corners: usize) -> Result<(), BuildError> {
     let limit = u64::from(u32::MAX) - 1;
-    let (triangles, corners) = (mesh.triangles.len() as u64, mesh.positions.len() as u64);
+    let (triangles, corners) = (triangles as u64, corners as u64);
     let what = if triangles > limit {
         format!("{triangles} triangles")
     } else if corners > limit {
@@ -424,7 +425,7 @@ fn check_size(mesh: &Mesh) -> Result<(), BuildError> {
     } else {
         return Ok(());
     };
-    Err(BuildError::TooLarge { mesh: mesh.name.clone(), what, backend: "Embree", limit })
+    Err(BuildError::TooLarge { mesh: name.to_owned(), what, backend: "Embree", limit })
 }
 
 impl Quality {
@@ -670,4 +671,28 @@ fn is_sound(linear: &DMat3) -> bool {
     (1e-12..1e12).contains(&size)
         && unit.determinant() != 0.0
         && norm(&unit.inverse()) <= WORST_CONDITION
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_32_bits_cannot_count_is_refused_by_name() {
+        let most = u32::MAX as usize - 1;
+        assert!(check_size("statue", most, most).is_ok());
+        for (triangles, corners, what) in [(most + 1, 3, "triangles"), (1, most + 1, "vertices")] {
+            let refused = check_size("statue", triangles, corners).expect_err("too many");
+            let message = refused.to_string();
+            assert!(message.contains("statue") && message.contains(what), "{message}");
+        }
+    }
+
+    #[test]
+    fn placements_that_single_precision_cannot_invert_are_baked() {
+        let sound = |x: f64, y: f64, z: f64| is_sound(&DMat3::from_diagonal(DVec3::new(x, y, z)));
+        assert!(sound(1.0, 1.0, 1.0) && sound(-1e-6, 1e-6, 2e-6) && sound(1e5, -1e5, 1e5));
+        assert!(!sound(1.0, 1.0, 0.0) && !sound(0.0, 0.0, 0.0) && !sound(1e-7, 1.0, 1.0));
+        assert!(!sound(f64::NAN, 1.0, 1.0));
+    }
 }

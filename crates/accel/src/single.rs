@@ -21,11 +21,17 @@ pub(crate) struct Frame {
 /// of their own. Up to here f32 loses at most two bits more than it must, and buffers stay shared.
 const NEAR: f64 = 4.0;
 
-/// A unit vector that no sensible ray runs along.
-const ODD_AXIS: [f64; 3] = [0.48, 0.6, 0.64];
+/// Two unit vectors, far from each other and from the ways that rays and edges mostly run.
+const ODD_AXES: [[f64; 3]; 2] = [[0.48, 0.6, 0.64], [-0.64, 0.48, -0.6]];
 
 /// Rays that start farther from the box than this many half-diagonals are started nearer.
 const FAR: f64 = 1.5;
+
+/// How far rays are moved sideways on purpose, in units in the last place of the largest coordinate.
+///
+/// Embree's edge functions are off by up to about six such units and mostly by one; see
+/// [`Frame::nudge`].
+const NUDGE: f64 = 3.0;
 
 /// Single precision's distances are trusted to this many times its lateral error: up to a cosine of
 /// incidence of one in so many.
@@ -60,7 +66,7 @@ impl Frame {
     /// move is towards the centre of the scene's box, so that at the outline, where a miss could
     /// never be checked, rays err on the side of hitting, and f64 decides.
     fn nudge(&self) -> f64 {
-        2.0 * f64::from(f32::EPSILON) * (self.centre.length() + FAR * self.radius)
+        NUDGE * f64::from(f32::EPSILON) * (self.centre.length() + FAR * self.radius)
     }
 
     /// Whether ray `i`'s line may meet the scene's box: separating axes along the cross products of
@@ -76,7 +82,7 @@ impl Frame {
     /// Lateral distance (m) by which single precision may misplace a ray against the scene: a few
     /// units in the last place of the largest coordinate there is.
     pub(crate) fn blur(&self) -> f64 {
-        8.0 * f64::from(f32::EPSILON) * (self.centre.length() + (1.0 + FAR) * self.radius)
+        2.0 * NUDGE * f64::from(f32::EPSILON) * (self.centre.length() + (1.0 + FAR) * self.radius)
     }
 
     /// By how much (m) single precision's distance `t` may be off. What counts at a limit of a ray
@@ -175,7 +181,7 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
     let advance = &mut out.advance[..n];
     let far = FAR * frame.radius;
     let pull = frame.nudge() / frame.radius;
-    let push = 0.5 * frame.nudge();
+    let push = frame.nudge();
     let [pad, pad_per_distance] = [frame.slack(0.0), frame.slack(1.0) - frame.slack(0.0)];
     let sphere = (1.0 + SPHERE_SLACK) * frame.radius + pad;
     for i in 0..n {
@@ -196,9 +202,12 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
         // Only a far ray is moved ahead, to `far` before the foot.
         let ahead = (foot - far).max(-pad);
         // Sideways: towards the box's centre, the more the farther out, and a little across.
-        let sx = pull * fx + push * (ODD_AXIS[1] * dz[i] - ODD_AXIS[2] * dy[i]);
-        let sy = pull * fy + push * (ODD_AXIS[2] * dx[i] - ODD_AXIS[0] * dz[i]);
-        let sz = pull * fz + push * (ODD_AXIS[0] * dy[i] - ODD_AXIS[1] * dx[i]);
+        let [first, second] = ODD_AXES;
+        let along = first[0] * dx[i] + first[1] * dy[i] + first[2] * dz[i];
+        let odd = |axis: usize| if along.abs() < 0.8 { first[axis] } else { second[axis] };
+        let sx = pull * fx + push * (odd(1) * dz[i] - odd(2) * dy[i]);
+        let sy = pull * fy + push * (odd(2) * dx[i] - odd(0) * dz[i]);
+        let sz = pull * fz + push * (odd(0) * dy[i] - odd(1) * dx[i]);
         let near = t_min[i] - ahead;
         let near = (near - (pad + pad_per_distance * near)).max(0.0);
         let end = t_max[i] - ahead;

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! a = L p0 + o,   e1 = L (p1 − p0),   e2 = L (p2 − p0),   n = e1 × e2
-//! t = n·a / n·d,  u = (−a)·(d × e2) / det,  v = d·((−a) × e1) / det,  det = e1·(d × e2)
+//! t = n·a / n·d,  u = (a × d)·e2 / n·d,  v = −(a × d)·e1 / n·d
 //! ```
 //!
 //! (Möller & Trumbore 1997, with the distance from the plane, whose error does not grow with `|a|/|e|`:
@@ -17,7 +17,9 @@
 //! error. Single precision picks the wrong one of two neighbours when a ray passes within about 10⁻⁷
 //! of their edge; such a hit comes out invalid here and is looked at again by the backend.
 
-use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::glam::DMat3;
+use std::ops::Range;
+
 use etendue_geometry::{
     Detail, Geometry, HitBatch, MISS, Mesh, Placement, Positions, RayBatch, Transform,
 };
@@ -38,6 +40,11 @@ type Lane = [f64; LANES];
 /// The triangles of one chunk of rays as seen from the rays' origins, and what comes of them.
 #[derive(Debug)]
 pub(crate) struct Lanes {
+    /// Which corners each triangle has.
+    indices: [[u32; 3]; LANES],
+    /// The corners `[corner][axis]` in their mesh, as most meshes have them, and in f64.
+    narrow: [[[f32; LANES]; 3]; 3],
+    corners: [[Lane; 3]; 3],
     a: [Lane; 3],
     e1: [Lane; 3],
     e2: [Lane; 3],
@@ -59,6 +66,9 @@ impl Default for Lanes {
     fn default() -> Self {
         let zero = [0.0; LANES];
         Self {
+            indices: [[0; 3]; LANES],
+            narrow: [[[0.0; LANES]; 3]; 3],
+            corners: [[zero; 3]; 3],
             a: [zero; 3],
             e1: [zero; 3],
             e2: [zero; 3],
@@ -80,12 +90,16 @@ impl Default for Lanes {
 pub(crate) struct Solved {
     /// The ray meets its triangle within `t_min..=t_max`; true for misses.
     pub(crate) valid: Vec<bool>,
-    /// It meets the triangle's front.
+    /// It meets the triangle's front; false for misses.
     pub(crate) front: Vec<bool>,
+    /// Whether all are valid.
+    pub(crate) all_valid: bool,
+    /// Whether triangles are met from both sides.
+    pub(crate) both_sides: bool,
 }
 
 /// Works out `t` (and `u`, `v`, the normal, when `hits.detail` asks) for every entry of `hits` that
-/// names a triangle.
+/// names a triangle, and makes the others misses.
 pub(crate) fn solve(
     geometry: &Geometry,
     rays: &RayBatch,
@@ -93,80 +107,55 @@ pub(crate) fn solve(
     lanes: &mut Lanes,
     solved: &mut Solved,
 ) {
-    solved.valid.clear();
     solved.valid.resize(rays.len(), true);
-    solved.front.clear();
     solved.front.resize(rays.len(), false);
+    solved.all_valid = true;
+    let mut sides = [false; 2];
     let mut start = 0;
     while start < rays.len() {
         let count = LANES.min(rays.len() - start);
-        if gather(geometry, rays, hits, start..start + count, lanes) {
-            measure(lanes, hits.detail == Detail::Surface);
-            scatter(rays, hits, start, start..start + count, lanes, solved);
-        }
+        gather(geometry, rays, hits, start..start + count, lanes);
+        measure(lanes, hits.detail == Detail::Surface);
+        let seen = scatter(rays, hits, start, count, lanes, solved);
+        solved.all_valid &= seen.all_valid;
+        sides = [sides[0] | seen.front, sides[1] | seen.back];
         start += count;
     }
+    solved.both_sides = sides == [true; 2];
 }
 
-/// Fills the lanes with the triangles of one chunk; `false` when no ray of it hit anything.
+/// Fills the lanes with the triangles of one chunk. Where nothing was hit, whatever stands in the lanes
+/// is measured and not looked at.
 fn gather(
     geometry: &Geometry,
     rays: &RayBatch,
     hits: &HitBatch,
-    range: std::ops::Range<usize>,
+    range: Range<usize>,
     lanes: &mut Lanes,
-) -> bool {
+) {
     for axis in 0..3 {
         lanes.d[axis][..range.len()].copy_from_slice(&rays.direction[axis][range.clone()]);
     }
-    let mut any = false;
     let mut i = range.start;
     while i < range.end {
         let index = hits.placement[i];
-        let run_end = (i..range.end).find(|&k| hits.placement[k] != index).unwrap_or(range.end);
-        if index == MISS {
-            // Whatever stands in the lanes is measured and not looked at.
-        } else {
-            any = true;
+        let rest = &hits.placement[i..range.end];
+        // Mostly all of them, which is told without a branch for each.
+        let others = rest.iter().fold(0, |others, &other| others | (other ^ index));
+        let same = |&other: &u32| other == index;
+        let run = i..if others == 0 { range.end } else { i + leading(rest, same) };
+        i = run.end;
+        if index != MISS {
             let placement = &geometry.placements[index as usize];
             let mesh = geometry.mesh_of(placement);
-            gather_run(placement, mesh, rays, hits, range.start, i..run_end, lanes);
+            lanes.gather_run(placement, mesh, rays, hits, range.start, run);
         }
-        i = run_end;
     }
-    any
 }
 
-/// Fills the lanes of consecutive rays that hit the same placement.
-fn gather_run(
-    placement: &Placement,
-    mesh: &Mesh,
-    rays: &RayBatch,
-    hits: &HitBatch,
-    first: usize,
-    run: std::ops::Range<usize>,
-    lanes: &mut Lanes,
-) {
-    let triangles: &[[u32; 3]] = &mesh.triangles;
-    let place = Place::of(&placement.world_from_mesh);
-    let corners = |i: usize| triangles[hits.triangle[i] as usize].map(|corner| corner as usize);
-    match &mesh.positions {
-        Positions::F32(vertices) if vertices.stride() == 3 => {
-            // The usual layout, with one bounds check a corner.
-            let (floats, _) = vertices.floats().as_chunks::<3>();
-            for i in run {
-                let [p, q, r] = corners(i);
-                let corners = [wide(floats[p]), wide(floats[q]), wide(floats[r])];
-                lanes.put(i - first, &place, rays.origin(i), corners);
-            }
-        }
-        positions => {
-            for i in run {
-                let corners = corners(i).map(|corner| positions.get(corner));
-                lanes.put(i - first, &place, rays.origin(i), corners);
-            }
-        }
-    }
+/// How many values at the beginning are `wanted`.
+fn leading(values: &[u32], wanted: impl Fn(&u32) -> bool) -> usize {
+    values.iter().position(|value| !wanted(value)).unwrap_or(values.len())
 }
 
 /// A placement's transform with what is asked of it for every hit.
@@ -175,44 +164,122 @@ struct Place<'a> {
     handedness: f64,
     /// Nothing to multiply.
     moved_only: bool,
-}
-
-impl<'a> Place<'a> {
-    fn of(transform: &'a Transform) -> Self {
-        let moved_only = transform.linear == DMat3::IDENTITY;
-        Self { transform, handedness: transform.handedness(), moved_only }
-    }
+    /// The corners are in [`Lanes::narrow`].
+    narrow: bool,
 }
 
 impl Lanes {
-    /// Puts a triangle of local corners, seen from `origin`, into a lane.
-    #[inline]
-    fn put(&mut self, lane: usize, place: &Place<'_>, origin: DVec3, [p0, p1, p2]: [DVec3; 3]) {
-        let offset = place.transform.offset_from(origin);
-        let (mut p0, mut e1, mut e2) = (p0, p1 - p0, p2 - p0);
-        if !place.moved_only {
-            let linear = &place.transform.linear;
-            (p0, e1, e2) = (*linear * p0, *linear * e1, *linear * e2);
+    /// Fills the lanes of consecutive rays that hit the same placement.
+    fn gather_run(
+        &mut self,
+        placement: &Placement,
+        mesh: &Mesh,
+        rays: &RayBatch,
+        hits: &HitBatch,
+        first: usize,
+        run: Range<usize>,
+    ) {
+        let here = run.start - first..run.end - first;
+        let triangles: &[[u32; 3]] = &mesh.triangles;
+        // One kind of memory at a time: the processor fetches as many ahead as it can.
+        for (indices, &triangle) in
+            self.indices[here.clone()].iter_mut().zip(&hits.triangle[run.clone()])
+        {
+            *indices = triangles[triangle as usize];
         }
-        let a = p0 + offset;
-        for axis in 0..3 {
-            self.a[axis][lane] = a[axis];
-            self.e1[axis][lane] = e1[axis];
-            self.e2[axis][lane] = e2[axis];
-        }
-        self.magnitude[lane] = l1(p0) + l1(offset);
-        self.handedness[lane] = place.handedness;
+        let narrow = match &mesh.positions {
+            // The usual layout, with one bounds check a corner.
+            Positions::F32(vertices) if vertices.stride() == 3 => {
+                let (floats, _) = vertices.floats().as_chunks::<3>();
+                for lane in here.clone() {
+                    for (k, corner) in self.indices[lane].into_iter().enumerate() {
+                        let point = floats[corner as usize];
+                        let [x, y, z] = &mut self.narrow[k];
+                        (x[lane], y[lane], z[lane]) = (point[0], point[1], point[2]);
+                    }
+                }
+                true
+            }
+            positions => {
+                for lane in here.clone() {
+                    for (k, corner) in self.indices[lane].into_iter().enumerate() {
+                        let point = positions.get(corner as usize);
+                        let [x, y, z] = &mut self.corners[k];
+                        (x[lane], y[lane], z[lane]) = (point[0], point[1], point[2]);
+                    }
+                }
+                false
+            }
+        };
+        let transform = &placement.world_from_mesh;
+        let place = Place {
+            transform,
+            handedness: transform.handedness(),
+            moved_only: transform.linear == DMat3::IDENTITY,
+            narrow,
+        };
+        let origin = rays.origin.each_ref().map(|axis| &axis[run.clone()]);
+        self.put(here, &place, origin);
+    }
+
+    /// Brings the corners of some lanes to where they are seen from the rays' origins.
+    fn put(&mut self, range: Range<usize>, place: &Place<'_>, origin: [&[f64]; 3]) {
+        see(self, range, place, origin);
     }
 }
 
-#[inline]
-fn wide([x, y, z]: [f32; 3]) -> DVec3 {
-    DVec3::new(x.into(), y.into(), z.into())
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn see(lanes: &mut Lanes, range: Range<usize>, place: &Place<'_>, origin: [&[f64]; 3]) {
+    let Range { start, end } = range;
+    let Lanes { narrow, corners, a, e1, e2, magnitude, handedness, .. } = lanes;
+    if place.narrow {
+        for (wide, narrow) in corners.iter_mut().flatten().zip(narrow.iter().flatten()) {
+            for (wide, &narrow) in wide[start..end].iter_mut().zip(&narrow[start..end]) {
+                *wide = f64::from(narrow);
+            }
+        }
+    }
+    magnitude[start..end].fill(0.0);
+    handedness[start..end].fill(place.handedness);
+    let [p, q, r] = corners;
+    for axis in 0..3 {
+        for i in start..end {
+            a[axis][i] = p[axis][i];
+            e1[axis][i] = q[axis][i] - p[axis][i];
+            e2[axis][i] = r[axis][i] - p[axis][i];
+        }
+    }
+    if !place.moved_only {
+        let linear = &place.transform.linear;
+        for vectors in [&mut *a, &mut *e1, &mut *e2] {
+            turn(linear, vectors, start, end);
+        }
+    }
+    let (high, low) = (place.transform.translation, place.transform.translation_low);
+    for axis in 0..3 {
+        let origin = &origin[axis][..end - start];
+        for i in start..end {
+            let offset = (high[axis] - origin[i - start]) + low[axis];
+            magnitude[i] += a[axis][i].abs() + offset.abs();
+            a[axis][i] += offset;
+        }
+    }
 }
 
-#[inline]
-fn l1(v: DVec3) -> f64 {
-    v.x.abs() + v.y.abs() + v.z.abs()
+#[inline(always)]
+fn turn(linear: &DMat3, vectors: &mut [Lane; 3], start: usize, end: usize) {
+    let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
+    let [vx, vy, vz] = vectors.each_mut().map(|axis| &mut axis[start..end]);
+    for ((vx, vy), vz) in vx.iter_mut().zip(vy).zip(vz) {
+        let v = [*vx, *vy, *vz];
+        *vx = x.x * v[0] + y.x * v[1] + z.x * v[2];
+        *vy = x.y * v[0] + y.y * v[1] + z.y * v[2];
+        *vz = x.z * v[0] + y.z * v[1] + z.z * v[2];
+    }
 }
 
 /// The formulas of this module's head, one lane beside the other.
@@ -222,7 +289,7 @@ fn l1(v: DVec3) -> f64 {
     "aarch64+neon"
 ))]
 fn measure(lanes: &mut Lanes, want_normal: bool) {
-    let Lanes { a, e1, e2, d, magnitude, handedness, t, u, v, excess, front, n } = lanes;
+    let Lanes { a, e1, e2, d, magnitude, handedness, t, u, v, excess, front, n, .. } = lanes;
     for i in 0..LANES {
         let (ax, ay, az) = (a[0][i], a[1][i], a[2][i]);
         let (bx, by, bz) = (e1[0][i], e1[1][i], e1[2][i]);
@@ -230,13 +297,12 @@ fn measure(lanes: &mut Lanes, want_normal: bool) {
         let (dx, dy, dz) = (d[0][i], d[1][i], d[2][i]);
         let (nx, ny, nz) = (by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx);
         let along = nx * dx + ny * dy + nz * dz;
-        t[i] = (nx * ax + ny * ay + nz * az) / along;
+        let inverse = 1.0 / along;
+        t[i] = (nx * ax + ny * ay + nz * az) * inverse;
         front[i] = -along * handedness[i];
-        let (px, py, pz) = (dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx);
-        let (qx, qy, qz) = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
-        let inverse = -1.0 / (bx * px + by * py + bz * pz);
-        let ui = (ax * px + ay * py + az * pz) * inverse;
-        let vi = (dx * qx + dy * qy + dz * qz) * inverse;
+        let (mx, my, mz) = (ay * dz - az * dy, az * dx - ax * dz, ax * dy - ay * dx);
+        let ui = (mx * cx + my * cy + mz * cz) * inverse;
+        let vi = -(mx * bx + my * by + mz * bz) * inverse;
         u[i] = ui;
         v[i] = vi;
         let edges = (bx.abs() + by.abs() + bz.abs()).max(cx.abs() + cy.abs() + cz.abs());
@@ -257,32 +323,60 @@ fn measure(lanes: &mut Lanes, want_normal: bool) {
     }
 }
 
+/// What one chunk says of all its hits.
+struct Seen {
+    all_valid: bool,
+    front: bool,
+    back: bool,
+}
+
 /// Copies one chunk's results to the hits.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn scatter(
     rays: &RayBatch,
     hits: &mut HitBatch,
     start: usize,
-    range: std::ops::Range<usize>,
+    count: usize,
     lanes: &Lanes,
     solved: &mut Solved,
-) {
-    let surface = hits.detail == Detail::Surface;
-    for i in range {
-        let lane = i - start;
-        if hits.placement[i] == MISS {
-            continue;
-        }
-        let t = lanes.t[lane];
+) -> Seen {
+    let range = start..start + count;
+    let placement = &hits.placement[range.clone()];
+    let (t_min, t_max) = (&rays.t_min[range.clone()], &rays.t_max[range.clone()]);
+    let (out, t) = (&mut hits.t[range.clone()], &lanes.t[..count]);
+    let (excess, front) = (&lanes.excess[..count], &lanes.front[..count]);
+    let valid_out = &mut solved.valid[range.clone()];
+    let front_out = &mut solved.front[range.clone()];
+    let mut seen = Seen { all_valid: true, front: false, back: false };
+    for i in 0..count {
+        let hit = placement[i] != MISS;
         // Written so that NaN, from a triangle seen edge-on, is invalid.
-        solved.valid[i] = lanes.excess[lane] <= 0.0 && t >= rays.t_min[i] && t <= rays.t_max[i];
-        solved.front[i] = lanes.front[lane] > 0.0;
-        hits.t[i] = t;
-        if surface {
-            hits.u[i] = lanes.u[lane].clamp(0.0, 1.0);
-            hits.v[i] = lanes.v[lane].clamp(0.0, 1.0);
-            for axis in 0..3 {
-                hits.normal[axis][i] = lanes.n[axis][lane];
+        let valid = !hit | ((excess[i] <= 0.0) & (t[i] >= t_min[i]) & (t[i] <= t_max[i]));
+        let is_front = hit & (front[i] > 0.0);
+        out[i] = if hit { t[i] } else { f64::INFINITY };
+        valid_out[i] = valid;
+        front_out[i] = is_front;
+        seen.all_valid &= valid;
+        seen.front |= is_front;
+        seen.back |= hit & !is_front;
+    }
+    if hits.detail == Detail::Surface {
+        for (out, weight) in [(&mut hits.u, &lanes.u), (&mut hits.v, &lanes.v)] {
+            let out = &mut out[range.clone()];
+            for i in 0..count {
+                out[i] = if placement[i] != MISS { weight[i].clamp(0.0, 1.0) } else { 0.0 };
+            }
+        }
+        for (out, normal) in hits.normal.iter_mut().zip(&lanes.n) {
+            let out = &mut out[range.clone()];
+            for i in 0..count {
+                out[i] = if placement[i] != MISS { normal[i] } else { 0.0 };
             }
         }
     }
+    seen
 }

@@ -2,6 +2,8 @@
 
 #![expect(clippy::cast_possible_truncation, reason = "meshes and batches here are small")]
 
+#[path = "contract/accuracy.rs"]
+mod accuracy;
 #[path = "contract/meshes.rs"]
 mod meshes;
 
@@ -87,6 +89,7 @@ fn assert_agreement(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str, found
             let rays = RayBatch { coherent, ..rays.clone() };
             let hits = closest(&*accel, &rays);
             assert_eq!(hits.len(), rays.len());
+            let mut at_edges = 0;
             for i in 0..rays.len() {
                 let context = || {
                     let ray = (rays.origin(i), rays.direction(i), rays.t_min[i], rays.t_max[i]);
@@ -101,6 +104,11 @@ fn assert_agreement(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str, found
                 let same = (ours.1, ours.2) == (theirs.1, theirs.2);
                 let allowed = tolerance(name, same, &rays, i, theirs.0);
                 let error = (ours.0 - theirs.0).abs();
+                let wrong = error > allowed;
+                if wrong && name == "embree" && is_at_edge(geometry, &rays, &truth, i) {
+                    at_edges += 1;
+                    continue;
+                }
                 assert!(error <= allowed, "{}: {ours:?} is not {theirs:?}", context());
                 // Where two triangles meet, either may come first by the last digit.
                 if same {
@@ -110,6 +118,7 @@ fn assert_agreement(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str, found
                     assert!(moved < 1e-6, "{}: weights", context());
                 }
             }
+            assert!(at_edges * 1000 <= rays.len(), "{what}: {at_edges} rays pass along edges");
             let mut blocked = Vec::new();
             accel.occluded(&rays, &mut blocked);
             assert_eq!(blocked.len(), rays.len());
@@ -118,6 +127,25 @@ fn assert_agreement(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str, found
             }
         }
     }
+}
+
+/// Whether ray `i` hits its triangle so close to an open edge, or to one behind which the mesh turns
+/// away, that single precision may see what is behind: within 2·10⁻⁶ of the scene's and the ray's size,
+/// which is what rays are nudged by and what f32 may be off by.
+fn is_at_edge(geometry: &Geometry, rays: &RayBatch, truth: &HitBatch, i: usize) -> bool {
+    let placement = &geometry.placements[truth.placement[i] as usize];
+    let mesh = geometry.mesh_of(placement);
+    let to = |corner| placement.world_from_mesh.point_from(corner, rays.origin(i));
+    let corners = mesh.corners(truth.triangle[i] as usize).map(to);
+    let at = rays.direction(i) * truth.t[i];
+    let size = truth.t[i].max(corners[0].length()) + geometry.loose_bounds().diagonal();
+    (0..3).any(|k| {
+        let (p, edge) = (corners[k], corners[(k + 1) % 3] - corners[k]);
+        let along = ((at - p).dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+        let way = at - (p + edge * along);
+        // Sideways, as the ray sees it.
+        way.cross(rays.direction(i)).length() <= 2e-6 * size
+    })
 }
 
 /// By how much (m) a distance may differ from `t`.

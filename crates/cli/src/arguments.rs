@@ -188,6 +188,14 @@ pub(crate) enum AccelArgument {
     Exact,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AccelMode {
+    /// Closed meshes have no leaks: suspicious rays are looked at again in f64
+    Robust,
+    /// No second look: some rays slip through edges and corners
+    Fast,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct RenderArguments {
     #[command(flatten)]
@@ -201,6 +209,12 @@ pub(crate) struct RenderArguments {
     /// Threads of build and render; 0 takes all that this process may use
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     pub(crate) threads: usize,
+    /// How carefully Embree looks; the other accelerators always are robust
+    #[arg(long, value_enum, default_value_t = AccelMode::Robust)]
+    pub(crate) accel_mode: AccelMode,
+    /// Make Embree use this instruction set: sse2, sse4.2, avx, avx2 or avx512
+    #[arg(long, value_name = "NAME")]
+    pub(crate) isa: Option<String>,
     /// Stop a build whose structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
     #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
     pub(crate) memory_limit: Option<u64>,

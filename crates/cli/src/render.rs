@@ -14,7 +14,7 @@ use etendue_scene::file::{FileKind, SceneFile};
 use etendue_scene::import::Note;
 use etendue_scene::{LoadOptions, Scene};
 
-use crate::arguments::{RenderArguments, SceneArguments};
+use crate::arguments::{AccelMode, RenderArguments, SceneArguments};
 use crate::fault::{Fault, print_text};
 use crate::progress::Stages;
 use crate::stop;
@@ -70,6 +70,8 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let options = BuildOptions {
         threads: rayon::current_num_threads(),
         memory_limit: arguments.memory_limit,
+        robust: arguments.accel_mode == AccelMode::Robust,
+        isa: arguments.isa.clone(),
         progress: Some(stages.begin("build")),
         ..BuildOptions::default()
     };

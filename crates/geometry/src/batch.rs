@@ -134,6 +134,18 @@ impl HitBatch {
         }
     }
 
+    /// Makes room for `len` hits without setting them, for whoever sets all of them.
+    pub fn resize(&mut self, len: usize) {
+        self.t.resize(len, f64::INFINITY);
+        self.placement.resize(len, MISS);
+        self.triangle.resize(len, MISS);
+        if self.detail == Detail::Surface {
+            for array in [&mut self.u, &mut self.v].into_iter().chain(&mut self.normal) {
+                array.resize(len, 0.0);
+            }
+        }
+    }
+
     /// Turns hit `i` into a miss.
     pub fn clear_hit(&mut self, i: usize) {
         self.t[i] = f64::INFINITY;

@@ -27,6 +27,11 @@ pub enum RenderError {
     /// The backend was left out when this program was built.
     #[error("this program was built without {0}; use `--accel bvh`, or build it with the feature")]
     Absent(&'static str),
+    /// An instruction set was asked for that the backend cannot be told.
+    #[error(
+        "only Embree can be told an instruction set; leave `--isa` out, or use `--accel embree`"
+    )]
+    NotEmbree,
     /// The result is no picture; a fault of this program.
     #[error(transparent)]
     Picture(#[from] PictureError),
@@ -66,7 +71,8 @@ pub fn accelerators() -> &'static [AccelName] {
 ///
 /// # Errors
 ///
-/// When the backend is not built in, or cannot build: memory, size, or a stop.
+/// When the backend is not built in, cannot be told the options, or cannot build: memory, size, or a
+/// stop.
 pub fn build(
     scene: &Scene,
     plan: &Plan,
@@ -74,7 +80,11 @@ pub fn build(
 ) -> Result<Box<dyn Accel>, RenderError> {
     let geometry = Arc::clone(&scene.geometry);
     let options = BuildOptions { quality: plan.quality, ..options.clone() };
-    Ok(match scene.render.accel.unwrap_or(accelerators()[0]) {
+    let name = scene.render.accel.unwrap_or(accelerators()[0]);
+    if options.isa.is_some() && name != AccelName::Embree {
+        return Err(RenderError::NotEmbree);
+    }
+    Ok(match name {
         #[cfg(feature = "embree")]
         AccelName::Embree => Box::new(etendue_accel::Embree::build(geometry, &options)?),
         #[cfg(not(feature = "embree"))]

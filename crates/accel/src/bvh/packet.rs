@@ -401,20 +401,12 @@ impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, '_, L, S> {
                 & look.inside
                 & l.le(self.surely_near, look.closest)
                 & l.le(look.farthest, self.surely_first);
-            if S::ANY_WILL_DO {
-                for lane in bits(sure) {
-                    self.packet.sinks[lane].find();
-                }
-                self.packet.active &= !sure;
-                self.far = l.select(sure, l.splat(f32::NEG_INFINITY), self.far);
-            } else {
-                self.pending |= sure;
-                self.far = l.select(sure, look.farthest, self.far);
-                self.surely_first = l.select(sure, look.closest, self.surely_first);
-                self.leaf = l.select(sure, l.splat(f32::from_bits(leaf.0)), self.leaf);
-                let place = f32::from_bits(u32::from(i.to_le_bytes()[0]));
-                self.place = l.select(sure, l.splat(place), self.place);
-            }
+            self.pending |= sure;
+            self.far = l.select(sure, look.farthest, self.far);
+            self.surely_first = l.select(sure, look.closest, self.surely_first);
+            self.leaf = l.select(sure, l.splat(f32::from_bits(leaf.0)), self.leaf);
+            let place = f32::from_bits(u32::from(i.to_le_bytes()[0]));
+            self.place = l.select(sure, l.splat(place), self.place);
             if look.maybe != sure {
                 self.test_exactly(numbers, n, i, look.maybe & !sure);
             }

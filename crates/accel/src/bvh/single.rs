@@ -24,9 +24,6 @@ pub(super) trait Sink {
 
     fn new(t_max: f64) -> Self;
 
-    /// There is a hit, whichever; only where any will do.
-    fn find(&mut self);
-
     /// Takes a hit within the limits; answers how far to look on, or `None` to end.
     fn take(&mut self, hit: watertight::Hit, placement: u32, triangle: u32) -> Option<f64>;
 }
@@ -38,8 +35,6 @@ impl Sink for Nearest {
     fn new(t_max: f64) -> Self {
         Self::none(t_max)
     }
-
-    fn find(&mut self) {}
 
     #[inline(always)]
     fn take(&mut self, hit: watertight::Hit, placement: u32, triangle: u32) -> Option<f64> {
@@ -59,11 +54,6 @@ impl Sink for AnyHit {
     #[inline(always)]
     fn new(_: f64) -> Self {
         Self { found: false }
-    }
-
-    #[inline(always)]
-    fn find(&mut self) {
-        self.found = true;
     }
 
     #[inline(always)]
@@ -89,7 +79,10 @@ impl<L: Lanes, S: Sink, F: FnMut(usize, S)> NullaryFnOnce for Batch<'_, L, S, F>
     #[inline(always)]
     fn call(mut self) {
         let mut stacks = Stacks::new();
-        let alone = if self.rays.coherent { self.packets(&mut stacks) } else { 0 };
+        // A packet goes on until its last ray has found something; rays for which any hit will do are
+        // done sooner alone.
+        let together = self.rays.coherent && !S::ANY_WILL_DO;
+        let alone = if together { self.packets(&mut stacks) } else { 0 };
         for i in alone..self.rays.len() {
             if let Some(query) = Query::of(self.rays, i) {
                 let mut sink = S::new(query.t_max);

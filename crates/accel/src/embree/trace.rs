@@ -201,13 +201,11 @@ macro_rules! packets {
                 found: &mut Found,
             ) {
                 let mut query = Aligned(sys::$rayhit::default());
-                let mut start = 0;
-                while start < rays.len() {
+                query.0.ray.mask = [u32::MAX; $width];
+                for start in (0..rays.len()).step_by($width) {
                     let count = $width.min(rays.len() - start);
-                    let valid = Aligned(std::array::from_fn::<i32, $width, _>(|lane| {
-                        if lane < count { -1 } else { 0 }
-                    }));
-                    fill_packet!(query.0.ray, rays, start, count);
+                    let valid = Aligned(first_lanes::<$width>(count));
+                    fill_packet!(query.0.ray, rays, start, count, $width);
                     query.0.hit.geomID = [MISS; $width];
                     query.0.hit.primID = [MISS; $width];
                     query.0.hit.instID[0] = [MISS; $width];
@@ -222,14 +220,13 @@ macro_rules! packets {
                         );
                     }
                     let hit = &query.0.hit;
-                    let range = start..start + count;
-                    for (lane, placement) in found.placement[range.clone()].iter_mut().enumerate() {
-                        let instance = hit.instID[0][lane];
-                        *placement = if instance == MISS { hit.geomID[lane] } else { instance };
+                    let mut placement = hit.geomID;
+                    for (placement, &instance) in placement.iter_mut().zip(&hit.instID[0]) {
+                        *placement = if instance == MISS { *placement } else { instance };
                     }
-                    found.triangle[range.clone()].copy_from_slice(&hit.primID[..count]);
-                    found.t[range].copy_from_slice(&query.0.ray.tfar[..count]);
-                    start += count;
+                    put(&mut found.placement, start, count, &placement);
+                    put(&mut found.triangle, start, count, &hit.primID);
+                    put(&mut found.t, start, count, &query.0.ray.tfar);
                 }
             }
 
@@ -240,13 +237,11 @@ macro_rules! packets {
                 blocked: &mut [bool],
             ) {
                 let mut query = Aligned(sys::$ray::default());
-                let mut start = 0;
-                while start < rays.len() {
+                query.0.mask = [u32::MAX; $width];
+                for start in (0..rays.len()).step_by($width) {
                     let count = $width.min(rays.len() - start);
-                    let valid = Aligned(std::array::from_fn::<i32, $width, _>(|lane| {
-                        if lane < count { -1 } else { 0 }
-                    }));
-                    fill_packet!(query.0, rays, start, count);
+                    let valid = Aligned(first_lanes::<$width>(count));
+                    fill_packet!(query.0, rays, start, count, $width);
                     // SAFETY: as above.
                     unsafe {
                         sys::$occlude(
@@ -256,10 +251,10 @@ macro_rules! packets {
                             arguments,
                         );
                     }
-                    for (lane, blocked) in blocked[start..start + count].iter_mut().enumerate() {
-                        *blocked = query.0.tfar[lane] == f32::NEG_INFINITY;
+                    let tfar = &query.0.tfar[..count];
+                    for (blocked, &t) in blocked[start..start + count].iter_mut().zip(tfar) {
+                        *blocked = t == f32::NEG_INFINITY;
                     }
-                    start += count;
                 }
             }
         }
@@ -268,20 +263,48 @@ macro_rules! packets {
 
 /// Copies `count` rays from `start` into a packet.
 macro_rules! fill_packet {
-    ($ray:expr, $rays:expr, $start:expr, $count:expr) => {{
-        let range = $start..$start + $count;
+    ($ray:expr, $rays:expr, $start:expr, $count:expr, $width:literal) => {{
         let ray = &mut $ray;
-        ray.org_x[..$count].copy_from_slice(&$rays.origin[0][range.clone()]);
-        ray.org_y[..$count].copy_from_slice(&$rays.origin[1][range.clone()]);
-        ray.org_z[..$count].copy_from_slice(&$rays.origin[2][range.clone()]);
-        ray.dir_x[..$count].copy_from_slice(&$rays.direction[0][range.clone()]);
-        ray.dir_y[..$count].copy_from_slice(&$rays.direction[1][range.clone()]);
-        ray.dir_z[..$count].copy_from_slice(&$rays.direction[2][range.clone()]);
-        ray.tnear[..$count].copy_from_slice(&$rays.t_near[range.clone()]);
-        ray.tfar[..$count].copy_from_slice(&$rays.t_far[range]);
-        ray.mask = [u32::MAX; _];
-        ray.id = std::array::from_fn(|lane| number($start + lane));
+        take(&mut ray.org_x, &$rays.origin[0], $start, $count);
+        take(&mut ray.org_y, &$rays.origin[1], $start, $count);
+        take(&mut ray.org_z, &$rays.origin[2], $start, $count);
+        take(&mut ray.dir_x, &$rays.direction[0], $start, $count);
+        take(&mut ray.dir_y, &$rays.direction[1], $start, $count);
+        take(&mut ray.dir_z, &$rays.direction[2], $start, $count);
+        take(&mut ray.tnear, &$rays.t_near, $start, $count);
+        take(&mut ray.tfar, &$rays.t_far, $start, $count);
+        for lane in 0..$width {
+            ray.id[lane] = number($start + lane);
+        }
     }};
+}
+
+/// Takes `count` values from `start` on; a whole packet in one move.
+#[inline(always)]
+fn take<const W: usize>(lanes: &mut [f32; W], from: &[f32], start: usize, count: usize) {
+    match from[start..].first_chunk::<W>() {
+        Some(whole) => *lanes = *whole,
+        None => lanes[..count].copy_from_slice(&from[start..start + count]),
+    }
+}
+
+/// Puts the first `count` values from `start` on; a whole packet in one move.
+#[inline(always)]
+fn put<T: Copy, const W: usize>(to: &mut [T], start: usize, count: usize, lanes: &[T; W]) {
+    match to[start..].first_chunk_mut::<W>() {
+        Some(whole) => *whole = *lanes,
+        None => to[start..start + count].copy_from_slice(&lanes[..count]),
+    }
+}
+
+/// The mask of the first `count` lanes.
+#[inline(always)]
+fn first_lanes<const W: usize>(count: usize) -> [i32; W] {
+    let mut valid = [-1; W];
+    if count < W {
+        valid[count..].fill(0);
+    }
+    valid
 }
 
 /// The alignment of the widest packet, for all of them.

@@ -273,6 +273,14 @@ fn folders_that_cannot_be_written_to_are_refused_before_rendering() {
 }
 
 #[test]
+fn instruction_sets_that_there_are_not_are_refused_by_name() {
+    let bench = Bench::with_scene(r#"{"etendue": 1, "objects": [{"shape": "box"}]}"#);
+    refused(&bench, &["--isa", "mmx"], &["isa", "mmx"]);
+    refused(&bench, &["--isa", "avx2", "--accel", "bvh"], &["--isa", "--accel embree"]);
+    refused(&bench, &["--accel-mode", "sloppy"], &["--accel-mode", "robust", "fast"]);
+}
+
+#[test]
 fn a_memory_limit_that_the_build_would_pass_stops_it() {
     let bench =
         Bench::with_scene(r#"{"etendue": 1, "objects": [{"shape": "blob", "triangles": 200000}]}"#);
