@@ -1,13 +1,18 @@
 //! The closed set of cameras, and what all of them can do.
 
+use std::sync::Arc;
+
 use etendue_geometry::{Bounds, RayBatch};
+use etendue_spectrum::Lanes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::element::Resolve;
 use crate::length::{Degrees, Metres};
 use crate::{
-    CameraError, CameraRays, FilmSamples, Orthographic, OrthographicSpec, Pinhole, PinholeSpec,
-    Pose, PoseSpec, SensorSpec,
+    CameraError, CameraRays, ChromaticRealLensCameraSpec, FilmSamples, LaneGroup, LensCamera,
+    LensCameraSpec, Orthographic, OrthographicSpec, Pinhole, PinholeSpec, Pose, PoseSpec,
+    RealLensCameraSpec, SensorSpec, ThinLensCameraSpec,
 };
 
 /// Rows of the picture of a camera that comes without a resolution.
@@ -21,6 +26,28 @@ pub enum CameraSpec {
     Pinhole(PinholeSpec),
     /// All rays are parallel.
     Orthographic(OrthographicSpec),
+    /// An ideal thin lens with an aperture.
+    ThinLens(ThinLensCameraSpec),
+    /// One thick spherical lens.
+    RealLens(RealLensCameraSpec),
+    /// One thick spherical lens that disperses.
+    ChromaticRealLens(ChromaticRealLensCameraSpec),
+    /// Any lens, by its file or in place.
+    Lens(LensCameraSpec),
+}
+
+/// The same expression for every kind of camera.
+macro_rules! for_each_kind {
+    ($camera:expr, $spec:ident => $value:expr) => {
+        match $camera {
+            Self::Pinhole($spec) => $value,
+            Self::Orthographic($spec) => $value,
+            Self::ThinLens($spec) => $value,
+            Self::RealLens($spec) => $value,
+            Self::ChromaticRealLens($spec) => $value,
+            Self::Lens($spec) => $value,
+        }
+    };
 }
 
 /// A camera ready to send rays.
@@ -38,6 +65,8 @@ pub enum Projection {
     Pinhole(Pinhole),
     /// In parallel.
     Orthographic(Orthographic),
+    /// Through a lens.
+    Lens(Arc<LensCamera>),
 }
 
 /// A rectangle of pixels. Rays of a block run row by row from its top left.
@@ -111,43 +140,44 @@ impl CameraSpec {
         match self {
             Self::Pinhole(_) => "pinhole",
             Self::Orthographic(_) => "orthographic",
+            Self::ThinLens(_) => "thin_lens",
+            Self::RealLens(_) => "real_lens",
+            Self::ChromaticRealLens(_) => "chromatic_real_lens",
+            Self::Lens(_) => "lens",
         }
     }
 
     /// Whether the file says where the camera stands.
     #[must_use]
     pub fn has_pose(&self) -> bool {
-        match self {
-            Self::Pinhole(spec) => spec.pose.is_some(),
-            Self::Orthographic(spec) => spec.pose.is_some(),
-        }
+        for_each_kind!(self, spec => spec.pose.is_some())
     }
 
     /// The sensor.
     #[must_use]
     pub fn sensor(&self) -> &SensorSpec {
-        match self {
-            Self::Pinhole(spec) => &spec.sensor,
-            Self::Orthographic(spec) => &spec.sensor,
-        }
+        for_each_kind!(self, spec => &spec.sensor)
     }
 
     /// The sensor, to be changed.
     pub fn sensor_mut(&mut self) -> &mut SensorSpec {
-        match self {
-            Self::Pinhole(spec) => &mut spec.sensor,
-            Self::Orthographic(spec) => &mut spec.sensor,
-        }
+        for_each_kind!(self, spec => &mut spec.sensor)
     }
 
     /// The camera. `bounds` is the box of what it may have to frame (m), asked for only when the
-    /// file leaves the pose or the field to us.
+    /// file leaves the pose or the field to us. `resolve` turns paths that the camera names (lens
+    /// files, masks) into paths to be opened, or says why not.
     ///
     /// # Errors
     ///
     /// When the description makes no camera: the error names the key.
-    pub fn build(&self, bounds: impl FnOnce() -> Bounds) -> Result<Camera, CameraError> {
+    pub fn build(
+        &self,
+        bounds: impl FnOnce() -> Bounds,
+        resolve: Resolve<'_>,
+    ) -> Result<Camera, CameraError> {
         self.sensor().check()?;
+        let lens = |(pose, lens)| (pose, Projection::Lens(Arc::new(lens)));
         let (pose, projection) = match self {
             Self::Pinhole(spec) => {
                 let (pose, pinhole) = spec.build(bounds)?;
@@ -157,6 +187,10 @@ impl CameraSpec {
                 let (pose, orthographic) = spec.build(bounds)?;
                 (pose, Projection::Orthographic(orthographic))
             }
+            Self::ThinLens(spec) => lens(spec.build(bounds, resolve)?),
+            Self::RealLens(spec) => lens(spec.build(bounds, resolve)?),
+            Self::ChromaticRealLens(spec) => lens(spec.build(bounds, resolve)?),
+            Self::Lens(spec) => lens(spec.build(bounds, resolve)?),
         };
         if !pose.is_finite() {
             return Err(CameraError::new("pose", "no finite place frames a scene of this size"));
@@ -182,10 +216,47 @@ impl Camera {
         self.sensor.resolution
     }
 
-    /// From one pixel's centre to the next (µm), when the file says so.
+    /// From one pixel's centre to the next (µm): as the file says, or as the lens and its field of
+    /// view make it.
     #[must_use]
     pub fn pixel_pitch(&self) -> Option<f64> {
-        self.sensor.pixel_pitch.map(|pitch| pitch.0)
+        match &self.projection {
+            Projection::Lens(lens) => Some(lens.focused().pixel_pitch()),
+            _ => self.sensor.pixel_pitch.map(|pitch| pitch.0),
+        }
+    }
+
+    /// The lens, if there is one.
+    #[must_use]
+    pub fn lens(&self) -> Option<&LensCamera> {
+        match &self.projection {
+            Projection::Lens(lens) => Some(lens),
+            _ => None,
+        }
+    }
+
+    /// Which of `lanes` have to be traced apart: all in one group unless the lens tells wavelengths
+    /// apart and there are several lanes.
+    #[must_use]
+    pub fn lane_groups(&self, lanes: &Lanes) -> Vec<LaneGroup> {
+        match &self.projection {
+            Projection::Lens(lens) => lens.lane_groups(lanes),
+            _ => vec![LaneGroup { lanes: 0..lanes.count(), wavelength: None }],
+        }
+    }
+
+    /// The camera with all measured that sampling its pupil for `lanes` needs; to be done once,
+    /// before [`Self::sample_rays`] is asked from many threads.
+    ///
+    /// # Errors
+    ///
+    /// When no light gets through at these wavelengths: the error names what blocks it.
+    pub fn opened(&self, lanes: &Lanes) -> Result<Self, CameraError> {
+        let projection = match &self.projection {
+            Projection::Lens(lens) => Projection::Lens(Arc::new(lens.opened(lanes)?)),
+            other => other.clone(),
+        };
+        Ok(Self { projection, ..self.clone() })
     }
 
     /// Place and axes. `z` depths are measured from its position along its forward axis.
@@ -227,8 +298,12 @@ impl Camera {
 
     /// The rays of `samples` that leave the camera, each with its weight: `out` is refilled.
     ///
-    /// Places that a distorted camera does not see have no ray.
+    /// Places that a distorted camera does not see have no ray. A lens has rays for the wavelengths
+    /// of its [`lane_groups`](Self::lane_groups).
     pub fn sample_rays(&self, samples: &FilmSamples, out: &mut CameraRays) {
+        if let Projection::Lens(lens) = &self.projection {
+            return lens.sample_rays(&self.pose, samples, out);
+        }
         self.rays_through(&samples.columns, &samples.rows, &mut out.rays);
         out.sample.clear();
         out.sample.extend(0..u32::try_from(samples.len()).unwrap_or(u32::MAX));
@@ -241,6 +316,7 @@ impl Camera {
         match &self.projection {
             Projection::Pinhole(pinhole) => pinhole.aim(&self.pose, rays),
             Projection::Orthographic(orthographic) => orthographic.aim(&self.pose, rays),
+            Projection::Lens(lens) => lens.aim(&self.pose, rays),
         }
     }
 }

@@ -4,7 +4,8 @@ use glam::DMat4;
 use serde::{Deserialize, Serialize};
 
 use crate::distortion::{Distortion, DistortionSpec};
-use crate::{Camera, Convention, PixelOrigin, Projection};
+use crate::lens::focused::View;
+use crate::{Camera, Convention, LensCamera, PixelOrigin, Projection};
 
 /// A camera's projection and pose in OpenCV's convention: x right, y down, z forward, metres.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,9 +33,37 @@ pub struct CameraFile {
     /// From one pixel's centre to the next (µm), when the scene says so.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixel_pitch_um: Option<f64>,
-    /// K's fy in millimetres, when the pixel pitch is known.
+    /// K's fy in millimetres, when the pixel pitch is known: behind a lens, the image distance and
+    /// not the focal length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_length_mm: Option<f64>,
+    /// The lens, when there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lens: Option<LensFacts>,
+}
+
+/// What is known of a camera's lens.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LensFacts {
+    /// What `K` is.
+    pub k_is: String,
+    /// The design wavelength (nm), for which the other numbers are.
+    pub wavelength_nm: f64,
+    /// The effective focal length (mm); `null` for an afocal lens.
+    pub effective_focal_length_mm: Option<f64>,
+    /// Focal length over the entrance pupil's diameter.
+    pub f_number: Option<f64>,
+    /// The entrance pupil's diameter (mm).
+    pub entrance_pupil_diameter_mm: Option<f64>,
+    /// From the first element's vertex back to the camera's origin, the entrance pupil (mm).
+    pub entrance_pupil_depth_mm: f64,
+    /// The distance of what is in focus from the origin (m); `null` for infinity.
+    pub focus_distance_m: Option<f64>,
+    /// From the last element's vertex to the sensor (mm).
+    pub sensor_distance_mm: f64,
+    /// The projected solid angle of the pupil seen from the axis (sr): the irradiance for a radiance
+    /// of 1.
+    pub pupil_solid_angle_sr: f64,
 }
 
 /// How points are projected.
@@ -45,6 +74,9 @@ pub enum ProjectionName {
     Perspective,
     /// Through one point, with OpenCV's fisheye model.
     Fisheye,
+    /// Through a lens that was traced: `K` holds near the axis, and the layer `position` has what
+    /// every pixel's chief ray hits.
+    Lens,
     /// In parallel.
     Orthographic,
 }
@@ -83,6 +115,7 @@ impl Camera {
             world_from_camera: by_rows(self.pose().world_from_camera(Convention::Opencv)),
             pixel_pitch_um: self.pixel_pitch(),
             focal_length_mm: None,
+            lens: self.lens().map(LensFacts::of),
         };
         match self.projection() {
             Projection::Pinhole(pinhole) => {
@@ -99,6 +132,23 @@ impl Camera {
                 file.focal_length_mm =
                     self.pixel_pitch().map(|um| um * 1e-3 * pinhole.intrinsics().focal[1]);
             }
+            Projection::Lens(lens) => match lens.focused().view() {
+                View::Perspective(k) => {
+                    let ideal = lens.focused().train().is_ideal();
+                    file.projection =
+                        if ideal { ProjectionName::Perspective } else { ProjectionName::Lens };
+                    file.k = Some(k.matrix(PixelOrigin::Center));
+                    file.distortion = ideal
+                        .then(|| DistortionFile { model: "none".to_owned(), coefficients: vec![] });
+                    file.focal_length_mm = Some(1e-3 * lens.focused().pixel_pitch() * k.focal[1]);
+                }
+                View::Parallel { metres_per_pixel, centre } => {
+                    file.projection = ProjectionName::Orthographic;
+                    let principal_point = centre.map(|c| c - PixelOrigin::Center.to_corner());
+                    file.orthographic =
+                        Some(OrthographicFile { metres_per_pixel, principal_point });
+                }
+            },
             Projection::Orthographic(orthographic) => {
                 file.projection = ProjectionName::Orthographic;
                 file.orthographic = Some(OrthographicFile {
@@ -110,6 +160,34 @@ impl Camera {
             }
         }
         file
+    }
+}
+
+impl LensFacts {
+    fn of(lens: &LensCamera) -> Self {
+        let focused = lens.focused();
+        let paraxial = focused.paraxial();
+        let k_is = match focused.view() {
+            View::Perspective(_) if focused.train().is_ideal() => {
+                "exact for what is in focus: the lens is ideal"
+            }
+            View::Perspective(_) => {
+                "the paraxial camera: what the lens does near its axis, without its distortion"
+            }
+            View::Parallel { .. } => "none: the lens is telecentric towards the object",
+        };
+        let finite = |x: f64| x.is_finite().then_some(x);
+        Self {
+            k_is: k_is.to_owned(),
+            wavelength_nm: paraxial.wavelength,
+            effective_focal_length_mm: paraxial.efl,
+            f_number: paraxial.f_number,
+            entrance_pupil_diameter_mm: paraxial.entrance_pupil.diameter,
+            entrance_pupil_depth_mm: focused.origin(),
+            focus_distance_m: finite(focused.object_distance()),
+            sensor_distance_mm: focused.sensor_z() - focused.train().last_vertex(),
+            pupil_solid_angle_sr: lens.solid_angle(),
+        }
     }
 }
 

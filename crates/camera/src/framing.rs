@@ -27,6 +27,28 @@ pub(crate) struct Reach {
 }
 
 impl Reach {
+    /// What a picture of `size` (pixels) reaches to: the least of what is seen at the middles and
+    /// corners of each edge, by `tangents` of a place (right, down), and `widest`. The middles are
+    /// across from `centre`.
+    pub(crate) fn of_picture(
+        [width, height]: [f64; 2],
+        centre: [f64; 2],
+        widest: f64,
+        tangents: impl Fn(f64, f64) -> [f64; 2],
+    ) -> Self {
+        let corners = [tangents(0.0, 0.0), tangents(width, 0.0), tangents(0.0, height)];
+        let far = tangents(width, height);
+        let [cu, cv] = centre.map(|c| c.max(0.0));
+        let (cu, cv) = (cu.min(width), cv.min(height));
+        let least = |a: f64, b: f64, c: f64| a.min(b).min(c).min(widest);
+        Self {
+            left: least(-corners[0][0], -corners[2][0], -tangents(0.0, cv)[0]),
+            right: least(corners[1][0], far[0], tangents(width, cv)[0]),
+            up: least(-corners[0][1], -corners[1][1], -tangents(cu, 0.0)[1]),
+            down: least(corners[2][1], far[1], tangents(cu, height)[1]),
+        }
+    }
+
     /// The same picture without its margin; `None` when an edge is on the wrong side of the axis
     /// by so much that nothing is left.
     fn inside_margin(self) -> Option<Self> {

@@ -19,6 +19,7 @@ mod framing;
 pub mod glass;
 pub mod intrinsics;
 pub mod length;
+pub mod lens;
 pub mod orthographic;
 pub mod pinhole;
 pub mod pose;
@@ -32,6 +33,10 @@ pub use camera_file::CameraFile;
 pub use distortion::{Distortion, DistortionSpec};
 pub use error::CameraError;
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin};
+pub use lens::{
+    ChromaticRealLensCameraSpec, LaneGroup, LensCamera, LensCameraSpec, RealLensCameraSpec,
+    ThinLensCameraSpec,
+};
 pub use orthographic::{Orthographic, OrthographicSpec};
 pub use pinhole::{Pinhole, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};

@@ -145,17 +145,7 @@ impl Pinhole {
             }
         };
         let widest = if self.distortion.is_some() { 3_f64.sqrt() } else { f64::INFINITY };
-        let corners = [tangents(0.0, 0.0), tangents(width, 0.0), tangents(0.0, height)];
-        let far = tangents(width, height);
-        let [cu, cv] = self.intrinsics.centre.map(|c| c.max(0.0));
-        let (cu, cv) = (cu.min(width), cv.min(height));
-        let least = |a: f64, b: f64, c: f64| a.min(b).min(c).min(widest);
-        Reach {
-            left: least(-corners[0][0], -corners[2][0], -tangents(0.0, cv)[0]),
-            right: least(corners[1][0], far[0], tangents(width, cv)[0]),
-            up: least(-corners[0][1], -corners[1][1], -tangents(cu, 0.0)[1]),
-            down: least(corners[2][1], far[1], tangents(cu, height)[1]),
-        }
+        Reach::of_picture([width, height], self.intrinsics.centre, widest, tangents)
     }
 
     /// Turns places on the sensor (pixels from the corner), which stand in the first two arrays of

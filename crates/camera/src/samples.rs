@@ -2,6 +2,8 @@
 
 use etendue_geometry::RayBatch;
 
+use crate::element::{FateCounts, LensRays};
+
 /// Where a batch of samples lies: on the film, in the pupil, and at which wavelength. The arrays have
 /// one entry a sample.
 #[derive(Debug, Clone, Default)]
@@ -27,6 +29,10 @@ pub struct CameraRays {
     pub weight: Vec<f64>,
     /// The sample of each ray.
     pub sample: Vec<u32>,
+    /// What became of the rays inside the lens, over all batches since it was last emptied.
+    pub fates: FateCounts,
+    /// The rays while they are in the lens.
+    pub(crate) in_lens: LensRays,
 }
 
 impl FilmSamples {
@@ -58,6 +64,13 @@ impl FilmSamples {
 }
 
 impl CameraRays {
+    /// Removes all rays and keeps the memory and the counts.
+    pub(crate) fn clear(&mut self) {
+        self.rays.clear();
+        self.weight.clear();
+        self.sample.clear();
+    }
+
     /// Leaves out rays that were ended before they began: they see nothing.
     pub(crate) fn drop_unseen(&mut self) {
         if self.rays.t_max.iter().all(|&t_max| t_max >= 0.0) {

@@ -10,7 +10,10 @@ const PIXELS: f64 = 1e-9;
 
 fn camera(json: &str) -> Camera {
     let spec: CameraSpec = serde_json::from_str(json).unwrap_or_else(|e| panic!("{e}: {json}"));
-    spec.build(|| Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) }).unwrap()
+    spec.build(|| Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) }, &|name| {
+        Err(format!("{name}: no files here"))
+    })
+    .unwrap()
 }
 
 fn cameras() -> Vec<Camera> {
@@ -279,7 +282,9 @@ fn bad_cameras_are_refused_by_key() {
     ];
     for (json, at) in cases {
         let spec: CameraSpec = serde_json::from_str(&json).unwrap();
-        let error = spec.build(|| Bounds::EMPTY).unwrap_err();
+        let error = spec
+            .build(|| Bounds::EMPTY, &|name| Err(format!("{name}: no files here")))
+            .unwrap_err();
         assert_eq!(error.at, at, "{json}: {error}");
     }
     for json in [

@@ -231,6 +231,8 @@ fn report(
         seed: scene.render.seed,
         seconds,
         rays: rendered.rays,
+        lens_rays: rendered.fates.total(),
+        lens_losses: rendered.fates.losses(),
         mrays_per_second: rendered.rays as f64 / rendered.trace_time.as_secs_f64() / 1e6,
         rechecked: counts.rechecked,
         corrected: counts.corrected,
@@ -268,6 +270,13 @@ fn say(report: &Report) {
         report.mrays_per_second,
         report.accel
     ));
+    if report.lens_rays > 0 {
+        let lost = match report.lens_losses.as_slice() {
+            [] => "none lost".to_owned(),
+            losses => losses.join(", "),
+        };
+        lines.push(format!("{} rays into the lens: {lost}", report.lens_rays));
+    }
     lines.push(format!(
         "load {load:.2} s, build {build:.2} s, decode {decode:.2} s, render {render:.2} s, write \
          {write:.2} s; {total:.2} s in all, {} MiB at most",

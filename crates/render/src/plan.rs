@@ -4,6 +4,7 @@
 use std::fmt;
 
 use etendue_accel::Quality;
+use etendue_camera::LensCamera;
 use etendue_geometry::Detail;
 use etendue_scene::Scene;
 use etendue_scene::import::Wanted;
@@ -53,6 +54,8 @@ pub struct Plan {
     pub images: bool,
     /// Rays a pixel for coloured layers.
     pub samples: u32,
+    /// Whether rays are spread over a pupil.
+    pub pupil: bool,
     /// Rays in all.
     pub rays: u64,
     /// Build time against traversal speed.
@@ -75,11 +78,14 @@ impl Plan {
     pub fn new(scene: &Scene, outputs: Outputs) -> Self {
         let layers = scene.layers.clone();
         let needs = needs(&layers);
-        let (centre, mean) = passes(&layers, scene.render.samples);
+        let lens = scene.camera.lens().is_some();
+        let (centre, mean) = passes(&layers, scene.render.samples, lens);
         let [width, height] = scene.camera.resolution();
         let pixels = u64::from(width) * u64::from(height);
         let samples = scene.render.samples;
-        let rays = pixels * (u64::from(centre) + if mean { u64::from(samples) } else { 0 });
+        let apart = scene.camera.lane_groups(&Lanes::Rgb).len() as u64;
+        let means = if mean { u64::from(samples) * apart } else { 0 };
+        let rays = pixels * (u64::from(centre) + means);
         let triangles = scene.geometry.triangles_unique();
         let quality =
             if rays / RAYS_PER_TRIANGLE < triangles { Quality::Low } else { Quality::Medium };
@@ -91,6 +97,7 @@ impl Plan {
             detail,
             images,
             samples,
+            pupil: lens && mean,
             rays,
             quality,
             precision,
@@ -114,14 +121,13 @@ impl Plan {
             decisions.push(Decision { what, choice: choice.to_owned(), because });
         };
         let on = |yes| if yes { "on" } else { "off" };
-        let count = self.layers.len();
         let rays_of = match (centre, mean) {
             (true, true) => format!(
                 "the chief ray of each pixel for data layers, {} samples a pixel for colours",
                 self.samples
             ),
             (false, true) => format!("{} samples a pixel, no data layers", self.samples),
-            _ => format!("the chief ray of each pixel serves all {count} layers"),
+            _ => format!("the chief ray of each pixel serves all {} layers", self.layers.len()),
         };
         decide("rays", &self.rays.to_string(), rays_of);
         let (lanes, because) = expose::explain_lanes(scene, &self.lanes);
@@ -129,23 +135,27 @@ impl Plan {
         if let Some((choice, because)) = expose::explain_sensor(scene) {
             decide("sensor", &choice, because);
         }
-        decide("pupil", "off", "the camera has no aperture: every ray is a chief ray".to_owned());
+        for (what, choice, because) in self.explain_lens(scene) {
+            decide(what, choice, because);
+        }
         decide("shadows and bounces", "off", "no layer looks at light".to_owned());
         decide(
             "surface",
             on(needs.surface),
-            match needs.surface {
-                true => "a layer needs normals or barycentric coordinates".to_owned(),
-                false => "no layer needs more than distance and ids".to_owned(),
-            },
+            either(
+                needs.surface,
+                "a layer needs normals or barycentric coordinates",
+                "no layer needs more than distance and ids",
+            ),
         );
         decide(
             "vertex normals",
             on(needs.normals),
-            match needs.normals {
-                true => "a layer needs shading normals".to_owned(),
-                false => "no layer needs shading normals; they are not read".to_owned(),
-            },
+            either(
+                needs.normals,
+                "a layer needs shading normals",
+                "no layer needs shading normals; they are not read",
+            ),
         );
         decide(
             "materials and textures",
@@ -177,25 +187,66 @@ impl Plan {
         );
         decide(
             "data layers",
-            match self.precision {
-                Precision::Single => "32 bits",
-                Precision::Double => "64 bits",
-            },
-            match self.precision {
-                Precision::Single => "an EXR holds no more".to_owned(),
-                Precision::Double => "NPY files hold what was computed".to_owned(),
-            },
+            if self.precision == Precision::Single { "32 bits" } else { "64 bits" },
+            either(
+                self.precision == Precision::Single,
+                "an EXR holds no more",
+                "NPY files hold what was computed",
+            ),
         );
         decisions
     }
+
+    /// How wavelengths and the pupil of the camera's lens are sampled.
+    fn explain_lens(&self, scene: &Scene) -> [(&'static str, &'static str, String); 2] {
+        let apart = scene.camera.lane_groups(&Lanes::Rgb).len() > 1;
+        let rays = if apart && self.pupil { "their own" } else { "shared" };
+        let (pupil, because) = pupil(scene.camera.lens(), self.pupil);
+        [
+            ("rays of a wavelength", rays, wavelengths(apart, self.pupil).to_owned()),
+            ("pupil", pupil, because),
+        ]
+    }
+}
+
+/// One of two reasons.
+fn either(yes: bool, reason: &str, other: &str) -> String {
+    if yes { reason } else { other }.to_owned()
 }
 
 /// Whether chief rays and whether averaged samples have to be traced.
-fn passes(layers: &[LayerSpec], samples: u32) -> (bool, bool) {
+fn passes(layers: &[LayerSpec], samples: u32, lens: bool) -> (bool, bool) {
     let colored = |layer: &LayerSpec| matches!(layer, LayerSpec::Flat | LayerSpec::Facing);
-    let mean = samples > 1 && layers.iter().any(colored);
-    let centre = layers.iter().any(|layer| samples == 1 || !colored(layer));
+    let averaged = samples > 1 || lens;
+    let mean = averaged && layers.iter().any(colored);
+    let centre = layers.iter().any(|layer| !averaged || !colored(layer));
     (centre, mean)
+}
+
+/// Why wavelengths are traced together or apart.
+fn wavelengths(apart: bool, pupil: bool) -> &'static str {
+    match (apart, pupil) {
+        (false, _) => "no glass or filter of a lens tells them apart",
+        (true, true) => "the lens bends or dims each in its own way",
+        (true, false) => "the chief ray at the lens' design wavelength serves all",
+    }
+}
+
+/// Whether rays are spread over a pupil, and why.
+fn pupil(lens: Option<&LensCamera>, spread: bool) -> (&'static str, String) {
+    let Some(lens) = lens else {
+        return ("off", "the camera has no aperture: every ray is a chief ray".to_owned());
+    };
+    if !spread {
+        return ("off", "no layer is a picture: data are taken along chief rays".to_owned());
+    }
+    let f_number = match lens.focused().paraxial().f_number {
+        Some(f_number) => format!(" (f/{f_number:.2})"),
+        None => String::new(),
+    };
+    let symmetric = lens.focused().train().is_rotationally_symmetric();
+    let bound = if symmetric { "along a radius of the sensor" } else { "on a grid of the sensor" };
+    ("on", format!("colours are averaged over the lens' exit pupil{f_number}, bounded {bound}"))
 }
 
 impl fmt::Display for Plan {

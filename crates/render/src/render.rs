@@ -4,14 +4,17 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildError, BuildOptions};
+use etendue_camera::Camera;
+use etendue_camera::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::AccelName;
+use etendue_spectrum::Lanes;
 use etendue_tracer::{Image, Surroundings, Texture, View};
 use rayon::prelude::*;
 
 use crate::film::FilmLayer;
 use crate::output::{Layer, Picture, PictureError};
-use crate::tiles::{Job, Sampling, Stopped};
+use crate::tiles::{Counts, Job, Sampling, Stopped};
 use crate::{Plan, expose};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
@@ -35,6 +38,22 @@ pub enum RenderError {
     /// The result is no picture; a fault of this program.
     #[error(transparent)]
     Picture(#[from] PictureError),
+    /// The camera's pupil cannot be sampled: nothing gets through the lens at the wavelengths that
+    /// are wanted.
+    #[error("camera: {0}")]
+    Camera(String),
+    /// Rays were sent, and not one left the lens.
+    #[error(
+        "the picture would be black: no ray gets from the sensor past element {element} of the \
+         camera's lens, counted from 0 on the object side ({})",
+        losses.join(", ")
+    )]
+    Dark {
+        /// The element nearest to the object at which rays ended.
+        element: usize,
+        /// Which share of the rays ended where.
+        losses: Vec<String>,
+    },
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
@@ -53,6 +72,8 @@ pub struct Rendered {
     pub picture: Picture,
     /// Rays traced by the camera.
     pub rays: u64,
+    /// What became of the rays inside the camera's lens; all 0 without one.
+    pub fates: FateCounts,
     /// Wall time of the tracing alone.
     pub trace_time: Duration,
 }
@@ -134,7 +155,7 @@ impl Images {
 ///
 /// # Errors
 ///
-/// When `progress` asks to stop.
+/// When `progress` asks to stop, or no light gets through the camera's lens.
 pub fn render(
     scene: &Scene,
     plan: &Plan,
@@ -150,8 +171,18 @@ pub fn render(
         .map(|&layer| FilmLayer::new(layer, width * height, plan.precision))
         .collect();
     let start = Instant::now();
-    let rays = job(scene, plan, accel, images, progress).run(&mut film)?;
+    let camera = match plan.pupil {
+        true => scene.camera.opened(&Lanes::Rgb).map_err(|e| RenderError::Camera(e.why))?,
+        false => scene.camera.clone(),
+    };
+    let job = job(scene, plan, accel, images, &camera, progress);
+    let Counts { rays, fates } = job.run(&mut film)?;
     let trace_time = start.elapsed();
+    if let (true, 0, Some(element)) =
+        (fates.total() > 0, fates.exited, fates.farthest_from_sensor())
+    {
+        return Err(RenderError::Dark { element, losses: fates.losses() });
+    }
     let mut layers: Vec<Layer> = film
         .into_iter()
         .map(|layer| {
@@ -161,7 +192,7 @@ pub fn render(
         .collect();
     layers.extend(expose::spectrum(scene, &layers));
     let picture = Picture::new(width, height, layers, header)?;
-    Ok(Rendered { picture, rays, trace_time })
+    Ok(Rendered { picture, rays, fates, trace_time })
 }
 
 fn job<'a>(
@@ -169,12 +200,14 @@ fn job<'a>(
     plan: &Plan,
     accel: &'a dyn Accel,
     images: &'a Images,
+    camera: &'a Camera,
     progress: &'a (dyn Fn(f64) -> bool + Sync),
 ) -> Job<'a> {
     let pose = scene.camera.pose();
     Job {
         accel,
-        camera: &scene.camera,
+        camera,
+        groups: camera.lane_groups(&Lanes::Rgb),
         surroundings: Surroundings {
             geometry: &scene.geometry,
             materials: &scene.materials,

@@ -49,6 +49,11 @@ pub struct Report {
     pub seconds: Seconds,
     /// Rays traced.
     pub rays: u64,
+    /// Rays sent into the camera's lens from the sensor; 0 without a lens.
+    pub lens_rays: u64,
+    /// Where rays ended inside the lens, as `vignetted at element 3: 12 %`, the greatest loss first;
+    /// elements count from 0 on the object side.
+    pub lens_losses: Vec<String>,
     /// Millions of rays a second of the tracing, layers included.
     pub mrays_per_second: f64,
     /// Rays looked at a second time in f64, and how many of those changed.

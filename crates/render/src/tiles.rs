@@ -4,7 +4,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use etendue_accel::Accel;
-use etendue_camera::{Camera, CameraRays, FilmSamples, PixelSamples, Sampler};
+use etendue_camera::element::FateCounts;
+use etendue_camera::{Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, Sampler};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_tracer::{LayerSpec, NormalKind, Surroundings, Traced};
 use rayon::prelude::*;
@@ -30,6 +31,8 @@ pub(crate) struct Sampling {
 pub(crate) struct Job<'a> {
     pub(crate) accel: &'a dyn Accel,
     pub(crate) camera: &'a Camera,
+    /// The colours of coloured layers that the camera traces apart.
+    pub(crate) groups: Vec<LaneGroup>,
     pub(crate) surroundings: Surroundings<'a>,
     pub(crate) detail: Detail,
     pub(crate) sampling: Sampling,
@@ -37,35 +40,48 @@ pub(crate) struct Job<'a> {
     pub(crate) progress: &'a (dyn Fn(f64) -> bool + Sync),
 }
 
+/// What was traced.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Counts {
+    /// Rays sent into the scene.
+    pub(crate) rays: u64,
+    /// What became of rays inside the camera's lens.
+    pub(crate) fates: FateCounts,
+}
+
 /// The render was stopped before it was done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Stopped;
 
 impl Job<'_> {
-    /// Fills `layers` and returns the number of rays that were traced.
-    pub(crate) fn run(&self, layers: &mut [FilmLayer]) -> Result<u64, Stopped> {
+    /// Fills `layers` and tells what was traced.
+    pub(crate) fn run(&self, layers: &mut [FilmLayer]) -> Result<Counts, Stopped> {
         let [width, height] = self.camera.resolution();
         let bands = bands(layers, [width, height], TILE);
         let total = bands.len() as f64;
-        let (done, rays) = (AtomicU64::new(0), AtomicU64::new(0));
+        let (done, counts) = (AtomicU64::new(0), Mutex::new(Counts::default()));
         bands
             .par_iter()
             .try_for_each(|band| {
                 let Some(mut band) = take(band) else { return Some(()) };
                 let mut batch = Batch::new(self.detail);
                 self.fill(&mut band, width, &mut batch);
-                rays.fetch_add(batch.traced, Ordering::Relaxed);
+                let mut counts = counts.lock().unwrap_or_else(PoisonError::into_inner);
+                counts.rays += batch.traced;
+                counts.fates.merge(&batch.camera_rays.fates);
+                drop(counts);
                 let done = done.fetch_add(1, Ordering::Relaxed) + 1;
                 (self.progress)(done as f64 / total).then_some(())
             })
             .ok_or(Stopped)?;
-        Ok(rays.into_inner())
+        Ok(counts.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
     fn fill(&self, band: &mut Band<'_>, width: u32, batch: &mut Batch) {
+        let at_centre = self.sampling.samples == 1 && self.camera.lens().is_none();
         let (mut centre, mut mean): (Vec<_>, Vec<_>) = std::mem::take(&mut band.layers)
             .into_iter()
-            .partition(|(layer, _)| self.sampling.samples == 1 || !is_colored(*layer));
+            .partition(|(layer, _)| at_centre || !is_colored(*layer));
         for left in (0..width).step_by(TILE as usize) {
             let tile =
                 Tile { left, top: band.top, width: TILE.min(width - left), height: band.height };
@@ -105,19 +121,25 @@ impl Job<'_> {
             let mut sums = vec![[0.0; 3]; pixels.len() * layers.len()];
             for first in (0..samples).step_by(at_once as usize) {
                 let range = first..samples.min(first + at_once);
-                batch.aim_at_samples(self.camera, tile, pixels, range.clone(), |x, y| {
+                batch.place_samples(tile, pixels, range.clone(), |x, y| {
                     sampler.pixel(seed, x, y, samples)
                 });
-                let CameraRays { rays, weight, sample } = &batch.camera_rays;
-                self.accel.closest(rays, &mut batch.hits);
-                batch.traced += rays.len() as u64;
-                let traced = Traced { rays, hits: &batch.hits };
-                for (i, (&weight, &sample)) in weight.iter().zip(sample).enumerate() {
-                    let pixel = sample as usize / range.len();
-                    for (k, (layer, _)) in layers.iter().enumerate() {
-                        let color = self.color(*layer, traced, i);
-                        let sum = &mut sums[pixel * layers.len() + k];
-                        *sum = std::array::from_fn(|c| sum[c] + weight * color[c]);
+                for group in &self.groups {
+                    batch.samples.wavelength = group.wavelength;
+                    self.camera.sample_rays(&batch.samples, &mut batch.camera_rays);
+                    let CameraRays { rays, weight, sample, .. } = &batch.camera_rays;
+                    self.accel.closest(rays, &mut batch.hits);
+                    batch.traced += rays.len() as u64;
+                    let traced = Traced { rays, hits: &batch.hits };
+                    for (i, (&weight, &sample)) in weight.iter().zip(sample).enumerate() {
+                        let pixel = sample as usize / range.len();
+                        for (k, (layer, _)) in layers.iter().enumerate() {
+                            let color = self.color(*layer, traced, i);
+                            let sum = &mut sums[pixel * layers.len() + k];
+                            for c in group.lanes.clone() {
+                                sum[c] += weight * color[c];
+                            }
+                        }
                     }
                 }
             }
@@ -326,10 +348,9 @@ impl Batch {
         camera.rays_through(&self.columns, &self.rows, &mut self.rays);
     }
 
-    /// Rays through samples `range` of each of `pixels`, those of one pixel side by side.
-    fn aim_at_samples(
+    /// Samples `range` of each of `pixels`, those of one pixel side by side.
+    fn place_samples(
         &mut self,
-        camera: &Camera,
         tile: Tile,
         pixels: &[(u32, u32)],
         range: std::ops::Range<u32>,
@@ -345,6 +366,5 @@ impl Batch {
                 self.samples.push(f64::from(x) + u, f64::from(y) + v, pupil);
             }
         }
-        camera.sample_rays(&self.samples, &mut self.camera_rays);
     }
 }

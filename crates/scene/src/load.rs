@@ -1,5 +1,6 @@
 //! From a scene file to a scene: each model once, in parallel, then put together.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -7,13 +8,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use etendue_camera::{Camera, CameraError, CameraSpec};
 use etendue_geometry::{Bounds, Geometry, Mesh, Placement, Positions, Transform};
+use etendue_spectrum::Lanes;
 use etendue_tracer::{Material, Paint, Texture};
 use rayon::prelude::*;
 
 use crate::cameras::{self, CameraOrigin, SceneCamera};
 use crate::file::{FileKind, SceneFile, Source, join, join_index, suggest};
 use crate::identity::Ingredients;
-use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Wanted};
+use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Strictness, Wanted};
 use crate::paths::{Folder, Found};
 use crate::scene::{LoadOptions, LoadProgress, LoadStats, Scene};
 use crate::shape::{ShapeError, ShapeSpec};
@@ -52,7 +54,10 @@ impl SceneFile {
         let folder = Folder::open(self.folder(), options.reach)?;
         let materials = self.named_materials()?;
         // What can be checked without the models is; a bad camera need not wait for them.
-        self.camera_spec().build(Bounds::default).map_err(|error| self.camera_fault(&error))?;
+        let parts_of_camera = CameraFiles::new(&folder);
+        self.camera_spec()
+            .build(Bounds::default, &|name| parts_of_camera.find(name))
+            .map_err(|error| self.camera_fault(&error))?;
         let (origins, objects) = self.resolve_objects(&folder, &materials)?;
         let imports = self.import_all(&origins, &objects, &folder, wanted, options)?;
         let mut parts = Parts { materials, ..Parts::default() };
@@ -75,7 +80,8 @@ impl SceneFile {
     }
 
     fn camera_fault(&self, error: &CameraError) -> SceneError {
-        self.fault(&format!("camera.{}", error.at), error.why.as_str())
+        let dot = if error.at.is_empty() { "" } else { "." };
+        self.fault(&format!("camera{dot}{}", error.at), error.why.as_str())
     }
 
     /// The scene's own materials in the order of their names.
@@ -230,12 +236,16 @@ impl SceneFile {
         options: &LoadOptions<'_>,
     ) -> Result<Scene, SceneError> {
         let geometry = Arc::new(parts.geometry);
-        let (camera, camera_origin) = self.camera(&geometry, &parts.cameras, options)?;
-        let opened = parts.stats.files.iter();
-        let files = opened.map(|(path, _)| (folder.relative(path), path.clone())).collect();
+        let camera_files = CameraFiles::new(folder);
+        let (camera, camera_origin) =
+            self.camera(&geometry, &parts.cameras, &camera_files, options)?;
+        let opened = parts.stats.files.iter().map(|(path, _)| path.clone());
+        let opened = opened.chain(camera_files.found.into_inner());
+        let files = opened.map(|path| (folder.relative(&path), path)).collect();
         let mut notes = parts.notes;
         notes.extend(self.unused_materials());
         let sensor = self.sensor.clone().map(|s| s.with_resolution(camera.resolution()));
+        notes.extend(self.lens_notes(&camera, options.strictness)?);
         Ok(Scene {
             path: self.path().to_owned(),
             geometry,
@@ -259,6 +269,7 @@ impl SceneFile {
         &self,
         geometry: &Geometry,
         cameras: &[SceneCamera],
+        files: &CameraFiles<'_>,
         options: &LoadOptions<'_>,
     ) -> Result<(Camera, CameraOrigin), SceneError> {
         let own = self.camera_spec();
@@ -281,9 +292,29 @@ impl SceneFile {
             None if own.has_pose() => (own, CameraOrigin::Scene),
             None => (own, CameraOrigin::Framed),
         };
-        let camera =
-            spec.build(|| bounds::tight(geometry)).map_err(|error| self.camera_fault(&error))?;
+        let camera = spec
+            .build(|| bounds::tight(geometry), &|name| files.find(name))
+            .map_err(|error| self.camera_fault(&error))?;
         Ok((camera, origin))
+    }
+
+    /// What is odd about the camera's lens. Glasses and filters that are not known at a wavelength
+    /// that is traced are an error when strict.
+    fn lens_notes(&self, camera: &Camera, strictness: Strictness) -> Result<Vec<Note>, SceneError> {
+        let Some(lens) = camera.lens() else { return Ok(Vec::new()) };
+        let guesses = lens.out_of_range(&Lanes::Rgb);
+        if let (Strictness::Strict, Some(guess)) = (strictness, guesses.first()) {
+            return Err(self.fault("camera", guess.as_str()));
+        }
+        let train = lens.focused().train();
+        let subject = if train.name().is_empty() { "the camera's lens" } else { train.name() };
+        let note = |message: &String| Note {
+            kind: NoteKind::Irregular,
+            subject: subject.to_owned(),
+            message: message.clone(),
+            count: 1,
+        };
+        Ok(train.notes().iter().chain(&guesses).map(note).collect())
     }
 
     fn unused_materials(&self) -> impl Iterator<Item = Note> + '_ {
@@ -295,6 +326,28 @@ impl SceneFile {
             message: "no object uses this material".to_owned(),
             count: 1,
         })
+    }
+}
+
+/// The files that a camera names: lenses and masks.
+struct CameraFiles<'a> {
+    folder: &'a Folder,
+    /// Those that were asked for and are there.
+    found: RefCell<Vec<PathBuf>>,
+}
+
+impl<'a> CameraFiles<'a> {
+    fn new(folder: &'a Folder) -> Self {
+        Self { folder, found: RefCell::default() }
+    }
+
+    fn find(&self, written: &str) -> Result<PathBuf, String> {
+        let path = self.folder.find(written)?.path;
+        let mut found = self.found.borrow_mut();
+        if !found.contains(&path) {
+            found.push(path.clone());
+        }
+        Ok(path)
     }
 }
 

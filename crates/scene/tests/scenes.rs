@@ -36,8 +36,9 @@ fn assets() -> Option<PathBuf> {
 
 fn examples() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-    let mut scenes: Vec<PathBuf> = fs::read_dir(folder)
-        .unwrap()
+    let mut scenes: Vec<PathBuf> = [folder.clone(), folder.join("paper")]
+        .into_iter()
+        .flat_map(|folder| fs::read_dir(folder).unwrap())
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.extension().is_some_and(|e| e == "json"))
         .collect();
@@ -53,6 +54,81 @@ fn every_example_scene_reads_and_loads() {
         let scene = load(&path, &[]);
         assert!(scene.geometry.triangles() > 0, "{}", path.display());
         assert!(scene.notes.is_empty(), "{}: {:?}", path.display(), scene.notes);
+    }
+}
+
+#[test]
+fn lens_files_are_read_by_the_folder_rule_and_belong_to_the_scenes_identity() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = folder.path().join("scene/lenses");
+    fs::create_dir_all(&inside).unwrap();
+    image_of_one_pixel(&inside.join("mask.png"));
+    let lens = r#"{"elements": [{"type": "thin_lens", "focal_length": 50},
+        {"type": "aperture", "shape": "image", "file": "mask.png", "width": 9}]}"#;
+    fs::write(inside.join("lens.json"), lens).unwrap();
+    fs::write(folder.path().join("other.json"), lens).unwrap();
+    let path = folder.path().join("scene/scene.json");
+    let write = |file: &str| {
+        let text = format!(
+            r#"{{"etendue": 1, "camera": {{"type": "lens", "lens": "{file}", "fov": 30}},
+                "objects": [{{"shape": "box"}}]}}"#
+        );
+        fs::write(&path, text).unwrap();
+    };
+    write("lenses/lens.json");
+    let first = load(&path, &[]).hash().unwrap();
+    assert_eq!(load(&path, &[]).hash().unwrap(), first);
+    fs::write(inside.join("lens.json"), lens.replace("50}", "51}")).unwrap();
+    assert_ne!(load(&path, &[]).hash().unwrap(), first, "another lens is another scene");
+    write("../other.json");
+    let error = SceneFile::read(&path, &[])
+        .unwrap()
+        .load(Wanted::EVERYTHING, &LoadOptions::default())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("camera.lens") && error.contains("--allow-outside"), "{error}");
+}
+
+/// A mask that is open: one white pixel.
+fn image_of_one_pixel(path: &Path) {
+    const PNG: &[u8] =
+        b"\x89\x50\x4e\x47\x0d\x0a\x1a\x0a\x00\x00\x00\x0d\x49\x48\x44\x52\x00\x00\x00\x01\x00\
+        \x00\x00\x01\x08\x00\x00\x00\x00\x3a\x7e\x9b\x55\x00\x00\x00\x0a\x49\x44\x41\x54\x78\
+        \x9c\x63\xf8\x0f\x00\x01\x01\x01\x00\xb1\x38\xf6\x14\x00\x00\x00\x00\x49\x45\x4e\x44\
+        \xae\x42\x60\x82";
+    fs::write(path, PNG).unwrap();
+}
+
+#[test]
+fn faults_of_a_lens_are_told_with_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.json");
+    for (camera, words) in [
+        (r#""type": "thin_lens", "focal_lenght": 50"#, "did you mean `focal_length`?"),
+        (r#""type": "thin_lens", "aperture": {"shape": "round", "radius": 3}"#, "unknown shape"),
+        (r#""type": "thin_lens", "aperture": {"radius": 3}"#, "give it `shape`"),
+        (
+            r#""type": "thin_lens", "elements": [{"type": "aperture", "shape": "circular", "radius": 3}]"#,
+            "the key `at` is missing",
+        ),
+        (
+            r#""type": "thin_lens", "elements": [{"type": "filter", "at": 3, "thickness": 3}]"#,
+            "camera.elements[0].thickness: unknown key",
+        ),
+        (
+            r#""type": "lens", "lens": {"elements": [{"type": "surface", "radious": 3}]}"#,
+            "camera.lens.elements[0].radious: unknown key; did you mean `radius`?",
+        ),
+        (r#""type": "lens""#, "the key `lens` is missing: A lens file's path"),
+        (r#""type": "thin_lens", "focal_length": 50, "fov": 30"#, "camera.f_number"),
+    ] {
+        let text = format!(r#"{{"etendue": 1, "camera": {{{camera}}}}}"#);
+        fs::write(&path, text).unwrap();
+        let error = SceneFile::read(&path, &[])
+            .and_then(|file| file.load(Wanted::EVERYTHING, &LoadOptions::default()))
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(words), "{camera}: {error}");
     }
 }
 

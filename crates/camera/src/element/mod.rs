@@ -13,7 +13,9 @@ mod step;
 mod surface;
 mod thin_lens;
 
-use schemars::JsonSchema;
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
@@ -34,8 +36,7 @@ pub(crate) use refract::Refraction;
 pub(crate) use step::{Action, Step};
 
 /// An element of a lens file: a part, and how it is mounted.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ElementSpec {
     /// What it is.
     #[serde(flatten)]
@@ -128,6 +129,61 @@ fn read<T: DeserializeOwned>(keys: Map<String, Value>) -> Result<T, String> {
     })
 }
 
+impl JsonSchema for ElementSpec {
+    fn schema_name() -> Cow<'static, str> {
+        "ElementSpec".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        element_schema(generator, Map::new(), &[])
+    }
+}
+
+/// The schema of a part with the mount's keys, `extra` ones that are required, and not those of
+/// `without`. As with reading, flattening would lose the refusal of unknown keys.
+pub(crate) fn element_schema(
+    generator: &mut SchemaGenerator,
+    extra: Map<String, Value>,
+    without: &[&str],
+) -> Schema {
+    let mut mount = Mount::json_schema(generator);
+    let required: Vec<Value> = extra.keys().map(|key| key.as_str().into()).collect();
+    let mut keys = extra;
+    if let Some(Value::Object(members)) = mount.ensure_object().remove("properties") {
+        keys.extend(members.into_iter().filter(|(key, _)| !without.contains(&key.as_str())));
+    }
+    let mut schema = PartSpec::json_schema(generator);
+    if let Some(Value::Array(kinds)) = schema.get_mut("oneOf") {
+        for kind in kinds {
+            mount_on(kind, &keys, &required);
+        }
+    }
+    schema
+}
+
+/// Adds `keys` to all objects that a schema chooses between, which refuse all others.
+fn mount_on(schema: &mut Value, keys: &Map<String, Value>, required: &[Value]) {
+    let Value::Object(schema) = schema else { return };
+    schema.remove("unevaluatedProperties");
+    let mut known = keys.clone();
+    if let Some(Value::Object(own)) = schema.get("properties") {
+        known.extend(own.clone());
+    }
+    if let Some(Value::Array(shapes)) = schema.get_mut("oneOf") {
+        // The tag has been looked at when it comes to the shapes.
+        known.insert("type".to_owned(), Value::Bool(true));
+        for shape in shapes {
+            mount_on(shape, &known, required);
+        }
+        return;
+    }
+    if let Some(Value::Array(all)) = schema.get_mut("required") {
+        all.extend_from_slice(required);
+    }
+    schema.insert("properties".to_owned(), Value::Object(known));
+    schema.insert("additionalProperties".to_owned(), Value::Bool(false));
+}
+
 impl From<SurfaceSpec> for PartSpec {
     fn from(spec: SurfaceSpec) -> Self {
         Self::Surface(spec)
@@ -184,6 +240,26 @@ mod tests {
         assert_eq!(stop.unwrap(), ElementSpec::new(PartSpec::circular(8.55), 4.5).as_stop());
         assert!(read(r#"{"type": "thin_lens", "focal_length": "50 mm"}"#).is_ok());
         assert!(read(r#"{"type": "filter", "transmission": [[400, 0.1], [700, 0.9]]}"#).is_ok());
+    }
+
+    #[test]
+    fn the_schema_knows_the_keys_of_part_and_mount_and_refuses_others() {
+        fn leaves<'a>(schema: &'a Value, found: &mut Vec<&'a Value>) {
+            match schema.get("oneOf").and_then(Value::as_array) {
+                Some(kinds) => kinds.iter().for_each(|kind| leaves(kind, found)),
+                None => found.push(schema),
+            }
+        }
+        let schema = schemars::schema_for!(ElementSpec).to_value();
+        let mut kinds = Vec::new();
+        leaves(&schema, &mut kinds);
+        assert_eq!(kinds.len(), 6, "three shapes of apertures");
+        for kind in kinds {
+            assert_eq!(kind["additionalProperties"], false, "{kind}");
+            let keys = kind["properties"].as_object().unwrap();
+            assert!(MOUNT_KEYS.iter().all(|key| keys.contains_key(*key)), "{kind}");
+            assert!(keys.len() > MOUNT_KEYS.len() + 1 && keys.contains_key("type"), "{kind}");
+        }
     }
 
     #[test]

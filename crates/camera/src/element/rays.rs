@@ -80,6 +80,8 @@ pub struct FateCounts {
     pub reflected: Vec<u64>,
     /// Rays stopped by element `i`.
     pub vignetted: Vec<u64>,
+    /// Rays that were not begun: no light reaches their place on the sensor.
+    pub unlit: u64,
 }
 
 impl FateCounts {
@@ -87,7 +89,7 @@ impl FateCounts {
     #[must_use]
     pub fn new(elements: usize) -> Self {
         let zeros = || vec![0; elements];
-        Self { exited: 0, missed: zeros(), reflected: zeros(), vignetted: zeros() }
+        Self { missed: zeros(), reflected: zeros(), vignetted: zeros(), ..Self::default() }
     }
 
     /// Counts one ray.
@@ -114,11 +116,27 @@ impl FateCounts {
         }
     }
 
+    /// Adds what was counted elsewhere.
+    pub fn merge(&mut self, other: &Self) {
+        self.exited += other.exited;
+        self.unlit += other.unlit;
+        for (counts, others) in [
+            (&mut self.missed, &other.missed),
+            (&mut self.reflected, &other.reflected),
+            (&mut self.vignetted, &other.vignetted),
+        ] {
+            if counts.len() < others.len() {
+                counts.resize(others.len(), 0);
+            }
+            counts.iter_mut().zip(others).for_each(|(count, other)| *count += other);
+        }
+    }
+
     /// All rays.
     #[must_use]
     pub fn total(&self) -> u64 {
         let lost = self.missed.iter().chain(&self.reflected).chain(&self.vignetted);
-        self.exited + lost.sum::<u64>()
+        self.exited + self.unlit + lost.sum::<u64>()
     }
 
     /// The element nearest to the object at which rays ended: when rays come from the sensor and
@@ -137,13 +155,17 @@ impl FateCounts {
             ("missed", &self.missed),
             ("totally reflected at", &self.reflected),
         ];
+        #[expect(clippy::cast_precision_loss, reason = "a percentage to read")]
+        let percent = |count: u64| 100.0 * count as f64 / self.total() as f64;
         let mut losses: Vec<(u64, String)> = Vec::new();
         for (way, counts) in ways {
             for (element, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
-                #[expect(clippy::cast_precision_loss, reason = "a percentage to read")]
-                let share = 100.0 * count as f64 / self.total() as f64;
-                losses.push((count, format!("{way} element {element}: {share:.3} %")));
+                losses.push((count, format!("{way} element {element}: {:.3} %", percent(count))));
             }
+        }
+        if self.unlit > 0 {
+            let text = format!("outside of the image circle: {:.3} %", percent(self.unlit));
+            losses.push((self.unlit, text));
         }
         losses.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
         losses.into_iter().map(|(_, text)| text).collect()

@@ -67,21 +67,35 @@ impl OpticalTrain {
         film: DVec3,
         start: Option<DVec2>,
     ) -> Option<DVec3> {
-        let pupil = self.paraxial(at.wavelength()).ok()?.exit_pupil.z;
-        let paraxial = |film: DVec3| match pupil {
-            Some(z) if (film.z - z).abs() > 1e-9 => -film.truncate() / (film.z - z),
-            _ => DVec2::ZERO,
+        let paraxial = || match self.paraxial(at.wavelength()).ok()?.exit_pupil.z {
+            Some(z) if (film.z - z).abs() > 1e-9 => Some(-film.truncate() / (film.z - z)),
+            _ => Some(DVec2::ZERO),
         };
-        let miss = |share: f64| {
+        let start = start.or_else(paraxial)?;
+        let shares = |share: f64| {
             let film = DVec3::new(film.x * share, film.y * share, film.z);
-            move |slopes: DVec2| {
-                let ray = Ray::new(film, towards_lens(slopes))?;
-                at.crossing(Side::Sensor, self.stop, ray).map(DVec2::from)
-            }
+            move |slopes: DVec2| self.on_stop(at, film, slopes)
         };
-        let slopes = solve(miss(1.0), start.unwrap_or_else(|| paraxial(film)), 1.0)
-            .or_else(|| follow(miss, DVec2::ZERO, 1.0))?;
+        let slopes =
+            self.chief_slopes_near(at, film, start).or_else(|| follow(shares, DVec2::ZERO, 1.0))?;
         Some(towards_lens(slopes))
+    }
+
+    /// The slopes of the chief ray of a point of the sensor (mm), found from slopes that are near or
+    /// not at all.
+    pub(crate) fn chief_slopes_near(
+        &self,
+        at: &TrainAt,
+        film: DVec3,
+        start: DVec2,
+    ) -> Option<DVec2> {
+        solve(|slopes| self.on_stop(at, film, slopes), start, 1.0)
+    }
+
+    /// Where a ray from the sensor crosses the stop (mm).
+    fn on_stop(&self, at: &TrainAt, film: DVec3, slopes: DVec2) -> Option<DVec2> {
+        let ray = Ray::new(film, towards_lens(slopes))?;
+        at.crossing(Side::Sensor, self.stop, ray).map(DVec2::from)
     }
 
     /// A distance from `z` (mm) that is in front of every part of the lens from any direction.

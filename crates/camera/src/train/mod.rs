@@ -177,6 +177,13 @@ impl OpticalTrain {
         self.sensor == SensorMount::default() && self.elements.iter().all(Element::is_symmetric)
     }
 
+    /// Whether nothing in it aberrates: thin lenses and sheets, centred and square to the axis.
+    #[must_use]
+    pub fn is_ideal(&self) -> bool {
+        let flat = |e: &Element| e.frame.is_axial() && !matches!(e.part, Part::Surface(_));
+        self.sensor.tilt == SensorMount::default().tilt && self.elements.iter().all(flat)
+    }
+
     /// Whether rays of different wavelengths run differently.
     #[must_use]
     pub fn is_dispersive(&self) -> bool {
@@ -274,6 +281,13 @@ impl OpticalTrain {
         }
         self.wavelength = wavelength;
         Ok(self)
+    }
+
+    /// The same lens with its sensor mounted in another way, if one is given.
+    #[must_use]
+    pub fn with_sensor(mut self, mount: Option<SensorMount>) -> Self {
+        self.sensor = mount.unwrap_or(self.sensor);
+        self
     }
 
     /// Sets the stop, or finds the element that limits the beam from infinity on the axis, and

@@ -159,6 +159,14 @@ impl OpticalTrain {
         Ok(heights.collect())
     }
 
+    /// From the first vertex to the plane at `z` (mm) behind the lens, at the design wavelength.
+    pub(crate) fn to_plane(&self, z: f64) -> Result<Abcd, GlassError> {
+        let indices = self.indices(self.wavelength)?;
+        let all = self.matrix(&indices, 0, self.elements.len());
+        let behind = indices[indices.len() - 1];
+        Ok(all.then(Abcd::gap((z - self.last_vertex()) / behind)))
+    }
+
     /// From before element `from` to behind the one before `to`: the gaps between, none outside.
     pub(crate) fn matrix(&self, indices: &[f64], from: usize, to: usize) -> Abcd {
         let mut all = Abcd::ONE;

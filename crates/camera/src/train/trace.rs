@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use etendue_spectrum::Curve;
 use glam::DVec3;
 use multiversion::multiversion;
 use schemars::JsonSchema;
@@ -52,12 +53,21 @@ impl OpticalTrain {
     /// When a glass has no index there. Being outside of a glass' stated range is no error here;
     /// see [`Self::outside_of_range`].
     pub fn at(&self, wavelength: f64) -> Result<TrainAt, GlassError> {
+        self.at_with(wavelength, &|curve| curve.held(wavelength))
+    }
+
+    /// As [`Self::at`], with filters that pass what `transmission` makes of their curves.
+    pub(crate) fn at_with(
+        &self,
+        wavelength: f64,
+        transmission: &dyn Fn(&Curve) -> f64,
+    ) -> Result<TrainAt, GlassError> {
         let indices = self.indices(wavelength)?;
         let (mut forward, mut backward) = (Vec::new(), Vec::new());
         for (element, placed) in self.elements.iter().enumerate() {
             let [before, behind] = [indices[element], indices[element + 1]];
             let [towards_sensor, towards_object] =
-                actions(&placed.part, before, behind, wavelength);
+                actions(&placed.part, before, behind, transmission);
             let (frame, axial) = (placed.frame, placed.frame.is_axial());
             forward.push(Step { element, frame, axial, action: towards_sensor });
             backward.push(Step { element, frame, axial, action: towards_object });
@@ -73,7 +83,12 @@ impl OpticalTrain {
 }
 
 /// What a part does to light from the object, and to light traced from the sensor.
-fn actions(part: &Part, before: f64, behind: f64, wavelength: f64) -> [Action; 2] {
+fn actions(
+    part: &Part,
+    before: f64,
+    behind: f64,
+    transmission: &dyn Fn(&Curve) -> f64,
+) -> [Action; 2] {
     let both = |action: Action| [action.clone(), action];
     match part {
         Part::Surface(surface) => [
@@ -84,7 +99,7 @@ fn actions(part: &Part, before: f64, behind: f64, wavelength: f64) -> [Action; 2
             .map(|power| Action::ThinLens { power, semi_diameter: lens.semi_diameter }),
         Part::Aperture(opening) => both(Action::Opening(Arc::clone(opening))),
         Part::Filter(filter) => {
-            let transmissions = filter.curves.iter().map(|c| c.held(wavelength)).collect();
+            let transmissions = filter.curves.iter().map(transmission).collect();
             both(Action::Filter { filter: Arc::clone(filter), transmissions })
         }
     }

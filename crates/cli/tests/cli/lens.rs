@@ -264,7 +264,7 @@ fn bad_lenses_are_refused_with_file_and_place() {
     let element = |keys: &str| format!(r#"{{"elements": [{{"type": "surface", {keys}}}]}}"#);
     lens("", &["line 1"]);
     lens("[]", &["expected an object"]);
-    lens(&element(r#""radios": 5"#), &["elements[0]", "`radios`", "`radius`"]);
+    lens(&element(r#""radios": 5"#), &["elements[0]", "radios", "`radius`"]);
     lens(&element(r#""conic": "flat""#), &["elements[0].conic", "a number"]);
     lens("\u{0}\u{1}", &["line 1"]);
     lens("{\"elements\": []}", &["elements", "at least one"]);

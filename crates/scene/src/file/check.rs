@@ -276,7 +276,14 @@ impl<'a> Checker<'a> {
             if let Some((key, word)) = tag
                 && members.get(*key).and_then(Value::as_str) == Some(word)
             {
-                return self.object(branch, members, path);
+                return match branch.get("oneOf").and_then(Value::as_array) {
+                    // A choice within the choice, such as the shape of an aperture.
+                    Some(inner) => {
+                        let inner: Vec<&Value> = inner.iter().map(|b| self.resolve(b)).collect();
+                        self.choose_object(&inner, members, path)
+                    }
+                    None => self.object(branch, members, path),
+                };
             }
         }
         let named = tags.iter().flatten().find(|(key, _)| members.contains_key(*key));

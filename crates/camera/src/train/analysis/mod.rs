@@ -11,3 +11,5 @@ pub use illumination::{
     Illumination, half_field, illumination, image_circle, projected_solid_angle,
 };
 pub use spots::{Spot, spot};
+
+pub(crate) use distortion::chief_height;

@@ -264,7 +264,7 @@ pub(super) struct Stray {
 }
 
 /// How far from the axis there is light, up to `limit` (mm), and a little more.
-fn lit_radius(train: &OpticalTrain, lenses: &[TrainAt], z: f64, limit: f64) -> f64 {
+pub(crate) fn lit_radius(train: &OpticalTrain, lenses: &[TrainAt], z: f64, limit: f64) -> f64 {
     let lit = |r: f64| {
         let film = DVec3::new(r, 0.0, z);
         lenses.iter().any(|lens| Window::find(train, lens, film).is_some())

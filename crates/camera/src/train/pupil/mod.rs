@@ -35,6 +35,7 @@ use super::{OpticalTrain, Part, Side, TrainAt};
 use crate::element::{Clip, Fate, FateCounts, Frame, LensRays, Opening};
 use crate::glass::GlassError;
 
+pub(crate) use measure::lit_radius;
 pub(crate) use search::Window;
 
 /// Angles in the table of a node.
@@ -370,7 +371,7 @@ fn concentric(u: [f64; 2]) -> (f64, f64) {
     (radius.abs(), turn.rem_euclid(1.0))
 }
 
-/// The same lens with masks and filter pictures clear: the bound goes around their whole rectangle.
+/// The same lens with masks clear: the bound goes around their whole rectangle.
 fn without_masks(train: &OpticalTrain) -> OpticalTrain {
     let mut train = train.clone();
     for element in &mut train.elements {
@@ -383,12 +384,36 @@ fn without_masks(train: &OpticalTrain) -> OpticalTrain {
     train
 }
 
+/// The same lens with filters clear: what is left does not depend on the wavelength but for glass.
+pub(crate) fn without_filters(train: &OpticalTrain) -> OpticalTrain {
+    let mut train = train.clone();
+    for element in &mut train.elements {
+        if let Part::Filter(filter) = &element.part {
+            let opening = Opening::Circle { radius: filter.radius() };
+            element.part = Part::Aperture(opening.into());
+        }
+    }
+    train
+}
+
+/// The same lens with masks and filters clear.
+pub(crate) fn without_dimming(train: &OpticalTrain) -> OpticalTrain {
+    without_filters(&without_masks(train))
+}
+
 /// The error that names what blocks the light.
-fn blocked(train: &OpticalTrain, lens: &TrainAt, film: DVec3) -> ExitPupilError {
+pub(crate) fn blocked(train: &OpticalTrain, lens: &TrainAt, film: DVec3) -> ExitPupilError {
     let mut counts = FateCounts::new(train.elements.len());
-    if let Some(mut rays) = Window::probe(train, film) {
-        lens.trace(Side::Sensor, Clip::On, &mut rays);
-        counts.add_all(&rays);
+    match Window::probe(train, film) {
+        Some(mut rays) => {
+            lens.trace(Side::Sensor, Clip::On, &mut rays);
+            counts.add_all(&rays);
+        }
+        // There is no direction to the nearest rim: it is closed.
+        None => {
+            let closed = train.elements.iter().rposition(|e| e.clear_radius() == 0.0);
+            counts.add(Fate::Vignetted { element: closed.unwrap_or(train.stop) });
+        }
     }
     // Where the last rays end: nothing gets past it.
     let element = counts.farthest_from_sensor().unwrap_or(train.stop);

@@ -1,0 +1,25 @@
+//! Cameras with a lens: how a scene writes them, and how places on their sensor become rays.
+//!
+//! Every one of them is an [`OpticalTrain`](crate::train::OpticalTrain) focused on a sensor; they
+//! differ in how the train is written.
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`spec`] | the cameras of the scene file, and the lens files that they stand for |
+//! | [`source`] | a lens by its file or in place, and parts put on its axis |
+//! | [`focused`] | a lens and its sensor: where pixels lie, and the paraxial camera of both |
+//! | [`chief`] | the chief rays of a whole sensor |
+//! | [`lens_camera`] | chief rays for data, weighted rays of the pupil for pictures |
+
+pub mod chief;
+pub mod focused;
+pub mod lens_camera;
+pub mod source;
+pub mod spec;
+
+pub use focused::Focused;
+pub use lens_camera::{LaneGroup, LensCamera};
+pub use source::{LensSource, PlacedSpec};
+pub use spec::{
+    ChromaticRealLensCameraSpec, LensCameraSpec, RealLensCameraSpec, ThinLensCameraSpec,
+};

@@ -1,0 +1,119 @@
+//! A lens as a camera names it: a file or the lens itself; and parts put on a lens' axis.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Map, Value};
+
+use crate::CameraError;
+use crate::element::{ElementSpec, Resolve, element_schema};
+use crate::length::Millimetres;
+use crate::train::{LensError, LensFile, OpticalTrain};
+
+/// The longest text that is read as a lens (bytes).
+const LONGEST: u64 = 16 << 20;
+
+/// Where a lens is written.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum LensSource {
+    /// The path of a lens file, from the scene's folder.
+    File(String),
+    /// The lens itself, as its file would have it.
+    Inline(LensFile),
+}
+
+impl LensSource {
+    /// The lens. `resolve` turns paths that start at the scene's folder into paths to be opened.
+    ///
+    /// # Errors
+    ///
+    /// When a file may not be read or is no lens; the error names the place in it.
+    pub(crate) fn read(&self, resolve: Resolve<'_>) -> Result<OpticalTrain, CameraError> {
+        match self {
+            Self::Inline(file) => file.build(resolve).map_err(|error| in_camera("lens", &error)),
+            Self::File(written) => {
+                let error = |why: String| CameraError::new("lens", why);
+                let path = resolve(written).map_err(error)?;
+                let text = read_text(&path).map_err(|why| error(format!("{written}: {why}")))?;
+                // The lens file's own paths start at its own folder.
+                let folder = Path::new(written).parent().unwrap_or(Path::new(""));
+                let beside = |name: &str| match Path::new(name).is_absolute() {
+                    true => resolve(name),
+                    false => resolve(&folder.join(name).to_string_lossy()),
+                };
+                LensFile::from_json(&text)
+                    .and_then(|file| file.build(&beside))
+                    .map_err(|fault| error(format!("{written}: {fault}")))
+            }
+        }
+    }
+}
+
+fn read_text(path: &Path) -> Result<String, String> {
+    let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
+    if !metadata.is_file() {
+        return Err("is not a regular file".to_owned());
+    }
+    if metadata.len() > LONGEST {
+        return Err(format!("has {} bytes, too many for a lens", metadata.len()));
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| format!("cannot be read: {e}"))?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+/// The fault of a lens that is written in the camera at `key`.
+pub(crate) fn in_camera(key: &str, error: &LensError) -> CameraError {
+    let dot = if key.is_empty() { "" } else { "." };
+    match error {
+        LensError::Element { index, why } => {
+            CameraError::new(format!("{key}{dot}elements[{index}]"), why.clone())
+        }
+        LensError::Glass { index, source } => {
+            CameraError::new(format!("{key}{dot}elements[{index}].glass"), source.to_string())
+        }
+        other => CameraError::new(key, other.to_string()),
+    }
+}
+
+/// A part at a place of its own on a lens' axis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlacedSpec {
+    /// Where its vertex is on the axis (mm): from the lens' first vertex, negative in front of it.
+    pub at: Millimetres,
+    /// The part and how it is mounted, as in a lens file but without `thickness`.
+    #[serde(flatten)]
+    pub element: ElementSpec,
+}
+
+impl<'de> Deserialize<'de> for PlacedSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut keys = Map::deserialize(deserializer)?;
+        let at = keys.remove("at").ok_or_else(|| D::Error::missing_field("at"))?;
+        if keys.contains_key("thickness") {
+            let why = "`thickness` has no place beside `at`, which says where the part is";
+            return Err(D::Error::custom(why));
+        }
+        let at = Millimetres::deserialize(at).map_err(D::Error::custom)?;
+        let element = ElementSpec::deserialize(Value::Object(keys)).map_err(D::Error::custom)?;
+        Ok(Self { at, element })
+    }
+}
+
+impl JsonSchema for PlacedSpec {
+    fn schema_name() -> Cow<'static, str> {
+        "PlacedSpec".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut at = generator.subschema_for::<Millimetres>();
+        let about = "Where its vertex is on the axis (mm): from the lens' first vertex, negative in \
+                     front of it.";
+        at.insert("description".to_owned(), about.into());
+        let keys = Map::from_iter([("at".to_owned(), at.to_value())]);
+        element_schema(generator, keys, &["thickness"])
+    }
+}

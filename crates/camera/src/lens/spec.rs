@@ -1,0 +1,449 @@
+//! The cameras with a lens as the scene file writes them, and the lens that each one is.
+
+use etendue_geometry::Bounds;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::focused::{Focused, View, positive};
+use super::lens_camera::LensCamera;
+use super::source::{LensSource, PlacedSpec, in_camera};
+use crate::element::{ApertureSpec, ElementSpec, PartSpec, Resolve, SurfaceSpec, ThinLensSpec};
+use crate::framing::{self, Reach};
+use crate::glass::GlassSpec;
+use crate::length::{Degrees, Metres, Millimetres};
+use crate::train::{Focus, LensFile, OpticalTrain};
+use crate::{CameraError, Pose, PoseSpec, SensorSpec};
+
+/// What the cameras with a lens have in common.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Setup<'a> {
+    pub(crate) f_number: Option<f64>,
+    pub(crate) focus: Option<Focus>,
+    pub(crate) fov: Option<f64>,
+    pub(crate) sensor_height: Option<f64>,
+    pub(crate) sensor_tilt: [Degrees; 2],
+    pub(crate) sensor_decentre: [Millimetres; 2],
+    pub(crate) pose: Option<&'a PoseSpec>,
+    pub(crate) sensor: &'a SensorSpec,
+}
+
+impl Setup<'_> {
+    /// Counts `sensor_distance` from a vertex that is `reach` (mm) in front of the last element's.
+    fn measure_past(&mut self, reach: f64) {
+        if let Some(Focus::Sensor(distance)) = &mut self.focus {
+            *distance -= reach;
+        }
+    }
+}
+
+/// How far (mm) parts on the axis reach behind the lens' last vertex at z = `rear`.
+fn reach_behind(elements: &[PlacedSpec], rear: f64) -> f64 {
+    elements.iter().map(|placed| placed.at.0 - rear).fold(0.0, f64::max)
+}
+
+/// Declares a camera by its own keys; those that all cameras with a lens have are added.
+macro_rules! camera_with_a_lens {
+    ($(#[$about:meta])* pub struct $name:ident { $($(#[$attribute:meta])* pub $key:ident: $kind:ty,)* }) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $($(#[$attribute])* pub $key: $kind,)*
+            /// Closes the stop to this f-number: focal length over the entrance pupil's diameter,
+            /// for an object at infinity.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub f_number: Option<f64>,
+            /// The distance of what is in focus (m), along the axis from the entrance pupil.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub focus_distance: Option<Metres>,
+            /// Instead of `focus_distance`: from the lens' last vertex to the sensor (mm).
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub sensor_distance: Option<Millimetres>,
+            /// The vertical field of view (degrees), when it is to give the size of the pixels.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub fov: Option<Degrees>,
+            /// The height of all rows of the sensor (mm), when it is to give the size of the pixels.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub sensor_height: Option<Millimetres>,
+            /// Turns the sensor about the x axis and then about its own y axis (degrees),
+            /// right-handed around its centre: Scheimpflug's rule.
+            #[serde(default, skip_serializing_if = "is_zero")]
+            pub sensor_tilt: [Degrees; 2],
+            /// Moves the sensor across the axis by x and y (mm): shift.
+            #[serde(default, skip_serializing_if = "is_zero")]
+            pub sensor_decentre: [Millimetres; 2],
+            /// Where the entrance pupil stands; when absent, the whole scene is framed and what is
+            /// in its middle is in focus.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub pose: Option<PoseSpec>,
+            /// The grid of pixels.
+            #[serde(default)]
+            pub sensor: SensorSpec,
+        }
+
+        impl $name {
+            /// What it has in common with the others.
+            pub(crate) fn setup(&self) -> Result<Setup<'_>, CameraError> {
+                let focus = match (self.focus_distance, self.sensor_distance) {
+                    (Some(_), Some(_)) => {
+                        return Err(CameraError::new(
+                            "sensor_distance",
+                            "is given beside `focus_distance`, which already fixes it; remove one \
+                             of them",
+                        ));
+                    }
+                    (Some(Metres(distance)), None) => Some(Focus::Distance(distance)),
+                    (None, Some(Millimetres(distance))) => Some(Focus::Sensor(distance)),
+                    (None, None) => None,
+                };
+                Ok(Setup {
+                    f_number: self.f_number,
+                    focus,
+                    fov: self.fov.map(|fov| fov.0),
+                    sensor_height: self.sensor_height.map(|height| height.0),
+                    sensor_tilt: self.sensor_tilt,
+                    sensor_decentre: self.sensor_decentre,
+                    pose: self.pose.as_ref(),
+                    sensor: &self.sensor,
+                })
+            }
+        }
+    };
+}
+
+fn is_zero<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// Gives a camera whose lens is made by `train` the rest of what makes a camera.
+macro_rules! build_by_train {
+    ($($name:ident),*) => {$(
+        impl $name {
+            pub(crate) fn build(
+                &self,
+                bounds: impl FnOnce() -> Bounds,
+                resolve: Resolve<'_>,
+            ) -> Result<(Pose, LensCamera), CameraError> {
+                let mut setup = self.setup()?;
+                setup.measure_past(self.reach_behind());
+                place(&self.train(resolve)?, &setup, bounds)
+            }
+        }
+    )*};
+}
+
+build_by_train!(RealLensCameraSpec, ChromaticRealLensCameraSpec, LensCameraSpec);
+
+camera_with_a_lens! {
+    /// An ideal thin lens: every plane is imaged without aberrations.
+    pub struct ThinLensCameraSpec {
+        /// The focal length (mm). When absent, `fov` and the size of the pixels give it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub focal_length: Option<Millimetres>,
+        /// The opening in the lens, a circle by `f_number` when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub aperture: Option<ApertureSpec>,
+        /// Apertures, filters and other parts in front of the lens and behind it.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub elements: Vec<PlacedSpec>,
+    }
+}
+
+camera_with_a_lens! {
+    /// One thick spherical lens of the same refractive index at all wavelengths.
+    pub struct RealLensCameraSpec {
+        /// Radius of the front surface (mm), positive when its centre is behind it, as on a lens
+        /// that bulges towards the object; flat when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub front_radius: Option<Millimetres>,
+        /// Radius of the rear surface (mm), negative when its centre is in front of it, as on a lens
+        /// that bulges towards the sensor; flat when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub rear_radius: Option<Millimetres>,
+        /// From vertex to vertex (mm).
+        pub thickness: Millimetres,
+        /// The index of the glass.
+        pub refractive_index: f64,
+        /// Half the lens' diameter (mm); unlimited when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub semi_diameter: Option<Millimetres>,
+        /// Apertures, filters and other parts in front of the lens, in it and behind it.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub elements: Vec<PlacedSpec>,
+    }
+}
+
+camera_with_a_lens! {
+    /// One thick spherical lens of a glass that disperses.
+    pub struct ChromaticRealLensCameraSpec {
+        /// Radius of the front surface (mm), positive when its centre is behind it, as on a lens
+        /// that bulges towards the object; flat when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub front_radius: Option<Millimetres>,
+        /// Radius of the rear surface (mm), negative when its centre is in front of it, as on a lens
+        /// that bulges towards the sensor; flat when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub rear_radius: Option<Millimetres>,
+        /// From vertex to vertex (mm).
+        pub thickness: Millimetres,
+        /// The glass: a name of the catalogue, or its dispersion.
+        pub glass: GlassSpec,
+        /// Half the lens' diameter (mm); unlimited when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub semi_diameter: Option<Millimetres>,
+        /// Apertures, filters and other parts in front of the lens, in it and behind it.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub elements: Vec<PlacedSpec>,
+    }
+}
+
+camera_with_a_lens! {
+    /// Any lens.
+    pub struct LensCameraSpec {
+        /// A lens file's path, or the lens itself as such a file would have it.
+        pub lens: LensSource,
+    }
+}
+
+/// Focuses a lens and finds it a place.
+fn place(
+    train: &OpticalTrain,
+    setup: &Setup<'_>,
+    bounds: impl FnOnce() -> Bounds,
+) -> Result<(Pose, LensCamera), CameraError> {
+    let default = Focus::AsWritten;
+    let focused = Focused::new(train.clone(), setup, setup.focus.unwrap_or(default))?;
+    if let Some(pose) = setup.pose {
+        return Ok((pose.build()?, LensCamera::new(focused)?));
+    }
+    let bounds = bounds();
+    let lens = LensCamera::new(focused)?;
+    let pose = frame(bounds, &lens, setup);
+    if setup.focus.is_some() || bounds.is_empty() {
+        return Ok((pose, lens));
+    }
+    // Focusing changes the field a little, and with it the distance: two rounds leave less than the
+    // depth of any field.
+    let (mut pose, mut lens) = (pose, lens);
+    for _ in 0..2 {
+        let distance = (bounds.centre() - pose.position).dot(pose.forward());
+        let Ok(focused) = Focused::new(train.clone(), setup, Focus::Distance(distance)) else {
+            break;
+        };
+        lens = LensCamera::new(focused)?;
+        pose = frame(bounds, &lens, setup);
+    }
+    Ok((pose, lens))
+}
+
+/// The nearest place from which the whole box is in the picture.
+fn frame(bounds: Bounds, lens: &LensCamera, setup: &Setup<'_>) -> Pose {
+    match lens.focused().view() {
+        View::Perspective(k) => {
+            // 60° off the axis, as for distorted pinholes.
+            let widest = 3_f64.sqrt();
+            let size = setup.sensor.resolution.map(f64::from);
+            let reach = Reach::of_picture(size, k.centre, widest, |u, v| lens.tangents(u, v));
+            framing::perspective(bounds, reach)
+        }
+        View::Parallel { .. } => framing::orthographic(bounds, setup.sensor.aspect()).0,
+    }
+}
+
+/// A part and its place on the axis (mm).
+type Placed = (f64, ElementSpec);
+
+impl ThinLensCameraSpec {
+    pub(crate) fn build(
+        &self,
+        bounds: impl FnOnce() -> Bounds,
+        resolve: Resolve<'_>,
+    ) -> Result<(Pose, LensCamera), CameraError> {
+        let mut setup = self.setup()?;
+        setup.measure_past(reach_behind(&self.elements, 0.0));
+        let focal_length = match self.focal_length {
+            Some(Millimetres(focal_length)) => focal_length,
+            None => {
+                let focal_length = self.focal_length_by_fov(&setup)?;
+                setup.fov = None;
+                focal_length
+            }
+        };
+        place(&self.train(focal_length, resolve)?, &setup, bounds)
+    }
+
+    /// The focal length (mm) that shows the rows of the sensor under the vertical field of view.
+    fn focal_length_by_fov(&self, setup: &Setup<'_>) -> Result<f64, CameraError> {
+        let Some(fov) = setup.fov else {
+            let why = "is missing: give this, or `fov`";
+            return Err(CameraError::new("focal_length", why));
+        };
+        if !(fov > 0.0 && fov < 180.0) {
+            let why = format!("{fov} is outside 0 to 180 degrees (both excluded)");
+            return Err(CameraError::new("fov", why));
+        }
+        let rows = f64::from(setup.sensor.resolution[1]);
+        let height = match (setup.sensor.pixel_pitch, setup.sensor_height) {
+            (Some(pitch), None) => 1e-3 * pitch.0 * rows,
+            (None, height @ Some(_)) => positive(height, "sensor_height")?,
+            (None, None) => {
+                let why = "is missing: with `fov` alone the lens has no size; give this, \
+                           `sensor.pixel_pitch` or `sensor_height`";
+                return Err(CameraError::new("focal_length", why));
+            }
+            (Some(_), Some(_)) => {
+                let why = "is given beside `sensor.pixel_pitch`; remove one of them";
+                return Err(CameraError::new("sensor_height", why));
+            }
+        };
+        let image = 0.5 * height / (0.5 * fov.to_radians()).tan();
+        match setup.focus {
+            None => Ok(image),
+            Some(Focus::Distance(distance)) if distance > 0.0 => {
+                Ok(1.0 / (1.0 / image + 1e-3 / distance))
+            }
+            Some(Focus::Distance(distance)) => {
+                let why = format!("{distance} m is not above zero");
+                Err(CameraError::new("focus_distance", why))
+            }
+            Some(_) => Err(CameraError::new(
+                "focal_length",
+                "is missing: beside `fov`, `sensor_distance` does not give it",
+            )),
+        }
+    }
+
+    /// The lens of the given focal length (mm).
+    pub(crate) fn train(
+        &self,
+        focal_length: f64,
+        resolve: Resolve<'_>,
+    ) -> Result<OpticalTrain, CameraError> {
+        let has_opening = |e: &PlacedSpec| matches!(e.element.part, PartSpec::Aperture(_));
+        let opening = match (&self.aperture, self.f_number) {
+            (Some(aperture), _) => Some(PartSpec::Aperture(aperture.clone())),
+            // The f-number sets the radius.
+            (None, Some(_)) if !self.elements.iter().any(|e| e.element.mount.stop) => {
+                Some(PartSpec::circular(1.0))
+            }
+            (None, None) if !self.elements.iter().any(has_opening) => {
+                return Err(CameraError::new(
+                    "f_number",
+                    "is missing: a thin lens needs an opening; give this, or `aperture`",
+                ));
+            }
+            _ => None,
+        };
+        let lens = ThinLensSpec { focal_length: Millimetres(focal_length), semi_diameter: None };
+        let lens = PartSpec::ThinLens(lens);
+        let opening = opening.map(|part| (0.0, ElementSpec::new(part, 0.0).as_stop()));
+        let lens = [(0.0, ElementSpec::new(lens, 0.0))];
+        assemble(lens.into_iter().chain(opening).collect(), &self.elements, resolve)
+    }
+}
+
+impl RealLensCameraSpec {
+    fn reach_behind(&self) -> f64 {
+        reach_behind(&self.elements, self.thickness.0)
+    }
+
+    fn train(&self, resolve: Resolve<'_>) -> Result<OpticalTrain, CameraError> {
+        if !(self.refractive_index > 0.0 && self.refractive_index.is_finite()) {
+            let why = format!("{} is not above zero", self.refractive_index);
+            return Err(CameraError::new("refractive_index", why));
+        }
+        let shape = Thick {
+            radii: [self.front_radius, self.rear_radius],
+            thickness: self.thickness,
+            semi_diameter: self.semi_diameter,
+        };
+        shape.train(GlassSpec::Constant(self.refractive_index), &self.elements, resolve)
+    }
+}
+
+impl ChromaticRealLensCameraSpec {
+    fn reach_behind(&self) -> f64 {
+        reach_behind(&self.elements, self.thickness.0)
+    }
+
+    fn train(&self, resolve: Resolve<'_>) -> Result<OpticalTrain, CameraError> {
+        self.glass.resolve().map_err(|fault| CameraError::new("glass", fault.to_string()))?;
+        let shape = Thick {
+            radii: [self.front_radius, self.rear_radius],
+            thickness: self.thickness,
+            semi_diameter: self.semi_diameter,
+        };
+        shape.train(self.glass.clone(), &self.elements, resolve)
+    }
+}
+
+impl LensCameraSpec {
+    /// The lens' last vertex is that of its last element.
+    fn reach_behind(&self) -> f64 {
+        0.0
+    }
+
+    fn train(&self, resolve: Resolve<'_>) -> Result<OpticalTrain, CameraError> {
+        self.lens.read(resolve)
+    }
+}
+
+/// A lens of two spherical surfaces.
+struct Thick {
+    radii: [Option<Millimetres>; 2],
+    thickness: Millimetres,
+    semi_diameter: Option<Millimetres>,
+}
+
+impl Thick {
+    fn train(
+        self,
+        glass: GlassSpec,
+        elements: &[PlacedSpec],
+        resolve: Resolve<'_>,
+    ) -> Result<OpticalTrain, CameraError> {
+        let keys = ["front_radius", "rear_radius"];
+        let surfaces = self.radii.into_iter().zip([Some(glass), None]);
+        let mut parts: Vec<Placed> = Vec::new();
+        for ((radius, glass), (at, key)) in
+            surfaces.zip([0.0, self.thickness.0].into_iter().zip(keys))
+        {
+            let semi_diameter = self.semi_diameter;
+            let spec = SurfaceSpec { radius, glass, semi_diameter, ..SurfaceSpec::default() };
+            spec.build().map_err(|why| CameraError::new(key, why))?;
+            parts.push((at, ElementSpec::new(PartSpec::Surface(spec), 0.0)));
+        }
+        if self.thickness.0 < 0.0 {
+            let why = format!("{} mm is negative", self.thickness.0);
+            return Err(CameraError::new("thickness", why));
+        }
+        assemble(parts, elements, resolve)
+    }
+}
+
+/// The lens of `own` parts and of those that are put on its axis besides.
+fn assemble(
+    own: Vec<Placed>,
+    besides: &[PlacedSpec],
+    resolve: Resolve<'_>,
+) -> Result<OpticalTrain, CameraError> {
+    let mut parts = own;
+    for (index, placed) in besides.iter().enumerate() {
+        let Millimetres(at) = placed.at;
+        // Alone first: a fault there is told by the part's number in the camera.
+        LensFile::new(vec![placed.element.clone()]).build(resolve).map_err(|fault| {
+            let mut fault = in_camera("", &fault);
+            fault.at = fault.at.replacen("elements[0]", &format!("elements[{index}]"), 1);
+            fault
+        })?;
+        parts.push((at, placed.element.clone()));
+    }
+    parts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let places: Vec<f64> = parts.iter().map(|part| part.0).collect();
+    let mut elements: Vec<ElementSpec> = parts.into_iter().map(|part| part.1).collect();
+    for (element, gap) in elements.iter_mut().zip(places.windows(2)) {
+        element.mount.thickness = Millimetres(gap[1] - gap[0]);
+    }
+    let lens = LensFile::new(elements).build(resolve);
+    lens.map_err(|fault| CameraError::new("elements", fault.to_string()))
+}

@@ -1,0 +1,413 @@
+//! Cameras with a lens, from what a scene writes to the rays in the world.
+
+use std::f64::consts::PI;
+
+use etendue_camera::{Camera, CameraRays, CameraSpec, FilmSamples};
+use etendue_geometry::{Bounds, RayBatch};
+use etendue_spectrum::Lanes;
+use glam::DVec3;
+
+fn try_build(json: &str) -> Result<Camera, String> {
+    let spec: CameraSpec = serde_json::from_str(json).map_err(|e| e.to_string())?;
+    let presets = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes");
+    let resolve = |name: &str| Ok(std::path::Path::new(presets).join(name));
+    let frame = || Bounds { min: DVec3::splat(-0.5), max: DVec3::splat(0.5) };
+    spec.build(frame, &resolve).map_err(|e| e.to_string())
+}
+
+fn build(json: &str) -> Camera {
+    try_build(json).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A camera at the origin that looks along −z: `{` and what is special about it are put in front.
+fn at_origin(special: &str) -> Camera {
+    build(&format!(r#"{{{special}, "pose": {{"from": [0, 0, 0], "look_at": [0, 0, -1]}}}}"#))
+}
+
+fn chief(camera: &Camera, places: &[[f64; 2]]) -> RayBatch {
+    let mut rays = RayBatch::default();
+    let [columns, rows] = [0, 1].map(|k| places.iter().map(|p| p[k]).collect::<Vec<f64>>());
+    camera.rays_through(&columns, &rows, &mut rays);
+    rays
+}
+
+fn origin(rays: &RayBatch, i: usize) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|k| rays.origin[k][i]))
+}
+
+fn direction(rays: &RayBatch, i: usize) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|k| rays.direction[k][i]))
+}
+
+/// `count` rays from one place of the sensor, spread over the pupil by the R2 sequence.
+fn sampled(camera: &Camera, place: [f64; 2], wavelength: Option<f64>, count: u32) -> CameraRays {
+    let mut samples = FilmSamples { wavelength, ..FilmSamples::default() };
+    for i in 0..count {
+        let unit = [0.754_877_666_246_693, 0.569_840_290_998_053];
+        let u = unit.map(|step: f64| (0.5 + step * f64::from(i)).fract());
+        samples.push(place[0], place[1], u);
+    }
+    let mut rays = CameraRays::default();
+    camera.sample_rays(&samples, &mut rays);
+    rays
+}
+
+fn mean_weight(rays: &CameraRays, count: u32) -> f64 {
+    rays.weight.iter().sum::<f64>() / f64::from(count)
+}
+
+const THIN: &str = r#""type": "thin_lens", "focal_length": 50, "f_number": 2, "focus_distance": 2,
+    "sensor": {"resolution": [300, 200], "pixel_pitch": 120}"#;
+
+#[test]
+fn a_thin_lens_is_registered_with_the_pinhole_of_its_field() {
+    let thin = at_origin(THIN);
+    let k = thin.opencv().k.unwrap();
+    // The image of 2 m lies 50·2000/1950 mm behind the lens.
+    let focal = 50.0 * 2000.0 / 1950.0 / 0.12;
+    assert!((k[1][1] / focal - 1.0).abs() < 1e-12, "{k:?}");
+    let fov = 2.0 * (100.0 / focal).atan().to_degrees();
+    let pinhole = at_origin(&format!(
+        r#""type": "pinhole", "fov": {fov}, "sensor": {{"resolution": [300, 200]}}"#
+    ));
+    let by_fov = at_origin(&format!(
+        r#""type": "thin_lens", "fov": {fov}, "f_number": 2, "focus_distance": 2,
+           "sensor": {{"resolution": [300, 200], "pixel_pitch": 120}}"#
+    ));
+    let places = [[150.0, 100.0], [0.0, 0.0], [300.0, 0.0], [0.0, 200.0], [299.5, 171.3]];
+    let [a, b, c] = [&thin, &pinhole, &by_fov].map(|camera| chief(camera, &places));
+    for i in 0..places.len() {
+        // Newton stops within 1e-11 mm of the stop's centre, 51 mm away.
+        assert!((direction(&a, i) - direction(&b, i)).length() < 1e-12, "{i}");
+        assert!((direction(&c, i) - direction(&b, i)).length() < 1e-12, "{i}");
+        assert!(origin(&a, i).length() < 1e-14 && a.t_min[i] < 1e-14, "{i}");
+    }
+    assert!(direction(&a, 2).x > 0.0 && direction(&a, 2).y > 0.0, "pictures are upright");
+}
+
+#[test]
+fn the_blur_of_a_thin_lens_camera_is_the_formula_at_ten_distances() {
+    // At distance d all rays of a point in focus at s are in a disc of diameter D |d − s|/s around
+    // the chief ray: similar triangles over the pupil D.
+    let camera = at_origin(THIN);
+    let (pupil, focus) = (0.025, 2.0);
+    for place in [[150.0, 100.0], [20.0, 190.0]] {
+        let centre = direction(&chief(&camera, &[place]), 0);
+        let rays = sampled(&camera, place, None, 4096);
+        for distance in [0.3, 0.5, 0.9, 1.4, 1.9, 2.0, 2.2, 3.0, 8.0, 100.0] {
+            let on_axis = centre * (distance / -centre.z);
+            let mut widest = 0.0_f64;
+            for i in 0..rays.rays.len() {
+                let (o, d) = (origin(&rays.rays, i), direction(&rays.rays, i));
+                let there = o + d * ((distance + o.z) / -d.z);
+                widest = widest.max(2.0 * (there - on_axis).length());
+            }
+            let formula = pupil * (distance - focus).abs() / focus;
+            // 4096 points leave the outermost 1/4096 of the disc's area free: 1e-4 of its radius,
+            // more along the rim's own unevenness; rays are exact.
+            let error = widest - formula;
+            assert!(
+                error < 1e-12 + 1e-9 * formula && error > -2e-3 * formula - 1e-12,
+                "{distance}"
+            );
+        }
+    }
+}
+
+#[test]
+fn light_falls_off_with_the_fourth_power_of_the_cosine() {
+    let camera = at_origin(
+        r#""type": "thin_lens", "focal_length": 50, "f_number": 32, "sensor_distance": 50,
+           "sensor": {"resolution": [300, 200], "pixel_pitch": 240}"#,
+    );
+    const COUNT: u32 = 20_000;
+    let on_axis = mean_weight(&sampled(&camera, [150.0, 100.0], None, COUNT), COUNT);
+    assert!((on_axis - 1.0).abs() < 1e-3, "{on_axis}: 2 % of 20 000 rays fail, 1e-3 if random");
+    for [column, row] in [[220.0, 100.0], [150.0, 0.0], [290.0, 30.0], [0.0, 0.0]] {
+        let tangent = f64::hypot(column - 150.0, row - 100.0) * 0.24 / 50.0;
+        let cosine4 = (1.0 + tangent * tangent).powi(-2);
+        let rays = sampled(&camera, [column, row], None, COUNT);
+        let measured = mean_weight(&rays, COUNT);
+        // f/32 is no point: (D/2f)² = 2.4e-4 of it differs; and the error of counting.
+        assert!((measured / cosine4 - 1.0).abs() < 2e-3, "{column} {row}: {measured} {cosine4}");
+    }
+}
+
+#[test]
+fn an_unvignetted_pixel_on_the_axis_weighs_1_and_corners_are_vignetted() {
+    let gauss = r#""type": "lens", "lens": "lenses/double-gauss.json", "focus_distance": 1.5,
+        "sensor": {"resolution": [360, 240], "pixel_pitch": 100}"#;
+    let camera = at_origin(gauss);
+    const COUNT: u32 = 50_000;
+    let axis = sampled(&camera, [180.0, 120.0], None, COUNT);
+    // As in the thin lens, and 1e-4 for the sum over a grid that is the yardstick.
+    assert!((mean_weight(&axis, COUNT) - 1.0).abs() < 1e-3);
+    assert!(axis.fates.exited as f64 > 0.95 * f64::from(COUNT), "{:?}", axis.fates.losses());
+    assert_eq!(axis.fates.total(), u64::from(COUNT));
+    let corner = sampled(&camera, [0.0, 0.0], None, COUNT);
+    let weight = mean_weight(&corner, COUNT);
+    let tangent: f64 = 21.6 / 50.0;
+    let cosine4 = (1.0 + tangent * tangent).powi(-2);
+    assert!(weight < 0.6 * cosine4 && weight > 0.1, "{weight} against {cosine4}");
+    // Focused: rays of the axis meet within the lens' spot, 1/30 of the pupil, at 1.5 m.
+    for i in 0..axis.rays.len() {
+        let (o, d) = (origin(&axis.rays, i), direction(&axis.rays, i));
+        let there = o + d * ((1.5 + o.z) / -d.z);
+        assert!(there.truncate().length() < 1.2e-3, "{there}");
+    }
+    // The camera's origin is the entrance pupil; the front of the lens is before it.
+    let rays = chief(&camera, &[[180.0, 120.0], [300.0, 40.0]]);
+    assert!(rays.t_min.iter().all(|&t| t > 0.01 && t < 0.05), "{:?}", rays.t_min);
+    assert!(origin(&rays, 0).length() < 1e-12);
+    assert!(origin(&rays, 1).length() < 2e-3, "pupil aberration moves it a little");
+    // Near the axis K is what is traced.
+    let k = camera.opencv().k.unwrap();
+    let rays = chief(&camera, &[[181.0, 119.0]]);
+    let d = direction(&rays, 0);
+    assert!((d.x / -d.z * k[0][0] - 1.0).abs() < 1e-4 && (d.y / -d.z * k[1][1] - 1.0).abs() < 1e-4);
+}
+
+#[test]
+fn a_stop_in_the_rear_focal_plane_keeps_sizes() {
+    let camera = at_origin(
+        r#""type": "thin_lens", "focal_length": 40, "sensor_distance": 60,
+           "elements": [{"type": "aperture", "shape": "circular", "radius": 2, "at": 40, "stop": true}],
+           "sensor": {"resolution": [100, 100], "pixel_pitch": 100}"#,
+    );
+    let file = camera.opencv();
+    assert_eq!(file.k, None);
+    // Image distance 60 behind a lens of 40: magnification 1 − 60/40 = −1/2.
+    let pixel = file.orthographic.unwrap().metres_per_pixel;
+    assert!((pixel - 0.2e-3).abs() < 1e-15, "{pixel}");
+    let rays = chief(&camera, &[[50.0, 50.0], [70.0, 40.0]]);
+    assert!((direction(&rays, 1) - DVec3::NEG_Z).length() < 1e-12);
+    assert!((origin(&rays, 1) - DVec3::new(20.0, 10.0, 0.0) * pixel).length() < 1e-12);
+}
+
+#[test]
+fn orthographic_pictures_keep_sizes_at_all_distances() {
+    let camera =
+        at_origin(r#""type": "orthographic", "height": 2, "sensor": {"resolution": [200, 200]}"#);
+    let rays = chief(&camera, &[[30.0, 100.0], [130.0, 100.0]]);
+    for distance in [0.1, 1.0, 1e3] {
+        let apart = origin(&rays, 1) - origin(&rays, 0)
+            + (direction(&rays, 1) - direction(&rays, 0)) * distance;
+        assert_eq!(apart, DVec3::X, "100 pixels of 2 m / 200");
+    }
+}
+
+#[test]
+fn wavelengths_are_traced_apart_only_where_they_differ() {
+    let of = |lens: &str| {
+        at_origin(&format!(
+            r#"{lens}, "front_radius": 50, "rear_radius": -50, "thickness": 6, "semi_diameter": 8,
+               "sensor_distance": 48, "sensor": {{"resolution": [60, 40], "pixel_pitch": 50}}"#
+        ))
+    };
+    let plain = of(r#""type": "real_lens", "refractive_index": 1.5168"#);
+    assert_eq!(plain.lane_groups(&Lanes::Rgb).len(), 1);
+    let glass = of(r#""type": "chromatic_real_lens", "glass": "N-BK7""#);
+    assert_eq!(glass.lane_groups(&Lanes::Grey).len(), 1);
+    let groups = glass.lane_groups(&Lanes::Rgb);
+    assert_eq!(groups.len(), 3);
+    let opened = glass.opened(&Lanes::Rgb).unwrap();
+    // Where the rays of the axis cross it in front of the lens: blue is focused nearest.
+    let focus = |wavelength| {
+        let rays = sampled(&opened, [30.0, 20.0], wavelength, 500);
+        let crossing = |i: usize| {
+            let (o, d) = (origin(&rays.rays, i), direction(&rays.rays, i));
+            -o.z - d.z * o.truncate().length() / d.truncate().length()
+        };
+        let (count, sum) = (0..rays.rays.len())
+            .filter(|&i| origin(&rays.rays, i).truncate().length() < 1e-3)
+            .fold((0.0, 0.0), |(n, sum), i| (n + 1.0, sum + 1.0 / crossing(i)));
+        sum / count
+    };
+    let vergence: Vec<f64> = groups.iter().map(|group| focus(group.wavelength)).collect();
+    // Paraxial: Δ(1/f) = Δn/(n − 1)/f, 1/m; rays within 1 mm have 1e-3 of spherical aberration.
+    let n = |nm: f64| {
+        let um2 = (nm * 1e-3).powi(2);
+        let [b, c] = [
+            [1.039_612_12, 0.231_792_344, 1.010_469_45],
+            [0.006_000_698_67, 0.020_017_914_4, 103.560_653],
+        ];
+        (1.0 + (0..3).map(|i| b[i] * um2 / (um2 - c[i])).sum::<f64>()).sqrt()
+    };
+    let power = |nm: f64| {
+        let n = n(nm);
+        (n - 1.0) * (2.0 / 0.05 - (n - 1.0) * 0.006 / (n * 0.05 * 0.05))
+    };
+    let [red, blue] = [groups[0].wavelength.unwrap(), groups[2].wavelength.unwrap()];
+    let measured = vergence[2] - vergence[0];
+    let formula = power(blue) - power(red);
+    assert!((measured / formula - 1.0).abs() < 0.02, "{measured} and {formula}");
+}
+
+#[test]
+fn filters_dim_each_lane_by_its_own_mean() {
+    let camera = at_origin(
+        r#""type": "thin_lens", "focal_length": 50, "f_number": 4, "sensor_distance": 50,
+           "elements": [{"type": "filter", "transmission": [[380, 0], [499, 0], [501, 1], [780, 1]], "at": -1}],
+           "sensor": {"resolution": [30, 20], "pixel_pitch": 50}"#,
+    );
+    let opened = camera.opened(&Lanes::Rgb).unwrap();
+    const COUNT: u32 = 4096;
+    let weights: Vec<f64> = opened
+        .lane_groups(&Lanes::Rgb)
+        .into_iter()
+        .map(|g| mean_weight(&sampled(&opened, [15.0, 10.0], g.wavelength, COUNT), COUNT))
+        .collect();
+    assert!(weights[1] > 0.8 && weights[2] < 0.2, "yellow passes, blue does not: {weights:?}");
+    let halves = at_origin(
+        r#""type": "thin_lens", "focal_length": 50, "f_number": 4, "sensor_distance": 50,
+           "elements": [{"type": "filter", "transmission": 0.5, "at": 3}],
+           "sensor": {"resolution": [30, 20], "pixel_pitch": 50}"#,
+    );
+    assert_eq!(halves.lane_groups(&Lanes::Rgb).len(), 1, "a grey filter tells nothing apart");
+    let half = mean_weight(&sampled(&halves, [15.0, 10.0], None, COUNT), COUNT);
+    assert!((half - 0.5).abs() < 1e-3, "{half}");
+}
+
+#[test]
+fn a_tilted_sensor_puts_a_tilted_plane_in_focus() {
+    // Scheimpflug: the planes of lens, sensor and object meet in one line, here at y = −f'/tan τ.
+    let camera = at_origin(
+        r#""type": "thin_lens", "focal_length": 50, "f_number": 2, "sensor_distance": 52,
+           "sensor_tilt": [6, 0], "sensor": {"resolution": [30, 200], "pixel_pitch": 100}"#,
+    );
+    let tilt = 6_f64.to_radians();
+    for row in [40.0, 100.0, 170.0] {
+        let film = (row - 100.0) * 0.1;
+        // Turned about x, right-handed: y goes towards +z, away from the lens.
+        let (y, s) = (film * tilt.cos(), 52.0 + film * tilt.sin());
+        let object = 1.0 / (1.0 / 50.0 - 1.0 / s);
+        let focus = DVec3::new(0.0, -y / s * object, -object) * 1e-3;
+        let rays = sampled(&camera, [15.0, row], None, 200);
+        assert!(rays.rays.len() > 150);
+        for i in 0..rays.rays.len() {
+            let (o, d) = (origin(&rays.rays, i), direction(&rays.rays, i));
+            let past = (focus - o).cross(d).length();
+            assert!(past < 1e-12 * object, "{row}: {past}");
+        }
+    }
+}
+
+#[test]
+fn a_camera_without_a_pose_frames_the_box_and_focuses_on_it() {
+    for special in [
+        r#""type": "thin_lens", "focal_length": 35, "f_number": 2, "sensor_height": 24"#,
+        r#""type": "lens", "lens": "lenses/double-gauss.json", "sensor_height": 24"#,
+        r#""type": "lens", "lens": "lenses/fisheye.json", "sensor_height": 10"#,
+    ] {
+        let camera = build(&format!(r#"{{{special}, "sensor": {{"resolution": [300, 200]}}}}"#));
+        let distance = -(camera.pose().rotation.transpose() * -camera.pose().position).z;
+        let focus = camera.lens().unwrap().focused().object_distance();
+        assert!((focus / distance - 1.0).abs() < 0.01, "{special}: {focus} at {distance}");
+        let by_name = camera.opencv();
+        assert!(by_name.lens.is_some() && by_name.pixel_pitch_um.is_some());
+    }
+}
+
+#[test]
+fn the_field_of_view_gives_the_size_of_the_pixels() {
+    let fisheye = at_origin(
+        r#""type": "lens", "lens": "lenses/fisheye.json", "fov": 120, "sensor": {"resolution": [300, 200]}"#,
+    );
+    let rays = chief(&fisheye, &[[150.0, 0.0], [150.0, 200.0]]);
+    for (i, up) in [(0, 1.0), (1, -1.0)] {
+        let d = direction(&rays, i);
+        let expected = DVec3::new(0.0, up * 60_f64.to_radians().sin(), -0.5);
+        // Both chief rays pass within 1e-9 mm of the stop's centre.
+        assert!((d - expected).length() < 1e-8, "{d}");
+    }
+}
+
+#[test]
+fn what_makes_no_camera_is_refused_with_its_place() {
+    let thin = |keys: &str| try_build(&format!(r#"{{"type": "thin_lens", {keys}}}"#));
+    let sensor = r#""sensor": {"resolution": [30, 20], "pixel_pitch": 50}"#;
+    for (camera, place, words) in [
+        (thin(sensor), "focal_length:", "give this, or `fov`"),
+        (thin(&format!(r#""focal_length": 50, {sensor}"#)), "f_number:", "or `aperture`"),
+        (thin(r#""focal_length": 50, "f_number": 2"#), "sensor.pixel_pitch:", "`sensor_height`"),
+        (
+            thin(&format!(r#""focal_length": 50, "f_number": 2, "fov": 30, {sensor}"#)),
+            "fov:",
+            "both give the size",
+        ),
+        (
+            thin(&format!(r#""focal_length": 50, "f_number": 0, {sensor}"#)),
+            "f_number:",
+            "must be positive",
+        ),
+        (
+            thin(&format!(
+                r#""focal_length": 50, "f_number": 2, "focus_distance": 0.05, {sensor}"#
+            )),
+            "focus_distance:",
+            "front focal point",
+        ),
+        (
+            thin(&format!(
+                r#""focal_length": 50, "f_number": 2, "focus_distance": 0.03, {sensor}"#
+            )),
+            "focus_distance:",
+            "no real image",
+        ),
+        (
+            thin(&format!(
+                r#""focal_length": 50, "f_number": 2, "focus_distance": 1, "sensor_distance": 51, {sensor}"#
+            )),
+            "sensor_distance:",
+            "remove one",
+        ),
+        (
+            thin(&format!(
+                r#""focal_length": 50, "aperture": {{"shape": "circular", "radius": 0}}, {sensor}"#
+            )),
+            ": no light passes the lens",
+            "vignetted at element 1",
+        ),
+        (
+            thin(&format!(
+                r#""focal_length": 50, "f_number": 2, "elements": [{{"type": "aperture",
+                   "shape": "polygon", "blades": 2, "radius": 1, "at": 3}}], {sensor}"#
+            )),
+            "elements[0]:",
+            "3 to 1024",
+        ),
+        (
+            try_build(&format!(
+                r#"{{"type": "lens", "lens": {{"elements": [{{"type": "surface", "glass": "N-BK8"}}]}}, {sensor}}}"#
+            )),
+            "lens.elements[0].glass:",
+            "N-BK7",
+        ),
+        (
+            try_build(&format!(r#"{{"type": "lens", "lens": "lenses/none.json", {sensor}}}"#)),
+            "lens:",
+            "cannot be read",
+        ),
+        (
+            try_build(&format!(
+                r#"{{"type": "real_lens", "thickness": 5, "front_radius": 50, "refractive_index": 1.5, {sensor}}}"#
+            )),
+            ": the lens passes light in all directions",
+            "semi_diameter",
+        ),
+    ] {
+        let error = camera.expect_err(words);
+        assert!(error.starts_with(place) && error.contains(words), "{error}");
+    }
+}
+
+#[test]
+fn the_weights_of_a_small_lens_are_its_solid_angle() {
+    let camera = at_origin(THIN);
+    let image = 50.0 * 2000.0 / 1950.0;
+    // π sin²θ of the cone from the axis to the rim of 12.5 mm.
+    let exact = PI * 12.5 * 12.5 / (12.5 * 12.5 + image * image);
+    let measured = camera.lens().unwrap().solid_angle();
+    // A grid of 500 cells across cuts a rim of 1500 cells.
+    assert!((measured / exact - 1.0).abs() < 2e-4, "{measured} and {exact}");
+}
