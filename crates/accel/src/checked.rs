@@ -153,8 +153,14 @@ impl Embree {
     ) {
         again.clear();
         for &i in suspects.iter() {
-            let shift = recheck::nudge(rays.direction(i as usize), self.frame.blur());
-            again.push_shifted(rays32, i as usize, shift);
+            let i = i as usize;
+            let t = if hits.placement[i] == MISS {
+                rays32.reach(i, &self.frame)
+            } else {
+                hits.t[i] - rays32.advance[i]
+            };
+            let shift = recheck::nudge(rays.direction(i), rays32.blur(i, t));
+            again.push_shifted(rays32, i, shift);
         }
         self.scene.closest(again, rays.coherent, found);
         let mut k = 0;
@@ -162,7 +168,7 @@ impl Embree {
             // A nearer hit contradicts the first answer, or any hit a miss.
             let t = f64::from(found.t[k]) + again.advance[k];
             let contradicts = found.placement[k] != MISS
-                && t < hits.t[i as usize] - self.frame.slack(f64::from(found.t[k]));
+                && t < hits.t[i as usize] - again.slack(k, f64::from(found.t[k]));
             k += 1;
             contradicts
         });
@@ -197,18 +203,18 @@ impl Embree {
     ) -> Nearest {
         let Some(query) = Query::of(rays, i) else { return Nearest::none(0.0) };
         let advance = rays32.advance[i];
-        let slack = |t: f64| self.frame.slack(t - advance);
-        let farthest = slack(first.unwrap_or(advance + 4.0 * self.frame.radius));
-        let mut search = Search::new(self.scene.geometry(), query, advance, farthest);
+        let t = first.map_or_else(|| rays32.reach(i, &self.frame), |t| t - advance);
+        let slack = rays32.slack(i, t);
+        let mut search = Search::new(self.scene.geometry(), query, advance, slack);
         // Where it should be, as rounding has it: mostly the neighbour of what was found first.
         again.clear();
-        again.push_unmoved(rays, &self.frame, rays32, i);
+        again.push_unturned(rays, rays32, i);
         self.scene.search(again, &mut search, found);
-        let is_neighbour = first.is_some_and(|t| (search.nearest.t - t).abs() <= slack(t));
+        let is_neighbour = first.is_some_and(|t| (search.nearest.t - t).abs() <= slack);
         let mut turn = 0;
         while !is_neighbour && turn < TURNS {
             again.clear();
-            for shift in recheck::bundle(rays.direction(i), self.frame.blur(), turn) {
+            for shift in recheck::bundle(rays.direction(i), rays32.blur(i, t), turn) {
                 again.push_shifted(rays32, i, shift);
             }
             self.scene.search(again, &mut search, found);
@@ -237,9 +243,7 @@ impl Accel for Embree {
             scratch.doubtful.clear();
             scratch.rays.convert(rays, &self.frame);
             if self.checks() && Self::start_on_surfaces(rays) {
-                let slack = |t| 2.0 * self.frame.slack(t);
-                let trusted = [slack(0.0), slack(1.0) - slack(0.0)];
-                let mut judged = Judged::new(geometry, rays, trusted, &mut scratch.doubtful);
+                let mut judged = Judged::new(geometry, rays, &scratch.rays, &mut scratch.doubtful);
                 self.scene.closest_from_surfaces(&scratch.rays, &mut judged, &mut scratch.found);
             } else {
                 self.scene.closest(&scratch.rays, rays.coherent, &mut scratch.found);
@@ -269,7 +273,7 @@ impl Accel for Embree {
             }
             doubtful.clear();
             let geometry = self.scene.geometry();
-            let mut judged = Judged::new(geometry, rays, [0.0; 2], doubtful);
+            let mut judged = Judged::new(geometry, rays, rays32, doubtful);
             self.scene.occluded_exactly(rays32, rays.coherent, &mut judged, blocked);
             doubtful.retain(|&i| !blocked[i as usize]);
             doubtful.dedup();

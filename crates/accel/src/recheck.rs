@@ -1,7 +1,7 @@
 //! Which of single precision's answers deserve a second look, and what decides then.
 //!
-//! Rays are nudged aside before they are rounded (`Frame::nudge`), so that vertices are never aimed
-//! at exactly, and single precision takes the wrong neighbour when a ray passes within about 10⁻⁶ of
+//! Rays are turned aside before they are rounded (`NUDGE` of [`crate::single`]), so that vertices are
+//! never aimed at exactly, and single precision takes the wrong neighbour when a ray passes within about 10⁻⁶ of
 //! an edge. What is wrong after that betrays itself:
 //!
 //! * the f64 solution lies outside the triangle that was found (*invalid*);

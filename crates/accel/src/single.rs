@@ -27,11 +27,22 @@ const ODD_AXES: [[f64; 3]; 2] = [[0.48, 0.6, 0.64], [-0.64, 0.48, -0.6]];
 /// Rays that start farther from the box than this many half-diagonals are started nearer.
 const FAR: f64 = 1.5;
 
-/// How far rays are moved sideways on purpose, in units in the last place of the largest coordinate.
+/// How far rays are turned aside on purpose, in units in the last place.
 ///
-/// Embree's edge functions are off by up to about six such units and mostly by one; see
-/// [`Frame::nudge`].
-const NUDGE: f64 = 3.0;
+/// A ray aimed exactly at a vertex slips between its triangles in single precision about once in a
+/// hundred times, even in Embree's robust mode: the signs of the edge functions around the vertex are
+/// then all noise, which grows with the distance (by six such units at worst and mostly one). A few
+/// units beside the vertex they are not. The turn is towards the centre of the scene's box, so that at
+/// the outline, where a miss could never be checked, rays err on the side of hitting, and f64 decides;
+/// and a little across, for rays that pass the centre.
+const NUDGE: f64 = 3.0 * F32_EPSILON;
+
+/// How far single precision may misplace a ray sideways at any distance: the nudge, and as much again
+/// for roundings of the ray and of what it meets.
+const BLUR: f64 = 2.0 * NUDGE;
+
+/// From 1 to the next f32.
+const F32_EPSILON: f64 = f32::EPSILON as f64;
 
 /// Single precision's distances are trusted to this many times its lateral error: up to a cosine of
 /// incidence of one in so many.
@@ -58,17 +69,6 @@ impl Frame {
         Self { origin, centre: centre - origin, radius, half }
     }
 
-    /// Lateral distance (m) by which rays are moved on purpose before they are rounded.
-    ///
-    /// A ray aimed exactly at a vertex slips between its triangles in single precision about once in
-    /// a hundred times, even in Embree's robust mode: the signs of the edge functions around the
-    /// vertex are then all noise. A few units in the last place beside the vertex they are not. The
-    /// move is towards the centre of the scene's box, so that at the outline, where a miss could
-    /// never be checked, rays err on the side of hitting, and f64 decides.
-    fn nudge(&self) -> f64 {
-        NUDGE * f64::from(f32::EPSILON) * (self.centre.length() + FAR * self.radius)
-    }
-
     /// Whether ray `i`'s line may meet the scene's box: separating axes along the cross products of
     /// the line with the box's axes. Safe rather than tight.
     pub(crate) fn may_meet(&self, rays: &RayBatch, i: usize) -> bool {
@@ -77,18 +77,6 @@ impl Frame {
         let (h, a) = (self.half, d.abs());
         let reach = DVec3::new(h.y * a.z + h.z * a.y, h.z * a.x + h.x * a.z, h.x * a.y + h.y * a.x);
         moment.cmple(reach).all()
-    }
-
-    /// Lateral distance (m) by which single precision may misplace a ray against the scene: a few
-    /// units in the last place of the largest coordinate there is.
-    pub(crate) fn blur(&self) -> f64 {
-        2.0 * NUDGE * f64::from(f32::EPSILON) * (self.centre.length() + (1.0 + FAR) * self.radius)
-    }
-
-    /// By how much (m) single precision's distance `t` may be off. What counts at a limit of a ray
-    /// within this is decided in f64.
-    pub(crate) fn slack(&self, t: f64) -> f64 {
-        SLOPE * (self.blur() + f64::from(f32::EPSILON) * t.max(0.0))
     }
 }
 
@@ -109,6 +97,25 @@ pub(crate) struct Rays32 {
 impl Rays32 {
     pub(crate) fn len(&self) -> usize {
         self.t_near.len()
+    }
+
+    /// Lateral distance (m) by which single precision may misplace ray `i` at `t` (m, from where it
+    /// was moved to).
+    pub(crate) fn blur(&self, i: usize, t: f64) -> f64 {
+        let size = self.origin.iter().fold(0.0, |sum, axis| sum + f64::from(axis[i]).abs());
+        BLUR * (size + t.max(0.0))
+    }
+
+    /// By how much (m) single precision's distance `t` (m, likewise) may be off. What counts at a limit
+    /// of a ray within this is decided in f64.
+    pub(crate) fn slack(&self, i: usize, t: f64) -> f64 {
+        SLOPE * self.blur(i, t)
+    }
+
+    /// How far (m, likewise) ray `i` may meet anything in `frame`.
+    pub(crate) fn reach(&self, i: usize, frame: &Frame) -> f64 {
+        let [x, y, z] = self.origin.each_ref().map(|axis| f64::from(axis[i]));
+        frame.centre.distance(DVec3::new(x, y, z)) + frame.radius
     }
 
     /// Whether ray `i` is sound and ends behind the scene's beginning.
@@ -142,14 +149,12 @@ impl Rays32 {
         self.advance.push(from.advance[i]);
     }
 
-    /// Appends ray `i` of `rays` without moving it sideways, ahead as `from` has it.
-    pub(crate) fn push_unmoved(&mut self, rays: &RayBatch, frame: &Frame, from: &Self, i: usize) {
-        let ahead = rays.direction(i) * from.advance[i];
-        let origin = (rays.origin(i) - frame.origin) + ahead;
+    /// Appends ray `i` of `rays` without turning it, ahead as `from` has it.
+    pub(crate) fn push_unturned(&mut self, rays: &RayBatch, from: &Self, i: usize) {
         self.push_shifted(from, i, DVec3::ZERO);
         for axis in 0..3 {
-            if let Some(last) = self.origin[axis].last_mut() {
-                *last = round(origin[axis]);
+            if let Some(last) = self.direction[axis].last_mut() {
+                *last = round(rays.direction[axis][i]);
             }
         }
     }
@@ -180,10 +185,8 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
     let (t_near, t_far) = (&mut out.t_near[..n], &mut out.t_far[..n]);
     let advance = &mut out.advance[..n];
     let far = FAR * frame.radius;
-    let pull = frame.nudge() / frame.radius;
-    let push = frame.nudge();
-    let [pad, pad_per_distance] = [frame.slack(0.0), frame.slack(1.0) - frame.slack(0.0)];
-    let sphere = (1.0 + SPHERE_SLACK) * frame.radius + pad;
+    let pull = NUDGE / frame.radius;
+    let sphere = (1.0 + SPHERE_SLACK) * frame.radius;
     for i in 0..n {
         let x = ox[i] - frame.origin.x;
         let y = oy[i] - frame.origin.y;
@@ -200,28 +203,33 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
         let unit = dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i] > 0.5;
         let sound = unit && distance <= frame.radius * MOST_RADII && t_min[i] <= t_max[i];
         // Only a far ray is moved ahead, to `far` before the foot.
-        let ahead = (foot - far).max(-pad);
+        let start = (foot - far).max(0.0);
+        let (x, y, z) = (x + dx[i] * start, y + dy[i] * start, z + dz[i] * start);
+        let pad = SLOPE * BLUR * (x.abs() + y.abs() + z.abs());
+        // The others are moved back.
+        let back = if start > 0.0 { 0.0 } else { pad };
+        let ahead = start - back;
         // Sideways: towards the box's centre, the more the farther out, and a little across.
         let [first, second] = ODD_AXES;
         let along = first[0] * dx[i] + first[1] * dy[i] + first[2] * dz[i];
         let odd = |axis: usize| if along.abs() < 0.8 { first[axis] } else { second[axis] };
-        let sx = pull * fx + push * (odd(1) * dz[i] - odd(2) * dy[i]);
-        let sy = pull * fy + push * (odd(2) * dx[i] - odd(0) * dz[i]);
-        let sz = pull * fz + push * (odd(0) * dy[i] - odd(1) * dx[i]);
+        let sx = pull * fx + NUDGE * (odd(1) * dz[i] - odd(2) * dy[i]);
+        let sy = pull * fy + NUDGE * (odd(2) * dx[i] - odd(0) * dz[i]);
+        let sz = pull * fz + NUDGE * (odd(0) * dy[i] - odd(1) * dx[i]);
         let near = t_min[i] - ahead;
-        let near = (near - (pad + pad_per_distance * near)).max(0.0);
+        let near = (near - (pad + SLOPE * BLUR * near)).max(0.0);
         let end = t_max[i] - ahead;
-        let end = (end + (pad + pad_per_distance * end.max(0.0))).max(near);
+        let end = (end + (pad + SLOPE * BLUR * end.max(0.0))).max(near);
         // A ray that cannot hit is put beside the scene, pointing away.
         let traced = meets && sound;
         let choose = |value: f64, otherwise: f64| round(if traced { value } else { otherwise });
         advance[i] = ahead;
-        px[i] = choose(x + dx[i] * ahead + sx, frame.centre.x + 2.0 * far);
-        py[i] = choose(y + dy[i] * ahead + sy, frame.centre.y);
-        pz[i] = choose(z + dz[i] * ahead + sz, frame.centre.z);
-        qx[i] = choose(dx[i], 1.0);
-        qy[i] = choose(dy[i], 0.0);
-        qz[i] = choose(dz[i], 0.0);
+        px[i] = choose(x - dx[i] * back, frame.centre.x + 2.0 * far);
+        py[i] = choose(y - dy[i] * back, frame.centre.y);
+        pz[i] = choose(z - dz[i] * back, frame.centre.z);
+        qx[i] = choose(dx[i] + sx, 1.0);
+        qy[i] = choose(dy[i] + sy, 0.0);
+        qz[i] = choose(dz[i] + sz, 0.0);
         t_near[i] = choose(near, 0.0);
         // Embree takes no ray that ends before it starts.
         t_far[i] = choose(end, 0.0).max(t_near[i]);

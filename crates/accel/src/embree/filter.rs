@@ -10,7 +10,7 @@ use embree4_sys as sys;
 use etendue_geometry::{Geometry, MISS, RayBatch};
 
 use crate::nearest::{Nearest, Query, Verdict, View};
-use crate::single;
+use crate::single::{self, Rays32};
 
 /// The hits that a filter is asked about: one for each lane of a packet.
 struct Lanes {
@@ -21,7 +21,6 @@ struct Lanes {
 }
 
 // Which of the arrays of `RTCRayN` and `RTCHitN` holds what (rtcore_ray.h).
-const RAY_TNEAR: usize = 3;
 const RAY_TFAR: usize = 8;
 const RAY_ID: usize = 10;
 const HIT_PRIMITIVE: usize = 5;
@@ -78,10 +77,6 @@ impl Hit<'_> {
         self.of_ray(RAY_ID).to_bits() as usize
     }
 
-    fn t_near(&self) -> f32 {
-        self.of_ray(RAY_TNEAR)
-    }
-
     fn t(&self) -> f32 {
         self.of_ray(RAY_TFAR)
     }
@@ -115,8 +110,7 @@ pub(crate) struct Judged<'a> {
     context: sys::RTCRayQueryContext,
     geometry: &'a Geometry,
     rays: &'a RayBatch,
-    /// Hits this far behind a ray's start are taken as they are: at 0 and a unit farther.
-    trusted: [f32; 2],
+    rays32: &'a Rays32,
     /// Rays that met a triangle in single precision and pass beside it in f64: they may have hit its
     /// neighbour.
     pub(super) doubtful: &'a mut Vec<u32>,
@@ -126,11 +120,17 @@ impl<'a> Judged<'a> {
     pub(crate) fn new(
         geometry: &'a Geometry,
         rays: &'a RayBatch,
-        trusted: [f64; 2],
+        rays32: &'a Rays32,
         doubtful: &'a mut Vec<u32>,
     ) -> Self {
-        let trusted = trusted.map(single::round);
-        Self { context: sys::RTCRayQueryContext::default(), geometry, rays, trusted, doubtful }
+        Self { context: sys::RTCRayQueryContext::default(), geometry, rays, rays32, doubtful }
+    }
+
+    /// Whether a hit is certainly behind the ray's nearest distance that counts.
+    fn is_clear(&self, hit: &Hit<'_>) -> bool {
+        let i = hit.id();
+        let near = f64::from(self.rays32.t_near[i]);
+        f64::from(hit.t()) > near + 2.0 * self.rays32.slack(i, near)
     }
 
     fn keeps(&mut self, hit: &Hit<'_>) -> bool {
@@ -173,11 +173,7 @@ pub(super) unsafe extern "C" fn keep_clear(args: *const sys::RTCFilterFunctionNA
     // SAFETY: as in `keep_exact`.
     let (lanes, judged) =
         unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<Judged<'_>>()) };
-    lanes.judge(|hit| {
-        let near = hit.t_near();
-        let clear = near + judged.trusted[0] + judged.trusted[1] * near;
-        hit.t() > clear || judged.keeps(&hit)
-    });
+    lanes.judge(|hit| judged.is_clear(&hit) || judged.keeps(&hit));
 }
 
 /// The nearest of the triangles that a bundle of rays around one ray meets and that one ray hits.

@@ -227,3 +227,21 @@ fn an_unknown_instruction_set_is_refused_by_name() {
     let message = refused.to_string();
     assert!(message.contains("\"mmx\"") && message.contains("avx2"), "{message}");
 }
+
+/// Single precision's error, and with it how many rays are looked at twice, follows from how far away
+/// things are, not from how wide the scene is.
+#[test]
+fn small_things_in_a_wide_scene_are_found_at_once() {
+    let ground = [[-1e3, -2.0, -1e3], [1e3, -2.0, -1e3], [-1e3, -2.0, 1e3]];
+    let geometry = scene(vec![blob(100), mesh("ground", &ground, vec![[0, 1, 2]])]);
+    let rays = from_outside(20_000, &Transform::IDENTITY, 113);
+    let embree = Embree::build(Arc::clone(&geometry), &BuildOptions::default()).expect("sound");
+    let exact = Exact::build(geometry, &BuildOptions::default()).expect("sound");
+    let (truth, hits) = (closest(&exact, &rays), closest(&embree, &rays));
+    assert_accurate(&truth, &hits, &rays, "statue");
+    let wrong = (0..rays.len()).filter(|&i| hits.triangle[i] != truth.triangle[i]).count();
+    assert_eq!(wrong, 0);
+    let again = embree.counts().rechecked;
+    println!("{again} of {} rays looked at again", rays.len());
+    assert!(again * 50 < rays.len() as u64, "{again} of {} rays", rays.len());
+}
