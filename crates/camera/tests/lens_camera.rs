@@ -269,6 +269,33 @@ fn filters_dim_each_lane_by_its_own_mean() {
 }
 
 #[test]
+fn losses_are_those_of_the_surfaces_and_of_the_way_and_only_when_asked_for() {
+    let of = |losses: &str| {
+        at_origin(&format!(
+            r#""type": "chromatic_real_lens", "front_radius": 500, "rear_radius": -500, "thickness": 6,
+               "glass": "N-BK7", "semi_diameter": 5, "sensor_distance": 480, {losses}
+               "sensor": {{"resolution": [30, 20], "pixel_pitch": 50}}"#
+        ))
+    };
+    const COUNT: u32 = 4096;
+    let value = |camera: &Camera| {
+        let opened = camera.opened(&Lanes::Grey).unwrap();
+        mean_weight(&sampled(&opened, [15.0, 10.0], None, COUNT), COUNT)
+    };
+    let lossless = value(&of(""));
+    let bare = value(&of(r#""losses": {"reflection": "uncoated"},"#)) / lossless;
+    // Rays are within 1.5° of the normals: ((n − 1)/(n + 1))² at both surfaces, to the square of it.
+    let reflected = (0.5168 / 2.5168_f64).powi(2);
+    assert!((bare - (1.0 - reflected).powi(2)).abs() < 1e-4, "{bare}");
+    let coated = r#""losses": {"reflection": {"index": 1.38, "thickness": 106.4}},"#;
+    let coated = value(&of(coated)) / lossless;
+    let least = ((1.5168 - 1.9044) / (1.5168 + 1.9044_f64)).powi(2);
+    assert!((coated - (1.0 - least).powi(2)).abs() < 1e-4, "{coated}");
+    let absorbed = value(&of(r#""losses": {"absorption": true},"#)) / lossless;
+    assert!(absorbed < 1.0 && absorbed > 0.98, "6 mm of crown glass are clear: {absorbed}");
+}
+
+#[test]
 fn a_tilted_sensor_puts_a_tilted_plane_in_focus() {
     // Scheimpflug: the planes of lens, sensor and object meet in one line, here at y = −f'/tan τ.
     let camera = at_origin(

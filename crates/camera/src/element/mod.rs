@@ -1,11 +1,13 @@
 //! The parts of a lens. Each file holds one part: how a lens file writes it, and what it does.
 //!
-//! To add a part: its own file, and here a variant of [`PartSpec`].
+//! To add a part: its own file, and a variant of [`Part`] and [`PartSpec`] in `part.rs`.
 
 mod aperture;
 mod asphere;
 mod filter;
 mod frame;
+mod losses;
+mod part;
 mod picture;
 mod rays;
 mod refract;
@@ -25,12 +27,15 @@ use crate::length::{Degrees, Millimetres};
 pub use aperture::{ApertureSpec, CircularSpec, MaskSpec, Opening, PolygonSpec};
 pub use filter::{Filter, FilterSpec};
 pub use frame::Frame;
+pub use losses::{Coating, LossesSpec, Plain, Reflection};
+pub use part::{Part, PartSpec};
 pub use picture::{Picture, Resolve};
 pub use rays::{Fate, FateCounts, LensRays};
 pub use step::Clip;
 pub use surface::{Surface, SurfaceSpec};
 pub use thin_lens::{ThinLens, ThinLensSpec};
 
+pub(crate) use losses::Loss;
 pub(crate) use rays::{Block, Ray};
 pub(crate) use refract::Refraction;
 pub(crate) use step::{Action, Step};
@@ -44,20 +49,6 @@ pub struct ElementSpec {
     /// How it is mounted.
     #[serde(flatten)]
     pub mount: Mount,
-}
-
-/// The closed set of parts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "type", rename_all = "snake_case")]
-pub enum PartSpec {
-    /// A refracting surface.
-    Surface(SurfaceSpec),
-    /// An ideal thin lens.
-    ThinLens(ThinLensSpec),
-    /// An opening in an opaque sheet.
-    Aperture(ApertureSpec),
-    /// A sheet that absorbs.
-    Filter(FilterSpec),
 }
 
 /// How an element is mounted.
@@ -182,32 +173,6 @@ fn mount_on(schema: &mut Value, keys: &Map<String, Value>, required: &[Value]) {
     }
     schema.insert("properties".to_owned(), Value::Object(known));
     schema.insert("additionalProperties".to_owned(), Value::Bool(false));
-}
-
-impl From<SurfaceSpec> for PartSpec {
-    fn from(spec: SurfaceSpec) -> Self {
-        Self::Surface(spec)
-    }
-}
-
-impl PartSpec {
-    /// A round aperture of the given radius (mm).
-    #[must_use]
-    pub fn circular(radius: f64) -> Self {
-        Self::Aperture(ApertureSpec::Circular(CircularSpec { radius: Millimetres(radius) }))
-    }
-
-    /// A spherical surface: radius (mm, infinite for a plane), what follows it, semi-diameter (mm).
-    #[must_use]
-    pub fn spherical(
-        radius: f64,
-        glass: Option<crate::glass::GlassSpec>,
-        semi_diameter: f64,
-    ) -> Self {
-        let radius = radius.is_finite().then_some(Millimetres(radius));
-        let semi_diameter = semi_diameter.is_finite().then_some(Millimetres(semi_diameter));
-        Self::Surface(SurfaceSpec { radius, glass, semi_diameter, ..SurfaceSpec::default() })
-    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use super::aperture::Opening;
 use super::filter::Filter;
 use super::frame::Frame;
+use super::losses::Loss;
 use super::rays::{Block, Fate, LANES, PENDING, Ray};
 use super::refract::{Crossing, Refraction, each_lane};
 use super::thin_lens::at_thin_lens;
@@ -31,6 +32,8 @@ pub(crate) struct Step {
     pub(crate) frame: Frame,
     pub(crate) axial: bool,
     pub(crate) action: Action,
+    /// What is lost here, when losses are asked for.
+    pub(crate) loss: Option<Loss>,
 }
 
 /// What an element does.
@@ -46,6 +49,11 @@ pub(crate) enum Action {
 }
 
 impl Action {
+    /// Whether it moves rays to itself; sheets only look at them.
+    pub(crate) fn moves(&self) -> bool {
+        !matches!(self, Self::Opening(_) | Self::Filter { .. })
+    }
+
     /// The kernel that a surface needs.
     pub(crate) fn refract(refraction: Refraction) -> Self {
         let surface = &refraction.surface;
@@ -85,6 +93,18 @@ impl Step {
     /// Takes a block of rays through the element.
     #[inline(always)]
     pub(crate) fn run(&self, block: &mut Block, clip: Clip) {
+        match &self.loss {
+            None => self.pass(block, clip),
+            Some(loss) => {
+                let before = block.clone();
+                self.pass(block, clip);
+                loss.dim(block, &before);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn pass(&self, block: &mut Block, clip: Clip) {
         if self.axial {
             self.run_at(block, clip, self.frame.vertex.z);
         } else {
@@ -199,7 +219,7 @@ impl Step {
     fn decide(&self, block: &mut Block, clip: Clip) {
         for lane in 0..LANES {
             if block.outcome[lane] == PENDING {
-                let passage = self.run_one(block.ray(lane), clip);
+                let passage = self.pass_one(block.ray(lane), clip);
                 let mut ray = passage.ray;
                 if let (Fate::Vignetted { .. }, Some(point)) = (passage.fate, passage.point)
                     && self.moves()
@@ -215,12 +235,21 @@ impl Step {
 
     /// Whether the element moves rays to itself; sheets only look at them.
     pub(crate) fn moves(&self) -> bool {
-        !matches!(self.action, Action::Opening(_) | Action::Filter { .. })
+        self.action.moves()
     }
 
     /// Takes one ray through the element.
     #[inline]
     pub(crate) fn run_one(&self, ray: Ray, clip: Clip) -> Passage {
+        let mut passage = self.pass_one(ray, clip);
+        if let (Some(loss), Fate::Exited) = (&self.loss, passage.fate) {
+            passage.transmission *= loss.share(ray, passage.ray);
+        }
+        passage
+    }
+
+    #[inline]
+    fn pass_one(&self, ray: Ray, clip: Clip) -> Passage {
         if self.axial {
             let z = self.frame.vertex.z;
             let mut local = ray;

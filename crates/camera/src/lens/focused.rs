@@ -81,7 +81,11 @@ impl Focused {
         setup: &Setup<'_>,
         focus: Focus,
     ) -> Result<Self, CameraError> {
-        let train = stopped(train, setup)?.with_sensor(mount(setup)?);
+        setup
+            .losses
+            .check()
+            .map_err(|(key, why)| CameraError::new(format!("losses.{key}"), why))?;
+        let train = stopped(train, setup)?.with_sensor(mount(setup)?).with_losses(setup.losses);
         let z = train.sensor_z(focus).map_err(|fault| {
             let key = match focus {
                 Focus::Sensor(_) => "sensor_distance",

@@ -6,7 +6,8 @@
 //! E = ∫ L cos θ dΩ over the exit pupil is Eq. (1) of Nürnberg et al. (2019). A sample's weight is the
 //! projected solid angle that it stands for over that of the pupil seen from the axis, with filters
 //! and masks clear and before anything vignettes: cos⁴ and vignetting are in it, nothing is painted
-//! on. A filter dims, and a mask passes what it leaves open.
+//! on. A filter dims, a mask passes what it leaves open, and losses in glass, where they are asked for,
+//! are lost.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -17,7 +18,7 @@ use glam::{DVec2, DVec3};
 
 use super::chief::ChiefTable;
 use super::focused::{Focused, View};
-use crate::element::{Clip, Fate, Ray};
+use crate::element::{Clip, Fate, Ray, Reflection};
 use crate::train::analysis::projected_solid_angle;
 use crate::train::pupil::{Window, blocked, lit_radius, without_dimming, without_filters};
 use crate::train::{ExitPupil, ExitPupilError, OpticalTrain, Part, Side, TrainAt};
@@ -279,7 +280,10 @@ fn tells_wavelengths_apart(train: &OpticalTrain) -> bool {
         Part::Filter(filter) => filter.curves.iter().any(|curve| curve.as_flat().is_none()),
         _ => false,
     });
-    filters || train.is_dispersive()
+    let losses = train.losses();
+    let coated = matches!(losses.reflection, Some(Reflection::Coated(_)));
+    let absorbs = losses.absorption && train.media().iter().any(|g| g.absorption(550.0).is_some());
+    filters || coated || absorbs || train.is_dispersive()
 }
 
 /// The pupil as seen from the axis with all filters and masks clear; from elsewhere when the axis is

@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 use super::focused::{Focused, View, positive};
 use super::lens_camera::LensCamera;
 use super::source::{LensSource, PlacedSpec, in_camera};
-use crate::element::{ApertureSpec, ElementSpec, PartSpec, Resolve, SurfaceSpec, ThinLensSpec};
+use crate::element::{
+    ApertureSpec, ElementSpec, LossesSpec, PartSpec, Resolve, SurfaceSpec, ThinLensSpec,
+};
 use crate::framing::{self, Reach};
 use crate::glass::GlassSpec;
 use crate::length::{Degrees, Metres, Millimetres};
@@ -23,6 +25,7 @@ pub(crate) struct Setup<'a> {
     pub(crate) sensor_height: Option<f64>,
     pub(crate) sensor_tilt: [Degrees; 2],
     pub(crate) sensor_decentre: [Millimetres; 2],
+    pub(crate) losses: LossesSpec,
     pub(crate) pose: Option<&'a PoseSpec>,
     pub(crate) sensor: &'a SensorSpec,
 }
@@ -72,6 +75,9 @@ macro_rules! camera_with_a_lens {
             /// Moves the sensor across the axis by x and y (mm): shift.
             #[serde(default, skip_serializing_if = "is_zero")]
             pub sensor_decentre: [Millimetres; 2],
+            /// What glass takes from light; nothing when absent.
+            #[serde(default, skip_serializing_if = "is_zero")]
+            pub losses: LossesSpec,
             /// Where the entrance pupil stands; when absent, the whole scene is framed and what is
             /// in its middle is in focus.
             #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -103,6 +109,7 @@ macro_rules! camera_with_a_lens {
                     sensor_height: self.sensor_height.map(|height| height.0),
                     sensor_tilt: self.sensor_tilt,
                     sensor_decentre: self.sensor_decentre,
+                    losses: self.losses,
                     pose: self.pose.as_ref(),
                     sensor: &self.sensor,
                 })

@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Element, LensError, OpticalTrain, Part};
-use crate::element::{ElementSpec, Frame, PartSpec, Resolve};
+use super::{Element, LensError, OpticalTrain};
+use crate::element::{ElementSpec, Frame, LossesSpec, PartSpec, Resolve};
 use crate::glass::{FRAUNHOFER_D, Glass};
 use crate::length::{Degrees, Millimetres, Nanometres};
 
@@ -87,6 +87,7 @@ impl LensFile {
             wavelength,
             end: z,
             sensor: self.sensor.unwrap_or_default(),
+            losses: LossesSpec::default(),
             notes: Vec::new(),
         };
         train.with_stop(self.stop()?)
@@ -108,12 +109,7 @@ impl LensFile {
 }
 
 fn place(spec: &ElementSpec, z: f64, resolve: Resolve<'_>) -> Result<Element, String> {
-    let part = match &spec.part {
-        PartSpec::Surface(surface) => Part::Surface(surface.build()?),
-        PartSpec::ThinLens(lens) => Part::ThinLens(lens.build()?),
-        PartSpec::Aperture(aperture) => Part::Aperture(aperture.build(resolve)?.into()),
-        PartSpec::Filter(filter) => Part::Filter(filter.build(resolve)?.into()),
-    };
+    let part = spec.part.build(resolve)?;
     let tilt = spec.mount.tilt.map(|angle| angle.0);
     let decentre = spec.mount.decentre.map(|length| length.0);
     let numbers = [spec.mount.thickness.0, tilt[0], tilt[1], decentre[0], decentre[1]];

@@ -22,11 +22,10 @@ pub mod rays_file;
 pub mod report;
 pub mod trace;
 
-use std::sync::Arc;
-
-use crate::element::{Filter, Frame, Opening, Surface, ThinLens};
+use crate::element::{Frame, LossesSpec};
 use crate::glass::{Glass, GlassError};
 
+pub use crate::element::Part;
 pub use aim::ChiefRay;
 pub use file::{LensFile, SensorMount};
 pub use focus::{Focus, FocusError};
@@ -83,19 +82,6 @@ pub enum LensError {
     },
 }
 
-/// What an element is, ready to be traced.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Part {
-    /// A refracting surface between the media before and behind it.
-    Surface(Surface),
-    /// An ideal thin lens.
-    ThinLens(ThinLens),
-    /// An opening in an opaque sheet.
-    Aperture(Arc<Opening>),
-    /// A sheet that absorbs.
-    Filter(Arc<Filter>),
-}
-
 /// A part at its place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Element {
@@ -118,6 +104,7 @@ pub struct OpticalTrain {
     pub(crate) wavelength: f64,
     pub(crate) end: f64,
     pub(crate) sensor: SensorMount,
+    pub(crate) losses: LossesSpec,
     pub(crate) notes: Vec<String>,
 }
 
@@ -184,6 +171,12 @@ impl OpticalTrain {
         self.sensor.tilt == SensorMount::default().tilt && self.elements.iter().all(flat)
     }
 
+    /// What its glass takes from light.
+    #[must_use]
+    pub fn losses(&self) -> &LossesSpec {
+        &self.losses
+    }
+
     /// Whether rays of different wavelengths run differently.
     #[must_use]
     pub fn is_dispersive(&self) -> bool {
@@ -238,15 +231,7 @@ impl OpticalTrain {
         if !(radius >= 0.0 && radius.is_finite()) {
             return Err(error("the radius must be a length from 0 on"));
         }
-        match &mut self.elements[index].part {
-            Part::Surface(surface) => surface.semi_diameter = radius,
-            Part::ThinLens(lens) => lens.semi_diameter = radius,
-            Part::Filter(filter) => Arc::make_mut(filter).semi_diameter = radius,
-            Part::Aperture(opening) => {
-                let opening = Arc::make_mut(opening);
-                *opening = opening.with_radius(radius).ok_or_else(|| error("it is a mask"))?;
-            }
-        }
+        self.elements[index].part.set_clear_radius(radius).map_err(error)?;
         Ok(self)
     }
 
@@ -281,6 +266,13 @@ impl OpticalTrain {
         }
         self.wavelength = wavelength;
         Ok(self)
+    }
+
+    /// The same lens with what its glass takes from light.
+    #[must_use]
+    pub fn with_losses(mut self, losses: LossesSpec) -> Self {
+        self.losses = losses;
+        self
     }
 
     /// The same lens with its sensor mounted in another way, if one is given.
@@ -375,20 +367,10 @@ impl Element {
     /// How far from its axis the element lets light pass (mm); infinite when unlimited.
     #[must_use]
     pub fn clear_radius(&self) -> f64 {
-        match &self.part {
-            Part::Surface(surface) => surface.semi_diameter,
-            Part::ThinLens(lens) => lens.semi_diameter,
-            Part::Aperture(opening) => opening.radius(),
-            Part::Filter(filter) => filter.radius(),
-        }
+        self.part.clear_radius()
     }
 
     fn is_symmetric(&self) -> bool {
-        let round = match &self.part {
-            Part::Surface(_) | Part::ThinLens(_) => true,
-            Part::Aperture(opening) => opening.is_round(),
-            Part::Filter(filter) => filter.is_uniform(),
-        };
-        round && self.frame.is_axial()
+        self.part.is_round() && self.frame.is_axial()
     }
 }

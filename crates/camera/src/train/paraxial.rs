@@ -9,7 +9,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{OpticalTrain, Part};
+use super::OpticalTrain;
 use crate::glass::GlassError;
 
 /// A power this small a share of the powers it is made of is rounding: the lens is afocal.
@@ -190,10 +190,6 @@ impl OpticalTrain {
     }
 
     fn power(&self, indices: &[f64], i: usize) -> f64 {
-        match &self.elements[i].part {
-            Part::Surface(surface) => (indices[i + 1] - indices[i]) * surface.paraxial_curvature(),
-            Part::ThinLens(lens) => indices[i] * lens.power,
-            Part::Aperture(_) | Part::Filter(_) => 0.0,
-        }
+        self.elements[i].part.power(indices[i], indices[i + 1])
     }
 }

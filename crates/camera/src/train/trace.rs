@@ -1,15 +1,13 @@
 //! Rays through a lens at one wavelength.
 
-use std::sync::Arc;
-
 use etendue_spectrum::Curve;
 use glam::DVec3;
 use multiversion::multiversion;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{OpticalTrain, Part};
-use crate::element::{Action, Block, Clip, Fate, LensRays, Ray, Refraction, Step};
+use super::OpticalTrain;
+use crate::element::{Action, Block, Clip, Fate, LensRays, Loss, Ray, Step};
 use crate::glass::GlassError;
 
 /// Where rays come from.
@@ -41,7 +39,7 @@ pub struct RayPath {
     pub points: Vec<DVec3>,
     /// Its direction behind the last element; `None` unless it left.
     pub direction: Option<DVec3>,
-    /// The share of light that passes apertures and filters.
+    /// The share of light that is left by apertures, filters and, where they are asked for, losses.
     pub throughput: f64,
 }
 
@@ -67,10 +65,18 @@ impl OpticalTrain {
         for (element, placed) in self.elements.iter().enumerate() {
             let [before, behind] = [indices[element], indices[element + 1]];
             let [towards_sensor, towards_object] =
-                actions(&placed.part, before, behind, transmission);
+                placed.part.actions(before, behind, transmission);
+            let absorption = |medium: usize| self.media[medium].absorption(wavelength);
+            let loss =
+                |indices, medium| Loss::new(&self.losses, indices, absorption(medium), wavelength);
             let (frame, axial) = (placed.frame, placed.frame.is_axial());
-            forward.push(Step { element, frame, axial, action: towards_sensor });
-            backward.push(Step { element, frame, axial, action: towards_object });
+            let add = |steps: &mut Vec<Step>, action: Action, loss: Option<Loss>| {
+                // Sheets do not move rays: what absorbs before one is counted at the next surface.
+                let loss = loss.filter(|_| action.moves());
+                steps.push(Step { element, frame, axial, action, loss });
+            };
+            add(&mut forward, towards_sensor, loss([before, behind], element));
+            add(&mut backward, towards_object, loss([behind, before], element + 1));
         }
         backward.reverse();
         Ok(TrainAt { wavelength, indices, forward, backward })
@@ -79,29 +85,6 @@ impl OpticalTrain {
     /// The index of each medium at `wavelength` (nm), from the object's to the sensor's.
     pub(crate) fn indices(&self, wavelength: f64) -> Result<Vec<f64>, GlassError> {
         self.media.iter().map(|glass| glass.index(wavelength)).collect()
-    }
-}
-
-/// What a part does to light from the object, and to light traced from the sensor.
-fn actions(
-    part: &Part,
-    before: f64,
-    behind: f64,
-    transmission: &dyn Fn(&Curve) -> f64,
-) -> [Action; 2] {
-    let both = |action: Action| [action.clone(), action];
-    match part {
-        Part::Surface(surface) => [
-            Action::refract(Refraction::new(surface.clone(), before, behind)),
-            Action::refract(Refraction::new(surface.clone(), behind, before)),
-        ],
-        Part::ThinLens(lens) => [lens.power, -lens.power]
-            .map(|power| Action::ThinLens { power, semi_diameter: lens.semi_diameter }),
-        Part::Aperture(opening) => both(Action::Opening(Arc::clone(opening))),
-        Part::Filter(filter) => {
-            let transmissions = filter.curves.iter().map(transmission).collect();
-            both(Action::Filter { filter: Arc::clone(filter), transmissions })
-        }
     }
 }
 

@@ -32,7 +32,7 @@ use glam::{DVec2, DVec3};
 
 use super::aim::towards_lens;
 use super::{OpticalTrain, Part, Side, TrainAt};
-use crate::element::{Clip, Fate, FateCounts, Frame, LensRays, Opening};
+use crate::element::{Clip, Fate, FateCounts, Frame, LensRays, LossesSpec, Opening};
 use crate::glass::GlassError;
 
 pub(crate) use measure::lit_radius;
@@ -396,9 +396,9 @@ pub(crate) fn without_filters(train: &OpticalTrain) -> OpticalTrain {
     train
 }
 
-/// The same lens with masks and filters clear.
+/// The same lens with masks and filters clear, and nothing lost in glass.
 pub(crate) fn without_dimming(train: &OpticalTrain) -> OpticalTrain {
-    without_filters(&without_masks(train))
+    without_filters(&without_masks(train)).with_losses(LossesSpec::default())
 }
 
 /// The error that names what blocks the light.

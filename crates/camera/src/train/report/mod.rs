@@ -296,14 +296,13 @@ fn rows(train: &OpticalTrain, at: &TrainAt, sensor_z: Option<f64>) -> Vec<Elemen
     let row = |(i, element): (usize, &super::Element)| {
         let z = element.frame.vertex.z;
         let next = elements.get(i + 1).map(|next| next.frame.vertex.z).or(sensor_z);
-        let (kind, radius) = match &element.part {
-            Part::Surface(surface) => ("surface", finite(1.0 / surface.curvature)),
-            Part::ThinLens(lens) => ("thin_lens", finite(1.0 / lens.power)),
-            Part::Aperture(_) => ("aperture", None),
-            Part::Filter(_) => ("filter", None),
+        let radius = match &element.part {
+            Part::Surface(surface) => finite(1.0 / surface.curvature),
+            Part::ThinLens(lens) => finite(1.0 / lens.power),
+            _ => None,
         };
         ElementRow {
-            kind,
+            kind: element.part.type_name(),
             z,
             radius,
             shape: shape_of(element),
@@ -335,7 +334,7 @@ fn shape_of(element: &super::Element) -> String {
                 words.push(format!("mask of {} x {} pixels", picture.pixels[0], picture.pixels[1]));
             }
         },
-        Part::ThinLens(_) | Part::Filter(_) => {}
+        _ => {}
     }
     if !element.frame.is_axial() {
         words.push("tilted or decentred".to_owned());
