@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render test test-embree4 bench bench-peers docs-figures clean
+.PHONY: help setup render test test-embree4 bench bench-peers bench-sensor docs-figures clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -14,6 +14,7 @@ help:
 	@echo "make test-embree4  run the tests that touch Embree against Embree 4, in a Debian 13 root"
 	@echo "make bench         measure everything, write docs/benchmarks.md"
 	@echo "make bench-peers   add other programs at the same job, from PyPI"
+	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make clean         remove target/ and out/"
 
@@ -41,10 +42,20 @@ bench-peers: setup
 	cargo build --release -p etendue -p etendue-benches
 	scripts/bench-peers.sh $(ARGS)
 
+bench-sensor:
+	scripts/bench-sensor.sh
+
 docs-figures: setup
 	cargo run --release -p etendue -- render scenes/first-light.json -o out/docs-figures \
 		--set 'camera.sensor.resolution=[640,640]' --samples 16 --outputs png
 	install -D -m 644 out/docs-figures/picture.png docs/images/first-light.png
+
+	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
+	for kind in fig5a fig5b fig5c fig7a-raw fig7b-rgb fig7c-multispectral; do \
+		cargo run --release -p etendue -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind \
+			--outputs png && \
+		install -D -m 644 out/docs-figures/$$kind/raw.preview.png docs/images/$$kind.png || exit 1; \
+	done
 
 clean:
 	rm -rf target out

@@ -4,8 +4,11 @@
 //! N(μ, μ + σ²). Mean and variance agree, everything else does not: at few electrons the true
 //! distribution is skewed, and with little read noise it is a comb.
 
+use std::fmt::Write as _;
+
 use serde::Serialize;
 
+use crate::chart::{Chart, Corner, Line, svg};
 use crate::clipping::{normal_cdf, normal_density};
 use crate::poisson::probability;
 
@@ -77,6 +80,89 @@ pub fn electrons_needed(read_noise: f64, limit: f64) -> Option<f64> {
         mean /= if worst < 0.7 * limit { 1.1 } else { 1.01 };
     }
     None
+}
+
+/// Read noises that the charts and the table show (e⁻), with a colour for each.
+const SHOWN: [(f64, &str); 6] = [
+    (0.0, "#000000"),
+    (0.3, "#7b3fa0"),
+    (1.0, "#1f5fa8"),
+    (2.0, "#2e8b57"),
+    (5.0, "#c9820a"),
+    (10.0, "#c0392b"),
+];
+
+/// Means that the charts show (e⁻): 0.1 to 1000.
+fn means() -> impl Iterator<Item = f64> {
+    (0..=80).map(|i| 0.1 * 10f64.powf(0.05 * f64::from(i)))
+}
+
+/// Distance, bias after clipping and skewness against mean electrons, a line for each of some read
+/// noises, as SVG.
+#[must_use]
+pub fn charts() -> String {
+    let names = SHOWN.map(|(sigma, _)| format!("read noise {sigma} e⁻"));
+    let all: Vec<Vec<Deviation>> = SHOWN
+        .iter()
+        .map(|&(sigma, _)| means().map(|mean| Deviation::new(mean, sigma)).collect())
+        .collect();
+    let line = |k: usize, value: &dyn Fn(&Deviation) -> f64| Line {
+        name: &names[k],
+        colour: SHOWN[k].1,
+        dashes: "",
+        points: all[k].iter().map(|at| [at.mean, value(at)]).collect(),
+    };
+    let lines = |value: &dyn Fn(&Deviation) -> f64| -> Vec<Line<'_>> {
+        (0..SHOWN.len()).map(|k| line(k, value)).collect()
+    };
+    let one_percent = Line {
+        name: "1 %",
+        colour: "#888888",
+        dashes: "2 3",
+        points: vec![[0.1, 0.01], [1000.0, 0.01]],
+    };
+    let distance = Chart {
+        title: "Kolmogorov's distance to the truth",
+        axes: ["mean electrons", "distance"],
+        lines: lines(&|at| at.distance).into_iter().chain([one_percent]).collect(),
+        legend: Corner::BottomRight,
+    };
+    // Without a black level; below a millionth of an electron lies rounding.
+    let visible = |bias: f64| if bias > 1e-6 { bias } else { 0.0 };
+    let bias = Chart {
+        title: "Bias after clipping, normal − exact",
+        axes: ["mean electrons", "bias (e⁻)"],
+        lines: lines(&|at| visible(at.bias_of_normal - at.bias)),
+        legend: Corner::TopRight,
+    };
+    let skewness = Chart {
+        title: "Skewness, which the normal lacks",
+        axes: ["mean electrons", "skewness"],
+        lines: lines(&|at| at.skewness),
+        legend: Corner::BottomRight,
+    };
+    svg(&[distance, bias, skewness])
+}
+
+/// Mean electrons below which the approximation is over a limit of Kolmogorov's distance, a line for
+/// each of some read noises, as a table of Markdown.
+#[must_use]
+pub fn table() -> String {
+    let limits = [0.05, 0.02, 0.01, 0.005];
+    let mut text =
+        String::from("| read noise e⁻ | 5 % | 2 % | 1 % | 0.5 % |\n|---|---|---|---|---|\n");
+    for sigma in [0.0, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0] {
+        let _ = write!(text, "| {sigma} |");
+        for limit in limits {
+            let _ = match electrons_needed(sigma, limit) {
+                Some(electrons) if electrons >= 10.0 => write!(text, " {electrons:.0} |"),
+                Some(electrons) => write!(text, " {electrons:.2} |"),
+                None => write!(text, " never |"),
+            };
+        }
+        text.push('\n');
+    }
+    text
 }
 
 /// Poisson(μ) + N(0, σ²).
@@ -192,6 +278,16 @@ mod tests {
             assert!((deviation.distance / expected - 1.0).abs() < 0.02, "{mean}: {deviation:?}");
             assert!((deviation.skewness - mean / (mean + 4.0f64).powf(1.5)).abs() < 1e-15);
         }
+    }
+
+    #[test]
+    fn charts_and_table_show_what_was_computed() {
+        let drawn = charts();
+        // Bias is nothing but rounding in none of them: six lines each, and the limit.
+        assert_eq!(drawn.matches("<polyline").count(), 19);
+        assert!(!drawn.contains("NaN"));
+        let row = table().lines().find(|line| line.starts_with("| 1 |")).unwrap().to_owned();
+        assert!(row.contains("| never | 7.") && row.contains("| 4"), "{row}");
     }
 
     #[test]

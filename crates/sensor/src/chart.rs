@@ -17,6 +17,16 @@ pub(crate) struct Chart<'a> {
     pub(crate) title: &'a str,
     pub(crate) axes: [&'a str; 2],
     pub(crate) lines: Vec<Line<'a>>,
+    /// Where its lines leave room for their names.
+    pub(crate) legend: Corner,
+}
+
+/// A corner of a chart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Corner {
+    TopLeft,
+    TopRight,
+    BottomRight,
 }
 
 const WIDTH: f64 = 460.0;
@@ -25,6 +35,8 @@ const LEFT: f64 = 64.0;
 const RIGHT: f64 = 16.0;
 const TOP: f64 = 34.0;
 const BOTTOM: f64 = 48.0;
+/// What a name in the legend may take, and its line's height.
+const LEGEND: [f64; 2] = [160.0, 16.0];
 
 /// Charts side by side.
 pub(crate) fn svg(charts: &[Chart<'_>]) -> String {
@@ -93,18 +105,27 @@ impl Chart<'_> {
                 places.join(" ")
             );
         }
+        let [wide, high] = LEGEND;
+        let left = match self.legend {
+            Corner::TopLeft => LEFT,
+            Corner::TopRight | Corner::BottomRight => WIDTH - RIGHT - wide,
+        };
+        let top = match self.legend {
+            Corner::TopLeft | Corner::TopRight => TOP,
+            Corner::BottomRight => HEIGHT - BOTTOM - high * (self.lines.len() as f64 + 0.5),
+        };
         for (i, line) in self.lines.iter().enumerate() {
-            let at = TOP + 16.0 + 16.0 * i as f64;
+            let at = top + high * (i as f64 + 1.0);
             let _ = writeln!(
                 out,
                 "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\" stroke=\"{3}\" stroke-width=\"1.6\" \
                  stroke-dasharray=\"{4}\"/><text x=\"{5}\" y=\"{6}\">{7}</text>",
-                LEFT + 10.0,
-                LEFT + 36.0,
+                left + 10.0,
+                left + 36.0,
                 at - 4.0,
                 line.colour,
                 line.dashes,
-                LEFT + 42.0,
+                left + 42.0,
                 at,
                 escaped(line.name)
             );
@@ -179,7 +200,12 @@ mod tests {
         let points = vec![[0.0, 1.0], [1.0, 1.0], [10.0, 100.0], [f64::NAN, 2.0], [100.0, -1.0]];
         let line = Line { name: "a < b", colour: "#000000", dashes: "", points };
         let empty = Line { name: "none", colour: "#ff0000", dashes: "4 2", points: Vec::new() };
-        let chart = Chart { title: "t", axes: ["x", "y"], lines: vec![line, empty] };
+        let chart = Chart {
+            title: "t",
+            axes: ["x", "y"],
+            lines: vec![line, empty],
+            legend: Corner::TopLeft,
+        };
         let text = svg(&[chart]);
         // One decade wide and two high: its corners are the ends of the line.
         assert!(text.contains("points=\"64.0,312.0 444.0,34.0\""), "{text}");

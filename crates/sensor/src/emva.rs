@@ -48,7 +48,7 @@ pub struct Options {
     pub steps: usize,
     /// The largest images, in columns and rows: a corner of the sensor. `None`: as many pixels as a
     /// linearity error of 0.02 % wants (four standard errors of a mean at a tenth of saturation), 256
-    /// to 1024 a side.
+    /// to 1536 a side.
     pub size: Option<[u32; 2]>,
     /// The seed of the noise.
     pub seed: u64,
@@ -255,7 +255,7 @@ fn side(sensor: &Sensor) -> u32 {
     let pixels = 0.5 * relative * (4.0f64 / 2e-4).powi(2);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cast saturates")]
     let side = pixels.sqrt().ceil() as u32;
-    side.clamp(256, 1024)
+    side.clamp(256, 1536)
 }
 
 /// The longest exposure time (s); see the head of this file.

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::approximation::electrons_needed;
-use crate::chart::{Chart, Line, svg};
+use crate::chart::{Chart, Corner, Line, svg};
 use crate::even_light::EvenLight;
 use crate::film::{RawImage, Shot};
 use crate::{NoiseModel, Sensor, SensorError};
@@ -198,6 +198,7 @@ impl PhotonTransfer {
                     [p.electrons * self.system_gain, p.variance_expected]
                 }),
             ],
+            legend: Corner::TopLeft,
         };
         let ratio = Chart {
             title: "Signal to noise",
@@ -208,6 +209,7 @@ impl PhotonTransfer {
                 line("linear model", "#555555", "2 3", &|p| [p.photons, p.snr_expected]),
                 line("ideal sensor", "#2e8b57", "8 3 2 3", &|p| [p.photons, p.snr_ideal]),
             ],
+            legend: Corner::TopLeft,
         };
         svg(&[transfer, ratio])
     }

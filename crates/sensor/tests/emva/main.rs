@@ -1,5 +1,6 @@
 //! The standard's own characterisation, run on our images, gives back the parameters that went in.
 
+mod python;
 mod reference;
 
 use std::collections::BTreeSet;

@@ -1,35 +1,12 @@
-//! The round trip through the reference implementation of EMVA 1288 (`emva1288` 1.0.2 of
-//! Python's package index), in an environment of its own below the target directory. Without a
-//! network it is skipped, and says so.
+//! The round trip through the reference implementation. Without a network it is skipped, and says
+//! so.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
 use etendue_sensor::emva::{DESCRIPTOR, Options, Series};
 use serde_json::{Value, json};
 
-use crate::sensor;
-
-/// A Python that has the reference implementation; `Err` says why there is none.
-fn python() -> Result<PathBuf, String> {
-    let venv = Path::new(env!("CARGO_TARGET_TMPDIR")).join("emva1288-1.0.2");
-    let (python, ready) = (venv.join("bin/python"), venv.join("ready"));
-    if ready.exists() {
-        return Ok(python);
-    }
-    let run = |program: &Path, arguments: &[&str]| {
-        let out = Command::new(program).args(arguments).output();
-        let out = out.map_err(|error| format!("{} cannot be run: {error}", program.display()))?;
-        let last = String::from_utf8_lossy(&out.stderr).lines().last().unwrap_or("").to_owned();
-        if out.status.success() { Ok(()) } else { Err(format!("{}: {last}", arguments.join(" "))) }
-    };
-    let folder = venv.to_str().ok_or("the target directory's name is not UTF-8")?;
-    run(Path::new("python3"), &["-m", "venv", "--clear", folder])?;
-    let pip = ["-m", "pip", "install", "--quiet", "numpy<2", "emva1288==1.0.2"];
-    run(&python, &pip)?;
-    std::fs::write(&ready, "").map_err(|error| error.to_string())?;
-    Ok(python)
-}
+use crate::{python, sensor};
 
 fn characterised(python: &Path, spec: Value) -> Value {
     let sensor = sensor(spec);
@@ -37,17 +14,12 @@ fn characterised(python: &Path, spec: Value) -> Value {
     let series = Series::plan(&sensor, &options).unwrap();
     let folder = tempfile::tempdir().unwrap();
     series.write(&sensor, &options, folder.path(), |_| true).unwrap();
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/emva/characterise.py");
-    let descriptor = folder.path().join(DESCRIPTOR);
-    let out = Command::new(python).arg(script).arg(descriptor).output().unwrap();
-    let errors = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success(), "the reference implementation failed: {errors}");
-    serde_json::from_slice(&out.stdout).unwrap_or_else(|error| panic!("{error}: {out:?}"))
+    python::characterised(python, &folder.path().join(DESCRIPTOR))
 }
 
 #[test]
 fn the_reference_implementation_gives_back_what_went_in() {
-    let python = match python() {
+    let python = match python::python() {
         Ok(python) => python,
         Err(why) => {
             println!("skipped: the reference implementation of EMVA 1288 cannot be had: {why}");
