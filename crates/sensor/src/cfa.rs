@@ -118,7 +118,7 @@ impl<'de> Visitor<'de> for CfaVisitor {
     }
 
     fn visit_str<E: de::Error>(self, word: &str) -> Result<CfaSpec, E> {
-        CfaSpec::two_by_two(word).map_err(E::custom)
+        CfaSpec::two_by_two(word).map_err(|error| E::custom(error.why()))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<CfaSpec, A::Error> {
@@ -126,7 +126,7 @@ impl<'de> Visitor<'de> for CfaVisitor {
         while let Some(row) = list.next_element::<String>()? {
             rows.push(row.chars().collect());
         }
-        CfaSpec::from_rows(rows).map_err(de::Error::custom)
+        CfaSpec::from_rows(rows).map_err(|error| de::Error::custom(error.why()))
     }
 }
 

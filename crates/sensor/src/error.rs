@@ -50,6 +50,13 @@ pub enum SensorError {
     },
     /// A colour filter array that is not a rectangle of letters.
     Pattern(String),
+    /// A channel of a multispectral sensor that cannot be called so.
+    Channel {
+        /// Which, counted from 0.
+        index: usize,
+        /// What is wrong with its name.
+        why: &'static str,
+    },
     /// A letter of the colour filter array without a curve.
     UnknownFilter {
         /// The letter.
@@ -110,6 +117,7 @@ impl SensorError {
             Self::Curve { key, .. } => key,
             Self::FullWell { .. } => "full_well",
             Self::Pattern(_) | Self::UnknownFilter { .. } => "cfa",
+            Self::Channel { .. } => "channels",
             Self::BlindAt { .. } | Self::Film { .. } | Self::Steps { .. } => "",
         }
     }
@@ -118,7 +126,9 @@ impl SensorError {
     #[must_use]
     pub fn why(&self) -> String {
         match self {
-            Self::Value { value, demand, .. } => format!("expected {demand}, found {value}"),
+            Self::Value { value, demand, .. } => {
+                format!("expected {demand}, found {}", Shown(*value))
+            }
             Self::Missing { why, .. } => format!("is missing: {why}"),
             Self::Misplaced { why, .. } => format!("is of no use here: {why}"),
             Self::Curve { fault, .. } => fault.to_string(),
@@ -127,6 +137,7 @@ impl SensorError {
                  system_gain): every pixel would be black"
             ),
             Self::Pattern(why) => why.clone(),
+            Self::Channel { index, why } => format!("the name of channel {index} {why}"),
             Self::UnknownFilter { letter } => format!(
                 "names the filter `{letter}`, for which there is no curve: add it to `filters`, or \
                  use r, g, b or w"
@@ -160,3 +171,17 @@ impl fmt::Display for SensorError {
 }
 
 impl std::error::Error for SensorError {}
+
+/// A number as people write it: neither 300 digits nor 300 zeros.
+struct Shown(f64);
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(value) = *self;
+        if value == 0.0 || (1e-4..1e15).contains(&value.abs()) {
+            write!(f, "{value}")
+        } else {
+            write!(f, "{value:e}")
+        }
+    }
+}

@@ -7,6 +7,9 @@ use crate::response::{Channel, Response};
 use crate::spec::Radiometry;
 use crate::{Sensor, SensorError};
 
+/// Less than this is no quantum efficiency that could be measured.
+const LEAST_EFFICIENCY: f64 = 1e-9;
+
 /// The silicon of a sensor without its colour filters, lit by photons of one wavelength.
 #[derive(Debug, Clone)]
 pub(crate) struct EvenLight {
@@ -27,7 +30,7 @@ impl EvenLight {
             return Err(SensorError::Missing { key: "system_gain", why });
         }
         let efficiency = sensor.quantum_efficiency().at(wavelength).unwrap_or(0.0);
-        if efficiency <= 0.0 {
+        if efficiency < LEAST_EFFICIENCY {
             return Err(SensorError::BlindAt { wavelength });
         }
         let [width, height] = sensor.resolution();

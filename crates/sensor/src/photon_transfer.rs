@@ -45,8 +45,11 @@ pub struct PhotonTransfer {
     pub exposure: f64,
     /// η at the wavelength.
     pub quantum_efficiency: f64,
-    /// K as the slope of the simulated variances up to 70 % of saturation (DN/e⁻).
+    /// K of the sensor (DN/e⁻).
     pub system_gain: f64,
+    /// K as the slope of the simulated variances up to 70 % of saturation (DN/e⁻); `None` where they
+    /// have no slope, as with a converter of one bit.
+    pub system_gain_measured: Option<f64>,
     /// Temporal dark noise `σ_d`: read-out and dark current (e⁻).
     pub dark_noise: f64,
     /// Saturation (e⁻ and photons).
@@ -121,6 +124,10 @@ impl PhotonTransfer {
     pub fn table(&self) -> String {
         let mut text = String::new();
         let decibel = |ratio: f64| 20.0 * ratio.log10();
+        let measured = match self.system_gain_measured {
+            Some(gain) => format!("measured {gain:.5}"),
+            None => "not measurable".into(),
+        };
         let fails = match self.normal_fails_below {
             Some(electrons) => {
                 format!("below {electrons:.3} e⁻ the normal approximation is over 1 % off")
@@ -130,7 +137,7 @@ impl PhotonTransfer {
         let _ = writeln!(
             text,
             "wavelength {:.1} nm, quantum efficiency {:.4}, exposure {} s\n\
-             system gain {:.5} DN/e⁻, dark noise {:.3} e⁻\n\
+             system gain {:.5} DN/e⁻ ({measured}), dark noise {:.3} e⁻\n\
              saturation {:.0} e⁻ ({:.0} photons), SNR at most {:.1} ({:.1} dB)\n\
              threshold {:.2} photons, dynamic range {:.0} ({:.1} dB)\n{fails}\n",
             self.wavelength,
@@ -292,7 +299,8 @@ impl Bench<'_> {
             wavelength,
             exposure: self.exposure,
             quantum_efficiency: efficiency,
-            system_gain: if square > 0.0 { product / square } else { gain },
+            system_gain: gain,
+            system_gain_measured: (square > 0.0 && product > 0.0).then(|| product / square),
             dark_noise: dark.sqrt(),
             saturation_electrons: saturation,
             saturation_photons: saturation / efficiency,
@@ -325,7 +333,7 @@ mod tests {
         for model in ["imx183", "kaf50100", "mt9m031"] {
             let (sensor, curves) = measured(model);
             // Forty variances of 65 536 pixels each: 0.1 % of the slope.
-            let error = curves.system_gain / sensor.system_gain() - 1.0;
+            let error = curves.system_gain_measured.unwrap() / sensor.system_gain() - 1.0;
             assert!(error.abs() < 4e-3, "{model}: K off by {error}");
             for p in curves.points.iter().filter(|p| p.electrons < 0.8 * sensor.saturation()) {
                 let scatter = 5.0 * p.variance_expected * (2.0f64 / 65_536.0).sqrt();

@@ -143,7 +143,17 @@ fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
         let count = channels.len();
         SensorError::unless(count <= MOST_CHANNELS, "channels", count as f64, demand)?;
         let mut filters = Vec::new();
-        for channel in channels {
+        for (index, channel) in channels.iter().enumerate() {
+            let name = channel.name.as_str();
+            let fit = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+            if name.is_empty() || name.len() > 48 || !name.chars().all(fit) {
+                let why = "must be 1 to 48 letters, digits, underscores or hyphens";
+                return Err(SensorError::Channel { index, why });
+            }
+            if channels[..index].iter().any(|other| other.name == name) {
+                let why = "is taken by one before it";
+                return Err(SensorError::Channel { index, why });
+            }
             let key = || format!("channels.{}", channel.name);
             filters.push(Filter::Curve(transmission(&channel.curve, key)?));
         }

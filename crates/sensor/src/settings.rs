@@ -2,14 +2,20 @@
 
 use etendue_spectrum::Curve;
 
-use crate::spec::{HotPixels, NoiseModel, Radiometry, SensorKind, SensorSpec};
-use crate::{Model, SensorError};
+use crate::spec::{Filters, HotPixels, NoiseModel, Radiometry, SensorKind, SensorSpec};
+use crate::{CfaSpec, Model, SensorError};
 
 /// Room temperature (K), where dark currents are measured unless somebody says otherwise.
 const ROOM: f64 = 293.15;
 
 /// The most pixels along a side: what image formats can hold.
 const LONGEST_SIDE: u32 = 65_535;
+
+/// Noise beyond this is a slip (e⁻), and would leave f64 no room.
+const MOST_ELECTRONS: f64 = 1e9;
+
+/// Dark currents beyond this are, too (e⁻/s).
+const MOST_CURRENT: f64 = 1e15;
 
 /// A sensor's numbers, in the units of [`SensorSpec`].
 #[derive(Debug, Clone, PartialEq)]
@@ -104,7 +110,7 @@ impl Settings {
                 "1 to 65535 pixels a side",
             )?;
         }
-        positive("pixel_pitch", self.pixel_pitch, "micrometres, above 0")?;
+        within("pixel_pitch", self.pixel_pitch, [1e-6, 1e6], "micrometres, above 0, up to 1e6")?;
         self.efficiency
             .clone()
             .within(0.0, 1.0)
@@ -113,24 +119,24 @@ impl Settings {
     }
 
     fn check_electrons(&self) -> Result<(), SensorError> {
-        let demand = "electrons, 0 or more";
+        let demand = "electrons, 0 or more, up to 1e9";
         for (key, value) in [
             ("read_noise", self.read_noise),
             ("dsnu", self.dsnu),
             ("row_noise", self.row_noise),
             ("column_noise", self.column_noise),
         ] {
-            not_negative(key, value, demand)?;
+            within(key, value, [0.0, MOST_ELECTRONS], demand)?;
         }
-        not_negative("dark_current", self.dark_current, "electrons a second, 0 or more")?;
+        let demand = "electrons a second, 0 or more, up to 1e15";
+        within("dark_current", self.dark_current, [0.0, MOST_CURRENT], demand)?;
         let share = |key, value| {
             SensorError::unless((0.0..=1.0).contains(&value), key, value, "a fraction in 0..=1")
         };
         share("prnu", self.prnu)?;
         if let Some(hot) = self.hot_pixels {
             share("hot_pixels.share", hot.share)?;
-            let demand = "electrons a second, 0 or more";
-            not_negative("hot_pixels.dark_current", hot.dark_current, demand)?;
+            within("hot_pixels.dark_current", hot.dark_current, [0.0, MOST_CURRENT], demand)?;
         }
         Ok(())
     }
@@ -139,14 +145,14 @@ impl Settings {
         let bits = f64::from(self.bit_depth);
         let demand = "a converter of 1 to 16 bits";
         SensorError::unless((1..=16).contains(&self.bit_depth), "bit_depth", bits, demand)?;
-        positive("system_gain", self.gain, "DN per electron, above 0")?;
-        let demand = "a gain at which the electrons of a full pixel can be counted";
-        SensorError::unless(self.white() / self.gain < 1e300, "system_gain", self.gain, demand)?;
+        let demand = "DN per electron, above 0 (1e-9 to 1e9)";
+        within("system_gain", self.gain, [1e-9, 1e9], demand)?;
         let demand = "DN, 0 or more and below full scale, 2^bit_depth - 1";
         let inside = (0.0..self.white()).contains(&self.black);
         SensorError::unless(inside, "black_level", self.black, demand)?;
         if let Some(capacity) = full_well {
-            positive("full_well", capacity, "electrons, above 0")?;
+            let demand = "electrons, above 0 (1e-9 to 1e15)";
+            within("full_well", capacity, [1e-9, 1e15], demand)?;
         }
         let black = self.black / self.gain;
         if self.full_well < black {
@@ -156,12 +162,12 @@ impl Settings {
     }
 
     fn check_exposures(&self, spec: &SensorSpec) -> Result<(), SensorError> {
-        let demand = "seconds, above 0";
+        let demand = "seconds, above 0 (1e-12 to 1e9)";
         if let Some(exposure) = spec.exposure {
-            positive("exposure", exposure, demand)?;
+            within("exposure", exposure, [1e-12, 1e9], demand)?;
         }
         for &exposure in &self.exposures {
-            positive("exposures", exposure, demand)?;
+            within("exposures", exposure, [1e-12, 1e9], demand)?;
         }
         SensorError::unless(
             !self.exposures.is_empty(),
@@ -196,6 +202,13 @@ impl Settings {
         if spec.channels.is_some() && spec.kind != SensorKind::Multispectral {
             let why = "only a `multispectral` sensor has channels";
             return Err(SensorError::Misplaced { key: "channels", why });
+        }
+        if let Some(Filters::Curves(curves)) = &spec.filters {
+            let named = spec.cfa.as_ref().map_or(vec!['r', 'g', 'b'], CfaSpec::letters);
+            if curves.keys().any(|letter| !named.contains(letter)) {
+                let why = "it has a curve for a letter that no pixel has";
+                return Err(SensorError::Misplaced { key: "filters", why });
+            }
         }
         let electrons = [
             spec.read_noise,
@@ -246,10 +259,11 @@ impl Settings {
         positive("dark_current_doubling", doubling, "kelvin, above 0")?;
         let factor = ((temperature - reference) / doubling).exp2();
         let demand = "a temperature at which the dark current can be counted";
-        SensorError::unless(factor < 1e100, "temperature", temperature, demand)?;
-        self.dark_current *= factor;
+        let warm = self.dark_current * factor;
+        SensorError::unless(warm <= MOST_CURRENT, "temperature", temperature, demand)?;
+        self.dark_current = warm;
         if let Some(hot) = &mut self.hot_pixels {
-            hot.dark_current *= factor;
+            hot.dark_current = (hot.dark_current * factor).min(MOST_CURRENT);
         }
         Ok(())
     }
@@ -257,6 +271,15 @@ impl Settings {
 
 fn positive(key: &'static str, value: f64, demand: &'static str) -> Result<(), SensorError> {
     SensorError::unless(value > 0.0 && value.is_finite(), key, value, demand)
+}
+
+fn within(
+    key: &'static str,
+    value: f64,
+    [low, high]: [f64; 2],
+    demand: &'static str,
+) -> Result<(), SensorError> {
+    SensorError::unless((low..=high).contains(&value), key, value, demand)
 }
 
 fn not_negative(key: &'static str, value: f64, demand: &'static str) -> Result<(), SensorError> {

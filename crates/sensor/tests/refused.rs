@@ -20,7 +20,7 @@ fn numbers_out_of_range() {
         (json!({ "quantum_efficiency": [[400, 0.5], [500, 1.5]] }), "1.5 at 500 nm"),
         (json!({ "system_gain": 0 }), "sensor.system_gain: expected "),
         (json!({ "system_gain": -1 }), "above 0"),
-        (json!({ "system_gain": 1e-300 }), "can be counted"),
+        (json!({ "system_gain": 1e-300 }), "1e-9 to 1e9), found 1e-300"),
         (json!({ "full_well": 50, "black_level": 100 }), "black level's worth of 100 e⁻"),
         (json!({ "full_well": 0 }), "sensor.full_well: expected "),
         (json!({ "full_well": -5 }), "sensor.full_well: expected "),
@@ -115,6 +115,19 @@ fn keys_that_would_do_nothing() {
         (json!({ "type": "rgb", "cfa": "rggb" }), "sensor.cfa: is of no use"),
         (json!({ "type": "raw", "filters": "nikon_d5100" }), "sensor.cfa: is missing"),
         (json!({ "type": "multispectral" }), "sensor.bands: is missing"),
+        (
+            json!({ "type": "multispectral", "channels":
+                [{ "name": "a", "curve": 1 }, { "name": "a", "curve": 1 }] }),
+            "sensor.channels: the name of channel 1 is taken",
+        ),
+        (
+            json!({ "type": "multispectral", "channels": [{ "name": "a b", "curve": 1 }] }),
+            "sensor.channels: the name of channel 0 must be",
+        ),
+        (
+            json!({ "type": "raw", "cfa": "rggb", "filters": { "w": 1 } }),
+            "sensor.filters: is of no use here: it has a curve for a letter",
+        ),
         (json!({ "type": "multispectral", "channels": [] }), "sensor.channels: is missing"),
         (json!({ "type": "multispectral", "bands": [1, 2], "filters": "ideal" }), "of no use"),
         (json!({ "type": "rgb", "channels": [] }), "sensor.channels: is of no use"),

@@ -53,7 +53,7 @@ fn a_preset_gives_curves_as_table_json_and_svg() {
     assert!(svg.starts_with("<svg") && svg.contains("ideal sensor"));
     let found = bench.json("out/curves.json");
     assert_eq!(found["sensor"]["model"], "kaf8300");
-    let gain = found["curves"]["system_gain"].as_f64().unwrap();
+    let gain = found["curves"]["system_gain_measured"].as_f64().unwrap();
     // K as the slope of 40 variances of 65 536 pixels.
     assert!((gain * 0.37 - 1.0).abs() < 4e-3, "{gain}");
     let printed = bench.run(&["sensor", "kaf8300", "--json", "--quiet"]);
@@ -132,17 +132,20 @@ fn what_is_no_sensor_is_refused_by_file_path_and_remedy() {
             json!({ "quantum_efficiency": [[500, 0.5], [400, 0.5]] }),
             ["quantum_efficiency", "sort the samples"],
         ),
-        (json!({ "system_gain": 0 }), ["system_gain", "above 0, found 0"]),
-        (json!({ "system_gain": -1 }), ["system_gain", "above 0, found -1"]),
+        (json!({ "system_gain": 0 }), ["system_gain", "above 0 (1e-9 to 1e9), found 0"]),
+        (json!({ "system_gain": -1 }), ["system_gain", "above 0 (1e-9 to 1e9), found -1"]),
         (json!({ "full_well": 10 }), ["full_well", "black level's worth"]),
         (json!({ "bit_depth": 0 }), ["bit_depth", "1 to 16 bits, found 0"]),
         (json!({ "bit_depth": 17 }), ["bit_depth", "1 to 16 bits, found 17"]),
-        (json!({ "exposure": 0 }), ["exposure", "seconds, above 0, found 0"]),
+        (json!({ "exposure": 0 }), ["exposure", "seconds, above 0 (1e-12 to 1e9), found 0"]),
         (json!({ "temperature": -1 }), ["temperature", "kelvin, 0 or more, found -1"]),
         (json!({ "read_nose": 1 }), ["read_nose", "did you mean `read_noise`"]),
         (json!({ "noise": "gauss" }), ["noise", "`poisson`"]),
         (json!({ "model": "imx184" }), ["model", "`imx183`"]),
         (json!({ "cfa": "rggx" }), ["cfa", "use r, g, b or w"]),
+        (json!({ "cfa": "rgb" }), ["cfa: `rgb` has 3 letters", "two by two"]),
+        (json!({ "cfa": "rggb", "filters": { "x": 1 } }), ["filters", "no pixel has"]),
+        (json!({ "read_noise": 1e300 }), ["read_noise", "up to 1e9, found 1e300"]),
         (
             json!({ "quantum_efficiency": [[900, 0.5], [1000, 0.5]] }),
             ["quantum_efficiency", "the image would be black"],
