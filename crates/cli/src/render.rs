@@ -78,7 +78,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let accel = etendue_render::build(&scene, &plan, &options)?;
     drop(options);
     time.build = lap.take();
-    let images = Images::decode(&scene.textures, &plan);
+    let images = Images::decode(&scene, &plan);
     if arguments.scene.strict
         && let Some(fault) = images.faults.first()
     {
@@ -87,13 +87,14 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     time.decode = lap.take();
     let header = header(&scene)?;
     let progress = stages.begin("render");
-    let rendered = etendue_render::render(&scene, &plan, &*accel, &images, header, &*progress)?;
+    let mut rendered = etendue_render::render(&scene, &plan, &*accel, &images, header, &*progress)?;
     drop(progress);
     time.render = lap.take();
     let mut files = write(&arguments.output, &scene, &rendered.picture, outputs, stages)?;
     let progress = stages.begin("expose");
     let folder = &arguments.output;
-    let exposed = expose::write(&scene, &rendered.picture, folder, outputs, &*progress)?;
+    let light = (&rendered.picture, rendered.lane_film.take());
+    let exposed = expose::write(&scene, light, folder, outputs, &*progress)?;
     drop(progress);
     files.extend(exposed.files);
     time.write = lap.take();
@@ -212,7 +213,12 @@ fn report(
     let counts = accel.counts();
     let (peak, private) = memory();
     let mut notes: Vec<String> = scene.notes.iter().map(in_words).collect();
-    notes.extend(images.faults.iter().map(|fault| format!("{fault}; shown as magenta squares")));
+    notes.extend(images.faults.iter().cloned());
+    if rendered.light.not_finite > 0 {
+        let count = rendered.light.not_finite;
+        notes.push(format!("{count} contributions of light were not finite and are left out"));
+    }
+    let sizes = images.sizes(scene);
     Ok(Report {
         software: SOFTWARE,
         scene: scene.path.clone(),
@@ -242,7 +248,9 @@ fn report(
         bvh_bytes: built.bytes,
         geometry_bytes_mapped: scene.stats.bytes_mapped,
         geometry_bytes_copied: scene.stats.bytes_copied + built.copied_bytes,
-        image_bytes: images.bytes(),
+        image_bytes: sizes.iter().map(|size| size.bytes).sum(),
+        images: sizes,
+        not_finite: rendered.light.not_finite,
         peak_memory_bytes: peak,
         peak_private_bytes: private,
         notes,

@@ -20,6 +20,9 @@ pub struct RayBatch {
     /// Neighbours in the batch run close together (pixels of one block, samples of one pixel), so
     /// they are worth tracing as packets. Scattered rays are traced one by one.
     pub coherent: bool,
+    /// The rays start on surfaces, outside by no more than a hit's own error: near their ends only
+    /// f64 can tell what counts. `false` for rays that start in the open.
+    pub from_surface: bool,
 }
 
 impl RayBatch {
@@ -33,6 +36,7 @@ impl RayBatch {
             t_min: array(),
             t_max: array(),
             coherent: false,
+            from_surface: false,
         }
     }
 

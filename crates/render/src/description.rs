@@ -131,5 +131,54 @@ pub(crate) fn describe(spec: LayerSpec) -> Description {
                 ("miss", "0 0 0"),
             ],
         },
+        LayerSpec::Albedo => Description {
+            name: "Albedo",
+            channels: &["R", "G", "B"],
+            look: Look::Color,
+            meaning: vec![
+                ("definition", "base colour without light"),
+                ("unit", "1 (linear light, sRGB primaries)"),
+                CHIEF_RAY,
+                ("miss", "0 0 0"),
+            ],
+        },
+        LayerSpec::Uv => Description {
+            name: "Uv",
+            channels: &["U", "V"],
+            look: Look::Extent,
+            meaning: vec![
+                (
+                    "definition",
+                    "texture coordinates of the first set, v down; 0 0 on meshes without any",
+                ),
+                ("unit", "1"),
+                CHIEF_RAY,
+                ("miss", "0 0"),
+            ],
+        },
+        LayerSpec::MaterialId => Description {
+            name: "MaterialId",
+            channels: &["material"],
+            look: Look::Ids,
+            meaning: vec![
+                ("definition", "number of the material in the scene, counted from 1"),
+                CHIEF_RAY,
+                ("miss", "0"),
+            ],
+        },
+        LayerSpec::Radiance => Description {
+            name: "Radiance",
+            channels: &["R", "G", "B"],
+            look: Look::Color,
+            meaning: vec![
+                (
+                    "definition",
+                    "radiance that the camera gathers, mean over the pixel's samples; 1 is full \
+                     scale",
+                ),
+                ("unit", "1 (linear light; R G B: sRGB primaries)"),
+                ("miss", "the environment's radiance"),
+            ],
+        },
     }
 }

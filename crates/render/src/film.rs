@@ -2,9 +2,11 @@
 
 use std::sync::Mutex;
 
+use etendue_spectrum::Lanes;
 use etendue_tracer::LayerSpec;
 
 use crate::description::{Description, describe};
+use crate::expose::LaneFilm;
 use crate::output::{Channel, Layer, Values};
 
 /// How finely data layers are kept.
@@ -20,6 +22,7 @@ pub enum Precision {
 #[derive(Debug)]
 pub(crate) struct FilmLayer {
     pub(crate) spec: LayerSpec,
+    names: Vec<String>,
     planes: Vec<Values>,
 }
 
@@ -88,24 +91,53 @@ pub(crate) struct Band<'a> {
 }
 
 impl FilmLayer {
-    pub(crate) fn new(spec: LayerSpec, pixels: usize, precision: Precision) -> Self {
+    /// An empty layer; the picture of a tracer of light has a plane for each of `lanes`.
+    pub(crate) fn new(spec: LayerSpec, pixels: usize, precision: Precision, lanes: &Lanes) -> Self {
         let plane = || match (spec, precision) {
-            (LayerSpec::Ids, _) => Values::U32(vec![0; pixels]),
-            (LayerSpec::Flat | LayerSpec::Facing | LayerSpec::Coverage, _)
+            (LayerSpec::Ids | LayerSpec::MaterialId, _) => Values::U32(vec![0; pixels]),
+            (
+                LayerSpec::Flat
+                | LayerSpec::Facing
+                | LayerSpec::Albedo
+                | LayerSpec::Radiance
+                | LayerSpec::Coverage,
+                _,
+            )
             | (_, Precision::Single) => Values::F32(vec![0.0; pixels]),
             (_, Precision::Double) => Values::F64(vec![0.0; pixels]),
         };
-        let planes = describe(spec).channels.iter().map(|_| plane()).collect();
-        Self { spec, planes }
+        let names: Vec<String> = match spec {
+            LayerSpec::Radiance => lanes.names(),
+            _ => describe(spec).channels.iter().map(|name| (*name).to_owned()).collect(),
+        };
+        let planes = names.iter().map(|_| plane()).collect();
+        Self { spec, names, planes }
+    }
+
+    /// Takes the light of a tracer out of its lanes, whose place red, green and blue take; `None`
+    /// when they are the lanes already.
+    pub(crate) fn take_lanes(&mut self, lanes: &Lanes) -> Option<LaneFilm> {
+        if self.spec != LayerSpec::Radiance || *lanes == Lanes::Rgb {
+            return None;
+        }
+        let planes = self.planes.iter().filter_map(|plane| match plane {
+            Values::F32(values) => Some(values.as_slice()),
+            _ => None,
+        });
+        let film = LaneFilm::woven(lanes.clone(), &planes.collect::<Vec<_>>());
+        self.names = ["R", "G", "B"].map(str::to_owned).into();
+        self.planes = film.colors().map(Values::F32).into();
+        Some(film)
     }
 
     /// The layer as it is written; `root` puts it at the root of the file, without a name.
     pub(crate) fn into_layer(self, root: bool) -> Layer {
-        let Description { name, channels, look, meaning } = describe(self.spec);
-        let channels = channels
-            .iter()
+        let Description { name, look, meaning, .. } = describe(self.spec);
+        let channels = self
+            .names
+            .into_iter()
             .zip(self.planes)
-            .map(|(name, values)| Channel { name: (*name).to_owned(), values })
+            .map(|(name, values)| Channel { name, values })
             .collect();
         let meaning = meaning.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         Layer { name: if root { String::new() } else { name.to_owned() }, look, channels, meaning }

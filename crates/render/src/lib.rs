@@ -16,6 +16,7 @@ pub mod expose;
 mod film;
 pub mod output;
 pub mod plan;
+mod radiance;
 pub mod render;
 pub mod report;
 mod tiles;

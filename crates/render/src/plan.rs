@@ -5,11 +5,12 @@ use std::fmt;
 
 use etendue_accel::Quality;
 use etendue_camera::LensCamera;
-use etendue_geometry::Detail;
+use etendue_geometry::{Detail, Placement};
 use etendue_scene::Scene;
+use etendue_scene::file::TracerSpec;
 use etendue_scene::import::Wanted;
 use etendue_spectrum::Lanes;
-use etendue_tracer::{LayerSpec, Needs};
+use etendue_tracer::{LayerSpec, Needs, TextureScope};
 use serde::Serialize;
 
 use crate::expose;
@@ -22,9 +23,10 @@ pub fn wanted(layers: &[LayerSpec]) -> Wanted {
     let needs = needs(layers);
     Wanted {
         normals: needs.normals,
-        uvs: needs.materials,
+        uvs: needs.uvs,
         colors: needs.materials,
         textures: needs.materials,
+        light: needs.light,
     }
 }
 
@@ -50,8 +52,8 @@ pub struct Plan {
     pub layers: Vec<LayerSpec>,
     /// How much of each hit is worked out.
     pub detail: Detail,
-    /// Whether images of materials are decoded.
-    pub images: bool,
+    /// Which images of materials are decoded; none for `None`.
+    pub images: Option<TextureScope>,
     /// Rays a pixel for coloured layers.
     pub samples: u32,
     /// Whether rays are spread over a pupil.
@@ -72,6 +74,10 @@ pub struct Plan {
 /// `make bench` measures both sides of (build time a triangle, traversal time a ray).
 const RAYS_PER_TRIANGLE: u64 = 50;
 
+/// Rays that a sample of light is counted as when the build quality is chosen: the camera's, one to a
+/// light, and one more bounce with its own.
+const RAYS_A_SAMPLE_OF_LIGHT: u64 = 4;
+
 impl Plan {
     /// The plan for `scene`, written as `outputs`.
     #[must_use]
@@ -79,19 +85,26 @@ impl Plan {
         let layers = scene.layers.clone();
         let needs = needs(&layers);
         let lens = scene.camera.lens().is_some();
-        let (centre, mean) = passes(&layers, scene.render.samples, lens);
+        let passes = Passes::of(&layers, scene.render.samples, lens);
         let [width, height] = scene.camera.resolution();
         let pixels = u64::from(width) * u64::from(height);
         let samples = scene.render.samples;
-        let apart = scene.camera.lane_groups(&Lanes::Rgb).len() as u64;
-        let means = if mean { u64::from(samples) * apart } else { 0 };
-        let rays = pixels * (u64::from(centre) + means);
+        let apart = scene.camera.lane_groups(&expose::lanes(scene)).len() as u64;
+        let sampled = |yes| if yes { u64::from(samples) * apart } else { 0 };
+        let rays = pixels
+            * (u64::from(passes.centre)
+                + sampled(passes.mean)
+                + sampled(passes.light) * RAYS_A_SAMPLE_OF_LIGHT);
         let triangles = scene.geometry.triangles_unique();
         let quality =
             if rays / RAYS_PER_TRIANGLE < triangles { Quality::Low } else { Quality::Medium };
         let detail = if needs.surface { Detail::Surface } else { Detail::Distance };
         let precision = if outputs.npy { Precision::Double } else { Precision::Single };
-        let images = needs.materials && !scene.textures.is_empty();
+        let images = match (needs.materials && !scene.textures.is_empty(), needs.light) {
+            (false, _) => None,
+            (true, false) => Some(TextureScope::BaseColor),
+            (true, true) => Some(TextureScope::Light),
+        };
         let mut plan = Self {
             layers,
             detail,
@@ -104,7 +117,7 @@ impl Plan {
             lanes: expose::lanes(scene),
             decisions: Vec::new(),
         };
-        plan.decisions = plan.explain(scene, needs, centre, mean, triangles);
+        plan.decisions = plan.explain(scene, needs, passes, triangles);
         plan
     }
 
@@ -112,8 +125,7 @@ impl Plan {
         &self,
         scene: &Scene,
         needs: Needs,
-        centre: bool,
-        mean: bool,
+        passes: Passes,
         triangles: u64,
     ) -> Vec<Decision> {
         let mut decisions = Vec::new();
@@ -121,15 +133,26 @@ impl Plan {
             decisions.push(Decision { what, choice: choice.to_owned(), because });
         };
         let on = |yes| if yes { "on" } else { "off" };
-        let rays_of = match (centre, mean) {
-            (true, true) => format!(
+        let seen = match (passes.centre, passes.mean) {
+            (true, true) => Some(format!(
                 "the chief ray of each pixel for data layers, {} samples a pixel for colours",
                 self.samples
-            ),
-            (false, true) => format!("{} samples a pixel, no data layers", self.samples),
-            _ => format!("the chief ray of each pixel serves all {} layers", self.layers.len()),
+            )),
+            (false, true) => Some(format!("{} samples a pixel for colours", self.samples)),
+            (true, false) => Some(match passes.light {
+                true => "the chief ray of each pixel for data layers".to_owned(),
+                false => format!("the chief ray of each pixel serves all {} layers", self.layers.len()),
+            }),
+            (false, false) => None,
         };
-        decide("rays", &self.rays.to_string(), rays_of);
+        let lit = passes.light.then(|| {
+            format!(
+                "{} samples of light a pixel, counted as {RAYS_A_SAMPLE_OF_LIGHT} rays each",
+                self.samples
+            )
+        });
+        let parts: Vec<String> = seen.into_iter().chain(lit).collect();
+        decide("rays", &self.rays.to_string(), parts.join("; "));
         let (lanes, because) = expose::explain_lanes(scene, &self.lanes);
         decide("wavelengths", &lanes, because);
         if let Some((choice, because)) = expose::explain_sensor(scene) {
@@ -138,7 +161,8 @@ impl Plan {
         for (what, choice, because) in self.explain_lens(scene) {
             decide(what, choice, because);
         }
-        decide("shadows and bounces", "off", "no layer looks at light".to_owned());
+        let (choice, because) = light_words(scene, needs);
+        decide("shadows and bounces", &choice, because);
         decide(
             "surface",
             on(needs.surface),
@@ -148,6 +172,10 @@ impl Plan {
                 "no layer needs more than distance and ids",
             ),
         );
+        if needs.light {
+            let (choice, because) = source_words(scene);
+            decide("lights", &choice, because);
+        }
         decide(
             "vertex normals",
             on(needs.normals),
@@ -161,7 +189,8 @@ impl Plan {
             "materials and textures",
             on(needs.materials),
             match (needs.materials, scene.textures.len()) {
-                (true, n) => format!("a layer shows base colour; {n} images to decode"),
+                (true, n) if needs.light => format!("light is scattered by them; {n} images named"),
+                (true, n) => format!("a layer shows base colour; {n} images named"),
                 (false, _) => "no layer shows colour; no image is decoded".to_owned(),
             },
         );
@@ -214,13 +243,62 @@ fn either(yes: bool, reason: &str, other: &str) -> String {
     if yes { reason } else { other }.to_owned()
 }
 
-/// Whether chief rays and whether averaged samples have to be traced.
-fn passes(layers: &[LayerSpec], samples: u32, lens: bool) -> (bool, bool) {
-    let colored = |layer: &LayerSpec| matches!(layer, LayerSpec::Flat | LayerSpec::Facing);
-    let averaged = samples > 1 || lens;
-    let mean = averaged && layers.iter().any(colored);
-    let centre = layers.iter().any(|layer| !averaged || !colored(layer));
-    (centre, mean)
+/// Which rays have to be traced.
+#[derive(Debug, Clone, Copy)]
+struct Passes {
+    /// Chief rays.
+    centre: bool,
+    /// Samples of layers that are averaged.
+    mean: bool,
+    /// Samples of light.
+    light: bool,
+}
+
+impl Passes {
+    fn of(layers: &[LayerSpec], samples: u32, lens: bool) -> Self {
+        let averaged = samples > 1 || lens;
+        let light = layers.contains(&LayerSpec::Radiance);
+        let mut seen = layers.iter().filter(|layer| **layer != LayerSpec::Radiance);
+        let mean = averaged && seen.clone().any(|layer| layer.is_averaged());
+        let centre = seen.any(|layer| !averaged || !layer.is_averaged());
+        Self { centre, mean, light }
+    }
+}
+
+/// What becomes of light, and why.
+fn light_words(scene: &Scene, needs: Needs) -> (String, String) {
+    let tracer = scene.tracer.filter(|_| needs.light);
+    match tracer {
+        Some(TracerSpec::Direct {}) => {
+            ("1 bounce".to_owned(), "the tracer is `direct`: light of one surface".to_owned())
+        }
+        Some(TracerSpec::Whitted { max_bounces }) => (
+            format!("at most {max_bounces} mirrors"),
+            "the tracer is `whitted`: direct light through mirrors and glass".to_owned(),
+        ),
+        Some(TracerSpec::Path { max_bounces }) => {
+            let more = "the tracer is `path`: light of any number of surfaces, up to its limit";
+            (format!("at most {max_bounces}"), more.to_owned())
+        }
+        _ => ("off".to_owned(), "no layer looks at light".to_owned()),
+    }
+}
+
+/// Where light comes from.
+fn source_words(scene: &Scene) -> (String, String) {
+    let shines = |placement: &&Placement| {
+        let material = scene.materials.get(placement.material as usize);
+        material.is_some_and(|material| material.emission.is_some())
+    };
+    let placed = scene.geometry.placements.iter().filter(shines);
+    let triangles: usize = placed.map(|p| scene.geometry.mesh_of(p).triangles.len()).sum();
+    let lights = scene.lights.len();
+    let words = match (lights, triangles) {
+        (0, 0) => "nothing shines: the picture is black".to_owned(),
+        (_, 0) => "named by the scene or its models, or chosen in their place".to_owned(),
+        _ => format!("lights are chosen by power; {triangles} triangles shine too"),
+    };
+    ((lights + triangles).to_string(), words)
 }
 
 /// Why wavelengths are traced together or apart.

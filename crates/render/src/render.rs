@@ -4,17 +4,21 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildError, BuildOptions};
-use etendue_camera::Camera;
 use etendue_camera::element::FateCounts;
 use etendue_scene::Scene;
-use etendue_scene::file::AccelName;
+use etendue_scene::file::{AccelName, TracerSpec};
 use etendue_spectrum::Lanes;
-use etendue_tracer::{Image, Surroundings, Texture, View};
+use etendue_tracer::{
+    Direct, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind, Lights, Material, Path,
+    Spectral, Stage, Surroundings, Tally, Tracer, View, Whitted,
+};
 use rayon::prelude::*;
 
 use crate::film::FilmLayer;
 use crate::output::{Layer, Picture, PictureError};
-use crate::tiles::{Counts, Job, Sampling, Stopped};
+use crate::radiance::LightPass;
+use crate::report::ImageSize;
+use crate::tiles::{Job, Sampling, Stopped, Traffic};
 use crate::{Plan, expose};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
@@ -54,6 +58,9 @@ pub enum RenderError {
         /// Which share of the rays ended where.
         losses: Vec<String>,
     },
+    /// A light's spectrum is of no use to the sensor.
+    #[error("a light's illuminant: {0}; give the light another one, or none")]
+    Lights(String),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
@@ -70,10 +77,14 @@ impl From<Stopped> for RenderError {
 pub struct Rendered {
     /// The layers.
     pub picture: Picture,
-    /// Rays traced by the camera.
+    /// The light of the picture in lanes other than red, green and blue, where it was traced so.
+    pub lane_film: Option<expose::LaneFilm>,
+    /// Rays traced, to lights included.
     pub rays: u64,
     /// What became of the rays inside the camera's lens; all 0 without one.
     pub fates: FateCounts,
+    /// What of it was light's.
+    pub light: Tally,
     /// Wall time of the tracing alone.
     pub trace_time: Duration,
 }
@@ -115,38 +126,99 @@ pub fn build(
     })
 }
 
-/// Images of a scene's materials, decoded; what could not be is told.
+/// Images of a scene's materials and its environment, decoded; what could not be is told.
 #[derive(Debug, Default)]
 pub struct Images {
     /// One a texture; `None` where no layer looks at it.
     pub decoded: Vec<Option<Image>>,
+    /// The image of the environment.
+    pub environment: Option<Arc<EnvironmentMap>>,
     /// What could not be decoded, in words.
     pub faults: Vec<String>,
 }
 
 impl Images {
-    /// Decodes all `textures` side by side when the plan wants them. A broken one becomes a magenta
-    /// checker and a fault.
+    /// Decodes side by side the textures that the plan's materials look at, and the environment. A
+    /// broken one becomes a magenta checker and a fault.
     #[must_use]
-    pub fn decode(textures: &[Texture], plan: &Plan) -> Self {
-        if !plan.images {
-            return Self { decoded: vec![None; textures.len()], faults: Vec::new() };
+    pub fn decode(scene: &Scene, plan: &Plan) -> Self {
+        let mut wanted = vec![false; scene.textures.len()];
+        let mut seen = vec![false; scene.materials.len()];
+        for placement in &scene.geometry.placements {
+            if let Some(seen) = seen.get_mut(placement.material as usize) {
+                *seen = true;
+            }
         }
-        let results: Vec<_> = textures.par_iter().map(Texture::decode).collect();
+        if let Some(scope) = plan.images {
+            for (material, _) in scene.materials.iter().zip(&seen).filter(|(_, seen)| **seen) {
+                for texture in material.textures(scope) {
+                    if let Some(wanted) = wanted.get_mut(texture as usize) {
+                        *wanted = true;
+                    }
+                }
+            }
+        }
+        let results: Vec<_> = scene
+            .textures
+            .par_iter()
+            .zip(&wanted)
+            .map(|(texture, &wanted)| wanted.then(|| texture.decode()))
+            .collect();
         let mut images = Self::default();
         for result in results {
-            images.decoded.push(Some(result.unwrap_or_else(|error| {
-                images.faults.push(error.to_string());
-                Image::missing()
-            })));
+            images.decoded.push(result.map(|result| {
+                result.unwrap_or_else(|error| {
+                    images.faults.push(format!("{error}; shown as magenta squares"));
+                    Image::missing()
+                })
+            }));
+        }
+        if plan.layers.contains(&LayerSpec::Radiance) {
+            images.read_environment(scene);
         }
         images
     }
 
-    /// Bytes of the decoded texels.
+    fn read_environment(&mut self, scene: &Scene) {
+        let found = scene.lights.iter().find_map(|light| match &light.kind {
+            LightKind::Environment { image, .. } => Some(image),
+            _ => None,
+        });
+        let map = match found {
+            Some(EnvironmentImage::Studio) => EnvironmentMap::studio(),
+            Some(EnvironmentImage::File(path)) => match EnvironmentMap::read(path) {
+                Ok(map) => map,
+                Err(error) => {
+                    self.faults.push(format!("{error}; the environment is dark"));
+                    EnvironmentMap::new([1, 1], vec![[0.0; 3]])
+                }
+            },
+            Some(EnvironmentImage::Constant) | None => return,
+        };
+        if map.dropped > 0 {
+            self.faults.push(format!(
+                "the environment has {} pixels that are not finite or below zero; they are black",
+                map.dropped
+            ));
+        }
+        self.environment = Some(Arc::new(map));
+    }
+
+    /// Each decoded image: what it is called, columns, rows and bytes.
     #[must_use]
-    pub fn bytes(&self) -> u64 {
-        self.decoded.iter().flatten().map(|image| image.bytes() as u64).sum()
+    pub fn sizes(&self, scene: &Scene) -> Vec<ImageSize> {
+        let textures = scene.textures.iter().zip(&self.decoded);
+        let textures = textures.filter_map(|(texture, image)| {
+            let image = image.as_ref()?;
+            let (name, resolution) = (texture.name.clone(), image.size());
+            Some(ImageSize { name, resolution, bytes: image.bytes() as u64 })
+        });
+        let environment = self.environment.iter().map(|map| ImageSize {
+            name: "environment".to_owned(),
+            resolution: map.size(),
+            bytes: map.bytes() as u64,
+        });
+        textures.chain(environment).collect()
     }
 }
 
@@ -168,21 +240,60 @@ pub fn render(
     let mut film: Vec<FilmLayer> = plan
         .layers
         .iter()
-        .map(|&layer| FilmLayer::new(layer, width * height, plan.precision))
+        .map(|&layer| FilmLayer::new(layer, width * height, plan.precision, &plan.lanes))
         .collect();
     let start = Instant::now();
-    let camera = match plan.pupil {
-        true => scene.camera.opened(&Lanes::Rgb).map_err(|e| RenderError::Camera(e.why))?,
-        false => scene.camera.clone(),
+    let open = |lanes: &Lanes| match plan.pupil {
+        true => scene.camera.opened(lanes).map_err(|e| RenderError::Camera(e.why)),
+        false => Ok(scene.camera.clone()),
     };
-    let job = job(scene, plan, accel, images, &camera, progress);
-    let Counts { rays, fates } = job.run(&mut film)?;
+    let camera = open(&Lanes::Rgb)?;
+    let light_camera = if plan.lanes == Lanes::Rgb { camera.clone() } else { open(&plan.lanes)? };
+    let surroundings = surroundings(scene, images);
+    let spectral = Spectral::new(&plan.lanes);
+    let lit = match scene.tracer.and_then(tracer) {
+        Some(tracer) if plan.layers.contains(&LayerSpec::Radiance) => {
+            let map = images.environment.clone();
+            let lights = Lights::new(&scene.lights, map, &surroundings, &spectral)
+                .map_err(|error| RenderError::Lights(error.to_string()))?;
+            Some((tracer, lights))
+        }
+        _ => None,
+    };
+    let light = lit.as_ref().map(|(tracer, lights)| LightPass {
+        stage: Stage {
+            accel,
+            surroundings,
+            lights,
+            spectral: &spectral,
+            is_pierced: is_pierced(scene),
+        },
+        tracer: &**tracer,
+        camera: &light_camera,
+        groups: light_camera.lane_groups(&plan.lanes),
+    });
+    let job = Job {
+        accel,
+        camera: &camera,
+        groups: camera.lane_groups(&Lanes::Rgb),
+        surroundings,
+        detail: plan.detail,
+        sampling: Sampling {
+            samples: plan.samples,
+            sampler: scene.render.sampler,
+            seed: scene.render.seed,
+        },
+        light,
+        progress,
+    };
+    let Traffic { chief_rays, light, fates } = job.run(&mut film)?;
     let trace_time = start.elapsed();
     if let (true, 0, Some(element)) =
         (fates.total() > 0, fates.exited, fates.farthest_from_sensor())
     {
         return Err(RenderError::Dark { element, losses: fates.losses() });
     }
+    let lane_film = film.iter_mut().find_map(|layer| layer.take_lanes(&plan.lanes));
     let mut layers: Vec<Layer> = film
         .into_iter()
         .map(|layer| {
@@ -190,36 +301,35 @@ pub fn render(
             layer.into_layer(root)
         })
         .collect();
-    layers.extend(expose::spectrum(scene, &layers));
+    layers.extend(expose::spectrum(scene, &layers, lane_film.as_ref()));
     let picture = Picture::new(width, height, layers, header)?;
-    Ok(Rendered { picture, rays, fates, trace_time })
+    let rays = chief_rays + light.rays + light.shadow_rays;
+    Ok(Rendered { picture, lane_film, rays, light, fates, trace_time })
 }
 
-fn job<'a>(
-    scene: &'a Scene,
-    plan: &Plan,
-    accel: &'a dyn Accel,
-    images: &'a Images,
-    camera: &'a Camera,
-    progress: &'a (dyn Fn(f64) -> bool + Sync),
-) -> Job<'a> {
+fn surroundings<'a>(scene: &'a Scene, images: &'a Images) -> Surroundings<'a> {
     let pose = scene.camera.pose();
-    Job {
-        accel,
-        camera,
-        groups: camera.lane_groups(&Lanes::Rgb),
-        surroundings: Surroundings {
-            geometry: &scene.geometry,
-            materials: &scene.materials,
-            images: &images.decoded,
-            view: View { origin: pose.position, axes: pose.rotation },
-        },
-        detail: plan.detail,
-        sampling: Sampling {
-            samples: plan.samples,
-            sampler: scene.render.sampler,
-            seed: scene.render.seed,
-        },
-        progress,
+    Surroundings {
+        geometry: &scene.geometry,
+        materials: &scene.materials,
+        images: &images.decoded,
+        view: View { origin: pose.position, axes: pose.rotation },
     }
+}
+
+/// What traces light, if the scene's tracer does.
+fn tracer(spec: TracerSpec) -> Option<Box<dyn Tracer>> {
+    match spec {
+        TracerSpec::Facing {} | TracerSpec::Flat {} => None,
+        TracerSpec::Direct {} => Some(Box::new(Direct)),
+        TracerSpec::Whitted { max_bounces } => Some(Box::new(Whitted { max_bounces })),
+        TracerSpec::Path { max_bounces } => Some(Box::new(Path { max_bounces })),
+    }
+}
+
+/// Whether rays may pass some surface of the scene as if it were not there.
+fn is_pierced(scene: &Scene) -> bool {
+    let materials = scene.geometry.placements.iter();
+    let mut materials = materials.filter_map(|p| scene.materials.get(p.material as usize));
+    materials.any(Material::is_pierced)
 }

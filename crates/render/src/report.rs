@@ -22,6 +22,17 @@ pub struct Seconds {
     pub total: f64,
 }
 
+/// A decoded image and its memory.
+#[derive(Debug, Clone, Serialize)]
+pub struct ImageSize {
+    /// What the file calls it.
+    pub name: String,
+    /// Columns and rows.
+    pub resolution: [usize; 2],
+    /// Bytes of its texels.
+    pub bytes: u64,
+}
+
 /// What is written to `report.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
@@ -74,6 +85,10 @@ pub struct Report {
     pub geometry_bytes_copied: u64,
     /// Bytes of decoded images.
     pub image_bytes: u64,
+    /// Each of them.
+    pub images: Vec<ImageSize>,
+    /// Contributions of light that were not finite and were left out.
+    pub not_finite: u64,
     /// The most memory that the process held (bytes), mapped files included; 0 when the system does
     /// not tell.
     pub peak_memory_bytes: u64,

@@ -7,10 +7,11 @@ use etendue_accel::Accel;
 use etendue_camera::element::FateCounts;
 use etendue_camera::{Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, Sampler};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
-use etendue_tracer::{LayerSpec, NormalKind, Surroundings, Traced};
+use etendue_tracer::{LayerSpec, NormalKind, Surroundings, Tally, Traced};
 use rayon::prelude::*;
 
 use crate::film::{Band, FilmLayer, Rows, bands, single};
+use crate::radiance::{LightBatch, LightPass};
 
 /// Side of a tile (pixels): its rays are one batch.
 const TILE: u32 = 16;
@@ -36,15 +37,19 @@ pub(crate) struct Job<'a> {
     pub(crate) surroundings: Surroundings<'a>,
     pub(crate) detail: Detail,
     pub(crate) sampling: Sampling,
+    /// What fills [`LayerSpec::Radiance`].
+    pub(crate) light: Option<LightPass<'a>>,
     /// Told the share done; answering `false` stops.
     pub(crate) progress: &'a (dyn Fn(f64) -> bool + Sync),
 }
 
 /// What was traced.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Counts {
-    /// Rays sent into the scene.
-    pub(crate) rays: u64,
+pub(crate) struct Traffic {
+    /// Rays of the camera for layers without light.
+    pub(crate) chief_rays: u64,
+    /// Rays of the radiance pass.
+    pub(crate) light: Tally,
     /// What became of rays inside the camera's lens.
     pub(crate) fates: FateCounts,
 }
@@ -54,34 +59,40 @@ pub(crate) struct Counts {
 pub(crate) struct Stopped;
 
 impl Job<'_> {
-    /// Fills `layers` and tells what was traced.
-    pub(crate) fn run(&self, layers: &mut [FilmLayer]) -> Result<Counts, Stopped> {
+    /// Fills `layers` and returns what was traced.
+    pub(crate) fn run(&self, layers: &mut [FilmLayer]) -> Result<Traffic, Stopped> {
         let [width, height] = self.camera.resolution();
         let bands = bands(layers, [width, height], TILE);
         let total = bands.len() as f64;
-        let (done, counts) = (AtomicU64::new(0), Mutex::new(Counts::default()));
+        let done = AtomicU64::new(0);
+        let traffic = Mutex::new(Traffic::default());
         bands
             .par_iter()
             .try_for_each(|band| {
                 let Some(mut band) = take(band) else { return Some(()) };
                 let mut batch = Batch::new(self.detail);
                 self.fill(&mut band, width, &mut batch);
-                let mut counts = counts.lock().unwrap_or_else(PoisonError::into_inner);
-                counts.rays += batch.traced;
-                counts.fates.merge(&batch.camera_rays.fates);
-                drop(counts);
+                let mut traffic = traffic.lock().unwrap_or_else(PoisonError::into_inner);
+                traffic.chief_rays += batch.traced;
+                traffic.light += batch.light.tally;
+                traffic.fates.merge(&batch.camera_rays.fates);
+                traffic.fates.merge(batch.light.fates());
+                drop(traffic);
                 let done = done.fetch_add(1, Ordering::Relaxed) + 1;
                 (self.progress)(done as f64 / total).then_some(())
             })
             .ok_or(Stopped)?;
-        Ok(counts.into_inner().unwrap_or_else(PoisonError::into_inner))
+        Ok(traffic.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
     fn fill(&self, band: &mut Band<'_>, width: u32, batch: &mut Batch) {
         let at_centre = self.sampling.samples == 1 && self.camera.lens().is_none();
-        let (mut centre, mut mean): (Vec<_>, Vec<_>) = std::mem::take(&mut band.layers)
+        let (mut lit, seen): (Vec<_>, Vec<_>) = std::mem::take(&mut band.layers)
             .into_iter()
-            .partition(|(layer, _)| at_centre || !is_colored(*layer));
+            .partition(|(layer, _)| *layer == LayerSpec::Radiance);
+        let (mut centre, mut mean): (Vec<_>, Vec<_>) = seen
+            .into_iter()
+            .partition(|(layer, _)| at_centre || !layer.is_averaged());
         for left in (0..width).step_by(TILE as usize) {
             let tile =
                 Tile { left, top: band.top, width: TILE.min(width - left), height: band.height };
@@ -96,6 +107,9 @@ impl Job<'_> {
             }
             if !mean.is_empty() {
                 self.average(&mut mean, tile, width, batch);
+            }
+            if let (Some(pass), Some((_, planes))) = (&self.light, lit.first_mut()) {
+                pass.fill(tile, width, self.sampling, planes, &mut batch.light);
             }
         }
     }
@@ -212,9 +226,15 @@ impl Job<'_> {
             LayerSpec::Coverage => {
                 each(planes, batch, index, |i| [f64::from(u8::from(batch.hits.is_hit(i)))]);
             }
-            LayerSpec::Flat | LayerSpec::Facing => {
+            LayerSpec::Flat | LayerSpec::Facing | LayerSpec::Albedo => {
                 each(planes, batch, index, |i| self.color(layer, traced, i));
             }
+            LayerSpec::Uv => each(planes, batch, index, |i| around.first_uv(&batch.hits, i)),
+            LayerSpec::MaterialId => {
+                each(planes, batch, index, |i| [f64::from(around.material_id(&batch.hits, i))]);
+            }
+            // Filled by the radiance pass.
+            LayerSpec::Radiance => {}
         }
     }
 }
@@ -258,20 +278,15 @@ fn each<const N: usize>(
     }
 }
 
-/// Whether a layer is a colour, which is averaged over a pixel; the others are taken at its centre.
-fn is_colored(layer: LayerSpec) -> bool {
-    matches!(layer, LayerSpec::Flat | LayerSpec::Facing)
-}
-
 fn take<'a>(band: &Mutex<Option<Band<'a>>>) -> Option<Band<'a>> {
     band.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
 /// A rectangle of the picture, at most [`TILE`] a side.
 #[derive(Debug, Clone, Copy)]
-struct Tile {
-    left: u32,
-    top: u32,
+pub(crate) struct Tile {
+    pub(crate) left: u32,
+    pub(crate) top: u32,
     width: u32,
     height: u32,
 }
@@ -279,14 +294,14 @@ struct Tile {
 impl Tile {
     /// Pixels from the tile's corner along a Z-order curve, so that any 4, 8 or 16 of them in a row,
     /// as many as go into a packet, are a block.
-    fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
+    pub(crate) fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
         (0..TILE * TILE)
             .map(|k| (even_bits(k), even_bits(k >> 1)))
             .filter(move |&(x, y)| x < self.width && y < self.height)
     }
 
     /// Where a pixel of the tile stands in the rows of its band.
-    fn index(self, x: u32, y: u32, width: u32) -> usize {
+    pub(crate) fn index(self, x: u32, y: u32, width: u32) -> usize {
         y as usize * width as usize + (self.left + x) as usize
     }
 }
@@ -312,6 +327,7 @@ struct Batch {
     /// One number of each ray, three times.
     numbers: [Vec<f64>; 3],
     traced: u64,
+    light: LightBatch,
 }
 
 impl Batch {
@@ -328,6 +344,7 @@ impl Batch {
             places: Vec::new(),
             numbers: Default::default(),
             traced: 0,
+            light: LightBatch::default(),
         }
     }
 

@@ -27,6 +27,7 @@ pub mod file;
 mod identity;
 pub mod import;
 mod load;
+mod looks;
 mod paths;
 pub mod scene;
 pub mod shape;

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use etendue_camera::{Camera, CameraError, CameraSpec};
 use etendue_geometry::{Bounds, Geometry, Mesh, Placement, Positions, Transform};
 use etendue_spectrum::Lanes;
-use etendue_tracer::{Material, Paint, Texture};
+use etendue_tracer::{EnvironmentImage, Light, LightKind, Material, Texture, TextureScope};
 use rayon::prelude::*;
 
 use crate::cameras::{self, CameraOrigin, SceneCamera};
@@ -52,21 +52,30 @@ impl SceneFile {
     /// imported; the message names the place.
     pub fn load(&self, wanted: Wanted, options: &LoadOptions<'_>) -> Result<Scene, SceneError> {
         let folder = Folder::open(self.folder(), options.reach)?;
-        let materials = self.named_materials()?;
+        let own = self.named_materials(&folder, wanted)?;
+        let lights = self.named_lights(&folder)?;
         // What can be checked without the models is; a bad camera need not wait for them.
         let parts_of_camera = CameraFiles::new(&folder);
         self.camera_spec()
             .build(Bounds::default, &|name| parts_of_camera.find(name))
             .map_err(|error| self.camera_fault(&error))?;
-        let (origins, objects) = self.resolve_objects(&folder, &materials)?;
+        let (origins, objects) = self.resolve_objects(&folder, &own.materials)?;
         let imports = self.import_all(&origins, &objects, &folder, wanted, options)?;
-        let mut parts = Parts { materials, ..Parts::default() };
+        let mut parts = Parts {
+            materials: own.materials,
+            textures: own.textures,
+            lights: lights.clone().unwrap_or_default(),
+            ..Parts::default()
+        };
         let split_nodes = self.kind() == FileKind::Model;
         for import in imports {
             parts.add_import(import);
         }
         for (index, object) in objects.iter().enumerate() {
             parts.place(object, split_nodes, index).map_err(|what| self.too_many(what))?;
+        }
+        if wanted.light && lights.is_none() {
+            parts.light_by_default();
         }
         self.finish(parts, &folder, options)
     }
@@ -82,34 +91,6 @@ impl SceneFile {
     fn camera_fault(&self, error: &CameraError) -> SceneError {
         let dot = if error.at.is_empty() { "" } else { "." };
         self.fault(&format!("camera{dot}{}", error.at), error.why.as_str())
-    }
-
-    /// The scene's own materials in the order of their names.
-    fn named_materials(&self) -> Result<Vec<Material>, SceneError> {
-        let mut materials = Vec::new();
-        for (name, spec) in &self.spec.materials {
-            let material = spec.resolve(name);
-            let at = |key: &str| join(&join("materials", name), key);
-            match &material.base_color {
-                Paint::Plain(color) if !color.iter().all(|c| (0.0..=1.0).contains(c)) => {
-                    let why = format!("{color:?} is outside 0 to 1; a surface reflects no more");
-                    return Err(self.fault(&at("color"), why));
-                }
-                Paint::Checker { colors, .. }
-                    if !colors.iter().flatten().all(|c| (0.0..=1.0).contains(c)) =>
-                {
-                    let why = "a value is outside 0 to 1; a surface reflects no more";
-                    return Err(self.fault(&at("colors"), why));
-                }
-                Paint::Checker { squares, .. } if squares.is_nan() || *squares <= 0.0 => {
-                    let why = format!("{squares} is not above zero");
-                    return Err(self.fault(&at("squares"), why));
-                }
-                _ => {}
-            }
-            materials.push(material);
-        }
-        Ok(materials)
     }
 
     fn resolve_objects(
@@ -240,8 +221,15 @@ impl SceneFile {
         let (camera, camera_origin) =
             self.camera(&geometry, &parts.cameras, &camera_files, options)?;
         let opened = parts.stats.files.iter().map(|(path, _)| path.clone());
-        let opened = opened.chain(camera_files.found.into_inner());
-        let files = opened.map(|path| (folder.relative(&path), path)).collect();
+        let images = parts.textures.iter().filter_map(Texture::file);
+        let skies = parts.lights.iter().filter_map(Light::file);
+        let mut files: Vec<(String, PathBuf)> = opened
+            .chain(camera_files.found.into_inner())
+            .chain(images.chain(skies).cloned())
+            .map(|path| (folder.relative(&path), path))
+            .collect();
+        files.sort();
+        files.dedup();
         let mut notes = parts.notes;
         notes.extend(self.unused_materials());
         let sensor = self.sensor.clone().map(|s| s.with_resolution(camera.resolution()));
@@ -252,6 +240,8 @@ impl SceneFile {
             objects: parts.objects,
             materials: parts.materials,
             textures: parts.textures,
+            lights: parts.lights,
+            tracer: self.spec.tracer,
             camera,
             sensor,
             camera_origin,
@@ -388,6 +378,7 @@ pub(crate) fn heap_bytes(mesh: &Mesh) -> usize {
 struct Home {
     placements: Vec<ImportedPlacement>,
     cameras: Vec<import::ImportedCamera>,
+    lights: Vec<import::ImportedLight>,
     meshes: usize,
     materials: usize,
 }
@@ -399,6 +390,7 @@ struct Parts {
     objects: Vec<String>,
     materials: Vec<Material>,
     textures: Vec<Texture>,
+    lights: Vec<Light>,
     cameras: Vec<SceneCamera>,
     notes: Vec<Note>,
     stats: LoadStats,
@@ -410,14 +402,15 @@ impl Parts {
         self.homes.push(Home {
             placements: import.placements,
             cameras: import.cameras,
+            lights: import.lights,
             meshes: self.geometry.meshes.len(),
             materials: self.materials.len(),
         });
         self.geometry.meshes.extend(import.meshes);
         let first_texture = u32::try_from(self.textures.len()).unwrap_or(u32::MAX);
         self.materials.extend(import.materials.into_iter().map(|mut material| {
-            if let Paint::Image { image, .. } = &mut material.base_color {
-                image.texture = image.texture.saturating_add(first_texture);
+            for used in material.textures_mut(TextureScope::Light) {
+                used.texture = used.texture.saturating_add(first_texture);
             }
             material
         }));
@@ -478,7 +471,33 @@ impl Parts {
         let cameras = home.cameras.iter();
         let placed = cameras.filter_map(|c| SceneCamera::new(c, number, &object.world_from_object));
         self.cameras.extend(placed);
+        let lights = home.lights.iter();
+        self.lights.extend(lights.filter_map(|light| light.placed(&object.world_from_object)));
         Ok(())
+    }
+
+    /// Lights the scene by the studio when nothing in it shines.
+    fn light_by_default(&mut self) {
+        let shines = |placement: &Placement| {
+            let material = self.materials.get(placement.material as usize);
+            material.is_some_and(|material| material.emission.is_some())
+        };
+        if !self.lights.is_empty() || self.geometry.placements.iter().any(shines) {
+            return;
+        }
+        self.lights.push(Light {
+            kind: LightKind::Environment { image: EnvironmentImage::Studio, rotation: 0.0 },
+            color: [1.0; 3],
+            illuminant: None,
+        });
+        self.notes.push(Note {
+            kind: NoteKind::Assumed,
+            subject: "lights".to_owned(),
+            message: "nothing in the scene shines: it is lit by a grey studio; name `lights` in \
+                      the scene for others, or `\"lights\": []` for none"
+                .to_owned(),
+            count: 1,
+        });
     }
 }
 

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use etendue_camera::Camera;
 use etendue_geometry::Geometry;
 use etendue_sensor::Sensor;
-use etendue_tracer::{LayerSpec, Material, Texture};
+use etendue_tracer::{LayerSpec, Light, Material, Texture};
 
-use crate::file::RenderSpec;
+use crate::file::{RenderSpec, TracerSpec};
 use crate::identity::Ingredients;
 use crate::import::{Note, Strictness};
 use crate::paths::Reach;
@@ -27,6 +27,10 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Images that materials use, still encoded; empty unless wanted.
     pub textures: Vec<Texture>,
+    /// Lights of the scene and of its models, beside emissive surfaces.
+    pub lights: Vec<Light>,
+    /// What the picture shows, when the scene says so.
+    pub tracer: Option<TracerSpec>,
     /// The camera.
     pub camera: Camera,
     /// The camera's sensor, of the camera's resolution; `None` when it is ideal: then the picture is

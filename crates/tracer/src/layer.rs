@@ -58,6 +58,15 @@ pub enum LayerSpec {
     Flat,
     /// `Facing.R G B`: base colour under a headlight, to look at.
     Facing,
+    /// `Albedo.R G B`: base colour along the chief ray, not averaged.
+    Albedo,
+    /// `Uv.U V`: texture coordinates of the first set.
+    Uv,
+    /// `MaterialId.material`: which material.
+    MaterialId,
+    /// The picture of a tracer of light: radiance, one channel a spectral lane. No file names it;
+    /// it comes with the tracer.
+    Radiance,
 }
 
 /// The same, with every option optional and unknown keys refused: what is read.
@@ -80,12 +89,33 @@ enum Written {
     Coverage {},
     Flat {},
     Facing {},
+    Albedo {},
+    Uv {},
+    MaterialId {},
 }
 
 impl LayerSpec {
     /// Every layer by its plain name, in the order that help texts list them.
-    pub const NAMES: [&'static str; 8] =
-        ["depth", "distance", "normal", "position", "ids", "coverage", "flat", "facing"];
+    pub const NAMES: [&'static str; 11] = [
+        "depth",
+        "distance",
+        "normal",
+        "position",
+        "ids",
+        "coverage",
+        "flat",
+        "facing",
+        "albedo",
+        "uv",
+        "material_id",
+    ];
+
+    /// Whether the layer is a mean over the samples of a pixel; the others are taken along the chief
+    /// ray of its centre.
+    #[must_use]
+    pub fn is_averaged(self) -> bool {
+        matches!(self, Self::Flat | Self::Facing | Self::Radiance)
+    }
 
     /// The layer of this plain name, with default options.
     #[must_use]
@@ -99,6 +129,9 @@ impl LayerSpec {
             "coverage" => Self::Coverage,
             "flat" => Self::Flat,
             "facing" => Self::Facing,
+            "albedo" => Self::Albedo,
+            "uv" => Self::Uv,
+            "material_id" => Self::MaterialId,
             _ => return None,
         })
     }
@@ -115,6 +148,9 @@ impl From<Written> for LayerSpec {
             Written::Coverage {} => Self::Coverage,
             Written::Flat {} => Self::Flat,
             Written::Facing {} => Self::Facing,
+            Written::Albedo {} => Self::Albedo,
+            Written::Uv {} => Self::Uv,
+            Written::MaterialId {} => Self::MaterialId,
         }
     }
 }

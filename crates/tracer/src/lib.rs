@@ -5,13 +5,49 @@
 //! Colours are linear light with the sRGB primaries (ITU-R BT.709), 1 being full scale; only files
 //! and pictures to look at carry the sRGB transfer curve.
 
-mod batches;
-pub mod layer;
-pub mod material;
-pub mod reference;
-pub mod texture;
+//!
+//! # Map
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`layer`] | the layers of a render, by name |
+//! | [`reference`](mod@reference) | what a ray meets first, without light |
+//! | [`spec`] | materials and lights as scene files write them |
+//! | [`material`], [`texture`] | surfaces, ready to be looked up |
+//! | [`bsdf`] | how surfaces scatter light |
+//! | [`light`], [`environment`] | where light comes from |
+//! | [`spawn`] | where a ray that leaves a surface starts |
+//! | [`transport`] | batches of paths, and what tracers share |
+//! | [`direct`], [`whitted`], [`path`] | the tracers |
+//! | [`spectral`], [`sampling`] | colours to lanes, numbers to directions |
 
+mod batches;
+pub mod bsdf;
+pub mod direct;
+pub mod environment;
+pub mod layer;
+pub mod light;
+pub mod material;
+pub mod path;
+pub mod reference;
+pub mod sampling;
+pub mod spawn;
+pub mod spec;
+pub mod spectral;
+mod surface;
+pub mod texture;
+pub mod transport;
+pub mod whitted;
+
+pub use direct::Direct;
+pub use environment::EnvironmentMap;
 pub use layer::{LayerSpec, NormalKind, Space};
-pub use material::{Color, Material, MaterialSpec, Paint};
-pub use reference::{Needs, Surroundings, Traced, View};
+pub use light::{EnvironmentImage, Light, LightKind, Lights};
+pub use material::{Color, Emission, Ior, Material, Paint, Scattering, TextureScope};
+pub use path::Path;
+pub use reference::{Needs, Spot, Surroundings, Traced, View};
+pub use spec::{LightSpec, MaterialSpec};
+pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
+pub use transport::{Samples, Scratch, Stage, Tally, Tracer};
+pub use whitted::Whitted;

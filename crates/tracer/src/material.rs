@@ -1,40 +1,12 @@
-//! Materials: what colour a surface has. (Light comes with the spectral tracers.)
+//! Materials, ready to be looked up at a hit: what colour a surface has, how it scatters light, and
+//! what it gives off itself.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use etendue_spectrum::{Curve, Illuminant};
 
 use crate::TextureUse;
 
 /// Linear RGB with the sRGB primaries, 0..=1 for reflectances.
 pub type Color = [f64; 3];
-
-/// A material as the scene file writes it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-pub enum MaterialSpec {
-    /// A Lambert reflector.
-    Matte {
-        /// Reflectance, linear RGB, each 0..=1.
-        color: Color,
-    },
-    /// Squares of two colours over the surface's texture coordinates.
-    Checker {
-        /// The two reflectances, linear RGB.
-        #[serde(default = "default_checker_colors")]
-        colors: [Color; 2],
-        /// Squares along one unit of the texture coordinates (> 0).
-        #[serde(default = "default_checker_squares")]
-        squares: f64,
-    },
-}
-
-fn default_checker_colors() -> [Color; 2] {
-    [[0.8; 3], [0.2; 3]]
-}
-
-fn default_checker_squares() -> f64 {
-    8.0
-}
 
 /// A material ready to be looked up at a hit.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,15 +17,205 @@ pub struct Material {
     pub base_color: Paint,
     /// The mesh's vertex colours multiply the base colour (glTF's `COLOR_0`).
     pub vertex_colors: bool,
+    /// How light is scattered.
+    pub scattering: Scattering,
+    /// What the surface gives off.
+    pub emission: Option<Emission>,
+    /// Where the surface is not there at all.
+    pub alpha: Alpha,
+    /// Tilts of the normal.
+    pub normal_map: Option<NormalMap>,
+}
+
+/// How a surface scatters light.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Scattering {
+    /// Not at all.
+    Black,
+    /// Alike in all directions (Lambert).
+    Matte,
+    /// Not at all, but it shows its base colour to whoever looks (`KHR_materials_unlit`).
+    Unlit,
+    /// As a mirror.
+    Mirror,
+    /// As metal with GGX facets.
+    Metal {
+        /// Roughness, 0..=1; its square is GGX's α.
+        roughness: f64,
+    },
+    /// As a smooth boundary of glass; the front is outside.
+    Dielectric(Ior),
+    /// As glTF's metallic-roughness surfaces.
+    Gltf(Box<GltfSurface>),
+}
+
+/// A refractive index.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ior {
+    /// The same for all wavelengths.
+    Constant(f64),
+    /// By wavelength (nm).
+    Dispersive(Curve),
+}
+
+impl Ior {
+    /// The index at a wavelength (nm).
+    #[must_use]
+    pub fn at(&self, wavelength: f64) -> f64 {
+        match self {
+            Self::Constant(n) => *n,
+            Self::Dispersive(curve) => curve.held(wavelength),
+        }
+    }
+}
+
+/// glTF's metallic-roughness parameters. Textures multiply their factors, by the channels that glTF
+/// prescribes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GltfSurface {
+    /// Share of metal, 0..=1.
+    pub metallic: f64,
+    /// Roughness, 0..=1; its square is GGX's α.
+    pub roughness: f64,
+    /// Roughness in green, metal in blue (linear).
+    pub metallic_roughness: Option<TextureUse>,
+    /// Refractive index of the dielectric (`KHR_materials_ior`).
+    pub ior: f64,
+    /// Strength of the dielectric's reflection (`KHR_materials_specular`), 0..=1.
+    pub specular: f64,
+    /// Strength in alpha (linear).
+    pub specular_texture: Option<TextureUse>,
+    /// Colour of the dielectric's reflection face on; may exceed 1.
+    pub specular_color: Color,
+    /// Colour (sRGB).
+    pub specular_color_texture: Option<TextureUse>,
+    /// Share of light that passes a thin wall (`KHR_materials_transmission`), 0..=1.
+    pub transmission: f64,
+    /// Share in red (linear).
+    pub transmission_texture: Option<TextureUse>,
+}
+
+impl Default for GltfSurface {
+    fn default() -> Self {
+        Self {
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_roughness: None,
+            ior: 1.5,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: [1.0; 3],
+            specular_color_texture: None,
+            transmission: 0.0,
+            transmission_texture: None,
+        }
+    }
+}
+
+/// What a surface gives off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Emission {
+    /// Radiance, times [`Self::strength`].
+    pub radiance: Paint,
+    /// Multiplies the radiance (`KHR_materials_emissive_strength`).
+    pub strength: f64,
+    /// The spectrum that the radiance multiplies; equal energy when absent.
+    pub illuminant: Option<Illuminant>,
+    /// The back shines too.
+    pub two_sided: bool,
+}
+
+/// Where a surface lets rays pass as if it were not there.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Alpha {
+    /// Nowhere.
+    #[default]
+    Opaque,
+    /// Where the base colour's alpha is below the cut-off.
+    Mask {
+        /// Multiplies the alpha.
+        factor: f64,
+        /// The cut-off.
+        cutoff: f64,
+    },
+    /// In the share that alpha leaves.
+    Blend {
+        /// Multiplies the alpha.
+        factor: f64,
+    },
+}
+
+/// Tilts of the normal by an image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NormalMap {
+    /// The image (linear); x and y over 0..=1 are tilts of −1..=1.
+    pub image: TextureUse,
+    /// Multiplies the tilts.
+    pub scale: f64,
 }
 
 impl Material {
+    /// A material that scatters in this way and nothing else.
+    #[must_use]
+    pub fn new(name: impl Into<String>, base_color: Paint, scattering: Scattering) -> Self {
+        Self {
+            name: name.into(),
+            base_color,
+            vertex_colors: false,
+            scattering,
+            emission: None,
+            alpha: Alpha::Opaque,
+            normal_map: None,
+        }
+    }
+
     /// The material of whatever names none: glTF's default white is too bright to show shape, so
     /// this is a light grey only where the file has no material at all.
     #[must_use]
     pub fn unnamed() -> Self {
-        Self { name: String::new(), base_color: Paint::Plain([0.8; 3]), vertex_colors: true }
+        let plain = Self::new("", Paint::Plain([0.8; 3]), Scattering::Matte);
+        Self { vertex_colors: true, ..plain }
     }
+
+    /// Which textures are looked at for the base colour alone, or for all of light transport.
+    #[must_use]
+    pub fn textures(&self, scope: TextureScope) -> Vec<u32> {
+        let mut copy = self.clone();
+        let uses = copy.textures_mut(scope);
+        uses.into_iter().map(|used| used.texture).collect()
+    }
+
+    /// The uses of textures, to be renumbered.
+    pub fn textures_mut(&mut self, scope: TextureScope) -> Vec<&mut TextureUse> {
+        let mut uses: Vec<&mut TextureUse> = self.base_color.image_mut().into_iter().collect();
+        if scope == TextureScope::BaseColor {
+            return uses;
+        }
+        if let Scattering::Gltf(surface) = &mut self.scattering {
+            uses.extend(surface.metallic_roughness.as_mut());
+            uses.extend(surface.specular_texture.as_mut());
+            uses.extend(surface.specular_color_texture.as_mut());
+            uses.extend(surface.transmission_texture.as_mut());
+        }
+        uses.extend(self.emission.as_mut().and_then(|emission| emission.radiance.image_mut()));
+        uses.extend(self.normal_map.as_mut().map(|map| &mut map.image));
+        uses
+    }
+
+    /// Whether rays may pass the surface as if it were not there.
+    #[must_use]
+    pub fn is_pierced(&self) -> bool {
+        self.alpha != Alpha::Opaque
+    }
+}
+
+/// How much of a material a render looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TextureScope {
+    /// The base colour.
+    BaseColor,
+    /// All of it.
+    Light,
 }
 
 /// A colour over a surface.
@@ -83,16 +245,15 @@ impl Paint {
     pub fn needs_uv(&self) -> bool {
         !matches!(self, Self::Plain(_))
     }
-}
 
-impl MaterialSpec {
-    /// The material as it is looked up at a hit.
+    /// The use of an image, if there is one.
+    pub fn image_mut(&mut self) -> Option<&mut TextureUse> {
+        if let Self::Image { image, .. } = self { Some(image) } else { None }
+    }
+
+    /// The use of an image, if there is one.
     #[must_use]
-    pub fn resolve(&self, name: &str) -> Material {
-        let base_color = match *self {
-            Self::Matte { color } => Paint::Plain(color),
-            Self::Checker { colors, squares } => Paint::Checker { colors, squares },
-        };
-        Material { name: name.to_owned(), base_color, vertex_colors: false }
+    pub fn image(&self) -> Option<&TextureUse> {
+        if let Self::Image { image, .. } = self { Some(image) } else { None }
     }
 }

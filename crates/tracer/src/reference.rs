@@ -2,7 +2,7 @@
 //! what a ray meets first. No light, no averaging: what a batch hit is written as it is.
 
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Geometry, HitBatch, MISS, Placement, RayBatch};
+use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vertices};
 
 use crate::{Color, Image, LayerSpec, Material, NormalKind, Paint, Space, TextureUse};
 
@@ -94,23 +94,23 @@ impl Surroundings<'_> {
 
     /// The file's vertex normals at hit `i`, interpolated, in world space; `None` without any.
     fn shading_normal(&self, hits: &HitBatch, i: usize) -> Option<DVec3> {
+        self.spot(hits, i)?.shading_normal(hits.normal(i))
+    }
+
+    /// Where hit `i` is on its mesh; `None` for a miss.
+    #[must_use]
+    pub fn spot(&self, hits: &HitBatch, i: usize) -> Option<Spot<'_>> {
         let placement = self.placement(hits, i)?;
-        let mesh = self.geometry.mesh_of(placement);
-        let normals = mesh.normals.as_ref()?;
-        let corners = mesh.triangles[hits.triangle[i] as usize];
-        let [a, b, c] = corners.map(|corner| {
-            let [x, y, z] = normals.get(corner as usize);
-            DVec3::new(x.into(), y.into(), z.into())
-        });
         let (u, v) = (hits.u[i], hits.v[i]);
-        let local = a * (1.0 - u - v) + b * u + c * v;
-        let place = &placement.world_from_mesh;
-        let unmoved = place.linear == DMat3::IDENTITY;
-        let world = if unmoved { local } else { place.normal_matrix() * local };
-        let world = world.try_normalize()?;
-        // Some files' normals point inwards; the triangle's winding decides.
-        let geometric = hits.normal(i);
-        Some(if world.dot(geometric) < 0.0 { -world } else { world })
+        let weights = [1.0 - u - v, u, v];
+        let spot = Spot::corner(self.geometry, placement, hits.triangle[i] as usize);
+        Some(Spot { weights, ..spot })
+    }
+
+    /// The material of a spot.
+    #[must_use]
+    pub fn material(&self, spot: &Spot<'_>) -> Option<&Material> {
+        self.materials.get(spot.placement.material as usize)
     }
 
     fn placement(&self, hits: &HitBatch, i: usize) -> Option<&Placement> {
@@ -131,31 +131,66 @@ impl Surroundings<'_> {
     /// Base colour without light at hit `i`, black for a miss.
     #[must_use]
     pub fn flat(&self, hits: &HitBatch, i: usize) -> Color {
-        let Some(placement) = self.placement(hits, i) else { return [0.0; 3] };
-        let Some(material) = self.materials.get(placement.material as usize) else {
-            return [0.0; 3];
-        };
-        let mut color = match &material.base_color {
-            Paint::Plain(color) => *color,
-            Paint::Checker { colors, squares } => {
-                let [u, v] = self.uv(hits, i, placement, 0);
-                // The last bit of the square numbers' sum alternates on both sides of 0. The cast
-                // saturates, so absurd coordinates give one colour and no fault.
-                #[expect(clippy::cast_possible_truncation, reason = "see above")]
-                let number = ((u * squares).floor() + (v * squares).floor()) as i64;
-                colors[usize::from(number & 1 != 0)]
-            }
-            Paint::Image { factor, image } => {
-                let texel = self.texel(hits, i, placement, image);
-                std::array::from_fn(|k| factor[k] * texel[k])
-            }
-        };
+        let Some(spot) = self.spot(hits, i) else { return [0.0; 3] };
+        let Some(material) = self.material(&spot) else { return [0.0; 3] };
+        let [r, g, b, _] = self.base_color(material, &spot);
+        [r, g, b]
+    }
+
+    /// Number of the material of hit `i`, counted from 1; 0 for a miss.
+    #[must_use]
+    pub fn material_id(&self, hits: &HitBatch, i: usize) -> u32 {
+        self.placement(hits, i).map_or(0, |placement| placement.material.saturating_add(1))
+    }
+
+    /// Texture coordinates of the first set at hit `i`; (0, 0) without any.
+    #[must_use]
+    pub fn first_uv(&self, hits: &HitBatch, i: usize) -> [f64; 2] {
+        self.spot(hits, i).map_or([0.0; 2], |spot| spot.uv(0))
+    }
+
+    /// Base colour and alpha, vertex colours included.
+    #[must_use]
+    pub fn base_color(&self, material: &Material, spot: &Spot<'_>) -> [f64; 4] {
+        let mut color = self.paint(&material.base_color, spot);
         if material.vertex_colors
-            && let Some(vertex) = self.vertex_color(hits, i, placement)
+            && let Some(vertex) = spot.vertex_color()
         {
             color = std::array::from_fn(|k| color[k] * vertex[k]);
         }
         color
+    }
+
+    /// A paint's colour and alpha.
+    #[must_use]
+    pub fn paint(&self, paint: &Paint, spot: &Spot<'_>) -> [f64; 4] {
+        match paint {
+            Paint::Plain([r, g, b]) => [*r, *g, *b, 1.0],
+            Paint::Checker { colors, squares } => {
+                let [u, v] = spot.uv(0);
+                // The last bit of the square numbers' sum alternates on both sides of 0. The cast
+                // saturates, so absurd coordinates give one colour and no fault.
+                #[expect(clippy::cast_possible_truncation, reason = "see above")]
+                let number = ((u * squares).floor() + (v * squares).floor()) as i64;
+                let [r, g, b] = colors[usize::from(number & 1 != 0)];
+                [r, g, b, 1.0]
+            }
+            Paint::Image { factor, image } => {
+                let [r, g, b, a] = self.texel(image, spot);
+                [factor[0] * r, factor[1] * g, factor[2] * b, a]
+            }
+        }
+    }
+
+    /// What a use of an image says at a spot; white without the image.
+    #[must_use]
+    pub fn texel(&self, image: &TextureUse, spot: &Spot<'_>) -> [f64; 4] {
+        let Some(Some(pixels)) = self.images.get(image.texture as usize) else { return [1.0; 4] };
+        let [u, v] = spot.uv(image.uv_set as usize);
+        let [row_u, row_v] = image.transform;
+        let u_image = row_u[0] * u + row_u[1] * v + row_u[2];
+        let v_image = row_v[0] * u + row_v[1] * v + row_v[2];
+        pixels.sample([u_image, v_image], image.encoding)
     }
 
     /// Base colour under a headlight at hit `i`: something to look at, not light transport. A little
@@ -169,38 +204,80 @@ impl Surroundings<'_> {
         let cosine = normal.dot(-traced.rays.direction(i)).max(0.0);
         self.flat(traced.hits, i).map(|c| (0.08 + 0.92 * c) * (0.15 + 0.85 * cosine))
     }
-
-    fn texel(&self, hits: &HitBatch, i: usize, placement: &Placement, image: &TextureUse) -> Color {
-        let Some(Some(pixels)) = self.images.get(image.texture as usize) else { return [1.0; 3] };
-        let [u, v] = self.uv(hits, i, placement, image.uv_set as usize);
-        let [row_u, row_v] = image.transform;
-        let u_image = row_u[0] * u + row_u[1] * v + row_u[2];
-        let v_image = row_v[0] * u + row_v[1] * v + row_v[2];
-        pixels.sample(u_image, v_image)
-    }
-
-    /// Texture coordinates of hit `i`; (0, 0) when the mesh has no such set.
-    fn uv(&self, hits: &HitBatch, i: usize, placement: &Placement, set: usize) -> [f64; 2] {
-        let mesh = self.geometry.mesh_of(placement);
-        let Some(uvs) = mesh.uvs.get(set) else { return [0.0; 2] };
-        let weights = weights(hits, i);
-        let corners = mesh.triangles[hits.triangle[i] as usize].map(|c| uvs.get(c as usize));
-        std::array::from_fn(|k| (0..3).map(|c| weights[c] * f64::from(corners[c][k])).sum())
-    }
-
-    fn vertex_color(&self, hits: &HitBatch, i: usize, placement: &Placement) -> Option<Color> {
-        let mesh = self.geometry.mesh_of(placement);
-        let colors = mesh.colors.as_ref()?;
-        let weights = weights(hits, i);
-        let corners = mesh.triangles[hits.triangle[i] as usize].map(|c| colors.get(c as usize));
-        Some(std::array::from_fn(|k| (0..3).map(|c| weights[c] * f64::from(corners[c][k])).sum()))
-    }
 }
 
-/// Barycentric weights of the three corners.
-fn weights(hits: &HitBatch, i: usize) -> [f64; 3] {
-    let (u, v) = (hits.u[i], hits.v[i]);
-    [1.0 - u - v, u, v]
+/// A place on a mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct Spot<'a> {
+    /// Which placement.
+    pub placement: &'a Placement,
+    /// Its mesh.
+    pub mesh: &'a Mesh,
+    /// Which triangle of the mesh.
+    pub triangle: usize,
+    /// Barycentric weights of its corners.
+    pub weights: [f64; 3],
+}
+
+impl<'a> Spot<'a> {
+    /// The first corner of a triangle.
+    #[must_use]
+    pub fn corner(geometry: &'a Geometry, placement: &'a Placement, triangle: usize) -> Self {
+        let mesh = geometry.mesh_of(placement);
+        Self { placement, mesh, triangle, weights: [1.0, 0.0, 0.0] }
+    }
+
+    /// Values at the three corners, weighted.
+    fn mix<const N: usize>(&self, values: &Vertices<N>) -> [f64; N] {
+        let corners = self.mesh.triangles[self.triangle].map(|c| values.get(c as usize));
+        std::array::from_fn(|k| {
+            let [a, b, c] = corners.map(|corner| f64::from(corner[k]));
+            self.weights[0] * a + self.weights[1] * b + self.weights[2] * c
+        })
+    }
+
+    /// Texture coordinates of a set; (0, 0) when the mesh has no such set.
+    #[must_use]
+    pub fn uv(&self, set: usize) -> [f64; 2] {
+        self.mesh.uvs.get(set).map_or([0.0; 2], |uvs| self.mix(uvs))
+    }
+
+    /// The mesh's colour, when it has any.
+    #[must_use]
+    pub fn vertex_color(&self) -> Option<[f64; 4]> {
+        self.mesh.colors.as_ref().map(|colors| self.mix(colors))
+    }
+
+    /// The mesh's own normal in world space, on the side of the unit normal `geometric`; `None` when
+    /// the mesh has none.
+    #[must_use]
+    pub fn shading_normal(&self, geometric: DVec3) -> Option<DVec3> {
+        let local = DVec3::from(self.mix(self.mesh.normals.as_ref()?));
+        let place = &self.placement.world_from_mesh;
+        let unmoved = place.linear == DMat3::IDENTITY;
+        let world = if unmoved { local } else { place.normal_matrix() * local };
+        let world = world.try_normalize()?;
+        // Some files' normals point inwards; the triangle's winding decides.
+        Some(if world.dot(geometric) < 0.0 { -world } else { world })
+    }
+
+    /// How the world's places change along the texture coordinates of a set: the directions of
+    /// growing u and of growing v. `None` where they do not tell.
+    #[must_use]
+    pub fn texture_axes(&self, set: usize) -> Option<[DVec3; 2]> {
+        let uvs = self.mesh.uvs.get(set)?;
+        let linear = &self.placement.world_from_mesh.linear;
+        let [p0, p1, p2] = self.mesh.corners(self.triangle);
+        let (e1, e2) = (*linear * (p1 - p0), *linear * (p2 - p0));
+        let [a, b, c] =
+            self.mesh.triangles[self.triangle].map(|k| uvs.get(k as usize).map(f64::from));
+        let (du1, dv1, du2, dv2) = (b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
+        // The sign of the area in texture space; its size is lost in normalisation.
+        let sign = (du1 * dv2 - du2 * dv1).signum();
+        let along_u = (e1 * dv2 - e2 * dv1) * sign;
+        let along_v = (e2 * du1 - e1 * du2) * sign;
+        Some([along_u.try_normalize()?, along_v.try_normalize()?])
+    }
 }
 
 /// What a layer needs of the mesh and of the hit.
@@ -210,8 +287,12 @@ pub struct Needs {
     pub surface: bool,
     /// The mesh's vertex normals.
     pub normals: bool,
-    /// Materials, and what they look up (texture coordinates, vertex colours, images).
+    /// Materials, and what they look up (vertex colours, images).
     pub materials: bool,
+    /// Texture coordinates.
+    pub uvs: bool,
+    /// Lights, and all that materials say of light.
+    pub light: bool,
 }
 
 impl Needs {
@@ -222,6 +303,8 @@ impl Needs {
             surface: self.surface || other.surface,
             normals: self.normals || other.normals,
             materials: self.materials || other.materials,
+            uvs: self.uvs || other.uvs,
+            light: self.light || other.light,
         }
     }
 }
@@ -232,14 +315,25 @@ impl LayerSpec {
     pub fn needs(self) -> Needs {
         let none = Needs::default();
         match self {
-            Self::Depth | Self::Distance | Self::Position { .. } | Self::Ids | Self::Coverage => {
-                none
-            }
+            Self::Depth
+            | Self::Distance
+            | Self::Position { .. }
+            | Self::Ids
+            | Self::MaterialId
+            | Self::Coverage => none,
+            Self::Uv => Needs { surface: true, uvs: true, ..none },
             Self::Normal { kind, .. } => {
                 Needs { surface: true, normals: kind == NormalKind::Shading, ..none }
             }
-            Self::Flat => Needs { surface: true, materials: true, ..none },
-            Self::Facing => Needs { surface: true, normals: true, materials: true },
+            Self::Flat | Self::Albedo => {
+                Needs { surface: true, materials: true, uvs: true, ..none }
+            }
+            Self::Facing => {
+                Needs { surface: true, normals: true, materials: true, uvs: true, ..none }
+            }
+            Self::Radiance => {
+                Needs { surface: true, normals: true, materials: true, uvs: true, light: true }
+            }
         }
     }
 }

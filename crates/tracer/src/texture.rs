@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use etendue_geometry::Buffer;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Where an image's bytes are, still encoded (PNG or JPEG).
 #[derive(Debug, Clone)]
@@ -14,7 +16,8 @@ pub enum ImageSource {
 }
 
 /// What happens to texture coordinates outside 0..=1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Wrap {
     /// The image repeats.
     #[default]
@@ -26,13 +29,25 @@ pub enum Wrap {
 }
 
 /// How a lookup reads texels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Filter {
     /// Weighted by distance to the four nearest.
     #[default]
     Bilinear,
     /// The nearest only.
     Nearest,
+}
+
+/// What the numbers of an image mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Encoding {
+    /// Colours by the sRGB curve.
+    #[default]
+    Srgb,
+    /// Plain numbers.
+    Linear,
 }
 
 /// An image with its sampler. Decoded only when the plan needs it, and once.
@@ -57,6 +72,8 @@ pub struct TextureUse {
     pub uv_set: u32,
     /// `KHR_texture_transform`: rows of the 2×3 matrix that carries (u, v, 1).
     pub transform: [[f64; 3]; 2],
+    /// What the image's numbers are to this use.
+    pub encoding: Encoding,
 }
 
 impl TextureUse {
@@ -64,12 +81,12 @@ impl TextureUse {
     pub const UNCHANGED: [[f64; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 }
 
-/// A decoded image: linear light, ready to be looked up.
+/// A decoded image, ready to be looked up.
 #[derive(Debug, Clone)]
 pub struct Image {
     width: usize,
     height: usize,
-    /// RGBA, sRGB-encoded as in the file, row 0 at the top.
+    /// RGBA as in the file, row 0 at the top.
     texels: Vec<[u8; 4]>,
     wrap: [Wrap; 2],
     filter: Filter,
@@ -101,6 +118,12 @@ pub enum ImageError {
 const MAX_SIDE: u32 = 32_768;
 
 impl Texture {
+    /// The file that holds the image, when it is one of its own.
+    #[must_use]
+    pub fn file(&self) -> Option<&PathBuf> {
+        if let ImageSource::File(path) = &self.source { Some(path) } else { None }
+    }
+
     /// Decodes the image.
     ///
     /// # Errors
@@ -116,23 +139,26 @@ impl Texture {
                 &read
             }
         };
-        let decode = || {
-            let mut reader =
-                image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format()?;
-            let mut limits = image::Limits::default();
-            limits.max_image_width = Some(MAX_SIDE);
-            limits.max_image_height = Some(MAX_SIDE);
-            limits.max_alloc = Some(u64::from(MAX_SIDE) * u64::from(MAX_SIDE) * 4);
-            reader.limits(limits);
-            reader.decode()
-        };
-        let decoded = decode()
-            .map_err(|source| ImageError::Decode { name: self.name.clone(), source })?
-            .into_rgba8();
+        let decoded = read_image(&self.name, bytes)?.into_rgba8();
         let (width, height) = (decoded.width() as usize, decoded.height() as usize);
         let texels = bytemuck::cast_vec::<u8, [u8; 4]>(decoded.into_raw());
         Ok(Image { width, height, texels, wrap: self.wrap, filter: self.filter })
     }
+}
+
+/// Decodes an image file of any kind that is read, within [`MAX_SIDE`].
+pub(crate) fn read_image(name: &str, bytes: &[u8]) -> Result<image::DynamicImage, ImageError> {
+    let decode = || {
+        let mut reader =
+            image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format()?;
+        let mut limits = image::Limits::default();
+        limits.max_image_width = Some(MAX_SIDE);
+        limits.max_image_height = Some(MAX_SIDE);
+        limits.max_alloc = Some(u64::from(MAX_SIDE) * u64::from(MAX_SIDE) * 4);
+        reader.limits(limits);
+        reader.decode()
+    };
+    decode().map_err(|source| ImageError::Decode { name: name.to_owned(), source })
 }
 
 impl Image {
@@ -155,20 +181,28 @@ impl Image {
         self.texels.len() * 4
     }
 
-    /// Linear colour at (u, v): (0, 0) is the upper left corner of the upper left texel, as in glTF.
+    /// Columns and rows.
     #[must_use]
-    pub fn sample(&self, u: f64, v: f64) -> [f64; 3] {
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// Linear colour and alpha at (u, v): (0, 0) is the upper left corner of the upper left texel, as
+    /// in glTF.
+    #[must_use]
+    pub fn sample(&self, [u, v]: [f64; 2], encoding: Encoding) -> [f64; 4] {
         if !(u.is_finite() && v.is_finite()) || self.texels.is_empty() {
-            return [0.0; 3];
+            return [0.0, 0.0, 0.0, 1.0];
         }
         let (x, y) = (u * self.width as f64, v * self.height as f64);
         match self.filter {
-            Filter::Nearest => self.texel(x.floor(), y.floor()),
+            Filter::Nearest => self.texel(x.floor(), y.floor(), encoding),
             Filter::Bilinear => {
                 let (x0, y0) = ((x - 0.5).floor(), (y - 0.5).floor());
                 let (fx, fy) = (x - 0.5 - x0, y - 0.5 - y0);
-                let (a, b) = (self.texel(x0, y0), self.texel(x0 + 1.0, y0));
-                let (c, d) = (self.texel(x0, y0 + 1.0), self.texel(x0 + 1.0, y0 + 1.0));
+                let at = |x, y| self.texel(x, y, encoding);
+                let (a, b) = (at(x0, y0), at(x0 + 1.0, y0));
+                let (c, d) = (at(x0, y0 + 1.0), at(x0 + 1.0, y0 + 1.0));
                 std::array::from_fn(|k| {
                     let top = a[k] + (b[k] - a[k]) * fx;
                     let bottom = c[k] + (d[k] - c[k]) * fx;
@@ -179,11 +213,16 @@ impl Image {
     }
 
     /// The texel in column `x` and row `y`, wrapped.
-    fn texel(&self, x: f64, y: f64) -> [f64; 3] {
+    fn texel(&self, x: f64, y: f64, encoding: Encoding) -> [f64; 4] {
         let column = self.wrap[0].apply(x, self.width);
         let row = self.wrap[1].apply(y, self.height);
-        let [r, g, b, _] = self.texels[row * self.width + column];
-        [r, g, b].map(linear_from_srgb)
+        let [r, g, b, a] = self.texels[row * self.width + column];
+        let alpha = f64::from(a) / 255.0;
+        let [r, g, b] = match encoding {
+            Encoding::Srgb => [r, g, b].map(linear_from_srgb),
+            Encoding::Linear => [r, g, b].map(|value| f64::from(value) / 255.0),
+        };
+        [r, g, b, alpha]
     }
 }
 
@@ -210,7 +249,7 @@ impl Wrap {
 }
 
 /// Linear light of an 8-bit sRGB value (IEC 61966-2-1, section 5.2).
-fn linear_from_srgb(encoded: u8) -> f64 {
+pub(crate) fn linear_from_srgb(encoded: u8) -> f64 {
     static TABLE: std::sync::LazyLock<[f64; 256]> = std::sync::LazyLock::new(|| {
         std::array::from_fn(|i| {
             let c = i as f64 / 255.0;

@@ -31,6 +31,30 @@ impl LaneFilm {
         Self { lanes, values }
     }
 
+    /// One plane a lane.
+    fn planes(&self) -> Vec<Vec<f32>> {
+        let count = self.lanes.count();
+        let plane = |k: usize| self.values.iter().skip(k).step_by(count).copied().collect();
+        (0..count).map(plane).collect()
+    }
+
+    /// The colours of the light, for looking: red, green and blue planes.
+    #[must_use]
+    pub fn colors(&self) -> [Vec<f32>; 3] {
+        let rows = self.lanes.to_rgb();
+        let count = rows.len();
+        let plane = |k: usize| {
+            let pixels = self.values.par_chunks(count);
+            let mix = |lanes: &[f32]| -> f64 {
+                lanes.iter().zip(&rows).map(|(lane, row)| f64::from(*lane) * row[k]).sum()
+            };
+            #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+            let plane: Vec<f32> = pixels.map(|lanes| mix(lanes) as f32).collect();
+            plane
+        };
+        [plane(0), plane(1), plane(2)]
+    }
+
     /// A picture's linear sRGB in other lanes. Exact for colours that were not mixed by light on
     /// their way: a lane is linear in the colour.
     #[must_use]
@@ -65,11 +89,18 @@ pub(super) fn colors(layers: &[Layer]) -> Option<[&[f32]; 3]> {
 }
 
 /// The hyperspectral cube of a multispectral sensor's picture, channels named by wavelength.
-pub(crate) fn spectrum(scene: &Scene, layers: &[Layer]) -> Option<Layer> {
+pub(crate) fn spectrum(
+    scene: &Scene,
+    layers: &[Layer],
+    lane_film: Option<&LaneFilm>,
+) -> Option<Layer> {
     let sensor = scene.sensor.as_ref()?;
     let lanes = sensor.lanes();
     if sensor.spec().kind != SensorKind::Multispectral || lanes.grid().is_none() {
         return None;
+    }
+    if let Some(film) = lane_film.filter(|film| film.lanes == *lanes) {
+        return Some(cube(lanes, film.planes()));
     }
     let colors = colors(layers)?;
     let planes: Vec<Vec<f32>> = lanes

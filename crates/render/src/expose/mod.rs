@@ -120,7 +120,7 @@ pub struct Exposed {
     pub notes: Vec<String>,
 }
 
-/// Exposes the picture of `scene` and writes what its sensor gives into `folder`; nothing when the
+/// Exposes the picture of `scene`, or its light in the sensor's own lanes where there is any, and writes what its sensor gives into `folder`; nothing when the
 /// scene has no sensor. Told the share done, `progress` answers whether to go on.
 ///
 /// # Errors
@@ -128,7 +128,7 @@ pub struct Exposed {
 /// When a file cannot be written, or `progress` says stop.
 pub fn write(
     scene: &Scene,
-    picture: &Picture,
+    (picture, lane_film): (&Picture, Option<LaneFilm>),
     folder: &Path,
     outputs: Outputs,
     progress: &dyn Fn(f64) -> bool,
@@ -142,8 +142,13 @@ pub fn write(
     };
     // In the picture's own three lanes where the sensor can: the same numbers from less memory.
     let in_rgb = sensor.clone().in_lanes(Lanes::Rgb);
-    let sensor = in_rgb.as_ref().unwrap_or(sensor);
-    let film = LaneFilm::from_rgb(sensor.lanes().clone(), &colors);
+    let (sensor, film) = match lane_film.filter(|film| film.lanes == *sensor.lanes()) {
+        Some(film) => (sensor, film),
+        None => {
+            let sensor = in_rgb.as_ref().unwrap_or(sensor);
+            (sensor, LaneFilm::from_rgb(sensor.lanes().clone(), &colors))
+        }
+    };
     let shots: Vec<Shot> = sensor.shots().collect();
     let digits = match shots.len() {
         1 => 0,

@@ -54,12 +54,14 @@ impl MemoryForecast {
 /// Values a pixel of a layer.
 fn values(layer: &LayerSpec) -> u64 {
     match layer {
-        LayerSpec::Depth | LayerSpec::Distance | LayerSpec::Coverage => 1,
-        LayerSpec::Ids => 2,
+        LayerSpec::Depth | LayerSpec::Distance | LayerSpec::Coverage | LayerSpec::MaterialId => 1,
+        LayerSpec::Ids | LayerSpec::Uv => 2,
         LayerSpec::Normal { .. }
         | LayerSpec::Position { .. }
         | LayerSpec::Flat
-        | LayerSpec::Facing => 3,
+        | LayerSpec::Facing
+        | LayerSpec::Albedo
+        | LayerSpec::Radiance => 3,
     }
 }
 

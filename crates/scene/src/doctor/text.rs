@@ -46,7 +46,7 @@ impl fmt::Display for Diagnosis {
             row(f, "", &text)?;
         }
         if self.lights > 0 {
-            row(f, "lights", &format!("{} in the models, not used", self.lights))?;
+            row(f, "lights", &format!("{} in the models", self.lights))?;
         }
         row(f, "memory", &self.memory)?;
         for path in self.unused_files.iter().take(LISTED) {
@@ -107,6 +107,7 @@ impl Finding {
             Kind::MissingFile => "missing file",
             Kind::NotFinite => "not finite",
             Kind::Unused => "unused",
+            Kind::Assumed => "assumed",
             Kind::Irregular => "irregular",
         }
     }

@@ -13,6 +13,30 @@ pub enum TracerSpec {
     Facing {},
     /// Base colour without light.
     Flat {},
+    /// Light that one surface sends to the camera, with shadows.
+    Direct {},
+    /// The same, seen through mirrors and clear glass.
+    Whitted {
+        /// The most surfaces on a path.
+        #[serde(default = "default_whitted_bounces")]
+        #[schemars(range(min = 1, max = 1024))]
+        max_bounces: u32,
+    },
+    /// Global illumination.
+    Path {
+        /// The most surfaces on a path.
+        #[serde(default = "default_path_bounces")]
+        #[schemars(range(min = 1, max = 1024))]
+        max_bounces: u32,
+    },
+}
+
+fn default_whitted_bounces() -> u32 {
+    16
+}
+
+fn default_path_bounces() -> u32 {
+    32
 }
 
 impl TracerSpec {
@@ -22,6 +46,19 @@ impl TracerSpec {
         match self {
             Self::Facing {} => LayerSpec::Facing,
             Self::Flat {} => LayerSpec::Flat,
+            Self::Direct {} | Self::Whitted { .. } | Self::Path { .. } => LayerSpec::Radiance,
+        }
+    }
+
+    /// The word behind `type` in the file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Facing {} => "facing",
+            Self::Flat {} => "flat",
+            Self::Direct {} => "direct",
+            Self::Whitted { .. } => "whitted",
+            Self::Path { .. } => "path",
         }
     }
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use etendue_camera::CameraSpec;
-use etendue_tracer::{LayerSpec, MaterialSpec};
+use etendue_tracer::{LayerSpec, LightSpec, MaterialSpec};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -33,6 +33,10 @@ pub struct SceneSpec {
     /// Materials by name, for `objects` to use.
     #[serde(default)]
     pub materials: BTreeMap<String, MaterialSpec>,
+    /// Where light comes from, beside emissive surfaces and the models' own lights. When there is
+    /// none at all, a studio lights the scene; an empty list leaves it dark.
+    #[serde(default)]
+    pub lights: Option<Vec<LightSpec>>,
     /// How it is rendered.
     #[serde(default)]
     pub render: RenderSpec,

@@ -24,7 +24,7 @@ mod text;
 use std::path::{Path, PathBuf};
 
 use etendue_geometry::{Mesh, Transform};
-use etendue_tracer::{Material, Texture};
+use etendue_tracer::{Light, LightKind, Material, Texture};
 
 pub use error::ImportError;
 pub use note::{Note, NoteKind};
@@ -42,13 +42,17 @@ pub struct Wanted {
     pub colors: bool,
     /// Images of materials. They are located, not decoded.
     pub textures: bool,
+    /// Lights, and all that materials say of light.
+    pub light: bool,
 }
 
 impl Wanted {
     /// Geometry alone.
-    pub const NOTHING: Self = Self { normals: false, uvs: false, colors: false, textures: false };
+    pub const NOTHING: Self =
+        Self { normals: false, uvs: false, colors: false, textures: false, light: false };
     /// All that is understood.
-    pub const EVERYTHING: Self = Self { normals: true, uvs: true, colors: true, textures: true };
+    pub const EVERYTHING: Self =
+        Self { normals: true, uvs: true, colors: true, textures: true, light: true };
 }
 
 /// What becomes of defects in the data, such as a NaN position.
@@ -86,6 +90,8 @@ pub struct Import {
     pub textures: Vec<Texture>,
     /// Cameras of the default scene, in the order of their nodes.
     pub cameras: Vec<ImportedCamera>,
+    /// Lights of the default scene, in the order of their nodes; empty unless wanted.
+    pub lights: Vec<ImportedLight>,
     /// What was dropped, ignored or missing.
     pub notes: Vec<Note>,
     /// What reading cost.
@@ -103,6 +109,34 @@ pub struct ImportedPlacement {
     pub model_from_mesh: Transform,
     /// The node's or group's name; may be empty.
     pub name: String,
+}
+
+/// A light of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedLight {
+    /// The light in its node's frame: at the origin, shining along −Z.
+    pub light: Light,
+    /// From the node's frame to the model's (m).
+    pub model_from_light: Transform,
+}
+
+impl ImportedLight {
+    /// The light in the world of a model placed by `world_from_model`; `None` where that leaves it
+    /// no direction.
+    pub(crate) fn placed(&self, world_from_model: &Transform) -> Option<Light> {
+        let world = world_from_model.then_inner(&self.model_from_light);
+        let at = world.translation + world.translation_low;
+        let along = || (-world.linear.z_axis).try_normalize();
+        let kind = match self.light.kind.clone() {
+            LightKind::Point(_) => LightKind::Point(at),
+            LightKind::Spot { cos_outer, cos_inner, .. } => {
+                LightKind::Spot { at, axis: along()?, cos_outer, cos_inner }
+            }
+            LightKind::Directional(_) => LightKind::Directional(along()?),
+            other => other,
+        };
+        Some(Light { kind, ..self.light.clone() })
+    }
 }
 
 /// A camera of the file.

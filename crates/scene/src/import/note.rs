@@ -29,6 +29,8 @@ pub enum NoteKind {
     NotFinite,
     /// A part of the file that nothing uses.
     Unused,
+    /// Something that the file leaves open and was chosen.
+    Assumed,
     /// Data that breaks the format's rules and could be read all the same.
     Irregular,
 }

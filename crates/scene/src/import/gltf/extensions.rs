@@ -28,20 +28,20 @@ const LOOK: &str = "surfaces are shown without it";
 /// What is known of an extension by its name; `None` for one that nobody has heard of here.
 fn support(name: &str) -> Option<Support> {
     Some(match name {
-        "KHR_mesh_quantization" | "EXT_mesh_gpu_instancing" | "KHR_texture_transform" => {
-            Support::Full
-        }
+        "KHR_mesh_quantization"
+        | "EXT_mesh_gpu_instancing"
+        | "KHR_texture_transform"
+        | "KHR_lights_punctual"
+        | "KHR_materials_unlit"
+        | "KHR_materials_ior"
+        | "KHR_materials_transmission"
+        | "KHR_materials_emissive_strength"
+        | "KHR_materials_specular" => Support::Full,
         "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
             Support::Encoded(DECOMPRESS)
         }
         "KHR_texture_basisu" => Support::Encoded(TO_PNG),
         "EXT_texture_webp" | "EXT_texture_avif" => Support::Encoded(FROM_WEBP),
-        "KHR_lights_punctual" => {
-            Support::Without("its lights are not used; name lights in the scene")
-        }
-        "KHR_materials_unlit" => Support::Without(
-            "its surfaces are treated as any other; the flat layer shows them unlit",
-        ),
         "KHR_node_visibility" => Support::Without("nodes that it hides are shown"),
         "KHR_materials_variants" => Support::Without("the default variant is shown"),
         "KHR_materials_pbrSpecularGlossiness" => {

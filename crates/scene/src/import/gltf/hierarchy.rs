@@ -8,13 +8,16 @@ use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 use super::document::{Document, Node};
 use super::{Reader, damaged, instancing};
 use crate::import::note::{self, Note, NoteKind};
-use crate::import::{Import, ImportError, ImportedCamera, ImportedPlacement, Projection};
+use crate::import::{
+    Import, ImportError, ImportedCamera, ImportedLight, ImportedPlacement, Projection,
+};
 
 /// What stands in the scene.
 #[derive(Default)]
 pub(super) struct Scene {
     pub meshes: Vec<PlacedMesh>,
     pub cameras: Vec<ImportedCamera>,
+    pub lights: Vec<ImportedLight>,
 }
 
 /// A node with a mesh.
@@ -64,6 +67,9 @@ pub(super) fn walk(
         }
         if let Some(camera) = node.camera {
             scene.cameras.push(placed_camera(path, document, node, camera, model_from_node)?);
+        }
+        if let Some(light) = super::lights::placed(path, document, node, index, notes)? {
+            scene.lights.push(ImportedLight { light, model_from_light: model_from_node });
         }
         open.extend(node.children.iter().rev().map(|&child| (child, model_from_node)));
     }

@@ -1,15 +1,18 @@
-//! Materials: base colour, its texture and vertex colours.
+//! Materials: glTF's metallic-roughness surfaces with their textures, and vertex colours.
 //!
 //! Factors are linear (glTF 2.0, section 3.9.2). Materials keep the document's numbers; what names
 //! none gets one more at the end.
 
-use etendue_tracer::texture::{Filter, Wrap};
-use etendue_tracer::{ImageSource, Material, Paint, Texture, TextureUse};
+use etendue_tracer::material::{Alpha, GltfSurface, NormalMap};
+use etendue_tracer::texture::{Encoding, Filter, Wrap};
+use etendue_tracer::{Emission, ImageSource, Material, Paint, Scattering, Texture, TextureUse};
 use gltf::json;
 use json::extensions::texture::TextureTransform;
 use json::material::AlphaMode;
 use json::texture::{MagFilter, WrappingMode};
 use json::validation::Checked;
+use serde::Deserialize;
+use serde_json::Value;
 
 use super::buffers::{Bytes, data_uri, percent_decoded};
 use super::{Reader, extensions};
@@ -49,22 +52,140 @@ fn read(
     import: &mut Import,
 ) -> Result<Material, ImportError> {
     let name = material.name.clone().unwrap_or_default();
-    if let Checked::Valid(AlphaMode::Mask | AlphaMode::Blend) = material.alpha_mode {
-        let message = "transparency is not supported: the surface is opaque";
-        note::push(&mut import.notes, Note::new(NoteKind::Unsupported, &name, message));
-    }
     let surface = &material.pbr_metallic_roughness;
-    let [red, green, blue, _] = surface.base_color_factor.0.map(f64::from);
+    let [red, green, blue, alpha] = surface.base_color_factor.0.map(f64::from);
     let factor = [red, green, blue];
     let image = match &surface.base_color_texture {
-        Some(info) if images.reader.wanted.textures => images.use_of(info, import)?,
+        Some(info) if images.reader.wanted.textures => {
+            images.use_of(info.index.value(), info, Encoding::Srgb, import)?
+        }
         _ => None,
     };
     let base_color = match image {
         Some(image) => Paint::Image { factor, image },
         None => Paint::Plain(factor),
     };
-    Ok(Material { name, base_color, vertex_colors: true })
+    let plain = Material::new(name, base_color, Scattering::Matte);
+    let mut read = Material { vertex_colors: true, ..plain };
+    if images.reader.wanted.light {
+        read.alpha = match (&material.alpha_mode, material.alpha_cutoff) {
+            (Checked::Valid(AlphaMode::Mask), cutoff) => {
+                Alpha::Mask { factor: alpha, cutoff: cutoff.map_or(0.5, |c| f64::from(c.0)) }
+            }
+            (Checked::Valid(AlphaMode::Blend), _) => Alpha::Blend { factor: alpha },
+            _ => Alpha::Opaque,
+        };
+        read.scattering = scattering(images, material, import)?;
+        read.emission = emission(images, material, import)?;
+        read.normal_map = match &material.normal_texture {
+            Some(normal) => {
+                let moved = normal.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));
+                let info = info_of(normal.index, normal.tex_coord, moved);
+                let image = images.use_of(normal.index.value(), &info, Encoding::Linear, import)?;
+                image.map(|image| NormalMap { image, scale: f64::from(normal.scale) })
+            }
+            None => None,
+        };
+    }
+    Ok(read)
+}
+
+const TRANSFORM: &str = "KHR_texture_transform";
+
+/// A texture's use in the words of the base colour's, whose type the document has no second time.
+fn info_of(
+    index: json::Index<json::Texture>,
+    tex_coord: u32,
+    moved: Option<&Value>,
+) -> json::texture::Info {
+    let moved = moved.and_then(|value| TextureTransform::deserialize(value).ok());
+    let extensions = moved.map(|transform| json::extensions::texture::Info {
+        texture_transform: Some(transform),
+        ..Default::default()
+    });
+    json::texture::Info { index, tex_coord, extensions, extras: json::Extras::default() }
+}
+
+/// The metallic-roughness surface and the extensions that change it.
+fn scattering(
+    images: &mut Images<'_>,
+    material: &json::Material,
+    import: &mut Import,
+) -> Result<Scattering, ImportError> {
+    let extension = |name: &str| material.extensions.as_ref().and_then(|e| e.others.get(name));
+    if extension("KHR_materials_unlit").is_some() {
+        return Ok(Scattering::Unlit);
+    }
+    let surface = &material.pbr_metallic_roughness;
+    let number = |name: &str, key: &str, default: f64| {
+        let value = extension(name).and_then(|e| e.get(key)).and_then(Value::as_f64);
+        value.filter(|v| v.is_finite() && *v >= 0.0).unwrap_or(default)
+    };
+    let texture = |name: &str, key: &str| {
+        let value = extension(name)?.get(key)?;
+        json::texture::Info::deserialize(value).ok()
+    };
+    let mut read = GltfSurface {
+        metallic: f64::from(surface.metallic_factor.0),
+        roughness: f64::from(surface.roughness_factor.0),
+        ..GltfSurface::default()
+    };
+    let mut placed = |info: Option<&json::texture::Info>, encoding| match info {
+        Some(info) => images.use_of(info.index.value(), info, encoding, import),
+        None => Ok(None),
+    };
+    read.metallic_roughness =
+        placed(surface.metallic_roughness_texture.as_ref(), Encoding::Linear)?;
+    // An index of 0 stands for a reflectance of 1 in the extension; glass of 10¹⁵ reflects as much.
+    read.ior = match number("KHR_materials_ior", "ior", 1.5) {
+        0.0 => 1e15,
+        ior => ior.max(1.0),
+    };
+    let specular = "KHR_materials_specular";
+    read.specular = number(specular, "specularFactor", 1.0).min(1.0);
+    let color = extension(specular).and_then(|e| e.get("specularColorFactor"));
+    if let Some(color) = color.and_then(|c| <[f64; 3]>::deserialize(c).ok()) {
+        read.specular_color = color.map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 });
+    }
+    let info = texture(specular, "specularTexture");
+    read.specular_texture = placed(info.as_ref(), Encoding::Linear)?;
+    let info = texture(specular, "specularColorTexture");
+    read.specular_color_texture = placed(info.as_ref(), Encoding::Srgb)?;
+    let transmission = "KHR_materials_transmission";
+    read.transmission = number(transmission, "transmissionFactor", 0.0).min(1.0);
+    let info = texture(transmission, "transmissionTexture");
+    read.transmission_texture = placed(info.as_ref(), Encoding::Linear)?;
+    Ok(Scattering::Gltf(Box::new(read)))
+}
+
+fn emission(
+    images: &mut Images<'_>,
+    material: &json::Material,
+    import: &mut Import,
+) -> Result<Option<Emission>, ImportError> {
+    let factor = material.emissive_factor.0.map(f64::from);
+    if !factor.iter().all(|c| c.is_finite() && *c >= 0.0) {
+        let subject = material.name.clone().unwrap_or_default();
+        let message = "its emissive factor is below zero or not finite; it does not shine";
+        note::push(&mut import.notes, Note::new(NoteKind::NotFinite, subject, message));
+        return Ok(None);
+    }
+    if factor == [0.0; 3] {
+        return Ok(None);
+    }
+    let image = match &material.emissive_texture {
+        Some(info) => images.use_of(info.index.value(), info, Encoding::Srgb, import)?,
+        None => None,
+    };
+    let radiance = match image {
+        Some(image) => Paint::Image { factor, image },
+        None => Paint::Plain(factor),
+    };
+    let name = "KHR_materials_emissive_strength";
+    let strength = material.extensions.as_ref().and_then(|e| e.others.get(name));
+    let strength = strength.and_then(|e| e.get("emissiveStrength")).and_then(Value::as_f64);
+    let strength = strength.filter(|s| s.is_finite() && *s >= 0.0).unwrap_or(1.0);
+    Ok(Some(Emission { radiance, strength, illuminant: None, two_sided: true }))
 }
 
 /// The textures that materials name, each located once.
@@ -77,10 +198,11 @@ struct Images<'a> {
 impl Images<'_> {
     fn use_of(
         &mut self,
+        index: usize,
         info: &json::texture::Info,
+        encoding: Encoding,
         import: &mut Import,
     ) -> Result<Option<TextureUse>, ImportError> {
-        let index = info.index.value();
         let known = self.of_texture.get(index).copied().flatten();
         let texture = match known {
             Some(texture) => texture,
@@ -98,6 +220,7 @@ impl Images<'_> {
             texture,
             uv_set: moved.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord),
             transform: moved.map_or(TextureUse::UNCHANGED, matrix),
+            encoding,
         }))
     }
 

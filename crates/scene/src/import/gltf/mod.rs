@@ -15,6 +15,7 @@ mod extensions;
 mod glb;
 mod hierarchy;
 mod instancing;
+mod lights;
 mod material;
 mod primitive;
 
@@ -68,6 +69,9 @@ pub(super) fn import(
     material::load(&reader, &mut import)?;
     hierarchy::place(&reader, &scene, &primitives, &mut import)?;
     import.cameras = scene.cameras;
+    if wanted.light {
+        import.lights = scene.lights;
+    }
     if document.has_animations {
         note::push(
             &mut import.notes,

@@ -9,8 +9,11 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use etendue_tracer::texture::{Filter, Wrap};
-use etendue_tracer::{ImageSource, Material, Paint, Texture, TextureUse};
+use etendue_tracer::material::{Alpha, GltfSurface};
+use etendue_tracer::texture::{Encoding, Filter, Wrap};
+use etendue_tracer::{
+    Emission, ImageSource, Ior, Material, Paint, Scattering, Texture, TextureUse,
+};
 
 use super::segment::Segment;
 use crate::import::files::Files;
@@ -188,7 +191,69 @@ fn resolve(
         Some(image) => Paint::Image { factor: finite.unwrap_or([1.0; 3]), image },
         None => finite.map_or(Material::unnamed().base_color, Paint::Plain),
     };
-    Ok(Material { name: material.name.clone(), base_color, ..Material::unnamed() })
+    let plain = Material { name: material.name.clone(), base_color, ..Material::unnamed() };
+    Ok(if wanted.light { nearest(material, plain) } else { plain })
+}
+
+/// The nearest of our materials to what an MTL material says.
+///
+/// 1. Glass (`illum` 4, 6, 7 or 9): a dielectric of index `Ni`.
+/// 2. Mirrors (`illum` 3, 5 or 8 with `Ks` and no `Kd`): metal of colour `Ks`.
+/// 3. Highlights (`Ks` above zero): a matte base under a sheet that reflects `Ks` face on.
+/// 4. All else is matte.
+///
+/// The roughness of 2 and 3 is that whose GGX peak is as wide as Phong's of exponent `Ns`, α² =
+/// 2 / (Ns + 2) (Walter et al. 2007, section 5.2). `d` below 1 leaves that share of 2 to 4 in place.
+/// `Ke` shines from both sides whatever else the surface does; so does `Ka` above 1, which can be no
+/// reflectance and is how lamps were written before `Ke`.
+fn nearest(material: &tobj::Material, plain: Material) -> Material {
+    let sound = |color: Option<[f64; 3]>| {
+        let color = color.filter(|c| c.iter().all(|v| v.is_finite()));
+        color.unwrap_or_default().map(|v| v.clamp(0.0, 1.0))
+    };
+    let (diffuse, specular) = (sound(material.diffuse), sound(material.specular));
+    let shininess = material.shininess.filter(|ns| ns.is_finite()).unwrap_or(0.0).max(0.0);
+    let roughness = (2.0 / (shininess + 2.0)).powf(0.25);
+    let ior = material.optical_density.filter(|n| n.is_finite()).map(|n| n.max(1.0));
+    let dark = |color: [f64; 3]| color == [0.0; 3];
+    let mut read = plain;
+    match material.illumination_model {
+        Some(4 | 6 | 7 | 9) => {
+            read.base_color = Paint::Plain([1.0; 3]);
+            read.scattering = Scattering::Dielectric(Ior::Constant(ior.unwrap_or(1.5)));
+        }
+        Some(3 | 5 | 8) if dark(diffuse) && !dark(specular) => {
+            read.base_color = Paint::Plain(specular);
+            read.scattering = Scattering::Metal { roughness };
+        }
+        _ if !dark(specular) => {
+            let surface = GltfSurface {
+                metallic: 0.0,
+                roughness,
+                specular_color: specular.map(|s| s / 0.04),
+                ..GltfSurface::default()
+            };
+            read.scattering = Scattering::Gltf(Box::new(surface));
+        }
+        _ => {}
+    }
+    let dissolve = material.dissolve.filter(|d| d.is_finite()).unwrap_or(1.0);
+    if dissolve < 1.0 && !matches!(read.scattering, Scattering::Dielectric(_)) {
+        read.alpha = Alpha::Blend { factor: dissolve.max(0.0) };
+    }
+    let shines = |[red, green, blue]: [f64; 3]| Emission {
+        radiance: Paint::Plain([red, green, blue]),
+        strength: 1.0,
+        illuminant: None,
+        two_sided: true,
+    };
+    let words = material.unknown_param.get("Ke").map(String::as_str).unwrap_or_default();
+    let numbers: Vec<f64> = words.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+    let own = <[f64; 3]>::try_from(numbers).ok().filter(|color| !dark(*color));
+    let ambient = material.ambient.filter(|color| color.iter().any(|v| *v > 1.0));
+    let sound = |color: &[f64; 3]| color.iter().all(|v| v.is_finite() && *v >= 0.0);
+    read.emission = own.or(ambient).filter(sound).map(shines);
+    read
 }
 
 /// The images that maps name, each once.
@@ -224,7 +289,7 @@ impl Maps<'_> {
         let ([su, sv], [ou, ov]) = (map.scale, map.offset);
         // The map's v runs up and ours down: 1 − (sv·(1 − v) + ov).
         let transform = [[su, 0.0, ou], [0.0, sv, 1.0 - sv - ov]];
-        Ok(Some(TextureUse { texture, uv_set: 0, transform }))
+        Ok(Some(TextureUse { texture, uv_set: 0, transform, encoding: Encoding::Srgb }))
     }
 }
 

@@ -1,0 +1,210 @@
+use super::*;
+
+const WHITE: Color = [1.0; 3];
+
+fn bsdf(model: Model, cos_theta: f64) -> Bsdf {
+    let wo = DVec3::new((1.0 - cos_theta * cos_theta).sqrt(), 0.0, cos_theta);
+    Bsdf::new(model, [DVec3::Z, DVec3::Z], wo, [WHITE, WHITE])
+}
+
+fn layered(metallic: f64, roughness: f64, transmission: f64) -> Model {
+    let alpha = roughness * roughness;
+    Model::Layered(Layered { metallic, alpha, f0: 0.04, f90: 1.0, transmission })
+}
+
+fn all() -> Vec<(&'static str, Model)> {
+    let mut models = vec![("matte", Model::Matte), ("mirror", Model::Mirror)];
+    for eta in [1.5, 1.0 / 1.5, 1.0] {
+        models.push(("glass", Model::Dielectric { eta }));
+    }
+    for roughness in [0.0_f64, 0.05, 0.3, 0.7, 1.0] {
+        models.push(("metal", Model::Metal { alpha: roughness * roughness }));
+        for metallic in [0.0, 0.4, 1.0] {
+            models.push(("gltf", layered(metallic, roughness, 0.0)));
+        }
+        models.push(("wall", layered(0.0, roughness, 0.7)));
+    }
+    let shiny = Layered { metallic: 0.0, alpha: 0.09, f0: 0.8, f90: 1.0, transmission: 0.3 };
+    models.push(("shiny", Model::Layered(shiny)));
+    models
+}
+
+fn total(w: Weights) -> f64 {
+    w.white + w.base + w.highlight
+}
+
+/// Points of a square grid.
+fn grid(n: u32) -> impl Iterator<Item = [f64; 2]> {
+    let at = move |k: u32| (f64::from(k) + 0.5) / f64::from(n);
+    (0..n * n).map(move |k| [at(k % n), at(k / n)])
+}
+
+/// A white surface returns no more than falls in: the mean weight of its own sampling is the albedo.
+#[test]
+fn energy_is_conserved() {
+    for (name, model) in all() {
+        for cosine in [1.0, 0.8, 0.5, 0.2, 0.05, 0.01] {
+            let surface = bsdf(model, cosine);
+            let (mut sum, n, layers) = (0.0, 48, 16);
+            for k in 0..layers {
+                let choice = (f64::from(k) + 0.5) / f64::from(layers);
+                for square in grid(n) {
+                    let Some(s) = surface.sample(choice, square) else { continue };
+                    // A boundary compresses radiance, not power: its own factor is undone.
+                    let compressed = match model {
+                        Model::Dielectric { eta } if s.direction.z < 0.0 => eta * eta,
+                        _ => 1.0,
+                    };
+                    sum += total(s.weights) * compressed;
+                }
+            }
+            let albedo = sum / f64::from(n * n * layers);
+            // 1e-3 is the bound asked for; the choice among parts is integrated with 16 steps, which
+            // weigh the parts' edges to 1/32 of their difference.
+            assert!(albedo <= 1.0 + 1e-3 + 0.031, "{name} {model:?} at {cosine}: {albedo}");
+        }
+    }
+}
+
+/// The same by integration of the value over the hemispheres, for models without single directions:
+/// no more than 1 + 1e-3.
+#[test]
+fn values_integrate_to_no_more_than_one() {
+    for (name, model) in all() {
+        for cosine in [1.0, 0.5, 0.15, 0.05] {
+            let surface = bsdf(model, cosine);
+            if surface.is_delta() {
+                continue;
+            }
+            let mut sum = 0.0;
+            let n = 400;
+            // cos θ and φ, midpoint rule; squares of the cosine resolve grazing directions.
+            for [u, v] in grid(n) {
+                let phi = std::f64::consts::TAU * v;
+                let z = 1.0 - (1.0 - u) * (1.0 - u);
+                let r = (1.0 - z * z).sqrt();
+                for side in [1.0, -1.0] {
+                    let wi = DVec3::new(r * phi.cos(), r * phi.sin(), side * z);
+                    sum += total(surface.evaluate(wi).0) * 2.0 * (1.0 - u);
+                }
+            }
+            let albedo = sum / f64::from(n * n) * std::f64::consts::TAU;
+            // Lobes narrower than the grid's cells are integrated by their own sampling above.
+            let narrow = matches!(model, Model::Metal { alpha } if alpha < 0.01)
+                || matches!(model, Model::Layered(l) if l.alpha < 0.01);
+            if !narrow {
+                assert!(albedo <= 1.0 + 1e-3, "{name} {model:?} at {cosine}: {albedo}");
+            }
+        }
+    }
+}
+
+/// f(wo, wi) = f(wi, wo).
+#[test]
+fn values_are_reciprocal() {
+    for (name, model) in all() {
+        for [u, v] in grid(9) {
+            for side in [1.0, -1.0] {
+                let z = 0.02 + 0.97 * u;
+                let wi = DVec3::new(
+                    (1.0 - z * z).sqrt() * (6.0 * v).cos(),
+                    (1.0 - z * z).sqrt() * (6.0 * v).sin(),
+                    side * z,
+                );
+                let cosine: f64 = 0.3;
+                let wo = DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
+                let value = |a: DVec3, b: DVec3| {
+                    // Seen from below the wall is turned over.
+                    let up = a.z.signum() * DVec3::Z;
+                    let s = Bsdf::new(model, [up, up], a, [WHITE, WHITE]);
+                    total(s.evaluate(b).0) / b.z.abs()
+                };
+                let (there, back) = (value(wo, wi), value(wi, wo));
+                // A few dozen roundings, and cancellation in the half vector's cosine.
+                let bound = 1e-9 * there.max(back).max(1e-12);
+                assert!((there - back).abs() <= bound, "{name} {model:?}: {there} {back}");
+            }
+        }
+    }
+}
+
+/// χ² of sampled directions against the density that `evaluate` states, over cells of equal solid
+/// angle on the sphere; and the sample's own density and weight against `evaluate`.
+#[test]
+fn sampling_has_the_density_it_states() {
+    const ROWS: usize = 16;
+    const COLUMNS: usize = 24;
+    for (name, model) in all() {
+        for cosine in [0.9, 0.35] {
+            let surface = bsdf(model, cosine);
+            if surface.is_delta() {
+                continue;
+            }
+            let cell = |w: DVec3| {
+                let row = ((1.0 - w.z) / 2.0 * ROWS as f64).clamp(0.0, ROWS as f64 - 1.0);
+                let phi = w.y.atan2(w.x).rem_euclid(std::f64::consts::TAU);
+                let column = (phi / std::f64::consts::TAU * COLUMNS as f64) as usize;
+                row as usize * COLUMNS + column.min(COLUMNS - 1)
+            };
+            let n: u32 = 200_000;
+            let mut counts = vec![0.0_f64; ROWS * COLUMNS];
+            let mut state = 0x1234_5678_9abc_def1_u64;
+            let mut random = || {
+                // xorshift*: Vigna 2016.
+                state ^= state >> 12;
+                state ^= state << 25;
+                state ^= state >> 27;
+                (state.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            for _ in 0..n {
+                let Some(s) = surface.sample(random(), [random(), random()]) else { continue };
+                if s.density == f64::INFINITY {
+                    continue;
+                }
+                let (value, density) = surface.evaluate(s.direction);
+                assert!((density / s.density - 1.0).abs() < 1e-6, "{name} {model:?}");
+                assert!((total(value) / density / total(s.weights) - 1.0).abs() < 1e-6);
+                counts[cell(s.direction)] += 1.0;
+            }
+            // Expected counts by the midpoint rule on a finer grid.
+            let fine = 12;
+            let mut expected = vec![0.0_f64; ROWS * COLUMNS];
+            for row in 0..ROWS * fine {
+                for column in 0..COLUMNS * fine {
+                    let z = 1.0 - 2.0 * (row as f64 + 0.5) / (ROWS * fine) as f64;
+                    let phi =
+                        std::f64::consts::TAU * (column as f64 + 0.5) / (COLUMNS * fine) as f64;
+                    let r = (1.0 - z * z).sqrt();
+                    let w = DVec3::new(r * phi.cos(), r * phi.sin(), z);
+                    let area = 4.0 * PI / (ROWS * COLUMNS * fine * fine) as f64;
+                    expected[row / fine * COLUMNS + column / fine] +=
+                        surface.evaluate(w).1 * area * f64::from(n);
+                }
+            }
+            let narrow = matches!(model, Model::Metal { alpha } if alpha < 0.01)
+                || matches!(model, Model::Layered(l) if l.alpha < 0.01);
+            if narrow {
+                // The lobe is finer than the cells of the expectation.
+                continue;
+            }
+            let (mut chi2, mut freedom) = (0.0, 0.0);
+            let (mut few_seen, mut few_expected) = (0.0, 0.0);
+            for (seen, wanted) in counts.iter().zip(&expected) {
+                if *wanted < 10.0 {
+                    few_seen += seen;
+                    few_expected += wanted;
+                } else {
+                    chi2 += (seen - wanted).powi(2) / wanted;
+                    freedom += 1.0;
+                }
+            }
+            if few_expected > 10.0 {
+                chi2 += (few_seen - few_expected).powi(2) / few_expected;
+                freedom += 1.0;
+            }
+            // χ² has mean ν and variance 2 ν: five standard deviations.
+            let bound = freedom + 5.0 * (2.0_f64 * freedom).sqrt();
+            assert!(chi2 < bound, "{name} {model:?} at {cosine}: {chi2} > {bound}");
+        }
+    }
+}

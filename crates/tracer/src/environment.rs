@@ -1,0 +1,264 @@
+//! Images of all directions, and directions by how bright they are.
+//!
+//! An image is a latitude–longitude map: its middle looks along −Z, its left and right edges along
+//! +Z, its top to +Y, and +X is right of the middle.
+
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+use etendue_geometry::glam::DVec3;
+
+use crate::Color;
+use crate::sampling::AliasTable;
+use crate::texture::{ImageError, linear_from_srgb, read_image};
+
+/// The most cells of the grid that directions are chosen on, across and down.
+const CELLS: [usize; 2] = [1024, 512];
+
+/// Radiance from all directions.
+#[derive(Debug, Clone)]
+pub struct EnvironmentMap {
+    width: usize,
+    height: usize,
+    /// Linear RGB, row 0 at the top.
+    texels: Vec<[f32; 3]>,
+    /// Texels that were not finite or below zero, and count as black.
+    pub dropped: u64,
+}
+
+impl EnvironmentMap {
+    /// Reads an HDR, EXR, PNG or JPEG file. 8- and 16-bit images are taken for sRGB.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be read or decoded.
+    pub fn read(path: &Path) -> Result<Self, ImageError> {
+        let name = path.display().to_string();
+        let bytes = std::fs::read(path)
+            .map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
+        let decoded = read_image(&name, &bytes)?;
+        let is_linear = matches!(
+            decoded,
+            image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_)
+        );
+        let size = [decoded.width() as usize, decoded.height() as usize];
+        let texels = if is_linear {
+            decoded.into_rgb32f().pixels().map(|p| p.0).collect()
+        } else {
+            let encoded = decoded.into_rgb8();
+            #[expect(clippy::cast_possible_truncation, reason = "radiance is kept as f32")]
+            let linear = |c: u8| linear_from_srgb(c) as f32;
+            encoded.pixels().map(|p| p.0.map(linear)).collect()
+        };
+        Ok(Self::new(size, texels))
+    }
+
+    /// From linear RGB, row by row from the top.
+    #[must_use]
+    pub fn new([width, height]: [usize; 2], mut texels: Vec<[f32; 3]>) -> Self {
+        texels.resize(width * height, [0.0; 3]);
+        let mut dropped = 0;
+        for texel in &mut texels {
+            if !texel.iter().all(|c| c.is_finite() && *c >= 0.0) {
+                *texel = texel.map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 });
+                dropped += 1;
+            }
+        }
+        Self { width, height, texels, dropped }
+    }
+
+    /// What lights a model that brings no light of its own: a bright grey sky, a darker floor, and a
+    /// large soft lamp up on the left before the model.
+    #[must_use]
+    pub fn studio() -> Self {
+        let (width, height) = (256, 128);
+        let lamp = DVec3::new(-0.6, 0.7, 0.55).normalize();
+        let texels = (0..width * height)
+            .map(|k| {
+                let at = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
+                let d = direction([at(k % width, width), at(k / width, height)]);
+                let sky = 0.3 + 0.2 * d.y;
+                let glow = (6.0 * (d.dot(lamp) - 0.82)).clamp(0.0, 1.0);
+                #[expect(clippy::cast_possible_truncation, reason = "radiance is kept as f32")]
+                let value = (sky + 4.0 * glow * glow * (3.0 - 2.0 * glow)) as f32;
+                [value, value, value]
+            })
+            .collect();
+        Self::new([width, height], texels)
+    }
+
+    /// Bytes of the texels.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.texels.len() * size_of::<[f32; 3]>()
+    }
+
+    /// Columns and rows.
+    #[must_use]
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// Radiance from the unit direction `d`, interpolated.
+    #[must_use]
+    pub fn radiance(&self, d: DVec3) -> Color {
+        if self.texels.is_empty() {
+            return [0.0; 3];
+        }
+        let [u, v] = place(d);
+        let (x, y) = (u * self.width as f64 - 0.5, v * self.height as f64 - 0.5);
+        let (x0, y0) = (x.floor(), y.floor());
+        let (fx, fy) = (x - x0, y - y0);
+        let [a, b] = [self.texel(x0, y0), self.texel(x0 + 1.0, y0)];
+        let [c, d] = [self.texel(x0, y0 + 1.0), self.texel(x0 + 1.0, y0 + 1.0)];
+        std::array::from_fn(|k| {
+            let top = f64::from(a[k]) * (1.0 - fx) + f64::from(b[k]) * fx;
+            let bottom = f64::from(c[k]) * (1.0 - fx) + f64::from(d[k]) * fx;
+            top * (1.0 - fy) + bottom * fy
+        })
+    }
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "wrapped, clamped")]
+    fn texel(&self, x: f64, y: f64) -> [f32; 3] {
+        let column = x.rem_euclid(self.width as f64) as usize;
+        let row = y.clamp(0.0, (self.height - 1) as f64) as usize;
+        self.texels[row * self.width + column.min(self.width - 1)]
+    }
+}
+
+/// Places (u, v) in 0..1 of a map for a unit direction.
+fn place(d: DVec3) -> [f64; 2] {
+    [0.5 + d.x.atan2(-d.z) / TAU, d.y.clamp(-1.0, 1.0).acos() / PI]
+}
+
+/// The direction of a place.
+fn direction([u, v]: [f64; 2]) -> DVec3 {
+    let (sin_theta, cos_theta) = (PI * v).sin_cos();
+    let (sin_phi, cos_phi) = (TAU * (u - 0.5)).sin_cos();
+    DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
+}
+
+/// Directions by the brightness of a map: a grid of cells, each uniform in u and v (Pharr, Jakob and
+/// Humphreys, *Physically Based Rendering*, 4th edition, section 12.5).
+#[derive(Debug, Clone)]
+pub struct MapSampler {
+    columns: usize,
+    rows: usize,
+    cells: AliasTable,
+    /// Mean radiance over all directions, the mean of the three colours.
+    pub mean: f64,
+}
+
+impl MapSampler {
+    /// For `map`.
+    #[must_use]
+    pub fn new(map: &EnvironmentMap) -> Self {
+        let columns = map.width.clamp(1, CELLS[0]);
+        let rows = map.height.clamp(1, CELLS[1]);
+        let mut bright = vec![0.0; columns * rows];
+        for (k, texel) in map.texels.iter().enumerate() {
+            let (x, y) = (k % map.width * columns / map.width, k / map.width * rows / map.height);
+            bright[y * columns + x] += f64::from(texel[0] + texel[1] + texel[2]) / 3.0;
+        }
+        let texels_a_cell = map.texels.len() as f64 / bright.len() as f64;
+        let mut weights = Vec::with_capacity(bright.len());
+        let mut mean = 0.0;
+        for y in 0..rows {
+            let row = (PI * (y as f64 + 0.5) / rows as f64).sin();
+            for x in 0..columns {
+                // Interpolation carries a bright texel into the cells beside it.
+                let mut around = 0.0;
+                for dy in [rows - 1, 0, 1] {
+                    for dx in [columns - 1, 0, 1] {
+                        let near = match (dy, y) {
+                            (1, y) => (y + 1).min(rows - 1),
+                            (0, y) => y,
+                            (_, y) => y.saturating_sub(1),
+                        };
+                        around += bright[near * columns + (x + dx) % columns];
+                    }
+                }
+                let own = bright[y * columns + x];
+                mean += own / texels_a_cell * row;
+                weights.push((0.75 * own + 0.25 * around / 9.0) * row);
+            }
+        }
+        // The mean of sin θ over rows is 2/π.
+        let mean = mean / (columns * rows) as f64 * PI / 2.0;
+        Self { columns, rows, cells: AliasTable::new(&weights), mean }
+    }
+
+    /// A direction and its density (1/sr).
+    #[must_use]
+    pub fn sample(&self, [u, v]: [f64; 2]) -> (DVec3, f64) {
+        let (cell, rest) = self.cells.pick(u);
+        let x = (cell % self.columns) as f64 + rest;
+        let y = (cell / self.columns) as f64 + v;
+        let d = direction([x / self.columns as f64, y / self.rows as f64]);
+        (d, self.density(d))
+    }
+
+    /// The density (1/sr) of a unit direction.
+    #[must_use]
+    pub fn density(&self, d: DVec3) -> f64 {
+        let [u, v] = place(d);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "u and v are in 0..=1"
+        )]
+        let [x, y] = [
+            ((u * self.columns as f64) as usize).min(self.columns - 1),
+            ((v * self.rows as f64) as usize).min(self.rows - 1),
+        ];
+        let sin_theta = (d.x * d.x + d.z * d.z).sqrt();
+        if sin_theta <= 0.0 {
+            return 0.0;
+        }
+        let share = self.cells.probability(y * self.columns + x);
+        share * (self.columns * self.rows) as f64 / (2.0 * PI * PI * sin_theta)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_and_directions_are_inverse() {
+        assert!((direction([0.5, 0.5]) - DVec3::NEG_Z).length() < 1e-15);
+        assert!((direction([0.75, 0.5]) - DVec3::X).length() < 1e-15);
+        assert!((direction([0.3, 0.0]) - DVec3::Y).length() < 1e-15);
+        for d in [DVec3::new(0.3, -0.4, 0.5).normalize(), DVec3::new(-0.9, 0.1, -0.2).normalize()] {
+            assert!((direction(place(d)) - d).length() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn densities_integrate_to_one_and_follow_the_light() {
+        let mut texels = vec![[0.1_f32; 3]; 64 * 32];
+        texels[10 * 64 + 20] = [500.0; 3];
+        let map = EnvironmentMap::new([64, 32], texels);
+        let sampler = MapSampler::new(&map);
+        let (mut integral, mut mean, n) = (0.0, 0.0, 512);
+        for k in 0..n * n {
+            let square = [((k % n) as f64 + 0.5) / n as f64, ((k / n) as f64 + 0.5) / n as f64];
+            let d = crate::sampling::sphere_direction(square);
+            integral += sampler.density(d) * 4.0 * PI / (n * n) as f64;
+            mean += map.radiance(d)[0] / (n * n) as f64;
+        }
+        // A bright texel is 16 × 16 points wide here: its edges are met to one in sixteen of 1 − ε.
+        assert!((integral - 1.0).abs() < 0.02, "{integral}");
+        assert!((sampler.mean / mean - 1.0).abs() < 0.02, "{} {mean}", sampler.mean);
+        let bright = direction([20.5 / 64.0, 10.5 / 32.0]);
+        assert!(sampler.density(bright) > 50.0 * sampler.density(DVec3::X));
+    }
+
+    #[test]
+    fn what_is_no_radiance_is_dropped_and_counted() {
+        let map =
+            EnvironmentMap::new([2, 1], vec![[f32::NAN, 1.0, -3.0], [f32::INFINITY, 0.0, 2.0]]);
+        assert_eq!(map.dropped, 2);
+        assert!(map.radiance(DVec3::X).iter().all(|c| c.is_finite()));
+    }
+}

@@ -1,0 +1,484 @@
+//! The lights of a scene, and how one of them is chosen for a point.
+//!
+//! A light is chosen by its power (W, of the mean of the three colours), a triangle of an emissive
+//! mesh by its own: `π A L` for one side. Lights far away are counted by what falls onto the scene's
+//! sphere of radius R: `π R² E` for parallel light, `4 π² R² L` for an environment.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use etendue_geometry::Placement;
+use etendue_geometry::glam::DVec3;
+use etendue_spectrum::{Illuminant, NoOverlap};
+
+use crate::environment::{EnvironmentMap, MapSampler};
+use crate::reference::{Spot, Surroundings};
+use crate::sampling::{AliasTable, sphere_direction, triangle_point};
+use crate::spawn::Anchor;
+use crate::spectral::Spectral;
+use crate::{Color, Material};
+
+/// A light of the scene, beside its emissive surfaces.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Light {
+    /// Where the light goes.
+    pub kind: LightKind,
+    /// Radiant intensity, irradiance or radiance, by the kind: linear RGB.
+    pub color: Color,
+    /// The spectrum that the colour multiplies; equal energy when absent.
+    pub illuminant: Option<Illuminant>,
+}
+
+impl Light {
+    /// The file of an environment's image.
+    #[must_use]
+    pub fn file(&self) -> Option<&std::path::PathBuf> {
+        match &self.kind {
+            LightKind::Environment { image: EnvironmentImage::File(path), .. } => Some(path),
+            _ => None,
+        }
+    }
+}
+
+/// The kinds of lights.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LightKind {
+    /// A point (m) with an intensity.
+    Point(DVec3),
+    /// A point (m) with an intensity in a cone.
+    Spot {
+        /// Where it is (m).
+        at: DVec3,
+        /// Where it is aimed (unit).
+        axis: DVec3,
+        /// Cosine of the half-angle outside of which it is dark.
+        cos_outer: f64,
+        /// Cosine of the half-angle inside of which it is at its full.
+        cos_inner: f64,
+    },
+    /// Parallel light that goes along this unit vector, with an irradiance.
+    Directional(DVec3),
+    /// Radiance from all around.
+    Environment {
+        /// Its image.
+        image: EnvironmentImage,
+        /// Turn about +Y (radians).
+        rotation: f64,
+    },
+}
+
+/// Where an environment's image comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum EnvironmentImage {
+    /// There is none: alike from all sides.
+    Constant,
+    /// The one that lights models without a light ([`EnvironmentMap::studio`]).
+    Studio,
+    /// A file.
+    File(std::path::PathBuf),
+}
+
+/// glTF's fall-off between a spot light's cones (`KHR_lights_punctual`): the square of the share.
+fn spot_falloff(cosine: f64, cos_outer: f64, cos_inner: f64) -> f64 {
+    if cosine >= cos_inner {
+        return 1.0;
+    }
+    let share = ((cosine - cos_outer) / (cos_inner - cos_outer)).clamp(0.0, 1.0);
+    share * share
+}
+
+/// A point's view of one light.
+#[derive(Debug, Clone, Copy)]
+pub struct Toward {
+    /// From the point to the light (unit).
+    pub direction: DVec3,
+    /// Density (1/sr) times the light's chance; of a light that is a point, its chance alone.
+    pub density: f64,
+    /// The light can be met by a direction in no other way.
+    pub is_delta: bool,
+    /// Where the light is (m); a surface knows how exactly. `None` far away.
+    pub end: End,
+}
+
+/// Where a ray to a light ends.
+#[derive(Debug, Clone, Copy)]
+pub enum End {
+    /// Nowhere.
+    Far,
+    /// At a point (m).
+    Point(DVec3),
+    /// On a surface.
+    Surface(Anchor),
+}
+
+/// All lights of a scene, ready to be chosen from.
+#[derive(Debug)]
+pub struct Lights {
+    lights: Vec<Light>,
+    /// The lanes of each light, one light after the other.
+    lanes: Vec<f64>,
+    environment: Option<Environment>,
+    /// The lanes by which each material's emission is multiplied, where it has an illuminant.
+    tints: Vec<Option<Vec<f64>>>,
+    /// For each placement, where its triangles start among the choices.
+    first: Vec<Option<u32>>,
+    /// Placement and triangle of each emissive triangle, behind the lights.
+    triangles: Vec<[u32; 2]>,
+    picker: AliasTable,
+}
+
+#[derive(Debug)]
+struct Environment {
+    index: usize,
+    map: Option<(Arc<EnvironmentMap>, MapSampler)>,
+    rotation: f64,
+}
+
+impl Environment {
+    fn turned(&self, d: DVec3, sign: f64) -> DVec3 {
+        let (sin, cos) = (sign * self.rotation).sin_cos();
+        DVec3::new(cos * d.x + sin * d.z, d.y, -sin * d.x + cos * d.z)
+    }
+
+    /// In the map's frame.
+    fn local(&self, d: DVec3) -> DVec3 {
+        self.turned(d, -1.0)
+    }
+
+    fn world(&self, d: DVec3) -> DVec3 {
+        self.turned(d, 1.0)
+    }
+}
+
+impl Lights {
+    /// The lights of a scene whose emissive surfaces are those of `around`; `map` is the decoded
+    /// image of the environment, if it has one.
+    ///
+    /// # Errors
+    ///
+    /// When an illuminant is known at no wavelength of the lanes.
+    pub fn new(
+        lights: &[Light],
+        map: Option<Arc<EnvironmentMap>>,
+        around: &Surroundings<'_>,
+        spectral: &Spectral,
+    ) -> Result<Self, NoOverlap> {
+        let count = spectral.count();
+        let mut lanes = vec![0.0; lights.len() * count];
+        for (light, lanes) in lights.iter().zip(lanes.chunks_mut(count)) {
+            spectral.spread(&light.color, lanes);
+            if let Some(illuminant) = light.illuminant {
+                let tint = spectral.illuminant(illuminant)?;
+                lanes.iter_mut().zip(&tint).for_each(|(lane, tint)| *lane *= tint);
+            }
+        }
+        let environment = lights.iter().enumerate().find_map(|(index, light)| match light.kind {
+            LightKind::Environment { rotation, .. } => {
+                let sampled = map.clone().map(|map| {
+                    let sampler = MapSampler::new(&map);
+                    (map, sampler)
+                });
+                Some(Environment { index, map: sampled, rotation })
+            }
+            _ => None,
+        });
+        let radius = 0.5 * around.geometry.loose_bounds().diagonal();
+        let far = if radius > 0.0 { PI * radius * radius } else { PI };
+        let mut powers: Vec<f64> =
+            lights.iter().map(|light| power(light, far, environment.as_ref())).collect();
+        let mut first = Vec::with_capacity(around.geometry.placements.len());
+        let mut triangles = Vec::new();
+        for (number, placement) in (0_u32..).zip(&around.geometry.placements) {
+            let material = around.materials.get(placement.material as usize);
+            let emits = material.is_some_and(|m| m.emission.is_some());
+            first.push(if emits { u32::try_from(powers.len()).ok() } else { None });
+            let Some(material) = material.filter(|_| emits) else { continue };
+            let mesh = around.geometry.mesh_of(placement);
+            for triangle in 0..mesh.triangles.len() {
+                powers.push(triangle_power(around, placement, triangle, material));
+                triangles.push([number, u32::try_from(triangle).unwrap_or(u32::MAX)]);
+            }
+        }
+        let tint = |material: &Material| -> Result<Option<Vec<f64>>, NoOverlap> {
+            match material.emission.as_ref().and_then(|e| e.illuminant) {
+                Some(illuminant) => spectral.illuminant(illuminant).map(Some),
+                None => Ok(None),
+            }
+        };
+        let tints = around.materials.iter().map(tint).collect::<Result<_, _>>()?;
+        let lit = powers.iter().any(|&p| p > 0.0);
+        let picker = if lit { AliasTable::new(&powers) } else { AliasTable::default() };
+        Ok(Self { lights: lights.to_vec(), lanes, environment, tints, first, triangles, picker })
+    }
+
+    /// Whether there is nothing to choose from.
+    #[must_use]
+    pub fn is_dark(&self) -> bool {
+        self.picker.is_empty()
+    }
+
+    /// How many emissive triangles there are.
+    #[must_use]
+    pub fn emissive_triangles(&self) -> usize {
+        self.triangles.len()
+    }
+
+    fn lanes_of(&self, light: usize, count: usize) -> &[f64] {
+        &self.lanes[light * count..(light + 1) * count]
+    }
+
+    /// Chooses a light for `from` by `choice` and a direction to it by `square` (in 0..1); its
+    /// radiance (of a point: intensity over squared distance) goes to `radiance`. `None` when it does
+    /// not shine there.
+    pub fn sample(
+        &self,
+        around: &Surroundings<'_>,
+        spectral: &Spectral,
+        from: &Anchor,
+        choice: f64,
+        square: [f64; 2],
+        radiance: &mut [f64],
+    ) -> Option<Toward> {
+        if self.picker.is_empty() {
+            return None;
+        }
+        let (index, _) = self.picker.pick(choice);
+        let chance = self.picker.probability(index);
+        let Some(light) = self.lights.get(index) else {
+            let [placement, triangle] = self.triangles[index - self.lights.len()];
+            let place = EmissiveTriangle::new(around, placement, triangle, from.point)?;
+            return self.toward_triangle(around, spectral, from, &place, square, chance, radiance);
+        };
+        radiance.copy_from_slice(self.lanes_of(index, radiance.len()));
+        let point = |at: DVec3, factor: f64, radiance: &mut [f64]| {
+            let offset = at - from.point;
+            let squared = offset.length_squared();
+            let direction = offset.try_normalize()?;
+            radiance.iter_mut().for_each(|lane| *lane *= factor / squared);
+            Some(Toward { direction, density: chance, is_delta: true, end: End::Point(at) })
+        };
+        match light.kind {
+            LightKind::Point(at) => point(at, 1.0, radiance),
+            LightKind::Spot { at, axis, cos_outer, cos_inner } => {
+                let cosine = (from.point - at).try_normalize()?.dot(axis);
+                let factor = spot_falloff(cosine, cos_outer, cos_inner);
+                if factor > 0.0 { point(at, factor, radiance) } else { None }
+            }
+            LightKind::Directional(along) => {
+                Some(Toward { direction: -along, density: chance, is_delta: true, end: End::Far })
+            }
+            LightKind::Environment { .. } => {
+                let environment = self.environment.as_ref()?;
+                let (direction, density) = match &environment.map {
+                    Some((_, sampler)) => {
+                        let (local, density) = sampler.sample(square);
+                        (environment.world(local), density)
+                    }
+                    None => (sphere_direction(square), 0.25 / PI),
+                };
+                if density <= 0.0 {
+                    return None;
+                }
+                self.environment(spectral, direction, radiance);
+                let density = density * chance;
+                Some(Toward { direction, density, is_delta: false, end: End::Far })
+            }
+        }
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "one step of `sample`, taken out to be read")]
+    fn toward_triangle(
+        &self,
+        around: &Surroundings<'_>,
+        spectral: &Spectral,
+        from: &Anchor,
+        place: &EmissiveTriangle<'_>,
+        square: [f64; 2],
+        chance: f64,
+        radiance: &mut [f64],
+    ) -> Option<Toward> {
+        let [u, v] = triangle_point(square);
+        let offset = place.corner + place.edges[0] * u + place.edges[1] * v;
+        let direction = offset.try_normalize()?;
+        let spot = Spot { weights: [1.0 - u - v, u, v], ..place.spot };
+        let facing = -direction.dot(place.normal);
+        if !self.emitted(around, spectral, &spot, facing > 0.0, radiance) {
+            return None;
+        }
+        let density = chance * offset.length_squared() / (facing.abs() * place.area);
+        let end = Anchor::new(
+            from.point + offset,
+            place.normal,
+            from.point,
+            spot.placement,
+            spot.mesh,
+            spot.triangle,
+        );
+        density.is_finite().then_some(Toward {
+            direction,
+            density,
+            is_delta: false,
+            end: End::Surface(end),
+        })
+    }
+
+    /// Radiance that a surface gives off to its front or back; `false` when it is dark.
+    pub fn emitted(
+        &self,
+        around: &Surroundings<'_>,
+        spectral: &Spectral,
+        spot: &Spot<'_>,
+        front: bool,
+        radiance: &mut [f64],
+    ) -> bool {
+        let number = spot.placement.material as usize;
+        let emission = around.materials.get(number).and_then(|m| m.emission.as_ref());
+        let Some(emission) = emission.filter(|e| front || e.two_sided) else { return false };
+        let [r, g, b, _] = around.paint(&emission.radiance, spot);
+        spectral.spread(&[r, g, b].map(|c| c * emission.strength), radiance);
+        if let Some(tint) = &self.tints[number] {
+            radiance.iter_mut().zip(tint).for_each(|(lane, tint)| *lane *= tint);
+        }
+        true
+    }
+
+    /// The density (1/sr), chance included, with which [`Self::sample`] gives the direction from
+    /// `from` to `spot`, where it was met by a ray along `direction`.
+    #[must_use]
+    pub fn density_of_surface(
+        &self,
+        around: &Surroundings<'_>,
+        placement: u32,
+        spot: &Spot<'_>,
+        from: DVec3,
+        direction: DVec3,
+    ) -> f64 {
+        let Some(Some(first)) = self.first.get(placement as usize) else { return 0.0 };
+        if self.picker.is_empty() {
+            return 0.0;
+        }
+        let triangle = u32::try_from(spot.triangle).unwrap_or(u32::MAX);
+        let Some(place) = EmissiveTriangle::new(around, placement, triangle, from) else {
+            return 0.0;
+        };
+        let chance = self.picker.probability(*first as usize + spot.triangle);
+        let [_, u, v] = spot.weights;
+        let offset = place.corner + place.edges[0] * u + place.edges[1] * v;
+        let density =
+            chance * offset.length_squared() / (direction.dot(place.normal).abs() * place.area);
+        if density.is_finite() { density } else { 0.0 }
+    }
+
+    /// Radiance that comes from the unit `direction` without meeting anything; `false` when it is
+    /// dark there.
+    pub fn environment(&self, spectral: &Spectral, direction: DVec3, radiance: &mut [f64]) -> bool {
+        let Some(environment) = &self.environment else { return false };
+        let own = self.lanes_of(environment.index, radiance.len());
+        match &environment.map {
+            None => radiance.copy_from_slice(own),
+            Some((map, _)) => {
+                let color = map.radiance(environment.local(direction));
+                for (i, lane) in radiance.iter_mut().enumerate() {
+                    *lane = own[i] * spectral.lane(&color, i);
+                }
+            }
+        }
+        true
+    }
+
+    /// The density (1/sr), chance included, with which [`Self::sample`] gives a direction of the
+    /// environment.
+    #[must_use]
+    pub fn density_of_environment(&self, direction: DVec3) -> f64 {
+        let Some(environment) = self.environment.as_ref().filter(|_| !self.picker.is_empty())
+        else {
+            return 0.0;
+        };
+        let density = match &environment.map {
+            Some((_, sampler)) => sampler.density(environment.local(direction)),
+            None => 0.25 / PI,
+        };
+        density * self.picker.probability(environment.index)
+    }
+}
+
+fn mean(color: &Color) -> f64 {
+    (color[0] + color[1] + color[2]) / 3.0
+}
+
+/// Power of a light (W), `far` being the area (m²) that the scene shows to far lights.
+fn power(light: &Light, far: f64, environment: Option<&Environment>) -> f64 {
+    let own = mean(&light.color);
+    match light.kind {
+        LightKind::Point(_) => 4.0 * PI * own,
+        LightKind::Spot { cos_outer, cos_inner, .. } => {
+            // As bright as inside over the mean of both cones.
+            2.0 * PI * (1.0 - 0.5 * (cos_outer + cos_inner)) * own
+        }
+        LightKind::Directional(_) => far * own,
+        LightKind::Environment { .. } => {
+            let map = environment.and_then(|e| e.map.as_ref());
+            4.0 * PI * far * own * map.map_or(1.0, |(_, sampler)| sampler.mean)
+        }
+    }
+}
+
+/// A triangle that shines, as seen from a point.
+struct EmissiveTriangle<'a> {
+    spot: Spot<'a>,
+    corner: DVec3,
+    edges: [DVec3; 2],
+    normal: DVec3,
+    area: f64,
+}
+
+impl<'a> EmissiveTriangle<'a> {
+    fn new(around: &Surroundings<'a>, number: u32, triangle: u32, from: DVec3) -> Option<Self> {
+        let placement = around.geometry.placements.get(number as usize)?;
+        let spot = Spot::corner(around.geometry, placement, triangle as usize);
+        let place = &placement.world_from_mesh;
+        let [a, b, c] = spot.mesh.corners(spot.triangle);
+        let edges = [place.linear * (b - a), place.linear * (c - a)];
+        let cross = edges[0].cross(edges[1]);
+        let length = cross.length();
+        let normal = cross / length * place.handedness();
+        normal.is_finite().then_some(Self {
+            spot,
+            corner: place.point_from(a, from),
+            edges,
+            normal,
+            area: 0.5 * length,
+        })
+    }
+}
+
+/// Power of an emissive triangle (W), by the paint at its middle and corners.
+fn triangle_power(
+    around: &Surroundings<'_>,
+    placement: &Placement,
+    triangle: usize,
+    material: &Material,
+) -> f64 {
+    let Some(emission) = &material.emission else { return 0.0 };
+    let spot = Spot::corner(around.geometry, placement, triangle);
+    let [a, b, c] = spot.mesh.corners(triangle);
+    let linear = &placement.world_from_mesh.linear;
+    let area = 0.5 * (*linear * (b - a)).cross(*linear * (c - a)).length();
+    let third = 1.0 / 3.0;
+    let weights = [[third, third, third], [0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]];
+    let radiance: f64 = weights
+        .map(|weights| {
+            let [r, g, b, _] = around.paint(&emission.radiance, &Spot { weights, ..spot });
+            mean(&[r, g, b])
+        })
+        .iter()
+        .sum();
+    let sides = if emission.two_sided { 2.0 } else { 1.0 };
+    // A texture may be dark at all four and shine between them: no triangle is passed over.
+    let least = match &emission.radiance {
+        crate::Paint::Plain(_) => 0.0,
+        crate::Paint::Checker { colors, .. } => mean(&colors[0]).max(mean(&colors[1])),
+        crate::Paint::Image { factor, .. } => 0.05 * mean(factor),
+    };
+    sides * PI * area * emission.strength * (radiance / 4.0).max(0.1 * least)
+}

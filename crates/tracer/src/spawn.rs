@@ -1,0 +1,64 @@
+//! Where a ray that leaves a surface starts, by the hit's own error bound.
+//!
+//! A hit is solved in f64, so the point `p = o + t d` misses its triangle's plane by a few roundings
+//! of the numbers that it was made from. Along the normal `n` these are at most
+//!
+//! ```text
+//! e = k ε Σᵢ |nᵢ| (|pᵢ| + |oᵢ| + |Tᵢ| + |L p₀|ᵢ)
+//! ```
+//!
+//! with the ray's origin `o`, the placement's translation `T` and a corner turned into the world
+//! `L p₀` (each term is one that the solution adds or subtracts, or whose product it rounds; the sum
+//! over the axes is Higham's bound for dot products, *Accuracy and Stability of Numerical
+//! Algorithms*, 2002, section 3.1). A ray that leaves starts `e` off the plane, on its own side: the
+//! idea of Wächter and Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing
+//! Gems 2019, with a bound in place of their constants. Nothing here has a unit, so nothing depends on
+//! the scene's scale, and far from the origin the bound grows as f64's spacing does.
+
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Mesh, Placement};
+
+/// Roundings that a point, a later ray's origin and that ray's own test of this triangle go through:
+/// about five each, and as many again for safety.
+const ROUNDINGS: f64 = 32.0 * f64::EPSILON;
+
+/// A point of a surface, with how well it is known.
+#[derive(Debug, Clone, Copy)]
+pub struct Anchor {
+    /// The point (m, world).
+    pub point: DVec3,
+    /// Unit geometric normal.
+    pub normal: DVec3,
+    /// How far (m) the point may lie off its triangle's plane, whatever is traced next.
+    pub error: f64,
+}
+
+impl Anchor {
+    /// The point on a triangle of `placement` (of which `corner` is one, in the mesh's frame), found
+    /// by a ray from `origin`, or for one.
+    #[must_use]
+    pub fn new(
+        point: DVec3,
+        normal: DVec3,
+        origin: DVec3,
+        placement: &Placement,
+        mesh: &Mesh,
+        triangle: usize,
+    ) -> Self {
+        let place = &placement.world_from_mesh;
+        let corner = mesh.positions.get(mesh.triangles[triangle][0] as usize).abs();
+        let linear = &place.linear;
+        let turned = linear.x_axis.abs() * corner.x
+            + linear.y_axis.abs() * corner.y
+            + linear.z_axis.abs() * corner.z;
+        let magnitudes = point.abs() + origin.abs() + place.translation.abs() + turned;
+        Self { point, normal, error: ROUNDINGS * normal.abs().dot(magnitudes) }
+    }
+
+    /// The point moved off the surface to the side that `towards` is on.
+    #[must_use]
+    pub fn leave(&self, towards: DVec3) -> DVec3 {
+        let side = if towards.dot(self.normal) < 0.0 { -1.0 } else { 1.0 };
+        self.point + self.normal * (side * self.error)
+    }
+}

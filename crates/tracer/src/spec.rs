@@ -1,0 +1,254 @@
+//! Materials and lights as the scene file writes them.
+
+use etendue_spectrum::Illuminant;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::Color;
+use crate::texture::{Filter, Wrap};
+
+/// A material as the scene file writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum MaterialSpec {
+    /// A Lambert reflector.
+    Matte {
+        /// Reflectance: linear RGB, each 0..=1, or an image.
+        color: PaintSpec,
+    },
+    /// A perfect mirror.
+    Mirror {
+        /// Reflectance: linear RGB, each 0..=1, or an image.
+        #[serde(default)]
+        color: PaintSpec,
+    },
+    /// A metal with GGX facets.
+    Metal {
+        /// Reflectance face on: linear RGB, each 0..=1, or an image.
+        color: PaintSpec,
+        /// Roughness, 0 (a mirror) to 1.
+        #[serde(default = "default_roughness")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        roughness: f64,
+    },
+    /// A smooth boundary of glass, water or the like. The front of its triangles is outside.
+    Dielectric {
+        /// Refractive index: a number (at least 1), a glass of the catalogue, or `{"nd", "vd"}`.
+        #[serde(default)]
+        ior: IorSpec,
+        /// Tint of what passes: linear RGB, each 0..=1.
+        #[serde(default)]
+        color: PaintSpec,
+    },
+    /// glTF's metallic-roughness surface.
+    Gltf {
+        /// Base colour: linear RGB, each 0..=1, or an image.
+        #[serde(default)]
+        color: PaintSpec,
+        /// Share of metal, 0 to 1.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        metallic: f64,
+        /// Roughness, 0 to 1.
+        #[serde(default = "default_gltf_roughness")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        roughness: f64,
+        /// Refractive index of the coat, at least 1.
+        #[serde(default = "default_ior")]
+        #[schemars(range(min = 1.0))]
+        ior: f64,
+        /// Share of the base that lets light through a thin wall, 0 to 1.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        transmission: f64,
+        /// Share of the surface that is there, 0 to 1.
+        #[serde(default = "one")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        opacity: f64,
+    },
+    /// A surface that shines and reflects nothing.
+    Emissive {
+        /// Radiance: linear RGB (not below zero), or an image.
+        radiance: PaintSpec,
+        /// The spectrum that the radiance multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+        /// The back shines too.
+        #[serde(default)]
+        two_sided: bool,
+    },
+    /// Matte squares of two colours over the surface's texture coordinates.
+    Checker {
+        /// The two reflectances, linear RGB.
+        #[serde(default = "default_checker_colors")]
+        colors: [Color; 2],
+        /// Squares along one unit of the texture coordinates (> 0).
+        #[serde(default = "default_checker_squares")]
+        squares: f64,
+    },
+}
+
+fn default_checker_colors() -> [Color; 2] {
+    [[0.8; 3], [0.2; 3]]
+}
+
+fn default_checker_squares() -> f64 {
+    8.0
+}
+
+fn default_roughness() -> f64 {
+    0.2
+}
+
+fn default_gltf_roughness() -> f64 {
+    0.5
+}
+
+fn default_ior() -> f64 {
+    1.5
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn white() -> Color {
+    [1.0; 3]
+}
+
+/// A colour, or an image of colours.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum PaintSpec {
+    /// Linear RGB.
+    Color(Color),
+    /// An image over the surface's texture coordinates.
+    Image(ImageSpec),
+}
+
+impl Default for PaintSpec {
+    fn default() -> Self {
+        Self::Color([1.0; 3])
+    }
+}
+
+/// An image file over the surface's texture coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ImageSpec {
+    /// A PNG or JPEG file, relative to the scene file.
+    pub image: String,
+    /// Multiplies the image: linear RGB.
+    #[serde(default = "white")]
+    pub factor: Color,
+    /// What the file's numbers are: colours by the sRGB curve, or plain.
+    #[serde(default)]
+    pub encoding: crate::texture::Encoding,
+    /// What happens outside of 0..=1, along both axes.
+    #[serde(default)]
+    pub wrap: Wrap,
+    /// How texels are read.
+    #[serde(default)]
+    pub filter: Filter,
+    /// Copies of the image along one unit of the texture coordinates, along u and v.
+    #[serde(default = "unit_scale")]
+    pub repeat: [f64; 2],
+}
+
+fn unit_scale() -> [f64; 2] {
+    [1.0; 2]
+}
+
+/// A refractive index as the scene file writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum IorSpec {
+    /// The same for all wavelengths, at least 1.
+    Constant(f64),
+    /// A glass of the catalogue.
+    Glass(String),
+    /// By the index and Abbe number of the helium d line.
+    Abbe(AbbeSpec),
+}
+
+/// Index and dispersion of a glass.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AbbeSpec {
+    /// Index at 587.56 nm, at least 1.
+    pub nd: f64,
+    /// Abbe number (> 0).
+    pub vd: f64,
+}
+
+impl Default for IorSpec {
+    fn default() -> Self {
+        Self::Constant(1.5)
+    }
+}
+
+/// A light as the scene file writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum LightSpec {
+    /// A point that shines alike in all directions.
+    Point {
+        /// Where it is (m).
+        at: [f64; 3],
+        /// Radiant intensity, linear RGB: at 1 m it gives this irradiance.
+        intensity: Color,
+        /// The spectrum that the intensity multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+    },
+    /// A point that shines into a cone.
+    Spot {
+        /// Where it is (m).
+        at: [f64; 3],
+        /// A point that it is aimed at (m).
+        look_at: [f64; 3],
+        /// Radiant intensity within the inner cone, linear RGB.
+        intensity: Color,
+        /// Half-angle of the cone (degrees, at most 90).
+        #[serde(default = "default_cone")]
+        #[schemars(range(min = 0.0, max = 90.0))]
+        cone: f64,
+        /// Half-angle within which the light is at its full (degrees); from there it falls to 0.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 90.0))]
+        inner_cone: f64,
+        /// The spectrum that the intensity multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+    },
+    /// Parallel light, as from the sun.
+    Directional {
+        /// Where the light goes.
+        direction: [f64; 3],
+        /// Irradiance on a surface that faces it, linear RGB.
+        irradiance: Color,
+        /// The spectrum that the irradiance multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+    },
+    /// Light from all around.
+    Environment {
+        /// Radiance, linear RGB; multiplies the image.
+        #[serde(default = "white")]
+        radiance: Color,
+        /// A latitude-longitude image (HDR, EXR, PNG or JPEG), relative to the scene file. Its middle
+        /// is at −Z, its top at +Y.
+        #[serde(default)]
+        image: Option<String>,
+        /// Turns the image about +Y (degrees, counter-clockwise from above).
+        #[serde(default)]
+        rotate: f64,
+        /// The spectrum that the radiance multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+    },
+}
+
+fn default_cone() -> f64 {
+    30.0
+}

@@ -1,0 +1,138 @@
+//! From a hit to a surface that light can be scattered by.
+
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{HitBatch, RayBatch};
+
+use crate::bsdf::{Bsdf, Layered, Model, fresnel};
+use crate::material::{Alpha, GltfSurface, NormalMap};
+use crate::reference::{Spot, Surroundings};
+use crate::spawn::Anchor;
+use crate::{Color, Material, Scattering};
+
+/// A hit seen from its ray.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Met<'a> {
+    pub(crate) spot: Spot<'a>,
+    pub(crate) material: &'a Material,
+    pub(crate) anchor: Anchor,
+    /// The ray came from the triangle's front.
+    pub(crate) front: bool,
+    /// Base colour and alpha.
+    pub(crate) base: [f64; 4],
+    wo: DVec3,
+}
+
+impl<'a> Met<'a> {
+    /// Hit `i`; `None` for a miss.
+    pub(crate) fn new(
+        around: &'a Surroundings<'a>,
+        rays: &RayBatch,
+        hits: &HitBatch,
+        i: usize,
+    ) -> Option<Self> {
+        let spot = around.spot(hits, i)?;
+        let material = around.material(&spot)?;
+        let (origin, direction) = (rays.origin(i), rays.direction(i));
+        let normal = hits.normal(i);
+        let anchor = Anchor::new(
+            origin + direction * hits.t[i],
+            normal,
+            origin,
+            spot.placement,
+            spot.mesh,
+            spot.triangle,
+        );
+        let front = normal.dot(direction) <= 0.0;
+        let base = around.base_color(material, &spot);
+        Some(Self { spot, material, anchor, front, base, wo: -direction })
+    }
+
+    /// Share of the surface that is there.
+    pub(crate) fn opacity(&self) -> f64 {
+        match self.material.alpha {
+            Alpha::Opaque => 1.0,
+            Alpha::Mask { factor, cutoff } => f64::from(u8::from(factor * self.base[3] >= cutoff)),
+            Alpha::Blend { factor } => (factor * self.base[3]).clamp(0.0, 1.0),
+        }
+    }
+
+    /// The base colour alone.
+    pub(crate) fn color(&self) -> Color {
+        let [r, g, b, _] = self.base;
+        [r, g, b]
+    }
+
+    /// How it scatters light of the wavelength (nm).
+    pub(crate) fn bsdf(&self, around: &Surroundings<'_>, wavelength: f64) -> Bsdf {
+        let side = if self.front { 1.0 } else { -1.0 };
+        let geometric = self.anchor.normal * side;
+        let model = match &self.material.scattering {
+            Scattering::Black | Scattering::Unlit => Model::Black,
+            Scattering::Matte => Model::Matte,
+            Scattering::Mirror => Model::Mirror,
+            Scattering::Metal { roughness } => Model::Metal { alpha: roughness * roughness },
+            Scattering::Dielectric(ior) => {
+                let n = ior.at(wavelength);
+                Model::Dielectric { eta: if self.front { n } else { 1.0 / n } }
+            }
+            Scattering::Gltf(surface) => return self.layered(around, surface, geometric),
+        };
+        let shading = self.shading(around, geometric);
+        Bsdf::new(model, [geometric, shading], self.wo, [self.color(), [1.0; 3]])
+    }
+
+    fn layered(&self, around: &Surroundings<'_>, own: &GltfSurface, geometric: DVec3) -> Bsdf {
+        let texel = |image: &Option<_>| match image {
+            Some(image) => around.texel(image, &self.spot),
+            None => [1.0; 4],
+        };
+        let rough = texel(&own.metallic_roughness);
+        let roughness = (own.roughness * rough[1]).clamp(0.0, 1.0);
+        let specular = (own.specular * texel(&own.specular_texture)[3]).clamp(0.0, 1.0);
+        let face_on = fresnel::normal_reflectance(own.ior);
+        let tint = texel(&own.specular_color_texture);
+        // The extension caps the reflectance face on at 1.
+        let most = if face_on > 0.0 { 1.0 / face_on } else { f64::INFINITY };
+        let highlight = std::array::from_fn(|k| (own.specular_color[k] * tint[k]).min(most));
+        let model = Model::Layered(Layered {
+            metallic: (own.metallic * rough[2]).clamp(0.0, 1.0),
+            alpha: roughness * roughness,
+            f0: face_on * specular,
+            f90: specular,
+            transmission: (own.transmission * texel(&own.transmission_texture)[0]).clamp(0.0, 1.0),
+        });
+        let base = self.color().map(|c| c.clamp(0.0, 1.0));
+        let shading = self.shading(around, geometric);
+        Bsdf::new(model, [geometric, shading], self.wo, [base, highlight])
+    }
+
+    /// The shading normal on the viewer's side; the geometric one where the viewer would see its
+    /// back.
+    fn shading(&self, around: &Surroundings<'_>, geometric: DVec3) -> DVec3 {
+        let front = self.anchor.normal;
+        let mut normal = self.spot.shading_normal(front).unwrap_or(front);
+        if let Some(map) = &self.material.normal_map {
+            normal = self.tilted(around, map, normal);
+        }
+        if !self.front {
+            normal = -normal;
+        }
+        if normal.dot(self.wo) > 0.0 { normal } else { geometric }
+    }
+
+    /// The normal tilted by a normal map: +x along u, +y up the image, against v (glTF 2.0, section
+    /// 3.9.3).
+    fn tilted(&self, around: &Surroundings<'_>, map: &NormalMap, normal: DVec3) -> DVec3 {
+        let Some([along_u, along_v]) = self.spot.texture_axes(map.image.uv_set as usize) else {
+            return normal;
+        };
+        let [x, y, z, _] = around.texel(&map.image, &self.spot).map(|c| 2.0 * c - 1.0);
+        let Some(tangent) = (along_u - normal * normal.dot(along_u)).try_normalize() else {
+            return normal;
+        };
+        let across = normal.cross(tangent);
+        let bitangent = if across.dot(along_v) > 0.0 { -across } else { across };
+        let tilted = tangent * (x * map.scale) + bitangent * (y * map.scale) + normal * z;
+        tilted.try_normalize().unwrap_or(normal)
+    }
+}

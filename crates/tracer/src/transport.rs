@@ -1,0 +1,540 @@
+//! Light transport in batches: what the tracers of light share.
+//!
+//! All paths of a batch take their next step together: closest hits of all, emission that they meet,
+//! then for each that goes on one light to ask (a shadow ray) and one direction to follow. Rays that
+//! ended are left out, so each batch that reaches the accelerator is full.
+//!
+//! # Sources
+//!
+//! * Estimators of light and of directions, weighed against each other: Veach, *Robust Monte Carlo
+//!   Methods for Light Transport Simulation*, 1997, sections 8.3 and 9.2 (power heuristic).
+//! * Russian roulette: Arvo and Kirk, "Particle Transport and Image Synthesis", 1990.
+//! * Many wavelengths on one path, all but one ending where a glass splits them: Wilkie et al., "Hero
+//!   Wavelength Spectral Sampling", 2014.
+
+use std::fmt::Debug;
+use std::ops::{AddAssign, Range};
+
+use etendue_accel::Accel;
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Detail, HitBatch, RayBatch};
+
+use crate::bsdf::{Bsdf, Weights};
+use crate::light::{End, Lights};
+use crate::reference::Surroundings;
+use crate::sampling::power_heuristic;
+use crate::spawn::Anchor;
+use crate::spectral::Spectral;
+use crate::surface::Met;
+use crate::{Ior, Scattering};
+
+/// A tracer of light.
+pub trait Tracer: Send + Sync + Debug {
+    /// The radiance that arrives along each ray against its direction, in `beam.lanes`: `out` is
+    /// `[ray][lane]` with all lanes of the stage, and is refilled; other lanes are 0.
+    fn radiance(
+        &self,
+        stage: &Stage<'_>,
+        beam: &Beam<'_>,
+        scratch: &mut Scratch,
+        out: &mut Vec<f64>,
+    ) -> Tally;
+}
+
+/// The scene as light sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Stage<'a> {
+    /// What finds the hits.
+    pub accel: &'a dyn Accel,
+    /// Meshes, materials and images.
+    pub surroundings: Surroundings<'a>,
+    /// Where light comes from.
+    pub lights: &'a Lights,
+    /// The lanes.
+    pub spectral: &'a Spectral,
+    /// Some surface is not wholly there ([`crate::Material::is_pierced`]).
+    pub is_pierced: bool,
+}
+
+/// A batch of rays with what they carry.
+#[derive(Debug, Clone)]
+pub struct Beam<'a> {
+    /// The rays.
+    pub rays: &'a RayBatch,
+    /// Random numbers of each ray.
+    pub samples: &'a dyn Samples,
+    /// The lanes that these rays stand for: all, unless the camera sends wavelengths separate ways.
+    pub lanes: Range<usize>,
+}
+
+/// Random numbers by ray and pair of dimensions, many at a time.
+pub trait Samples: Debug {
+    /// A point of the unit square for each of `wanted`, ray and pair: `out` is refilled. Pairs are
+    /// counted from 0, which no ray has used before.
+    fn squares(&self, wanted: &[(u32, u32)], out: &mut Vec<[f64; 2]>);
+}
+
+/// What became of a batch.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Rays traced for their closest hit.
+    pub rays: u64,
+    /// Rays traced to a light.
+    pub shadow_rays: u64,
+    /// Contributions that were not finite, and were left out.
+    pub not_finite: u64,
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.shadow_rays += other.shadow_rays;
+        self.not_finite += other.not_finite;
+    }
+}
+
+/// Where a tracer's paths end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Rules {
+    /// The most surfaces that scatter light on a path.
+    pub(crate) bounces: u32,
+    /// Which directions are followed beyond the first light that they meet.
+    pub(crate) follow: Follow,
+    /// Surfaces after which dim paths may end by chance.
+    pub(crate) roulette: Option<u32>,
+}
+
+/// Which scattered directions a tracer follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Follow {
+    /// Those of mirrors and clear glass alone.
+    Single,
+    /// All.
+    All,
+}
+
+/// Memory of one thread, kept between batches.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    now: Paths,
+    next: Paths,
+    hits: HitBatch,
+    alive: Vec<u32>,
+    wanted: Vec<(u32, u32)>,
+    squares: Vec<[f64; 2]>,
+    shadows: Shadows,
+    radiance: Vec<f64>,
+}
+
+/// Paths under way.
+#[derive(Debug, Default)]
+struct Paths {
+    rays: RayBatch,
+    states: Vec<State>,
+    /// `[path][lane]`.
+    throughput: Vec<f64>,
+}
+
+/// What a path remembers.
+#[derive(Debug, Clone, Copy)]
+struct State {
+    /// The camera's ray.
+    ray: u32,
+    /// Steps taken, for numbers not to be used twice.
+    steps: u32,
+    /// Surfaces that have scattered light.
+    bounces: u32,
+    /// Density (1/sr) of the direction; `+inf` when no light can be asked instead.
+    density: f64,
+    /// The surface that it left (m).
+    vertex: DVec3,
+    /// The one lane left, after a glass has split them.
+    lane: Option<u32>,
+    /// Looks for light and goes no farther.
+    is_last: bool,
+}
+
+impl Paths {
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.states.clear();
+        self.throughput.clear();
+    }
+
+    /// Adds a path that leaves a surface.
+    fn push(&mut self, origin: DVec3, direction: DVec3, state: State) {
+        self.rays.from_surface = true;
+        self.rays.coherent = false;
+        self.rays.push(origin, direction);
+        self.states.push(state);
+    }
+}
+
+/// Rays to lights and what each brings if nothing is in between.
+#[derive(Debug, Default)]
+struct Shadows {
+    rays: RayBatch,
+    ray: Vec<u32>,
+    /// `[shadow][lane]`.
+    brought: Vec<f64>,
+    blocked: Vec<bool>,
+    passed: Vec<f64>,
+    hits: HitBatch,
+    again: RayBatch,
+    open: Vec<u32>,
+}
+
+impl Shadows {
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.ray.clear();
+        self.brought.clear();
+    }
+}
+
+/// Pairs of random numbers that a path uses at each step.
+const PAIRS: u32 = 4;
+
+/// Rays whose transparency is looked through, one surface after the other.
+const MOST_LAYERS: u32 = 256;
+
+/// The most steps of a path: surfaces that let it pass count, and may be many.
+const MOST_STEPS: u32 = 4096;
+
+/// Traces `beam` by `rules`.
+pub(crate) fn trace(
+    rules: Rules,
+    stage: &Stage<'_>,
+    beam: &Beam<'_>,
+    scratch: &mut Scratch,
+    out: &mut Vec<f64>,
+) -> Tally {
+    let count = stage.spectral.count();
+    out.clear();
+    out.resize(beam.rays.len() * count, 0.0);
+    let mut tracing = Tracing { rules, stage, count, tally: Tally::default() };
+    scratch.hits.detail = Detail::Surface;
+    scratch.shadows.hits.detail = Detail::Surface;
+    scratch.radiance.resize(count, 0.0);
+    tracing.start(beam, &mut scratch.now);
+    while !scratch.now.states.is_empty() {
+        stage.accel.closest(&scratch.now.rays, &mut scratch.hits);
+        tracing.tally.rays += scratch.now.states.len() as u64;
+        tracing.meet(scratch, out);
+        beam.samples.squares(&scratch.wanted, &mut scratch.squares);
+        scratch.next.clear();
+        scratch.shadows.clear();
+        for k in 0..scratch.alive.len() {
+            tracing.step(scratch, k);
+        }
+        tracing.light(&mut scratch.shadows, out);
+        std::mem::swap(&mut scratch.now, &mut scratch.next);
+    }
+    tracing.tally
+}
+
+struct Tracing<'a> {
+    rules: Rules,
+    stage: &'a Stage<'a>,
+    count: usize,
+    tally: Tally,
+}
+
+impl Tracing<'_> {
+    fn start(&self, beam: &Beam<'_>, paths: &mut Paths) {
+        paths.clear();
+        paths.rays.coherent = beam.rays.coherent;
+        paths.rays.from_surface = false;
+        for i in 0..beam.rays.len() {
+            let (t_min, t_max) = (beam.rays.t_min[i], beam.rays.t_max[i]);
+            paths.rays.push_between(beam.rays.origin(i), beam.rays.direction(i), t_min, t_max);
+            paths.states.push(State {
+                ray: u32::try_from(i).unwrap_or(u32::MAX),
+                steps: 0,
+                bounces: 0,
+                density: f64::INFINITY,
+                vertex: beam.rays.origin(i),
+                lane: None,
+                is_last: false,
+            });
+            let lanes = 0..self.count;
+            paths.throughput.extend(lanes.map(|k| f64::from(u8::from(beam.lanes.contains(&k)))));
+        }
+    }
+
+    /// Adds the light that paths met by themselves, and lists those that go on.
+    fn meet(&mut self, scratch: &mut Scratch, out: &mut [f64]) {
+        let Scratch { now, hits, alive, wanted, radiance, .. } = scratch;
+        alive.clear();
+        wanted.clear();
+        for (i, state) in now.states.iter().enumerate() {
+            let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
+            let weight = self.met(now, hits, i, radiance);
+            if let Some(weight) = weight {
+                radiance.iter_mut().zip(throughput).for_each(|(r, t)| *r *= t * weight);
+                self.add(radiance, state.ray, out);
+            }
+            if hits.is_hit(i) && self.goes_on(hits, i, state) {
+                alive.push(u32::try_from(i).unwrap_or(u32::MAX));
+                wanted.extend((0..PAIRS).map(|k| (state.ray, state.steps * PAIRS + k)));
+            }
+        }
+    }
+
+    /// A last ray goes on only where the surface that it met may not be there.
+    fn goes_on(&self, hits: &HitBatch, i: usize, state: &State) -> bool {
+        if state.steps >= MOST_STEPS {
+            return false;
+        }
+        let around = &self.stage.surroundings;
+        let pierced = || {
+            let spot = around.spot(hits, i);
+            spot.and_then(|spot| around.material(&spot)).is_some_and(crate::Material::is_pierced)
+        };
+        !state.is_last || (self.stage.is_pierced && pierced())
+    }
+
+    /// The light that ray `i` met, and its weight against having asked for it; `None` if none.
+    fn met(&self, now: &Paths, hits: &HitBatch, i: usize, radiance: &mut [f64]) -> Option<f64> {
+        let Stage { lights, surroundings: around, spectral, .. } = self.stage;
+        let (state, direction) = (&now.states[i], now.rays.direction(i));
+        let asked = |density: f64| match state.density {
+            f64::INFINITY => 1.0,
+            own => power_heuristic(own, density),
+        };
+        let Some(spot) = around.spot(hits, i) else {
+            let shines = lights.environment(spectral, direction, radiance);
+            return shines.then(|| asked(lights.density_of_environment(direction)));
+        };
+        let front = hits.normal(i).dot(direction) <= 0.0;
+        let material = around.material(&spot)?;
+        // A surface that is only partly there shines by as much.
+        let there = || match Met::new(around, &now.rays, hits, i) {
+            Some(met) if material.is_pierced() => met.opacity(),
+            _ => 1.0,
+        };
+        if material.scattering == Scattering::Unlit {
+            if state.density != f64::INFINITY {
+                return None;
+            }
+            let [r, g, b, _] = around.base_color(material, &spot);
+            spectral.spread(&[r, g, b], radiance);
+            return Some(there());
+        }
+        if !lights.emitted(around, spectral, &spot, front, radiance) {
+            return None;
+        }
+        let density =
+            lights.density_of_surface(around, hits.placement[i], &spot, state.vertex, direction);
+        Some(asked(density) * there())
+    }
+
+    /// One path's step at the surface that it met: a light is asked, a direction is chosen.
+    fn step(&mut self, scratch: &mut Scratch, k: usize) {
+        let Scratch { now, next, hits, alive, squares, shadows, radiance, .. } = scratch;
+        let i = alive[k] as usize;
+        let around = &self.stage.surroundings;
+        let Some(met) = Met::new(around, &now.rays, hits, i) else { return };
+        let numbers = &squares[k * PAIRS as usize..(k + 1) * PAIRS as usize];
+        let mut state = now.states[i];
+        state.steps += 1;
+        let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
+        if met.material.is_pierced() && numbers[3][0] >= met.opacity() {
+            let direction = now.rays.direction(i);
+            next.push(met.anchor.leave(direction), direction, state);
+            next.throughput.extend_from_slice(throughput);
+            return;
+        }
+        if state.is_last || state.bounces >= self.rules.bounces {
+            return;
+        }
+        if let Scattering::Dielectric(Ior::Dispersive(_)) = met.material.scattering
+            && self.count > 1
+        {
+            // A boundary asks no light: its numbers are free.
+            split(throughput, &mut state, numbers[1][0]);
+        }
+        let wavelength = self.stage.spectral.wavelength(state.lane.unwrap_or(0) as usize);
+        let bsdf = met.bsdf(around, wavelength);
+        state.bounces += 1;
+        if !bsdf.is_delta() {
+            self.ask(&bsdf, &met.anchor, throughput, state.ray, numbers, shadows, radiance);
+        }
+        self.scatter(&bsdf, &met.anchor, throughput, state, numbers, next);
+    }
+
+    /// Chooses a light and notes the ray to it.
+    #[expect(clippy::too_many_arguments, reason = "scratch memory, passed down once")]
+    fn ask(
+        &mut self,
+        bsdf: &Bsdf,
+        anchor: &Anchor,
+        throughput: &[f64],
+        ray: u32,
+        numbers: &[[f64; 2]],
+        shadows: &mut Shadows,
+        radiance: &mut [f64],
+    ) {
+        let Stage { lights, surroundings: around, spectral, .. } = self.stage;
+        let toward = lights.sample(around, spectral, anchor, numbers[0][0], numbers[1], radiance);
+        let Some(toward) = toward else { return };
+        let (value, density) = bsdf.evaluate(toward.direction);
+        if value.is_zero() {
+            return;
+        }
+        let balance = if toward.is_delta { 1.0 } else { power_heuristic(toward.density, density) };
+        let factor = balance / toward.density;
+        let origin = anchor.leave(toward.direction);
+        match toward.end {
+            End::Far => shadows.rays.push(origin, toward.direction),
+            End::Point(at) => push_to(&mut shadows.rays, origin, at),
+            End::Surface(end) => {
+                push_to(&mut shadows.rays, origin, end.leave(-toward.direction));
+            }
+        }
+        shadows.ray.push(ray);
+        let lanes = radiance.iter().zip(throughput).enumerate();
+        let brought = lanes.map(|(k, (l, t))| l * t * factor * in_lane(spectral, bsdf, value, k));
+        shadows.brought.extend(brought);
+    }
+
+    /// Chooses a direction and notes the path along it.
+    fn scatter(
+        &self,
+        bsdf: &Bsdf,
+        anchor: &Anchor,
+        throughput: &mut [f64],
+        mut state: State,
+        numbers: &[[f64; 2]],
+        next: &mut Paths,
+    ) {
+        let Some(scattered) = bsdf.sample(numbers[0][1], numbers[2]) else { return };
+        let single = scattered.density == f64::INFINITY;
+        let follows = single || self.rules.follow == Follow::All;
+        state.is_last = state.bounces >= self.rules.bounces || !follows;
+        let mut most = 0.0_f64;
+        for (k, lane) in throughput.iter_mut().enumerate() {
+            *lane *= in_lane(self.stage.spectral, bsdf, scattered.weights, k);
+            most = most.max(*lane);
+        }
+        if most <= 0.0 {
+            return;
+        }
+        if self.rules.roulette.is_some_and(|after| state.bounces >= after) && !state.is_last {
+            let survival = most.min(0.95);
+            if numbers[3][1] >= survival {
+                return;
+            }
+            throughput.iter_mut().for_each(|lane| *lane /= survival);
+        }
+        state.density = scattered.density;
+        state.vertex = anchor.point;
+        next.push(anchor.leave(scattered.direction), scattered.direction, state);
+        next.throughput.extend_from_slice(throughput);
+    }
+
+    /// Adds what lights bring along rays that nothing blocks.
+    fn light(&mut self, shadows: &mut Shadows, out: &mut [f64]) {
+        if shadows.rays.is_empty() {
+            return;
+        }
+        shadows.rays.from_surface = true;
+        self.tally.shadow_rays += shadows.rays.len() as u64;
+        if self.stage.is_pierced {
+            self.look_through(shadows);
+        } else {
+            self.stage.accel.occluded(&shadows.rays, &mut shadows.blocked);
+        }
+        for (k, &ray) in shadows.ray.iter().enumerate() {
+            let brought = &mut shadows.brought[k * self.count..(k + 1) * self.count];
+            if self.stage.is_pierced {
+                brought.iter_mut().for_each(|lane| *lane *= shadows.passed[k]);
+            } else if shadows.blocked[k] {
+                continue;
+            }
+            self.add(brought, ray, out);
+        }
+    }
+
+    /// What share of each shadow ray passes the surfaces on its way.
+    fn look_through(&mut self, shadows: &mut Shadows) {
+        let Shadows { rays, passed, hits, again, open, .. } = shadows;
+        passed.clear();
+        passed.resize(rays.len(), 1.0);
+        open.clear();
+        open.extend(0..u32::try_from(rays.len()).unwrap_or(u32::MAX));
+        again.clone_from(rays);
+        for layer in 0..MOST_LAYERS {
+            self.stage.accel.closest(again, hits);
+            if layer > 0 {
+                self.tally.shadow_rays += again.len() as u64;
+            }
+            let mut onward = RayBatch { from_surface: true, ..RayBatch::default() };
+            let mut still = Vec::new();
+            for (k, &i) in open.iter().enumerate() {
+                let Some(met) = Met::new(&self.stage.surroundings, again, hits, k) else {
+                    continue;
+                };
+                let share = &mut passed[i as usize];
+                *share *= 1.0 - met.opacity();
+                if *share > 0.0 {
+                    let direction = again.direction(k);
+                    let origin = met.anchor.leave(direction);
+                    let left = again.t_max[k] - (origin - again.origin(k)).length();
+                    onward.push_between(origin, direction, 0.0, left.max(0.0));
+                    still.push(i);
+                }
+            }
+            *again = onward;
+            *open = still;
+            if open.is_empty() {
+                return;
+            }
+        }
+        open.iter().for_each(|&i| passed[i as usize] = 0.0);
+    }
+
+    fn add(&mut self, light: &[f64], ray: u32, out: &mut [f64]) {
+        if !light.iter().all(|lane| lane.is_finite()) {
+            self.tally.not_finite += 1;
+            return;
+        }
+        let start = ray as usize * self.count;
+        out[start..start + self.count].iter_mut().zip(light).for_each(|(sum, lane)| *sum += lane);
+    }
+}
+
+/// A ray from one point to another (m).
+fn push_to(rays: &mut RayBatch, origin: DVec3, end: DVec3) {
+    let offset = end - origin;
+    let distance = offset.length();
+    // Points that fall together see each other: a ray of no length meets nothing.
+    let direction = if distance > 0.0 { offset / distance } else { DVec3::Z };
+    rays.push_between(origin, direction, 0.0, distance);
+}
+
+/// The value in lane `k`.
+fn in_lane(spectral: &Spectral, bsdf: &Bsdf, value: Weights, k: usize) -> f64 {
+    let mut sum = value.white;
+    if value.base != 0.0 {
+        sum += value.base * spectral.lane(&bsdf.base, k);
+    }
+    if value.highlight != 0.0 {
+        sum += value.highlight * spectral.lane(&bsdf.highlight, k);
+    }
+    sum
+}
+
+/// Keeps one lane, chosen by `u` among those that carry anything, at as many times its throughput.
+fn split(throughput: &mut [f64], state: &mut State, u: f64) {
+    if state.lane.is_some() {
+        return;
+    }
+    let live: Vec<usize> = (0..throughput.len()).filter(|&k| throughput[k] > 0.0).collect();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "u is in 0..1")]
+    let Some(&kept) = live.get((u * live.len() as f64) as usize) else { return };
+    for (k, lane) in throughput.iter_mut().enumerate() {
+        *lane = if k == kept { *lane * live.len() as f64 } else { 0.0 };
+    }
+    state.lane = u32::try_from(kept).ok();
+}
