@@ -121,6 +121,32 @@ impl Plan {
         plan
     }
 
+    /// What the rays are for.
+    fn ray_words(&self, passes: Passes) -> String {
+        let seen = match (passes.centre, passes.mean) {
+            (true, true) => Some(format!(
+                "the chief ray of each pixel for data layers, {} samples a pixel for colours",
+                self.samples
+            )),
+            (false, true) => Some(format!("{} samples a pixel for colours", self.samples)),
+            (true, false) => Some(match passes.light {
+                true => "the chief ray of each pixel for data layers".to_owned(),
+                false => {
+                    format!("the chief ray of each pixel serves all {} layers", self.layers.len())
+                }
+            }),
+            (false, false) => None,
+        };
+        let lit = passes.light.then(|| {
+            format!(
+                "{} samples of light a pixel, counted as {RAYS_A_SAMPLE_OF_LIGHT} rays each",
+                self.samples
+            )
+        });
+        let parts: Vec<String> = seen.into_iter().chain(lit).collect();
+        parts.join("; ")
+    }
+
     fn explain(
         &self,
         scene: &Scene,
@@ -133,26 +159,7 @@ impl Plan {
             decisions.push(Decision { what, choice: choice.to_owned(), because });
         };
         let on = |yes| if yes { "on" } else { "off" };
-        let seen = match (passes.centre, passes.mean) {
-            (true, true) => Some(format!(
-                "the chief ray of each pixel for data layers, {} samples a pixel for colours",
-                self.samples
-            )),
-            (false, true) => Some(format!("{} samples a pixel for colours", self.samples)),
-            (true, false) => Some(match passes.light {
-                true => "the chief ray of each pixel for data layers".to_owned(),
-                false => format!("the chief ray of each pixel serves all {} layers", self.layers.len()),
-            }),
-            (false, false) => None,
-        };
-        let lit = passes.light.then(|| {
-            format!(
-                "{} samples of light a pixel, counted as {RAYS_A_SAMPLE_OF_LIGHT} rays each",
-                self.samples
-            )
-        });
-        let parts: Vec<String> = seen.into_iter().chain(lit).collect();
-        decide("rays", &self.rays.to_string(), parts.join("; "));
+        decide("rays", &self.rays.to_string(), self.ray_words(passes));
         let (lanes, because) = expose::explain_lanes(scene, &self.lanes);
         decide("wavelengths", &lanes, because);
         if let Some((choice, because)) = expose::explain_sensor(scene) {

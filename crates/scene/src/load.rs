@@ -9,7 +9,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use etendue_camera::{Camera, CameraError, CameraSpec};
 use etendue_geometry::{Bounds, Geometry, Mesh, Placement, Positions, Transform};
 use etendue_spectrum::Lanes;
-use etendue_tracer::{EnvironmentImage, Light, LightKind, Material, Texture, TextureScope};
+use etendue_tracer::{
+    EnvironmentImage, LayerSpec, Light, LightKind, Material, Texture, TextureScope,
+};
 use rayon::prelude::*;
 
 use crate::cameras::{self, CameraOrigin, SceneCamera};
@@ -74,7 +76,7 @@ impl SceneFile {
         for (index, object) in objects.iter().enumerate() {
             parts.place(object, split_nodes, index).map_err(|what| self.too_many(what))?;
         }
-        if wanted.light && lights.is_none() {
+        if self.spec.picture() == Some(LayerSpec::Radiance) && lights.is_none() {
             parts.light_by_default();
         }
         self.finish(parts, &folder, options)

@@ -108,7 +108,7 @@ fn unknown_keys_name_the_nearest() {
         &["layers[1].spcae", "did you mean `space`?"],
     );
     // What later versions know is refused like any other key.
-    assert_says(r#"{"etendue": 1, "lights": []}"#, &["lights: unknown key"]);
+    assert_says(r#"{"etendue": 1, "lamps": []}"#, &["lamps: unknown key"]);
 }
 
 #[test]

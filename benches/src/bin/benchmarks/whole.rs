@@ -168,7 +168,7 @@ pub(crate) fn print_memory(path: &Path) -> anyhow::Result<()> {
     let load = Memory::now();
     let accel = etendue_render::build(&scene, &plan, &BuildOptions::default())?;
     let build = Memory::now();
-    let images = Images::decode(&scene.textures, &plan);
+    let images = Images::decode(&scene, &plan);
     let rendered = etendue_render::render(&scene, &plan, &*accel, &images, Vec::new(), &|_| true)?;
     let render = Memory::now();
     drop(rendered);

@@ -174,7 +174,7 @@ impl Bsdf {
                 self.given(local, Weights::base(1.0), local.z / PI)
             }
             Model::Mirror => self.single(mirrored(self.wo), Weights::base(1.0)),
-            Model::Metal { alpha } if alpha == 0.0 => {
+            Model::Metal { alpha: 0.0 } => {
                 let wi = mirrored(self.wo);
                 self.single(wi, metal(self.wo, wi))
             }

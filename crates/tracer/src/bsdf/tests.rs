@@ -140,6 +140,7 @@ fn sampling_has_the_density_it_states() {
             if surface.is_delta() {
                 continue;
             }
+            #[expect(clippy::cast_possible_truncation, reason = "a cell's number")]
             let cell = |w: DVec3| {
                 let row = ((1.0 - w.z) / 2.0 * ROWS as f64).clamp(0.0, ROWS as f64 - 1.0);
                 let phi = w.y.atan2(w.x).rem_euclid(std::f64::consts::TAU);

@@ -74,7 +74,7 @@ pub(super) fn placed(
     let written = Written::deserialize(value)
         .map_err(|error| damaged(path, place(), format!("the light is damaged: {error}")))?;
     let color = written.color.map(|c| c * written.intensity);
-    let named = written.name.clone().unwrap_or_else(|| place());
+    let named = written.name.clone().unwrap_or_else(place);
     if !color.iter().all(|c| c.is_finite() && *c >= 0.0) {
         let message = "its colour or intensity is below zero or not finite; it is left out";
         note::push(notes, Note::new(NoteKind::NotFinite, named, message));
