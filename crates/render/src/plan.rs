@@ -110,7 +110,7 @@ impl Plan {
             detail,
             images,
             samples,
-            pupil: lens && mean,
+            pupil: lens && (passes.mean || passes.light),
             rays,
             quality,
             precision,

@@ -90,9 +90,8 @@ impl Job<'_> {
         let (mut lit, seen): (Vec<_>, Vec<_>) = std::mem::take(&mut band.layers)
             .into_iter()
             .partition(|(layer, _)| *layer == LayerSpec::Radiance);
-        let (mut centre, mut mean): (Vec<_>, Vec<_>) = seen
-            .into_iter()
-            .partition(|(layer, _)| at_centre || !layer.is_averaged());
+        let (mut centre, mut mean): (Vec<_>, Vec<_>) =
+            seen.into_iter().partition(|(layer, _)| at_centre || !layer.is_averaged());
         for left in (0..width).step_by(TILE as usize) {
             let tile =
                 Tile { left, top: band.top, width: TILE.min(width - left), height: band.height };
