@@ -148,7 +148,8 @@ pub(crate) struct SceneArguments {
     /// Look through one of the models' own cameras, by its name or number (from 0)
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) camera: Option<String>,
-    /// Layers to write: depth, distance, normal, position, ids, coverage, flat, facing
+    /// Layers to write: depth, distance, normal, position, ids, coverage, flat, facing, albedo, uv,
+    /// material_id
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_layer)]
     pub(crate) layers: Option<Vec<String>>,
     /// Samples a pixel of colours; data layers take the pixel's centre
