@@ -148,9 +148,15 @@ pub(crate) struct SceneArguments {
     /// Look through one of the models' own cameras, by its name or number (from 0)
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) camera: Option<String>,
-    /// Layers to write: depth, distance, normal, position, ids, coverage, flat, facing, albedo, uv,
-    /// material_id
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_layer)]
+    // Not a comment of documentation, whose names would need backticks.
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        value_parser = parse_layer,
+        help = "Layers to write: depth, distance, normal, position, ids, coverage, flat, facing, \
+                albedo, uv, material_id"
+    )]
     pub(crate) layers: Option<Vec<String>>,
     /// Samples a pixel of colours; data layers take the pixel's centre
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576))]
