@@ -98,12 +98,14 @@ RAYS.json: {\"from\": \"object\" or \"sensor\", \"clip\": true or false, \"rays\
 Examples:
   etendue lens scenes/lenses/double-gauss.json
   etendue lens scenes/lenses/achromat.json --json --fields 0,5,10
-  etendue lens scenes/lenses/double-gauss.json --rays rays.json --json";
+  etendue lens scenes/lenses/double-gauss.json --rays rays.json --json
+  etendue lens scenes/lenses/double-gauss.json -o out/double-gauss
+  etendue lens bought.zmx --save bought.json";
 
 #[derive(Debug, Args)]
 pub(crate) struct LensArguments {
-    /// A lens file (.json), or a scene whose camera is a lens
-    #[arg(value_name = "LENS|SCENE")]
+    /// A lens file (.json), a Zemax file (.zmx), or a scene whose camera is a lens
+    #[arg(value_name = "LENS|ZMX|SCENE")]
     pub(crate) lens: PathBuf,
     /// Print JSON for machines, with all digits
     #[arg(long)]
@@ -111,7 +113,13 @@ pub(crate) struct LensArguments {
     /// Trace the rays of a file instead, and print every intersection and how each ray ends
     #[arg(long, value_name = "FILE")]
     pub(crate) rays: Option<PathBuf>,
-    /// Field angles in degrees; shares of the field of view when absent
+    /// Draw layout.svg, spots.svg and illumination.svg into this folder, made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write the lens as a lens file, such as an imported one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) save: Option<PathBuf>,
+    /// Field angles in degrees; the file's own or shares of the field of view when absent
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) fields: Option<Vec<f64>>,
     /// Wavelengths in nm, the main one first; the lens' own and the F, d and C lines when absent

@@ -1,21 +1,27 @@
 //! `etendue lens`: what a lens does, and where given rays go in it.
 
 use std::io::Write;
+use std::path::Path;
 
 use etendue_camera::length::Dimension;
-use etendue_camera::train::{Focus, Inquiry, LensReport, OpticalTrain};
+use etendue_camera::train::{Focus, Inquiry, LensReport, OpticalTrain, drawing};
+use etendue_render::output::{prepare_folder, sidecar, write_whole};
 use etendue_scene::Reach;
-use etendue_scene::file::{read_lens, trace_rays};
+use etendue_scene::file::{ReadLens, read_lens, trace_rays};
 
 use crate::arguments::LensArguments;
 use crate::fault::{Fault, print_json, print_text};
 
 pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
     let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
-    let train = adjusted(read_lens(&arguments.lens, reach)?, arguments)?;
+    let mut lens = read_lens(&arguments.lens, reach)?;
+    if let Some(path) = &arguments.save {
+        sidecar::write_json(path, &lens.file)?;
+    }
+    lens.train = adjusted(lens.train, arguments)?;
     match &arguments.rays {
         Some(rays) => {
-            let traced = trace_rays(&train, rays)?;
+            let traced = trace_rays(&lens.train, rays)?;
             warn(&traced.out_of_range, arguments)?;
             match arguments.json {
                 // On one line: there may be millions of them.
@@ -25,7 +31,7 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
                 false => print_text(&traced.to_string()),
             }
         }
-        None => report(&train, arguments),
+        None => report(&lens, arguments),
     }
 }
 
@@ -45,14 +51,19 @@ fn adjusted(mut train: OpticalTrain, arguments: &LensArguments) -> Result<Optica
     Ok(train)
 }
 
-fn report(train: &OpticalTrain, arguments: &LensArguments) -> Result<(), Fault> {
+fn report(lens: &ReadLens, arguments: &LensArguments) -> Result<(), Fault> {
+    let named = |list: &[f64]| (!list.is_empty()).then(|| list.to_vec());
     let inquiry = Inquiry {
-        wavelengths: arguments.wavelengths.clone(),
-        fields: arguments.fields.clone(),
+        wavelengths: arguments.wavelengths.clone().or_else(|| named(&lens.wavelengths)),
+        fields: arguments.fields.clone().or_else(|| named(&lens.fields)),
         focus: arguments.focus.unwrap_or_default(),
     };
-    let report = LensReport::new(train, &inquiry)
+    let mut report = LensReport::new(&lens.train, &inquiry)
         .map_err(|error| Fault::refused(format!("{}: {error}", arguments.lens.display())))?;
+    report.notes.splice(..0, lens.notes.iter().cloned());
+    if let Some(folder) = &arguments.output {
+        draw(&lens.train, &report, folder)?;
+    }
     if arguments.json {
         warn(&report.out_of_range, arguments)?;
         print_json(&report)
@@ -62,6 +73,24 @@ fn report(train: &OpticalTrain, arguments: &LensArguments) -> Result<(), Fault> 
         }
         print_text(&report.to_string())
     }
+}
+
+/// Draws a lens; each file appears when it is complete.
+fn draw(train: &OpticalTrain, report: &LensReport, folder: &Path) -> Result<(), Fault> {
+    let pictures = [
+        ("layout.svg", drawing::layout(train, report)),
+        ("spots.svg", drawing::spots(train, report)),
+        ("illumination.svg", drawing::falloff(train, report)),
+    ];
+    prepare_folder(folder)?;
+    for (name, picture) in pictures {
+        let picture = picture.map_err(|error| Fault::Refused(error.into()))?;
+        let path = folder.join(name);
+        write_whole(&path, |file| file.write_all(picture.as_bytes()))?;
+        // Standard output has the numbers.
+        let _ = writeln!(std::io::stderr(), "wrote {}", path.display());
+    }
+    Ok(())
 }
 
 /// Says on standard error that wavelengths are out of range, or refuses them.

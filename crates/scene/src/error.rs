@@ -49,6 +49,14 @@ pub enum SceneError {
         /// What it is instead.
         reason: String,
     },
+    /// A Zemax file that cannot be imported.
+    #[error("{}, {source}", file.display())]
+    Zemax {
+        /// The file.
+        file: PathBuf,
+        /// Where and why.
+        source: etendue_camera::train::ZemaxError,
+    },
     /// Broken JSON.
     #[error("{}, line {}, column {}: broken JSON: {reason}\n{excerpt}",
         file.display(), place.line, place.column)]

@@ -141,6 +141,7 @@ impl Entry {
             name: name.to_owned(),
             range: [self.column(2).parse().ok()?, self.column(3).parse().ok()?],
             source: self.column(8).to_owned(),
+            maker: (self.maker() != "-").then(|| self.maker().to_owned()),
             namesakes: Vec::new(),
             dispersion,
             extinction,

@@ -92,6 +92,8 @@ pub struct Glass {
     pub range: [f64; 2],
     /// Where the numbers come from, empty for inline ones.
     pub source: String,
+    /// Who makes it; `None` for substances and inline numbers.
+    pub maker: Option<String>,
     /// Other makers whose glass of the same name is not meant.
     pub namesakes: Vec<String>,
     dispersion: Dispersion,
@@ -111,6 +113,7 @@ impl Glass {
             name: name.into(),
             range: [0.0, f64::INFINITY],
             source: String::new(),
+            maker: None,
             namesakes: Vec::new(),
             dispersion,
             extinction: Vec::new(),

@@ -10,10 +10,13 @@
 //! | [`analysis`] | spots, distortion, relative illumination, colour |
 //! | [`pupil`] | the exit pupil as seen from the sensor, and samples of it |
 //! | [`report`] | all of it in one piece |
+//! | [`drawing`] | pictures of it |
 //! | [`rays_file`] | given rays, point by point |
+//! | [`zemax`] | lenses from Zemax files |
 
 pub mod aim;
 pub mod analysis;
+pub mod drawing;
 pub mod file;
 pub mod focus;
 pub mod paraxial;
@@ -21,6 +24,7 @@ pub mod pupil;
 pub mod rays_file;
 pub mod report;
 pub mod trace;
+pub mod zemax;
 
 use crate::element::{Frame, LossesSpec};
 use crate::glass::{Glass, GlassError};
@@ -34,6 +38,7 @@ pub use pupil::{ExitPupil, ExitPupilError, PupilSample};
 pub use rays_file::{GivenRay, RayError, RaysFile, TracedRays};
 pub use report::{Inquiry, LensReport, ReportError};
 pub use trace::{RayPath, Registers, Side, TrainAt};
+pub use zemax::{ZemaxError, ZemaxLens};
 
 /// Why a lens file makes no lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -308,8 +313,8 @@ impl OpticalTrain {
         for glass in self.media.iter().filter(|g| !g.namesakes.is_empty()) {
             let others = glass.namesakes.join(" and ");
             let note = format!(
-                "glass {} is taken from {}; {others} also makes one (write \"{others}:{}\")",
-                glass.name, glass.source, glass.name
+                "glass {} is taken from {}; {others} also make one (write \"{}:{}\")",
+                glass.name, glass.source, glass.namesakes[0], glass.name
             );
             if !notes.contains(&note) {
                 notes.push(note);

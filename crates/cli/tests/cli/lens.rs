@@ -349,6 +349,51 @@ fn bad_rays_are_refused_with_file_and_place() {
     );
 }
 
+/// A singlet as Zemax writes it, at a focal length that it states.
+const ZMX: &str = "VERS 140730\nMODE SEQ\nNAME Singlet EFL=50\nUNIT MM\nFTYP 0 0 2 1 0 0 0\n\
+    YFLN 0 3\nWAVM 1 0.58756 1\nPWAV 1\nRAIM 0 0 1\nSURF 0\n  CURV 0\n  DISZ INFINITY\n\
+    SURF 1\n  STOP\n  TYPE STANDARD\n  CURV 2.0E-2 0\n  DISZ 4\n  GLAS N-BK7 0 0 1.5168 64.17\n  \
+    DIAM 8 1\nSURF 2\n  CURV -2.0E-2 0\n  DISZ 47\n  DIAM 8 1\nSURF 3\n  CURV 0\n  DISZ 0\n";
+
+#[test]
+fn a_zemax_file_is_analysed_with_what_it_leaves_out_and_saved_as_a_lens_file() {
+    let bench = Bench::new();
+    let utf16: Vec<u8> =
+        std::iter::once(0xfeff).chain(ZMX.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    bench.write("lens.ZMX", &utf16);
+    let output = bench.run(&["lens", "lens.ZMX", "--json", "--save", "lens.json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    // 1/f = (n - 1) (2/R - (n - 1) d / (n R^2)), n = 1.5168 of N-BK7 to the fifth digit.
+    let (n, r, d) = (1.516_80, 50.0, 4.0);
+    let efl = 1.0 / ((n - 1.0) * (2.0 / r - (n - 1.0) * d / (n * r * r)));
+    assert!((number(&report["paraxial"]["efl"]) - efl).abs() < 1e-3, "{}", report["paraxial"]);
+    assert_eq!(report["fields"], json!([0.0, 3.0]));
+    let notes = report["notes"].to_string();
+    assert!(notes.contains("states a focal length of 50 mm, and it is"), "{notes}");
+    assert!(notes.contains("RAIM (line 9)"), "{notes}");
+    let again = run(&bench, &[]);
+    assert_eq!(again["paraxial"], report["paraxial"]);
+    bench.write("bad.zmx", ZMX.replace("N-BK7", "N-BK77").as_bytes());
+    refused(&bench, &["bad.zmx"], &["bad.zmx", "line 18", "N-BK77", "N-BK7"]);
+    bench.write("empty.zmx", b"");
+    refused(&bench, &["empty.zmx"], &["empty.zmx", "empty"]);
+}
+
+#[test]
+fn drawings_are_written_whole() {
+    let bench = Bench::new();
+    bench.write("lens.json", LENS.as_bytes());
+    let output = bench.run(&["lens", "lens.json", "-o", "out/drawn"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    for name in ["layout.svg", "spots.svg", "illumination.svg"] {
+        let drawing = std::fs::read_to_string(bench.path("out/drawn").join(name)).unwrap();
+        assert!(drawing.starts_with("<svg") && drawing.ends_with("</svg>"), "{name}");
+    }
+    bench.write("file", b"");
+    refused(&bench, &["lens.json", "-o", "file/out"], &["file/out"]);
+}
+
 #[test]
 fn wavelengths_out_of_range_are_warned_of_once_or_refused() {
     let bench = Bench::new();

@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use etendue_camera::train::{LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays};
+use etendue_camera::train::{
+    LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays, ZemaxError, ZemaxLens,
+};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::de::DeserializeOwned;
@@ -38,14 +40,32 @@ fn schema_of<T: JsonSchema>(title: &str) -> Value {
     schema.to_value()
 }
 
-/// Reads the lens of a lens file (`.json`), or that of the camera of a scene. The lens' own files
-/// (masks) must lie in its folder, and the scene's lens in the scene's, unless `reach` says
-/// otherwise.
+/// A lens, and what its file says beside it.
+#[derive(Debug, Clone)]
+pub struct ReadLens {
+    /// The lens.
+    pub train: OpticalTrain,
+    /// The lens file that it is, or would be.
+    pub file: LensFile,
+    /// Field angles (degrees) that its file names.
+    pub fields: Vec<f64>,
+    /// Wavelengths (nm) that its file names, the main one first.
+    pub wavelengths: Vec<f64>,
+    /// What was changed, assumed or left out when it was imported, in sentences.
+    pub notes: Vec<String>,
+}
+
+/// Reads the lens of a lens file (`.json`), of a Zemax file (`.zmx`), or that of the camera of a
+/// scene. The lens' own files (masks) must lie in its folder, and the scene's lens in the scene's,
+/// unless `reach` says otherwise.
 ///
 /// # Errors
 ///
 /// When the file is missing, holds no lens, or the lens makes no sense; the message names the place.
-pub fn read_lens(path: &Path, reach: Reach) -> Result<OpticalTrain, SceneError> {
+pub fn read_lens(path: &Path, reach: Reach) -> Result<ReadLens, SceneError> {
+    if ZemaxLens::is_named(path) {
+        return read_zemax(path);
+    }
     let (written, value) = read(path)?;
     if !SCENE_KEYS.iter().any(|key| value.get(key).is_some()) {
         return build(&written, &value, reach);
@@ -55,6 +75,9 @@ pub fn read_lens(path: &Path, reach: Reach) -> Result<OpticalTrain, SceneError> 
         Some(file) if kind == "lens" => {
             let found = folder(path, reach)?.find(file);
             let found = found.map_err(|why| written.fault("camera.lens", why))?;
+            if ZemaxLens::is_named(&found.path) {
+                return read_zemax(&found.path);
+            }
             let (written, value) = read(&found.path)?;
             build(&written, &value, reach)
         }
@@ -79,10 +102,7 @@ pub fn trace_rays(lens: &OpticalTrain, path: &Path) -> Result<TracedRays, SceneE
 }
 
 fn read(path: &Path) -> Result<(Written, Value), SceneError> {
-    let (document, value) = read_document(path).map_err(|error| match error {
-        SceneError::NotAScene { file, reason } => SceneError::NotALens { file, reason },
-        error => error,
-    })?;
+    let (document, value) = read_document(path).map_err(not_a_lens)?;
     Ok((Written::new(path, Some(document)), value))
 }
 
@@ -104,11 +124,31 @@ fn folder(file: &Path, reach: Reach) -> Result<Folder, SceneError> {
     Folder::open(folder.unwrap_or(Path::new(".")), reach)
 }
 
-fn build(written: &Written, value: &Value, reach: Reach) -> Result<OpticalTrain, SceneError> {
+fn build(written: &Written, value: &Value, reach: Reach) -> Result<ReadLens, SceneError> {
     let file: LensFile = read_as(&LENS, written, value)?;
     let folder = folder(&written.path, reach)?;
-    file.build(&|name| folder.find(name).map(|found| found.path))
-        .map_err(|error| fault(written, &error))
+    let train = file
+        .build(&|name| folder.find(name).map(|found| found.path))
+        .map_err(|error| fault(written, &error))?;
+    Ok(ReadLens { train, file, fields: Vec::new(), wavelengths: Vec::new(), notes: Vec::new() })
+}
+
+fn read_zemax(path: &Path) -> Result<ReadLens, SceneError> {
+    let bytes = super::read_bytes(path).map_err(not_a_lens)?;
+    let zemax = |source| SceneError::Zemax { file: path.to_owned(), source };
+    let ZemaxLens { file, fields, wavelengths, notes, .. } =
+        ZemaxLens::read(&bytes).map_err(zemax)?;
+    let train = file
+        .build(&|name| Err(format!("{name}: a Zemax file has no masks")))
+        .map_err(|error| zemax(ZemaxError { line: 1, why: error.to_string() }))?;
+    Ok(ReadLens { train, file, fields, wavelengths, notes })
+}
+
+fn not_a_lens(error: SceneError) -> SceneError {
+    match error {
+        SceneError::NotAScene { file, reason } => SceneError::NotALens { file, reason },
+        error => error,
+    }
 }
 
 /// The error with the place in the file that it is about.

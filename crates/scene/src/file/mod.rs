@@ -18,7 +18,7 @@ use etendue_sensor::Sensor;
 use serde_json::{Value, json};
 
 pub use document::Place;
-pub use lens::{lens_schema, rays_schema, read_lens, trace_rays};
+pub use lens::{ReadLens, lens_schema, rays_schema, read_lens, trace_rays};
 pub use object::{ObjectSpec, Scale, Source, TransformSpec};
 pub use overrides::OverrideError;
 pub use schema::scene_schema;
@@ -209,6 +209,21 @@ fn is_model(path: &Path) -> bool {
 }
 
 fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
+    let text = String::from_utf8(read_bytes(path)?).map_err(|error| SceneError::NotAScene {
+        file: path.to_owned(),
+        reason: format!("is not UTF-8 text (byte {})", error.utf8_error().valid_up_to()),
+    })?;
+    let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
+    Document::parse(text.clone()).map_err(|fault| SceneError::Syntax {
+        file: path.to_owned(),
+        place: fault.place,
+        excerpt: excerpt(&text, fault.place),
+        reason: fault.reason,
+    })
+}
+
+/// The bytes of a regular file of sensible size.
+fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
     let unreadable = |source| SceneError::unreadable(path, source);
     let metadata = fs::metadata(path).map_err(unreadable)?;
     if !metadata.is_file() {
@@ -220,19 +235,8 @@ fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
     if metadata.len() > LONGEST {
         return Err(SceneError::NotAScene {
             file: path.to_owned(),
-            reason: format!("has {} bytes, too many for a JSON scene", metadata.len()),
+            reason: format!("has {} bytes, too many for a scene or a lens", metadata.len()),
         });
     }
-    let bytes = fs::read(path).map_err(unreadable)?;
-    let text = String::from_utf8(bytes).map_err(|error| SceneError::NotAScene {
-        file: path.to_owned(),
-        reason: format!("is not UTF-8 text (byte {})", error.utf8_error().valid_up_to()),
-    })?;
-    let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
-    Document::parse(text.clone()).map_err(|fault| SceneError::Syntax {
-        file: path.to_owned(),
-        place: fault.place,
-        excerpt: excerpt(&text, fault.place),
-        reason: fault.reason,
-    })
+    fs::read(path).map_err(unreadable)
 }

@@ -1,0 +1,300 @@
+//! The lens cut along y and z.
+
+use glam::DVec3;
+
+use super::{Anchor, COLOURS, Canvas, round_length, short, title};
+use crate::element::{Clip, Fate};
+use crate::train::{Element, LensReport, OpticalTrain, Part, Side, TrainAt};
+
+/// The picture's width and the most of its height (pixels).
+const WIDTH: f64 = 960.0;
+const TALLEST: f64 = 620.0;
+const MARGIN: f64 = 40.0;
+/// Room for the title.
+const HEAD: f64 = 44.0;
+/// Room for what the colours mean.
+const FOOT: f64 = 34.0;
+
+/// Rays of a fan.
+const FAN: i32 = 9;
+/// Fields that are drawn.
+const FANS: usize = 3;
+/// Points of a surface's section.
+const SECTION: i32 = 48;
+
+/// The lens in section, with fans of rays from points at infinity: those that leave it.
+///
+/// # Errors
+///
+/// When a glass has no index at the lens' wavelength.
+pub fn layout(
+    train: &OpticalTrain,
+    report: &LensReport,
+) -> Result<String, crate::glass::GlassError> {
+    let at = train.at(train.wavelength())?;
+    let end =
+        report.sensor_z.unwrap_or_else(|| train.last_vertex() + 0.3 * train.last_vertex().max(1.0));
+    let fields = drawn_fields(report);
+    let fans: Vec<Fan> = fields.iter().map(|&field| fan(train, &at, report, field, end)).collect();
+    let heights = heights(train, &fans);
+    let view = View::around(train, &heights, &fans, report, end);
+    let mut canvas = Canvas::new(WIDTH, view.height, &title(report));
+    glasses(&mut canvas, &view, train, &at, &heights);
+    canvas.dashed(view.pixel([view.left, 0.0]), view.pixel([view.right, 0.0]), "10 3 2 3");
+    for (i, fan) in fans.iter().enumerate() {
+        for ray in &fan.rays {
+            let points: Vec<[f64; 2]> = ray.iter().map(|&point| view.pixel(point)).collect();
+            canvas.path(&points, &format!("c{}", i % COLOURS), 0.8);
+        }
+    }
+    for (i, element) in train.elements().iter().enumerate() {
+        draw(&mut canvas, &view, element, heights[i], i == train.stop());
+    }
+    if let Some(z) = report.sensor_z {
+        let half = view.sensor;
+        canvas.path(&[view.pixel([z, -half]), view.pixel([z, half])], "ink", 2.5);
+    }
+    legend(&mut canvas, &view, &fields);
+    Ok(canvas.finish())
+}
+
+/// The axis, a middle field and the widest one.
+fn drawn_fields(report: &LensReport) -> Vec<f64> {
+    let mut fields = report.fields.clone();
+    fields.sort_by(f64::total_cmp);
+    fields.dedup();
+    if fields.len() > FANS {
+        fields = vec![fields[0], fields[fields.len() / 2], fields[fields.len() - 1]];
+    }
+    fields
+}
+
+/// The rays of a field that leave the lens, as points (z, y).
+struct Fan {
+    rays: Vec<Vec<[f64; 2]>>,
+}
+
+fn fan(train: &OpticalTrain, at: &TrainAt, report: &LensReport, field: f64, end: f64) -> Fan {
+    let none = Fan { rays: Vec::new() };
+    let Some(chief) = train.chief_ray(at, field) else { return none };
+    // Vignetting decides which of the rays there are; twice the pupil finds them at wide angles.
+    let radius =
+        report.paraxial.entrance_pupil.diameter.map_or(0.2 * train.lateral_scale(), |d| 0.5 * d);
+    let across = DVec3::new(0.0, chief.direction.z, -chief.direction.y);
+    let lit =
+        |offset: f64| trace(train, at, chief.position + across * offset, chief.direction, end);
+    // Where the beam ends on both sides of its chief ray, to a percent of the pupil.
+    let edge = |side: f64| {
+        let steps = (0..=200).map(|i| side * radius * 0.01 * f64::from(i));
+        steps.filter(|&offset| lit(offset).is_some()).last()
+    };
+    let (Some(low), Some(high)) = (edge(-1.0), edge(1.0)) else { return none };
+    let place = |i: i32| low + (high - low) * f64::from(i) / f64::from(FAN - 1);
+    Fan { rays: (0..FAN).filter_map(|i| lit(place(i))).collect() }
+}
+
+/// The way of a ray that leaves, from a little in front of the lens to the plane at `end`.
+fn trace(
+    train: &OpticalTrain,
+    at: &TrainAt,
+    position: DVec3,
+    direction: DVec3,
+    end: f64,
+) -> Option<Vec<[f64; 2]>> {
+    let path = at.path(Side::Object, Clip::On, position, direction);
+    let (Fate::Exited, Some(out)) = (path.fate, path.direction) else { return None };
+    let (first, last) = (*path.points.first()?, *path.points.last()?);
+    let lead = 0.25 * (end.abs() + train.lateral_scale());
+    let start = first - direction * lead;
+    let stop = last + out * ((end - last.z) / out.z);
+    let points = std::iter::once(start).chain(path.points.iter().copied()).chain([stop]);
+    let points: Vec<[f64; 2]> = points.map(|point| [point.z, point.y]).collect();
+    points.iter().flatten().all(|number| number.is_finite()).then_some(points)
+}
+
+/// How far from its axis each element is drawn (mm): its rim, or where the rays are.
+fn heights(train: &OpticalTrain, fans: &[Fan]) -> Vec<f64> {
+    let rays = || fans.iter().flat_map(|fan| &fan.rays);
+    let reach = |i: usize| {
+        let heights = rays().filter_map(|ray| ray.get(i + 1)).map(|point| point[1].abs());
+        1.1 * heights.fold(0.0, f64::max)
+    };
+    let height = |(i, element): (usize, &Element)| {
+        let rim = element.clear_radius();
+        let rim = if rim.is_finite() { rim } else { reach(i).max(0.05 * train.lateral_scale()) };
+        match &element.part {
+            Part::Surface(surface) => rim.min(surface.domain()),
+            _ => rim,
+        }
+    };
+    train.elements().iter().enumerate().map(height).collect()
+}
+
+/// From millimetres to pixels.
+struct View {
+    left: f64,
+    right: f64,
+    top: f64,
+    scale: f64,
+    height: f64,
+    /// Half the sensor's height (mm).
+    sensor: f64,
+}
+
+impl View {
+    fn around(
+        train: &OpticalTrain,
+        heights: &[f64],
+        fans: &[Fan],
+        report: &LensReport,
+        end: f64,
+    ) -> Self {
+        let (mut left, mut right, mut top) = (0.0_f64, end, 0.0_f64);
+        for (element, &height) in train.elements().iter().zip(heights) {
+            top = top.max(height + element.frame.vertex.truncate().length());
+            for [z, _] in section(element, height) {
+                (left, right) = (left.min(z), right.max(z));
+            }
+        }
+        let landed = fans.iter().flat_map(|fan| &fan.rays).filter_map(|ray| ray.last());
+        let sensor = landed.map(|point| point[1].abs()).fold(0.0, f64::max);
+        let circle = report.image_circle.map_or(sensor, |diameter| 0.5 * diameter);
+        let sensor = circle.max(sensor).max(0.05 * top);
+        let length = (right - left).max(top).max(1e-9);
+        left -= 0.2 * length;
+        right += 0.03 * length;
+        // Beams from the side are cut off rather than shrink the lens.
+        top = 1.12 * top.max(sensor).max(0.05 * length);
+        let across = (WIDTH - 2.0 * MARGIN) / (right - left);
+        let scale = across.min((TALLEST - HEAD - FOOT) / (2.0 * top));
+        // A tall lens leaves room on both sides.
+        let spare = 0.5 * ((WIDTH - 2.0 * MARGIN) / scale - (right - left));
+        let height = HEAD + FOOT + 2.0 * top * scale;
+        Self { left: left - spare, right: right + spare, top, scale, height, sensor }
+    }
+
+    fn pixel(&self, [z, y]: [f64; 2]) -> [f64; 2] {
+        [MARGIN + (z - self.left) * self.scale, HEAD + (self.top - y) * self.scale]
+    }
+}
+
+/// Points (z, y) of a surface from its lower rim to its upper.
+fn section(element: &Element, height: f64) -> Vec<[f64; 2]> {
+    let sag = |r: f64| match &element.part {
+        Part::Surface(surface) => surface.sag(r),
+        _ => Some(0.0),
+    };
+    let points = (-SECTION..=SECTION).filter_map(|i| {
+        let y = height * f64::from(i) / f64::from(SECTION);
+        let point = element.frame.point(DVec3::new(0.0, y, sag(y)?));
+        Some([point.z, point.y])
+    });
+    points.collect()
+}
+
+/// The bodies of glass between surfaces.
+fn glasses(canvas: &mut Canvas, view: &View, train: &OpticalTrain, at: &TrainAt, heights: &[f64]) {
+    let surfaces: Vec<usize> = (0..heights.len())
+        .filter(|&i| matches!(train.elements()[i].part, Part::Surface(_)))
+        .collect();
+    for pair in surfaces.windows(2) {
+        let [front, back] = [pair[0], pair[1]];
+        if at.index_behind(front) <= 1.0 {
+            continue;
+        }
+        let side = |i: usize| section(&train.elements()[i], heights[i]);
+        let (first, second) = (side(front), side(back));
+        // The thicker of the two rims is the glass'.
+        let rim = heights[front].max(heights[back]);
+        let edge = |points: &[[f64; 2]], upper: bool| {
+            let point = if upper { points.last() } else { points.first() };
+            point.map(|&[z, y]| {
+                [z, if y.abs() < rim { rim * if upper { 1.0 } else { -1.0 } } else { y }]
+            })
+        };
+        let tilted = [front, back].iter().any(|&i| !train.elements()[i].frame.is_axial());
+        let mut outline = first.clone();
+        if !tilted {
+            outline.extend(edge(&first, true));
+            outline.extend(edge(&second, true));
+        }
+        outline.extend(second.iter().rev());
+        if !tilted {
+            outline.extend(edge(&second, false));
+            outline.extend(edge(&first, false));
+        }
+        let outline: Vec<[f64; 2]> = outline.iter().map(|&point| view.pixel(point)).collect();
+        canvas.path(&outline, "glass", 0.0);
+        let count = first.len();
+        if !tilted && outline.len() > count + 2 {
+            let rims = [&outline[count - 1..count + 3], &outline[outline.len() - 3..]];
+            canvas.path(rims[0], "ink", 1.0);
+            let closing: Vec<[f64; 2]> = rims[1].iter().copied().chain([outline[0]]).collect();
+            canvas.path(&closing, "ink", 1.0);
+        }
+    }
+}
+
+fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: bool) {
+    let line = |canvas: &mut Canvas, points: &[DVec3], width: f64| {
+        let points: Vec<[f64; 2]> = points
+            .iter()
+            .map(|&local| element.frame.point(local))
+            .map(|point| view.pixel([point.z, point.y]))
+            .collect();
+        canvas.path(&points, "ink", width);
+    };
+    let at = |y: f64, z: f64| DVec3::new(0.0, y, z);
+    match &element.part {
+        Part::Surface(_) => {
+            let points: Vec<[f64; 2]> =
+                section(element, height).iter().map(|&point| view.pixel(point)).collect();
+            canvas.path(&points, "ink", 1.2);
+        }
+        Part::ThinLens(lens) => {
+            let tip = 0.05 * height * lens.power.signum();
+            line(canvas, &[at(-height, 0.0), at(height, 0.0)], 1.2);
+            for side in [-1.0, 1.0] {
+                let inner = side * (height - tip);
+                line(
+                    canvas,
+                    &[at(inner, -tip.abs()), at(side * height, 0.0), at(inner, tip.abs())],
+                    1.2,
+                );
+            }
+        }
+        Part::Aperture(_) => {
+            let outer = height + (0.2 * height).max(8.0 / view.scale);
+            for side in [-1.0, 1.0] {
+                line(canvas, &[at(side * height, 0.0), at(side * outer, 0.0)], 3.0);
+            }
+        }
+        Part::Filter(_) => {
+            let half = 1.5 / view.scale;
+            for z in [-half, half] {
+                line(canvas, &[at(-height, z), at(height, z)], 0.8);
+            }
+        }
+    }
+    if stop {
+        let top = element.frame.point(at(-height, 0.0));
+        let [x, y] = view.pixel([top.z, top.y]);
+        let below = if matches!(element.part, Part::Aperture(_)) { 26.0 } else { 14.0 };
+        canvas.text([x, y + below], Anchor::Middle, "small", "stop");
+    }
+}
+
+/// Fields by colour, and a scale.
+fn legend(canvas: &mut Canvas, view: &View, fields: &[f64]) {
+    let y = view.height - 14.0;
+    for (i, &field) in fields.iter().enumerate() {
+        let x = MARGIN + 90.0 * f64::from(u32::try_from(i).unwrap_or(0));
+        canvas.path(&[[x, y - 4.0], [x + 24.0, y - 4.0]], &format!("c{}", i % COLOURS), 2.0);
+        canvas.text([x + 30.0, y], Anchor::Start, "small", &format!("{}\u{b0}", short(field)));
+    }
+    let length = round_length(140.0 / view.scale);
+    let right = WIDTH - MARGIN;
+    let left = right - length * view.scale;
+    canvas.path(&[[left, y - 4.0], [right, y - 4.0]], "ink", 2.0);
+    canvas.text([left - 8.0, y], Anchor::End, "small", &format!("{} mm", short(length)));
+}

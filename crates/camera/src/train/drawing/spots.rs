@@ -1,0 +1,154 @@
+//! Spot diagrams: one box a field, one colour a wavelength, the same scale in all.
+
+use glam::DVec2;
+
+use super::{Anchor, COLOURS, Canvas, round_length, short, title};
+use crate::glass::GlassError;
+use crate::train::analysis::{Spot, spot};
+use crate::train::{LensReport, OpticalTrain};
+
+/// A box's side and the gap between boxes (pixels).
+const BOX: f64 = 210.0;
+const GAP: f64 = 22.0;
+const COLUMNS: usize = 4;
+const HEAD: f64 = 76.0;
+/// Room for a box's captions.
+const CAPTION: f64 = 40.0;
+
+/// The spots of a report's fields at its wavelengths, about the centroid of the main one, on the
+/// sensor. The dashed circle is the Airy disc, 1.22 λN in radius.
+///
+/// # Errors
+///
+/// When a glass has no index at one of the wavelengths.
+pub fn spots(train: &OpticalTrain, report: &LensReport) -> Result<String, GlassError> {
+    let boxes = boxes(train, report)?;
+    let columns = boxes.len().clamp(1, COLUMNS);
+    let rows = boxes.len().div_ceil(columns).max(1);
+    let size = |count: usize, step: f64| f64::from(u32::try_from(count).unwrap_or(1)) * step;
+    let width = (GAP + size(columns, BOX + GAP)).max(640.0);
+    let height = HEAD + size(rows, BOX + CAPTION + GAP) + 14.0;
+    let mut canvas = Canvas::new(width, height, &title(report));
+    let reach = boxes.iter().map(SpotBox::reach).fold(1e-6, f64::max);
+    let scale = 0.46 * BOX / reach;
+    legend(&mut canvas, report, &boxes, scale, width);
+    for (i, spots) in boxes.iter().enumerate() {
+        let corner =
+            [GAP + size(i % columns, BOX + GAP), HEAD + size(i / columns, BOX + CAPTION + GAP)];
+        spots.draw(&mut canvas, corner, scale, report);
+    }
+    Ok(canvas.finish())
+}
+
+/// The spots of one field by wavelength.
+struct SpotBox {
+    field: f64,
+    spots: Vec<Option<Spot>>,
+    /// Of the main wavelength.
+    main: Option<Spot>,
+}
+
+fn boxes(train: &OpticalTrain, report: &LensReport) -> Result<Vec<SpotBox>, GlassError> {
+    let Some(z) = report.sensor_z else { return Ok(Vec::new()) };
+    let wavelengths = drawn_wavelengths(report);
+    let mut lenses = Vec::new();
+    for &wavelength in &wavelengths {
+        lenses.push(train.at(wavelength)?);
+    }
+    let of_field = |&field: &f64| SpotBox {
+        field,
+        spots: lenses.iter().map(|at| spot(train, at, field, z)).collect(),
+        main: report.spots.iter().find(|spot| spot.field == field).cloned(),
+    };
+    Ok(report.fields.iter().map(of_field).collect())
+}
+
+/// The wavelengths that run differently: one for all where no glass disperses.
+fn drawn_wavelengths(report: &LensReport) -> Vec<f64> {
+    let differs = |row: &crate::train::report::ColourRow| row.paraxial.bfl != report.paraxial.bfl;
+    if report.colour.iter().any(differs) {
+        report.colour.iter().map(|row| row.wavelength).take(COLOURS).collect()
+    } else {
+        vec![report.wavelength]
+    }
+}
+
+impl SpotBox {
+    fn centre(&self) -> f64 {
+        let any = self.main.as_ref().or_else(|| self.spots.iter().flatten().next());
+        any.map_or(0.0, |spot| spot.centroid_y)
+    }
+
+    /// Points of a wavelength from the main one's centroid (mm).
+    fn points<'a>(&'a self, spot: &'a Spot) -> impl Iterator<Item = DVec2> + 'a {
+        let shift = DVec2::new(0.0, spot.centroid_y - self.centre());
+        spot.points.iter().map(move |&point| point + shift)
+    }
+
+    fn reach(&self) -> f64 {
+        let points = self.spots.iter().flatten().flat_map(|spot| self.points(spot));
+        points.map(|point| point.abs().max_element()).fold(0.0, f64::max)
+    }
+
+    fn draw(&self, canvas: &mut Canvas, [x, y]: [f64; 2], scale: f64, report: &LensReport) {
+        let (right, bottom) = (x + BOX, y + BOX);
+        canvas.path(&[[x, y], [right, y], [right, bottom], [x, bottom], [x, y]], "faint", 0.8);
+        let middle = [x + 0.5 * BOX, y + 0.5 * BOX];
+        for (i, spot) in self.spots.iter().enumerate() {
+            let class = format!("f{}", i % COLOURS);
+            for point in spot.iter().flat_map(|spot| self.points(spot)) {
+                let at = [middle[0] + point.x * scale, middle[1] - point.y * scale];
+                canvas.circle(at, 0.9, &class);
+            }
+        }
+        if let Some(radius) = airy_radius(report) {
+            canvas.airy(middle, radius * scale);
+        }
+        let caption = match &self.main {
+            Some(spot) => format!("RMS {} \u{b5}m", short(1e3 * spot.rms)),
+            None => "no light".to_owned(),
+        };
+        let field = format!("{}\u{b0}", short(self.field));
+        canvas.text([x, bottom + 16.0], Anchor::Start, "", &field);
+        canvas.text([right, bottom + 16.0], Anchor::End, "", &caption);
+    }
+}
+
+/// 1.22 λN (mm).
+fn airy_radius(report: &LensReport) -> Option<f64> {
+    report.paraxial.f_number.map(|n| 1.22 * report.wavelength * 1e-6 * n)
+}
+
+impl Canvas {
+    fn airy(&mut self, at: [f64; 2], radius: f64) {
+        // A dot of less than a pixel says nothing.
+        if (1.0..0.5 * BOX).contains(&radius) {
+            let circle = svg::node::element::Circle::new()
+                .set("cx", super::rounded(at[0]))
+                .set("cy", super::rounded(at[1]))
+                .set("r", super::rounded(radius))
+                .set("class", "ink")
+                .set("stroke-dasharray", "4 3");
+            self.add(circle);
+        }
+    }
+}
+
+fn legend(canvas: &mut Canvas, report: &LensReport, boxes: &[SpotBox], scale: f64, width: f64) {
+    let y = 52.0;
+    if boxes.is_empty() {
+        canvas.text([16.0, y], Anchor::Start, "", "no image, no spots");
+        return;
+    }
+    for (i, wavelength) in drawn_wavelengths(report).iter().enumerate() {
+        let x = 22.0 + 110.0 * f64::from(u32::try_from(i).unwrap_or(0));
+        canvas.circle([x, y - 4.0], 4.0, &format!("f{}", i % COLOURS));
+        canvas.text([x + 9.0, y], Anchor::Start, "small", &format!("{wavelength} nm"));
+    }
+    let length = round_length(90.0 / scale);
+    let right = width - GAP;
+    let left = right - length * scale;
+    canvas.path(&[[left, y - 4.0], [right, y - 4.0]], "ink", 2.0);
+    let words = format!("{} \u{b5}m", short(1e3 * length));
+    canvas.text([left - 8.0, y], Anchor::End, "small", &words);
+}

@@ -1,0 +1,468 @@
+//! Lines to the rows of the lens data sheet.
+//!
+//! A line is a command and its values; indented lines belong to the `SURF` above them.
+
+use std::collections::BTreeMap;
+
+use super::ZemaxError;
+use super::place::Break;
+
+/// The most surfaces; large designs have a hundred.
+const MOST_SURFACES: usize = 4096;
+
+/// A whole file.
+#[derive(Debug, Default)]
+pub(super) struct Sheet {
+    pub(super) name: String,
+    /// Millimetres in the file's unit of length.
+    pub(super) unit: f64,
+    pub(super) rows: Vec<Row>,
+    /// The system's aperture and its line.
+    pub(super) aperture: Option<(usize, Aperture)>,
+    /// In the order in which glasses are looked for.
+    pub(super) makers: Vec<String>,
+    /// In the file's unit.
+    pub(super) stated_efl: Option<f64>,
+    pub(super) last_line: usize,
+    wavelengths: Vec<f64>,
+    primary: usize,
+    fields: Fields,
+    configurations: usize,
+    ignored: BTreeMap<String, Ignored>,
+}
+
+/// How wide the beam is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Aperture {
+    /// The entrance pupil's diameter, in the file's unit.
+    EntrancePupil(f64),
+    FNumber(f64),
+}
+
+/// A surface.
+#[derive(Debug, Default)]
+pub(super) struct Row {
+    pub(super) line: usize,
+    pub(super) shape: Shape,
+    pub(super) curvature: f64,
+    pub(super) conic: f64,
+    pub(super) thickness: f64,
+    pub(super) glass: Option<Glass>,
+    pub(super) stop: bool,
+    pub(super) parameters: BTreeMap<usize, Parameter>,
+    pub(super) extra: BTreeMap<usize, Parameter>,
+    semi_diameter: Option<f64>,
+    fixed: bool,
+    clear: Option<f64>,
+}
+
+/// The types that have a counterpart here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Shape {
+    #[default]
+    Standard,
+    EvenAsphere,
+    ExtendedAsphere,
+    Paraxial,
+    CoordinateBreak,
+}
+
+#[derive(Debug)]
+pub(super) struct Glass {
+    pub(super) line: usize,
+    pub(super) name: String,
+    /// nd and Abbe number of a glass that is nothing else.
+    pub(super) model: Option<[f64; 2]>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Parameter {
+    pub(super) line: usize,
+    pub(super) value: f64,
+}
+
+#[derive(Debug, Default)]
+struct Fields {
+    kind: usize,
+    count: Option<usize>,
+    wavelengths: Option<usize>,
+    x: Vec<f64>,
+    y: Vec<f64>,
+}
+
+#[derive(Debug)]
+struct Ignored {
+    first: usize,
+    times: usize,
+}
+
+/// One line, taken apart.
+struct Line<'a> {
+    number: usize,
+    command: &'a str,
+    rest: &'a str,
+}
+
+impl Line<'_> {
+    fn error(&self, why: impl std::fmt::Display) -> ZemaxError {
+        ZemaxError::new(self.number, format!("{}: {why}", self.command))
+    }
+
+    fn word(&self, i: usize) -> Option<&str> {
+        self.rest.split_whitespace().nth(i)
+    }
+
+    fn number(&self, i: usize) -> Result<f64, ZemaxError> {
+        let word = self.word(i).ok_or_else(|| self.error("a number is missing"))?;
+        self.parse(word)
+    }
+
+    /// The number at `i`, or `absent`.
+    fn number_or(&self, i: usize, absent: f64) -> Result<f64, ZemaxError> {
+        self.word(i).map_or(Ok(absent), |word| self.parse(word))
+    }
+
+    fn parse(&self, word: &str) -> Result<f64, ZemaxError> {
+        word.parse::<f64>()
+            .ok()
+            .filter(|number| number.is_finite())
+            .ok_or_else(|| self.error(format!("`{word}` is not a number")))
+    }
+
+    fn numbers(&self) -> Result<Vec<f64>, ZemaxError> {
+        self.rest.split_whitespace().map(|word| self.parse(word)).collect()
+    }
+
+    fn index(&self, i: usize) -> Result<usize, ZemaxError> {
+        let word = self.word(i).ok_or_else(|| self.error("a whole number is missing"))?;
+        word.parse().map_err(|_| self.error(format!("`{word}` is not a whole number")))
+    }
+}
+
+impl Sheet {
+    pub(super) fn read(text: &str) -> Result<Self, ZemaxError> {
+        let mut sheet = Self { unit: 1.0, configurations: 1, ..Self::default() };
+        let mut in_surface = false;
+        for (number, written) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
+            let trimmed = written.trim();
+            let (command, rest) = trimmed.split_once(char::is_whitespace).unwrap_or((trimmed, ""));
+            let line = Line { number, command, rest: rest.trim() };
+            sheet.last_line = number;
+            let indented = written.starts_with(char::is_whitespace);
+            let known = match command {
+                "" => true,
+                "SURF" => {
+                    sheet.begin_surface(&line)?;
+                    in_surface = true;
+                    true
+                }
+                _ => {
+                    in_surface &= indented;
+                    match sheet.rows.last_mut() {
+                        Some(row) if in_surface => row.read(&line)?,
+                        _ => sheet.read_header(&line)?,
+                    }
+                }
+            };
+            if !known {
+                sheet.ignore(&line);
+            }
+        }
+        if sheet.rows.is_empty() {
+            return Err(ZemaxError::new(1, "no SURF in the file; is it a sequential Zemax lens?"));
+        }
+        Ok(sheet)
+    }
+
+    fn begin_surface(&mut self, line: &Line<'_>) -> Result<(), ZemaxError> {
+        if line.index(0)? != self.rows.len() {
+            return Err(line.error(format!("expected surface {} here", self.rows.len())));
+        }
+        if self.rows.len() >= MOST_SURFACES {
+            return Err(line.error(format!("more than {MOST_SURFACES} surfaces")));
+        }
+        self.rows.push(Row { line: line.number, ..Row::default() });
+        Ok(())
+    }
+
+    /// Whether the line is understood.
+    fn read_header(&mut self, line: &Line<'_>) -> Result<bool, ZemaxError> {
+        match line.command {
+            "NAME" => line.rest.trim_matches('"').clone_into(&mut self.name),
+            "MODE" if line.word(0) == Some("SEQ") => {}
+            "MODE" => return Err(line.error("only sequential lenses (MODE SEQ) can be imported")),
+            "UNIT" => self.unit = unit(line)?,
+            "ENPD" | "FNUM" => self.set_aperture(line)?,
+            // The stop's own size.
+            "FLOA" => self.aperture = None,
+            "GCAT" => self.makers = line.rest.split_whitespace().map(maker).collect(),
+            "WAVM" => self.set_wavelength(line.index(0)?, line.number(1)?),
+            "WAVL" | "WAVN" => self.wavelengths = line.numbers()?,
+            "PWAV" | "PRIM" => self.primary = line.index(0)?,
+            "FTYP" => self.fields.set_kind(line)?,
+            "XFLN" => self.fields.x = line.numbers()?,
+            "YFLN" => self.fields.y = line.numbers()?,
+            "MNUM" => {
+                self.configurations = line.index(0)?;
+            }
+            "EFFL" => self.state_focal_length(line)?,
+            "NOTE" => {
+                self.stated_efl = self.stated_efl.or_else(|| focal_length_in_words(line.rest));
+                return Ok(false);
+            }
+            _ => return Ok(false),
+        }
+        if line.command == "NAME" {
+            self.stated_efl = self.stated_efl.or_else(|| focal_length_in_words(line.rest));
+        }
+        Ok(true)
+    }
+
+    fn set_aperture(&mut self, line: &Line<'_>) -> Result<(), ZemaxError> {
+        let value = line.number(0)?;
+        // Files list apertures that are not in use with the value 0.
+        if value == 0.0 {
+            return Ok(());
+        }
+        if value < 0.0 {
+            return Err(line.error(format!("{value} must be positive")));
+        }
+        let aperture = if line.command == "ENPD" {
+            Aperture::EntrancePupil(value)
+        } else {
+            Aperture::FNumber(value)
+        };
+        self.aperture = Some((line.number, aperture));
+        Ok(())
+    }
+
+    fn set_wavelength(&mut self, number: usize, micrometres: f64) {
+        // Numbered from 1; there are up to 24.
+        let slot = number.clamp(1, 64) - 1;
+        if self.wavelengths.len() <= slot {
+            self.wavelengths.resize(slot + 1, micrometres);
+        }
+        self.wavelengths[slot] = micrometres;
+    }
+
+    /// `EFFL value`, or the operand of the merit function with a target that has a weight.
+    fn state_focal_length(&mut self, line: &Line<'_>) -> Result<(), ZemaxError> {
+        let numbers = line.numbers()?;
+        let stated = match numbers[..] {
+            [value] => Some(value),
+            [_, _, _, _, _, _, target, weight, ..] if weight != 0.0 => Some(target),
+            _ => None,
+        };
+        self.stated_efl = stated.filter(|efl| *efl != 0.0).or(self.stated_efl);
+        Ok(())
+    }
+
+    fn ignore(&mut self, line: &Line<'_>) {
+        let ignored = self
+            .ignored
+            .entry(line.command.to_owned())
+            .or_insert(Ignored { first: line.number, times: 0 });
+        ignored.times += 1;
+    }
+
+    /// Wavelengths (nm) in use, the primary one first.
+    pub(super) fn wavelengths_nm(&self) -> Vec<f64> {
+        let used = match self.fields.wavelengths {
+            Some(count) if count > 0 => count,
+            // Slots that are not in use repeat the same value.
+            _ => {
+                let last = self.wavelengths.last();
+                let fill = self.wavelengths.iter().rev().take_while(|w| Some(*w) == last).count();
+                self.wavelengths.len() + 1 - fill.max(1)
+            }
+        };
+        let used = &self.wavelengths[..used.min(self.wavelengths.len())];
+        let mut all: Vec<f64> = Vec::new();
+        let primary = used.get(self.primary.max(1) - 1).or(used.first());
+        for &micrometres in primary.into_iter().chain(used) {
+            // Micrometres to three decimals more than anyone writes: 0.55 * 1000 is 550.
+            let nanometres = (micrometres * 1e9).round() / 1e6;
+            if nanometres > 0.0 && !all.contains(&nanometres) {
+                all.push(nanometres);
+            }
+        }
+        all
+    }
+
+    /// Field angles (degrees) without those that repeat; none when the file gives heights.
+    pub(super) fn field_angles(&self) -> Vec<f64> {
+        let Fields { kind: 0, count, x, y, .. } = &self.fields else { return Vec::new() };
+        let mut angles: Vec<f64> = Vec::new();
+        let count = count.unwrap_or(y.len()).min(x.len().max(y.len()));
+        for i in 0..count {
+            let slope = |list: &[f64]| list.get(i).map_or(0.0, |a| a.to_radians().tan());
+            let (across, up) = (slope(x), slope(y));
+            let angle = match across == 0.0 {
+                true => y.get(i).copied().unwrap_or(0.0),
+                false => across.hypot(up).atan().to_degrees(),
+            };
+            if angle.abs() < 180.0 && !angles.contains(&angle) {
+                angles.push(angle);
+            }
+        }
+        angles
+    }
+
+    pub(super) fn what_is_left_out(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.configurations > 1 {
+            notes.push(format!(
+                "of {} configurations, the one that the file stands at is taken",
+                self.configurations
+            ));
+        }
+        if self.fields.kind != 0 {
+            notes.push("fields given as heights are left out".to_owned());
+        }
+        let mut left_out: Vec<(&String, &Ignored)> = self.ignored.iter().collect();
+        left_out.sort_by_key(|(_, ignored)| ignored.first);
+        let words: Vec<String> = left_out
+            .iter()
+            .map(|(command, ignored)| match ignored.times {
+                1 => format!("{command} (line {})", ignored.first),
+                times => format!("{command} ({times} times, first in line {})", ignored.first),
+            })
+            .collect();
+        if !words.is_empty() {
+            notes.push(format!("commands left out: {}", words.join(", ")));
+        }
+        notes
+    }
+}
+
+impl Fields {
+    /// Kind, normalisation, number of fields, number of wavelengths.
+    fn set_kind(&mut self, line: &Line<'_>) -> Result<(), ZemaxError> {
+        self.kind = line.index(0)?;
+        self.count = line.word(2).map(|_| line.index(2)).transpose()?;
+        self.wavelengths = line.word(3).map(|_| line.index(3)).transpose()?;
+        Ok(())
+    }
+}
+
+impl Row {
+    /// Whether the line is understood.
+    fn read(&mut self, line: &Line<'_>) -> Result<bool, ZemaxError> {
+        match line.command {
+            "STOP" => self.stop = true,
+            "TYPE" => self.shape = shape(line)?,
+            "CURV" => self.curvature = line.number(0)?,
+            "CONI" => self.conic = line.number(0)?,
+            "DISZ" if line.rest.starts_with("INF") => self.thickness = f64::INFINITY,
+            "DISZ" => self.thickness = line.number(0)?,
+            "GLAS" => self.glass = glass(line)?,
+            "PARM" => {
+                let parameter = Parameter { line: line.number, value: line.number(1)? };
+                self.parameters.insert(line.index(0)?, parameter);
+            }
+            "XDAT" => {
+                let parameter = Parameter { line: line.number, value: line.number(1)? };
+                self.extra.insert(line.index(0)?, parameter);
+            }
+            "DIAM" => {
+                self.semi_diameter = Some(line.number(0)?).filter(|length| *length > 0.0);
+                self.fixed = line.number_or(1, 0.0)? == 1.0;
+            }
+            "CLAP" | "FLAP" => {
+                if line.number(0)? > 0.0 {
+                    let why = "an aperture with a central obscuration has no counterpart here";
+                    return Err(line.error(why));
+                }
+                self.clear = Some(line.number(1)?).filter(|length| *length > 0.0);
+            }
+            "SQAP" | "ELAP" | "OBSC" | "SQOB" | "ELOB" | "UDAP" => {
+                return Err(line.error(
+                    "only round clear apertures (CLAP) can be imported; take the line out to go by \
+                     the semi-diameter",
+                ));
+            }
+            // The substrate of a mirror, of which every surface has one; a mirror is GLAS MIRROR.
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// How far from the axis light passes, in the file's unit.
+    pub(super) fn semi_diameter(&self) -> Option<f64> {
+        self.clear.or(self.semi_diameter)
+    }
+
+    /// Whether someone wants this surface to stop light.
+    pub(super) fn has_fixed_rim(&self) -> bool {
+        self.clear.is_some() || (self.fixed && self.semi_diameter.is_some())
+    }
+
+    pub(super) fn coordinate_break(&self, unit: f64) -> Break {
+        let parameter = |i: usize| self.parameters.get(&i).map_or(0.0, |p| p.value);
+        Break {
+            decentre: [parameter(1) * unit, parameter(2) * unit],
+            tilt: [parameter(3), parameter(4), parameter(5)],
+            turned_first: parameter(6) != 0.0,
+        }
+    }
+}
+
+fn unit(line: &Line<'_>) -> Result<f64, ZemaxError> {
+    match line.word(0) {
+        Some("MM") => Ok(1.0),
+        Some("CM") => Ok(10.0),
+        Some("IN" | "INCH") => Ok(25.4),
+        Some("M" | "METER") => Ok(1000.0),
+        other => {
+            let found = other.unwrap_or_default();
+            Err(line.error(format!("unknown unit `{found}`; known: MM, CM, IN, METER")))
+        }
+    }
+}
+
+/// A catalogue's name as ours: `SCHOTT_2000` is Schott.
+fn maker(catalogue: &str) -> String {
+    catalogue.split(['_', '-']).next().unwrap_or_default().to_owned()
+}
+
+fn shape(line: &Line<'_>) -> Result<Shape, ZemaxError> {
+    match line.word(0) {
+        Some("STANDARD") => Ok(Shape::Standard),
+        Some("EVENASPH") => Ok(Shape::EvenAsphere),
+        Some("XASPHERE") => Ok(Shape::ExtendedAsphere),
+        Some("PARAXIAL") => Ok(Shape::Paraxial),
+        Some("COORDBRK") => Ok(Shape::CoordinateBreak),
+        other => Err(line.error(format!(
+            "the surface type {} has no counterpart here; known: STANDARD, EVENASPH, XASPHERE, \
+             PARAXIAL, COORDBRK",
+            other.unwrap_or_default()
+        ))),
+    }
+}
+
+fn glass(line: &Line<'_>) -> Result<Option<Glass>, ZemaxError> {
+    let name = line.word(0).ok_or_else(|| line.error("a name is missing"))?;
+    if name == "MIRROR" {
+        return Err(line.error("mirrors cannot be imported; lenses here only refract"));
+    }
+    // Old files name the air.
+    if name == "AIR" {
+        return Ok(None);
+    }
+    let is_model = name == "___BLANK" || line.word(1) == Some("1");
+    let model = if is_model { Some([line.number(3)?, line.number_or(4, 0.0)?]) } else { None };
+    Ok(Some(Glass { line: line.number, name: name.to_owned(), model }))
+}
+
+/// `EFL 50`, `EFL=50 mm`, `EFFL: 50` somewhere in a title or a note.
+fn focal_length_in_words(text: &str) -> Option<f64> {
+    let upper = text.to_ascii_uppercase();
+    ["EFFL", "EFL"].iter().find_map(|word| {
+        let after = &upper[upper.find(word)? + word.len()..];
+        let after = after.trim_start_matches([' ', '=', ':', '\t']);
+        let end = after
+            .find(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-' || c == '+'))
+            .unwrap_or(after.len());
+        after[..end].parse().ok().filter(|efl: &f64| *efl != 0.0)
+    })
+}
