@@ -287,6 +287,8 @@ fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: 
 /// Fields by colour, and a scale.
 fn legend(canvas: &mut Canvas, view: &View, fields: &[f64]) {
     let y = view.height - 14.0;
+    // Beams from the side may reach down here.
+    canvas.cover([0.0, view.height - FOOT + 6.0], [WIDTH, FOOT]);
     for (i, &field) in fields.iter().enumerate() {
         let x = MARGIN + 90.0 * f64::from(u32::try_from(i).unwrap_or(0));
         canvas.path(&[[x, y - 4.0], [x + 24.0, y - 4.0]], &format!("c{}", i % COLOURS), 2.0);

@@ -31,6 +31,7 @@ text { font: 13px sans-serif; fill: #24292f; }
 .c0 { stroke: #0550ae; fill: none; } .c1 { stroke: #1a7f37; fill: none; }
 .c2 { stroke: #cf222e; fill: none; } .c3 { stroke: #8250df; fill: none; }
 .c4 { stroke: #bc4c00; fill: none; }
+circle { fill-opacity: 0.7; }
 .f0 { fill: #0550ae; } .f1 { fill: #1a7f37; } .f2 { fill: #cf222e; }
 .f3 { fill: #8250df; } .f4 { fill: #bc4c00; }
 @media (prefers-color-scheme: dark) {
@@ -138,6 +139,17 @@ impl Canvas {
         self.add(circle);
     }
 
+    /// Paper over what was drawn before.
+    fn cover(&mut self, corner: [f64; 2], size: [f64; 2]) {
+        let paper = Rectangle::new()
+            .set("class", "paper")
+            .set("x", rounded(corner[0]))
+            .set("y", rounded(corner[1]))
+            .set("width", rounded(size[0]))
+            .set("height", rounded(size[1]));
+        self.add(paper);
+    }
+
     fn finish(self) -> String {
         self.document.to_string()
     }
@@ -179,7 +191,7 @@ fn title(report: &LensReport) -> String {
     if let Some(n) = report.paraxial.f_number {
         words.push(format!("f/{}", short((n * 100.0).round() / 100.0)));
     }
-    words.join("   ")
+    words.join(" \u{b7} ")
 }
 
 #[cfg(test)]

@@ -8,9 +8,9 @@ use crate::train::analysis::{Spot, spot};
 use crate::train::{LensReport, OpticalTrain};
 
 /// A box's side and the gap between boxes (pixels).
-const BOX: f64 = 210.0;
+const BOX: f64 = 190.0;
 const GAP: f64 = 22.0;
-const COLUMNS: usize = 4;
+const COLUMNS: usize = 5;
 const HEAD: f64 = 76.0;
 /// Room for a box's captions.
 const CAPTION: f64 = 40.0;
