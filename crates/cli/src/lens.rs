@@ -16,7 +16,10 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
     let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
     let mut lens = read_lens(&arguments.lens, reach)?;
     if let Some(path) = &arguments.save {
-        sidecar::write_json(path, &lens.file)?;
+        let file = lens.file.as_ref().ok_or_else(|| {
+            Fault::refused("--save: the lens of a scene cannot be saved; give its own file")
+        })?;
+        sidecar::write_json(path, file)?;
     }
     lens.train = adjusted(lens.train, arguments)?;
     match &arguments.rays {
@@ -56,7 +59,7 @@ fn report(lens: &ReadLens, arguments: &LensArguments) -> Result<(), Fault> {
     let inquiry = Inquiry {
         wavelengths: arguments.wavelengths.clone().or_else(|| named(&lens.wavelengths)),
         fields: arguments.fields.clone().or_else(|| named(&lens.fields)),
-        focus: arguments.focus.unwrap_or_default(),
+        focus: arguments.focus.unwrap_or(lens.focus),
     };
     let mut report = LensReport::new(&lens.train, &inquiry)
         .map_err(|error| Fault::refused(format!("{}: {error}", arguments.lens.display())))?;

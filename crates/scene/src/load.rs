@@ -57,10 +57,7 @@ impl SceneFile {
         let own = self.named_materials(&folder, wanted)?;
         let lights = self.named_lights(&folder)?;
         // What can be checked without the models is; a bad camera need not wait for them.
-        let parts_of_camera = CameraFiles::new(&folder);
-        self.camera_spec()
-            .build(Bounds::default, &|name| parts_of_camera.find(name))
-            .map_err(|error| self.camera_fault(&error))?;
+        self.camera_alone(&folder)?;
         let (origins, objects) = self.resolve_objects(&folder, &own.materials)?;
         let imports = self.import_all(&origins, &objects, &folder, wanted, options)?;
         let mut parts = Parts {
@@ -80,6 +77,15 @@ impl SceneFile {
             parts.light_by_default();
         }
         self.finish(parts, &folder, options)
+    }
+
+    /// The camera as far as it is known without the models: one that frames the scene sees nothing
+    /// yet.
+    pub(crate) fn camera_alone(&self, folder: &Folder) -> Result<Camera, SceneError> {
+        let files = CameraFiles::new(folder);
+        self.camera_spec()
+            .build(Bounds::default, &|name| files.find(name))
+            .map_err(|error| self.camera_fault(&error))
     }
 
     fn too_many(&self, what: &'static str) -> SceneError {

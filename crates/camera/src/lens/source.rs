@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use crate::CameraError;
 use crate::element::{ElementSpec, Resolve, element_schema};
 use crate::length::Millimetres;
-use crate::train::{LensError, LensFile, OpticalTrain};
+use crate::train::{LensError, LensFile, OpticalTrain, ZemaxLens};
 
 /// The longest text that is read as a lens (bytes).
 const LONGEST: u64 = 16 << 20;
@@ -38,14 +38,22 @@ impl LensSource {
             Self::File(written) => {
                 let error = |why: String| CameraError::new("lens", why);
                 let path = resolve(written).map_err(error)?;
-                let text = read_text(&path).map_err(|why| error(format!("{written}: {why}")))?;
+                let bytes = read_bytes(&path).map_err(|why| error(format!("{written}: {why}")))?;
+                if ZemaxLens::is_named(&path) {
+                    let fault = |why: String| error(format!("{written}, {why}"));
+                    let lens = ZemaxLens::read(&bytes).map_err(|e| fault(e.to_string()))?;
+                    return lens.file.build(resolve).map_err(|e| fault(e.to_string()));
+                }
+                let text = String::from_utf8(bytes)
+                    .map_err(|_| error(format!("{written}: is not UTF-8 text")))?;
+                let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
                 // The lens file's own paths start at its own folder.
                 let folder = Path::new(written).parent().unwrap_or(Path::new(""));
                 let beside = |name: &str| match Path::new(name).is_absolute() {
                     true => resolve(name),
                     false => resolve(&folder.join(name).to_string_lossy()),
                 };
-                LensFile::from_json(&text)
+                LensFile::from_json(text)
                     .and_then(|file| file.build(&beside))
                     .map_err(|fault| error(format!("{written}: {fault}")))
             }
@@ -53,7 +61,7 @@ impl LensSource {
     }
 }
 
-fn read_text(path: &Path) -> Result<String, String> {
+fn read_bytes(path: &Path) -> Result<Vec<u8>, String> {
     let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
     if !metadata.is_file() {
         return Err("is not a regular file".to_owned());
@@ -61,8 +69,7 @@ fn read_text(path: &Path) -> Result<String, String> {
     if metadata.len() > LONGEST {
         return Err(format!("has {} bytes, too many for a lens", metadata.len()));
     }
-    let text = std::fs::read_to_string(path).map_err(|e| format!("cannot be read: {e}"))?;
-    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+    std::fs::read(path).map_err(|e| format!("cannot be read: {e}"))
 }
 
 /// The fault of a lens that is written in the camera at `key`.

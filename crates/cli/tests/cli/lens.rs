@@ -305,6 +305,31 @@ fn scenes_without_a_lens_are_told_so_by_their_camera() {
 }
 
 #[test]
+fn the_lens_of_a_scenes_camera_stands_where_the_scene_focuses_it() {
+    let bench = Bench::with_scene(
+        r#"{"etendue": 1, "camera": {"type": "lens", "lens": "lens.json", "focus_distance": 1,
+            "fov": 20, "pose": {"from": [0, 0, 1], "look_at": [0, 0, 0]}}}"#,
+    );
+    bench.write(
+        "lens.json",
+        br#"{"elements": [
+        {"type": "thin_lens", "focal_length": 50, "semi_diameter": 10}]}"#,
+    );
+    let output = bench.run(&["lens", "scene.json", "--json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    // 1/s' = 1/50 - 1/1000.
+    assert!((number(&report["sensor_z"]) - 1000.0 / 19.0).abs() < 1e-9, "{}", report["sensor_z"]);
+    refused(&bench, &["scene.json", "--save", "x.json"], &["--save"]);
+    let scene = r#"{"etendue": 1, "camera": {"type": "lens", "lens": "lens.zmx", "fov": 20}}"#;
+    bench.write("zemax.json", scene.as_bytes());
+    bench.write("lens.zmx", ZMX.as_bytes());
+    assert!(bench.run(&["lens", "zemax.json"]).status.success());
+    bench.write("lens.zmx", ZMX.replace("STANDARD", "BICONICX").as_bytes());
+    refused(&bench, &["zemax.json"], &["zemax.json", "lens.zmx, line 15", "BICONICX"]);
+}
+
+#[test]
 fn bad_rays_are_refused_with_file_and_place() {
     let bench = Bench::new();
     bench.write("lens.json", LENS.as_bytes());
@@ -350,7 +375,7 @@ fn bad_rays_are_refused_with_file_and_place() {
 }
 
 /// A singlet as Zemax writes it, at a focal length that it states.
-const ZMX: &str = "VERS 140730\nMODE SEQ\nNAME Singlet EFL=50\nUNIT MM\nFTYP 0 0 2 1 0 0 0\n\
+const ZMX: &str = "VERS 140730\nMODE SEQ\nNAME Singlet EFL=49.04\nUNIT MM\nFTYP 0 0 2 1 0 0 0\n\
     YFLN 0 3\nWAVM 1 0.58756 1\nPWAV 1\nRAIM 0 0 1\nSURF 0\n  CURV 0\n  DISZ INFINITY\n\
     SURF 1\n  STOP\n  TYPE STANDARD\n  CURV 2.0E-2 0\n  DISZ 4\n  GLAS N-BK7 0 0 1.5168 64.17\n  \
     DIAM 8 1\nSURF 2\n  CURV -2.0E-2 0\n  DISZ 47\n  DIAM 8 1\nSURF 3\n  CURV 0\n  DISZ 0\n";
@@ -370,7 +395,7 @@ fn a_zemax_file_is_analysed_with_what_it_leaves_out_and_saved_as_a_lens_file() {
     assert!((number(&report["paraxial"]["efl"]) - efl).abs() < 1e-3, "{}", report["paraxial"]);
     assert_eq!(report["fields"], json!([0.0, 3.0]));
     let notes = report["notes"].to_string();
-    assert!(notes.contains("states a focal length of 50 mm, and it is"), "{notes}");
+    assert!(notes.contains("states a focal length of 49.04 mm, and it is"), "{notes}");
     assert!(notes.contains("RAIM (line 9)"), "{notes}");
     let again = run(&bench, &[]);
     assert_eq!(again["paraxial"], report["paraxial"]);

@@ -4,14 +4,14 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use etendue_camera::train::{
-    LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays, ZemaxError, ZemaxLens,
+    Focus, LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays, ZemaxError, ZemaxLens,
 };
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::{Written, check, read_document};
+use super::{SceneFile, Written, check, read_document};
 use crate::SceneError;
 use crate::paths::{Folder, Reach};
 
@@ -45,8 +45,10 @@ fn schema_of<T: JsonSchema>(title: &str) -> Value {
 pub struct ReadLens {
     /// The lens.
     pub train: OpticalTrain,
-    /// The lens file that it is, or would be.
-    pub file: LensFile,
+    /// The lens file that it is, or would be; `None` for a scene's.
+    pub file: Option<LensFile>,
+    /// Where a scene has its sensor; as written in other files.
+    pub focus: Focus,
     /// Field angles (degrees) that its file names.
     pub fields: Vec<f64>,
     /// Wavelengths (nm) that its file names, the main one first.
@@ -70,22 +72,22 @@ pub fn read_lens(path: &Path, reach: Reach) -> Result<ReadLens, SceneError> {
     if !SCENE_KEYS.iter().any(|key| value.get(key).is_some()) {
         return build(&written, &value, reach);
     }
-    let kind = value.pointer("/camera/type").and_then(Value::as_str).unwrap_or("pinhole");
-    match value.pointer("/camera/lens").and_then(Value::as_str) {
-        Some(file) if kind == "lens" => {
-            let found = folder(path, reach)?.find(file);
-            let found = found.map_err(|why| written.fault("camera.lens", why))?;
-            if ZemaxLens::is_named(&found.path) {
-                return read_zemax(&found.path);
-            }
-            let (written, value) = read(&found.path)?;
-            build(&written, &value, reach)
-        }
-        _ => {
-            let why = format!("a \"{kind}\" has no lens to look at; give a scene whose camera has");
-            Err(written.fault("camera.type", why))
-        }
-    }
+    let camera = SceneFile::read(path, &[])?.camera_alone(&folder(path, reach)?)?;
+    let Some(lens) = camera.lens() else {
+        let kind = value.pointer("/camera/type").and_then(Value::as_str).unwrap_or("pinhole");
+        let why = format!("a \"{kind}\" has no lens to look at; give a scene whose camera has");
+        return Err(written.fault("camera.type", why));
+    };
+    let focused = lens.focused();
+    let distance = focused.sensor_z() - focused.train().last_vertex();
+    Ok(ReadLens {
+        train: focused.train().clone(),
+        file: None,
+        focus: if distance > 0.0 { Focus::Sensor(distance) } else { Focus::AsWritten },
+        fields: Vec::new(),
+        wavelengths: Vec::new(),
+        notes: Vec::new(),
+    })
 }
 
 /// Reads rays and traces them through a lens.
@@ -130,7 +132,14 @@ fn build(written: &Written, value: &Value, reach: Reach) -> Result<ReadLens, Sce
     let train = file
         .build(&|name| folder.find(name).map(|found| found.path))
         .map_err(|error| fault(written, &error))?;
-    Ok(ReadLens { train, file, fields: Vec::new(), wavelengths: Vec::new(), notes: Vec::new() })
+    Ok(ReadLens {
+        train,
+        file: Some(file),
+        focus: Focus::AsWritten,
+        fields: Vec::new(),
+        wavelengths: Vec::new(),
+        notes: Vec::new(),
+    })
 }
 
 fn read_zemax(path: &Path) -> Result<ReadLens, SceneError> {
@@ -141,7 +150,8 @@ fn read_zemax(path: &Path) -> Result<ReadLens, SceneError> {
     let train = file
         .build(&|name| Err(format!("{name}: a Zemax file has no masks")))
         .map_err(|error| zemax(ZemaxError { line: 1, why: error.to_string() }))?;
-    Ok(ReadLens { train, file, fields, wavelengths, notes })
+    let focus = Focus::AsWritten;
+    Ok(ReadLens { train, file: Some(file), focus, fields, wavelengths, notes })
 }
 
 fn not_a_lens(error: SceneError) -> SceneError {
