@@ -85,8 +85,8 @@ fn fan(train: &OpticalTrain, at: &TrainAt, report: &LensReport, field: f64, end:
         |offset: f64| trace(train, at, chief.position + across * offset, chief.direction, end);
     // Where the beam ends on both sides of its chief ray, to a percent of the pupil.
     let edge = |side: f64| {
-        let steps = (0..=200).map(|i| side * radius * 0.01 * f64::from(i));
-        steps.filter(|&offset| lit(offset).is_some()).last()
+        let mut steps = (0..=200).rev().map(|i| side * radius * 0.01 * f64::from(i));
+        steps.find(|&offset| lit(offset).is_some())
     };
     let (Some(low), Some(high)) = (edge(-1.0), edge(1.0)) else { return none };
     let place = |i: i32| low + (high - low) * f64::from(i) / f64::from(FAN - 1);
