@@ -77,7 +77,7 @@ impl LensCamera {
         let half = focused.film().half_size();
         let frame = focused.film().frame;
         let lit_from =
-            |film: DVec2| Window::find(train, &design, frame.point(film.extend(0.0))).is_some();
+            |film: DVec2| Window::find(train, &clear, frame.point(film.extend(0.0))).is_some();
         let places = [-1.0, 0.0, 1.0].map(|y| [-1.0, 0.0, 1.0].map(|x| DVec2::new(x, y) * half));
         if !lit_from(DVec2::ZERO) && !places.into_iter().flatten().any(lit_from) {
             return Err(dark(blocked(train, &clear, frame.vertex)));

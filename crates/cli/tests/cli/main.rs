@@ -5,6 +5,7 @@ mod bad_input; // refused with exit code 2, one message, and nothing written
 mod emva; // the characterisation of what the command writes
 mod exposures; // what a scene's sensor makes of a render
 mod lens; // lenses against other software, and what is refused
+mod lens_pictures; // pictures through lenses, with closed-form answers
 mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
 mod sensor; // presets, curves, series of a characterisation

@@ -1,0 +1,113 @@
+//! Pictures through lenses, with closed-form answers.
+
+use crate::run::{Bench, text};
+
+/// A white wall at 3 m, and what is special about the camera in front of it.
+fn wall(camera: &str, more: &str) -> Bench {
+    Bench::with_scene(&format!(
+        r#"{{"etendue": 1, "camera": {{{camera}, "pose": {{"from": [0, 0, 0], "look_at": [0, 0, -1]}}}},
+            "objects": [{{"shape": "rectangle", "width": 200, "height": 200, "material": "white",
+                          "transform": {{"translate": [0, 0, -3]}}}}],
+            "materials": {{"white": {{"type": "matte", "color": [1, 1, 1]}}}}, {more}}}"#
+    ))
+}
+
+#[test]
+fn a_white_wall_falls_off_with_the_fourth_power_of_the_cosine() {
+    let bench = wall(
+        r#""type": "thin_lens", "focal_length": 50, "f_number": 32, "sensor_distance": 50,
+           "sensor": {"resolution": [48, 32], "pixel_pitch": 750}"#,
+        r#""tracer": {"type": "flat"}, "render": {"samples": 64}"#,
+    );
+    bench.render(&["--outputs", "npy", "--report", "report.json"]);
+    let picture = bench.array("picture");
+    let (mut errors, mut worst) = (0.0, 0.0_f64);
+    for (i, pixel) in picture.chunks(3).enumerate() {
+        let (x, y) = (0.75 * ((i % 48) as f64 - 23.5), 0.75 * ((i / 48) as f64 - 15.5));
+        let expected = (1.0 + (x * x + y * y) / 2500.0).powi(-2);
+        let error = pixel[1] / expected - 1.0;
+        errors += error / (48.0 * 32.0);
+        worst = worst.max(error.abs());
+    }
+    // 2.5 % of the samples are lost: √(0.025/64) = 0.02 a pixel if random, 4 of them; and over all
+    // pixels 5e-4, and what f/32 and a pixel's width are not points for: 2e-4.
+    assert!(worst < 0.08, "{worst}");
+    assert!(errors.abs() < 1.5e-3, "{errors}");
+    let report = bench.json("report.json");
+    assert_eq!(report["lens_rays"], 48 * 32 * 64);
+    let losses = report["lens_losses"][0].as_str().unwrap_or_default();
+    assert!(losses.starts_with("vignetted at element 1: "), "{report}");
+}
+
+#[test]
+fn data_through_a_lens_are_those_of_the_chief_ray() {
+    let bench = wall(
+        r#""type": "lens", "lens": {"elements": [
+             {"type": "surface", "radius": 22.01359, "thickness": 3.25896, "glass": "N-SK16", "semi_diameter": 7},
+             {"type": "surface", "radius": -435.76044, "thickness": 6.00755, "semi_diameter": 6.25},
+             {"type": "surface", "radius": -22.21328, "thickness": 0.99997, "glass": "F2", "semi_diameter": 4.05},
+             {"type": "surface", "radius": 20.29192, "thickness": 4.75041, "semi_diameter": 3.8, "stop": true},
+             {"type": "surface", "radius": 79.6836, "thickness": 2.95208, "glass": "N-SK16", "semi_diameter": 5.4},
+             {"type": "surface", "radius": -18.39533, "semi_diameter": 6}]},
+           "focus_distance": 3, "sensor": {"resolution": [24, 16], "pixel_pitch": 1000}"#,
+        r#""layers": ["depth", "distance", "position", "coverage"]"#,
+    );
+    bench.render(&["--outputs", "npy"]);
+    let [depth, distance, position] = ["depth", "distance", "position"].map(|l| bench.array(l));
+    let camera = bench.json("out/camera.json");
+    assert_eq!((&camera["projection"], &camera["distortion"]), (&"lens".into(), &().into()));
+    let focal = camera["K"][0][0].as_f64().unwrap();
+    for (i, point) in position.chunks(3).enumerate() {
+        let (x, y) = ((i % 24) as f64 - 11.5, (i / 24) as f64 - 7.5);
+        assert!((depth[i] - 3.0).abs() < 1e-12, "{i}: {}", depth[i]);
+        // The chief ray passes the pupil's centre but for the pupil's aberration, under a millimetre.
+        let straight = point.iter().map(|x| x * x).sum::<f64>().sqrt();
+        assert!((distance[i] / straight - 1.0).abs() < 1e-3, "{i}");
+        // The triplet's distortion is under 1 % here: K is near, and upright.
+        let [u, v] = [point[0] / 3.0 * focal, -point[1] / 3.0 * focal];
+        assert!((u - x).abs() < 0.01 * x.abs() + 1e-3, "{i}: {u} for {x}");
+        assert!((v - y).abs() < 0.01 * y.abs() + 1e-3, "{i}: {v} for {y}");
+    }
+}
+
+#[test]
+fn a_picture_through_a_dispersing_lens_is_the_same_for_any_thread_count() {
+    let bench = wall(
+        r#""type": "chromatic_real_lens", "front_radius": 50, "rear_radius": -50, "thickness": 6,
+           "glass": "N-BK7", "f_number": 4, "fov": 20, "focus_distance": 2,
+           "sensor": {"resolution": [64, 48]}"#,
+        r#""tracer": {"type": "facing"}, "layers": ["depth"], "render": {"samples": 5}"#,
+    );
+    let mut hashes = Vec::new();
+    for threads in ["1", "2", "5"] {
+        bench.render(&["--threads", threads, "--report", "report.json"]);
+        hashes.push(bench.json("report.json")["image_hash"].clone());
+    }
+    assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:?}");
+    let plan = text(&bench.run(&["plan", "scene.json"]).stdout);
+    assert!(plan.contains("their own") && plan.contains("exit pupil (f/4.00)"), "{plan}");
+}
+
+#[test]
+fn a_lens_that_passes_nothing_is_refused_with_what_blocks() {
+    let thin = r#""type": "thin_lens", "focal_length": 50, "fov": 20"#;
+    for (elements, words) in [
+        (r#""aperture": {"shape": "circular", "radius": 0}"#, "elements[1]"),
+        (
+            r#""f_number": 4, "elements": [{"type": "filter", "transmission": 0, "at": 3}]"#,
+            "element 2",
+        ),
+        (
+            r#""f_number": 4, "elements": [{"type": "aperture", "shape": "circular", "radius": 1,
+                "at": 9, "decentre": [40, 0]}]"#,
+            "elements[",
+        ),
+    ] {
+        let bench = wall(&format!("{thin}, {elements}"), r#""tracer": {"type": "flat"}"#);
+        let output = bench.run(&["render", "scene.json", "-o", "out"]);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains(words), "{words}: {message}");
+        assert!(!bench.path("out").exists(), "nothing is written");
+    }
+}
