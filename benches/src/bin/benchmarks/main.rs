@@ -106,22 +106,23 @@ fn main() -> anyhow::Result<()> {
     let effort = Effort::of(&arguments);
     let has = |part: &str| arguments.only.is_empty() || arguments.only.iter().any(|p| p == part);
     // The page is written after each part, so that a run that is stopped leaves what it has.
+    let write = |findings: &Findings| page::write(effort, findings, &arguments.output).map(drop);
     let mut findings = Findings::default();
     if has("traversal") || has("threads") {
-        traversal::measure(effort, [has("traversal"), has("threads")], &mut findings)?;
-        page::write(effort, &findings, &arguments.output)?;
+        let parts = [has("traversal"), has("threads")];
+        traversal::measure(effort, parts, &mut findings, &write)?;
     }
     if has("first-light") {
         first_light::measure(effort, &mut findings)?;
-        page::write(effort, &findings, &arguments.output)?;
+        write(&findings)?;
     }
     if has("build") {
         build::measure(effort, &mut findings)?;
-        page::write(effort, &findings, &arguments.output)?;
+        write(&findings)?;
     }
     if has("load") {
         load::measure(effort, &mut findings)?;
-        page::write(effort, &findings, &arguments.output)?;
+        write(&findings)?;
     }
     if has("whole") {
         whole::measure(effort, &mut findings)?;

@@ -22,13 +22,16 @@ const INCOHERENT_RAYS: usize = 1 << 18;
 /// The reference is timed on one chunk in so many.
 const EXACT_SHARE: usize = 16;
 
-/// Rays cross many instances: one chunk in so many is enough.
-const FOREST_SHARE: usize = 8;
+/// Rays cross many instances: one chunk in so many is enough. Those to a lamp cross most of the
+/// forest.
+const FOREST_SHARE: usize = 16;
+const FOREST_SHADOW_SHARE: usize = 256;
 
 pub(crate) fn measure(
     effort: Effort,
     [alone, side_by_side]: [bool; 2],
     findings: &mut Findings,
+    write: &dyn Fn(&Findings) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
     let mut scenes: Vec<(String, Arc<Geometry>, Reference)> = Vec::new();
     for triangles in effort.blobs {
@@ -66,6 +69,7 @@ pub(crate) fn measure(
             let rays = Rays::new(primary, Query::Closest);
             findings.contests.push(threads::contest(effort, &mesh, &field, &rays));
         }
+        write(findings)?;
     }
     Ok(())
 }
@@ -73,7 +77,11 @@ pub(crate) fn measure(
 fn contest(effort: Effort, mesh: &str, question: &str, field: &Field, rays: &Rays) -> Contest {
     eprintln!("  {question}");
     let is_forest = field.geometry.placements.len() > 1;
-    let share = if is_forest { FOREST_SHARE } else { 1 };
+    let share = match question {
+        _ if !is_forest => 1,
+        OCCLUSION => FOREST_SHADOW_SHARE,
+        _ => FOREST_SHARE,
+    };
     let all = contestants(field, rays);
     let items = all.first().map_or(0, |(_, contestant)| contestant.rays()) as f64;
     let mut turns: Vec<Turn<'_>> = Vec::new();
