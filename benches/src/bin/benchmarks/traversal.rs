@@ -22,10 +22,8 @@ const INCOHERENT_RAYS: usize = 1 << 18;
 /// The reference is timed on one chunk in so many.
 const EXACT_SHARE: usize = 16;
 
-/// Rays cross many instances: one chunk in so many is enough. Those to a lamp cross most of the
-/// forest.
+/// Rays cross many instances: one chunk in so many is enough.
 const FOREST_SHARE: usize = 16;
-const FOREST_SHADOW_SHARE: usize = 256;
 
 pub(crate) fn measure(
     effort: Effort,
@@ -62,6 +60,11 @@ pub(crate) fn measure(
             ];
             let first = (PRIMARY, Rays::new(primary.clone(), Query::Closest));
             for (question, rays) in [first].into_iter().chain(sets) {
+                // Rays to a lamp cross most of the forest: they would take longer
+                // than all other questions together.
+                if is_forest && question == OCCLUSION {
+                    continue;
+                }
                 findings.contests.push(contest(effort, &mesh, question, &field, &rays));
             }
         }
@@ -77,11 +80,7 @@ pub(crate) fn measure(
 fn contest(effort: Effort, mesh: &str, question: &str, field: &Field, rays: &Rays) -> Contest {
     eprintln!("  {question}");
     let is_forest = field.geometry.placements.len() > 1;
-    let share = match question {
-        _ if !is_forest => 1,
-        OCCLUSION => FOREST_SHADOW_SHARE,
-        _ => FOREST_SHARE,
-    };
+    let share = if is_forest { FOREST_SHARE } else { 1 };
     let all = contestants(field, rays);
     let items = all.first().map_or(0, |(_, contestant)| contestant.rays()) as f64;
     let mut turns: Vec<Turn<'_>> = Vec::new();
