@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use etendue_camera::{Camera, CameraError, CameraSpec};
 use etendue_geometry::{Bounds, Geometry, Mesh, Placement, Positions, Transform};
+use etendue_sensor::Sensor;
 use etendue_spectrum::Lanes;
 use etendue_tracer::{
     EnvironmentImage, LayerSpec, Light, LightKind, Material, Texture, TextureScope,
@@ -240,7 +241,7 @@ impl SceneFile {
         files.dedup();
         let mut notes = parts.notes;
         notes.extend(self.unused_materials());
-        let sensor = self.sensor.clone().map(|s| s.with_resolution(camera.resolution()));
+        let sensor = self.sensor_behind(&camera)?;
         notes.extend(self.lens_notes(&camera, options.strictness)?);
         Ok(Scene {
             path: self.path().to_owned(),
@@ -313,6 +314,17 @@ impl SceneFile {
             count: 1,
         };
         Ok(train.notes().iter().chain(&guesses).map(note).collect())
+    }
+
+    /// The sensor with the pixels that the camera gives it.
+    fn sensor_behind(&self, camera: &Camera) -> Result<Option<Sensor>, SceneError> {
+        let Some(sensor) = &self.sensor else { return Ok(None) };
+        let sized = match camera.pixel_pitch() {
+            Some(pitch) if pitch != sensor.pixel_pitch() => sensor.with_pixel_pitch(pitch),
+            _ => Ok(sensor.clone()),
+        };
+        let sized = sized.map_err(|error| self.fault("camera.sensor", error.why()))?;
+        Ok(Some(sized.with_resolution(camera.resolution())))
     }
 
     fn unused_materials(&self) -> impl Iterator<Item = Note> + '_ {

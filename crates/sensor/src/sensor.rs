@@ -53,6 +53,15 @@ impl Sensor {
         self
     }
 
+    /// The same sensor, as its file says, with pixels of another size (µm).
+    ///
+    /// # Errors
+    ///
+    /// When the size is none.
+    pub fn with_pixel_pitch(&self, pitch: f64) -> Result<Self, SensorError> {
+        Self::new(&SensorSpec { pixel_pitch: Some(pitch), ..self.spec.clone() })
+    }
+
     /// The same sensor for a render in other lanes than it asks for: in three, say, where nothing in
     /// the scene has a spectrum of its own.
     ///

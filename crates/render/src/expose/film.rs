@@ -1,7 +1,8 @@
 //! The light of a picture in the lanes of a sensor.
 
+use etendue_camera::Projection;
 use etendue_scene::Scene;
-use etendue_sensor::SensorKind;
+use etendue_sensor::{Radiometry, Sensor, SensorKind};
 use etendue_spectrum::Lanes;
 use rayon::prelude::*;
 
@@ -53,6 +54,21 @@ impl LaneFilm {
             plane
         };
         [plane(0), plane(1), plane(2)]
+    }
+
+    /// What falls on the sensor: in physical mode the light of a lens camera is radiance
+    /// (W·m⁻²·sr⁻¹·nm⁻¹), and the projected solid angle of its pupil makes irradiance
+    /// (W·m⁻²·nm⁻¹) of it. Cameras without an aperture give irradiance as it is.
+    #[must_use]
+    pub(super) fn on_sensor(mut self, scene: &Scene, sensor: &Sensor) -> Self {
+        if let (Radiometry::Physical, Projection::Lens(lens)) =
+            (sensor.radiometry(), scene.camera.projection())
+        {
+            #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+            let angle = lens.solid_angle() as f32;
+            self.values.par_iter_mut().for_each(|value| *value *= angle);
+        }
+        self
     }
 
     /// A picture's linear sRGB in other lanes. Exact for colours that were not mixed by light on

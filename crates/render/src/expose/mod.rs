@@ -154,6 +154,7 @@ pub fn write(
         1 => 0,
         count => (count - 1).to_string().len().max(3),
     };
+    let film = film.on_sensor(scene, sensor);
     let mut writer = Writer {
         sensor,
         film,
