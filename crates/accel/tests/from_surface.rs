@@ -21,13 +21,12 @@ fn cube() -> Mesh {
 
 fn backends(geometry: &Arc<Geometry>) -> Vec<Box<dyn Accel>> {
     let options = BuildOptions::default();
-    let mut all: Vec<Box<dyn Accel>> = vec![
+    vec![
         Box::new(Bvh::build(Arc::clone(geometry), &options).unwrap()),
         Box::new(Exact::build(Arc::clone(geometry), &options).unwrap()),
-    ];
-    #[cfg(feature = "embree")]
-    all.push(Box::new(etendue_accel::Embree::build(Arc::clone(geometry), &options).unwrap()));
-    all
+        #[cfg(feature = "embree")]
+        Box::new(etendue_accel::Embree::build(Arc::clone(geometry), &options).unwrap()),
+    ]
 }
 
 /// From points a few roundings inside of a cube's faces, edges and corners in all directions: rays
