@@ -10,7 +10,9 @@ mod meshes;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use etendue_accel::{Accel, BuildError, BuildOptions, Bvh, Embree, Exact, watertight};
+#[cfg(feature = "embree")]
+use etendue_accel::Embree;
+use etendue_accel::{Accel, BuildError, BuildOptions, Bvh, Exact, watertight};
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 use etendue_geometry::{Detail, Geometry, HitBatch, MISS, Positions, RayBatch, Transform};
 use meshes::{Random, at, blob, mesh, placed, rays, scene, soup};
@@ -21,6 +23,7 @@ type Build = fn(Arc<Geometry>, &BuildOptions) -> Result<Box<dyn Accel>, BuildErr
 const BACKENDS: &[(&str, Build)] = &[
     ("exact", |geometry, options| Ok(Box::new(Exact::build(geometry, options)?))),
     ("bvh", |geometry, options| Ok(Box::new(Bvh::build(geometry, options)?))),
+    #[cfg(feature = "embree")]
     ("embree", |geometry, options| Ok(Box::new(Embree::build(geometry, options)?))),
 ];
 

@@ -113,6 +113,7 @@ fn assert_ten_million(backend: &str) {
     println!("{backend}: 0 leaks of {count} rays");
 }
 
+#[cfg(feature = "embree")]
 #[test]
 #[ignore = "ten million rays; see the head of this file"]
 fn ten_million_aimed_rays_do_not_leak_through_embree() {
@@ -126,6 +127,7 @@ fn ten_million_aimed_rays_do_not_leak_through_bvh() {
 }
 
 /// Without this the test above could not tell a mode that leaks from one that does not.
+#[cfg(feature = "embree")]
 #[test]
 fn embrees_fast_mode_leaks() {
     let mesh = blob(30);
@@ -197,6 +199,7 @@ fn distances_and_normals_are_those_of_exact() {
 
 /// The instruction sets differ in their roundings (fused or not) and widths, and so in what single
 /// precision finds; what is measured in the end does not.
+#[cfg(feature = "embree")]
 #[test]
 fn all_instruction_sets_of_embree_agree() {
     let geometry = scene(vec![blob(40)]);
@@ -227,6 +230,7 @@ fn all_instruction_sets_of_embree_agree() {
     assert!(tried > 0, "no instruction set works here");
 }
 
+#[cfg(feature = "embree")]
 #[test]
 fn an_unknown_instruction_set_is_refused_by_name() {
     let options = BuildOptions { isa: Some("mmx".to_owned()), ..BuildOptions::default() };
@@ -238,6 +242,7 @@ fn an_unknown_instruction_set_is_refused_by_name() {
 
 /// Single precision's error, and with it how many rays are looked at twice, follows from how far away
 /// things are, not from how wide the scene is.
+#[cfg(feature = "embree")]
 #[test]
 fn small_things_in_a_wide_scene_are_found_at_once() {
     let ground = [[-1e3, -2.0, -1e3], [1e3, -2.0, -1e3], [-1e3, -2.0, 1e3]];
