@@ -2,9 +2,9 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`text`] | bytes to lines: UTF-8 and UTF-16 |
-//! | [`sheet`] | lines to the rows of the lens data sheet |
-//! | [`place`] | coordinate breaks to tilts and decentrings |
+//! | `text` | bytes to lines: UTF-8 and UTF-16 |
+//! | `sheet` | lines to the rows of the lens data sheet |
+//! | `place` | coordinate breaks to tilts and decentrings |
 //! | here | rows to the elements of a lens file |
 //!
 //! What has no counterpart here and would change the light's way is an error that names its line;
