@@ -1,0 +1,245 @@
+//! Scenes whose radiance is known, by every tracer of light and every accelerator.
+//!
+//! The pixels of each picture see the same radiance, so their spread gives the standard error of
+//! their mean: it has to be within four of the known value, or within `bias` where a scene is only
+//! nearly the one that the formula speaks of.
+
+use etendue_accel::BuildOptions;
+use etendue_render::output::Outputs;
+use etendue_render::output::Values;
+use etendue_render::{Images, Plan, accelerators, build, plan, render};
+use etendue_scene::file::{AccelName, SceneFile};
+use etendue_scene::{LoadOptions, Scene};
+use etendue_tracer::{Emission, Paint};
+
+const TRACERS: [&str; 3] = ["direct", "whitted", "path"];
+
+fn load(text: &str) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.json");
+    std::fs::write(&path, text).unwrap();
+    let file = SceneFile::read(&path, &[]).unwrap();
+    file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).unwrap()
+}
+
+/// All pixels' red.
+fn picture(mut scene: Scene, accel: AccelName) -> Vec<f64> {
+    scene.render.accel = Some(accel);
+    let outputs = Outputs::from_list("exr").unwrap();
+    let plan = Plan::new(&scene, outputs);
+    let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
+    let images = Images::decode(&scene, &plan);
+    let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_| true).unwrap();
+    assert_eq!(done.light.not_finite, 0);
+    match &done.picture.layers()[0].channels[0].values {
+        Values::F32(values) => values.iter().map(|&v| f64::from(v)).collect(),
+        other => panic!("a picture is f32: {other:?}"),
+    }
+}
+
+fn assert_shows(name: &str, pixels: &[f64], known: f64, bias: f64) {
+    let n = pixels.len() as f64;
+    let mean = pixels.iter().sum::<f64>() / n;
+    let variance = pixels.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    // Pictures are f32: half a unit in the last place is the least error.
+    let bound = 4.0 * (variance / n).sqrt() + bias + 1e-7 * known;
+    assert!((mean - known).abs() <= bound, "{name}: {mean} is not {known} within {bound}");
+}
+
+/// A picture of `8 × 8` pixels of a tiny patch around `at`, from `from`.
+fn patch(tracer: &str, samples: u32, from: [f64; 3], at: [f64; 3], rest: &str) -> String {
+    format!(
+        r#"{{"etendue": 1, "tracer": {{"type": "{tracer}"}},
+        "camera": {{"type": "orthographic", "height": 1e-3,
+            "pose": {{"from": {from:?}, "look_at": {at:?}, "up": [0.1, 0.2, 0.9]}},
+            "sensor": {{"resolution": [8, 8]}}}},
+        "render": {{"samples": {samples}}}, {rest}}}"#
+    )
+}
+
+/// Runs `text` by every tracer and accelerator against the value that each tracer should find.
+fn check(
+    name: &str,
+    samples: u32,
+    [from, at]: [[f64; 3]; 2],
+    rest: &str,
+    change: impl Fn(&mut Scene),
+    bias: f64,
+    known: impl Fn(&str) -> f64,
+) {
+    for tracer in TRACERS {
+        for &accel in accelerators() {
+            let mut scene = load(&patch(tracer, samples, from, at, rest));
+            change(&mut scene);
+            let pixels = picture(scene, accel);
+            assert_shows(&format!("{name}, {tracer}, {accel:?}"), &pixels, known(tracer), bias);
+        }
+    }
+}
+
+/// Inside of a closed box whose walls shine by 1 and return ρ: 1 + ρ + ρ² + … = 1/(1 − ρ), and 1 + ρ
+/// after one bounce.
+#[test]
+fn a_closed_furnace() {
+    for albedo in [0.2, 0.6] {
+        let rest = format!(
+            r#""lights": [],
+            "objects": [{{"shape": "box", "size": [2, 2, 2], "material": "wall"}}],
+            "materials": {{"wall": {{"type": "matte", "color": [{albedo}, {albedo}, {albedo}]}}}}"#
+        );
+        let shine = |scene: &mut Scene| {
+            let radiance = Paint::Plain([1.0; 3]);
+            scene.materials[0].emission =
+                Some(Emission { radiance, strength: 1.0, illuminant: None, two_sided: true });
+        };
+        let eye = [[0.2, 0.1, 0.3], [-0.5, -1.0, 0.2]];
+        check("furnace", 64, eye, &rest, shine, 0.0, |tracer| match tracer {
+            "path" => 1.0 / (1.0 - albedo),
+            _ => 1.0 + albedo,
+        });
+    }
+}
+
+/// A Lambert plane under a point light, ρ I cos θ / (π d²), and under the sun, ρ E cos θ / π: without
+/// noise.
+#[test]
+fn the_cosine_law() {
+    let plane = r#""objects": [{"shape": "rectangle", "width": 10, "height": 10, "material": "m"}],
+        "materials": {"m": {"type": "matte", "color": [0.5, 0.5, 0.5]}}"#;
+    let eye = [[1.0, 0.5, 3.0], [0.0, 0.0, 0.0]];
+    let pi = std::f64::consts::PI;
+    let point = format!(
+        r#""lights": [{{"type": "point", "at": [0, 3, 4], "intensity": [10, 10, 10]}}], {plane}"#
+    );
+    // The patch is 1 mm wide and the light 5 m away: its mean differs by (1e-3 / 5)².
+    check("point", 16, eye, &point, |_| (), 1e-7, |_| 0.5 * 10.0 * 0.8 / (pi * 25.0));
+    let sun = format!(
+        r#""lights": [{{"type": "directional", "direction": [3, 0, -4],
+        "irradiance": [2, 2, 2]}}], {plane}"#
+    );
+    check("sun", 4, eye, &sun, |_| (), 0.0, |_| 0.5 * 2.0 * 0.8 / pi);
+    // From behind the plane is dark.
+    let below = [[1.0, 0.5, -3.0], [0.0, 0.0, 0.0]];
+    check("behind", 4, below, &sun, |_| (), 0.0, |_| 0.0);
+}
+
+/// A sphere of radiance L over a plane: its form factor is (r/d)² cos θ (Howell, *A Catalog of
+/// Radiation Heat Transfer Configuration Factors*, B-34), so the plane shows ρ L (r/d)² cos θ.
+#[test]
+fn a_sphere_light_over_a_plane() {
+    let rest = r#""lights": [],
+        "objects": [{"shape": "rectangle", "width": 10, "height": 10, "material": "m"},
+            {"shape": "sphere", "radius": 0.5, "triangles": 20000, "material": "lamp",
+             "transform": {"translate": [0.9, 0, 1.2]}}],
+        "materials": {"m": {"type": "matte", "color": [0.8, 0.8, 0.8]},
+            "lamp": {"type": "emissive", "radiance": [3, 3, 3]}}"#;
+    let eye = [[-1.0, 0.3, 2.0], [0.0, 0.0, 0.0]];
+    let known = 0.8 * 3.0 * (0.25 / 2.25) * (1.2 / 1.5);
+    // The triangles' edges cut about 3e-4 off the sphere's outline.
+    check("sphere light", 256, eye, rest, |_| (), 1e-3 * known, |_| known);
+}
+
+/// A mirror of reflectance 0.7 shows 0.7 of what it sees, and no tracer needs a second surface for
+/// the sky.
+#[test]
+fn a_mirror_under_a_sky() {
+    let rest = r#""lights": [{"type": "environment", "radiance": [2, 2, 2]}],
+        "objects": [{"shape": "rectangle", "width": 4, "height": 4, "material": "m"}],
+        "materials": {"m": {"type": "mirror", "color": [0.7, 0.7, 0.7]}}"#;
+    check("mirror", 4, [[1.0, 0.5, 3.0], [0.0; 3]], rest, |_| (), 0.0, |_| 1.4);
+}
+
+/// A slab of glass before a wall of radiance 1: with reflectance R of each face, the light that
+/// passes after any number of reflections within is (1 − R)/(1 + R). One bounce ends in the slab.
+#[test]
+fn a_slab_of_glass() {
+    let rest = r#""lights": [],
+        "objects": [{"shape": "box", "size": [4, 4, 0.2], "material": "glass"},
+            {"shape": "rectangle", "width": 40, "height": 40, "material": "lamp",
+             "transform": {"translate": [0, 0, -2]}}],
+        "materials": {"glass": {"type": "dielectric", "ior": 1.5},
+            "lamp": {"type": "emissive", "radiance": [1, 1, 1]}}"#;
+    for from in [[0.0, 0.0, 3.0], [2.0, 1.0, 3.0]] {
+        let cosine = 3.0 / f64::hypot(f64::hypot(from[0], from[1]), 3.0);
+        let (reflectance, _) = etendue_tracer::bsdf::fresnel::dielectric(cosine, 1.5);
+        let passed = (1.0 - reflectance) / (1.0 + reflectance);
+        check(
+            "slab",
+            256,
+            [from, [0.0; 3]],
+            rest,
+            |_| (),
+            0.0,
+            |tracer| match tracer {
+                "direct" => 0.0,
+                _ => passed,
+            },
+        );
+    }
+}
+
+/// A closed box in a blinding sky is dark inside: exactly.
+#[test]
+fn no_light_leaks_into_a_closed_box() {
+    for tracer in TRACERS {
+        for &accel in accelerators() {
+            let scene = load(&format!(
+                r#"{{"etendue": 1, "tracer": {{"type": "{tracer}"}},
+                "camera": {{"type": "pinhole", "fov": 100,
+                    "pose": {{"from": [0.3, 0.1, 0.2], "look_at": [-1, -1, -1]}},
+                    "sensor": {{"resolution": [48, 48]}}}},
+                "lights": [{{"type": "environment", "radiance": [1e6, 1e6, 1e6]}},
+                    {{"type": "point", "at": [0, 5, 0], "intensity": [1e6, 1e6, 1e6]}}],
+                "objects": [{{"shape": "box", "size": [2, 2, 2], "material": "m"}},
+                    {{"shape": "box", "size": [0.5, 0.5, 0.5], "material": "m",
+                      "transform": {{"translate": [-0.75, -0.75, -0.75]}}}}],
+                "materials": {{"m": {{"type": "matte", "color": [0.9, 0.9, 0.9]}}}},
+                "render": {{"samples": 16}}}}"#
+            ));
+            let lit = picture(scene, accel).iter().filter(|&&p| p != 0.0).count();
+            assert_eq!(lit, 0, "{tracer} {accel:?}");
+        }
+    }
+}
+
+/// The same scene in millimetres, metres and kilometres, and moved by 10⁶ m, gives the same picture:
+/// hits differ by roundings, so a random choice or an edge may fall the other way in a few pixels.
+#[test]
+fn neither_scale_nor_place_changes_the_picture() {
+    let at = |scale: f64, far: f64| {
+        let place = |x: f64, y: f64, z: f64| [x * scale + far, y * scale + far, z * scale + far];
+        load(&format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "path", "max_bounces": 4}},
+            "camera": {{"type": "pinhole", "fov": 40,
+                "pose": {{"from": {:?}, "look_at": {:?}}},
+                "sensor": {{"resolution": [32, 32]}}}},
+            "lights": [{{"type": "environment", "radiance": [0.5, 0.5, 0.5]}},
+                {{"type": "directional", "direction": [1, -2, -1], "irradiance": [2, 2, 2]}}],
+            "objects": [
+                {{"shape": "rectangle", "width": {}, "height": {}, "material": "m",
+                  "transform": {{"translate": {:?}, "rotate": [1, 0, 0, -90]}}}},
+                {{"shape": "sphere", "radius": {}, "triangles": 2000, "material": "g",
+                  "transform": {{"translate": {:?}}}}}],
+            "materials": {{"m": {{"type": "matte", "color": [0.5, 0.6, 0.7]}},
+                "g": {{"type": "gltf", "metallic": 0.2, "roughness": 0.3}}}},
+            "render": {{"samples": 8}}}}"#,
+            place(2.0, 2.0, 3.0),
+            place(0.0, 0.3, 0.0),
+            10.0 * scale,
+            10.0 * scale,
+            place(0.0, 0.0, 0.0),
+            scale,
+            place(0.0, 1.0, 0.0),
+        ))
+    };
+    for &accel in accelerators() {
+        let metres = picture(at(1.0, 0.0), accel);
+        for (scale, far) in [(1e-3, 0.0), (1e3, 0.0), (1.0, 1e6)] {
+            let other = picture(at(scale, far), accel);
+            let differ = |(a, b): &(&f64, &f64)| (*a - *b).abs() > 1e-4 * a.max(0.1);
+            let count = metres.iter().zip(&other).filter(differ).count();
+            // One in a hundred pixels, each of 8 paths of up to 4 bounces.
+            assert!(count <= 10, "{accel:?} scale {scale} far {far}: {count} of 1024 differ");
+        }
+    }
+}
