@@ -272,6 +272,7 @@ fn folders_that_cannot_be_written_to_are_refused_before_rendering() {
     refused_command(&bench, &["render", "scene.json", "-o", "file"], &["file"]);
 }
 
+#[cfg(feature = "embree")]
 #[test]
 fn instruction_sets_that_there_are_not_are_refused_by_name() {
     let bench = Bench::with_scene(r#"{"etendue": 1, "objects": [{"shape": "box"}]}"#);
