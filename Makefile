@@ -49,7 +49,9 @@ docs-figures: setup
 	cargo run --release -p etendue -- render scenes/first-light.json -o out/docs-figures \
 		--set 'camera.sensor.resolution=[640,640]' --samples 16 --outputs png
 	install -D -m 644 out/docs-figures/picture.png docs/images/first-light.png
-
+	cargo run --release -p etendue -- render scenes/paper/fig3.json -o out/docs-figures/fig3 \
+		--samples 256 --outputs png
+	install -D -m 644 out/docs-figures/fig3/picture.png docs/images/fig3.png
 	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
 	for kind in fig5a fig5b fig5c fig7a-raw fig7b-rgb fig7c-multispectral; do \
 		cargo run --release -p etendue -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind \
