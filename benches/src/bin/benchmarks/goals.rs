@@ -141,10 +141,13 @@ fn rendering(findings: &Findings, goals: &mut Vec<Goal>) {
             Bound::AtMost(1.30),
             "times the bare loop over the same rays",
             contest.and_then(|c| c.speed(&ours, &limit)).map(f64::recip),
-            REFINING,
+            RENDERING,
         ));
     }
 }
+
+const RENDERING: &str = "the f64 solution with the fetching of corners adds most, then the first touch of the \
+                         film's memory, then camera rays and layers";
 
 fn whole_process(mesh: &str, findings: &Findings, goals: &mut Vec<Goal>) {
     let contest = findings.contest(Part::Whole, mesh, whole::QUESTION);
