@@ -1,18 +1,27 @@
-//! How fast are rays that have nothing to do with each other?
+//! How fast are rays: primary ones (one a pixel, and sixteen samples of one pixel), such as have nothing
+//! to do with each other, and shadow rays?
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use etendue_benches::contest::{Query, time_of};
 use etendue_benches::field::{Field, Rays, Reference, contestants};
+use etendue_benches::rays::View;
 use etendue_benches::{meshes, rays};
 
 fn sets(field: &Field) -> Vec<(&'static str, Rays)> {
-    let geometry = &field.geometry;
-    let rays = rays::incoherent(geometry.bounds(), 1 << 18);
-    vec![("chords", Rays::new(rays, Query::Closest))]
+    let bounds = field.geometry.bounds();
+    let view = View::framing(bounds);
+    let primary = view.primary();
+    let shadows = rays::occlusion(&field.embree, &field.geometry, &primary);
+    vec![
+        ("primary-1-sample", Rays::new(primary, Query::Closest)),
+        ("primary-16-samples", Rays::new(view.samples(), Query::Closest)),
+        ("incoherent", Rays::new(rays::incoherent(bounds, 1 << 18), Query::Closest)),
+        ("occlusion", Rays::new(shadows, Query::Occluded)),
+    ]
 }
 
-fn incoherent(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("incoherent");
+fn traversal(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("traversal");
     group.sample_size(10);
     let blob = |triangles| meshes::blob(triangles).expect("a blob of so many triangles");
     let scenes = [
@@ -34,5 +43,5 @@ fn incoherent(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, incoherent);
+criterion_group!(benches, traversal);
 criterion_main!(benches);
