@@ -156,51 +156,48 @@ camera_with_a_lens! {
     }
 }
 
-camera_with_a_lens! {
+/// Declares a camera of one thick spherical lens by the key that says what glass it is.
+macro_rules! camera_with_a_thick_lens {
+    ($(#[$about:meta])* pub struct $name:ident { $(#[$glass_doc:meta])* pub $glass:ident: $kind:ty, }) => {
+        camera_with_a_lens! {
+            $(#[$about])*
+            pub struct $name {
+                /// Radius of the front surface (mm), positive when its centre is behind it, as on a
+                /// lens that bulges towards the object; flat when absent.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub front_radius: Option<Millimetres>,
+                /// Radius of the rear surface (mm), negative when its centre is in front of it, as on
+                /// a lens that bulges towards the sensor; flat when absent.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub rear_radius: Option<Millimetres>,
+                /// From vertex to vertex (mm).
+                pub thickness: Millimetres,
+                $(#[$glass_doc])*
+                pub $glass: $kind,
+                /// Half the lens' diameter (mm); unlimited when absent.
+                #[serde(default, skip_serializing_if = "Option::is_none")]
+                pub semi_diameter: Option<Millimetres>,
+                /// Apertures, filters and other parts in front of the lens, in it and behind it.
+                #[serde(default, skip_serializing_if = "Vec::is_empty")]
+                pub elements: Vec<PlacedSpec>,
+            }
+        }
+    };
+}
+
+camera_with_a_thick_lens! {
     /// One thick spherical lens of the same refractive index at all wavelengths.
     pub struct RealLensCameraSpec {
-        /// Radius of the front surface (mm), positive when its centre is behind it, as on a lens
-        /// that bulges towards the object; flat when absent.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub front_radius: Option<Millimetres>,
-        /// Radius of the rear surface (mm), negative when its centre is in front of it, as on a lens
-        /// that bulges towards the sensor; flat when absent.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub rear_radius: Option<Millimetres>,
-        /// From vertex to vertex (mm).
-        pub thickness: Millimetres,
         /// The index of the glass.
         pub refractive_index: f64,
-        /// Half the lens' diameter (mm); unlimited when absent.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub semi_diameter: Option<Millimetres>,
-        /// Apertures, filters and other parts in front of the lens, in it and behind it.
-        #[serde(default, skip_serializing_if = "Vec::is_empty")]
-        pub elements: Vec<PlacedSpec>,
     }
 }
 
-camera_with_a_lens! {
+camera_with_a_thick_lens! {
     /// One thick spherical lens of a glass that disperses.
     pub struct ChromaticRealLensCameraSpec {
-        /// Radius of the front surface (mm), positive when its centre is behind it, as on a lens
-        /// that bulges towards the object; flat when absent.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub front_radius: Option<Millimetres>,
-        /// Radius of the rear surface (mm), negative when its centre is in front of it, as on a lens
-        /// that bulges towards the sensor; flat when absent.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub rear_radius: Option<Millimetres>,
-        /// From vertex to vertex (mm).
-        pub thickness: Millimetres,
         /// The glass: a name of the catalogue, or its dispersion.
         pub glass: GlassSpec,
-        /// Half the lens' diameter (mm); unlimited when absent.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub semi_diameter: Option<Millimetres>,
-        /// Apertures, filters and other parts in front of the lens, in it and behind it.
-        #[serde(default, skip_serializing_if = "Vec::is_empty")]
-        pub elements: Vec<PlacedSpec>,
     }
 }
 
