@@ -162,4 +162,17 @@ impl Mesh {
     pub fn corners(&self, i: usize) -> [DVec3; 3] {
         self.triangles[i].map(|corner| self.positions.get(corner as usize))
     }
+
+    /// Bytes of vertices and indices that are in no mapped file.
+    #[must_use]
+    pub fn heap_bytes(&self) -> usize {
+        let positions = match &self.positions {
+            Positions::F32(vertices) => vertices.floats().heap_bytes(),
+            Positions::F64(vertices) => vertices.heap_bytes(),
+        };
+        let normals = self.normals.as_ref().map_or(0, |normals| normals.floats().heap_bytes());
+        let colors = self.colors.as_ref().map_or(0, |colors| colors.floats().heap_bytes());
+        let uvs: usize = self.uvs.iter().map(|uvs| uvs.floats().heap_bytes()).sum();
+        positions + self.triangles.heap_bytes() + normals + uvs + colors
+    }
 }

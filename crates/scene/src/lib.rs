@@ -28,6 +28,7 @@ mod identity;
 pub mod import;
 mod load;
 mod looks;
+mod parts;
 mod paths;
 pub mod scene;
 pub mod shape;

@@ -7,20 +7,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use etendue_camera::{Camera, CameraError, CameraSpec};
-use etendue_geometry::{Bounds, Geometry, Mesh, Placement, Positions, Transform};
+use etendue_geometry::{Bounds, Geometry, Transform};
 use etendue_sensor::Sensor;
 use etendue_spectrum::Lanes;
-use etendue_tracer::{
-    EnvironmentImage, LayerSpec, Light, LightKind, Material, Texture, TextureScope,
-};
+use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
 
 use crate::cameras::{self, CameraOrigin, SceneCamera};
 use crate::file::{FileKind, SceneFile, Source, join, join_index, suggest};
 use crate::identity::Ingredients;
 use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Strictness, Wanted};
+use crate::parts::{Object, Parts};
 use crate::paths::{Folder, Found};
-use crate::scene::{LoadOptions, LoadProgress, LoadStats, Scene};
+use crate::scene::{LoadOptions, LoadProgress, Scene};
 use crate::shape::{ShapeError, ShapeSpec};
 use crate::{SceneError, bounds};
 
@@ -35,14 +34,6 @@ struct Origin {
 enum OriginKind {
     File(PathBuf),
     Shape(ShapeSpec),
-}
-
-/// An object, checked; its triangles are still to come.
-struct Object {
-    title: String,
-    origin: usize,
-    world_from_object: Transform,
-    material: Option<u32>,
 }
 
 impl SceneFile {
@@ -61,12 +52,7 @@ impl SceneFile {
         self.camera_alone(&folder)?;
         let (origins, objects) = self.resolve_objects(&folder, &own.materials)?;
         let imports = self.import_all(&origins, &objects, &folder, wanted, options)?;
-        let mut parts = Parts {
-            materials: own.materials,
-            textures: own.textures,
-            lights: lights.clone().unwrap_or_default(),
-            ..Parts::default()
-        };
+        let mut parts = Parts::new(own.materials, own.textures, lights.clone().unwrap_or_default());
         let split_nodes = self.kind() == FileKind::Model;
         for import in imports {
             parts.add_import(import);
@@ -364,7 +350,7 @@ impl<'a> CameraFiles<'a> {
 /// A shape as if it had been imported.
 fn of_shape(shape: &ShapeSpec, wanted: Wanted) -> Result<Import, ShapeError> {
     let mesh = shape.build(wanted)?;
-    let stats = import::Stats { bytes_copied: heap_bytes(&mesh) as u64, ..Default::default() };
+    let stats = import::Stats { bytes_copied: mesh.heap_bytes() as u64, ..Default::default() };
     Ok(Import {
         placements: vec![ImportedPlacement {
             mesh: 0,
@@ -377,151 +363,4 @@ fn of_shape(shape: &ShapeSpec, wanted: Wanted) -> Result<Import, ShapeError> {
         stats,
         ..Import::default()
     })
-}
-
-/// Bytes of a mesh's vertices and indices that are in no mapped file.
-pub(crate) fn heap_bytes(mesh: &Mesh) -> usize {
-    let positions = match &mesh.positions {
-        Positions::F32(vertices) => vertices.floats().heap_bytes(),
-        Positions::F64(vertices) => vertices.heap_bytes(),
-    };
-    let attributes = mesh.normals.iter().map(|normals| normals.floats().heap_bytes()).chain(
-        mesh.uvs
-            .iter()
-            .map(|uvs| uvs.floats().heap_bytes())
-            .chain(mesh.colors.iter().map(|colors| colors.floats().heap_bytes())),
-    );
-    positions + mesh.triangles.heap_bytes() + attributes.sum::<usize>()
-}
-
-/// Where the contents of one import went.
-struct Home {
-    placements: Vec<ImportedPlacement>,
-    cameras: Vec<import::ImportedCamera>,
-    lights: Vec<import::ImportedLight>,
-    meshes: usize,
-    materials: usize,
-}
-
-/// A scene being put together.
-#[derive(Default)]
-struct Parts {
-    geometry: Geometry,
-    objects: Vec<String>,
-    materials: Vec<Material>,
-    textures: Vec<Texture>,
-    lights: Vec<Light>,
-    cameras: Vec<SceneCamera>,
-    notes: Vec<Note>,
-    stats: LoadStats,
-    homes: Vec<Home>,
-}
-
-impl Parts {
-    fn add_import(&mut self, import: Import) {
-        self.homes.push(Home {
-            placements: import.placements,
-            cameras: import.cameras,
-            lights: import.lights,
-            meshes: self.geometry.meshes.len(),
-            materials: self.materials.len(),
-        });
-        self.geometry.meshes.extend(import.meshes);
-        let first_texture = u32::try_from(self.textures.len()).unwrap_or(u32::MAX);
-        self.materials.extend(import.materials.into_iter().map(|mut material| {
-            for used in material.textures_mut(TextureScope::Light) {
-                used.texture = used.texture.saturating_add(first_texture);
-            }
-            material
-        }));
-        self.textures.extend(import.textures);
-        self.notes.extend(import.notes);
-        let stats = import.stats;
-        for (path, bytes) in stats.files {
-            if !self.stats.files.iter().any(|(known, _)| *known == path) {
-                self.stats.files.push((path, bytes));
-            }
-        }
-        self.stats.bytes_mapped += stats.bytes_mapped;
-        self.stats.bytes_copied += stats.bytes_copied;
-        self.stats.dropped += stats.dropped;
-        if let Some(degenerate) = stats.degenerate {
-            self.stats.degenerate = Some(self.stats.degenerate.unwrap_or(0) + degenerate);
-        }
-    }
-
-    /// Places an object. A model that stands for a scene has an object for each of its nodes.
-    /// The error names what there is too much of.
-    fn place(
-        &mut self,
-        object: &Object,
-        split_nodes: bool,
-        index: usize,
-    ) -> Result<(), &'static str> {
-        let home = &self.homes[object.origin];
-        let sum = |offset: usize, index: u32| u32::try_from(offset + index as usize).ok();
-        if !split_nodes {
-            self.objects.push(object.title.clone());
-        }
-        let mut last: Option<&ImportedPlacement> = None;
-        for placement in &home.placements {
-            let starts_node = last.is_none_or(|last| !is_same_node(last, placement));
-            if split_nodes && starts_node {
-                let named = !placement.name.is_empty();
-                let name = if named { &placement.name } else { &object.title };
-                self.objects.push(name.clone());
-            }
-            last = Some(placement);
-            let number = if split_nodes { self.objects.len() - 1 } else { index };
-            let material = match object.material {
-                Some(material) => Some(material),
-                None => sum(home.materials, placement.material),
-            };
-            self.geometry.placements.push(Placement {
-                mesh: sum(home.meshes, placement.mesh).ok_or("meshes")?,
-                object: u32::try_from(number).map_err(|_| "objects")?,
-                material: material.ok_or("materials")?,
-                world_from_mesh: object.world_from_object.then_inner(&placement.model_from_mesh),
-            });
-        }
-        if u32::try_from(self.geometry.placements.len()).is_err() {
-            return Err("placements");
-        }
-        let number = u32::try_from(index).map_err(|_| "objects")?;
-        let cameras = home.cameras.iter();
-        let placed = cameras.filter_map(|c| SceneCamera::new(c, number, &object.world_from_object));
-        self.cameras.extend(placed);
-        let lights = home.lights.iter();
-        self.lights.extend(lights.filter_map(|light| light.placed(&object.world_from_object)));
-        Ok(())
-    }
-
-    /// Lights the scene by the studio when nothing in it shines.
-    fn light_by_default(&mut self) {
-        let shines = |placement: &Placement| {
-            let material = self.materials.get(placement.material as usize);
-            material.is_some_and(|material| material.emission.is_some())
-        };
-        if !self.lights.is_empty() || self.geometry.placements.iter().any(shines) {
-            return;
-        }
-        self.lights.push(Light {
-            kind: LightKind::Environment { image: EnvironmentImage::Studio, rotation: 0.0 },
-            color: [1.0; 3],
-            illuminant: None,
-        });
-        self.notes.push(Note {
-            kind: NoteKind::Assumed,
-            subject: "lights".to_owned(),
-            message: "nothing in the scene shines: it is lit by a grey studio; name `lights` in \
-                      the scene for others, or `\"lights\": []` for none"
-                .to_owned(),
-            count: 1,
-        });
-    }
-}
-
-/// Whether two placements in a row are primitives of one node's mesh.
-fn is_same_node(a: &ImportedPlacement, b: &ImportedPlacement) -> bool {
-    a.name == b.name && a.mesh != b.mesh && a.model_from_mesh == b.model_from_mesh
 }

@@ -6,7 +6,6 @@ use etendue_tracer::LayerSpec;
 use serde::Serialize;
 
 use crate::Scene;
-use crate::load::heap_bytes;
 
 /// Bytes of Embree's structure per triangle: 92, 90 and 88 for blobs of 0.1, 1 and 4 million at low
 /// quality, 63 and 70 for 0.1 and 0.3 million at medium. As `bvh_bytes` in the report of
@@ -38,7 +37,7 @@ pub struct MemoryForecast {
 
 impl MemoryForecast {
     pub(super) fn of(scene: &Scene) -> Self {
-        let geometry: u64 = scene.geometry.meshes.iter().map(|mesh| heap_bytes(mesh) as u64).sum();
+        let geometry: u64 = scene.geometry.meshes.iter().map(|mesh| mesh.heap_bytes() as u64).sum();
         let uses = scene.geometry.uses();
         let instances: u64 = uses.iter().filter(|&&n| n > 1).map(|&n| u64::from(n)).sum();
         let structure = EMBREE_PER_TRIANGLE * scene.geometry.triangles_unique()

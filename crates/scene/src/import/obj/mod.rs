@@ -20,7 +20,7 @@ mod weld;
 
 use std::path::Path;
 
-use etendue_geometry::{Mesh, Transform};
+use etendue_geometry::Transform;
 use rayon::prelude::*;
 
 use super::admit::{self, Admitted};
@@ -92,7 +92,7 @@ fn place(
     options: &Options,
     import: &mut Import,
 ) -> Result<(), ImportError> {
-    import.stats.bytes_copied += heap_bytes(&admitted.mesh);
+    import.stats.bytes_copied += admitted.mesh.heap_bytes() as u64;
     import.stats.dropped += admitted.dropped;
     if options.count_degenerate {
         *import.stats.degenerate.get_or_insert(0) += admitted.degenerate;
@@ -109,17 +109,6 @@ fn place(
     });
     import.meshes.push(admitted.mesh);
     Ok(())
-}
-
-fn heap_bytes(mesh: &Mesh) -> u64 {
-    let positions = match &mesh.positions {
-        etendue_geometry::Positions::F32(vertices) => vertices.floats().heap_bytes(),
-        etendue_geometry::Positions::F64(vertices) => vertices.heap_bytes(),
-    };
-    let uvs: usize = mesh.uvs.iter().map(|uvs| uvs.floats().heap_bytes()).sum();
-    let normals = mesh.normals.as_ref().map_or(0, |normals| normals.floats().heap_bytes());
-    let colors = mesh.colors.as_ref().map_or(0, |colors| colors.floats().heap_bytes());
-    (positions + mesh.triangles.heap_bytes() + uvs + normals + colors) as u64
 }
 
 fn note_leftovers(chunks: &[Chunk], missing: u64, notes: &mut Vec<Note>) {
