@@ -6,19 +6,32 @@ use rayon::prelude::*;
 /// The tight box around all triangles in world space (m).
 ///
 /// A placement whose loose box (around the eight corners of its mesh's own) lies inside the tight
-/// box found so far cannot widen it and is not visited, so a forest of instances costs a few trees.
+/// box found so far cannot widen it and is not visited. Those that reach farthest go first, so of a
+/// forest of instances only the trees at its edges are looked at.
 pub(crate) fn tight(geometry: &Geometry) -> Bounds {
-    let mut open: Vec<(Bounds, &Placement)> = geometry
-        .placements
-        .iter()
+    let placements = &geometry.placements;
+    let all: Vec<(Bounds, &Placement)> = placements
+        .par_iter()
         .map(|placement| (loose(geometry, placement), placement))
         .filter(|(bounds, _)| !bounds.is_empty())
         .collect();
-    open.sort_by(|(a, _), (b, _)| b.diagonal().total_cmp(&a.diagonal()));
     let mut bounds = Bounds::EMPTY;
-    for (around, placement) in open {
-        let inside = around.min.cmpge(bounds.min).all() && around.max.cmple(bounds.max).all();
-        if !inside {
+    for axis in 0..3 {
+        let least = all.iter().min_by(|(a, _), (b, _)| a.min[axis].total_cmp(&b.min[axis]));
+        let most = all.iter().max_by(|(a, _), (b, _)| a.max[axis].total_cmp(&b.max[axis]));
+        for (_, placement) in least.into_iter().chain(most) {
+            bounds = bounds.union(exact(geometry, placement));
+        }
+    }
+    let beyond = |around: &Bounds, bounds: &Bounds| {
+        (bounds.min - around.min).max_element().max((around.max - bounds.max).max_element())
+    };
+    let mut open: Vec<(f64, &Bounds, &Placement)> =
+        all.iter().map(|(around, p)| (beyond(around, &bounds), around, *p)).collect();
+    open.retain(|(beyond, ..)| *beyond > 0.0);
+    open.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
+    for (_, around, placement) in open {
+        if beyond(around, &bounds) > 0.0 {
             bounds = bounds.union(exact(geometry, placement));
         }
     }

@@ -26,6 +26,7 @@ pub mod error;
 pub mod file;
 mod identity;
 pub mod import;
+mod instances;
 mod load;
 mod looks;
 mod parts;

@@ -14,9 +14,10 @@ use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
 
 use crate::cameras::{self, CameraOrigin, SceneCamera};
-use crate::file::{FileKind, SceneFile, Source, join, join_index, suggest};
+use crate::file::{FileKind, ObjectSpec, SceneFile, Source, join, join_index, suggest};
 use crate::identity::Ingredients;
 use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Strictness, Wanted};
+use crate::instances::Instances;
 use crate::parts::{Object, Parts};
 use crate::paths::{Folder, Found};
 use crate::scene::{LoadOptions, LoadProgress, Scene};
@@ -50,14 +51,18 @@ impl SceneFile {
         let lights = self.named_lights(&folder)?;
         // What can be checked without the models is; a bad camera need not wait for them.
         self.camera_alone(&folder)?;
-        let (origins, objects) = self.resolve_objects(&folder, &own.materials)?;
+        let mut named = OwnParts { materials: &own.materials, files: Vec::new() };
+        let (origins, objects) = self.resolve_objects(&folder, &mut named)?;
+        let instance_files = named.files;
         let imports = self.import_all(&origins, &objects, &folder, wanted, options)?;
         let mut parts = Parts::new(own.materials, own.textures, lights.clone().unwrap_or_default());
         let split_nodes = self.kind() == FileKind::Model;
         for import in imports {
             parts.add_import(import);
         }
+        parts.files = instance_files;
         for (index, object) in objects.iter().enumerate() {
+            self.check_overrides(&parts, object, index)?;
             parts.place(object, split_nodes, index).map_err(|what| self.too_many(what))?;
         }
         if self.spec.picture() == Some(LayerSpec::Radiance) && lights.is_none() {
@@ -91,7 +96,7 @@ impl SceneFile {
     fn resolve_objects(
         &self,
         folder: &Folder,
-        materials: &[Material],
+        own: &mut OwnParts<'_>,
     ) -> Result<(Vec<Origin>, Vec<Object>), SceneError> {
         let mut origins: Vec<Origin> = Vec::new();
         let mut files: BTreeMap<PathBuf, usize> = BTreeMap::new();
@@ -114,17 +119,68 @@ impl SceneFile {
                     })
                 }
             };
-            let world_from_object = spec.transform.build().map_err(|(key, why)| {
-                let at = join(&at, "transform");
-                self.fault(&if key.is_empty() { at } else { join(&at, key) }, why)
-            })?;
-            let material = match &spec.material {
-                Some(name) => Some(self.material_index(name, materials, &at)?),
-                None => None,
-            };
-            objects.push(Object { title: spec.title(), origin, world_from_object, material });
+            objects.push(self.object(spec, &at, origin, folder, own)?);
         }
         Ok((origins, objects))
+    }
+
+    /// The object at path `at`, its names resolved.
+    fn object(
+        &self,
+        spec: &ObjectSpec,
+        at: &str,
+        origin: usize,
+        folder: &Folder,
+        own: &mut OwnParts<'_>,
+    ) -> Result<Object, SceneError> {
+        let world_from_object = spec.transform.build().map_err(|(key, why)| {
+            let at = join(at, "transform");
+            self.fault(&if key.is_empty() { at } else { join(&at, key) }, why)
+        })?;
+        let named = |name: &str, at: &str| {
+            let position = own.materials.iter().position(|material| material.name == name);
+            let position = position.and_then(|position| u32::try_from(position).ok());
+            position.ok_or_else(|| self.fault(at, unknown_material(name, own.materials)))
+        };
+        let material = match &spec.material {
+            Some(name) => Some(named(name, &join(at, "material"))?),
+            None => None,
+        };
+        let mut overrides = BTreeMap::new();
+        for (theirs, ours) in &spec.materials {
+            let at = join(&join(at, "materials"), theirs);
+            overrides.insert(theirs.clone(), named(ours, &at)?);
+        }
+        let instances = Instances::resolve(spec.instances.as_ref(), &join(at, "instances"), folder)
+            .map_err(|(at, why)| self.fault(&at, why))?;
+        own.files.extend(instances.file);
+        let copies = instances.transforms.iter().map(|copy| world_from_object.then_inner(copy));
+        Ok(Object {
+            title: spec.title(),
+            origin,
+            world_from_object: copies.collect(),
+            material,
+            overrides,
+        })
+    }
+
+    /// Materials that an object replaces and its model does not have are refused.
+    fn check_overrides(
+        &self,
+        parts: &Parts,
+        object: &Object,
+        index: usize,
+    ) -> Result<(), SceneError> {
+        let known: Vec<&str> = parts.names_of_materials(object).collect();
+        match object.overrides.keys().find(|name| !known.contains(&name.as_str())) {
+            None => Ok(()),
+            Some(name) => {
+                let at = join(&join(&join_index("objects", index), "materials"), name);
+                let known = known.into_iter().filter(|name| !name.is_empty());
+                let why = format!("the model has no material \"{name}\"{}", suggest(name, known));
+                Err(self.fault(&at, why))
+            }
+        }
     }
 
     /// The file of an object. A model that stands for the scene is where the user said it is.
@@ -138,26 +194,6 @@ impl SceneFile {
         }
         let at = join(&join_index("objects", index), "file");
         folder.find(written).map_err(|why| self.fault(&at, why))
-    }
-
-    fn material_index(
-        &self,
-        name: &str,
-        materials: &[Material],
-        at: &str,
-    ) -> Result<u32, SceneError> {
-        let position = materials.iter().position(|material| material.name == name);
-        match position.and_then(|position| u32::try_from(position).ok()) {
-            Some(position) => Ok(position),
-            None => {
-                let known = materials.iter().map(|material| material.name.as_str());
-                let why = match materials {
-                    [] => format!("unknown material \"{name}\"; the scene has no `materials`"),
-                    _ => format!("unknown material \"{name}\"{}", suggest(name, known)),
-                };
-                Err(self.fault(&join(at, "material"), why))
-            }
-        }
     }
 
     fn import_all(
@@ -218,9 +254,10 @@ impl SceneFile {
         let opened = parts.stats.files.iter().map(|(path, _)| path.clone());
         let images = parts.textures.iter().filter_map(Texture::file);
         let skies = parts.lights.iter().filter_map(Light::file);
+        let others = parts.files.iter();
         let mut files: Vec<(String, PathBuf)> = opened
             .chain(camera_files.found.into_inner())
-            .chain(images.chain(skies).cloned())
+            .chain(images.chain(skies).chain(others).cloned())
             .map(|path| (folder.relative(&path), path))
             .collect();
         files.sort();
@@ -314,14 +351,34 @@ impl SceneFile {
     }
 
     fn unused_materials(&self) -> impl Iterator<Item = Note> + '_ {
-        let is_used =
-            |name: &String| self.spec.objects.iter().any(|o| o.material.as_ref() == Some(name));
+        let is_used = |name: &String| {
+            let names = |o: &ObjectSpec| {
+                o.material.as_ref() == Some(name) || o.materials.values().any(|m| m == name)
+            };
+            self.spec.objects.iter().any(names)
+        };
         self.spec.materials.keys().filter(move |name| !is_used(name)).map(|name| Note {
             kind: NoteKind::Unused,
             subject: name.clone(),
             message: "no object uses this material".to_owned(),
             count: 1,
         })
+    }
+}
+
+/// What the scene file itself brings, while its objects are resolved.
+struct OwnParts<'a> {
+    materials: &'a [Material],
+    /// Files that objects name beside their models.
+    files: Vec<PathBuf>,
+}
+
+/// That the scene has no material of this name, and which it has.
+fn unknown_material(name: &str, materials: &[Material]) -> String {
+    let known = materials.iter().map(|material| material.name.as_str());
+    match materials {
+        [] => format!("unknown material \"{name}\"; the scene has no `materials`"),
+        _ => format!("unknown material \"{name}\"{}", suggest(name, known)),
     }
 }
 

@@ -46,7 +46,7 @@ impl SceneFile {
             let mut builder = Builder { folder, wanted, textures: &mut own.textures };
             let material = builder
                 .material(name, spec)
-                .map_err(|(key, why)| self.fault(&join(&join("materials", name), &key), why))?;
+                .map_err(|(key, why)| self.fault(&below(&join("materials", name), &key), why))?;
             own.materials.push(material);
         }
         Ok(own)
@@ -58,9 +58,8 @@ impl SceneFile {
         let mut lights: Vec<Light> = Vec::new();
         for (index, spec) in specs.iter().enumerate() {
             let at = join_index("lights", index);
-            let light = light(folder, spec).map_err(|(key, why)| {
-                self.fault(&if key.is_empty() { at.clone() } else { join(&at, &key) }, why)
-            })?;
+            let light =
+                light(folder, spec).map_err(|(key, why)| self.fault(&below(&at, &key), why))?;
             let is_sky = |l: &Light| matches!(l.kind, LightKind::Environment { .. });
             if is_sky(&light) && lights.iter().any(is_sky) {
                 return Err(self.fault(&at, "a second environment; a scene has one at most"));
@@ -69,6 +68,11 @@ impl SceneFile {
         }
         Ok(Some(lights))
     }
+}
+
+/// The path `key`, which may be of several parts or none, below `at`.
+fn below(at: &str, key: &str) -> String {
+    if key.is_empty() { at.to_owned() } else { format!("{at}.{key}") }
 }
 
 struct Builder<'a> {

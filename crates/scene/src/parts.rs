@@ -1,5 +1,8 @@
 //! A scene while it is put together: what the imports bring, and where the objects place it.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
 use etendue_geometry::{Geometry, Placement, Transform};
 use etendue_tracer::{EnvironmentImage, Light, LightKind, Material, Texture, TextureScope};
 
@@ -11,8 +14,12 @@ use crate::scene::LoadStats;
 pub(crate) struct Object {
     pub(crate) title: String,
     pub(crate) origin: usize,
-    pub(crate) world_from_object: Transform,
+    /// Where each of its copies stands.
+    pub(crate) world_from_object: Vec<Transform>,
+    /// The scene's material that replaces the model's.
     pub(crate) material: Option<u32>,
+    /// The scene's materials that replace those of the model, by their names there.
+    pub(crate) overrides: BTreeMap<String, u32>,
 }
 
 /// Where the contents of one import went.
@@ -35,6 +42,8 @@ pub(crate) struct Parts {
     pub(crate) cameras: Vec<SceneCamera>,
     pub(crate) notes: Vec<Note>,
     pub(crate) stats: LoadStats,
+    /// Files that the scene names beside its models, textures and lights.
+    pub(crate) files: Vec<PathBuf>,
     homes: Vec<Home>,
 }
 
@@ -103,27 +112,41 @@ impl Parts {
             }
             last = Some(placement);
             let number = if split_nodes { self.objects.len() - 1 } else { index };
-            let material = match object.material {
-                Some(material) => Some(material),
-                None => sum(home.materials, placement.material),
-            };
-            self.geometry.placements.push(Placement {
-                mesh: sum(home.meshes, placement.mesh).ok_or("meshes")?,
-                object: u32::try_from(number).map_err(|_| "objects")?,
-                material: material.ok_or("materials")?,
-                world_from_mesh: object.world_from_object.then_inner(&placement.model_from_mesh),
+            let own = sum(home.materials, placement.material).ok_or("materials")?;
+            let named = self.materials.get(own as usize).map(|material| &material.name);
+            let replaced = named.and_then(|name| object.overrides.get(name).copied());
+            let material = replaced.or(object.material).unwrap_or(own);
+            let mesh = sum(home.meshes, placement.mesh).ok_or("meshes")?;
+            let number = u32::try_from(number).map_err(|_| "objects")?;
+            let copies = object.world_from_object.iter().map(|copy| Placement {
+                mesh,
+                object: number,
+                material,
+                world_from_mesh: copy.then_inner(&placement.model_from_mesh),
             });
+            self.geometry.placements.extend(copies);
         }
         if u32::try_from(self.geometry.placements.len()).is_err() {
             return Err("placements");
         }
         let number = u32::try_from(index).map_err(|_| "objects")?;
-        let cameras = home.cameras.iter();
-        let placed = cameras.filter_map(|c| SceneCamera::new(c, number, &object.world_from_object));
-        self.cameras.extend(placed);
-        let lights = home.lights.iter();
-        self.lights.extend(lights.filter_map(|light| light.placed(&object.world_from_object)));
+        // A million copies of a model have one place to look from: the first one's.
+        if let Some(first) = object.world_from_object.first() {
+            let cameras = home.cameras.iter();
+            let placed = cameras.filter_map(|camera| SceneCamera::new(camera, number, first));
+            self.cameras.extend(placed);
+        }
+        for copy in &object.world_from_object {
+            self.lights.extend(home.lights.iter().filter_map(|light| light.placed(copy)));
+        }
         Ok(())
+    }
+
+    /// The names of the materials that the object's model brings.
+    pub(crate) fn names_of_materials(&self, object: &Object) -> impl Iterator<Item = &str> {
+        let home = &self.homes[object.origin];
+        let end = self.homes.get(object.origin + 1).map_or(self.materials.len(), |h| h.materials);
+        self.materials[home.materials..end].iter().map(|material| material.name.as_str())
     }
 
     /// Lights the scene by the studio when nothing in it shines.

@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 
 pub use document::Place;
 pub use lens::{ReadLens, lens_schema, rays_schema, read_lens, trace_rays};
-pub use object::{ObjectSpec, Scale, Source, TransformSpec};
+pub use object::{InstancesSpec, ObjectSpec, Scale, Source, TransformSpec};
 pub use overrides::OverrideError;
 pub use schema::scene_schema;
 pub use sensor::SensorFile;

@@ -1,6 +1,7 @@
 //! The objects of a scene file: models and shapes, and where they stand.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use etendue_geometry::Transform;
 use glam::{DMat3, DQuat, DVec3};
@@ -20,8 +21,24 @@ pub struct ObjectSpec {
     pub name: Option<String>,
     /// The name of a material, which replaces those of the model.
     pub material: Option<String>,
+    /// For materials of the model by name, the name of the material that replaces each; they go
+    /// before [`Self::material`].
+    pub materials: BTreeMap<String, String>,
     /// Where it stands.
     pub transform: TransformSpec,
+    /// Where copies of it stand before `transform` moves them all; one, unmoved, when absent.
+    pub instances: Option<InstancesSpec>,
+}
+
+/// Copies of an object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum InstancesSpec {
+    /// An NPY file of n × 4 × 4 or n × 3 × 4 matrices by rows, float32 or float64, relative to the
+    /// scene file.
+    File(String),
+    /// A transform for each copy.
+    List(Vec<TransformSpec>),
 }
 
 /// Where an object's triangles come from.
@@ -42,9 +59,16 @@ struct Common {
     /// The name of one of `materials`; replaces those of the model.
     #[serde(default)]
     material: Option<String>,
+    /// For materials of the model by name, the one of the scene's `materials` that replaces each.
+    #[serde(default)]
+    materials: BTreeMap<String, String>,
     /// Where it stands.
     #[serde(default)]
     transform: TransformSpec,
+    /// Where copies of it stand, all moved by `transform`: a list of transforms, or an NPY file of
+    /// n × 4 × 4 or n × 3 × 4 matrices by rows.
+    #[serde(default)]
+    instances: Option<InstancesSpec>,
 }
 
 /// A model.
@@ -72,12 +96,12 @@ impl<'de> Deserialize<'de> for ObjectSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let mut own = Map::<String, Value>::deserialize(deserializer)?;
         let mut common = Map::new();
-        for key in ["name", "material", "transform"] {
+        for key in ["name", "material", "materials", "transform", "instances"] {
             if let Some(value) = own.remove(key) {
                 common.insert(key.to_owned(), value);
             }
         }
-        let Common { name, material, transform } =
+        let Common { name, material, materials, transform, instances } =
             serde_json::from_value(Value::Object(common)).map_err(D::Error::custom)?;
         let source = match own.remove("file") {
             Some(Value::String(path)) if own.is_empty() => Source::File(path),
@@ -90,7 +114,7 @@ impl<'de> Deserialize<'de> for ObjectSpec {
                 Source::Shape(shape.map_err(D::Error::custom)?)
             }
         };
-        Ok(Self { source, name, material, transform })
+        Ok(Self { source, name, material, materials, transform, instances })
     }
 }
 
