@@ -1,7 +1,7 @@
 //! Tracing a committed scene: one by one, or in packets of the width that the processor has.
 
 use embree4_sys as sys;
-use etendue_geometry::MISS;
+use etendue_geometry::{Geometry, MISS, Mesh, Positions};
 
 use super::Scene;
 use super::filter::{self, Judged, Search};
@@ -114,6 +114,7 @@ impl Scene {
         arguments: &mut sys::RTCIntersectArguments,
         found: &mut Found,
     ) {
+        let mut ahead = Ahead::new(&self.geometry);
         for i in 0..rays.len() {
             let mut query = sys::RTCRayHit { ray: single_ray(rays, i), ..Default::default() };
             query.hit.geomID = MISS;
@@ -126,7 +127,9 @@ impl Scene {
             found.placement[i] = if hit.instID[0] == MISS { hit.geomID } else { hit.instID[0] };
             found.triangle[i] = hit.primID;
             found.t[i] = query.ray.tfar;
+            ahead.fetch(found.placement[i], found.triangle[i]);
         }
+        ahead.fetch(MISS, MISS);
     }
 
     fn occluded1(
@@ -142,6 +145,53 @@ impl Scene {
             *blocked = ray.tfar == f32::NEG_INFINITY;
         }
     }
+}
+
+/// Fetches the corners of the triangles that were hit while the next rays are traced: solving for
+/// them in f64 comes next, and Embree's own structure holds copies elsewhere.
+struct Ahead<'a> {
+    geometry: &'a Geometry,
+    /// The hit before the last, whose indices have come meanwhile.
+    before: Option<(&'a Mesh, u32)>,
+}
+
+impl<'a> Ahead<'a> {
+    fn new(geometry: &'a Geometry) -> Self {
+        Self { geometry, before: None }
+    }
+
+    /// Takes note of a hit ([`MISS`]: none), and fetches what the one before it needs.
+    #[inline(always)]
+    fn fetch(&mut self, placement: u32, triangle: u32) {
+        if let Some((mesh, triangle)) = self.before.take() {
+            for corner in mesh.triangles[triangle as usize] {
+                match &mesh.positions {
+                    Positions::F32(vertices) => {
+                        prefetch(&vertices.floats()[corner as usize * vertices.stride()]);
+                    }
+                    Positions::F64(vertices) => prefetch(&vertices[corner as usize]),
+                }
+            }
+        }
+        if placement != MISS {
+            let mesh = self.geometry.mesh_of(&self.geometry.placements[placement as usize]);
+            prefetch(&mesh.triangles[triangle as usize]);
+            self.before = Some((mesh, triangle));
+        }
+    }
+}
+
+/// Has the processor fetch what is at a place, without waiting for it.
+#[inline(always)]
+fn prefetch<T>(place: &T) {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: a hint, which reads nothing; every x86-64 processor has it.
+    unsafe {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(place).cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = place;
 }
 
 fn single_ray(rays: &Rays32, i: usize) -> sys::RTCRay {
