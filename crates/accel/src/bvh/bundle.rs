@@ -10,7 +10,7 @@ use crate::parts::{Instance, LocalRays};
 pub(super) const PACKET: usize = 16;
 
 /// Fewer rays than this are traced one by one.
-const FEWEST: u32 = 4;
+pub(super) const FEWEST: u32 = 4;
 
 /// Rays whose directions differ by more than this along an axis are traced one by one.
 const WIDEST: f32 = 0.1;
@@ -277,6 +277,59 @@ fn box_test<L: Lanes>(
         test.far_offset[axis] = lanes.splat(far * fast);
     }
     test
+}
+
+/// Each ray of a packet against one box, as [`BoxTest`] is one ray against eight.
+pub(super) struct EachRay<A: Arithmetic> {
+    backwards: [bool; 3],
+    inverse: [A::F; 3],
+    near_offset: [A::F; 3],
+    far_offset: [A::F; 3],
+    near: A::F,
+}
+
+impl<A: Arithmetic> EachRay<A> {
+    /// Of the rays of `group`, which run towards the same octant; the others' answers mean nothing.
+    #[inline(always)]
+    pub(super) fn new<L: Lanes<Sixteen = A>>(lanes: L, rays: &FrameRays, group: u32) -> Self {
+        let first = group.trailing_zeros();
+        let mut inverse = [[0.0; PACKET]; 3];
+        let mut offset = [[[0.0; PACKET]; 3]; 2];
+        for axis in 0..3 {
+            for i in 0..PACKET {
+                let slope = 1.0 / steer(rays.direction[axis][i]);
+                let widening = slope.abs() * rays.error[i];
+                inverse[axis][i] = slope;
+                offset[0][axis][i] = rays.origin[axis][i] * slope + widening;
+                offset[1][axis][i] = rays.origin[axis][i] * slope - widening;
+            }
+        }
+        let load = |axes: [[f32; PACKET]; 3]| {
+            let [x, y, z] = axes;
+            [lanes.load_sixteen(&x), lanes.load_sixteen(&y), lanes.load_sixteen(&z)]
+        };
+        let [near_offset, far_offset] = offset;
+        Self {
+            backwards: rays.backwards.map(|backwards| backwards >> first & 1 != 0),
+            inverse: load(inverse),
+            near_offset: load(near_offset),
+            far_offset: load(far_offset),
+            near: lanes.load_sixteen(&rays.near),
+        }
+    }
+
+    /// Which rays meet the box before `far`.
+    #[inline(always)]
+    pub(super) fn meet(&self, l: A, [lo, hi]: [[f32; 3]; 2], far: A::F) -> u32 {
+        let (mut enter, mut leave) = (self.near, far);
+        for axis in 0..3 {
+            let (lo, hi) = (l.splat(lo[axis]), l.splat(hi[axis]));
+            let (near, far) = if self.backwards[axis] { (hi, lo) } else { (lo, hi) };
+            enter = l.max(enter, l.mul_sub(near, self.inverse[axis], self.near_offset[axis]));
+            leave = l.min(leave, l.mul_sub(far, self.inverse[axis], self.far_offset[axis]));
+        }
+        l.le(enter, leave)
+    }
 }
 
 /// All rays sheared along the same axes. The first ray's longest component is at least 1/√3, and the

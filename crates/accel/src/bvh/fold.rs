@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use super::arena::Arena;
 use super::wide::{
-    Cell, Child, LEAF_CELLS, LeafNumbers, MOST_CELLS, MOST_IN_LEAF, NO_CHILDREN, Units, WideTree,
+    Cell, Child, INSTANCE_NUMBERS, LEAF_CELLS, LeafNumbers, MOST_CELLS, MOST_IN_LEAF, NO_CHILDREN,
+    Units, WideTree,
 };
 use crate::parts::{Part, Source};
 use crate::tree::{Ref, Tree};
@@ -239,9 +240,11 @@ pub(super) struct Instances;
 
 impl WriteLeaf for Instances {
     fn write(&self, refs: &[Ref], numbers: &mut LeafNumbers) -> usize {
-        for (number, r) in numbers.iter_mut().zip(refs) {
-            *number = f32::from_bits(r.first);
+        let (leaves, _) = numbers.as_chunks_mut::<INSTANCE_NUMBERS>();
+        for (leaf, r) in leaves.iter_mut().zip(refs) {
+            let ([x0, y0, z0], [x1, y1, z1]) = (r.lo, r.hi);
+            *leaf = [f32::from_bits(r.first), x0, y0, z0, x1, y1, z1];
         }
-        refs.len()
+        refs.len() * INSTANCE_NUMBERS
     }
 }

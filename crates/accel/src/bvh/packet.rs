@@ -16,13 +16,13 @@ use etendue_geometry::glam::DVec3;
 use pulp::NullaryFnOnce;
 
 use super::Bvh;
-use super::bundle::{Bundle, FrameRays, PACKET, bits};
+use super::bundle::{Bundle, EachRay, FEWEST, FrameRays, PACKET, bits};
 use super::lanes::{Arithmetic, Lanes};
 use super::placed::PlacedTriangles;
 use super::ray::{BoxTest, Runs, TriangleTest, meet_triangles};
 use super::single::{Search, Sink, Stacks, Visit};
 use super::traverse::{Leaves, Stack, traverse};
-use super::wide::{Cell, Child, LeafNumbers, leaf_numbers};
+use super::wide::{Cell, Child, LeafNumbers, instances_of, leaf_numbers};
 use crate::nearest::Query;
 use crate::parts::Instance;
 use crate::watertight::{self, Lines};
@@ -124,7 +124,8 @@ impl<'a, S: Sink> Packet<'a, S> {
         };
         let stack = &mut stacks.inner;
         let far = self.farthest(lanes, rays, group);
-        let mut leaves = InstanceLeaves { lanes, bvh, packet: self, rays, group, stack };
+        let each = EachRay::new(lanes, rays, group);
+        let mut leaves = InstanceLeaves { lanes, bvh, packet: self, rays, each, group, stack };
         traverse(lanes, &bvh.top.cells, &bundle.boxes, far, &mut stacks.outer, &mut leaves);
     }
 
@@ -139,6 +140,43 @@ impl<'a, S: Sink> Packet<'a, S> {
     ) -> Search<'b, L, S> {
         let t_max = self.t_max[lane];
         Search { lanes, bvh, query, t_max, sink: &mut self.sinks[lane], stack }
+    }
+
+    /// Takes the rays of `group` to one instance.
+    #[inline(always)]
+    fn visit<L: Lanes>(
+        &mut self,
+        lanes: L,
+        bvh: &Bvh,
+        instance: &Instance,
+        group: u32,
+        stack: &mut Stack,
+    ) {
+        if group.count_ones() < FEWEST {
+            self.visit_alone(lanes, bvh, instance, group, stack);
+        } else {
+            lanes.run(VisitTogether { lanes, bvh, packet: self, instance, group, stack });
+        }
+    }
+
+    #[inline(always)]
+    fn visit_alone<L: Lanes>(
+        &mut self,
+        lanes: L,
+        bvh: &Bvh,
+        instance: &Instance,
+        group: u32,
+        stack: &mut Stack,
+    ) {
+        for lane in bits(group) {
+            let query = self.query(lane);
+            let mut search = self.search(lanes, bvh, lane, &query, stack);
+            let go_on = lanes.run(Visit { search: &mut search, instance });
+            self.t_max[lane] = search.t_max;
+            if !go_on {
+                self.active &= !(1 << lane);
+            }
+        }
     }
 
     /// The farthest that any active ray of `group` looks.
@@ -176,11 +214,12 @@ fn soundness(
 }
 
 /// Leaves of the tree over the instances.
-struct InstanceLeaves<'a, 'b, L, S> {
+struct InstanceLeaves<'a, 'b, L: Lanes, S> {
     lanes: L,
     bvh: &'a Bvh,
     packet: &'a mut Packet<'b, S>,
     rays: &'a FrameRays,
+    each: EachRay<L::Sixteen>,
     group: u32,
     stack: &'a mut Stack,
 }
@@ -189,11 +228,13 @@ impl<L: Lanes, S: Sink> Leaves for InstanceLeaves<'_, '_, L, S> {
     #[inline(always)]
     fn see(&mut self, leaf: Child, _: f32) -> Option<f32> {
         let (lanes, bvh) = (self.lanes, self.bvh);
-        for number in leaf_numbers(&bvh.top.cells, leaf)?.get(..leaf.count())? {
-            let instance = bvh.layout.instances.get(number.to_bits() as usize)?;
-            let group = self.group & self.packet.active;
-            let (packet, stack) = (&mut *self.packet, &mut *self.stack);
-            lanes.run(VisitTogether { lanes, bvh, packet, instance, group, stack });
+        for (number, lo, hi) in instances_of(&bvh.top.cells, leaf)? {
+            let instance = bvh.layout.instances.get(number)?;
+            // The bundle as a whole meets the box; over many small instances few of its rays do.
+            let far = lanes.load_sixteen(&self.rays.far(&self.packet.t_max));
+            let meets = self.each.meet(lanes.sixteen(), [lo, hi], far);
+            let group = self.group & self.packet.active & meets;
+            self.packet.visit(lanes, bvh, instance, group, self.stack);
         }
         if self.group & self.packet.active == 0 {
             return None;
@@ -232,15 +273,7 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for VisitTogether<'_, '_, L, S> {
                 leaves.measure_pending();
                 continue;
             }
-            for lane in bits(together) {
-                let query = packet.query(lane);
-                let mut search = packet.search(lanes, bvh, lane, &query, stack);
-                let go_on = lanes.run(Visit { search: &mut search, instance });
-                packet.t_max[lane] = search.t_max;
-                if !go_on {
-                    packet.active &= !(1 << lane);
-                }
-            }
+            packet.visit_alone(lanes, bvh, instance, together, stack);
         }
     }
 }

@@ -12,7 +12,7 @@ use super::packet::Packet;
 use super::placed::PlacedTriangles;
 use super::ray::{BoxTest, NarrowRay, TriangleTest};
 use super::traverse::{Leaves, Stack, traverse};
-use super::wide::{Cell, Child, leaf_numbers};
+use super::wide::{Cell, Child, instances_of, leaf_numbers};
 use crate::nearest::{Nearest, Query};
 use crate::parts::Instance;
 use crate::watertight;
@@ -163,8 +163,8 @@ impl<L: Lanes, S: Sink> Leaves for InstanceLeaves<'_, '_, L, S> {
     #[inline(always)]
     fn see(&mut self, leaf: Child, _: f32) -> Option<f32> {
         let bvh = self.search.bvh;
-        for number in leaf_numbers(&bvh.top.cells, leaf)?.get(..leaf.count())? {
-            let instance = bvh.layout.instances.get(number.to_bits() as usize)?;
+        for (number, ..) in instances_of(&bvh.top.cells, leaf)? {
+            let instance = bvh.layout.instances.get(number)?;
             if !self.search.lanes.run(Visit { search: self.search, instance }) {
                 return None;
             }

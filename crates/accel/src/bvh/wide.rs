@@ -62,13 +62,16 @@ impl Child {
 ///
 /// A leaf of `n` triangles has nine runs of `n` coordinates, corner by corner and axis by axis, then
 /// the `n` triangles, and then, where a part has several placements, the `n` placements. A leaf of
-/// instances has their numbers.
+/// instances has [`INSTANCE_NUMBERS`] for each: its number, and the lower and upper bounds of its box.
 #[derive(Debug, Default)]
 pub(super) struct WideTree {
     pub(super) cells: Arena,
     pub(super) lo: [f32; 3],
     pub(super) hi: [f32; 3],
 }
+
+/// What a leaf says of an instance.
+pub(super) const INSTANCE_NUMBERS: usize = 7;
 
 /// Cells that may be read from the first of any leaf: more than eight lanes from the last run of
 /// eight, and a power of two, so that a remainder is all it takes to stay within.
@@ -81,6 +84,19 @@ pub(super) type LeafNumbers = [f32; 8 * LEAF_CELLS];
 pub(super) fn leaf_numbers(cells: &[Cell], leaf: Child) -> Option<&LeafNumbers> {
     let cells = cells.get(leaf.place()..leaf.place() + LEAF_CELLS)?;
     bytemuck::cast_slice(cells).first_chunk()
+}
+
+/// The instances of a leaf: the number, the lower and the upper bounds of each.
+#[inline(always)]
+pub(super) fn instances_of(
+    cells: &[Cell],
+    leaf: Child,
+) -> Option<impl Iterator<Item = (usize, [f32; 3], [f32; 3])>> {
+    let (instances, _) = leaf_numbers(cells, leaf)?.as_chunks::<INSTANCE_NUMBERS>();
+    let instances = instances.get(..leaf.count())?.iter();
+    Some(instances.map(|&[number, x0, y0, z0, x1, y1, z1]| {
+        (number.to_bits() as usize, [x0, y0, z0], [x1, y1, z1])
+    }))
 }
 
 impl WideTree {
