@@ -17,7 +17,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
 use rayon::prelude::*;
 
-use crate::nearest::{Nearest, Query, View};
+use crate::nearest::{Nearest, Query, Triangle, View};
 use crate::parts::{Baking, Instance, Layout, LocalRay, Part, outward};
 use crate::tree::{LeafSize, MAX_DEPTH, Node, Ref, Tree};
 use crate::watch::{Watch, with_threads};
@@ -86,18 +86,18 @@ impl Exact {
     fn nearest(&self, query: &Query, stack: &mut Stack) -> Nearest {
         let mut nearest = Nearest::none(query.t_max);
         self.visit(query, stack, &mut |placement, triangle| {
-            if let Some(hit) = self.test(query, placement, triangle) {
-                nearest.offer(hit, placement, triangle);
+            let triangle = Triangle::of(&self.geometry, placement, triangle);
+            if let Some(hit) = self.test(query, &triangle) {
+                nearest.offer(hit, &triangle);
             }
             Some(nearest.t)
         });
         nearest
     }
 
-    fn test(&self, query: &Query, placement: u32, triangle: u32) -> Option<crate::watertight::Hit> {
-        let placement = &self.geometry.placements[placement as usize];
-        let corners = self.geometry.mesh_of(placement).corners(triangle as usize);
-        query.test(&View::new(&placement.world_from_mesh), corners)
+    fn test(&self, query: &Query, triangle: &Triangle) -> Option<crate::watertight::Hit> {
+        let placement = &self.geometry.placements[triangle.placement as usize];
+        query.test(&View::new(&placement.world_from_mesh), triangle.corners)
     }
 
     /// Shows every triangle near the ray to `see`, roughly from near to far, which answers how far
@@ -157,7 +157,8 @@ impl Accel for Exact {
             let Some(query) = Query::of(rays, i) else { return false };
             let mut found = false;
             self.visit(&query, &mut stack, &mut |placement, triangle| {
-                found = self.test(&query, placement, triangle).is_some();
+                let triangle = Triangle::of(&self.geometry, placement, triangle);
+                found = self.test(&query, &triangle).is_some();
                 (!found).then_some(query.t_max)
             });
             found

@@ -90,6 +90,23 @@ impl<'a> View<'a> {
     }
 }
 
+/// A triangle, and which it is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Triangle {
+    pub(crate) placement: u32,
+    pub(crate) number: u32,
+    /// In its mesh's frame (m).
+    pub(crate) corners: [DVec3; 3],
+}
+
+impl Triangle {
+    #[inline(always)]
+    pub(crate) fn of(geometry: &Geometry, placement: u32, number: u32) -> Self {
+        let mesh = geometry.mesh_of(&geometry.placements[placement as usize]);
+        Self { placement, number, corners: mesh.corners(number as usize) }
+    }
+}
+
 /// The closest hit so far.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Nearest {
@@ -98,22 +115,28 @@ pub(crate) struct Nearest {
     pub(crate) triangle: u32,
     u: f64,
     v: f64,
+    /// On the triangle's front, in its mesh's frame, of any length.
+    normal: DVec3,
 }
 
 impl Nearest {
     /// Nothing yet; nothing beyond `t_max` counts.
     #[inline]
     pub(crate) fn none(t_max: f64) -> Self {
-        Self { t: t_max, placement: MISS, triangle: MISS, u: 0.0, v: 0.0 }
+        let (placement, triangle, normal) = (MISS, MISS, DVec3::ZERO);
+        Self { t: t_max, placement, triangle, u: 0.0, v: 0.0, normal }
     }
 
     /// Takes `hit` when it is closer, or as close and of a lower placement, then triangle.
     #[inline(always)]
-    pub(crate) fn offer(&mut self, hit: watertight::Hit, placement: u32, triangle: u32) {
+    pub(crate) fn offer(&mut self, hit: watertight::Hit, triangle: &Triangle) {
+        let &Triangle { placement, number, corners } = triangle;
         let closer = hit.t < self.t
-            || (hit.t == self.t && (placement, triangle) < (self.placement, self.triangle));
+            || (hit.t == self.t && (placement, number) < (self.placement, self.triangle));
         if closer {
-            *self = Self { t: hit.t, placement, triangle, u: hit.u, v: hit.v };
+            // Now, while the corners are at hand: afterwards they would have to be fetched anew.
+            let normal = local_normal(corners);
+            *self = Self { t: hit.t, placement, triangle: number, u: hit.u, v: hit.v, normal };
         }
     }
 
@@ -127,35 +150,43 @@ impl Nearest {
         hits.placement[i] = self.placement;
         hits.triangle[i] = self.triangle;
         if hits.detail == Detail::Surface {
-            self.write_surface(geometry, hits, i);
-        }
-    }
-
-    fn write_surface(&self, geometry: &Geometry, hits: &mut HitBatch, i: usize) {
-        hits.u[i] = self.u;
-        hits.v[i] = self.v;
-        let placement = &geometry.placements[self.placement as usize];
-        let corners = geometry.mesh_of(placement).corners(self.triangle as usize);
-        let normal = front_normal(placement, corners);
-        for axis in 0..3 {
-            hits.normal[axis][i] = normal[axis];
+            hits.u[i] = self.u;
+            hits.v[i] = self.v;
+            let normal = world_normal(&geometry.placements[self.placement as usize], self.normal);
+            for axis in 0..3 {
+                hits.normal[axis][i] = normal[axis];
+            }
         }
     }
 }
 
-/// The unit normal, in world space, on the front of a placed triangle. From the local edges, whose
-/// differences f64 forms without rounding when the corners were f32.
-pub(crate) fn front_normal(placement: &Placement, [a, b, c]: [DVec3; 3]) -> DVec3 {
-    let unit = |v: DVec3| v / v.abs().max_element();
+/// The normal on the front of a triangle, of any length. From its edges, whose differences f64 forms
+/// without rounding when the corners were f32.
+#[inline(always)]
+fn local_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     let normal = (b - a).cross(c - a);
-    let normal =
-        if normal.length_squared().is_normal() { normal } else { unit(b - a).cross(unit(c - a)) };
-    let world = placement.world_from_mesh.normal_matrix() * normal.normalize_or_zero();
+    if normal.length_squared().is_normal() { normal } else { unit(b - a).cross(unit(c - a)) }
+}
+
+/// The unit normal, in world space, of a placed triangle.
+#[inline(always)]
+fn world_normal(placement: &Placement, normal: DVec3) -> DVec3 {
+    let transform = &placement.world_from_mesh;
+    let world = if transform.linear == DMat3::IDENTITY {
+        normal
+    } else {
+        transform.normal_matrix() * normal.normalize_or_zero()
+    };
     if world.length_squared().is_normal() {
         world.normalize()
     } else {
         unit(world).normalize_or_zero()
     }
+}
+
+/// `v` with 1 as its largest component.
+fn unit(v: DVec3) -> DVec3 {
+    v / v.abs().max_element()
 }
 
 #[cfg(test)]
@@ -166,6 +197,10 @@ mod tests {
         watertight::Hit { t, u: 0.0, v: 0.0, front: true }
     }
 
+    fn named(placement: u32, number: u32) -> Triangle {
+        Triangle { placement, number, corners: [DVec3::X, DVec3::Y, DVec3::Z] }
+    }
+
     #[test]
     fn ties_go_to_the_lower_placement_then_triangle_in_any_order() {
         let offers = [(2.0, 0, 0), (1.0, 3, 4), (1.0, 2, 9), (1.0, 2, 7), (1.5, 0, 0)];
@@ -173,7 +208,7 @@ mod tests {
             let mut nearest = Nearest::none(f64::INFINITY);
             for k in 0..offers.len() {
                 let (t, placement, triangle) = offers[(start + k) % offers.len()];
-                nearest.offer(hit(t), placement, triangle);
+                nearest.offer(hit(t), &named(placement, triangle));
             }
             assert_eq!((nearest.placement, nearest.triangle), (2, 7));
         }
@@ -182,7 +217,7 @@ mod tests {
     #[test]
     fn a_hit_exactly_at_the_limit_counts() {
         let mut nearest = Nearest::none(1.0);
-        nearest.offer(hit(1.0), 5, 6);
+        nearest.offer(hit(1.0), &named(5, 6));
         assert_eq!(nearest.placement, 5);
     }
 }

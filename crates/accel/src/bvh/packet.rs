@@ -23,7 +23,7 @@ use super::ray::{BoxTest, Runs, TriangleTest, meet_triangles};
 use super::single::{Search, Sink, Stacks, Visit};
 use super::traverse::{Leaves, Stack, traverse};
 use super::wide::{Cell, Child, LeafNumbers, instances_of, leaf_numbers};
-use crate::nearest::Query;
+use crate::nearest::{Query, Triangle};
 use crate::parts::Instance;
 use crate::watertight::{self, Lines};
 
@@ -365,9 +365,10 @@ impl<'a, 'b, L: Lanes, S: Sink> TriangleLeaves<'a, 'b, L, S> {
     }
 
     fn test_one(&mut self, numbers: &LeafNumbers, n: usize, i: usize, lane: usize) {
-        let Some((placed, triangle, corners)) = self.triangles.get(numbers, n, i) else { return };
-        let Some(hit) = self.packet.query(lane).test(&placed.view, corners) else { return };
-        match self.packet.sinks[lane].take(hit, placed.placement, triangle) {
+        let Some((placed, triangle)) = self.triangles.get(numbers, n, i) else { return };
+        let query = self.packet.query(lane);
+        let Some(hit) = query.test(&placed.view, triangle.corners) else { return };
+        match self.packet.sinks[lane].take(hit, &triangle) {
             Some(limit) => self.packet.t_max[lane] = limit,
             None => self.packet.active &= !(1 << lane),
         }
@@ -384,31 +385,30 @@ impl<'a, 'b, L: Lanes, S: Sink> TriangleLeaves<'a, 'b, L, S> {
         let zero = [0.0; PACKET];
         let mut lines =
             Lines { corners: [[zero; 3]; 3], direction: self.packet.direction.map(|d| *d) };
-        let mut whose = [(0, 0); PACKET];
+        let nothing = Triangle { placement: 0, number: 0, corners: [DVec3::ZERO; 3] };
+        let mut triangles = [nothing; PACKET];
         for lane in bits(self.pending) {
             let leaf = Child(leaf[lane].to_bits());
-            let Some((placed, triangle, corners)) =
-                leaf_numbers(self.cells, leaf).and_then(|numbers| {
-                    self.triangles.get(numbers, leaf.count(), place[lane].to_bits() as usize)
-                })
+            let place = place[lane].to_bits() as usize;
+            let Some((placed, triangle)) = leaf_numbers(self.cells, leaf)
+                .and_then(|numbers| self.triangles.get(numbers, leaf.count(), place))
             else {
                 continue;
             };
             let origin = self.packet.origin;
             let origin = DVec3::new(origin[0][lane], origin[1][lane], origin[2][lane]);
-            let corners = placed.view.seen_from(origin, corners);
+            let corners = placed.view.seen_from(origin, triangle.corners);
             for (k, corner) in corners.into_iter().enumerate() {
                 lines.corners[k][0][lane] = corner.x;
                 lines.corners[k][1][lane] = corner.y;
                 lines.corners[k][2][lane] = corner.z;
             }
-            whose[lane] = (placed.placement, triangle);
+            triangles[lane] = triangle;
         }
         let [t, u, v] = watertight::locate_many(&lines, self.pending);
         for lane in bits(self.pending) {
             let hit = watertight::Hit { t: t[lane], u: u[lane], v: v[lane], front: true };
-            let (placement, triangle) = whose[lane];
-            if let Some(limit) = self.packet.sinks[lane].take(hit, placement, triangle) {
+            if let Some(limit) = self.packet.sinks[lane].take(hit, &triangles[lane]) {
                 self.packet.t_max[lane] = limit;
             }
         }

@@ -1,11 +1,10 @@
 //! From a place in a leaf to a triangle's corners in its mesh's frame, for the exact test.
 
 use etendue_geometry::Mesh;
-use etendue_geometry::glam::DVec3;
 
 use super::wide::{LeafNumbers, Units};
 use super::{Bvh, Owner};
-use crate::nearest::View;
+use crate::nearest::{Triangle, View};
 use crate::parts::Instance;
 
 /// A placement with what the exact test needs of it.
@@ -45,24 +44,23 @@ impl<'a> PlacedTriangles<'a> {
         Self { bvh, only, units: shape.units }
     }
 
-    /// Triangle `i` of the `n` in a leaf with these numbers: its placement, its number and its
-    /// corners in the mesh's frame.
+    /// Triangle `i` of the `n` in a leaf with these numbers, and its placement.
     #[inline(always)]
     pub(super) fn get(
         &self,
         numbers: &LeafNumbers,
         n: usize,
         i: usize,
-    ) -> Option<(Placed<'a>, u32, [DVec3; 3])> {
-        let triangle = numbers.get(9 * n + i)?.to_bits();
+    ) -> Option<(Placed<'a>, Triangle)> {
+        let number = numbers.get(9 * n + i)?.to_bits();
         let placed = match self.only {
             Some(placed) => placed,
             None => Placed::new(self.bvh, numbers.get(10 * n + i)?.to_bits()),
         };
         let corners = match self.units {
             Some(units) => units.corners(numbers, n, i),
-            None => placed.mesh.corners(triangle as usize),
+            None => placed.mesh.corners(number as usize),
         };
-        Some((placed, triangle, corners))
+        Some((placed, Triangle { placement: placed.placement, number, corners }))
     }
 }

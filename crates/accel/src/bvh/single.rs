@@ -13,7 +13,7 @@ use super::placed::PlacedTriangles;
 use super::ray::{BoxTest, NarrowRay, TriangleTest};
 use super::traverse::{Leaves, Stack, traverse};
 use super::wide::{Cell, Child, instances_of, leaf_numbers};
-use crate::nearest::{Nearest, Query};
+use crate::nearest::{Nearest, Query, Triangle};
 use crate::parts::Instance;
 use crate::watertight;
 
@@ -25,7 +25,7 @@ pub(super) trait Sink {
     fn new(t_max: f64) -> Self;
 
     /// Takes a hit within the limits; answers how far to look on, or `None` to end.
-    fn take(&mut self, hit: watertight::Hit, placement: u32, triangle: u32) -> Option<f64>;
+    fn take(&mut self, hit: watertight::Hit, triangle: &Triangle) -> Option<f64>;
 }
 
 impl Sink for Nearest {
@@ -37,8 +37,8 @@ impl Sink for Nearest {
     }
 
     #[inline(always)]
-    fn take(&mut self, hit: watertight::Hit, placement: u32, triangle: u32) -> Option<f64> {
-        self.offer(hit, placement, triangle);
+    fn take(&mut self, hit: watertight::Hit, triangle: &Triangle) -> Option<f64> {
+        self.offer(hit, triangle);
         Some(self.t)
     }
 }
@@ -57,7 +57,7 @@ impl Sink for AnyHit {
     }
 
     #[inline(always)]
-    fn take(&mut self, _: watertight::Hit, _: u32, _: u32) -> Option<f64> {
+    fn take(&mut self, _: watertight::Hit, _: &Triangle) -> Option<f64> {
         self.found = true;
         None
     }
@@ -234,11 +234,11 @@ impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, L, S> {
         while maybe != 0 {
             let i = maybe.trailing_zeros() as usize;
             maybe &= maybe - 1;
-            let (placed, triangle, corners) = self.triangles.get(numbers, n, i)?;
-            if let Some(hit) = self.query.test(&placed.view, corners)
+            let (placed, triangle) = self.triangles.get(numbers, n, i)?;
+            if let Some(hit) = self.query.test(&placed.view, triangle.corners)
                 && hit.t <= self.t_max
             {
-                match self.sink.take(hit, placed.placement, triangle) {
+                match self.sink.take(hit, &triangle) {
                     Some(limit) => self.t_max = limit,
                     None => {
                         self.go_on = false;

@@ -9,7 +9,7 @@ use std::ffi::c_int;
 use embree4_sys as sys;
 use etendue_geometry::{Geometry, MISS, RayBatch};
 
-use crate::nearest::{Nearest, Query, Verdict, View};
+use crate::nearest::{Nearest, Query, Triangle, Verdict, View};
 use crate::single::{self, Rays32};
 
 /// The hits that a filter is asked about: one for each lane of a packet.
@@ -88,19 +88,17 @@ impl Hit<'_> {
         unsafe { *self.lanes.ray.add(RAY_TFAR * self.lanes.width + self.lane) = t }
     }
 
-    /// Placement and triangle.
-    fn what(&self) -> (u32, u32) {
+    fn triangle(&self, geometry: &Geometry) -> Triangle {
         let instance = self.of_hit(HIT_INSTANCE);
         let placement = if instance == MISS { self.of_hit(HIT_GEOMETRY) } else { instance };
-        (placement, self.of_hit(HIT_PRIMITIVE))
+        Triangle::of(geometry, placement, self.of_hit(HIT_PRIMITIVE))
     }
 }
 
 /// What the exact test says of a ray and a triangle.
-fn verdict(geometry: &Geometry, query: &Query, (placement, triangle): (u32, u32)) -> Verdict {
-    let placement = &geometry.placements[placement as usize];
-    let corners = geometry.mesh_of(placement).corners(triangle as usize);
-    query.judge(&View::new(&placement.world_from_mesh), corners)
+fn verdict(geometry: &Geometry, query: &Query, triangle: &Triangle) -> Verdict {
+    let placement = &geometry.placements[triangle.placement as usize];
+    query.judge(&View::new(&placement.world_from_mesh), triangle.corners)
 }
 
 /// The rays of a query whose hits are decided one by one.
@@ -136,7 +134,7 @@ impl<'a> Judged<'a> {
     fn keeps(&mut self, hit: &Hit<'_>) -> bool {
         let i = hit.id();
         let Some(query) = Query::of(self.rays, i) else { return false };
-        match verdict(self.geometry, &query, hit.what()) {
+        match verdict(self.geometry, &query, &hit.triangle(self.geometry)) {
             Verdict::Hit(_) => true,
             Verdict::OutOfRange => false,
             Verdict::Beside => {
@@ -210,11 +208,11 @@ impl<'a> Search<'a> {
     }
 
     fn keeps(&mut self, hit: &Hit<'_>) -> bool {
-        let (placement, triangle) = hit.what();
-        let Verdict::Hit(exact) = verdict(self.geometry, &self.query, (placement, triangle)) else {
+        let triangle = hit.triangle(self.geometry);
+        let Verdict::Hit(exact) = verdict(self.geometry, &self.query, &triangle) else {
             return false;
         };
-        self.nearest.offer(exact, placement, triangle);
+        self.nearest.offer(exact, &triangle);
         let end = self.nearest.t - self.advance + self.slack;
         self.limit = self.limit.min(single::round(end));
         hit.look_to(self.limit);
