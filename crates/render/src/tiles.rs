@@ -144,13 +144,13 @@ impl Job<'_> {
                     self.accel.closest(rays, &mut batch.hits);
                     batch.traced += rays.len() as u64;
                     let traced = Traced { rays, hits: &batch.hits };
-                    for (i, (&weight, &sample)) in weight.iter().zip(sample).enumerate() {
-                        let pixel = sample as usize / range.len();
-                        for (k, (layer, _)) in layers.iter().enumerate() {
-                            let color = self.color(*layer, traced, i);
+                    for (k, (layer, _)) in layers.iter().enumerate() {
+                        self.colors(*layer, traced, &mut batch.numbers);
+                        for (i, (&weight, &sample)) in weight.iter().zip(sample).enumerate() {
+                            let pixel = sample as usize / range.len();
                             let sum = &mut sums[pixel * layers.len() + k];
                             for c in group.lanes.clone() {
-                                sum[c] += weight * color[c];
+                                sum[c] += weight * batch.numbers[c][i];
                             }
                         }
                     }
@@ -168,10 +168,10 @@ impl Job<'_> {
         }
     }
 
-    fn color(&self, layer: LayerSpec, traced: Traced<'_>, i: usize) -> [f64; 3] {
+    fn colors(&self, layer: LayerSpec, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
         match layer {
-            LayerSpec::Facing => self.surroundings.facing(traced, i),
-            _ => self.surroundings.flat(traced.hits, i),
+            LayerSpec::Facing => self.surroundings.facings(traced, out),
+            _ => self.surroundings.flats(traced, out),
         }
     }
 
@@ -187,6 +187,12 @@ impl Job<'_> {
             }
             LayerSpec::Normal { space, kind: NormalKind::Geometric } => {
                 self.surroundings.geometric_normals(traced, space, numbers);
+                for (plane, values) in planes.iter_mut().zip(numbers) {
+                    plane.scatter(places, values);
+                }
+            }
+            LayerSpec::Flat | LayerSpec::Facing | LayerSpec::Albedo => {
+                self.colors(layer, traced, numbers);
                 for (plane, values) in planes.iter_mut().zip(numbers) {
                     plane.scatter(places, values);
                 }
@@ -212,7 +218,12 @@ impl Job<'_> {
             tile.index(x, y, width)
         };
         match layer {
-            LayerSpec::Depth | LayerSpec::Distance => {}
+            // Written a batch at a time.
+            LayerSpec::Depth
+            | LayerSpec::Distance
+            | LayerSpec::Flat
+            | LayerSpec::Facing
+            | LayerSpec::Albedo => {}
             LayerSpec::Normal { space, kind } => {
                 each(planes, batch, index, |i| around.normal(traced, i, kind, space).to_array());
             }
@@ -224,9 +235,6 @@ impl Job<'_> {
             }
             LayerSpec::Coverage => {
                 each(planes, batch, index, |i| [f64::from(u8::from(batch.hits.is_hit(i)))]);
-            }
-            LayerSpec::Flat | LayerSpec::Facing | LayerSpec::Albedo => {
-                each(planes, batch, index, |i| self.color(layer, traced, i));
             }
             LayerSpec::Uv => each(planes, batch, index, |i| around.first_uv(&batch.hits, i)),
             LayerSpec::MaterialId => {

@@ -1,8 +1,11 @@
 //! Layers worked out a whole batch at a time, in loops that vectorise: what most renders write.
 
-use etendue_geometry::glam::DVec3;
+use std::ops::Range;
 
-use crate::{Space, Surroundings, Traced};
+use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{HitBatch, MISS, Placement};
+
+use crate::{Color, Paint, Space, Surroundings, Traced};
 
 /// Vector units that loops are compiled for beside the portable ones.
 macro_rules! vectorised {
@@ -40,6 +43,101 @@ impl Surroundings<'_> {
             }
         };
         normals(traced, axes, out);
+    }
+
+    /// Base colour under a headlight, of every ray: something to look at, not light transport. A
+    /// little of it does not depend on the colour, so that black things show their shape as well.
+    /// Misses are black. The arrays of `out` are refilled.
+    pub fn facings(&self, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
+        self.flats(traced, out);
+        let mut cosine = vec![0.0; traced.rays.len()];
+        for (run, placement) in self.runs(traced.hits) {
+            match &self.geometry.mesh_of(placement).normals {
+                None => cosines(traced, run, &mut cosine),
+                Some(_) => self.shading_cosines(traced, run, placement, &mut cosine),
+            }
+        }
+        let hits = &traced.hits.placement;
+        for array in out {
+            for ((color, cosine), &hit) in array.iter_mut().zip(&cosine).zip(hits) {
+                let lit = (0.08 + 0.92 * *color) * (0.15 + 0.85 * cosine);
+                *color = if hit == MISS { 0.0 } else { lit };
+            }
+        }
+    }
+
+    /// [`Surroundings::flat`] of every ray: the arrays of `out` are refilled.
+    pub fn flats(&self, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
+        for array in out.iter_mut() {
+            array.clear();
+            array.resize(traced.rays.len(), 0.0);
+        }
+        for (run, placement) in self.runs(traced.hits) {
+            if let Some(color) = self.plain_color(placement) {
+                for (array, c) in out.iter_mut().zip(color) {
+                    array[run.clone()].fill(c);
+                }
+                continue;
+            }
+            for i in run {
+                for (array, c) in out.iter_mut().zip(self.flat(traced.hits, i)) {
+                    array[i] = c;
+                }
+            }
+        }
+    }
+
+    /// Runs of rays that hit the same placement.
+    fn runs(&self, hits: &HitBatch) -> impl Iterator<Item = (Range<usize>, &Placement)> {
+        let mut start = 0;
+        hits.placement.chunk_by(|a, b| a == b).filter_map(move |run| {
+            let range = start..start + run.len();
+            start = range.end;
+            (run[0] != MISS).then(|| (range, &self.geometry.placements[run[0] as usize]))
+        })
+    }
+
+    /// The base colour of a placement that has the same everywhere.
+    fn plain_color(&self, placement: &Placement) -> Option<Color> {
+        let Some(material) = self.materials.get(placement.material as usize) else {
+            return Some([0.0; 3]);
+        };
+        let colored = material.vertex_colors && self.geometry.mesh_of(placement).colors.is_some();
+        match material.base_color {
+            Paint::Plain(color) if !colored => Some(color),
+            _ => None,
+        }
+    }
+
+    /// Cosines between rays of a run and the mesh's own normals, on the side of the triangle that the
+    /// ray came from.
+    fn shading_cosines(
+        &self,
+        traced: Traced<'_>,
+        run: Range<usize>,
+        placement: &Placement,
+        out: &mut [f64],
+    ) {
+        let transform = &placement.world_from_mesh;
+        let turn = (transform.linear != DMat3::IDENTITY).then(|| transform.normal_matrix());
+        for i in run {
+            let (geometric, direction) = (traced.hits.normal(i), traced.rays.direction(i));
+            let side = if geometric.dot(direction) > 0.0 { 1.0 } else { -1.0 };
+            let spot = self.spot(traced.hits, i);
+            let normal = spot.and_then(|spot| spot.turned_normal(turn.as_ref(), geometric));
+            out[i] = (normal.unwrap_or(geometric).dot(direction) * side).max(0.0);
+        }
+    }
+}
+
+vectorised! {
+    /// Cosines between rays and the triangles' normals.
+    fn cosines(traced: Traced<'_>, run: Range<usize>, out: &mut [f64]) {
+        let [dx, dy, dz] = traced.rays.direction.each_ref().map(|array| &array[run.clone()]);
+        let [nx, ny, nz] = traced.hits.normal.each_ref().map(|array| &array[run.clone()]);
+        for (i, out) in out[run].iter_mut().enumerate() {
+            *out = (nx[i] * dx[i] + ny[i] * dy[i] + nz[i] * dz[i]).abs();
+        }
     }
 }
 

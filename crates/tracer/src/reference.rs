@@ -192,18 +192,6 @@ impl Surroundings<'_> {
         let v_image = row_v[0] * u + row_v[1] * v + row_v[2];
         pixels.sample([u_image, v_image], image.encoding)
     }
-
-    /// Base colour under a headlight at hit `i`: something to look at, not light transport. A little
-    /// of it does not depend on the colour, so that black things show their shape as well.
-    #[must_use]
-    pub fn facing(&self, traced: Traced<'_>, i: usize) -> Color {
-        if !traced.hits.is_hit(i) {
-            return [0.0; 3];
-        }
-        let normal = self.normal(traced, i, NormalKind::Shading, Space::World);
-        let cosine = normal.dot(-traced.rays.direction(i)).max(0.0);
-        self.flat(traced.hits, i).map(|c| (0.08 + 0.92 * c) * (0.15 + 0.85 * cosine))
-    }
 }
 
 /// A place on a mesh.
@@ -252,11 +240,16 @@ impl<'a> Spot<'a> {
     /// the mesh has none.
     #[must_use]
     pub fn shading_normal(&self, geometric: DVec3) -> Option<DVec3> {
-        let local = DVec3::from(self.mix(self.mesh.normals.as_ref()?));
         let place = &self.placement.world_from_mesh;
-        let unmoved = place.linear == DMat3::IDENTITY;
-        let world = if unmoved { local } else { place.normal_matrix() * local };
-        let world = world.try_normalize()?;
+        let turn = (place.linear != DMat3::IDENTITY).then(|| place.normal_matrix());
+        self.turned_normal(turn.as_ref(), geometric)
+    }
+
+    /// [`Self::shading_normal`] with the placement's matrix for normals, or none where it turns
+    /// nothing.
+    pub(crate) fn turned_normal(&self, turn: Option<&DMat3>, geometric: DVec3) -> Option<DVec3> {
+        let local = DVec3::from(self.mix(self.mesh.normals.as_ref()?));
+        let world = turn.map_or(local, |turn| *turn * local).try_normalize()?;
         // Some files' normals point inwards; the triangle's winding decides.
         Some(if world.dot(geometric) < 0.0 { -world } else { world })
     }
