@@ -165,6 +165,17 @@ pub enum BuildError {
         /// The limit (bytes).
         limit: u64,
     },
+    /// The machine has no more memory to give. What was built so far is freed.
+    #[error(
+        "the machine has too little free memory for the {backend} structure ({call}); end other \
+         programs, or place fewer or lighter meshes"
+    )]
+    OutOfMemory {
+        /// The backend that was building.
+        backend: &'static str,
+        /// The library's call that said so.
+        call: &'static str,
+    },
     /// More triangles or corners than the backend can number.
     #[error("mesh \"{mesh}\": {what} is over the {backend} limit of {limit}; split the mesh")]
     TooLarge {

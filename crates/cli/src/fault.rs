@@ -62,7 +62,9 @@ impl From<RenderError> for Fault {
             RenderError::Stopped | RenderError::Build(BuildError::Stopped) => {
                 Self::Failed(anyhow::Error::msg(STOPPED))
             }
-            RenderError::Picture(_) => Self::Failed(error.into()),
+            RenderError::Picture(_) | RenderError::Build(BuildError::OutOfMemory { .. }) => {
+                Self::Failed(error.into())
+            }
             error => Self::Refused(error.into()),
         }
     }

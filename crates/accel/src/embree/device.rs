@@ -49,6 +49,9 @@ impl Device {
         let Some(handle) = NonNull::new(handle) else {
             // SAFETY: the null device reports the error of the failed creation on this thread.
             let code = unsafe { sys::rtcGetDeviceError(ptr::null_mut()) };
+            if code == sys::RTC_ERROR_OUT_OF_MEMORY {
+                return Err(BuildError::OutOfMemory { backend: "Embree", call: "rtcNewDevice" });
+            }
             return Err(BuildError::Library {
                 call: "rtcNewDevice",
                 message: format!("Embree could not open a device (error {})", code.0),
@@ -101,6 +104,9 @@ impl Device {
         if message.starts_with(STOPPED) {
             return Err(BuildError::Stopped);
         }
+        if message.starts_with(OUT_OF_MEMORY) {
+            return Err(BuildError::OutOfMemory { backend: "Embree", call });
+        }
         Err(BuildError::Library { call, message })
     }
 }
@@ -123,6 +129,7 @@ impl fmt::Debug for Device {
 }
 
 const STOPPED: &str = "cancelled";
+const OUT_OF_MEMORY: &str = "out of memory";
 
 unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError, text: *const c_char) {
     // SAFETY: `user` is the `Watch` that `Device::new` registered; the text is a C string or null.
@@ -133,7 +140,7 @@ unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError, text: *con
     let name = match code {
         sys::RTC_ERROR_INVALID_ARGUMENT => "invalid argument",
         sys::RTC_ERROR_INVALID_OPERATION => "invalid operation",
-        sys::RTC_ERROR_OUT_OF_MEMORY => "out of memory",
+        sys::RTC_ERROR_OUT_OF_MEMORY => OUT_OF_MEMORY,
         sys::RTC_ERROR_UNSUPPORTED_CPU => "unsupported CPU",
         sys::RTC_ERROR_CANCELLED => STOPPED,
         _ => "unknown error",
