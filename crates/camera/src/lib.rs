@@ -26,6 +26,7 @@ pub mod pose;
 pub mod sampler;
 pub mod samples;
 pub mod sensor;
+mod sobol;
 pub mod train;
 
 pub use camera::{Camera, CameraSpec, PixelBlock, Projection};
@@ -40,6 +41,6 @@ pub use lens::{
 pub use orthographic::{Orthographic, OrthographicSpec};
 pub use pinhole::{Pinhole, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};
-pub use sampler::{PixelSamples, Sampler};
+pub use sampler::{PixelSamples, Sampler, squares};
 pub use samples::{CameraRays, FilmSamples};
 pub use sensor::SensorSpec;

@@ -6,6 +6,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::sobol::{self, Key};
+
+/// Dimensions of the Sobol set.
+const DIMENSIONS: u32 = sobol_burley::NUM_DIMENSIONS;
+
 /// The point sets that samples come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -48,14 +53,10 @@ impl PixelSamples {
         let random = |salt: u64| unit(mix(key ^ mix(u64::from(index) << 8 | salt)));
         match self.sampler {
             Sampler::Sobol => {
-                // The set has 2¹⁶ points in 256 dimensions; beyond both it starts over, scrambled
-                // anew.
-                let dimension = 2 * pair % 256;
-                let again = u64::from(2 * pair / 256) << 32 | u64::from(index >> 16);
-                #[expect(clippy::cast_possible_truncation, reason = "the low half is the seed")]
-                let seed = mix(self.seed ^ again) as u32;
+                let Key { index, seed } = self.sobol_key(index, pair);
+                let dimension = 2 * pair % DIMENSIONS;
                 // Four dimensions side by side take the time of one.
-                let four = sobol_burley::sample_4d(index & 0xffff, dimension / 4, seed);
+                let four = sobol_burley::sample_4d(index, dimension / 4, seed);
                 let [a, b, c, d] = four.map(f64::from);
                 if dimension.is_multiple_of(4) { [a, b] } else { [c, d] }
             }
@@ -80,6 +81,14 @@ impl PixelSamples {
         }
     }
 
+    /// The set has 2¹⁶ points in [`DIMENSIONS`]; beyond both it starts over, scrambled anew.
+    fn sobol_key(&self, index: u32, pair: u32) -> Key {
+        let again = u64::from(2 * pair / DIMENSIONS) << 32 | u64::from(index >> 16);
+        #[expect(clippy::cast_possible_truncation, reason = "the low half is the seed")]
+        let seed = mix(self.seed ^ again) as u32;
+        Key { index: index & 0xffff, seed }
+    }
+
     /// Columns and rows whose product is at most the number of samples and is nearest to a square.
     fn grid(&self) -> [u32; 2] {
         let mut rows = self.count.isqrt();
@@ -87,6 +96,41 @@ impl PixelSamples {
             rows -= 1;
         }
         [self.count / rows, rows]
+    }
+}
+
+/// [`PixelSamples::square`] for each of `wanted`, which are a pixel's samples, an index and a pair of
+/// dimensions, in one go: `out` is refilled.
+pub fn squares(wanted: &[(PixelSamples, u32, u32)], out: &mut Vec<[f64; 2]>) {
+    out.clear();
+    if wanted.iter().any(|(pixel, ..)| pixel.sampler != Sampler::Sobol) {
+        out.extend(wanted.iter().map(|(pixel, index, pair)| pixel.square(*index, *pair)));
+        return;
+    }
+    out.resize(wanted.len(), [0.0; 2]);
+    // Rays of a batch are about equally far on their way: few pairs in all.
+    let mut pairs: Vec<u32> = Vec::new();
+    for &(.., pair) in wanted {
+        if !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
+    }
+    let mut keys = Vec::with_capacity(wanted.len());
+    let mut places = Vec::with_capacity(wanted.len());
+    let mut numbers = vec![[0.0; 2]; wanted.len()];
+    for pair in pairs {
+        keys.clear();
+        places.clear();
+        for (place, &(pixel, index, _)) in
+            wanted.iter().enumerate().filter(|(_, (.., own))| *own == pair)
+        {
+            keys.push(pixel.sobol_key(index, pair));
+            places.push(place);
+        }
+        sobol::pairs(&keys, 2 * pair % DIMENSIONS, &mut numbers[..keys.len()]);
+        for (&place, &number) in places.iter().zip(&numbers) {
+            out[place] = number;
+        }
     }
 }
 
@@ -157,6 +201,21 @@ mod tests {
                 let error = (sum / 4096.0 - 0.25).abs();
                 assert!(error < 4.0 * 0.2205 / 64.0, "{sampler:?} pair {pair}: {error}");
             }
+        }
+    }
+
+    #[test]
+    fn many_at_once_are_those_one_by_one() {
+        for sampler in ALL {
+            let wanted: Vec<_> = (0..200)
+                .map(|i| {
+                    (sampler.pixel(5, i % 7, i / 7, 80_000), i * 381, [0, 3, 200][i as usize % 3])
+                })
+                .collect();
+            let mut out = Vec::new();
+            squares(&wanted, &mut out);
+            let one_by_one = wanted.iter().map(|(pixel, i, pair)| pixel.square(*i, *pair));
+            assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?}");
         }
     }
 

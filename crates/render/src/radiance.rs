@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use etendue_camera::element::FateCounts;
-use etendue_camera::{Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples};
+use etendue_camera::{Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, squares};
 use etendue_tracer::transport::Beam;
 use etendue_tracer::{Samples, Scratch, Stage, Tally, Tracer};
 
@@ -56,11 +56,11 @@ struct Numbers {
 
 impl Samples for Numbers {
     fn squares(&self, wanted: &[(u32, u32)], out: &mut Vec<[f64; 2]>) {
-        out.clear();
-        out.extend(wanted.iter().map(|&(ray, pair)| {
-            let (pixel, index) = &self.samples[self.of_ray[ray as usize] as usize];
-            pixel.square(*index, CAMERA_PAIRS + pair)
-        }));
+        let sample_of = |&(ray, pair): &(u32, u32)| {
+            let (pixel, index) = self.samples[self.of_ray[ray as usize] as usize];
+            (pixel, index, CAMERA_PAIRS + pair)
+        };
+        squares(&wanted.iter().map(sample_of).collect::<Vec<_>>(), out);
     }
 }
 
