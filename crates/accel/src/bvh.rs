@@ -108,7 +108,7 @@ impl Isa {
     }
 }
 
-const LEAF: LeafSize = LeafSize { most: MOST_IN_LEAF, block: 4 };
+const LEAF: LeafSize = LeafSize { most: MOST_IN_LEAF, block: 8 };
 const INSTANCE_LEAF: LeafSize = LeafSize { most: 1, block: 1 };
 
 /// Instances that the cells of a tree can certainly number: one each and a node for every few.
