@@ -2,7 +2,7 @@
 //!
 //! **The limit** is Embree called directly, a bare loop over prepared records with nothing of ours
 //! in between ([`limit`]). Everything else is given as a ratio to it, measured in the same run, the
-//! contestants taking turns.
+//! contestants taking turns. Medians and the machine's description come from [`etendue_bench`].
 //!
 //! # Map
 //!
@@ -14,12 +14,10 @@
 //! | [`contest`] | who is timed, on which clock, and in which order |
 //! | [`field`] | all contestants on one scene |
 //! | [`files`] | the meshes as GLB, OBJ and PLY, and a scene around them |
-//! | [`machine`] | what all this was measured on, and the memory of a process |
 
 pub mod contest;
 pub mod field;
 pub mod files;
 pub mod limit;
-pub mod machine;
 pub mod meshes;
 pub mod rays;

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::element::Resolve;
-use crate::length::{Degrees, Metres};
+use crate::length::{Degrees, Metres, Micrometres};
 use crate::{
     CameraError, CameraRays, ChromaticRealLensCameraSpec, FilmSamples, LaneGroup, LensCamera,
     LensCameraSpec, Orthographic, OrthographicSpec, Pinhole, PinholeSpec, Pose, PoseSpec,
@@ -257,6 +257,24 @@ impl Camera {
             other => other.clone(),
         };
         Ok(Self { projection, ..self.clone() })
+    }
+
+    /// The same view on pixels `factor` times as large. Columns and rows that do not fill a pixel are
+    /// left out on the right and below, and at least one is left.
+    #[must_use]
+    pub fn coarser(&self, factor: u32) -> Self {
+        let factor = factor.max(1);
+        let times = f64::from(factor);
+        let projection = match &self.projection {
+            Projection::Pinhole(pinhole) => Projection::Pinhole(pinhole.coarser(times)),
+            Projection::Orthographic(parallel) => Projection::Orthographic(parallel.coarser(times)),
+            Projection::Lens(lens) => Projection::Lens(Arc::new(lens.coarser(times))),
+        };
+        let sensor = SensorSpec {
+            resolution: self.sensor.resolution.map(|side| (side / factor).max(1)),
+            pixel_pitch: self.sensor.pixel_pitch.map(|pitch| Micrometres(pitch.0 * times)),
+        };
+        Self { pose: self.pose, sensor, projection }
     }
 
     /// Place and axes. `z` depths are measured from its position along its forward axis.

@@ -61,6 +61,12 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
+    /// The same on pixels `factor` times as large.
+    pub(crate) fn coarser(&self, factor: f64) -> Self {
+        let [focal, centre] = [self.focal, self.centre].map(|pair| pair.map(|x| x / factor));
+        Self { focal, centre, skew: self.skew / factor }
+    }
+
     /// Square pixels and a centred axis, for a vertical field of view (radians).
     #[must_use]
     pub fn from_fov(fov: f64, [width, height]: [u32; 2]) -> Self {

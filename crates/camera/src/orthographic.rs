@@ -67,6 +67,11 @@ impl Orthographic {
         self.pixel
     }
 
+    /// The same on pixels `factor` times as large.
+    pub(crate) fn coarser(&self, factor: f64) -> Self {
+        Self { pixel: self.pixel * factor, centre: self.centre.map(|c| c / factor) }
+    }
+
     /// The place of the axis on the sensor (pixels from the corner).
     #[must_use]
     pub fn centre(&self) -> [f64; 2] {

@@ -132,6 +132,11 @@ impl Pinhole {
         self.pixel_origin
     }
 
+    /// The same on pixels `factor` times as large.
+    pub(crate) fn coarser(&self, factor: f64) -> Self {
+        Self { intrinsics: self.intrinsics.coarser(factor), ..self.clone() }
+    }
+
     /// The tangents up to which a framed scene may reach: of the picture's edges, or of what is
     /// seen at their middles and corners, at most 60° from the axis.
     fn reach(&self, [width, height]: [u32; 2]) -> Reach {

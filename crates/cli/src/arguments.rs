@@ -45,6 +45,9 @@ pub(crate) enum Command {
     /// Analyse a lens, or trace given rays through it
     #[command(after_help = LENS_HELP)]
     Lens(LensArguments),
+    /// Measure speed against accuracy on a scene: every accelerator, on this machine
+    #[command(after_help = BENCH_HELP)]
+    Bench(BenchArguments),
     /// Print the JSON Schema of scene files, lens files, or files of rays
     #[command(after_help = "Example:\n  etendue schema > scene.schema.json\n  \
                             etendue schema lens > lens.schema.json")]
@@ -72,6 +75,25 @@ Examples:
   etendue render scenes/first-light.json -o out/first-light
   etendue render model.glb -o out/model --layers depth,normal,ids
   etendue render scenes/cube.json -o out/cube --set camera.fov=30 --samples 16";
+
+const BENCH_HELP: &str = "\
+Prints a table, and writes into the folder:
+  bench.json                 all that was measured, with the machine
+  accelerators.csv           each accelerator x batch width x threads: build, memory, speed, errors
+  accelerators-hits.svg      rays with a wrong answer against time (.png too)
+  accelerators-depth.svg     error of the distance against time
+  accelerators-batch.svg     time against batch width
+  samplers.csv               each sampler x number of samples: time, and error of the picture
+  samplers-time.svg, samplers-samples.svg
+  cameras.csv, cameras-time.svg
+                             each model of the camera's lens, from a pinhole to the full train
+
+Errors of hits are against `exact`, the f64 reference, which is built and traced too; errors of
+pictures against one of sixteen times the samples. Run it on a machine that does nothing else.
+
+Examples:
+  etendue bench scenes/first-light.json -o out/bench --quick
+  etendue bench model.glb -o out/bench --batches 64,256 --threads 1,8 --rays 1000000";
 
 const SENSOR_HELP: &str = "\
 Without a sensor, lists the presets. With one, exposes frames of even light from a tenth of an
@@ -140,7 +162,7 @@ pub(crate) struct LensArguments {
 }
 
 /// A scene, and what of it is overridden.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct SceneArguments {
     /// A scene (.json), or a model (.gltf, .glb, .obj, .ply) to frame by itself
     #[arg(value_name = "SCENE|MODEL")]
@@ -237,6 +259,56 @@ pub(crate) struct RenderArguments {
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
     /// Show no progress and no summary; the list of files and errors remain
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PartArgument {
+    /// Each accelerator x batch width x threads
+    Accelerators,
+    /// Each sampler x number of samples
+    Samplers,
+    /// Each model of the camera's lens x number of samples
+    Cameras,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+    /// The folder to write into; made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Fewer rays, rounds and batch widths: under a minute for a million triangles
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Measure these alone
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    pub(crate) only: Vec<PartArgument>,
+    /// Times that everything is built and timed [default: 5, quick 3]
+    #[arg(long, value_name = "N", value_parser = parse_rounds)]
+    pub(crate) rounds: Option<usize>,
+    /// The most rays to trace, in whole tiles of the picture [default: 524288, quick 65536]
+    #[arg(long, value_name = "N", value_parser = parse_rays)]
+    pub(crate) rays: Option<usize>,
+    /// Batch widths in rays [default: 16,64,256,1024, quick 64,256]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_batch)]
+    pub(crate) batches: Option<Vec<usize>>,
+    /// Numbers of threads [default: 1, 2, 4 … all, quick 1 and all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_some_threads)]
+    pub(crate) threads: Option<Vec<usize>>,
+    /// Samples a pixel to compare [default: 1,4,16,64,256, quick 1,4,16,64]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_samples)]
+    pub(crate) sample_counts: Option<Vec<u32>>,
+    /// About how long samplers and cameras may take, each; pixels are made larger until they do
+    /// [default: 60, quick 10]
+    #[arg(long, value_name = "S", value_parser = parse_seconds)]
+    pub(crate) seconds: Option<f64>,
+    /// Stop when a structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
+    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    pub(crate) memory_limit: Option<u64>,
+    /// Show no progress and no list of files; the table and errors remain
     #[arg(short, long)]
     pub(crate) quiet: bool,
 }
@@ -361,6 +433,42 @@ fn parse_threads(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(threads) if threads <= MOST_THREADS => Ok(threads),
         _ => Err(format!("expected a whole number from 0 to {MOST_THREADS}")),
+    }
+}
+
+fn parse_some_threads(text: &str) -> Result<usize, String> {
+    parse_count(text, MOST_THREADS)
+}
+
+fn parse_rounds(text: &str) -> Result<usize, String> {
+    parse_count(text, 1000)
+}
+
+fn parse_rays(text: &str) -> Result<usize, String> {
+    parse_count(text, 1 << 30)
+}
+
+fn parse_samples(text: &str) -> Result<u32, String> {
+    // The converged picture has sixteen times as many.
+    let count = parse_count(text, 1 << 16)?;
+    u32::try_from(count).map_err(|error| error.to_string())
+}
+
+fn parse_seconds(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if seconds > 0.0 && f64::is_finite(seconds) => Ok(seconds),
+        _ => Err("expected seconds, such as 60".to_owned()),
+    }
+}
+
+fn parse_batch(text: &str) -> Result<usize, String> {
+    parse_count(text, 1 << 16)
+}
+
+fn parse_count(text: &str, most: usize) -> Result<usize, String> {
+    match text.trim().parse() {
+        Ok(count) if (1..=most).contains(&count) => Ok(count),
+        _ => Err(format!("expected a whole number from 1 to {most}")),
     }
 }
 

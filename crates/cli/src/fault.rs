@@ -4,6 +4,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use etendue_accel::BuildError;
+use etendue_bench::BenchError;
 use etendue_render::RenderError;
 use etendue_render::expose::ExposeError;
 use etendue_render::output::OutputError;
@@ -86,6 +87,18 @@ impl From<ExposeError> for Fault {
             ExposeError::Output(error) => error.into(),
             ExposeError::Stopped => Self::Failed(anyhow::Error::msg(STOPPED)),
             error => Self::Failed(error.into()),
+        }
+    }
+}
+
+impl From<BenchError> for Fault {
+    fn from(error: BenchError) -> Self {
+        match error {
+            BenchError::Stopped | BenchError::Build(BuildError::Stopped) => {
+                Self::Failed(anyhow::Error::msg(STOPPED))
+            }
+            BenchError::Drawing(_) => Self::Failed(error.into()),
+            error => Self::Refused(error.into()),
         }
     }
 }

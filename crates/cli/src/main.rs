@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod bench;
 mod check;
 mod fault;
 mod lens;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
         Some(Command::Render(arguments)) => render::run(&arguments),
         Some(Command::Check(arguments)) => check::run(&arguments),
         Some(Command::Plan(arguments)) => plan::run(&arguments),
+        Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Sensor(arguments)) => sensor::run(&arguments),
         Some(Command::Lens(arguments)) => lens::run(&arguments),
         Some(Command::Schema { of }) => print_schema(of),

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildOptions};
-use etendue_benches::contest::{Turn, take_turns, wall};
+use etendue_bench::rounds::{Turn, take_turns, wall};
 use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_camera::{Camera, PixelBlock};
 use etendue_geometry::{

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Context;
-use etendue_benches::contest::Series;
+use etendue_bench::machine;
+use etendue_bench::rounds::Series;
 use etendue_benches::field::names;
-use etendue_benches::machine;
 
 use crate::findings::{Contest, Findings, Part, Record};
 use crate::goals::{self, Goal};
@@ -36,7 +36,7 @@ fn kept(old: &str) -> String {
 
 fn compose(effort: Effort, findings: &Findings, peers: &str) -> String {
     let mut text = String::from(HEAD);
-    for line in machine::describe() {
+    for line in machine::describe().into_iter().chain([machine::checkout()]) {
         push(&mut text, &format!("- {line}"));
     }
     push(&mut text, &format!("- Rounds: {}, after one that is not counted", effort.rounds));

@@ -1,6 +1,7 @@
 //! Tracing on one thread and on two.
 
-use etendue_benches::contest::{Turn, take_turns, time, wall};
+use etendue_bench::rounds::{Turn, take_turns, wall};
+use etendue_benches::contest::time;
 use etendue_benches::field::{Field, Rays, contestants, names};
 
 use crate::Effort;

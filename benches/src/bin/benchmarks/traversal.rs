@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use etendue_benches::contest::{Query, Turn, take_turns, time};
+use etendue_bench::rounds::{Turn, take_turns};
+use etendue_benches::contest::{Query, time};
 use etendue_benches::field::{Field, Rays, Reference, contestants, names};
 use etendue_benches::meshes;
 use etendue_benches::rays::{View, incoherent, occlusion};

@@ -7,9 +7,10 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, ensure};
 use etendue_accel::{BuildOptions, Quality};
-use etendue_benches::contest::{LimitPackets, Query, Turn, take_turns, time, wall};
+use etendue_bench::machine::Memory;
+use etendue_bench::rounds::{Turn, take_turns, wall};
+use etendue_benches::contest::{LimitPackets, Query, time};
 use etendue_benches::limit::{BareScene, Mode, Packet};
-use etendue_benches::machine::Memory;
 use etendue_benches::meshes;
 use etendue_benches::rays::View;
 use etendue_render::output::Outputs;

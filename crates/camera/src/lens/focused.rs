@@ -127,6 +127,20 @@ impl Focused {
         Ok(Self { train, paraxial, film, view, object_distance, origin })
     }
 
+    /// The same on pixels `factor` times as large.
+    pub(crate) fn coarser(&self, factor: f64) -> Self {
+        let pitch = self.film.pitch * factor;
+        let film = Film { pitch, centre: self.film.centre / factor, ..self.film };
+        let view = match self.view {
+            View::Perspective(k) => View::Perspective(k.coarser(factor)),
+            View::Parallel { metres_per_pixel, centre } => View::Parallel {
+                metres_per_pixel: metres_per_pixel * factor,
+                centre: centre.map(|c| c / factor),
+            },
+        };
+        Self { film, view, ..self.clone() }
+    }
+
     /// The lens.
     #[must_use]
     pub fn train(&self) -> &OpticalTrain {

@@ -97,6 +97,11 @@ impl LensCamera {
         &self.focused
     }
 
+    /// The same on pixels `factor` times as large: what was measured of the pupil holds for them too.
+    pub(crate) fn coarser(&self, factor: f64) -> Self {
+        Self { focused: self.focused.coarser(factor), ..self.clone() }
+    }
+
     /// The projected solid angle (sr) of the unvignetted pupil seen from the axis: times the mean of
     /// weight times radiance, it is the irradiance.
     #[must_use]

@@ -13,7 +13,7 @@ fn version_names_the_program_and_what_traces() {
 #[test]
 fn help_exists_for_every_command_and_shows_an_example() {
     let bench = Bench::new();
-    for command in ["render", "check", "plan", "lens", "sensor", "schema"] {
+    for command in ["render", "check", "plan", "lens", "sensor", "bench", "schema"] {
         let output = bench.run(&[command, "--help"]);
         assert!(output.status.success());
         assert!(text(&output.stdout).contains("Example"), "{command}");

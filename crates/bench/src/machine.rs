@@ -3,20 +3,34 @@
 use std::fs;
 use std::process::Command;
 
-/// The processor's model, its cores, and what is installed, one line each.
+/// The processor's model, its cores, and what is measured, one line each.
 #[must_use]
 pub fn describe() -> Vec<String> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let embree = match etendue_accel::embree_version() {
-        Ok(version) => version.to_string(),
-        Err(error) => error.to_string(),
-    };
     vec![
         format!("Processor: {}, {cores} cores for this process", processor()),
         format!("Memory: {:.0} GiB", gibibytes_of_machine()),
-        format!("{embree}; {}", rustc()),
-        format!("etendue {}, commit {}", env!("CARGO_PKG_VERSION"), commit()),
+        format!("etendue {}; {}", env!("CARGO_PKG_VERSION"), embree()),
     ]
+}
+
+/// The compiler and the commit of the repository that the process was started in.
+#[must_use]
+pub fn checkout() -> String {
+    format!("Commit {}; {}", commit(), first_line(Command::new("rustc").arg("--version")))
+}
+
+#[cfg(feature = "embree")]
+fn embree() -> String {
+    match etendue_accel::embree_version() {
+        Ok(version) => version.to_string(),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[cfg(not(feature = "embree"))]
+fn embree() -> String {
+    "built without Embree".to_owned()
 }
 
 fn processor() -> String {
@@ -32,10 +46,6 @@ fn processor() -> String {
 
 fn gibibytes_of_machine() -> f64 {
     kilobytes("/proc/meminfo", "MemTotal:") as f64 / f64::from(1 << 20)
-}
-
-fn rustc() -> String {
-    first_line(Command::new("rustc").arg("--version"))
 }
 
 fn commit() -> String {

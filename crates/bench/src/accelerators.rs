@@ -1,0 +1,296 @@
+//! Each accelerator × batch width × threads: what it costs, and what it gets wrong.
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use etendue_accel::{Accel, BuildError, BuildOptions, Bvh, Exact, Quality};
+use etendue_geometry::{Detail, Geometry, HitBatch, RayBatch};
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::Serialize;
+
+use crate::hits::{HitErrors, Hits, trace};
+use crate::rays::Rays;
+use crate::rounds::{Series, Spread, order};
+use crate::{BenchError, Progress};
+
+/// The width of a batch in a render: the pixels of a tile.
+pub const RENDER_WIDTH: usize = 256;
+
+/// Timing goes on for at least so long (s), however few the rays.
+const LEAST: f64 = 0.01;
+
+/// What finds the hits, and how carefully.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Method {
+    /// Embree without its robust mode and without f64: its own fastest.
+    EmbreeFast,
+    /// The same with hits solved again in f64.
+    EmbreeFastRefined,
+    /// Embree's robust mode, distances in f32.
+    EmbreeRobust,
+    /// Robust, hits solved again in f64 and looked at again where suspicious: what renders use.
+    EmbreeRefined,
+    /// The pure-Rust tree.
+    Bvh,
+    /// The f64 reference.
+    Exact,
+}
+
+impl Method {
+    /// Those that this program was built with; the reference is the last.
+    #[must_use]
+    pub fn all() -> &'static [Self] {
+        if cfg!(feature = "embree") {
+            &[
+                Self::EmbreeFast,
+                Self::EmbreeFastRefined,
+                Self::EmbreeRobust,
+                Self::EmbreeRefined,
+                Self::Bvh,
+                Self::Exact,
+            ]
+        } else {
+            &[Self::Bvh, Self::Exact]
+        }
+    }
+
+    /// As tables and charts write it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::EmbreeFast => "embree fast",
+            Self::EmbreeFastRefined => "embree fast + f64",
+            Self::EmbreeRobust => "embree robust",
+            Self::EmbreeRefined => "embree robust + f64",
+            Self::Bvh => "bvh",
+            Self::Exact => "exact",
+        }
+    }
+
+    /// Builds its structure.
+    ///
+    /// # Errors
+    ///
+    /// As the accelerator's own build; [`BuildError::Library`] for Embree where it was left out.
+    pub fn build(
+        self,
+        geometry: &Arc<Geometry>,
+        options: &BuildOptions,
+    ) -> Result<Box<dyn Accel>, BuildError> {
+        let geometry = Arc::clone(geometry);
+        let robust = matches!(self, Self::EmbreeRobust | Self::EmbreeRefined);
+        let refine = matches!(self, Self::EmbreeFastRefined | Self::EmbreeRefined);
+        Ok(match self {
+            Self::Bvh => Box::new(Bvh::build(geometry, options)?),
+            Self::Exact => Box::new(Exact::build(geometry, options)?),
+            _ => embree(geometry, &BuildOptions { robust, refine, ..options.clone() })?,
+        })
+    }
+}
+
+#[cfg(feature = "embree")]
+fn embree(geometry: Arc<Geometry>, options: &BuildOptions) -> Result<Box<dyn Accel>, BuildError> {
+    Ok(Box::new(etendue_accel::Embree::build(geometry, options)?))
+}
+
+#[cfg(not(feature = "embree"))]
+fn embree(_: Arc<Geometry>, _: &BuildOptions) -> Result<Box<dyn Accel>, BuildError> {
+    let message = "this program was built without Embree".to_owned();
+    Err(BuildError::Library { call: "Embree", message })
+}
+
+/// How much is measured.
+#[derive(Debug, Clone)]
+pub struct Effort {
+    /// What takes part.
+    pub methods: Vec<Method>,
+    /// Rays a batch.
+    pub widths: Vec<usize>,
+    /// Numbers of threads.
+    pub threads: Vec<usize>,
+    /// Times that everything is built and timed (at least 1).
+    pub rounds: usize,
+    /// Of the builds that heed it.
+    pub quality: Quality,
+    /// The most that a structure may hold (bytes).
+    pub memory_limit: Option<u64>,
+}
+
+impl Effort {
+    fn build_options(&self) -> BuildOptions {
+        BuildOptions {
+            quality: self.quality,
+            memory_limit: self.memory_limit,
+            ..BuildOptions::default()
+        }
+    }
+}
+
+/// What was measured of one accelerator at one batch width and number of threads.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// The accelerator and its mode, as [`Method::name`] writes it.
+    pub method: &'static str,
+    /// As the accelerator writes itself, with its version.
+    pub backend: String,
+    /// Rays a batch.
+    pub width: usize,
+    /// Threads that traced.
+    pub threads: usize,
+    /// Of the build, on all threads (s).
+    pub build_seconds: Spread,
+    /// Bytes of the structure without the geometry that it shares.
+    pub bytes: u64,
+    /// Bytes of geometry that it had to copy.
+    pub copied_bytes: u64,
+    /// Wall time of tracing all rays with their normals (s).
+    pub seconds: Spread,
+    /// Millions of rays a second, by the median.
+    pub mrays_per_second: f64,
+    /// Against the reference.
+    pub errors: HitErrors,
+}
+
+/// Builds and traces with every method in turn. Only one structure stands at a time, so a round
+/// needs no more memory than the heaviest of them.
+///
+/// # Errors
+///
+/// When a structure cannot be built, the reference among them, or `progress` asks to stop.
+pub fn measure(
+    geometry: &Arc<Geometry>,
+    rays: &Rays,
+    effort: &Effort,
+    progress: Progress<'_>,
+) -> Result<Vec<Finding>, BenchError> {
+    let pools = pools(&effort.threads)?;
+    let batches: Vec<Vec<RayBatch>> =
+        effort.widths.iter().map(|&width| rays.batches(width)).collect();
+    let reference = reference(geometry, rays, effort)?;
+    let rounds = effort.rounds.max(1);
+    let steps = (1 + rounds * effort.methods.len()) as f64;
+    let mut done = 1.0;
+    let mut entries: Vec<Entry> = effort.methods.iter().map(|&m| Entry::new(m, effort)).collect();
+    for round in 0..rounds {
+        for who in order(round, entries.len()) {
+            if !progress(done / steps) {
+                return Err(BenchError::Stopped);
+            }
+            let entry = &mut entries[who];
+            let accel = entry.build(geometry, effort)?;
+            if entry.errors.is_empty() {
+                let compare = |batches| HitErrors::of(&trace(&*accel, batches), &reference);
+                entry.errors = batches.iter().map(|batches| compare(batches)).collect();
+            }
+            let cells = batches.iter().flat_map(|batches| pools.iter().map(move |p| (batches, p)));
+            for ((batches, pool), series) in cells.zip(&mut entry.traces) {
+                series.0.push(time(&*accel, batches, pool));
+            }
+            done += 1.0;
+        }
+    }
+    Ok(entries.iter().flat_map(|entry| entry.findings(effort, rays.len())).collect())
+}
+
+/// What the reference hits.
+fn reference(geometry: &Arc<Geometry>, rays: &Rays, effort: &Effort) -> Result<Hits, BenchError> {
+    let exact = Exact::build(Arc::clone(geometry), &effort.build_options())?;
+    Ok(trace(&exact, &rays.batches(RENDER_WIDTH)))
+}
+
+fn pools(threads: &[usize]) -> Result<Vec<ThreadPool>, BenchError> {
+    let pool = |&threads: &usize| {
+        let built = ThreadPoolBuilder::new().num_threads(threads).build();
+        built.map_err(|error| BenchError::Threads { threads, why: error.to_string() })
+    };
+    threads.iter().map(pool).collect()
+}
+
+/// Wall time (s) of tracing all batches once. Pages and caches are warm.
+fn time(accel: &dyn Accel, batches: &[RayBatch], pool: &ThreadPool) -> f64 {
+    let pass = || {
+        let hits = || HitBatch::new(Detail::Surface);
+        batches.par_iter().for_each_init(hits, |hits, rays| {
+            accel.closest(rays, hits);
+            black_box(hits);
+        });
+    };
+    pool.install(|| {
+        pass();
+        let start = Instant::now();
+        let mut passes = 0.0;
+        loop {
+            pass();
+            passes += 1.0;
+            let elapsed = start.elapsed().as_secs_f64();
+            if elapsed >= LEAST {
+                return elapsed / passes;
+            }
+        }
+    })
+}
+
+/// One method while it is measured.
+struct Entry {
+    method: Method,
+    backend: String,
+    bytes: u64,
+    copied_bytes: u64,
+    builds: Series,
+    /// One a width.
+    errors: Vec<HitErrors>,
+    /// One a width and number of threads.
+    traces: Vec<Series>,
+}
+
+impl Entry {
+    fn new(method: Method, effort: &Effort) -> Self {
+        Self {
+            method,
+            backend: String::new(),
+            bytes: 0,
+            copied_bytes: 0,
+            builds: Series::default(),
+            errors: Vec::new(),
+            traces: vec![Series::default(); effort.widths.len() * effort.threads.len()],
+        }
+    }
+
+    fn build(
+        &mut self,
+        geometry: &Arc<Geometry>,
+        effort: &Effort,
+    ) -> Result<Box<dyn Accel>, BenchError> {
+        let accel = self.method.build(geometry, &effort.build_options())?;
+        let report = accel.report();
+        self.builds.0.push(report.time.as_secs_f64());
+        self.backend = report.backend;
+        (self.bytes, self.copied_bytes) = (report.bytes, report.copied_bytes);
+        Ok(accel)
+    }
+
+    fn findings(&self, effort: &Effort, rays: usize) -> Vec<Finding> {
+        let widths = effort.widths.iter().zip(&self.errors);
+        let cells = widths
+            .flat_map(|(width, errors)| effort.threads.iter().map(move |t| (width, t, errors)));
+        let finding =
+            |((&width, &threads, errors), series): ((&usize, &usize, &HitErrors), &Series)| {
+                let seconds = series.spread()?;
+                Some(Finding {
+                    method: self.method.name(),
+                    backend: self.backend.clone(),
+                    width,
+                    threads,
+                    build_seconds: self.builds.spread()?,
+                    bytes: self.bytes,
+                    copied_bytes: self.copied_bytes,
+                    seconds,
+                    mrays_per_second: rays as f64 / seconds.median / 1e6,
+                    errors: errors.clone(),
+                })
+            };
+        cells.zip(&self.traces).filter_map(finding).collect()
+    }
+}

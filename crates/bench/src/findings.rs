@@ -1,0 +1,110 @@
+//! All that was measured on a scene: as text, CSV and charts.
+
+mod accelerator_charts;
+mod picture_charts;
+mod table;
+
+use etendue_chart::Chart;
+use serde::Serialize;
+
+use crate::accelerators;
+use crate::cameras::Cameras;
+use crate::samplers::{Converged, Samplers};
+use table::Table;
+
+/// What was measured, and on what.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Findings {
+    /// The machine, one line a fact.
+    pub machine: Vec<String>,
+    /// What was traced, one line a fact.
+    pub scene: Vec<String>,
+    /// Times that each was timed.
+    pub rounds: usize,
+    /// Each accelerator × batch width × threads.
+    pub accelerators: Vec<accelerators::Finding>,
+    /// Each sampler × number of samples, where the scene has a picture.
+    pub samplers: Option<Samplers>,
+    /// Each model of the lens × number of samples, where the camera has one.
+    pub cameras: Option<Cameras>,
+    /// What was left out or stands in for something, and why.
+    pub notes: Vec<String>,
+}
+
+impl Findings {
+    /// Everything as tables for a terminal.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        for line in self.machine.iter().chain(&self.scene) {
+            text.push_str(line);
+            text.push('\n');
+        }
+        for (title, table) in self.tables() {
+            text.push_str(&format!("\n{title}\n{}", table.text()));
+        }
+        text
+    }
+
+    /// Each table as the name of a file and its CSV, with all digits.
+    #[must_use]
+    pub fn csv(&self) -> Vec<(&'static str, String)> {
+        let mut files = Vec::new();
+        if !self.accelerators.is_empty() {
+            files.push(("accelerators.csv", table::accelerators(&self.accelerators).csv()));
+        }
+        if let Some(samplers) = &self.samplers {
+            files.push(("samplers.csv", table::samplers(samplers).csv()));
+        }
+        if let Some(cameras) = &self.cameras {
+            files.push(("cameras.csv", table::cameras(cameras).csv()));
+        }
+        files
+    }
+
+    /// Each chart with the stem of its file's name.
+    #[must_use]
+    pub fn charts(&self) -> Vec<(&'static str, Chart)> {
+        let mut charts = Vec::new();
+        if !self.accelerators.is_empty() {
+            charts.extend(accelerator_charts::charts(&self.accelerators));
+        }
+        if let Some(samplers) = &self.samplers {
+            charts.extend(picture_charts::samplers(samplers));
+        }
+        if let Some(cameras) = &self.cameras {
+            charts.extend(picture_charts::cameras(cameras));
+        }
+        charts
+    }
+
+    fn tables(&self) -> Vec<(String, Table)> {
+        let mut tables = Vec::new();
+        if let Some(first) = self.accelerators.first() {
+            let title = format!(
+                "Accelerators: {} rays of the camera, {} rounds. Wrong are rays that miss, hit \
+                 falsely, or hit another triangle elsewhere than `exact`.",
+                first.errors.rays, self.rounds
+            );
+            tables.push((title, table::accelerators(&self.accelerators)));
+        }
+        let pictures = |what: &str, [width, height]: [u32; 2], converged: &Converged, of: &str| {
+            format!(
+                "{what}: pictures of {width} x {height} pixels against {of} of {} samples, whose own \
+                 error is {:.1e} of its mean.",
+                converged.samples,
+                converged.rmse / converged.mean
+            )
+        };
+        if let Some(found) = &self.samplers {
+            let title = pictures("Samplers", found.resolution, &found.converged, "one");
+            tables.push((title, table::samplers(found)));
+        }
+        if let Some(found) = &self.cameras {
+            let of = "the full train's";
+            let title = pictures("Camera models", found.resolution, &found.converged, of);
+            tables.push((title, table::cameras(found)));
+        }
+        tables
+    }
+}

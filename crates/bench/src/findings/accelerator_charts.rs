@@ -1,0 +1,128 @@
+//! Charts of the accelerators: what is wrong, and how far, against time.
+
+use etendue_chart::{Axis, Chart, Mark, Point, Series};
+
+use crate::accelerators::{Finding, RENDER_WIDTH};
+
+/// What stands on a chart's axes for one finding.
+type Measure = fn(&Finding) -> Option<f64>;
+
+pub(super) fn charts(findings: &[Finding]) -> Vec<(&'static str, Chart)> {
+    let rays = findings.first().map_or(0, |finding| finding.errors.rays);
+    let hits = Chart {
+        title: "Rays with a wrong answer".to_owned(),
+        axes: [
+            Axis::new(TIME),
+            Axis::new("share of rays that miss, hit falsely, or hit another triangle")
+                .with_zero(format!("not one of {rays} rays")),
+        ],
+        ..against_time(findings, |finding| Some(finding.errors.wrong_share()))
+    };
+    let depth = Chart {
+        title: "Error of the distance".to_owned(),
+        axes: [
+            Axis::new(TIME),
+            Axis::new("relative error that 99.9 % of hits stay below")
+                .with_zero("equal to `exact` to the bit"),
+        ],
+        ..against_time(findings, |finding| Some(finding.errors.relative_distance?.p999))
+    };
+    let mut charts = vec![("accelerators-hits", hits), ("accelerators-depth", depth)];
+    let widths = |finding: &Finding| finding.width;
+    if findings.iter().any(|finding| Some(widths(finding)) != findings.first().map(widths)) {
+        charts.push(("accelerators-batch", batch_widths(findings)));
+    }
+    charts
+}
+
+const TIME: &str = "wall time a ray (µs)";
+
+fn micros(finding: &Finding) -> f64 {
+    finding.seconds.median / finding.errors.rays.max(1) as f64 * 1e6
+}
+
+/// Every method with all its batch widths; for each number of threads a series of its own.
+fn against_time(findings: &[Finding], error: Measure) -> Chart {
+    let most = most_threads(findings);
+    let mut notes = Vec::new();
+    let others: Vec<String> = threads(findings)
+        .into_iter()
+        .filter(|&threads| threads != most)
+        .map(|threads| threads.to_string())
+        .collect();
+    let mut marks = format!("disks: {most} threads");
+    if !others.is_empty() {
+        marks.push_str(&format!("; rings: {} threads", others.join(", ")));
+    }
+    if findings.iter().any(|finding| finding.width != width(findings)) {
+        marks.push_str(&format!("; batches of {}, dots: of other widths", width(findings)));
+    }
+    notes.push(marks);
+    notes.push("shaded: the Pareto front, which nothing else of all threads beats in both".into());
+    let mut series = Vec::new();
+    for (colour, method) in methods(findings).into_iter().enumerate() {
+        for threads in threads(findings) {
+            let own = findings.iter().filter(|f| f.method == method && f.threads == threads);
+            let points = own.filter_map(|finding| {
+                let mark = match (finding.width == width(findings), threads == most) {
+                    (true, true) => Mark::Disk,
+                    (true, false) => Mark::Ring,
+                    (false, _) => Mark::Dot,
+                };
+                Some(Point { at: [micros(finding), error(finding)?], mark })
+            });
+            series.push(Series {
+                name: if threads == most { method.to_owned() } else { String::new() },
+                points: points.collect(),
+                joined: false,
+                dashed: false,
+                colour,
+                contends: threads == most,
+            });
+        }
+    }
+    Chart { notes, series, front: true, ..Chart::default() }
+}
+
+fn batch_widths(findings: &[Finding]) -> Chart {
+    let most = most_threads(findings);
+    let series = methods(findings).into_iter().enumerate().map(|(colour, method)| {
+        let own = findings.iter().filter(|f| f.method == method && f.threads == most);
+        let points = own.map(|finding| [finding.width as f64, micros(finding)]);
+        Series { colour, ..Series::line(method, points) }
+    });
+    Chart {
+        title: "Time by batch width".to_owned(),
+        notes: vec![format!("{most} threads; renders trace batches of {RENDER_WIDTH}")],
+        axes: [Axis::new("rays a batch"), Axis::new(TIME)],
+        series: series.collect(),
+        front: false,
+    }
+}
+
+/// The methods in their order.
+fn methods(findings: &[Finding]) -> Vec<&'static str> {
+    let mut methods: Vec<&str> = findings.iter().map(|finding| finding.method).collect();
+    methods.dedup();
+    methods
+}
+
+fn threads(findings: &[Finding]) -> Vec<usize> {
+    let mut threads: Vec<usize> = findings.iter().map(|finding| finding.threads).collect();
+    threads.sort_unstable();
+    threads.dedup();
+    threads
+}
+
+fn most_threads(findings: &[Finding]) -> usize {
+    findings.iter().map(|finding| finding.threads).max().unwrap_or(1)
+}
+
+/// The batch width that points are named at: a render's, or else the widest.
+fn width(findings: &[Finding]) -> usize {
+    let widths = || findings.iter().map(|finding| finding.width);
+    if widths().any(|width| width == RENDER_WIDTH) {
+        return RENDER_WIDTH;
+    }
+    widths().max().unwrap_or(RENDER_WIDTH)
+}

@@ -1,0 +1,71 @@
+#![forbid(unsafe_code)]
+//! Speed against accuracy, measured on any scene and machine.
+//!
+//! Everything is measured the same way: contestants take turns, times are medians over the rounds,
+//! and what each gets wrong is told beside what it costs.
+//!
+//! # Map
+//!
+//! | module | idea |
+//! |---|---|
+//! | [`rounds`] | who is timed when, and medians |
+//! | [`machine`] | what it was measured on, and the memory of a process |
+//! | [`rays`] | a camera's chief rays, in batches of any width |
+//! | [`hits`] | how far hits are from the reference's |
+//! | [`accelerators`] | each accelerator × batch width × threads |
+//! | [`pictures`] | a scene's picture at any number of samples |
+//! | [`samplers`] | each sampler × number of samples |
+//! | [`cameras`] | each model of the same lens × number of samples |
+//! | [`findings`] | all that was measured on a scene: as text, CSV and charts |
+//! | [`drawing`] | charts as files, SVG and PNG |
+
+pub mod accelerators;
+pub mod cameras;
+pub mod drawing;
+pub mod findings;
+pub mod hits;
+pub mod machine;
+pub mod pictures;
+pub mod rays;
+pub mod rounds;
+pub mod samplers;
+
+use etendue_accel::BuildError;
+use etendue_render::RenderError;
+
+/// Told the share done (0..=1) now and then; answering `false` stops.
+pub type Progress<'a> = &'a dyn Fn(f64) -> bool;
+
+/// Why nothing was measured.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BenchError {
+    /// A structure could not be built.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// Threads could not be had.
+    #[error("{threads} threads: {why}; ask for fewer with --threads")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// The system's word.
+        why: String,
+    },
+    /// The scene has layers and no picture.
+    #[error(
+        "the scene has no `tracer`, so there is no picture to compare; name one, such as facing"
+    )]
+    NoPicture,
+    /// The camera has no lens that could be simplified.
+    #[error("there are no models of the camera's lens: {0}")]
+    NoLens(&'static str),
+    /// A picture could not be rendered.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A chart could not be turned into pixels; a fault of this program.
+    #[error("a chart cannot be drawn as PNG: {0}")]
+    Drawing(String),
+    /// The caller asked to stop.
+    #[error("stopped")]
+    Stopped,
+}

@@ -1,0 +1,143 @@
+//! A scene's picture at any number of samples, and how far it is from another.
+
+use etendue_accel::Accel;
+use etendue_camera::{Camera, Sampler};
+use etendue_render::output::{Outputs, Picture};
+use etendue_render::{Images, Plan};
+use etendue_scene::Scene;
+use etendue_tracer::LayerSpec;
+
+use crate::BenchError;
+use crate::rounds::wall;
+
+/// The fewest pixels along a side.
+const LEAST_SIDE: u32 = 16;
+
+/// A scene whose picture is rendered again and again, as red, green and blue before any sensor.
+#[derive(Debug)]
+pub struct Studio<'a> {
+    scene: Scene,
+    accel: &'a dyn Accel,
+    images: Images,
+}
+
+/// How samples are spread.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sampling {
+    /// Rays a pixel.
+    pub samples: u32,
+    /// The point set.
+    pub sampler: Sampler,
+    /// Other seeds give other samples.
+    pub seed: u64,
+}
+
+/// A picture's values, one after the other, and the time it took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Taken {
+    /// Red, green and blue planes.
+    pub values: Vec<f64>,
+    /// Wall time of the tracing (s), without measuring the lens' pupil.
+    pub seconds: f64,
+}
+
+impl<'a> Studio<'a> {
+    /// For `scene`'s picture, found by `accel`.
+    ///
+    /// # Errors
+    ///
+    /// [`BenchError::NoPicture`] when the scene has layers alone.
+    pub fn new(scene: &Scene, accel: &'a dyn Accel) -> Result<Self, BenchError> {
+        let picture = scene.picture.ok_or(BenchError::NoPicture)?;
+        let mut scene = scene.clone();
+        (scene.layers, scene.sensor) = (vec![picture], None);
+        let images = Images::decode(&scene, &Plan::new(&scene, OUTPUTS));
+        Ok(Self { scene, accel, images })
+    }
+
+    /// The scene's camera.
+    #[must_use]
+    pub fn camera(&self) -> &Camera {
+        &self.scene.camera
+    }
+
+    /// Makes the camera's pixels as large as it takes for `per_pixel` samples of each to be done in
+    /// `seconds`, by what a few samples take.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::take`].
+    pub fn fit(&mut self, per_pixel: f64, seconds: f64) -> Result<(), BenchError> {
+        let [width, height] = self.camera().resolution();
+        let limit = (width.min(height) / LEAST_SIDE).max(1);
+        let pilot = self.camera().coarser((width.max(height) / 64).clamp(1, limit));
+        let sampling = Sampling { samples: 4, sampler: Sampler::default(), seed: 0 };
+        // The first wakes threads and caches.
+        self.take(&pilot, sampling)?;
+        let taken = self.take(&pilot, sampling)?;
+        let samples = 4.0 * taken.values.len() as f64 / 3.0;
+        let pixels = seconds / (per_pixel * taken.seconds / samples);
+        let all = f64::from(width) * f64::from(height);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share of a side, saturated"
+        )]
+        let factor = (all / pixels).sqrt().ceil() as u32;
+        self.scene.camera = self.camera().coarser(factor.clamp(1, limit));
+        Ok(())
+    }
+
+    /// The picture through `camera`.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be rendered, such as when no light gets through the lens.
+    pub fn take(&mut self, camera: &Camera, sampling: Sampling) -> Result<Taken, BenchError> {
+        let render = &mut self.scene.render;
+        (render.samples, render.sampler, render.seed) =
+            (sampling.samples, sampling.sampler, sampling.seed);
+        self.scene.camera = camera.clone();
+        let plan = Plan::new(&self.scene, OUTPUTS);
+        let (pupil, _) = wall(|| camera.opened(&plan.lanes));
+        let rendered = etendue_render::render(
+            &self.scene,
+            &plan,
+            self.accel,
+            &self.images,
+            Vec::new(),
+            &|_| true,
+        )?;
+        let pupil = if plan.pupil { pupil } else { 0.0 };
+        let seconds = (rendered.trace_time.as_secs_f64() - pupil).max(0.0);
+        Ok(Taken { values: values(&rendered.picture), seconds })
+    }
+}
+
+/// In double precision.
+const OUTPUTS: Outputs = Outputs { exr: false, png: false, npy: true, dng: false };
+
+fn values(picture: &Picture) -> Vec<f64> {
+    let layers = picture.layers().iter().filter(|layer| layer.name.is_empty());
+    let channels = layers.flat_map(|layer| &layer.channels);
+    channels.flat_map(|channel| (0..channel.values.len()).map(|i| channel.values.at(i))).collect()
+}
+
+/// Whether the picture of a scene is the mean of samples.
+#[must_use]
+pub fn is_sampled(layer: LayerSpec) -> bool {
+    layer == LayerSpec::Radiance || layer.is_averaged()
+}
+
+/// The mean of squared differences.
+#[must_use]
+pub fn mean_square(a: &[f64], b: &[f64]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
+    sum / a.len().min(b.len()).max(1) as f64
+}
+
+/// The mean of all values.
+#[must_use]
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}

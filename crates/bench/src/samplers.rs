@@ -1,0 +1,174 @@
+//! Each sampler × number of samples: how far the picture is from the converged one, and the time.
+
+use etendue_camera::{Camera, Sampler};
+use serde::Serialize;
+
+use crate::pictures::{Sampling, Studio, mean, mean_square};
+use crate::rounds::{Series, Spread, order};
+use crate::{BenchError, Progress};
+
+/// How much is measured.
+#[derive(Debug, Clone)]
+pub struct Effort {
+    /// Samples a pixel.
+    pub counts: Vec<u32>,
+    /// Samples a pixel of the converged picture (at least 2).
+    pub converged: u32,
+    /// Times that everything is rendered, each with other samples (at least 1).
+    pub rounds: usize,
+    /// What all of it may take (s): pixels are made larger until it does.
+    pub seconds: f64,
+}
+
+/// What was measured of one scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Samplers {
+    /// Columns and rows of the pictures.
+    pub resolution: [u32; 2],
+    /// The picture that others are compared with.
+    pub converged: Converged,
+    /// Each sampler × number of samples.
+    pub findings: Vec<Finding>,
+}
+
+/// The picture that others are compared with: the mean of two of half the samples.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Converged {
+    /// Samples a pixel.
+    pub samples: u32,
+    /// The mean of its values.
+    pub mean: f64,
+    /// Its own error: half the root of the mean square of the difference of the two halves.
+    pub rmse: f64,
+    #[serde(skip)]
+    pub(crate) values: Vec<f64>,
+}
+
+/// What was measured of one sampler at one number of samples.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// The point set, as a scene file writes it.
+    pub sampler: &'static str,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Wall time of tracing the picture on all threads (s).
+    pub seconds: Spread,
+    /// The root of the mean squared difference to the converged picture.
+    pub rmse: f64,
+    /// The same over the mean of the converged picture.
+    pub relative_rmse: f64,
+}
+
+/// The samplers, the plainest first.
+const ALL: [Sampler; 4] =
+    [Sampler::Independent, Sampler::Stratified, Sampler::Hammersley, Sampler::Sobol];
+
+fn name(sampler: Sampler) -> &'static str {
+    match sampler {
+        Sampler::Independent => "independent",
+        Sampler::Stratified => "stratified",
+        Sampler::Hammersley => "hammersley",
+        Sampler::Sobol => "sobol",
+    }
+}
+
+/// Renders with every sampler in turn.
+///
+/// # Errors
+///
+/// When the scene cannot be rendered, or `progress` asks to stop.
+pub fn measure(
+    studio: &mut Studio<'_>,
+    effort: &Effort,
+    progress: Progress<'_>,
+) -> Result<Samplers, BenchError> {
+    let rounds = effort.rounds.max(1);
+    let own: f64 = effort.counts.iter().map(|&n| f64::from(n)).sum();
+    let all = f64::from(effort.converged) + own * (rounds * ALL.len()) as f64;
+    studio.fit(all, effort.seconds)?;
+    let camera = studio.camera().clone();
+    let converged = Converged::render(studio, &camera, effort.converged)?;
+    let mut done = f64::from(effort.converged);
+    let mut entries: Vec<Entry<Sampler>> =
+        ALL.iter().flat_map(|&sampler| Entry::each(sampler, &effort.counts)).collect();
+    for round in 0..rounds {
+        for who in order(round, entries.len()) {
+            if !progress(done / all) {
+                return Err(BenchError::Stopped);
+            }
+            let entry = &mut entries[who];
+            let sampler = entry.of;
+            entry.take(studio, &camera, sampler, round, &converged)?;
+            done += f64::from(entry.samples);
+        }
+    }
+    let finding = |entry: &Entry<Sampler>| {
+        let rmse = entry.rmse();
+        Some(Finding {
+            sampler: name(entry.of),
+            samples: entry.samples,
+            seconds: entry.seconds.spread()?,
+            rmse,
+            relative_rmse: rmse / converged.mean,
+        })
+    };
+    let findings = entries.iter().filter_map(finding).collect();
+    Ok(Samplers { resolution: camera.resolution(), converged, findings })
+}
+
+impl Converged {
+    pub(crate) fn render(
+        studio: &mut Studio<'_>,
+        camera: &Camera,
+        samples: u32,
+    ) -> Result<Self, BenchError> {
+        let half = (samples / 2).max(1);
+        let mut take =
+            |seed| studio.take(camera, Sampling { samples: half, sampler: Sampler::Sobol, seed });
+        // Far from the seeds of the rounds.
+        let [a, b] = [take(u64::MAX)?.values, take(u64::MAX - 1)?.values];
+        let rmse = 0.5 * mean_square(&a, &b).sqrt();
+        let values: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 0.5 * (a + b)).collect();
+        Ok(Self { samples: 2 * half, mean: mean(&values), rmse, values })
+    }
+}
+
+/// One contestant at one number of samples while it is measured.
+pub(crate) struct Entry<T> {
+    pub(crate) of: T,
+    pub(crate) samples: u32,
+    pub(crate) seconds: Series,
+    squares: Vec<f64>,
+}
+
+impl<T: Clone> Entry<T> {
+    /// One for each of `counts`.
+    pub(crate) fn each(of: T, counts: &[u32]) -> impl Iterator<Item = Self> {
+        counts.iter().map(move |&samples| Self {
+            of: of.clone(),
+            samples,
+            seconds: Series::default(),
+            squares: Vec::new(),
+        })
+    }
+
+    pub(crate) fn take(
+        &mut self,
+        studio: &mut Studio<'_>,
+        camera: &Camera,
+        sampler: Sampler,
+        round: usize,
+        converged: &Converged,
+    ) -> Result<(), BenchError> {
+        let sampling = Sampling { samples: self.samples, sampler, seed: round as u64 };
+        let taken = studio.take(camera, sampling)?;
+        self.seconds.0.push(taken.seconds);
+        self.squares.push(mean_square(&taken.values, &converged.values));
+        Ok(())
+    }
+
+    /// Over all rounds.
+    pub(crate) fn rmse(&self) -> f64 {
+        mean(&self.squares).sqrt()
+    }
+}

@@ -1,0 +1,114 @@
+//! What a chart shows.
+
+use crate::draw;
+
+/// A chart: points and lines over two logarithmic axes.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Chart {
+    /// The first line.
+    pub title: String,
+    /// What else has to be said, one line each.
+    pub notes: Vec<String>,
+    /// Across, and upwards.
+    pub axes: [Axis; 2],
+    /// Whatever is measured.
+    pub series: Vec<Series>,
+    /// Whether to draw the Pareto front: small values are good on both axes.
+    pub front: bool,
+}
+
+/// A logarithmic axis.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Axis {
+    /// What is measured, with its unit.
+    pub label: String,
+    /// What a value of exactly zero is called. With it, zeros have a place of their own below all
+    /// other values; without it, they are left out.
+    pub zero: Option<String>,
+}
+
+/// Points of one name and colour.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Series {
+    /// The name, which stands beside one of the points; none when empty.
+    pub name: String,
+    /// The points. Those that are negative or not finite are left out.
+    pub points: Vec<Point>,
+    /// Whether a line joins them, in their order.
+    pub joined: bool,
+    /// Whether that line is dashed.
+    pub dashed: bool,
+    /// Which of the colours; series of one number look alike.
+    pub colour: usize,
+    /// Whether the points count for the Pareto front.
+    pub contends: bool,
+}
+
+/// A point of a chart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Its values.
+    pub at: [f64; 2],
+    /// How it is drawn.
+    pub mark: Mark,
+}
+
+/// How a point is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mark {
+    /// A disk, beside which the name may stand.
+    #[default]
+    Disk,
+    /// A ring.
+    Ring,
+    /// A small disk.
+    Dot,
+    /// Nothing but its line.
+    None,
+}
+
+/// For whom the colours are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Theme {
+    /// The reader's own, light or dark.
+    #[default]
+    Reader,
+    /// Light, for programs that know no themes.
+    Light,
+}
+
+impl Axis {
+    /// An axis whose zeros are left out.
+    #[must_use]
+    pub fn new(label: impl Into<String>) -> Self {
+        Self { label: label.into(), zero: None }
+    }
+
+    /// The same with a place for zeros, called `name`.
+    #[must_use]
+    pub fn with_zero(self, name: impl Into<String>) -> Self {
+        Self { zero: Some(name.into()), ..self }
+    }
+}
+
+impl Series {
+    /// A line through `points`, marked by disks.
+    #[must_use]
+    pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = [f64; 2]>) -> Self {
+        let disk = |at| Point { at, mark: Mark::Disk };
+        Self {
+            name: name.into(),
+            points: points.into_iter().map(disk).collect(),
+            joined: true,
+            ..Self::default()
+        }
+    }
+}
+
+impl Chart {
+    /// The chart as an SVG document. Its fonts are the reader's sans-serif.
+    #[must_use]
+    pub fn svg(&self, theme: Theme) -> String {
+        draw::svg(self, theme)
+    }
+}

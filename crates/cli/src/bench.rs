@@ -1,0 +1,223 @@
+//! `etendue bench`: speed against accuracy on the user's own scene and machine.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use etendue_accel::{BuildOptions, Quality};
+use etendue_bench::BenchError;
+use etendue_bench::accelerators::{self, Method};
+use etendue_bench::cameras;
+use etendue_bench::findings::Findings;
+use etendue_bench::pictures::{Studio, is_sampled};
+use etendue_bench::rays::Rays;
+use etendue_bench::samplers;
+use etendue_bench::{drawing, machine};
+use etendue_chart::Theme;
+use etendue_render::Plan;
+use etendue_render::output::{Outputs, prepare_folder, sidecar, write_whole};
+use etendue_scene::Scene;
+use etendue_scene::file::SceneFile;
+
+use crate::arguments::{BenchArguments, PartArgument, SceneArguments};
+use crate::fault::{Fault, print_text};
+use crate::progress::Stages;
+use crate::{render, stop};
+
+/// All of a run, and of a quick one.
+const ROUNDS: [usize; 2] = [5, 3];
+const RAYS: [usize; 2] = [1 << 19, 1 << 16];
+const BATCHES: [&[usize]; 2] = [&[16, 64, 256, 1024], &[64, 256]];
+const SAMPLES: [&[u32]; 2] = [&[1, 4, 16, 64, 256], &[1, 4, 16, 64]];
+const SECONDS: [f64; 2] = [60.0, 10.0];
+
+/// The converged picture has so many times as many samples as the best of the others.
+const CONVERGED: u32 = 16;
+
+pub(crate) fn run(arguments: &BenchArguments) -> Result<(), Fault> {
+    stop::listen();
+    let folder_is_new = !arguments.output.exists();
+    let done = bench(arguments);
+    if done.is_err() && folder_is_new {
+        // Goes only when nothing was written into it.
+        let _ = std::fs::remove_dir(&arguments.output);
+    }
+    done
+}
+
+fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
+    let stages = Stages::new(arguments.quiet);
+    prepare_folder(&arguments.output)?;
+    let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
+    let has_pictures = has(PartArgument::Samplers) || has(PartArgument::Cameras);
+    let mut notes = Vec::new();
+    let scene = match has_pictures {
+        true => render::load(&with_picture(&arguments.scene, &mut notes)?, stages)?,
+        false => render::load(&arguments.scene, stages)?,
+    };
+    let mut findings = Findings {
+        machine: machine::describe(),
+        scene: about(&scene),
+        rounds: arguments.rounds.unwrap_or(ROUNDS[usize::from(arguments.quick)]),
+        accelerators: Vec::new(),
+        samplers: None,
+        cameras: None,
+        notes,
+    };
+    if has(PartArgument::Accelerators) {
+        accelerators(arguments, &scene, stages, &mut findings)?;
+    }
+    if has_pictures {
+        pictures(arguments, &scene, stages, &mut findings)?;
+    }
+    let files = write(arguments, &findings)?;
+    print_text(&findings.text())?;
+    if !arguments.quiet {
+        let lines = findings.notes.iter().map(|note| format!("note: {note}"));
+        let files = files.iter().map(|path| path.display().to_string());
+        let lines: Vec<String> = lines.chain(files).collect();
+        // When standard error is gone there is nobody to tell.
+        let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
+    }
+    Ok(())
+}
+
+/// What is traced.
+fn about(scene: &Scene) -> Vec<String> {
+    let geometry = &scene.geometry;
+    let [width, height] = scene.camera.resolution();
+    vec![format!(
+        "Scene: {}, {} triangles ({} stored) in {} placements, {width} x {height} pixels",
+        scene.path.display(),
+        geometry.triangles(),
+        geometry.triangles_unique(),
+        geometry.placements.len()
+    )]
+}
+
+fn accelerators(
+    arguments: &BenchArguments,
+    scene: &Scene,
+    stages: Stages,
+    findings: &mut Findings,
+) -> Result<(), Fault> {
+    let quick = usize::from(arguments.quick);
+    let rays = Rays::primary(&scene.camera, arguments.rays.unwrap_or(RAYS[quick]));
+    let effort = accelerators::Effort {
+        methods: Method::all().to_vec(),
+        widths: sorted(arguments.batches.as_deref().unwrap_or(BATCHES[quick])),
+        threads: match &arguments.threads {
+            Some(threads) => sorted(threads),
+            None => threads(arguments.quick),
+        },
+        rounds: findings.rounds,
+        quality: quality(scene),
+        memory_limit: arguments.memory_limit,
+    };
+    let progress = stages.begin("trace");
+    findings.accelerators =
+        accelerators::measure(&scene.geometry, &rays, &effort, &|share| progress(share))?;
+    Ok(())
+}
+
+/// The scene with a picture: base colours when it names none.
+fn with_picture(
+    arguments: &SceneArguments,
+    notes: &mut Vec<String>,
+) -> Result<SceneArguments, Fault> {
+    let mut arguments = arguments.clone();
+    let file = SceneFile::read(&arguments.scene, &arguments.overrides())?;
+    if file.spec.tracer.is_none() {
+        arguments.settings.push(("tracer".to_owned(), r#"{"type": "facing"}"#.to_owned()));
+        notes.push("the scene names no `tracer`; its pictures are of `facing`".to_owned());
+    }
+    Ok(arguments)
+}
+
+/// The samplers, and the models of the lens when there is one.
+fn pictures(
+    arguments: &BenchArguments,
+    scene: &Scene,
+    stages: Stages,
+    findings: &mut Findings,
+) -> Result<(), Fault> {
+    let quick = usize::from(arguments.quick);
+    let options = BuildOptions { memory_limit: arguments.memory_limit, ..BuildOptions::default() };
+    let plan = Plan::new(scene, Outputs::ALL);
+    let accel = etendue_render::build(scene, &plan, &options)?;
+    let counts = match &arguments.sample_counts {
+        Some(counts) => sorted(counts),
+        None => SAMPLES[quick].to_vec(),
+    };
+    let effort = samplers::Effort {
+        converged: CONVERGED.saturating_mul(counts.last().copied().unwrap_or(1)),
+        counts,
+        rounds: findings.rounds,
+        seconds: arguments.seconds.unwrap_or(SECONDS[quick]),
+    };
+    let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
+    if has(PartArgument::Samplers) && scene.picture.is_some_and(is_sampled) {
+        let progress = stages.begin("sample");
+        let mut studio = Studio::new(scene, &*accel)?;
+        findings.samplers =
+            Some(samplers::measure(&mut studio, &effort, &|share| progress(share))?);
+    }
+    if has(PartArgument::Cameras) {
+        let progress = stages.begin("camera");
+        let mut studio = Studio::new(scene, &*accel)?;
+        match cameras::measure(&mut studio, &effort, &|share| progress(share)) {
+            Ok(cameras) => {
+                findings.notes.extend(cameras.notes.iter().cloned());
+                findings.cameras = Some(cameras);
+            }
+            Err(error @ BenchError::NoLens(_)) => findings.notes.push(error.to_string()),
+            Err(error) => return Err(error.into()),
+        }
+    }
+    Ok(())
+}
+
+/// The quality that a render of the scene would build with.
+fn quality(scene: &Scene) -> Quality {
+    Plan::new(scene, Outputs::ALL).quality
+}
+
+/// One thread, twice as many and so on, and all; in a quick run the first and the last of these.
+fn threads(quick: bool) -> Vec<usize> {
+    let all = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut threads: Vec<usize> =
+        std::iter::successors(Some(1), |n| Some(2 * n)).take_while(|&n| n < all).collect();
+    if quick {
+        threads.truncate(1);
+    }
+    threads.push(all);
+    threads
+}
+
+/// In order, each once.
+fn sorted<T: Ord + Copy>(numbers: &[T]) -> Vec<T> {
+    let mut numbers = numbers.to_vec();
+    numbers.sort_unstable();
+    numbers.dedup();
+    numbers
+}
+
+/// Writes all files; each appears when it is complete.
+fn write(arguments: &BenchArguments, findings: &Findings) -> Result<Vec<PathBuf>, Fault> {
+    let place = |name: &str| arguments.output.join(name);
+    let mut files = vec![place("bench.json")];
+    sidecar::write_json(&files[0], findings)?;
+    let mut save = |name: String, bytes: &[u8]| {
+        let path = place(&name);
+        write_whole(&path, |file| file.write_all(bytes))?;
+        files.push(path);
+        Ok::<(), Fault>(())
+    };
+    for (name, csv) in findings.csv() {
+        save(name.to_owned(), csv.as_bytes())?;
+    }
+    for (stem, chart) in findings.charts() {
+        save(format!("{stem}.svg"), chart.svg(Theme::Reader).as_bytes())?;
+        save(format!("{stem}.png"), &drawing::png(&chart)?)?;
+    }
+    Ok(files)
+}

@@ -1,0 +1,129 @@
+//! `etendue bench`: a tiny scene from end to end, and what is refused.
+
+use crate::run::{Bench, text};
+
+const SCENE: &str = r#"{"etendue": 1,
+    "camera": {"type": "pinhole", "sensor": {"resolution": [48, 32]}},
+    "objects": [{"shape": "sphere", "radius": 1}, {"shape": "box", "transform": {"translate": [3, 0, 0]}}]}"#;
+
+#[test]
+fn a_quick_run_leaves_tables_and_charts() {
+    let bench = Bench::with_scene(SCENE);
+    let output = bench.run(&[
+        "bench",
+        "scene.json",
+        "-o",
+        "out",
+        "--quick",
+        "--rounds",
+        "1",
+        "--seconds",
+        "0.1",
+    ]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let table = text(&output.stdout);
+    let found = bench.json("out/bench.json");
+    let rows = found["accelerators"].as_array().unwrap();
+    for method in ["bvh", "exact"] {
+        assert!(table.lines().any(|line| line.starts_with(method)), "{table}");
+        let row = rows.iter().find(|row| row["method"] == method).unwrap();
+        let errors = &row["errors"];
+        assert_eq!(errors["rays"], 48 * 32);
+        let wrong = ["missed", "false_hits", "wrong_triangle"].map(|key| errors[key].as_u64());
+        assert_eq!(wrong, [Some(0); 3], "{method}: {errors}");
+        assert!(row["mrays_per_second"].as_f64().unwrap() > 0.0);
+    }
+    let csv = text(&std::fs::read(bench.path("out/accelerators.csv")).unwrap());
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(lines.len(), 1 + rows.len());
+    let columns = lines[0].split(',').count();
+    assert!(lines.iter().all(|line| line.split(',').count() == columns), "{csv}");
+    let samplers = found["samplers"]["findings"].as_array().unwrap();
+    assert_eq!(samplers.len(), 4 * 4, "four samplers at four numbers of samples");
+    let rmse = |sampler: &str, samples: u64| {
+        let of = samplers.iter().find(|f| f["sampler"] == sampler && f["samples"] == samples);
+        of.unwrap()["relative_rmse"].as_f64().unwrap()
+    };
+    for sampler in ["independent", "stratified", "hammersley", "sobol"] {
+        // Random numbers promise 1/√16, from 4 samples to 64; the others more.
+        assert!(rmse(sampler, 64) < 0.5 * rmse(sampler, 4), "{sampler}: {samplers:?}");
+    }
+    assert!(found["cameras"].is_null(), "a pinhole has no lens");
+    assert!(text(&output.stderr).contains("the camera has none"), "{}", text(&output.stderr));
+    for chart in ["accelerators-hits", "accelerators-depth", "accelerators-batch"] {
+        let svg = text(&std::fs::read(bench.path(&format!("out/{chart}.svg"))).unwrap());
+        assert!(svg.contains(">\nbvh\n<") || svg.contains(">bvh<"), "every method is named: {svg}");
+        let png = std::fs::read(bench.path(&format!("out/{chart}.png"))).unwrap();
+        assert_eq!(&png[1..4], b"PNG");
+    }
+}
+
+#[test]
+fn models_of_a_lens_are_compared_with_the_full_train() {
+    let scene = r#"{"etendue": 1, "tracer": {"type": "facing"},
+        "camera": {"type": "lens", "sensor_height": 24, "focus_distance": 2, "f_number": 2.8,
+            "lens": {"elements": [
+                {"type": "surface", "radius": 40, "thickness": 10, "glass": {"n": 1.6}, "semi_diameter": 14},
+                {"type": "surface", "radius": -60, "thickness": 3, "semi_diameter": 14},
+                {"type": "aperture", "shape": "circular", "radius": 8, "thickness": 30, "stop": true}]},
+            "pose": {"from": [0, 0, 2], "look_at": [0, 0, 0]},
+            "sensor": {"resolution": [48, 32]}},
+        "materials": {"dice": {"type": "checker", "colors": [[1, 1, 1], [0.1, 0.1, 0.1]], "squares": 8}},
+        "objects": [{"shape": "rectangle", "width": 4, "height": 4, "material": "dice"},
+            {"shape": "box", "size": [0.2, 0.2, 0.2], "material": "dice", "transform": {"translate": [0.2, 0.1, 0.8]}}]}"#;
+    let bench = Bench::with_scene(scene);
+    let output = bench.run(&[
+        "bench",
+        "scene.json",
+        "-o",
+        "out",
+        "--only",
+        "cameras",
+        "--rounds",
+        "1",
+        "--seconds",
+        "0.1",
+        "--sample-counts",
+        "4,64",
+    ]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = bench.json("out/bench.json");
+    let findings = found["cameras"]["findings"].as_array().unwrap();
+    let rmse = |model: &str| {
+        let of = findings.iter().find(|f| f["model"] == model && f["samples"] == 64);
+        of.unwrap_or_else(|| panic!("{model}: {found}"))["relative_rmse"].as_f64().unwrap()
+    };
+    // What a model leaves out of the lens, more samples do not bring back.
+    assert!(rmse("full") < 0.5 * rmse("thick"), "{findings:?}");
+    assert!(rmse("thin") < rmse("pinhole") && rmse("thick") < rmse("pinhole"), "{findings:?}");
+    assert!(bench.path("out/cameras-time.svg").exists() && bench.path("out/cameras.csv").exists());
+    assert!(
+        !bench.path("out/samplers.csv").exists() && !bench.path("out/accelerators.csv").exists()
+    );
+}
+
+#[test]
+fn counts_that_make_no_sense_are_refused() {
+    let bench = Bench::with_scene(SCENE);
+    let cases = [
+        (["--rounds", "0"], "1 to 1000"),
+        (["--threads", "1,0"], "1 to 1024"),
+        (["--batches", "a"], "whole number"),
+        (["--rays", "-3"], "-3"),
+        (["--memory-limit", "1"], "--memory-limit"),
+        (["--sample-counts", "0"], "1 to 65536"),
+        (["--seconds", "nan"], "seconds"),
+        (["--only", "lenses"], "lenses"),
+    ];
+    for (options, word) in cases {
+        let output = bench.run(&[&["bench", "scene.json", "-o", "out"], &options[..]].concat());
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{options:?}: {message}");
+        assert!(message.contains(word), "{options:?}: {message}");
+        assert!(!bench.path("out").exists(), "{options:?}");
+    }
+    let missing = bench.run(&["bench", "none.json", "-o", "out"]);
+    assert_eq!(missing.status.code(), Some(2));
+    assert!(text(&missing.stderr).contains("none.json"));
+    assert_eq!(bench.run(&["bench", "scene.json"]).status.code(), Some(2), "-o is needed");
+}
