@@ -108,7 +108,8 @@ impl Embree {
         }
         suspects.retain(|&i| solved.valid[i as usize]);
         let could_hit = |i| rays32.can_hit(i) && self.frame.may_meet(rays, i);
-        recheck::lonely_misses(hits, could_hit, suspects);
+        let missed = |i: usize| hits.placement[i] == MISS;
+        recheck::lonely_misses(missed, hits.len(), could_hit, suspects);
         let mut rechecked = suspects.len() as u64;
         if !suspects.is_empty() {
             self.ask_beside(rays, hits, rays32, again, found, suspects);
@@ -173,6 +174,30 @@ impl Embree {
             k += 1;
             contradicts
         });
+    }
+
+    /// As [`Self::ask_beside`], for rays of which it was only asked whether they hit anything, and
+    /// that did not.
+    fn ask_beside_for_any(
+        &self,
+        rays: &RayBatch,
+        rays32: &Rays32,
+        again: &mut Rays32,
+        suspects: &mut Vec<u32>,
+    ) {
+        if suspects.is_empty() {
+            return;
+        }
+        again.clear();
+        for &i in suspects.iter() {
+            let i = i as usize;
+            let blur = rays32.blur(i, rays32.reach(i, &self.frame));
+            again.push_shifted(rays32, i, recheck::nudge(rays.direction(i), blur));
+        }
+        let mut blocked = vec![false; again.len()];
+        self.scene.occluded(again, rays.coherent, &mut blocked);
+        let mut blocked = blocked.into_iter();
+        suspects.retain(|_| blocked.next() == Some(true));
     }
 
     /// Decides ray `i` by the exact test on all triangles that single precision meets along it, and
@@ -266,7 +291,7 @@ impl Accel for Embree {
         blocked.clear();
         blocked.resize(rays.len(), false);
         SCRATCH.with_borrow_mut(|scratch| {
-            let Scratch { rays: rays32, again, found, doubtful, .. } = scratch;
+            let Scratch { rays: rays32, again, found, suspects, doubtful, .. } = scratch;
             rays32.convert(rays, &self.frame);
             if !self.checks() {
                 self.scene.occluded(rays32, rays.coherent, blocked);
@@ -277,6 +302,12 @@ impl Accel for Embree {
             let mut judged = Judged::new(geometry, rays, rays32, doubtful);
             self.scene.occluded_exactly(rays32, rays.coherent, &mut judged, blocked);
             doubtful.retain(|&i| !blocked[i as usize]);
+            let could_hit = |i| rays32.can_hit(i) && self.frame.may_meet(rays, i);
+            suspects.clear();
+            recheck::lonely_misses(|i| !blocked[i], blocked.len(), could_hit, suspects);
+            self.ask_beside_for_any(rays, rays32, again, suspects);
+            doubtful.append(suspects);
+            doubtful.sort_unstable();
             doubtful.dedup();
             let mut corrected = 0;
             for &i in doubtful.iter() {

@@ -48,16 +48,18 @@ pub(crate) fn nudge(direction: DVec3, radius: f64) -> DVec3 {
 /// rays that slip through are rare, so they are few among many, and the sky around an object is not
 /// looked at twice.
 pub(crate) fn lonely_misses(
-    hits: &HitBatch,
+    missed: impl Fn(usize) -> bool,
+    count: usize,
     in_box: impl Fn(usize) -> bool,
     suspects: &mut Vec<u32>,
 ) {
-    let misses = hits.placement.iter().filter(|&&placement| placement == MISS).count();
-    if misses == 0 || (misses * 8 > hits.len() && hits.len() >= 16) {
+    let misses = (0..count).filter(|&i| missed(i)).count();
+    if misses == 0 || (misses * 8 > count && count >= 16) {
         return;
     }
-    let missed = (0..).zip(&hits.placement).filter(|&(_, &placement)| placement == MISS);
-    suspects.extend(missed.map(|(i, _)| i).filter(|&i: &u32| in_box(i as usize)));
+    let lonely = (0..count).filter(|&i| missed(i) && in_box(i));
+    #[expect(clippy::cast_possible_truncation, reason = "batches are small")]
+    suspects.extend(lonely.map(|i| i as u32));
 }
 
 /// For each placement met by the batch, the rays that met the side that fewer of the others met.
