@@ -9,10 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::element::Resolve;
 use crate::length::{Degrees, Metres, Micrometres};
+use crate::lens::focused::View;
 use crate::{
-    CameraError, CameraRays, ChromaticRealLensCameraSpec, FilmSamples, LaneGroup, LensCamera,
-    LensCameraSpec, Orthographic, OrthographicSpec, Pinhole, PinholeSpec, Pose, PoseSpec,
-    RealLensCameraSpec, SensorSpec, ThinLensCameraSpec,
+    CameraError, CameraRays, ChromaticRealLensCameraSpec, Distortion, DistortionSpec, FilmSamples,
+    Intrinsics, LaneGroup, LensCamera, LensCameraSpec, Orthographic, OrthographicSpec, Pinhole,
+    PinholeSpec, Pose, PoseSpec, RealLensCameraSpec, SensorSpec, ThinLensCameraSpec,
 };
 
 /// Rows of the picture of a camera that comes without a resolution.
@@ -67,6 +68,15 @@ pub enum Projection {
     Orthographic(Orthographic),
     /// Through a lens.
     Lens(Arc<LensCamera>),
+}
+
+/// What a pixel covers of the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PixelExtent {
+    /// A side per distance along the axis, at its middle.
+    Angle(f64),
+    /// A side (m).
+    Width(f64),
 }
 
 /// A rectangle of pixels. Rays of a block run row by row from its top left.
@@ -223,6 +233,31 @@ impl Camera {
         match &self.projection {
             Projection::Lens(lens) => Some(lens.focused().pixel_pitch()),
             _ => self.sensor.pixel_pitch.map(|pitch| pitch.0),
+        }
+    }
+
+    /// What a pixel covers of the scene; `None` where the camera bends directions by more than a
+    /// little (OpenCV's fisheye model).
+    ///
+    /// With a lens it is what the paraxial camera says: the cone from any point of the pupil over a
+    /// pixel of the plane in focus.
+    #[must_use]
+    pub fn pixel_extent(&self) -> Option<PixelExtent> {
+        let perspective =
+            |k: Intrinsics| PixelExtent::Angle(1.0 / (k.focal[0] * k.focal[1]).sqrt());
+        match &self.projection {
+            Projection::Pinhole(pinhole) => {
+                let bent = pinhole.distortion().map(Distortion::spec);
+                let fisheye = matches!(bent, Some(DistortionSpec::Fisheye(_)));
+                (!fisheye).then(|| perspective(pinhole.intrinsics()))
+            }
+            Projection::Orthographic(parallel) => {
+                Some(PixelExtent::Width(parallel.metres_per_pixel()))
+            }
+            Projection::Lens(lens) => Some(match lens.focused().view() {
+                View::Perspective(k) => perspective(k),
+                View::Parallel { metres_per_pixel, .. } => PixelExtent::Width(metres_per_pixel),
+            }),
         }
     }
 

@@ -29,7 +29,7 @@ pub mod sensor;
 mod sobol;
 pub mod train;
 
-pub use camera::{Camera, CameraSpec, PixelBlock, Projection};
+pub use camera::{Camera, CameraSpec, PixelBlock, PixelExtent, Projection};
 pub use camera_file::CameraFile;
 pub use distortion::{Distortion, DistortionSpec};
 pub use error::CameraError;

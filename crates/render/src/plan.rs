@@ -27,6 +27,7 @@ pub fn wanted(layers: &[LayerSpec]) -> Wanted {
         colors: needs.materials,
         textures: needs.materials,
         light: needs.light,
+        occlusion: needs.ambient,
     }
 }
 
@@ -54,6 +55,8 @@ pub struct Plan {
     pub detail: Detail,
     /// Which images of materials are decoded; none for `None`.
     pub images: Option<TextureScope>,
+    /// Whether images are averaged over the footprint of a sample.
+    pub footprint: bool,
     /// Rays a pixel for coloured layers.
     pub samples: u32,
     /// Whether rays are spread over a pupil.
@@ -100,15 +103,13 @@ impl Plan {
             if rays / RAYS_PER_TRIANGLE < triangles { Quality::Low } else { Quality::Medium };
         let detail = if needs.surface { Detail::Surface } else { Detail::Distance };
         let precision = if outputs.npy { Precision::Double } else { Precision::Single };
-        let images = match (needs.materials && !scene.textures.is_empty(), needs.light) {
-            (false, _) => None,
-            (true, false) => Some(TextureScope::BaseColor),
-            (true, true) => Some(TextureScope::Light),
-        };
+        let images = (needs.materials && !scene.textures.is_empty())
+            .then_some(TextureScope { light: needs.light, ambient: needs.ambient });
         let mut plan = Self {
             layers,
             detail,
             images,
+            footprint: images.is_some() && scene.camera.pixel_extent().is_some(),
             samples,
             pupil: lens && (passes.mean || passes.light),
             rays,
@@ -201,6 +202,17 @@ impl Plan {
                 (false, _) => "no layer shows colour; no image is decoded".to_owned(),
             },
         );
+        if self.images.is_some() {
+            decide(
+                "texture filter",
+                if self.footprint { "footprint" } else { "none" },
+                either(
+                    self.footprint,
+                    "the camera tells what a sample covers",
+                    "the camera does not tell what a pixel covers",
+                ),
+            );
+        }
         decide(
             "build quality",
             match self.quality {

@@ -4,13 +4,15 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildError, BuildOptions};
+use etendue_camera::PixelExtent;
 use etendue_camera::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, TracerSpec};
 use etendue_spectrum::Lanes;
+use etendue_tracer::texture::ImageError;
 use etendue_tracer::{
     Direct, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind, Lights, Material, Path,
-    Spectral, Stage, Surroundings, Tally, Tracer, View, Whitted,
+    Pixel, Spectral, Stage, Surroundings, Tally, Tracer, View, Whitted,
 };
 use rayon::prelude::*;
 
@@ -143,6 +145,7 @@ impl Images {
     #[must_use]
     pub fn decode(scene: &Scene, plan: &Plan) -> Self {
         let mut wanted = vec![false; scene.textures.len()];
+        let mut filtered = vec![[None; 2]; scene.textures.len()];
         let mut seen = vec![false; scene.materials.len()];
         for placement in &scene.geometry.placements {
             if let Some(seen) = seen.get_mut(placement.material as usize) {
@@ -151,9 +154,11 @@ impl Images {
         }
         if let Some(scope) = plan.images {
             for (material, _) in scene.materials.iter().zip(&seen).filter(|(_, seen)| **seen) {
-                for texture in material.textures(scope) {
+                for (texture, encoding) in material.textures(scope) {
                     if let Some(wanted) = wanted.get_mut(texture as usize) {
                         *wanted = true;
+                        filtered[texture as usize][encoding as usize] =
+                            plan.footprint.then_some(encoding);
                     }
                 }
             }
@@ -161,8 +166,15 @@ impl Images {
         let results: Vec<_> = scene
             .textures
             .par_iter()
-            .zip(&wanted)
-            .map(|(texture, &wanted)| wanted.then(|| texture.decode()))
+            .zip(wanted.par_iter().zip(&filtered))
+            .map(|(texture, (&wanted, encodings))| {
+                let decode = || -> Result<Image, ImageError> {
+                    let mut image = texture.decode()?;
+                    encodings.iter().flatten().for_each(|&e| image.filter_by_footprint(e));
+                    Ok(image)
+                };
+                wanted.then(decode)
+            })
             .collect();
         let mut images = Self::default();
         for result in results {
@@ -249,7 +261,7 @@ pub fn render(
     };
     let camera = open(&Lanes::Rgb)?;
     let light_camera = if plan.lanes == Lanes::Rgb { camera.clone() } else { open(&plan.lanes)? };
-    let surroundings = surroundings(scene, images);
+    let surroundings = surroundings(scene, images, plan.samples);
     let spectral = Spectral::new(&plan.lanes);
     let lit = match scene.tracer.and_then(tracer) {
         Some(tracer) if plan.layers.contains(&LayerSpec::Radiance) => {
@@ -307,13 +319,19 @@ pub fn render(
     Ok(Rendered { picture, lane_film, rays, light, fates, trace_time })
 }
 
-fn surroundings<'a>(scene: &'a Scene, images: &'a Images) -> Surroundings<'a> {
+fn surroundings<'a>(scene: &'a Scene, images: &'a Images, samples: u32) -> Surroundings<'a> {
     let pose = scene.camera.pose();
+    // The samples of a pixel share it.
+    let share = 1.0 / f64::from(samples).sqrt();
+    let pixel = scene.camera.pixel_extent().map(|extent| match extent {
+        PixelExtent::Angle(angle) => Pixel::Angle(angle * share),
+        PixelExtent::Width(width) => Pixel::Width(width * share),
+    });
     Surroundings {
         geometry: &scene.geometry,
         materials: &scene.materials,
         images: &images.decoded,
-        view: View { origin: pose.position, axes: pose.rotation },
+        view: View { origin: pose.position, axes: pose.rotation, pixel },
     }
 }
 

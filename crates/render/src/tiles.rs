@@ -171,6 +171,7 @@ impl Job<'_> {
     fn colors(&self, layer: LayerSpec, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
         match layer {
             LayerSpec::Facing => self.surroundings.facings(traced, out),
+            LayerSpec::Albedo => self.surroundings.albedos(traced, out),
             _ => self.surroundings.flats(traced, out),
         }
     }

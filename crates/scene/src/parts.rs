@@ -68,7 +68,7 @@ impl Parts {
         self.geometry.meshes.extend(import.meshes);
         let first_texture = u32::try_from(self.textures.len()).unwrap_or(u32::MAX);
         self.materials.extend(import.materials.into_iter().map(|mut material| {
-            for used in material.textures_mut(TextureScope::Light) {
+            for used in material.textures_mut(TextureScope::ALL) {
                 used.texture = used.texture.saturating_add(first_texture);
             }
             material

@@ -51,7 +51,12 @@ impl Surroundings<'_> {
     pub fn facings(&self, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
         self.flats(traced, out);
         let mut cosine = vec![0.0; traced.rays.len()];
+        let mut ambient = vec![0.15; traced.rays.len()];
         for (run, placement) in self.runs(traced.hits) {
+            let material = self.materials.get(placement.material as usize);
+            if material.is_some_and(|material| material.occlusion.is_some()) {
+                run.clone().for_each(|i| ambient[i] *= self.unoccluded(traced, i));
+            }
             match &self.geometry.mesh_of(placement).normals {
                 None => cosines(traced, run, &mut cosine),
                 Some(_) => self.shading_cosines(traced, run, placement, &mut cosine),
@@ -59,8 +64,10 @@ impl Surroundings<'_> {
         }
         let hits = &traced.hits.placement;
         for array in out {
-            for ((color, cosine), &hit) in array.iter_mut().zip(&cosine).zip(hits) {
-                let lit = (0.08 + 0.92 * *color) * (0.15 + 0.85 * cosine);
+            let light =
+                cosine.iter().zip(&ambient).map(|(cosine, ambient)| ambient + 0.85 * cosine);
+            for ((color, light), &hit) in array.iter_mut().zip(light).zip(hits) {
+                let lit = (0.08 + 0.92 * *color) * light;
                 *color = if hit == MISS { 0.0 } else { lit };
             }
         }
@@ -68,6 +75,16 @@ impl Surroundings<'_> {
 
     /// [`Surroundings::flat`] of every ray: the arrays of `out` are refilled.
     pub fn flats(&self, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
+        self.colors(traced, |i| self.flat(traced, i), out);
+    }
+
+    /// [`Surroundings::albedo`] of every ray: the arrays of `out` are refilled.
+    pub fn albedos(&self, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
+        self.colors(traced, |i| self.albedo(traced.hits, i), out);
+    }
+
+    /// Base colours, by `color` where a placement has several.
+    fn colors(&self, traced: Traced<'_>, color: impl Fn(usize) -> Color, out: &mut [Vec<f64>; 3]) {
         for array in out.iter_mut() {
             array.clear();
             array.resize(traced.rays.len(), 0.0);
@@ -80,7 +97,7 @@ impl Surroundings<'_> {
                 continue;
             }
             for i in run {
-                for (array, c) in out.iter_mut().zip(self.flat(traced.hits, i)) {
+                for (array, c) in out.iter_mut().zip(color(i)) {
                     array[i] = c;
                 }
             }

@@ -14,6 +14,7 @@
 //! | [`reference`](mod@reference) | what a ray meets first, without light |
 //! | [`spec`] | materials and lights as scene files write them |
 //! | [`material`], [`texture`] | surfaces, ready to be looked up |
+//! | [`footprint`] | how much of a surface a sample stands for |
 //! | [`bsdf`] | how surfaces scatter light |
 //! | [`light`], [`environment`] | where light comes from |
 //! | [`spawn`] | where a ray that leaves a surface starts |
@@ -25,10 +26,12 @@ mod batches;
 pub mod bsdf;
 pub mod direct;
 pub mod environment;
+pub mod footprint;
 pub mod layer;
 pub mod light;
 pub mod material;
 pub mod path;
+mod pyramid;
 pub mod reference;
 pub mod sampling;
 pub mod spawn;
@@ -41,6 +44,7 @@ pub mod whitted;
 
 pub use direct::Direct;
 pub use environment::EnvironmentMap;
+pub use footprint::{Cone, Footprint, Pixel};
 pub use layer::{LayerSpec, NormalKind, Space};
 pub use light::{EnvironmentImage, Light, LightKind, Lights};
 pub use material::{Color, Emission, Ior, Material, Paint, Scattering, TextureScope};

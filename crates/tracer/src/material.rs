@@ -4,6 +4,7 @@
 use etendue_spectrum::{Curve, Illuminant};
 
 use crate::TextureUse;
+use crate::texture::Encoding;
 
 /// Linear RGB with the sRGB primaries, 0..=1 for reflectances.
 pub type Color = [f64; 3];
@@ -25,6 +26,19 @@ pub struct Material {
     pub alpha: Alpha,
     /// Tilts of the normal.
     pub normal_map: Option<NormalMap>,
+    /// How much of the light from all around reaches the surface.
+    pub occlusion: Option<Occlusion>,
+}
+
+/// Light from all around that does not reach a surface, by an image (glTF 2.0, section 3.9.3). Light
+/// that is traced finds out by itself what is hidden from it, so only pictures without traced light
+/// use it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Occlusion {
+    /// The image (linear): the share that arrives, in red.
+    pub image: TextureUse,
+    /// How much of it counts, 0..=1.
+    pub strength: f64,
 }
 
 /// How a surface scatters light.
@@ -166,6 +180,7 @@ impl Material {
             emission: None,
             alpha: Alpha::Opaque,
             normal_map: None,
+            occlusion: None,
         }
     }
 
@@ -177,18 +192,21 @@ impl Material {
         Self { vertex_colors: true, ..plain }
     }
 
-    /// Which textures are looked at for the base colour alone, or for all of light transport.
+    /// Which textures a render of this scope looks at, and as what.
     #[must_use]
-    pub fn textures(&self, scope: TextureScope) -> Vec<u32> {
+    pub fn textures(&self, scope: TextureScope) -> Vec<(u32, Encoding)> {
         let mut copy = self.clone();
         let uses = copy.textures_mut(scope);
-        uses.into_iter().map(|used| used.texture).collect()
+        uses.into_iter().map(|used| (used.texture, used.encoding)).collect()
     }
 
     /// The uses of textures, to be renumbered.
     pub fn textures_mut(&mut self, scope: TextureScope) -> Vec<&mut TextureUse> {
         let mut uses: Vec<&mut TextureUse> = self.base_color.image_mut().into_iter().collect();
-        if scope == TextureScope::BaseColor {
+        if scope.ambient {
+            uses.extend(self.occlusion.as_mut().map(|occlusion| &mut occlusion.image));
+        }
+        if !scope.light {
             return uses;
         }
         if let Scattering::Gltf(surface) = &mut self.scattering {
@@ -209,13 +227,18 @@ impl Material {
     }
 }
 
-/// How much of a material a render looks at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TextureScope {
-    /// The base colour.
-    BaseColor,
+/// How much of a material a render looks at beside the base colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct TextureScope {
+    /// All that light transport does.
+    pub light: bool,
+    /// The occlusion of ambient light.
+    pub ambient: bool,
+}
+
+impl TextureScope {
     /// All of it.
-    Light,
+    pub const ALL: Self = Self { light: true, ambient: true };
 }
 
 /// A colour over a surface.

@@ -4,7 +4,11 @@
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vertices};
 
-use crate::{Color, Image, LayerSpec, Material, NormalKind, Paint, Space, TextureUse};
+use crate::footprint::mean_of_squares;
+use crate::texture::Encoding;
+use crate::{
+    Color, Footprint, Image, LayerSpec, Material, NormalKind, Paint, Pixel, Space, TextureUse,
+};
 
 /// The frame that depths and camera-space vectors refer to.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +17,8 @@ pub struct View {
     pub origin: DVec3,
     /// The camera's axes in the world: +X right, +Y up, and +Z, which points backwards.
     pub axes: DMat3,
+    /// What a sample of the picture covers, where the camera tells.
+    pub pixel: Option<Pixel>,
 }
 
 impl View {
@@ -128,9 +134,27 @@ impl Surroundings<'_> {
         }
     }
 
-    /// Base colour without light at hit `i`, black for a miss.
+    /// Where ray `i` of the camera hit, with its footprint; `None` for a miss.
+    fn seen(&self, traced: Traced<'_>, i: usize) -> Option<Spot<'_>> {
+        let direction = traced.rays.direction(i);
+        let cone = self.view.cone(direction).map(|cone| cone.after(traced.hits.t[i]));
+        let footprint = cone.map(|cone| Footprint { direction, width: cone.width });
+        Some(Spot { footprint, ..self.spot(traced.hits, i)? })
+    }
+
+    /// Base colour without light at hit `i` of the camera's rays, averaged over their footprint;
+    /// black for a miss.
     #[must_use]
-    pub fn flat(&self, hits: &HitBatch, i: usize) -> Color {
+    pub fn flat(&self, traced: Traced<'_>, i: usize) -> Color {
+        let Some(spot) = self.seen(traced, i) else { return [0.0; 3] };
+        let Some(material) = self.material(&spot) else { return [0.0; 3] };
+        let [r, g, b, _] = self.base_color(material, &spot);
+        [r, g, b]
+    }
+
+    /// Base colour at the very point of hit `i`, black for a miss.
+    #[must_use]
+    pub fn albedo(&self, hits: &HitBatch, i: usize) -> Color {
         let Some(spot) = self.spot(hits, i) else { return [0.0; 3] };
         let Some(material) = self.material(&spot) else { return [0.0; 3] };
         let [r, g, b, _] = self.base_color(material, &spot);
@@ -150,9 +174,16 @@ impl Surroundings<'_> {
     }
 
     /// Base colour and alpha, vertex colours included.
+    ///
+    /// Where alpha cuts holes there is no mean over a footprint: the mean of alpha against a cut-off
+    /// is not the share that is cut.
     #[must_use]
     pub fn base_color(&self, material: &Material, spot: &Spot<'_>) -> [f64; 4] {
-        let mut color = self.paint(&material.base_color, spot);
+        let mut color = if material.is_pierced() {
+            self.paint(&material.base_color, &Spot { footprint: None, ..*spot })
+        } else {
+            self.paint(&material.base_color, spot)
+        };
         if material.vertex_colors
             && let Some(vertex) = spot.vertex_color()
         {
@@ -168,6 +199,16 @@ impl Surroundings<'_> {
             Paint::Plain([r, g, b]) => [*r, *g, *b, 1.0],
             Paint::Checker { colors, squares } => {
                 let [u, v] = spot.uv(0);
+                if let Some([a, b]) = spot.extent(0) {
+                    let mean = |x: f64, k: usize| {
+                        mean_of_squares(x * squares, (a[k].abs() + b[k].abs()) * squares)
+                    };
+                    let wave = 0.5 * mean(u, 0) * mean(v, 1);
+                    let [r, g, b] = std::array::from_fn(|k| {
+                        colors[0][k] * (0.5 + wave) + colors[1][k] * (0.5 - wave)
+                    });
+                    return [r, g, b, 1.0];
+                }
                 // The last bit of the square numbers' sum alternates on both sides of 0. The cast
                 // saturates, so absurd coordinates give one colour and no fault.
                 #[expect(clippy::cast_possible_truncation, reason = "see above")]
@@ -185,12 +226,37 @@ impl Surroundings<'_> {
     /// What a use of an image says at a spot; white without the image.
     #[must_use]
     pub fn texel(&self, image: &TextureUse, spot: &Spot<'_>) -> [f64; 4] {
-        let Some(Some(pixels)) = self.images.get(image.texture as usize) else { return [1.0; 4] };
-        let [u, v] = spot.uv(image.uv_set as usize);
-        let [row_u, row_v] = image.transform;
-        let u_image = row_u[0] * u + row_u[1] * v + row_u[2];
-        let v_image = row_v[0] * u + row_v[1] * v + row_v[2];
-        pixels.sample([u_image, v_image], image.encoding)
+        self.lookup(image, spot).unwrap_or([1.0; 4])
+    }
+
+    /// What a use of an image says at a spot, averaged over the spot's footprint; `None` without the
+    /// image.
+    #[must_use]
+    pub fn lookup(&self, image: &TextureUse, spot: &Spot<'_>) -> Option<[f64; 4]> {
+        let pixels = self.images.get(image.texture as usize)?.as_ref()?;
+        // Magenta is for looking at, not a roughness or a tilt.
+        if pixels.stands_in() && image.encoding == Encoding::Linear {
+            return None;
+        }
+        let set = image.uv_set as usize;
+        let [u, v] = spot.uv(set);
+        let at = image.transform.map(|[a, b, c]| a * u + b * v + c);
+        Some(match spot.extent(set) {
+            None => pixels.sample(at, image.encoding),
+            Some(axes) => {
+                let axes = axes.map(|[u, v]| image.transform.map(|[a, b, _]| a * u + b * v));
+                pixels.sample_over(at, axes, image.encoding)
+            }
+        })
+    }
+
+    /// Share of ambient light that reaches hit `i`.
+    pub(crate) fn unoccluded(&self, traced: Traced<'_>, i: usize) -> f64 {
+        let Some(spot) = self.seen(traced, i) else { return 1.0 };
+        let occlusion = self.material(&spot).and_then(|material| material.occlusion.as_ref());
+        let Some(occlusion) = occlusion else { return 1.0 };
+        let [arrives, ..] = self.texel(&occlusion.image, &spot);
+        1.0 + occlusion.strength.clamp(0.0, 1.0) * (arrives - 1.0)
     }
 }
 
@@ -205,6 +271,8 @@ pub struct Spot<'a> {
     pub triangle: usize,
     /// Barycentric weights of its corners.
     pub weights: [f64; 3],
+    /// How much around it is seen at once; a point when absent.
+    pub footprint: Option<Footprint>,
 }
 
 impl<'a> Spot<'a> {
@@ -212,7 +280,7 @@ impl<'a> Spot<'a> {
     #[must_use]
     pub fn corner(geometry: &'a Geometry, placement: &'a Placement, triangle: usize) -> Self {
         let mesh = geometry.mesh_of(placement);
-        Self { placement, mesh, triangle, weights: [1.0, 0.0, 0.0] }
+        Self { placement, mesh, triangle, weights: [1.0, 0.0, 0.0], footprint: None }
     }
 
     /// Values at the three corners, weighted.
@@ -230,10 +298,11 @@ impl<'a> Spot<'a> {
         self.mesh.uvs.get(set).map_or([0.0; 2], |uvs| self.mix(uvs))
     }
 
-    /// The mesh's colour, when it has any.
+    /// The mesh's colour, when it has any; what is outside 0..=1 is brought there.
     #[must_use]
     pub fn vertex_color(&self) -> Option<[f64; 4]> {
-        self.mesh.colors.as_ref().map(|colors| self.mix(colors))
+        let colors = self.mesh.colors.as_ref()?;
+        Some(self.mix(colors).map(|c| c.clamp(0.0, 1.0)))
     }
 
     /// The mesh's own normal in world space, on the side of the unit normal `geometric`; `None` when
@@ -286,6 +355,8 @@ pub struct Needs {
     pub uvs: bool,
     /// Lights, and all that materials say of light.
     pub light: bool,
+    /// The occlusion of ambient light.
+    pub ambient: bool,
 }
 
 impl Needs {
@@ -298,6 +369,7 @@ impl Needs {
             materials: self.materials || other.materials,
             uvs: self.uvs || other.uvs,
             light: self.light || other.light,
+            ambient: self.ambient || other.ambient,
         }
     }
 }
@@ -321,12 +393,14 @@ impl LayerSpec {
             Self::Flat | Self::Albedo => {
                 Needs { surface: true, materials: true, uvs: true, ..none }
             }
-            Self::Facing => {
-                Needs { surface: true, normals: true, materials: true, uvs: true, ..none }
-            }
-            Self::Radiance => {
-                Needs { surface: true, normals: true, materials: true, uvs: true, light: true }
-            }
+            Self::Facing | Self::Radiance => Needs {
+                surface: true,
+                normals: true,
+                materials: true,
+                uvs: true,
+                light: self == Self::Radiance,
+                ambient: self == Self::Facing,
+            },
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::bsdf::{Bsdf, Layered, Model, fresnel};
 use crate::material::{Alpha, GltfSurface, NormalMap};
 use crate::reference::{Spot, Surroundings};
 use crate::spawn::Anchor;
-use crate::{Color, Material, Scattering};
+use crate::{Color, Footprint, Material, Scattering};
 
 /// A hit seen from its ray.
 #[derive(Debug, Clone, Copy)]
@@ -29,8 +29,9 @@ impl<'a> Met<'a> {
         rays: &RayBatch,
         hits: &HitBatch,
         i: usize,
+        footprint: Option<Footprint>,
     ) -> Option<Self> {
-        let spot = around.spot(hits, i)?;
+        let spot = Spot { footprint, ..around.spot(hits, i)? };
         let material = around.material(&spot)?;
         let (origin, direction) = (rays.origin(i), rays.direction(i));
         let normal = hits.normal(i);
@@ -56,10 +57,10 @@ impl<'a> Met<'a> {
         }
     }
 
-    /// The base colour alone.
+    /// The base colour alone, brought to what a surface can reflect.
     pub(crate) fn color(&self) -> Color {
         let [r, g, b, _] = self.base;
-        [r, g, b]
+        [r, g, b].map(|c| c.clamp(0.0, 1.0))
     }
 
     /// How it scatters light of the wavelength (nm).
@@ -101,7 +102,7 @@ impl<'a> Met<'a> {
             f90: specular,
             transmission: (own.transmission * texel(&own.transmission_texture)[0]).clamp(0.0, 1.0),
         });
-        let base = self.color().map(|c| c.clamp(0.0, 1.0));
+        let base = self.color();
         let shading = self.shading(around, geometric);
         Bsdf::new(model, [geometric, shading], self.wo, [base, highlight])
     }
@@ -126,7 +127,8 @@ impl<'a> Met<'a> {
         let Some([along_u, along_v]) = self.spot.texture_axes(map.image.uv_set as usize) else {
             return normal;
         };
-        let [x, y, z, _] = around.texel(&map.image, &self.spot).map(|c| 2.0 * c - 1.0);
+        let Some(texel) = around.lookup(&map.image, &self.spot) else { return normal };
+        let [x, y, z, _] = texel.map(|c| 2.0 * c - 1.0);
         let Some(tangent) = (along_u - normal * normal.dot(along_u)).try_normalize() else {
             return normal;
         };

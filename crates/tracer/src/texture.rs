@@ -6,6 +6,8 @@ use etendue_geometry::Buffer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::pyramid::Pyramid;
+
 /// Where an image's bytes are, still encoded (PNG or JPEG).
 #[derive(Debug, Clone)]
 pub enum ImageSource {
@@ -13,6 +15,8 @@ pub enum ImageSource {
     File(PathBuf),
     /// Bytes inside another file (a GLB's buffer view, a data URI).
     Bytes(Buffer<u8>),
+    /// Nowhere: the file that the model names is not there.
+    Missing,
 }
 
 /// What happens to texture coordinates outside 0..=1.
@@ -90,6 +94,9 @@ pub struct Image {
     texels: Vec<[u8; 4]>,
     wrap: [Wrap; 2],
     filter: Filter,
+    /// For each encoding that is filtered by footprint.
+    pyramids: [Option<Pyramid>; 2],
+    stands_in: bool,
 }
 
 /// Why an image could not be decoded.
@@ -132,6 +139,7 @@ impl Texture {
     pub fn decode(&self) -> Result<Image, ImageError> {
         let read;
         let bytes: &[u8] = match &self.source {
+            ImageSource::Missing => return Ok(Image::missing()),
             ImageSource::Bytes(bytes) => bytes,
             ImageSource::File(path) => {
                 read = std::fs::read(path)
@@ -142,7 +150,9 @@ impl Texture {
         let decoded = read_image(&self.name, bytes)?.into_rgba8();
         let (width, height) = (decoded.width() as usize, decoded.height() as usize);
         let texels = bytemuck::cast_vec::<u8, [u8; 4]>(decoded.into_raw());
-        Ok(Image { width, height, texels, wrap: self.wrap, filter: self.filter })
+        let (wrap, filter) = (self.wrap, self.filter);
+        let pyramids = [None, None];
+        Ok(Image { width, height, texels, wrap, filter, pyramids, stands_in: false })
     }
 }
 
@@ -172,13 +182,35 @@ impl Image {
             texels: vec![magenta, black, black, magenta],
             wrap: [Wrap::Repeat; 2],
             filter: Filter::Nearest,
+            pyramids: [None, None],
+            stands_in: true,
         }
     }
 
-    /// Bytes of the decoded texels.
+    /// Whether this is [`Self::missing`], which is to be seen where it is a colour and to be left
+    /// out where it is anything else.
+    #[must_use]
+    pub fn stands_in(&self) -> bool {
+        self.stands_in
+    }
+
+    /// Makes ready for [`Self::sample_over`] in an encoding.
+    pub fn filter_by_footprint(&mut self, encoding: Encoding) {
+        if self.pyramids[encoding as usize].is_some() || self.texels.is_empty() {
+            return;
+        }
+        let pyramid = Pyramid::new(self.size(), |x, y| {
+            #[expect(clippy::cast_possible_truncation, reason = "means are kept in 16 bits")]
+            decoded(self.texels[y * self.width + x], encoding).map(|c| c as f32)
+        });
+        self.pyramids[encoding as usize] = Some(pyramid);
+    }
+
+    /// Bytes of the decoded texels, those of means over several included.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        self.texels.len() * 4
+        let means: usize = self.pyramids.iter().flatten().map(Pyramid::bytes).sum();
+        self.texels.len() * 4 + means
     }
 
     /// Columns and rows.
@@ -212,23 +244,78 @@ impl Image {
         }
     }
 
+    /// [`Self::sample`], averaged over an ellipse with these axes (in units of u and v): several
+    /// lookups along the longer one, in a level of the pyramid whose texels are as wide as the
+    /// shorter. Ellipses within one texel are points.
+    #[must_use]
+    pub fn sample_over(&self, uv: [f64; 2], axes: [[f64; 2]; 2], encoding: Encoding) -> [f64; 4] {
+        let Some(pyramid) = &self.pyramids[encoding as usize] else {
+            return self.sample(uv, encoding);
+        };
+        let length = |[u, v]: [f64; 2]| f64::hypot(u * self.width as f64, v * self.height as f64);
+        let lengths = axes.map(length);
+        let (long, short, axis) = if lengths[0] >= lengths[1] {
+            (lengths[0], lengths[1], axes[0])
+        } else {
+            (lengths[1], lengths[0], axes[1])
+        };
+        if !(long > 1.0 && uv.iter().all(|c| c.is_finite())) {
+            return self.sample(uv, encoding);
+        }
+        let wide = short.max(long / MOST_LOOKUPS).max(1.0);
+        let level = wide.log2().min(pyramid.len() as f64);
+        let count = (long / wide).ceil().clamp(1.0, MOST_LOOKUPS);
+        let mut sum = [0.0; 4];
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 8")]
+        for i in 0..count as u32 {
+            let at = (f64::from(i) + 0.5) / count - 0.5;
+            let value =
+                self.between(pyramid, level, [0, 1].map(|k| uv[k] + at * axis[k]), encoding);
+            sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += value / count);
+        }
+        sum
+    }
+
+    /// The value between the two levels next to a fractional one; level 0 is the image.
+    fn between(&self, pyramid: &Pyramid, level: f64, uv: [f64; 2], encoding: Encoding) -> [f64; 4] {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "few levels")]
+        let below = level.floor() as usize;
+        let share = level - level.floor();
+        let at = |level: usize| match level {
+            0 => self.sample(uv, encoding),
+            level => pyramid.sample(level, uv, self.wrap),
+        };
+        let lower = at(below);
+        if share == 0.0 {
+            return lower;
+        }
+        let upper = at(below + 1);
+        std::array::from_fn(|k| lower[k] + (upper[k] - lower[k]) * share)
+    }
+
     /// The texel in column `x` and row `y`, wrapped.
     fn texel(&self, x: f64, y: f64, encoding: Encoding) -> [f64; 4] {
         let column = self.wrap[0].apply(x, self.width);
         let row = self.wrap[1].apply(y, self.height);
-        let [r, g, b, a] = self.texels[row * self.width + column];
-        let alpha = f64::from(a) / 255.0;
-        let [r, g, b] = match encoding {
-            Encoding::Srgb => [r, g, b].map(linear_from_srgb),
-            Encoding::Linear => [r, g, b].map(|value| f64::from(value) / 255.0),
-        };
-        [r, g, b, alpha]
+        decoded(self.texels[row * self.width + column], encoding)
     }
+}
+
+/// Lookups along a footprint: beyond eight times as long as wide it is made wider.
+const MOST_LOOKUPS: f64 = 8.0;
+
+/// Linear colour and alpha of a texel.
+fn decoded([r, g, b, a]: [u8; 4], encoding: Encoding) -> [f64; 4] {
+    let [r, g, b] = match encoding {
+        Encoding::Srgb => [r, g, b].map(linear_from_srgb),
+        Encoding::Linear => [r, g, b].map(|value| f64::from(value) / 255.0),
+    };
+    [r, g, b, f64::from(a) / 255.0]
 }
 
 impl Wrap {
     /// Column or row `x` (a whole number) of `size` after wrapping.
-    fn apply(self, x: f64, size: usize) -> usize {
+    pub(crate) fn apply(self, x: f64, size: usize) -> usize {
         let n = size as f64;
         let wrapped = match self {
             Self::Repeat => x.rem_euclid(n),

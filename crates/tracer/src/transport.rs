@@ -20,8 +20,9 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 
 use crate::bsdf::{Bsdf, Weights};
+use crate::footprint::{Cone, Footprint};
 use crate::light::{End, Lights};
-use crate::reference::Surroundings;
+use crate::reference::{Spot, Surroundings};
 use crate::sampling::power_heuristic;
 use crate::spawn::Anchor;
 use crate::spectral::Spectral;
@@ -152,6 +153,9 @@ struct State {
     lane: Option<u32>,
     /// Looks for light and goes no farther.
     is_last: bool,
+    /// What the path stands for, as long as it only met mirrors and clear boundaries; as wide as at
+    /// its vertex.
+    cone: Option<Cone>,
 }
 
 impl Paths {
@@ -159,6 +163,12 @@ impl Paths {
         self.rays.clear();
         self.states.clear();
         self.throughput.clear();
+    }
+
+    /// What path `i` covers of what it hit.
+    fn footprint(&self, hits: &HitBatch, i: usize) -> Option<Footprint> {
+        let width = self.states[i].cone?.after(hits.t[i]).width;
+        Some(Footprint { direction: self.rays.direction(i), width })
     }
 
     /// Adds a path that leaves a surface.
@@ -256,6 +266,7 @@ impl Tracing<'_> {
                 vertex: beam.rays.origin(i),
                 lane: None,
                 is_last: false,
+                cone: self.stage.surroundings.view.cone(beam.rays.direction(i)),
             });
             let lanes = 0..self.count;
             paths.throughput.extend(lanes.map(|k| f64::from(u8::from(beam.lanes.contains(&k)))));
@@ -308,8 +319,9 @@ impl Tracing<'_> {
         };
         let front = hits.normal(i).dot(direction) <= 0.0;
         let material = around.material(&spot)?;
+        let spot = Spot { footprint: now.footprint(hits, i), ..spot };
         // A surface that is only partly there shines by as much.
-        let there = || match Met::new(around, &now.rays, hits, i) {
+        let there = || match Met::new(around, &now.rays, hits, i, None) {
             Some(met) if material.is_pierced() => met.opacity(),
             _ => 1.0,
         };
@@ -334,10 +346,12 @@ impl Tracing<'_> {
         let Scratch { now, next, hits, alive, squares, shadows, radiance, .. } = scratch;
         let i = alive[k] as usize;
         let around = &self.stage.surroundings;
-        let Some(met) = Met::new(around, &now.rays, hits, i) else { return };
+        let footprint = now.footprint(hits, i);
+        let Some(met) = Met::new(around, &now.rays, hits, i, footprint) else { return };
         let numbers = &squares[k * PAIRS as usize..(k + 1) * PAIRS as usize];
         let mut state = now.states[i];
         state.steps += 1;
+        state.cone = state.cone.map(|cone| cone.after(hits.t[i]));
         let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
         if met.material.is_pierced() && numbers[3][0] >= met.opacity() {
             let direction = now.rays.direction(i);
@@ -427,6 +441,10 @@ impl Tracing<'_> {
             }
             throughput.iter_mut().for_each(|lane| *lane /= survival);
         }
+        if !single {
+            // Seen by chance from one point, a surface is a point.
+            state.cone = None;
+        }
         state.density = scattered.density;
         state.vertex = anchor.point;
         next.push(anchor.leave(scattered.direction), scattered.direction, state);
@@ -472,7 +490,7 @@ impl Tracing<'_> {
             let mut onward = RayBatch { from_surface: true, ..RayBatch::default() };
             let mut still = Vec::new();
             for (k, &i) in open.iter().enumerate() {
-                let Some(met) = Met::new(&self.stage.surroundings, again, hits, k) else {
+                let Some(met) = Met::new(&self.stage.surroundings, again, hits, k, None) else {
                     continue;
                 };
                 let share = &mut passed[i as usize];

@@ -44,15 +44,29 @@ pub struct Wanted {
     pub textures: bool,
     /// Lights, and all that materials say of light.
     pub light: bool,
+    /// The images of ambient occlusion.
+    pub occlusion: bool,
 }
 
 impl Wanted {
     /// Geometry alone.
-    pub const NOTHING: Self =
-        Self { normals: false, uvs: false, colors: false, textures: false, light: false };
+    pub const NOTHING: Self = Self {
+        normals: false,
+        uvs: false,
+        colors: false,
+        textures: false,
+        light: false,
+        occlusion: false,
+    };
     /// All that is understood.
-    pub const EVERYTHING: Self =
-        Self { normals: true, uvs: true, colors: true, textures: true, light: true };
+    pub const EVERYTHING: Self = Self {
+        normals: true,
+        uvs: true,
+        colors: true,
+        textures: true,
+        light: true,
+        occlusion: true,
+    };
 }
 
 /// What becomes of defects in the data, such as a NaN position.

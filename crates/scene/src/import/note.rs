@@ -52,6 +52,12 @@ impl Note {
     }
 }
 
+/// That the image `written` is not there.
+pub(super) fn missing_image(written: String) -> Note {
+    let message = "the image does not exist; where it is a colour, magenta squares show it";
+    Note::new(NoteKind::MissingFile, written, message)
+}
+
 /// Adds `note`, or counts it to one that says the same of the same subject.
 pub(super) fn push(notes: &mut Vec<Note>, note: Note) {
     let same = |n: &&mut Note| {

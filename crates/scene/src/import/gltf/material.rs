@@ -3,7 +3,7 @@
 //! Factors are linear (glTF 2.0, section 3.9.2). Materials keep the document's numbers; what names
 //! none gets one more at the end.
 
-use etendue_tracer::material::{Alpha, GltfSurface, NormalMap};
+use etendue_tracer::material::{Alpha, GltfSurface, NormalMap, Occlusion};
 use etendue_tracer::texture::{Encoding, Filter, Wrap};
 use etendue_tracer::{Emission, ImageSource, Material, Paint, Scattering, Texture, TextureUse};
 use gltf::json;
@@ -54,7 +54,7 @@ fn read(
     let name = material.name.clone().unwrap_or_default();
     let surface = &material.pbr_metallic_roughness;
     let [red, green, blue, alpha] = surface.base_color_factor.0.map(f64::from);
-    let factor = [red, green, blue];
+    let factor = reflectance(images.reader, [red, green, blue], &name, import)?;
     let image = match &surface.base_color_texture {
         Some(info) if images.reader.wanted.textures => {
             images.use_of(info.index.value(), info, Encoding::Srgb, import)?
@@ -87,7 +87,35 @@ fn read(
             None => None,
         };
     }
+    if images.reader.wanted.occlusion
+        && let Some(occlusion) = &material.occlusion_texture
+    {
+        let moved = occlusion.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));
+        let info = info_of(occlusion.index, occlusion.tex_coord, moved);
+        let image = images.use_of(occlusion.index.value(), &info, Encoding::Linear, import)?;
+        let strength = f64::from(occlusion.strength.0);
+        read.occlusion = image.map(|image| Occlusion { image, strength });
+    }
     Ok(read)
+}
+
+/// A base colour brought to what a surface can reflect, with a note; refused when strict.
+fn reflectance(
+    reader: &Reader<'_>,
+    factor: [f64; 3],
+    name: &str,
+    import: &mut Import,
+) -> Result<[f64; 3], ImportError> {
+    if factor.iter().all(|c| (0.0..=1.0).contains(c)) {
+        return Ok(factor);
+    }
+    if reader.options.strictness == Strictness::Strict {
+        let reason = format!("its base colour {factor:?} is outside 0 to 1");
+        return Err(reader.damaged(format!("material \"{name}\""), reason));
+    }
+    let message = "its base colour is outside 0 to 1; it is brought there";
+    note::push(&mut import.notes, Note::new(NoteKind::Irregular, name, message));
+    Ok(factor.map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, 1.0) }))
 }
 
 const TRANSFORM: &str = "KHR_texture_transform";
@@ -290,9 +318,8 @@ impl Images<'_> {
                 Err(reader.damaged(place(), format!("\"{written}\" does not exist")))
             }
             None => {
-                let message = "the image does not exist; the surface has its plain colour";
-                note::push(&mut import.notes, Note::new(NoteKind::MissingFile, written, message));
-                Ok(None)
+                note::push(&mut import.notes, note::missing_image(written));
+                Ok(Some(ImageSource::Missing))
             }
         }
     }

@@ -64,7 +64,7 @@ pub(super) fn import(
     let segments = segment::divide(&chunks);
     let pool = Pool::gather(&mut chunks);
     let libraries = segment::libraries(&chunks);
-    let numbers = mtl::load(&libraries, &segments, files, wanted, &mut import)?;
+    let numbers = mtl::load(&libraries, &segments, files, wanted, options.strictness, &mut import)?;
     let mut welder = weld::Welder::new(&pool, &chunks);
     let single = segments.len() == 1;
     for (segment, material) in segments.iter().zip(numbers) {

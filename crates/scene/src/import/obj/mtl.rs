@@ -18,7 +18,7 @@ use etendue_tracer::{
 use super::segment::Segment;
 use crate::import::files::Files;
 use crate::import::note::{self, Note, NoteKind};
-use crate::import::{Import, ImportError, Wanted};
+use crate::import::{Import, ImportError, Strictness, Wanted};
 
 /// A material and the file that defines it.
 struct Defined {
@@ -32,6 +32,7 @@ pub(super) fn load(
     segments: &[Segment],
     files: &Files,
     wanted: Wanted,
+    strictness: Strictness,
     import: &mut Import,
 ) -> Result<Vec<u32>, ImportError> {
     let mut defined: HashMap<String, Defined> = HashMap::new();
@@ -42,7 +43,7 @@ pub(super) fn load(
         }
     }
     let mut known: HashMap<Option<&str>, u32> = HashMap::new();
-    let mut maps = Maps { files, numbers: HashMap::new() };
+    let mut maps = Maps { files, strictness, numbers: HashMap::new() };
     let mut numbers = Vec::with_capacity(segments.len());
     for segment in segments {
         let name = segment.material.as_deref();
@@ -186,10 +187,24 @@ fn resolve(
         Some(map) if wanted.textures => maps.use_of(map, &defined.file, import)?,
         _ => None,
     };
-    let finite = material.diffuse.filter(|color| color.iter().all(|value| value.is_finite()));
+    let sound = |color: &[f64; 3]| color.iter().all(|value| (0.0..=1.0).contains(value));
+    if material.diffuse.is_some_and(|color| !sound(&color)) {
+        if maps.strictness == Strictness::Strict {
+            return Err(ImportError::Damaged {
+                file: defined.file.clone(),
+                place: format!("material \"{}\"", material.name),
+                reason: "Kd is outside 0 to 1".to_owned(),
+            });
+        }
+        let message = "Kd is outside 0 to 1; it is brought there";
+        let note = Note::new(NoteKind::Irregular, material.name.clone(), message);
+        note::push(&mut import.notes, note);
+    }
+    let diffuse = material.diffuse.filter(|color| !color.iter().any(|value| value.is_nan()));
+    let diffuse = diffuse.map(|color| color.map(|value| value.clamp(0.0, 1.0)));
     let base_color = match image {
-        Some(image) => Paint::Image { factor: finite.unwrap_or([1.0; 3]), image },
-        None => finite.map_or(Material::unnamed().base_color, Paint::Plain),
+        Some(image) => Paint::Image { factor: diffuse.unwrap_or([1.0; 3]), image },
+        None => diffuse.map_or(Material::unnamed().base_color, Paint::Plain),
     };
     let plain = Material { name: material.name.clone(), base_color, ..Material::unnamed() };
     Ok(if wanted.light { nearest(material, plain) } else { plain })
@@ -259,6 +274,7 @@ fn nearest(material: &tobj::Material, plain: Material) -> Material {
 /// The images that maps name, each once.
 struct Maps<'a> {
     files: &'a Files,
+    strictness: Strictness,
     numbers: HashMap<(PathBuf, bool), u32>,
 }
 
@@ -270,17 +286,26 @@ impl Maps<'_> {
         import: &mut Import,
     ) -> Result<Option<TextureUse>, ImportError> {
         let map = Map::parse(written);
-        let Some(file) = self.files.locate_beside(library, &map.name)? else {
-            let message = "the image does not exist; the surface has its plain colour";
-            note::push(&mut import.notes, Note::new(NoteKind::MissingFile, map.name, message));
-            return Ok(None);
+        let (key, source) = match self.files.locate_beside(library, &map.name)? {
+            Some(file) => (file.clone(), ImageSource::File(file)),
+            None if self.strictness == Strictness::Strict => {
+                return Err(ImportError::Damaged {
+                    file: library.to_owned(),
+                    place: "map_Kd".to_owned(),
+                    reason: format!("\"{}\" does not exist", map.name),
+                });
+            }
+            None => {
+                note::push(&mut import.notes, note::missing_image(map.name.clone()));
+                (PathBuf::from(&map.name), ImageSource::Missing)
+            }
         };
         let next = u32::try_from(import.textures.len()).unwrap_or(u32::MAX);
-        let texture = *self.numbers.entry((file.clone(), map.clamp)).or_insert_with(|| {
+        let texture = *self.numbers.entry((key, map.clamp)).or_insert_with(|| {
             let wrap = if map.clamp { Wrap::ClampToEdge } else { Wrap::Repeat };
             import.textures.push(Texture {
                 name: map.name.clone(),
-                source: ImageSource::File(file),
+                source,
                 wrap: [wrap; 2],
                 filter: Filter::Bilinear,
             });

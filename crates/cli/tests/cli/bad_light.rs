@@ -1,0 +1,183 @@
+//! Materials, textures and lights that make no sense: refused by name, or shown as such and told.
+
+use crate::run::{Bench, text};
+
+/// A square over the whole picture with the texture `image` on it, by an OBJ model.
+fn textured(image: Option<&[u8]>) -> Bench {
+    let bench = Bench::with_scene(
+        r#"{"etendue": 1, "tracer": {"type": "flat"}, "objects": [{"file": "m.obj"}],
+            "camera": {"type": "orthographic", "height": 1, "sensor": {"resolution": [8, 8]},
+                       "pose": {"from": [0.5, 0.5, 2], "look_at": [0.5, 0.5, 0]}}}"#,
+    );
+    bench.write(
+        "m.obj",
+        b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+        usemtl m\nf 1/1 2/2 3/3 4/4\n",
+    );
+    bench.write("m.mtl", b"newmtl m\nKd 1 1 1\nmap_Kd wood.png\n");
+    if let Some(image) = image {
+        bench.write("wood.png", image);
+    }
+    bench
+}
+
+/// The header of a PNG of `side` × `side` pixels, and nothing behind it.
+fn png_header(side: u32) -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, side, side);
+    encoder.set_color(png::ColorType::Rgb);
+    drop(encoder.write_header().expect("a header"));
+    file
+}
+
+#[test]
+fn textures_that_cannot_be_had_are_magenta_and_told_or_refused_when_strict() {
+    let cases: [(&str, Option<&[u8]>); 4] = [
+        ("does not exist", None),
+        ("wood.png", Some(b"\x89PNG\r\n\x1a\nnot much of an image")),
+        ("wood.png", Some(&png_header(8))),
+        ("wood.png", Some(&png_header(100_000))),
+    ];
+    for (words, image) in cases {
+        let bench = textured(image);
+        bench.render(&["--report", "report.json"]);
+        let picture = bench.array("picture");
+        let magenta = picture.chunks(3).filter(|p| **p == [1.0, 0.0, 1.0]).count();
+        let black = picture.chunks(3).filter(|p| **p == [0.0; 3]).count();
+        assert_eq!((magenta, black), (32, 32), "{words}: two of four squares each");
+        let notes = bench.json("report.json")["notes"].to_string();
+        assert!(notes.contains(words) && notes.contains("magenta"), "{notes}");
+        let output = bench.run(&["render", "scene.json", "-o", "strict", "--strict"]);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains("wood.png"), "{message}");
+    }
+}
+
+#[test]
+fn images_that_the_scene_itself_names_have_to_be_there() {
+    let scene = r#"{"etendue": 1, "tracer": {"type": "flat"},
+        "objects": [{"shape": "box", "material": "m"}],
+        "materials": {"m": {"type": "matte", "color": {"image": "wodo.png"}}}}"#;
+    let bench = Bench::with_scene(scene);
+    bench.write("wood.png", b"");
+    let output = bench.run(&["render", "scene.json", "-o", "out"]);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    for word in ["materials.m.color.image", "wodo.png", "mean \"wood.png\""] {
+        assert!(message.contains(word), "{word}: {message}");
+    }
+}
+
+#[test]
+fn values_that_no_material_or_light_can_have_are_refused_by_path() {
+    let material = |m: &str| {
+        format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "path"}},
+            "objects": [{{"shape": "box", "material": "m"}}], "materials": {{"m": {m}}}}}"#
+        )
+    };
+    let light = |l: &str| format!(r#"{{"etendue": 1, "lights": [{l}]}}"#);
+    let cases = [
+        (material(r#"{"type": "matte", "color": [0.5, -0.1, 0]}"#), "materials.m.color"),
+        (material(r#"{"type": "matte", "color": [0.5, NaN, 0]}"#), "broken JSON"),
+        (material(r#"{"type": "matte", "color": [0.5, 1e999, 0]}"#), "out of range"),
+        (material(r#"{"type": "emissive", "radiance": [-1, 0, 0]}"#), "materials.m.radiance"),
+        (material(r#"{"type": "dielectric", "ior": 0.9}"#), "materials.m.ior: 0.9 is below 1"),
+        (material(r#"{"type": "dielectric", "ior": {"nd": 0.5, "vd": 60}}"#), "materials.m.ior"),
+        (material(r#"{"type": "gltf", "ior": 0.9}"#), "materials.m.ior"),
+        (material(r#"{"type": "metal", "color": [1, 1, 1], "roughness": -1}"#), "roughness"),
+        (material(r#"{"type": "gltf", "roughness": 1.1}"#), "materials.m.roughness"),
+        (light(r#"{"type": "point", "at": [0, 0, 0], "intensity": [1, -1, 1]}"#), "lights[0]"),
+        (light(r#"{"type": "environment", "radiance": [-1, 1, 1]}"#), "lights[0].radiance"),
+        (light(r#"{"type": "environment", "image": "sky.exr"}"#), "lights[0].image: no such file"),
+        (
+            light(r#"{"type": "directional", "direction": [0, 0, 0], "irradiance": [1, 1, 1]}"#),
+            "lights[0].direction",
+        ),
+    ];
+    for (scene, words) in cases {
+        let output = Bench::with_scene(&scene).run(&["render", "scene.json", "-o", "out"]);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{scene}: {message}");
+        assert!(message.contains(words), "expected \"{words}\": {message}");
+    }
+}
+
+/// A plane of this material under these lights, by global illumination; the picture's numbers.
+fn plane(material: &str, lights: &str, bench: &mut Option<Bench>) -> Vec<f64> {
+    let scene = format!(
+        r#"{{"etendue": 1, "tracer": {{"type": "path"}}, "render": {{"samples": 16}},
+        "camera": {{"type": "pinhole", "fov": 20, "sensor": {{"resolution": [6, 6]}},
+                    "pose": {{"from": [1, 0.5, 3], "look_at": [0, 0, 0]}}}},
+        "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "m"}}],
+        "materials": {{"m": {material}}}, "lights": {lights}}}"#
+    );
+    let own = Bench::with_scene(&scene);
+    if let Some(other) = bench {
+        let sky = std::fs::read(other.path("sky.exr")).expect("the sky");
+        own.write("sky.exr", &sky);
+    }
+    own.render(&["--report", "report.json"]);
+    assert_eq!(own.json("report.json")["not_finite"], 0);
+    let picture = own.array("picture");
+    *bench = Some(own);
+    picture
+}
+
+#[test]
+fn lights_without_power_light_nothing() {
+    let matte = r#"{"type": "matte", "color": [0.5, 0.5, 0.5]}"#;
+    let dark = [
+        r#"[{"type": "point", "at": [0, 0, 2], "intensity": [0, 0, 0]}]"#,
+        r#"[{"type": "environment", "radiance": [0, 0, 0]}]"#,
+        r#"[{"type": "spot", "at": [0, 0, 2], "look_at": [0, 0, 0], "intensity": [1, 1, 1],
+             "cone": 0}]"#,
+        "[]",
+    ];
+    for lights in dark {
+        assert!(plane(matte, lights, &mut None).iter().all(|&p| p == 0.0), "{lights}");
+    }
+    let lamp = r#"{"type": "emissive", "radiance": [0, 0, 0]}"#;
+    assert!(plane(lamp, "[]", &mut None).iter().all(|&p| p == 0.0));
+}
+
+/// At roughness 0 metal is a mirror, glTF's coat too: of a sky of 1 they return all that they can.
+#[test]
+fn surfaces_without_roughness_are_mirrors() {
+    let sky = r#"[{"type": "environment", "radiance": [1, 1, 1]}]"#;
+    let metal = r#"{"type": "metal", "color": [1, 1, 1], "roughness": 0}"#;
+    for value in plane(metal, sky, &mut None) {
+        assert!((value - 1.0).abs() < 1e-6, "{value}");
+    }
+    let coat = r#"{"type": "gltf", "color": [1, 1, 1], "metallic": 1, "roughness": 0}"#;
+    for value in plane(coat, sky, &mut None) {
+        assert!((value - 1.0).abs() < 1e-6, "{value}");
+    }
+    let glazed = plane(r#"{"type": "gltf", "roughness": 0}"#, sky, &mut None);
+    assert!(glazed.iter().all(|p| (0.5..=1.001).contains(p)), "{glazed:?}");
+}
+
+#[test]
+fn an_environment_that_is_no_number_is_black_and_counted_or_refused_when_strict() {
+    let bench = Bench::new();
+    let sky = bench.path("sky.exr");
+    // A quarter of the pixels is no radiance.
+    let value = |x: usize, y: usize| match (x + y) % 8 {
+        0 => f32::NAN,
+        1 => f32::NEG_INFINITY,
+        _ => 1.0_f32,
+    };
+    exr::prelude::write_rgb_file(&sky, 16, 8, |x, y| (value(x, y), value(x, y), value(x, y)))
+        .expect("an EXR file");
+    let mut bench = Some(bench);
+    let lights = r#"[{"type": "environment", "image": "sky.exr"}]"#;
+    let matte = r#"{"type": "matte", "color": [1, 1, 1]}"#;
+    let picture = plane(matte, lights, &mut bench);
+    assert!(picture.iter().all(|p| p.is_finite() && *p > 0.3 && *p < 1.0), "{picture:?}");
+    let bench = bench.expect("the bench of the render");
+    let notes = bench.json("report.json")["notes"].to_string();
+    assert!(notes.contains("32 pixels that are not finite or below zero"), "{notes}");
+    let output = bench.run(&["render", "scene.json", "-o", "strict", "--strict"]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+}

@@ -1,0 +1,132 @@
+//! How much of a surface a sample of the picture stands for: a cone around each ray, which is as wide
+//! as its share of a pixel and grows with the way.
+//!
+//! # Sources
+//!
+//! * Cones around rays: Akenine-Möller et al., "Texture Level of Detail Strategies for Real-Time Ray
+//!   Tracing", *Ray Tracing Gems*, 2019, section 20.3; a plane mirror leaves the spread as it is
+//!   (curved ones are taken for plane).
+//! * The ellipse that a cone cuts out of a surface: Akenine-Möller et al., "Improved Shader and Texture
+//!   Level of Detail Using Ray Cones", JCGT 10 (1), 2021, section 5.
+
+use etendue_geometry::glam::DVec3;
+
+use crate::reference::{Spot, View};
+
+/// Grazing rays see no more of a surface than this (a cosine).
+const LEAST_COSINE: f64 = 1e-4;
+
+/// What one sample of the picture covers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pixel {
+    /// A side per distance along the camera's axis, where rays pass through a point.
+    Angle(f64),
+    /// A side (m), where rays are parallel.
+    Width(f64),
+}
+
+/// A cone around a ray.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cone {
+    /// Its width at the ray's start (m).
+    pub width: f64,
+    /// By how much it widens per length of the ray.
+    pub spread: f64,
+}
+
+impl Cone {
+    /// The cone after this way (m).
+    #[must_use]
+    pub fn after(self, way: f64) -> Self {
+        Self { width: self.width + self.spread * way, ..self }
+    }
+}
+
+impl View {
+    /// The cone around the camera's ray along the unit `direction`; `None` when the camera does not
+    /// tell.
+    ///
+    /// Off the axis of a perspective camera a pixel's solid angle falls as cos³, so its side does as
+    /// cos^1.5.
+    #[must_use]
+    pub fn cone(&self, direction: DVec3) -> Option<Cone> {
+        Some(match self.pixel? {
+            Pixel::Width(width) => Cone { width, spread: 0.0 },
+            Pixel::Angle(angle) => {
+                let cosine = direction.dot(self.forward()).clamp(0.0, 1.0);
+                Cone { width: 0.0, spread: angle * cosine * cosine.sqrt() }
+            }
+        })
+    }
+}
+
+/// Where a cone meets a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Footprint {
+    /// The ray's unit direction.
+    pub direction: DVec3,
+    /// The cone's width there (m).
+    pub width: f64,
+}
+
+impl Spot<'_> {
+    /// The axes of the ellipse that the footprint covers, in texture coordinates of a set; `None`
+    /// where there is no footprint or no texture coordinates.
+    #[must_use]
+    pub fn extent(&self, set: usize) -> Option<[[f64; 2]; 2]> {
+        let Footprint { direction, width } = self.footprint?;
+        let uvs = self.mesh.uvs.get(set)?;
+        let linear = &self.placement.world_from_mesh.linear;
+        let [p0, p1, p2] = self.mesh.corners(self.triangle);
+        let (e1, e2) = (*linear * (p1 - p0), *linear * (p2 - p0));
+        let cross = e1.cross(e2);
+        let squared = cross.length_squared();
+        let normal = cross.try_normalize()?;
+        let [a, b, c] =
+            self.mesh.triangles[self.triangle].map(|k| uvs.get(k as usize).map(f64::from));
+        let cosine = normal.dot(direction);
+        let along = (direction - normal * cosine).try_normalize();
+        let along = along.unwrap_or_else(|| normal.any_orthonormal_vector());
+        let long = along * (width / cosine.abs().max(LEAST_COSINE));
+        let short = normal.cross(along) * width;
+        let extent = [long, short].map(|axis| {
+            let x = axis.cross(e2).dot(cross) / squared;
+            let y = e1.cross(axis).dot(cross) / squared;
+            [0, 1].map(|k| x * (b[k] - a[k]) + y * (c[k] - a[k]))
+        });
+        extent.iter().flatten().all(|x| x.is_finite()).then_some(extent)
+    }
+}
+
+/// The mean of a wave that is 1 in even intervals of length 1 and −1 in odd ones, over `width` around
+/// `x`.
+pub(crate) fn mean_of_squares(x: f64, width: f64) -> f64 {
+    let (a, b) = (x - 0.5 * width, x + 0.5 * width);
+    let (low, high) = (a.floor(), b.floor());
+    if low == high || b - a <= 0.0 {
+        return if x.floor().rem_euclid(2.0) < 1.0 { 1.0 } else { -1.0 };
+    }
+    // The wave's integral from 0.
+    let integral = |x: f64| {
+        let m = x.rem_euclid(2.0);
+        if m < 1.0 { m } else { 2.0 - m }
+    };
+    ((integral(b) - integral(a)) / (b - a)).clamp(-1.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn squares_have_their_mean() {
+        assert_eq!(mean_of_squares(0.5, 0.4), 1.0);
+        assert_eq!(mean_of_squares(-0.5, 0.4), -1.0);
+        assert_eq!(mean_of_squares(1.5, 0.0), -1.0);
+        // Two whole periods, half of each sort, and three quarters of one square.
+        assert!(mean_of_squares(0.3, 4.0).abs() < 1e-15);
+        assert!(mean_of_squares(1.0, 1.0).abs() < 1e-15);
+        assert!((mean_of_squares(0.75, 1.0) - 0.5).abs() < 1e-15);
+        assert!(mean_of_squares(0.1, 1e6).abs() < 1e-6);
+    }
+}
