@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# bench-peers.sh [ARGUMENT...]: other programs at the same job, by benches/peers.py, which takes the
-# arguments. What is missing for them is installed or, where that cannot be, said.
+# bench-peers.sh [ARGUMENT...]: other programs at the same job, by benches/peers.py (or what PEERS
+# names there), which takes the arguments. What is missing for them is installed or, where that cannot be, said.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/packages.sh
@@ -29,4 +29,8 @@ has_library libLLVM || need "Mitsuba's variant for processors compiles with it" 
 [ ${#missing[@]} -eq 0 ] || install_packages "${missing[@]}" || true
 
 target=${CARGO_TARGET_DIR:-target}
-python3 benches/peers.py "$target/release/etendue" "$target/release/benchmarks" "$@"
+# Where Debian has the library without the name that Mitsuba looks for.
+for library in /usr/lib/*/libLLVM.so.19.1; do
+    [ ! -e "$library" ] || export DRJIT_LIBLLVM_PATH="${DRJIT_LIBLLVM_PATH:-$library}"
+done
+python3 "benches/${PEERS:-peers.py}" "$target/release/etendue" "$target/release/benchmarks" "$@"

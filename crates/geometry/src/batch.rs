@@ -61,6 +61,18 @@ impl RayBatch {
         self.t_max.clear();
     }
 
+    /// Takes the rays of `other`; memory is kept.
+    pub fn copy_from(&mut self, other: &Self) {
+        let arrays = self.origin.iter_mut().chain(&mut self.direction);
+        for (own, other) in arrays.zip(other.origin.iter().chain(&other.direction)) {
+            own.clone_from(other);
+        }
+        self.t_min.clone_from(&other.t_min);
+        self.t_max.clone_from(&other.t_max);
+        self.coherent = other.coherent;
+        self.from_surface = other.from_surface;
+    }
+
     /// Appends a ray from `origin` along the unit vector `direction`, without limits.
     pub fn push(&mut self, origin: DVec3, direction: DVec3) {
         self.push_between(origin, direction, 0.0, f64::INFINITY);

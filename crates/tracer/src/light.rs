@@ -217,6 +217,12 @@ impl Lights {
         self.picker.is_empty()
     }
 
+    /// Whether a ray that nobody aimed may come upon a light: not upon points and parallel light.
+    #[must_use]
+    pub fn can_be_met(&self) -> bool {
+        self.environment.is_some() || !self.triangles.is_empty()
+    }
+
     /// How many emissive triangles there are.
     #[must_use]
     pub fn emissive_triangles(&self) -> usize {

@@ -234,6 +234,8 @@ pub(crate) fn trace(
         beam.samples.squares(&scratch.wanted, &mut scratch.squares);
         scratch.next.clear();
         scratch.shadows.clear();
+        // From neighbouring places to lights: as coherent as what they start from.
+        scratch.shadows.rays.coherent = scratch.now.rays.coherent;
         for k in 0..scratch.alive.len() {
             tracing.step(scratch, k);
         }
@@ -253,11 +255,9 @@ struct Tracing<'a> {
 impl Tracing<'_> {
     fn start(&self, beam: &Beam<'_>, paths: &mut Paths) {
         paths.clear();
-        paths.rays.coherent = beam.rays.coherent;
+        paths.rays.copy_from(beam.rays);
         paths.rays.from_surface = false;
         for i in 0..beam.rays.len() {
-            let (t_min, t_max) = (beam.rays.t_min[i], beam.rays.t_max[i]);
-            paths.rays.push_between(beam.rays.origin(i), beam.rays.direction(i), t_min, t_max);
             paths.states.push(State {
                 ray: u32::try_from(i).unwrap_or(u32::MAX),
                 steps: 0,
@@ -321,9 +321,9 @@ impl Tracing<'_> {
         let material = around.material(&spot)?;
         let spot = Spot { footprint: now.footprint(hits, i), ..spot };
         // A surface that is only partly there shines by as much.
-        let there = || match Met::new(around, &now.rays, hits, i, None) {
-            Some(met) if material.is_pierced() => met.opacity(),
-            _ => 1.0,
+        let there = || match material.is_pierced() {
+            true => Met::new(around, &now.rays, hits, i, None).map_or(1.0, |met| met.opacity()),
+            false => 1.0,
         };
         if material.scattering == Scattering::Unlit {
             if state.density != f64::INFINITY {
@@ -426,6 +426,9 @@ impl Tracing<'_> {
         let single = scattered.density == f64::INFINITY;
         let follows = single || self.rules.follow == Follow::All;
         state.is_last = state.bounces >= self.rules.bounces || !follows;
+        if state.is_last && !single && !self.stage.lights.can_be_met() {
+            return;
+        }
         let mut most = 0.0_f64;
         for (k, lane) in throughput.iter_mut().enumerate() {
             *lane *= in_lane(self.stage.spectral, bsdf, scattered.weights, k);
@@ -481,7 +484,7 @@ impl Tracing<'_> {
         passed.resize(rays.len(), 1.0);
         open.clear();
         open.extend(0..u32::try_from(rays.len()).unwrap_or(u32::MAX));
-        again.clone_from(rays);
+        again.copy_from(rays);
         for layer in 0..MOST_LAYERS {
             self.stage.accel.closest(again, hits);
             if layer > 0 {

@@ -4,12 +4,14 @@
 //! benchmarks [--quick] [--rounds N] [--output docs/benchmarks.md]
 //! benchmarks models FOLDER [--triangles N]     the models and scenes that other programs are given
 //! benchmarks memory SCENE                      memory after each stage of a render, as JSON
+//! benchmarks light-rays SCENE --light X,Y,Z    the bare loop over a lens' rays and shadow rays
 //! ```
 
 mod build;
 mod findings;
 mod first_light;
 mod goals;
+mod light;
 mod load;
 mod page;
 mod threads;
@@ -53,6 +55,18 @@ enum Command {
         /// How heavy
         #[arg(long, default_value_t = 1_000_000)]
         triangles: u64,
+    },
+    /// Print as JSON what Embree's bare loop takes for a camera's rays over the blob, and for one
+    /// ray from each hit to a light
+    LightRays {
+        /// The scene that has the camera
+        scene: PathBuf,
+        /// How heavy the blob is
+        #[arg(long, default_value_t = 1_000_000)]
+        triangles: u64,
+        /// Where the light is (m): X,Y,Z
+        #[arg(long, value_delimiter = ',', num_args = 3, default_values_t = [1.0, 2.0, 1.5])]
+        light: Vec<f64>,
     },
     /// Print the memory of this process after each stage of a render
     Memory {
@@ -100,6 +114,10 @@ fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     match &arguments.command {
         Some(Command::Models { folder, triangles }) => return write_models(folder, *triangles),
+        Some(Command::LightRays { scene, triangles, light }) => {
+            let light = etendue_geometry::glam::DVec3::from_slice(light);
+            return light::print_bound(scene, *triangles, light);
+        }
         Some(Command::Memory { scene }) => return whole::print_memory(scene),
         None => {}
     }

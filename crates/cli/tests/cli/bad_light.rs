@@ -155,7 +155,9 @@ fn surfaces_without_roughness_are_mirrors() {
         assert!((value - 1.0).abs() < 1e-6, "{value}");
     }
     let glazed = plane(r#"{"type": "gltf", "roughness": 0}"#, sky, &mut None);
-    assert!(glazed.iter().all(|p| (0.5..=1.001).contains(p)), "{glazed:?}");
+    // 16 samples of 36 pixels: their spread of 0.03 leaves the mean 0.005.
+    let mean = glazed.iter().sum::<f64>() / glazed.len() as f64;
+    assert!((0.9..=1.02).contains(&mean), "{mean}");
 }
 
 #[test]

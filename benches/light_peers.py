@@ -1,0 +1,331 @@
+#!/usr/bin/env python3
+"""Light in etendue and in Mitsuba 3, in one run, taking turns.
+
+    python3 benches/light_peers.py ETENDUE BENCHMARKS [--rounds N] [--output docs/benchmarks-light.md]
+
+The job: a matte blob of a million triangles through a thin lens, 512 x 512 pixels of 64 samples,
+under a point light and under a square lamp, by direct light and by paths of five bounces. Timed is
+tracing alone, from a built structure to pixels: for etendue the `render` stage of its own report, for
+Mitsuba `render` of a loaded scene, once warmed up. Both on all cores, in processes of their own.
+
+How noisy a picture is: two renders with different seeds, the root of the mean square of their
+difference over the root of two, relative to the mean. Where the noise differs, time times its square
+is the cost of one error.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import peers  # noqa: E402
+
+SIDE, SAMPLES = 512, 64
+CAMERA = {"from": [0.7, 0.9, 2.6], "look_at": [0, 0, 0], "fov": 28.0, "focal_length": 50.0,
+          "f_number": 2.8, "focus": 2.4}
+COLOR = [0.8, 0.4, 0.3]
+POINT = {"at": [1.0, 2.0, 1.5], "intensity": 8.0}
+# A square of one metre, centred and turned towards the blob.
+LAMP = {"at": [1.0, 2.0, 1.5], "radiance": 6.0, "side": 1.0}
+JOBS = {
+    "direct, point light": ("point", 1),
+    "direct, area light": ("area", 1),
+    "path, point light": ("point", 5),
+    "path, area light": ("area", 5),
+}
+VARIANTS = {"mitsuba_llvm": "llvm_ad_rgb", "mitsuba_scalar": "scalar_rgb"}
+
+
+def lamp_rows():
+    """Where the lamp stands: rows of the matrix that turns +z of a square at the blob."""
+    import numpy as np
+
+    at = np.array(LAMP["at"])
+    z = -at / np.linalg.norm(at)
+    x = np.cross([0.0, 1.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = x, np.cross(z, x), z, at
+    return matrix
+
+
+def scene(job, model):
+    """The job as a scene of etendue."""
+    light, bounces = JOBS[job]
+    objects = [{"file": model, "material": "clay"}]
+    materials = {"clay": {"type": "matte", "color": COLOR}}
+    lights = []
+    if light == "point":
+        lights.append({"type": "point", "at": POINT["at"], "intensity": [POINT["intensity"]] * 3})
+    else:
+        objects.append({"shape": "rectangle", "width": LAMP["side"], "height": LAMP["side"],
+                        "material": "lamp", "transform": {"matrix": lamp_rows().tolist()}})
+        materials["lamp"] = {"type": "emissive", "radiance": [LAMP["radiance"]] * 3}
+    tracer = {"type": "direct"} if bounces == 1 else {"type": "path", "max_bounces": bounces}
+    return {
+        "etendue": 1,
+        "camera": {
+            "type": "thin_lens", "focal_length": CAMERA["focal_length"],
+            "f_number": CAMERA["f_number"], "fov": CAMERA["fov"],
+            "focus_distance": CAMERA["focus"],
+            "pose": {"from": CAMERA["from"], "look_at": CAMERA["look_at"]},
+            "sensor": {"resolution": [SIDE, SIDE]},
+        },
+        "tracer": tracer, "objects": objects, "materials": materials, "lights": lights,
+        "render": {"samples": SAMPLES},
+    }
+
+
+class Mitsuba:
+    """The same scene by Mitsuba's own parts."""
+
+    def __init__(self, folder, variant):
+        import mitsuba
+
+        mitsuba.set_variant(variant)
+        self.mitsuba, self.folder, self.scenes = mitsuba, folder, {}
+
+    def load(self, job):
+        mi = self.mitsuba
+        light, bounces = JOBS[job]
+        frame = mi.ScalarTransform4f().look_at(CAMERA["from"], CAMERA["look_at"], [0, 1, 0])
+        aperture = 1e-3 * CAMERA["focal_length"] / CAMERA["f_number"] / 2
+        parts = {
+            "type": "scene",
+            # A depth of 2 is one surface; the emitter and the surface are sampled once each.
+            "integrator": {"type": "path", "max_depth": bounces + 1},
+            "sensor": {
+                "type": "thinlens", "fov": CAMERA["fov"], "to_world": frame,
+                "aperture_radius": aperture, "focus_distance": CAMERA["focus"],
+                "sampler": {"type": "independent"},
+                "film": {"type": "hdrfilm", "width": SIDE, "height": SIDE, "pixel_format": "rgb",
+                         "rfilter": {"type": "box"}},
+            },
+            "blob": {"type": "ply", "filename": str(self.folder / "blob.ply"),
+                     "face_normals": True,
+                     "bsdf": {"type": "twosided", "inner": {
+                         "type": "diffuse", "reflectance": {"type": "rgb", "value": COLOR}}}},
+        }
+        if light == "point":
+            parts["light"] = {"type": "point", "position": POINT["at"],
+                              "intensity": {"type": "rgb", "value": [POINT["intensity"]] * 3}}
+        else:
+            matrix = lamp_rows()
+            matrix[:3, :2] *= LAMP["side"] / 2
+            parts["light"] = {
+                "type": "rectangle", "to_world": mi.ScalarTransform4f(matrix),
+                "emitter": {"type": "area", "radiance": {
+                    "type": "rgb", "value": [LAMP["radiance"]] * 3}}}
+        self.scenes[job] = mi.load_dict(parts)
+
+    def trace(self, job, seed):
+        import numpy as np
+
+        return np.array(self.mitsuba.render(self.scenes[job], spp=SAMPLES, seed=seed))
+
+
+def serve(peer, folder):
+    """Carries out one command a line from standard input; answers its seconds, the picture's file."""
+    import time
+
+    import numpy as np
+
+    subject = Mitsuba(Path(folder), VARIANTS[peer])
+    for line in sys.stdin:
+        word, job, seed = json.loads(line)
+        if word == "load":
+            subject.load(job)
+            print(json.dumps([0, ""]), flush=True)
+            continue
+        start = time.perf_counter()
+        image = subject.trace(job, seed)
+        seconds = time.perf_counter() - start
+        name = str(Path(folder) / f"{peer}.npy")
+        np.save(name, image)
+        print(json.dumps([seconds, name]), flush=True)
+
+
+class Peer(peers.Peer):
+    """A Mitsuba in a process of its own, told jobs and seeds."""
+
+    def __init__(self, python, peer, folder):
+        self.process = subprocess.Popen(
+            [python, __file__, "--serve", peer, folder], text=True, env=dict(os.environ),
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+    def tell(self, *words):
+        try:
+            self.process.stdin.write(json.dumps(words) + "\n")
+            self.process.stdin.flush()
+        except BrokenPipeError:
+            pass
+        for line in self.process.stdout:
+            if line.startswith("["):
+                return json.loads(line)
+        lines = self.process.stderr.read().strip().splitlines()
+        raise RuntimeError(lines[-1] if lines else "it ended without a word")
+
+
+class Etendue:
+    """The `etendue` command, one process a run."""
+
+    def __init__(self, program, folder):
+        self.program, self.folder = program, Path(folder)
+
+    def trace(self, job, seed):
+        import numpy as np
+
+        path, report = self.folder / "scene.json", self.folder / "report.json"
+        path.write_text(json.dumps(scene(job, "blob.glb")))
+        command = [self.program, "render", path, "-o", self.folder / "out", "--outputs", "npy",
+                   "--quiet", "--report", report, "--seed", str(seed)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        report = json.loads(report.read_text())
+        return report["seconds"]["render"], np.load(self.folder / "out" / "picture.npy"), report
+
+
+def noise(one, other):
+    import numpy as np
+
+    difference = np.sqrt(np.mean((one - other) ** 2) / 2)
+    return float(difference / np.mean(one))
+
+
+def bound(program, folder, job):
+    """Seconds of all cores that Embree's bare loop takes for the rays of the first surface."""
+    path = Path(folder) / "scene.json"
+    path.write_text(json.dumps(scene(job, "blob.glb")))
+    command = [program, "light-rays", path]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    return json.loads(done.stdout)
+
+
+def measure(arguments, folder):
+    import numpy as np
+
+    python, remarks, others = peers.environment(), [], {}
+    ok, words = peers.install(python, ["mitsuba"])
+    if not ok:
+        remarks.append(f"Mitsuba is left out: pip could not install it ({words}).")
+    for peer, variant in VARIANTS.items() if ok else []:
+        title = f"Mitsuba {peers.version(python, 'mitsuba')}, {variant}"
+        process = Peer(python, peer, folder)
+        try:
+            for job in arguments.jobs:
+                process.tell("load", job, 0)
+                process.tell("trace", job, 0)
+        except RuntimeError as error:
+            remarks.append(f"{title} is left out: {error}")
+            process.end()
+            continue
+        others[title] = process
+    ours = Etendue(arguments.etendue, folder)
+    results = {}
+    for job in arguments.jobs:
+        seconds, pictures = {}, {}
+        for seed in range(arguments.rounds):
+            time, picture, report = ours.trace(job, seed)
+            seconds.setdefault("etendue", []).append(time)
+            pictures.setdefault("etendue", []).append(picture)
+            for title, process in others.items():
+                # The scalar variant takes a while: half of the rounds are enough for it.
+                if "scalar" in title and seed >= max(2, arguments.rounds // 2):
+                    continue
+                time, name = process.tell("trace", job, seed)
+                seconds.setdefault(title, []).append(time)
+                pictures.setdefault(title, []).append(np.load(name))
+        results[job] = {
+            "seconds": seconds,
+            "noise": {title: noise(*pair[:2]) for title, pair in pictures.items()},
+            "mean": {title: float(np.mean(pair)) for title, pair in pictures.items()},
+            "rays": report["rays"],
+            "bound": bound(arguments.benchmarks, folder, job),
+        }
+    for process in others.values():
+        process.end()
+    return results, remarks
+
+
+def page(results, remarks, arguments):
+    lines = [
+        "# Light, against Mitsuba 3", "",
+        "`make bench-light` measures this and writes this page: a matte blob of a million triangles "
+        f"through a thin lens, {SIDE} × {SIDE} pixels of {SAMPLES} samples, on all cores "
+        f"({os.cpu_count()}). Tracing alone, seconds, medians of {arguments.rounds} rounds (of the "
+        "scalar variant half as many) in which the programs take turns, with the fastest and the "
+        "slowest. *Noise* is the relative standard error of a pixel, from two seeds; *cost* is time "
+        "times noise squared against etendue's: how much longer the other takes to one error. etendue "
+        "draws Sobol points, measures hits in f64 and starts rays by their error bounds; Mitsuba "
+        "draws independent numbers in f32. Its thin lens does not dim towards the corners, etendue's does "
+        "by cos⁴: hence the means.", "",
+        "The bound is what Embree's bare loop takes for the same camera rays and for as many rays "
+        "from where they hit to the light, with everything else for nothing. Paths' further rays "
+        "are not in it.", "",
+    ]
+    for job, result in results.items():
+        middle = {title: statistics.median(all) for title, all in result["seconds"].items()}
+        own = middle["etendue"] * result["noise"]["etendue"] ** 2
+        lines += [f"## {job[0].upper() + job[1:]}", "",
+                  "| | seconds | noise | mean | etendue is faster by | cost at one error |",
+                  "|---|---|---|---|---|---|"]
+        for title, all in result["seconds"].items():
+            cost = middle[title] * result["noise"][title] ** 2 / own
+            lines.append(
+                f"| {title} | {middle[title]:.2f} ({min(all):.2f} to {max(all):.2f}) "
+                f"| {100 * result['noise'][title]:.2f} % | {result['mean'][title]:.4f} "
+                f"| {middle[title] / middle['etendue']:.2f} | {cost:.2f} |")
+        limit = result["bound"]
+        lines += ["", f"Embree's bare loop: {limit['camera']:.2f} s for the {limit['camera_rays']} "
+                  f"camera rays, {limit['shadow']:.2f} s for {limit['shadow_rays']} rays to the "
+                  f"light: {(limit['camera'] + limit['shadow']) / middle['etendue']:.0%} of "
+                  f"etendue's time, which traces {result['rays']} rays.", ""]
+    lines += goals(results) + [""] + [f"- {remark}" for remark in remarks]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def goals(results):
+    """Which goals are met."""
+    wanted = [("direct, point light", "llvm", 1.5), ("direct, area light", "llvm", 1.5),
+              ("direct, point light", "scalar", 4.0), ("direct, area light", "scalar", 4.0),
+              ("path, area light", "scalar", 3.0), ("path, area light", "llvm", 1.0)]
+    lines = ["## Goals", "", "Times faster than Mitsuba at the same samples, and to the same error.",
+             "", "| what | goal | at the same samples | to the same error | |", "|---|---|---|---|---|"]
+    for job, variant, goal in wanted:
+        result = results.get(job)
+        title = next((t for t in result["seconds"] if variant in t), None) if result else None
+        if title is None:
+            continue
+        times = (statistics.median(result["seconds"][title])
+                 / statistics.median(result["seconds"]["etendue"]))
+        error = times * (result["noise"][title] / result["noise"]["etendue"]) ** 2
+        verdict = "met" if times >= goal else "**missed**"
+        lines.append(f"| {job}, {variant} | ≥ {goal:.1f} | {times:.2f} | {error:.2f} | {verdict} |")
+    return lines
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("etendue", help="the etendue command")
+    parser.add_argument("benchmarks", help="the benchmarks command, which makes the models")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--jobs", nargs="+", choices=list(JOBS), default=list(JOBS))
+    parser.add_argument("--output", type=Path, default=peers.ROOT / "docs" / "benchmarks-light.md")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([arguments.benchmarks, "models", folder, "--triangles", "1000000"], check=True)
+        text = page(*measure(arguments, folder), arguments)
+    arguments.output.write_text(text)
+    print(text)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--serve"]:
+        serve(*sys.argv[2:4])
+    else:
+        main()
