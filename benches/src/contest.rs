@@ -20,7 +20,8 @@ use crate::rays::BATCH;
 const CHUNK: usize = 16;
 
 /// Processor time of this thread (s).
-fn thread_time() -> f64 {
+#[must_use]
+pub fn thread_time() -> f64 {
     let now = clock_gettime(ClockId::ThreadCPUTime);
     now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
 }
