@@ -193,25 +193,8 @@ impl Plan {
                 "no layer needs shading normals; they are not read",
             ),
         );
-        decide(
-            "materials and textures",
-            on(needs.materials),
-            match (needs.materials, scene.textures.len()) {
-                (true, n) if needs.light => format!("light is scattered by them; {n} images named"),
-                (true, n) => format!("a layer shows base colour; {n} images named"),
-                (false, _) => "no layer shows colour; no image is decoded".to_owned(),
-            },
-        );
-        if self.images.is_some() {
-            decide(
-                "texture filter",
-                if self.footprint { "footprint" } else { "none" },
-                either(
-                    self.footprint,
-                    "the camera tells what a sample covers",
-                    "the camera does not tell what a pixel covers",
-                ),
-            );
+        for (what, choice, because) in self.explain_textures(scene, needs) {
+            decide(what, choice, because);
         }
         decide(
             "build quality",
@@ -242,6 +225,31 @@ impl Plan {
                 "NPY files hold what was computed",
             ),
         );
+        decisions
+    }
+
+    /// What is read of materials, and how images are looked up.
+    fn explain_textures(
+        &self,
+        scene: &Scene,
+        needs: Needs,
+    ) -> Vec<(&'static str, &'static str, String)> {
+        let because = match (needs.materials, scene.textures.len()) {
+            (true, n) if needs.light => format!("light is scattered by them; {n} images named"),
+            (true, n) => format!("a layer shows base colour; {n} images named"),
+            (false, _) => "no layer shows colour; no image is decoded".to_owned(),
+        };
+        let on = if needs.materials { "on" } else { "off" };
+        let mut decisions = vec![("materials and textures", on, because)];
+        if self.images.is_some() {
+            let reason = either(
+                self.footprint,
+                "the camera tells what a sample covers",
+                "the camera does not tell what a pixel covers",
+            );
+            let choice = if self.footprint { "footprint" } else { "none" };
+            decisions.push(("texture filter", choice, reason));
+        }
         decisions
     }
 
