@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render test test-embree4 bench bench-peers bench-light bench-sensor docs-figures clean
+.PHONY: help setup render test test-embree4 bench bench-peers bench-light bench-sensor docs-figures docs-stability clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -17,6 +17,7 @@ help:
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
+	@echo "make docs-stability  take every method to where it fails, at full scale, write docs/stability.md"
 	@echo "make clean         remove target/ and out/"
 
 setup:
@@ -50,7 +51,7 @@ bench-light: setup
 bench-sensor:
 	scripts/bench-sensor.sh
 
-docs-figures: setup
+docs-figures: setup docs-stability
 	cargo run --release -p etendue -- render scenes/first-light.json -o out/docs-figures \
 		--set 'camera.sensor.resolution=[640,640]' --samples 16 --outputs png
 	install -D -m 644 out/docs-figures/picture.png docs/images/first-light.png
@@ -63,6 +64,10 @@ docs-figures: setup
 			--outputs png && \
 		install -D -m 644 out/docs-figures/$$kind/raw.preview.png docs/images/$$kind.png || exit 1; \
 	done
+
+# A few minutes: every case of tests/stability at full scale.
+docs-stability: setup
+	cargo run --release -p etendue-stability -- $(ARGS)
 
 clean:
 	rm -rf target out

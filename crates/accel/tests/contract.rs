@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 #[cfg(feature = "embree")]
 use etendue_accel::Embree;
 use etendue_accel::{Accel, BuildError, BuildOptions, Bvh, Exact, watertight};
-use etendue_geometry::glam::{DMat3, DQuat, DVec3};
-use etendue_geometry::{Detail, Geometry, HitBatch, MISS, Positions, RayBatch, Transform};
+use etendue_geometry::glam::{DQuat, DVec3};
+use etendue_geometry::{Detail, Geometry, HitBatch, MISS, RayBatch, Transform};
 use meshes::{Random, at, blob, mesh, placed, rays, scene, soup};
 
 type Build = fn(Arc<Geometry>, &BuildOptions) -> Result<Box<dyn Accel>, BuildError>;
@@ -234,49 +234,6 @@ fn backends_agree_on_blobs_soups_and_instances() {
 }
 
 #[test]
-fn far_placements_lose_nothing() {
-    let here = scene(vec![blob(20)]);
-    let near_rays = rays(3000, DVec3::ZERO, 1.0, 31);
-    let near = Exact::build(Arc::clone(&here), &BuildOptions::default()).expect("sound");
-    let near = closest(&near, &near_rays);
-    for distance in [1e4, 1e6, 1e7] {
-        // A whole number of metres, so the rays' origins can follow exactly to 2⁻²⁹ m.
-        let place = DVec3::new(distance, -distance, distance + 3.0);
-        let there = at(vec![blob(20)], vec![placed(0, Transform::new(DMat3::IDENTITY, place))]);
-        let mut far_rays = RayBatch::with_capacity(near_rays.len());
-        for i in 0..near_rays.len() {
-            let (t_min, t_max) = (near_rays.t_min[i], near_rays.t_max[i]);
-            let origin = near_rays.origin(i) + place;
-            far_rays.push_between(origin, near_rays.direction(i), t_min, t_max);
-        }
-        assert_all_agree(&there, &far_rays, &format!("at {distance:e} m"));
-        for (name, accel) in each(&there) {
-            let far = closest(&*accel, &far_rays);
-            for i in (0..far_rays.len()).filter(|&i| near.is_hit(i) && far.is_hit(i)) {
-                // The near ray from the very place the far ray starts at.
-                let moved = far_rays.origin(i) - place;
-                let exact = closest_on(&near, &near_rays, i, moved, &here.meshes[0]);
-                let error = exact.map_or(0.0, |t| (t - far.t[i]).abs());
-                assert!(error <= 1e-9, "{name} at {distance:e} m: ray {i} is off by {error:e} m");
-            }
-        }
-    }
-}
-
-/// The distance from `origin` to the triangle that ray `i` hit.
-fn closest_on(
-    hits: &HitBatch,
-    rays: &RayBatch,
-    i: usize,
-    origin: DVec3,
-    mesh: &etendue_geometry::Mesh,
-) -> Option<f64> {
-    let corners = mesh.corners(hits.triangle[i] as usize);
-    let [a, b, c] = corners.map(|corner| corner - origin);
-    watertight::intersect(a, b, c, rays.direction(i)).map(|hit| hit.t)
-}
-
-#[test]
 fn far_instances_and_scattered_scenes_agree() {
     let mut random = Random(41);
     let place = |p: DVec3, random: &mut Random| {
@@ -298,35 +255,6 @@ fn far_instances_and_scattered_scenes_agree() {
         assert_agreement(&geometry, &rays, "scattered", Found::NotInF32);
         assert_bvh_equals_exact(&geometry, &rays, "scattered");
     }
-}
-
-#[test]
-fn sizes_from_micrometres_to_megametres_agree() {
-    for size in [1e-6, 1e-3, 1e3, 1e6] {
-        let transform = Transform::from_trs(DVec3::ZERO, DQuat::IDENTITY, DVec3::splat(size));
-        let geometry = at(vec![blob(20)], vec![placed(0, transform)]);
-        assert_all_agree(&geometry, &rays(2000, DVec3::ZERO, size, 47), &format!("size {size:e}"));
-        let twice = at(vec![blob(20)], vec![placed(0, transform), placed(0, transform)]);
-        assert_all_agree(&twice, &rays(2000, DVec3::ZERO, size, 48), &format!("twice {size:e}"));
-    }
-}
-
-#[test]
-fn rays_along_axes_with_zeros_of_either_sign_hit() {
-    let geometry = scene(vec![blob(12)]);
-    let mut batch = RayBatch::default();
-    for zero in [0.0, -0.0, 1e-300, -1e-42] {
-        for k in 0..40 {
-            let s = f64::from(k) / 40.0 - 0.5;
-            batch.push(DVec3::new(s, 0.0, 3.0), DVec3::new(zero, zero, -1.0));
-            batch.push(DVec3::new(s, s, -3.0), DVec3::new(zero, -zero, 1.0));
-            batch.push(DVec3::new(-3.0, 0.0, s), DVec3::new(1.0, zero, zero));
-            batch.push(DVec3::new(0.0, 3.0, s), DVec3::new(-zero, -1.0, zero));
-        }
-    }
-    assert_all_agree(&geometry, &batch, "axes");
-    let hits = closest(&*each(&geometry)[1].1, &batch);
-    assert!((0..batch.len()).all(|i| hits.is_hit(i)), "all of them aim at the inside");
 }
 
 /// From a hit onwards: without a limit the same place again, at a distance of a rounding or none;
@@ -361,64 +289,6 @@ fn limits_are_inclusive() {
     }
 }
 
-/// Triangles a million times as long as wide, and some without any area at all.
-#[test]
-fn needles_and_degenerate_triangles_agree() {
-    let mut random = Random(59);
-    let mut positions = Vec::new();
-    for i in 0..2000 {
-        let tip = random.cube();
-        let along = random.direction();
-        let across = random.direction().cross(along).normalize() * 1e-6;
-        let corners = match i % 10 {
-            0 => [tip, tip, tip],
-            1 => [tip, tip + along, tip + along],
-            2 => [tip, tip + along, tip + along * 0.5],
-            _ => [tip, tip + along + across, tip + along - across],
-        };
-        positions.extend(corners.map(|p| p.to_array().map(|c| c as f32)));
-    }
-    let triangles: Vec<[u32; 3]> = (0..2000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-    let needles = mesh("needles", &positions, triangles.clone());
-    // Aimed at, because by chance no ray would meet a needle.
-    let mut batch = RayBatch::default();
-    for triangle in 0..2000 {
-        let [a, b, c] = needles.corners(triangle);
-        let origin = random.direction() * 4.0;
-        batch.push(origin, ((a + b * 2.0 + c * 2.0) / 5.0 - origin).normalize());
-    }
-    let geometry = scene(vec![needles, blob(8)]);
-    // A needle of 10⁻⁶ is thinner than f32 resolves at a distance of 4.
-    assert_agreement(&geometry, &batch, "needles", Found::NotInF32);
-    assert_bvh_equals_exact(&geometry, &batch, "needles");
-}
-
-#[test]
-fn ties_go_to_the_lowest_placement_and_triangle() {
-    // Each triangle three times in the mesh, and the mesh three times in the same place.
-    let once = blob(6);
-    let Positions::F32(vertices) = &once.positions else { unreachable!() };
-    let positions: Vec<[f32; 3]> = (0..vertices.len()).map(|i| vertices.get(i)).collect();
-    let count = once.triangles.len() as u32;
-    let thrice: Vec<[u32; 3]> = (0..3).flat_map(|_| once.triangles.iter().copied()).collect();
-    let thrice = mesh("thrice", &positions, thrice);
-    let turned = Transform::from_trs(DVec3::X, DQuat::from_rotation_y(0.3), DVec3::splat(0.7));
-    for transform in [Transform::IDENTITY, turned] {
-        let placements = vec![placed(0, transform); 3];
-        let geometry = at(vec![thrice.clone()], placements);
-        let batch = rays(1000, transform.translation, 1.0, 61);
-        assert_all_agree(&geometry, &batch, "thrice in one place");
-        for (name, accel) in each(&geometry) {
-            let hits = closest(&*accel, &batch);
-            for i in (0..batch.len()).filter(|&i| hits.is_hit(i)) {
-                assert_eq!(hits.placement[i], 0, "{name}: ray {i}");
-                // Embree keeps whichever of a mesh's own copies it meets first.
-                assert!(hits.triangle[i] < count || name == "embree", "{name}: ray {i}");
-            }
-        }
-    }
-}
-
 #[test]
 fn mirrored_and_flattened_placements_agree() {
     let mut random = Random(67);
@@ -436,51 +306,6 @@ fn mirrored_and_flattened_placements_agree() {
         let rays = rays(3000, DVec3::ZERO, 1.5, 71);
         assert_all_agree(&geometry, &rays, "mirrored and flattened");
         assert_bvh_equals_exact(&geometry, &rays, "mirrored and flattened");
-    }
-}
-
-/// The outside of a closed mesh stays outside under mirrors: seen from outside, normals face the
-/// viewer.
-#[test]
-fn normals_lie_on_the_front() {
-    for scale in [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, -2.0, 1.0)] {
-        for copies in [1, 2] {
-            let transform = Transform::from_trs(DVec3::ONE, DQuat::from_rotation_x(1.0), scale);
-            let geometry = at(vec![blob(12)], vec![placed(0, transform); copies]);
-            let mut batch = RayBatch::default();
-            let mut random = Random(73);
-            for _ in 0..500 {
-                let away = random.direction();
-                batch.push(DVec3::ONE + away * 5.0, -away);
-            }
-            for (name, accel) in each(&geometry) {
-                let hits = closest(&*accel, &batch);
-                for i in 0..batch.len() {
-                    let facing = hits.normal(i).dot(batch.direction(i));
-                    assert!(facing < 0.0, "{name}, {scale}: ray {i} sees the back");
-                    assert!((hits.normal(i).length() - 1.0).abs() < 1e-14, "{name}: unit");
-                }
-            }
-        }
-    }
-}
-
-#[test]
-fn empty_things_and_batches_of_every_length_work() {
-    let nothing = mesh("nothing", &[], vec![]);
-    let one = mesh("one", &[[-1., -1., 1.], [1., -1., 1.], [0., 1., 1.]], vec![[0, 1, 2]]);
-    let point = mesh("point", &[[1.0, 1.0, 1.0]], vec![[0, 0, 0]]);
-    for (what, geometry) in [
-        ("no geometry", Arc::new(Geometry::default())),
-        ("mesh without triangles", scene(vec![nothing.clone()])),
-        ("mesh that is not placed", at(vec![one.clone()], vec![])),
-        ("one triangle", scene(vec![one.clone()])),
-        ("one point", scene(vec![point])),
-        ("one triangle among nothing", scene(vec![nothing, one])),
-    ] {
-        for count in [0, 1, 7, 16, 17, 300] {
-            assert_all_agree(&geometry, &rays(count, DVec3::ZERO, 1.0, 79), what);
-        }
     }
 }
 
@@ -505,51 +330,6 @@ fn senseless_rays_miss() {
         let hits = closest(&*accel, &batch);
         let hit: Vec<usize> = (0..batch.len()).filter(|&i| hits.is_hit(i)).collect();
         assert_eq!(hit, [0, 3, 6, batch.len() - 1], "{name}");
-    }
-}
-
-/// No ray aimed exactly at a corner or an edge of a closed mesh gets through, from outside or from
-/// inside, wherever the mesh stands.
-#[test]
-fn closed_meshes_do_not_leak() {
-    let closed = blob(12);
-    let turned = Transform::from_trs(
-        DVec3::new(1e5, 3.0, -7e6),
-        DQuat::from_rotation_y(0.7),
-        DVec3::new(1.0, -1.5, 0.8),
-    );
-    let mut random = Random(83);
-    for transform in [Transform::IDENTITY, turned] {
-        for copies in [1, 2] {
-            let geometry = at(vec![closed.clone()], vec![placed(0, transform); copies]);
-            let mut batch = RayBatch::default();
-            for triangle in 0..closed.triangles.len() {
-                let corners = closed.corners(triangle).map(|p| transform.point(p));
-                let away = random.direction();
-                for k in 0..3 {
-                    let middle = (corners[k] + corners[(k + 1) % 3]) / 2.0;
-                    for target in [corners[k], middle] {
-                        let inside = transform.point(away * 0.3);
-                        batch.push(inside, (target - inside).normalize());
-                        // From ahead, so that the target is no silhouette.
-                        let local = closed.corners(triangle)[k];
-                        let outside = transform.point(local * 4.0 + away * 0.3);
-                        batch.push(outside, (target - outside).normalize());
-                    }
-                }
-            }
-            for (name, accel) in each(&geometry) {
-                for coherent in [false, true] {
-                    batch.coherent = coherent;
-                    let hits = closest(&*accel, &batch);
-                    let leaks = (0..batch.len()).filter(|&i| !hits.is_hit(i)).count();
-                    assert_eq!(leaks, 0, "{name}, coherent {coherent}, of {} rays", batch.len());
-                    let mut blocked = Vec::new();
-                    accel.occluded(&batch, &mut blocked);
-                    assert!(blocked.iter().all(|&b| b), "{name}, coherent {coherent}: occlusion");
-                }
-            }
-        }
     }
 }
 

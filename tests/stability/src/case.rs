@@ -1,0 +1,80 @@
+//! A case, and what comes of it.
+
+use std::fmt;
+
+/// How much a case does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// Enough to fail when something is wrong: the tests, on every change.
+    Quick,
+    /// What the page states.
+    Full,
+}
+
+impl Scale {
+    /// The number for this scale.
+    #[must_use]
+    pub fn pick<T>(self, quick: T, full: T) -> T {
+        match self {
+            Self::Quick => quick,
+            Self::Full => full,
+        }
+    }
+}
+
+/// Cases of one method.
+#[derive(Debug)]
+pub struct Method {
+    /// What it is called on the page.
+    pub name: &'static str,
+    /// Its cases.
+    pub cases: &'static [Case],
+}
+
+/// A regime in which a method may fail.
+#[derive(Debug)]
+pub struct Case {
+    /// One word for tests and page, unlike any other of its method.
+    pub name: &'static str,
+    /// Where the method is taken.
+    pub regime: &'static str,
+    /// What must happen there. For a known limit, what still has to hold.
+    pub must: &'static str,
+    /// Why it is no better, where it is not mended.
+    pub limit: Option<&'static str>,
+    /// Goes there. An error means that it could not even be tried.
+    pub run: fn(Scale) -> anyhow::Result<Outcome>,
+}
+
+/// What a case found.
+#[derive(Debug, Default)]
+pub struct Outcome {
+    measured: Vec<String>,
+    violations: Vec<String>,
+}
+
+impl Outcome {
+    /// Notes something measured, in words.
+    pub fn measured(&mut self, what: impl Into<String>) {
+        self.measured.push(what.into());
+    }
+
+    /// Notes that something which must hold does not.
+    pub fn must(&mut self, holds: bool, otherwise: impl FnOnce() -> String) {
+        if !holds {
+            self.violations.push(otherwise());
+        }
+    }
+
+    /// What did not hold.
+    #[must_use]
+    pub fn violations(&self) -> &[String] {
+        &self.violations
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.measured.join("; "))
+    }
+}

@@ -1,0 +1,196 @@
+//! Lights nearer than near, and a sky that is one pixel.
+
+use std::f64::consts::PI;
+
+use anyhow::Result;
+
+use crate::rendered::{Pixels, load, patch};
+use crate::{Case, Outcome, Scale};
+
+pub(super) const ON_A_SURFACE: Case = Case {
+    name: "lamp_over_a_surface",
+    regime: "a lamp of 1 m square, 1 m to 10⁻⁶ m over a matte floor, seen through the gap",
+    must: "the floor shows ρ L times the form factor of the square (Howell, B-3), within 4 standard \
+        errors; no sparkles: no pixel is beyond 1.5 times the mean",
+    limit: None,
+    run: on_a_surface,
+};
+
+pub(super) const POINT_ON_A_SURFACE: Case = Case {
+    name: "point_light_on_a_surface",
+    regime: "a point light 1 m, 10⁻⁶, 10⁻¹² and 10⁻³⁰ m over a floor, in its plane, and under it",
+    must: "all numbers are finite; 1 m away the law of cosines to 10⁻⁶; under the floor it is dark",
+    limit: None,
+    run: point_on_a_surface,
+};
+
+pub(super) const TOUCHING: Case = Case {
+    name: "lamp_that_touches",
+    regime: "a lamp that stands on the floor: the corner between both, where the distance goes to 0",
+    must: "the floor shows ρ L/2 at the corner, within 4 standard errors and 1 %; all numbers are finite",
+    limit: None,
+    run: touching,
+};
+
+pub(super) const ONE_BRIGHT_PIXEL: Case = Case {
+    name: "one_bright_pixel_of_sky",
+    regime: "an environment image of 256 × 128 and 2048 × 1024 pixels, black but for one of 10⁶",
+    must: "a matte floor under it shows the integral of that pixel within 4 standard errors, and pixels \
+        differ by no more than 10 % of it",
+    limit: None,
+    run: one_bright_pixel,
+};
+
+/// The form factor of a square of side 1 from a point under its middle, `h` below.
+fn form_factor(h: f64) -> f64 {
+    let x = 0.5 / h;
+    let root = (1.0 + x * x).sqrt();
+    // Four corners, each X/√(1 + X²) · atan(X/√(1 + X²)) / π.
+    4.0 / PI * (x / root) * (x / root).atan()
+}
+
+fn on_a_surface(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    for gap in [1.0, 1e-1, 1e-2, 1e-4, 1e-6] {
+        // A camera in the gap that looks down at the point under the lamp's middle.
+        let text = format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "direct"}},
+            "camera": {{"type": "pinhole", "fov": 1,
+                "pose": {{"from": [0, 0, {}], "look_at": [0, 0, 0], "up": [0, 1, 0]}},
+                "sensor": {{"resolution": [8, 8]}}}},
+            "lights": [],
+            "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "m"}},
+                {{"shape": "rectangle", "material": "lamp",
+                  "transform": {{"translate": [0, 0, {gap}], "rotate": [0, 1, 0, 180]}}}}],
+            "materials": {{"m": {{"type": "matte", "color": [0.8, 0.8, 0.8]}},
+                "lamp": {{"type": "emissive", "radiance": [5, 5, 5]}}}},
+            "render": {{"samples": {}}}}}"#,
+            gap / 2.0,
+            scale.pick(256, 16_384)
+        );
+        let seen = Pixels::read(&text)?;
+        let known = 0.8 * 5.0 * form_factor(gap);
+        let (mean, error) = (seen.mean(), seen.standard_error());
+        outcome.must(seen.are_sound(), || format!("at {gap} m: not finite"));
+        // The patch is 10⁻² of the gap wide, of which the form factor knows the square.
+        let bound = 4.0 * error + 1e-4 * known;
+        let holds = (mean - known).abs() <= bound;
+        outcome.must(holds, || format!("at {gap} m: {mean} ± {error}, not {known}"));
+        outcome.must(seen.most() <= 1.5 * mean, || format!("at {gap} m: {}", seen.most()));
+        let off = mean / known - 1.0;
+        outcome.measured(format!("{gap:.0e} m: {off:+.1e} off, ± {:.0e}", error / known));
+    }
+    Ok(outcome)
+}
+
+fn point_on_a_surface(_: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    for height in [1.0, 1e-6, 1e-12, 1e-30, 0.0, -1e-6] {
+        let rest = format!(
+            r#""lights": [{{"type": "point", "at": [0, 0, {height:?}], "intensity": [1, 1, 1]}}],
+            "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "m"}}],
+            "materials": {{"m": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}}"#
+        );
+        let eye = [[1.0, 0.5, 3.0], [0.0; 3]];
+        let seen = Pixels::read(&patch(r#"{"type": "direct"}"#, 64, eye, &rest))?;
+        outcome.must(seen.are_sound(), || format!("at {height:e} m: not finite"));
+        let mean = seen.mean();
+        if height == 1.0 {
+            let off = mean / (0.5 / PI) - 1.0;
+            outcome.must(off.abs() <= 1e-6, || format!("at 1 m: {off:e} off"));
+        }
+        outcome.must(height >= 0.0 || mean == 0.0, || format!("under the floor: {mean}"));
+        outcome.measured(format!("{height:.0e} m: {mean:.1e}"));
+    }
+    Ok(outcome)
+}
+
+fn touching(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    for away in [1e-3, 1e-6, 1e-9] {
+        // The lamp stands in the plane x = 0 and shines along +x over the floor z = 0.
+        let text = format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "direct"}},
+            "camera": {{"type": "orthographic", "height": {},
+                "pose": {{"from": [3, 0, 3], "look_at": [{away:?}, 0, 0], "up": [0, 0, 1]}},
+                "sensor": {{"resolution": [8, 8]}}}},
+            "lights": [],
+            "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "m"}},
+                {{"shape": "rectangle", "width": 8, "height": 8, "material": "lamp",
+                  "transform": {{"translate": [0, 0, 4], "rotate": [0, 1, 0, 90]}}}}],
+            "materials": {{"m": {{"type": "matte", "color": [0.8, 0.8, 0.8]}},
+                "lamp": {{"type": "emissive", "radiance": [5, 5, 5]}}}},
+            "render": {{"samples": {}}}}}"#,
+            away / 10.0,
+            scale.pick(256, 65_536)
+        );
+        let seen = Pixels::read(&text)?;
+        outcome.must(seen.are_sound(), || format!("at {away:e} m: not finite"));
+        let (mean, error) = (seen.mean(), seen.standard_error());
+        let known = 0.8 * 5.0 / 2.0;
+        let holds = (mean - known).abs() <= 4.0 * error + 0.01 * known;
+        outcome.must(holds, || format!("at {away:e} m: {mean} ± {error}, not {known}"));
+        let off = mean / known - 1.0;
+        outcome.measured(format!("{away:.0e} m: {off:+.1e} off, ± {:.0e}", error / known));
+    }
+    Ok(outcome)
+}
+
+/// The irradiance on a floor that faces +y, of one pixel of the sky's image at `row`, radiance 1: an
+/// image is interpolated between the middles of its pixels, so the pixel is a tent.
+fn irradiance(row: f64, [width, height]: [f64; 2]) -> f64 {
+    let steps = 1_000;
+    let tent = |k: i32| {
+        let t = (f64::from(k) + 0.5) / f64::from(steps) * 2.0 - 1.0;
+        let theta = PI * (row + 0.5 + t) / height;
+        (1.0 - t.abs()) * theta.cos() * theta.sin() * 2.0 / f64::from(steps)
+    };
+    (0..steps).map(tent).sum::<f64>() * (2.0 * PI / width) * (PI / height)
+}
+
+fn one_bright_pixel(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    let sizes: &[[u16; 2]] = scale.pick(&[[256, 128]], &[[256, 128], [2048, 1024]]);
+    for &[width, height] in sizes {
+        let (column, row) = (width / 3, height / 4);
+        let folder = tempfile::tempdir()?;
+        let dark = image::Rgb([0.0_f32; 3]);
+        let mut sky = image::Rgb32FImage::from_pixel(width.into(), height.into(), dark);
+        sky.put_pixel(column.into(), row.into(), image::Rgb([1e6; 3]));
+        write_exr(&folder.path().join("sky.exr"), &sky)?;
+        let rest = r#""lights": [{"type": "environment", "image": "sky.exr"}],
+            "objects": [{"shape": "rectangle", "width": 9, "height": 9, "material": "m",
+                "transform": {"rotate": [1, 0, 0, -90]}}],
+            "materials": {"m": {"type": "matte", "color": [0.5, 0.5, 0.5]}}"#;
+        let size = [width, height].map(f64::from);
+        let known = 0.5 / PI * 1e6 * irradiance(f64::from(row), size);
+        for tracer in ["direct", "path"] {
+            let eye = [[0.5, 3.0, 1.0], [0.0; 3]];
+            let samples = scale.pick(1_024, 16_384);
+            let tracer_spec = format!(r#"{{"type": "{tracer}"}}"#);
+            let text = patch(&tracer_spec, samples, eye, rest);
+            let seen = Pixels::of(&load(folder.path(), &text)?)?;
+            let (mean, error) = (seen.mean(), seen.standard_error());
+            outcome.must(seen.are_sound(), || format!("{tracer}, {width}: not finite"));
+            let holds = (mean - known).abs() <= 4.0 * error + 1e-5 * known;
+            outcome.must(holds, || format!("{tracer}, {width}: {mean} ± {error}, not {known}"));
+            let spread = 8.0 * error / known;
+            outcome.must(spread <= 0.1, || format!("{tracer}, {width}: pixels differ by {spread}"));
+            let off = mean / known - 1.0;
+            outcome.measured(format!(
+                "{tracer}, {width} columns: {off:+.1e} off, pixels ± {spread:.0e}"
+            ));
+        }
+    }
+    Ok(outcome)
+}
+
+fn write_exr(path: &std::path::Path, image: &image::Rgb32FImage) -> Result<()> {
+    let [width, height] = [image.width(), image.height()].map(|side| side as usize);
+    exr::prelude::write_rgb_file(path, width, height, |x, y| {
+        let [x, y] = [x, y].map(|k| u32::try_from(k).unwrap_or(u32::MAX));
+        let [r, g, b] = image.get_pixel(x, y).0;
+        (r, g, b)
+    })?;
+    Ok(())
+}

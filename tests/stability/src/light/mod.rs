@@ -1,0 +1,22 @@
+//! Light transport.
+
+mod lights;
+mod paths;
+mod surfaces;
+
+use crate::Method;
+
+/// Tracers of light, materials and lights.
+pub const METHOD: Method = Method {
+    name: "Light",
+    cases: &[
+        surfaces::GRAZING,
+        surfaces::SMOOTH,
+        lights::ON_A_SURFACE,
+        lights::POINT_ON_A_SURFACE,
+        lights::TOUCHING,
+        lights::ONE_BRIGHT_PIXEL,
+        paths::FIREFLIES,
+        paths::ROULETTE,
+    ],
+};

@@ -1,0 +1,103 @@
+//! Surfaces at grazing incidence, and nearly smooth ones.
+
+use anyhow::Result;
+
+use crate::rendered::{Pixels, patch};
+use crate::{Case, Outcome, Scale};
+
+pub(super) const GRAZING: Case = Case {
+    name: "grazing_surfaces",
+    regime: "white surfaces of each material under a white sky, seen at 60 to 89.9999 degrees from the \
+        normal, roughness 0 to 1",
+    must: "all numbers are finite and none returns more than falls in, by more than 10⁻³ and 4 standard \
+        errors",
+    limit: None,
+    run: grazing,
+};
+
+pub(super) const SMOOTH: Case = Case {
+    name: "roughness_to_zero",
+    regime: "metal of roughness 0.1 to 10⁻⁸ and 0 before a lamp that fills its highlight, and half of it",
+    must: "all numbers are finite; from 10⁻³ on the picture is the mirror's, to 10⁻³ and 4 standard errors",
+    limit: None,
+    run: smooth,
+};
+
+fn materials() -> Vec<(String, String)> {
+    let mut all = vec![("matte".to_owned(), r#""type": "matte", "color": [1, 1, 1]"#.to_owned())];
+    for roughness in ["0", "0.01", "0.1", "0.5", "1"] {
+        let metal = format!(r#""type": "metal", "color": [1, 1, 1], "roughness": {roughness}"#);
+        all.push((format!("metal {roughness}"), metal));
+        for metallic in ["0", "0.5", "1"] {
+            let gltf = format!(
+                r#""type": "gltf", "color": [1, 1, 1], "metallic": {metallic}, "roughness": {roughness}"#
+            );
+            all.push((format!("gltf {metallic} {roughness}"), gltf));
+        }
+    }
+    all
+}
+
+fn grazing(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    for degrees in [60.0_f64, 85.0, 89.0, 89.9, 89.9999] {
+        let (mut most, mut worst) = (0.0_f64, String::new());
+        for (name, material) in materials() {
+            let rest = format!(
+                r#""lights": [{{"type": "environment", "radiance": [1, 1, 1]}}],
+                "objects": [{{"shape": "disk", "radius": 1000, "triangles": 4, "material": "m"}}],
+                "materials": {{"m": {{{material}}}}}"#
+            );
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let eye = [[3.0 * sin, 0.0, 3.0 * cos], [0.0; 3]];
+            let samples = scale.pick(16, 4_096);
+            let seen = Pixels::read(&patch(r#"{"type": "direct"}"#, samples, eye, &rest))?;
+            outcome.must(seen.are_sound(), || format!("{name} at {degrees}: not finite"));
+            let bound = 1.001 + 4.0 * seen.standard_error();
+            let mean = seen.mean();
+            outcome.must(mean <= bound, || format!("{name} at {degrees}: returns {mean}"));
+            outcome.must(mean > 0.1, || format!("{name} at {degrees}: returns only {mean}"));
+            if mean > most {
+                (most, worst) = (mean, name);
+            }
+        }
+        outcome.measured(format!("{degrees} degrees: at most {most:.4} returns, of {worst}"));
+    }
+    Ok(outcome)
+}
+
+fn smooth(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    // The mirror's direction meets the lamp's middle, or its edge.
+    for (what, x) in [("whole", 0.0), ("half", 2.0)] {
+        let mirror = 1.0;
+        for roughness in ["0.1", "0.01", "1e-3", "1e-4", "1e-6", "1e-8", "0"] {
+            let rest = format!(
+                r#""lights": [],
+                "objects": [{{"shape": "rectangle", "width": 1, "height": 1, "material": "m"}},
+                    {{"shape": "rectangle", "width": 4, "height": 4, "material": "lamp",
+                      "transform": {{"translate": [{}, 0, 3], "rotate": [0, 1, 0, 180]}}}}],
+                "materials": {{
+                    "m": {{"type": "metal", "color": [1, 1, 1], "roughness": {roughness}}},
+                    "lamp": {{"type": "emissive", "radiance": [1, 1, 1]}}}}"#,
+                x + 3.0
+            );
+            // At 45 degrees from the left; the mirrored ray meets z = 3 at x = 3.
+            let eye = [[-2.0, 0.0, 2.0], [0.0; 3]];
+            let samples = scale.pick(64, 16_384);
+            let seen = Pixels::read(&patch(r#"{"type": "whitted"}"#, samples, eye, &rest))?;
+            outcome.must(seen.are_sound(), || format!("{what}, {roughness}: not finite"));
+            let (mean, error) = (seen.mean(), seen.standard_error());
+            let smooth: f64 = roughness.parse()?;
+            let known = if what == "whole" { mirror } else { 0.5 };
+            // The facets of a rough highlight lose a little, and the lamp's edge is not quite amid it.
+            let bias = if what == "whole" { 1e-3 } else { 2e-2 };
+            let holds = smooth > 1e-3 || (mean - known).abs() <= bias + 4.0 * error;
+            outcome.must(holds, || format!("{what}, {roughness}: {mean} ± {error}"));
+            if smooth <= 0.01 && what == "whole" {
+                outcome.measured(format!("{roughness}: {mean:.6}"));
+            }
+        }
+    }
+    Ok(outcome)
+}

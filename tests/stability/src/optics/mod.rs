@@ -1,0 +1,30 @@
+//! Lenses.
+
+mod bench;
+mod fates;
+mod focus;
+mod openings;
+mod random;
+
+use crate::Method;
+
+/// Tracing through lens trains, their focus, pupils and openings.
+pub const METHOD: Method = Method {
+    name: "Optics",
+    cases: &[
+        fates::TOTAL_REFLECTION,
+        fates::MISSED,
+        fates::WRONG_ROOT,
+        fates::STEEP_ASPHERE,
+        fates::RIM_BEYOND_THE_RADIUS,
+        fates::FLAT,
+        fates::EQUAL_INDICES,
+        fates::CROSSING_EDGES,
+        focus::FOCUS,
+        focus::WAVELENGTH,
+        openings::CLOSED,
+        openings::F_0_5,
+        openings::ONE_PIXEL,
+        random::ANY_LENS,
+    ],
+};

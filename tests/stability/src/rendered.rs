@@ -1,0 +1,78 @@
+//! Scenes from text to pixels, by the whole program.
+
+use anyhow::{Context, Result, ensure};
+use etendue_accel::BuildOptions;
+use etendue_render::output::Outputs;
+use etendue_render::{Images, Plan, build, plan, render};
+use etendue_scene::file::SceneFile;
+use etendue_scene::{LoadOptions, Scene};
+use std::path::Path;
+
+/// A scene file's text in a folder of its own, or beside the images that it names.
+pub(crate) fn load(folder: &Path, text: &str) -> Result<Scene> {
+    let path = folder.join("scene.json");
+    std::fs::write(&path, text)?;
+    let file = SceneFile::read(&path, &[])?;
+    Ok(file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default())?)
+}
+
+/// Red of all pixels.
+#[derive(Debug)]
+pub(crate) struct Pixels {
+    pub(crate) values: Vec<f64>,
+    /// Contributions that were not finite, and were left out.
+    pub(crate) not_finite: u64,
+}
+
+impl Pixels {
+    /// Of `scene`, with the default accelerator.
+    pub(crate) fn of(scene: &Scene) -> Result<Self> {
+        let plan = Plan::new(scene, Outputs::from_list("exr").map_err(anyhow::Error::msg)?);
+        let accel = build(scene, &plan, &BuildOptions::default())?;
+        let images = Images::decode(scene, &plan);
+        ensure!(images.faults.is_empty(), "{:?}", images.faults);
+        let done = render(scene, &plan, &*accel, &images, Vec::new(), &|_| true)?;
+        let layer = done.picture.layers().first().context("a picture has a layer")?;
+        let channel = layer.channels.first().context("a layer has a channel")?;
+        let values = (0..channel.values.len()).map(|i| channel.values.at(i)).collect();
+        Ok(Self { values, not_finite: done.light.not_finite })
+    }
+
+    /// Of the scene in `text`.
+    pub(crate) fn read(text: &str) -> Result<Self> {
+        let folder = tempfile::tempdir()?;
+        Self::of(&load(folder.path(), text)?)
+    }
+
+    pub(crate) fn mean(&self) -> f64 {
+        self.values.iter().sum::<f64>() / self.values.len() as f64
+    }
+
+    /// Of the mean, from the spread of the pixels, and half a unit in the last place of the f32 that
+    /// they are kept in.
+    pub(crate) fn standard_error(&self) -> f64 {
+        let (n, mean) = (self.values.len() as f64, self.mean());
+        let squares: f64 = self.values.iter().map(|v| (v - mean) * (v - mean)).sum();
+        (squares / (n - 1.0) / n).sqrt() + 2.5e-8 * mean.abs()
+    }
+
+    pub(crate) fn most(&self) -> f64 {
+        self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Whether all numbers are, and none had to be left out.
+    pub(crate) fn are_sound(&self) -> bool {
+        self.not_finite == 0 && self.values.iter().all(|v| v.is_finite())
+    }
+}
+
+/// 8 × 8 pixels of a tiny patch around `at`, seen from `from`, and the `rest` of the scene.
+pub(crate) fn patch(tracer: &str, samples: u32, [from, at]: [[f64; 3]; 2], rest: &str) -> String {
+    format!(
+        r#"{{"etendue": 1, "tracer": {tracer},
+        "camera": {{"type": "orthographic", "height": 1e-3,
+            "pose": {{"from": {from:?}, "look_at": {at:?}, "up": [0.1, 0.2, 0.9]}},
+            "sensor": {{"resolution": [8, 8]}}}},
+        "render": {{"samples": {samples}}}, {rest}}}"#
+    )
+}
