@@ -6,7 +6,8 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render test test-embree4 bench bench-peers bench-light bench-sensor docs-figures docs-stability clean
+.PHONY: help setup render test test-embree4 bench bench-peers bench-light bench-sensor docs-figures docs-charts \
+	docs-stability clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -17,6 +18,7 @@ help:
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
+	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
 	@echo "make docs-stability  take every method to where it fails, at full scale, write docs/stability.md"
 	@echo "make clean         remove target/ and out/"
 
@@ -51,7 +53,11 @@ bench-light: setup
 bench-sensor:
 	scripts/bench-sensor.sh
 
-docs-figures: setup docs-stability
+# ARGS=--quick takes lighter meshes
+docs-charts: setup
+	cargo run --release -p etendue-benches --bin charts -- $(ARGS)
+
+docs-figures: setup docs-charts docs-stability
 	cargo run --release -p etendue -- render scenes/first-light.json -o out/docs-figures \
 		--set 'camera.sensor.resolution=[640,640]' --samples 16 --outputs png
 	install -D -m 644 out/docs-figures/picture.png docs/images/first-light.png

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | `pinhole` | where its entrance pupil is, and the scale of the picture |
 //! | `thin` | also focal length, f-number and the plane in focus: blur |
-//! | `thick` | also where the entrance pupil stands to the principal planes |
+//! | `thick` | also how far its pupils are from its principal planes: falloff |
 //! | `full` | everything: aberrations, distortion, vignetting, cos⁴ |
 //!
 //! All of them are registered: the same pixel looks along the same paraxial chief ray. `thin` and
@@ -23,7 +23,7 @@ use etendue_camera::{
 use etendue_geometry::Bounds;
 use serde::Serialize;
 
-use crate::pictures::Studio;
+use crate::pictures::{Studio, opened};
 use crate::rounds::{Spread, order};
 use crate::samplers::{Converged, Effort, Entry};
 use crate::{BenchError, Progress};
@@ -123,7 +123,8 @@ pub fn models(full: &Camera) -> Result<(Vec<Model>, Vec<String>), BenchError> {
     ];
     for (name, spec) in specs {
         let build = |spec: CameraSpec| {
-            spec.build(|| Bounds::EMPTY, &|name| Err(name.to_owned())).map_err(|e| e.to_string())
+            let camera = spec.build(|| Bounds::EMPTY, &|name| Err(name.to_owned()));
+            opened(&camera.map_err(|e| e.to_string())?).map_err(|e| e.to_string())
         };
         match spec.map_err(str::to_owned).and_then(build) {
             Ok(camera) => models.push((name, camera)),

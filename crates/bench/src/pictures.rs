@@ -3,12 +3,12 @@
 use etendue_accel::Accel;
 use etendue_camera::{Camera, Sampler};
 use etendue_render::output::{Outputs, Picture};
-use etendue_render::{Images, Plan};
+use etendue_render::{Images, Plan, RenderError};
 use etendue_scene::Scene;
+use etendue_spectrum::Lanes;
 use etendue_tracer::LayerSpec;
 
 use crate::BenchError;
-use crate::rounds::wall;
 
 /// The fewest pixels along a side.
 const LEAST_SIDE: u32 = 16;
@@ -17,6 +17,7 @@ const LEAST_SIDE: u32 = 16;
 #[derive(Debug)]
 pub struct Studio<'a> {
     scene: Scene,
+    camera: Camera,
     accel: &'a dyn Accel,
     images: Images,
 }
@@ -37,7 +38,7 @@ pub struct Sampling {
 pub struct Taken {
     /// Red, green and blue planes.
     pub values: Vec<f64>,
-    /// Wall time of the tracing (s), without measuring the lens' pupil.
+    /// Wall time of the tracing (s).
     pub seconds: f64,
 }
 
@@ -52,13 +53,14 @@ impl<'a> Studio<'a> {
         let mut scene = scene.clone();
         (scene.layers, scene.sensor) = (vec![picture], None);
         let images = Images::decode(&scene, &Plan::new(&scene, OUTPUTS));
-        Ok(Self { scene, accel, images })
+        let camera = opened(&scene.camera)?;
+        Ok(Self { scene, camera, accel, images })
     }
 
-    /// The scene's camera.
+    /// The scene's camera, with pixels as large as [`Self::fit`] made them.
     #[must_use]
     pub fn camera(&self) -> &Camera {
-        &self.scene.camera
+        &self.camera
     }
 
     /// Makes the camera's pixels as large as it takes for `per_pixel` samples of each to be done in
@@ -84,11 +86,11 @@ impl<'a> Studio<'a> {
             reason = "a share of a side, saturated"
         )]
         let factor = (all / pixels).sqrt().ceil() as u32;
-        self.scene.camera = self.camera().coarser(factor.clamp(1, limit));
+        self.camera = self.camera.coarser(factor.clamp(1, limit));
         Ok(())
     }
 
-    /// The picture through `camera`.
+    /// The picture through `camera`, which has been [`opened`].
     ///
     /// # Errors
     ///
@@ -99,7 +101,6 @@ impl<'a> Studio<'a> {
             (sampling.samples, sampling.sampler, sampling.seed);
         self.scene.camera = camera.clone();
         let plan = Plan::new(&self.scene, OUTPUTS);
-        let (pupil, _) = wall(|| camera.opened(&plan.lanes));
         let rendered = etendue_render::render(
             &self.scene,
             &plan,
@@ -108,10 +109,19 @@ impl<'a> Studio<'a> {
             Vec::new(),
             &|_| true,
         )?;
-        let pupil = if plan.pupil { pupil } else { 0.0 };
-        let seconds = (rendered.trace_time.as_secs_f64() - pupil).max(0.0);
+        let seconds = rendered.trace_time.as_secs_f64();
         Ok(Taken { values: values(&rendered.picture), seconds })
     }
+}
+
+/// A camera whose lens' pupil is measured once and not again for every picture.
+///
+/// # Errors
+///
+/// When no light gets through the lens.
+pub fn opened(camera: &Camera) -> Result<Camera, BenchError> {
+    let opened = camera.opened(&Lanes::Rgb);
+    opened.map_err(|error| BenchError::Render(RenderError::Camera(error.why)))
 }
 
 /// In double precision.

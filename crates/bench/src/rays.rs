@@ -31,7 +31,7 @@ impl Rays {
         let wanted = (most / (TILE * TILE) as usize).clamp(1, tiles.len());
         let (mut columns, mut rows) = (Vec::new(), Vec::new());
         for k in 0..wanted {
-            let tile = tiles[k * tiles.len() / wanted];
+            let tile = tiles[spread(k, wanted, tiles.len())];
             for (x, y) in z_order(tile) {
                 columns.push(f64::from(x) + 0.5);
                 rows.push(f64::from(y) + 0.5);
@@ -82,6 +82,20 @@ impl Rays {
     }
 }
 
+/// The place of number `k` of `wanted` among `all`: somewhere in its share of them, so that a share as
+/// long as a row does not end up in one column. The golden ratio spreads any number evenly.
+fn spread(k: usize, wanted: usize, all: usize) -> usize {
+    let [start, end] = [k, k + 1].map(|k| k * all / wanted);
+    let place = (k as f64 * 0.618_033_988_75).fract() * (end - start) as f64;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a fraction of a positive number"
+    )]
+    let place = place as usize;
+    start + place
+}
+
 /// The pixels of a tile along a Z-order curve.
 fn z_order(tile: PixelBlock) -> impl Iterator<Item = (u32, u32)> {
     let even_bits = |k: u32| k & 1 | k >> 1 & 2 | k >> 2 & 4 | k >> 3 & 8;
@@ -117,7 +131,19 @@ mod tests {
             assert_eq!(joined, rays.0.direction[0], "{width}");
             assert!(batches.iter().all(|b| b.len() <= width && b.coherent));
         }
+        // Every column and row of tiles has its share.
+        spec.sensor_mut().resolution = [1024, 1024];
+        let camera = spec.build(|| unreachable!("the pose is given"), &|_| unreachable!()).unwrap();
+        let some = Rays::primary(&camera, 64 * 256);
+        for axis in 0..2 {
+            let side = |k: &f64| usize::from(*k > 0.0);
+            let mut halves = [0usize; 2];
+            some.0.direction[axis].iter().for_each(|k| halves[side(k)] += 1);
+            assert!(halves[0].abs_diff(halves[1]) < 64 * 256 / 8, "{halves:?}");
+        }
         // Whole tiles, no more than asked for.
+        spec.sensor_mut().resolution = [40, 21];
+        let camera = spec.build(|| unreachable!("the pose is given"), &|_| unreachable!()).unwrap();
         assert_eq!(Rays::primary(&camera, 600).len() % 16, 0);
         assert!(Rays::primary(&camera, 600).len() <= 600);
     }

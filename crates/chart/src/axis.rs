@@ -93,7 +93,8 @@ fn widened([low, high]: [f64; 2]) -> [f64; 2] {
     if span > 3.0 {
         return [(low - 0.15).floor(), (high + 0.15).ceil()];
     }
-    let room = (0.12 * span).max(0.12);
+    // At least a decade, so that there are ticks to read by.
+    let room = (0.12 * span).max(0.5 * (1.0 - span)).max(0.12);
     [low - room, high + room]
 }
 

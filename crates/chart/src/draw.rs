@@ -159,7 +159,7 @@ impl Drawing<'_> {
             let start = self.y.start();
             dashed(document, [left, start], [right, start]);
             text(document, [left - 8.0, at + 4.0], Anchor::End, "", "0");
-            text(document, [right - 4.0, bottom - 5.0], Anchor::End, "small", name);
+            text(document, [right - 4.0, start - 5.0], Anchor::End, "small", name);
         }
         if let (Some(at), Some(name)) = (self.x.zero(), &across.zero) {
             let start = self.x.start();
@@ -248,7 +248,7 @@ impl Drawing<'_> {
         }
         if let (Some(_), Some(name)) = (self.y.zero(), &self.chart.axes[1].zero) {
             let width = 6.6 * name.chars().count() as f64;
-            let Area { right, bottom, .. } = self.frame;
+            let (right, bottom) = (self.frame.right, self.y.start());
             let area = Area { left: right - width, top: bottom - 16.0, right, bottom };
             obstacles.push(Obstacle { area, weight: 20.0 });
         }

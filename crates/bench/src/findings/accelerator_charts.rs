@@ -50,9 +50,12 @@ fn against_time(findings: &[Finding], error: Measure) -> Chart {
         .filter(|&threads| threads != most)
         .map(|threads| threads.to_string())
         .collect();
-    let mut marks = format!("disks: {most} threads");
+    let mut marks = match most {
+        1 => "disks: 1 thread".to_owned(),
+        _ => format!("disks: {most} threads"),
+    };
     if !others.is_empty() {
-        marks.push_str(&format!("; rings: {} threads", others.join(", ")));
+        marks.push_str(&format!("; rings: {}", others.join(", ")));
     }
     if findings.iter().any(|finding| finding.width != width(findings)) {
         marks.push_str(&format!("; batches of {}, dots: of other widths", width(findings)));
@@ -93,7 +96,7 @@ fn batch_widths(findings: &[Finding]) -> Chart {
     });
     Chart {
         title: "Time by batch width".to_owned(),
-        notes: vec![format!("{most} threads; renders trace batches of {RENDER_WIDTH}")],
+        notes: vec![format!("threads: {most}; renders trace batches of {RENDER_WIDTH}")],
         axes: [Axis::new("rays a batch"), Axis::new(TIME)],
         series: series.collect(),
         front: false,

@@ -50,6 +50,7 @@ pub struct LensCamera {
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
 struct Opened {
+    lanes: Lanes,
     lenses: Vec<(Option<f64>, TrainAt)>,
     pupil: ExitPupil,
 }
@@ -121,8 +122,14 @@ impl LensCamera {
         (0..count).map(group).collect()
     }
 
-    /// The same camera with its exit pupil measured for `lanes`, which takes a moment.
+    /// The same camera with its exit pupil measured for `lanes`, which takes a moment when it is not
+    /// yet.
     pub(crate) fn opened(&self, lanes: &Lanes) -> Result<Self, CameraError> {
+        if let Some(Some(opened)) = self.opened.get()
+            && opened.lanes == *lanes
+        {
+            return Ok(self.clone());
+        }
         let opened = OnceLock::from(Some(Arc::new(self.open(lanes)?)));
         Ok(Self { opened, ..self.clone() })
     }
@@ -155,7 +162,7 @@ impl LensCamera {
         let z = self.focused.sensor_z();
         let pupil = ExitPupil::new(&without_filters(train), &wavelengths, z, half_size)
             .map_err(|error| fault(error.to_string()))?;
-        Ok(Opened { lenses, pupil })
+        Ok(Opened { lanes: lanes.clone(), lenses, pupil })
     }
 
     /// The rays of `samples` that leave the lens.
