@@ -24,11 +24,11 @@ const FARTHEST: i32 = 7;
 
 const DEPTH: &str = "\
     Pick refinement, which is on unless turned off, for anything that is measured: its error is that of the file's \
-    coordinates at any distance, for objects that f32 can tell apart. Without it, distances are good to a ten-millionth \
-    of what the scene spans, which does for pictures of compact scenes.";
+    coordinates, as long as f32 finds the right triangle. Without it, distances are good to some millionths of what \
+    the scene spans, which does for pictures.";
 const WRONG: &str = "\
-    Split a scene, or pick `bvh` or `exact`, when it spans more than some ten thousand times the size of its details. \
-    f64 measures what f32 has found; what f32 cannot tell apart, it does not find.";
+    Split a scene, or pick `bvh` or `exact`, when it spans more than some five hundred times the size of the objects \
+    that are looked at. f64 measures what f32 has found; what f32 cannot tell apart, it does not find.";
 
 /// What is drawn: a name, the method, and whether the scene reaches to the origin.
 const SHOWN: [(&str, Method, bool); 5] = [

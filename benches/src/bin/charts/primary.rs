@@ -45,15 +45,15 @@ pub(crate) fn measure(effort: Effort, page: &mut Page) -> anyhow::Result<()> {
 }
 
 const SMOOTH: &str = "\
-    Pick `embree robust + f64`, which renders use anyway: it is on the front, its distances are of double precision, and \
-    the modes below it in time buy little. Pick `bvh` where Embree is not to be had; it is as accurate.";
+    Pick `embree robust + f64`, which renders use anyway: its distances are of double precision, every ray finds its \
+    triangle, and modes that do less buy little. Pick `bvh` where Embree is not to be had; it is as accurate.";
 const HEAVY_ADVICE: &str = "\
-    Pick the same: as memory takes more of the time than arithmetic does, what f64 adds is a smaller share than on the \
-    lighter mesh. Pick `exact` only to check others, and mind its build.";
+    Pick the same: at this size memory takes most of the time, and the modes of Embree differ by no more than their \
+    rounds do. Pick `bvh` where not one ray may take the neighbour of its triangle, and `exact` only to check others.";
 const SOUP: &str = "\
-    Pick `bvh` or `exact` where every hit counts: triangles that are no surface have open edges, and of rays along these \
-    Embree may miss one in thousands, which no neighbour makes suspicious. Pick `embree robust + f64` otherwise, for \
-    pictures of grass, hair cards and scans full of holes.";
+    Pick `bvh` where every hit counts: triangles that are no surface have open edges, and of the rays along these \
+    Embree misses some, which no neighbour makes suspicious. Pick `embree robust + f64` for pictures of such scenes, \
+    where one ray in some hundreds at an edge does not show.";
 const FOREST: &str = "\
     Pick `embree robust + f64` for scenes of instances; one copy of the mesh is all that is held. Distances in f32 are \
     coarse here, as the scene is wide and what is seen is far from its middle.";
