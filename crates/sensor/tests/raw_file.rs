@@ -1,7 +1,10 @@
 //! A DNG carries what a raw converter needs to know.
 
+mod environment;
+
 use std::collections::BTreeMap;
 use std::io::Cursor;
+use std::process::Command;
 
 use etendue_sensor::dng::DngError;
 use etendue_sensor::{Film, RawImage, Sensor, SensorSpec, Shot};
@@ -101,4 +104,65 @@ fn what_is_no_raw_is_refused() {
     assert!(written(&sensor, &image).unwrap_err().to_string().contains("3 channels"));
     let (sensor, image) = taken(json!({ "type": "raw", "cfa": "rgbw", "resolution": [4, 4] }));
     assert!(written(&sensor, &image).unwrap_err().to_string().contains("no filter `w`"));
+}
+
+/// Colours as an independent raw converter (LibRaw, of Python's `rawpy`) develops them, in the four
+/// quarters of a picture: pattern, levels, balance and matrix are right, and up is up.
+#[test]
+fn a_raw_converter_develops_the_colours() {
+    let python = match environment::python_with("rawpy-0.28.0", &["rawpy==0.28.0"]) {
+        Ok(python) => python,
+        Err(why) => {
+            println!("skipped: the raw converter rawpy cannot be had: {why}");
+            return;
+        }
+    };
+    // Top left, top right, bottom left, bottom right, in linear sRGB.
+    let colours = [[0.7, 0.05, 0.05], [0.05, 0.6, 0.05], [0.05, 0.05, 0.7], [0.8, 0.8, 0.8]];
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("raw.dng");
+    let program = "import rawpy, sys, json
+raw = rawpy.imread(sys.argv[1])
+look = raw.postprocess(use_camera_wb=True, no_auto_bright=True, output_bps=8)
+height, width = look.shape[:2]
+quarter = lambda i: look[(1 + 2 * (i // 2)) * height // 4 - 4:, (1 + 2 * (i % 2)) * width // 4 - 4:]
+print(json.dumps({
+    'pattern': ''.join(chr(raw.color_desc[i]) for i in raw.raw_pattern.flatten()),
+    'black': raw.black_level_per_channel, 'white': int(raw.white_level),
+    'look': [quarter(i)[:8, :8].reshape(-1, 3).mean(0).tolist() for i in range(4)]}))";
+    for (cfa, pattern) in [("rggb", "RGGB"), ("gbrg", "GBRG"), ("grbg", "GRBG"), ("bggr", "BGGR")] {
+        let spec = json!({
+            "type": "raw", "model": "imx183", "resolution": [96, 64], "cfa": cfa,
+            "filters": "nikon_d5100",
+        });
+        let sensor = Sensor::new(&serde_json::from_value(spec).unwrap()).unwrap();
+        let rows = sensor.lanes().from_rgb();
+        let film: Vec<f32> = (0..96 * 64)
+            .flat_map(|i| {
+                let colour = colours[(i / 96 / 32) * 2 + i % 96 / 48];
+                rows.iter()
+                    .map(move |row| (0..3).map(|k| row[k] * colour[k]).sum::<f64>() as f32)
+                    .collect::<Vec<f32>>()
+            })
+            .collect();
+        let shot = Shot { exposure: 0.01, frame: 0 };
+        let image = sensor.expose(Film { values: &film }, shot, 0).unwrap();
+        std::fs::write(&path, written(&sensor, &image).unwrap()).unwrap();
+        let out = Command::new(&python).args(["-c", program]).arg(&path).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let read: Value = serde_json::from_slice(&out.stdout).unwrap();
+        // LibRaw counts the second green as a colour of its own.
+        assert_eq!(read["pattern"].as_str().unwrap(), pattern);
+        assert_eq!(read["white"], 4095);
+        assert_eq!(read["black"], json!([38, 38, 38, 38]));
+        for (i, colour) in colours.iter().enumerate() {
+            for (k, linear) in colour.iter().enumerate() {
+                let found = read["look"][i][k].as_f64().unwrap();
+                let expected = 255.0 * etendue_spectrum::colour::srgb_encode(*linear);
+                // The converter's tone curve is BT.709's, up to 14 of 255 darker than sRGB's; filters
+                // of a real camera and a matrix of three by three miss a colour by about as much.
+                assert!((found - expected).abs() < 30.0, "{cfa} {i} {k}: {found}, not {expected}");
+            }
+        }
+    }
 }
