@@ -14,7 +14,10 @@ pub struct FilmSamples {
     pub rows: Vec<f64>,
     /// Places in the unit square that the camera maps to its pupil; cameras without one do not look.
     pub pupil: Vec<[f64; 2]>,
-    /// The wavelength of the rays (nm); `None` where one ray serves all.
+    /// Places in 0..1 of the light that the rays stand for, from its shortest wavelength to its
+    /// longest; cameras whose lenses do not disperse do not look.
+    pub spectrum: Vec<f64>,
+    /// The [`wavelength`](crate::LaneGroup::wavelength) of the lanes that the rays are for.
     pub wavelength: Option<f64>,
 }
 
@@ -22,7 +25,7 @@ pub struct FilmSamples {
 /// have none: they count as zero.
 #[derive(Debug, Clone, Default)]
 pub struct CameraRays {
-    /// The rays, in the order of their samples.
+    /// The rays.
     pub rays: RayBatch,
     /// What the radiance of each ray counts in the mean over its pixel's samples: relative to a pixel
     /// that sees through an unvignetted pupil on the axis.
@@ -33,6 +36,8 @@ pub struct CameraRays {
     pub fates: FateCounts,
     /// The rays while they are in the lens.
     pub(crate) in_lens: LensRays,
+    /// The samples by the wavelength that they are traced at.
+    pub(crate) order: Vec<(usize, u32)>,
 }
 
 impl FilmSamples {
@@ -53,13 +58,15 @@ impl FilmSamples {
         self.columns.clear();
         self.rows.clear();
         self.pupil.clear();
+        self.spectrum.clear();
     }
 
-    /// Appends a sample.
-    pub fn push(&mut self, column: f64, row: f64, pupil: [f64; 2]) {
+    /// Appends a sample: column and row, place in the pupil, place in the spectrum.
+    pub fn push(&mut self, [column, row]: [f64; 2], pupil: [f64; 2], spectrum: f64) {
         self.columns.push(column);
         self.rows.push(row);
         self.pupil.push(pupil);
+        self.spectrum.push(spectrum);
     }
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use etendue_camera::{Camera, CameraRays, CameraSpec, FilmSamples};
 use etendue_geometry::{Bounds, RayBatch};
-use etendue_spectrum::Lanes;
+use etendue_spectrum::{Grid, Lanes};
 use glam::DVec3;
 
 fn try_build(json: &str) -> Result<Camera, String> {
@@ -39,13 +39,14 @@ fn direction(rays: &RayBatch, i: usize) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(|k| rays.direction[k][i]))
 }
 
-/// `count` rays from one place of the sensor, spread over the pupil by the R2 sequence.
+/// `count` rays from one place of the sensor, spread over the pupil by the R2 sequence and over wavelengths by the golden
+/// section.
 fn sampled(camera: &Camera, place: [f64; 2], wavelength: Option<f64>, count: u32) -> CameraRays {
     let mut samples = FilmSamples { wavelength, ..FilmSamples::default() };
     for i in 0..count {
-        let unit = [0.754_877_666_246_693, 0.569_840_290_998_053];
-        let u = unit.map(|step: f64| (0.5 + step * f64::from(i)).fract());
-        samples.push(place[0], place[1], u);
+        let unit = [0.754_877_666_246_693, 0.569_840_290_998_053, 0.618_033_988_749_895];
+        let [u, v, w] = unit.map(|step: f64| (0.5 + step * f64::from(i)).fract());
+        samples.push(place, [u, v], w);
     }
     let mut rays = CameraRays::default();
     camera.sample_rays(&samples, &mut rays);
@@ -213,34 +214,82 @@ fn wavelengths_are_traced_apart_only_where_they_differ() {
     let opened = glass.opened(&Lanes::Rgb).unwrap();
     // Where the rays of the axis cross it in front of the lens: blue is focused nearest.
     let focus = |wavelength| {
-        let rays = sampled(&opened, [30.0, 20.0], wavelength, 500);
-        let crossing = |i: usize| {
-            let (o, d) = (origin(&rays.rays, i), direction(&rays.rays, i));
-            -o.z - d.z * o.truncate().length() / d.truncate().length()
-        };
-        let (count, sum) = (0..rays.rays.len())
-            .filter(|&i| origin(&rays.rays, i).truncate().length() < 1e-3)
-            .fold((0.0, 0.0), |(n, sum), i| (n + 1.0, sum + 1.0 / crossing(i)));
-        sum / count
+        let found = vergences(&sampled(&opened, [30.0, 20.0], wavelength, 20_000));
+        found.iter().sum::<f64>() / found.len() as f64
     };
     let vergence: Vec<f64> = groups.iter().map(|group| focus(group.wavelength)).collect();
     // Paraxial: Δ(1/f) = Δn/(n − 1)/f, 1/m; rays within 1 mm have 1e-3 of spherical aberration.
-    let n = |nm: f64| {
-        let um2 = (nm * 1e-3).powi(2);
-        let [b, c] = [
-            [1.039_612_12, 0.231_792_344, 1.010_469_45],
-            [0.006_000_698_67, 0.020_017_914_4, 103.560_653],
-        ];
-        (1.0 + (0..3).map(|i| b[i] * um2 / (um2 - c[i])).sum::<f64>()).sqrt()
-    };
-    let power = |nm: f64| {
-        let n = n(nm);
-        (n - 1.0) * (2.0 / 0.05 - (n - 1.0) * 0.006 / (n * 0.05 * 0.05))
-    };
     let [red, blue] = [groups[0].wavelength.unwrap(), groups[2].wavelength.unwrap()];
     let measured = vergence[2] - vergence[0];
-    let formula = power(blue) - power(red);
+    let formula = crown_power(blue) - crown_power(red);
     assert!((measured / formula - 1.0).abs() < 0.02, "{measured} and {formula}");
+}
+
+/// The vergences (1/m) at which the rays of the axis that pass within 1 mm of it leave a lens, sorted.
+fn vergences(rays: &CameraRays) -> Vec<f64> {
+    let vergence = |i: usize| {
+        let (o, d) = (origin(&rays.rays, i), direction(&rays.rays, i));
+        1.0 / (-o.z - d.z * o.truncate().length() / d.truncate().length())
+    };
+    let near = |i: &usize| (2e-4..1e-3).contains(&origin(&rays.rays, *i).truncate().length());
+    let mut found: Vec<f64> = (0..rays.rays.len()).filter(near).map(vergence).collect();
+    found.sort_by(f64::total_cmp);
+    found
+}
+
+/// 1/(1 m) of a biconvex lens of N-BK7, 50 mm and 50 mm, 6 mm thick.
+fn crown_power(nm: f64) -> f64 {
+    let um2 = (nm * 1e-3).powi(2);
+    let [b, c] = [
+        [1.039_612_12, 0.231_792_344, 1.010_469_45],
+        [0.006_000_698_67, 0.020_017_914_4, 103.560_653],
+    ];
+    let n = (1.0 + (0..3).map(|i| b[i] * um2 / (um2 - c[i])).sum::<f64>()).sqrt();
+    (n - 1.0) * (2.0 / 0.05 - (n - 1.0) * 0.006 / (n * 0.05 * 0.05))
+}
+
+#[test]
+fn a_grey_sensor_sees_all_the_wavelengths_of_its_lane() {
+    let crown = |elements: &str| {
+        let camera = at_origin(&format!(
+            r#""type": "chromatic_real_lens", "glass": "N-BK7", "front_radius": 50,
+               "rear_radius": -50, "thickness": 6, "semi_diameter": 8, "sensor_distance": 48,
+               "elements": [{elements}], "sensor": {{"resolution": [60, 40], "pixel_pitch": 50}}"#
+        ));
+        camera.opened(&Lanes::Grey).unwrap()
+    };
+    const COUNT: u32 = 20_000;
+    let clear = sampled(&crown(""), [30.0, 20.0], None, COUNT);
+    let found = vergences(&clear);
+    // The same photons at every wavelength's weight λ, by the formula.
+    let grid = (0..4000).map(|i| 380.0 + 0.1 * (f64::from(i) + 0.5));
+    let (mean, weight) = grid.fold((0.0, 0.0), |(sum, w), nm| (sum + nm * crown_power(nm), w + nm));
+    let against = |nm: f64| crown_power(nm) - mean / weight;
+    let measured = found.iter().sum::<f64>() / found.len() as f64;
+    // Everything against the mean, so that the sensor's own vergence drops out; 1 mm of height
+    // aberrates by 1e-3 of the power of 20.7 1/m.
+    let ends = [found[0] - measured, found[found.len() - 1] - measured];
+    let expected = [against(780.0), against(380.0)];
+    for (end, expected) in ends.iter().zip(expected) {
+        let share = end / expected;
+        assert!(
+            (0.8..1.1).contains(&share),
+            "{ends:?} {expected:?}: 16 medians end before the rim"
+        );
+    }
+    // A line of 10 nm: no ray is wasted on what it stops, and all see its own focus.
+    let line = r#"{"type": "filter", "at": 3, "transmission":
+        [[380, 0], [449.9, 0], [450, 1], [460, 1], [460.1, 0], [780, 0]]}"#;
+    let through = sampled(&crown(line), [30.0, 20.0], None, COUNT);
+    assert!(through.sample.len() * 100 > clear.sample.len() * 99, "rays are lost to the filter");
+    let share = mean_weight(&through, COUNT) / mean_weight(&clear, COUNT);
+    // ∫ λ dλ over the line and its flanks, against 380..780 nm.
+    let photons = (460.05f64.powi(2) - 449.95f64.powi(2)) / (780f64.powi(2) - 380f64.powi(2));
+    assert!((share / photons - 1.0).abs() < 2e-3, "{share} and {photons}");
+    let blue = vergences(&through);
+    let shift = blue.iter().sum::<f64>() / blue.len() as f64 - measured;
+    assert!((shift / against(455.0) - 1.0).abs() < 0.03, "{shift} {}", against(455.0));
+    assert!(blue[blue.len() - 1] - blue[0] < 0.3 * (ends[1] - ends[0]), "{blue:?}");
 }
 
 #[test]
@@ -279,7 +328,9 @@ fn losses_are_those_of_the_surfaces_and_of_the_way_and_only_when_asked_for() {
     };
     const COUNT: u32 = 4096;
     let value = |camera: &Camera| {
-        let opened = camera.opened(&Lanes::Grey).unwrap();
+        // A lane so narrow that one wavelength stands for it.
+        let line = Lanes::Bands(Grid::from_edges(vec![580.0, 595.12]).unwrap());
+        let opened = camera.opened(&line).unwrap();
         mean_weight(&sampled(&opened, [15.0, 10.0], None, COUNT), COUNT)
     };
     let lossless = value(&of(""));
@@ -317,6 +368,37 @@ fn a_tilted_sensor_puts_a_tilted_plane_in_focus() {
             assert!(past < 1e-12 * object, "{row}: {past}");
         }
     }
+}
+
+#[test]
+fn data_end_at_the_image_circle_of_a_shifted_lens_too() {
+    // Behind the lens light goes straight: the lens' disc (2 mm) and an aperture (3 mm) 30 mm behind
+    // it overlap as seen from the sensor 50 mm behind it up to (2·20 + 3·50)/30 mm off the axis.
+    let camera = at_origin(
+        r#""type": "thin_lens", "focal_length": 50, "sensor_distance": 50,
+           "aperture": {"shape": "circular", "radius": 2},
+           "elements": [{"type": "aperture", "shape": "circular", "radius": 3, "at": 30}],
+           "sensor_decentre": [4, 2], "sensor": {"resolution": [100, 70], "pixel_pitch": 200}"#,
+    );
+    let circle = (2.0 * 20.0 + 3.0 * 50.0) / 30.0;
+    let places: Vec<[f64; 2]> =
+        (0..7000).map(|i| [f64::from(i % 100) + 0.5, f64::from(i / 100) + 0.5]).collect();
+    let rays = chief(&camera, &places);
+    let (mut inside, mut outside) = (0, 0);
+    for (i, [column, row]) in places.into_iter().enumerate() {
+        // Pictures are upright, so the sensor's axes are turned.
+        let off_axis = f64::hypot(-(column - 50.0) * 0.2 + 4.0, (row - 35.0) * 0.2 + 2.0);
+        let seen = rays.t_max[i] > 0.0;
+        // Edges are found to 0.5 %, and 32 of them are joined by straight lines.
+        if off_axis < 0.97 * circle {
+            inside += 1;
+            assert!(seen, "{column} {row}: {off_axis} mm");
+        } else if off_axis > 1.03 * circle {
+            outside += 1;
+            assert!(!seen, "{column} {row}: {off_axis} mm");
+        }
+    }
+    assert!(inside > 1000 && outside > 1000, "{inside} {outside}");
 }
 
 #[test]

@@ -255,11 +255,14 @@ impl Plan {
 
     /// How wavelengths and the pupil of the camera's lens are sampled.
     fn explain_lens(&self, scene: &Scene) -> [(&'static str, &'static str, String); 2] {
-        let apart = scene.camera.lane_groups(&Lanes::Rgb).len() > 1;
+        let lens = scene.camera.lens();
+        let groups = scene.camera.lane_groups(&self.lanes).len();
+        let each = lens.map_or(1, |lens| lens.wavelengths_a_group(&self.lanes));
+        let apart = groups > 1 || each > 1;
         let rays = if apart && self.pupil { "their own" } else { "shared" };
-        let (pupil, because) = pupil(scene.camera.lens(), self.pupil);
+        let (pupil, because) = pupil(lens, self.pupil, self.samples);
         [
-            ("rays of a wavelength", rays, wavelengths(apart, self.pupil).to_owned()),
+            ("rays of a wavelength", rays, wavelengths(apart, self.pupil, each)),
             ("pupil", pupil, because),
         ]
     }
@@ -328,17 +331,21 @@ fn source_words(scene: &Scene) -> (String, String) {
     ((lights + triangles).to_string(), words)
 }
 
-/// Why wavelengths are traced together or apart.
-fn wavelengths(apart: bool, pupil: bool) -> &'static str {
-    match (apart, pupil) {
-        (false, _) => "no glass or filter of a lens tells them apart",
-        (true, true) => "the lens bends or dims each in its own way",
-        (true, false) => "the chief ray at the lens' design wavelength serves all",
+/// Why wavelengths are traced together or apart, `each` of them a lane.
+fn wavelengths(apart: bool, pupil: bool, each: usize) -> String {
+    match (apart, pupil, each) {
+        (false, ..) => "no glass or filter of a lens tells them apart".to_owned(),
+        (true, true, 1) => "the lens bends or dims each in its own way".to_owned(),
+        (true, true, _) => format!(
+            "the lens bends or dims each in its own way, and the widest lane's samples are drawn \
+             from {each} wavelengths"
+        ),
+        (true, false, _) => "the chief ray at the lens' design wavelength serves all".to_owned(),
     }
 }
 
 /// Whether rays are spread over a pupil, and why.
-fn pupil(lens: Option<&LensCamera>, spread: bool) -> (&'static str, String) {
+fn pupil(lens: Option<&LensCamera>, spread: bool, samples: u32) -> (&'static str, String) {
     let Some(lens) = lens else {
         return ("off", "the camera has no aperture: every ray is a chief ray".to_owned());
     };
@@ -351,7 +358,16 @@ fn pupil(lens: Option<&LensCamera>, spread: bool) -> (&'static str, String) {
     };
     let symmetric = lens.focused().train().is_rotationally_symmetric();
     let bound = if symmetric { "along a radius of the sensor" } else { "on a grid of the sensor" };
-    ("on", format!("colours are averaged over the lens' exit pupil{f_number}, bounded {bound}"))
+    let noise = match samples {
+        1 => {
+            "; 1 sample a pixel is one ray through one place of it, which is noise wherever the \
+              picture is not sharp: ask for more with `--samples` or render.samples"
+        }
+        _ => "",
+    };
+    let because =
+        format!("colours are averaged over the lens' exit pupil{f_number}, bounded {bound}");
+    ("on", because + noise)
 }
 
 impl fmt::Display for Plan {

@@ -12,15 +12,11 @@ use etendue_tracer::transport::Beam;
 use etendue_tracer::{Samples, Scratch, Stage, Tally, Tracer};
 
 use crate::film::Rows;
-use crate::tiles::{Sampling, Tile};
+use crate::tiles::{CAMERA_PAIRS, Sampling, Tile, push_sample};
 
 /// Samples that are traced together: enough that what is left of a batch after a few bounces still
 /// fills packets, and few enough that its arrays stay in the cache.
 const BATCH: u32 = 1024;
-
-/// Pairs of random numbers that the camera uses before light does: place in the pixel, place in the
-/// pupil.
-const CAMERA_PAIRS: u32 = 2;
 
 /// What tracing light needs; nothing of it changes on the way.
 #[derive(Debug)]
@@ -107,7 +103,7 @@ impl LightPass<'_> {
             batch.sums.resize(pixels.len() * lanes, Sum::default());
             for first in (0..samples).step_by(at_once as usize) {
                 let range = first..samples.min(first + at_once);
-                batch.aim(tile, pixels, range, sampling);
+                batch.aim(self.camera, tile, pixels, range, sampling);
                 for group in &self.groups {
                     self.trace(group, batch);
                 }
@@ -149,7 +145,14 @@ impl LightBatch {
     }
 
     /// Samples `range` of each of `pixels`, those of one pixel side by side.
-    fn aim(&mut self, tile: Tile, pixels: &[(u32, u32)], range: Range<u32>, sampling: Sampling) {
+    fn aim(
+        &mut self,
+        camera: &Camera,
+        tile: Tile,
+        pixels: &[(u32, u32)],
+        range: Range<u32>,
+        sampling: Sampling,
+    ) {
         self.film.clear();
         self.numbers.samples.clear();
         let Sampling { samples, sampler, seed } = sampling;
@@ -157,9 +160,7 @@ impl LightBatch {
             let (x, y) = (tile.left + x, tile.top + y);
             let numbers = sampler.pixel(seed, x, y, samples);
             for index in range.clone() {
-                let [u, v] = numbers.square(index, 0);
-                let pupil = numbers.square(index, 1);
-                self.film.push(f64::from(x) + u, f64::from(y) + v, pupil);
+                push_sample(&mut self.film, camera, [x, y], &numbers, index);
                 self.numbers.samples.push((numbers, index));
             }
         }

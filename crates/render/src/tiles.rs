@@ -134,7 +134,7 @@ impl Job<'_> {
             let mut sums = vec![[0.0; 3]; pixels.len() * layers.len()];
             for first in (0..samples).step_by(at_once as usize) {
                 let range = first..samples.min(first + at_once);
-                batch.place_samples(tile, pixels, range.clone(), |x, y| {
+                batch.place_samples(self.camera, tile, pixels, range.clone(), |x, y| {
                     sampler.pixel(seed, x, y, samples)
                 });
                 for group in &self.groups {
@@ -319,6 +319,26 @@ fn even_bits(k: u32) -> u32 {
     k & 1 | k >> 1 & 2 | k >> 2 & 4 | k >> 3 & 8
 }
 
+/// Pairs of random numbers that the camera uses before light does: place in the pixel, place in the
+/// pupil, and of the third one number for the wavelength.
+pub(crate) const CAMERA_PAIRS: u32 = 3;
+
+/// Appends sample `index` of a pixel. A camera without a lens looks at its place alone.
+pub(crate) fn push_sample(
+    film: &mut FilmSamples,
+    camera: &Camera,
+    pixel: [u32; 2],
+    numbers: &PixelSamples,
+    index: u32,
+) {
+    let place = numbers.square(index, 0);
+    let [pupil, [wavelength, _]] = match camera.lens() {
+        Some(_) => [1, 2].map(|pair| numbers.square(index, pair)),
+        None => [[0.5; 2]; 2],
+    };
+    film.push([0, 1].map(|k| f64::from(pixel[k]) + place[k]), pupil, wavelength);
+}
+
 /// One thread's rays and hits.
 struct Batch {
     rays: RayBatch,
@@ -376,6 +396,7 @@ impl Batch {
     /// Samples `range` of each of `pixels`, those of one pixel side by side.
     fn place_samples(
         &mut self,
+        camera: &Camera,
         tile: Tile,
         pixels: &[(u32, u32)],
         range: std::ops::Range<u32>,
@@ -386,9 +407,7 @@ impl Batch {
             let (x, y) = (tile.left + x, tile.top + y);
             let samples = samples(x, y);
             for index in range.clone() {
-                let [u, v] = samples.square(index, 0);
-                let pupil = samples.square(index, 1);
-                self.samples.push(f64::from(x) + u, f64::from(y) + v, pupil);
+                push_sample(&mut self.samples, camera, [x, y], &samples, index);
             }
         }
     }

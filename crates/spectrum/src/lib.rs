@@ -35,6 +35,7 @@
 //! | [`colour`] | the CIE 1931 observer and sRGB |
 //! | [`rgb`] | from a colour to a spectrum and back |
 //! | [`lanes`] | the numbers that a ray of a render carries |
+//! | [`spread`] | wavelengths that stand for a wide lane |
 
 mod cie;
 pub mod colour;
@@ -44,11 +45,13 @@ pub mod illuminant;
 pub mod lanes;
 mod mallett_yuksel;
 pub mod rgb;
+pub mod spread;
 
 pub use curve::{Curve, CurveError, integral};
 pub use grid::{Band, Grid, GridError};
 pub use illuminant::{Illuminant, IlluminantError};
 pub use lanes::{Lanes, NoOverlap, Outside, VISIBLE};
+pub use spread::Spread;
 
 /// Planck's constant (J·s), exact in the SI.
 pub const PLANCK: f64 = 6.626_070_15e-34;

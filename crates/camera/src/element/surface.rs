@@ -14,6 +14,13 @@ use crate::length::Millimetres;
 /// The highest power of r that an asphere may have.
 const HIGHEST_POWER: u32 = 30;
 
+/// The smallest radius of curvature and focal length (mm), far below light's wavelengths: powers of
+/// what is smaller soon are no numbers.
+pub(crate) const SMALLEST_RADIUS: f64 = 1e-9;
+
+/// 1 over it (1/mm).
+pub(crate) const LARGEST_CURVATURE: f64 = 1e9;
+
 /// A surface as a lens file writes it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -86,14 +93,22 @@ impl SurfaceSpec {
                 return Err("radius is 0; a flat surface has no radius".to_owned());
             }
             // An infinite radius is a plane: 1/∞ = 0.
+            (Some(Millimetres(radius)), None) if radius.abs() < SMALLEST_RADIUS => {
+                return Err(format!(
+                    "radius is {radius:e} mm; it must be at least {SMALLEST_RADIUS:e} mm, or absent for \
+                     a flat surface"
+                ));
+            }
             (Some(Millimetres(radius)), None) => 1.0 / radius,
             (None, Some(curvature)) => curvature,
             (None, None) => 0.0,
         };
-        if curvature.is_finite() {
+        if curvature.abs() <= LARGEST_CURVATURE {
             Ok(curvature)
         } else {
-            Err("the curvature must be finite".to_owned())
+            Err(format!(
+                "the curvature is {curvature:e} 1/mm; it must be at most {LARGEST_CURVATURE:e} 1/mm"
+            ))
         }
     }
 
@@ -217,6 +232,9 @@ mod tests {
     fn what_is_no_surface_is_refused_in_words() {
         let error = |json| read(json).unwrap_err();
         assert!(error(r#"{"radius": 0}"#).contains("has no radius"));
+        assert!(error(r#"{"radius": 1e-300}"#).contains("at least 1e-9 mm"));
+        assert!(error(r#"{"radius": -1e-10}"#).contains("at least 1e-9 mm"));
+        assert!(error(r#"{"curvature": 1e300}"#).contains("at most 1e9 1/mm"));
         assert!(error(r#"{"radius": 5, "curvature": 0.2}"#).contains("either"));
         assert!(error(r#"{"aspheric": {"3": 1}}"#).contains("even numbers from 2"));
         assert!(error(r#"{"aspheric": {"four": 1}}"#).contains("\"four\""));

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::rays::Ray;
 use super::refract::{Crossing, TOUCH};
+use super::surface::{LARGEST_CURVATURE, SMALLEST_RADIUS};
 use crate::length::Millimetres;
 
 /// A thin lens as a lens file writes it.
@@ -43,10 +44,13 @@ impl ThinLensSpec {
         }
         // An infinite focal length is a lens without power.
         let power = 1.0 / self.focal_length.0;
-        if power.is_finite() {
+        if power.abs() <= LARGEST_CURVATURE {
             Ok(ThinLens { power, semi_diameter })
         } else {
-            Err("focal_length must not be 0".to_owned())
+            Err(format!(
+                "focal_length is {} mm; it must be at least {SMALLEST_RADIUS:e} mm",
+                self.focal_length.0
+            ))
         }
     }
 }
@@ -103,6 +107,6 @@ mod tests {
         let flat = spec(f64::INFINITY).build().unwrap();
         let ray = Ray::new([1.0, 2.0, -3.0].into(), [0.1, 0.2, 1.0].into()).unwrap();
         assert_eq!(at_thin_lens(flat.power, ray, 1e9).ray.direction, ray.direction);
-        assert!(spec(0.0).build().unwrap_err().contains("must not be 0"));
+        assert!(spec(0.0).build().unwrap_err().contains("at least 1e-9 mm"));
     }
 }

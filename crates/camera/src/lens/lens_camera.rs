@@ -13,14 +13,16 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use etendue_geometry::RayBatch;
-use etendue_spectrum::{Lanes, Outside};
+use etendue_spectrum::{Curve, Lanes, Outside, Spread};
 use glam::{DVec2, DVec3};
 
 use super::chief::ChiefTable;
 use super::focused::{Focused, View};
+use super::lit_area::LitArea;
 use crate::element::{Clip, Fate, Ray, Reflection};
+use crate::glass::GlassError;
 use crate::train::analysis::projected_solid_angle;
-use crate::train::pupil::{Window, blocked, lit_radius, without_dimming, without_filters};
+use crate::train::pupil::{Window, blocked, without_dimming, without_filters};
 use crate::train::{ExitPupil, ExitPupilError, OpticalTrain, Part, Side, TrainAt};
 use crate::{CameraError, CameraRays, FilmSamples, Pose};
 
@@ -40,8 +42,8 @@ pub struct LensCamera {
     focused: Focused,
     design: TrainAt,
     chief: ChiefTable,
-    /// How far from the axis light arrives (mm), for lenses with rotational symmetry.
-    lit: f64,
+    /// Where on the sensor light arrives.
+    lit: LitArea,
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
     solid_angle: f64,
     opened: OnceLock<Option<Arc<Opened>>>,
@@ -51,8 +53,17 @@ pub struct LensCamera {
 #[derive(Debug)]
 struct Opened {
     lanes: Lanes,
-    lenses: Vec<(Option<f64>, TrainAt)>,
+    groups: Vec<OpenedGroup>,
     pupil: ExitPupil,
+}
+
+/// The lens as it is for a group of lanes.
+#[derive(Debug)]
+struct OpenedGroup {
+    /// As in [`LaneGroup`].
+    wavelength: Option<f64>,
+    /// One, or as many as share the group's light.
+    lenses: Vec<TrainAt>,
 }
 
 impl PartialEq for LensCamera {
@@ -83,10 +94,7 @@ impl LensCamera {
         if !lit_from(DVec2::ZERO) && !places.into_iter().flatten().any(lit_from) {
             return Err(dark(blocked(train, &clear, frame.vertex)));
         }
-        let lit = match train.is_rotationally_symmetric() {
-            true => lit_radius(train, std::slice::from_ref(&clear), frame.vertex.z, half.length()),
-            false => f64::INFINITY,
-        };
+        let lit = LitArea::measure(train, &clear, frame, half);
         let solid_angle = unvignetted(focused.train(), &design, &focused);
         let chief = ChiefTable::new(&focused, &design);
         Ok(Self { focused, design, chief, lit, solid_angle, opened: OnceLock::new() })
@@ -137,32 +145,54 @@ impl LensCamera {
     fn open(&self, lanes: &Lanes) -> Result<Opened, CameraError> {
         let fault = |why: String| CameraError::new("", why);
         let train = self.focused.train();
-        let mut lenses = Vec::new();
-        for group in self.lane_groups(lanes) {
-            let wavelength = group.wavelength.unwrap_or(train.wavelength());
-            for (i, element) in train.elements().iter().enumerate() {
-                let Part::Filter(filter) = &element.part else { continue };
-                for curve in &filter.curves {
-                    lanes
-                        .from_curve(curve, Outside::Held)
-                        .map_err(|error| fault(format!("the filter elements[{i}]: {error}")))?;
-                }
+        for (i, element) in train.elements().iter().enumerate() {
+            let Part::Filter(filter) = &element.part else { continue };
+            for curve in &filter.curves {
+                lanes
+                    .from_curve(curve, Outside::Held)
+                    .map_err(|error| fault(format!("the filter elements[{i}]: {error}")))?;
             }
-            // The mean over the lane, which a wide lane and a narrow filter make another number than
-            // the value at its middle.
-            let lane = group.lanes.start;
-            let passes = |curve: &etendue_spectrum::Curve| {
-                lanes.from_curve(curve, Outside::Held).map_or(0.0, |means| means[lane])
-            };
-            let lens = train.at_with(wavelength, &passes).map_err(|e| fault(e.to_string()))?;
-            lenses.push((group.wavelength, lens));
         }
-        let wavelengths: Vec<f64> = lenses.iter().map(|(_, lens)| lens.wavelength()).collect();
+        let (mut groups, mut measured) = (Vec::new(), Vec::new());
+        for group in self.lane_groups(lanes) {
+            let Spread { wavelengths, overlap } = self.spread(lanes, &group);
+            let lenses = through_filters(train, lanes, group.lanes.start, &wavelengths, overlap)
+                .map_err(|error| fault(error.to_string()))?;
+            // Between its ends and its middle the pupil changes as little as the index.
+            let last = wavelengths.len() - 1;
+            let mut few = vec![wavelengths[0], wavelengths[last / 2], wavelengths[last]];
+            few.dedup();
+            measured.extend(few);
+            groups.push(OpenedGroup { wavelength: group.wavelength, lenses });
+        }
         let half_size = self.focused.film().half_size().to_array();
         let z = self.focused.sensor_z();
-        let pupil = ExitPupil::new(&without_filters(train), &wavelengths, z, half_size)
+        let pupil = ExitPupil::new(&without_filters(train), &measured, z, half_size)
             .map_err(|error| fault(error.to_string()))?;
-        Ok(Opened { lanes: lanes.clone(), lenses, pupil })
+        Ok(Opened { lanes: lanes.clone(), groups, pupil })
+    }
+
+    /// The wavelengths at which the rays of a group run: several for wide lanes where the lens bends
+    /// or dims each in its own way.
+    fn spread(&self, lanes: &Lanes, group: &LaneGroup) -> Spread {
+        let train = self.focused.train();
+        let spread = lanes.spread(group.lanes.start, &uniform_filters(train));
+        let one = |nm| Spread { wavelengths: vec![nm], overlap: spread.overlap };
+        match group.wavelength {
+            _ if !tells_wavelengths_apart(train) || group.lanes.len() > 1 => {
+                Spread { wavelengths: vec![train.wavelength()], overlap: 1.0 }
+            }
+            Some(nm) if !runs_apart(train) => one(nm),
+            None if !runs_apart(train) => one(train.wavelength()),
+            _ => spread,
+        }
+    }
+
+    /// How many wavelengths the rays of each of [`Self::lane_groups`] are drawn from, at most.
+    #[must_use]
+    pub fn wavelengths_a_group(&self, lanes: &Lanes) -> usize {
+        let groups = self.lane_groups(lanes).into_iter();
+        groups.map(|group| self.spread(lanes, &group).wavelengths.len()).max().unwrap_or(1)
     }
 
     /// The rays of `samples` that leave the lens.
@@ -171,37 +201,61 @@ impl LensCamera {
         // Not opened yet: at the design wavelength of RGB.
         let opened = self.opened.get_or_init(|| self.open(&Lanes::Rgb).ok().map(Arc::new));
         let Some(opened) = opened else { return };
-        let wanted = opened.lenses.iter().find(|(nm, _)| *nm == samples.wavelength);
-        let Some((_, lens)) = wanted.or(opened.lenses.first()) else { return };
+        let wanted = opened.groups.iter().find(|group| group.wavelength == samples.wavelength);
+        let Some(group) = wanted.or(opened.groups.first()) else { return };
+        let mut order = std::mem::take(&mut out.order);
+        order.clear();
+        order.extend(samples.spectrum.iter().zip(0..).map(|(&u, i)| (group.lens_at(u), i)));
+        if group.lenses.len() > 1 {
+            order.sort_unstable();
+        }
+        for samples_of_lens in order.chunk_by(|a, b| a.0 == b.0) {
+            let lens = &group.lenses[samples_of_lens[0].0];
+            let numbers = samples_of_lens.iter().map(|&(_, i)| i);
+            self.trace_samples(pose, (&opened.pupil, lens), samples, numbers, out);
+        }
+        out.order = order;
+        out.rays.coherent = true;
+    }
+
+    /// Appends the rays of some of `samples`, all at the wavelength of one lens.
+    fn trace_samples(
+        &self,
+        pose: &Pose,
+        (pupil, lens): (&ExitPupil, &TrainAt),
+        samples: &FilmSamples,
+        numbers: impl Iterator<Item = u32>,
+        out: &mut CameraRays,
+    ) {
         let (film, rays) = (self.focused.film(), &mut out.in_lens);
+        let mut kept = out.sample.len();
         rays.clear();
-        let places = samples.columns.iter().zip(&samples.rows).zip(&samples.pupil);
-        for (i, ((&column, &row), &u)) in (0..).zip(places) {
-            let place = film.place(column, row);
-            match opened.pupil.sample(place, u) {
+        for number in numbers {
+            let i = number as usize;
+            let place = film.place(samples.columns[i], samples.rows[i]);
+            match pupil.sample(place, samples.pupil[i]) {
                 Some(sample) => {
-                    let at = opened.pupil.film_point(place);
+                    let at = pupil.film_point(place);
                     rays.push_weighted(at, sample.direction, sample.weight / self.solid_angle);
-                    out.sample.push(i);
+                    out.sample.push(number);
                 }
                 None => out.fates.unlit += 1,
             }
         }
         lens.trace(Side::Sensor, Clip::On, rays);
         out.fates.add_all(rays);
-        let mut kept = 0;
+        let first = kept;
         for i in 0..rays.len() {
             let weight = rays.throughput(i);
             if rays.fate(i) == Fate::Exited && weight > 0.0 {
                 let (origin, direction) = self.in_world(pose, rays.position(i), rays.direction(i));
                 out.rays.push(origin, direction);
                 out.weight.push(weight);
-                out.sample[kept] = out.sample[i];
+                out.sample[kept] = out.sample[first + i];
                 kept += 1;
             }
         }
         out.sample.truncate(kept);
-        out.rays.coherent = true;
     }
 
     fn in_world(&self, pose: &Pose, point: DVec3, direction: DVec3) -> (DVec3, DVec3) {
@@ -246,7 +300,7 @@ impl LensCamera {
     /// the last element that it meets, and its direction. `None` outside of the image circle, and
     /// where the stop's centre cannot be seen.
     fn chief_ray(&self, film: DVec2) -> Option<(DVec3, DVec3)> {
-        if film.length() > self.lit {
+        if !self.lit.contains(film) {
             return None;
         }
         let direction = self.chief.direction(&self.focused, &self.design, film)?;
@@ -275,15 +329,66 @@ impl LensCamera {
         let train = self.focused.train();
         let mut notes: Vec<String> = Vec::new();
         for group in self.lane_groups(lanes) {
-            let wavelength = group.wavelength.unwrap_or(train.wavelength());
-            for note in train.outside_of_range(wavelength) {
-                if !notes.contains(&note) {
-                    notes.push(note);
+            for wavelength in self.spread(lanes, &group).wavelengths {
+                for note in train.outside_of_range(wavelength) {
+                    if !notes.contains(&note) {
+                        notes.push(note);
+                    }
                 }
             }
         }
         notes
     }
+}
+
+impl OpenedGroup {
+    /// Which lens serves a place of the spectrum in 0..1.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at most a few dozen lenses"
+    )]
+    fn lens_at(&self, u: f64) -> usize {
+        ((u * self.lenses.len() as f64) as usize).min(self.lenses.len() - 1)
+    }
+}
+
+/// Curves of filters that are the same all over and pass some wavelengths better than others.
+fn uniform_filters(train: &OpticalTrain) -> Vec<&Curve> {
+    let filters = train.elements().iter().filter_map(|element| match &element.part {
+        Part::Filter(filter) if filter.is_uniform() => filter.curves.first(),
+        _ => None,
+    });
+    filters.filter(|curve| curve.as_flat().is_none()).collect()
+}
+
+/// The lens at each of a lane's wavelengths, with filters that pass what they pass of the lane.
+///
+/// The wavelengths are already those that uniform filters leave, so these pass their mean over the
+/// lane, all of them together the mean of their product. What a picture of filters passes differs
+/// from wavelength to wavelength, about the same mean.
+fn through_filters(
+    train: &OpticalTrain,
+    lanes: &Lanes,
+    lane: usize,
+    wavelengths: &[f64],
+    overlap: f64,
+) -> Result<Vec<TrainAt>, GlassError> {
+    let uniform = uniform_filters(train);
+    let each = overlap.powf(1.0 / uniform.len().max(1) as f64);
+    let lens = |&nm: &f64| {
+        let passes = |curve: &Curve| {
+            let mean = lanes.from_curve(curve, Outside::Held).map_or(0.0, |means| means[lane]);
+            if uniform.contains(&curve) {
+                return mean * each;
+            }
+            let all: f64 = wavelengths.iter().map(|&nm| curve.held(nm)).sum();
+            let share = curve.held(nm) * wavelengths.len() as f64 / all;
+            if all > 0.0 { mean * share } else { mean }
+        };
+        train.at_with(nm, &passes)
+    };
+    wavelengths.iter().map(lens).collect()
 }
 
 /// Whether rays of other wavelengths run differently, or lose another share on the way.
@@ -292,10 +397,15 @@ fn tells_wavelengths_apart(train: &OpticalTrain) -> bool {
         Part::Filter(filter) => filter.curves.iter().any(|curve| curve.as_flat().is_none()),
         _ => false,
     });
+    filters || runs_apart(train)
+}
+
+/// Whether glass, or what it loses, makes another lens of each wavelength.
+fn runs_apart(train: &OpticalTrain) -> bool {
     let losses = train.losses();
     let coated = matches!(losses.reflection, Some(Reflection::Coated(_)));
     let absorbs = losses.absorption && train.media().iter().any(|g| g.absorption(550.0).is_some());
-    filters || coated || absorbs || train.is_dispersive()
+    coated || absorbs || train.is_dispersive()
 }
 
 /// The pupil as seen from the axis with all filters and masks clear; from elsewhere when the axis is

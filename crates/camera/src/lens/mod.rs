@@ -9,11 +9,13 @@
 //! | [`source`] | a lens by its file or in place, and parts put on its axis |
 //! | [`focused`] | a lens and its sensor: where pixels lie, and the paraxial camera of both |
 //! | [`chief`] | the chief rays of a whole sensor |
+//! | `lit_area` | the part of the sensor that light reaches |
 //! | [`lens_camera`] | chief rays for data, weighted rays of the pupil for pictures |
 
 pub mod chief;
 pub mod focused;
 pub mod lens_camera;
+mod lit_area;
 pub mod source;
 pub mod spec;
 

@@ -277,7 +277,7 @@ fn bad_lenses_are_refused_with_file_and_place() {
     lens(&element(r#""glass": "N-BK8""#), &["elements[0].glass", "N-BK8", "N-BK7"]);
     lens(&element(r#""glass": {"n": -1}"#), &["elements[0].glass", "from 1 on"]);
     lens(&element(r#""semi_diameter": -1"#), &["elements[0]", "semi_diameter"]);
-    lens(&element(r#""radius": 1e-320"#), &["elements[0]", "curvature"]);
+    lens(&element(r#""radius": 1e-320"#), &["elements[0]", "at least 1e-9 mm"]);
     lens(r#"{"elements": [{"type": "prism"}]}"#, &["elements[0]", "prism", "surface"]);
     lens(
         r#"{"elements": [{"type": "aperture", "shape": "image", "file": "../m.png", "width": 1}]}"#,

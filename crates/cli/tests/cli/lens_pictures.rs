@@ -84,8 +84,48 @@ fn a_picture_through_a_dispersing_lens_is_the_same_for_any_thread_count() {
         hashes.push(bench.json("report.json")["image_hash"].clone());
     }
     assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:?}");
-    let plan = text(&bench.run(&["plan", "scene.json"]).stdout);
-    assert!(plan.contains("their own") && plan.contains("exit pupil (f/4.00)"), "{plan}");
+    let plan = |more: &[&str]| text(&bench.run(&[&["plan", "scene.json"], more].concat()).stdout);
+    let many = plan(&[]);
+    assert!(many.contains("their own") && many.contains("exit pupil (f/4.00)"), "{many}");
+    assert!(many.contains("drawn from 16 wavelengths") && !many.contains("is noise"), "{many}");
+    let one = plan(&["--set", "render.samples=1"]);
+    assert!(one.contains("1 sample a pixel is one ray") && one.contains("`--samples`"), "{one}");
+}
+
+/// A uniform radiance L, a thin lens of f-number N focused on it at the magnification m = f/(s − f):
+/// on the axis E = π L sin²θ′ = π L/(1 + 4 N² (1 + m)²), as tan θ′ = 1/(2 N (1 + m)); and the mean of
+/// a pixel is E·A·T·η/(hc) · ∫ λ dλ electrons.
+#[test]
+fn the_electrons_of_a_uniform_scene_are_those_of_the_camera_equation() {
+    for (f_number, distance) in [(1.4, 0.3), (1.4, 2.0), (2.8, 0.15), (8.0, 1.0)] {
+        let bench = Bench::with_scene(&format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "direct"}}, "lights": [],
+                "camera": {{"type": "thin_lens", "focal_length": 50, "f_number": {f_number},
+                    "focus_distance": {distance},
+                    "pose": {{"from": [0, 0, 0], "look_at": [0, 0, -1]}},
+                    "sensor": {{"type": "raw", "resolution": [4, 4], "pixel_pitch": 4,
+                        "quantum_efficiency": 0.5, "system_gain": 1, "noise": "none",
+                        "radiometry": "physical", "exposure": 0.02}}}},
+                "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "glow",
+                    "transform": {{"translate": [0, 0, -{distance}]}}}}],
+                "materials": {{"glow": {{"type": "emissive", "radiance": [1e-3, 1e-3, 1e-3]}}}},
+                "render": {{"samples": 1024}}}}"#
+        ));
+        bench.render(&["--outputs", "npy"]);
+        let m = 0.05 / (distance - 0.05);
+        let t = 2.0 * f_number * (1.0 + m);
+        let irradiance = std::f64::consts::PI * 1e-3 / (1.0 + t * t);
+        // A = (4 µm)², hc of the SI, ∫ λ dλ over 380 to 780 nm.
+        let photons = 16e-12 * 0.02 / 1.986_445_857e-25 * 2.32e5 * 1e-9;
+        let expected = 0.5 * irradiance * photons;
+        let raw = bench.array("raw");
+        let mean = raw.iter().sum::<f64>() / raw.len() as f64;
+        // A few in a hundred of 16 384 samples are lost at the pupil's rim, which is worth √(0.03/16 384)
+        // if random, and all numbers are rounded to an electron.
+        let bound = 4.0 * 1.4e-3 * expected + 0.5;
+        assert!((mean - expected).abs() < bound, "f/{f_number}, {distance} m: {mean} {expected}");
+        assert!(expected > 500.0, "{expected} electrons are no test");
+    }
 }
 
 #[test]

@@ -5,6 +5,7 @@
 //! | `text` | bytes to lines: UTF-8 and UTF-16 |
 //! | `sheet` | lines to the rows of the lens data sheet |
 //! | `place` | coordinate breaks to tilts and decentrings |
+//! | `fields` | field points to field angles |
 //! | here | rows to the elements of a lens file |
 //!
 //! What has no counterpart here and would change the light's way is an error that names its line;
@@ -15,6 +16,7 @@
 //! The format has no public specification. What the lines mean is taken from files in the wild and
 //! from OpticStudio's knowledge base ("Rotation Matrix and Tilt About X/Y/Z in OpticStudio", 2021).
 
+mod fields;
 mod place;
 mod sheet;
 mod text;
@@ -53,7 +55,7 @@ impl ZemaxError {
 pub struct ZemaxLens {
     /// The lens.
     pub file: LensFile,
-    /// Field angles (degrees); empty when the file gives heights.
+    /// Field angles (degrees).
     pub fields: Vec<f64>,
     /// Wavelengths (nm), the primary one first.
     pub wavelengths: Vec<f64>,
@@ -79,9 +81,10 @@ impl ZemaxLens {
     pub fn read(bytes: &[u8]) -> Result<Self, ZemaxError> {
         let text = text::decode(bytes)?;
         let sheet = Sheet::read(&text)?;
-        let mut importer = Importer { sheet: &sheet, elements: Vec::new(), notes: Vec::new() };
+        let mut importer =
+            Importer { sheet: &sheet, elements: Vec::new(), notes: Vec::new(), object_z: None };
         let sensor = importer.convert()?;
-        let Importer { elements, mut notes, .. } = importer;
+        let Importer { elements, mut notes, object_z, .. } = importer;
         if elements.is_empty() {
             return Err(ZemaxError::new(
                 sheet.last_line,
@@ -93,9 +96,11 @@ impl ZemaxLens {
         file.sensor = (sensor != SensorMount::default()).then_some(sensor);
         let wavelengths = sheet.wavelengths_nm();
         file.wavelength = wavelengths.first().copied().map(Nanometres);
-        let train = open_stop(&mut file, &sheet, &mut notes)?;
+        let train = open_stop(&mut file, &sheet, object_z, &mut notes)?;
+        let (fields, left_out) = sheet.fields.angles(sheet.unit, &train, object_z);
+        notes.extend(left_out);
         let mut lens = Self {
-            fields: sheet.field_angles(),
+            fields,
             file,
             wavelengths,
             notes,
@@ -129,6 +134,8 @@ struct Importer<'a> {
     sheet: &'a Sheet,
     elements: Vec<ElementSpec>,
     notes: Vec<String>,
+    /// z of an object at a finite distance in lens coordinates (mm).
+    object_z: Option<f64>,
 }
 
 impl Importer<'_> {
@@ -146,7 +153,7 @@ impl Importer<'_> {
         self.look_at_ends(object, image)?;
         let mut axes = Axes::default();
         let mut medium_is_air = true;
-        let mut last_z = None;
+        let (mut first_z, mut last_z) = (None, None);
         for row in inner {
             if row.shape == Shape::CoordinateBreak {
                 axes = axes.broken(&row.coordinate_break(unit));
@@ -154,6 +161,7 @@ impl Importer<'_> {
                 let flat_in_air = row.is_flat() && medium_is_air && row.glass.is_none();
                 if let Some(part) = self.part(row, flat_in_air)? {
                     let placed = axes.placed();
+                    first_z = first_z.or(Some(placed.z));
                     self.place(part, row, &placed, &mut last_z);
                 }
                 medium_is_air = row.glass.is_none();
@@ -168,6 +176,9 @@ impl Importer<'_> {
         if let (Some(last), Some(z)) = (self.elements.last_mut(), last_z) {
             last.mount.thickness = Millimetres(image.z - z);
         }
+        // Lens coordinates begin at the first element, which need not be the first row.
+        self.object_z = (object.thickness.is_finite())
+            .then(|| -object.thickness * unit - first_z.unwrap_or_default());
         Ok(SensorMount { tilt: image.tilt.map(Degrees), decentre: image.decentre.map(Millimetres) })
     }
 
@@ -263,10 +274,24 @@ impl Importer<'_> {
     }
 }
 
+/// The stop's radius (mm) that makes the entrance pupil as wide as `radius` says, from its z (mm).
+fn with_entrance_pupil(
+    train: &OpticalTrain,
+    command: &str,
+    radius: impl FnOnce(f64) -> Result<f64, String>,
+) -> Result<f64, String> {
+    let paraxial = train.paraxial(train.wavelength()).ok();
+    let found = paraxial.and_then(|p| Some((p.entrance_pupil.z?, p.stop_magnification?)));
+    let (z, magnification) =
+        found.ok_or_else(|| format!("{command}: the entrance pupil is at infinity"))?;
+    Ok(radius(z)? * magnification.abs())
+}
+
 /// Sets the stop by the system's aperture, and gives the lens.
 fn open_stop(
     file: &mut LensFile,
     sheet: &Sheet,
+    object_z: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<OpticalTrain, ZemaxError> {
     let build = |file: &LensFile| {
@@ -278,17 +303,21 @@ fn open_stop(
     let index = train.stop();
     let written = train.stop_radius();
     let error = |error: LensError| ZemaxError::new(line, error.to_string());
-    let opened = match aperture {
+    let stop_radius = match aperture {
         Aperture::EntrancePupil(diameter) => {
-            let magnification = train
-                .paraxial(train.wavelength())
-                .ok()
-                .and_then(|paraxial| paraxial.stop_magnification)
-                .ok_or_else(|| ZemaxError::new(line, "ENPD: the entrance pupil is at infinity"))?;
-            let radius = 0.5 * diameter * sheet.unit * magnification.abs();
-            train.with_stop_radius(radius).map_err(error)?
+            with_entrance_pupil(&train, "ENPD", |_| Ok(0.5 * diameter * sheet.unit)).map(Some)
         }
-        Aperture::FNumber(f_number) => train.with_f_number(f_number).map_err(error)?,
+        Aperture::ObjectAperture(sine) => with_entrance_pupil(&train, "OBNA", |pupil| {
+            let object = object_z.ok_or("OBNA: the object is at infinity; write ENPD or FNUM")?;
+            Ok((pupil - object).abs() * sine.asin().tan())
+        })
+        .map(Some),
+        Aperture::FNumber(_) => Ok(None),
+    };
+    let opened = match (stop_radius.map_err(|why| ZemaxError::new(line, why))?, aperture) {
+        (Some(radius), _) => train.with_stop_radius(radius).map_err(error)?,
+        (None, Aperture::FNumber(f_number)) => train.with_f_number(f_number).map_err(error)?,
+        (None, _) => train,
     };
     let radius = opened.stop_radius();
     if written.is_finite() && written > 0.0 && (radius - written).abs() > 0.01 * written {

@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 
 use super::ZemaxError;
+use super::fields::Fields;
 use super::place::Break;
 
 /// The most surfaces; large designs have a hundred.
@@ -26,7 +27,7 @@ pub(super) struct Sheet {
     pub(super) last_line: usize,
     wavelengths: Vec<f64>,
     primary: usize,
-    fields: Fields,
+    pub(super) fields: Fields,
     configurations: usize,
     ignored: BTreeMap<String, Ignored>,
 }
@@ -37,6 +38,8 @@ pub(super) enum Aperture {
     /// The entrance pupil's diameter, in the file's unit.
     EntrancePupil(f64),
     FNumber(f64),
+    /// The sine of the half angle of the cone from the object's point on the axis.
+    ObjectAperture(f64),
 }
 
 /// A surface.
@@ -81,15 +84,6 @@ pub(super) struct Parameter {
     pub(super) value: f64,
 }
 
-#[derive(Debug, Default)]
-struct Fields {
-    kind: usize,
-    count: Option<usize>,
-    wavelengths: Option<usize>,
-    x: Vec<f64>,
-    y: Vec<f64>,
-}
-
 #[derive(Debug)]
 struct Ignored {
     first: usize,
@@ -97,7 +91,7 @@ struct Ignored {
 }
 
 /// One line, taken apart.
-struct Line<'a> {
+pub(super) struct Line<'a> {
     number: usize,
     command: &'a str,
     rest: &'a str,
@@ -108,7 +102,7 @@ impl Line<'_> {
         ZemaxError::new(self.number, format!("{}: {why}", self.command))
     }
 
-    fn word(&self, i: usize) -> Option<&str> {
+    pub(super) fn word(&self, i: usize) -> Option<&str> {
         self.rest.split_whitespace().nth(i)
     }
 
@@ -133,7 +127,7 @@ impl Line<'_> {
         self.rest.split_whitespace().map(|word| self.parse(word)).collect()
     }
 
-    fn index(&self, i: usize) -> Result<usize, ZemaxError> {
+    pub(super) fn index(&self, i: usize) -> Result<usize, ZemaxError> {
         let word = self.word(i).ok_or_else(|| self.error("a whole number is missing"))?;
         word.parse().map_err(|_| self.error(format!("`{word}` is not a whole number")))
     }
@@ -192,7 +186,7 @@ impl Sheet {
             "MODE" if line.word(0) == Some("SEQ") => {}
             "MODE" => return Err(line.error("only sequential lenses (MODE SEQ) can be imported")),
             "UNIT" => self.unit = unit(line)?,
-            "ENPD" | "FNUM" => self.set_aperture(line)?,
+            "ENPD" | "FNUM" | "OBNA" => self.set_aperture(line)?,
             // The stop's own size.
             "FLOA" => self.aperture = None,
             "GCAT" => self.makers = line.rest.split_whitespace().map(maker).collect(),
@@ -227,10 +221,13 @@ impl Sheet {
         if value < 0.0 {
             return Err(line.error(format!("{value} must be positive")));
         }
-        let aperture = if line.command == "ENPD" {
-            Aperture::EntrancePupil(value)
-        } else {
-            Aperture::FNumber(value)
+        let aperture = match line.command {
+            "ENPD" => Aperture::EntrancePupil(value),
+            "OBNA" if value >= 1.0 => {
+                return Err(line.error(format!("{value} must be below 1 in air")));
+            }
+            "OBNA" => Aperture::ObjectAperture(value),
+            _ => Aperture::FNumber(value),
         };
         self.aperture = Some((line.number, aperture));
         Ok(())
@@ -289,25 +286,6 @@ impl Sheet {
         all
     }
 
-    /// Field angles (degrees) without those that repeat; none when the file gives heights.
-    pub(super) fn field_angles(&self) -> Vec<f64> {
-        let Fields { kind: 0, count, x, y, .. } = &self.fields else { return Vec::new() };
-        let mut angles: Vec<f64> = Vec::new();
-        let count = count.unwrap_or(y.len()).min(x.len().max(y.len()));
-        for i in 0..count {
-            let slope = |list: &[f64]| list.get(i).map_or(0.0, |a| a.to_radians().tan());
-            let (across, up) = (slope(x), slope(y));
-            let angle = match across == 0.0 {
-                true => y.get(i).copied().unwrap_or(0.0),
-                false => across.hypot(up).atan().to_degrees(),
-            };
-            if angle.abs() < 180.0 && !angles.contains(&angle) {
-                angles.push(angle);
-            }
-        }
-        angles
-    }
-
     pub(super) fn what_is_left_out(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if self.configurations > 1 {
@@ -315,9 +293,6 @@ impl Sheet {
                 "of {} configurations, the one that the file stands at is taken",
                 self.configurations
             ));
-        }
-        if self.fields.kind != 0 {
-            notes.push("fields given as heights are left out".to_owned());
         }
         let mut left_out: Vec<(&String, &Ignored)> = self.ignored.iter().collect();
         left_out.sort_by_key(|(_, ignored)| ignored.first);
@@ -332,16 +307,6 @@ impl Sheet {
             notes.push(format!("commands left out: {}", words.join(", ")));
         }
         notes
-    }
-}
-
-impl Fields {
-    /// Kind, normalisation, number of fields, number of wavelengths.
-    fn set_kind(&mut self, line: &Line<'_>) -> Result<(), ZemaxError> {
-        self.kind = line.index(0)?;
-        self.count = line.word(2).map(|_| line.index(2)).transpose()?;
-        self.wavelengths = line.word(3).map(|_| line.index(3)).transpose()?;
-        Ok(())
     }
 }
 

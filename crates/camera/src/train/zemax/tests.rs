@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::*;
 use crate::element::{Clip, Fate};
 use crate::train::Side;
+use crate::train::analysis::chief_height;
 
 /// A surface's lines.
 fn surface(number: usize, lines: &[&str]) -> String {
@@ -234,9 +235,59 @@ fn wavelengths_and_fields_in_use_are_taken_the_primary_first() {
     assert_eq!(lens.fields[..2], [0.0, 7.0]);
     let (three, four) = (3_f64.to_radians().tan(), 4_f64.to_radians().tan());
     assert!((lens.fields[2] - three.hypot(four).atan().to_degrees()).abs() < 1e-14);
-    let heights = read(&file(&["FTYP 3 0 3 1 0 0 0", "YFLN 0 7 4"], &SINGLET));
-    assert!(heights.fields.is_empty());
-    assert!(heights.notes.iter().any(|note| note.contains("heights")));
+}
+
+/// A file whose object is `distance` in front of its first surface.
+fn near(distance: f64, header: &[&str], surfaces: &[&[&str]]) -> ZemaxLens {
+    read(&file(header, surfaces).replace("DISZ INFINITY", &format!("DISZ {distance}")))
+}
+
+#[test]
+fn heights_become_the_angles_of_their_chief_rays() {
+    let by = |kind: u32, heights: &str| {
+        let kind = format!("FTYP {kind} 0 3 1 0 0 0");
+        read(&file(&[&kind, &format!("YFLN {heights}")], &SINGLET))
+    };
+    let lens = train(&by(0, "0 7 4").file);
+    let at = lens.at(lens.wavelength()).unwrap();
+    let lands = |angle| chief_height(&lens, &at, angle, 52.0).unwrap();
+    // Real heights, on the image 47 mm behind the lens: there and back.
+    let real = by(3, "0 7 4").fields;
+    for (angle, height) in real.iter().zip([0.0, 7.0, 4.0]) {
+        assert!((lands(*angle) - height).abs() < 1e-9, "{real:?}");
+    }
+    // Paraxial ones, by the slope on the axis.
+    let paraxial = by(2, "0 7 4").fields;
+    let scale = lands(1e-4) / 1e-4_f64.to_radians();
+    for (angle, height) in paraxial.iter().zip([0.0, 7.0, 4.0]) {
+        assert!((angle.to_radians().tan() * scale - height).abs() < 1e-6, "{paraxial:?}");
+    }
+    assert!(real[1] != paraxial[1], "the lens distorts");
+    let beyond = by(3, "0 700");
+    assert_eq!(beyond.fields, [0.0]);
+    assert!(beyond.notes.iter().any(|note| note.contains("image height of 700 mm")));
+    // Heights of an object 200 mm in front of the stop, which is the first vertex; a plane that is
+    // left out in front of the lens changes no distance.
+    let object = near(200.0, &["FTYP 1 0 2 1 0 0 0", "YFLN 0 20"], &SINGLET).fields;
+    assert!((object[1] + 0.1_f64.atan().to_degrees()).abs() < 1e-12, "{object:?}");
+    let dummy: &[&str] = &["TYPE STANDARD", "CURV 0.0", "DISZ 10", "DIAM 30 0"];
+    let further =
+        near(190.0, &["FTYP 1 0 2 1 0 0 0", "YFLN 0 20"], &[dummy, SINGLET[0], SINGLET[1]]);
+    assert!((further.fields[1] - object[1]).abs() < 1e-12, "{:?}", further.fields);
+    let nowhere = by(1, "0 7");
+    assert!(nowhere.notes.iter().any(|note| note.contains("object at infinity")));
+    assert!(by(4, "0 7").notes.iter().any(|note| note.contains("kind 4")));
+}
+
+#[test]
+fn an_aperture_given_at_the_object_sets_the_stop() {
+    let lens = near(200.0, &["OBNA 0.02 0"], &SINGLET);
+    let pupil = train(&lens.file).paraxial(587.56).unwrap().entrance_pupil;
+    let expected = 2.0 * 200.0 * 0.02_f64.asin().tan();
+    assert!((pupil.diameter.unwrap() - expected).abs() < 1e-9, "{pupil:?}");
+    let far = refused(&file(&["OBNA 0.02 0"], &SINGLET));
+    assert!(far.contains("line 3: OBNA: the object is at infinity"), "{far}");
+    assert!(refused(&file(&["OBNA 1.2 0"], &SINGLET)).contains("below 1"));
 }
 
 #[test]

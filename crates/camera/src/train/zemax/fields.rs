@@ -1,0 +1,102 @@
+//! Field points, given as angles or heights, to field angles.
+
+use super::ZemaxError;
+use super::sheet::Line;
+use crate::train::analysis::chief_height;
+use crate::train::{Focus, OpticalTrain};
+
+/// The field points of a file.
+#[derive(Debug, Default)]
+pub(super) struct Fields {
+    kind: usize,
+    count: Option<usize>,
+    /// How many wavelengths are in use, which stands in the same line.
+    pub(super) wavelengths: Option<usize>,
+    pub(super) x: Vec<f64>,
+    pub(super) y: Vec<f64>,
+}
+
+impl Fields {
+    /// Kind, normalisation, number of fields, number of wavelengths.
+    pub(super) fn set_kind(&mut self, line: &Line<'_>) -> Result<(), ZemaxError> {
+        self.kind = line.index(0)?;
+        self.count = line.word(2).map(|_| line.index(2)).transpose()?;
+        self.wavelengths = line.word(3).map(|_| line.index(3)).transpose()?;
+        Ok(())
+    }
+
+    /// The angles (degrees) of the chief rays of the fields, without those that repeat, and sentences
+    /// on fields that have none. `unit` is the file's length in millimetres; `object_z` is where the
+    /// object stands in lens coordinates (mm).
+    pub(super) fn angles(
+        &self,
+        unit: f64,
+        train: &OpticalTrain,
+        object_z: Option<f64>,
+    ) -> (Vec<f64>, Vec<String>) {
+        let (mut angles, mut notes): (Vec<f64>, Vec<String>) = (Vec::new(), Vec::new());
+        for [x, y] in self.points() {
+            let height = unit * if x == 0.0 { y } else { x.hypot(y) };
+            let found = match self.kind {
+                0 if x == 0.0 => Ok(y),
+                0 => Ok(x.to_radians().tan().hypot(y.to_radians().tan()).atan().to_degrees()),
+                1 => angle_of_object(train, object_z, height),
+                2 | 3 => angle_of_image(train, height, self.kind == 3),
+                kind => Err(format!("fields of kind {kind} are neither angles nor heights")),
+            };
+            match found {
+                Ok(angle) if angle.abs() < 180.0 && !angles.contains(&angle) => angles.push(angle),
+                Ok(_) => {}
+                Err(why) if notes.contains(&why) => {}
+                Err(why) => notes.push(why),
+            }
+        }
+        (angles, notes.into_iter().map(|why| format!("fields left out: {why}")).collect())
+    }
+
+    fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        let longest = self.x.len().max(self.y.len());
+        let count = self.count.unwrap_or(self.y.len()).min(longest);
+        let at = |list: &[f64], i: usize| list.get(i).copied().unwrap_or(0.0);
+        (0..count).map(move |i| [at(&self.x, i), at(&self.y, i)])
+    }
+}
+
+/// The angle (degrees) at which the entrance pupil sees a point of the object `height` (mm) off the
+/// axis; rays from above come down.
+fn angle_of_object(
+    train: &OpticalTrain,
+    object_z: Option<f64>,
+    height: f64,
+) -> Result<f64, String> {
+    let object = object_z.ok_or("heights of an object at infinity are none")?;
+    let pupil = train.paraxial(train.wavelength()).ok().and_then(|p| p.entrance_pupil.z);
+    let pupil = pupil.ok_or("heights seen from an entrance pupil at infinity have no angle")?;
+    Ok((-height / (pupil - object)).atan().to_degrees())
+}
+
+/// The angle (degrees) whose chief ray lands at `height` (mm) on the sensor, through the whole lens
+/// or as it does near the axis.
+fn angle_of_image(train: &OpticalTrain, height: f64, real: bool) -> Result<f64, String> {
+    const NEAR: f64 = 1e-6;
+    let dark = || format!("no chief ray arrives at an image height of {height} mm");
+    let sensor = train.sensor_z(Focus::AsWritten).map_err(|error| error.to_string())?;
+    let lens = train.at(train.wavelength()).map_err(|error| error.to_string())?;
+    let lands = |slope: f64| chief_height(train, &lens, slope.atan().to_degrees(), sensor);
+    let scale = lands(NEAR).filter(|scale| *scale != 0.0).ok_or_else(dark)? / NEAR;
+    let mut slope = height / scale;
+    if !real || height == 0.0 {
+        return Ok(slope.atan().to_degrees());
+    }
+    let (mut before, mut missed_before) = (0.0, -height);
+    for _ in 0..50 {
+        let missed = lands(slope).ok_or_else(dark)? - height;
+        if missed.abs() <= 1e-10 * height.abs() {
+            return Ok(slope.atan().to_degrees());
+        }
+        let next = slope - missed * (slope - before) / (missed - missed_before);
+        (before, missed_before) = (slope, missed);
+        slope = next;
+    }
+    Err(dark())
+}

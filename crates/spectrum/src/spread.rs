@@ -1,0 +1,139 @@
+//! Wavelengths that together stand for a wide lane, where one in its middle would hide what happens
+//! within it: a lens of glass is sharp at one of them and blurs the others.
+
+use crate::colour::OBSERVER;
+use crate::{Curve, Lanes, VISIBLE, rgb};
+
+/// The width of a lane (nm) that one wavelength may stand for.
+const STEP: f64 = 25.0;
+
+/// Cells in which light is summed over a lane: far narrower than the narrowest band of a filter.
+const CELLS: u32 = 4000;
+
+/// Wavelengths of equal weight, and what filters leave of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spread {
+    /// In ascending order (nm). An equal share of the lane's light behind the filters lies around
+    /// each.
+    pub wavelengths: Vec<f64>,
+    /// What passes all filters one behind the other, over the product of what passes each of them
+    /// alone: 1 for fewer than two, 0 for two that pass different light.
+    pub overlap: f64,
+}
+
+impl Lanes {
+    /// Wavelengths that stand for lane `i` behind `filters`: one for each 25 nm of a wide lane, each
+    /// the median of an equal share of its light, or [`wavelength`](Self::wavelength) alone when the
+    /// lane is narrow or no light is left.
+    ///
+    /// The light of a lane is counted as photons, as a sensor does; that of red, green and blue as
+    /// the CIE 1931 observer's x̄ + ȳ + z̄ sees it.
+    #[must_use]
+    pub fn spread(&self, i: usize, filters: &[&Curve]) -> Spread {
+        let [from, to] = match self {
+            Self::Grey | Self::Rgb => VISIBLE,
+            Self::Bands(grid) => [grid.edges()[i], grid.edges()[i + 1]],
+        };
+        let cell = (to - from) / f64::from(CELLS);
+        let middle = |c: u32| from + (f64::from(c) + 0.5) * cell;
+        let (mut total, mut passed) = (0.0, 0.0);
+        let mut alone = vec![0.0; filters.len()];
+        let mut sums = Vec::with_capacity(CELLS as usize);
+        for nm in (0..CELLS).map(middle) {
+            let light = self.light(i, nm);
+            let mut left = light;
+            for (alone, filter) in alone.iter_mut().zip(filters) {
+                *alone += light * filter.held(nm);
+                left *= filter.held(nm);
+            }
+            total += light;
+            passed += left;
+            sums.push(passed);
+        }
+        let independent = alone.iter().map(|alone| alone / total).product::<f64>();
+        let overlap = if independent > 0.0 { passed / total / independent } else { 1.0 };
+        let count = ((to - from) / STEP).ceil().max(1.0);
+        if count < 2.0 || passed <= 0.0 {
+            return Spread { wavelengths: vec![self.wavelength(i)], overlap };
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen")]
+        let medians = (0..count as u32).map(|k| (f64::from(k) + 0.5) / count * passed);
+        let place = |median: f64| {
+            let c = sums.partition_point(|&sum| sum < median).min(sums.len() - 1);
+            let before = if c > 0 { sums[c - 1] } else { 0.0 };
+            from + (c as f64 + (median - before) / (sums[c] - before)) * cell
+        };
+        Spread { wavelengths: medians.map(place).collect(), overlap }
+    }
+
+    /// The light of lane `i` at a wavelength (nm), to a factor.
+    fn light(&self, i: usize, nm: f64) -> f64 {
+        match self {
+            Self::Grey | Self::Bands(_) => nm,
+            Self::Rgb => {
+                rgb::PRIMARIES[i].held(nm) * OBSERVER.iter().map(|c| c.held(nm)).sum::<f64>()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Grid;
+
+    fn mean(of: &[f64]) -> f64 {
+        of.iter().sum::<f64>() / of.len() as f64
+    }
+
+    #[test]
+    fn narrow_lanes_keep_their_middle_and_wide_ones_spread_over_all_of_their_light() {
+        let bands = Lanes::Bands(Grid::from_edges(vec![400.0, 425.0, 525.0]).unwrap());
+        assert_eq!(bands.spread(0, &[]).wavelengths, [412.5]);
+        let wide = bands.spread(1, &[]).wavelengths;
+        assert_eq!(wide.len(), 4);
+        // Photons: densities of λ, so that the first quarter is the widest. Its median by hand.
+        let quarter =
+            |share: f64| (425f64.powi(2) + share * (525f64.powi(2) - 425f64.powi(2))).sqrt();
+        for (k, nm) in (0..4).zip(&wide) {
+            assert!((nm - quarter((f64::from(k) + 0.5) / 4.0)).abs() < 1e-4, "{wide:?}");
+        }
+        let grey = Lanes::Grey.spread(0, &[]).wavelengths;
+        assert!(grey.len() == 16 && grey[0] < 400.0 && grey[15] > 765.0, "{grey:?}");
+        // The centroids of red, green and blue: 16 medians give a mean to half a nanometre, as the
+        // outermost of them stand for long tails.
+        for (i, centroid) in rgb::PRIMARY_WAVELENGTHS.into_iter().enumerate() {
+            let own = Lanes::Rgb.spread(i, &[]).wavelengths;
+            assert!((mean(&own) - centroid).abs() < 0.5, "{i}: {}", mean(&own));
+        }
+    }
+
+    #[test]
+    fn filters_choose_the_wavelengths_and_what_two_of_them_leave() {
+        let band = |from: f64, to: f64| {
+            let [before, behind] = [from - 0.01, to + 0.01];
+            Curve::sampled(vec![
+                [300.0, 0.0],
+                [before, 0.0],
+                [from, 1.0],
+                [to, 1.0],
+                [behind, 0.0],
+                [900.0, 0.0],
+            ])
+            .unwrap()
+        };
+        let [line, low, high] = [band(500.0, 510.0), band(400.0, 600.0), band(550.0, 700.0)];
+        let through = Lanes::Grey.spread(0, &[&line]);
+        assert!(through.wavelengths.iter().all(|nm| (499.0..511.0).contains(nm)), "{through:?}");
+        assert!((through.overlap - 1.0).abs() < 1e-12);
+        // Photons of 550..600 nm, by ∫ λ dλ, over the product of both alone.
+        let photons =
+            |from: f64, to: f64| (to * to - from * from) / (780f64.powi(2) - 380f64.powi(2));
+        let both = Lanes::Grey.spread(0, &[&low, &high]);
+        let expected = photons(550.0, 600.0) / (photons(400.0, 600.0) * photons(550.0, 700.0));
+        // Cells are 0.1 nm wide.
+        assert!((both.overlap / expected - 1.0).abs() < 2e-3, "{} {expected}", both.overlap);
+        let none = Lanes::Grey.spread(0, &[&line, &high]);
+        assert_eq!((none.wavelengths.as_slice(), none.overlap), ([555.0].as_slice(), 0.0));
+    }
+}
