@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render test test-embree4 bench bench-peers bench-light bench-sensor docs-figures docs-charts \
+.PHONY: help setup render test test-embree4 bench bench-peers bench-light bench-lens bench-sensor docs-figures docs-charts \
 	docs-stability clean
 
 help:
@@ -15,6 +15,7 @@ help:
 	@echo "make test-embree4  run the tests that touch Embree against Embree 4, in a Debian 13 root"
 	@echo "make bench         measure everything, write docs/benchmarks.md"
 	@echo "make bench-peers   add other programs at the same job, from PyPI"
+	@echo "make bench-lens    time rays through a lens against optiland, from PyPI"
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
@@ -49,6 +50,9 @@ bench-peers: setup
 bench-light: setup
 	cargo build --release -p etendue -p etendue-benches
 	PEERS=light_peers.py scripts/bench-peers.sh $(ARGS)
+
+bench-lens:
+	scripts/bench-lens.sh
 
 bench-sensor:
 	scripts/bench-sensor.sh

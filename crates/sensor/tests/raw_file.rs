@@ -106,7 +106,7 @@ fn what_is_no_raw_is_refused() {
     assert!(written(&sensor, &image).unwrap_err().to_string().contains("no filter `w`"));
 }
 
-/// Colours as an independent raw converter (LibRaw, of Python's `rawpy`) develops them, in the four
+/// Colours as an independent raw converter (`LibRaw`, of Python's `rawpy`) develops them, in the four
 /// quarters of a picture: pattern, levels, balance and matrix are right, and up is up.
 #[test]
 fn a_raw_converter_develops_the_colours() {
@@ -140,9 +140,9 @@ print(json.dumps({
         let film: Vec<f32> = (0..96 * 64)
             .flat_map(|i| {
                 let colour = colours[(i / 96 / 32) * 2 + i % 96 / 48];
-                rows.iter()
-                    .map(move |row| (0..3).map(|k| row[k] * colour[k]).sum::<f64>() as f32)
-                    .collect::<Vec<f32>>()
+                #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+                let lane = |row: &[f64; 3]| (0..3).map(|k| row[k] * colour[k]).sum::<f64>() as f32;
+                rows.iter().map(lane).collect::<Vec<f32>>()
             })
             .collect();
         let shot = Shot { exposure: 0.01, frame: 0 };
@@ -151,7 +151,7 @@ print(json.dumps({
         let out = Command::new(&python).args(["-c", program]).arg(&path).output().unwrap();
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         let read: Value = serde_json::from_slice(&out.stdout).unwrap();
-        // LibRaw counts the second green as a colour of its own.
+        // It counts the second green as a colour of its own.
         assert_eq!(read["pattern"].as_str().unwrap(), pattern);
         assert_eq!(read["white"], 4095);
         assert_eq!(read["black"], json!([38, 38, 38, 38]));

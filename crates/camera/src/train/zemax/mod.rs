@@ -307,7 +307,7 @@ fn open_stop(
         Aperture::EntrancePupil(diameter) => {
             with_entrance_pupil(&train, "ENPD", |_| Ok(0.5 * diameter * sheet.unit)).map(Some)
         }
-        Aperture::ObjectAperture(sine) => with_entrance_pupil(&train, "OBNA", |pupil| {
+        Aperture::AtObject(sine) => with_entrance_pupil(&train, "OBNA", |pupil| {
             let object = object_z.ok_or("OBNA: the object is at infinity; write ENPD or FNUM")?;
             Ok((pupil - object).abs() * sine.asin().tan())
         })

@@ -39,7 +39,7 @@ pub(super) enum Aperture {
     EntrancePupil(f64),
     FNumber(f64),
     /// The sine of the half angle of the cone from the object's point on the axis.
-    ObjectAperture(f64),
+    AtObject(f64),
 }
 
 /// A surface.
@@ -226,7 +226,7 @@ impl Sheet {
             "OBNA" if value >= 1.0 => {
                 return Err(line.error(format!("{value} must be below 1 in air")));
             }
-            "OBNA" => Aperture::ObjectAperture(value),
+            "OBNA" => Aperture::AtObject(value),
             _ => Aperture::FNumber(value),
         };
         self.aperture = Some((line.number, aperture));

@@ -1,0 +1,43 @@
+"""A section of a page that a command writes: between two comments that name it."""
+
+import platform
+import statistics
+import subprocess
+
+
+def machine():
+    """The processor, and which etendue was measured."""
+    model = platform.processor() or platform.machine()
+    fields = {}
+    try:
+        with open("/proc/cpuinfo") as lines:
+            for line in lines:
+                key, _, value = (part.strip() for part in line.partition(":"))
+                fields.setdefault(key, value)
+    except OSError:
+        pass
+    if "model name" in fields:
+        family, number = fields.get("cpu family", "?"), fields.get("model", "?")
+        model = f"{fields['model name']} (family {family}, model {number})"
+    commit = subprocess.run(
+        ["git", "describe", "--always", "--dirty"], capture_output=True, text=True
+    ).stdout.strip()
+    return f"{model}; etendue at commit {commit or 'unknown'}; Python {platform.python_version()}"
+
+
+def spread(values, digits=1):
+    """The median, with the least and the greatest in brackets."""
+    middle, low, high = statistics.median(values), min(values), max(values)
+    return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def put(page, name, text):
+    """Replaces the section `name` of `page`."""
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    with open(page) as file:
+        before, found, rest = file.read().partition(begin)
+    _, closed, after = rest.partition(end)
+    if not found or not closed:
+        raise SystemExit(f"{page} has no section {name}: it wants the lines {begin} and {end}")
+    with open(page, "w") as file:
+        file.write(f"{before}{begin}\n\n{text.strip()}\n\n{end}{after}")
