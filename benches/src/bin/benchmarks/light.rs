@@ -77,7 +77,7 @@ fn camera_rays(
             let numbers = settings.sampler.pixel(settings.seed, x, y, samples);
             for index in 0..samples {
                 let [u, v] = numbers.square(index, 0);
-                film.push(f64::from(x) + u, f64::from(y) + v, numbers.square(index, 1));
+                film.push([f64::from(x) + u, f64::from(y) + v], numbers.square(index, 1), 0.5);
             }
         }
         camera.sample_rays(&film, &mut rays);
