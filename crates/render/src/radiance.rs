@@ -4,7 +4,6 @@
 //! Sums are compensated (Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation endlicher
 //! Summen", 1974), so the mean of a million samples is as exact as that of ten.
 
-use std::ops::Range;
 
 use etendue_camera::element::FateCounts;
 use etendue_camera::{Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, squares};
@@ -12,7 +11,7 @@ use etendue_tracer::transport::Beam;
 use etendue_tracer::{Samples, Scratch, Stage, Tally, Tracer};
 
 use crate::film::Rows;
-use crate::tiles::{CAMERA_PAIRS, Sampling, Tile, push_sample};
+use crate::tiles::{CAMERA_PAIRS, Sampling, Tile, place_samples};
 
 /// Samples that are traced together: enough that what is left of a batch after a few bounces still
 /// fills packets, and few enough that its arrays stay in the cache.
@@ -103,7 +102,9 @@ impl LightPass<'_> {
             batch.sums.resize(pixels.len() * lanes, Sum::default());
             for first in (0..samples).step_by(at_once as usize) {
                 let range = first..samples.min(first + at_once);
-                batch.aim(self.camera, tile, pixels, range, sampling);
+                let LightBatch { numbers, film, .. } = &mut *batch;
+                let wanted = (pixels, range);
+                place_samples(self.camera, tile, wanted, sampling, &mut numbers.samples, film);
                 for group in &self.groups {
                     self.trace(group, batch);
                 }
@@ -142,27 +143,5 @@ impl LightBatch {
     /// What became of rays inside the camera's lens.
     pub(crate) fn fates(&self) -> &FateCounts {
         &self.camera.fates
-    }
-
-    /// Samples `range` of each of `pixels`, those of one pixel side by side.
-    fn aim(
-        &mut self,
-        camera: &Camera,
-        tile: Tile,
-        pixels: &[(u32, u32)],
-        range: Range<u32>,
-        sampling: Sampling,
-    ) {
-        self.film.clear();
-        self.numbers.samples.clear();
-        let Sampling { samples, sampler, seed } = sampling;
-        for &(x, y) in pixels {
-            let (x, y) = (tile.left + x, tile.top + y);
-            let numbers = sampler.pixel(seed, x, y, samples);
-            for index in range.clone() {
-                push_sample(&mut self.film, camera, [x, y], &numbers, index);
-                self.numbers.samples.push((numbers, index));
-            }
-        }
     }
 }

@@ -1,11 +1,12 @@
 //! The tile loop: batches of rays from the camera, through the accelerator, onto the film.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use etendue_accel::Accel;
 use etendue_camera::element::FateCounts;
-use etendue_camera::{Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, Sampler};
+use etendue_camera::{Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, Sampler, squares};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_tracer::{LayerSpec, NormalKind, Surroundings, Tally, Traced};
 use rayon::prelude::*;
@@ -126,7 +127,7 @@ impl Job<'_> {
         width: u32,
         batch: &mut Batch,
     ) {
-        let Sampling { samples, sampler, seed } = self.sampling;
+        let samples = self.sampling.samples;
         let at_once = samples.min(BATCH);
         let pixels_at_once = (BATCH / at_once) as usize;
         let pixels: Vec<(u32, u32)> = tile.pixels().collect();
@@ -134,9 +135,9 @@ impl Job<'_> {
             let mut sums = vec![[0.0; 3]; pixels.len() * layers.len()];
             for first in (0..samples).step_by(at_once as usize) {
                 let range = first..samples.min(first + at_once);
-                batch.place_samples(self.camera, tile, pixels, range.clone(), |x, y| {
-                    sampler.pixel(seed, x, y, samples)
-                });
+                let Batch { numbered, samples: film, .. } = &mut *batch;
+                let wanted = (pixels, range.clone());
+                place_samples(self.camera, tile, wanted, self.sampling, numbered, film);
                 for group in &self.groups {
                     batch.samples.wavelength = group.wavelength;
                     self.camera.sample_rays(&batch.samples, &mut batch.camera_rays);
@@ -323,20 +324,37 @@ fn even_bits(k: u32) -> u32 {
 /// pupil, and of the third one number for the wavelength.
 pub(crate) const CAMERA_PAIRS: u32 = 3;
 
-/// Appends sample `index` of a pixel. A camera without a lens looks at its place alone.
-pub(crate) fn push_sample(
-    film: &mut FilmSamples,
+/// Refills `film` with samples `range` of each of `pixels`, those of one pixel side by side, and
+/// `numbers` with what each of them is sampled by. A camera without a lens looks at places alone.
+pub(crate) fn place_samples(
     camera: &Camera,
-    pixel: [u32; 2],
-    numbers: &PixelSamples,
-    index: u32,
+    tile: Tile,
+    (pixels, range): (&[(u32, u32)], Range<u32>),
+    sampling: Sampling,
+    numbers: &mut Vec<(PixelSamples, u32)>,
+    film: &mut FilmSamples,
 ) {
-    let place = numbers.square(index, 0);
-    let [pupil, [wavelength, _]] = match camera.lens() {
-        Some(_) => [1, 2].map(|pair| numbers.square(index, pair)),
-        None => [[0.5; 2]; 2],
-    };
-    film.push([0, 1].map(|k| f64::from(pixel[k]) + place[k]), pupil, wavelength);
+    let Sampling { samples, sampler, seed } = sampling;
+    numbers.clear();
+    for &(x, y) in pixels {
+        let pixel = sampler.pixel(seed, tile.left + x, tile.top + y, samples);
+        numbers.extend(range.clone().map(|index| (pixel, index)));
+    }
+    let pairs = if camera.lens().is_some() { CAMERA_PAIRS } else { 1 };
+    let wanted = |pair| numbers.iter().map(move |&(pixel, index)| (pixel, index, pair));
+    let mut places = Vec::new();
+    squares(&(0..pairs).flat_map(wanted).collect::<Vec<_>>(), &mut places);
+    let mut places = places.chunks(numbers.len().max(1));
+    let [in_pixel, in_pupil, in_spectrum] =
+        [places.next(), places.next(), places.next()].map(Option::unwrap_or_default);
+    film.clear();
+    for (i, place) in in_pixel.iter().enumerate() {
+        let (x, y) = pixels[i / range.len()];
+        let corner = [tile.left + x, tile.top + y];
+        let of = |squares: &[[f64; 2]]| squares.get(i).copied().unwrap_or([0.5; 2]);
+        let [wavelength, _] = of(in_spectrum);
+        film.push([0, 1].map(|k| f64::from(corner[k]) + place[k]), of(in_pupil), wavelength);
+    }
 }
 
 /// One thread's rays and hits.
@@ -346,6 +364,8 @@ struct Batch {
     columns: Vec<f64>,
     rows: Vec<f64>,
     samples: FilmSamples,
+    /// What each of the samples is sampled by.
+    numbered: Vec<(PixelSamples, u32)>,
     camera_rays: CameraRays,
     /// The tile of the chief rays.
     tile: Option<Tile>,
@@ -366,6 +386,7 @@ impl Batch {
             columns: Vec::new(),
             rows: Vec::new(),
             samples: FilmSamples::default(),
+            numbered: Vec::new(),
             camera_rays: CameraRays::default(),
             tile: None,
             pixels: Vec::new(),
@@ -391,24 +412,5 @@ impl Batch {
         self.rows.clear();
         self.rows.extend(self.pixels.iter().map(|&(_, y)| f64::from(tile.top + y) + 0.5));
         camera.rays_through(&self.columns, &self.rows, &mut self.rays);
-    }
-
-    /// Samples `range` of each of `pixels`, those of one pixel side by side.
-    fn place_samples(
-        &mut self,
-        camera: &Camera,
-        tile: Tile,
-        pixels: &[(u32, u32)],
-        range: std::ops::Range<u32>,
-        samples: impl Fn(u32, u32) -> PixelSamples,
-    ) {
-        self.samples.clear();
-        for &(x, y) in pixels {
-            let (x, y) = (tile.left + x, tile.top + y);
-            let samples = samples(x, y);
-            for index in range.clone() {
-                push_sample(&mut self.samples, camera, [x, y], &samples, index);
-            }
-        }
     }
 }
