@@ -4,7 +4,6 @@
 //! Sums are compensated (Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation endlicher
 //! Summen", 1974), so the mean of a million samples is as exact as that of ten.
 
-
 use etendue_camera::element::FateCounts;
 use etendue_camera::{Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, squares};
 use etendue_tracer::transport::Beam;
