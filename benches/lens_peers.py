@@ -77,7 +77,7 @@ def main():
         ("ray by ray, the same arithmetic", ns["singly"]),
     ]
     try:
-        rows.append(("optiland 0.6.3, numpy", optiland_rounds(lens)))
+        rows.append(("optiland 0.6.3, numpy (conics compiled by numba)", optiland_rounds(lens)))
     except ImportError as error:
         print(f"optiland is left out: {error}", file=sys.stderr)
     best = median["widest"]
