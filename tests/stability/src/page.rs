@@ -50,8 +50,8 @@ pub fn write(scale: Scale, ran: &[(&str, &str, Outcome)]) -> String {
         for case in method.cases {
             let Some(why) = case.limit else { continue };
             let found = found(method.name, case.name);
-            let _ =
-                writeln!(page, "- **{}: {}.** {why} Measured: {found}.", method.name, case.regime);
+            let name = case.name.replace('_', " ");
+            let _ = writeln!(page, "- **{}, {name}.** {why} Measured: {found}.", method.name);
         }
     }
     page
