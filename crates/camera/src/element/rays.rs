@@ -210,6 +210,9 @@ pub(crate) fn at_lane(axes: &[[f64; LANES]; 3], lane: usize) -> [f64; 3] {
     [axes[0][lane], axes[1][lane], axes[2][lane]]
 }
 
+/// Nothing is farther (mm): squares of more overflow, and sums of them are no numbers.
+const FARTHEST: f64 = 1e150;
+
 /// One ray (mm), by components so that vector kernels see plain numbers.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ray {
@@ -218,18 +221,22 @@ pub(crate) struct Ray {
 }
 
 impl Ray {
-    /// With a direction of any length but 0; `None` unless all numbers are finite.
+    /// With a direction of any length but 0; `None` unless all numbers are finite and the ray starts
+    /// within [`FARTHEST`].
     pub(crate) fn new(position: DVec3, direction: DVec3) -> Option<Self> {
+        if !position.is_finite() || position.abs().max_element() > FARTHEST {
+            return None;
+        }
         // Within a rounding or two of 1 there is nothing to scale.
-        if (direction.length_squared() - 1.0).abs() < 1e-15 && position.is_finite() {
+        if (direction.length_squared() - 1.0).abs() < 1e-15 {
             return Some(Self { position: position.into(), direction: direction.into() });
         }
         // Squares overflow or lose digits long before the direction does.
         let ordinary = (1e-100..1e100).contains(&direction.length_squared());
         let scale = if ordinary { 1.0 } else { direction.abs().max_element() };
         let unit = (direction / scale).try_normalize()?;
-        (position.is_finite() && unit.is_finite())
-            .then(|| Self { position: position.to_array(), direction: unit.to_array() })
+        let ray = Self { position: position.to_array(), direction: unit.to_array() };
+        unit.is_finite().then_some(ray)
     }
 
     /// The ray `distance` further on.

@@ -59,31 +59,36 @@ const OF_F32: f64 = 1e-5;
 struct Aimed(Vec<(RayBatch, Vec<f64>)>);
 
 impl Aimed {
+    /// First all rays from inside, then all from outside, so that packets run side by side.
     fn at(mesh: &Mesh, place: &Transform, coherent: bool, seed: u64) -> Self {
         let mut random = Rng::with_seed(seed);
-        let mut batches: Vec<(RayBatch, Vec<f64>)> = Vec::new();
-        for triangle in 0..mesh.triangles.len() {
-            let local = mesh.corners(triangle);
-            let away = direction(&mut random) * 0.3;
-            for k in 0..3 {
-                let middle = (local[k] + local[(k + 1) % 3]) / 2.0;
-                for target in [local[k], middle] {
+        let mut aimed = Self(Vec::new());
+        for ahead in [0.0, 4.0] {
+            for triangle in 0..mesh.triangles.len() {
+                let local = mesh.corners(triangle);
+                let away = direction(&mut random) * 0.3;
+                for k in 0..3 {
                     // From ahead, so that the target is no silhouette.
-                    for origin in [away, local[k] * 4.0 + away] {
-                        let way = place.point_from(target, place.point(origin));
-                        if batches.last().is_none_or(|(rays, _)| rays.len() == BATCH) {
-                            let rays = RayBatch { coherent, ..RayBatch::with_capacity(BATCH) };
-                            batches.push((rays, Vec::with_capacity(BATCH)));
-                        }
-                        if let Some((rays, distances)) = batches.last_mut() {
-                            rays.push(place.point(origin), way.normalize());
-                            distances.push(way.length());
-                        }
+                    let origin = place.point(local[k] * ahead + away);
+                    let middle = (local[k] + local[(k + 1) % 3]) / 2.0;
+                    for target in [local[k], middle] {
+                        aimed.push(origin, place.point_from(target, origin), coherent);
                     }
                 }
             }
         }
-        Self(batches)
+        aimed
+    }
+
+    fn push(&mut self, origin: DVec3, way: DVec3, coherent: bool) {
+        if self.0.last().is_none_or(|(rays, _)| rays.len() == BATCH) {
+            let rays = RayBatch { coherent, ..RayBatch::with_capacity(BATCH) };
+            self.0.push((rays, Vec::with_capacity(BATCH)));
+        }
+        if let Some((rays, distances)) = self.0.last_mut() {
+            rays.push(origin, way.normalize());
+            distances.push(way.length());
+        }
     }
 
     fn len(&self) -> usize {

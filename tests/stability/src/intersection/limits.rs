@@ -17,8 +17,8 @@ use crate::{Case, Outcome, Scale};
 pub(super) const SMALL_IN_WIDE: Case = Case {
     name: "small_in_a_wide_scene",
     regime: "a blob of 10⁻², 10⁻⁴, 10⁻⁵, 10⁻⁶ and 10⁻⁷ m beside the far corner of a ground of 1 km",
-    must: "`bvh` finds what `exact` finds, to the bit; Embree hits all of what is 10⁻⁵ of the scene or \
-        larger, if not always the same of its triangles",
+    must: "`bvh` finds what `exact` finds, to the bit; Embree misses at most 1 in 10⁴ of what is \
+        10⁻⁵ of the scene, if not always the same of its triangles",
     limit: Some(
         "Embree's coordinates are f32 and relative to the scene's middle: what is smaller than about \
          10⁻⁶ of the scene is lost to it. `--accel bvh` finds it.",
@@ -72,7 +72,8 @@ fn small_in_wide(scale: Scale) -> Result<Outcome> {
         outcome.must(found.is_none(), || format!("bvh at {size:e} m: {found:?}"));
         let found = Difference::between(&*truth, &*embree(geometry)?, &rays);
         // The scene measures 10³ m, so 10⁻² m is 10⁻⁵ of it.
-        let holds = (size < 1e-2 || found.missed == 0) && found.invented == 0;
+        let few = found.missed * 10_000 <= found.rays;
+        let holds = (size < 1e-2 || few) && found.invented == 0;
         outcome.must(holds, || format!("Embree at {size:e} m: {found:?}"));
         let share = |count: usize| 100.0 * count as f64 / found.rays as f64;
         let (missed, other) = (share(found.missed), share(found.other));

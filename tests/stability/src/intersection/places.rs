@@ -109,7 +109,7 @@ fn twice(scale: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();
     let place = Transform::from_trs(DVec3::X, DQuat::from_rotation_y(0.3), DVec3::splat(0.7));
     let geometry = at(blob(2_000)?, &[place; 3]);
-    let rays = inwards(scale.pick(10_000, 1_000_000), 0.6, &place, 61);
+    let rays = inwards(scale.pick(10_000, 1_000_000), 0.5, &place, 61);
     for (name, build) in BACKENDS {
         let accel = build(geometry.clone())?;
         let mut later = 0;

@@ -122,7 +122,7 @@ fn touching(scale: Scale) -> Result<Outcome> {
                 "lamp": {{"type": "emissive", "radiance": [5, 5, 5]}}}},
             "render": {{"samples": {}}}}}"#,
             away / 10.0,
-            scale.pick(256, 65_536)
+            scale.pick(256, 16_384)
         );
         let seen = Pixels::read(&text)?;
         outcome.must(seen.are_sound(), || format!("at {away:e} m: not finite"));

@@ -40,7 +40,7 @@ fn fireflies(scale: Scale) -> Result<Outcome> {
             "lamp": {"type": "emissive", "radiance": [1000, 1000, 1000]}}"#;
     // Below the mirror, from the side where the lamp is not.
     let eye = [[-1.0, 0.3, 1.5], [0.0; 3]];
-    let samples = scale.pick(4_096, 262_144);
+    let samples = scale.pick(4_096, 65_536);
     let tracer = r#"{"type": "path", "max_bounces": 2}"#;
     let seen = Pixels::read(&patch(tracer, samples, eye, rest))?;
     let factor = |d2: f64, cosine: f64| 0.05 * 0.05 / d2 * cosine;
@@ -77,7 +77,7 @@ fn roulette(scale: Scale) -> Result<Outcome> {
         let tracer = format!(r#"{{"type": "path", "max_bounces": {bounces}}}"#);
         let eye = [[0.2, 0.1, 0.3], [-0.5, -1.0, 0.2]];
         let folder = tempfile::tempdir()?;
-        let text = patch(&tracer, scale.pick(64, 65_536), eye, &rest);
+        let text = patch(&tracer, scale.pick(64, 4_096), eye, &rest);
         let mut scene = load(folder.path(), &text)?;
         for material in &mut scene.materials {
             let radiance = Paint::Plain([1.0; 3]);

@@ -50,7 +50,7 @@ fn grazing(scale: Scale) -> Result<Outcome> {
             );
             let (sin, cos) = degrees.to_radians().sin_cos();
             let eye = [[3.0 * sin, 0.0, 3.0 * cos], [0.0; 3]];
-            let samples = scale.pick(16, 4_096);
+            let samples = scale.pick(16, 1_024);
             let seen = Pixels::read(&patch(r#"{"type": "direct"}"#, samples, eye, &rest))?;
             outcome.must(seen.are_sound(), || format!("{name} at {degrees}: not finite"));
             let bound = 1.001 + 4.0 * seen.standard_error();
@@ -84,7 +84,7 @@ fn smooth(scale: Scale) -> Result<Outcome> {
             );
             // At 45 degrees from the left; the mirrored ray meets z = 3 at x = 3.
             let eye = [[-2.0, 0.0, 2.0], [0.0; 3]];
-            let samples = scale.pick(64, 16_384);
+            let samples = scale.pick(64, 4_096);
             let seen = Pixels::read(&patch(r#"{"type": "whitted"}"#, samples, eye, &rest))?;
             outcome.must(seen.are_sound(), || format!("{what}, {roughness}: not finite"));
             let (mean, error) = (seen.mean(), seen.standard_error());

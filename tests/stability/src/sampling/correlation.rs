@@ -52,7 +52,7 @@ fn neighbours(scale: Scale) -> Result<Outcome> {
 
 fn pairs(scale: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();
-    let (pixels, count): (u32, u32) = (scale.pick(4_096, 262_144), 16);
+    let (pixels, count): (u32, u32) = (scale.pick(4_096, 65_536), 16);
     for (name, sampler) in SAMPLERS {
         let mut most = 0.0_f64;
         for (first, second) in [(0, 1), (0, 2), (1, 2), (2, 3), (2, 6), (3, 7)] {
