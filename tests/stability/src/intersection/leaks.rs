@@ -21,7 +21,7 @@ pub(super) const DEFAULT: Case = Case {
 
 pub(super) const OCCLUSION: Case = Case {
     name: "corners_and_edges_occlusion",
-    regime: "the same rays, asked whether anything is in the way",
+    regime: "the same rays one by one, asked whether anything is in the way",
     must: "something always is, with any accelerator in its default mode",
     limit: None,
     run: occlusion,
@@ -129,18 +129,22 @@ fn places() -> [Transform; 3] {
     ]
 }
 
-/// Asks every backend for the leaks of all aimed rays.
-fn default_modes(scale: Scale, leaks_of: fn(&Aimed, &dyn Accel) -> usize) -> Result<Outcome> {
+/// Asks every backend for the leaks of all rays that are aimed at a mesh of so many triangles.
+fn default_modes(
+    triangles: u64,
+    as_packets: &[bool],
+    leaks_of: fn(&Aimed, &dyn Accel) -> usize,
+) -> Result<Outcome> {
     let mut outcome = Outcome::default();
     // Twelve rays a triangle, three places, packets and single rays. A mesh placed twice is an
     // instance, which is another way through Embree.
-    let (once, instance) = (blob(scale.pick(2_000, 140_000))?, blob(1_000)?);
+    let (once, instance) = (blob(triangles)?, blob(1_000)?);
     for (name, build) in BACKENDS {
         let (mut leaks, mut rays) = (0, 0);
         for (seed, place) in (101..).zip(places()) {
             for (mesh, copies) in [(&once, 1), (&instance, 2)] {
                 let accel = build(at(mesh.clone(), &vec![place; copies]))?;
-                for coherent in [false, true] {
+                for &coherent in as_packets {
                     let aimed = Aimed::at(mesh, &place, coherent, seed);
                     leaks += leaks_of(&aimed, &*accel);
                     rays += aimed.len();
@@ -154,11 +158,12 @@ fn default_modes(scale: Scale, leaks_of: fn(&Aimed, &dyn Accel) -> usize) -> Res
 }
 
 fn closest_hits(scale: Scale) -> Result<Outcome> {
-    default_modes(scale, |aimed, accel| aimed.past(accel, OF_F64))
+    let triangles = scale.pick(2_000, 140_000);
+    default_modes(triangles, &[false, true], |aimed, accel| aimed.past(accel, OF_F64))
 }
 
 fn occlusion(scale: Scale) -> Result<Outcome> {
-    default_modes(scale, Aimed::free)
+    default_modes(scale.pick(2_000, 140_000), &[false], Aimed::free)
 }
 
 /// The share of rays that leak with `options`, told place by place.
