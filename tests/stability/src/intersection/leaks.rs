@@ -21,7 +21,7 @@ pub(super) const DEFAULT: Case = Case {
 
 pub(super) const OCCLUSION: Case = Case {
     name: "corners_and_edges_occlusion",
-    regime: "the same rays one by one, asked whether anything is in the way",
+    regime: "the same rays, asked whether anything is in the way",
     must: "something always is, with any accelerator in its default mode",
     limit: None,
     run: occlusion,
@@ -163,7 +163,7 @@ fn closest_hits(scale: Scale) -> Result<Outcome> {
 }
 
 fn occlusion(scale: Scale) -> Result<Outcome> {
-    default_modes(scale.pick(2_000, 140_000), &[false], Aimed::free)
+    default_modes(scale.pick(2_000, 140_000), &[false, true], Aimed::free)
 }
 
 /// The share of rays that leak with `options`, told place by place.
