@@ -4,7 +4,7 @@
 //! Means are of linear light, in 16 bits a channel: an 8-bit mean in the file's own curve would be off
 //! by half a percent. A pyramid takes two thirds of its image's memory.
 
-use crate::texture::Wrap;
+use crate::texture::{Wrap, bilinear};
 
 /// The levels above the image itself.
 #[derive(Debug, Clone)]
@@ -63,16 +63,7 @@ impl Pyramid {
             return [0.0, 0.0, 0.0, 1.0];
         };
         let (x, y) = (u * level.width as f64 - 0.5, v * level.height as f64 - 0.5);
-        let (x0, y0) = (x.floor(), y.floor());
-        let (fx, fy) = (x - x0, y - y0);
-        let at = |x, y| level.texel(x, y, wrap);
-        let (a, b) = (at(x0, y0), at(x0 + 1.0, y0));
-        let (c, d) = (at(x0, y0 + 1.0), at(x0 + 1.0, y0 + 1.0));
-        std::array::from_fn(|k| {
-            let top = a[k] + (b[k] - a[k]) * fx;
-            let bottom = c[k] + (d[k] - c[k]) * fx;
-            top + (bottom - top) * fy
-        })
+        bilinear([x, y], |x, y| level.texel(x, y, wrap))
     }
 }
 

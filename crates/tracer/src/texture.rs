@@ -171,6 +171,19 @@ pub(crate) fn read_image(name: &str, bytes: &[u8]) -> Result<image::DynamicImage
     decode().map_err(|source| ImageError::Decode { name: name.to_owned(), source })
 }
 
+/// What lies between the four texels around a place, whose centres are at whole numbers.
+pub(crate) fn bilinear([x, y]: [f64; 2], at: impl Fn(f64, f64) -> [f64; 4]) -> [f64; 4] {
+    let (x0, y0) = (x.floor(), y.floor());
+    let (fx, fy) = (x - x0, y - y0);
+    let (a, b) = (at(x0, y0), at(x0 + 1.0, y0));
+    let (c, d) = (at(x0, y0 + 1.0), at(x0 + 1.0, y0 + 1.0));
+    std::array::from_fn(|k| {
+        let top = a[k] + (b[k] - a[k]) * fx;
+        let bottom = c[k] + (d[k] - c[k]) * fx;
+        top + (bottom - top) * fy
+    })
+}
+
 impl Image {
     /// The magenta and black checker that stands in for an image that cannot be had.
     #[must_use]
@@ -229,18 +242,7 @@ impl Image {
         let (x, y) = (u * self.width as f64, v * self.height as f64);
         match self.filter {
             Filter::Nearest => self.texel(x.floor(), y.floor(), encoding),
-            Filter::Bilinear => {
-                let (x0, y0) = ((x - 0.5).floor(), (y - 0.5).floor());
-                let (fx, fy) = (x - 0.5 - x0, y - 0.5 - y0);
-                let at = |x, y| self.texel(x, y, encoding);
-                let (a, b) = (at(x0, y0), at(x0 + 1.0, y0));
-                let (c, d) = (at(x0, y0 + 1.0), at(x0 + 1.0, y0 + 1.0));
-                std::array::from_fn(|k| {
-                    let top = a[k] + (b[k] - a[k]) * fx;
-                    let bottom = c[k] + (d[k] - c[k]) * fx;
-                    top + (bottom - top) * fy
-                })
-            }
+            Filter::Bilinear => bilinear([x - 0.5, y - 0.5], |x, y| self.texel(x, y, encoding)),
         }
     }
 
