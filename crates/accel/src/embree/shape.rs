@@ -1,0 +1,201 @@
+//! One mesh or instance, before it is attached to a scene.
+
+use std::ptr::NonNull;
+
+use embree4_sys as sys;
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Mesh, Positions, Transform, Vertices};
+use rayon::prelude::*;
+
+use super::SceneHandle;
+use super::device::Device;
+use crate::{BuildError, BuildOptions};
+
+/// One mesh or instance, before it is attached to a scene.
+pub(super) struct Shape {
+    pub(super) handle: NonNull<sys::RTCGeometryTy>,
+    pub(super) copied_bytes: u64,
+}
+
+impl Shape {
+    fn new(
+        device: &Device,
+        kind: sys::RTCGeometryType,
+        options: &BuildOptions,
+    ) -> Result<Self, BuildError> {
+        // SAFETY: the device is live.
+        let handle = unsafe { sys::rtcNewGeometry(device.handle.as_ptr(), kind) };
+        device.check("rtcNewGeometry")?;
+        let Some(handle) = NonNull::new(handle) else {
+            return Err(BuildError::Library {
+                call: "rtcNewGeometry",
+                message: "no geometry".to_owned(),
+            });
+        };
+        // SAFETY: the geometry was just made and is ours alone.
+        unsafe { sys::rtcSetGeometryBuildQuality(handle.as_ptr(), options.quality.to_embree()) };
+        Ok(Self { handle, copied_bytes: 0 })
+    }
+
+    /// The triangles of `mesh`, moved by `to_frame`; the buffers are shared when nothing moves them.
+    /// `mesh` must outlive the scene that this is attached to.
+    pub(super) fn mesh(
+        device: &Device,
+        mesh: &Mesh,
+        to_frame: &Transform,
+        options: &BuildOptions,
+    ) -> Result<Self, BuildError> {
+        check_size(&mesh.name, mesh.triangles.len(), mesh.positions.len())?;
+        let mut shape = Self::new(device, sys::RTC_GEOMETRY_TYPE_TRIANGLE, options)?;
+        shape.share_triangles(mesh);
+        match &mesh.positions {
+            Positions::F32(vertices) if to_frame.is_identity() && vertices.is_padded() => {
+                shape.share_vertices(vertices);
+            }
+            positions => shape.copy_positions(device, positions, to_frame)?,
+        }
+        device.check("rtcSetGeometryBuffer")?;
+        // SAFETY: the geometry is complete and not yet in use.
+        unsafe { sys::rtcCommitGeometry(shape.handle.as_ptr()) };
+        device.check("rtcCommitGeometry")?;
+        Ok(shape)
+    }
+
+    /// Lets Embree read the triangles where they stand. `mesh` must outlive the scene.
+    fn share_triangles(&mut self, mesh: &Mesh) {
+        let triangles: &[[u32; 3]] = &mesh.triangles;
+        // SAFETY: the indices stand behind `mesh`, which outlives the scene (`Scene` keeps the
+        // geometry alive, `Buffer` never moves its values), three u32 a triangle; each is less than
+        // the number of positions, as `Mesh` promises.
+        unsafe {
+            sys::rtcSetSharedGeometryBuffer(
+                self.handle.as_ptr(),
+                sys::RTC_BUFFER_TYPE_INDEX,
+                0,
+                sys::RTC_FORMAT_UINT3,
+                triangles.as_ptr().cast(),
+                0,
+                size_of::<[u32; 3]>(),
+                triangles.len(),
+            );
+        }
+    }
+
+    /// Lets Embree read the corners where they stand. They must be padded, and outlive the scene.
+    fn share_vertices(&mut self, vertices: &Vertices<3>) {
+        assert!(vertices.is_padded(), "Embree reads 16 bytes at the last vertex");
+        let floats: &[f32] = vertices.floats();
+        // SAFETY: as for the triangles; `is_padded` says that 16 bytes can be read at the last
+        // vertex, and `Vertices` that all vertices lie inside the floats.
+        unsafe {
+            sys::rtcSetSharedGeometryBuffer(
+                self.handle.as_ptr(),
+                sys::RTC_BUFFER_TYPE_VERTEX,
+                0,
+                sys::RTC_FORMAT_FLOAT3,
+                floats.as_ptr().cast(),
+                0,
+                vertices.stride() * size_of::<f32>(),
+                vertices.len(),
+            );
+        }
+    }
+
+    /// Moves the positions into a buffer of Embree's own, which it pads itself.
+    fn copy_positions(
+        &mut self,
+        device: &Device,
+        positions: &Positions,
+        to_frame: &Transform,
+    ) -> Result<(), BuildError> {
+        let count = positions.len();
+        // SAFETY: the geometry is ours; Embree allocates `count` items of 12 bytes and padding.
+        let data = unsafe {
+            sys::rtcSetNewGeometryBuffer(
+                self.handle.as_ptr(),
+                sys::RTC_BUFFER_TYPE_VERTEX,
+                0,
+                sys::RTC_FORMAT_FLOAT3,
+                size_of::<[f32; 3]>(),
+                count,
+            )
+        };
+        device.check("rtcSetNewGeometryBuffer")?;
+        if data.is_null() || count == 0 {
+            return Ok(());
+        }
+        // SAFETY: the buffer is `count` times three floats, aligned to 16 bytes, written by nobody
+        // else until the geometry is committed.
+        let out = unsafe { std::slice::from_raw_parts_mut(data.cast::<[f32; 3]>(), count) };
+        out.par_iter_mut().with_min_len(4096).enumerate().for_each(|(i, corner)| {
+            *corner = to_frame.point(positions.get(i)).as_vec3().to_array();
+        });
+        self.copied_bytes = (count * size_of::<[f32; 3]>()) as u64;
+        Ok(())
+    }
+
+    /// `scene` once more, moved by `to_frame`.
+    pub(super) fn instance(
+        device: &Device,
+        scene: &SceneHandle,
+        to_frame: &Transform,
+        options: &BuildOptions,
+    ) -> Result<Self, BuildError> {
+        let shape = Self::new(device, sys::RTC_GEOMETRY_TYPE_INSTANCE, options)?;
+        let linear = to_frame.linear.as_mat3().to_cols_array();
+        let moved = to_frame.point(DVec3::ZERO).as_vec3();
+        let mut columns = [0.0f32; 12];
+        columns[..9].copy_from_slice(&linear);
+        columns[9..].copy_from_slice(&moved.to_array());
+        // SAFETY: both handles are live; Embree copies the twelve floats and retains the scene.
+        unsafe {
+            sys::rtcSetGeometryInstancedScene(shape.handle.as_ptr(), scene.0.as_ptr());
+            sys::rtcSetGeometryTransform(
+                shape.handle.as_ptr(),
+                0,
+                sys::RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR,
+                columns.as_ptr().cast(),
+            );
+            sys::rtcCommitGeometry(shape.handle.as_ptr());
+        }
+        device.check("rtcSetGeometryInstancedScene")?;
+        Ok(shape)
+    }
+}
+
+impl Drop for Shape {
+    fn drop(&mut self) {
+        // SAFETY: releases the reference that `rtcNewGeometry` gave; scenes hold their own.
+        unsafe { sys::rtcReleaseGeometry(self.handle.as_ptr()) };
+    }
+}
+
+/// Refuses what Embree's 32-bit numbers cannot count.
+fn check_size(name: &str, triangles: usize, corners: usize) -> Result<(), BuildError> {
+    let limit = u64::from(u32::MAX) - 1;
+    let (triangles, corners) = (triangles as u64, corners as u64);
+    let what = if triangles > limit {
+        format!("{triangles} triangles")
+    } else if corners > limit {
+        format!("{corners} vertices")
+    } else {
+        return Ok(());
+    };
+    Err(BuildError::TooLarge { mesh: name.to_owned(), what, backend: "Embree", limit })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_32_bits_cannot_count_is_refused_by_name() {
+        let most = u32::MAX as usize - 1;
+        assert!(check_size("statue", most, most).is_ok());
+        for (triangles, corners, what) in [(most + 1, 3, "triangles"), (1, most + 1, "vertices")] {
+            let refused = check_size("statue", triangles, corners).expect_err("too many");
+            let message = refused.to_string();
+            assert!(message.contains("statue") && message.contains(what), "{message}");
+        }
+    }
+}
