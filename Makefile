@@ -45,17 +45,19 @@ bench: setup
 
 bench-peers: setup
 	cargo build --release -p etendue -p etendue-benches
-	scripts/bench-peers.sh $(ARGS)
+	scripts/bench-peers.sh peers.py $(ARGS)
 
 bench-light: setup
 	cargo build --release -p etendue -p etendue-benches
-	PEERS=light_peers.py scripts/bench-peers.sh $(ARGS)
+	scripts/bench-peers.sh light_peers.py $(ARGS)
 
 bench-lens:
-	scripts/bench-lens.sh
+	cargo build --release -p etendue-camera --example trace_lens
+	scripts/bench-peers.sh lens_peers.py $(ARGS)
 
 bench-sensor:
-	scripts/bench-sensor.sh
+	cargo build --release -p etendue-sensor --example expose_frame
+	scripts/bench-peers.sh sensor_peers.py $(ARGS)
 
 # ARGS=--quick takes lighter meshes
 docs-charts: setup

@@ -1,7 +1,8 @@
+#!/usr/bin/env python3
 """Takes the same rays through the double Gauss with etendue and with optiland's numpy backend, one
 thread each, and writes the section of docs/lenses.md on it.
 
-lens_peers.py TRACE_LENS LENS: the path of etendue-camera's example of that name, and a lens file.
+    python3 benches/lens_peers.py [--rounds N] [--output docs/lenses.md]
 """
 
 import json
@@ -10,18 +11,17 @@ import subprocess
 import sys
 import time
 
-import numpy as np
-
+import program
 from section import machine, put, spread
 
-ROUNDS = 9
+LENS = program.ROOT / "scenes" / "lenses" / "double-gauss.json"
 # Where optiland is at its best: its figures fall with smaller and with greater batches.
 RAYS = 100_000
-PAGE = "docs/lenses.md"
 
 
-def optiland_rounds(lens):
+def optiland_rounds(lens, count):
     """Nanoseconds a ray, and the height at which the middle of the beam leaves."""
+    import numpy as np
     from optiland.materials import IdealMaterial
     from optiland.optic import Optic
     from optiland.rays import RealRays
@@ -47,7 +47,7 @@ def optiland_rounds(lens):
     ones, zeros = np.ones(RAYS), np.zeros(RAYS)
     rounds = []
     # The first round compiles, and does not count.
-    for _ in range(ROUNDS + 1):
+    for _ in range(count + 1):
         rays = RealRays(
             r * np.cos(turn), r * np.sin(turn), -10 * ones, zeros, slope * ones,
             np.sqrt(1 - slope**2) * ones, ones, 0.58756 * ones,
@@ -61,11 +61,13 @@ def optiland_rounds(lens):
 
 
 def main():
-    example, path = sys.argv[1:]
-    with open(path) as file:
-        lens = json.load(file)
+    arguments = program.arguments(__doc__, "lenses.md", rounds=9).parse_args()
+    # One thread against one thread.
+    program.enter("lens-peers", ["optiland==0.6.3"], OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
+    lens = json.loads(LENS.read_text())
     out = subprocess.run(
-        [example, path, str(ROUNDS)], check=True, capture_output=True, text=True
+        [program.built("examples/trace_lens"), LENS, str(arguments.rounds)], check=True,
+        capture_output=True, text=True,
     )
     ours = json.loads(out.stdout)
     ns, surfaces = ours["ns"], ours["surfaces"]
@@ -77,14 +79,14 @@ def main():
         ("ray by ray, the same arithmetic", ns["singly"]),
     ]
     try:
-        rows.append(("optiland 0.6.3, numpy (conics compiled by numba)", optiland_rounds(lens)))
+        rows.append(("optiland 0.6.3, numpy (conics compiled by numba)", optiland_rounds(lens, arguments.rounds)))
     except ImportError as error:
         print(f"optiland is left out: {error}", file=sys.stderr)
     best = median["widest"]
     text = [
         f"`make bench-lens` writes this section. {lens['name']}: {surfaces} spheres and a stop; all",
         "checks on, f64, one thread; rays 1° off the axis, all of which pass. etendue takes 512 rays",
-        f"at a time, optiland {RAYS}. Processor time of the thread; medians of {ROUNDS} rounds, with",
+        f"at a time, optiland {RAYS}. Processor time of the thread; medians of {arguments.rounds} rounds, with",
         "the least and the greatest.",
         f"Machine: {machine()}.",
         "",
@@ -113,7 +115,7 @@ def main():
         "The rest is multiplications, additions and comparisons. A block of 32 rays goes through all",
         "elements before the next one begins, so rays stay in the nearest cache.",
     ]
-    put(PAGE, "bench-lens", "\n".join(text))
+    put(arguments.output, "bench-lens", "\n".join(text))
     print("\n".join(text))
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Light in etendue and in Mitsuba 3, in one run, taking turns.
 
-    python3 benches/light_peers.py ETENDUE BENCHMARKS [--rounds N] [--output docs/benchmarks-light.md]
+    python3 benches/light_peers.py [--rounds N] [--output docs/benchmarks-light.md]
 
 The job: a matte blob of a million triangles through a thin lens, 512 x 512 pixels of 64 samples,
 under a point light and under a square lamp, by direct light, and under the lamp by paths of five
@@ -15,7 +15,6 @@ difference over the root of two, relative to the mean. Where the noise differs, 
 is the cost of one error.
 """
 
-import argparse
 import json
 import os
 import resource
@@ -24,11 +23,10 @@ import subprocess
 import sys
 import tempfile
 import textwrap
+import time
 from pathlib import Path
 
-sys.dont_write_bytecode = True
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-import peers  # noqa: E402
+import program
 
 SIDE, SAMPLES = 512, 64
 CAMERA = {"from": [0.7, 0.9, 2.6], "look_at": [0, 0, 0], "fov": 42.0, "focal_length": 50.0,
@@ -134,52 +132,30 @@ class Mitsuba:
 
 
 def serve(peer, folder):
-    """Carries out one command a line from standard input; answers its seconds, the picture's file."""
-    import time
-
+    """Answers with its seconds and the picture's file."""
     import numpy as np
 
     subject = Mitsuba(Path(folder), VARIANTS[peer])
-    for line in sys.stdin:
-        word, job, seed = json.loads(line)
+
+    def answer(word, job, seed):
         if word == "load":
             subject.load(job)
-            print(json.dumps([0, ""]), flush=True)
-            continue
+            return 0, ""
         start = time.process_time()
         image = subject.trace(job, seed)
         seconds = time.process_time() - start
         name = str(Path(folder) / f"{peer}.npy")
         np.save(name, image)
-        print(json.dumps([seconds, name]), flush=True)
+        return seconds, name
 
-
-class Peer(peers.Peer):
-    """A Mitsuba in a process of its own, told jobs and seeds."""
-
-    def __init__(self, python, peer, folder):
-        self.process = subprocess.Popen(
-            [python, __file__, "--serve", peer, folder], text=True, env=dict(os.environ),
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-
-    def tell(self, *words):
-        try:
-            self.process.stdin.write(json.dumps(words) + "\n")
-            self.process.stdin.flush()
-        except BrokenPipeError:
-            pass
-        for line in self.process.stdout:
-            if line.startswith("["):
-                return json.loads(line)
-        lines = self.process.stderr.read().strip().splitlines()
-        raise RuntimeError(lines[-1] if lines else "it ended without a word")
+    program.serve(answer)
 
 
 class Etendue:
     """The `etendue` command, one process a run."""
 
-    def __init__(self, program, folder):
-        self.program, self.folder = program, Path(folder)
+    def __init__(self, folder):
+        self.program, self.folder = program.built("etendue"), Path(folder)
 
     def trace(self, job, seed):
         import numpy as np
@@ -209,11 +185,11 @@ def noise(one, other):
     return float(difference / np.mean(one))
 
 
-def bound(program, folder, job):
+def bound(folder, job):
     """Processor seconds that Embree's bare loop takes for the rays of the first surface."""
     path = Path(folder) / "scene.json"
     path.write_text(json.dumps(scene(job, "blob.glb")))
-    command = [program, "light-rays", path]
+    command = [program.built("benchmarks"), "light-rays", path]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     limit = json.loads(done.stdout)
     # It tells what the busiest of all cores took.
@@ -223,39 +199,39 @@ def bound(program, folder, job):
 def measure(arguments, folder):
     import numpy as np
 
-    python, remarks, others = peers.environment(), [], {}
-    ok, words = peers.install(python, ["mitsuba"])
+    remarks, others = [], {}
+    ok, words = program.install(["mitsuba"])
     if not ok:
         remarks.append(f"Mitsuba is left out: pip could not install it ({words}).")
     for peer, variant in VARIANTS.items() if ok else []:
-        title = f"Mitsuba {peers.version(python, 'mitsuba')}, {variant}"
-        process = Peer(python, peer, folder)
+        title = f"Mitsuba {program.version('mitsuba')}, {variant}"
+        process = program.Peer(__file__, peer, folder)
         try:
             for job in arguments.jobs:
-                process.tell("load", job, 0)
+                process.ask("load", job, 0)
                 if "llvm" in variant:
                     # The first render compiles.
-                    process.tell("trace", job, 0)
+                    process.ask("trace", job, 0)
         except RuntimeError as error:
             remarks.append(f"{title} is left out: {error}")
             process.end()
             continue
         others[title] = process
-    ours = Etendue(arguments.etendue, folder)
+    ours = Etendue(folder)
     results = {}
-    limit = bound(arguments.benchmarks, folder, arguments.jobs[0])
+    limit = bound(folder, arguments.jobs[0])
     for job in arguments.jobs:
         seconds, pictures = {}, {}
         for seed in range(arguments.rounds):
-            time, picture, report = ours.trace(job, seed)
-            seconds.setdefault("etendue", []).append(time)
+            taken, picture, report = ours.trace(job, seed)
+            seconds.setdefault("etendue", []).append(taken)
             pictures.setdefault("etendue", []).append(picture)
             for title, process in others.items():
                 # The scalar variant takes a while: half of the rounds are enough for it.
                 if "scalar" in title and seed >= max(1, arguments.rounds // 2):
                     continue
-                time, name = process.tell("trace", job, seed)
-                seconds.setdefault(title, []).append(time)
+                taken, name = process.ask("trace", job, seed)
+                seconds.setdefault(title, []).append(taken)
                 pictures.setdefault(title, []).append(np.load(name))
         results[job] = {
             "seconds": seconds,
@@ -350,15 +326,12 @@ def goals(results):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("etendue", help="the etendue command")
-    parser.add_argument("benchmarks", help="the benchmarks command, which makes the models")
-    parser.add_argument("--rounds", type=int, default=5)
+    parser = program.arguments(__doc__, "benchmarks-light.md", rounds=5)
     parser.add_argument("--jobs", nargs="+", choices=list(JOBS), default=list(JOBS))
-    parser.add_argument("--output", type=Path, default=peers.ROOT / "docs" / "benchmarks-light.md")
     arguments = parser.parse_args()
+    program.enter("peers", ["numpy"])
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([arguments.benchmarks, "models", folder, "--triangles", "1000000"], check=True)
+        subprocess.run([program.built("benchmarks"), "models", folder, "--triangles", "1000000"], check=True)
         text = page(*measure(arguments, folder), arguments)
     arguments.output.write_text(text)
     print(text)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Other programs at the same job, in one run, taking turns with etendue.
 
-    python3 benches/peers.py ETENDUE BENCHMARKS [--triangles N] [--rounds N] [--output docs/benchmarks.md]
+    python3 benches/peers.py [--triangles N] [--rounds N] [--output docs/benchmarks.md]
 
 The job: the blob of `benchmarks models`, depth and normals of 1024 x 1024 pixels through the same
 pinhole, once with one ray a pixel and, where a program can, with 16. Each program is timed twice:
@@ -15,19 +15,17 @@ they are told to, so that only one of them works at a time. The programs come fr
 virtual environment below target/; what cannot be had is named in the table.
 """
 
-import argparse
 import json
-import os
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-import venv
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-BEGIN, END = "<!-- peers: begin -->", "<!-- peers: end -->"
+import program
+from section import put, spread
+
 SIDE = 1024
 
 # Title, packages of PyPI, model, and the ways to sample.
@@ -180,75 +178,26 @@ def make(peer, folder):
 
 
 def serve(peer, folder):
-    """Carries out one command a line from standard input; answers its seconds and its value."""
+    """Answers with its seconds and its value."""
     subject = make(peer, Path(folder))
     prepared = set()
-    for line in sys.stdin:
-        word, samples = json.loads(line)
+
+    def answer(word, samples=1):
         if word == "trace" and samples not in prepared:
             subject.prepare(samples)
             prepared.add(samples)
         start = time.perf_counter()
         value = subject.load() if word == "load" else subject.trace(samples)
-        print(json.dumps([time.perf_counter() - start, value]), flush=True)
+        return time.perf_counter() - start, value
 
-
-class Peer:
-    """A program in a process of its own."""
-
-    def __init__(self, python, peer, folder):
-        environment = dict(os.environ, TF_CPP_MIN_LOG_LEVEL="3")
-        self.process = subprocess.Popen(
-            [python, __file__, "--serve", peer, folder], text=True, env=environment,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-
-    def ask(self, word, samples=1):
-        try:
-            self.process.stdin.write(json.dumps([word, samples]) + "\n")
-            self.process.stdin.flush()
-        except BrokenPipeError:
-            pass
-        for line in self.process.stdout:
-            if line.startswith("["):
-                return json.loads(line)
-        lines = self.process.stderr.read().strip().splitlines()
-        raise RuntimeError(lines[-1] if lines else "it ended without a word")
-
-    def end(self):
-        self.process.stdin.close()
-        try:
-            self.process.wait(timeout=30)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-
-
-def install(python, packages):
-    """Whether pip could install `packages`, and its last words if not."""
-    done = subprocess.run([python, "-m", "pip", "install", "-q", "--disable-pip-version-check",
-                           *packages], capture_output=True, text=True)
-    words = done.stderr.strip().splitlines()
-    return done.returncode == 0, words[-1] if words else ""
-
-
-def environment():
-    """The Python of a virtual environment below target/."""
-    folder = ROOT / "target" / "peers"
-    python = folder / "bin" / "python"
-    if not python.exists():
-        venv.create(folder, with_pip=True)
-    return str(python)
-
-
-def version(python, package):
-    code = f"from importlib.metadata import version; print(version({package!r}))"
-    return subprocess.run([python, "-c", code], capture_output=True, text=True).stdout.strip()
+    program.serve(answer)
 
 
 class Etendue:
     """The `etendue` command on the GLB; one process a run."""
 
-    def __init__(self, program, folder):
-        self.program, self.folder = program, Path(folder)
+    def __init__(self, folder):
+        self.program, self.folder = program.built("etendue"), Path(folder)
 
     def run(self, *more):
         report = self.folder / "report.json"
@@ -263,14 +212,13 @@ class Etendue:
 def measure(arguments, folder):
     """Seconds by (title, what), and remarks on what could not be measured."""
     series, remarks, peers, depths = {}, [], {}, {}
-    python = environment()
     for peer, (title, packages, _, ways) in PEERS.items():
-        ok, words = install(python, packages)
+        ok, words = program.install(packages)
         if not ok:
             remarks.append(f"{title} is left out: pip could not install it ({words}).")
             continue
-        versions = ", ".join(f"{package} {version(python, package)}" for package in packages)
-        process = Peer(python, peer, folder)
+        versions = ", ".join(f"{package} {program.version(package)}" for package in packages)
+        process = program.Peer(__file__, peer, folder)
         try:
             process.ask("load")
             for samples in ways:
@@ -280,7 +228,7 @@ def measure(arguments, folder):
             process.end()
             continue
         peers[f"{title} ({versions})"] = (process, ways)
-    ours = Etendue(arguments.etendue, folder)
+    ours = Etendue(folder)
     ours.run()
     note = lambda title, what, seconds: series.setdefault((title, what), []).append(seconds)
     for _ in range(arguments.rounds):
@@ -305,10 +253,7 @@ def table(series, remarks, depths, arguments):
 
     def cell(title, what):
         values = series.get((title, what))
-        if not values:
-            return "-"
-        middle, low, high = statistics.median(values), min(values), max(values)
-        return f"{middle:.3f} ({low:.3f} to {high:.3f})"
+        return spread(values, 3) if values else "-"
 
     lines = [
         "",
@@ -349,29 +294,19 @@ def table(series, remarks, depths, arguments):
     return "\n".join(lines) + "\n"
 
 
-def put(text, path):
-    """Puts `text` between the marks of the page."""
-    page = path.read_text() if path.exists() else f"# Benchmarks\n\n{BEGIN}\n{END}\n"
-    head, rest = page.split(BEGIN, 1)
-    path.write_text(head + BEGIN + text + END + rest.split(END, 1)[1])
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("etendue", help="the etendue command")
-    parser.add_argument("benchmarks", help="the benchmarks command, which makes the models")
+    parser = program.arguments(__doc__, "benchmarks.md", rounds=5)
     parser.add_argument("--triangles", type=int, nargs="+", default=[1_000_000, 10_000_000])
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "benchmarks.md")
     arguments = parser.parse_args()
+    program.enter("peers")
     text = ""
     for triangles in arguments.triangles:
         arguments.triangles = triangles
         with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([arguments.benchmarks, "models", folder, "--triangles", str(triangles)],
-                           check=True)
+            subprocess.run([program.built("benchmarks"), "models", folder, "--triangles",
+                            str(triangles)], check=True)
             text += table(*measure(arguments, folder), arguments)
-    put(text, arguments.output)
+    put(arguments.output, "peers", text)
     print(text)
 
 

@@ -3,6 +3,7 @@
 import platform
 import statistics
 import subprocess
+from pathlib import Path
 
 
 def machine():
@@ -32,12 +33,9 @@ def spread(values, digits=1):
 
 
 def put(page, name, text):
-    """Replaces the section `name` of `page`."""
+    """Replaces the section `name` of `page`, or adds it at its end."""
     begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-    with open(page) as file:
-        before, found, rest = file.read().partition(begin)
-    _, closed, after = rest.partition(end)
-    if not found or not closed:
-        raise SystemExit(f"{page} has no section {name}: it wants the lines {begin} and {end}")
-    with open(page, "w") as file:
-        file.write(f"{before}{begin}\n\n{text.strip()}\n\n{end}{after}")
+    page = Path(page)
+    before, _, rest = (page.read_text() if page.exists() else "").partition(begin)
+    after = rest.partition(end)[2] or "\n"
+    page.write_text(f"{before}{begin}\n\n{text.strip()}\n\n{end}{after}")

@@ -1,8 +1,10 @@
+#!/usr/bin/env python3
 """Exposes frames with etendue, exactly and by the normal approximation, and the same frame with Python's
 ways to do it, one thread each; writes the section of docs/sensors.md on it.
 
-sensor_peers.py EXPOSE_FRAME: the path of etendue-sensor's example of that name. Every program gets
-the same mean electrons (a ramp over the columns), 2.5 e- of read noise, 12 bits.
+    python3 benches/sensor_peers.py [--rounds N] [--output docs/sensors.md]
+
+Every program gets the same mean electrons (a ramp over the columns), 2.5 e- of read noise, 12 bits.
 """
 
 import json
@@ -11,36 +13,34 @@ import subprocess
 import sys
 import time
 
-import numpy as np
-
+import program
 from section import machine, put, spread
 
 COLUMNS, ROWS = 2736, 1824
 ELECTRONS = 16000.0
 READ_NOISE = 2.5
-TIMES = 5
 # A sensor of 20 megapixels.
 LARGE = (5472, 3648)
-PAGE = "docs/sensors.md"
 
 
-def rounds_of(frame):
+def rounds_of(frame, count):
     """Seconds of every round but a first one, which touches the memory for the first time."""
     taken = []
-    for _ in range(TIMES + 1):
+    for _ in range(count + 1):
         start = time.perf_counter()
         frame()
         taken.append(time.perf_counter() - start)
     return taken[1:]
 
 
-def plain_numpy(mean, draw):
+def plain_numpy(rng, mean, draw):
+    import numpy as np
+
     def frame():
         electrons = draw(mean) + rng.normal(0.0, READ_NOISE, mean.shape)
         counts = np.rint(electrons * (4095 / ELECTRONS))
         return np.clip(counts, 0, 4095).astype(np.uint16)
 
-    rng = np.random.default_rng(0)
     return frame
 
 
@@ -56,6 +56,7 @@ def prysm_detector(mean):
 
 
 def emva_camera(mean):
+    import numpy as np
     from emva1288.camera.camera import Camera
 
     camera = Camera(
@@ -68,14 +69,15 @@ def emva_camera(mean):
     return lambda: camera.grab(radiance)
 
 
-def exposed(columns, rows, light, threads):
+def exposed(columns, rows, light, threads, rounds):
     """etendue's rounds: seconds by noise model."""
-    arguments = [str(value) for value in (columns, rows, light, TIMES, threads)]
-    out = subprocess.run([sys.argv[1], *arguments], check=True, capture_output=True, text=True)
+    arguments = [str(value) for value in (columns, rows, light, rounds, threads)]
+    out = subprocess.run([program.built("examples/expose_frame"), *arguments], check=True,
+                         capture_output=True, text=True)
     return json.loads(out.stdout)
 
 
-def large_frames(text, goals):
+def large_frames(rounds, text, goals):
     """The frame of 20 megapixels by light, on one thread and on two."""
     columns, rows = LARGE
     pixels = columns * rows / 1e6
@@ -88,7 +90,7 @@ def large_frames(text, goals):
     ]
     for light in ["1", "10", "40", "1000", "ramp"]:
         for threads in [1, 2]:
-            seconds = exposed(columns, rows, light, threads)
+            seconds = exposed(columns, rows, light, threads, rounds)
             rates = {name: [pixels / s for s in times] for name, times in seconds.items()}
             ratio = statistics.median(
                 p / n for p, n in zip(seconds["poisson"], seconds["normal"])
@@ -105,21 +107,24 @@ def large_frames(text, goals):
                 goals.append((f"exact, {name} e⁻, Mpixel/s on one thread", rate, 40.0, True))
 
 
-def side_by_side(text, goals):
+def side_by_side(rounds, text, goals):
     """A smaller frame by every program."""
-    ours = exposed(COLUMNS, ROWS, "ramp", 1)
+    import numpy as np
+
+    ours = exposed(COLUMNS, ROWS, "ramp", 1, rounds)
     ramp = np.linspace(0.0, ELECTRONS, COLUMNS, endpoint=False)
     mean = np.ascontiguousarray(np.broadcast_to(ramp, (ROWS, COLUMNS)))
-    rng = np.random.default_rng(1)
+    draws, noise = np.random.default_rng(1), np.random.default_rng(0)
     rows = [("etendue, exact Poisson", ours["poisson"]), ("etendue, normal", ours["normal"])]
     for name, make in [
-        ("numpy, Poisson", lambda: plain_numpy(mean, rng.poisson)),
-        ("numpy, normal", lambda: plain_numpy(mean, lambda m: rng.normal(m, np.sqrt(m)))),
+        ("numpy, Poisson", lambda: plain_numpy(noise, mean, draws.poisson)),
+        ("numpy, normal", lambda: plain_numpy(
+            noise, mean, lambda m: draws.normal(m, np.sqrt(m)))),
         ("prysm.detector 0.21.1", lambda: prysm_detector(mean)),
         ("emva1288 1.0.2 Camera", lambda: emva_camera(mean)),
     ]:
         try:
-            rows.append((name, rounds_of(make())))
+            rows.append((name, rounds_of(make(), rounds)))
         except Exception as error:
             print(f"{name} is left out: {type(error).__name__}: {error}", file=sys.stderr)
     text += [
@@ -144,14 +149,18 @@ def side_by_side(text, goals):
 
 
 def main():
+    arguments = program.arguments(__doc__, "sensors.md", rounds=5).parse_args()
+    # One thread against one thread.
+    program.enter("sensor-peers", ["numpy<2", "prysm==0.21.1", "emva1288==1.0.2"],
+                  OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
     text = [
-        f"`make bench-sensor` writes this section. Medians of {TIMES} rounds, with the least and the",
+        f"`make bench-sensor` writes this section. Medians of {arguments.rounds} rounds, with the least and the",
         f"greatest. Machine: {machine()}.",
         "",
     ]
     goals = []
-    large_frames(text, goals)
-    side_by_side(text, goals)
+    large_frames(arguments.rounds, text, goals)
+    side_by_side(arguments.rounds, text, goals)
     text += ["", "| goal | | measured | |", "|---|---|---|---|"]
     for name, value, bound, at_least in goals:
         met = value >= bound if at_least else value <= bound
@@ -161,7 +170,7 @@ def main():
             if at_least
             else f"| {name} | {sign} {bound:.1f} | {value:.2f} | {'met' if met else '**missed**'} |"
         )
-    put(PAGE, "bench-sensor", "\n".join(text))
+    put(arguments.output, "bench-sensor", "\n".join(text))
     print("\n".join(text))
 
 

@@ -1,6 +1,13 @@
 # Sourced by the other scripts: Debian packages, and the right to install them.
 # shellcheck shell=bash
 
+# need REASON PACKAGE...: notes the packages in `missing`, and says why.
+missing=()
+need() {
+    echo "missing: ${*:2} ($1)"
+    missing+=("${@:2}")
+}
+
 # Runs a command as root: directly, or through sudo when that is there and may ask for a password.
 as_root() {
     if [ "$(id -u)" -eq 0 ]; then

@@ -6,16 +6,6 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/packages.sh
 . scripts/packages.sh
 
-missing=()
-
-# need REASON PACKAGE...: notes the packages and says why.
-need() {
-    local reason=$1
-    shift
-    echo "missing: $* ($reason)"
-    missing+=("$@")
-}
-
 any_file() {
     compgen -G "$1" >/dev/null
 }

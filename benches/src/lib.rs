@@ -13,9 +13,11 @@
 //! | [`limit`] | Embree's bare loop; the only unsafe code here |
 //! | [`contest`] | who is timed, on which clock, and in which order |
 //! | [`field`] | all contestants on one scene |
+//! | [`effort`] | how heavy the meshes are, how often everything is timed |
 //! | [`files`] | the meshes as GLB, OBJ and PLY, and a scene around them |
 
 pub mod contest;
+pub mod effort;
 pub mod field;
 pub mod files;
 pub mod limit;

@@ -1,4 +1,4 @@
-//! Nanoseconds that one thread takes for a ray through a lens, for `scripts/bench-lens.sh`: the lens
+//! Nanoseconds that one thread takes for a ray through a lens, for `benches/lens_peers.py`: the lens
 //! file and the number of rounds; the rounds of every way, as JSON.
 //!
 //! ```sh

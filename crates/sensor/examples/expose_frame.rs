@@ -1,4 +1,4 @@
-//! Seconds for a frame, for `scripts/bench-sensor.sh`: columns, rows, the light (`ramp`, from nothing
+//! Seconds for a frame, for `benches/sensor_peers.py`: columns, rows, the light (`ramp`, from nothing
 //! on the left to full scale on the right, or mean electrons all over), rounds and threads; the
 //! rounds of exact Poisson noise and of its normal approximation, which take turns, as JSON.
 //!

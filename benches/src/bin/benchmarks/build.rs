@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildOptions, Bvh, Embree, Exact, Quality};
 use etendue_bench::rounds::{Turn, take_turns, wall};
+use etendue_benches::effort::{Effort, in_short};
 use etendue_benches::limit::{BareScene, Mode};
 use etendue_benches::meshes;
 use etendue_geometry::Geometry;
 
-use crate::Effort;
 use crate::findings::{Contest, Findings, Part, Record};
 
 /// The contestants, as the page shows them.
@@ -25,14 +25,15 @@ pub(crate) const QUESTION: &str = "build";
 
 pub(crate) fn measure(effort: Effort, findings: &mut Findings) -> anyhow::Result<()> {
     let mut scenes: Vec<(String, Arc<Geometry>)> = Vec::new();
-    for triangles in effort.blobs {
-        scenes.push((Effort::blob_name(triangles), meshes::blob(triangles)?));
+    for triangles in effort.blobs() {
+        scenes.push((crate::blob_name(triangles), meshes::blob(triangles)?));
     }
-    let soup = meshes::soup(effort.soup);
-    scenes.push((format!("soup {}", crate::in_words(effort.soup.into())), soup));
-    let instances = u64::from(effort.forest) * u64::from(effort.forest);
-    let forest = meshes::forest(effort.forest)?;
-    scenes.push((format!("forest {} x 10k", crate::in_words(instances)), forest));
+    let soup = meshes::soup(effort.soup());
+    scenes.push((format!("soup {}", in_short(effort.soup().into())), soup));
+    let side = crate::forest(effort);
+    let instances = u64::from(side) * u64::from(side);
+    let forest = meshes::forest(side)?;
+    scenes.push((format!("forest {} x 10k", in_short(instances)), forest));
     for (mesh, geometry) in scenes {
         eprintln!("building {mesh}");
         findings.contests.push(contest(effort, mesh, &geometry));
@@ -92,7 +93,7 @@ fn contest(effort: Effort, mesh: String, geometry: &Arc<Geometry>) -> Contest {
             seconds
         }));
     }
-    let series = take_turns(effort.rounds, &mut turns);
+    let series = take_turns(effort.rounds(), &mut turns);
     drop(turns);
     let names = all.iter().map(|(name, _)| (*name).to_owned());
     let records = names.zip(series).zip(&bytes).map(|((who, series), bytes)| Record {

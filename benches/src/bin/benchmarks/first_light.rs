@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_bench::rounds::{Turn, take_turns, wall};
+use etendue_benches::effort::Effort;
 use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_camera::{Camera, PixelBlock};
 use etendue_geometry::{
@@ -17,7 +18,6 @@ use etendue_scene::{LoadOptions, Scene, SceneFile};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use crate::Effort;
 use crate::findings::{Contest, Findings, Part, Record};
 
 /// The contest's name, in place of a mesh's.
@@ -61,7 +61,7 @@ pub(crate) fn measure(effort: Effort, findings: &mut Findings) -> anyhow::Result
             turns.push(Box::new(move || prepared.render(pool)));
         }
     }
-    let series = take_turns(effort.rounds, &mut turns);
+    let series = take_turns(effort.rounds(), &mut turns);
     drop(turns);
     let records =
         titles.into_iter().zip(series).map(|(who, series)| Record { who, series, bytes: None });

@@ -1,9 +1,10 @@
 //! The goals, what was measured of each, and why those that are missed are missed.
 
+use etendue_benches::effort::Effort;
 use etendue_benches::field::names;
 
 use crate::findings::{Findings, Part};
-use crate::{Effort, build, first_light, load, threads, traversal, whole};
+use crate::{build, first_light, load, threads, traversal, whole};
 
 /// A goal and how far it is met.
 #[derive(Debug)]
@@ -37,18 +38,18 @@ fn goal(what: String, bound: Bound, of: &str, figure: Option<f64>, why: &'static
 /// All goals that one run can judge; those against other programs are in their own table.
 pub(crate) fn all(effort: Effort, findings: &Findings) -> Vec<Goal> {
     let mut goals = Vec::new();
-    for triangles in effort.blobs {
-        let mesh = Effort::blob_name(triangles);
+    for triangles in effort.blobs() {
+        let mesh = crate::blob_name(triangles);
         tracing(&mesh, findings, &mut goals);
     }
-    for triangles in effort.blobs {
-        let mesh = Effort::blob_name(triangles);
+    for triangles in effort.blobs() {
+        let mesh = crate::blob_name(triangles);
         building(&mesh, findings, &mut goals);
         scaling(&mesh, findings, &mut goals);
     }
     rendering(findings, &mut goals);
-    let [_, heavy] = effort.blobs;
-    whole_process(&Effort::blob_name(heavy), findings, &mut goals);
+    let [_, heavy] = effort.blobs();
+    whole_process(&crate::blob_name(heavy), findings, &mut goals);
     goals
 }
 

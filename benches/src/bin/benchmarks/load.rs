@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use etendue_bench::rounds::{Turn, take_turns, wall};
+use etendue_benches::effort::Effort;
 use etendue_benches::files::Format;
 use etendue_benches::meshes;
 use etendue_scene::import::{Options, Wanted, import};
 
-use crate::Effort;
 use crate::findings::{Contest, Findings, Part, Record};
 
 /// What else is timed.
@@ -22,8 +22,8 @@ pub(crate) fn title(format: Format) -> String {
 }
 
 pub(crate) fn measure(effort: Effort, findings: &mut Findings) -> anyhow::Result<()> {
-    for triangles in effort.blobs {
-        let mesh = Effort::blob_name(triangles);
+    for triangles in effort.blobs() {
+        let mesh = crate::blob_name(triangles);
         eprintln!("loading {mesh}");
         let folder = tempfile::tempdir().context("a temporary folder")?;
         let geometry = meshes::blob(triangles)?;
@@ -66,7 +66,7 @@ fn contest(effort: Effort, mesh: String, triangles: u64, files: &[(Format, PathB
             turns.push(Box::new(move || wall(|| std::fs::read(path).is_ok()).0));
         }
     }
-    let series = take_turns(effort.rounds, &mut turns);
+    let series = take_turns(effort.rounds(), &mut turns);
     let records = titles.into_iter().zip(series).zip(sizes).map(|((who, series), bytes)| Record {
         who,
         series,

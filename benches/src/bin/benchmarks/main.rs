@@ -22,6 +22,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
+use etendue_benches::effort::{Effort, in_short};
 use etendue_benches::files::{self, Format};
 use etendue_benches::meshes;
 use etendue_benches::rays::View;
@@ -30,12 +31,8 @@ use crate::findings::Findings;
 
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// Meshes a tenth as heavy
-    #[arg(long)]
-    quick: bool,
-    /// Times that each contestant is timed
-    #[arg(long, default_value_t = 5)]
-    rounds: usize,
+    #[command(flatten)]
+    effort: Effort,
     /// The page to write
     #[arg(long, default_value = "docs/benchmarks.md")]
     output: PathBuf,
@@ -75,39 +72,13 @@ enum Command {
     },
 }
 
-/// How heavy the meshes are and how often everything is timed.
-#[derive(Debug, Clone, Copy)]
-struct Effort {
-    rounds: usize,
-    /// Triangles of the two blobs.
-    blobs: [u64; 2],
-    soup: u32,
-    /// Instances along a side of the forest.
-    forest: u32,
+/// Instances along a side of the forest.
+fn forest(effort: Effort) -> u32 {
+    effort.pick(1_000, 100)
 }
 
-impl Effort {
-    fn of(arguments: &Arguments) -> Self {
-        let rounds = arguments.rounds.max(1);
-        if arguments.quick {
-            Self { rounds, blobs: [100_000, 1_000_000], soup: 100_000, forest: 100 }
-        } else {
-            Self { rounds, blobs: [1_000_000, 10_000_000], soup: 1_000_000, forest: 1_000 }
-        }
-    }
-
-    fn blob_name(triangles: u64) -> String {
-        format!("blob {}", in_words(triangles))
-    }
-}
-
-/// 1000000 is "1M", 100000 "100k".
-fn in_words(count: u64) -> String {
-    match count {
-        1_000_000.. => format!("{}M", count / 1_000_000),
-        1_000.. => format!("{}k", count / 1_000),
-        _ => count.to_string(),
-    }
+fn blob_name(triangles: u64) -> String {
+    format!("blob {}", in_short(triangles))
 }
 
 fn main() -> anyhow::Result<()> {
@@ -121,7 +92,7 @@ fn main() -> anyhow::Result<()> {
         Some(Command::Memory { scene }) => return whole::print_memory(scene),
         None => {}
     }
-    let effort = Effort::of(&arguments);
+    let effort = arguments.effort;
     let has = |part: &str| arguments.only.is_empty() || arguments.only.iter().any(|p| p == part);
     // The page is written after each part, so that a run that is stopped leaves what it has.
     let write = |findings: &Findings| page::write(effort, findings, &arguments.output).map(drop);

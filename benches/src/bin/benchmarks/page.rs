@@ -6,11 +6,12 @@ use std::path::Path;
 use anyhow::Context;
 use etendue_bench::machine;
 use etendue_bench::rounds::Series;
+use etendue_benches::effort::Effort;
 use etendue_benches::field::names;
 
 use crate::findings::{Contest, Findings, Part, Record};
 use crate::goals::{self, Goal};
-use crate::{Effort, build, first_light, load, threads, whole};
+use crate::{build, first_light, load, threads, whole};
 
 /// Between these, another script writes what other programs take; it is kept.
 const PEERS: [&str; 2] = ["<!-- peers: begin -->", "<!-- peers: end -->"];
@@ -39,7 +40,7 @@ fn compose(effort: Effort, findings: &Findings, peers: &str) -> String {
     for line in machine::describe().into_iter().chain([machine::checkout()]) {
         push(&mut text, &format!("- {line}"));
     }
-    push(&mut text, &format!("- Rounds: {}, after one that is not counted", effort.rounds));
+    push(&mut text, &format!("- Rounds: {}, after one that is not counted", effort.rounds()));
     goals_table(&mut text, &goals::all(effort, findings));
     text.push_str(TRACING);
     for contest in findings.of(Part::Traversal) {

@@ -2,9 +2,9 @@
 
 use etendue_bench::rounds::{Turn, take_turns, wall};
 use etendue_benches::contest::time;
+use etendue_benches::effort::Effort;
 use etendue_benches::field::{Field, Rays, contestants, names};
 
-use crate::Effort;
 use crate::findings::{Contest, Part, Record};
 
 /// The clocks, as the page shows them.
@@ -33,7 +33,7 @@ pub(crate) fn contest(effort: Effort, mesh: &str, field: &Field, rays: &Rays) ->
             turns.push(Box::new(move || wall(|| time(&**contestant, threads, 1)).0));
         }
     }
-    let series = take_turns(effort.rounds, &mut turns);
+    let series = take_turns(effort.rounds(), &mut turns);
     let records =
         titles.into_iter().zip(series).map(|(who, series)| Record { who, series, bytes: None });
     Contest {

@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use etendue_bench::rounds::{Turn, take_turns};
 use etendue_benches::contest::{Query, time};
+use etendue_benches::effort::{Effort, in_short};
 use etendue_benches::field::{Field, Rays, Reference, contestants, names};
 use etendue_benches::meshes;
 use etendue_benches::rays::{View, incoherent, occlusion};
 use etendue_geometry::Geometry;
 
 use crate::findings::{Contest, Findings, Part, Record};
-use crate::{Effort, threads};
+use crate::threads;
 
 /// The questions, as the page shows them.
 pub(crate) const PRIMARY: &str = "primary, 1 sample";
@@ -33,17 +34,18 @@ pub(crate) fn measure(
     write: &dyn Fn(&Findings) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
     let mut scenes: Vec<(String, Arc<Geometry>, Reference)> = Vec::new();
-    for triangles in effort.blobs {
+    for triangles in effort.blobs() {
         let reference =
             if triangles > 1_000_000 { Reference::LeftOut } else { Reference::Included };
-        scenes.push((Effort::blob_name(triangles), meshes::blob(triangles)?, reference));
+        scenes.push((crate::blob_name(triangles), meshes::blob(triangles)?, reference));
     }
     if alone {
-        let name = format!("soup {}", crate::in_words(effort.soup.into()));
-        scenes.push((name, meshes::soup(effort.soup), Reference::Included));
-        let instances = u64::from(effort.forest) * u64::from(effort.forest);
-        let name = format!("forest {} x 10k", crate::in_words(instances));
-        scenes.push((name, meshes::forest(effort.forest)?, Reference::LeftOut));
+        let name = format!("soup {}", in_short(effort.soup().into()));
+        scenes.push((name, meshes::soup(effort.soup()), Reference::Included));
+        let side = crate::forest(effort);
+        let instances = u64::from(side) * u64::from(side);
+        let name = format!("forest {} x 10k", in_short(instances));
+        scenes.push((name, meshes::forest(side)?, Reference::LeftOut));
     }
     for (mesh, geometry, reference) in scenes {
         eprintln!("tracing {mesh}");
@@ -89,7 +91,7 @@ fn contest(effort: Effort, mesh: &str, question: &str, field: &Field, rays: &Ray
         let every = if *name == names::EXACT { EXACT_SHARE } else { share };
         turns.push(Box::new(move || time(&**contestant, 1, every)));
     }
-    let series = take_turns(effort.rounds, &mut turns);
+    let series = take_turns(effort.rounds(), &mut turns);
     let records = all.iter().zip(series).map(|((name, _), series)| Record {
         who: (*name).to_owned(),
         series,

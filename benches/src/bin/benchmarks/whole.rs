@@ -10,6 +10,7 @@ use etendue_accel::{BuildOptions, Quality};
 use etendue_bench::machine::Memory;
 use etendue_bench::rounds::{Turn, take_turns, wall};
 use etendue_benches::contest::{LimitPackets, Query, time};
+use etendue_benches::effort::Effort;
 use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_benches::meshes;
 use etendue_benches::rays::View;
@@ -18,7 +19,6 @@ use etendue_render::{Images, Plan, plan};
 use etendue_scene::{LoadOptions, SceneFile};
 use serde_json::{Value, json};
 
-use crate::Effort;
 use crate::findings::{Contest, Findings, Part, Record};
 
 /// The contestants, as the page shows them.
@@ -40,8 +40,8 @@ pub(crate) const HELD: [&str; 4] = ["start", "load", "build", "render"];
 pub(crate) fn measure(effort: Effort, findings: &mut Findings) -> anyhow::Result<()> {
     let program = std::env::current_exe()?.with_file_name("etendue");
     ensure!(program.exists(), "{} is missing; build it first", program.display());
-    for triangles in effort.blobs {
-        let mesh = Effort::blob_name(triangles);
+    for triangles in effort.blobs() {
+        let mesh = crate::blob_name(triangles);
         eprintln!("{mesh}, from file to pixels");
         let folder = tempfile::tempdir().context("a temporary folder")?;
         crate::write_models(folder.path(), triangles)?;
@@ -143,7 +143,7 @@ fn contest(effort: Effort, mesh: &str, triangles: u64, job: &Job) -> anyhow::Res
         Box::new(least),
         Box::new(|| run(&["--layers", "facing", "--samples", "16"])),
     ];
-    let series = take_turns(effort.rounds, &mut turns);
+    let series = take_turns(effort.rounds(), &mut turns);
     drop(turns);
     if let Some(error) = fault.into_inner() {
         return Err(error);

@@ -7,6 +7,7 @@ use etendue_accel::Quality;
 use etendue_bench::accelerators::{self, Method, RENDER_WIDTH};
 use etendue_bench::hits::HitErrors;
 use etendue_bench::rays::Rays;
+use etendue_benches::effort::Effort;
 use etendue_benches::meshes;
 use etendue_benches::rays::View;
 use etendue_camera::{CameraSpec, Pose};
@@ -14,7 +15,6 @@ use etendue_chart::{Axis, Chart, Series};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, Placement, Transform};
 
-use crate::Effort;
 use crate::page::Page;
 
 const TRIANGLES: u64 = 20_000;
@@ -99,7 +99,7 @@ fn errors(
     let pose = pose.context("a view upright")?;
     let camera = CameraSpec::perspective(pose, view.fov.to_radians(), 1.0)
         .build(|| Bounds::EMPTY, &|name| Err(name.to_owned()))?;
-    let rays = Rays::primary(&camera, effort.rays / 2);
+    let rays = Rays::primary(&camera, crate::rays(effort) / 2);
     let effort = accelerators::Effort {
         methods: vec![method],
         widths: vec![RENDER_WIDTH],

@@ -7,12 +7,12 @@ use etendue_accel::{Accel, BuildOptions};
 use etendue_bench::findings::Findings;
 use etendue_bench::pictures::Studio;
 use etendue_bench::{cameras, samplers};
+use etendue_benches::effort::Effort;
 use etendue_chart::Chart;
 use etendue_render::output::Outputs;
 use etendue_render::{Plan, plan};
 use etendue_scene::{LoadOptions, Scene, SceneFile};
 
-use crate::Effort;
 use crate::page::Page;
 
 const THIN_LENS: &str = "scenes/paper/fig6a.json";
@@ -69,8 +69,8 @@ fn pictures(effort: Effort) -> samplers::Effort {
     samplers::Effort {
         counts: vec![1, 4, 16, 64, 256],
         converged: 4096,
-        rounds: effort.rounds.min(3),
-        seconds: effort.seconds,
+        rounds: effort.rounds().min(3),
+        seconds: effort.pick(25.0, 4.0),
     }
 }
 

@@ -7,6 +7,7 @@ use etendue_accel::Quality;
 use etendue_bench::accelerators::{self, Finding, Method, RENDER_WIDTH};
 use etendue_bench::findings::Findings;
 use etendue_bench::rays::Rays;
+use etendue_benches::effort::Effort;
 use etendue_benches::meshes;
 use etendue_benches::rays::View;
 use etendue_camera::{Camera, CameraSpec, Pose};
@@ -14,14 +15,13 @@ use etendue_chart::Chart;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, RayBatch};
 
-use crate::Effort;
 use crate::page::Page;
 
 /// Builds of more triangles take so long that fewer rounds have to do.
 const HEAVY: u64 = 5_000_000;
 
 pub(crate) fn measure(effort: Effort, page: &mut Page) -> anyhow::Result<()> {
-    let [small, large] = effort.meshes;
+    let [small, large] = effort.blobs();
     let smooth = |triangles: u64| -> anyhow::Result<_> {
         let geometry = meshes::blob(triangles)?;
         let view = View::framing(geometry.bounds());
@@ -33,12 +33,14 @@ pub(crate) fn measure(effort: Effort, page: &mut Page) -> anyhow::Result<()> {
     let (geometry, view) = smooth(large)?;
     let title = format!("A smooth mesh of {}", in_words(large));
     primary(effort, page, "smooth-heavy", &title, (&geometry, view), HEAVY_ADVICE)?;
-    let geometry = meshes::soup(effort.soup);
+    let geometry = meshes::soup(effort.soup());
     let view = View::framing(geometry.bounds());
-    let title = format!("A soup of {}", in_words(effort.soup.into()));
+    let title = format!("A soup of {}", in_words(effort.soup().into()));
     primary(effort, page, "soup", &title, (&geometry, view), SOUP)?;
-    let geometry = meshes::forest(effort.forest)?;
-    let instances = u64::from(effort.forest).pow(2);
+    // Instances along a side.
+    let side = effort.pick(100, 30);
+    let geometry = meshes::forest(side)?;
+    let instances = u64::from(side).pow(2);
     let title = format!("A forest of {instances} instances of 10 000 triangles");
     primary(effort, page, "forest", &title, (&geometry, View::over_forest()), FOREST)?;
     aimed(effort, page)
@@ -70,9 +72,9 @@ fn primary(
     advice: &str,
 ) -> anyhow::Result<()> {
     page.heading(title);
-    let rays = Rays::primary(&camera(view)?, effort.rays);
+    let rays = Rays::primary(&camera(view)?, crate::rays(effort));
     let (findings, rounds) = accelerators(effort, geometry, &rays)?;
-    if rounds != effort.rounds {
+    if rounds != effort.rounds() {
         page.paragraph(&format!("Medians of {rounds} rounds."));
     }
     let mut chart = chart(&findings, "accelerators-depth")?;
@@ -84,7 +86,7 @@ fn primary(
 
 /// A closed mesh seen from inside, by rays at its corners and edges.
 fn aimed(effort: Effort, page: &mut Page) -> anyhow::Result<()> {
-    let triangles = effort.meshes[0] / 10;
+    let triangles = effort.blobs()[0] / 10;
     page.heading("Rays aimed at corners and edges");
     page.paragraph(&format!(
         "From inside a closed mesh of {}: every ray aims at a corner, or at the middle of an edge. None may get out.",
@@ -118,7 +120,7 @@ fn accelerators(
     let mut threads = vec![1, cores];
     threads.dedup();
     let is_heavy = geometry.triangles_unique() > HEAVY;
-    let rounds = if is_heavy { effort.rounds.min(3) } else { effort.rounds };
+    let rounds = if is_heavy { effort.rounds().min(3) } else { effort.rounds() };
     let effort = accelerators::Effort {
         methods: Method::all().to_vec(),
         widths: vec![RENDER_WIDTH],

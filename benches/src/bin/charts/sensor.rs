@@ -3,11 +3,11 @@
 use std::cell::RefCell;
 
 use etendue_bench::rounds::{Turn, take_turns, wall};
+use etendue_benches::effort::Effort;
 use etendue_chart::{Axis, Chart, Mark, Point, Series};
 use etendue_sensor::approximation::Deviation;
 use etendue_sensor::{Film, NoiseModel, Sensor, Shot};
 
-use crate::Effort;
 use crate::page::Page;
 
 /// Columns and rows that are exposed at a time.
@@ -52,7 +52,7 @@ pub(crate) fn measure(effort: Effort, page: &mut Page) -> anyhow::Result<()> {
             }));
         }
     }
-    let series = take_turns(effort.rounds, &mut turns);
+    let series = take_turns(effort.rounds(), &mut turns);
     drop(turns);
     if let Some(error) = fault.into_inner() {
         return Err(error.into());
