@@ -2,6 +2,9 @@
 
 use crate::draw;
 
+/// The colour of what is no contestant: limits and models.
+pub const GREY: usize = 7;
+
 /// A chart: points and lines over two logarithmic axes.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Chart {
@@ -36,8 +39,8 @@ pub struct Series {
     pub points: Vec<Point>,
     /// Whether a line joins them, in their order.
     pub joined: bool,
-    /// Whether that line is dashed.
-    pub dashed: bool,
+    /// How that line is drawn.
+    pub stroke: Stroke,
     /// Which of the colours; series of one number look alike.
     pub colour: usize,
     /// Whether the points count for the Pareto front.
@@ -65,6 +68,18 @@ pub enum Mark {
     Dot,
     /// Nothing but its line.
     None,
+}
+
+/// How a line is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Stroke {
+    /// Through.
+    #[default]
+    Solid,
+    /// In dashes.
+    Dashed,
+    /// In dots, which show on top of dashes.
+    Dotted,
 }
 
 /// For whom the colours are.
@@ -95,13 +110,22 @@ impl Series {
     /// A line through `points`, marked by disks.
     #[must_use]
     pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = [f64; 2]>) -> Self {
-        let disk = |at| Point { at, mark: Mark::Disk };
-        Self {
-            name: name.into(),
-            points: points.into_iter().map(disk).collect(),
-            joined: true,
-            ..Self::default()
-        }
+        Self::joined(name, points, Mark::Disk)
+    }
+
+    /// A line through `points`, which are not marked.
+    #[must_use]
+    pub fn curve(name: impl Into<String>, points: impl IntoIterator<Item = [f64; 2]>) -> Self {
+        Self::joined(name, points, Mark::None)
+    }
+
+    fn joined(
+        name: impl Into<String>,
+        points: impl IntoIterator<Item = [f64; 2]>,
+        mark: Mark,
+    ) -> Self {
+        let points = points.into_iter().map(|at| Point { at, mark }).collect();
+        Self { name: name.into(), points, joined: true, ..Self::default() }
     }
 }
 
@@ -109,6 +133,12 @@ impl Chart {
     /// The chart as an SVG document. Its fonts are the reader's sans-serif.
     #[must_use]
     pub fn svg(&self, theme: Theme) -> String {
-        draw::svg(self, theme)
+        draw::single(self, theme)
     }
+}
+
+/// Smaller charts beside each other, two a row, as one SVG document.
+#[must_use]
+pub fn side_by_side(charts: &[Chart], theme: Theme) -> String {
+    draw::rows(charts, theme)
 }

@@ -1,99 +1,98 @@
 //! Charts as SVG.
 
-use svg::node::element::path::Data;
-use svg::node::element::{Circle, Line, Path, Rectangle, Style, Text};
+use svg::node::element::{Circle, Group, Rectangle, Text};
 use svg::{Document, Node};
 
 use crate::axis::Scale;
-use crate::chart::{Chart, Mark, Point, Theme};
+use crate::chart::{Chart, Mark, Point, Stroke, Theme};
 use crate::front::front;
+use crate::ink::{self, Anchor, COLOURS, dashed, line, path, rounded, straight, text};
 use crate::names::{self, Area, LINE, Obstacle};
 
-const WIDTH: f64 = 860.0;
 const LEFT: f64 = 84.0;
 const RIGHT: f64 = 22.0;
 const HEAD: f64 = 40.0;
 const NOTE: f64 = 18.0;
-const PLOT: f64 = 420.0;
 const FOOT: f64 = 54.0;
-
-/// Colours by theme.
-const LIGHT: &str = "\
-text { font-family: sans-serif; font-size: 12px; fill: #24292f; }
-.title { font-size: 16px; } .small { font-size: 11px; fill: #57606a; }
-.paper { fill: #ffffff; } .halo { fill: #ffffff; fill-opacity: 0.82; }
-.ink { stroke: #57606a; fill: none; } .faint { stroke: #d8dee4; fill: none; }
-.front { stroke: #57606a; stroke-opacity: 0.3; fill: none; stroke-width: 7px; }
-.ring { fill: #ffffff; }
-.s0 { stroke: #0550ae; } .s1 { stroke: #1a7f37; } .s2 { stroke: #cf222e; }
-.s3 { stroke: #8250df; } .s4 { stroke: #bc4c00; } .s5 { stroke: #0b7285; }
-.s6 { stroke: #bf3989; } .s7 { stroke: #57606a; }
-.f0 { fill: #0550ae; } .f1 { fill: #1a7f37; } .f2 { fill: #cf222e; }
-.f3 { fill: #8250df; } .f4 { fill: #bc4c00; } .f5 { fill: #0b7285; }
-.f6 { fill: #bf3989; } .f7 { fill: #57606a; }
-";
-
-const DARK: &str = "\
-@media (prefers-color-scheme: dark) {
-text { fill: #e6edf3; } .small { fill: #9198a1; }
-.paper { fill: #0d1117; } .halo { fill: #0d1117; } .ring { fill: #0d1117; }
-.ink { stroke: #9198a1; } .faint { stroke: #30363d; } .front { stroke: #9198a1; }
-.s0 { stroke: #79c0ff; } .s1 { stroke: #56d364; } .s2 { stroke: #ff7b72; }
-.s3 { stroke: #d2a8ff; } .s4 { stroke: #ffa657; } .s5 { stroke: #66d9e8; }
-.s6 { stroke: #ff9bce; } .s7 { stroke: #b1bac4; }
-.f0 { fill: #79c0ff; } .f1 { fill: #56d364; } .f2 { fill: #ff7b72; }
-.f3 { fill: #d2a8ff; } .f4 { fill: #ffa657; } .f5 { fill: #66d9e8; }
-.f6 { fill: #ff9bce; } .f7 { fill: #b1bac4; }
-}
-";
-
-/// Colours that the style has.
-const COLOURS: usize = 8;
 
 /// Steps along a line (pixels) in which it keeps names away.
 const STEP: f64 = 9.0;
 
-/// Where a text stands against its place.
+/// Room for a chart (pixels).
 #[derive(Debug, Clone, Copy)]
-enum Anchor {
-    Start,
-    Middle,
-    End,
+struct Room {
+    width: f64,
+    /// Height of the part between the axes.
+    plot: f64,
 }
 
-pub(crate) fn svg(chart: &Chart, theme: Theme) -> String {
-    let top = HEAD + NOTE * chart.notes.len() as f64;
-    let frame = Area { left: LEFT, top, right: WIDTH - RIGHT, bottom: top + PLOT };
-    let values = |axis: usize| {
-        let points = chart.series.iter().flat_map(|series| &series.points);
-        // What has no place on the other axis does not stretch this one.
-        points.filter(|point| is_shown(chart, point)).map(move |point| point.at[axis])
-    };
-    let [x, y] = &chart.axes;
-    let drawing = Drawing {
-        chart,
-        frame,
-        x: Scale::new(values(0), x.zero.is_some(), [frame.left, frame.right]),
-        y: Scale::new(values(1), y.zero.is_some(), [frame.bottom, frame.top]),
-    };
-    let style = match theme {
-        Theme::Reader => format!("{LIGHT}{DARK}"),
-        Theme::Light => LIGHT.to_owned(),
-    };
-    let height = frame.bottom + FOOT;
-    let paper = Rectangle::new().set("class", "paper").set("width", WIDTH).set("height", height);
-    let mut document = Document::new()
-        .set("viewBox", (0, 0, WIDTH, height))
-        .set("width", WIDTH)
+/// A chart that stands alone, and one beside others.
+const ALONE: Room = Room { width: 860.0, plot: 420.0 };
+const BESIDE: Room = Room { width: 470.0, plot: 300.0 };
+
+/// Charts beside each other before a new row begins.
+const ROW: usize = 2;
+
+/// One chart on its own.
+pub(crate) fn single(chart: &Chart, theme: Theme) -> String {
+    let size = [ALONE.width, ALONE.height(chart)];
+    document(size, theme).add(ALONE.draw(chart)).to_string()
+}
+
+/// Charts in rows.
+pub(crate) fn rows(charts: &[Chart], theme: Theme) -> String {
+    let mut all = Group::new();
+    let mut height = 0.0;
+    for row in charts.chunks(ROW) {
+        for (column, chart) in row.iter().enumerate() {
+            let left = BESIDE.width * column as f64;
+            all.append(BESIDE.draw(chart).set("transform", format!("translate({left} {height})")));
+        }
+        height += row.iter().map(|chart| BESIDE.height(chart)).fold(0.0, f64::max);
+    }
+    let columns = charts.len().clamp(1, ROW);
+    document([BESIDE.width * columns as f64, height], theme).add(all).to_string()
+}
+
+fn document([width, height]: [f64; 2], theme: Theme) -> Document {
+    let paper = Rectangle::new().set("class", "paper").set("width", width).set("height", height);
+    Document::new()
+        .set("viewBox", (0, 0, width, height))
+        .set("width", width)
         .set("height", height)
-        .add(Style::new(style))
-        .add(paper);
-    drawing.heading(&mut document);
-    drawing.axes(&mut document);
-    drawing.front(&mut document);
-    drawing.series(&mut document);
-    drawing.names(&mut document);
-    document.to_string()
+        .add(ink::style(theme))
+        .add(paper)
+}
+
+impl Room {
+    /// Height of all of `chart` (pixels).
+    fn height(self, chart: &Chart) -> f64 {
+        HEAD + NOTE * chart.notes.len() as f64 + self.plot + FOOT
+    }
+
+    fn draw(self, chart: &Chart) -> Group {
+        let top = HEAD + NOTE * chart.notes.len() as f64;
+        let frame = Area { left: LEFT, top, right: self.width - RIGHT, bottom: top + self.plot };
+        let values = |axis: usize| {
+            let points = chart.series.iter().flat_map(|series| &series.points);
+            // What has no place on the other axis does not stretch this one.
+            points.filter(|point| is_shown(chart, point)).map(move |point| point.at[axis])
+        };
+        let [x, y] = &chart.axes;
+        let drawing = Drawing {
+            chart,
+            frame,
+            x: Scale::new(values(0), x.zero.is_some(), [frame.left, frame.right]),
+            y: Scale::new(values(1), y.zero.is_some(), [frame.bottom, frame.top]),
+        };
+        let mut group = Group::new();
+        drawing.heading(&mut group);
+        drawing.axes(&mut group);
+        drawing.front(&mut group);
+        drawing.series(&mut group);
+        drawing.names(&mut group);
+        group
+    }
 }
 
 fn is_shown(chart: &Chart, point: &Point) -> bool {
@@ -121,58 +120,58 @@ impl Drawing<'_> {
         points.filter_map(|point| Some((self.place(point.at)?, point.mark))).collect()
     }
 
-    fn heading(&self, document: &mut Document) {
-        text(document, [LEFT, 25.0], Anchor::Start, "title", &self.chart.title);
+    fn heading(&self, group: &mut Group) {
+        text(group, [LEFT, 25.0], Anchor::Start, "title", &self.chart.title);
         for (i, note) in self.chart.notes.iter().enumerate() {
             let y = 25.0 + NOTE * (i as f64 + 1.0);
-            text(document, [LEFT, y], Anchor::Start, "small", note);
+            text(group, [LEFT, y], Anchor::Start, "small", note);
         }
     }
 
-    fn axes(&self, document: &mut Document) {
+    fn axes(&self, group: &mut Group) {
         let Area { left, top, right, bottom } = self.frame;
         for (name, at) in self.x.ticks() {
-            line(document, [at, top], [at, bottom], "faint");
-            text(document, [at, bottom + 18.0], Anchor::Middle, "", &name);
+            line(group, [at, top], [at, bottom], "faint");
+            text(group, [at, bottom + 18.0], Anchor::Middle, "", &name);
         }
         for (name, at) in self.y.ticks() {
-            line(document, [left, at], [right, at], "faint");
-            text(document, [left - 8.0, at + 4.0], Anchor::End, "", &name);
+            line(group, [left, at], [right, at], "faint");
+            text(group, [left - 8.0, at + 4.0], Anchor::End, "", &name);
         }
-        self.zeros(document);
-        line(document, [left, bottom], [right, bottom], "ink");
-        line(document, [left, bottom], [left, top], "ink");
+        self.zeros(group);
+        line(group, [left, bottom], [right, bottom], "ink");
+        line(group, [left, bottom], [left, top], "ink");
         let [across, upwards] = &self.chart.axes;
         let middle = 0.5 * (left + right);
-        text(document, [middle, bottom + 42.0], Anchor::Middle, "", &across.label);
+        text(group, [middle, bottom + 42.0], Anchor::Middle, "", &across.label);
         let upright = Text::new(&upwards.label)
             .set("transform", format!("translate(18 {}) rotate(-90)", 0.5 * (top + bottom)))
             .set("text-anchor", "middle");
-        document.append(upright);
+        group.append(upright);
     }
 
     /// A dashed line above the place of zeros, and their name.
-    fn zeros(&self, document: &mut Document) {
+    fn zeros(&self, group: &mut Group) {
         let Area { left, top, right, bottom } = self.frame;
         let [across, upwards] = &self.chart.axes;
         if let (Some(at), Some(name)) = (self.y.zero(), &upwards.zero) {
             let start = self.y.start();
-            dashed(document, [left, start], [right, start]);
-            text(document, [left - 8.0, at + 4.0], Anchor::End, "", "0");
-            text(document, [right - 4.0, start - 5.0], Anchor::End, "small", name);
+            dashed(group, [left, start], [right, start]);
+            text(group, [left - 8.0, at + 4.0], Anchor::End, "", "0");
+            text(group, [right - 4.0, start - 5.0], Anchor::End, "small", name);
         }
         if let (Some(at), Some(name)) = (self.x.zero(), &across.zero) {
             let start = self.x.start();
-            dashed(document, [start, bottom], [start, top]);
-            text(document, [at, bottom + 18.0], Anchor::Middle, "", "0");
-            text(document, [left + 4.0, top + 12.0], Anchor::Start, "small", name);
+            dashed(group, [start, bottom], [start, top]);
+            text(group, [at, bottom + 18.0], Anchor::Middle, "", "0");
+            text(group, [left + 4.0, top + 12.0], Anchor::Start, "small", name);
         }
     }
 
-    fn front(&self, document: &mut Document) {
+    fn front(&self, group: &mut Group) {
         let corners = self.front_corners();
         if corners.len() > 1 {
-            path(document, &corners, "front", None);
+            path(group, &corners, "front", Stroke::Solid);
         }
     }
 
@@ -198,14 +197,13 @@ impl Drawing<'_> {
         corners
     }
 
-    fn series(&self, document: &mut Document) {
+    fn series(&self, group: &mut Group) {
         for (i, series) in self.chart.series.iter().enumerate() {
             let colour = series.colour % COLOURS;
             let places = self.places(i);
             if series.joined && places.len() > 1 {
                 let line: Vec<[f64; 2]> = places.iter().map(|(place, _)| *place).collect();
-                let dashes = series.dashed.then_some("5 4");
-                path(document, &line, &format!("s{colour}"), dashes);
+                path(group, &line, &format!("s{colour}"), series.stroke);
             }
             for (place, mark) in places {
                 let (radius, class) = match mark {
@@ -220,12 +218,12 @@ impl Drawing<'_> {
                     .set("r", radius)
                     .set("stroke-width", 1.6)
                     .set("class", class);
-                document.append(circle);
+                group.append(circle);
             }
         }
     }
 
-    fn names(&self, document: &mut Document) {
+    fn names(&self, group: &mut Group) {
         let mut obstacles = Vec::new();
         let mut names = Vec::new();
         let mut named = Vec::new();
@@ -258,7 +256,7 @@ impl Drawing<'_> {
             let colour = series.colour % COLOURS;
             if let Some([from, to]) = placed.leader {
                 let leader = straight(from, to).set("class", format!("s{colour}"));
-                document.append(leader.set("stroke-width", 0.8).set("stroke-opacity", 0.7));
+                group.append(leader.set("stroke-width", 0.8).set("stroke-opacity", 0.7));
             }
             let Area { left, top, right, bottom } = placed.area;
             let halo = Rectangle::new()
@@ -267,9 +265,9 @@ impl Drawing<'_> {
                 .set("y", rounded(top))
                 .set("width", rounded(right - left))
                 .set("height", rounded(bottom - top));
-            document.append(halo);
+            group.append(halo);
             let at = [0.5 * (left + right), top + 0.77 * LINE];
-            text(document, at, Anchor::Middle, &format!("f{colour}"), name);
+            text(group, at, Anchor::Middle, &format!("f{colour}"), name);
         }
     }
 }
@@ -287,55 +285,6 @@ fn along(places: &[([f64; 2], Mark)], obstacles: &mut Vec<Obstacle>) {
             done += STEP;
         }
     }
-}
-
-fn text(document: &mut Document, at: [f64; 2], anchor: Anchor, class: &str, words: &str) {
-    let anchor = match anchor {
-        Anchor::Start => "start",
-        Anchor::Middle => "middle",
-        Anchor::End => "end",
-    };
-    let text = Text::new(words)
-        .set("x", rounded(at[0]))
-        .set("y", rounded(at[1]))
-        .set("text-anchor", anchor);
-    document.append(if class.is_empty() { text } else { text.set("class", class) });
-}
-
-fn straight(from: [f64; 2], to: [f64; 2]) -> Line {
-    Line::new()
-        .set("x1", rounded(from[0]))
-        .set("y1", rounded(from[1]))
-        .set("x2", rounded(to[0]))
-        .set("y2", rounded(to[1]))
-}
-
-fn line(document: &mut Document, from: [f64; 2], to: [f64; 2], class: &str) {
-    document.append(straight(from, to).set("class", class));
-}
-
-fn dashed(document: &mut Document, from: [f64; 2], to: [f64; 2]) {
-    document.append(straight(from, to).set("class", "ink").set("stroke-dasharray", "3 4"));
-}
-
-fn path(document: &mut Document, points: &[[f64; 2]], class: &str, dashes: Option<&str>) {
-    let [first, rest @ ..] = points else { return };
-    let pair = |point: &[f64; 2]| (rounded(point[0]), rounded(point[1]));
-    let data =
-        rest.iter().fold(Data::new().move_to(pair(first)), |d, point| d.line_to(pair(point)));
-    let mut path = Path::new().set("class", class).set("fill", "none").set("d", data);
-    if class != "front" {
-        path = path.set("stroke-width", 1.6);
-    }
-    if let Some(dashes) = dashes {
-        path = path.set("stroke-dasharray", dashes);
-    }
-    document.append(path);
-}
-
-/// A hundredth of a pixel is more than enough; files stay small.
-fn rounded(pixels: f64) -> f64 {
-    (pixels * 100.0).round() / 100.0
 }
 
 #[cfg(test)]
@@ -360,6 +309,17 @@ mod tests {
         assert!(text.contains("a &lt; b") && text.contains("none wrong"));
         assert!(text.contains("prefers-color-scheme"));
         assert!(!chart(&[]).svg(Theme::Light).contains("prefers-color-scheme"));
+    }
+
+    #[test]
+    fn charts_beside_each_other_stand_in_rows_of_two() {
+        let three = [(); 3].map(|()| chart(&[[1.0, 1.0], [10.0, 2.0]]));
+        let text = rows(&three, Theme::Light);
+        let [width, height] = [BESIDE.width, BESIDE.height(&three[0])];
+        for place in [[0.0, 0.0], [width, 0.0], [0.0, height]] {
+            assert!(text.contains(&format!("translate({} {})", place[0], place[1])), "{text}");
+        }
+        assert!(text.contains(&format!("viewBox=\"0 0 {} {}\"", 2.0 * width, 2.0 * height)));
     }
 
     #[test]

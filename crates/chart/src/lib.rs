@@ -11,12 +11,14 @@
 //! | `names` | where names go, so that none covers another |
 //! | `front` | the points that no other beats on both axes |
 //! | `draw` | all of it as SVG |
+//! | `ink` | lines and letters in the colours of a theme |
 
 mod axis;
 pub mod chart;
 mod draw;
 mod front;
+mod ink;
 mod names;
 
-pub use chart::{Axis, Chart, Mark, Point, Series, Theme};
+pub use chart::{Axis, Chart, GREY, Mark, Point, Series, Stroke, Theme, side_by_side};
 pub use front::front;

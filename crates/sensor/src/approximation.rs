@@ -6,9 +6,9 @@
 
 use std::fmt::Write as _;
 
+use etendue_chart::{Axis, Chart, GREY, Series, Stroke, Theme, side_by_side};
 use serde::Serialize;
 
-use crate::chart::{Chart, Corner, Line, svg};
 use crate::clipping::{normal_cdf, normal_density};
 use crate::poisson::probability;
 
@@ -82,15 +82,8 @@ pub fn electrons_needed(read_noise: f64, limit: f64) -> Option<f64> {
     None
 }
 
-/// Read noises that the charts and the table show (e⁻), with a colour for each.
-const SHOWN: [(f64, &str); 6] = [
-    (0.0, "#000000"),
-    (0.3, "#7b3fa0"),
-    (1.0, "#1f5fa8"),
-    (2.0, "#2e8b57"),
-    (5.0, "#c9820a"),
-    (10.0, "#c0392b"),
-];
+/// Read noises that the charts show (e⁻).
+const SHOWN: [f64; 6] = [0.0, 0.3, 1.0, 2.0, 5.0, 10.0];
 
 /// Means that the charts show (e⁻): 0.1 to 1000.
 fn means() -> impl Iterator<Item = f64> {
@@ -101,47 +94,40 @@ fn means() -> impl Iterator<Item = f64> {
 /// noises, as SVG.
 #[must_use]
 pub fn charts() -> String {
-    let names = SHOWN.map(|(sigma, _)| format!("read noise {sigma} e⁻"));
     let all: Vec<Vec<Deviation>> = SHOWN
         .iter()
-        .map(|&(sigma, _)| means().map(|mean| Deviation::new(mean, sigma)).collect())
+        .map(|&sigma| means().map(|mean| Deviation::new(mean, sigma)).collect())
         .collect();
-    let line = |k: usize, value: &dyn Fn(&Deviation) -> f64| Line {
-        name: &names[k],
-        colour: SHOWN[k].1,
-        dashes: "",
-        points: all[k].iter().map(|at| [at.mean, value(at)]).collect(),
+    let lines = |value: &dyn Fn(&Deviation) -> f64| -> Vec<Series> {
+        let all = SHOWN.iter().zip(&all).enumerate();
+        all.map(|(colour, (sigma, deviations))| {
+            let points = deviations.iter().map(|at| [at.mean, value(at)]);
+            Series { colour, ..Series::curve(format!("{sigma} e⁻"), points) }
+        })
+        .collect()
     };
-    let lines = |value: &dyn Fn(&Deviation) -> f64| -> Vec<Line<'_>> {
-        (0..SHOWN.len()).map(|k| line(k, value)).collect()
+    let chart = |title: &str, upwards: &str, series: Vec<Series>| Chart {
+        title: title.to_owned(),
+        notes: vec!["a line for each read noise".to_owned()],
+        axes: [Axis::new("mean electrons"), Axis::new(upwards)],
+        series,
+        ..Chart::default()
     };
-    let one_percent = Line {
-        name: "1 %",
-        colour: "#888888",
-        dashes: "2 3",
-        points: vec![[0.1, 0.01], [1000.0, 0.01]],
+    let one_percent = Series {
+        colour: GREY,
+        stroke: Stroke::Dotted,
+        ..Series::curve("1 %", [[0.1, 0.01], [1000.0, 0.01]])
     };
-    let distance = Chart {
-        title: "Kolmogorov's distance to the truth",
-        axes: ["mean electrons", "distance"],
-        lines: lines(&|at| at.distance).into_iter().chain([one_percent]).collect(),
-        legend: Corner::BottomRight,
-    };
+    let distances = lines(&|at| at.distance).into_iter().chain([one_percent]).collect();
     // Without a black level; below a millionth of an electron lies rounding.
     let visible = |bias: f64| if bias > 1e-6 { bias } else { 0.0 };
-    let bias = Chart {
-        title: "Bias after clipping, normal − exact",
-        axes: ["mean electrons", "bias (e⁻)"],
-        lines: lines(&|at| visible(at.bias_of_normal - at.bias)),
-        legend: Corner::TopRight,
-    };
-    let skewness = Chart {
-        title: "Skewness, which the normal lacks",
-        axes: ["mean electrons", "skewness"],
-        lines: lines(&|at| at.skewness),
-        legend: Corner::BottomRight,
-    };
-    svg(&[distance, bias, skewness])
+    let biases = lines(&|at| visible(at.bias_of_normal - at.bias));
+    let charts = [
+        chart("Kolmogorov's distance to the truth", "distance", distances),
+        chart("Bias after clipping, normal − exact", "bias (e⁻)", biases),
+        chart("Skewness, which the normal lacks", "skewness", lines(&|at| at.skewness)),
+    ];
+    side_by_side(&charts, Theme::Reader)
 }
 
 /// Mean electrons below which the approximation is over a limit of Kolmogorov's distance, a line for
@@ -284,7 +270,7 @@ mod tests {
     fn charts_and_table_show_what_was_computed() {
         let drawn = charts();
         // Bias is nothing but rounding in none of them: six lines each, and the limit.
-        assert_eq!(drawn.matches("<polyline").count(), 19);
+        assert_eq!(drawn.matches("<path").count(), 19);
         assert!(!drawn.contains("NaN"));
         let row = table().lines().find(|line| line.starts_with("| 1 |")).unwrap().to_owned();
         assert!(row.contains("| never | 7.") && row.contains("| 4"), "{row}");

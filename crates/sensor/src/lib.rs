@@ -48,7 +48,6 @@
 pub mod approximation;
 pub mod cfa;
 mod chain;
-mod chart;
 mod clipping;
 pub mod demosaic;
 pub mod dng;

@@ -8,11 +8,11 @@
 
 use std::fmt::Write as _;
 
+use etendue_chart::{Axis, Chart, GREY, Series, Stroke, Theme, side_by_side};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::approximation::electrons_needed;
-use crate::chart::{Chart, Corner, Line, svg};
 use crate::even_light::EvenLight;
 use crate::film::{RawImage, Shot};
 use crate::{NoiseModel, Sensor, SensorError};
@@ -189,38 +189,42 @@ impl PhotonTransfer {
     /// Both curves as SVG.
     #[must_use]
     pub fn svg(&self) -> String {
-        let line = |name, colour, dashes, f: &dyn Fn(&Point) -> [f64; 2]| Line {
-            name,
+        const EXACT: Look = ("exact Poisson", 0, Stroke::Solid);
+        const NORMAL: Look = ("normal approximation", 2, Stroke::Dashed);
+        const MODEL: Look = ("linear model", GREY, Stroke::Dotted);
+        const IDEAL: Look = ("ideal sensor", 1, Stroke::Solid);
+        let line = |(name, colour, stroke): Look, point: &dyn Fn(&Point) -> [f64; 2]| Series {
             colour,
-            dashes,
-            points: self.points.iter().map(f).collect(),
+            stroke,
+            ..Series::curve(name, self.points.iter().map(point))
         };
         let transfer = Chart {
-            title: "Photon transfer",
-            axes: ["signal (DN)", "temporal variance (DN²)"],
-            lines: vec![
-                line("exact Poisson", "#1f5fa8", "", &|p| [p.signal, p.variance]),
-                line("normal approximation", "#c0392b", "5 3", &|p| [p.signal, p.variance_normal]),
-                line("linear model", "#555555", "2 3", &|p| {
-                    [p.electrons * self.system_gain, p.variance_expected]
-                }),
+            title: "Photon transfer".to_owned(),
+            axes: [Axis::new("signal (DN)"), Axis::new("temporal variance (DN²)")],
+            series: vec![
+                line(EXACT, &|p| [p.signal, p.variance]),
+                line(NORMAL, &|p| [p.signal, p.variance_normal]),
+                line(MODEL, &|p| [p.electrons * self.system_gain, p.variance_expected]),
             ],
-            legend: Corner::TopLeft,
+            ..Chart::default()
         };
         let ratio = Chart {
-            title: "Signal to noise",
-            axes: ["photons a pixel", "SNR"],
-            lines: vec![
-                line("exact Poisson", "#1f5fa8", "", &|p| [p.photons, p.snr]),
-                line("normal approximation", "#c0392b", "5 3", &|p| [p.photons, p.snr_normal]),
-                line("linear model", "#555555", "2 3", &|p| [p.photons, p.snr_expected]),
-                line("ideal sensor", "#2e8b57", "8 3 2 3", &|p| [p.photons, p.snr_ideal]),
+            title: "Signal to noise".to_owned(),
+            axes: [Axis::new("photons a pixel"), Axis::new("SNR")],
+            series: vec![
+                line(EXACT, &|p| [p.photons, p.snr]),
+                line(NORMAL, &|p| [p.photons, p.snr_normal]),
+                line(MODEL, &|p| [p.photons, p.snr_expected]),
+                line(IDEAL, &|p| [p.photons, p.snr_ideal]),
             ],
-            legend: Corner::TopLeft,
+            ..Chart::default()
         };
-        svg(&[transfer, ratio])
+        side_by_side(&[transfer, ratio], Theme::Reader)
     }
 }
+
+/// Name, colour and stroke of a line.
+type Look = (&'static str, usize, Stroke);
 
 /// A sensor on the bench.
 struct Bench<'a> {
@@ -359,7 +363,7 @@ mod tests {
         assert_eq!(curves.wavelength, sensor.quantum_efficiency().peak().unwrap());
         let table = curves.table();
         assert_eq!(table.lines().count(), 7 + curves.points.len(), "{table}");
-        assert!(curves.svg().matches("<polyline").count() == 7);
+        assert!(curves.svg().matches("<path").count() == 7);
     }
 
     #[test]

@@ -77,10 +77,9 @@ fn against_time(findings: &[Finding], error: Measure) -> Chart {
             series.push(Series {
                 name: if threads == most { method.to_owned() } else { String::new() },
                 points: points.collect(),
-                joined: false,
-                dashed: false,
                 colour,
                 contends: threads == most,
+                ..Series::default()
             });
         }
     }

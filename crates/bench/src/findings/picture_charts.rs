@@ -1,6 +1,6 @@
 //! Charts of pictures: their error against time, and against the number of samples.
 
-use etendue_chart::{Axis, Chart, Mark, Point, Series};
+use etendue_chart::{Axis, Chart, GREY, Mark, Point, Series, Stroke};
 
 use crate::cameras::Cameras;
 use crate::samplers::{Converged, Samplers};
@@ -103,8 +103,8 @@ impl Pictures<'_> {
             name: "error of the converged picture itself".to_owned(),
             points: vec![end(low), end(high)],
             joined: true,
-            dashed: true,
-            colour: 7,
+            stroke: Stroke::Dashed,
+            colour: GREY,
             contends: false,
         })
     }

@@ -1,0 +1,107 @@
+//! Lines and letters in the colours of a theme.
+
+use svg::Node;
+use svg::node::element::path::Data;
+use svg::node::element::{Group, Line, Path, Style, Text};
+
+use crate::chart::{Stroke, Theme};
+
+/// Colours by theme.
+const LIGHT: &str = "\
+text { font-family: sans-serif; font-size: 12px; fill: #24292f; }
+.title { font-size: 16px; } .small { font-size: 11px; fill: #57606a; }
+.paper { fill: #ffffff; } .halo { fill: #ffffff; fill-opacity: 0.82; }
+.ink { stroke: #57606a; fill: none; } .faint { stroke: #d8dee4; fill: none; }
+.front { stroke: #57606a; stroke-opacity: 0.3; fill: none; stroke-width: 7px; }
+.ring { fill: #ffffff; }
+.s0 { stroke: #0550ae; } .s1 { stroke: #1a7f37; } .s2 { stroke: #cf222e; }
+.s3 { stroke: #8250df; } .s4 { stroke: #bc4c00; } .s5 { stroke: #0b7285; }
+.s6 { stroke: #bf3989; } .s7 { stroke: #57606a; }
+.f0 { fill: #0550ae; } .f1 { fill: #1a7f37; } .f2 { fill: #cf222e; }
+.f3 { fill: #8250df; } .f4 { fill: #bc4c00; } .f5 { fill: #0b7285; }
+.f6 { fill: #bf3989; } .f7 { fill: #57606a; }
+";
+
+const DARK: &str = "\
+@media (prefers-color-scheme: dark) {
+text { fill: #e6edf3; } .small { fill: #9198a1; }
+.paper { fill: #0d1117; } .halo { fill: #0d1117; } .ring { fill: #0d1117; }
+.ink { stroke: #9198a1; } .faint { stroke: #30363d; } .front { stroke: #9198a1; }
+.s0 { stroke: #79c0ff; } .s1 { stroke: #56d364; } .s2 { stroke: #ff7b72; }
+.s3 { stroke: #d2a8ff; } .s4 { stroke: #ffa657; } .s5 { stroke: #66d9e8; }
+.s6 { stroke: #ff9bce; } .s7 { stroke: #b1bac4; }
+.f0 { fill: #79c0ff; } .f1 { fill: #56d364; } .f2 { fill: #ff7b72; }
+.f3 { fill: #d2a8ff; } .f4 { fill: #ffa657; } .f5 { fill: #66d9e8; }
+.f6 { fill: #ff9bce; } .f7 { fill: #b1bac4; }
+}
+";
+
+/// The style's sheet.
+pub(crate) fn style(theme: Theme) -> Style {
+    Style::new(match theme {
+        Theme::Reader => format!("{LIGHT}{DARK}"),
+        Theme::Light => LIGHT.to_owned(),
+    })
+}
+
+/// Colours that the style has.
+pub(crate) const COLOURS: usize = 8;
+
+/// Where a text stands against its place.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+pub(crate) fn text(document: &mut Group, at: [f64; 2], anchor: Anchor, class: &str, words: &str) {
+    let anchor = match anchor {
+        Anchor::Start => "start",
+        Anchor::Middle => "middle",
+        Anchor::End => "end",
+    };
+    let text = Text::new(words)
+        .set("x", rounded(at[0]))
+        .set("y", rounded(at[1]))
+        .set("text-anchor", anchor);
+    document.append(if class.is_empty() { text } else { text.set("class", class) });
+}
+
+pub(crate) fn straight(from: [f64; 2], to: [f64; 2]) -> Line {
+    Line::new()
+        .set("x1", rounded(from[0]))
+        .set("y1", rounded(from[1]))
+        .set("x2", rounded(to[0]))
+        .set("y2", rounded(to[1]))
+}
+
+pub(crate) fn line(document: &mut Group, from: [f64; 2], to: [f64; 2], class: &str) {
+    document.append(straight(from, to).set("class", class));
+}
+
+pub(crate) fn dashed(document: &mut Group, from: [f64; 2], to: [f64; 2]) {
+    document.append(straight(from, to).set("class", "ink").set("stroke-dasharray", "3 4"));
+}
+
+pub(crate) fn path(document: &mut Group, points: &[[f64; 2]], class: &str, stroke: Stroke) {
+    let [first, rest @ ..] = points else { return };
+    let pair = |point: &[f64; 2]| (rounded(point[0]), rounded(point[1]));
+    let data =
+        rest.iter().fold(Data::new().move_to(pair(first)), |d, point| d.line_to(pair(point)));
+    let mut path = Path::new().set("class", class).set("fill", "none").set("d", data);
+    if class != "front" {
+        path = path.set("stroke-width", 1.6);
+    }
+    match stroke {
+        Stroke::Solid => {}
+        Stroke::Dashed => path = path.set("stroke-dasharray", "5 4"),
+        Stroke::Dotted => path = path.set("stroke-dasharray", "2 3"),
+    }
+    document.append(path);
+}
+
+/// A hundredth of a pixel is more than enough; files stay small.
+pub(crate) fn rounded(pixels: f64) -> f64 {
+    (pixels * 100.0).round() / 100.0
+}
