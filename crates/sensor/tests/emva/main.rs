@@ -1,6 +1,8 @@
 //! The standard's own characterisation, run on our images, gives back the parameters that went in.
 
+mod analysis;
 mod python;
+mod random;
 mod reference;
 
 use std::collections::BTreeSet;
