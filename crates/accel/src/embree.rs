@@ -134,6 +134,8 @@ pub(crate) struct Scene {
     handle: SceneHandle,
     device: Device,
     geometry: Arc<Geometry>,
+    /// Some meshes are scenes of their own.
+    has_instances: bool,
     /// Bytes of vertices that had to be copied.
     pub(crate) copied_bytes: u64,
 }
@@ -192,7 +194,8 @@ impl Scene {
         }
         device.check("rtcAttachGeometry")?;
         let handle = builder.commit(options.progress.as_deref())?;
-        Ok(Self { handle, device, geometry, copied_bytes })
+        let has_instances = instanced.meshes.contains(&true);
+        Ok(Self { handle, device, geometry, has_instances, copied_bytes })
     }
 
     /// The geometry whose buffers are shared.

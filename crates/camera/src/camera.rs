@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use etendue_geometry::{Bounds, RayBatch};
+use etendue_geometry::RayBatch;
 use etendue_spectrum::Lanes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::element::Resolve;
+use crate::framing::Subject;
 use crate::length::{Degrees, Metres, Micrometres};
 use crate::lens::focused::View;
 use crate::{
@@ -174,33 +175,34 @@ impl CameraSpec {
         for_each_kind!(self, spec => &mut spec.sensor)
     }
 
-    /// The camera. `bounds` is the box of what it may have to frame (m), asked for only when the
+    /// The camera. `subject` is what it may have to frame, or its box (m), asked for only when the
     /// file leaves the pose or the field to us. `resolve` turns paths that the camera names (lens
     /// files, masks) into paths to be opened, or says why not.
     ///
     /// # Errors
     ///
     /// When the description makes no camera: the error names the key.
-    pub fn build(
+    pub fn build<S: Into<Subject>>(
         &self,
-        bounds: impl FnOnce() -> Bounds,
+        subject: impl FnOnce() -> S,
         resolve: Resolve<'_>,
     ) -> Result<Camera, CameraError> {
         self.sensor().check()?;
+        let subject = || subject().into();
         let lens = |(pose, lens)| (pose, Projection::Lens(Arc::new(lens)));
         let (pose, projection) = match self {
             Self::Pinhole(spec) => {
-                let (pose, pinhole) = spec.build(bounds)?;
+                let (pose, pinhole) = spec.build(subject)?;
                 (pose, Projection::Pinhole(pinhole))
             }
             Self::Orthographic(spec) => {
-                let (pose, orthographic) = spec.build(bounds)?;
+                let (pose, orthographic) = spec.build(subject)?;
                 (pose, Projection::Orthographic(orthographic))
             }
-            Self::ThinLens(spec) => lens(spec.build(bounds, resolve)?),
-            Self::RealLens(spec) => lens(spec.build(bounds, resolve)?),
-            Self::ChromaticRealLens(spec) => lens(spec.build(bounds, resolve)?),
-            Self::Lens(spec) => lens(spec.build(bounds, resolve)?),
+            Self::ThinLens(spec) => lens(spec.build(subject, resolve)?),
+            Self::RealLens(spec) => lens(spec.build(subject, resolve)?),
+            Self::ChromaticRealLens(spec) => lens(spec.build(subject, resolve)?),
+            Self::Lens(spec) => lens(spec.build(subject, resolve)?),
         };
         if !pose.is_finite() {
             return Err(CameraError::new("pose", "no finite place frames a scene of this size"));

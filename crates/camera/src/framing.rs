@@ -17,6 +17,51 @@ const FLAT: [f64; 3] = [0.1, 0.02, 0.1];
 /// and above.
 const THREE_QUARTER: DVec3 = DVec3::new(0.6, 0.45, 1.0);
 
+/// What a camera that was given no place has to frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Subject {
+    /// The tight box around all of it (m).
+    pub bounds: Bounds,
+    /// Where it is best looked at from.
+    pub viewpoint: Viewpoint,
+}
+
+/// Where something is looked at from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Viewpoint {
+    /// From the front right above; face on when it is flat.
+    Usual,
+    /// Face on, from where this unit vector along an axis of the world points.
+    Side(DVec3),
+    /// From this place inside of it (m), in the direction that is usual from outside.
+    Within(DVec3),
+}
+
+impl From<Bounds> for Subject {
+    /// Something to be looked at from the usual side.
+    fn from(bounds: Bounds) -> Self {
+        Self { bounds, viewpoint: Viewpoint::Usual }
+    }
+}
+
+impl Subject {
+    /// The direction that it is looked at in; the position says nothing.
+    #[must_use]
+    pub fn view(&self) -> Pose {
+        let (towards, up) = match self.viewpoint {
+            Viewpoint::Side(towards) => (towards, upright(towards)),
+            _ => usual(self.bounds),
+        };
+        Pose::look_at(towards, DVec3::ZERO, up).unwrap_or(Pose::IDENTITY)
+    }
+
+    /// The axis that it is so flat along that the usual view is face on.
+    #[must_use]
+    pub fn flat_axis(&self) -> Option<usize> {
+        flat_axis(self.bounds)
+    }
+}
+
 /// How far a picture reaches to each side of the axis: tangents for a perspective picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Reach {
@@ -64,32 +109,41 @@ impl Reach {
     }
 }
 
-/// Which way to look at a box: from the front right above, or face on when it is flat.
-fn view(bounds: Bounds) -> Pose {
+/// The axis that a box is flat along.
+fn flat_axis(bounds: Bounds) -> Option<usize> {
     let size = bounds.max - bounds.min;
     let mut axes = [0, 1, 2];
     axes.sort_by(|&a, &b| size[a].total_cmp(&size[b]));
     let [thin, middle, _] = axes;
-    let is_flat = size[middle] > 0.0 && size[thin] < FLAT[thin] * size[middle];
-    let (towards, up) = match (is_flat, thin) {
-        (true, 0) => (DVec3::X, DVec3::Y),
-        (true, 1) => (DVec3::Y, DVec3::NEG_Z),
-        (true, _) => (DVec3::Z, DVec3::Y),
-        (false, _) => (THREE_QUARTER, DVec3::Y),
-    };
-    Pose::look_at(towards, DVec3::ZERO, up).unwrap_or(Pose::IDENTITY)
+    (size[middle] > 0.0 && size[thin] < FLAT[thin] * size[middle]).then_some(thin)
 }
 
-/// The nearest pose of a perspective camera that has the whole of `bounds` in its picture.
+/// From where to look at a box, and which way is up: from the front right above, or face on when it
+/// is flat.
+fn usual(bounds: Bounds) -> (DVec3, DVec3) {
+    let towards = flat_axis(bounds).map_or(THREE_QUARTER, |axis| DVec3::AXES[axis]);
+    (towards, upright(towards))
+}
+
+/// Which way is up in a view from where `towards` points.
+fn upright(towards: DVec3) -> DVec3 {
+    if towards.x == 0.0 && towards.z == 0.0 { DVec3::NEG_Z } else { DVec3::Y }
+}
+
+/// The nearest pose of a perspective camera that has the whole of its subject in the picture, unless
+/// it is seen from within.
 ///
 /// With the view's direction fixed, each side of the picture is a plane that all corners of the box
 /// must lie inside of, which is linear in the camera's place: the two planes of an axis give the
 /// least distance and the middle. An empty box is looked at from 3 m.
-pub(crate) fn perspective(bounds: Bounds, reach: Reach) -> Pose {
+pub(crate) fn perspective(subject: Subject, reach: Reach) -> Pose {
+    let (bounds, view) = (subject.bounds, subject.view());
+    if let Viewpoint::Within(position) = subject.viewpoint {
+        return Pose { position, ..view };
+    }
     let Some(reach) = usable(bounds).and_then(|()| reach.inside_margin()) else {
         return Pose { position: bounds.centre() + DVec3::Z * 3.0, ..Pose::IDENTITY };
     };
-    let view = view(bounds);
     let centre = bounds.centre();
     let seen = bounds.corners().map(|corner| view.rotation.transpose() * (corner - centre));
     let (near_x, x) = fit(seen.map(|p| (p.x, p.z)), reach.left, reach.right);
@@ -113,13 +167,17 @@ fn fit(points: [(f64, f64); 8], low: f64, high: f64) -> (f64, impl Fn(f64) -> f6
 
 /// A pose of an orthographic camera outside `bounds`, and the height (m) of a picture of this
 /// width-to-height ratio that holds the whole box.
-pub(crate) fn orthographic(bounds: Bounds, aspect: f64) -> (Pose, f64) {
+pub(crate) fn orthographic(subject: Subject, aspect: f64) -> (Pose, f64) {
+    let bounds = subject.bounds;
     let Some(()) = usable(bounds) else {
         return (Pose { position: bounds.centre() + DVec3::Z * 3.0, ..Pose::IDENTITY }, 2.0);
     };
-    let view = view(bounds);
-    let pose =
-        Pose { position: bounds.centre() - view.forward() * bounds.diagonal().max(1e-3), ..view };
+    let view = subject.view();
+    let position = match subject.viewpoint {
+        Viewpoint::Within(position) => position,
+        _ => bounds.centre() - view.forward() * bounds.diagonal().max(1e-3),
+    };
+    let pose = Pose { position, ..view };
     (pose, orthographic_height(bounds, &pose, aspect))
 }
 
@@ -160,7 +218,7 @@ mod tests {
     fn the_whole_box_is_inside_and_touches_the_margin() {
         for bounds in boxes() {
             for reach in [REACH, Reach { left: 0.1, right: 0.9, ..REACH }] {
-                let pose = perspective(bounds, reach);
+                let pose = perspective(bounds.into(), reach);
                 let mut fullest = 0.0_f64;
                 for corner in bounds.corners() {
                     let p = pose.rotation.transpose() * (corner - pose.position);
@@ -182,27 +240,27 @@ mod tests {
 
     #[test]
     fn solid_boxes_are_seen_from_the_front_right_above() {
-        let pose = perspective(boxes()[0], REACH);
+        let pose = perspective(boxes()[0].into(), REACH);
         assert!(pose.position.cmpgt(DVec3::ZERO).all(), "{}", pose.position);
         assert!(pose.up().y > 0.5 && pose.right().y == 0.0, "upright");
     }
 
     #[test]
     fn flat_boxes_are_seen_face_on() {
-        let floor = perspective(boxes()[3], REACH);
+        let floor = perspective(boxes()[3].into(), REACH);
         assert_eq!((floor.forward(), floor.up()), (DVec3::NEG_Y, DVec3::NEG_Z));
-        let wall = perspective(boxes()[4], REACH);
+        let wall = perspective(boxes()[4].into(), REACH);
         assert_eq!((wall.forward(), wall.up()), (DVec3::NEG_Z, DVec3::Y));
         let sliver = Bounds { min: DVec3::ZERO, max: DVec3::new(0.9, 70.0, 11.0) };
-        assert_eq!(perspective(sliver, REACH).forward(), DVec3::NEG_X);
+        assert_eq!(perspective(sliver.into(), REACH).forward(), DVec3::NEG_X);
         let land = Bounds { min: DVec3::ZERO, max: DVec3::new(100.0, 5.0, 120.0) };
-        assert!(perspective(land, REACH).forward().z < -0.5, "hills are seen from the side");
+        assert!(perspective(land.into(), REACH).forward().z < -0.5, "hills are seen from the side");
     }
 
     #[test]
     fn orthographic_pictures_hold_the_box_too() {
         for bounds in boxes() {
-            let (pose, height) = orthographic(bounds, 1.5);
+            let (pose, height) = orthographic(bounds.into(), 1.5);
             for corner in bounds.corners() {
                 let p = pose.rotation.transpose() * (corner - pose.position);
                 assert!(p.z < 0.0, "in front of the camera: {p}");
@@ -213,11 +271,26 @@ mod tests {
 
     #[test]
     fn nothing_and_a_point_have_a_finite_camera() {
-        assert!(perspective(Bounds::EMPTY, REACH).is_finite());
+        assert!(perspective(Bounds::EMPTY.into(), REACH).is_finite());
         let point = Bounds { min: DVec3::ONE, max: DVec3::ONE };
-        assert!((perspective(point, REACH).position - DVec3::ONE).length() > 0.5);
+        assert!((perspective(point.into(), REACH).position - DVec3::ONE).length() > 0.5);
         let huge = Bounds { min: DVec3::splat(-f64::MAX), max: DVec3::splat(f64::MAX) };
-        assert!(orthographic(Bounds::EMPTY, 1.0).0.is_finite());
-        let _ = perspective(huge, REACH);
+        assert!(orthographic(Bounds::EMPTY.into(), 1.0).0.is_finite());
+        let _ = perspective(huge.into(), REACH);
+    }
+
+    #[test]
+    fn a_side_is_seen_face_on_and_a_room_from_within() {
+        let bounds = boxes()[0];
+        let side = Viewpoint::Side(DVec3::NEG_Z);
+        let pose = perspective(Subject { bounds, viewpoint: side }, REACH);
+        assert_eq!((pose.forward(), pose.up()), (DVec3::Z, DVec3::Y));
+        assert!(pose.position.z < -1.0 && pose.position.x.abs() < 1e-12, "{}", pose.position);
+        let place = DVec3::new(0.3, 0.2, 0.5);
+        let within = Subject { bounds, viewpoint: Viewpoint::Within(place) };
+        let usual = perspective(bounds.into(), REACH);
+        for pose in [perspective(within, REACH), orthographic(within, 1.0).0] {
+            assert_eq!((pose.position, pose.rotation), (place, usual.rotation));
+        }
     }
 }

@@ -15,7 +15,7 @@ pub mod camera_file;
 pub mod distortion;
 pub mod element;
 pub mod error;
-mod framing;
+pub mod framing;
 pub mod glass;
 pub mod intrinsics;
 pub mod length;
@@ -33,6 +33,7 @@ pub use camera::{Camera, CameraSpec, PixelBlock, PixelExtent, Projection};
 pub use camera_file::CameraFile;
 pub use distortion::{Distortion, DistortionSpec};
 pub use error::CameraError;
+pub use framing::{Subject, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin};
 pub use lens::{
     ChromaticRealLensCameraSpec, LaneGroup, LensCamera, LensCameraSpec, RealLensCameraSpec,

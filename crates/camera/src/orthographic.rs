@@ -1,11 +1,12 @@
 //! The orthographic camera: all rays are parallel to the axis.
 
-use etendue_geometry::{Bounds, RayBatch};
+use etendue_geometry::RayBatch;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::framing::{self, Subject};
 use crate::length::Metres;
-use crate::{CameraError, Pose, PoseSpec, SensorSpec, framing};
+use crate::{CameraError, Pose, PoseSpec, SensorSpec};
 
 /// An orthographic camera as the scene file writes it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -34,10 +35,10 @@ pub struct Orthographic {
 }
 
 impl OrthographicSpec {
-    /// The pose and projection. `bounds` is asked for only when something is to be chosen.
+    /// The pose and projection. `subject` is asked for only when something is to be chosen.
     pub(crate) fn build(
         &self,
-        bounds: impl FnOnce() -> Bounds,
+        subject: impl FnOnce() -> Subject,
     ) -> Result<(Pose, Orthographic), CameraError> {
         if let Some(Metres(height)) = self.height
             && !(height > 0.0 && height.is_finite())
@@ -49,9 +50,11 @@ impl OrthographicSpec {
         let given = self.pose.as_ref().map(PoseSpec::build).transpose()?;
         let (pose, height) = match (given, self.height) {
             (Some(pose), Some(Metres(height))) => (pose, height),
-            (Some(pose), None) => (pose, framing::orthographic_height(bounds(), &pose, aspect)),
+            (Some(pose), None) => {
+                (pose, framing::orthographic_height(subject().bounds, &pose, aspect))
+            }
             (None, height) => {
-                let (pose, fitting) = framing::orthographic(bounds(), aspect);
+                let (pose, fitting) = framing::orthographic(subject(), aspect);
                 (pose, height.map_or(fitting, |Metres(height)| height))
             }
         };

@@ -1,12 +1,12 @@
 //! The pinhole: every ray of the picture passes through one point.
 
+use etendue_geometry::RayBatch;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, RayBatch};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::distortion::{Distortion, DistortionSpec};
-use crate::framing::{self, Reach};
+use crate::framing::{self, Reach, Subject};
 use crate::length::Degrees;
 use crate::{CameraError, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec, SensorSpec};
 
@@ -47,10 +47,10 @@ pub struct Pinhole {
 }
 
 impl PinholeSpec {
-    /// The pose and projection. `bounds` is asked for only when the pose is to be chosen.
+    /// The pose and projection. `subject` is asked for only when the pose is to be chosen.
     pub(crate) fn build(
         &self,
-        bounds: impl FnOnce() -> Bounds,
+        subject: impl FnOnce() -> Subject,
     ) -> Result<(Pose, Pinhole), CameraError> {
         let intrinsics = match (&self.intrinsics, self.fov) {
             (Some(_), Some(_)) => {
@@ -82,7 +82,7 @@ impl PinholeSpec {
         let pinhole = Pinhole { intrinsics, distortion, pixel_origin };
         let pose = match &self.pose {
             Some(pose) => pose.build()?,
-            None => framing::perspective(bounds(), pinhole.reach(self.sensor.resolution)),
+            None => framing::perspective(subject(), pinhole.reach(self.sensor.resolution)),
         };
         Ok((pose, pinhole))
     }

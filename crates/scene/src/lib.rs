@@ -23,6 +23,7 @@ mod bounds;
 pub mod cameras;
 pub mod doctor;
 pub mod error;
+mod facing;
 pub mod file;
 mod identity;
 pub mod import;

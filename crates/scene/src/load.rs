@@ -22,7 +22,7 @@ use crate::parts::{Object, Parts};
 use crate::paths::{Folder, Found};
 use crate::scene::{LoadOptions, LoadProgress, Scene};
 use crate::shape::{ShapeError, ShapeSpec};
-use crate::{SceneError, bounds};
+use crate::{SceneError, facing};
 
 /// Where triangles come from, once for all objects that share them.
 struct Origin {
@@ -315,7 +315,7 @@ impl SceneFile {
             None => (own, CameraOrigin::Framed),
         };
         let camera = spec
-            .build(|| bounds::tight(geometry), &|name| files.find(name))
+            .build(|| facing::subject(geometry), &|name| files.find(name))
             .map_err(|error| self.camera_fault(&error))?;
         Ok((camera, origin))
     }

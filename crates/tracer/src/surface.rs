@@ -118,7 +118,7 @@ impl<'a> Met<'a> {
         if !self.front {
             normal = -normal;
         }
-        if normal.dot(self.wo) > 0.0 { normal } else { geometric }
+        if normal.dot(self.wo) > 0.0 { outward(normal, geometric, self.wo) } else { geometric }
     }
 
     /// The normal tilted by a normal map: +x along u, +y up the image, against v (glTF 2.0, section
@@ -136,5 +136,54 @@ impl<'a> Met<'a> {
         let bitangent = if across.dot(along_v) > 0.0 { -across } else { across };
         let tilted = tangent * (x * map.scale) + bitangent * (y * map.scale) + normal * z;
         tilted.try_normalize().unwrap_or(normal)
+    }
+}
+
+/// A shading normal that mirrors the viewer into the surface, bent until it mirrors them along it: a
+/// tilted mirror would be black there (Keller et al., "The Iray Light Transport Simulation and
+/// Rendering System", 2017, appendix A.3). All unit; `normal` and `geometric` face the viewer.
+fn outward(normal: DVec3, geometric: DVec3, wo: DVec3) -> DVec3 {
+    /// How far above the surface the mirrored direction is raised before it is brought back to unit
+    /// length, as a share of the viewer's elevation: enough to stay above it in rounding.
+    const LEAST: f64 = 0.05;
+    let mirrored = 2.0 * normal.dot(wo) * normal - wo;
+    let lacking = LEAST * geometric.dot(wo) - geometric.dot(mirrored);
+    let slope = normal.dot(geometric);
+    if lacking <= 0.0 || slope <= 0.0 {
+        return normal;
+    }
+    let raised = (mirrored + normal * (lacking / slope)).try_normalize();
+    raised.and_then(|raised| (wo + raised).try_normalize()).unwrap_or(normal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bent_normals_mirror_outwards() {
+        let unit = |azimuth: f64, cosine: f64| {
+            let sine = (1.0 - cosine * cosine).sqrt();
+            DVec3::new(azimuth.cos() * sine, azimuth.sin() * sine, cosine)
+        };
+        let mut bent = 0;
+        for k in 0..4000 {
+            let share = |step: f64| (f64::from(k) * step).fract();
+            let wo = unit(std::f64::consts::TAU * share(0.618), 0.01 + 0.99 * share(0.7549));
+            let normal = unit(std::f64::consts::TAU * share(0.5698), 0.01 + 0.99 * share(0.8191));
+            if normal.dot(wo) <= 0.0 {
+                continue;
+            }
+            let outward = outward(normal, DVec3::Z, wo);
+            let mirrored = |n: DVec3| (2.0 * n.dot(wo) * n - wo).z;
+            assert!((outward.length() - 1.0).abs() < 1e-12);
+            assert!(mirrored(outward) > 0.0, "{normal} {wo}: {outward}");
+            if mirrored(normal) >= 0.05 * wo.z {
+                assert_eq!(outward, normal, "untouched where it need not be");
+            } else {
+                bent += 1;
+            }
+        }
+        assert!(bent > 500, "{bent}");
     }
 }

@@ -100,7 +100,9 @@ impl Scene {
         arguments: &mut sys::RTCOccludedArguments,
         blocked: &mut [bool],
     ) {
-        match (coherent, self.device.width) {
+        // Debian 12's Embree keeps the 16 rays of a packet that meets instances in 16 bits and reads
+        // 64 of them: by what lies beside, it never comes back.
+        match (coherent && !self.has_instances, self.device.width) {
             (true, 16) => self.occluded16(rays, arguments, blocked),
             (true, 8) => self.occluded8(rays, arguments, blocked),
             (true, 4) => self.occluded4(rays, arguments, blocked),

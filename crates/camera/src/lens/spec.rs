@@ -1,6 +1,5 @@
 //! The cameras with a lens as the scene file writes them, and the lens that each one is.
 
-use etendue_geometry::Bounds;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +9,7 @@ use super::source::{LensSource, PlacedSpec, in_camera};
 use crate::element::{
     ApertureSpec, ElementSpec, LossesSpec, PartSpec, Resolve, SurfaceSpec, ThinLensSpec,
 };
-use crate::framing::{self, Reach};
+use crate::framing::{self, Reach, Subject};
 use crate::glass::GlassSpec;
 use crate::length::{Degrees, Metres, Millimetres};
 use crate::train::{Focus, LensFile, OpticalTrain};
@@ -128,12 +127,12 @@ macro_rules! build_by_train {
         impl $name {
             pub(crate) fn build(
                 &self,
-                bounds: impl FnOnce() -> Bounds,
+                subject: impl FnOnce() -> Subject,
                 resolve: Resolve<'_>,
             ) -> Result<(Pose, LensCamera), CameraError> {
                 let mut setup = self.setup()?;
                 setup.measure_past(self.reach_behind());
-                place(&self.train(resolve)?, &setup, bounds)
+                place(&self.train(resolve)?, &setup, subject)
             }
         }
     )*};
@@ -213,16 +212,17 @@ camera_with_a_lens! {
 fn place(
     train: &OpticalTrain,
     setup: &Setup<'_>,
-    bounds: impl FnOnce() -> Bounds,
+    subject: impl FnOnce() -> Subject,
 ) -> Result<(Pose, LensCamera), CameraError> {
     let default = Focus::AsWritten;
     let focused = Focused::new(train.clone(), setup, setup.focus.unwrap_or(default))?;
     if let Some(pose) = setup.pose {
         return Ok((pose.build()?, LensCamera::new(focused)?));
     }
-    let bounds = bounds();
+    let subject = subject();
+    let bounds = subject.bounds;
     let lens = LensCamera::new(focused)?;
-    let pose = frame(bounds, &lens, setup);
+    let pose = frame(subject, &lens, setup);
     if setup.focus.is_some() || bounds.is_empty() {
         return Ok((pose, lens));
     }
@@ -235,22 +235,22 @@ fn place(
             break;
         };
         lens = LensCamera::new(focused)?;
-        pose = frame(bounds, &lens, setup);
+        pose = frame(subject, &lens, setup);
     }
     Ok((pose, lens))
 }
 
 /// The nearest place from which the whole box is in the picture.
-fn frame(bounds: Bounds, lens: &LensCamera, setup: &Setup<'_>) -> Pose {
+fn frame(subject: Subject, lens: &LensCamera, setup: &Setup<'_>) -> Pose {
     match lens.focused().view() {
         View::Perspective(k) => {
             // 60° off the axis, as for distorted pinholes.
             let widest = 3_f64.sqrt();
             let size = setup.sensor.resolution.map(f64::from);
             let reach = Reach::of_picture(size, k.centre, widest, |u, v| lens.tangents(u, v));
-            framing::perspective(bounds, reach)
+            framing::perspective(subject, reach)
         }
-        View::Parallel { .. } => framing::orthographic(bounds, setup.sensor.aspect()).0,
+        View::Parallel { .. } => framing::orthographic(subject, setup.sensor.aspect()).0,
     }
 }
 
@@ -260,7 +260,7 @@ type Placed = (f64, ElementSpec);
 impl ThinLensCameraSpec {
     pub(crate) fn build(
         &self,
-        bounds: impl FnOnce() -> Bounds,
+        subject: impl FnOnce() -> Subject,
         resolve: Resolve<'_>,
     ) -> Result<(Pose, LensCamera), CameraError> {
         let mut setup = self.setup()?;
@@ -273,7 +273,7 @@ impl ThinLensCameraSpec {
                 focal_length
             }
         };
-        place(&self.train(focal_length, resolve)?, &setup, bounds)
+        place(&self.train(focal_length, resolve)?, &setup, subject)
     }
 
     /// The focal length (mm) that shows the rows of the sensor under the vertical field of view.

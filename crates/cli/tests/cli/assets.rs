@@ -47,9 +47,8 @@ fn every_model_has_the_triangles_and_the_box_of_an_independent_reader() {
     }
 }
 
-#[test]
-fn every_model_renders_to_a_picture_with_something_in_it() {
-    let Some(folder) = assets("the rendering of real models") else { return };
+/// All models of the folder.
+fn models(folder: &std::path::Path) -> Vec<std::path::PathBuf> {
     let mut models: Vec<_> = ["gltf", "obj"]
         .iter()
         .flat_map(|kind| walk(&folder.join("data").join(kind)))
@@ -60,13 +59,48 @@ fn every_model_renders_to_a_picture_with_something_in_it() {
         .collect();
     models.sort();
     assert!(models.len() > 20, "{models:?}");
-    for model in models {
+    models
+}
+
+#[test]
+fn every_model_renders_to_a_picture_with_something_in_it() {
+    let Some(folder) = assets("the rendering of real models") else { return };
+    for model in models(&folder) {
         let bench = Bench::new();
         let model = model.to_string_lossy();
         let output = bench.run(&["render", &model, "-o", "out", "--layers", "coverage"]);
         assert!(output.status.success(), "{model}: {}", text(&output.stderr));
         let covered = bench.array("coverage").iter().filter(|a| **a == 1.0).count();
         assert!(covered > 1000, "{model}: {covered} pixels hit");
+    }
+}
+
+/// By global illumination, from the view that is chosen for them: neither black nor burnt out.
+#[test]
+fn every_model_is_lit_where_it_is_looked_at() {
+    let Some(folder) = assets("the lighting of real models") else { return };
+    // Nothing but black by their own files: `Kd 0 0 0`.
+    let black = ["leading-decimal-dot-issue-201.obj"];
+    for model in models(&folder) {
+        let bench = Bench::new();
+        let name = model.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        let path = model.to_string_lossy();
+        let settings = ["tracer.type=path", "camera.sensor.resolution=[48,48]", "render.samples=4"];
+        let mut words = vec!["render", &path, "-o", "out", "--layers", "coverage"];
+        words.extend(settings.iter().flat_map(|setting| ["--set", setting]));
+        let output = bench.run(&words);
+        assert!(output.status.success(), "{path}: {}", text(&output.stderr));
+        let hit = bench.array("coverage");
+        let picture = bench.array("picture");
+        let pixels = picture.chunks(3).zip(&hit).filter(|(_, hit)| **hit == 1.0);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (rgb, _) in pixels {
+            sum += rgb.iter().sum::<f64>() / 3.0;
+            count += 1.0;
+        }
+        let mean = sum / count;
+        let least = if black.contains(&name) { 0.0 } else { 0.003 };
+        assert!((least..1.2).contains(&mean), "{path}: {mean}");
     }
 }
 

@@ -1,0 +1,372 @@
+//! What a glTF model's material, lights and textures look like: a square that fills the picture, and
+//! values that a closed form gives.
+
+use std::f64::consts::PI;
+
+use serde_json::{Value, json};
+
+use crate::run::Bench;
+
+/// The square −1..1 in z = 0 that faces +Z, (0, 0) of its texture at the upper left, with `material`
+/// and whatever else the document holds.
+fn model(material: &Value, rest: &Value) -> (String, Vec<u8>) {
+    let corners = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0_f32]];
+    let mut bytes = Vec::new();
+    for [x, y] in corners {
+        bytes.extend([x, y, 0.0].iter().flat_map(|c: &f32| c.to_le_bytes()));
+    }
+    for [x, y] in corners {
+        bytes.extend([0.5 + 0.5 * x, 0.5 - 0.5 * y].iter().flat_map(|c: &f32| c.to_le_bytes()));
+    }
+    for index in [0_u32, 3, 2, 0, 2, 1] {
+        bytes.extend(index.to_le_bytes());
+    }
+    let mut document = json!({
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [
+            {"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0}]}],
+        "materials": [material],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 4,
+             "min": [-1, -1, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5126, "type": "VEC2", "count": 4},
+            {"bufferView": 2, "componentType": 5125, "type": "SCALAR", "count": 6}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 32},
+            {"buffer": 0, "byteOffset": 80, "byteLength": 24}],
+        "buffers": [{"uri": "m.bin", "byteLength": bytes.len()}],
+    });
+    for (key, value) in rest.as_object().expect("an object") {
+        document[key] = value.clone();
+    }
+    (document.to_string(), bytes)
+}
+
+/// Radiance 1 from all around.
+fn sky() -> Value {
+    json!([{"type": "environment"}])
+}
+
+/// A scene of the model, looked at straight on, with some of its keys given.
+fn stage(material: &Value, rest: &Value, scene: &Value) -> Bench {
+    let mut whole = json!({
+        "etendue": 1,
+        "tracer": {"type": "path"},
+        "camera": {"type": "orthographic", "height": 2, "sensor": {"resolution": [8, 8]},
+                   "pose": {"from": [0, 0, 5], "look_at": [0, 0, 0]}},
+        "objects": [{"file": "m.gltf"}],
+        "lights": sky(),
+        "render": {"samples": 64},
+    });
+    for (key, value) in scene.as_object().expect("an object") {
+        whole[key] = value.clone();
+    }
+    let bench = Bench::with_scene(&whole.to_string());
+    let (document, bytes) = model(material, rest);
+    bench.write("m.gltf", document.as_bytes());
+    bench.write("m.bin", &bytes);
+    bench
+}
+
+/// The pixels of the picture.
+fn pixels(bench: &Bench) -> Vec<[f64; 3]> {
+    bench.render(&["--report", "report.json"]);
+    bench.array("picture").as_chunks().0.to_vec()
+}
+
+/// The mean of all pixels is `known`, and within four standard errors of it.
+fn assert_shows(bench: &Bench, known: [f64; 3], what: &str) {
+    let pixels = pixels(bench);
+    let n = pixels.len() as f64;
+    for k in 0..3 {
+        let mean = pixels.iter().map(|p| p[k]).sum::<f64>() / n;
+        let variance = pixels.iter().map(|p| (p[k] - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        // Factors of glTF are f32, pictures too.
+        let bound = 4.0 * (variance / n).sqrt() + 3e-7 * known[k].max(1.0);
+        assert!((mean - known[k]).abs() <= bound, "{what}: {mean} is not {known:?} by {bound}");
+    }
+}
+
+/// A PNG of 2 × 2 texels.
+fn texels(rgba: [[u8; 4]; 4]) -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, 2, 2);
+    encoder.set_color(png::ColorType::Rgba);
+    let mut writer = encoder.write_header().expect("a header");
+    writer.write_image_data(rgba.as_flattened()).expect("an image");
+    drop(writer);
+    file
+}
+
+/// The model's texture 0 from `t.png`, nearest texels.
+fn textured(sampler: &Value) -> Value {
+    let mut nearest = sampler.clone();
+    nearest["magFilter"] = json!(9728);
+    json!({"textures": [{"source": 0, "sampler": 0}], "images": [{"uri": "t.png"}],
+           "samplers": [nearest]})
+}
+
+const GREY: [[u8; 4]; 4] = [[128, 128, 128, 255]; 4];
+
+/// Light behind the square and none in front of it.
+fn lamp_behind() -> Value {
+    json!({
+        "lights": [],
+        "objects": [{"file": "m.gltf"},
+            {"shape": "rectangle", "width": 20, "height": 20, "material": "lamp",
+             "transform": {"translate": [0, 0, -1]}}],
+        "materials": {"lamp": {"type": "emissive", "radiance": [1, 1, 1]}},
+    })
+}
+
+#[test]
+fn unlit_surfaces_show_their_colour_and_light_nothing() {
+    let unlit = json!({"pbrMetallicRoughness": {"baseColorFactor": [0.25, 0.5, 0.75, 1]},
+        "extensions": {"KHR_materials_unlit": {}}});
+    let used = json!({"extensionsUsed": ["KHR_materials_unlit"]});
+    for lights in [json!([]), sky()] {
+        let bench = stage(&unlit, &used, &json!({"lights": lights}));
+        assert_shows(&bench, [0.25, 0.5, 0.75], "unlit");
+    }
+    let wall = json!({"lights": [], "objects": [
+        {"file": "m.gltf", "transform": {"rotate": [0, 1, 0, 90], "translate": [-1, 0, 1]}},
+        {"shape": "rectangle", "width": 4, "height": 4}]});
+    let bench = stage(&unlit, &used, &wall);
+    // The square is seen from its edge, and the wall that it faces stays dark.
+    assert_shows(&bench, [0.0; 3], "beside an unlit surface");
+}
+
+/// A black base leaves the coat alone. Face on its reflectance is ((n − 1)/(n + 1))², times what
+/// `KHR_materials_specular` says.
+#[test]
+fn index_and_specular_give_the_reflectance_face_on() {
+    let coat = |extensions: Value| {
+        json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0,
+            "roughnessFactor": 0}, "extensions": extensions})
+    };
+    let specular = "KHR_materials_specular";
+    let cases = [
+        (json!({}), [0.04; 3]),
+        (json!({"KHR_materials_ior": {"ior": 2}}), [1.0 / 9.0; 3]),
+        (json!({"KHR_materials_ior": {"ior": 1}}), [0.0; 3]),
+        (json!({specular: {"specularFactor": 0.5}}), [0.02; 3]),
+        (json!({specular: {"specularColorFactor": [1, 0.5, 0]}}), [0.04, 0.02, 0.0]),
+        (json!({specular: {"specularColorFactor": [100, 1, 1]}}), [1.0, 0.04, 0.04]),
+    ];
+    for (extensions, known) in cases {
+        let used: Vec<_> = extensions.as_object().into_iter().flat_map(|e| e.keys()).collect();
+        let bench = stage(&coat(extensions.clone()), &json!({"extensionsUsed": used}), &json!({}));
+        assert_shows(&bench, known, &extensions.to_string());
+    }
+}
+
+/// Of light from behind a wall shows its tint times what it lets through, and none without
+/// transmission.
+#[test]
+fn transmission_lets_light_through() {
+    let used = json!({"extensionsUsed": ["KHR_materials_transmission", "KHR_materials_ior"]});
+    for (transmission, known) in [(1.0, [0.9, 0.5, 0.25]), (0.5, [0.45, 0.25, 0.125])] {
+        let glass = json!({
+            "pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.5, 0.25, 1], "metallicFactor": 0,
+                                     "roughnessFactor": 0},
+            "extensions": {"KHR_materials_transmission": {"transmissionFactor": transmission},
+                           "KHR_materials_ior": {"ior": 1}}});
+        assert_shows(&stage(&glass, &used, &lamp_behind()), known, "glass");
+    }
+    let opaque = json!({"pbrMetallicRoughness": {"metallicFactor": 0}});
+    assert_shows(&stage(&opaque, &json!({}), &lamp_behind()), [0.0; 3], "opaque");
+}
+
+#[test]
+fn emission_is_its_factor_times_its_strength() {
+    let lamp = json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]},
+        "emissiveFactor": [1, 0.5, 0.25],
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}});
+    let used = json!({"extensionsUsed": ["KHR_materials_emissive_strength"]});
+    assert_shows(&stage(&lamp, &used, &json!({"lights": []})), [4.0, 2.0, 1.0], "lamp");
+}
+
+/// What alpha leaves out shows what is behind: a wall of radiance 1 behind a black square.
+#[test]
+fn alpha_cuts_or_thins() {
+    let black = |mode: &str, alpha: f64, more: Value| {
+        let mut material = json!({"alphaMode": mode, "pbrMetallicRoughness":
+            {"baseColorFactor": [0, 0, 0, alpha], "metallicFactor": 1, "roughnessFactor": 1}});
+        for (key, value) in more.as_object().into_iter().flatten() {
+            material[key] = value.clone();
+        }
+        material
+    };
+    let cases = [
+        (black("OPAQUE", 0.1, json!({})), 0.0),
+        (black("MASK", 0.49, json!({})), 1.0),
+        (black("MASK", 0.51, json!({})), 0.0),
+        (black("MASK", 0.51, json!({"alphaCutoff": 0.6})), 1.0),
+        (black("BLEND", 0.25, json!({})), 0.75),
+    ];
+    for (material, known) in cases {
+        let bench = stage(&material, &json!({}), &lamp_behind());
+        assert_shows(&bench, [known; 3], &material.to_string());
+    }
+    let mut holes = black("MASK", 1.0, json!({}));
+    holes["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+    let bench = stage(&holes, &textured(&json!({})), &lamp_behind());
+    bench.write("t.png", &texels([[0, 0, 0, 0], [0, 0, 0, 255], [0, 0, 0, 255], [0, 0, 0, 0]]));
+    let pixels = pixels(&bench);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let hole = (i % 8 < 4) == (i / 8 < 4);
+        assert_eq!(*pixel, [f64::from(u8::from(hole)); 3], "pixel {i}");
+    }
+}
+
+/// Whatever `doubleSided` says, a surface is there from behind.
+#[test]
+fn surfaces_have_two_sides() {
+    for double_sided in [false, true] {
+        let white = json!({"doubleSided": double_sided, "pbrMetallicRoughness":
+            {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0, "roughnessFactor": 0}});
+        let behind = json!({"camera": {"type": "orthographic", "height": 2,
+            "sensor": {"resolution": [8, 8]},
+            "pose": {"from": [0, 0, -5], "look_at": [0, 0, 0]}}});
+        assert_shows(&stage(&white, &json!({}), &behind), [0.04; 3], "from behind");
+    }
+}
+
+/// Colours are sRGB; metal and roughness, beside it, are plain numbers: half metal, half of the coat.
+#[test]
+fn images_are_read_as_what_they_are() {
+    let color = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}});
+    let bench = stage(&color, &textured(&json!({})), &json!({"tracer": {"type": "flat"}}));
+    bench.write("t.png", &texels(GREY));
+    let linear = ((128.0 / 255.0 + 0.055) / 1.055_f64).powf(2.4);
+    assert_shows(&bench, [linear; 3], "colour");
+    let metal = json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1],
+        "roughnessFactor": 0, "metallicRoughnessTexture": {"index": 0}}});
+    let bench = stage(&metal, &textured(&json!({})), &json!({}));
+    bench.write("t.png", &texels([[0, 255, 128, 255]; 4]));
+    assert_shows(&bench, [0.04 * (1.0 - 128.0 / 255.0); 3], "metal");
+}
+
+/// Texels at 2 u and 2 v of each wrap mode, by `KHR_texture_transform`.
+#[test]
+fn images_wrap_and_move_as_the_file_says() {
+    let colors = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 255]];
+    let apply = |mode: u32, texel: usize| match mode {
+        10497 => texel % 2,
+        33648 => [0, 1, 1, 0][texel],
+        _ => texel.min(1),
+    };
+    for (along_u, along_v) in [(10497, 33071), (33648, 10497), (33071, 33648)] {
+        let material = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0,
+            "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}}}});
+        let mut rest = textured(&json!({"wrapS": along_u, "wrapT": along_v}));
+        rest["extensionsUsed"] = json!(["KHR_texture_transform"]);
+        let bench = stage(&material, &rest, &json!({"tracer": {"type": "flat"}}));
+        bench.write("t.png", &texels(colors));
+        for (i, pixel) in pixels(&bench).iter().enumerate() {
+            // Four texels across eight pixels.
+            let (x, y) = (apply(along_u, i % 8 / 2), apply(along_v, i / 8 / 2));
+            let [r, g, b, _] = colors[2 * y + x].map(|c| f64::from(c) / 255.0);
+            assert_eq!(*pixel, [r, g, b], "pixel {i} of {along_u} {along_v}");
+        }
+    }
+}
+
+/// `facing` has 0.15 of even light and 0.85 of a headlight: occlusion of one half at strength 0.6
+/// takes 0.3 of the former. Traced light finds out by itself.
+#[test]
+fn occlusion_dims_even_light_only() {
+    let plain = json!({"pbrMetallicRoughness": {"metallicFactor": 0}});
+    let mut occluded = plain.clone();
+    occluded["occlusionTexture"] = json!({"index": 0, "strength": 0.6});
+    let image = texels([[128, 0, 255, 255]; 4]);
+    let facing = json!({"tracer": {"type": "facing"}});
+    for (tracer, least, lost) in
+        [(&facing, 1.0, 0.15 * 0.6 * (1.0 - 128.0 / 255.0)), (&json!({}), 0.9, 0.0)]
+    {
+        let [with, without] = [&occluded, &plain].map(|material| {
+            let bench = stage(material, &textured(&json!({})), tracer);
+            bench.write("t.png", &image);
+            pixels(&bench)
+        });
+        for (with, without) in with.iter().zip(&without) {
+            assert!((without[0] - with[0] - lost).abs() < 1e-6, "{with:?} {without:?}");
+            assert!(without[0] >= least - 1e-6, "{without:?}");
+        }
+    }
+}
+
+/// Candela and lux on a matte wall: I cos θ / (π d²), between the cones by glTF's fall-off, and
+/// E cos θ / π.
+#[test]
+fn punctual_lights_have_their_units_and_cones() {
+    let scene = json!({
+        "lights": [],
+        "materials": {"wall": {"type": "matte", "color": [1, 1, 1]}},
+        "objects": [{"file": "m.gltf", "material": "wall"}],
+    });
+    let lit = |light: Value, node: Value| {
+        let mut node = node;
+        node["extensions"] = json!({"KHR_lights_punctual": {"light": 0}});
+        let rest = json!({"extensionsUsed": ["KHR_lights_punctual"],
+            "extensions": {"KHR_lights_punctual": {"lights": [light]}},
+            "scenes": [{"nodes": [0, 1]}], "nodes": [{"mesh": 0}, node]});
+        pixels(&stage(&json!({}), &rest, &scene))
+    };
+    let (inner, outer) = (0.2_f64, 0.5_f64);
+    let spot = json!({"type": "spot", "intensity": 10,
+        "spot": {"innerConeAngle": inner, "outerConeAngle": outer}});
+    let point = json!({"type": "point", "intensity": 10, "color": [1, 0.5, 0]});
+    let above = json!({"translation": [0, 0, 2]});
+    let (spots, points) = (lit(spot, above.clone()), lit(point, above));
+    for i in 0..64 {
+        let at = |k: usize| (k as f64 + 0.5) / 4.0 - 1.0;
+        let (x, y) = (at(i % 8), at(i / 8));
+        let squared = x * x + y * y + 4.0;
+        let cosine = 2.0 / squared.sqrt();
+        let known = 10.0 * cosine / (PI * squared);
+        // A pixel is a mean over a quarter of a metre: its second difference is under a hundredth.
+        assert!((points[i][0] / known - 1.0).abs() < 0.02, "{i}: {} {known}", points[i][0]);
+        assert!((points[i][1] / points[i][0] - 0.5).abs() < 1e-6 && points[i][2] == 0.0);
+        let share = (cosine - outer.cos()) / (inner.cos() - outer.cos());
+        let known = known * share.clamp(0.0, 1.0).powi(2);
+        assert!((spots[i][0] - known).abs() < 0.05, "{i}: {} {known}", spots[i][0]);
+        if cosine < 0.83 {
+            assert_eq!(spots[i][0], 0.0, "outside of the cone");
+        }
+    }
+    // Parallel light of π lx along the node's −Z, turned by 60°: half of it.
+    let sun = json!({"type": "directional", "intensity": PI});
+    let turned = json!({"rotation": [0.0, 0.5, 0.0, 0.75_f64.sqrt()]});
+    for pixel in lit(sun, turned) {
+        assert!((pixel[0] - 0.5).abs() < 1e-6, "{pixel:?}");
+    }
+}
+
+/// Each image that is looked at is decoded, once, and its memory is told; others are not.
+#[test]
+fn images_are_decoded_once_and_only_when_looked_at() {
+    let material = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0},
+            "metallicRoughnessTexture": {"index": 0}},
+        "emissiveTexture": {"index": 1}, "emissiveFactor": [1, 1, 1]});
+    let rest = json!({"textures": [{"source": 0}, {"source": 1}, {"source": 2}],
+        "images": [{"uri": "t.png"}, {"uri": "e.png"}, {"uri": "broken.png"}]});
+    for (tracer, count) in [("flat", 1), ("path", 2)] {
+        let bench = stage(&material, &rest, &json!({"tracer": {"type": tracer}}));
+        bench.write("t.png", &texels(GREY));
+        bench.write("e.png", &texels(GREY));
+        bench.write("broken.png", b"no image, and nobody looks");
+        bench.render(&["--strict", "--report", "report.json"]);
+        let report = bench.json("report.json");
+        let told = report["images"].as_array().expect("a list").clone();
+        assert_eq!(told.len(), count, "{told:?}");
+        // Four texels of four bytes, and means over them where they are averaged.
+        assert!(told.iter().all(|t| t["bytes"].as_u64().is_some_and(|b| b >= 16)), "{told:?}");
+    }
+    let bench = stage(&material, &rest, &json!({"layers": ["depth"], "tracer": null}));
+    bench.render(&["--strict", "--report", "report.json"]);
+    assert_eq!(bench.json("report.json")["images"], json!([]));
+}
