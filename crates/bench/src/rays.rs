@@ -116,7 +116,12 @@ mod tests {
         let pose = Pose::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y).unwrap();
         let mut spec = CameraSpec::perspective(pose, 0.7, 1.0);
         spec.sensor_mut().resolution = [40, 21];
-        let camera = spec.build(|| unreachable!("the pose is given"), &|_| unreachable!()).unwrap();
+        let camera = spec
+            .build(
+                || -> etendue_geometry::Bounds { unreachable!("the pose is given") },
+                &|_| unreachable!(),
+            )
+            .unwrap();
         let rays = Rays::primary(&camera, usize::MAX);
         assert_eq!(rays.len(), 40 * 21);
         let mut ends: Vec<[u64; 2]> = (0..rays.len())
@@ -133,7 +138,12 @@ mod tests {
         }
         // Every column and row of tiles has its share.
         spec.sensor_mut().resolution = [1024, 1024];
-        let camera = spec.build(|| unreachable!("the pose is given"), &|_| unreachable!()).unwrap();
+        let camera = spec
+            .build(
+                || -> etendue_geometry::Bounds { unreachable!("the pose is given") },
+                &|_| unreachable!(),
+            )
+            .unwrap();
         let some = Rays::primary(&camera, 64 * 256);
         for axis in 0..2 {
             let side = |k: &f64| usize::from(*k > 0.0);
@@ -143,7 +153,12 @@ mod tests {
         }
         // Whole tiles, no more than asked for.
         spec.sensor_mut().resolution = [40, 21];
-        let camera = spec.build(|| unreachable!("the pose is given"), &|_| unreachable!()).unwrap();
+        let camera = spec
+            .build(
+                || -> etendue_geometry::Bounds { unreachable!("the pose is given") },
+                &|_| unreachable!(),
+            )
+            .unwrap();
         assert_eq!(Rays::primary(&camera, 600).len() % 16, 0);
         assert!(Rays::primary(&camera, 600).len() <= 600);
     }
