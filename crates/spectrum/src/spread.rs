@@ -13,8 +13,8 @@ const CELLS: u32 = 4000;
 /// Wavelengths of equal weight, and what filters leave of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spread {
-    /// In ascending order (nm). An equal share of the lane's light behind the filters lies around
-    /// each.
+    /// In ascending order (nm), each the mean of an equal share of the lane's light behind the
+    /// filters. So their own mean is that of the light.
     pub wavelengths: Vec<f64>,
     /// What passes all filters one behind the other, over the product of what passes each of them
     /// alone: 1 for fewer than two, 0 for two that pass different light.
@@ -23,8 +23,9 @@ pub struct Spread {
 
 impl Lanes {
     /// Wavelengths that stand for lane `i` behind `filters`: one for each 25 nm of a wide lane, each
-    /// the median of an equal share of its light, or [`wavelength`](Self::wavelength) alone when the
-    /// lane is narrow or no light is left.
+    /// the mean of an equal share of its light, or [`wavelength`](Self::wavelength) alone when the
+    /// lane is narrow or no light is left. What depends on the wavelength linearly thus comes out as
+    /// it does with all of the light.
     ///
     /// The light of a lane is counted as photons, as a sensor does; that of red, green and blue as
     /// the CIE 1931 observer's x̄ + ȳ + z̄ sees it.
@@ -36,7 +37,7 @@ impl Lanes {
         };
         let cell = (to - from) / f64::from(CELLS);
         let middle = |c: u32| from + (f64::from(c) + 0.5) * cell;
-        let (mut total, mut passed) = (0.0, 0.0);
+        let (mut total, mut passed, mut moment) = (0.0, 0.0, 0.0);
         let mut alone = vec![0.0; filters.len()];
         let mut sums = Vec::with_capacity(CELLS as usize);
         for nm in (0..CELLS).map(middle) {
@@ -48,7 +49,8 @@ impl Lanes {
             }
             total += light;
             passed += left;
-            sums.push(passed);
+            moment += left * nm;
+            sums.push([passed, moment]);
         }
         let independent = alone.iter().map(|alone| alone / total).product::<f64>();
         let overlap = if independent > 0.0 { passed / total / independent } else { 1.0 };
@@ -56,14 +58,19 @@ impl Lanes {
         if count < 2.0 || passed <= 0.0 {
             return Spread { wavelengths: vec![self.wavelength(i)], overlap };
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen")]
-        let medians = (0..count as u32).map(|k| (f64::from(k) + 0.5) / count * passed);
-        let place = |median: f64| {
-            let c = sums.partition_point(|&sum| sum < median).min(sums.len() - 1);
-            let before = if c > 0 { sums[c - 1] } else { 0.0 };
-            from + (c as f64 + (median - before) / (sums[c] - before)) * cell
+        // The moment of the light up to where so much of it has passed; within a cell light is even.
+        let moment_at = |light: f64| {
+            let c = sums.partition_point(|&[sum, _]| sum < light).min(sums.len() - 1);
+            let [before, moment] = if c > 0 { sums[c - 1] } else { [0.0; 2] };
+            let share = (light - before) / (sums[c][0] - before);
+            moment + (light - before) * (from + (c as f64 + 0.5 * share) * cell)
         };
-        Spread { wavelengths: medians.map(place).collect(), overlap }
+        let each = passed / count;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen")]
+        let ends = (1..count as u32).map(|k| moment_at(f64::from(k) * each)).chain([moment]);
+        let mut before = 0.0;
+        let mean = |end: f64| (end - std::mem::replace(&mut before, end)) / each;
+        Spread { wavelengths: ends.map(mean).collect(), overlap }
     }
 
     /// The light of lane `i` at a wavelength (nm), to a factor.
@@ -81,6 +88,7 @@ impl Lanes {
 mod tests {
     use super::*;
     use crate::Grid;
+    use crate::curve::integral;
 
     fn mean(of: &[f64]) -> f64 {
         of.iter().sum::<f64>() / of.len() as f64
@@ -92,20 +100,41 @@ mod tests {
         assert_eq!(bands.spread(0, &[]).wavelengths, [412.5]);
         let wide = bands.spread(1, &[]).wavelengths;
         assert_eq!(wide.len(), 4);
-        // Photons: densities of λ, so that the first quarter is the widest. Its median by hand.
-        let quarter =
-            |share: f64| (425f64.powi(2) + share * (525f64.powi(2) - 425f64.powi(2))).sqrt();
+        // Photons: densities of λ, so that the first quarter is the widest. Its mean by hand.
+        let edge = |share: f64| (425f64.powi(2) + share * (525f64.powi(2) - 425f64.powi(2))).sqrt();
         for (k, nm) in (0..4).zip(&wide) {
-            assert!((nm - quarter((f64::from(k) + 0.5) / 4.0)).abs() < 1e-4, "{wide:?}");
+            let [a, b] = [edge(f64::from(k) / 4.0), edge((f64::from(k) + 1.0) / 4.0)];
+            let mean = 2.0 / 3.0 * (b.powi(3) - a.powi(3)) / (b.powi(2) - a.powi(2));
+            // Cells are 0.025 nm wide.
+            assert!((nm - mean).abs() < 1e-4, "{wide:?}");
         }
         let grey = Lanes::Grey.spread(0, &[]).wavelengths;
         assert!(grey.len() == 16 && grey[0] < 400.0 && grey[15] > 765.0, "{grey:?}");
-        // The centroids of red, green and blue. 16 medians give a mean to 2 nm: the outermost stand for
-        // tails a hundred nanometres long, of which a median is not the mean.
-        for (i, centroid) in rgb::PRIMARY_WAVELENGTHS.into_iter().enumerate() {
-            let own = Lanes::Rgb.spread(i, &[]).wavelengths;
-            assert!((mean(&own) - centroid).abs() < 2.0, "{i}: {}", mean(&own));
+    }
+
+    #[test]
+    fn the_mean_of_the_wavelengths_is_that_of_the_light() {
+        let nm = Curve::sampled(vec![[380.0, 380.0], [780.0, 780.0]]).unwrap();
+        let check = |lanes: Lanes, i: usize, filters: &[&Curve], [moment, light]: [f64; 2]| {
+            let found = lanes.spread(i, filters).wavelengths;
+            assert!(found.is_sorted() && found.len() == 16, "{found:?}");
+            // The midpoints of cells of 0.1 nm are off by about its square.
+            let (found, centroid) = (mean(&found), moment / light);
+            assert!((found - centroid).abs() < 1e-3, "{found}, {centroid}");
+        };
+        // By the integrals of the polygons: of what the observer sees of each colour,
+        let seen = |curves: &[&Curve]| -> f64 {
+            OBSERVER.iter().map(|c| integral(&[curves, &[c]].concat(), 380.0, 780.0)).sum()
+        };
+        for (i, primary) in rgb::PRIMARIES.iter().enumerate() {
+            check(Lanes::Rgb, i, &[], [seen(&[&nm, primary]), seen(&[primary])]);
         }
+        // and of photons behind a filter.
+        let skewed = [[380.0, 0.9], [450.0, 0.0], [520.0, 1.0], [700.0, 0.05], [780.0, 0.3]];
+        let filter = Curve::sampled(skewed.to_vec()).unwrap();
+        let passed = |curves: &[&Curve]| integral(curves, 380.0, 780.0);
+        let expected = [passed(&[&nm, &nm, &filter]), passed(&[&nm, &filter])];
+        check(Lanes::Grey, 0, &[&filter], expected);
     }
 
     #[test]
