@@ -21,7 +21,7 @@ use crate::instances::Instances;
 use crate::parts::{Object, Parts};
 use crate::paths::{Folder, Found};
 use crate::scene::{LoadOptions, LoadProgress, Scene};
-use crate::shape::{ShapeError, ShapeSpec};
+use crate::shape::{GoOn, ShapeError, ShapeSpec};
 use crate::{SceneError, facing};
 
 /// Where triangles come from, once for all objects that share them.
@@ -210,6 +210,11 @@ impl SceneFile {
             root: folder.limit().map(std::path::Path::to_owned),
             count_degenerate: options.count_degenerate,
         };
+        let goes_on = |origin: &Origin, done: usize| {
+            let name = &objects[origin.user].title;
+            let step = LoadProgress { name, done, total: origins.len() };
+            options.progress.is_none_or(|progress| progress(step))
+        };
         // All are waited for, so that the first fault in the file's order is the one reported.
         let imports: Vec<Result<Import, SceneError>> = origins
             .par_iter()
@@ -218,16 +223,14 @@ impl SceneFile {
                 let import = match &origin.kind {
                     OriginKind::File(path) => import::import(path, wanted, &settings)
                         .map_err(|source| self.import_fault(at, source))?,
-                    OriginKind::Shape(shape) => of_shape(shape, wanted)
-                        .map_err(|fault| self.fault(&join(&at, fault.key), fault.reason))?,
+                    OriginKind::Shape(shape) => {
+                        of_shape(shape, wanted, &|| goes_on(origin, done.load(Ordering::Relaxed)))
+                            .map_err(|fault| self.fault(&join(&at, fault.key), fault.reason))?
+                            .ok_or(SceneError::Stopped)?
+                    }
                 };
-                let title = &objects[origin.user].title;
                 let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                let step = LoadProgress { name: title, done, total: origins.len() };
-                match options.progress {
-                    Some(progress) if !progress(step) => Err(SceneError::Stopped),
-                    _ => Ok(import),
-                }
+                if goes_on(origin, done) { Ok(import) } else { Err(SceneError::Stopped) }
             })
             .collect();
         imports.into_iter().collect()
@@ -404,11 +407,15 @@ impl<'a> CameraFiles<'a> {
     }
 }
 
-/// A shape as if it had been imported.
-fn of_shape(shape: &ShapeSpec, wanted: Wanted) -> Result<Import, ShapeError> {
-    let mesh = shape.build(wanted)?;
+/// A shape as if it had been imported; `None` once `go_on` says no.
+fn of_shape(
+    shape: &ShapeSpec,
+    wanted: Wanted,
+    go_on: GoOn<'_>,
+) -> Result<Option<Import>, ShapeError> {
+    let Some(mesh) = shape.build_while(wanted, go_on)? else { return Ok(None) };
     let stats = import::Stats { bytes_copied: mesh.heap_bytes() as u64, ..Default::default() };
-    Ok(Import {
+    Ok(Some(Import {
         placements: vec![ImportedPlacement {
             mesh: 0,
             material: 0,
@@ -419,5 +426,5 @@ fn of_shape(shape: &ShapeSpec, wanted: Wanted) -> Result<Import, ShapeError> {
         materials: vec![Material::unnamed()],
         stats,
         ..Import::default()
-    })
+    }))
 }

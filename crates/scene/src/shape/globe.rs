@@ -8,6 +8,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Mesh, Positions, Vertices};
 use rayon::prelude::*;
 
+use super::GoOn;
 use super::relief::Relief;
 use super::turn::sin_cos_turns;
 use crate::import::Wanted;
@@ -60,23 +61,35 @@ impl Globe {
         Self { n, cuts: u32::try_from(left / 2).unwrap_or(0) }
     }
 
-    /// Makes the surface that `relief` describes.
-    pub(super) fn build(&self, name: &str, relief: &Relief, wanted: Wanted) -> Mesh {
+    /// Makes the surface that `relief` describes; `None` once `go_on` says no.
+    pub(super) fn build(
+        &self,
+        name: &str,
+        relief: &Relief,
+        wanted: Wanted,
+        go_on: GoOn<'_>,
+    ) -> Option<Mesh> {
         let cuts = self.cut_edges();
         let triangles = self.triangles(&cuts, wanted.uvs);
-        let places = Places { globe: self, cuts: &cuts, seam: wanted.uvs };
-        let (floats, bounds) = places.positions(relief);
+        let places = Places { globe: self, cuts: &cuts, seam: wanted.uvs, go_on };
+        let (floats, bounds) = places.positions(relief)?;
         let count = places.count();
-        let positions = vertices(floats, count);
-        Mesh {
+        let positions = Positions::F32(vertices(floats, count));
+        let normals = match wanted.normals {
+            true => Some(vertices(places.normals(relief)?, count)),
+            false => None,
+        };
+        let uvs = if wanted.uvs { vec![vertices(places.uvs()?, count)] } else { Vec::new() };
+        let triangles = triangles.into();
+        Some(Mesh {
             name: name.to_owned(),
-            positions: Positions::F32(positions),
-            triangles: triangles.into(),
-            normals: wanted.normals.then(|| vertices(places.normals(relief), count)),
-            uvs: if wanted.uvs { vec![vertices(places.uvs(), count)] } else { Vec::new() },
+            positions,
+            triangles,
+            normals,
+            uvs,
             colors: None,
             bounds,
-        }
+        })
     }
 
     /// Vertices of the rings alone.
@@ -248,6 +261,7 @@ struct Places<'a> {
     globe: &'a Globe,
     cuts: &'a [Cut],
     seam: bool,
+    go_on: GoOn<'a>,
 }
 
 impl Places<'_> {
@@ -256,9 +270,9 @@ impl Places<'_> {
         self.globe.ring_vertices() + self.cuts.len() + seam
     }
 
-    fn positions(&self, relief: &Relief) -> (Vec<f32>, Bounds) {
+    fn positions(&self, relief: &Relief) -> Option<(Vec<f32>, Bounds)> {
         let point = |place: Place| relief.point(place.direction()).as_vec3().to_array();
-        let floats = self.each(point);
+        let floats = self.each(point)?;
         let bounds = floats[..3 * self.count()]
             .par_chunks(3 * CHUNK)
             .map(|chunk| {
@@ -269,15 +283,15 @@ impl Places<'_> {
                 bounds
             })
             .reduce(|| Bounds::EMPTY, Bounds::union);
-        (floats, bounds)
+        Some((floats, bounds))
     }
 
-    fn normals(&self, relief: &Relief) -> Vec<f32> {
+    fn normals(&self, relief: &Relief) -> Option<Vec<f32>> {
         self.each(|place| relief.normal(place.direction()).as_vec3().to_array())
     }
 
     /// u to the east, v to the south. At a pole, where all meridians meet, u is that of the middle.
-    fn uvs(&self) -> Vec<f32> {
+    fn uvs(&self) -> Option<Vec<f32>> {
         self.each(|place| {
             let is_pole = place.south <= 0.0 || place.south >= 1.0;
             let east = if is_pole { 0.5 } else { place.east };
@@ -285,22 +299,23 @@ impl Places<'_> {
         })
     }
 
-    /// `N` floats for each vertex, in parallel, and the padding.
-    fn each<const N: usize>(&self, value: impl Fn(Place) -> [f32; N] + Sync) -> Vec<f32> {
+    /// `N` floats for each vertex, in parallel, and the padding; `None` when it was stopped.
+    fn each<const N: usize>(&self, value: impl Fn(Place) -> [f32; N] + Sync) -> Option<Vec<f32>> {
         let rings = self.globe.ring_vertices();
         let mut floats = vec![0.0; self.count() * N + PADDING];
         let (of_rings, of_others) = floats.split_at_mut(rings * N);
-        of_rings.par_chunks_mut(CHUNK * N).enumerate().for_each(|(number, chunk)| {
+        of_rings.par_chunks_mut(CHUNK * N).enumerate().try_for_each(|(number, chunk)| {
             let mut walk = Walk::at(self.globe, number * CHUNK);
             for to in chunk.chunks_exact_mut(N) {
                 to.copy_from_slice(&value(walk.next_place()));
             }
-        });
+            (self.go_on)().then_some(())
+        })?;
         let others = self.cuts.iter().map(|cut| cut.place(self.globe)).chain(self.seam_places());
         for (to, place) in of_others.chunks_exact_mut(N).zip(others) {
             to.copy_from_slice(&value(place));
         }
-        floats
+        Some(floats)
     }
 
     fn seam_places(&self) -> impl Iterator<Item = Place> {

@@ -106,6 +106,9 @@ pub struct ShapeError {
     pub reason: String,
 }
 
+/// Answers whether to go on, on any thread.
+pub type GoOn<'a> = &'a (dyn Fn() -> bool + Sync);
+
 impl ShapeSpec {
     /// The word behind `shape` in the file.
     #[must_use]
@@ -125,22 +128,33 @@ impl ShapeSpec {
     ///
     /// When a size is not positive or a number of triangles is out of range.
     pub fn build(&self, wanted: Wanted) -> Result<Mesh, ShapeError> {
-        match *self {
+        let stopped = || ShapeError { key: "shape", reason: "was stopped".to_owned() };
+        self.build_while(wanted, &|| true)?.ok_or_else(stopped)
+    }
+
+    /// Makes the mesh as [`Self::build`] does, and asks now and then whether to go on: `None` when
+    /// it was stopped.
+    ///
+    /// # Errors
+    ///
+    /// When a size is not positive or a number of triangles is out of range.
+    pub fn build_while(&self, wanted: Wanted, go_on: GoOn<'_>) -> Result<Option<Mesh>, ShapeError> {
+        Ok(match *self {
             Self::Rectangle { width, height } => {
                 let half = [half("width", width)?, half("height", height)?];
-                Ok(flat::rectangle(half, wanted))
+                Some(flat::rectangle(half, wanted))
             }
-            Self::Box { size } => {
-                let [x, y, z] = size;
-                Ok(flat::cuboid([half("size", x)?, half("size", y)?, half("size", z)?], wanted))
+            Self::Box { size: [x, y, z] } => {
+                let half = [half("size", x)?, half("size", y)?, half("size", z)?];
+                Some(flat::cuboid(half, wanted))
             }
             Self::Sphere { radius, triangles } => {
                 let relief = Relief::none(positive("radius", radius)?);
-                Ok(Globe::new(in_range(triangles)?).build("sphere", &relief, wanted))
+                Globe::new(in_range(triangles)?).build("sphere", &relief, wanted, go_on)
             }
             Self::Disk { radius, triangles } => {
                 let radius = positive("radius", radius)?;
-                Ok(globe::disk(radius, in_range(triangles)?, wanted))
+                Some(globe::disk(radius, in_range(triangles)?, wanted))
             }
             Self::Blob { radius, triangles, seed, amplitude } => {
                 let radius = positive("radius", radius)?;
@@ -149,9 +163,9 @@ impl ShapeSpec {
                     return Err(ShapeError { key: "amplitude", reason });
                 }
                 let relief = Relief::new(radius, amplitude, seed);
-                Ok(Globe::new(in_range(triangles)?).build("blob", &relief, wanted))
+                Globe::new(in_range(triangles)?).build("blob", &relief, wanted, go_on)
             }
-        }
+        })
     }
 }
 
@@ -181,6 +195,7 @@ fn in_range(triangles: u64) -> Result<u64, ShapeError> {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     use etendue_geometry::Positions;
     use etendue_geometry::glam::DVec3;
@@ -211,6 +226,18 @@ mod tests {
             a.dot(b.cross(c)) / 6.0
         };
         (0..mesh.triangles.len()).map(signed).sum()
+    }
+
+    #[test]
+    fn making_can_be_stopped() {
+        let asked = AtomicUsize::new(0);
+        let stop = || asked.fetch_add(1, Ordering::Relaxed) < 5;
+        let made = blob(1_000_000, 1).build_while(Wanted::EVERYTHING, &stop);
+        assert!(matches!(made, Ok(None)), "{made:?}");
+        // There are 123 tasks; those that other threads have begun are ended.
+        let asked = asked.into_inner();
+        assert!((6..100).contains(&asked), "{asked}");
+        assert!(matches!(blob(64, 1).build_while(Wanted::EVERYTHING, &|| true), Ok(Some(_))));
     }
 
     #[test]
