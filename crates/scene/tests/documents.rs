@@ -1,0 +1,125 @@
+//! What the documents say in JSON is understood, and what they link to is there.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use etendue_scene::import::Wanted;
+use etendue_scene::{LoadOptions, SceneFile};
+use serde_json::{Value, json};
+
+/// The documents that people write, with their text; `None` where the tests stand without them.
+fn documents() -> Option<Vec<(PathBuf, String)>> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut paths: Vec<PathBuf> =
+        ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(|name| root.join(name)).to_vec();
+    let Ok(folder) = fs::read_dir(root.join("docs")) else {
+        println!("skipped: there is no folder docs beside the sources");
+        return None;
+    };
+    let found = folder.map(|entry| entry.unwrap().path());
+    paths.extend(found.filter(|path| path.extension().is_some_and(|end| end == "md")));
+    paths.sort();
+    Some(paths.into_iter().map(|path| (path.clone(), fs::read_to_string(&path).unwrap())).collect())
+}
+
+/// The blocks of JSON of a document.
+fn blocks(text: &str) -> impl Iterator<Item = &str> {
+    text.split("```json\n").skip(1).filter_map(|rest| rest.split("```").next())
+}
+
+/// Lines outside of code.
+fn prose(text: &str) -> String {
+    let parts = text.split("```").step_by(2);
+    parts.collect()
+}
+
+/// A heading's name in links, as GitHub makes it.
+fn anchor(heading: &str) -> String {
+    // Of a link only its words count.
+    let words = heading.replace("](", "\u{0}").split(['[', ']']).collect::<String>();
+    let words = words.split('\u{0}').next().unwrap_or_default().trim().to_lowercase();
+    let kept = words.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+#[test]
+fn scenes_and_lenses_in_the_documents_load() {
+    let Some(documents) = documents() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("model.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let mut loaded = 0;
+    for (document, text) in documents {
+        // A file that stands for any.
+        let text = text.replace("model.glb", "model.obj");
+        for (number, block) in blocks(&text).enumerate() {
+            let at = format!("{}, block {number}", document.display());
+            // Some show what the program writes, shortened.
+            let Ok(value) = serde_json::from_str::<Value>(block) else { continue };
+            let scene = match value {
+                Value::Object(ref keys) if keys.contains_key("etendue") => value,
+                Value::Object(ref keys) if keys.contains_key("elements") => {
+                    json!({ "etendue": 1, "camera": { "type": "lens", "lens": value, "fov": 10 } })
+                }
+                _ => continue,
+            };
+            let path = folder.path().join("scene.json");
+            fs::write(&path, scene.to_string()).unwrap();
+            let file = SceneFile::read(&path, &[]).unwrap_or_else(|error| panic!("{at}: {error}"));
+            let scene = file.load(Wanted::EVERYTHING, &LoadOptions::default());
+            scene.unwrap_or_else(|error| panic!("{at}: {error}"));
+            loaded += 1;
+        }
+    }
+    assert!(loaded >= 15, "only {loaded} were found");
+}
+
+#[test]
+fn the_first_scene_of_the_readme_is_the_file() {
+    let Some(documents) = documents() else { return };
+    let readme = documents.iter().find(|(path, _)| path.ends_with("README.md")).unwrap();
+    let shown: Value = serde_json::from_str(blocks(&readme.1).next().unwrap()).unwrap();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/first-light.json");
+    let file: Value = serde_json::from_str(&fs::read_to_string(file).unwrap()).unwrap();
+    assert_eq!(shown, file);
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let Some(documents) = documents() else { return };
+    let headings = |text: &str| -> BTreeSet<String> {
+        let prose = prose(text);
+        let lines = prose.lines().filter(|line| line.starts_with('#'));
+        lines.map(|line| anchor(line.trim_start_matches('#'))).collect()
+    };
+    for (document, text) in &documents {
+        let folder = document.parent().unwrap();
+        for link in prose(text).split("](").skip(1) {
+            let link = link.split(')').next().unwrap();
+            if link.contains("://") {
+                continue;
+            }
+            let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+            let target = if file.is_empty() { document.clone() } else { folder.join(file) };
+            assert!(target.exists(), "{}: no {link}", document.display());
+            let known = heading.is_empty()
+                || headings(&fs::read_to_string(target).unwrap()).contains(heading);
+            assert!(known, "{}: no heading {link}", document.display());
+        }
+    }
+}
+
+#[test]
+fn the_map_of_the_tree_names_files_that_are_there() {
+    let Some(documents) = documents() else { return };
+    let (_, map) = documents.iter().find(|(path, _)| path.ends_with("architecture.md")).unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let code = map.split('`').skip(1).step_by(2);
+    let paths: Vec<&str> =
+        code.filter(|name| name.contains("/src/") || name.contains("/tests/")).collect();
+    assert!(paths.len() > 40, "{paths:?}");
+    for path in paths {
+        let found = [root.join("crates").join(path), root.join(path)].iter().any(|p| p.exists());
+        assert!(found, "docs/architecture.md: no {path}");
+    }
+}
