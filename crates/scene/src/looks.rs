@@ -4,7 +4,7 @@ use etendue_camera::glass::GlassSpec;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{Curve, Illuminant};
 use etendue_tracer::material::{Alpha, GltfSurface};
-use etendue_tracer::spec::{ImageSpec, IorSpec, PaintSpec};
+use etendue_tracer::spec::{BRIGHTEST, ImageSpec, IorSpec, PaintSpec};
 use etendue_tracer::{
     Color, Emission, EnvironmentImage, ImageSource, Ior, Light, LightKind, LightSpec, Material,
     MaterialSpec, Paint, Scattering, Texture, TextureUse,
@@ -183,6 +183,9 @@ fn in_bounds(key: &str, color: &Color, bound: Bound) -> Result<(), Fault> {
     let fault = |why: String| Err((key.to_owned(), why));
     if !color.iter().all(|c| *c >= 0.0 && c.is_finite()) {
         return fault(format!("{color:?} has a part below zero"));
+    }
+    if !color.iter().all(|c| *c <= BRIGHTEST) {
+        return fault(format!("{color:?} is above {BRIGHTEST:e}; pictures hold no more"));
     }
     if bound == Bound::One && !color.iter().all(|c| *c <= 1.0) {
         return fault(format!("{color:?} is outside 0 to 1; a surface reflects no more"));

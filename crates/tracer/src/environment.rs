@@ -138,6 +138,16 @@ fn direction([u, v]: [f64; 2]) -> DVec3 {
     DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
 }
 
+/// The mean over cell (x, y) of what lies between the middles of cells: each along an axis gets 3/4 of
+/// its own brightness and 1/8 of each neighbour's. Columns go around, rows end.
+fn interpolated(bright: &[f64], [columns, rows]: [usize; 2], [x, y]: [usize; 2]) -> f64 {
+    let along = |row: usize| {
+        let row = &bright[row * columns..(row + 1) * columns];
+        0.75 * row[x] + 0.125 * (row[(x + columns - 1) % columns] + row[(x + 1) % columns])
+    };
+    0.75 * along(y) + 0.125 * (along(y.saturating_sub(1)) + along((y + 1).min(rows - 1)))
+}
+
 /// Directions by the brightness of a map: a grid of cells, each uniform in u and v (Pharr, Jakob and
 /// Humphreys, *Physically Based Rendering*, 4th edition, section 12.5).
 #[derive(Debug, Clone)]
@@ -166,21 +176,9 @@ impl MapSampler {
         for y in 0..rows {
             let row = (PI * (y as f64 + 0.5) / rows as f64).sin();
             for x in 0..columns {
-                // Interpolation carries a bright texel into the cells beside it.
-                let mut around = 0.0;
-                for dy in [rows - 1, 0, 1] {
-                    for dx in [columns - 1, 0, 1] {
-                        let near = match (dy, y) {
-                            (1, y) => (y + 1).min(rows - 1),
-                            (0, y) => y,
-                            (_, y) => y.saturating_sub(1),
-                        };
-                        around += bright[near * columns + (x + dx) % columns];
-                    }
-                }
                 let own = bright[y * columns + x];
                 mean += own / texels_a_cell * row;
-                weights.push((0.75 * own + 0.25 * around / 9.0) * row);
+                weights.push(interpolated(&bright, [columns, rows], [x, y]) * row);
             }
         }
         // The mean of sin θ over rows is 2/π.

@@ -7,6 +7,10 @@ use serde::{Deserialize, Serialize};
 use crate::Color;
 use crate::texture::{Filter, Wrap};
 
+/// The brightest that a light or a surface may be, in whichever unit: pictures hold no number above
+/// 3·10³⁸, and the powers of all lights are added up.
+pub const BRIGHTEST: f64 = 1e30;
+
 /// A material as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]

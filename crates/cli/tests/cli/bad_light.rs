@@ -83,6 +83,12 @@ fn values_that_no_material_or_light_can_have_are_refused_by_path() {
         (material(r#"{"type": "matte", "color": [0.5, NaN, 0]}"#), "broken JSON"),
         (material(r#"{"type": "matte", "color": [0.5, 1e999, 0]}"#), "out of range"),
         (material(r#"{"type": "emissive", "radiance": [-1, 0, 0]}"#), "materials.m.radiance"),
+        (material(r#"{"type": "emissive", "radiance": [1e31, 0, 0]}"#), "above 1e30"),
+        (light(r#"{"type": "environment", "radiance": [1e308, 1, 1]}"#), "above 1e30"),
+        (
+            material(r#"{"type": "emissive", "radiance": [1, 1, 1], "illuminant": "d66"}"#),
+            "materials.m.illuminant: \"d66\" is not known here; did you mean `d65`?",
+        ),
         (material(r#"{"type": "dielectric", "ior": 0.9}"#), "materials.m.ior: 0.9 is below 1"),
         (material(r#"{"type": "dielectric", "ior": {"nd": 0.5, "vd": 60}}"#), "materials.m.ior"),
         (material(r#"{"type": "gltf", "ior": 0.9}"#), "materials.m.ior"),
@@ -182,4 +188,19 @@ fn an_environment_that_is_no_number_is_black_and_counted_or_refused_when_strict(
     assert!(notes.contains("32 pixels that are not finite or below zero"), "{notes}");
     let output = bench.run(&["render", "scene.json", "-o", "strict", "--strict"]);
     assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+}
+
+/// The brightest lights that are taken leave every number finite.
+#[test]
+fn the_brightest_lights_leave_numbers() {
+    let bright = [
+        r#"[{"type": "point", "at": [0, 0, 2], "intensity": [1e30, 1e30, 1e30]}]"#,
+        r#"[{"type": "environment", "radiance": [1e30, 1e30, 1e30]}]"#,
+        r#"[{"type": "directional", "direction": [0, 0, -1], "irradiance": [1e30, 1e30, 1e30]}]"#,
+    ];
+    for lights in bright {
+        for value in plane(r#"{"type": "matte", "color": [0.5, 0.5, 0.5]}"#, lights, &mut None) {
+            assert!(value > 1e28 && value.is_finite(), "{lights}: {value}");
+        }
+    }
 }

@@ -370,3 +370,35 @@ fn images_are_decoded_once_and_only_when_looked_at() {
     bench.render(&["--strict", "--report", "report.json"]);
     assert_eq!(bench.json("report.json")["images"], json!([]));
 }
+
+/// Numbers that no surface can have are told by material and key, and refused when strict.
+#[test]
+fn numbers_that_no_surface_can_have_are_told_or_refused_when_strict() {
+    let with = |key: &str, value: Value| json!({"name": "odd", key: value});
+    let extended = |name: &str, value: Value| with("extensions", json!({name: value}));
+    let cases = [
+        (with("pbrMetallicRoughness", json!({"roughnessFactor": -1})), "roughnessFactor -1"),
+        (with("pbrMetallicRoughness", json!({"metallicFactor": 2})), "metallicFactor 2"),
+        (with("pbrMetallicRoughness", json!({"baseColorFactor": [2, 0, 0, 1]})), "base colour"),
+        (with("emissiveFactor", json!([-1, 0, 0])), "emission"),
+        (with("emissiveFactor", json!([1e38, 0, 0])), "emission"),
+        (with("alphaMode", json!("SOLID")), "alphaMode"),
+        (extended("KHR_materials_ior", json!({"ior": 0.5})), "ior 0.5 is below 1"),
+        (extended("KHR_materials_ior", json!({"ior": "glass"})), "ior is not a number"),
+        (extended("KHR_materials_transmission", json!({"transmissionFactor": 5})), "Factor 5"),
+        (extended("KHR_materials_specular", json!({"specularFactor": -5})), "specularFactor -5"),
+        (extended("KHR_materials_specular", json!({"specularColorFactor": [1]})), "ColorFactor"),
+        (extended("KHR_materials_specular", json!(7)), "specularFactor is not a number"),
+    ];
+    for (material, words) in cases {
+        let bench = stage(&material, &json!({}), &json!({"render": {"samples": 4}}));
+        let odd = pixels(&bench);
+        assert!(odd.iter().flatten().all(|v| v.is_finite()), "{material}");
+        let notes = bench.json("report.json")["notes"].to_string();
+        assert!(notes.contains("odd") && notes.contains(words), "{material}: {notes}");
+        let output = bench.run(&["render", "scene.json", "-o", "strict", "--strict"]);
+        let message = crate::run::text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{material}: {message}");
+        assert!(message.contains("m.gltf") && message.contains(words), "{message}");
+    }
+}

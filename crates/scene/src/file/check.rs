@@ -229,12 +229,13 @@ impl<'a> Checker<'a> {
     /// Goes on in the branch that was meant: by tag, by the kind of value, or by the keys.
     fn choose(&self, branches: &'a [Value], value: &Value, path: &str) -> Outcome {
         let branches: Vec<&Value> = branches.iter().map(|branch| self.resolve(branch)).collect();
-        if branches.iter().all(|branch| branch.get("const").is_some()) {
-            let words: Vec<&Value> = branches.iter().filter_map(|b| b.get("const")).collect();
-            return Self::no_such_word(&words, value, path);
-        }
         let fitting: Vec<&Value> =
             branches.iter().copied().filter(|branch| self.may_be(branch, value)).collect();
+        let considered = if fitting.is_empty() { &branches } else { &fitting };
+        let words: Vec<&Value> = considered.iter().filter_map(|b| b.get("const")).collect();
+        if words.len() == considered.len() {
+            return Self::no_such_word(&words, value, path);
+        }
         match (&fitting[..], value) {
             ([], _) => {
                 let kinds: Vec<&str> = branches.iter().flat_map(|b| self.kinds(b)).collect();

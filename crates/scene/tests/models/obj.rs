@@ -2,7 +2,8 @@
 
 use etendue_geometry::glam::DVec3;
 use etendue_scene::import::NoteKind;
-use etendue_tracer::Paint;
+use etendue_tracer::material::Alpha;
+use etendue_tracer::{Ior, Material, Paint, Scattering};
 
 use crate::{error, folder, import_strict, load, points, write};
 
@@ -80,4 +81,59 @@ fn broken_obj_is_refused_with_its_line() {
     let message = import_strict(&path).unwrap_err().to_string();
     assert!(message.contains("line 2, column 3") && message.contains("0 texture"), "{message}");
     assert!(load(&write(&folder, "empty.obj", "")).meshes[0].triangles.is_empty());
+}
+
+/// Each rule of `docs/light.md`: glass, mirrors, a coat over a matte base, thin surfaces, lamps.
+#[test]
+fn mtl_materials_become_the_nearest_of_ours() {
+    let folder = folder();
+    write(
+        &folder,
+        "m.mtl",
+        "newmtl matte\nKd 0.5 0.25 1\n\
+        newmtl glass\nKd 0.1 0.1 0.1\nNi 1.7\nillum 7\n\
+        newmtl thin\nKd 1 1 1\nNi 0.3\nillum 4\nd 0.2\n\
+        newmtl metal\nKd 0 0 0\nKs 0.9 0.6 0.3\nNs 30\nillum 3\n\
+        newmtl glazed\nKd 0.5 0.5 0.5\nKs 0.2 0.1 0\nNs 6\nd 0.25\n\
+        newmtl lamp\nKd 0 0 0\nKe 5 4 3\n\
+        newmtl old\nKa 20 10 5\nKd 1 1 1\n\
+        newmtl dim\nKa 1 1 1\nKd 1 1 1\n\
+        newmtl bad\nKd 1 1 1\nKe -1 0 0\n",
+    );
+    let names = ["matte", "glass", "thin", "metal", "glazed", "lamp", "old", "dim", "bad"];
+    let mut text = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned();
+    for name in names {
+        text += &format!("usemtl {name}\nf 1 2 3\n");
+    }
+    let import = load(&write(&folder, "m.obj", &text));
+    let of = |name: &str| {
+        let found = import.materials.iter().find(|m| m.name == name);
+        found.unwrap_or_else(|| panic!("{name}: {:?}", import.materials))
+    };
+    assert_eq!(of("matte").scattering, Scattering::Matte);
+    assert_eq!(of("matte").base_color, Paint::Plain([0.5, 0.25, 1.0]));
+    assert_eq!(of("glass").scattering, Scattering::Dielectric(Ior::Constant(1.7)));
+    assert_eq!(of("glass").base_color, Paint::Plain([1.0; 3]), "glass lets all through");
+    assert_eq!(of("thin").scattering, Scattering::Dielectric(Ior::Constant(1.0)));
+    assert_eq!(of("thin").alpha, Alpha::Opaque, "glass is there as a whole");
+    // α² = 2 / (Ns + 2) and α is the square of the roughness.
+    let roughness = |material: &Material| match &material.scattering {
+        Scattering::Metal { roughness } => *roughness,
+        Scattering::Gltf(surface) => surface.roughness,
+        other => panic!("{other:?}"),
+    };
+    assert!((roughness(of("metal")) - 0.5).abs() < 1e-12);
+    assert_eq!(of("metal").base_color, Paint::Plain([0.9, 0.6, 0.3]));
+    let glazed = of("glazed");
+    assert!((roughness(glazed) - 0.25_f64.powf(0.25)).abs() < 1e-12);
+    let Scattering::Gltf(surface) = &glazed.scattering else { panic!("{glazed:?}") };
+    // Times the reflectance of glass face on, 0.04, that is Ks.
+    let face_on = surface.specular_color.map(|c| c * 0.04);
+    assert!(face_on.iter().zip([0.2, 0.1, 0.0]).all(|(a, b)| (a - b).abs() < 1e-12));
+    assert_eq!((surface.metallic, glazed.alpha), (0.0, Alpha::Blend { factor: 0.25 }));
+    for (name, radiance) in [("lamp", [5.0, 4.0, 3.0]), ("old", [20.0, 10.0, 5.0])] {
+        let emission = of(name).emission.as_ref().expect("it shines");
+        assert_eq!((&emission.radiance, emission.two_sided), (&Paint::Plain(radiance), true));
+    }
+    assert!(["matte", "glazed", "dim", "bad"].iter().all(|name| of(name).emission.is_none()));
 }

@@ -7,6 +7,7 @@ use std::f64::consts::FRAC_PI_4;
 use std::path::Path;
 
 use etendue_geometry::glam::DVec3;
+use etendue_tracer::spec::BRIGHTEST;
 use etendue_tracer::{Light, LightKind};
 use serde::Deserialize;
 use serde_json::Value;
@@ -75,8 +76,9 @@ pub(super) fn placed(
         .map_err(|error| damaged(path, place(), format!("the light is damaged: {error}")))?;
     let color = written.color.map(|c| c * written.intensity);
     let named = written.name.clone().unwrap_or_else(place);
-    if !color.iter().all(|c| c.is_finite() && *c >= 0.0) {
-        let message = "its colour or intensity is below zero or not finite; it is left out";
+    if !color.iter().all(|c| (0.0..=BRIGHTEST).contains(c)) {
+        let message =
+            "its colour or intensity is below zero, not finite or above 1e30; it is left out";
         note::push(notes, Note::new(NoteKind::NotFinite, named, message));
         return Ok(None);
     }
@@ -94,8 +96,13 @@ pub(super) fn placed(
             cos_outer: cone.outer_cone_angle.cos(),
             cos_inner: cone.inner_cone_angle.min(cone.outer_cone_angle).cos(),
         },
+        ("spot", None) => {
+            let reason = "a spot light without `spot`, its cones; export the file again";
+            return Err(damaged(path, place(), reason));
+        }
         (other, _) => {
-            let reason = format!("a light of type \"{other}\" is none that the extension knows");
+            let reason =
+                format!("a light of type \"{other}\" is none of `point`, `spot` and `directional`");
             return Err(damaged(path, place(), reason));
         }
     };

@@ -4,6 +4,7 @@
 //! none gets one more at the end.
 
 use etendue_tracer::material::{Alpha, GltfSurface, NormalMap, Occlusion};
+use etendue_tracer::spec::BRIGHTEST;
 use etendue_tracer::texture::{Encoding, Filter, Wrap};
 use etendue_tracer::{Emission, ImageSource, Material, Paint, Scattering, Texture, TextureUse};
 use gltf::json;
@@ -38,23 +39,84 @@ pub(super) fn number(
 /// Reads the document's materials into `import`, and the nameless one behind them.
 pub(super) fn load(reader: &Reader<'_>, import: &mut Import) -> Result<(), ImportError> {
     let mut images = Images { reader, of_texture: vec![None; reader.document.root.textures.len()] };
-    for material in &reader.document.root.materials {
-        let material = read(&mut images, material, import)?;
+    for (index, material) in reader.document.root.materials.iter().enumerate() {
+        let named = material.name.clone().filter(|name| !name.is_empty());
+        let subject = named.unwrap_or_else(|| format!("materials[{index}]"));
+        let material = read(&mut images, &mut Judge { reader, subject }, material, import)?;
         import.materials.push(material);
     }
     import.materials.push(Material::unnamed());
     Ok(())
 }
 
+/// What becomes of numbers that no surface can have.
+struct Judge<'a> {
+    reader: &'a Reader<'a>,
+    /// What the material is called in messages.
+    subject: String,
+}
+
+impl Judge<'_> {
+    /// Says that the material's `what` is wrong and what is done about it; refused when strict.
+    fn say(&self, what: &str, remedy: &str, import: &mut Import) -> Result<(), ImportError> {
+        if self.reader.options.strictness == Strictness::Strict {
+            let place = format!("material \"{}\"", self.subject);
+            return Err(self.reader.damaged(place, format!("its {what}; export it again")));
+        }
+        let message = format!("its {what}; {remedy}");
+        note::push(&mut import.notes, Note::new(NoteKind::Irregular, &self.subject, message));
+        Ok(())
+    }
+
+    /// A factor brought to `low..=high`.
+    fn factor(
+        &self,
+        key: &str,
+        value: f64,
+        [low, high]: [f64; 2],
+        import: &mut Import,
+    ) -> Result<f64, ImportError> {
+        if !(low..=high).contains(&value) {
+            let what = match high {
+                f64::INFINITY => format!("{key} {value} is below {low}"),
+                _ => format!("{key} {value} is outside {low} to {high}"),
+            };
+            self.say(&what, "it is brought there", import)?;
+        }
+        Ok(if value.is_nan() { low } else { value.clamp(low, high) })
+    }
+
+    /// The number that an extension of the material gives; `None` without one.
+    fn number(
+        &self,
+        material: &json::Material,
+        name: &str,
+        key: &str,
+        import: &mut Import,
+    ) -> Result<Option<f64>, ImportError> {
+        let extension = material.extensions.as_ref().and_then(|e| e.others.get(name));
+        let Some(extension) = extension else { return Ok(None) };
+        let value = match (extension.is_object(), extension.get(key)) {
+            (true, None) => return Ok(None),
+            (_, value) => value.and_then(Value::as_f64),
+        };
+        if value.is_none() {
+            self.say(&format!("{name}.{key} is not a number"), "it is left out", import)?;
+        }
+        Ok(value)
+    }
+}
+
 fn read(
     images: &mut Images<'_>,
+    judge: &mut Judge<'_>,
     material: &json::Material,
     import: &mut Import,
 ) -> Result<Material, ImportError> {
     let name = material.name.clone().unwrap_or_default();
     let surface = &material.pbr_metallic_roughness;
     let [red, green, blue, alpha] = surface.base_color_factor.0.map(f64::from);
-    let factor = reflectance(images.reader, [red, green, blue], &name, import)?;
+    let factor = reflectance(judge, [red, green, blue], import)?;
     let image = match &surface.base_color_texture {
         Some(info) if images.reader.wanted.textures => {
             images.use_of(info.index.value(), info, Encoding::Srgb, import)?
@@ -73,10 +135,14 @@ fn read(
                 Alpha::Mask { factor: alpha, cutoff: cutoff.map_or(0.5, |c| f64::from(c.0)) }
             }
             (Checked::Valid(AlphaMode::Blend), _) => Alpha::Blend { factor: alpha },
-            _ => Alpha::Opaque,
+            (Checked::Valid(AlphaMode::Opaque), _) => Alpha::Opaque,
+            (Checked::Invalid, _) => {
+                judge.say("alphaMode is none that glTF knows", "it is opaque", import)?;
+                Alpha::Opaque
+            }
         };
-        read.scattering = scattering(images, material, import)?;
-        read.emission = emission(images, material, import)?;
+        read.scattering = scattering(images, judge, material, import)?;
+        read.emission = emission(images, judge, material, import)?;
         read.normal_map = match &material.normal_texture {
             Some(normal) => {
                 let moved = normal.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));
@@ -101,24 +167,20 @@ fn read(
 
 /// A base colour brought to what a surface can reflect, with a note; refused when strict.
 fn reflectance(
-    reader: &Reader<'_>,
+    judge: &Judge<'_>,
     factor: [f64; 3],
-    name: &str,
     import: &mut Import,
 ) -> Result<[f64; 3], ImportError> {
-    if factor.iter().all(|c| (0.0..=1.0).contains(c)) {
-        return Ok(factor);
+    if !factor.iter().all(|c| (0.0..=1.0).contains(c)) {
+        let what = format!("base colour {factor:?} is outside 0 to 1");
+        judge.say(&what, "it is brought there", import)?;
     }
-    if reader.options.strictness == Strictness::Strict {
-        let reason = format!("its base colour {factor:?} is outside 0 to 1");
-        return Err(reader.damaged(format!("material \"{name}\""), reason));
-    }
-    let message = "its base colour is outside 0 to 1; it is brought there";
-    note::push(&mut import.notes, Note::new(NoteKind::Irregular, name, message));
     Ok(factor.map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, 1.0) }))
 }
 
 const TRANSFORM: &str = "KHR_texture_transform";
+const SPECULAR: &str = "KHR_materials_specular";
+const TRANSMISSION: &str = "KHR_materials_transmission";
 
 /// A texture's use in the words of the base colour's, whose type the document has no second time.
 fn info_of(
@@ -137,6 +199,7 @@ fn info_of(
 /// The metallic-roughness surface and the extensions that change it.
 fn scattering(
     images: &mut Images<'_>,
+    judge: &Judge<'_>,
     material: &json::Material,
     import: &mut Import,
 ) -> Result<Scattering, ImportError> {
@@ -145,60 +208,76 @@ fn scattering(
         return Ok(Scattering::Unlit);
     }
     let surface = &material.pbr_metallic_roughness;
-    let number = |name: &str, key: &str, default: f64| {
-        let value = extension(name).and_then(|e| e.get(key)).and_then(Value::as_f64);
-        value.filter(|v| v.is_finite() && *v >= 0.0).unwrap_or(default)
-    };
     let texture = |name: &str, key: &str| {
         let value = extension(name)?.get(key)?;
         json::texture::Info::deserialize(value).ok()
     };
+    const SHARE: [f64; 2] = [0.0, 1.0];
+    let metallic = f64::from(surface.metallic_factor.0);
+    let roughness = f64::from(surface.roughness_factor.0);
+    let ior = judge.number(material, "KHR_materials_ior", "ior", import)?.unwrap_or(1.5);
+    let strength = judge.number(material, SPECULAR, "specularFactor", import)?.unwrap_or(1.0);
+    let passes = judge.number(material, TRANSMISSION, "transmissionFactor", import)?.unwrap_or(0.0);
     let mut read = GltfSurface {
-        metallic: f64::from(surface.metallic_factor.0),
-        roughness: f64::from(surface.roughness_factor.0),
+        metallic: judge.factor("metallicFactor", metallic, SHARE, import)?,
+        roughness: judge.factor("roughnessFactor", roughness, SHARE, import)?,
+        // An index of 0 stands for a reflectance of 1 in the extension; glass of 10¹⁵ reflects as
+        // much.
+        ior: match ior {
+            0.0 => 1e15,
+            ior => judge.factor("ior", ior, [1.0, f64::INFINITY], import)?.min(1e15),
+        },
+        specular: judge.factor("specularFactor", strength, SHARE, import)?,
+        transmission: judge.factor("transmissionFactor", passes, SHARE, import)?,
         ..GltfSurface::default()
     };
+    if let Some(color) = extension(SPECULAR).and_then(|e| e.get("specularColorFactor")) {
+        read.specular_color = specular_color(judge, color, import)?;
+    }
     let mut placed = |info: Option<&json::texture::Info>, encoding| match info {
         Some(info) => images.use_of(info.index.value(), info, encoding, import),
         None => Ok(None),
     };
     read.metallic_roughness =
         placed(surface.metallic_roughness_texture.as_ref(), Encoding::Linear)?;
-    // An index of 0 stands for a reflectance of 1 in the extension; glass of 10¹⁵ reflects as much.
-    read.ior = match number("KHR_materials_ior", "ior", 1.5) {
-        0.0 => 1e15,
-        ior => ior.max(1.0),
-    };
-    let specular = "KHR_materials_specular";
-    read.specular = number(specular, "specularFactor", 1.0).min(1.0);
-    let color = extension(specular).and_then(|e| e.get("specularColorFactor"));
-    if let Some(color) = color.and_then(|c| <[f64; 3]>::deserialize(c).ok()) {
-        read.specular_color = color.map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 });
-    }
-    let info = texture(specular, "specularTexture");
+    let info = texture(SPECULAR, "specularTexture");
     read.specular_texture = placed(info.as_ref(), Encoding::Linear)?;
-    let info = texture(specular, "specularColorTexture");
+    let info = texture(SPECULAR, "specularColorTexture");
     read.specular_color_texture = placed(info.as_ref(), Encoding::Srgb)?;
-    let transmission = "KHR_materials_transmission";
-    read.transmission = number(transmission, "transmissionFactor", 0.0).min(1.0);
-    let info = texture(transmission, "transmissionTexture");
+    let info = texture(TRANSMISSION, "transmissionTexture");
     read.transmission_texture = placed(info.as_ref(), Encoding::Linear)?;
     Ok(Scattering::Gltf(Box::new(read)))
 }
 
+/// The tint of the reflection face on: anything from 0.
+fn specular_color(
+    judge: &Judge<'_>,
+    written: &Value,
+    import: &mut Import,
+) -> Result<[f64; 3], ImportError> {
+    let color = <[f64; 3]>::deserialize(written).ok();
+    let color = color.filter(|color| color.iter().all(|c| c.is_finite() && *c >= 0.0));
+    if color.is_none() {
+        judge.say("specularColorFactor is not three numbers from 0", "it is left out", import)?;
+    }
+    Ok(color.unwrap_or([1.0; 3]))
+}
+
 fn emission(
     images: &mut Images<'_>,
+    judge: &Judge<'_>,
     material: &json::Material,
     import: &mut Import,
 ) -> Result<Option<Emission>, ImportError> {
     let factor = material.emissive_factor.0.map(f64::from);
-    if !factor.iter().all(|c| c.is_finite() && *c >= 0.0) {
-        let subject = material.name.clone().unwrap_or_default();
-        let message = "its emissive factor is below zero or not finite; it does not shine";
-        note::push(&mut import.notes, Note::new(NoteKind::NotFinite, subject, message));
+    if factor == [0.0; 3] {
         return Ok(None);
     }
-    if factor == [0.0; 3] {
+    let name = "KHR_materials_emissive_strength";
+    let strength = judge.number(material, name, "emissiveStrength", import)?.unwrap_or(1.0);
+    if !factor.iter().all(|c| *c >= 0.0 && (0.0..=BRIGHTEST).contains(&(c * strength))) {
+        let what = format!("emission is below zero, not finite or above {BRIGHTEST:e}");
+        judge.say(&what, "it does not shine", import)?;
         return Ok(None);
     }
     let image = match &material.emissive_texture {
@@ -209,10 +288,6 @@ fn emission(
         Some(image) => Paint::Image { factor, image },
         None => Paint::Plain(factor),
     };
-    let name = "KHR_materials_emissive_strength";
-    let strength = material.extensions.as_ref().and_then(|e| e.others.get(name));
-    let strength = strength.and_then(|e| e.get("emissiveStrength")).and_then(Value::as_f64);
-    let strength = strength.filter(|s| s.is_finite() && *s >= 0.0).unwrap_or(1.0);
     Ok(Some(Emission { radiance, strength, illuminant: None, two_sided: true }))
 }
 
@@ -273,7 +348,16 @@ impl Images<'_> {
         };
         let number = u32::try_from(import.textures.len())
             .map_err(|_| reader.damaged(place(), "there are more than 32 bits can count"))?;
-        let sampler = texture.sampler.and_then(|sampler| root.samplers.get(sampler.value()));
+        let sampler = match texture.sampler {
+            Some(index) => Some(root.samplers.get(index.value()).ok_or_else(|| {
+                let number = index.value();
+                reader.damaged(
+                    place(),
+                    format!("there is no sampler {number}; export the file again"),
+                )
+            })?),
+            None => None,
+        };
         import.textures.push(Texture {
             name: label(texture, image, index),
             source,

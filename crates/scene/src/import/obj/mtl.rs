@@ -10,6 +10,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use etendue_tracer::material::{Alpha, GltfSurface};
+use etendue_tracer::spec::BRIGHTEST;
 use etendue_tracer::texture::{Encoding, Filter, Wrap};
 use etendue_tracer::{
     Emission, ImageSource, Ior, Material, Paint, Scattering, Texture, TextureUse,
@@ -262,11 +263,9 @@ fn nearest(material: &tobj::Material, plain: Material) -> Material {
         illuminant: None,
         two_sided: true,
     };
-    let words = material.unknown_param.get("Ke").map(String::as_str).unwrap_or_default();
-    let numbers: Vec<f64> = words.split_whitespace().filter_map(|w| w.parse().ok()).collect();
-    let own = <[f64; 3]>::try_from(numbers).ok().filter(|color| !dark(*color));
+    let own = material.emissive.filter(|color| !dark(*color));
     let ambient = material.ambient.filter(|color| color.iter().any(|v| *v > 1.0));
-    let sound = |color: &[f64; 3]| color.iter().all(|v| v.is_finite() && *v >= 0.0);
+    let sound = |color: &[f64; 3]| color.iter().all(|v| (0.0..=BRIGHTEST).contains(v));
     read.emission = own.or(ambient).filter(sound).map(shines);
     read
 }

@@ -1,0 +1,108 @@
+//! How lights are chosen: what would sparkle by chance alone does not.
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use etendue_accel::BuildOptions;
+use etendue_render::output::{Outputs, Values};
+use etendue_render::{Images, Plan, build, plan, render};
+use etendue_scene::LoadOptions;
+use etendue_scene::file::SceneFile;
+
+/// The red of all pixels of the scene `text` in `folder`.
+fn picture(folder: &Path, text: &str) -> Vec<f64> {
+    let path = folder.join("scene.json");
+    std::fs::write(&path, text).unwrap();
+    let file = SceneFile::read(&path, &[]).unwrap();
+    let wanted = plan::wanted(&file.spec.all_layers());
+    let scene = file.load(wanted, &LoadOptions::default()).unwrap();
+    let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
+    let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
+    let images = Images::decode(&scene, &plan);
+    assert!(images.faults.is_empty(), "{:?}", images.faults);
+    let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_| true).unwrap();
+    match &done.picture.layers()[0].channels[0].values {
+        Values::F32(values) => values.iter().map(|&v| f64::from(v)).collect(),
+        other => panic!("a picture is f32: {other:?}"),
+    }
+}
+
+/// A sky of 64 × 32 pixels, black but for one: E = L Ω cos θ on a plane, of which 16 samples a pixel
+/// give every pixel to a few tenths. Directions chosen alike from all sides would meet the pixel with
+/// one sample in 1300.
+#[test]
+fn a_small_sun_in_an_image_lights_without_noise() {
+    let folder = tempfile::tempdir().unwrap();
+    let (columns, rows, sun) = (64_u32, 32_u32, [40_u32, 7_u32]);
+    let radiance = |x: u32, y: u32| if [x, y] == sun { 1e4_f32 } else { 0.0 };
+    let sky = image::Rgb32FImage::from_fn(columns, rows, |x, y| image::Rgb([radiance(x, y); 3]));
+    image::DynamicImage::from(sky).save(folder.path().join("sky.hdr")).unwrap();
+    exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 64, 32, |x, y| {
+        let value = radiance(u32::try_from(x).unwrap(), u32::try_from(y).unwrap());
+        (value, value, value)
+    })
+    .unwrap();
+    // The pixel's solid angle times the cosine to +Y, integrated: Δφ ½ (sin² θ₁ − sin² θ₀), θ from
+    // the top.
+    let theta = |row: u32| PI * f64::from(row) / f64::from(rows);
+    let width = 2.0 * PI / f64::from(columns);
+    let above = 0.5 * width * (theta(sun[1] + 1).sin().powi(2) - theta(sun[1]).sin().powi(2));
+    let known = 0.5 / PI * 1e4 * above;
+    for (file, rotate) in [("sky.hdr", 0), ("sky.exr", 0), ("sky.exr", 77)] {
+        let pixels = picture(
+            folder.path(),
+            &format!(
+                r#"{{"etendue": 1, "tracer": {{"type": "path"}}, "render": {{"samples": 16}},
+                "camera": {{"type": "orthographic", "height": 1, "sensor": {{"resolution": [8, 8]}},
+                    "pose": {{"from": [0, 5, 0], "look_at": [0, 0, 0], "up": [0, 0, -1]}}}},
+                "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "m",
+                              "transform": {{"rotate": [1, 0, 0, -90]}}}}],
+                "materials": {{"m": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}},
+                "lights": [{{"type": "environment", "image": "{file}", "rotate": {rotate}}}]}}"#
+            ),
+        );
+        let n = pixels.len() as f64;
+        let mean = pixels.iter().sum::<f64>() / n;
+        // Bilinear lookups smear the one pixel over its neighbours: the mean cosine moves by less
+        // than two hundredths.
+        assert!((mean / known - 1.0).abs() < 0.02, "{file}: {mean} is not {known}");
+        // A lookup between texels is not the texel's own chance: samples differ by 1.04 of their mean
+        // (the square of the interpolation over its mean in each cell, summed: 2.09), means of 16 by
+        // 0.26, which 64 pixels show to a tenth.
+        let square = pixels.iter().map(|p| (p / mean - 1.0).powi(2)).sum::<f64>() / n;
+        assert!(square.sqrt() < 0.35, "{file}: pixels differ by {}", square.sqrt());
+    }
+}
+
+/// Before a small lamp a glossy plane shows its highlight: light that is chosen by the lamp or by the
+/// plane alone sparkles at one end of the roughnesses. By the power heuristic each of the two gives a
+/// sample of no more than the lamp's radiance times the share that the plane returns.
+#[test]
+fn no_highlight_is_brighter_than_the_lamp_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    for roughness in [0.03, 0.1, 0.3, 0.7] {
+        for size in [0.01, 0.3, 3.0] {
+            let pixels = picture(
+                folder.path(),
+                &format!(
+                    r#"{{"etendue": 1, "tracer": {{"type": "path"}}, "render": {{"samples": 1}},
+                    "camera": {{"type": "pinhole", "fov": 40, "sensor": {{"resolution": [64, 64]}},
+                        "pose": {{"from": [0, 2, 3], "look_at": [0, 0, 0]}}}},
+                    "objects": [
+                        {{"shape": "rectangle", "width": 9, "height": 9, "material": "m",
+                          "transform": {{"rotate": [1, 0, 0, -90]}}}},
+                        {{"shape": "rectangle", "width": {size}, "height": {size},
+                          "material": "lamp", "transform": {{"translate": [0, 2, -3]}}}}],
+                    "materials": {{"m": {{"type": "metal", "color": [1, 1, 1],
+                                          "roughness": {roughness}}},
+                        "lamp": {{"type": "emissive", "radiance": [100, 100, 100]}}}},
+                    "lights": []}}"#
+                ),
+            );
+            let most = pixels.iter().copied().fold(0.0, f64::max);
+            // Twice: by the lamp and by the plane, in the same sample.
+            assert!(most <= 200.0, "roughness {roughness}, lamp {size}: {most}");
+            assert!(most > 0.0, "the lamp shines");
+        }
+    }
+}
