@@ -1,12 +1,13 @@
 //! What can be asked for on the command line.
 
+mod parse;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use etendue_camera::train::Focus;
 use etendue_scene::import::Strictness;
 use etendue_scene::{LoadOptions, Reach};
-use etendue_tracer::LayerSpec;
 
 use crate::lens::parse_focus;
 
@@ -171,7 +172,7 @@ pub(crate) struct SceneArguments {
     #[arg(
         long = "set",
         value_name = "PATH=VALUE",
-        value_parser = parse_setting,
+        value_parser = parse::setting,
         help = "Set any value of the scene, e.g. camera.fov=30 or objects[0].transform.scale=2"
     )]
     pub(crate) settings: Vec<(String, String)>,
@@ -183,7 +184,7 @@ pub(crate) struct SceneArguments {
         long,
         value_name = "LIST",
         value_delimiter = ',',
-        value_parser = parse_layer,
+        value_parser = parse::layer,
         help = "Layers to write: depth, distance, normal, position, ids, coverage, flat, facing, \
                 albedo, uv, material_id"
     )]
@@ -244,7 +245,7 @@ pub(crate) struct RenderArguments {
     #[arg(long, value_name = "LIST", default_value = "exr,png,npy,dng")]
     pub(crate) outputs: String,
     /// Threads of build and render; 0 takes all that this process may use
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse::threads)]
     pub(crate) threads: usize,
     /// How carefully Embree looks; the other accelerators always are robust
     #[arg(long, value_enum, default_value_t = AccelMode::Robust)]
@@ -253,7 +254,7 @@ pub(crate) struct RenderArguments {
     #[arg(long, value_name = "NAME")]
     pub(crate) isa: Option<String>,
     /// Stop a build whose structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
-    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(crate) memory_limit: Option<u64>,
     /// Write times, rays, memory and fingerprints as JSON
     #[arg(long, value_name = "FILE")]
@@ -287,26 +288,26 @@ pub(crate) struct BenchArguments {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     pub(crate) only: Vec<PartArgument>,
     /// Times that everything is built and timed [default: 5, quick 3]
-    #[arg(long, value_name = "N", value_parser = parse_rounds)]
+    #[arg(long, value_name = "N", value_parser = parse::rounds)]
     pub(crate) rounds: Option<usize>,
     /// The most rays to trace, in whole tiles of the picture [default: 524288, quick 65536]
-    #[arg(long, value_name = "N", value_parser = parse_rays)]
+    #[arg(long, value_name = "N", value_parser = parse::rays)]
     pub(crate) rays: Option<usize>,
     /// Batch widths in rays [default: 16,64,256,1024, quick 64,256]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_batch)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::batch)]
     pub(crate) batches: Option<Vec<usize>>,
     /// Numbers of threads [default: 1, 2, 4 … all, quick 1 and all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_some_threads)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::some_threads)]
     pub(crate) threads: Option<Vec<usize>>,
     /// Samples a pixel to compare [default: 1,4,16,64,256, quick 1,4,16,64]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_samples)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::samples)]
     pub(crate) sample_counts: Option<Vec<u32>>,
     /// About how long samplers and cameras may take, each; pixels are made larger until they do
     /// [default: 60, quick 10]
-    #[arg(long, value_name = "S", value_parser = parse_seconds)]
+    #[arg(long, value_name = "S", value_parser = parse::seconds)]
     pub(crate) seconds: Option<f64>,
     /// Stop when a structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
-    #[arg(long, value_name = "BYTES", value_parser = parse_bytes)]
+    #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(crate) memory_limit: Option<u64>,
     /// Show no progress and no list of files; the table and errors remain
     #[arg(short, long)]
@@ -339,7 +340,7 @@ pub(crate) struct SensorArguments {
     #[arg(
         long = "set",
         value_name = "PATH=VALUE",
-        value_parser = parse_setting,
+        value_parser = parse::setting,
         help = "Set any value of the file, e.g. read_noise=3, or camera.sensor.read_noise=3 of a scene"
     )]
     pub(crate) settings: Vec<(String, String)>,
@@ -350,7 +351,7 @@ pub(crate) struct SensorArguments {
     #[arg(long, value_name = "OUT", requires = "sensor", conflicts_with = "output")]
     pub(crate) emva: Option<PathBuf>,
     /// Wavelength of the light (nm) [default: where the sensor sees best; 525 with --emva]
-    #[arg(long, value_name = "NM", requires = "sensor", allow_negative_numbers = true, value_parser = parse_wavelength)]
+    #[arg(long, value_name = "NM", requires = "sensor", allow_negative_numbers = true, value_parser = parse::wavelength)]
     pub(crate) wavelength: Option<f64>,
     /// Exposure times of the series, 20 or more
     #[arg(long, value_name = "N", default_value_t = 25, requires = "emva")]
@@ -401,97 +402,4 @@ impl SceneArguments {
         }
         overrides
     }
-}
-
-fn parse_setting(text: &str) -> Result<(String, String), String> {
-    match text.split_once('=') {
-        Some((path, value)) if !path.trim().is_empty() => {
-            Ok((path.trim().to_owned(), value.to_owned()))
-        }
-        _ => Err("expected PATH=VALUE, such as camera.fov=30".to_owned()),
-    }
-}
-
-fn parse_wavelength(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(nanometres) if nanometres > 0.0 && f64::is_finite(nanometres) => Ok(nanometres),
-        _ => Err("expected nanometres, such as 525".to_owned()),
-    }
-}
-
-fn parse_layer(name: &str) -> Result<String, String> {
-    match LayerSpec::from_name(name) {
-        Some(_) => Ok(name.to_owned()),
-        None => Err(format!("known layers: {}", LayerSpec::NAMES.join(", "))),
-    }
-}
-
-/// More threads than any machine has cores only make a machine unusable.
-const MOST_THREADS: usize = 1024;
-
-fn parse_threads(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(threads) if threads <= MOST_THREADS => Ok(threads),
-        _ => Err(format!("expected a whole number from 0 to {MOST_THREADS}")),
-    }
-}
-
-fn parse_some_threads(text: &str) -> Result<usize, String> {
-    parse_count(text, MOST_THREADS)
-}
-
-fn parse_rounds(text: &str) -> Result<usize, String> {
-    parse_count(text, 1000)
-}
-
-fn parse_rays(text: &str) -> Result<usize, String> {
-    parse_count(text, 1 << 30)
-}
-
-fn parse_samples(text: &str) -> Result<u32, String> {
-    // The converged picture has sixteen times as many.
-    let count = parse_count(text, 1 << 16)?;
-    u32::try_from(count).map_err(|error| error.to_string())
-}
-
-fn parse_seconds(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(seconds) if seconds > 0.0 && f64::is_finite(seconds) => Ok(seconds),
-        _ => Err("expected seconds, such as 60".to_owned()),
-    }
-}
-
-fn parse_batch(text: &str) -> Result<usize, String> {
-    parse_count(text, 1 << 16)
-}
-
-fn parse_count(text: &str, most: usize) -> Result<usize, String> {
-    match text.trim().parse() {
-        Ok(count) if (1..=most).contains(&count) => Ok(count),
-        _ => Err(format!("expected a whole number from 1 to {most}")),
-    }
-}
-
-fn parse_bytes(text: &str) -> Result<u64, String> {
-    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
-    let shift = match text[digits.len()..].to_ascii_uppercase().trim_end_matches("IB") {
-        "" | "B" => 0,
-        "K" | "KB" => 10,
-        "M" | "MB" => 20,
-        "G" | "GB" => 30,
-        "T" | "TB" => 40,
-        unit => return Err(format!("unknown unit \"{unit}\"; known: K, M, G, T")),
-    };
-    let number: f64 =
-        digits.trim().parse().map_err(|_| "expected a number of bytes, such as 4G")?;
-    let bytes = number * f64::from(2u32).powi(shift);
-    if !(0.0..=9e18).contains(&bytes) {
-        return Err("not a number of bytes".to_owned());
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "in range, and a fraction of a byte does not matter"
-    )]
-    Ok(bytes as u64)
 }

@@ -196,26 +196,8 @@ impl Plan {
         for (what, choice, because) in self.explain_textures(scene, needs) {
             decide(what, choice, because);
         }
-        decide(
-            "build quality",
-            match self.quality {
-                Quality::Low => "low",
-                Quality::Medium => "medium",
-                Quality::High => "high",
-            },
-            match self.quality {
-                Quality::Low => format!(
-                    "{} rays over {triangles} triangles: under {RAYS_PER_TRIANGLE} a triangle, a \
-                     better structure would not pay for its build",
-                    self.rays
-                ),
-                _ => format!(
-                    "{} rays over {triangles} triangles: {RAYS_PER_TRIANGLE} a triangle or more \
-                     pay for a better structure",
-                    self.rays
-                ),
-            },
-        );
+        let (choice, because) = self.explain_quality(triangles);
+        decide("build quality", choice, because);
         decide(
             "data layers",
             if self.precision == Precision::Single { "32 bits" } else { "64 bits" },
@@ -226,6 +208,19 @@ impl Plan {
             ),
         );
         decisions
+    }
+
+    fn explain_quality(&self, triangles: u64) -> (&'static str, String) {
+        let what = format!("{} rays over {triangles} triangles:", self.rays);
+        let pays = format!("{RAYS_PER_TRIANGLE} a triangle or more pay for a better structure");
+        match self.quality {
+            Quality::Low => {
+                let less = format!("under {RAYS_PER_TRIANGLE} a triangle, a better structure");
+                ("low", format!("{what} {less} would not pay for its build"))
+            }
+            Quality::Medium => ("medium", format!("{what} {pays}")),
+            Quality::High => ("high", format!("{what} {pays}")),
+        }
     }
 
     /// What is read of materials, and how images are looked up.

@@ -1,0 +1,96 @@
+//! Values of arguments from their words, or what would have been one.
+
+use etendue_tracer::LayerSpec;
+
+/// More threads than any machine has cores only make a machine unusable.
+const MOST_THREADS: usize = 1024;
+
+pub(super) fn setting(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((path, value)) if !path.trim().is_empty() => {
+            Ok((path.trim().to_owned(), value.to_owned()))
+        }
+        _ => Err("expected PATH=VALUE, such as camera.fov=30".to_owned()),
+    }
+}
+
+pub(super) fn wavelength(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(nanometres) if nanometres > 0.0 && f64::is_finite(nanometres) => Ok(nanometres),
+        _ => Err("expected nanometres, such as 525".to_owned()),
+    }
+}
+
+pub(super) fn layer(name: &str) -> Result<String, String> {
+    match LayerSpec::from_name(name) {
+        Some(_) => Ok(name.to_owned()),
+        None => Err(format!("known layers: {}", LayerSpec::NAMES.join(", "))),
+    }
+}
+
+pub(super) fn threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(threads) if threads <= MOST_THREADS => Ok(threads),
+        _ => Err(format!("expected a whole number from 0 to {MOST_THREADS}")),
+    }
+}
+
+pub(super) fn some_threads(text: &str) -> Result<usize, String> {
+    count(text, MOST_THREADS)
+}
+
+pub(super) fn rounds(text: &str) -> Result<usize, String> {
+    count(text, 1000)
+}
+
+pub(super) fn rays(text: &str) -> Result<usize, String> {
+    count(text, 1 << 30)
+}
+
+pub(super) fn samples(text: &str) -> Result<u32, String> {
+    // The converged picture has sixteen times as many.
+    let count = count(text, 1 << 16)?;
+    u32::try_from(count).map_err(|error| error.to_string())
+}
+
+pub(super) fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if seconds > 0.0 && f64::is_finite(seconds) => Ok(seconds),
+        _ => Err("expected seconds, such as 60".to_owned()),
+    }
+}
+
+pub(super) fn batch(text: &str) -> Result<usize, String> {
+    count(text, 1 << 16)
+}
+
+fn count(text: &str, most: usize) -> Result<usize, String> {
+    match text.trim().parse() {
+        Ok(count) if (1..=most).contains(&count) => Ok(count),
+        _ => Err(format!("expected a whole number from 1 to {most}")),
+    }
+}
+
+pub(super) fn bytes(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let shift = match text[digits.len()..].to_ascii_uppercase().trim_end_matches("IB") {
+        "" | "B" => 0,
+        "K" | "KB" => 10,
+        "M" | "MB" => 20,
+        "G" | "GB" => 30,
+        "T" | "TB" => 40,
+        unit => return Err(format!("unknown unit \"{unit}\"; known: K, M, G, T")),
+    };
+    let number: f64 =
+        digits.trim().parse().map_err(|_| "expected a number of bytes, such as 4G")?;
+    let bytes = number * f64::from(2u32).powi(shift);
+    if !(0.0..=9e18).contains(&bytes) {
+        return Err("not a number of bytes".to_owned());
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "in range, and a fraction of a byte does not matter"
+    )]
+    Ok(bytes as u64)
+}

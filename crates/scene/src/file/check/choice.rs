@@ -1,0 +1,136 @@
+//! Which of several things a value is meant to be, and the message when it is none.
+
+use serde_json::{Map, Value};
+
+use super::{Checker, Outcome, join, problem, show, suggest, words_for};
+
+impl<'a> Checker<'a> {
+    /// Goes on in the branch that was meant: by tag, by the kind of value, or by the keys.
+    pub(super) fn choose(&self, branches: &'a [Value], value: &Value, path: &str) -> Outcome {
+        let branches: Vec<&Value> = branches.iter().map(|branch| self.resolve(branch)).collect();
+        let fitting: Vec<&Value> =
+            branches.iter().copied().filter(|branch| self.may_be(branch, value)).collect();
+        let considered = if fitting.is_empty() { &branches } else { &fitting };
+        let words: Vec<&Value> = considered.iter().filter_map(|b| b.get("const")).collect();
+        if words.len() == considered.len() {
+            return Self::no_such_word(&words, value, path);
+        }
+        match (&fitting[..], value) {
+            ([], _) => {
+                let kinds: Vec<&str> = branches.iter().flat_map(|b| self.kinds(b)).collect();
+                let reason = format!("expected {}, found {}", words_for(&kinds), show(value));
+                problem(path, reason)
+            }
+            ([branch], _) => self.visit(branch, value, path),
+            (objects, Value::Object(members)) => self.choose_object(objects, members, path),
+            (several, _) => {
+                // Same kind, different contents: right when one of them allows it.
+                let mut first = Ok(());
+                for branch in several {
+                    match self.visit(branch, value, path) {
+                        Ok(()) => return Ok(()),
+                        fault if first.is_ok() => first = fault,
+                        _ => {}
+                    }
+                }
+                first
+            }
+        }
+    }
+
+    fn choose_object(
+        &self,
+        branches: &[&'a Value],
+        members: &Map<String, Value>,
+        path: &str,
+    ) -> Outcome {
+        let tag_of = |branch: &'a Value| {
+            let properties = branch.get("properties").and_then(Value::as_object)?;
+            properties.iter().find_map(|(key, schema)| {
+                schema.get("const").and_then(Value::as_str).map(|word| (key.as_str(), word))
+            })
+        };
+        let tags: Vec<Option<(&str, &str)>> =
+            branches.iter().map(|branch| tag_of(branch)).collect();
+        for (branch, tag) in branches.iter().zip(&tags) {
+            if let Some((key, word)) = tag
+                && members.get(*key).and_then(Value::as_str) == Some(word)
+            {
+                return match branch.get("oneOf").and_then(Value::as_array) {
+                    // A choice within the choice, such as the shape of an aperture.
+                    Some(inner) => {
+                        let inner: Vec<&Value> = inner.iter().map(|b| self.resolve(b)).collect();
+                        self.choose_object(&inner, members, path)
+                    }
+                    None => self.object(branch, members, path),
+                };
+            }
+        }
+        let named = tags.iter().flatten().find(|(key, _)| members.contains_key(*key));
+        if let Some((key, _)) = named {
+            let words = tags.iter().flatten().filter(|(k, _)| k == key).map(|(_, word)| *word);
+            let given = &members[*key];
+            let known = suggest(given.as_str().unwrap_or_default(), words);
+            return problem(&join(path, key), format!("unknown {key} {}{known}", show(given)));
+        }
+        self.choose_by_keys(branches, &tags, members, path)
+    }
+
+    /// Where no tag was given: the branch with the most of these keys, and of them the one that lacks
+    /// the least.
+    fn choose_by_keys(
+        &self,
+        branches: &[&'a Value],
+        tags: &[Option<(&str, &str)>],
+        members: &Map<String, Value>,
+        path: &str,
+    ) -> Outcome {
+        let score = |branch: &Value| {
+            let has = |key: &String| branch.get("properties").and_then(|p| p.get(key)).is_some();
+            let required = branch.get("required").and_then(Value::as_array);
+            let lacking = required
+                .into_iter()
+                .flatten()
+                .filter_map(Value::as_str)
+                .filter(|key| !members.contains_key(*key))
+                .count();
+            (members.keys().filter(|key| has(key)).count(), std::cmp::Reverse(lacking))
+        };
+        let untagged = branches.iter().zip(tags).filter(|(_, tag)| tag.is_none());
+        let best = untagged.map(|(branch, _)| *branch).max_by_key(|branch| score(branch));
+        let keys: Vec<&str> = tags.iter().flatten().map(|(key, _)| *key).collect();
+        match (best, keys.first()) {
+            (Some(best), _) if score(best).1.0 == 0 || keys.is_empty() => {
+                self.object(best, members, path)
+            }
+            (_, Some(tag)) => problem(path, self.say_what_it_is(branches, tag)),
+            (best, None) => best.map_or(Ok(()), |best| self.object(best, members, path)),
+        }
+    }
+
+    /// That an object says not which of several things it is, with all ways to say so.
+    fn say_what_it_is(&self, branches: &[&'a Value], tag: &str) -> String {
+        let mut ways = Vec::new();
+        let mut words = Vec::new();
+        for branch in branches {
+            let word = branch.pointer(&format!("/properties/{tag}/const")).and_then(Value::as_str);
+            let required = branch.pointer("/required/0").and_then(Value::as_str);
+            match (word, required) {
+                (Some(word), _) => words.push(format!("`{word}`")),
+                (None, Some(key)) => ways.push(format!("`{key}`")),
+                _ => {}
+            }
+        }
+        ways.push(format!("`{tag}` (one of {})", words.join(", ")));
+        format!("says not what it is; give it {}", ways.join(" or "))
+    }
+
+    pub(super) fn no_such_word(words: &[&Value], value: &Value, path: &str) -> Outcome {
+        if words.contains(&value) {
+            return Ok(());
+        }
+        let known = words.iter().filter_map(|word| word.as_str());
+        let given = value.as_str().unwrap_or_default();
+        problem(path, format!("{} is not known here{}", show(value), suggest(given, known)))
+    }
+}
