@@ -82,7 +82,7 @@ impl Findings {
         let mut tables = Vec::new();
         if let Some(first) = self.accelerators.first() {
             let title = format!(
-                "Accelerators: {} rays of the camera, rounds: {}. Wrong are rays that miss, hit \
+                "Accelerators: {} rays, rounds: {}. Wrong are rays that miss, hit \
                  falsely, or hit another triangle elsewhere than `exact`.",
                 first.errors.rays, self.rounds
             );

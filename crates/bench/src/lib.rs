@@ -10,7 +10,7 @@
 //! |---|---|
 //! | [`rounds`] | who is timed when, and medians |
 //! | [`machine`] | what it was measured on, and the memory of a process |
-//! | [`rays`] | a camera's chief rays, in batches of any width |
+//! | [`rays`] | a camera's chief rays and what they scatter into, in batches of any width |
 //! | [`hits`] | how far hits are from the reference's |
 //! | [`accelerators`] | each accelerator × batch width × threads |
 //! | [`pictures`] | a scene's picture at any number of samples |

@@ -94,7 +94,8 @@ pictures against one of sixteen times the samples. Run it on a machine that does
 
 Examples:
   etendue bench scenes/first-light.json -o out/bench --quick
-  etendue bench model.glb -o out/bench --batches 64,256 --threads 1,8 --rays 1000000";
+  etendue bench model.glb -o out/bench --batches 64,256 --threads 1,8 --rays 1000000
+  etendue bench scenes/first-light.json -o out/bench --only accelerators --scattered";
 
 const SENSOR_HELP: &str = "\
 Without a sensor, lists the presets. With one, exposes frames of even light from a tenth of an
@@ -293,6 +294,9 @@ pub(crate) struct BenchArguments {
     /// The most rays to trace, in whole tiles of the picture [default: 524288, quick 65536]
     #[arg(long, value_name = "N", value_parser = parse::rays)]
     pub(crate) rays: Option<usize>,
+    /// Trace rays that scatter from what the camera sees, as paths go on, instead of the camera's own
+    #[arg(long)]
+    pub(crate) scattered: bool,
     /// Batch widths in rays [default: 16,64,256,1024, quick 64,256]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::batch)]
     pub(crate) batches: Option<Vec<usize>>,

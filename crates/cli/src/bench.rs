@@ -101,7 +101,19 @@ fn accelerators(
     findings: &mut Findings,
 ) -> Result<(), Fault> {
     let quick = usize::from(arguments.quick);
-    let rays = Rays::primary(&scene.camera, arguments.rays.unwrap_or(RAYS[quick]));
+    let mut rays = Rays::primary(&scene.camera, arguments.rays.unwrap_or(RAYS[quick]));
+    if arguments.scattered {
+        let options =
+            BuildOptions { memory_limit: arguments.memory_limit, ..BuildOptions::default() };
+        let accel = Method::Bvh.build(&scene.geometry, &options).map_err(BenchError::from)?;
+        rays = rays.scattered(&*accel);
+        if rays.is_empty() {
+            let why = "--scattered: the camera sees nothing that rays could scatter from";
+            return Err(Fault::refused(why));
+        }
+        let many = format!("Rays: {} scattered from what the camera sees", rays.len());
+        findings.scene.push(many);
+    }
     let effort = accelerators::Effort {
         methods: Method::all().to_vec(),
         widths: sorted(arguments.batches.as_deref().unwrap_or(BATCHES[quick])),

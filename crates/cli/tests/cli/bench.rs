@@ -59,6 +59,26 @@ fn a_quick_run_leaves_tables_and_charts() {
 }
 
 #[test]
+fn rays_scatter_from_what_the_camera_sees() {
+    let bench = Bench::with_scene(SCENE);
+    let words = ["bench", "scene.json", "-o", "out", "--quick", "--rounds", "1", "--scattered"];
+    let words = [&words[..], &["--only", "accelerators"]].concat();
+    let output = bench.run(&words);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = bench.json("out/bench.json");
+    let rows = found["accelerators"].as_array().unwrap();
+    let errors = &rows.iter().find(|row| row["method"] == "bvh").unwrap()["errors"];
+    let rays = errors["rays"].as_u64().unwrap();
+    assert!(0 < rays && rays < 48 * 32, "one from each pixel that sees something: {errors}");
+    let wrong = ["missed", "false_hits", "wrong_triangle"].map(|key| errors[key].as_u64());
+    assert_eq!(wrong, [Some(0); 3], "{errors}");
+    assert!(text(&output.stdout).contains(&format!("Rays: {rays} scattered")));
+    let nothing = bench.run(&[&words[..], &["--set", "objects=[]"]].concat());
+    assert_eq!(nothing.status.code(), Some(2));
+    assert!(text(&nothing.stderr).contains("sees nothing"), "{}", text(&nothing.stderr));
+}
+
+#[test]
 fn models_of_a_lens_are_compared_with_the_full_train() {
     let scene = r#"{"etendue": 1, "tracer": {"type": "facing"},
         "camera": {"type": "lens", "sensor_height": 24, "focus_distance": 2, "f_number": 2.8,
