@@ -123,6 +123,63 @@ fn the_cosine_law() {
     check("behind", 4, below, &sun, |_| (), 0.0, |_| 0.0);
 }
 
+/// A spot light of intensity I: I cos θ / (π d²) inside the inner cone, nothing outside of the cone, and
+/// between them the square of the share that the cosine has gone (KHR_lights_punctual).
+#[test]
+fn a_spot_light_by_its_cones() {
+    let pi = std::f64::consts::PI;
+    for (angle, share) in [(20.0_f64, 1.0), (50.0, 2.0), (70.0, 0.0)] {
+        let off = angle.to_radians().tan();
+        let cosine = angle.to_radians().cos();
+        let between = |degrees: f64| degrees.to_radians().cos();
+        let share = if share == 2.0 {
+            ((cosine - between(60.0)) / (between(40.0) - between(60.0))).powi(2)
+        } else {
+            share
+        };
+        let rest = format!(
+            r#""lights": [{{"type": "spot", "at": [{off}, 0, 1], "look_at": [{off}, 0, 0],
+                "intensity": [10, 10, 10], "cone": 60, "inner_cone": 40}}],
+            "objects": [{{"shape": "rectangle", "width": 10, "height": 10, "material": "m"}}],
+            "materials": {{"m": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}}"#
+        );
+        // d = 1 / cos θ. The patch is 1 mm wide, over which the square bends by a millionth.
+        let known = share * 0.5 * 10.0 * cosine.powi(3) / pi;
+        check("spot", 16, [[1.0, 0.5, 3.0], [0.0; 3]], &rest, |_| (), 1e-5, |_| known);
+    }
+}
+
+/// Radiance that is no number is left out and counted, and the picture has numbers only.
+#[test]
+fn what_is_not_finite_is_counted_and_left_out() {
+    for tracer in TRACERS {
+        let mut scene = load(&patch(
+            tracer,
+            4,
+            [0.0, 0.0, 3.0],
+            [0.0; 3],
+            r#""lights": [{"type": "environment"}], "objects": [
+                {"shape": "rectangle", "width": 4, "height": 4, "material": "m"},
+                {"shape": "rectangle", "width": 1, "height": 1, "material": "lamp",
+                 "transform": {"translate": [0, 0, -1]}}],
+            "materials": {"lamp": {"type": "emissive", "radiance": [1, 1, 1]},
+                "m": {"type": "gltf", "color": [1, 1, 1], "opacity": 0.5}}"#,
+        ));
+        let lamp = scene.materials.iter_mut().find(|m| m.name == "lamp").unwrap();
+        lamp.emission.as_mut().unwrap().radiance = Paint::Plain([f64::NAN, 1.0, f64::INFINITY]);
+        scene.render.accel = Some(AccelName::Bvh);
+        let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
+        let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
+        let images = Images::decode(&scene, &plan);
+        let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_| true).unwrap();
+        assert!(done.light.not_finite > 0, "{tracer}");
+        for channel in &done.picture.layers()[0].channels {
+            let Values::F32(values) = &channel.values else { panic!("a picture is f32") };
+            assert!(values.iter().all(|v| v.is_finite()), "{tracer}");
+        }
+    }
+}
+
 /// A sphere of radiance L over a plane: its form factor is (r/d)² cos θ (Howell, *A Catalog of
 /// Radiation Heat Transfer Configuration Factors*, B-34), so the plane shows ρ L (r/d)² cos θ.
 #[test]

@@ -402,3 +402,18 @@ fn numbers_that_no_surface_can_have_are_told_or_refused_when_strict() {
         assert!(message.contains("m.gltf") && message.contains(words), "{message}");
     }
 }
+
+/// A model without lights is lit by the studio, and told so; a scene that wants none stays dark.
+#[test]
+fn what_has_no_light_is_lit_by_the_studio_unless_it_shall_be_dark() {
+    let grey = json!({"pbrMetallicRoughness": {"metallicFactor": 0}});
+    let lit = stage(&grey, &json!({}), &json!({"lights": null}));
+    for pixel in pixels(&lit) {
+        // The studio's floor and lamp are 0.1 and 4.5.
+        assert!((0.1..1.5).contains(&pixel[0]), "{pixel:?}");
+    }
+    assert!(lit.json("report.json")["notes"].to_string().contains("grey studio"));
+    let dark = stage(&grey, &json!({}), &json!({"lights": []}));
+    assert_eq!(pixels(&dark), vec![[0.0; 3]; 64]);
+    assert_eq!(dark.json("report.json")["notes"], json!([]));
+}

@@ -177,7 +177,7 @@ impl Diagnosis {
             camera: scene.camera.opencv(),
             camera_origin: match &scene.camera_origin {
                 CameraOrigin::Scene => "the scene file".to_owned(),
-                CameraOrigin::Framed => "placed to frame the whole scene".to_owned(),
+                CameraOrigin::Framed => "placed to show the whole scene".to_owned(),
                 CameraOrigin::Model(name) => format!("the model's camera {name}"),
             },
             cameras: cameras(scene),
