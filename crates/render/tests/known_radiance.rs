@@ -124,7 +124,7 @@ fn the_cosine_law() {
 }
 
 /// A spot light of intensity I: I cos θ / (π d²) inside the inner cone, nothing outside of the cone, and
-/// between them the square of the share that the cosine has gone (KHR_lights_punctual).
+/// between them the square of the share that the cosine has gone (`KHR_lights_punctual`).
 #[test]
 fn a_spot_light_by_its_cones() {
     let pi = std::f64::consts::PI;
