@@ -36,6 +36,9 @@ pub struct CameraRays {
     pub fates: FateCounts,
     /// The rays while they are in the lens.
     pub(crate) in_lens: LensRays,
+    /// Where the samples lie on the sensor (mm), one array an axis, and in the unit square.
+    pub(crate) places: [Vec<f64>; 2],
+    pub(crate) squares: Vec<[f64; 2]>,
     /// The samples by the wavelength that they are traced at.
     pub(crate) order: Vec<(usize, u32)>,
 }

@@ -12,7 +12,7 @@ use etendue_spectrum::Lanes;
 use etendue_tracer::texture::ImageError;
 use etendue_tracer::{
     Direct, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind, Lights, Material, Path,
-    Pixel, Spectral, Stage, Surroundings, Tally, Tracer, View, Whitted,
+    Pixel, Spectral, Stage, Surroundings, Tally, Tracer, Traits, View, Whitted,
 };
 use rayon::prelude::*;
 
@@ -278,7 +278,7 @@ pub fn render(
             surroundings,
             lights,
             spectral: &spectral,
-            is_pierced: is_pierced(scene),
+            traits: Traits::of(&scene.geometry, &scene.materials),
         },
         tracer: &**tracer,
         camera: &light_camera,
@@ -323,7 +323,10 @@ fn surroundings<'a>(scene: &'a Scene, images: &'a Images, samples: u32) -> Surro
     let pose = scene.camera.pose();
     // The samples of a pixel share it.
     let share = 1.0 / f64::from(samples).sqrt();
-    let pixel = scene.camera.pixel_extent().map(|extent| match extent {
+    // Where nothing has a pattern, nothing is averaged.
+    let patterned = scene.materials.iter().any(Material::is_patterned);
+    let extent = scene.camera.pixel_extent().filter(|_| patterned);
+    let pixel = extent.map(|extent| match extent {
         PixelExtent::Angle(angle) => Pixel::Angle(angle * share),
         PixelExtent::Width(width) => Pixel::Width(width * share),
     });
@@ -343,11 +346,4 @@ fn tracer(spec: TracerSpec) -> Option<Box<dyn Tracer>> {
         TracerSpec::Whitted { max_bounces } => Some(Box::new(Whitted { max_bounces })),
         TracerSpec::Path { max_bounces } => Some(Box::new(Path { max_bounces })),
     }
-}
-
-/// Whether rays may pass some surface of the scene as if it were not there.
-fn is_pierced(scene: &Scene) -> bool {
-    let materials = scene.geometry.placements.iter();
-    let mut materials = materials.filter_map(|p| scene.materials.get(p.material as usize));
-    materials.any(Material::is_pierced)
 }

@@ -340,7 +340,11 @@ pub(crate) fn place_samples(
         let pixel = sampler.pixel(seed, tile.left + x, tile.top + y, samples);
         numbers.extend(range.clone().map(|index| (pixel, index)));
     }
-    let pairs = if camera.lens().is_some() { CAMERA_PAIRS } else { 1 };
+    let pairs = match camera.lens() {
+        None => 1,
+        Some(lens) if lens.draws_wavelengths() => CAMERA_PAIRS,
+        Some(_) => 2,
+    };
     let wanted = |pair| numbers.iter().map(move |&(pixel, index)| (pixel, index, pair));
     let mut places = Vec::new();
     squares(&(0..pairs).flat_map(wanted).collect::<Vec<_>>(), &mut places);

@@ -53,5 +53,5 @@ pub use reference::{Needs, Spot, Surroundings, Traced, View};
 pub use spec::{LightSpec, MaterialSpec};
 pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
-pub use transport::{Samples, Scratch, Stage, Tally, Tracer};
+pub use transport::{Samples, Scratch, Stage, Tally, Tracer, Traits};
 pub use whitted::Whitted;

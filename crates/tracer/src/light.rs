@@ -223,6 +223,18 @@ impl Lights {
         self.environment.is_some() || !self.triangles.is_empty()
     }
 
+    /// Whether there is more than one to choose from.
+    #[must_use]
+    pub fn are_several(&self) -> bool {
+        self.picker.len() > 1
+    }
+
+    /// Whether light comes from where nothing is.
+    #[must_use]
+    pub fn has_environment(&self) -> bool {
+        self.environment.is_some()
+    }
+
     /// How many emissive triangles there are.
     #[must_use]
     pub fn emissive_triangles(&self) -> usize {
@@ -312,14 +324,8 @@ impl Lights {
             return None;
         }
         let density = chance * offset.length_squared() / (facing.abs() * place.area);
-        let end = Anchor::new(
-            from.point + offset,
-            place.normal,
-            from.point,
-            spot.placement,
-            spot.mesh,
-            spot.triangle,
-        );
+        let end =
+            Anchor::new(from.point + offset, place.normal, from.point, spot.placement, spot.mesh);
         density.is_finite().then_some(Toward {
             direction,
             density,

@@ -220,6 +220,13 @@ impl Material {
         uses
     }
 
+    /// Whether anything of it changes over texture coordinates.
+    #[must_use]
+    pub fn is_patterned(&self) -> bool {
+        let shines = self.emission.as_ref().is_some_and(|emission| emission.radiance.needs_uv());
+        self.base_color.needs_uv() || shines || !self.textures(TextureScope::ALL).is_empty()
+    }
+
     /// Whether rays may pass the surface as if it were not there.
     #[must_use]
     pub fn is_pierced(&self) -> bool {

@@ -7,8 +7,8 @@
 //! e = k ε Σᵢ |nᵢ| (|pᵢ| + |oᵢ| + |Tᵢ| + |L p₀|ᵢ)
 //! ```
 //!
-//! with the ray's origin `o`, the placement's translation `T` and a corner turned into the world
-//! `L p₀` (each term is one that the solution adds or subtracts, or whose product it rounds; the sum
+//! with the ray's origin `o`, the placement's translation `T` and the farthest corner of the mesh's box
+//! turned into the world `L p₀` (each term is one that the solution adds or subtracts, or whose product it rounds; the sum
 //! over the axes is Higham's bound for dot products, *Accuracy and Stability of Numerical
 //! Algorithms*, 2002, section 3.1). A ray that leaves starts `e` off the plane, on its own side: the
 //! idea of Wächter and Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing
@@ -34,8 +34,7 @@ pub struct Anchor {
 }
 
 impl Anchor {
-    /// The point on a triangle of `placement` (of which `corner` is one, in the mesh's frame), found
-    /// by a ray from `origin`, or for one.
+    /// The point on a triangle of `placement`, found by a ray from `origin`, or for one.
     #[must_use]
     pub fn new(
         point: DVec3,
@@ -43,10 +42,9 @@ impl Anchor {
         origin: DVec3,
         placement: &Placement,
         mesh: &Mesh,
-        triangle: usize,
     ) -> Self {
         let place = &placement.world_from_mesh;
-        let corner = mesh.positions.get(mesh.triangles[triangle][0] as usize).abs();
+        let corner = mesh.bounds.min.abs().max(mesh.bounds.max.abs());
         let linear = &place.linear;
         let turned = linear.x_axis.abs() * corner.x
             + linear.y_axis.abs() * corner.y

@@ -35,14 +35,8 @@ impl<'a> Met<'a> {
         let material = around.material(&spot)?;
         let (origin, direction) = (rays.origin(i), rays.direction(i));
         let normal = hits.normal(i);
-        let anchor = Anchor::new(
-            origin + direction * hits.t[i],
-            normal,
-            origin,
-            spot.placement,
-            spot.mesh,
-            spot.triangle,
-        );
+        let anchor =
+            Anchor::new(origin + direction * hits.t[i], normal, origin, spot.placement, spot.mesh);
         let front = normal.dot(direction) <= 0.0;
         let base = around.base_color(material, &spot);
         Some(Self { spot, material, anchor, front, base, wo: -direction })

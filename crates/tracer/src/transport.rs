@@ -17,7 +17,7 @@ use std::ops::{AddAssign, Range};
 
 use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, HitBatch, RayBatch};
+use etendue_geometry::{Detail, Geometry, HitBatch, MISS, RayBatch};
 
 use crate::bsdf::{Bsdf, Weights};
 use crate::footprint::{Cone, Footprint};
@@ -27,7 +27,7 @@ use crate::sampling::power_heuristic;
 use crate::spawn::Anchor;
 use crate::spectral::Spectral;
 use crate::surface::Met;
-use crate::{Ior, Scattering};
+use crate::{Ior, Material, Scattering};
 
 /// A tracer of light.
 pub trait Tracer: Send + Sync + Debug {
@@ -53,8 +53,32 @@ pub struct Stage<'a> {
     pub lights: &'a Lights,
     /// The lanes.
     pub spectral: &'a Spectral,
-    /// Some surface is not wholly there ([`crate::Material::is_pierced`]).
+    /// What its surfaces make tracers do.
+    pub traits: Traits,
+}
+
+/// What no surface of a scene asks for is not done.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Traits {
+    /// Some surface is not wholly there ([`Material::is_pierced`]).
     pub is_pierced: bool,
+    /// Some surface scatters light in several ways, among which is chosen.
+    pub has_choice: bool,
+}
+
+impl Traits {
+    /// Those of all placed surfaces.
+    #[must_use]
+    pub fn of(geometry: &Geometry, materials: &[Material]) -> Self {
+        let mut traits = Self::default();
+        let placed = geometry.placements.iter().filter_map(|p| materials.get(p.material as usize));
+        for material in placed {
+            traits.is_pierced |= material.is_pierced();
+            traits.has_choice |=
+                matches!(material.scattering, Scattering::Dielectric(_) | Scattering::Gltf(_));
+        }
+        traits
+    }
 }
 
 /// A batch of rays with what they carry.
@@ -121,8 +145,7 @@ pub struct Scratch {
     next: Paths,
     hits: HitBatch,
     alive: Vec<u32>,
-    wanted: Vec<(u32, u32)>,
-    squares: Vec<[f64; 2]>,
+    numbers: Numbers,
     shadows: Shadows,
     radiance: Vec<f64>,
 }
@@ -202,8 +225,60 @@ impl Shadows {
     }
 }
 
-/// Pairs of random numbers that a path uses at each step.
-const PAIRS: u32 = 4;
+/// What a path uses random numbers for at each step.
+#[derive(Debug, Clone, Copy)]
+enum Draw {
+    /// Choosing a light, and among the ways in which a surface scatters.
+    Choice,
+    /// A place on the light; or the lane that stays where glass splits them.
+    Light,
+    /// The direction to follow.
+    Direction,
+    /// Whether a surface is there, and whether a path goes on.
+    Chance,
+}
+
+/// How many uses there are.
+const DRAWS: u32 = 4;
+
+impl Draw {
+    const ALL: [Self; DRAWS as usize] = [Self::Choice, Self::Light, Self::Direction, Self::Chance];
+}
+
+/// The random numbers of a step: those that it does without are not made.
+#[derive(Debug, Default)]
+struct Numbers {
+    wanted: Vec<(u32, u32)>,
+    /// By [`Draw`], one a path that goes on; empty where not needed.
+    drawn: [Vec<[f64; 2]>; DRAWS as usize],
+}
+
+impl Numbers {
+    /// Makes what the paths `alive` among `states` need.
+    fn draw(
+        &mut self,
+        samples: &dyn Samples,
+        needs: impl Fn(Draw) -> bool,
+        (states, alive): (&[State], &[u32]),
+    ) {
+        for draw in Draw::ALL {
+            let drawn = &mut self.drawn[draw as usize];
+            drawn.clear();
+            if needs(draw) {
+                let pair = |state: &State| state.steps * DRAWS + draw as u32;
+                let states = alive.iter().map(|&i| &states[i as usize]);
+                self.wanted.clear();
+                self.wanted.extend(states.map(|state| (state.ray, pair(state))));
+                samples.squares(&self.wanted, drawn);
+            }
+        }
+    }
+
+    /// Those of the `k`-th path that goes on.
+    fn of(&self, k: usize) -> [[f64; 2]; DRAWS as usize] {
+        self.drawn.each_ref().map(|drawn| drawn.get(k).copied().unwrap_or([0.5; 2]))
+    }
+}
 
 /// Rays whose transparency is looked through, one surface after the other.
 const MOST_LAYERS: u32 = 256;
@@ -231,7 +306,9 @@ pub(crate) fn trace(
         stage.accel.closest(&scratch.now.rays, &mut scratch.hits);
         tracing.tally.rays += scratch.now.states.len() as u64;
         tracing.meet(scratch, out);
-        beam.samples.squares(&scratch.wanted, &mut scratch.squares);
+        let needs = tracing.needs(&scratch.now.states);
+        let paths = (&scratch.now.states[..], &scratch.alive[..]);
+        scratch.numbers.draw(beam.samples, needs, paths);
         scratch.next.clear();
         scratch.shadows.clear();
         // From neighbouring places to lights: as coherent as what they start from.
@@ -273,23 +350,55 @@ impl Tracing<'_> {
         }
     }
 
+    /// What the next step of any of `states` may draw.
+    fn needs(&self, states: &[State]) -> impl Fn(Draw) -> bool {
+        let Stage { lights, traits, .. } = self.stage;
+        let most = states.iter().map(|state| state.bounces + 1).max().unwrap_or(0);
+        let least = states.iter().map(|state| state.bounces + 1).min().unwrap_or(0);
+        let goes_on = self.rules.follow == Follow::All && least < self.rules.bounces;
+        let follows = goes_on || lights.can_be_met() || traits.has_choice;
+        let roulette = self.rules.roulette.is_some_and(|after| most >= after);
+        let [several, extended] = [lights.are_several(), lights.can_be_met()];
+        move |draw| match draw {
+            Draw::Choice => several || traits.has_choice,
+            Draw::Light => extended || traits.has_choice,
+            Draw::Direction => follows,
+            Draw::Chance => roulette || traits.is_pierced,
+        }
+    }
+
     /// Adds the light that paths met by themselves, and lists those that go on.
     fn meet(&mut self, scratch: &mut Scratch, out: &mut [f64]) {
-        let Scratch { now, hits, alive, wanted, radiance, .. } = scratch;
+        let Scratch { now, hits, alive, radiance, .. } = scratch;
         alive.clear();
-        wanted.clear();
-        for (i, state) in now.states.iter().enumerate() {
-            let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
-            let weight = self.met(now, hits, i, radiance);
-            if let Some(weight) = weight {
-                radiance.iter_mut().zip(throughput).for_each(|(r, t)| *r *= t * weight);
-                self.add(radiance, state.ray, out);
-            }
-            if hits.is_hit(i) && self.goes_on(hits, i, state) {
-                alive.push(u32::try_from(i).unwrap_or(u32::MAX));
-                wanted.extend((0..PAIRS).map(|k| (state.ray, state.steps * PAIRS + k)));
+        let mut start = 0;
+        for run in hits.placement.chunk_by(|a, b| a == b) {
+            let range = start..start + run.len();
+            start = range.end;
+            let is_plain = self.is_plain(run[0]);
+            for i in range {
+                let state = &now.states[i];
+                let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
+                if !is_plain && let Some(weight) = self.met(now, hits, i, radiance) {
+                    radiance.iter_mut().zip(throughput).for_each(|(r, t)| *r *= t * weight);
+                    self.add(radiance, state.ray, out);
+                }
+                if run[0] != MISS && self.goes_on(hits, i, state) {
+                    alive.push(u32::try_from(i).unwrap_or(u32::MAX));
+                }
             }
         }
+    }
+
+    /// Whether nothing is to be seen at a placement but what it scatters.
+    fn is_plain(&self, placement: u32) -> bool {
+        let around = &self.stage.surroundings;
+        let Some(placement) = around.geometry.placements.get(placement as usize) else {
+            return !self.stage.lights.has_environment();
+        };
+        around.materials.get(placement.material as usize).is_some_and(|material| {
+            material.emission.is_none() && material.scattering != Scattering::Unlit
+        })
     }
 
     /// A last ray goes on only where the surface that it met may not be there.
@@ -300,9 +409,9 @@ impl Tracing<'_> {
         let around = &self.stage.surroundings;
         let pierced = || {
             let spot = around.spot(hits, i);
-            spot.and_then(|spot| around.material(&spot)).is_some_and(crate::Material::is_pierced)
+            spot.and_then(|spot| around.material(&spot)).is_some_and(Material::is_pierced)
         };
-        !state.is_last || (self.stage.is_pierced && pierced())
+        !state.is_last || (self.stage.traits.is_pierced && pierced())
     }
 
     /// The light that ray `i` met, and its weight against having asked for it; `None` if none.
@@ -343,17 +452,17 @@ impl Tracing<'_> {
 
     /// One path's step at the surface that it met: a light is asked, a direction is chosen.
     fn step(&mut self, scratch: &mut Scratch, k: usize) {
-        let Scratch { now, next, hits, alive, squares, shadows, radiance, .. } = scratch;
+        let Scratch { now, next, hits, alive, numbers, shadows, radiance, .. } = scratch;
         let i = alive[k] as usize;
         let around = &self.stage.surroundings;
         let footprint = now.footprint(hits, i);
         let Some(met) = Met::new(around, &now.rays, hits, i, footprint) else { return };
-        let numbers = &squares[k * PAIRS as usize..(k + 1) * PAIRS as usize];
+        let numbers = numbers.of(k);
         let mut state = now.states[i];
         state.steps += 1;
         state.cone = state.cone.map(|cone| cone.after(hits.t[i]));
         let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
-        if met.material.is_pierced() && numbers[3][0] >= met.opacity() {
+        if met.material.is_pierced() && numbers[Draw::Chance as usize][0] >= met.opacity() {
             let direction = now.rays.direction(i);
             next.push(met.anchor.leave(direction), direction, state);
             next.throughput.extend_from_slice(throughput);
@@ -366,15 +475,15 @@ impl Tracing<'_> {
             && self.count > 1
         {
             // A boundary asks no light: its numbers are free.
-            split(throughput, &mut state, numbers[1][0]);
+            split(throughput, &mut state, numbers[Draw::Light as usize][0]);
         }
         let wavelength = self.stage.spectral.wavelength(state.lane.unwrap_or(0) as usize);
         let bsdf = met.bsdf(around, wavelength);
         state.bounces += 1;
         if !bsdf.is_delta() {
-            self.ask(&bsdf, &met.anchor, throughput, state.ray, numbers, shadows, radiance);
+            self.ask(&bsdf, &met.anchor, throughput, state.ray, &numbers, shadows, radiance);
         }
-        self.scatter(&bsdf, &met.anchor, throughput, state, numbers, next);
+        self.scatter(&bsdf, &met.anchor, throughput, state, &numbers, next);
     }
 
     /// Chooses a light and notes the ray to it.
@@ -385,12 +494,19 @@ impl Tracing<'_> {
         anchor: &Anchor,
         throughput: &[f64],
         ray: u32,
-        numbers: &[[f64; 2]],
+        numbers: &[[f64; 2]; DRAWS as usize],
         shadows: &mut Shadows,
         radiance: &mut [f64],
     ) {
         let Stage { lights, surroundings: around, spectral, .. } = self.stage;
-        let toward = lights.sample(around, spectral, anchor, numbers[0][0], numbers[1], radiance);
+        let toward = lights.sample(
+            around,
+            spectral,
+            anchor,
+            numbers[Draw::Choice as usize][0],
+            numbers[Draw::Light as usize],
+            radiance,
+        );
         let Some(toward) = toward else { return };
         let (value, density) = bsdf.evaluate(toward.direction);
         if value.is_zero() {
@@ -419,13 +535,23 @@ impl Tracing<'_> {
         anchor: &Anchor,
         throughput: &mut [f64],
         mut state: State,
-        numbers: &[[f64; 2]],
+        numbers: &[[f64; 2]; DRAWS as usize],
         next: &mut Paths,
     ) {
-        let Some(scattered) = bsdf.sample(numbers[0][1], numbers[2]) else { return };
+        let ends = state.bounces >= self.rules.bounces;
+        if (ends || self.rules.follow == Follow::Single)
+            && !self.stage.lights.can_be_met()
+            && !bsdf.has_single()
+        {
+            return;
+        }
+        let choice = numbers[Draw::Choice as usize][1];
+        let Some(scattered) = bsdf.sample(choice, numbers[Draw::Direction as usize]) else {
+            return;
+        };
         let single = scattered.density == f64::INFINITY;
         let follows = single || self.rules.follow == Follow::All;
-        state.is_last = state.bounces >= self.rules.bounces || !follows;
+        state.is_last = ends || !follows;
         if state.is_last && !single && !self.stage.lights.can_be_met() {
             return;
         }
@@ -439,7 +565,7 @@ impl Tracing<'_> {
         }
         if self.rules.roulette.is_some_and(|after| state.bounces >= after) && !state.is_last {
             let survival = most.min(0.95);
-            if numbers[3][1] >= survival {
+            if numbers[Draw::Chance as usize][1] >= survival {
                 return;
             }
             throughput.iter_mut().for_each(|lane| *lane /= survival);
@@ -461,14 +587,14 @@ impl Tracing<'_> {
         }
         shadows.rays.from_surface = true;
         self.tally.shadow_rays += shadows.rays.len() as u64;
-        if self.stage.is_pierced {
+        if self.stage.traits.is_pierced {
             self.look_through(shadows);
         } else {
             self.stage.accel.occluded(&shadows.rays, &mut shadows.blocked);
         }
         for (k, &ray) in shadows.ray.iter().enumerate() {
             let brought = &mut shadows.brought[k * self.count..(k + 1) * self.count];
-            if self.stage.is_pierced {
+            if self.stage.traits.is_pierced {
                 brought.iter_mut().for_each(|lane| *lane *= shadows.passed[k]);
             } else if shadows.blocked[k] {
                 continue;

@@ -36,7 +36,7 @@ pub use surface::{Surface, SurfaceSpec};
 pub use thin_lens::{ThinLens, ThinLensSpec};
 
 pub(crate) use losses::Loss;
-pub(crate) use rays::{Block, Ray};
+pub(crate) use rays::{Block, LANES, Ray};
 pub(crate) use refract::Refraction;
 pub(crate) use step::{Action, Step};
 

@@ -111,8 +111,13 @@ impl FateCounts {
 
     /// Counts every ray of a batch.
     pub fn add_all(&mut self, rays: &LensRays) {
-        for i in 0..rays.len() {
-            self.add(rays.fate(i));
+        for (b, block) in rays.blocks.iter().enumerate() {
+            let outcomes = &block.outcome[..LANES.min(rays.len() - b * LANES)];
+            if outcomes.iter().all(|&code| code == EXITED) {
+                self.exited += outcomes.len() as u64;
+            } else {
+                outcomes.iter().for_each(|&code| self.add(Fate::from_code(code)));
+            }
         }
     }
 
@@ -183,6 +188,17 @@ pub(crate) struct Block {
 }
 
 impl Block {
+    /// Whether a ray left and carries something.
+    pub(crate) fn is_bright_at(&self, lane: usize) -> bool {
+        self.outcome[lane] == EXITED && self.throughput[lane] > 0.0
+    }
+
+    /// Whether the first `count` rays all do.
+    pub(crate) fn is_bright(&self, count: usize) -> bool {
+        let lanes = self.outcome[..count].iter().zip(&self.throughput[..count]);
+        lanes.fold(true, |all, (&code, &throughput)| all & (code == EXITED) & (throughput > 0.0))
+    }
+
     const EMPTY: Self = Self {
         position: [[0.0; LANES]; 3],
         direction: [[0.0; LANES]; 3],
@@ -280,6 +296,13 @@ impl LensRays {
         self.len = 0;
     }
 
+    /// Makes room for `len` rays, all of them to be set.
+    pub(crate) fn resize(&mut self, len: usize) {
+        self.blocks.clear();
+        self.blocks.resize(len.div_ceil(LANES), Block::EMPTY);
+        self.len = len;
+    }
+
     /// Appends a ray of throughput 1. A direction of another length is scaled to 1; a ray that has
     /// no direction or no finite place counts as having missed element 0.
     pub fn push(&mut self, position: DVec3, direction: DVec3) {
@@ -308,6 +331,11 @@ impl LensRays {
         }
         block.throughput[lane] = throughput;
         self.len += 1;
+    }
+
+    /// The block that begins with ray `start`, and how many of its lanes are rays.
+    pub(crate) fn block_at(&self, start: usize) -> (&Block, usize) {
+        (&self.blocks[start / LANES], LANES.min(self.len - start))
     }
 
     /// Where ray `i` is (mm): at the last refracting element that it reached.

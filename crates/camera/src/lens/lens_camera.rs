@@ -14,15 +14,16 @@ use std::sync::{Arc, OnceLock};
 
 use etendue_geometry::RayBatch;
 use etendue_spectrum::{Curve, Lanes, Outside, Spread};
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 use super::chief::ChiefTable;
 use super::focused::{Focused, View};
 use super::lit_area::LitArea;
-use crate::element::{Clip, Fate, Ray, Reflection};
+
+use crate::element::{Block, Clip, Fate, LANES, Ray, Reflection};
 use crate::glass::GlassError;
 use crate::train::analysis::projected_solid_angle;
-use crate::train::pupil::{Window, blocked, without_dimming, without_filters};
+use crate::train::pupil::{Bundle, Disc, Window, blocked, without_dimming, without_filters};
 use crate::train::{ExitPupil, ExitPupilError, OpticalTrain, Part, Side, TrainAt};
 use crate::{CameraError, CameraRays, FilmSamples, Pose};
 
@@ -188,6 +189,12 @@ impl LensCamera {
         }
     }
 
+    /// Whether rays of a sample run at a wavelength that is drawn.
+    pub fn draws_wavelengths(&self) -> bool {
+        let opened = self.opened.get().and_then(Option::as_ref);
+        opened.is_none_or(|opened| opened.groups.iter().any(|group| group.lenses.len() > 1))
+    }
+
     /// How many wavelengths the rays of each of [`Self::lane_groups`] are drawn from, at most.
     #[must_use]
     pub fn wavelengths_a_group(&self, lanes: &Lanes) -> usize {
@@ -227,35 +234,104 @@ impl LensCamera {
         numbers: impl Iterator<Item = u32>,
         out: &mut CameraRays,
     ) {
+        let first = out.sample.len();
+        out.sample.extend(numbers);
+        match pupil.disc() {
+            Some(disc) => self.aim_at_disc((pupil, disc), samples, first, out),
+            None => self.aim_at_pupil(pupil, samples, first, out),
+        }
+        lens.trace(Side::Sensor, Clip::On, &mut out.in_lens);
+        out.fates.add_all(&out.in_lens);
+        self.leave(pose, first, out);
+    }
+
+    /// Starts rays for the samples that `out` names from `first` on, towards a pupil known in closed
+    /// form.
+    fn aim_at_disc(
+        &self,
+        (pupil, disc): (&ExitPupil, &Disc),
+        samples: &FilmSamples,
+        first: usize,
+        out: &mut CameraRays,
+    ) {
+        let film = self.focused.film();
+        let [x, y] = &mut out.places;
+        x.clear();
+        y.clear();
+        out.squares.clear();
+        for &number in &out.sample[first..] {
+            let i = number as usize;
+            let place = film.place(samples.columns[i], samples.rows[i]);
+            x.push(place.x);
+            y.push(place.y);
+            out.squares.push(samples.pupil[i]);
+        }
+        let scale = pupil.index2() / self.solid_angle;
+        let bundle = Bundle { sensor: &film.frame, scale, film: [x, y], squares: &out.squares };
+        disc.fill(&bundle, &mut out.in_lens);
+    }
+
+    /// Starts rays for the samples that `out` names from `first` on, and leaves out those of places
+    /// where no light arrives.
+    fn aim_at_pupil(
+        &self,
+        pupil: &ExitPupil,
+        samples: &FilmSamples,
+        first: usize,
+        out: &mut CameraRays,
+    ) {
         let (film, rays) = (self.focused.film(), &mut out.in_lens);
-        let mut kept = out.sample.len();
         rays.clear();
-        for number in numbers {
+        let mut kept = first;
+        for k in first..out.sample.len() {
+            let number = out.sample[k];
             let i = number as usize;
             let place = film.place(samples.columns[i], samples.rows[i]);
             match pupil.sample(place, samples.pupil[i]) {
                 Some(sample) => {
                     let at = pupil.film_point(place);
                     rays.push_weighted(at, sample.direction, sample.weight / self.solid_angle);
-                    out.sample.push(number);
+                    out.sample[kept] = number;
+                    kept += 1;
                 }
                 None => out.fates.unlit += 1,
             }
         }
-        lens.trace(Side::Sensor, Clip::On, rays);
-        out.fates.add_all(rays);
-        let first = kept;
-        for i in 0..rays.len() {
-            let weight = rays.throughput(i);
-            if rays.fate(i) == Fate::Exited && weight > 0.0 {
-                let (origin, direction) = self.in_world(pose, rays.position(i), rays.direction(i));
-                out.rays.push(origin, direction);
-                out.weight.push(weight);
-                out.sample[kept] = out.sample[first + i];
+        out.sample.truncate(kept);
+    }
+
+    /// Brings the rays that left the lens into the world; `out` names their samples from `first` on.
+    fn leave(&self, pose: &Pose, first: usize, out: &mut CameraRays) {
+        let to_world =
+            ToWorld { position: pose.position, turn: pose.rotation, origin: self.focused.origin() };
+        let mut kept = first;
+        for start in (0..out.in_lens.len()).step_by(LANES) {
+            let (block, count) = out.in_lens.block_at(start);
+            let (position, direction) = to_world.block(block);
+            if block.is_bright(count) {
+                for axis in 0..3 {
+                    out.rays.origin[axis].extend_from_slice(&position[axis][..count]);
+                    out.rays.direction[axis].extend_from_slice(&direction[axis][..count]);
+                }
+                out.weight.extend_from_slice(&block.throughput[..count]);
+                let from = first + start;
+                out.sample.copy_within(from..from + count, kept);
+                kept += count;
+                continue;
+            }
+            for lane in (0..count).filter(|&lane| block.is_bright_at(lane)) {
+                for axis in 0..3 {
+                    out.rays.origin[axis].push(position[axis][lane]);
+                    out.rays.direction[axis].push(direction[axis][lane]);
+                }
+                out.weight.push(block.throughput[lane]);
+                out.sample[kept] = out.sample[first + start + lane];
                 kept += 1;
             }
         }
         out.sample.truncate(kept);
+        out.rays.t_min.resize(kept, 0.0);
+        out.rays.t_max.resize(kept, f64::INFINITY);
     }
 
     fn in_world(&self, pose: &Pose, point: DVec3, direction: DVec3) -> (DVec3, DVec3) {
@@ -338,6 +414,47 @@ impl LensCamera {
             }
         }
         notes
+    }
+}
+
+/// From lens coordinates (mm) to the world (m).
+struct ToWorld {
+    position: DVec3,
+    turn: DMat3,
+    /// z of the camera's origin (mm).
+    origin: f64,
+}
+
+impl ToWorld {
+    /// Places and directions of a block's rays, one array an axis.
+    fn block(&self, block: &Block) -> ([[f64; LANES]; 3], [[f64; LANES]; 3]) {
+        let (mut position, mut direction) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        turn_block(self, block, &mut position, &mut direction);
+        (position, direction)
+    }
+}
+
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn turn_block(
+    to_world: &ToWorld,
+    block: &Block,
+    position: &mut [[f64; LANES]; 3],
+    direction: &mut [[f64; LANES]; 3],
+) {
+    let ToWorld { position: at, turn, origin } = *to_world;
+    let [px, py, pz] = &block.position;
+    let [dx, dy, dz] = &block.direction;
+    for axis in 0..3 {
+        let [x, y, z] = [turn.x_axis[axis], turn.y_axis[axis], turn.z_axis[axis]];
+        for i in 0..LANES {
+            let local = x * (px[i] * 1e-3) + y * (py[i] * 1e-3) + z * ((pz[i] - origin) * 1e-3);
+            position[axis][i] = at[axis] + local;
+            direction[axis][i] = x * dx[i] + y * dy[i] + z * dz[i];
+        }
     }
 }
 

@@ -25,6 +25,7 @@
 //! The bounds that this replaces: C. Kolb, D. Mitchell, P. Hanrahan, "A realistic camera model for
 //! computer graphics", 1995; M. Pharr, W. Jakob, G. Humphreys, *Physically Based Rendering*, 6.4.5.
 
+mod disc;
 mod measure;
 mod search;
 
@@ -35,6 +36,7 @@ use super::{OpticalTrain, Part, Side, TrainAt};
 use crate::element::{Clip, Fate, FateCounts, Frame, LensRays, LossesSpec, Opening};
 use crate::glass::GlassError;
 
+pub(crate) use disc::{Bundle, Disc};
 pub(crate) use measure::lit_radius;
 pub(crate) use search::Window;
 
@@ -92,6 +94,8 @@ pub struct ExitPupil {
     sensor: Frame,
     half_size: DVec2,
     layout: Layout,
+    /// The pupil in closed form; there are no nodes then.
+    disc: Option<Disc>,
     nodes: Vec<Outline>,
     index2: f64,
     /// How far from the sensor's centre the nodes of a radial layout reach (mm).
@@ -154,6 +158,7 @@ impl ExitPupil {
             sensor: train.sensor_frame(sensor_z),
             half_size,
             layout: if symmetric { Layout::Radial } else { Layout::Planar },
+            disc: None,
             nodes: Vec::new(),
             index2: 1.0,
             radius: half_size.length(),
@@ -162,6 +167,12 @@ impl ExitPupil {
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
         let Some(first) = lenses.first() else { return Err(ExitPupilError::Sensor) };
         pupil.index2 = first.index_before_sensor().powi(2);
+        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
+        let corners = corners.map(|corner| pupil.film_point(DVec2::from(corner) * half_size));
+        pupil.disc = Disc::of(train, &corners);
+        if pupil.disc.is_some() {
+            return Ok(pupil);
+        }
         pupil.measure(train, &lenses);
         if pupil.nodes.iter().all(Outline::is_dark) {
             return Err(blocked(train, first, pupil.sensor.vertex));
@@ -175,6 +186,16 @@ impl ExitPupil {
     #[must_use]
     pub fn is_radial(&self) -> bool {
         self.layout == Layout::Radial
+    }
+
+    /// The pupil in closed form, if it has one.
+    pub(crate) fn disc(&self) -> Option<&Disc> {
+        self.disc.as_ref()
+    }
+
+    /// The square of the index before the sensor.
+    pub(crate) fn index2(&self) -> f64 {
+        self.index2
     }
 
     /// A point of the sensor in lens coordinates (mm), from its place on the sensor: x and y from
@@ -192,19 +213,26 @@ impl ExitPupil {
     pub fn sample(&self, film: DVec2, u: [f64; 2]) -> Option<PupilSample> {
         let (disc_radius, turn) = concentric(u);
         let (sine, cosine) = (turn * std::f64::consts::TAU).sin_cos();
-        let place = self.place(film)?;
         let (mut centre, mut half, mut reach) = (DVec2::ZERO, DVec2::ZERO, 0.0);
-        for (node, weight) in place.nodes {
-            let outline = &self.nodes[node];
-            centre += outline.centre * weight;
-            half += outline.half * weight;
-            reach += between(&outline.reach, turn) * weight;
+        let mut axis = DVec2::X;
+        if let Some(disc) = &self.disc {
+            let (middle, radius) = disc.seen_from(self.film_point(film));
+            (centre, half, reach) = (middle, DVec2::splat(radius), 1.0);
+        } else {
+            let place = self.place(film)?;
+            axis = place.axis;
+            for (node, weight) in place.nodes {
+                let outline = &self.nodes[node];
+                centre += outline.centre * weight;
+                half += outline.half * weight;
+                reach += between(&outline.reach, turn) * weight;
+            }
         }
         if reach <= 0.0 || half.min_element() <= 0.0 {
             return None;
         }
         let offset = DVec2::new(cosine, sine) * half * (reach * disc_radius);
-        let slopes = place.turned(centre + offset);
+        let slopes = axis.rotate(centre + offset);
         let area = std::f64::consts::PI * half.x * half.y * reach * reach;
         let direction = towards_lens(slopes);
         let cosine = -direction.z;
@@ -252,6 +280,11 @@ impl ExitPupil {
     /// empty where no light arrives.
     #[must_use]
     pub fn outline(&self, film: DVec2) -> Vec<DVec2> {
+        if let Some(disc) = &self.disc {
+            let (centre, radius) = disc.seen_from(self.film_point(film));
+            let angle = |i| DVec2::from_angle(turn_of(i) * std::f64::consts::TAU);
+            return (0..ANGLES).map(|i| centre + angle(i) * radius).collect();
+        }
         let Some(place) = self.place(film) else { return Vec::new() };
         let mut corners = Vec::with_capacity(ANGLES);
         for i in 0..ANGLES {
@@ -271,6 +304,7 @@ impl ExitPupil {
 
     fn place(&self, film: DVec2) -> Option<Place> {
         match self.layout {
+            _ if self.nodes.is_empty() => None,
             Layout::Radial => self.radial_place(film),
             Layout::Planar => self.planar_place(film),
         }
