@@ -11,8 +11,8 @@ use etendue_scene::file::{AccelName, TracerSpec};
 use etendue_spectrum::Lanes;
 use etendue_tracer::texture::ImageError;
 use etendue_tracer::{
-    Direct, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind, Lights, Material, Path,
-    Pixel, Spectral, Stage, Surroundings, Tally, Tracer, Traits, View, Whitted,
+    Direct, Emitters, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind, Lights,
+    Material, Path, Pixel, Spectral, Stage, Surroundings, Tally, Tracer, Traits, View, Whitted,
 };
 use rayon::prelude::*;
 
@@ -272,6 +272,7 @@ pub fn render(
         }
         _ => None,
     };
+    let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
     let light = lit.as_ref().map(|(tracer, lights)| LightPass {
         stage: Stage {
             accel,
@@ -279,6 +280,7 @@ pub fn render(
             lights,
             spectral: &spectral,
             traits: Traits::of(&scene.geometry, &scene.materials),
+            emitters: emitters.as_ref(),
         },
         tracer: &**tracer,
         camera: &light_camera,

@@ -16,7 +16,7 @@
 //! | [`material`], [`texture`] | surfaces, ready to be looked up |
 //! | [`footprint`] | how much of a surface a sample stands for |
 //! | [`bsdf`] | how surfaces scatter light |
-//! | [`light`], [`environment`] | where light comes from |
+//! | [`light`], [`emitters`], [`environment`] | where light comes from |
 //! | [`spawn`] | where a ray that leaves a surface starts |
 //! | [`transport`] | batches of paths, and what tracers share |
 //! | [`direct`], [`whitted`], [`path`] | the tracers |
@@ -25,6 +25,7 @@
 mod batches;
 pub mod bsdf;
 pub mod direct;
+pub mod emitters;
 pub mod environment;
 pub mod footprint;
 pub mod layer;
@@ -43,6 +44,7 @@ pub mod transport;
 pub mod whitted;
 
 pub use direct::Direct;
+pub use emitters::Emitters;
 pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};
 pub use layer::{LayerSpec, NormalKind, Space};

@@ -20,6 +20,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, Geometry, HitBatch, MISS, RayBatch};
 
 use crate::bsdf::{Bsdf, Weights};
+use crate::emitters::Emitters;
 use crate::footprint::{Cone, Footprint};
 use crate::light::{End, Lights};
 use crate::reference::{Spot, Surroundings};
@@ -55,6 +56,8 @@ pub struct Stage<'a> {
     pub spectral: &'a Spectral,
     /// What its surfaces make tracers do.
     pub traits: Traits,
+    /// The surfaces that shine, where they are few.
+    pub emitters: Option<&'a Emitters>,
 }
 
 /// What no surface of a scene asks for is not done.
@@ -143,6 +146,8 @@ pub(crate) enum Follow {
 pub struct Scratch {
     now: Paths,
     next: Paths,
+    /// Paths that only look for light.
+    last: Paths,
     hits: HitBatch,
     alive: Vec<u32>,
     numbers: Numbers,
@@ -310,6 +315,7 @@ pub(crate) fn trace(
         let paths = (&scratch.now.states[..], &scratch.alive[..]);
         scratch.numbers.draw(beam.samples, needs, paths);
         scratch.next.clear();
+        scratch.last.clear();
         scratch.shadows.clear();
         // From neighbouring places to lights: as coherent as what they start from.
         scratch.shadows.rays.coherent = scratch.now.rays.coherent;
@@ -317,6 +323,7 @@ pub(crate) fn trace(
             tracing.step(scratch, k);
         }
         tracing.light(&mut scratch.shadows, out);
+        tracing.glimpse(scratch, out);
         std::mem::swap(&mut scratch.now, &mut scratch.next);
     }
     tracing.tally
@@ -452,7 +459,7 @@ impl Tracing<'_> {
 
     /// One path's step at the surface that it met: a light is asked, a direction is chosen.
     fn step(&mut self, scratch: &mut Scratch, k: usize) {
-        let Scratch { now, next, hits, alive, numbers, shadows, radiance, .. } = scratch;
+        let Scratch { now, next, last, hits, alive, numbers, shadows, radiance, .. } = scratch;
         let i = alive[k] as usize;
         let around = &self.stage.surroundings;
         let footprint = now.footprint(hits, i);
@@ -483,7 +490,7 @@ impl Tracing<'_> {
         if !bsdf.is_delta() {
             self.ask(&bsdf, &met.anchor, throughput, state.ray, &numbers, shadows, radiance);
         }
-        self.scatter(&bsdf, &met.anchor, throughput, state, &numbers, next);
+        self.scatter(&bsdf, &met.anchor, throughput, state, &numbers, [next, last]);
     }
 
     /// Chooses a light and notes the ray to it.
@@ -536,7 +543,7 @@ impl Tracing<'_> {
         throughput: &mut [f64],
         mut state: State,
         numbers: &[[f64; 2]; DRAWS as usize],
-        next: &mut Paths,
+        [next, last]: [&mut Paths; 2],
     ) {
         let ends = state.bounces >= self.rules.bounces;
         if (ends || self.rules.follow == Follow::Single)
@@ -576,8 +583,43 @@ impl Tracing<'_> {
         }
         state.density = scattered.density;
         state.vertex = anchor.point;
+        let glimpses = state.is_last && !single && self.glimpses();
+        let next = if glimpses { last } else { next };
         next.push(anchor.leave(scattered.direction), scattered.direction, state);
         next.throughput.extend_from_slice(throughput);
+    }
+
+    /// Whether paths that only look for light ask what shines before they ask the scene. Through
+    /// surfaces that are partly there they have to be followed.
+    fn glimpses(&self) -> bool {
+        self.stage.emitters.is_some() && !self.stage.traits.is_pierced
+    }
+
+    /// Adds the light that the last directions of paths meet.
+    fn glimpse(&mut self, scratch: &mut Scratch, out: &mut [f64]) {
+        let Scratch { last, hits, shadows, radiance, .. } = scratch;
+        let Some(emitters) = self.stage.emitters.filter(|_| !last.states.is_empty()) else {
+            return;
+        };
+        emitters.closest(&last.rays, hits);
+        shadows.clear();
+        shadows.rays.coherent = false;
+        for (i, state) in last.states.iter().enumerate() {
+            let Some(weight) = self.met(last, hits, i, radiance) else { continue };
+            let (origin, direction) = (last.rays.origin(i), last.rays.direction(i));
+            match self.stage.surroundings.spot(hits, i) {
+                None => shadows.rays.push(origin, direction),
+                Some(spot) => {
+                    let point = origin + direction * hits.t[i];
+                    let end = Anchor::new(point, hits.normal(i), origin, spot.placement, spot.mesh);
+                    push_to(&mut shadows.rays, origin, end.leave(-direction));
+                }
+            }
+            let throughput = &last.throughput[i * self.count..(i + 1) * self.count];
+            shadows.ray.push(state.ray);
+            shadows.brought.extend(radiance.iter().zip(throughput).map(|(r, t)| r * t * weight));
+        }
+        self.light(shadows, out);
     }
 
     /// Adds what lights bring along rays that nothing blocks.

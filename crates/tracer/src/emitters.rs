@@ -1,0 +1,76 @@
+//! Surfaces that shine, by themselves: a direction that is followed for its light alone asks these
+//! first, and the whole scene only where one of them is met.
+//!
+//! What a path adds is the same as if the whole scene were asked for its closest hit. Most such
+//! directions meet no light, and those that do need a shadow ray, which is cheaper than a closest hit.
+
+use std::sync::Arc;
+
+use etendue_accel::{Accel, BuildOptions, Bvh};
+use etendue_geometry::{Geometry, HitBatch, MISS, RayBatch};
+
+use crate::Material;
+
+/// Emissive surfaces are kept apart when they are at most this share of the scene's triangles.
+const MOST: f64 = 0.125;
+
+/// The emissive surfaces of a scene.
+#[derive(Debug)]
+pub struct Emitters {
+    /// `None` when nothing shines.
+    accel: Option<Bvh>,
+    /// The scene's number of each placement of the structure.
+    numbers: Vec<u32>,
+}
+
+impl Emitters {
+    /// The emissive surfaces among the placements of `geometry`; `None` when there are too many for
+    /// this to be of use.
+    #[must_use]
+    pub fn of(geometry: &Geometry, materials: &[Material]) -> Option<Self> {
+        let mut own = Geometry { meshes: geometry.meshes.clone(), placements: Vec::new() };
+        let mut numbers = Vec::new();
+        for (number, placement) in (0_u32..).zip(&geometry.placements) {
+            let material = materials.get(placement.material as usize);
+            if material.is_some_and(|material| material.emission.is_some()) {
+                own.placements.push(placement.clone());
+                numbers.push(number);
+            }
+        }
+        if numbers.is_empty() {
+            return Some(Self { accel: None, numbers });
+        }
+        if own.triangles() as f64 > MOST * geometry.triangles() as f64 {
+            return None;
+        }
+        keep_placed_meshes(&mut own);
+        let accel = Bvh::build(Arc::new(own), &BuildOptions::default()).ok()?;
+        Some(Self { accel: Some(accel), numbers })
+    }
+
+    /// The closest emissive surface along each ray, by the scene's numbers.
+    pub(crate) fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
+        match &self.accel {
+            Some(accel) => accel.closest(rays, hits),
+            None => hits.reset(rays.len()),
+        }
+        for number in hits.placement.iter_mut().filter(|number| **number != MISS) {
+            *number = self.numbers[*number as usize];
+        }
+    }
+}
+
+/// Leaves out meshes that nothing places, which a structure would be built over.
+fn keep_placed_meshes(geometry: &mut Geometry) {
+    let mut number = vec![None; geometry.meshes.len()];
+    let mut kept = Vec::new();
+    for placement in &mut geometry.placements {
+        let old = placement.mesh as usize;
+        let new = *number[old].get_or_insert_with(|| {
+            kept.push(geometry.meshes[old].clone());
+            u32::try_from(kept.len() - 1).unwrap_or(u32::MAX)
+        });
+        placement.mesh = new;
+    }
+    geometry.meshes = kept;
+}
