@@ -42,6 +42,6 @@ pub use lens::{
 pub use orthographic::{Orthographic, OrthographicSpec};
 pub use pinhole::{Pinhole, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};
-pub use sampler::{PixelSamples, Sampler, squares};
+pub use sampler::{PixelSamples, Sampler, squares, squares_of_pair};
 pub use samples::{CameraRays, FilmSamples};
 pub use sensor::SensorSpec;

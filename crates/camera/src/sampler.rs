@@ -99,6 +99,23 @@ impl PixelSamples {
     }
 }
 
+/// [`PixelSamples::square`] of one pair of dimensions for each of `samples`, which are a pixel's
+/// samples and an index, in one go: `out` is refilled.
+pub fn squares_of_pair(
+    samples: impl Iterator<Item = (PixelSamples, u32)> + Clone,
+    pair: u32,
+    out: &mut Vec<[f64; 2]>,
+) {
+    out.clear();
+    if samples.clone().any(|(pixel, _)| pixel.sampler != Sampler::Sobol) {
+        out.extend(samples.map(|(pixel, index)| pixel.square(index, pair)));
+        return;
+    }
+    let keys: Vec<Key> = samples.map(|(pixel, index)| pixel.sobol_key(index, pair)).collect();
+    out.resize(keys.len(), [0.0; 2]);
+    sobol::pairs(&keys, 2 * pair % DIMENSIONS, out);
+}
+
 /// [`PixelSamples::square`] for each of `wanted`, which are a pixel's samples, an index and a pair of
 /// dimensions, in one go: `out` is refilled.
 pub fn squares(wanted: &[(PixelSamples, u32, u32)], out: &mut Vec<[f64; 2]>) {
@@ -215,6 +232,10 @@ mod tests {
             let mut out = Vec::new();
             squares(&wanted, &mut out);
             let one_by_one = wanted.iter().map(|(pixel, i, pair)| pixel.square(*i, *pair));
+            assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?}");
+            let samples = wanted.iter().map(|&(pixel, i, _)| (pixel, i));
+            squares_of_pair(samples.clone(), 3, &mut out);
+            let one_by_one = samples.map(|(pixel, i)| pixel.square(i, 3));
             assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?}");
         }
     }

@@ -17,6 +17,7 @@
 //! | [`batch`] | [`RayBatch`] and [`HitBatch`], structures of arrays |
 //! | [`bounds`] | axis-aligned boxes |
 //! | [`buffer`] | plain values owned by a `Vec` or by a mapped file |
+//! | [`disk`] | the unit square on the unit disk |
 //! | [`mapped`] | the one place that maps files |
 //! | [`mesh`] | a triangle mesh and its vertex attributes |
 //! | [`transform`] | affine maps whose translation keeps 106 bits |
@@ -25,6 +26,7 @@
 pub mod batch;
 pub mod bounds;
 pub mod buffer;
+pub mod disk;
 pub mod mapped;
 pub mod mesh;
 pub mod transform;

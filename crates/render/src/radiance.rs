@@ -5,7 +5,9 @@
 //! Summen", 1974), so the mean of a million samples is as exact as that of ten.
 
 use etendue_camera::element::FateCounts;
-use etendue_camera::{Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, squares};
+use etendue_camera::{
+    Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, squares, squares_of_pair,
+};
 use etendue_tracer::transport::Beam;
 use etendue_tracer::{Samples, Scratch, Stage, Tally, Tracer};
 
@@ -50,11 +52,17 @@ struct Numbers {
 
 impl Samples for Numbers {
     fn squares(&self, wanted: &[(u32, u32)], out: &mut Vec<[f64; 2]>) {
-        let sample_of = |&(ray, pair): &(u32, u32)| {
-            let (pixel, index) = self.samples[self.of_ray[ray as usize] as usize];
+        let sample_of = |ray: u32| self.samples[self.of_ray[ray as usize] as usize];
+        let Some(&(_, pair)) = wanted.first() else { return out.clear() };
+        if wanted.iter().all(|&(_, other)| other == pair) {
+            let samples = wanted.iter().map(|&(ray, _)| sample_of(ray));
+            return squares_of_pair(samples, CAMERA_PAIRS + pair, out);
+        }
+        let numbered = wanted.iter().map(|&(ray, pair)| {
+            let (pixel, index) = sample_of(ray);
             (pixel, index, CAMERA_PAIRS + pair)
-        };
-        squares(&wanted.iter().map(sample_of).collect::<Vec<_>>(), out);
+        });
+        squares(&numbered.collect::<Vec<_>>(), out);
     }
 }
 

@@ -6,7 +6,10 @@ use std::sync::{Mutex, PoisonError};
 
 use etendue_accel::Accel;
 use etendue_camera::element::FateCounts;
-use etendue_camera::{Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, Sampler, squares};
+use etendue_camera::lens::LensCamera;
+use etendue_camera::{
+    Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, Sampler, squares_of_pair,
+};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_tracer::{LayerSpec, NormalKind, Surroundings, Tally, Traced};
 use rayon::prelude::*;
@@ -340,24 +343,25 @@ pub(crate) fn place_samples(
         let pixel = sampler.pixel(seed, tile.left + x, tile.top + y, samples);
         numbers.extend(range.clone().map(|index| (pixel, index)));
     }
-    let pairs = match camera.lens() {
-        None => 1,
-        Some(lens) if lens.draws_wavelengths() => CAMERA_PAIRS,
-        Some(_) => 2,
-    };
-    let wanted = |pair| numbers.iter().map(move |&(pixel, index)| (pixel, index, pair));
-    let mut places = Vec::new();
-    squares(&(0..pairs).flat_map(wanted).collect::<Vec<_>>(), &mut places);
-    let mut places = places.chunks(numbers.len().max(1));
-    let [in_pixel, in_pupil, in_spectrum] =
-        [places.next(), places.next(), places.next()].map(Option::unwrap_or_default);
+    let count = numbers.len();
+    let draw = |pair, out: &mut Vec<_>| squares_of_pair(numbers.iter().copied(), pair, out);
     film.clear();
-    for (i, place) in in_pixel.iter().enumerate() {
-        let (x, y) = pixels[i / range.len()];
-        let corner = [tile.left + x, tile.top + y];
-        let of = |squares: &[[f64; 2]]| squares.get(i).copied().unwrap_or([0.5; 2]);
-        let [wavelength, _] = of(in_spectrum);
-        film.push([0, 1].map(|k| f64::from(corner[k]) + place[k]), of(in_pupil), wavelength);
+    let mut places = Vec::new();
+    draw(0, &mut places);
+    for (&(x, y), places) in pixels.iter().zip(places.chunks(range.len().max(1))) {
+        let corner = [tile.left + x, tile.top + y].map(f64::from);
+        film.columns.extend(places.iter().map(|place| corner[0] + place[0]));
+        film.rows.extend(places.iter().map(|place| corner[1] + place[1]));
+    }
+    match camera.lens() {
+        Some(_) => draw(1, &mut film.pupil),
+        None => film.pupil.resize(count, [0.5; 2]),
+    }
+    if camera.lens().is_some_and(LensCamera::draws_wavelengths) {
+        draw(2, &mut places);
+        film.spectrum.extend(places.iter().map(|place| place[0]));
+    } else {
+        film.spectrum.resize(count, 0.5);
     }
 }
 

@@ -235,6 +235,16 @@ impl Lights {
         self.environment.is_some()
     }
 
+    /// The only light there is, when that is a point (m), with its intensity in `count` lanes.
+    pub(crate) fn lone_point(&self, count: usize) -> Option<(DVec3, &[f64])> {
+        match self.lights[..] {
+            [Light { kind: LightKind::Point(at), .. }] if self.picker.len() == 1 => {
+                Some((at, self.lanes_of(0, count)))
+            }
+            _ => None,
+        }
+    }
+
     /// How many emissive triangles there are.
     #[must_use]
     pub fn emissive_triangles(&self) -> usize {

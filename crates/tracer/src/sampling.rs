@@ -7,8 +7,9 @@
 //! * Orthonormal frames: Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
 //! * Choice by weight: Walker 1977 and Vose 1991 (alias tables), constant time for any number.
 
-use std::f64::consts::{FRAC_PI_4, PI, TAU};
+use std::f64::consts::{PI, TAU};
 
+use etendue_geometry::disk;
 use etendue_geometry::glam::DVec3;
 
 /// Three unit vectors at right angles; z is a surface's normal.
@@ -44,24 +45,8 @@ impl Frame {
 /// A direction about +z with density cos θ / π.
 #[must_use]
 pub fn cosine_direction(square: [f64; 2]) -> DVec3 {
-    let [x, y] = disk(square);
+    let [x, y] = disk::point(square);
     DVec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())
-}
-
-/// A point of the unit disk with density 1/π.
-#[must_use]
-pub fn disk([u, v]: [f64; 2]) -> [f64; 2] {
-    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
-    if a == 0.0 && b == 0.0 {
-        return [0.0; 2];
-    }
-    let (r, phi) = if a.abs() > b.abs() {
-        (a, FRAC_PI_4 * (b / a))
-    } else {
-        (b, 2.0 * FRAC_PI_4 - FRAC_PI_4 * (a / b))
-    };
-    let (sin, cos) = phi.sin_cos();
-    [r * cos, r * sin]
 }
 
 /// A direction with density 1/4π.

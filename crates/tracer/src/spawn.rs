@@ -20,7 +20,7 @@ use etendue_geometry::{Mesh, Placement};
 
 /// Roundings that a point, a later ray's origin and that ray's own test of this triangle go through:
 /// about five each, and as many again for safety.
-const ROUNDINGS: f64 = 32.0 * f64::EPSILON;
+pub(crate) const ROUNDINGS: f64 = 32.0 * f64::EPSILON;
 
 /// A point of a surface, with how well it is known.
 #[derive(Debug, Clone, Copy)]
@@ -43,13 +43,7 @@ impl Anchor {
         placement: &Placement,
         mesh: &Mesh,
     ) -> Self {
-        let place = &placement.world_from_mesh;
-        let corner = mesh.bounds.min.abs().max(mesh.bounds.max.abs());
-        let linear = &place.linear;
-        let turned = linear.x_axis.abs() * corner.x
-            + linear.y_axis.abs() * corner.y
-            + linear.z_axis.abs() * corner.z;
-        let magnitudes = point.abs() + origin.abs() + place.translation.abs() + turned;
+        let magnitudes = point.abs() + origin.abs() + magnitudes(placement, mesh);
         Self { point, normal, error: ROUNDINGS * normal.abs().dot(magnitudes) }
     }
 
@@ -59,4 +53,15 @@ impl Anchor {
         let side = if towards.dot(self.normal) < 0.0 { -1.0 } else { 1.0 };
         self.point + self.normal * (side * self.error)
     }
+}
+
+/// `|T| + |L p₀|`: what a placement's own numbers add to the rounding of a hit (m).
+pub(crate) fn magnitudes(placement: &Placement, mesh: &Mesh) -> DVec3 {
+    let place = &placement.world_from_mesh;
+    let corner = mesh.bounds.min.abs().max(mesh.bounds.max.abs());
+    let linear = &place.linear;
+    let turned = linear.x_axis.abs() * corner.x
+        + linear.y_axis.abs() * corner.y
+        + linear.z_axis.abs() * corner.z;
+    place.translation.abs() + turned
 }

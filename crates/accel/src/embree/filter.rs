@@ -88,10 +88,16 @@ impl Hit<'_> {
         unsafe { *self.lanes.ray.add(RAY_TFAR * self.lanes.width + self.lane) = t }
     }
 
-    fn triangle(&self, geometry: &Geometry) -> Triangle {
+    /// Placement and triangle.
+    fn met(&self) -> [u32; 2] {
         let instance = self.of_hit(HIT_INSTANCE);
         let placement = if instance == MISS { self.of_hit(HIT_GEOMETRY) } else { instance };
-        Triangle::of(geometry, placement, self.of_hit(HIT_PRIMITIVE))
+        [placement, self.of_hit(HIT_PRIMITIVE)]
+    }
+
+    fn triangle(&self, geometry: &Geometry) -> Triangle {
+        let [placement, triangle] = self.met();
+        Triangle::of(geometry, placement, triangle)
     }
 }
 
@@ -133,6 +139,9 @@ impl<'a> Judged<'a> {
 
     fn keeps(&mut self, hit: &Hit<'_>) -> bool {
         let i = hit.id();
+        if self.rays.left.get(i) == Some(&hit.met()) {
+            return false;
+        }
         let Some(query) = Query::of(self.rays, i) else { return false };
         match verdict(self.geometry, &query, &hit.triangle(self.geometry)) {
             Verdict::Hit(_) => true,

@@ -4,8 +4,9 @@
 //!
 //! Samples of a batch are worked out side by side, in loops that vectorise.
 
-use std::f64::consts::{FRAC_PI_4, PI};
+use std::f64::consts::PI;
 
+use etendue_geometry::disk;
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::element::{Block, Fate, Frame, LANES, LensRays, Opening};
@@ -89,7 +90,7 @@ fn fill_blocks(disc: &Disc, bundle: &Bundle<'_>, blocks: &mut [Block]) {
             let px = vertex.x + (right.x * x[i] + up.x * y[i]);
             let py = vertex.y + (right.y * x[i] + up.y * y[i]);
             let pz = vertex.z + (right.z * x[i] + up.z * y[i]);
-            let [a, b] = disc_point(square[i]);
+            let [a, b] = disk::point(square[i]);
             let (u, v) =
                 (disc.centre.x + a * disc.radius - px, disc.centre.y + b * disc.radius - py);
             let w = disc.centre.z - pz;
@@ -107,67 +108,5 @@ fn fill_blocks(disc: &Disc, bundle: &Bundle<'_>, blocks: &mut [Block]) {
             block.throughput[i] = factor * -dz / length2 * on_sensor;
         }
         block.outcome[..range.len()].fill(Fate::Exited.code());
-    }
-}
-
-/// A point of the unit square on the unit disc, equal areas staying equal (P. Shirley and K. Chiu, "A
-/// low distortion map between disk and square", 1997).
-#[inline(always)]
-fn disc_point([u, v]: [f64; 2]) -> [f64; 2] {
-    let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
-    let flat = a.abs() > b.abs();
-    let (radius, other) = if flat { (a, b) } else { (b, a) };
-    let ratio = if radius == 0.0 { 0.0 } else { other / radius };
-    let (sine, cosine) = small_sine_cosine(FRAC_PI_4 * ratio);
-    if flat { [radius * cosine, radius * sine] } else { [radius * sine, radius * cosine] }
-}
-
-/// Sine and cosine of an angle of at most π/4 by their series: what is left out is below 10⁻¹⁶.
-#[inline(always)]
-fn small_sine_cosine(angle: f64) -> (f64, f64) {
-    let x = angle * angle;
-    let series = |terms: [f64; 8]| {
-        let mut sum = terms[7];
-        for k in (0..7).rev() {
-            sum = sum * x + terms[k];
-        }
-        sum
-    };
-    let sine = series([
-        1.0,
-        -1.0 / 6.0,
-        1.0 / 120.0,
-        -1.0 / 5_040.0,
-        1.0 / 362_880.0,
-        -1.0 / 39_916_800.0,
-        1.0 / 6_227_020_800.0,
-        -1.0 / 1_307_674_368_000.0,
-    ]);
-    let cosine = series([
-        -1.0 / 2.0,
-        1.0 / 24.0,
-        -1.0 / 720.0,
-        1.0 / 40_320.0,
-        -1.0 / 3_628_800.0,
-        1.0 / 479_001_600.0,
-        -1.0 / 87_178_291_200.0,
-        1.0 / 20_922_789_888_000.0,
-    ]);
-    (angle * sine, 1.0 + x * cosine)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sines_and_cosines_are_those_of_the_library() {
-        for i in -100..=100 {
-            let angle = FRAC_PI_4 * f64::from(i) / 100.0;
-            let (sine, cosine) = small_sine_cosine(angle);
-            // A rounding of each of two operations near 1.
-            assert!((sine - angle.sin()).abs() < 3e-16, "{angle}: {sine}");
-            assert!((cosine - angle.cos()).abs() < 3e-16, "{angle}: {cosine}");
-        }
     }
 }

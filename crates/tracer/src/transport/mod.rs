@@ -12,6 +12,11 @@
 //! * Many wavelengths on one path, all but one ending where a glass splits them: Wilkie et al., "Hero
 //!   Wavelength Spectral Sampling", 2014.
 
+mod matte;
+mod numbers;
+mod paths;
+mod shadows;
+
 use std::fmt::Debug;
 use std::ops::{AddAssign, Range};
 
@@ -19,9 +24,12 @@ use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, Geometry, HitBatch, MISS, RayBatch};
 
+use self::matte::Patch;
+use self::numbers::{DRAWS, Draw, Numbers};
+use self::paths::{Paths, State};
+use self::shadows::{Shadows, push_to};
 use crate::bsdf::{Bsdf, Weights};
 use crate::emitters::Emitters;
-use crate::footprint::{Cone, Footprint};
 use crate::light::{End, Lights};
 use crate::reference::{Spot, Surroundings};
 use crate::sampling::power_heuristic;
@@ -153,140 +161,8 @@ pub struct Scratch {
     numbers: Numbers,
     shadows: Shadows,
     radiance: Vec<f64>,
+    patch: Box<Patch>,
 }
-
-/// Paths under way.
-#[derive(Debug, Default)]
-struct Paths {
-    rays: RayBatch,
-    states: Vec<State>,
-    /// `[path][lane]`.
-    throughput: Vec<f64>,
-}
-
-/// What a path remembers.
-#[derive(Debug, Clone, Copy)]
-struct State {
-    /// The camera's ray.
-    ray: u32,
-    /// Steps taken, for numbers not to be used twice.
-    steps: u32,
-    /// Surfaces that have scattered light.
-    bounces: u32,
-    /// Density (1/sr) of the direction; `+inf` when no light can be asked instead.
-    density: f64,
-    /// The surface that it left (m).
-    vertex: DVec3,
-    /// The one lane left, after a glass has split them.
-    lane: Option<u32>,
-    /// Looks for light and goes no farther.
-    is_last: bool,
-    /// What the path stands for, as long as it only met mirrors and clear boundaries; as wide as at
-    /// its vertex.
-    cone: Option<Cone>,
-}
-
-impl Paths {
-    fn clear(&mut self) {
-        self.rays.clear();
-        self.states.clear();
-        self.throughput.clear();
-    }
-
-    /// What path `i` covers of what it hit.
-    fn footprint(&self, hits: &HitBatch, i: usize) -> Option<Footprint> {
-        let width = self.states[i].cone?.after(hits.t[i]).width;
-        Some(Footprint { direction: self.rays.direction(i), width })
-    }
-
-    /// Adds a path that leaves a surface.
-    fn push(&mut self, origin: DVec3, direction: DVec3, state: State) {
-        self.rays.from_surface = true;
-        self.rays.coherent = false;
-        self.rays.push(origin, direction);
-        self.states.push(state);
-    }
-}
-
-/// Rays to lights and what each brings if nothing is in between.
-#[derive(Debug, Default)]
-struct Shadows {
-    rays: RayBatch,
-    ray: Vec<u32>,
-    /// `[shadow][lane]`.
-    brought: Vec<f64>,
-    blocked: Vec<bool>,
-    passed: Vec<f64>,
-    hits: HitBatch,
-    again: RayBatch,
-    open: Vec<u32>,
-}
-
-impl Shadows {
-    fn clear(&mut self) {
-        self.rays.clear();
-        self.ray.clear();
-        self.brought.clear();
-    }
-}
-
-/// What a path uses random numbers for at each step.
-#[derive(Debug, Clone, Copy)]
-enum Draw {
-    /// Choosing a light, and among the ways in which a surface scatters.
-    Choice,
-    /// A place on the light; or the lane that stays where glass splits them.
-    Light,
-    /// The direction to follow.
-    Direction,
-    /// Whether a surface is there, and whether a path goes on.
-    Chance,
-}
-
-/// How many uses there are.
-const DRAWS: u32 = 4;
-
-impl Draw {
-    const ALL: [Self; DRAWS as usize] = [Self::Choice, Self::Light, Self::Direction, Self::Chance];
-}
-
-/// The random numbers of a step: those that it does without are not made.
-#[derive(Debug, Default)]
-struct Numbers {
-    wanted: Vec<(u32, u32)>,
-    /// By [`Draw`], one a path that goes on; empty where not needed.
-    drawn: [Vec<[f64; 2]>; DRAWS as usize],
-}
-
-impl Numbers {
-    /// Makes what the paths `alive` among `states` need.
-    fn draw(
-        &mut self,
-        samples: &dyn Samples,
-        needs: impl Fn(Draw) -> bool,
-        (states, alive): (&[State], &[u32]),
-    ) {
-        for draw in Draw::ALL {
-            let drawn = &mut self.drawn[draw as usize];
-            drawn.clear();
-            if needs(draw) {
-                let pair = |state: &State| state.steps * DRAWS + draw as u32;
-                let states = alive.iter().map(|&i| &states[i as usize]);
-                self.wanted.clear();
-                self.wanted.extend(states.map(|state| (state.ray, pair(state))));
-                samples.squares(&self.wanted, drawn);
-            }
-        }
-    }
-
-    /// Those of the `k`-th path that goes on.
-    fn of(&self, k: usize) -> [[f64; 2]; DRAWS as usize] {
-        self.drawn.each_ref().map(|drawn| drawn.get(k).copied().unwrap_or([0.5; 2]))
-    }
-}
-
-/// Rays whose transparency is looked through, one surface after the other.
-const MOST_LAYERS: u32 = 256;
 
 /// The most steps of a path: surfaces that let it pass count, and may be many.
 const MOST_STEPS: u32 = 4096;
@@ -319,9 +195,7 @@ pub(crate) fn trace(
         scratch.shadows.clear();
         // From neighbouring places to lights: as coherent as what they start from.
         scratch.shadows.rays.coherent = scratch.now.rays.coherent;
-        for k in 0..scratch.alive.len() {
-            tracing.step(scratch, k);
-        }
+        tracing.step_all(scratch);
         tracing.light(&mut scratch.shadows, out);
         tracing.glimpse(scratch, out);
         std::mem::swap(&mut scratch.now, &mut scratch.next);
@@ -457,6 +331,22 @@ impl Tracing<'_> {
         Some(asked(density) * there())
     }
 
+    /// The step of all paths that go on.
+    fn step_all(&mut self, scratch: &mut Scratch) {
+        let mut start = 0;
+        while let Some(&first) = scratch.alive.get(start) {
+            let placement = scratch.hits.placement[first as usize];
+            let met = |i: &u32| scratch.hits.placement[*i as usize] == placement;
+            let run = scratch.alive[start..].iter().take_while(|i| met(i)).count();
+            let which = start..start + run;
+            start = which.end;
+            match self.matte(placement) {
+                Some(matte) => self.step_matte(scratch, &matte, which),
+                None => which.for_each(|k| self.step(scratch, k)),
+            }
+        }
+    }
+
     /// One path's step at the surface that it met: a light is asked, a direction is chosen.
     fn step(&mut self, scratch: &mut Scratch, k: usize) {
         let Scratch { now, next, last, hits, alive, numbers, shadows, radiance, .. } = scratch;
@@ -465,13 +355,14 @@ impl Tracing<'_> {
         let footprint = now.footprint(hits, i);
         let Some(met) = Met::new(around, &now.rays, hits, i, footprint) else { return };
         let numbers = numbers.of(k);
+        let left = [hits.placement[i], hits.triangle[i]];
         let mut state = now.states[i];
         state.steps += 1;
         state.cone = state.cone.map(|cone| cone.after(hits.t[i]));
         let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
         if met.material.is_pierced() && numbers[Draw::Chance as usize][0] >= met.opacity() {
             let direction = now.rays.direction(i);
-            next.push(met.anchor.leave(direction), direction, state);
+            next.push((met.anchor.leave(direction), direction), left, state);
             next.throughput.extend_from_slice(throughput);
             return;
         }
@@ -488,19 +379,18 @@ impl Tracing<'_> {
         let bsdf = met.bsdf(around, wavelength);
         state.bounces += 1;
         if !bsdf.is_delta() {
-            self.ask(&bsdf, &met.anchor, throughput, state.ray, &numbers, shadows, radiance);
+            let path = (&*throughput, state.ray);
+            self.ask(&bsdf, (&met.anchor, left), path, &numbers, shadows, radiance);
         }
-        self.scatter(&bsdf, &met.anchor, throughput, state, &numbers, [next, last]);
+        self.scatter(&bsdf, (&met.anchor, left), throughput, state, &numbers, [next, last]);
     }
 
     /// Chooses a light and notes the ray to it.
-    #[expect(clippy::too_many_arguments, reason = "scratch memory, passed down once")]
     fn ask(
         &mut self,
         bsdf: &Bsdf,
-        anchor: &Anchor,
-        throughput: &[f64],
-        ray: u32,
+        (anchor, left): (&Anchor, [u32; 2]),
+        (throughput, ray): (&[f64], u32),
         numbers: &[[f64; 2]; DRAWS as usize],
         shadows: &mut Shadows,
         radiance: &mut [f64],
@@ -529,6 +419,7 @@ impl Tracing<'_> {
                 push_to(&mut shadows.rays, origin, end.leave(-toward.direction));
             }
         }
+        shadows.rays.left.push(left);
         shadows.ray.push(ray);
         let lanes = radiance.iter().zip(throughput).enumerate();
         let brought = lanes.map(|(k, (l, t))| l * t * factor * in_lane(spectral, bsdf, value, k));
@@ -539,7 +430,7 @@ impl Tracing<'_> {
     fn scatter(
         &self,
         bsdf: &Bsdf,
-        anchor: &Anchor,
+        (anchor, left): (&Anchor, [u32; 2]),
         throughput: &mut [f64],
         mut state: State,
         numbers: &[[f64; 2]; DRAWS as usize],
@@ -562,20 +453,8 @@ impl Tracing<'_> {
         if state.is_last && !single && !self.stage.lights.can_be_met() {
             return;
         }
-        let mut most = 0.0_f64;
         for (k, lane) in throughput.iter_mut().enumerate() {
             *lane *= in_lane(self.stage.spectral, bsdf, scattered.weights, k);
-            most = most.max(*lane);
-        }
-        if most <= 0.0 {
-            return;
-        }
-        if self.rules.roulette.is_some_and(|after| state.bounces >= after) && !state.is_last {
-            let survival = most.min(0.95);
-            if numbers[Draw::Chance as usize][1] >= survival {
-                return;
-            }
-            throughput.iter_mut().for_each(|lane| *lane /= survival);
         }
         if !single {
             // Seen by chance from one point, a surface is a point.
@@ -583,104 +462,37 @@ impl Tracing<'_> {
         }
         state.density = scattered.density;
         state.vertex = anchor.point;
-        let glimpses = state.is_last && !single && self.glimpses();
-        let next = if glimpses { last } else { next };
-        next.push(anchor.leave(scattered.direction), scattered.direction, state);
-        next.throughput.extend_from_slice(throughput);
+        let ray = (anchor.leave(scattered.direction), scattered.direction);
+        let chance = numbers[Draw::Chance as usize][1];
+        self.follow(ray, left, throughput, (state, chance), [next, last]);
     }
 
-    /// Whether paths that only look for light ask what shines before they ask the scene. Through
-    /// surfaces that are partly there they have to be followed.
-    fn glimpses(&self) -> bool {
-        self.stage.emitters.is_some() && !self.stage.traits.is_pierced
-    }
-
-    /// Adds the light that the last directions of paths meet.
-    fn glimpse(&mut self, scratch: &mut Scratch, out: &mut [f64]) {
-        let Scratch { last, hits, shadows, radiance, .. } = scratch;
-        let Some(emitters) = self.stage.emitters.filter(|_| !last.states.is_empty()) else {
-            return;
-        };
-        emitters.closest(&last.rays, hits);
-        shadows.clear();
-        shadows.rays.coherent = false;
-        for (i, state) in last.states.iter().enumerate() {
-            let Some(weight) = self.met(last, hits, i, radiance) else { continue };
-            let (origin, direction) = (last.rays.origin(i), last.rays.direction(i));
-            match self.stage.surroundings.spot(hits, i) {
-                None => shadows.rays.push(origin, direction),
-                Some(spot) => {
-                    let point = origin + direction * hits.t[i];
-                    let end = Anchor::new(point, hits.normal(i), origin, spot.placement, spot.mesh);
-                    push_to(&mut shadows.rays, origin, end.leave(-direction));
-                }
-            }
-            let throughput = &last.throughput[i * self.count..(i + 1) * self.count];
-            shadows.ray.push(state.ray);
-            shadows.brought.extend(radiance.iter().zip(throughput).map(|(r, t)| r * t * weight));
-        }
-        self.light(shadows, out);
-    }
-
-    /// Adds what lights bring along rays that nothing blocks.
-    fn light(&mut self, shadows: &mut Shadows, out: &mut [f64]) {
-        if shadows.rays.is_empty() {
+    /// Notes a path along a ray that leaves a placement's triangle, unless it carries nothing or ends
+    /// by `chance`.
+    fn follow(
+        &self,
+        ray: (DVec3, DVec3),
+        left: [u32; 2],
+        throughput: &mut [f64],
+        (state, chance): (State, f64),
+        [next, last]: [&mut Paths; 2],
+    ) {
+        let most = throughput.iter().copied().fold(0.0, f64::max);
+        if most <= 0.0 {
             return;
         }
-        shadows.rays.from_surface = true;
-        self.tally.shadow_rays += shadows.rays.len() as u64;
-        if self.stage.traits.is_pierced {
-            self.look_through(shadows);
-        } else {
-            self.stage.accel.occluded(&shadows.rays, &mut shadows.blocked);
-        }
-        for (k, &ray) in shadows.ray.iter().enumerate() {
-            let brought = &mut shadows.brought[k * self.count..(k + 1) * self.count];
-            if self.stage.traits.is_pierced {
-                brought.iter_mut().for_each(|lane| *lane *= shadows.passed[k]);
-            } else if shadows.blocked[k] {
-                continue;
-            }
-            self.add(brought, ray, out);
-        }
-    }
-
-    /// What share of each shadow ray passes the surfaces on its way.
-    fn look_through(&mut self, shadows: &mut Shadows) {
-        let Shadows { rays, passed, hits, again, open, .. } = shadows;
-        passed.clear();
-        passed.resize(rays.len(), 1.0);
-        open.clear();
-        open.extend(0..u32::try_from(rays.len()).unwrap_or(u32::MAX));
-        again.copy_from(rays);
-        for layer in 0..MOST_LAYERS {
-            self.stage.accel.closest(again, hits);
-            if layer > 0 {
-                self.tally.shadow_rays += again.len() as u64;
-            }
-            let mut onward = RayBatch { from_surface: true, ..RayBatch::default() };
-            let mut still = Vec::new();
-            for (k, &i) in open.iter().enumerate() {
-                let Some(met) = Met::new(&self.stage.surroundings, again, hits, k, None) else {
-                    continue;
-                };
-                let share = &mut passed[i as usize];
-                *share *= 1.0 - met.opacity();
-                if *share > 0.0 {
-                    let direction = again.direction(k);
-                    let origin = met.anchor.leave(direction);
-                    let left = again.t_max[k] - (origin - again.origin(k)).length();
-                    onward.push_between(origin, direction, 0.0, left.max(0.0));
-                    still.push(i);
-                }
-            }
-            *again = onward;
-            *open = still;
-            if open.is_empty() {
+        if self.rules.roulette.is_some_and(|after| state.bounces >= after) && !state.is_last {
+            let survival = most.min(0.95);
+            if chance >= survival {
                 return;
             }
+            throughput.iter_mut().for_each(|lane| *lane /= survival);
         }
-        open.iter().for_each(|&i| passed[i as usize] = 0.0);
+        let single = state.density == f64::INFINITY;
+        let glimpses = state.is_last && !single && self.glimpses();
+        let next = if glimpses { last } else { next };
+        next.push(ray, left, state);
+        next.throughput.extend_from_slice(throughput);
     }
 
     fn add(&mut self, light: &[f64], ray: u32, out: &mut [f64]) {
@@ -691,15 +503,6 @@ impl Tracing<'_> {
         let start = ray as usize * self.count;
         out[start..start + self.count].iter_mut().zip(light).for_each(|(sum, lane)| *sum += lane);
     }
-}
-
-/// A ray from one point to another (m).
-fn push_to(rays: &mut RayBatch, origin: DVec3, end: DVec3) {
-    let offset = end - origin;
-    let distance = offset.length();
-    // Points that fall together see each other: a ray of no length meets nothing.
-    let direction = if distance > 0.0 { offset / distance } else { DVec3::Z };
-    rays.push_between(origin, direction, 0.0, distance);
 }
 
 /// The value in lane `k`.

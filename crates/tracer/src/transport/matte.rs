@@ -1,0 +1,319 @@
+//! Matte surfaces of one colour and flat triangles, many hits at a time: what most rays of most scenes
+//! meet. The same light and the same directions as surfaces in general have ([`crate::bsdf`]), in loops
+//! that vectorise.
+
+use std::f64::consts::PI;
+use std::ops::Range;
+
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{HitBatch, disk};
+
+use super::numbers::Draw;
+use super::paths::Paths;
+use super::{Follow, Scratch, Tracing};
+use crate::bsdf::{Bsdf, Model};
+use crate::spawn::{Anchor, ROUNDINGS, magnitudes};
+use crate::{Color, Paint, Scattering};
+
+/// Hits worked on side by side.
+const LANES: usize = 64;
+
+type Lane = [f64; LANES];
+
+/// A placement whose surface is matte and alike all over.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Matte {
+    color: Color,
+    /// What its own numbers add to the rounding of a hit (m).
+    magnitudes: DVec3,
+}
+
+/// Hits on one placement, and what leaves them.
+#[derive(Debug)]
+pub(super) struct Patch {
+    count: usize,
+    /// Of each path: its number, and which of those that go on it is.
+    path: [(usize, usize); LANES],
+    origin: [Lane; 3],
+    direction: [Lane; 3],
+    t: Lane,
+    /// On the viewer's side.
+    normal: [Lane; 3],
+    point: [Lane; 3],
+    error: Lane,
+    away: Away,
+}
+
+/// Rays that leave a patch.
+#[derive(Debug)]
+struct Away {
+    start: [Lane; 3],
+    along: [Lane; 3],
+    /// How far (m).
+    reach: Lane,
+    /// The share of light that the surface turns to the viewer per colour, over the density of the
+    /// direction; or the density itself where the direction was drawn.
+    value: Lane,
+}
+
+impl Default for Patch {
+    fn default() -> Self {
+        const ZERO: Lane = [0.0; LANES];
+        Self {
+            count: 0,
+            path: [(0, 0); LANES],
+            origin: [ZERO; 3],
+            direction: [ZERO; 3],
+            t: ZERO,
+            normal: [ZERO; 3],
+            point: [ZERO; 3],
+            error: ZERO,
+            away: Away { start: [ZERO; 3], along: [ZERO; 3], reach: ZERO, value: ZERO },
+        }
+    }
+}
+
+impl Patch {
+    /// Takes up to [`LANES`] of the paths that go on, from the first of `which` on, and leaves out
+    /// those that have had their surfaces.
+    fn gather(
+        &mut self,
+        (now, hits, alive): (&Paths, &HitBatch, &[u32]),
+        which: &mut Range<usize>,
+        bounces: u32,
+    ) {
+        self.count = 0;
+        while self.count < LANES
+            && let Some(k) = which.next()
+        {
+            let i = alive[k] as usize;
+            if now.states[i].is_last || now.states[i].bounces >= bounces {
+                continue;
+            }
+            let lane = self.count;
+            self.path[lane] = (i, k);
+            self.t[lane] = hits.t[i];
+            for axis in 0..3 {
+                self.origin[axis][lane] = now.rays.origin[axis][i];
+                self.direction[axis][lane] = now.rays.direction[axis][i];
+                self.normal[axis][lane] = hits.normal[axis][i];
+            }
+            self.count += 1;
+        }
+    }
+
+    fn point(&self, lane: usize) -> DVec3 {
+        at(&self.point, lane)
+    }
+
+    fn anchor(&self, lane: usize) -> Anchor {
+        let normal = at(&self.normal, lane);
+        Anchor { point: self.point(lane), normal, error: self.error[lane] }
+    }
+}
+
+fn at(axes: &[Lane; 3], lane: usize) -> DVec3 {
+    DVec3::new(axes[0][lane], axes[1][lane], axes[2][lane])
+}
+
+impl Tracing<'_> {
+    /// What a placement is, if it is that simple.
+    pub(super) fn matte(&self, placement: u32) -> Option<Matte> {
+        let around = &self.stage.surroundings;
+        let placement = around.geometry.placements.get(placement as usize)?;
+        let material = around.materials.get(placement.material as usize)?;
+        let mesh = around.geometry.mesh_of(placement);
+        let colored = material.vertex_colors && mesh.colors.is_some();
+        let tilted = material.normal_map.is_some() || mesh.normals.is_some();
+        if material.scattering != Scattering::Matte || material.is_pierced() || colored || tilted {
+            return None;
+        }
+        let Paint::Plain(color) = material.base_color else { return None };
+        let color = color.map(|c| c.clamp(0.0, 1.0));
+        Some(Matte { color, magnitudes: magnitudes(placement, mesh) })
+    }
+
+    /// The step of the paths `which` of those that go on, all of which met `matte`.
+    pub(super) fn step_matte(
+        &mut self,
+        scratch: &mut Scratch,
+        matte: &Matte,
+        mut which: Range<usize>,
+    ) {
+        while !which.is_empty() {
+            let Scratch { now, hits, alive, patch, .. } = &mut *scratch;
+            patch.gather((now, hits, alive), &mut which, self.rules.bounces);
+            measure(patch, matte.magnitudes);
+            self.ask_from(scratch, matte);
+            self.scatter_from(scratch, matte);
+        }
+    }
+
+    /// Asks one light for each hit.
+    fn ask_from(&mut self, scratch: &mut Scratch, matte: &Matte) {
+        let lights = self.stage.lights;
+        let Scratch { now, hits, numbers, shadows, radiance, patch, .. } = scratch;
+        let Some((light, lanes)) = lights.lone_point(self.count) else {
+            for lane in 0..if lights.is_dark() { 0 } else { patch.count } {
+                let (i, k) = patch.path[lane];
+                let anchor = patch.anchor(lane);
+                let wo = -at(&patch.direction, lane);
+                let bsdf = Bsdf::new(Model::Matte, [anchor.normal; 2], wo, [matte.color; 2]);
+                let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
+                let left = [hits.placement[i], hits.triangle[i]];
+                let ray = now.states[i].ray;
+                let numbers = numbers.of(k);
+                self.ask(&bsdf, (&anchor, left), (throughput, ray), &numbers, shadows, radiance);
+            }
+            return;
+        };
+        aim_at(patch, light);
+        for (k, lane) in radiance.iter_mut().enumerate() {
+            *lane = lanes[k] * self.stage.spectral.lane(&matte.color, k);
+        }
+        let away = &patch.away;
+        for lane in (0..patch.count).filter(|&lane| away.value[lane] > 0.0) {
+            let (i, _) = patch.path[lane];
+            let (start, along) = (at(&away.start, lane), at(&away.along, lane));
+            shadows.rays.push_between(start, along, 0.0, away.reach[lane]);
+            shadows.rays.left.push([hits.placement[i], hits.triangle[i]]);
+            shadows.ray.push(now.states[i].ray);
+            let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
+            let brought = radiance.iter().zip(throughput).map(|(l, t)| l * t * away.value[lane]);
+            shadows.brought.extend(brought);
+        }
+    }
+
+    /// Chooses a direction for each hit.
+    fn scatter_from(&mut self, scratch: &mut Scratch, matte: &Matte) {
+        let follows_any = self.rules.follow == Follow::All;
+        let lights = self.stage.lights;
+        let Scratch { now, next, last, hits, numbers, patch, .. } = scratch;
+        let ends = |i: usize| now.states[i].bounces + 1 >= self.rules.bounces || !follows_any;
+        if !lights.can_be_met() && patch.path[..patch.count].iter().all(|&(i, _)| ends(i)) {
+            return;
+        }
+        let mut squares = [[0.5; 2]; LANES];
+        let drawn = &numbers.drawn[Draw::Direction as usize];
+        for (square, &(_, k)) in squares.iter_mut().zip(&patch.path[..patch.count]) {
+            *square = drawn[k];
+        }
+        scatter(patch, &squares);
+        for lane in 0..patch.count {
+            let (i, k) = patch.path[lane];
+            let is_last = ends(i);
+            let density = patch.away.value[lane];
+            if density <= 0.0 || (is_last && !lights.can_be_met()) {
+                continue;
+            }
+            let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
+            for (k, lane) in throughput.iter_mut().enumerate() {
+                *lane *= self.stage.spectral.lane(&matte.color, k);
+            }
+            let state = super::State {
+                steps: now.states[i].steps + 1,
+                bounces: now.states[i].bounces + 1,
+                density,
+                vertex: patch.point(lane),
+                is_last,
+                cone: None,
+                ..now.states[i]
+            };
+            let chance = numbers.drawn[Draw::Chance as usize].get(k).map_or(0.5, |pair| pair[1]);
+            let ray = (at(&patch.away.start, lane), at(&patch.away.along, lane));
+            let left = [hits.placement[i], hits.triangle[i]];
+            self.follow(ray, left, throughput, (state, chance), [&mut *next, &mut *last]);
+        }
+    }
+}
+
+/// Points, their errors, and normals on the viewer's side.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn measure(patch: &mut Patch, own: DVec3) {
+    let Patch { origin, direction, t, normal, point, error, .. } = patch;
+    for i in 0..LANES {
+        let (x, y, z) = (normal[0][i], normal[1][i], normal[2][i]);
+        let along = x * direction[0][i] + y * direction[1][i] + z * direction[2][i];
+        let side = if along <= 0.0 { 1.0 } else { -1.0 };
+        normal[0][i] = x * side;
+        normal[1][i] = y * side;
+        normal[2][i] = z * side;
+    }
+    error.fill(0.0);
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let start = origin[axis][i];
+            let here = start + direction[axis][i] * t[i];
+            point[axis][i] = here;
+            error[i] += normal[axis][i].abs() * (here.abs() + start.abs() + own[axis]);
+        }
+    }
+    for error in error {
+        *error *= ROUNDINGS;
+    }
+}
+
+/// Rays from the hits to the point `light`, with cos θ / (π r²): 0 where it is behind the surface.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn aim_at(patch: &mut Patch, light: DVec3) {
+    let Patch { normal, point, error, away, .. } = patch;
+    for i in 0..LANES {
+        let (x, y, z) = (normal[0][i], normal[1][i], normal[2][i]);
+        let (px, py, pz) = (point[0][i], point[1][i], point[2][i]);
+        let (dx, dy, dz) = (light.x - px, light.y - py, light.z - pz);
+        let squared = dx * dx + dy * dy + dz * dz;
+        let cosine = (dx * x + dy * y + dz * z) / squared.sqrt();
+        let value = cosine / (PI * squared);
+        away.value[i] = if cosine > 0.0 { value } else { 0.0 };
+        let (sx, sy, sz) = (px + x * error[i], py + y * error[i], pz + z * error[i]);
+        let (ax, ay, az) = (light.x - sx, light.y - sy, light.z - sz);
+        let reach = (ax * ax + ay * ay + az * az).sqrt();
+        let inverse = 1.0 / reach;
+        away.start[0][i] = sx;
+        away.start[1][i] = sy;
+        away.start[2][i] = sz;
+        away.along[0][i] = ax * inverse;
+        away.along[1][i] = ay * inverse;
+        away.along[2][i] = az * inverse;
+        away.reach[i] = reach;
+    }
+}
+
+/// Directions about the normals with density cos θ / π ([`crate::sampling`]).
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn scatter(patch: &mut Patch, squares: &[[f64; 2]; LANES]) {
+    let Patch { normal, point, error, away, .. } = patch;
+    for i in 0..LANES {
+        let (x, y, z) = (normal[0][i], normal[1][i], normal[2][i]);
+        let [a, b] = disk::point(squares[i]);
+        let c = (1.0 - a * a - b * b).max(0.0).sqrt();
+        // Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
+        let sign = if z < 0.0 { -1.0 } else { 1.0 };
+        let f = -1.0 / (sign + z);
+        let g = x * y * f;
+        let (ux, uy, uz) = (1.0 + sign * x * x * f, sign * g, -sign * x);
+        let (vx, vy, vz) = (g, sign + y * y * f, -y);
+        let (dx, dy, dz) =
+            (ux * a + vx * b + x * c, uy * a + vy * b + y * c, uz * a + vz * b + z * c);
+        let inverse = 1.0 / (dx * dx + dy * dy + dz * dz).sqrt();
+        away.along[0][i] = dx * inverse;
+        away.along[1][i] = dy * inverse;
+        away.along[2][i] = dz * inverse;
+        away.start[0][i] = point[0][i] + x * error[i];
+        away.start[1][i] = point[1][i] + y * error[i];
+        away.start[2][i] = point[2][i] + z * error[i];
+        away.value[i] = c / PI;
+    }
+}

@@ -1,0 +1,60 @@
+//! Paths under way, in arrays, and what each remembers.
+
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{HitBatch, RayBatch};
+
+use crate::footprint::{Cone, Footprint};
+
+/// Paths under way.
+#[derive(Debug, Default)]
+pub(super) struct Paths {
+    pub(super) rays: RayBatch,
+    pub(super) states: Vec<State>,
+    /// `[path][lane]`.
+    pub(super) throughput: Vec<f64>,
+}
+
+/// What a path remembers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct State {
+    /// The camera's ray.
+    pub(super) ray: u32,
+    /// Steps taken, for numbers not to be used twice.
+    pub(super) steps: u32,
+    /// Surfaces that have scattered light.
+    pub(super) bounces: u32,
+    /// Density (1/sr) of the direction; `+inf` when no light can be asked instead.
+    pub(super) density: f64,
+    /// The surface that it left (m).
+    pub(super) vertex: DVec3,
+    /// The one lane left, after a glass has split them.
+    pub(super) lane: Option<u32>,
+    /// Looks for light and goes no farther.
+    pub(super) is_last: bool,
+    /// What the path stands for, as long as it only met mirrors and clear boundaries; as wide as at
+    /// its vertex.
+    pub(super) cone: Option<Cone>,
+}
+
+impl Paths {
+    pub(super) fn clear(&mut self) {
+        self.rays.clear();
+        self.states.clear();
+        self.throughput.clear();
+    }
+
+    /// What path `i` covers of what it hit.
+    pub(super) fn footprint(&self, hits: &HitBatch, i: usize) -> Option<Footprint> {
+        let width = self.states[i].cone?.after(hits.t[i]).width;
+        Some(Footprint { direction: self.rays.direction(i), width })
+    }
+
+    /// Adds a path that leaves a placement's triangle: where it starts, and its direction.
+    pub(super) fn push(&mut self, ray: (DVec3, DVec3), left: [u32; 2], state: State) {
+        self.rays.from_surface = true;
+        self.rays.coherent = false;
+        self.rays.push(ray.0, ray.1);
+        self.rays.left.push(left);
+        self.states.push(state);
+    }
+}
