@@ -112,7 +112,7 @@ impl Rays {
                     t_max: part(&all.t_max),
                     coherent: all.coherent,
                     from_surface: all.from_surface,
-                    left: all.left.get(range.clone()).unwrap_or_default().to_vec(),
+                    ends: all.ends.get(range.clone()).unwrap_or_default().to_vec(),
                 }
             })
             .collect()

@@ -23,9 +23,9 @@ pub struct RayBatch {
     /// The rays start on surfaces, outside by no more than a hit's own error: near their ends only
     /// f64 can tell what counts. `false` for rays that start in the open.
     pub from_surface: bool,
-    /// The placement and the triangle that each ray leaves, which it cannot meet again; empty when
-    /// nobody says.
-    pub left: Vec<[u32; 2]>,
+    /// The placement and the triangle at either end of each ray, which are not in between; [`MISS`]
+    /// for none, and empty when nobody says.
+    pub ends: Vec<[[u32; 2]; 2]>,
 }
 
 impl RayBatch {
@@ -40,7 +40,7 @@ impl RayBatch {
             t_max: array(),
             coherent: false,
             from_surface: false,
-            left: Vec::new(),
+            ends: Vec::new(),
         }
     }
 
@@ -63,7 +63,7 @@ impl RayBatch {
         }
         self.t_min.clear();
         self.t_max.clear();
-        self.left.clear();
+        self.ends.clear();
     }
 
     /// Takes the rays of `other`; memory is kept.
@@ -76,7 +76,7 @@ impl RayBatch {
         self.t_max.clone_from(&other.t_max);
         self.coherent = other.coherent;
         self.from_surface = other.from_surface;
-        self.left.clone_from(&other.left);
+        self.ends.clone_from(&other.ends);
     }
 
     /// Appends a ray from `origin` along the unit vector `direction`, without limits.

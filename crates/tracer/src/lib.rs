@@ -28,6 +28,7 @@ pub mod direct;
 pub mod emitters;
 pub mod environment;
 pub mod footprint;
+mod lamps;
 pub mod layer;
 pub mod light;
 pub mod material;

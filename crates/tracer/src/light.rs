@@ -12,6 +12,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{Illuminant, NoOverlap};
 
 use crate::environment::{EnvironmentMap, MapSampler};
+use crate::lamps::{self, Lamp};
 use crate::reference::{Spot, Surroundings};
 use crate::sampling::{AliasTable, sphere_direction, triangle_point};
 use crate::spawn::Anchor;
@@ -107,8 +108,8 @@ pub enum End {
     Far,
     /// At a point (m).
     Point(DVec3),
-    /// On a surface.
-    Surface(Anchor),
+    /// On a triangle of a placement.
+    Surface(Anchor, [u32; 2]),
 }
 
 /// All lights of a scene, ready to be chosen from.
@@ -125,6 +126,10 @@ pub struct Lights {
     /// Placement and triangle of each emissive triangle, behind the lights.
     triangles: Vec<[u32; 2]>,
     picker: AliasTable,
+    /// The emissive triangles, where there are no other lights and each shines alike all over, and
+    /// what they give off in all lanes.
+    lamps: Vec<Lamp>,
+    lamp_lanes: Vec<f64>,
 }
 
 #[derive(Debug)]
@@ -208,7 +213,50 @@ impl Lights {
         let tints = around.materials.iter().map(tint).collect::<Result<_, _>>()?;
         let lit = powers.iter().any(|&p| p > 0.0);
         let picker = if lit { AliasTable::new(&powers) } else { AliasTable::default() };
-        Ok(Self { lights: lights.to_vec(), lanes, environment, tints, first, triangles, picker })
+        let lights = lights.to_vec();
+        let (lamps, lamp_lanes) = Default::default();
+        let mut all =
+            Self { lights, lanes, environment, tints, first, triangles, picker, lamps, lamp_lanes };
+        all.light_lamps(around, spectral);
+        Ok(all)
+    }
+
+    /// Keeps emissive triangles ready, if all that there is to choose from is of that kind.
+    fn light_lamps(&mut self, around: &Surroundings<'_>, spectral: &Spectral) {
+        if !self.lights.is_empty() || self.is_dark() || self.triangles.len() > lamps::MOST {
+            return;
+        }
+        let lamps: Option<Vec<Lamp>> =
+            self.triangles.iter().map(|&id| Lamp::new(around, id)).collect();
+        let Some(lamps) = lamps else { return };
+        let count = spectral.count();
+        let mut lanes = vec![0.0; lamps.len() * count];
+        for (lamp, lanes) in lamps.iter().zip(lanes.chunks_mut(count)) {
+            let placement = &around.geometry.placements[lamp.id[0] as usize];
+            let spot = Spot::corner(around.geometry, placement, lamp.id[1] as usize);
+            self.emitted(around, spectral, &spot, true, lanes);
+        }
+        (self.lamps, self.lamp_lanes) = (lamps, lanes);
+    }
+
+    /// The lamp for `choice`: its number, itself and its chance; `None` where lights have to be asked
+    /// one by one.
+    pub(crate) fn lamp(&self, choice: f64) -> Option<(usize, &Lamp, f64)> {
+        if self.lamps.is_empty() {
+            return None;
+        }
+        let (index, _) = self.picker.pick(choice);
+        Some((index, &self.lamps[index], self.picker.probability(index)))
+    }
+
+    /// What a lamp gives off in `count` lanes.
+    pub(crate) fn lanes_of_lamp(&self, lamp: usize, count: usize) -> &[f64] {
+        &self.lamp_lanes[lamp * count..(lamp + 1) * count]
+    }
+
+    /// Whether [`Self::lamp`] has one.
+    pub(crate) fn has_lamps(&self) -> bool {
+        !self.lamps.is_empty()
     }
 
     /// Whether there is nothing to choose from.
@@ -340,7 +388,7 @@ impl Lights {
             direction,
             density,
             is_delta: false,
-            end: End::Surface(end),
+            end: End::Surface(end, place.id),
         })
     }
 
@@ -447,6 +495,7 @@ fn power(light: &Light, far: f64, environment: Option<&Environment>) -> f64 {
 
 /// A triangle that shines, as seen from a point.
 struct EmissiveTriangle<'a> {
+    id: [u32; 2],
     spot: Spot<'a>,
     corner: DVec3,
     edges: [DVec3; 2],
@@ -465,6 +514,7 @@ impl<'a> EmissiveTriangle<'a> {
         let length = cross.length();
         let normal = cross / length * place.handedness();
         normal.is_finite().then_some(Self {
+            id: [number, triangle],
             spot,
             corner: place.point_from(a, from),
             edges,

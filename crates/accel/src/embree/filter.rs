@@ -139,7 +139,7 @@ impl<'a> Judged<'a> {
 
     fn keeps(&mut self, hit: &Hit<'_>) -> bool {
         let i = hit.id();
-        if self.rays.left.get(i) == Some(&hit.met()) {
+        if self.rays.ends.get(i).is_some_and(|ends| ends.contains(&hit.met())) {
             return false;
         }
         let Some(query) = Query::of(self.rays, i) else { return false };

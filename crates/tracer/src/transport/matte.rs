@@ -6,12 +6,15 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, disk};
+use etendue_geometry::{HitBatch, MISS, disk};
 
 use super::numbers::Draw;
 use super::paths::Paths;
 use super::{Follow, Scratch, Tracing};
 use crate::bsdf::{Bsdf, Model};
+use crate::lamps::Lamp;
+use crate::light::Lights;
+use crate::sampling::triangle_point;
 use crate::spawn::{Anchor, ROUNDINGS, magnitudes};
 use crate::{Color, Paint, Scattering};
 
@@ -42,6 +45,25 @@ pub(super) struct Patch {
     point: [Lane; 3],
     error: Lane,
     away: Away,
+    lamps: Chosen,
+}
+
+/// The lamps that the hits of a patch ask, as [`Lamp`] has them.
+#[derive(Debug)]
+struct Chosen {
+    /// Which lamp, and its placement and triangle.
+    chosen: [(usize, [u32; 2]); LANES],
+    /// The place on it, as the weights of two of its corners.
+    weights: [Lane; 2],
+    corner: [Lane; 3],
+    translation: [[Lane; 3]; 2],
+    edges: [[Lane; 3]; 2],
+    normal: [Lane; 3],
+    magnitudes: [Lane; 3],
+    /// Its chance over its area (1/m²).
+    density: Lane,
+    /// 1 when it shines on both sides.
+    two_sided: Lane,
 }
 
 /// Rays that leave a patch.
@@ -69,6 +91,17 @@ impl Default for Patch {
             point: [ZERO; 3],
             error: ZERO,
             away: Away { start: [ZERO; 3], along: [ZERO; 3], reach: ZERO, value: ZERO },
+            lamps: Chosen {
+                chosen: [(0, [0; 2]); LANES],
+                weights: [ZERO; 2],
+                corner: [ZERO; 3],
+                translation: [[ZERO; 3]; 2],
+                edges: [[ZERO; 3]; 2],
+                normal: [ZERO; 3],
+                magnitudes: [ZERO; 3],
+                density: ZERO,
+                two_sided: ZERO,
+            },
         }
     }
 }
@@ -102,6 +135,19 @@ impl Patch {
         }
     }
 
+    /// Chooses a lamp and a place on it for each hit.
+    fn choose(&mut self, lights: &Lights, drawn: &[Vec<[f64; 2]>]) {
+        let [choices, squares] = [Draw::Choice, Draw::Light].map(|draw| &drawn[draw as usize]);
+        for lane in 0..self.count {
+            let (_, k) = self.path[lane];
+            let choice = choices.get(k).map_or(0.5, |pair| pair[0]);
+            let Some((index, lamp, chance)) = lights.lamp(choice) else { continue };
+            self.lamps.set(lane, (index, lamp), chance);
+            let [u, v] = triangle_point(squares[k]);
+            (self.lamps.weights[0][lane], self.lamps.weights[1][lane]) = (u, v);
+        }
+    }
+
     fn point(&self, lane: usize) -> DVec3 {
         at(&self.point, lane)
     }
@@ -109,6 +155,23 @@ impl Patch {
     fn anchor(&self, lane: usize) -> Anchor {
         let normal = at(&self.normal, lane);
         Anchor { point: self.point(lane), normal, error: self.error[lane] }
+    }
+}
+
+impl Chosen {
+    fn set(&mut self, lane: usize, (index, lamp): (usize, &Lamp), chance: f64) {
+        self.chosen[lane] = (index, lamp.id);
+        for axis in 0..3 {
+            self.corner[axis][lane] = lamp.corner[axis];
+            self.normal[axis][lane] = lamp.normal[axis];
+            self.magnitudes[axis][lane] = lamp.magnitudes[axis];
+            for k in 0..2 {
+                self.translation[k][axis][lane] = lamp.translation[k][axis];
+                self.edges[k][axis][lane] = lamp.edges[k][axis];
+            }
+        }
+        self.density[lane] = chance / lamp.area;
+        self.two_sided[lane] = f64::from(u8::from(lamp.two_sided));
     }
 }
 
@@ -152,9 +215,20 @@ impl Tracing<'_> {
     /// Asks one light for each hit.
     fn ask_from(&mut self, scratch: &mut Scratch, matte: &Matte) {
         let lights = self.stage.lights;
-        let Scratch { now, hits, numbers, shadows, radiance, patch, .. } = scratch;
-        let Some((light, lanes)) = lights.lone_point(self.count) else {
-            for lane in 0..if lights.is_dark() { 0 } else { patch.count } {
+        if let Some((light, lanes)) = lights.lone_point(self.count) {
+            aim_at(&mut scratch.patch, light);
+            for (k, lane) in scratch.radiance.iter_mut().enumerate() {
+                *lane = lanes[k] * self.stage.spectral.lane(&matte.color, k);
+            }
+            self.note_shadows(scratch);
+        } else if lights.has_lamps() {
+            let Scratch { numbers, patch, .. } = &mut *scratch;
+            patch.choose(lights, &numbers.drawn);
+            aim_at_lamps(patch);
+            self.note_shadows_of_lamps(scratch, matte);
+        } else if !lights.is_dark() {
+            let Scratch { now, hits, numbers, shadows, radiance, patch, .. } = scratch;
+            for lane in 0..patch.count {
                 let (i, k) = patch.path[lane];
                 let anchor = patch.anchor(lane);
                 let wo = -at(&patch.direction, lane);
@@ -165,21 +239,44 @@ impl Tracing<'_> {
                 let numbers = numbers.of(k);
                 self.ask(&bsdf, (&anchor, left), (throughput, ray), &numbers, shadows, radiance);
             }
-            return;
-        };
-        aim_at(patch, light);
-        for (k, lane) in radiance.iter_mut().enumerate() {
-            *lane = lanes[k] * self.stage.spectral.lane(&matte.color, k);
         }
+    }
+
+    /// Notes the rays of a patch to a point, whose light is in `radiance`, the surface's colour
+    /// included.
+    fn note_shadows(&self, scratch: &mut Scratch) {
+        let Scratch { now, hits, shadows, radiance, patch, .. } = scratch;
         let away = &patch.away;
         for lane in (0..patch.count).filter(|&lane| away.value[lane] > 0.0) {
             let (i, _) = patch.path[lane];
             let (start, along) = (at(&away.start, lane), at(&away.along, lane));
             shadows.rays.push_between(start, along, 0.0, away.reach[lane]);
-            shadows.rays.left.push([hits.placement[i], hits.triangle[i]]);
+            shadows.rays.ends.push([[hits.placement[i], hits.triangle[i]], [MISS; 2]]);
             shadows.ray.push(now.states[i].ray);
             let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
             let brought = radiance.iter().zip(throughput).map(|(l, t)| l * t * away.value[lane]);
+            shadows.brought.extend(brought);
+        }
+    }
+
+    /// Notes the rays of a patch to the lamps that were chosen.
+    fn note_shadows_of_lamps(&self, scratch: &mut Scratch, matte: &Matte) {
+        let (lights, spectral) = (self.stage.lights, self.stage.spectral);
+        let Scratch { now, hits, shadows, radiance, patch, .. } = scratch;
+        for (k, lane) in radiance.iter_mut().enumerate() {
+            *lane = spectral.lane(&matte.color, k);
+        }
+        let away = &patch.away;
+        for lane in (0..patch.count).filter(|&lane| away.value[lane] > 0.0) {
+            let (i, _) = patch.path[lane];
+            let (start, along) = (at(&away.start, lane), at(&away.along, lane));
+            let (lamp, id) = patch.lamps.chosen[lane];
+            shadows.rays.push_between(start, along, 0.0, away.reach[lane]);
+            shadows.rays.ends.push([[hits.placement[i], hits.triangle[i]], id]);
+            shadows.ray.push(now.states[i].ray);
+            let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
+            let light = lights.lanes_of_lamp(lamp, self.count).iter().zip(throughput);
+            let brought = light.zip(&*radiance).map(|((l, t), c)| l * t * c * away.value[lane]);
             shadows.brought.extend(brought);
         }
     }
@@ -284,6 +381,67 @@ fn aim_at(patch: &mut Patch, light: DVec3) {
         away.along[1][i] = ay * inverse;
         away.along[2][i] = az * inverse;
         away.reach[i] = reach;
+    }
+}
+
+/// Rays from the hits to places on lamps, with cos θ / π over the density, weighed by the power
+/// heuristic against the density of [`scatter`]: 0 where either side is turned away.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn aim_at_lamps(patch: &mut Patch) {
+    let Patch { normal, point, error, away, lamps, .. } = patch;
+    let (mut offset, mut end) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+    let (mut squared, mut turned, mut facing) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    let mut blur = [0.0; LANES];
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let here = point[axis][i];
+            let corner = lamps.corner[axis][i]
+                + ((lamps.translation[0][axis][i] - here) + lamps.translation[1][axis][i]);
+            let across = lamps.edges[0][axis][i] * lamps.weights[0][i]
+                + lamps.edges[1][axis][i] * lamps.weights[1][i];
+            let way = corner + across;
+            let there = here + way;
+            offset[axis][i] = way;
+            end[axis][i] = there;
+            squared[i] += way * way;
+            turned[i] += way * normal[axis][i];
+            facing[i] -= way * lamps.normal[axis][i];
+            let magnitudes = there.abs() + here.abs() + lamps.magnitudes[axis][i];
+            blur[i] += lamps.normal[axis][i].abs() * magnitudes;
+        }
+    }
+    for i in 0..LANES {
+        let inverse = 1.0 / squared[i].sqrt();
+        let (cosine, shown) = (turned[i] * inverse, facing[i] * inverse);
+        let shines = (shown > 0.0) | ((shown < 0.0) & (lamps.two_sided[i] > 0.0));
+        let density = lamps.density[i] * squared[i] / shown.abs();
+        let ratio = cosine / PI / density;
+        let value = cosine / PI / ((1.0 + ratio * ratio) * density);
+        let counts = shines & (cosine > 0.0) & (density < f64::INFINITY);
+        away.value[i] = if counts { value } else { 0.0 };
+        blur[i] *= if shown < 0.0 { -ROUNDINGS } else { ROUNDINGS };
+    }
+    let mut length = [0.0; LANES];
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let start = point[axis][i] + normal[axis][i] * error[i];
+            let way = (end[axis][i] + lamps.normal[axis][i] * blur[i]) - start;
+            away.start[axis][i] = start;
+            away.along[axis][i] = way;
+            length[i] += way * way;
+        }
+    }
+    for (reach, squared) in away.reach.iter_mut().zip(length) {
+        *reach = squared.sqrt();
+    }
+    for along in &mut away.along {
+        for (along, reach) in along.iter_mut().zip(&away.reach) {
+            *along /= reach;
+        }
     }
 }
 

@@ -196,6 +196,9 @@ pub(crate) fn trace(
         // From neighbouring places to lights: as coherent as what they start from.
         scratch.shadows.rays.coherent = scratch.now.rays.coherent;
         tracing.step_all(scratch);
+        if stage.lights.can_be_met() {
+            scratch.shadows.sort(count);
+        }
         tracing.light(&mut scratch.shadows, out);
         tracing.glimpse(scratch, out);
         std::mem::swap(&mut scratch.now, &mut scratch.next);
@@ -412,14 +415,16 @@ impl Tracing<'_> {
         let balance = if toward.is_delta { 1.0 } else { power_heuristic(toward.density, density) };
         let factor = balance / toward.density;
         let origin = anchor.leave(toward.direction);
+        let mut met = [MISS; 2];
         match toward.end {
             End::Far => shadows.rays.push(origin, toward.direction),
             End::Point(at) => push_to(&mut shadows.rays, origin, at),
-            End::Surface(end) => {
+            End::Surface(end, id) => {
                 push_to(&mut shadows.rays, origin, end.leave(-toward.direction));
+                met = id;
             }
         }
-        shadows.rays.left.push(left);
+        shadows.rays.ends.push([left, met]);
         shadows.ray.push(ray);
         let lanes = radiance.iter().zip(throughput).enumerate();
         let brought = lanes.map(|(k, (l, t))| l * t * factor * in_lane(spectral, bsdf, value, k));

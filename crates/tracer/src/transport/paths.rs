@@ -1,7 +1,7 @@
 //! Paths under way, in arrays, and what each remembers.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, RayBatch};
+use etendue_geometry::{HitBatch, MISS, RayBatch};
 
 use crate::footprint::{Cone, Footprint};
 
@@ -54,7 +54,7 @@ impl Paths {
         self.rays.from_surface = true;
         self.rays.coherent = false;
         self.rays.push(ray.0, ray.1);
-        self.rays.left.push(left);
+        self.rays.ends.push([left, [MISS; 2]]);
         self.states.push(state);
     }
 }
