@@ -8,6 +8,7 @@ use std::time::Instant;
 use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
 
 use crate::embree::{Found, Judged, Scene, Search, version};
+use crate::ends::Ends;
 use crate::nearest::{Nearest, Query};
 use crate::recheck;
 use crate::single::{Frame, Rays32};
@@ -37,6 +38,7 @@ struct Scratch {
     found: Found,
     solved: Solved,
     lanes: Box<Lanes>,
+    ends: Ends,
     suspects: Vec<u32>,
     doubtful: Vec<u32>,
 }
@@ -269,6 +271,7 @@ impl Accel for Embree {
             scratch.doubtful.clear();
             scratch.rays.convert(rays, &self.frame);
             if self.checks() && Self::start_on_surfaces(rays) {
+                scratch.ends.spare(geometry, rays, &mut scratch.rays, &mut scratch.lanes);
                 let mut judged = Judged::new(geometry, rays, &scratch.rays, &mut scratch.doubtful);
                 self.scene.closest_from_surfaces(&scratch.rays, &mut judged, &mut scratch.found);
             } else {
@@ -291,7 +294,8 @@ impl Accel for Embree {
         blocked.clear();
         blocked.resize(rays.len(), false);
         SCRATCH.with_borrow_mut(|scratch| {
-            let Scratch { rays: rays32, again, found, suspects, doubtful, .. } = scratch;
+            let Scratch { rays: rays32, again, found, suspects, doubtful, ends, lanes, .. } =
+                scratch;
             rays32.convert(rays, &self.frame);
             if !self.checks() {
                 self.scene.occluded(rays32, rays.coherent, blocked);
@@ -299,6 +303,7 @@ impl Accel for Embree {
             }
             doubtful.clear();
             let geometry = self.scene.geometry();
+            ends.spare(geometry, rays, rays32, lanes);
             let mut judged = Judged::new(geometry, rays, rays32, doubtful);
             self.scene.occluded_exactly(rays32, rays.coherent, &mut judged, blocked);
             doubtful.retain(|&i| !blocked[i as usize]);

@@ -18,6 +18,8 @@ mod bvh;
 mod checked;
 #[cfg(feature = "embree")]
 mod embree;
+#[cfg(feature = "embree")]
+mod ends;
 mod exact;
 mod nearest;
 mod parts;

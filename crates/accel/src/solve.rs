@@ -25,7 +25,7 @@ use etendue_geometry::{
 };
 
 /// Rays worked on side by side: long enough to vectorise, short enough to stay in the first cache.
-const LANES: usize = 64;
+pub(crate) const LANES: usize = 64;
 
 /// Barycentric coordinates are trusted to no worse than this, however grazing the ray: beyond it a
 /// hit is looked at again.
@@ -35,7 +35,7 @@ const WORST_TOLERANCE: f64 = 1e-6;
 /// within one unit, on values that are themselves within two.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-type Lane = [f64; LANES];
+pub(crate) type Lane = [f64; LANES];
 
 /// The triangles of one chunk of rays as seen from the rays' origins, and what comes of them.
 #[derive(Debug)]
@@ -45,10 +45,10 @@ pub(crate) struct Lanes {
     /// The corners `[corner][axis]` in their mesh, as most meshes have them, and in f64.
     narrow: [[[f32; LANES]; 3]; 3],
     corners: [[Lane; 3]; 3],
-    a: [Lane; 3],
-    e1: [Lane; 3],
-    e2: [Lane; 3],
-    d: [Lane; 3],
+    pub(crate) a: [Lane; 3],
+    pub(crate) e1: [Lane; 3],
+    pub(crate) e2: [Lane; 3],
+    pub(crate) d: [Lane; 3],
     /// What `a` was summed from, for its rounding error.
     magnitude: Lane,
     handedness: Lane,
@@ -114,7 +114,8 @@ pub(crate) fn solve(
     let mut start = 0;
     while start < rays.len() {
         let count = LANES.min(rays.len() - start);
-        gather(geometry, rays, hits, start..start + count, lanes);
+        let met = (&hits.placement[..], &hits.triangle[..]);
+        lanes.gather(geometry, rays, met, start..start + count);
         measure(lanes, hits.detail == Detail::Surface);
         let seen = scatter(rays, hits, start, count, lanes, solved);
         solved.all_valid &= seen.all_valid;
@@ -122,35 +123,6 @@ pub(crate) fn solve(
         start += count;
     }
     solved.both_sides = sides == [true; 2];
-}
-
-/// Fills the lanes with the triangles of one chunk. Where nothing was hit, whatever stands in the lanes
-/// is measured and not looked at.
-fn gather(
-    geometry: &Geometry,
-    rays: &RayBatch,
-    hits: &HitBatch,
-    range: Range<usize>,
-    lanes: &mut Lanes,
-) {
-    for axis in 0..3 {
-        lanes.d[axis][..range.len()].copy_from_slice(&rays.direction[axis][range.clone()]);
-    }
-    let mut i = range.start;
-    while i < range.end {
-        let index = hits.placement[i];
-        let rest = &hits.placement[i..range.end];
-        // Mostly all of them, which is told without a branch for each.
-        let others = rest.iter().fold(0, |others, &other| others | (other ^ index));
-        let same = |&other: &u32| other == index;
-        let run = i..if others == 0 { range.end } else { i + leading(rest, same) };
-        i = run.end;
-        if index != MISS {
-            let placement = &geometry.placements[index as usize];
-            let mesh = geometry.mesh_of(placement);
-            lanes.gather_run(placement, mesh, rays, hits, range.start, run);
-        }
-    }
 }
 
 /// How many values at the beginning are `wanted`.
@@ -169,22 +141,49 @@ struct Place<'a> {
 }
 
 impl Lanes {
+    /// Fills the lanes with one triangle a ray, by placement and triangle, for the rays of `range`. Where
+    /// there is none, whatever stands in the lanes is measured and not looked at.
+    pub(crate) fn gather(
+        &mut self,
+        geometry: &Geometry,
+        rays: &RayBatch,
+        (placements, triangles): (&[u32], &[u32]),
+        range: Range<usize>,
+    ) {
+        for axis in 0..3 {
+            self.d[axis][..range.len()].copy_from_slice(&rays.direction[axis][range.clone()]);
+        }
+        let mut i = range.start;
+        while i < range.end {
+            let index = placements[i];
+            let rest = &placements[i..range.end];
+            // Mostly all of them, which is told without a branch for each.
+            let others = rest.iter().fold(0, |others, &other| others | (other ^ index));
+            let same = |&other: &u32| other == index;
+            let run = i..if others == 0 { range.end } else { i + leading(rest, same) };
+            i = run.end;
+            if index != MISS {
+                let placement = &geometry.placements[index as usize];
+                let mesh = geometry.mesh_of(placement);
+                self.gather_run(placement, mesh, rays, triangles, range.start, run);
+            }
+        }
+    }
+
     /// Fills the lanes of consecutive rays that hit the same placement.
     fn gather_run(
         &mut self,
         placement: &Placement,
         mesh: &Mesh,
         rays: &RayBatch,
-        hits: &HitBatch,
+        met: &[u32],
         first: usize,
         run: Range<usize>,
     ) {
         let here = run.start - first..run.end - first;
         let triangles: &[[u32; 3]] = &mesh.triangles;
         // One kind of memory at a time: the processor fetches as many ahead as it can.
-        for (indices, &triangle) in
-            self.indices[here.clone()].iter_mut().zip(&hits.triangle[run.clone()])
-        {
+        for (indices, &triangle) in self.indices[here.clone()].iter_mut().zip(&met[run.clone()]) {
             *indices = triangles[triangle as usize];
         }
         let narrow = match &mesh.positions {

@@ -210,7 +210,7 @@ fn prefetch<T>(place: &T) {
 /// hundred times as long for rays aimed at all corners of a mesh (`corners_and_edges_occlusion` of the
 /// stability suite).
 fn run_apart(rays: &Rays32, start: usize, count: usize) -> bool {
-    const MOST: f32 = 0.1;
+    const MOST: f32 = 0.25;
     rays.direction.iter().any(|axis| {
         let directions = &axis[start..start + count];
         let least = directions.iter().copied().fold(f32::INFINITY, f32::min);
