@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildOptions, Bvh};
+use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, HitBatch, MISS, RayBatch};
 
 use crate::Material;
@@ -21,6 +22,9 @@ pub struct Emitters {
     accel: Option<Bvh>,
     /// The scene's number of each placement of the structure.
     numbers: Vec<u32>,
+    /// A sphere around them (m): its centre, and its radius with room for rounding.
+    centre: DVec3,
+    radius: f64,
 }
 
 impl Emitters {
@@ -38,14 +42,28 @@ impl Emitters {
             }
         }
         if numbers.is_empty() {
-            return Some(Self { accel: None, numbers });
+            return Some(Self { accel: None, numbers, centre: DVec3::ZERO, radius: -1.0 });
         }
         if own.triangles() as f64 > MOST * geometry.triangles() as f64 {
             return None;
         }
         keep_placed_meshes(&mut own);
+        let bounds = own.loose_bounds();
+        let centre = bounds.centre();
+        let rounding = 1e-9 * (bounds.diagonal() + centre.length());
+        let radius = 0.5 * bounds.diagonal() + rounding;
         let accel = Bvh::build(Arc::new(own), &BuildOptions::default()).ok()?;
-        Some(Self { accel: Some(accel), numbers })
+        Some(Self { accel: Some(accel), numbers, centre, radius })
+    }
+
+    /// Whether a ray may meet any of them: `false` for most, at hardly a cost.
+    pub(crate) fn may_meet(&self, origin: DVec3, direction: DVec3) -> bool {
+        let way = self.centre - origin;
+        let foot = way.dot(direction);
+        let squared = self.radius * self.radius;
+        self.radius >= 0.0
+            && (foot >= 0.0 || way.length_squared() <= squared)
+            && way.length_squared() - foot * foot <= squared * (1.0 + 1e-9)
     }
 
     /// The closest emissive surface along each ray, by the scene's numbers.

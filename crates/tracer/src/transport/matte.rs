@@ -6,10 +6,11 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, MISS, disk};
+use etendue_geometry::{HitBatch, MISS, RayBatch, disk};
 
 use super::numbers::Draw;
 use super::paths::Paths;
+use super::shadows::Shadows;
 use super::{Follow, Scratch, Tracing};
 use crate::bsdf::{Bsdf, Model};
 use crate::lamps::Lamp;
@@ -220,12 +221,23 @@ impl Tracing<'_> {
             for (k, lane) in scratch.radiance.iter_mut().enumerate() {
                 *lane = lanes[k] * self.stage.spectral.lane(&matte.color, k);
             }
-            self.note_shadows(scratch);
+            let Scratch { now, hits, shadows, radiance, patch, .. } = scratch;
+            patch.lamps.chosen.fill((0, [MISS; 2]));
+            let (radiance, value) = (&*radiance, &patch.away.value);
+            self.note_shadows((now, hits, patch), shadows, |throughput, lane| {
+                radiance.iter().zip(throughput).map(move |(l, t)| l * t * value[lane])
+            });
         } else if lights.has_lamps() {
-            let Scratch { numbers, patch, .. } = &mut *scratch;
+            let Scratch { now, hits, numbers, shadows, radiance, patch, .. } = scratch;
             patch.choose(lights, &numbers.drawn);
             aim_at_lamps(patch);
-            self.note_shadows_of_lamps(scratch, matte);
+            self.stage.spectral.spread(&matte.color, radiance);
+            let (color, value) = (&*radiance, &patch.away.value);
+            self.note_shadows((now, hits, patch), shadows, |throughput, lane| {
+                let (lamp, _) = patch.lamps.chosen[lane];
+                let light = lights.lanes_of_lamp(lamp, self.count).iter().zip(throughput);
+                light.zip(color).map(move |((l, t), c)| l * t * c * value[lane])
+            });
         } else if !lights.is_dark() {
             let Scratch { now, hits, numbers, shadows, radiance, patch, .. } = scratch;
             for lane in 0..patch.count {
@@ -242,42 +254,28 @@ impl Tracing<'_> {
         }
     }
 
-    /// Notes the rays of a patch to a point, whose light is in `radiance`, the surface's colour
-    /// included.
-    fn note_shadows(&self, scratch: &mut Scratch) {
-        let Scratch { now, hits, shadows, radiance, patch, .. } = scratch;
+    /// Notes the rays of a patch to its lights. What the surface turns of their light to the viewer is
+    /// `brought`, by path and lane of the patch.
+    fn note_shadows<'a, L: Iterator<Item = f64> + 'a>(
+        &self,
+        (now, hits, patch): (&'a Paths, &HitBatch, &'a Patch),
+        shadows: &mut Shadows,
+        brought: impl Fn(&'a [f64], usize) -> L,
+    ) {
         let away = &patch.away;
-        for lane in (0..patch.count).filter(|&lane| away.value[lane] > 0.0) {
+        let lit = || (0..patch.count).filter(|&lane| away.value[lane] > 0.0);
+        let RayBatch { origin, direction, t_min, t_max, ends, .. } = &mut shadows.rays;
+        let from = away.start.iter().chain(&away.along).chain([&away.reach]);
+        for (to, from) in origin.iter_mut().chain(direction).chain([t_max]).zip(from) {
+            to.extend(lit().map(|lane| from[lane]));
+        }
+        for lane in lit() {
             let (i, _) = patch.path[lane];
-            let (start, along) = (at(&away.start, lane), at(&away.along, lane));
-            shadows.rays.push_between(start, along, 0.0, away.reach[lane]);
-            shadows.rays.ends.push([[hits.placement[i], hits.triangle[i]], [MISS; 2]]);
+            t_min.push(0.0);
+            ends.push([[hits.placement[i], hits.triangle[i]], patch.lamps.chosen[lane].1]);
             shadows.ray.push(now.states[i].ray);
             let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
-            let brought = radiance.iter().zip(throughput).map(|(l, t)| l * t * away.value[lane]);
-            shadows.brought.extend(brought);
-        }
-    }
-
-    /// Notes the rays of a patch to the lamps that were chosen.
-    fn note_shadows_of_lamps(&self, scratch: &mut Scratch, matte: &Matte) {
-        let (lights, spectral) = (self.stage.lights, self.stage.spectral);
-        let Scratch { now, hits, shadows, radiance, patch, .. } = scratch;
-        for (k, lane) in radiance.iter_mut().enumerate() {
-            *lane = spectral.lane(&matte.color, k);
-        }
-        let away = &patch.away;
-        for lane in (0..patch.count).filter(|&lane| away.value[lane] > 0.0) {
-            let (i, _) = patch.path[lane];
-            let (start, along) = (at(&away.start, lane), at(&away.along, lane));
-            let (lamp, id) = patch.lamps.chosen[lane];
-            shadows.rays.push_between(start, along, 0.0, away.reach[lane]);
-            shadows.rays.ends.push([[hits.placement[i], hits.triangle[i]], id]);
-            shadows.ray.push(now.states[i].ray);
-            let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
-            let light = lights.lanes_of_lamp(lamp, self.count).iter().zip(throughput);
-            let brought = light.zip(&*radiance).map(|((l, t), c)| l * t * c * away.value[lane]);
-            shadows.brought.extend(brought);
+            shadows.brought.extend(brought(throughput, lane));
         }
     }
 

@@ -482,8 +482,10 @@ impl Tracing<'_> {
         (state, chance): (State, f64),
         [next, last]: [&mut Paths; 2],
     ) {
+        let single = state.density == f64::INFINITY;
+        let glimpses = state.is_last && !single && self.glimpses();
         let most = throughput.iter().copied().fold(0.0, f64::max);
-        if most <= 0.0 {
+        if most <= 0.0 || (glimpses && !self.may_shine(ray)) {
             return;
         }
         if self.rules.roulette.is_some_and(|after| state.bounces >= after) && !state.is_last {
@@ -493,8 +495,6 @@ impl Tracing<'_> {
             }
             throughput.iter_mut().for_each(|lane| *lane /= survival);
         }
-        let single = state.density == f64::INFINITY;
-        let glimpses = state.is_last && !single && self.glimpses();
         let next = if glimpses { last } else { next };
         next.push(ray, left, state);
         next.throughput.extend_from_slice(throughput);

@@ -4,6 +4,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, RayBatch};
 
 use super::{Scratch, Tracing};
+use crate::emitters::Emitters;
 use crate::spawn::Anchor;
 use crate::surface::Met;
 
@@ -19,7 +20,7 @@ pub(super) struct Shadows {
     pub(super) hits: HitBatch,
     pub(super) again: RayBatch,
     pub(super) open: Vec<u32>,
-    order: Vec<(u32, usize)>,
+    order: Vec<u64>,
     sorted: Sorted,
 }
 
@@ -43,19 +44,24 @@ impl Shadows {
     pub(super) fn sort(&mut self, count: usize) {
         let Self { rays, ray, brought, order, sorted, .. } = self;
         order.clear();
-        order.extend((0..ray.len()).map(|i| (octant_cell(rays.direction(i)), i)));
+        order.extend((0_u32..).zip(0..ray.len()).map(|(number, i)| {
+            u64::from(octant_cell(rays.direction(i))) << 32 | u64::from(number)
+        }));
         order.sort_unstable();
+        let order = || order.iter().map(|&key| (key & 0xffff_ffff) as usize);
         let Sorted { rays: to, ray: number, brought: light } = sorted;
         to.clear();
-        number.clear();
-        light.clear();
-        for &(_, i) in order.iter() {
-            to.push_between(rays.origin(i), rays.direction(i), rays.t_min[i], rays.t_max[i]);
-            to.ends.push(rays.ends[i]);
-            number.push(ray[i]);
-            light.extend_from_slice(&brought[i * count..(i + 1) * count]);
+        let from = rays.origin.iter().chain(&rays.direction).chain([&rays.t_min, &rays.t_max]);
+        let arrays = to.origin.iter_mut().chain(&mut to.direction);
+        for (to, from) in arrays.chain([&mut to.t_min, &mut to.t_max]).zip(from) {
+            to.extend(order().map(|i| from[i]));
         }
+        to.ends.extend(order().map(|i| rays.ends[i]));
         to.coherent = rays.coherent;
+        number.clear();
+        number.extend(order().map(|i| ray[i]));
+        light.clear();
+        light.extend(order().flat_map(|i| &brought[i * count..(i + 1) * count]));
         std::mem::swap(rays, to);
         std::mem::swap(ray, number);
         std::mem::swap(brought, light);
@@ -70,6 +76,12 @@ impl Tracing<'_> {
     /// surfaces that are partly there they have to be followed.
     pub(super) fn glimpses(&self) -> bool {
         self.stage.emitters.is_some() && !self.stage.traits.is_pierced
+    }
+
+    /// Whether there may be light along a ray that asks what shines.
+    pub(super) fn may_shine(&self, (origin, direction): (DVec3, DVec3)) -> bool {
+        let met = |emitters: &Emitters| emitters.may_meet(origin, direction);
+        self.stage.lights.has_environment() || self.stage.emitters.is_some_and(met)
     }
 
     /// Adds the light that the last directions of paths meet.
