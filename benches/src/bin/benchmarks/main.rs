@@ -29,6 +29,7 @@ use etendue_benches::rays::View;
 
 use crate::findings::Findings;
 
+/// Measures everything in one run, contestants taking turns, and writes the page of results.
 #[derive(Debug, Parser)]
 struct Arguments {
     #[command(flatten)]

@@ -19,6 +19,7 @@ use etendue_benches::effort::Effort;
 
 use crate::page::Page;
 
+/// Measures speed against accuracy on scenes of all kinds, and writes the page with its charts.
 #[derive(Debug, Parser)]
 struct Arguments {
     #[command(flatten)]
