@@ -98,9 +98,10 @@ fn mtl_materials_become_the_nearest_of_ours() {
         newmtl lamp\nKd 0 0 0\nKe 5 4 3\n\
         newmtl old\nKa 20 10 5\nKd 1 1 1\n\
         newmtl dim\nKa 1 1 1\nKd 1 1 1\n\
-        newmtl bad\nKd 1 1 1\nKe -1 0 0\n",
+        newmtl bad\nKd 1 1 1\nKe -1 0 0\n\
+        newmtl veil\nKd 1 1 1\nTr 0.75\nmap_d veil.png\nmap_Ke veil.png\n",
     );
-    let names = ["matte", "glass", "thin", "metal", "glazed", "lamp", "old", "dim", "bad"];
+    let names = ["matte", "glass", "thin", "metal", "glazed", "lamp", "old", "dim", "bad", "veil"];
     let mut text = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned();
     for name in names {
         text += &format!("usemtl {name}\nf 1 2 3\n");
@@ -135,5 +136,13 @@ fn mtl_materials_become_the_nearest_of_ours() {
         let emission = of(name).emission.as_ref().expect("it shines");
         assert_eq!((&emission.radiance, emission.two_sided), (&Paint::Plain(radiance), true));
     }
+    assert_eq!(of("veil").alpha, Alpha::Blend { factor: 0.25 });
+    let noted = |subject: &str, words: &str| {
+        import.notes.iter().any(|note| note.subject == subject && note.message.contains(words))
+    };
+    assert!(noted("bad", "Ke is below zero") && noted("thin", "Ni is below 1"));
+    assert!(noted("map_d", "not supported") && noted("map_Ke", "not supported"));
+    let message = import_strict(&folder.path().join("m.obj")).unwrap_err().to_string();
+    assert!(message.contains("m.mtl") && message.contains("material \"thin\""), "{message}");
     assert!(["matte", "glazed", "dim", "bad"].iter().all(|name| of(name).emission.is_none()));
 }

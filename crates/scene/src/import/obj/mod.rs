@@ -14,6 +14,7 @@
 
 mod chunk;
 mod mtl;
+mod oddities;
 mod pool;
 mod segment;
 mod weld;

@@ -16,6 +16,7 @@ use etendue_tracer::{
     Emission, ImageSource, Ior, Material, Paint, Scattering, Texture, TextureUse,
 };
 
+use super::oddities;
 use super::segment::Segment;
 use crate::import::files::Files;
 use crate::import::note::{self, Note, NoteKind};
@@ -188,18 +189,22 @@ fn resolve(
         Some(map) if wanted.textures => maps.use_of(map, &defined.file, import)?,
         _ => None,
     };
-    let sound = |color: &[f64; 3]| color.iter().all(|value| (0.0..=1.0).contains(value));
-    if material.diffuse.is_some_and(|color| !sound(&color)) {
+    for what in oddities::impossible(material) {
         if maps.strictness == Strictness::Strict {
             return Err(ImportError::Damaged {
                 file: defined.file.clone(),
                 place: format!("material \"{}\"", material.name),
-                reason: "Kd is outside 0 to 1".to_owned(),
+                reason: what.split(';').next().unwrap_or_default().to_owned(),
             });
         }
-        let message = "Kd is outside 0 to 1; it is brought there";
-        let note = Note::new(NoteKind::Irregular, material.name.clone(), message);
+        let note = Note::new(NoteKind::Irregular, material.name.clone(), what);
         note::push(&mut import.notes, note);
+    }
+    if wanted.light {
+        for key in oddities::passed_over(material) {
+            let message = "not supported: surfaces are shown without it";
+            note::push(&mut import.notes, Note::new(NoteKind::Unsupported, key, message));
+        }
     }
     let diffuse = material.diffuse.filter(|color| !color.iter().any(|value| value.is_nan()));
     let diffuse = diffuse.map(|color| color.map(|value| value.clamp(0.0, 1.0)));
@@ -219,7 +224,7 @@ fn resolve(
 /// 4. All else is matte.
 ///
 /// The roughness of 2 and 3 is that whose GGX peak is as wide as Phong's of exponent `Ns`, α² =
-/// 2 / (Ns + 2) (Walter et al. 2007, section 5.2). `d` below 1 leaves that share of 2 to 4 in place.
+/// 2 / (Ns + 2) (Walter et al. 2007, section 5.2). `d` (or 1 − `Tr`) below 1 leaves that share of 2 to 4 in place.
 /// `Ke` shines from both sides whatever else the surface does; so does `Ka` above 1, which can be no
 /// reflectance and is how lamps were written before `Ke`.
 fn nearest(material: &tobj::Material, plain: Material) -> Material {
@@ -253,7 +258,10 @@ fn nearest(material: &tobj::Material, plain: Material) -> Material {
         }
         _ => {}
     }
-    let dissolve = material.dissolve.filter(|d| d.is_finite()).unwrap_or(1.0);
+    // Some write what is missing instead of what is there.
+    let tr = material.unknown_param.get("Tr").and_then(|tr| tr.parse::<f64>().ok());
+    let dissolve = material.dissolve.or(tr.map(|tr| 1.0 - tr));
+    let dissolve = dissolve.filter(|d| d.is_finite()).unwrap_or(1.0);
     if dissolve < 1.0 && !matches!(read.scattering, Scattering::Dielectric(_)) {
         read.alpha = Alpha::Blend { factor: dissolve.max(0.0) };
     }
