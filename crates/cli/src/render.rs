@@ -67,16 +67,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let scene = load(&arguments.scene, stages)?;
     let plan = Plan::new(&scene, outputs);
     time.load = lap.take();
-    let options = BuildOptions {
-        threads: rayon::current_num_threads(),
-        memory_limit: arguments.memory_limit,
-        robust: arguments.accel_mode == AccelMode::Robust,
-        isa: arguments.isa.clone(),
-        progress: Some(stages.begin("build")),
-        ..BuildOptions::default()
-    };
-    let accel = etendue_render::build(&scene, &plan, &options)?;
-    drop(options);
+    let accel = etendue_render::build(&scene, &plan, &build_options(arguments, stages))?;
     time.build = lap.take();
     let images = Images::decode(&scene, &plan);
     if arguments.scene.strict
@@ -109,6 +100,17 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     }
     let lines: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     print_text(&lines.join("\n"))
+}
+
+fn build_options(arguments: &RenderArguments, stages: Stages) -> BuildOptions {
+    BuildOptions {
+        threads: rayon::current_num_threads(),
+        memory_limit: arguments.memory_limit,
+        robust: arguments.accel_mode == AccelMode::Robust,
+        isa: arguments.isa.clone(),
+        progress: Some(stages.begin("build")),
+        ..BuildOptions::default()
+    }
 }
 
 /// Time since it was last asked.

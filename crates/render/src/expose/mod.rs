@@ -120,8 +120,9 @@ pub struct Exposed {
     pub notes: Vec<String>,
 }
 
-/// Exposes the picture of `scene`, or its light in the sensor's own lanes where there is any, and writes what its sensor gives into `folder`; nothing when the
-/// scene has no sensor. Told the share done, `progress` answers whether to go on.
+/// Exposes the picture of `scene`, or its light in the sensor's own lanes where there is any, and
+/// writes what its sensor gives into `folder`; nothing when the scene has no sensor. Told the share
+/// done, `progress` answers whether to go on.
 ///
 /// # Errors
 ///
@@ -140,13 +141,14 @@ pub fn write(
         exposed.notes.push(format!("camera.sensor is not used: {NOTHING_TO_EXPOSE}"));
         return Ok(exposed);
     };
-    // In the picture's own three lanes where the sensor can: the same numbers from less memory.
-    let in_rgb = sensor.clone().in_lanes(Lanes::Rgb);
     let (sensor, film) = match lane_film.filter(|film| film.lanes == *sensor.lanes()) {
-        Some(film) => (sensor, film),
+        Some(film) => (sensor.clone(), film),
         None => {
-            let sensor = in_rgb.as_ref().unwrap_or(sensor);
-            (sensor, LaneFilm::from_rgb(sensor.lanes().clone(), &colors))
+            // In the picture's own three lanes where the sensor can: the same numbers from less
+            // memory.
+            let sensor = sensor.clone().in_lanes(Lanes::Rgb).unwrap_or_else(|_| sensor.clone());
+            let film = LaneFilm::from_rgb(sensor.lanes().clone(), &colors);
+            (sensor, film)
         }
     };
     let shots: Vec<Shot> = sensor.shots().collect();
@@ -154,10 +156,9 @@ pub fn write(
         1 => 0,
         count => (count - 1).to_string().len().max(3),
     };
-    let film = film.on_sensor(scene, sensor);
     let mut writer = Writer {
-        sensor,
-        film,
+        sensor: &sensor,
+        film: film.on_sensor(scene, &sensor),
         folder,
         outputs,
         seed: scene.render.seed,
@@ -166,7 +167,7 @@ pub fn write(
         flaws: Flaws::default(),
         exposed,
     };
-    let mut sidecar = Sidecar::new(sensor, scene.render.seed);
+    let mut sidecar = Sidecar::new(&sensor, scene.render.seed);
     for (done, shot) in shots.iter().enumerate() {
         if !progress(done as f64 / shots.len() as f64) {
             return Err(ExposeError::Stopped);
@@ -174,15 +175,20 @@ pub fn write(
         sidecar.shots.push(writer.shot(*shot)?);
     }
     sidecar.flaws = writer.flaws;
-    if sidecar.flaws.any() {
-        let Flaws { negative, not_finite } = sidecar.flaws;
-        writer.exposed.notes.push(format!(
-            "{negative} negative and {not_finite} infinite or NaN values of the film are no light \
-             and were taken for none"
-        ));
-    }
+    writer.exposed.notes.extend(in_words(sidecar.flaws));
     sidecar.notes.clone_from(&writer.exposed.notes);
     let path = writer.place("sensor.json");
     sidecar::write_json(&path, &sidecar)?;
     Ok(writer.exposed)
+}
+
+/// What a film has that is no light, if anything.
+fn in_words(flaws: Flaws) -> Option<String> {
+    let Flaws { negative, not_finite } = flaws;
+    flaws.any().then(|| {
+        format!(
+            "{negative} negative and {not_finite} infinite or NaN values of the film are no light \
+             and were taken for none"
+        )
+    })
 }
