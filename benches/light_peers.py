@@ -293,11 +293,11 @@ def page(results, remarks, arguments):
 
 
 REASONS = (
-    "Where goals are missed: beside traversal, etendue places and weighs each ray in the lens' pupil, solves each hit "
-    "again in f64 and works out its error bound, and scatters it, all of it one ray after the other, where Mitsuba's "
-    "LLVM variant does a whole vector of samples in f32 at once. Its noise here is that of the few rays that the rim of "
-    "the lens stops (`lens_losses` in the report): the pupil is sampled by a bound that is a little too wide, and what "
-    "is stopped counts as black. Mitsuba samples its disc exactly.")
+    "Where goals at the same samples are missed: both programs have Embree find the hits, but Mitsuba's LLVM variant does "
+    "a whole vector of samples in f32 at once, and takes Embree's fast mode. etendue solves each hit again in f64, works "
+    "out its error bound, has robust mode and f64 decide at the ends of rays, and traces rays that scatter from surfaces "
+    "one by one. It gets back some of that by what it does not trace: a direction that is followed for its light alone "
+    "asks the lamps first.")
 
 
 def known(number):

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use etendue_accel::{Accel, BuildOptions, Bvh, Exact};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{
-    Detail, Geometry, HitBatch, Mesh, Placement, Positions, RayBatch, Transform, Vertices,
+    Detail, Geometry, HitBatch, MISS, Mesh, Placement, Positions, RayBatch, Transform, Vertices,
 };
 
 /// A cube of half-edge 1, seen from within and without.
@@ -42,7 +42,7 @@ fn rays_neither_stick_nor_leak() {
         // What a spawned ray is off by: 32 roundings of the numbers involved.
         let off = 32.0 * f64::EPSILON * 3.0 * (scale + far);
         let mut rays = RayBatch { from_surface: true, ..RayBatch::default() };
-        let mut inward = Vec::new();
+        let (mut inward, mut leaves) = (Vec::new(), Vec::new());
         let golden = 2.399_963_229_728_653;
         for k in 0..4000_u32 {
             let share = (f64::from(k) + 0.5) / 4000.0;
@@ -59,12 +59,16 @@ fn rays_neither_stick_nor_leak() {
             let origin =
                 DVec3::splat(far) + DVec3::new(x, -1.0, z) * scale + DVec3::Y * (side * off);
             rays.push(origin, direction);
+            // The floor is triangles 4 and 5, on both sides of its diagonal.
+            leaves.push([[0, if x > z { 4 } else { 5 }], [MISS; 2]]);
             inward.push(side > 0.0);
         }
         for accel in backends(&geometry) {
             let name = accel.report().backend;
-            for coherent in [false, true] {
+            // In packets or not, told which triangle each ray leaves or not.
+            for (coherent, told) in [(false, false), (true, false), (false, true), (true, true)] {
                 rays.coherent = coherent;
+                rays.ends = if told { leaves.clone() } else { Vec::new() };
                 let mut hits = HitBatch::new(Detail::Surface);
                 accel.closest(&rays, &mut hits);
                 let mut blocked = Vec::new();

@@ -352,7 +352,11 @@ fn pupil(lens: Option<&LensCamera>, spread: bool, samples: u32) -> (&'static str
         None => String::new(),
     };
     let symmetric = lens.focused().train().is_rotationally_symmetric();
-    let bound = if symmetric { "along a radius of the sensor" } else { "on a grid of the sensor" };
+    let bound = match symmetric {
+        _ if lens.has_round_pupil() => "known exactly: a disk",
+        true => "bounded along a radius of the sensor",
+        false => "bounded on a grid of the sensor",
+    };
     let noise = match samples {
         1 => {
             "; 1 sample a pixel is one ray through one place of it, which is noise wherever the \
@@ -360,8 +364,7 @@ fn pupil(lens: Option<&LensCamera>, spread: bool, samples: u32) -> (&'static str
         }
         _ => "",
     };
-    let because =
-        format!("colours are averaged over the lens' exit pupil{f_number}, bounded {bound}");
+    let because = format!("colours are averaged over the lens' exit pupil{f_number}, {bound}");
     ("on", because + noise)
 }
 

@@ -189,6 +189,15 @@ impl LensCamera {
         }
     }
 
+    /// Whether the exit pupil is known in closed form: a round opening with nothing behind it that
+    /// bends rays.
+    #[must_use]
+    pub fn has_round_pupil(&self) -> bool {
+        let film = self.focused.film();
+        let train = without_filters(self.focused.train());
+        Disc::of(&train, &film.frame, film.half_size()).is_some()
+    }
+
     /// Whether rays of a sample run at a wavelength that is drawn.
     pub fn draws_wavelengths(&self) -> bool {
         let opened = self.opened.get().and_then(Option::as_ref);
@@ -532,6 +541,10 @@ fn unvignetted(train: &OpticalTrain, at: &TrainAt, focused: &Focused) -> f64 {
     let lens = clear.at(at.wavelength()).unwrap_or_else(|_| at.clone());
     let z = focused.sensor_z();
     let half = focused.film().half_size();
+    let disc = Disc::of(&clear, &focused.film().frame, half);
+    if let Some(angle) = disc.and_then(|disc| disc.solid_angle_from(z)) {
+        return angle * lens.index_before_sensor().powi(2);
+    }
     let on_axis = projected_solid_angle(&clear, &lens, DVec3::new(0.0, 0.0, z));
     if on_axis > 0.0 {
         return on_axis;

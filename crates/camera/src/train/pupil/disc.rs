@@ -33,8 +33,9 @@ pub(crate) struct Bundle<'a> {
 }
 
 impl Disc {
-    /// The disc of a lens that has such a pupil, as long as the sensor's `corners` are behind it.
-    pub(super) fn of(train: &OpticalTrain, corners: &[DVec3]) -> Option<Self> {
+    /// The disc of a lens that has such a pupil, as long as it stands before all of a sensor of half
+    /// width and half height `half_size` (mm).
+    pub(crate) fn of(train: &OpticalTrain, sensor: &Frame, half_size: DVec2) -> Option<Self> {
         let mut disc = None;
         for element in train.elements() {
             if element.frame.rotation != DMat3::IDENTITY {
@@ -53,7 +54,18 @@ impl Disc {
                 _ => return None,
             }
         }
+        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
+        let corners = corners.map(|c| sensor.point((DVec2::from(c) * half_size).extend(0.0)));
         disc.filter(|disc| corners.iter().all(|corner| corner.z > disc.centre.z))
+    }
+
+    /// The projected solid angle (sr) of the disc from a point of the axis, for what stands square to
+    /// the axis: π sin²θ. `None` when the disc is not centred on the axis.
+    pub(crate) fn solid_angle_from(&self, z: f64) -> Option<f64> {
+        let distance = z - self.centre.z;
+        let squared = self.radius * self.radius;
+        let centred = self.centre.truncate() == DVec2::ZERO;
+        centred.then(|| PI * squared / (squared + distance * distance))
     }
 
     /// Centre and radius of the disc in slopes, from a point of the sensor (mm).

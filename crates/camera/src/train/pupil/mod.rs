@@ -167,9 +167,7 @@ impl ExitPupil {
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
         let Some(first) = lenses.first() else { return Err(ExitPupilError::Sensor) };
         pupil.index2 = first.index_before_sensor().powi(2);
-        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-        let corners = corners.map(|corner| pupil.film_point(DVec2::from(corner) * half_size));
-        pupil.disc = Disc::of(train, &corners);
+        pupil.disc = Disc::of(train, &pupil.sensor, half_size);
         if pupil.disc.is_some() {
             return Ok(pupil);
         }
