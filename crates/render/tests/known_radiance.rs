@@ -180,6 +180,36 @@ fn what_is_not_finite_is_counted_and_left_out() {
     }
 }
 
+/// A square lamp of radiance L close over a plane: ρ L times its form factor (Howell, B-4, four times).
+/// It fills so much of the sky that half of its light is found by directions that nobody aimed; a ball
+/// under the plane makes lamps few among the scene's triangles, so that these ask the lamps first.
+#[test]
+fn a_lamp_close_over_a_plane() {
+    let rest = r#""lights": [],
+        "objects": [
+            {"shape": "rectangle", "width": 10, "height": 10, "material": "m"},
+            {"shape": "sphere", "triangles": 2000, "material": "m",
+             "transform": {"translate": [0, 0, -3]}},
+            {"shape": "rectangle", "width": 4, "height": 4, "material": "lamp",
+             "transform": {"rotate": [1, 0, 0, 180], "translate": [0, 0, 1]}}],
+        "materials": {"m": {"type": "matte", "color": [0.5, 0.5, 0.5]},
+            "lamp": {"type": "emissive", "radiance": [2, 2, 2]}}"#;
+    let corner = 2.0 / 5.0_f64.sqrt() * (2.0 / 5.0_f64.sqrt()).atan() / std::f64::consts::PI;
+    let known = 0.5 * 2.0 * 4.0 * corner;
+    let eye = [[0.3, 0.0, 0.5], [0.0, 0.0, 0.0]];
+    check("lamp", 256, eye, rest, |_| (), 0.0, |_| known);
+}
+
+/// A Lambert plane under a sky of radiance L shows ρ L.
+#[test]
+fn a_plane_under_a_sky() {
+    let rest = r#""lights": [{"type": "environment", "radiance": [2, 2, 2]}],
+        "objects": [{"shape": "rectangle", "width": 10, "height": 10, "material": "m"}],
+        "materials": {"m": {"type": "matte", "color": [0.5, 0.5, 0.5]}}"#;
+    let eye = [[1.0, 0.5, 3.0], [0.0, 0.0, 0.0]];
+    check("sky", 64, eye, rest, |_| (), 0.0, |_| 1.0);
+}
+
 /// A sphere of radiance L over a plane: its form factor is (r/d)² cos θ (Howell, *A Catalog of
 /// Radiation Heat Transfer Configuration Factors*, B-34), so the plane shows ρ L (r/d)² cos θ.
 #[test]
