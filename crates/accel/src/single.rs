@@ -39,10 +39,10 @@ const NUDGE: f64 = 3.0 * F32_EPSILON;
 
 /// How far single precision may misplace a ray sideways at any distance: the nudge, and as much again
 /// for roundings of the ray and of what it meets.
-pub(crate) const BLUR: f64 = 2.0 * NUDGE;
+const BLUR: f64 = 2.0 * NUDGE;
 
 /// From 1 to the next f32.
-const F32_EPSILON: f64 = f32::EPSILON as f64;
+pub(crate) const F32_EPSILON: f64 = f32::EPSILON as f64;
 
 /// Single precision's distances are trusted to this many times its lateral error: up to a cosine of
 /// incidence of one in so many.

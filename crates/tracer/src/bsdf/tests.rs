@@ -39,29 +39,30 @@ fn grid(n: u32) -> impl Iterator<Item = [f64; 2]> {
     (0..n * n).map(move |k| [at(k % n), at(k / n)])
 }
 
+/// Steps of an additive recurrence in three dimensions (M. Roberts, *The unreasonable effectiveness of
+/// quasirandom sequences*, 2018).
+const R3: [f64; 3] = [0.819_172_513_396_164, 0.671_043_606_703_789, 0.549_700_477_901_960];
+
 /// A white surface returns no more than falls in: the mean weight of its own sampling is the albedo.
 #[test]
 fn energy_is_conserved() {
     for (name, model) in all() {
         for cosine in [1.0, 0.8, 0.5, 0.2, 0.05, 0.01] {
             let surface = bsdf(model, cosine);
-            let (mut sum, n, layers) = (0.0, 48, 16);
-            for k in 0..layers {
-                let choice = (f64::from(k) + 0.5) / f64::from(layers);
-                for square in grid(n) {
-                    let Some(s) = surface.sample(choice, square) else { continue };
-                    // A boundary compresses radiance, not power: its own factor is undone.
-                    let compressed = match model {
-                        Model::Dielectric { eta } if s.direction.z < 0.0 => eta * eta,
-                        _ => 1.0,
-                    };
-                    sum += total(s.weights) * compressed;
-                }
+            let (mut sum, n) = (0.0, 1 << 17);
+            for k in 0..n {
+                let [choice, u, v] = R3.map(|step| (0.5 + step * f64::from(k)).fract());
+                let Some(s) = surface.sample(choice, [u, v]) else { continue };
+                // A boundary compresses radiance, not power: its own factor is undone.
+                let compressed = match model {
+                    Model::Dielectric { eta } if s.direction.z < 0.0 => eta * eta,
+                    _ => 1.0,
+                };
+                sum += total(s.weights) * compressed;
             }
-            let albedo = sum / f64::from(n * n * layers);
-            // 1e-3 is the bound asked for; the choice among parts is integrated with 16 steps, which
-            // weigh the parts' edges to 1/32 of their difference.
-            assert!(albedo <= 1.0 + 1e-3 + 0.031, "{name} {model:?} at {cosine}: {albedo}");
+            let albedo = sum / f64::from(n);
+            // Of surfaces that return all of it the points make an error of a few 1e-4.
+            assert!(albedo <= 1.0 + 1e-3, "{name} {model:?} at {cosine}: {albedo}");
         }
     }
 }
