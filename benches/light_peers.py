@@ -294,9 +294,8 @@ def page(results, remarks, arguments):
 
 REASONS = (
     "Where goals at the same samples are missed: both programs have Embree find the hits, but Mitsuba's LLVM variant does "
-    "a whole vector of samples in f32 at once, and takes Embree's fast mode. etendue solves each hit again in f64, works "
-    "out its error bound, has robust mode and f64 decide at the ends of rays, and traces rays that scatter from surfaces "
-    "one by one. It gets back some of that by what it does not trace: a direction that is followed for its light alone "
+    "a whole vector of samples in f32 at once. etendue solves each hit again in f64, works out its error bound, has f64 "
+    "decide at the ends of rays, and traces rays that scatter from surfaces one by one. It gets back some of that by what it does not trace: a direction that is followed for its light alone "
     "asks the lamps first.")
 
 
