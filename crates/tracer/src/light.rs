@@ -7,12 +7,11 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use etendue_geometry::Placement;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{Illuminant, NoOverlap};
 
 use crate::environment::{EnvironmentMap, MapSampler};
-use crate::lamps::{self, Lamp};
+use crate::lamps::{self, EmissiveTriangle, Lamp, triangle_power};
 use crate::reference::{Spot, Surroundings};
 use crate::sampling::{AliasTable, sphere_direction, triangle_point};
 use crate::spawn::Anchor;
@@ -374,16 +373,21 @@ impl Lights {
         radiance: &mut [f64],
     ) -> Option<Toward> {
         let [u, v] = triangle_point(square);
-        let offset = place.corner + place.edges[0] * u + place.edges[1] * v;
+        let offset = place.corner + place.shape.edges[0] * u + place.shape.edges[1] * v;
         let direction = offset.try_normalize()?;
         let spot = Spot { weights: [1.0 - u - v, u, v], ..place.spot };
-        let facing = -direction.dot(place.normal);
+        let facing = -direction.dot(place.shape.normal);
         if !self.emitted(around, spectral, &spot, facing > 0.0, radiance) {
             return None;
         }
-        let density = chance * offset.length_squared() / (facing.abs() * place.area);
-        let end =
-            Anchor::new(from.point + offset, place.normal, from.point, spot.placement, spot.mesh);
+        let density = chance * offset.length_squared() / (facing.abs() * place.shape.area);
+        let end = Anchor::new(
+            from.point + offset,
+            place.shape.normal,
+            from.point,
+            spot.placement,
+            spot.mesh,
+        );
         density.is_finite().then_some(Toward {
             direction,
             density,
@@ -433,9 +437,9 @@ impl Lights {
         };
         let chance = self.picker.probability(*first as usize + spot.triangle);
         let [_, u, v] = spot.weights;
-        let offset = place.corner + place.edges[0] * u + place.edges[1] * v;
-        let density =
-            chance * offset.length_squared() / (direction.dot(place.normal).abs() * place.area);
+        let offset = place.corner + place.shape.edges[0] * u + place.shape.edges[1] * v;
+        let density = chance * offset.length_squared()
+            / (direction.dot(place.shape.normal).abs() * place.shape.area);
         if density.is_finite() { density } else { 0.0 }
     }
 
@@ -472,7 +476,7 @@ impl Lights {
     }
 }
 
-fn mean(color: &Color) -> f64 {
+pub(crate) fn mean(color: &Color) -> f64 {
     (color[0] + color[1] + color[2]) / 3.0
 }
 
@@ -491,66 +495,4 @@ fn power(light: &Light, far: f64, environment: Option<&Environment>) -> f64 {
             4.0 * PI * far * own * map.map_or(1.0, |(_, sampler)| sampler.mean)
         }
     }
-}
-
-/// A triangle that shines, as seen from a point.
-struct EmissiveTriangle<'a> {
-    id: [u32; 2],
-    spot: Spot<'a>,
-    corner: DVec3,
-    edges: [DVec3; 2],
-    normal: DVec3,
-    area: f64,
-}
-
-impl<'a> EmissiveTriangle<'a> {
-    fn new(around: &Surroundings<'a>, number: u32, triangle: u32, from: DVec3) -> Option<Self> {
-        let placement = around.geometry.placements.get(number as usize)?;
-        let spot = Spot::corner(around.geometry, placement, triangle as usize);
-        let place = &placement.world_from_mesh;
-        let [a, b, c] = spot.mesh.corners(spot.triangle);
-        let edges = [place.linear * (b - a), place.linear * (c - a)];
-        let cross = edges[0].cross(edges[1]);
-        let length = cross.length();
-        let normal = cross / length * place.handedness();
-        normal.is_finite().then_some(Self {
-            id: [number, triangle],
-            spot,
-            corner: place.point_from(a, from),
-            edges,
-            normal,
-            area: 0.5 * length,
-        })
-    }
-}
-
-/// Power of an emissive triangle (W), by the paint at its middle and corners.
-fn triangle_power(
-    around: &Surroundings<'_>,
-    placement: &Placement,
-    triangle: usize,
-    material: &Material,
-) -> f64 {
-    let Some(emission) = &material.emission else { return 0.0 };
-    let spot = Spot::corner(around.geometry, placement, triangle);
-    let [a, b, c] = spot.mesh.corners(triangle);
-    let linear = &placement.world_from_mesh.linear;
-    let area = 0.5 * (*linear * (b - a)).cross(*linear * (c - a)).length();
-    let third = 1.0 / 3.0;
-    let weights = [[third, third, third], [0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]];
-    let radiance: f64 = weights
-        .map(|weights| {
-            let [r, g, b, _] = around.paint(&emission.radiance, &Spot { weights, ..spot });
-            mean(&[r, g, b])
-        })
-        .iter()
-        .sum();
-    let sides = if emission.two_sided { 2.0 } else { 1.0 };
-    // A texture may be dark at all four and shine between them: no triangle is passed over.
-    let least = match &emission.radiance {
-        crate::Paint::Plain(_) => 0.0,
-        crate::Paint::Checker { colors, .. } => mean(&colors[0]).max(mean(&colors[1])),
-        crate::Paint::Image { factor, .. } => 0.05 * mean(factor),
-    };
-    sides * PI * area * emission.strength * (radiance / 4.0).max(0.1 * least)
 }

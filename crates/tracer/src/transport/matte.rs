@@ -164,14 +164,14 @@ impl Chosen {
         self.chosen[lane] = (index, lamp.id);
         for axis in 0..3 {
             self.corner[axis][lane] = lamp.corner[axis];
-            self.normal[axis][lane] = lamp.normal[axis];
+            self.normal[axis][lane] = lamp.shape.normal[axis];
             self.magnitudes[axis][lane] = lamp.magnitudes[axis];
             for k in 0..2 {
                 self.translation[k][axis][lane] = lamp.translation[k][axis];
-                self.edges[k][axis][lane] = lamp.edges[k][axis];
+                self.edges[k][axis][lane] = lamp.shape.edges[k][axis];
             }
         }
-        self.density[lane] = chance / lamp.area;
+        self.density[lane] = chance / lamp.shape.area;
         self.two_sided[lane] = f64::from(u8::from(lamp.two_sided));
     }
 }
