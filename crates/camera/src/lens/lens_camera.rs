@@ -14,18 +14,18 @@ use std::sync::{Arc, OnceLock};
 
 use etendue_geometry::RayBatch;
 use etendue_spectrum::{Curve, Lanes, Outside, Spread};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use super::chief::ChiefTable;
 use super::focused::{Focused, View};
 use super::lit_area::LitArea;
 
-use crate::element::{Block, Clip, Fate, LANES, Ray, Reflection};
+use crate::element::{Clip, Fate, Ray, Reflection};
 use crate::glass::GlassError;
 use crate::train::analysis::projected_solid_angle;
-use crate::train::pupil::{Bundle, Disc, Window, blocked, without_dimming, without_filters};
+use crate::train::pupil::{Disc, Window, blocked, without_dimming, without_filters};
 use crate::train::{ExitPupil, ExitPupilError, OpticalTrain, Part, Side, TrainAt};
-use crate::{CameraError, CameraRays, FilmSamples, Pose};
+use crate::{CameraError, Pose};
 
 /// Lanes whose rays run the same way.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,31 +40,31 @@ pub struct LaneGroup {
 /// A lens with a sensor behind it.
 #[derive(Debug, Clone)]
 pub struct LensCamera {
-    focused: Focused,
+    pub(super) focused: Focused,
     design: TrainAt,
     chief: ChiefTable,
     /// Where on the sensor light arrives.
     lit: LitArea,
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
-    solid_angle: f64,
-    opened: OnceLock<Option<Arc<Opened>>>,
+    pub(super) solid_angle: f64,
+    pub(super) opened: OnceLock<Option<Arc<Opened>>>,
 }
 
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
-struct Opened {
+pub(super) struct Opened {
     lanes: Lanes,
-    groups: Vec<OpenedGroup>,
-    pupil: ExitPupil,
+    pub(super) groups: Vec<OpenedGroup>,
+    pub(super) pupil: ExitPupil,
 }
 
 /// The lens as it is for a group of lanes.
 #[derive(Debug)]
-struct OpenedGroup {
+pub(super) struct OpenedGroup {
     /// As in [`LaneGroup`].
-    wavelength: Option<f64>,
+    pub(super) wavelength: Option<f64>,
     /// One, or as many as share the group's light.
-    lenses: Vec<TrainAt>,
+    pub(super) lenses: Vec<TrainAt>,
 }
 
 impl PartialEq for LensCamera {
@@ -143,7 +143,7 @@ impl LensCamera {
         Ok(Self { opened, ..self.clone() })
     }
 
-    fn open(&self, lanes: &Lanes) -> Result<Opened, CameraError> {
+    pub(super) fn open(&self, lanes: &Lanes) -> Result<Opened, CameraError> {
         let fault = |why: String| CameraError::new("", why);
         let train = self.focused.train();
         for (i, element) in train.elements().iter().enumerate() {
@@ -209,138 +209,6 @@ impl LensCamera {
     pub fn wavelengths_a_group(&self, lanes: &Lanes) -> usize {
         let groups = self.lane_groups(lanes).into_iter();
         groups.map(|group| self.spread(lanes, &group).wavelengths.len()).max().unwrap_or(1)
-    }
-
-    /// The rays of `samples` that leave the lens.
-    pub(crate) fn sample_rays(&self, pose: &Pose, samples: &FilmSamples, out: &mut CameraRays) {
-        out.clear();
-        // Not opened yet: at the design wavelength of RGB.
-        let opened = self.opened.get_or_init(|| self.open(&Lanes::Rgb).ok().map(Arc::new));
-        let Some(opened) = opened else { return };
-        let wanted = opened.groups.iter().find(|group| group.wavelength == samples.wavelength);
-        let Some(group) = wanted.or(opened.groups.first()) else { return };
-        let mut order = std::mem::take(&mut out.order);
-        order.clear();
-        order.extend(samples.spectrum.iter().zip(0..).map(|(&u, i)| (group.lens_at(u), i)));
-        if group.lenses.len() > 1 {
-            order.sort_unstable();
-        }
-        for samples_of_lens in order.chunk_by(|a, b| a.0 == b.0) {
-            let lens = &group.lenses[samples_of_lens[0].0];
-            let numbers = samples_of_lens.iter().map(|&(_, i)| i);
-            self.trace_samples(pose, (&opened.pupil, lens), samples, numbers, out);
-        }
-        out.order = order;
-        out.rays.coherent = true;
-    }
-
-    /// Appends the rays of some of `samples`, all at the wavelength of one lens.
-    fn trace_samples(
-        &self,
-        pose: &Pose,
-        (pupil, lens): (&ExitPupil, &TrainAt),
-        samples: &FilmSamples,
-        numbers: impl Iterator<Item = u32>,
-        out: &mut CameraRays,
-    ) {
-        let first = out.sample.len();
-        out.sample.extend(numbers);
-        match pupil.disc() {
-            Some(disc) => self.aim_at_disc((pupil, disc), samples, first, out),
-            None => self.aim_at_pupil(pupil, samples, first, out),
-        }
-        lens.trace(Side::Sensor, Clip::On, &mut out.in_lens);
-        out.fates.add_all(&out.in_lens);
-        self.leave(pose, first, out);
-    }
-
-    /// Starts rays for the samples that `out` names from `first` on, towards a pupil known in closed
-    /// form.
-    fn aim_at_disc(
-        &self,
-        (pupil, disc): (&ExitPupil, &Disc),
-        samples: &FilmSamples,
-        first: usize,
-        out: &mut CameraRays,
-    ) {
-        let film = self.focused.film();
-        let [x, y] = &mut out.places;
-        x.clear();
-        y.clear();
-        out.squares.clear();
-        for &number in &out.sample[first..] {
-            let i = number as usize;
-            let place = film.place(samples.columns[i], samples.rows[i]);
-            x.push(place.x);
-            y.push(place.y);
-            out.squares.push(samples.pupil[i]);
-        }
-        let scale = pupil.index2() / self.solid_angle;
-        let bundle = Bundle { sensor: &film.frame, scale, film: [x, y], squares: &out.squares };
-        disc.fill(&bundle, &mut out.in_lens);
-    }
-
-    /// Starts rays for the samples that `out` names from `first` on, and leaves out those of places
-    /// where no light arrives.
-    fn aim_at_pupil(
-        &self,
-        pupil: &ExitPupil,
-        samples: &FilmSamples,
-        first: usize,
-        out: &mut CameraRays,
-    ) {
-        let (film, rays) = (self.focused.film(), &mut out.in_lens);
-        rays.clear();
-        let mut kept = first;
-        for k in first..out.sample.len() {
-            let number = out.sample[k];
-            let i = number as usize;
-            let place = film.place(samples.columns[i], samples.rows[i]);
-            match pupil.sample(place, samples.pupil[i]) {
-                Some(sample) => {
-                    let at = pupil.film_point(place);
-                    rays.push_weighted(at, sample.direction, sample.weight / self.solid_angle);
-                    out.sample[kept] = number;
-                    kept += 1;
-                }
-                None => out.fates.unlit += 1,
-            }
-        }
-        out.sample.truncate(kept);
-    }
-
-    /// Brings the rays that left the lens into the world; `out` names their samples from `first` on.
-    fn leave(&self, pose: &Pose, first: usize, out: &mut CameraRays) {
-        let to_world =
-            ToWorld { position: pose.position, turn: pose.rotation, origin: self.focused.origin() };
-        let mut kept = first;
-        for start in (0..out.in_lens.len()).step_by(LANES) {
-            let (block, count) = out.in_lens.block_at(start);
-            let (position, direction) = to_world.block(block);
-            if block.is_bright(count) {
-                for axis in 0..3 {
-                    out.rays.origin[axis].extend_from_slice(&position[axis][..count]);
-                    out.rays.direction[axis].extend_from_slice(&direction[axis][..count]);
-                }
-                out.weight.extend_from_slice(&block.throughput[..count]);
-                let from = first + start;
-                out.sample.copy_within(from..from + count, kept);
-                kept += count;
-                continue;
-            }
-            for lane in (0..count).filter(|&lane| block.is_bright_at(lane)) {
-                for axis in 0..3 {
-                    out.rays.origin[axis].push(position[axis][lane]);
-                    out.rays.direction[axis].push(direction[axis][lane]);
-                }
-                out.weight.push(block.throughput[lane]);
-                out.sample[kept] = out.sample[first + start + lane];
-                kept += 1;
-            }
-        }
-        out.sample.truncate(kept);
-        out.rays.t_min.resize(kept, 0.0);
-        out.rays.t_max.resize(kept, f64::INFINITY);
     }
 
     fn in_world(&self, pose: &Pose, point: DVec3, direction: DVec3) -> (DVec3, DVec3) {
@@ -426,47 +294,6 @@ impl LensCamera {
     }
 }
 
-/// From lens coordinates (mm) to the world (m).
-struct ToWorld {
-    position: DVec3,
-    turn: DMat3,
-    /// z of the camera's origin (mm).
-    origin: f64,
-}
-
-impl ToWorld {
-    /// Places and directions of a block's rays, one array an axis.
-    fn block(&self, block: &Block) -> ([[f64; LANES]; 3], [[f64; LANES]; 3]) {
-        let (mut position, mut direction) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-        turn_block(self, block, &mut position, &mut direction);
-        (position, direction)
-    }
-}
-
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
-fn turn_block(
-    to_world: &ToWorld,
-    block: &Block,
-    position: &mut [[f64; LANES]; 3],
-    direction: &mut [[f64; LANES]; 3],
-) {
-    let ToWorld { position: at, turn, origin } = *to_world;
-    let [px, py, pz] = &block.position;
-    let [dx, dy, dz] = &block.direction;
-    for axis in 0..3 {
-        let [x, y, z] = [turn.x_axis[axis], turn.y_axis[axis], turn.z_axis[axis]];
-        for i in 0..LANES {
-            let local = x * (px[i] * 1e-3) + y * (py[i] * 1e-3) + z * ((pz[i] - origin) * 1e-3);
-            position[axis][i] = at[axis] + local;
-            direction[axis][i] = x * dx[i] + y * dy[i] + z * dz[i];
-        }
-    }
-}
-
 impl OpenedGroup {
     /// Which lens serves a place of the spectrum in 0..1.
     #[expect(
@@ -474,7 +301,7 @@ impl OpenedGroup {
         clippy::cast_sign_loss,
         reason = "at most a few dozen lenses"
     )]
-    fn lens_at(&self, u: f64) -> usize {
+    pub(super) fn lens_at(&self, u: f64) -> usize {
         ((u * self.lenses.len() as f64) as usize).min(self.lenses.len() - 1)
     }
 }

@@ -10,12 +10,14 @@
 //! | [`focused`] | a lens and its sensor: where pixels lie, and the paraxial camera of both |
 //! | [`chief`] | the chief rays of a whole sensor |
 //! | `lit_area` | the part of the sensor that light reaches |
-//! | [`lens_camera`] | chief rays for data, weighted rays of the pupil for pictures |
+//! | [`lens_camera`] | chief rays for data, and what is measured for pictures |
+//! | `rays` | weighted rays of the pupil for pictures |
 
 pub mod chief;
 pub mod focused;
 pub mod lens_camera;
 mod lit_area;
+mod rays;
 pub mod source;
 pub mod spec;
 

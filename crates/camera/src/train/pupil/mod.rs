@@ -27,10 +27,12 @@
 
 mod disc;
 mod measure;
+mod place;
 mod search;
 
 use glam::{DVec2, DVec3};
 
+use self::place::{between, turn_of};
 use super::aim::towards_lens;
 use super::{OpticalTrain, Part, Side, TrainAt};
 use crate::element::{Clip, Fate, FateCounts, Frame, LensRays, LossesSpec, Opening};
@@ -299,96 +301,6 @@ impl ExitPupil {
         }
         corners
     }
-
-    fn place(&self, film: DVec2) -> Option<Place> {
-        match self.layout {
-            _ if self.nodes.is_empty() => None,
-            Layout::Radial => self.radial_place(film),
-            Layout::Planar => self.planar_place(film),
-        }
-    }
-
-    fn radial_place(&self, film: DVec2) -> Option<Place> {
-        let r = film.length();
-        let intervals = self.nodes.len() - 1;
-        #[expect(clippy::cast_precision_loss, reason = "a few dozen nodes")]
-        let at = if self.radius > 0.0 { r / self.radius * intervals as f64 } else { 0.0 };
-        let (low, share) = split(at, intervals)?;
-        let axis = if r > 0.0 { film / r } else { DVec2::X };
-        let nodes = [(low, 1.0 - share), (low + 1, share), (low, 0.0), (low, 0.0)];
-        Some(Place { axis, nodes })
-    }
-
-    fn planar_place(&self, film: DVec2) -> Option<Place> {
-        let along = |x: f64, half: f64| {
-            #[expect(clippy::cast_precision_loss, reason = "8 intervals")]
-            let at =
-                if half > 0.0 { 0.5 * (x / half + 1.0) } else { 0.0 } * PLANAR_INTERVALS as f64;
-            split(at, PLANAR_INTERVALS)
-        };
-        let (column, right) = along(film.x, self.half_size.x)?;
-        let (row, down) = along(film.y, self.half_size.y)?;
-        let node = |c: usize, r: usize| (row + r) * (PLANAR_INTERVALS + 1) + column + c;
-        let nodes = [
-            (node(0, 0), (1.0 - right) * (1.0 - down)),
-            (node(1, 0), right * (1.0 - down)),
-            (node(0, 1), (1.0 - right) * down),
-            (node(1, 1), right * down),
-        ];
-        Some(Place { axis: DVec2::X, nodes })
-    }
-}
-
-/// Which nodes a point of the sensor lies between, and how it is turned against them.
-struct Place {
-    /// The direction on the sensor that is the nodes' +x.
-    axis: DVec2,
-    nodes: [(usize, f64); 4],
-}
-
-impl Place {
-    fn turned(&self, slopes: DVec2) -> DVec2 {
-        self.axis.rotate(slopes)
-    }
-}
-
-/// The interval that holds `at`, and the share of it that is passed; `None` beyond the last.
-fn split(at: f64, intervals: usize) -> Option<(usize, f64)> {
-    #[expect(clippy::cast_precision_loss, reason = "a few dozen nodes")]
-    let last = intervals as f64;
-    // Points on the very rim may be rounded past it.
-    if !(at >= -1e-9 && at <= last * (1.0 + 1e-9) + 1e-9) {
-        return None;
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "between 0 and a few dozen"
-    )]
-    let low = (at.max(0.0) as usize).min(intervals.saturating_sub(1));
-    #[expect(clippy::cast_precision_loss, reason = "a few dozen nodes")]
-    let share = (at - low as f64).clamp(0.0, 1.0);
-    Some((low, share))
-}
-
-#[expect(clippy::cast_precision_loss, reason = "at most 256 angles")]
-fn turn_of(i: usize) -> f64 {
-    i as f64 / ANGLES as f64
-}
-
-/// The table's value at a share of a full turn.
-fn between(reach: &[f64; ANGLES + 1], turn: f64) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "128 angles")]
-    let at = turn * ANGLES as f64;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a turn is in 0..=1"
-    )]
-    let low = (at as usize).min(ANGLES - 1);
-    #[expect(clippy::cast_precision_loss, reason = "128 angles")]
-    let share = at - low as f64;
-    reach[low] + (reach[low + 1] - reach[low]) * share
 }
 
 /// From the unit square to the disc: radius and share of a full turn, with equal areas staying
