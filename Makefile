@@ -52,7 +52,7 @@ bench-light: setup
 	scripts/bench-peers.sh light_peers.py $(ARGS)
 
 bench-lens:
-	cargo build --release -p etendue-camera --example trace_lens
+	cargo build --release -p etendue-optics --example trace_lens
 	scripts/bench-peers.sh lens_peers.py $(ARGS)
 
 bench-sensor:

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use etendue_camera::length::Metres;
 use etendue_geometry::glam::{DQuat, DVec3};
+use etendue_geometry::units::Metres;
 use etendue_geometry::{Buffer, Geometry, Mesh, Placement, Positions, Transform, Vertices};
 use etendue_scene::import::Wanted;
 use etendue_scene::shape::{ShapeError, ShapeSpec};

@@ -12,8 +12,6 @@
 //! `thick` are the approximations of C. Kolb, D. Mitchell and P. Hanrahan, "A realistic camera model
 //! for computer graphics", 1995.
 
-use etendue_camera::element::{ElementSpec, PartSpec};
-use etendue_camera::length::{Micrometres, Millimetres};
 use etendue_camera::lens::PlacedSpec;
 use etendue_camera::lens::focused::View;
 use etendue_camera::{
@@ -21,6 +19,8 @@ use etendue_camera::{
     SensorSpec, ThinLensCameraSpec,
 };
 use etendue_geometry::Bounds;
+use etendue_geometry::units::{Micrometres, Millimetres};
+use etendue_optics::element::{ElementSpec, PartSpec};
 use serde::Serialize;
 
 use crate::pictures::{Studio, opened};

@@ -7,15 +7,15 @@ use etendue_spectrum::Lanes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::element::Resolve;
 use crate::framing::Subject;
-use crate::length::{Degrees, Metres, Micrometres};
 use crate::lens::focused::View;
 use crate::{
     CameraError, CameraRays, ChromaticRealLensCameraSpec, Distortion, DistortionSpec, FilmSamples,
     Intrinsics, LaneGroup, LensCamera, LensCameraSpec, Orthographic, OrthographicSpec, Pinhole,
     PinholeSpec, Pose, PoseSpec, RealLensCameraSpec, SensorSpec, ThinLensCameraSpec,
 };
+use etendue_geometry::units::{Degrees, Metres, Micrometres};
+use etendue_optics::element::Resolve;
 
 /// Rows of the picture of a camera that comes without a resolution.
 const DEFAULT_ROWS: u32 = 1024;

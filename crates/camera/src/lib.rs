@@ -6,19 +6,15 @@
 //! * The camera's frame is right-handed: it looks along −Z, +Y is up, +X is right (glTF's camera).
 //!   Its origin is the **entrance pupil**: the pinhole, the thin lens' centre, the paraxial entrance
 //!   pupil of a real lens. Distances in the world are metres.
-//! * Inside a lens, lengths are millimetres, z = 0 is the first element's vertex and +z runs from the
-//!   object to the sensor, as lens designers write it.
+//! * Inside a lens [`etendue_optics`]' conventions hold: millimetres, +z from the object to the sensor.
 //! * Row 0 of an image is the top, column 0 the left; pictures are upright.
 
 pub mod camera;
 pub mod camera_file;
 pub mod distortion;
-pub mod element;
 pub mod error;
 pub mod framing;
-pub mod glass;
 pub mod intrinsics;
-pub mod length;
 pub mod lens;
 pub mod orthographic;
 pub mod pinhole;
@@ -27,7 +23,6 @@ pub mod sampler;
 pub mod samples;
 pub mod sensor;
 mod sobol;
-pub mod train;
 
 pub use camera::{Camera, CameraSpec, PixelBlock, PixelExtent, Projection};
 pub use camera_file::CameraFile;

@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::framing::{self, Subject};
-use crate::length::Metres;
 use crate::{CameraError, Pose, PoseSpec, SensorSpec};
+use etendue_geometry::units::Metres;
 
 /// An orthographic camera as the scene file writes it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::distortion::{Distortion, DistortionSpec};
 use crate::framing::{self, Reach, Subject};
-use crate::length::Degrees;
 use crate::{CameraError, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec, SensorSpec};
+use etendue_geometry::units::Degrees;
 
 /// The vertical field of view of a pinhole that says nothing about it.
 const DEFAULT_FOV: Degrees = Degrees(40.0);

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::CameraError;
-use crate::length::Micrometres;
+use etendue_geometry::units::Micrometres;
 
 /// The most pixels along a side: what image formats and OpenCV can hold.
 const LONGEST_SIDE: u32 = 65_535;

@@ -5,7 +5,7 @@ mod parse;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use etendue_camera::train::Focus;
+use etendue_optics::train::Focus;
 use etendue_scene::import::Strictness;
 use etendue_scene::{LoadOptions, Reach};
 

@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use etendue_camera::length::Dimension;
-use etendue_camera::train::{Focus, Inquiry, LensReport, OpticalTrain, drawing};
+use etendue_geometry::units::Dimension;
+use etendue_optics::train::{Focus, Inquiry, LensReport, OpticalTrain, drawing};
 use etendue_render::output::{prepare_folder, sidecar, write_whole};
 use etendue_scene::Reach;
 use etendue_scene::file::{ReadLens, read_lens, trace_rays};

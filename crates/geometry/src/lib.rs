@@ -21,6 +21,7 @@
 //! | [`mapped`] | the one place that maps files |
 //! | [`mesh`] | a triangle mesh and its vertex attributes |
 //! | [`transform`] | affine maps whose translation keeps 106 bits |
+//! | [`units`] | lengths, angles and times with their units, as files write them |
 //! | [`world`] | meshes and their placements |
 
 pub mod batch;
@@ -30,6 +31,7 @@ pub mod disk;
 pub mod mapped;
 pub mod mesh;
 pub mod transform;
+pub mod units;
 pub mod world;
 
 pub use batch::{Detail, HitBatch, MISS, RayBatch};

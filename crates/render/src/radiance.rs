@@ -4,10 +4,10 @@
 //! Sums are compensated (Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation endlicher
 //! Summen", 1974), so the mean of a million samples is as exact as that of ten.
 
-use etendue_camera::element::FateCounts;
 use etendue_camera::{
     Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, squares, squares_of_pair,
 };
+use etendue_optics::element::FateCounts;
 use etendue_tracer::transport::Beam;
 use etendue_tracer::{Samples, Scratch, Stage, Tally, Tracer};
 

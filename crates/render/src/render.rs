@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildError, BuildOptions};
 use etendue_camera::PixelExtent;
-use etendue_camera::element::FateCounts;
+use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, TracerSpec};
 use etendue_spectrum::Lanes;

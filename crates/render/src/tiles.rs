@@ -5,12 +5,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use etendue_accel::Accel;
-use etendue_camera::element::FateCounts;
 use etendue_camera::lens::LensCamera;
 use etendue_camera::{
     Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, Sampler, squares_of_pair,
 };
 use etendue_geometry::{Detail, HitBatch, RayBatch};
+use etendue_optics::element::FateCounts;
 use etendue_tracer::{LayerSpec, NormalKind, Surroundings, Tally, Traced};
 use rayon::prelude::*;
 

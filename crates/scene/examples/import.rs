@@ -9,7 +9,7 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use etendue_camera::length::Metres;
+use etendue_geometry::units::Metres;
 use etendue_scene::import::{Options, Wanted, import};
 use etendue_scene::shape::ShapeSpec;
 

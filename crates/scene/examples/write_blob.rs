@@ -7,7 +7,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Error, Result, Write};
 
-use etendue_camera::length::Metres;
+use etendue_geometry::units::Metres;
 use etendue_geometry::{Mesh, Positions, Vertices};
 use etendue_scene::import::Wanted;
 use etendue_scene::shape::ShapeSpec;

@@ -55,7 +55,7 @@ pub enum SceneError {
         /// The file.
         file: PathBuf,
         /// Where and why.
-        source: etendue_camera::train::ZemaxError,
+        source: etendue_optics::train::ZemaxError,
     },
     /// Broken JSON.
     #[error("{}, line {}, column {}: broken JSON: {reason}\n{excerpt}",

@@ -1,7 +1,7 @@
 //! The scene file's own materials and lights, checked and ready for the tracers.
 
-use etendue_camera::glass::GlassSpec;
 use etendue_geometry::glam::DVec3;
+use etendue_optics::glass::GlassSpec;
 use etendue_spectrum::{Curve, Illuminant};
 use etendue_tracer::material::{Alpha, GltfSurface};
 use etendue_tracer::spec::{BRIGHTEST, ImageSpec, IorSpec, PaintSpec};

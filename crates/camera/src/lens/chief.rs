@@ -6,7 +6,7 @@
 use glam::{DVec2, DVec3};
 
 use super::focused::Focused;
-use crate::train::TrainAt;
+use etendue_optics::train::TrainAt;
 
 /// Nodes over the half diagonal, for lenses with rotational symmetry.
 const RADIAL_NODES: u32 = 257;

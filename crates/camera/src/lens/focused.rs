@@ -3,11 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::spec::Setup;
-use crate::element::Frame;
-use crate::train::analysis::chief_height;
-use crate::train::paraxial::Abcd;
-use crate::train::{Focus, LensError, OpticalTrain, Paraxial, SensorMount, TrainAt};
 use crate::{CameraError, Intrinsics};
+use etendue_optics::element::Frame;
+use etendue_optics::train::analysis::chief_height;
+use etendue_optics::train::{Focus, LensError, OpticalTrain, Paraxial, SensorMount, TrainAt};
 
 /// Entrance pupils farther away than this many times the lens' own size (mm) count as infinitely
 /// far: rays towards the object are parallel.
@@ -93,7 +92,8 @@ impl Focused {
             };
             CameraError::new(key, fault.to_string())
         })?;
-        let fault = |error: crate::glass::GlassError| CameraError::new("lens", error.to_string());
+        let fault =
+            |error: etendue_optics::glass::GlassError| CameraError::new("lens", error.to_string());
         let paraxial = train.paraxial(train.wavelength()).map_err(fault)?;
         let far = FARTHEST_PUPIL * (train.last_vertex().abs() + train.lateral_scale());
         let pupil = paraxial.entrance_pupil.z.filter(|z| z.abs() < far);
@@ -271,19 +271,4 @@ pub(crate) fn positive(value: Option<f64>, key: &str) -> Result<f64, CameraError
         return Ok(value);
     }
     Err(CameraError::new(key, format!("{value} is not above zero")))
-}
-
-impl Abcd {
-    /// With `self` from the first vertex to the sensor: the height on the sensor (mm) for a slope of
-    /// 1 through the axis at z = `pupil`, air in front.
-    fn image_scale(&self, pupil: f64) -> f64 {
-        self.b - self.a * pupil
-    }
-
-    /// How far in front of the first vertex lies what is in focus (mm), air in front.
-    fn conjugate(&self) -> f64 {
-        let distance = -self.b / self.a;
-        // A rounding away from infinity is infinity.
-        if distance.is_finite() && distance.abs() < 1e15 { distance } else { f64::INFINITY }
-    }
 }

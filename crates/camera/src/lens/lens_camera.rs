@@ -20,12 +20,12 @@ use super::chief::ChiefTable;
 use super::focused::{Focused, View};
 use super::lit_area::LitArea;
 
-use crate::element::{Clip, Fate, Ray, Reflection};
-use crate::glass::GlassError;
-use crate::train::analysis::projected_solid_angle;
-use crate::train::pupil::{Disc, Window, blocked, without_dimming, without_filters};
-use crate::train::{ExitPupil, ExitPupilError, OpticalTrain, Part, Side, TrainAt};
 use crate::{CameraError, Pose};
+use etendue_optics::element::{Clip, Fate, Ray, Reflection};
+use etendue_optics::glass::GlassError;
+use etendue_optics::train::analysis::projected_solid_angle;
+use etendue_optics::train::pupil::{Disc, Window, blocked, without_dimming, without_filters};
+use etendue_optics::train::{ExitPupil, ExitPupilError, OpticalTrain, Part, Side, TrainAt};
 
 /// Lanes whose rays run the same way.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,9 +3,9 @@
 
 use glam::DVec2;
 
-use crate::element::Frame;
-use crate::train::pupil::{Window, lit_radius};
-use crate::train::{OpticalTrain, TrainAt};
+use etendue_optics::element::Frame;
+use etendue_optics::train::pupil::{Window, lit_radius};
+use etendue_optics::train::{OpticalTrain, TrainAt};
 
 /// Directions from the sensor's centre in which its edge is looked for.
 const DIRECTIONS: usize = 32;

@@ -1,6 +1,6 @@
 //! Cameras with a lens: how a scene writes them, and how places on their sensor become rays.
 //!
-//! Every one of them is an [`OpticalTrain`](crate::train::OpticalTrain) focused on a sensor; they
+//! Every one of them is an [`OpticalTrain`](etendue_optics::train::OpticalTrain) focused on a sensor; they
 //! differ in how the train is written.
 //!
 //! | module | idea |

@@ -6,10 +6,10 @@ use etendue_spectrum::Lanes;
 use glam::{DMat3, DVec3};
 
 use super::lens_camera::LensCamera;
-use crate::element::{Block, Clip, LANES};
-use crate::train::pupil::{Bundle, Disc};
-use crate::train::{ExitPupil, Side, TrainAt};
 use crate::{CameraRays, FilmSamples, Pose};
+use etendue_optics::element::{Block, Clip, LANES};
+use etendue_optics::train::pupil::{Bundle, Disc};
+use etendue_optics::train::{ExitPupil, Side, TrainAt};
 
 impl LensCamera {
     /// The rays of `samples` that leave the lens.

@@ -9,9 +9,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
 use crate::CameraError;
-use crate::element::{ElementSpec, Resolve, element_schema};
-use crate::length::Millimetres;
-use crate::train::{LensError, LensFile, OpticalTrain, ZemaxLens};
+use etendue_geometry::units::Millimetres;
+use etendue_optics::element::{ElementSpec, Resolve, element_schema};
+use etendue_optics::train::{LensError, LensFile, OpticalTrain, ZemaxLens};
 
 /// The longest text that is read as a lens (bytes).
 const LONGEST: u64 = 16 << 20;

@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 use super::focused::{Focused, View, positive};
 use super::lens_camera::LensCamera;
 use super::source::{LensSource, PlacedSpec, in_camera};
-use crate::element::{
+use crate::framing::{self, Reach, Subject};
+use crate::{CameraError, Pose, PoseSpec, SensorSpec};
+use etendue_geometry::units::{Degrees, Metres, Millimetres};
+use etendue_optics::element::{
     ApertureSpec, ElementSpec, LossesSpec, PartSpec, Resolve, SurfaceSpec, ThinLensSpec,
 };
-use crate::framing::{self, Reach, Subject};
-use crate::glass::GlassSpec;
-use crate::length::{Degrees, Metres, Millimetres};
-use crate::train::{Focus, LensFile, OpticalTrain};
-use crate::{CameraError, Pose, PoseSpec, SensorSpec};
+use etendue_optics::glass::GlassSpec;
+use etendue_optics::train::{Focus, LensFile, OpticalTrain};
 
 /// What the cameras with a lens have in common.
 #[derive(Debug, Clone, Copy)]

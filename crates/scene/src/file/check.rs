@@ -7,7 +7,7 @@
 
 mod choice;
 
-use etendue_camera::length::Dimension;
+use etendue_geometry::units::Dimension;
 use serde_json::{Map, Value};
 
 use super::document::{join, join_index};

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use etendue_camera::train::{
+use etendue_optics::train::{
     Focus, LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays, ZemaxError, ZemaxLens,
 };
 use schemars::JsonSchema;

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use etendue_camera::length::Micrometres;
+use etendue_geometry::units::Micrometres;
 use etendue_sensor::SensorSpec;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use etendue_camera::length::Micrometres;
+use etendue_geometry::units::Micrometres;
 use etendue_sensor::{Sensor, SensorError, SensorSpec};
 use serde::Deserialize;
 use serde_json::{Value, json};

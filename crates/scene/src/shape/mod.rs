@@ -9,8 +9,8 @@ mod globe;
 mod relief;
 mod turn;
 
-use etendue_camera::length::Metres;
 use etendue_geometry::Mesh;
+use etendue_geometry::units::Metres;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -5,8 +5,8 @@ use std::ops::Add;
 use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildError, BuildOptions, Bvh, Embree, Exact};
-use etendue_camera::length::Metres;
 use etendue_geometry::glam::DVec3;
+use etendue_geometry::units::Metres;
 use etendue_geometry::{
     Detail, Geometry, HitBatch, Mesh, Placement, Positions, RayBatch, Transform, Vertices,
 };

@@ -1,9 +1,9 @@
 //! Lenses from a few lines, and single rays through them.
 
 use anyhow::{Result, anyhow};
-use etendue_camera::element::{Clip, Fate, LensRays};
-use etendue_camera::train::{LensFile, OpticalTrain, Side};
 use etendue_geometry::glam::DVec3;
+use etendue_optics::element::{Clip, Fate, LensRays};
+use etendue_optics::train::{LensFile, OpticalTrain, Side};
 
 /// The yellow line of helium (nm).
 pub(super) const YELLOW: f64 = 587.56;

@@ -1,12 +1,12 @@
 //! Rays that end, surfaces that are hardly any.
 
 use anyhow::Result;
-use etendue_camera::element::ElementSpec;
-use etendue_camera::element::{Clip, Fate, LensRays, PartSpec, SurfaceSpec};
-use etendue_camera::glass::GlassSpec;
-use etendue_camera::length::Millimetres;
-use etendue_camera::train::{Focus, FocusError, LensFile, Side};
 use etendue_geometry::glam::DVec3;
+use etendue_geometry::units::Millimetres;
+use etendue_optics::element::ElementSpec;
+use etendue_optics::element::{Clip, Fate, LensRays, PartSpec, SurfaceSpec};
+use etendue_optics::glass::GlassSpec;
+use etendue_optics::train::{Focus, FocusError, LensFile, Side};
 
 use super::bench::{YELLOW, fate, greatest_height, lens, parallel};
 use crate::{Case, Outcome, Scale};

@@ -1,7 +1,7 @@
 //! Focus where there is none, and wavelengths that no glass knows.
 
 use anyhow::Result;
-use etendue_camera::train::{Focus, FocusError};
+use etendue_optics::train::{Focus, FocusError};
 
 use super::bench::lens;
 use crate::{Case, Outcome, Scale};

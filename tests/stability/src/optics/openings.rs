@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use anyhow::Result;
-use etendue_camera::element::{Clip, Fate, LensRays};
-use etendue_camera::train::{
+use etendue_geometry::glam::{DVec2, DVec3};
+use etendue_optics::element::{Clip, Fate, LensRays};
+use etendue_optics::train::{
     ExitPupil, ExitPupilError, Focus, LensFile, OpticalTrain, PupilSample, Side,
 };
-use etendue_geometry::glam::{DVec2, DVec3};
 
 use super::bench::{YELLOW, fate, lens, parallel};
 use crate::{Case, Outcome, Scale, rendered};

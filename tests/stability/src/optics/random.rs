@@ -4,13 +4,13 @@ use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use anyhow::{Result, anyhow};
-use etendue_camera::element::{
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::units::{Degrees, Millimetres};
+use etendue_optics::element::{
     Clip, ElementSpec, Fate, LensRays, PartSpec, SurfaceSpec, ThinLensSpec,
 };
-use etendue_camera::glass::GlassSpec;
-use etendue_camera::length::{Degrees, Millimetres};
-use etendue_camera::train::{LensFile, OpticalTrain, Side};
-use etendue_geometry::glam::DVec3;
+use etendue_optics::glass::GlassSpec;
+use etendue_optics::train::{LensFile, OpticalTrain, Side};
 use proptest::prelude::*;
 use proptest::test_runner::{TestCaseResult, TestRunner};
 

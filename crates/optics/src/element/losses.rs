@@ -1,0 +1,243 @@
+//! What glass takes from light: reflection at its surfaces, with and without a coating, and
+//! absorption on the way.
+//!
+//! Fresnel's equations for unpolarised light (M. Born and E. Wolf, *Principles of Optics*, 7th ed.,
+//! §1.5.2, eqs. 20-21) and the reflectance of a single homogeneous film (§1.6.4, eq. 57). What is
+//! reflected is lost: ghosts are not traced. Absorption is exp(−α d) (Bouguer, Lambert).
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::rays::{Block, LANES, Ray};
+use etendue_geometry::units::Nanometres;
+
+/// Losses as a camera writes them. Nothing is lost unless it is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct LossesSpec {
+    /// What the surfaces between glass and air reflect: `uncoated`, or a coating. Cemented surfaces
+    /// are always uncoated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reflection: Option<Reflection>,
+    /// Whether glasses absorb, where the catalogue knows how much.
+    #[serde(skip_serializing_if = "is_false")]
+    pub absorption: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// How surfaces between glass and air reflect.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Reflection {
+    /// By Fresnel's equations.
+    Plain(Plain),
+    /// Through one layer.
+    Coated(Coating),
+}
+
+/// The word for surfaces without a coating.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Plain {
+    /// No coating.
+    Uncoated,
+}
+
+/// A single layer on each surface between glass and air.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Coating {
+    /// Its index, from 1 on: 1.38 for magnesium fluoride.
+    pub index: f64,
+    /// Its thickness (nm): 100 is a quarter wave of 550 nm in magnesium fluoride.
+    pub thickness: Nanometres,
+}
+
+impl LossesSpec {
+    /// Whether nothing is lost.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Refuses coatings that are none.
+    ///
+    /// # Errors
+    ///
+    /// The key and a sentence.
+    pub fn check(&self) -> Result<(), (&'static str, String)> {
+        let Some(Reflection::Coated(Coating { index, thickness })) = self.reflection else {
+            return Ok(());
+        };
+        if !(1.0..=10.0).contains(&index) {
+            return Err(("reflection.index", format!("{index} is outside 1 to 10")));
+        }
+        if !(0.0..=1e5).contains(&thickness.0) {
+            let why = format!("{} nm is outside 0 to 100000 nm", thickness.0);
+            return Err(("reflection.thickness", why));
+        }
+        Ok(())
+    }
+}
+
+/// What one element takes from light that arrives on one side of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Loss {
+    /// Indices before and behind the surface, as the light goes.
+    indices: [f64; 2],
+    reflects: bool,
+    /// Index and phase thickness 2π n d/λ of the layer.
+    layer: Option<[f64; 2]>,
+    /// α of the medium that the light comes through (1/mm).
+    absorption: f64,
+}
+
+impl Loss {
+    /// `None` when nothing is lost. `absorption` is that of the medium on the side of arrival (1/mm).
+    pub(crate) fn new(
+        spec: &LossesSpec,
+        indices: [f64; 2],
+        absorption: Option<f64>,
+        wavelength: f64,
+    ) -> Option<Self> {
+        let reflects = spec.reflection.is_some() && indices[0] != indices[1];
+        let in_air = indices.contains(&1.0);
+        let layer = match spec.reflection {
+            Some(Reflection::Coated(Coating { index, thickness })) if in_air => {
+                Some([index, std::f64::consts::TAU * index * thickness.0 / wavelength])
+            }
+            _ => None,
+        };
+        let absorption = absorption.filter(|_| spec.absorption).unwrap_or(0.0);
+        (reflects || absorption > 0.0).then_some(Self { indices, reflects, layer, absorption })
+    }
+
+    /// The share of light that is left of a ray that came as `before` and goes on as `after`.
+    pub(crate) fn share(&self, before: Ray, after: Ray) -> f64 {
+        let mut share = 1.0;
+        if self.absorption > 0.0 {
+            let way = |axis: usize| after.position[axis] - before.position[axis];
+            share = (-self.absorption * way(0).hypot(way(1)).hypot(way(2))).exp();
+        }
+        if self.reflects {
+            share *= 1.0 - self.reflectance(before.direction, after.direction);
+        }
+        share
+    }
+
+    /// From the directions alone: n' d' − n d is along the normal.
+    fn reflectance(&self, before: [f64; 3], after: [f64; 3]) -> f64 {
+        let [n, m] = self.indices;
+        let normal: [f64; 3] = std::array::from_fn(|k| m * after[k] - n * before[k]);
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let length = dot(normal, normal).sqrt();
+        if length == 0.0 {
+            return 0.0;
+        }
+        let cosines = [before, after].map(|d| (dot(d, normal) / length).abs().min(1.0));
+        let Some([film, phase]) = self.layer else {
+            let [s, p] = amplitudes([n, m], cosines);
+            return 0.5 * (s * s + p * p);
+        };
+        let sine = n / film * (1.0 - cosines[0] * cosines[0]).max(0.0).sqrt();
+        let cosine = (1.0 - sine * sine).max(0.0).sqrt();
+        let twice = (2.0 * phase * cosine).cos();
+        let first = amplitudes([n, film], [cosines[0], cosine]);
+        let second = amplitudes([film, m], [cosine, cosines[1]]);
+        let mut mean = 0.0;
+        for (a, b) in first.into_iter().zip(second) {
+            let cross = 2.0 * a * b * twice;
+            let below = 1.0 + a * a * b * b + cross;
+            // 0/0 is the limit of grazing light: all of it is reflected.
+            let all = a * a + b * b + cross;
+            mean += 0.5 * if below > 0.0 { (all / below).clamp(0.0, 1.0) } else { 1.0 };
+        }
+        mean
+    }
+
+    /// Dims all rays of a block that came as `before` and are still on their way.
+    pub(crate) fn dim(&self, block: &mut Block, before: &Block) {
+        for lane in 0..LANES {
+            if block.outcome[lane] == 0 {
+                block.throughput[lane] *= self.share(before.ray(lane), block.ray(lane));
+            }
+        }
+    }
+}
+
+/// Fresnel's amplitudes for light polarised across and in the plane of incidence.
+fn amplitudes([n, m]: [f64; 2], [arriving, leaving]: [f64; 2]) -> [f64; 2] {
+    let ratio = |a: f64, b: f64| if a + b > 0.0 { (a - b) / (a + b) } else { 1.0 };
+    [ratio(n * arriving, m * leaving), ratio(m * arriving, n * leaving)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spec(json: &str) -> LossesSpec {
+        serde_json::from_str(json).unwrap()
+    }
+
+    /// The share of light at `angle` (radians) from `n` into `m`.
+    fn share(spec: &LossesSpec, [n, m]: [f64; 2], angle: f64) -> f64 {
+        let sine = n * angle.sin() / m;
+        let before = Ray { position: [0.0; 3], direction: [angle.sin(), 0.0, angle.cos()] };
+        let after = Ray { position: [0.0; 3], direction: [sine, 0.0, (1.0 - sine * sine).sqrt()] };
+        Loss::new(spec, [n, m], None, 550.0).map_or(1.0, |loss| loss.share(before, after))
+    }
+
+    #[test]
+    fn uncoated_glass_reflects_as_fresnel_says() {
+        let bare = spec(r#"{"reflection": "uncoated"}"#);
+        let head_on = ((1.5 - 1.0) / (1.5 + 1.0_f64)).powi(2);
+        assert!((share(&bare, [1.0, 1.5], 0.0) - (1.0 - head_on)).abs() < 1e-15);
+        // At Brewster's angle only light across the plane is reflected: half of
+        // ((n² − 1)/(n² + 1))².
+        let brewster = 1.5_f64.atan();
+        let across = 0.5 * (1.25 / 3.25_f64).powi(2);
+        assert!((share(&bare, [1.0, 1.5], brewster) - (1.0 - across)).abs() < 1e-14);
+        // Both ways alike (Stokes), and nothing at equal indices.
+        let inside = (brewster.sin() / 1.5).asin();
+        let back = share(&bare, [1.5, 1.0], inside);
+        assert!((back - (1.0 - across)).abs() < 1e-14);
+        assert_eq!(share(&bare, [1.5, 1.5], 0.3), 1.0);
+        assert!(share(&bare, [1.0, 1.5], 1.57).is_finite());
+    }
+
+    #[test]
+    fn a_quarter_wave_is_the_textbook_coating_and_no_layer_is_bare_glass() {
+        let quarter = 550.0 / (4.0 * 1.38);
+        let coated =
+            spec(&format!(r#"{{"reflection": {{"index": 1.38, "thickness": {quarter}}}}}"#));
+        // ((n₀ n₂ − n₁²)/(n₀ n₂ + n₁²))², here 1.26 %.
+        let least = ((1.52 - 1.38 * 1.38) / (1.52 + 1.38 * 1.38_f64)).powi(2);
+        assert!((share(&coated, [1.0, 1.52], 0.0) - (1.0 - least)).abs() < 1e-14);
+        assert!((share(&coated, [1.52, 1.0], 0.0) - (1.0 - least)).abs() < 1e-14);
+        let thin = spec(r#"{"reflection": {"index": 1.38, "thickness": 0}}"#);
+        let bare = spec(r#"{"reflection": "uncoated"}"#);
+        for angle in [0.0, 0.4, 1.2, 1.5] {
+            let error = share(&thin, [1.0, 1.52], angle) - share(&bare, [1.0, 1.52], angle);
+            assert!(error.abs() < 1e-14, "{angle}: {error}");
+        }
+        // Cement is not coated.
+        assert_eq!(share(&coated, [1.5, 1.7], 0.2), share(&bare, [1.5, 1.7], 0.2));
+    }
+
+    #[test]
+    fn absorption_is_by_the_way_and_what_is_no_coating_is_refused() {
+        let absorbing = spec(r#"{"absorption": true}"#);
+        let loss = Loss::new(&absorbing, [1.5, 1.0], Some(0.1), 550.0).unwrap();
+        let before = Ray { position: [0.0, 0.0, 0.0], direction: [0.0, 0.6, 0.8] };
+        let after = Ray { position: [0.0, 3.0, 4.0], direction: [0.0, 0.9, 0.4] };
+        assert!((loss.share(before, after) - (-0.5_f64).exp()).abs() < 1e-15);
+        assert_eq!(Loss::new(&LossesSpec::default(), [1.5, 1.0], Some(0.1), 550.0), None);
+        assert_eq!(Loss::new(&absorbing, [1.5, 1.0], None, 550.0), None);
+        let bad = spec(r#"{"reflection": {"index": 0.5, "thickness": 100}}"#);
+        assert_eq!(bad.check().unwrap_err().0, "reflection.index");
+    }
+}

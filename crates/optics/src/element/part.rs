@@ -1,0 +1,164 @@
+//! The closed set of parts: as a lens file writes them, and ready to be traced. One match a verb, so
+//! that a new part is asked for all of them here and nowhere else.
+
+use std::sync::Arc;
+
+use etendue_spectrum::Curve;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::step::Action;
+use super::{
+    ApertureSpec, CircularSpec, Filter, FilterSpec, Opening, Refraction, Resolve, Surface,
+    SurfaceSpec, ThinLens, ThinLensSpec,
+};
+use crate::glass::GlassSpec;
+use etendue_geometry::units::Millimetres;
+
+/// A part as a lens file writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum PartSpec {
+    /// A refracting surface.
+    Surface(SurfaceSpec),
+    /// An ideal thin lens.
+    ThinLens(ThinLensSpec),
+    /// An opening in an opaque sheet.
+    Aperture(ApertureSpec),
+    /// A sheet that absorbs.
+    Filter(FilterSpec),
+}
+
+/// What an element is, ready to be traced.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Part {
+    /// A refracting surface between the media before and behind it.
+    Surface(Surface),
+    /// An ideal thin lens.
+    ThinLens(ThinLens),
+    /// An opening in an opaque sheet.
+    Aperture(Arc<Opening>),
+    /// A sheet that absorbs.
+    Filter(Arc<Filter>),
+}
+
+impl From<SurfaceSpec> for PartSpec {
+    fn from(spec: SurfaceSpec) -> Self {
+        Self::Surface(spec)
+    }
+}
+
+impl PartSpec {
+    /// A round aperture of the given radius (mm).
+    #[must_use]
+    pub fn circular(radius: f64) -> Self {
+        Self::Aperture(ApertureSpec::Circular(CircularSpec { radius: Millimetres(radius) }))
+    }
+
+    /// A spherical surface: radius (mm, infinite for a plane), what follows it, semi-diameter (mm).
+    #[must_use]
+    pub fn spherical(radius: f64, glass: Option<GlassSpec>, semi_diameter: f64) -> Self {
+        let radius = radius.is_finite().then_some(Millimetres(radius));
+        let semi_diameter = semi_diameter.is_finite().then_some(Millimetres(semi_diameter));
+        Self::Surface(SurfaceSpec { radius, glass, semi_diameter, ..SurfaceSpec::default() })
+    }
+
+    /// The part, ready to be traced.
+    ///
+    /// # Errors
+    ///
+    /// A sentence on what makes no part.
+    pub fn build(&self, resolve: Resolve<'_>) -> Result<Part, String> {
+        Ok(match self {
+            Self::Surface(surface) => Part::Surface(surface.build()?),
+            Self::ThinLens(lens) => Part::ThinLens(lens.build()?),
+            Self::Aperture(aperture) => Part::Aperture(aperture.build(resolve)?.into()),
+            Self::Filter(filter) => Part::Filter(filter.build(resolve)?.into()),
+        })
+    }
+}
+
+impl Part {
+    /// The word behind `type` in the file.
+    #[must_use]
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Self::Surface(_) => "surface",
+            Self::ThinLens(_) => "thin_lens",
+            Self::Aperture(_) => "aperture",
+            Self::Filter(_) => "filter",
+        }
+    }
+
+    /// How far from its axis it lets light pass (mm); infinite when unlimited.
+    #[must_use]
+    pub fn clear_radius(&self) -> f64 {
+        match self {
+            Self::Surface(surface) => surface.semi_diameter,
+            Self::ThinLens(lens) => lens.semi_diameter,
+            Self::Aperture(opening) => opening.radius(),
+            Self::Filter(filter) => filter.radius(),
+        }
+    }
+
+    /// Opens or closes it to `radius` (mm).
+    ///
+    /// # Errors
+    ///
+    /// A sentence on why it has no radius to be set.
+    pub(crate) fn set_clear_radius(&mut self, radius: f64) -> Result<(), &'static str> {
+        match self {
+            Self::Surface(surface) => surface.semi_diameter = radius,
+            Self::ThinLens(lens) => lens.semi_diameter = radius,
+            Self::Filter(filter) => Arc::make_mut(filter).semi_diameter = radius,
+            Self::Aperture(opening) => {
+                let opening = Arc::make_mut(opening);
+                *opening = opening.with_radius(radius).ok_or("it is a mask")?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a turn about its axis changes nothing.
+    #[must_use]
+    pub fn is_round(&self) -> bool {
+        match self {
+            Self::Surface(_) | Self::ThinLens(_) => true,
+            Self::Aperture(opening) => opening.is_round(),
+            Self::Filter(filter) => filter.is_uniform(),
+        }
+    }
+
+    /// The paraxial power (1/mm) between media of index `before` and `behind`.
+    pub(crate) fn power(&self, before: f64, behind: f64) -> f64 {
+        match self {
+            Self::Surface(surface) => (behind - before) * surface.paraxial_curvature(),
+            Self::ThinLens(lens) => before * lens.power,
+            Self::Aperture(_) | Self::Filter(_) => 0.0,
+        }
+    }
+
+    /// What it does to light from the object, and to light traced from the sensor. `transmission` is
+    /// what passes of a filter's curve.
+    pub(crate) fn actions(
+        &self,
+        before: f64,
+        behind: f64,
+        transmission: &dyn Fn(&Curve) -> f64,
+    ) -> [Action; 2] {
+        let both = |action: Action| [action.clone(), action];
+        match self {
+            Self::Surface(surface) => [
+                Action::refract(Refraction::new(surface.clone(), before, behind)),
+                Action::refract(Refraction::new(surface.clone(), behind, before)),
+            ],
+            Self::ThinLens(lens) => [lens.power, -lens.power]
+                .map(|power| Action::ThinLens { power, semi_diameter: lens.semi_diameter }),
+            Self::Aperture(opening) => both(Action::Opening(Arc::clone(opening))),
+            Self::Filter(filter) => {
+                let transmissions = filter.curves.iter().map(transmission).collect();
+                both(Action::Filter { filter: Arc::clone(filter), transmissions })
+            }
+        }
+    }
+}

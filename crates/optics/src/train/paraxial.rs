@@ -1,0 +1,218 @@
+//! First-order optics by ABCD matrices.
+//!
+//! A matrix acts on the height y and the reduced slope ν = n u of a ray: a refracting surface of
+//! power Φ = (n' − n) c is [1 0; −Φ 1], a gap t in index n is [1 t/n; 0 1] (A. Gerrard and J. M.
+//! Burch, *Introduction to Matrix Methods in Optics*, 1975). Both have determinant 1.
+//!
+//! Tilts and decentrings are left out. Planes are given by their z in lens coordinates (mm).
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::OpticalTrain;
+use crate::glass::GlassError;
+
+/// A power this small a share of the powers it is made of is rounding: the lens is afocal.
+const AFOCAL: f64 = 1e-12;
+
+/// What a lens does to rays near its axis.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Paraxial {
+    /// The wavelength (nm).
+    pub wavelength: f64,
+    /// The effective focal length (mm), 1 over the power; `null` for an afocal lens.
+    pub efl: Option<f64>,
+    /// The back focal length (mm): from the last vertex to the rear focal point.
+    pub bfl: Option<f64>,
+    /// z of the front focal point (mm): the front focal length, as it is counted from the first
+    /// vertex.
+    pub ffl: Option<f64>,
+    /// z of the rear focal point (mm): the image of infinity.
+    pub image_z: Option<f64>,
+    /// z of the front principal plane (mm).
+    pub front_principal_z: Option<f64>,
+    /// z of the rear principal plane (mm).
+    pub rear_principal_z: Option<f64>,
+    /// The stop as seen from the object.
+    pub entrance_pupil: Pupil,
+    /// The stop as seen from the sensor.
+    pub exit_pupil: Pupil,
+    /// |efl| over the entrance pupil's diameter.
+    pub f_number: Option<f64>,
+    /// The stop's radius over the entrance pupil's; negative when the pupil is upside down.
+    #[serde(skip)]
+    pub stop_magnification: Option<f64>,
+}
+
+/// An image of the stop.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
+pub struct Pupil {
+    /// z of its plane (mm); `null` when it is at infinity (telecentric).
+    pub z: Option<f64>,
+    /// Its diameter (mm), positive also when it is upside down; `null` at infinity, or when nothing
+    /// limits the stop.
+    pub diameter: Option<f64>,
+}
+
+/// [a b; c d] on (y, ν).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Abcd {
+    /// Height for height.
+    pub a: f64,
+    /// Height for reduced slope (mm).
+    pub b: f64,
+    /// Reduced slope for height (1/mm): minus the power.
+    pub c: f64,
+    /// Reduced slope for reduced slope.
+    pub d: f64,
+}
+
+impl Abcd {
+    const ONE: Self = Self { a: 1.0, b: 0.0, c: 0.0, d: 1.0 };
+
+    fn power(power: f64) -> Self {
+        Self { c: -power, ..Self::ONE }
+    }
+
+    fn gap(reduced: f64) -> Self {
+        Self { b: reduced, ..Self::ONE }
+    }
+
+    /// First `self`, then `next`.
+    fn then(self, next: Self) -> Self {
+        Self {
+            a: next.a * self.a + next.b * self.c,
+            b: next.a * self.b + next.b * self.d,
+            c: next.c * self.a + next.d * self.c,
+            d: next.c * self.b + next.d * self.d,
+        }
+    }
+
+    /// With `self` from the first vertex to the sensor: the height on the sensor (mm) for a slope of
+    /// 1 through the axis at z = `pupil`, air in front.
+    #[must_use]
+    pub fn image_scale(&self, pupil: f64) -> f64 {
+        self.b - self.a * pupil
+    }
+
+    /// How far in front of the first vertex lies what is in focus (mm), air in front.
+    #[must_use]
+    pub fn conjugate(&self) -> f64 {
+        let distance = -self.b / self.a;
+        // A rounding away from infinity is infinity.
+        if distance.is_finite() && distance.abs() < 1e15 { distance } else { f64::INFINITY }
+    }
+}
+
+impl OpticalTrain {
+    /// First-order data at `wavelength` (nm).
+    ///
+    /// # Errors
+    ///
+    /// When a glass has no index there.
+    pub fn paraxial(&self, wavelength: f64) -> Result<Paraxial, GlassError> {
+        let indices = self.indices(wavelength)?;
+        let all = self.matrix(&indices, 0, self.elements.len());
+        let (before, behind) = (indices[0], indices[indices.len() - 1]);
+        let scale: f64 = (0..self.elements.len()).map(|i| self.power(&indices, i).abs()).sum();
+        let afocal = all.c.abs() <= AFOCAL * scale || all.c == 0.0;
+        let focal = |value: f64| (!afocal && value.is_finite()).then_some(value);
+        let last = self.last_vertex();
+        let efl = focal(-1.0 / all.c);
+        let bfl = focal(-behind * all.a / all.c);
+        let entrance = self.entrance_pupil(&indices);
+        let radius = entrance.1.map(|m| self.stop_radius() / m.abs()).filter(|r| r.is_finite());
+        let entrance_pupil = Pupil { z: entrance.0, diameter: radius.map(|r| 2.0 * r) };
+        let f_number = match (efl, entrance_pupil.diameter) {
+            (Some(efl), Some(diameter)) if diameter > 0.0 => Some(efl.abs() / diameter),
+            _ => None,
+        };
+        Ok(Paraxial {
+            wavelength,
+            efl,
+            bfl,
+            ffl: focal(before * all.d / all.c),
+            image_z: bfl.map(|bfl| last + bfl),
+            front_principal_z: focal(before * (all.d - 1.0) / all.c),
+            rear_principal_z: focal(last + behind * (1.0 - all.a) / all.c),
+            entrance_pupil,
+            exit_pupil: self.exit_pupil(&indices),
+            f_number,
+            stop_magnification: entrance.1,
+        })
+    }
+
+    /// z of the entrance pupil and the stop's radius over its radius.
+    fn entrance_pupil(&self, indices: &[f64]) -> (Option<f64>, Option<f64>) {
+        let to_stop = self.matrix(indices, 0, self.stop).then(self.gap_before(indices, self.stop));
+        if to_stop.a.abs() < 1e-12 {
+            return (None, None);
+        }
+        (Some(indices[0] * to_stop.b / to_stop.a), Some(to_stop.a))
+    }
+
+    fn exit_pupil(&self, indices: &[f64]) -> Pupil {
+        let from_stop = self.matrix(indices, self.stop, self.elements.len());
+        if from_stop.d.abs() < 1e-12 {
+            return Pupil::default();
+        }
+        let behind = indices[indices.len() - 1];
+        let radius = self.stop_radius() / from_stop.d.abs();
+        Pupil {
+            z: Some(self.last_vertex() - behind * from_stop.b / from_stop.d),
+            diameter: radius.is_finite().then_some(2.0 * radius),
+        }
+    }
+
+    /// The height at each element of a ray that comes from infinity at height 1.
+    pub(crate) fn heights_from_infinity(
+        &self,
+        wavelength: f64,
+    ) -> Result<Vec<f64>, (usize, GlassError)> {
+        let index = |(i, glass): (usize, &crate::glass::Glass)| {
+            glass.index(wavelength).map_err(|e| (i.saturating_sub(1), e))
+        };
+        let indices = self.media.iter().enumerate().map(index).collect::<Result<Vec<_>, _>>()?;
+        let heights = (0..self.elements.len())
+            .map(|i| self.matrix(&indices, 0, i).then(self.gap_before(&indices, i)).a);
+        Ok(heights.collect())
+    }
+
+    /// From the first vertex to the plane at `z` (mm) behind the lens, at the design wavelength.
+    ///
+    /// # Errors
+    ///
+    /// When a glass has no index there.
+    pub fn to_plane(&self, z: f64) -> Result<Abcd, GlassError> {
+        let indices = self.indices(self.wavelength)?;
+        let all = self.matrix(&indices, 0, self.elements.len());
+        let behind = indices[indices.len() - 1];
+        Ok(all.then(Abcd::gap((z - self.last_vertex()) / behind)))
+    }
+
+    /// From before element `from` to behind the one before `to`: the gaps between, none outside.
+    pub(crate) fn matrix(&self, indices: &[f64], from: usize, to: usize) -> Abcd {
+        let mut all = Abcd::ONE;
+        for i in from..to {
+            if i > from {
+                all = all.then(self.gap_before(indices, i));
+            }
+            all = all.then(Abcd::power(self.power(indices, i)));
+        }
+        all
+    }
+
+    fn gap_before(&self, indices: &[f64], i: usize) -> Abcd {
+        match i.checked_sub(1) {
+            Some(previous) => {
+                let gap = self.elements[i].frame.vertex.z - self.elements[previous].frame.vertex.z;
+                Abcd::gap(gap / indices[i])
+            }
+            None => Abcd::ONE,
+        }
+    }
+
+    fn power(&self, indices: &[f64], i: usize) -> f64 {
+        self.elements[i].part.power(indices[i], indices[i + 1])
+    }
+}

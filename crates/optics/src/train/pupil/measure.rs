@@ -1,0 +1,357 @@
+//! Measuring the outlines: frames at the nodes, radii on a grid twice as fine, and the closing check.
+
+use glam::{DVec2, DVec3};
+
+use super::search::Window;
+use super::{
+    ANGLES, ExitPupil, Layout, Outline, PLANAR_INTERVALS, RADIAL_INTERVALS, between, turn_of,
+};
+use crate::element::{Clip, Fate, LensRays};
+use crate::train::aim::towards_lens;
+use crate::train::{OpticalTrain, Side, TrainAt};
+
+/// Added to every radius, as a share of it: what rays measured on a grid may be short of.
+const MARGIN: f64 = 0.004;
+
+/// The same beside nodes in the dark: at the edge of the image circle the pupil closes as a square
+/// root, faster than straight lines.
+const FADING_MARGIN: f64 = 0.2;
+
+/// How much of a bend in the frames from node to node is added to the margin, and the bend that
+/// comes from the search grid's cells alone.
+const BEND: [f64; 2] = [0.4, 0.1];
+
+/// How far outside of the bound the closing check looks, as a share of the radius.
+const CHECKED: f64 = 0.35;
+
+/// Random rays of the closing check.
+pub(super) const CHECKS: u32 = 1 << 16;
+
+impl ExitPupil {
+    /// The sensor's point at a node of the grid that is twice as fine.
+    fn fine_film(&self, column: usize, row: usize) -> DVec2 {
+        #[expect(clippy::cast_precision_loss, reason = "a few dozen nodes")]
+        let share = |i: usize, intervals: usize| i as f64 / (2 * intervals) as f64;
+        match self.layout {
+            Layout::Radial => DVec2::new(self.radius * share(column, RADIAL_INTERVALS), 0.0),
+            Layout::Planar => {
+                let across =
+                    DVec2::new(share(column, PLANAR_INTERVALS), share(row, PLANAR_INTERVALS));
+                (2.0 * across - 1.0) * self.half_size
+            }
+        }
+    }
+
+    /// Intervals between nodes along both directions.
+    fn intervals(&self) -> [usize; 2] {
+        match self.layout {
+            Layout::Radial => [RADIAL_INTERVALS, 0],
+            Layout::Planar => [PLANAR_INTERVALS, PLANAR_INTERVALS],
+        }
+    }
+
+    pub(super) fn measure(&mut self, train: &OpticalTrain, lenses: &[TrainAt]) {
+        if self.layout == Layout::Radial {
+            self.radius = lit_radius(train, lenses, self.sensor.vertex.z, self.radius);
+        }
+        let [columns, rows] = self.intervals();
+        for row in 0..=rows {
+            for column in 0..=columns {
+                let film = self.film_point(self.fine_film(2 * column, 2 * row));
+                let previous = self.nodes.last().filter(|_| column > 0);
+                let node = frame_at(train, lenses, film, previous);
+                self.nodes.push(node);
+            }
+        }
+        let margins = self.margins();
+        self.continue_frames();
+        let fine = self.measure_fine(lenses);
+        let [fine_columns, fine_rows] = [2 * columns + 1, 2 * rows + 1];
+        for row in 0..=rows {
+            for column in 0..=columns {
+                let near = |at: usize, count: usize| {
+                    (2 * at).saturating_sub(1)..=(2 * at + 1).min(count - 1)
+                };
+                let node = &mut self.nodes[row * (columns + 1) + column];
+                if node.is_dark() {
+                    continue;
+                }
+                let margin = margins[row * (columns + 1) + column];
+                for (i, reach) in node.reach.iter_mut().enumerate() {
+                    let mut widest = 0.0_f64;
+                    for r in near(row, fine_rows) {
+                        for c in near(column, fine_columns) {
+                            let radii = &fine[r * fine_columns + c];
+                            for step in [2 * ANGLES - 1, 0, 1] {
+                                widest = widest.max(radii[(2 * i + step) % (2 * ANGLES)]);
+                            }
+                        }
+                    }
+                    *reach = widest * (1.0 + margin);
+                }
+            }
+        }
+    }
+
+    /// The margin of each node: more where frames do not follow straight lines over the sensor.
+    fn margins(&self) -> Vec<f64> {
+        let [columns, rows] = self.intervals();
+        let index = |column: usize, row: usize| row * (columns + 1) + column;
+        let mut margins = Vec::with_capacity(self.nodes.len());
+        for row in 0..=rows {
+            for column in 0..=columns {
+                let here = &self.nodes[index(column, row)];
+                let bend = |before: Option<usize>, after: Option<usize>| {
+                    // At the rim of the sensor there is no bend to be seen.
+                    let (Some(before), Some(after)) = (before, after) else { return 0.0 };
+                    let [before, after] = [&self.nodes[before], &self.nodes[after]];
+                    if here.is_dark() || before.is_dark() || after.is_dark() {
+                        return f64::INFINITY;
+                    }
+                    let turn = (before.centre - 2.0 * here.centre + after.centre).abs();
+                    let swell = (before.half - 2.0 * here.half + after.half).abs();
+                    ((turn + swell) / here.half).max_element()
+                };
+                let across = bend(
+                    column.checked_sub(1).map(|c| index(c, row)),
+                    (column < columns).then(|| index(column + 1, row)),
+                );
+                let down = bend(
+                    row.checked_sub(1).map(|r| index(column, r)),
+                    (row < rows).then(|| index(column, row + 1)),
+                );
+                let [weight, free] = BEND;
+                let bent = weight * (across.max(down) - free).max(0.0);
+                margins.push((MARGIN + bent).min(FADING_MARGIN));
+            }
+        }
+        margins
+    }
+
+    /// Gives dark nodes beside lit ones a frame, so that light between the two is not cut off.
+    fn continue_frames(&mut self) {
+        let [columns, rows] = self.intervals();
+        let lit = self.nodes.clone();
+        let index = |column: usize, row: usize| row * (columns + 1) + column;
+        for row in 0..=rows {
+            for column in 0..=columns {
+                if !lit[index(column, row)].is_dark() {
+                    continue;
+                }
+                let mut frames = Vec::new();
+                for (dc, dr) in
+                    [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
+                {
+                    let step = |times: isize| {
+                        let c = column.checked_add_signed(dc * times).filter(|c| *c <= columns)?;
+                        let r = row.checked_add_signed(dr * times).filter(|r| *r <= rows)?;
+                        Some(&lit[index(c, r)]).filter(|node| !node.is_dark())
+                    };
+                    if let Some(next) = step(1) {
+                        let drift = step(2).map_or(DVec2::ZERO, |far| next.centre - far.centre);
+                        frames.push((next.centre + drift, next.half));
+                    }
+                }
+                let Some(&(centre, half)) = frames.first() else { continue };
+                let node = &mut self.nodes[index(column, row)];
+                (node.centre, node.half) = (centre, half);
+            }
+        }
+    }
+
+    /// Radii at all nodes of the fine grid, each in the frame that the bound has there.
+    fn measure_fine(&self, lenses: &[TrainAt]) -> Vec<[f64; 2 * ANGLES]> {
+        let [columns, rows] = self.intervals();
+        let mut fine = Vec::new();
+        for row in 0..=2 * rows {
+            for column in 0..=2 * columns {
+                let film = self.fine_film(column, row);
+                let mut radii = [0.0; 2 * ANGLES];
+                if let Some(frame) = self.frame(film) {
+                    let at = self.film_point(film);
+                    for lens in lenses {
+                        widen(&mut radii, lens, at, frame);
+                    }
+                }
+                fine.push(radii);
+            }
+        }
+        fine
+    }
+
+    /// The interpolated centre and half axes; `None` in the dark.
+    fn frame(&self, film: DVec2) -> Option<[DVec2; 2]> {
+        let place = self.place(film)?;
+        let mut frame = [DVec2::ZERO; 2];
+        for (node, weight) in place.nodes {
+            frame[0] += self.nodes[node].centre * weight;
+            frame[1] += self.nodes[node].half * weight;
+        }
+        (frame[1].min_element() > 0.0).then_some(frame)
+    }
+
+    /// Looks for rays that pass just outside of the bound, and widens it around them until there
+    /// are none.
+    pub(super) fn widen_until_tight(&mut self, lenses: &[TrainAt]) {
+        for round in 0..4 {
+            let found: Vec<Stray> =
+                lenses.iter().flat_map(|lens| self.strays(lens, round * CHECKS)).collect();
+            for stray in &found {
+                self.widen_around(stray);
+            }
+            if found.is_empty() {
+                return;
+            }
+        }
+    }
+
+    /// Random rays outside of the bound that pass.
+    pub(super) fn strays(&self, lens: &TrainAt, first: u32) -> Vec<Stray> {
+        let mut rays = LensRays::with_capacity(CHECKS as usize);
+        let mut strays = Vec::with_capacity(CHECKS as usize);
+        for i in first..first + CHECKS {
+            let u = ROBERTS.map(|alpha| (0.5 + alpha * f64::from(i)).fract());
+            let film = match self.layout {
+                Layout::Radial => DVec2::new(self.radius * u[0].sqrt(), 0.0),
+                Layout::Planar => (2.0 * DVec2::new(u[0], u[3]) - 1.0) * self.half_size,
+            };
+            let Some(place) = self.place(film) else { continue };
+            let Some([centre, half]) = self.frame(film) else { continue };
+            let bound: f64 =
+                place.nodes.iter().map(|&(n, w)| between(&self.nodes[n].reach, u[1]) * w).sum();
+            let radius = bound * (1.0 + CHECKED * u[2]);
+            let angle = DVec2::from_angle(u[1] * std::f64::consts::TAU);
+            rays.push(self.film_point(film), towards_lens(centre + angle * half * radius));
+            strays.push(Stray { nodes: place.nodes, turn: u[1], radius });
+        }
+        lens.trace(Side::Sensor, Clip::On, &mut rays);
+        let passed = |i: &usize| rays.fate(*i) == Fate::Exited;
+        (0..rays.len()).filter(passed).map(|i| strays[i]).collect()
+    }
+
+    /// Raises the table's entries around a ray to the ray's radius.
+    fn widen_around(&mut self, stray: &Stray) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            clippy::cast_precision_loss,
+            reason = "a turn is in 0..1"
+        )]
+        let low = ((stray.turn * ANGLES as f64) as usize).min(ANGLES - 1);
+        for (node, _) in stray.nodes.into_iter().filter(|&(_, weight)| weight > 0.0) {
+            let reach = &mut self.nodes[node].reach;
+            for entry in [low, low + 1] {
+                reach[entry] = reach[entry].max(stray.radius * (1.0 + MARGIN));
+            }
+            let ends = reach[0].max(reach[ANGLES]);
+            (reach[0], reach[ANGLES]) = (ends, ends);
+        }
+    }
+}
+
+/// Steps of the additive recurrence of the plastic number's kin in four dimensions (M. Roberts,
+/// *The unreasonable effectiveness of quasirandom sequences*, 2018).
+const ROBERTS: [f64; 4] =
+    [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_037_806, 0.538_597_270_645_735];
+
+/// A ray that passes outside of the bound.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stray {
+    nodes: [(usize, f64); 4],
+    turn: f64,
+    /// In its frame.
+    radius: f64,
+}
+
+/// How far from the axis there is light, up to `limit` (mm), and a little more.
+pub fn lit_radius(train: &OpticalTrain, lenses: &[TrainAt], z: f64, limit: f64) -> f64 {
+    let lit = |r: f64| {
+        let film = DVec3::new(r, 0.0, z);
+        lenses.iter().any(|lens| Window::find(train, lens, film).is_some())
+    };
+    if lit(limit) || !lit(0.0) {
+        return limit;
+    }
+    let (mut low, mut high) = (0.0, limit);
+    while high - low > 2e-3 * high {
+        let middle = 0.5 * (low + high);
+        if lit(middle) { low = middle } else { high = middle }
+    }
+    (high * 1.005).min(limit)
+}
+
+/// The frame around what passes at any of the wavelengths, begun from the node before.
+fn frame_at(
+    train: &OpticalTrain,
+    lenses: &[TrainAt],
+    film: DVec3,
+    previous: Option<&Outline>,
+) -> Outline {
+    let mut window: Option<Window> = None;
+    let mut chief = None;
+    for lens in lenses {
+        let near = previous
+            .filter(|node| !node.is_dark())
+            .and_then(|node| Window::near(node.centre, node.half * 1.5, lens, film));
+        let Some(found) = near.or_else(|| Window::find(train, lens, film)) else { continue };
+        window =
+            Some(window.map_or(found, |w| Window {
+                min: w.min.min(found.min),
+                max: w.max.max(found.max),
+            }));
+        chief = chief.or_else(|| {
+            let start = previous.and_then(|node| node.chief);
+            let direction = train.chief_direction_from(lens, film, start)?;
+            Some(-direction.truncate() / direction.z)
+        });
+    }
+    match window {
+        Some(window) => {
+            Outline { centre: window.centre(), half: window.half(), chief, ..Outline::DARK }
+        }
+        None => Outline::DARK,
+    }
+}
+
+/// Raises `radii` to the outermost passing ray of each angle from `film` in the frame.
+fn widen(radii: &mut [f64; 2 * ANGLES], lens: &TrainAt, film: DVec3, [centre, half]: [DVec2; 2]) {
+    const SCANNED: u32 = 32;
+    const HALVINGS: u32 = 12;
+    // The frame's corners are √2 from its centre.
+    const OUTERMOST: f64 = 1.6;
+    let angle = |i: usize| DVec2::from_angle(0.5 * turn_of(i) * std::f64::consts::TAU) * half;
+    let directions: Vec<DVec2> = (0..2 * ANGLES).map(angle).collect();
+    let passes = |places: &[(usize, f64)]| -> Vec<bool> {
+        let mut rays = LensRays::with_capacity(places.len());
+        for &(i, radius) in places {
+            rays.push(film, towards_lens(centre + directions[i] * radius));
+        }
+        lens.trace(Side::Sensor, Clip::On, &mut rays);
+        (0..rays.len()).map(|i| rays.fate(i) == Fate::Exited).collect()
+    };
+    let step = OUTERMOST / f64::from(SCANNED);
+    let scan: Vec<(usize, f64)> =
+        (0..2 * ANGLES).flat_map(|i| (0..SCANNED).map(move |s| (i, step * f64::from(s)))).collect();
+    let mut outermost = [None; 2 * ANGLES];
+    for (&(i, radius), passed) in scan.iter().zip(passes(&scan)) {
+        if passed {
+            outermost[i] = Some(radius);
+        }
+    }
+    let mut brackets: Vec<(usize, f64)> =
+        (0..2 * ANGLES).filter_map(|i| outermost[i].map(|radius| (i, radius))).collect();
+    let mut width = step;
+    for _ in 0..HALVINGS {
+        width *= 0.5;
+        let middles: Vec<(usize, f64)> =
+            brackets.iter().map(|&(i, low)| (i, low + width)).collect();
+        for (bracket, passed) in brackets.iter_mut().zip(passes(&middles)) {
+            if passed {
+                bracket.1 += width;
+            }
+        }
+    }
+    for (i, low) in brackets {
+        radii[i] = radii[i].max(low + width);
+    }
+}

@@ -1,0 +1,441 @@
+//! The exit pupil as each point of the sensor sees it, and samples of it.
+//!
+//! Rays that leave the sensor in directions in which no light can come are wasted: around a double
+//! Gauss at f/2 a third of those aimed at a rectangle around the pupil. Here the outline of the
+//! passing directions is known at nodes over the sensor, in slopes (x/−z, y/−z), as a frame (centre
+//! and half axes) and a table of radii by angle in that frame. Frames and radii are joined by
+//! straight lines over the sensor and over the angle, so the bound has no steps and a picture no
+//! rings.
+//!
+//! # No bias
+//!
+//! A bound that cuts off part of the pupil would darken the picture, so each radius in the table is
+//! the greatest of those measured at the nine nearest places of a grid twice as fine, in the sensor
+//! and in the angle, plus a margin; the interpolated bound is then at least the true outline at all
+//! measured places between. What the fine grid itself could miss is looked for with random rays just
+//! outside the bound when it is built, and the bound is widened until none of them passes. Radii are
+//! those of the outermost passing ray, so an outline needs not be convex.
+//!
+//! # Weights
+//!
+//! For the irradiance of Eq. (1) of Nürnberg et al. (2019), E = ∫ L cos θ dΩ: a sample stands for
+//! dm = π a b ρ² of slopes, in which dΩ = cos³θ dm, θ from the axis, and the sensor sees it under its
+//! own cosine. In a medium of index n before the sensor the radiance is n² that of the object.
+//!
+//! The bounds that this replaces: C. Kolb, D. Mitchell, P. Hanrahan, "A realistic camera model for
+//! computer graphics", 1995; M. Pharr, W. Jakob, G. Humphreys, *Physically Based Rendering*, 6.4.5.
+
+mod disc;
+mod measure;
+mod place;
+mod search;
+
+use glam::{DVec2, DVec3};
+
+use self::place::{between, turn_of};
+use super::aim::towards_lens;
+use super::{OpticalTrain, Part, Side, TrainAt};
+use crate::element::{Clip, Fate, FateCounts, Frame, LensRays, LossesSpec, Opening};
+use crate::glass::GlassError;
+
+pub use disc::{Bundle, Disc};
+pub use measure::lit_radius;
+pub use search::Window;
+
+/// Angles in the table of a node.
+const ANGLES: usize = 128;
+
+/// Intervals between nodes over the sensor's half diagonal, for lenses with rotational symmetry.
+const RADIAL_INTERVALS: usize = 40;
+
+/// Intervals between nodes over each side of the sensor for other lenses.
+const PLANAR_INTERVALS: usize = 8;
+
+/// Why there is no exit pupil to sample.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExitPupilError {
+    /// Not one ray leaves the lens.
+    #[error(
+        "no light passes the lens: nothing gets from the sensor past elements[{element}] ({})",
+        losses.join(", ")
+    )]
+    Dark {
+        /// The element on which the rays end that got farthest.
+        element: usize,
+        /// Where rays from the sensor's centre end.
+        losses: Vec<String>,
+    },
+    /// No element has a rim.
+    #[error(
+        "the lens passes light in all directions: give its stop a radius, or a surface a \
+         semi_diameter"
+    )]
+    Unbounded,
+    /// A sensor without size, or before the lens.
+    #[error("the sensor must lie behind the last element and have a finite size")]
+    Sensor,
+    /// A glass without index.
+    #[error(transparent)]
+    Glass(#[from] GlassError),
+}
+
+/// One sample of the exit pupil.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PupilSample {
+    /// The unit direction from the point of the sensor into the lens, in lens coordinates.
+    pub direction: DVec3,
+    /// Projected solid angle that the sample stands for (sr): the mean of weight times radiance
+    /// over samples, blocked ones counted as 0, is the irradiance.
+    pub weight: f64,
+}
+
+/// Where light can come from, for each point of a sensor.
+#[derive(Debug, Clone)]
+pub struct ExitPupil {
+    sensor: Frame,
+    half_size: DVec2,
+    layout: Layout,
+    /// The pupil in closed form; there are no nodes then.
+    disc: Option<Disc>,
+    nodes: Vec<Outline>,
+    index2: f64,
+    /// How far from the sensor's centre the nodes of a radial layout reach (mm).
+    radius: f64,
+}
+
+/// How nodes lie on the sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Layout {
+    /// On a radius, for all directions across the sensor.
+    Radial,
+    /// On a grid.
+    Planar,
+}
+
+/// The passing directions from one point of the sensor.
+#[derive(Debug, Clone)]
+struct Outline {
+    /// The middle of the frame in slopes.
+    centre: DVec2,
+    /// The frame's half axes in slopes; 0 when nothing passes.
+    half: DVec2,
+    /// Radii in the frame by angle; the first again at the end.
+    reach: [f64; ANGLES + 1],
+    /// The slopes of the chief ray.
+    chief: Option<DVec2>,
+}
+
+impl Outline {
+    const DARK: Self =
+        Self { centre: DVec2::ZERO, half: DVec2::ZERO, reach: [0.0; ANGLES + 1], chief: None };
+
+    fn is_dark(&self) -> bool {
+        self.half == DVec2::ZERO
+    }
+}
+
+impl ExitPupil {
+    /// Measures the exit pupil for a sensor of half width and half height `half_size` (mm) at
+    /// `sensor_z`, tilted and decentred as the lens file says, at all of `wavelengths` (nm).
+    ///
+    /// # Errors
+    ///
+    /// When no light passes, when nothing bounds the light, or when a glass has no index.
+    pub fn new(
+        train: &OpticalTrain,
+        wavelengths: &[f64],
+        sensor_z: f64,
+        half_size: [f64; 2],
+    ) -> Result<Self, ExitPupilError> {
+        let half_size = DVec2::from(half_size);
+        if !half_size.is_finite() || half_size.min_element() < 0.0 || !sensor_z.is_finite() {
+            return Err(ExitPupilError::Sensor);
+        }
+        if train.elements.iter().all(|e| !e.clear_radius().is_finite()) {
+            return Err(ExitPupilError::Unbounded);
+        }
+        let symmetric = train.is_rotationally_symmetric();
+        let mut pupil = Self {
+            sensor: train.sensor_frame(sensor_z),
+            half_size,
+            layout: if symmetric { Layout::Radial } else { Layout::Planar },
+            disc: None,
+            nodes: Vec::new(),
+            index2: 1.0,
+            radius: half_size.length(),
+        };
+        let train = &without_masks(train);
+        let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
+        let Some(first) = lenses.first() else { return Err(ExitPupilError::Sensor) };
+        pupil.index2 = first.index_before_sensor().powi(2);
+        pupil.disc = Disc::of(train, &pupil.sensor, half_size);
+        if pupil.disc.is_some() {
+            return Ok(pupil);
+        }
+        pupil.measure(train, &lenses);
+        if pupil.nodes.iter().all(Outline::is_dark) {
+            return Err(blocked(train, first, pupil.sensor.vertex));
+        }
+        pupil.widen_until_tight(&lenses);
+        Ok(pupil)
+    }
+
+    /// Whether one radius of nodes serves the whole sensor; otherwise a coarser grid of nodes does,
+    /// and more rays are lost.
+    #[must_use]
+    pub fn is_radial(&self) -> bool {
+        self.layout == Layout::Radial
+    }
+
+    /// The pupil in closed form, if it has one.
+    pub fn disc(&self) -> Option<&Disc> {
+        self.disc.as_ref()
+    }
+
+    /// The square of the index before the sensor.
+    pub fn index2(&self) -> f64 {
+        self.index2
+    }
+
+    /// A point of the sensor in lens coordinates (mm), from its place on the sensor: x and y from
+    /// the sensor's centre (mm), in the lens' axes. Images are upside down there.
+    #[must_use]
+    pub fn film_point(&self, film: DVec2) -> DVec3 {
+        self.sensor.point(film.extend(0.0))
+    }
+
+    /// The direction for the point `u` of the unit square, uniform in area over the bound, as seen
+    /// from `film` on the sensor (mm). `None` where no light arrives.
+    ///
+    /// Neighbouring points of the square give neighbouring directions.
+    #[must_use]
+    pub fn sample(&self, film: DVec2, u: [f64; 2]) -> Option<PupilSample> {
+        let (disc_radius, turn) = concentric(u);
+        let (sine, cosine) = (turn * std::f64::consts::TAU).sin_cos();
+        let (mut centre, mut half, mut reach) = (DVec2::ZERO, DVec2::ZERO, 0.0);
+        let mut axis = DVec2::X;
+        if let Some(disc) = &self.disc {
+            let (middle, radius) = disc.seen_from(self.film_point(film));
+            (centre, half, reach) = (middle, DVec2::splat(radius), 1.0);
+        } else {
+            let place = self.place(film)?;
+            axis = place.axis;
+            for (node, weight) in place.nodes {
+                let outline = &self.nodes[node];
+                centre += outline.centre * weight;
+                half += outline.half * weight;
+                reach += between(&outline.reach, turn) * weight;
+            }
+        }
+        if reach <= 0.0 || half.min_element() <= 0.0 {
+            return None;
+        }
+        let offset = DVec2::new(cosine, sine) * half * (reach * disc_radius);
+        let slopes = axis.rotate(centre + offset);
+        let area = std::f64::consts::PI * half.x * half.y * reach * reach;
+        let direction = towards_lens(slopes);
+        let cosine = -direction.z;
+        let on_sensor = direction.dot(self.sensor.rotation.z_axis).abs();
+        let weight = self.index2 * area * cosine.powi(3) * on_sensor;
+        Some(PupilSample { direction, weight })
+    }
+
+    /// Appends one ray for each point of the sensor (mm) and point of the unit square, ready to be
+    /// traced from [`Side::Sensor`]; its throughput is its weight. Where no light arrives the ray
+    /// has ended and weighs 0.
+    pub fn push_rays(&self, film: &[DVec2], u: &[[f64; 2]], rays: &mut LensRays) {
+        for (&film, &u) in film.iter().zip(u) {
+            let at = self.film_point(film);
+            match self.sample(film, u) {
+                Some(sample) => rays.push_weighted(at, sample.direction, sample.weight),
+                None => {
+                    rays.push_weighted(at, DVec3::NEG_Z, 0.0);
+                    rays.set_fate(rays.len() - 1, Fate::Vignetted { element: 0 });
+                }
+            }
+        }
+    }
+
+    /// The direction of the chief ray from `film` (mm), which passes the stop's centre; `None` where
+    /// the stop's centre cannot be seen.
+    #[must_use]
+    pub fn chief_direction(
+        &self,
+        train: &OpticalTrain,
+        at: &TrainAt,
+        film: DVec2,
+    ) -> Option<DVec3> {
+        let start = self.place(film).and_then(|place| {
+            let mut slopes = DVec2::ZERO;
+            for (node, weight) in place.nodes {
+                slopes += self.nodes[node].chief? * weight;
+            }
+            Some(place.turned(slopes))
+        });
+        train.chief_direction_from(at, self.film_point(film), start)
+    }
+
+    /// The bound as a polygon of slopes around the passing directions from `film`, for drawing;
+    /// empty where no light arrives.
+    #[must_use]
+    pub fn outline(&self, film: DVec2) -> Vec<DVec2> {
+        if let Some(disc) = &self.disc {
+            let (centre, radius) = disc.seen_from(self.film_point(film));
+            let angle = |i| DVec2::from_angle(turn_of(i) * std::f64::consts::TAU);
+            return (0..ANGLES).map(|i| centre + angle(i) * radius).collect();
+        }
+        let Some(place) = self.place(film) else { return Vec::new() };
+        let mut corners = Vec::with_capacity(ANGLES);
+        for i in 0..ANGLES {
+            let angle = turn_of(i) * std::f64::consts::TAU;
+            let mut corner = [DVec2::ZERO, DVec2::ZERO];
+            let mut reach = 0.0;
+            for (node, weight) in place.nodes {
+                let outline = &self.nodes[node];
+                corner[0] += outline.centre * weight;
+                corner[1] += outline.half * weight;
+                reach += outline.reach[i] * weight;
+            }
+            corners.push(place.turned(corner[0] + DVec2::from_angle(angle) * corner[1] * reach));
+        }
+        corners
+    }
+}
+
+/// From the unit square to the disc: radius and share of a full turn, with equal areas staying
+/// equal (P. Shirley and K. Chiu, "A low distortion map between disk and square", 1997).
+fn concentric(u: [f64; 2]) -> (f64, f64) {
+    let [a, b] = u.map(|x| 2.0 * x - 1.0);
+    if a == 0.0 && b == 0.0 {
+        return (0.0, 0.0);
+    }
+    let (radius, eighths) = if a.abs() > b.abs() { (a, b / a) } else { (b, 2.0 - a / b) };
+    let turn = eighths / 8.0 + if radius < 0.0 { 0.5 } else { 0.0 };
+    (radius.abs(), turn.rem_euclid(1.0))
+}
+
+/// The same lens with masks clear: the bound goes around their whole rectangle.
+fn without_masks(train: &OpticalTrain) -> OpticalTrain {
+    let mut train = train.clone();
+    for element in &mut train.elements {
+        if let Part::Aperture(opening) = &element.part
+            && let Opening::Image(picture) = &**opening
+        {
+            element.part = Part::Aperture(Opening::Image(picture.blank()).into());
+        }
+    }
+    train
+}
+
+/// The same lens with filters clear: what is left does not depend on the wavelength but for glass.
+pub fn without_filters(train: &OpticalTrain) -> OpticalTrain {
+    let mut train = train.clone();
+    for element in &mut train.elements {
+        if let Part::Filter(filter) = &element.part {
+            let opening = Opening::Circle { radius: filter.radius() };
+            element.part = Part::Aperture(opening.into());
+        }
+    }
+    train
+}
+
+/// The same lens with masks and filters clear, and nothing lost in glass.
+pub fn without_dimming(train: &OpticalTrain) -> OpticalTrain {
+    without_filters(&without_masks(train)).with_losses(LossesSpec::default())
+}
+
+/// The error that names what blocks the light.
+pub fn blocked(train: &OpticalTrain, lens: &TrainAt, film: DVec3) -> ExitPupilError {
+    let mut counts = FateCounts::new(train.elements.len());
+    match Window::probe(train, film) {
+        Some(mut rays) => {
+            lens.trace(Side::Sensor, Clip::On, &mut rays);
+            counts.add_all(&rays);
+        }
+        // There is no direction to the nearest rim: it is closed.
+        None => {
+            let closed = train.elements.iter().rposition(|e| e.clear_radius() == 0.0);
+            counts.add(Fate::Vignetted { element: closed.unwrap_or(train.stop) });
+        }
+    }
+    // Where the last rays end: nothing gets past it.
+    let element = counts.farthest_from_sensor().unwrap_or(train.stop);
+    ExitPupilError::Dark { element, losses: counts.losses() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::measure::CHECKS;
+    use super::*;
+    use crate::train::{Focus, LensFile};
+
+    fn preset(name: &str) -> OpticalTrain {
+        let path = format!("{}/../../scenes/lenses/{name}.json", env!("CARGO_MANIFEST_DIR"));
+        let file = LensFile::from_json(&std::fs::read_to_string(path).unwrap()).unwrap();
+        file.build(&|name| Err(format!("{name}: presets have no files"))).unwrap()
+    }
+
+    #[test]
+    fn the_map_from_the_square_keeps_areas_and_neighbours() {
+        let mut inside = 0;
+        for i in 0..10_000 {
+            let u = [f64::from(i % 100) / 100.0 + 0.005, f64::from(i / 100) / 100.0 + 0.005];
+            let (radius, turn) = concentric(u);
+            assert!((0.0..=1.0).contains(&radius) && (0.0..1.0).contains(&turn));
+            inside += u32::from(radius <= 0.5);
+        }
+        assert_eq!(inside, 2500, "a quarter of the disc's area is a quarter of the square's");
+        assert_eq!(concentric([0.5, 0.5]), (0.0, 0.0));
+        assert_eq!(concentric([1.0, 0.5]), (1.0, 0.0));
+        assert_eq!(concentric([0.5, 1.0]), (1.0, 0.25));
+        assert_eq!(concentric([0.0, 0.5]), (1.0, 0.5));
+    }
+
+    /// The proof of the margin: the bound was closed with rays of the first rounds, and of the
+    /// rounds after them, with which it had nothing to do, none passes outside of it.
+    #[test]
+    fn of_a_million_rays_just_outside_of_the_bound_none_passes() {
+        for name in ["double-gauss", "fisheye", "telephoto", "asphere"] {
+            let train = preset(name);
+            let z = train.sensor_z(Focus::Infinity).unwrap();
+            let lens = train.at(587.56).unwrap();
+            let pupil = ExitPupil::new(&train, &[587.56], z, [18.0, 12.0]).unwrap();
+            let (mut looked_at, mut passed) = (0, 0);
+            for round in 16..32 {
+                passed += pupil.strays(&lens, round * CHECKS).len();
+                looked_at += CHECKS;
+            }
+            assert_eq!(passed, 0, "{name}: of {looked_at}");
+        }
+    }
+
+    #[test]
+    fn a_bound_drawn_too_tight_is_widened() {
+        let train = preset("double-gauss");
+        let z = train.sensor_z(Focus::Infinity).unwrap();
+        let lens = train.at(587.56).unwrap();
+        let mut pupil = ExitPupil::new(&train, &[587.56], z, [18.0, 12.0]).unwrap();
+        for reach in pupil.nodes.iter_mut().flat_map(|node| &mut node.reach) {
+            *reach *= 0.95;
+        }
+        let before = pupil.strays(&lens, 0).len();
+        pupil.widen_until_tight(std::slice::from_ref(&lens));
+        let after = pupil.strays(&lens, 20 * CHECKS).len();
+        assert!(before > 1000 && after * 100 < before, "{before} and then {after}");
+    }
+
+    #[test]
+    fn an_error_names_what_blocks_the_light() {
+        let closed = preset("double-gauss").with_stop_radius(0.0).unwrap();
+        let z = closed.sensor_z(Focus::Infinity).unwrap();
+        let error = ExitPupil::new(&closed, &[587.56], z, [18.0, 12.0]).unwrap_err();
+        assert!(matches!(error, ExitPupilError::Dark { element: 5, .. }), "{error}");
+        assert!(error.to_string().contains("vignetted at element 5"), "{error}");
+        let open =
+            LensFile::from_json(r#"{"elements": [{"type": "thin_lens", "focal_length": 9}]}"#);
+        let open = open.unwrap().build(&|_| Err(String::new())).unwrap();
+        let error = ExitPupil::new(&open, &[587.56], 9.0, [1.0, 1.0]).unwrap_err();
+        assert_eq!(error, ExitPupilError::Unbounded);
+    }
+}

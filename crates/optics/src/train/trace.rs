@@ -1,0 +1,265 @@
+//! Rays through a lens at one wavelength.
+
+use etendue_spectrum::Curve;
+use glam::DVec3;
+use multiversion::multiversion;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::OpticalTrain;
+use crate::element::{Action, Block, Clip, Fate, LensRays, Loss, Ray, Step};
+use crate::glass::GlassError;
+
+/// Where rays come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// From the object towards the sensor: elements in their order.
+    Object,
+    /// From the sensor towards the object: the last element first.
+    Sensor,
+}
+
+/// A lens at one wavelength.
+#[derive(Debug, Clone)]
+pub struct TrainAt {
+    wavelength: f64,
+    indices: Vec<f64>,
+    forward: Vec<Step>,
+    backward: Vec<Step>,
+}
+
+/// One ray's way through a lens.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RayPath {
+    /// What became of it.
+    pub fate: Fate,
+    /// Where it met each element that it reached (mm), in the order in which it met them. The last
+    /// one is where it was vignetted or totally reflected, if it was.
+    pub points: Vec<DVec3>,
+    /// Its direction behind the last element; `None` unless it left.
+    pub direction: Option<DVec3>,
+    /// The share of light that is left by apertures, filters and, where they are asked for, losses.
+    pub throughput: f64,
+}
+
+impl OpticalTrain {
+    /// The lens at `wavelength` (nm).
+    ///
+    /// # Errors
+    ///
+    /// When a glass has no index there. Being outside of a glass' stated range is no error here;
+    /// see [`Self::outside_of_range`].
+    pub fn at(&self, wavelength: f64) -> Result<TrainAt, GlassError> {
+        self.at_with(wavelength, &|curve| curve.held(wavelength))
+    }
+
+    /// As [`Self::at`], with filters that pass what `transmission` makes of their curves.
+    ///
+    /// # Errors
+    ///
+    /// When a glass has no index there.
+    pub fn at_with(
+        &self,
+        wavelength: f64,
+        transmission: &dyn Fn(&Curve) -> f64,
+    ) -> Result<TrainAt, GlassError> {
+        let indices = self.indices(wavelength)?;
+        let (mut forward, mut backward) = (Vec::new(), Vec::new());
+        for (element, placed) in self.elements.iter().enumerate() {
+            let [before, behind] = [indices[element], indices[element + 1]];
+            let [towards_sensor, towards_object] =
+                placed.part.actions(before, behind, transmission);
+            let absorption = |medium: usize| self.media[medium].absorption(wavelength);
+            let loss =
+                |indices, medium| Loss::new(&self.losses, indices, absorption(medium), wavelength);
+            let (frame, axial) = (placed.frame, placed.frame.is_axial());
+            let add = |steps: &mut Vec<Step>, action: Action, loss: Option<Loss>| {
+                // Sheets do not move rays: what absorbs before one is counted at the next surface.
+                let loss = loss.filter(|_| action.moves());
+                steps.push(Step { element, frame, axial, action, loss });
+            };
+            add(&mut forward, towards_sensor, loss([before, behind], element));
+            add(&mut backward, towards_object, loss([behind, before], element + 1));
+        }
+        backward.reverse();
+        Ok(TrainAt { wavelength, indices, forward, backward })
+    }
+
+    /// The index of each medium at `wavelength` (nm), from the object's to the sensor's.
+    pub(crate) fn indices(&self, wavelength: f64) -> Result<Vec<f64>, GlassError> {
+        self.media.iter().map(|glass| glass.index(wavelength)).collect()
+    }
+}
+
+impl TrainAt {
+    /// The wavelength (nm).
+    #[must_use]
+    pub fn wavelength(&self) -> f64 {
+        self.wavelength
+    }
+
+    /// The index of the medium between the last element and the sensor.
+    #[must_use]
+    pub fn index_before_sensor(&self) -> f64 {
+        self.indices[self.indices.len() - 1]
+    }
+
+    /// The index of the medium behind element `i`.
+    pub(crate) fn index_behind(&self, i: usize) -> f64 {
+        self.indices[i + 1]
+    }
+
+    fn steps(&self, from: Side) -> &[Step] {
+        match from {
+            Side::Object => &self.forward,
+            Side::Sensor => &self.backward,
+        }
+    }
+
+    /// Takes a batch through the lens: positions end on the last refracting element, directions are
+    /// those behind it, throughputs are multiplied by what apertures and filters pass, and fates say
+    /// who left. Rays that ended already stay as they are.
+    ///
+    /// The same ray gives the same bits in any batch, and on any processor: the arithmetic is
+    /// without fused operations, whatever the width of the registers.
+    pub fn trace(&self, from: Side, clip: Clip, rays: &mut LensRays) {
+        trace_blocks(&mut rays.blocks, self.steps(from), clip);
+    }
+
+    /// As [`Self::trace`] on registers of a stated width, to measure what width gains; a width that
+    /// the processor lacks is replaced by the widest that it has.
+    pub fn trace_on(&self, registers: Registers, from: Side, clip: Clip, rays: &mut LensRays) {
+        let (blocks, steps) = (&mut rays.blocks, self.steps(from));
+        match registers {
+            Registers::Widest => trace_blocks(blocks, steps, clip),
+            Registers::FourLanes => trace_blocks_of_four(blocks, steps, clip),
+            Registers::Baseline => all_blocks(blocks, steps, clip),
+        }
+    }
+
+    /// As [`Self::trace`], ray by ray through the single-ray code: the yardstick for what batches
+    /// gain, and the check that they change nothing.
+    pub fn trace_singly(&self, from: Side, clip: Clip, rays: &mut LensRays) {
+        for block in &mut rays.blocks {
+            for lane in 0..block.outcome.len() {
+                if block.outcome[lane] == Fate::Exited.code() {
+                    let end = self.run(from, clip, block.ray(lane));
+                    block.set_ray(lane, end.ray);
+                    block.throughput[lane] *= end.throughput;
+                    block.outcome[lane] = end.fate.code();
+                }
+            }
+        }
+    }
+
+    /// One ray's way, point by point.
+    #[must_use]
+    pub fn path(&self, from: Side, clip: Clip, position: DVec3, direction: DVec3) -> RayPath {
+        let mut path = RayPath {
+            fate: Fate::Missed { element: 0 },
+            points: Vec::new(),
+            direction: None,
+            throughput: 1.0,
+        };
+        let Some(mut ray) = Ray::new(position, direction) else { return path };
+        for step in self.steps(from) {
+            let passage = step.run_one(ray, clip);
+            path.points.extend(passage.point.map(DVec3::from));
+            path.throughput *= passage.transmission;
+            path.fate = passage.fate;
+            ray = passage.ray;
+            if passage.fate != Fate::Exited {
+                return path;
+            }
+        }
+        path.fate = Fate::Exited;
+        path.direction = Some(ray.direction.into());
+        path
+    }
+
+    /// One ray to its end.
+    #[inline]
+    pub fn run(&self, from: Side, clip: Clip, ray: Ray) -> End {
+        let mut end = End { fate: Fate::Exited, ray, throughput: 1.0 };
+        for step in self.steps(from) {
+            let passage = step.run_one(end.ray, clip);
+            end.throughput *= passage.transmission;
+            end.fate = passage.fate;
+            end.ray = passage.ray;
+            if passage.fate != Fate::Exited {
+                if let (Fate::Vignetted { .. }, Some(point)) = (passage.fate, passage.point)
+                    && step.moves()
+                {
+                    end.ray.position = point;
+                }
+                break;
+            }
+        }
+        end
+    }
+
+    /// Where a ray crosses an element, in the element's own frame and without any clipping; `None`
+    /// when it does not get there.
+    pub(crate) fn crossing(&self, from: Side, element: usize, mut ray: Ray) -> Option<[f64; 2]> {
+        for step in self.steps(from) {
+            let passage = step.run_one(ray, Clip::Off);
+            if step.element == element {
+                let local = step.frame.rotation.transpose()
+                    * (DVec3::from(passage.point?) - step.frame.vertex);
+                return Some([local.x, local.y]);
+            }
+            if passage.fate != Fate::Exited {
+                return None;
+            }
+            ray = passage.ray;
+        }
+        None
+    }
+}
+
+/// A single ray at its end.
+#[derive(Debug, Clone, Copy)]
+pub struct End {
+    /// Outcome: where and how the ray ended.
+    pub fate: Fate,
+    /// The ray as it leaves, or where it ended (mm).
+    pub ray: Ray,
+    pub(crate) throughput: f64,
+}
+
+/// Vector registers to trace with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Registers {
+    /// The widest that the processor has, found at run time.
+    #[default]
+    Widest,
+    /// Four lanes of f64 (AVX2).
+    FourLanes,
+    /// What the program was compiled for, without a look at the processor.
+    Baseline,
+}
+
+// Widest first: the first set that the processor has is taken, at run time.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+avx512bw",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn trace_blocks(blocks: &mut [Block], steps: &[Step], clip: Clip) {
+    all_blocks(blocks, steps, clip);
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn trace_blocks_of_four(blocks: &mut [Block], steps: &[Step], clip: Clip) {
+    all_blocks(blocks, steps, clip);
+}
+
+#[inline(always)]
+fn all_blocks(blocks: &mut [Block], steps: &[Step], clip: Clip) {
+    for block in blocks {
+        for step in steps {
+            step.run(block, clip);
+        }
+    }
+}

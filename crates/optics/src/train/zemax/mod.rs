@@ -1,0 +1,394 @@
+//! Lenses from Zemax OpticStudio's sequential `.zmx` files.
+//!
+//! | module | idea |
+//! |---|---|
+//! | `text` | bytes to lines: UTF-8 and UTF-16 |
+//! | `sheet` | lines to the rows of the lens data sheet |
+//! | `place` | coordinate breaks to tilts and decentrings |
+//! | `fields` | field points to field angles |
+//! | here | rows to the elements of a lens file |
+//!
+//! What has no counterpart here and would change the light's way is an error that names its line;
+//! what is left out is listed.
+//!
+//! # Sources
+//!
+//! The format has no public specification. What the lines mean is taken from files in the wild and
+//! from OpticStudio's knowledge base ("Rotation Matrix and Tilt About X/Y/Z in OpticStudio", 2021).
+
+mod fields;
+mod place;
+mod sheet;
+mod text;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::{LensError, LensFile, OpticalTrain, SensorMount};
+use crate::element::{ElementSpec, PartSpec, SurfaceSpec, ThinLensSpec};
+use crate::glass::{GlassSpec, Makers};
+use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
+use place::{Axes, Placed};
+use sheet::{Aperture, Parameter, Row, Shape, Sheet};
+
+/// A difference of focal lengths that is more than rounding (share).
+const SAME_FOCAL_LENGTH: f64 = 1e-3;
+
+/// Why a Zemax file gives no lens.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {why}")]
+pub struct ZemaxError {
+    /// The line, from 1.
+    pub line: usize,
+    /// What is wrong there and what would do.
+    pub why: String,
+}
+
+impl ZemaxError {
+    fn new(line: usize, why: impl Into<String>) -> Self {
+        Self { line, why: why.into() }
+    }
+}
+
+/// A lens as a Zemax file has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ZemaxLens {
+    /// The lens.
+    pub file: LensFile,
+    /// Field angles (degrees).
+    pub fields: Vec<f64>,
+    /// Wavelengths (nm), the primary one first.
+    pub wavelengths: Vec<f64>,
+    /// What was changed, assumed or left out, in sentences.
+    pub notes: Vec<String>,
+    /// The effective focal length that the file states (mm).
+    pub stated_efl: Option<f64>,
+}
+
+impl ZemaxLens {
+    /// Whether a file's name says that it is a Zemax file.
+    #[must_use]
+    pub fn is_named(path: &Path) -> bool {
+        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("zmx"))
+    }
+
+    /// Reads the bytes of a `.zmx` file.
+    ///
+    /// # Errors
+    ///
+    /// When it is no such file, or has a surface, glass or number that has no counterpart here; the
+    /// error names the line.
+    pub fn read(bytes: &[u8]) -> Result<Self, ZemaxError> {
+        let text = text::decode(bytes)?;
+        let sheet = Sheet::read(&text)?;
+        let mut importer =
+            Importer { sheet: &sheet, elements: Vec::new(), notes: Vec::new(), object_z: None };
+        let sensor = importer.convert()?;
+        let Importer { elements, mut notes, object_z, .. } = importer;
+        if elements.is_empty() {
+            return Err(ZemaxError::new(
+                sheet.last_line,
+                "the file has no surface that does anything",
+            ));
+        }
+        let mut file = LensFile { name: sheet.name.clone(), elements, ..LensFile::default() };
+        "a Zemax file".clone_into(&mut file.source);
+        file.sensor = (sensor != SensorMount::default()).then_some(sensor);
+        let wavelengths = sheet.wavelengths_nm();
+        file.wavelength = wavelengths.first().copied().map(Nanometres);
+        let train = open_stop(&mut file, &sheet, object_z, &mut notes)?;
+        let (fields, left_out) = sheet.fields.angles(sheet.unit, &train, object_z);
+        notes.extend(left_out);
+        let mut lens = Self {
+            fields,
+            file,
+            wavelengths,
+            notes,
+            stated_efl: sheet.stated_efl.map(|efl| efl * sheet.unit),
+        };
+        lens.compare_focal_length(&train);
+        lens.notes.extend(sheet.what_is_left_out());
+        Ok(lens)
+    }
+
+    fn compare_focal_length(&mut self, train: &OpticalTrain) {
+        let Some(stated) = self.stated_efl else { return };
+        let found = train.paraxial(train.wavelength()).ok().and_then(|paraxial| paraxial.efl);
+        self.notes.push(match found {
+            Some(efl) if (efl - stated).abs() <= SAME_FOCAL_LENGTH * stated.abs() => {
+                format!("the file states a focal length of {stated} mm, and it is {efl:.5} mm here")
+            }
+            Some(efl) => format!(
+                "the file states a focal length of {stated} mm, BUT IT IS {efl:.5} mm HERE: the \
+                 lens was changed, or the file is at odds with itself"
+            ),
+            None => format!(
+                "the file states a focal length of {stated} mm, BUT THE LENS IS AFOCAL HERE"
+            ),
+        });
+    }
+}
+
+/// Rows on their way to elements.
+struct Importer<'a> {
+    sheet: &'a Sheet,
+    elements: Vec<ElementSpec>,
+    notes: Vec<String>,
+    /// z of an object at a finite distance in lens coordinates (mm).
+    object_z: Option<f64>,
+}
+
+impl Importer<'_> {
+    /// Fills the elements, and says how the sensor stands.
+    fn convert(&mut self) -> Result<SensorMount, ZemaxError> {
+        let rows = &self.sheet.rows;
+        let unit = self.sheet.unit;
+        let ([object, inner @ .., image], true) = (rows.as_slice(), rows.len() >= 3) else {
+            let why = format!(
+                "the file has {} surfaces; a lens needs an object, surfaces and an image",
+                rows.len()
+            );
+            return Err(ZemaxError::new(self.sheet.last_line, why));
+        };
+        self.look_at_ends(object, image)?;
+        let mut axes = Axes::default();
+        let mut medium_is_air = true;
+        let (mut first_z, mut last_z) = (None, None);
+        for row in inner {
+            if row.shape == Shape::CoordinateBreak {
+                axes = axes.broken(&row.coordinate_break(unit));
+            } else {
+                let flat_in_air = row.is_flat() && medium_is_air && row.glass.is_none();
+                if let Some(part) = self.part(row, flat_in_air)? {
+                    let placed = axes.placed();
+                    first_z = first_z.or(Some(placed.z));
+                    self.place(part, row, &placed, &mut last_z);
+                }
+                medium_is_air = row.glass.is_none();
+            }
+            if !row.thickness.is_finite() {
+                let why = "DISZ is infinite inside the lens";
+                return Err(ZemaxError::new(row.line, why));
+            }
+            axes = axes.advanced(row.thickness * unit);
+        }
+        let image = axes.placed();
+        if let (Some(last), Some(z)) = (self.elements.last_mut(), last_z) {
+            last.mount.thickness = Millimetres(image.z - z);
+        }
+        // Lens coordinates begin at the first element, which need not be the first row.
+        self.object_z = (object.thickness.is_finite())
+            .then(|| -object.thickness * unit - first_z.unwrap_or_default());
+        Ok(SensorMount { tilt: image.tilt.map(Degrees), decentre: image.decentre.map(Millimetres) })
+    }
+
+    fn look_at_ends(&mut self, object: &Row, image: &Row) -> Result<(), ZemaxError> {
+        if let Some(glass) = &object.glass {
+            let why = "the object stands in a glass; lenses here begin in air";
+            return Err(ZemaxError::new(glass.line, why));
+        }
+        if object.thickness.is_finite() {
+            self.notes.push(format!(
+                "the file's object stands {} mm in front of the first surface; the sensor stays \
+                 where the file has its image",
+                object.thickness * self.sheet.unit
+            ));
+        }
+        if !image.is_flat() {
+            self.notes.push(format!("line {}: the curved image surface is taken flat", image.line));
+        }
+        Ok(())
+    }
+
+    /// What a row is; `None` for a plane between air and air that does nothing.
+    fn part(&mut self, row: &Row, flat_in_air: bool) -> Result<Option<PartSpec>, ZemaxError> {
+        let unit = self.sheet.unit;
+        let semi_diameter = row.semi_diameter().map(|length| length * unit);
+        if row.shape == Shape::Paraxial {
+            let focal_length = row.parameters.get(&1).map_or(100.0, |p| p.value) * unit;
+            if focal_length == 0.0 {
+                return Err(ZemaxError::new(row.line, "a paraxial lens of focal length 0"));
+            }
+            return Ok(Some(PartSpec::ThinLens(ThinLensSpec {
+                focal_length: Millimetres(focal_length),
+                semi_diameter: semi_diameter.map(Millimetres),
+            })));
+        }
+        if flat_in_air {
+            if !row.stop && !row.has_fixed_rim() {
+                self.notes.push(format!(
+                    "line {}: a plane in air that does nothing is left out",
+                    row.line
+                ));
+                return Ok(None);
+            }
+            // Nothing limits a stop of unknown size yet; the system's aperture may.
+            let radius = semi_diameter.unwrap_or(0.0);
+            return Ok(Some(PartSpec::circular(radius)));
+        }
+        let glass = row.glass.as_ref().map(|glass| self.glass(glass)).transpose()?;
+        Ok(Some(PartSpec::Surface(SurfaceSpec {
+            curvature: (row.curvature != 0.0).then_some(row.curvature / unit),
+            glass,
+            semi_diameter: semi_diameter.map(Millimetres),
+            conic: if row.curvature == 0.0 { 0.0 } else { row.conic },
+            aspheric: row.aspheric(unit)?,
+            radius: None,
+        })))
+    }
+
+    fn glass(&self, glass: &sheet::Glass) -> Result<GlassSpec, ZemaxError> {
+        let spec = match glass.model {
+            None => GlassSpec::Named(glass.name.clone()),
+            // OpticStudio takes an Abbe number of 0 for a glass without dispersion.
+            Some([nd, 0.0]) => GlassSpec::Constant(nd),
+            Some([nd, vd]) => GlassSpec::Abbe { nd, vd },
+        };
+        let makers: Vec<&str> = self.sheet.makers.iter().map(String::as_str).collect();
+        let found = spec.resolve_from(Makers(&makers)).map_err(|error| {
+            let remedy = match glass.model {
+                None => "; write its index into the file as GLAS ___BLANK 1 0 nd vd",
+                Some(_) => "",
+            };
+            ZemaxError::new(glass.line, format!("GLAS {}: {error}{remedy}", glass.name))
+        })?;
+        Ok(match (&spec, &found.maker) {
+            // With its maker in front, so that the lens file says which one is meant.
+            (GlassSpec::Named(name), Some(maker)) if !found.namesakes.is_empty() => {
+                GlassSpec::Named(format!("{maker}:{name}"))
+            }
+            _ => spec,
+        })
+    }
+
+    fn place(&mut self, part: PartSpec, row: &Row, placed: &Placed, last_z: &mut Option<f64>) {
+        if let (Some(last), Some(z)) = (self.elements.last_mut(), *last_z) {
+            last.mount.thickness = Millimetres(placed.z - z);
+        }
+        *last_z = Some(placed.z);
+        let mut element = ElementSpec::new(part, 0.0);
+        element.mount.stop = row.stop;
+        element.mount.tilt = placed.tilt.map(Degrees);
+        element.mount.decentre = placed.decentre.map(Millimetres);
+        self.elements.push(element);
+    }
+}
+
+/// The stop's radius (mm) that makes the entrance pupil as wide as `radius` says, from its z (mm).
+fn with_entrance_pupil(
+    train: &OpticalTrain,
+    command: &str,
+    radius: impl FnOnce(f64) -> Result<f64, String>,
+) -> Result<f64, String> {
+    let paraxial = train.paraxial(train.wavelength()).ok();
+    let found = paraxial.and_then(|p| Some((p.entrance_pupil.z?, p.stop_magnification?)));
+    let (z, magnification) =
+        found.ok_or_else(|| format!("{command}: the entrance pupil is at infinity"))?;
+    Ok(radius(z)? * magnification.abs())
+}
+
+/// Sets the stop by the system's aperture, and gives the lens.
+fn open_stop(
+    file: &mut LensFile,
+    sheet: &Sheet,
+    object_z: Option<f64>,
+    notes: &mut Vec<String>,
+) -> Result<OpticalTrain, ZemaxError> {
+    let build = |file: &LensFile| {
+        file.build(&|name| Err(format!("{name}: no files here")))
+            .map_err(|error| ZemaxError::new(sheet.last_line, error.to_string()))
+    };
+    let train = build(file)?;
+    let Some((line, aperture)) = sheet.aperture else { return Ok(train) };
+    let index = train.stop();
+    let written = train.stop_radius();
+    let error = |error: LensError| ZemaxError::new(line, error.to_string());
+    let stop_radius = match aperture {
+        Aperture::EntrancePupil(diameter) => {
+            with_entrance_pupil(&train, "ENPD", |_| Ok(0.5 * diameter * sheet.unit)).map(Some)
+        }
+        Aperture::AtObject(sine) => with_entrance_pupil(&train, "OBNA", |pupil| {
+            let object = object_z.ok_or("OBNA: the object is at infinity; write ENPD or FNUM")?;
+            Ok((pupil - object).abs() * sine.asin().tan())
+        })
+        .map(Some),
+        Aperture::FNumber(_) => Ok(None),
+    };
+    let opened = match (stop_radius.map_err(|why| ZemaxError::new(line, why))?, aperture) {
+        (Some(radius), _) => train.with_stop_radius(radius).map_err(error)?,
+        (None, Aperture::FNumber(f_number)) => train.with_f_number(f_number).map_err(error)?,
+        (None, _) => train,
+    };
+    let radius = opened.stop_radius();
+    if written.is_finite() && written > 0.0 && (radius - written).abs() > 0.01 * written {
+        notes.push(format!(
+            "line {line}: the system's aperture gives the stop a radius of {radius:.5} mm; its \
+             surface's is {written:.5} mm"
+        ));
+    }
+    let stop = &mut file.elements[index];
+    stop.mount.stop = true;
+    match &mut stop.part {
+        PartSpec::Surface(surface) => surface.semi_diameter = Some(Millimetres(radius)),
+        PartSpec::ThinLens(lens) => lens.semi_diameter = Some(Millimetres(radius)),
+        part => *part = PartSpec::circular(radius),
+    }
+    build(file)
+}
+
+impl Row {
+    fn is_flat(&self) -> bool {
+        let bends = |(number, parameter): (&usize, &Parameter)| {
+            parameter.value != 0.0 && (self.shape == Shape::EvenAsphere || *number > 2)
+        };
+        let terms = match self.shape {
+            Shape::EvenAsphere => &self.parameters,
+            Shape::ExtendedAsphere => &self.extra,
+            Shape::Standard => return self.curvature == 0.0,
+            Shape::Paraxial | Shape::CoordinateBreak => return false,
+        };
+        self.curvature == 0.0 && !terms.iter().any(bends)
+    }
+
+    /// Coefficients by power, in millimetres.
+    fn aspheric(&self, unit: f64) -> Result<BTreeMap<String, f64>, ZemaxError> {
+        let mut terms = BTreeMap::new();
+        let mut add = |power: usize, value: f64| {
+            let scale = unit.powi(1 - i32::try_from(power).unwrap_or(0));
+            if value != 0.0 {
+                terms.insert(power.to_string(), value * scale);
+            }
+        };
+        match self.shape {
+            Shape::EvenAsphere => {
+                for (&number, parameter) in self.parameters.iter().filter(|p| (1..=8).contains(p.0))
+                {
+                    add(2 * number, parameter.value);
+                }
+            }
+            Shape::ExtendedAsphere => {
+                let terms = self.extra.get(&1).map_or(0.0, |p| p.value);
+                let radius = self.extra.get(&2).map_or(1.0, |p| p.value);
+                let last = self.extra.range(3..).rfind(|(_, p)| p.value != 0.0);
+                if let Some((_, parameter)) = last.filter(|(number, _)| **number > 17) {
+                    let why = "XDAT: powers beyond r^30 have no counterpart here";
+                    return Err(ZemaxError::new(parameter.line, why));
+                }
+                for (&number, parameter) in self.extra.range(3..18) {
+                    let power = 2 * (number - 2);
+                    #[expect(clippy::cast_precision_loss, reason = "at most 15")]
+                    let counts = (number - 2) as f64 <= terms;
+                    if counts {
+                        let power_of_radius = radius.powi(i32::try_from(power).unwrap_or(0));
+                        add(power, parameter.value / power_of_radius);
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(terms)
+    }
+}
+
+#[cfg(test)]
+mod tests;
