@@ -42,7 +42,11 @@ fn broken_hierarchies_are_refused_with_their_place() {
         nodes(json!([{"children": [1, 2]}, {"children": [3]}, {"children": [3]}, {}])),
         &["nodes[3]", "two parents"],
     );
-    refused("missing.glb", nodes(json!([{"children": [7]}])), &["nodes[7]"]);
+    refused(
+        "missing.glb",
+        nodes(json!([{"children": [7]}])),
+        &["nodes[0].children[0]", "no node 7", "has 1"],
+    );
     refused("mesh.glb", nodes(json!([{"mesh": 5}])), &["nodes[0].mesh", "no mesh 5"]);
     refused("rotation.glb", nodes(json!([{"rotation": [0, 0, 0, 0]}])), &["nodes[0]", "rotation"]);
     refused(

@@ -6,6 +6,7 @@ mod damaged;
 mod gltf;
 mod obj;
 mod ply;
+mod skins;
 
 use std::path::{Path, PathBuf};
 

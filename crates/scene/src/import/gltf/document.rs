@@ -14,6 +14,7 @@ pub(super) struct Document {
     pub nodes: Vec<Node>,
     pub scenes: Vec<Scene>,
     pub cameras: Vec<Camera>,
+    pub skins: Vec<Skin>,
     pub has_animations: bool,
 }
 
@@ -47,6 +48,8 @@ pub(super) struct Node {
     pub mesh: Option<usize>,
     pub camera: Option<usize>,
     pub skin: Option<usize>,
+    /// For the morph targets of its mesh.
+    pub weights: Option<Vec<f64>>,
     pub extensions: Map<String, Value>,
 }
 
@@ -55,6 +58,16 @@ pub(super) struct Node {
 #[serde(default)]
 pub(super) struct Scene {
     pub nodes: Vec<usize>,
+}
+
+/// The joints that carry a mesh.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct Skin {
+    /// Nodes.
+    pub joints: Vec<usize>,
+    /// An accessor.
+    pub inverse_bind_matrices: Option<usize>,
 }
 
 /// A camera.
@@ -79,13 +92,14 @@ pub(super) struct Orthographic {
     pub ymag: f64,
 }
 
-/// The arrays that crate `gltf` would read in f32.
+/// The arrays that crate `gltf` would read in f32, and those that only make sense with them.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct InF64 {
     nodes: Vec<Node>,
     scenes: Vec<Scene>,
     cameras: Vec<Camera>,
+    skins: Vec<Skin>,
 }
 
 /// Reads the JSON of the glTF file at `path`.
@@ -103,17 +117,17 @@ pub(super) fn parse(path: &Path, json: &[u8]) -> Result<Document, ImportError> {
     require_version_2(path, &rest)?;
     let has_animations = rest.contains_key("animations");
     let mut taken = Map::new();
-    for key in ["nodes", "scenes", "cameras"] {
+    for key in ["nodes", "scenes", "cameras", "skins"] {
         if let Some((key, value)) = rest.remove_entry(key) {
             taken.insert(key, value);
         }
     }
-    let InF64 { nodes, scenes, cameras } = typed(path, Value::Object(taken))?;
+    let InF64 { nodes, scenes, cameras, skins } = typed(path, Value::Object(taken))?;
     // The crate refuses documents for parts that are not wanted, as animations that extensions
     // point elsewhere than to nodes.
     rest.retain(|key, _| READ.contains(&key.as_str()));
     let root = typed(path, Value::Object(rest))?;
-    Ok(Document { root, nodes, scenes, cameras, has_animations })
+    Ok(Document { root, nodes, scenes, cameras, skins, has_animations })
 }
 
 fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), ImportError> {

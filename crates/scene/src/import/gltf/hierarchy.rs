@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use etendue_geometry::Transform;
-use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 
 use super::document::{Document, Node};
+use super::pose::Pose;
+use super::primitive::Shapes;
 use super::{Reader, damaged, instancing};
-use crate::import::note::{self, Note, NoteKind};
+use crate::import::note::Note;
 use crate::import::{
     Import, ImportError, ImportedCamera, ImportedLight, ImportedPlacement, Projection,
 };
@@ -15,6 +16,7 @@ use crate::import::{
 /// What stands in the scene.
 #[derive(Default)]
 pub(super) struct Scene {
+    pub pose: Pose,
     pub meshes: Vec<PlacedMesh>,
     pub cameras: Vec<ImportedCamera>,
     pub lights: Vec<ImportedLight>,
@@ -23,137 +25,79 @@ pub(super) struct Scene {
 /// A node with a mesh.
 pub(super) struct PlacedMesh {
     pub node: usize,
-    pub mesh: usize,
+    pub shape: Shape,
     pub model_from_node: Transform,
 }
 
-/// Visits the nodes of the default scene, parents before children, in the order of the file.
-///
-/// The default scene is the one that the document names, else its first; a document without scenes
-/// shows all nodes that are nobody's children.
+/// A mesh of the document as a node shows it: with a skin, and with weights for its morph targets.
+/// Each is loaded once; a mesh of two skins is two of them.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Shape {
+    pub mesh: usize,
+    pub skin: Option<usize>,
+    /// The bits of the weights; none when all are 0.
+    weights: Vec<u64>,
+}
+
+impl Shape {
+    /// `mesh` as `node` shows it: the node's weights go before the mesh's own.
+    fn of(document: &Document, node: &Node, mesh: usize) -> Self {
+        let own = document.root.meshes.get(mesh).and_then(|mesh| mesh.weights.as_ref());
+        let weights: Vec<f64> = match (&node.weights, own) {
+            (Some(weights), _) => weights.clone(),
+            (None, Some(weights)) => weights.iter().copied().map(f64::from).collect(),
+            (None, None) => Vec::new(),
+        };
+        let moves = weights.iter().any(|&weight| weight != 0.0);
+        let weights =
+            if moves { weights.into_iter().map(f64::to_bits).collect() } else { Vec::new() };
+        Self { mesh, skin: node.skin, weights }
+    }
+
+    /// The weights of the morph targets; none when all are 0.
+    pub(super) fn weights(&self) -> impl Iterator<Item = f64> {
+        self.weights.iter().copied().map(f64::from_bits)
+    }
+}
+
+/// Collects what the nodes of the default scene show.
 pub(super) fn walk(
     path: &Path,
     document: &Document,
     notes: &mut Vec<Note>,
 ) -> Result<Scene, ImportError> {
+    let pose = Pose::at_rest(path, document)?;
     let mut scene = Scene::default();
-    let mut visited = vec![false; document.nodes.len()];
-    // Last in, first out: pushed in reverse, nodes come in the order of the file.
-    let mut open: Vec<(usize, Transform)> =
-        roots(path, document)?.into_iter().rev().map(|node| (node, Transform::IDENTITY)).collect();
-    while let Some((index, model_from_parent)) = open.pop() {
-        let place = || format!("nodes[{index}]");
-        let (Some(node), Some(visited)) = (document.nodes.get(index), visited.get_mut(index))
-        else {
-            return Err(damaged(path, place(), "there is no such node; export the file again"));
-        };
-        if std::mem::replace(visited, true) {
-            return Err(damaged(
-                path,
-                place(),
-                "it has two parents or is its own ancestor; export the file again",
-            ));
-        }
-        let model_from_node = model_from_parent.then_inner(&local(path, node, index)?);
+    for &index in &pose.shown {
+        let node = &document.nodes[index];
+        let model_from_node = pose.of(index).unwrap_or_default();
         if let Some(mesh) = node.mesh {
-            let model_from_node = if node.skin.is_some() {
-                note_skin(notes);
-                // glTF 2.0, section 3.7.3.3: only the joints place a skinned mesh.
-                Transform::IDENTITY
-            } else {
-                model_from_node
-            };
-            scene.meshes.push(PlacedMesh { node: index, mesh, model_from_node });
+            let shape = Shape::of(document, node, mesh);
+            scene.meshes.push(PlacedMesh { node: index, shape, model_from_node });
         }
         if let Some(camera) = node.camera {
-            scene.cameras.push(placed_camera(path, document, node, camera, model_from_node)?);
+            scene.cameras.push(placed_camera(path, document, index, camera, model_from_node)?);
         }
         if let Some(light) = super::lights::placed(path, document, node, index, notes)? {
             scene.lights.push(ImportedLight { light, model_from_light: model_from_node });
         }
-        open.extend(node.children.iter().rev().map(|&child| (child, model_from_node)));
     }
+    scene.pose = pose;
     Ok(scene)
-}
-
-fn roots(path: &Path, document: &Document) -> Result<Vec<usize>, ImportError> {
-    if document.scenes.is_empty() {
-        let mut is_child = vec![false; document.nodes.len()];
-        for &child in document.nodes.iter().flat_map(|node| &node.children) {
-            if let Some(is_child) = is_child.get_mut(child) {
-                *is_child = true;
-            }
-        }
-        return Ok((0..document.nodes.len()).filter(|&node| !is_child[node]).collect());
-    }
-    let default = document.root.scene.map_or(0, |scene| scene.value());
-    match document.scenes.get(default) {
-        Some(scene) => Ok(scene.nodes.clone()),
-        None => Err(damaged(
-            path,
-            "scene",
-            format!("there is no scene {default}; the file has {}", document.scenes.len()),
-        )),
-    }
-}
-
-fn note_skin(notes: &mut Vec<Note>) {
-    note::push(
-        notes,
-        Note::new(
-            NoteKind::Unsupported,
-            "skins",
-            "skinned meshes are shown as they were bound, without their joints; bake the pose \
-             into the mesh before exporting",
-        ),
-    );
-}
-
-/// From the node's frame to its parent's.
-fn local(path: &Path, node: &Node, index: usize) -> Result<Transform, ImportError> {
-    let place = || format!("nodes[{index}]");
-    let transform = match node.matrix {
-        Some(matrix) => affine(&matrix).ok_or_else(|| {
-            damaged(path, place(), "its matrix is a projection: the last row must be 0 0 0 1")
-        })?,
-        None => trs(
-            DVec3::from(node.translation.unwrap_or_default()),
-            DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0])),
-            DVec3::from(node.scale.unwrap_or([1.0; 3])),
-        ),
-    };
-    if transform.is_finite() {
-        Ok(transform)
-    } else {
-        Err(damaged(path, place(), "its transform is not finite, or its rotation is 0 0 0 0"))
-    }
-}
-
-/// A column-major matrix whose last row is that of an affine map.
-fn affine(matrix: &[f64; 16]) -> Option<Transform> {
-    let [a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, t0, t1, t2, t3] = *matrix;
-    let linear = DMat3::from_cols_array(&[a0, a1, a2, b0, b1, b2, c0, c1, c2]);
-    ([a3, b3, c3, t3] == [0.0, 0.0, 0.0, 1.0])
-        .then(|| Transform::new(linear, DVec3::new(t0, t1, t2)))
-}
-
-/// glTF's TRS. Files hold rotations in seven digits or so: they are made unit length again; one of
-/// length 0 gives NaN.
-pub(super) fn trs(translation: DVec3, rotation: DQuat, scale: DVec3) -> Transform {
-    let unit = rotation / rotation.length();
-    Transform::from_trs(translation, unit, scale)
 }
 
 fn placed_camera(
     path: &Path,
     document: &Document,
-    node: &Node,
+    node: usize,
     index: usize,
     model_from_camera: Transform,
 ) -> Result<ImportedCamera, ImportError> {
     let place = || format!("cameras[{index}]");
     let Some(camera) = document.cameras.get(index) else {
-        return Err(damaged(path, place(), "there is no such camera; export the file again"));
+        let count = document.cameras.len();
+        let reason = format!("there is no camera {index}; the file has {count}; export it again");
+        return Err(damaged(path, format!("nodes[{node}].camera"), reason));
     };
     let positive = |value: f64| value.is_finite() && value > 0.0;
     let projection = match (&camera.perspective, &camera.orthographic) {
@@ -177,7 +121,8 @@ fn placed_camera(
             ));
         }
     };
-    let name = node.name.clone().or_else(|| camera.name.clone()).unwrap_or_default();
+    let name = document.nodes[node].name.as_ref().or(camera.name.as_ref());
+    let name = name.cloned().unwrap_or_default();
     Ok(ImportedCamera { name, model_from_camera, projection })
 }
 
@@ -185,22 +130,24 @@ fn placed_camera(
 pub(super) fn place(
     reader: &Reader<'_>,
     scene: &Scene,
-    primitives: &[Vec<Option<super::primitive::Loaded>>],
+    shapes: &Shapes,
     import: &mut Import,
 ) -> Result<(), ImportError> {
     for placed in &scene.meshes {
         let node = &reader.document.nodes[placed.node];
         let instances = instancing::transforms(reader, node, placed.node)?;
-        let mesh = reader.document.root.meshes.get(placed.mesh);
+        let mesh = reader.document.root.meshes.get(placed.shape.mesh);
         let name = node.name.clone().or_else(|| mesh.and_then(|m| m.name.clone()));
         let name = name.unwrap_or_default();
-        let loaded = primitives.get(placed.mesh).into_iter().flatten().flatten();
-        for primitive in loaded {
+        for primitive in shapes.primitives(&placed.shape) {
+            // glTF 2.0, section 3.7.3.3: only the joints place a skinned mesh.
+            let model_from_node =
+                if primitive.skinned { Transform::IDENTITY } else { placed.model_from_node };
             for node_from_instance in &instances {
                 import.placements.push(ImportedPlacement {
                     mesh: primitive.mesh,
                     material: primitive.material,
-                    model_from_mesh: placed.model_from_node.then_inner(node_from_instance),
+                    model_from_mesh: model_from_node.then_inner(node_from_instance),
                     name: name.clone(),
                 });
             }

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::Reader;
 use super::document::Node;
-use super::hierarchy::trs;
+use super::pose::trs;
 use crate::import::ImportError;
 
 const NAME: &str = "EXT_mesh_gpu_instancing";

@@ -20,18 +20,19 @@ use super::{Reader, extensions};
 use crate::import::note::{self, Note, NoteKind};
 use crate::import::{Import, ImportError, Strictness};
 
-/// The number of the material of `primitive`.
+/// The number of the material of `primitive`, which messages call `place`.
 pub(super) fn number(
     reader: &Reader<'_>,
     primitive: &json::mesh::Primitive,
+    place: impl Fn() -> String,
 ) -> Result<u32, ImportError> {
     let materials = reader.document.root.materials.len();
     let index = primitive.material.map_or(materials, |material| material.value());
     match u32::try_from(index) {
         Ok(number) if index < materials || primitive.material.is_none() => Ok(number),
         _ => Err(reader.damaged(
-            format!("materials[{index}]"),
-            format!("there is no such material; the file has {materials}"),
+            format!("{}.material", place()),
+            format!("there is no material {index}; the file has {materials}; export it again"),
         )),
     }
 }

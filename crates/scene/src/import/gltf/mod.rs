@@ -10,6 +10,7 @@
 
 mod accessor;
 mod buffers;
+mod deform;
 mod document;
 mod extensions;
 mod glb;
@@ -17,7 +18,9 @@ mod hierarchy;
 mod instancing;
 mod lights;
 mod material;
+mod pose;
 mod primitive;
+mod skin;
 
 use std::path::Path;
 
@@ -65,9 +68,9 @@ pub(super) fn import(
     let buffers = Buffers::open(path, files, &document, container.binary)?;
     let reader =
         Reader { file: path, files, document: &document, buffers: &buffers, wanted, options };
-    let primitives = primitive::load(&reader, &scene, &mut import)?;
+    let shapes = primitive::load(&reader, &scene, &mut import)?;
     material::load(&reader, &mut import)?;
-    hierarchy::place(&reader, &scene, &primitives, &mut import)?;
+    hierarchy::place(&reader, &scene, &shapes, &mut import)?;
     import.cameras = scene.cameras;
     if wanted.light {
         import.lights = scene.lights;

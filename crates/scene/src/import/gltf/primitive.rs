@@ -1,5 +1,8 @@
 //! Primitives: the meshes of a glTF file, each loaded once and only when the scene shows it.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
 use etendue_geometry::{Buffer, Positions, Vertices};
 use gltf::json;
 use json::mesh::{Mode, Primitive, Semantic};
@@ -7,7 +10,9 @@ use json::validation::Checked;
 use rayon::prelude::*;
 
 use super::accessor::Accessor;
-use super::hierarchy::Scene;
+use super::deform::Corners;
+use super::hierarchy::{Scene, Shape};
+use super::skin::Skin;
 use super::{Reader, extensions};
 use crate::import::admit::{Admitted, Candidate, admit, cost};
 use crate::import::note::{self, Note, NoteKind};
@@ -19,59 +24,103 @@ pub(super) struct Loaded {
     pub mesh: u32,
     /// Index into the import's materials.
     pub material: u32,
+    /// Whether it stands in the model's frame already.
+    pub skinned: bool,
+}
+
+/// The shapes that a scene shows, each loaded once.
+pub(super) struct Shapes {
+    /// In order.
+    shapes: Vec<Shape>,
+    /// For each the primitives that have triangles.
+    primitives: Vec<Vec<Loaded>>,
+}
+
+impl Shapes {
+    /// The shapes of `scene`, not loaded yet.
+    fn of(scene: &Scene) -> Self {
+        let mut shapes: Vec<Shape> = scene.meshes.iter().map(|mesh| mesh.shape.clone()).collect();
+        shapes.sort_unstable();
+        shapes.dedup();
+        let mut primitives = Vec::new();
+        primitives.resize_with(shapes.len(), Vec::new);
+        Self { shapes, primitives }
+    }
+
+    /// The primitives of `shape` that have triangles.
+    pub(super) fn primitives(&self, shape: &Shape) -> &[Loaded] {
+        self.shapes.binary_search(shape).map_or(&[], |found| &self.primitives[found])
+    }
 }
 
 /// A primitive on its way in.
 struct Read {
+    skinned: bool,
     admitted: Admitted,
     copied: u64,
     mapped: u64,
     notes: Vec<Note>,
 }
 
-/// Loads the meshes that `scene` shows: for each mesh of the document its primitives, `None` for
-/// those without triangles. Materials are numbered as in the document.
+/// Loads the meshes that `scene` shows. Materials are numbered as in the document.
 pub(super) fn load(
     reader: &Reader<'_>,
     scene: &Scene,
     import: &mut Import,
-) -> Result<Vec<Vec<Option<Loaded>>>, ImportError> {
+) -> Result<Shapes, ImportError> {
     let meshes = &reader.document.root.meshes;
     let mut shown = vec![false; meshes.len()];
     for placed in &scene.meshes {
-        let Some(shown) = shown.get_mut(placed.mesh) else {
+        let Some(shown) = shown.get_mut(placed.shape.mesh) else {
             return Err(reader.damaged(
                 format!("nodes[{}].mesh", placed.node),
-                format!("there is no mesh {}; the file has {}", placed.mesh, meshes.len()),
+                format!("there is no mesh {}; the file has {}", placed.shape.mesh, meshes.len()),
             ));
         };
         *shown = true;
     }
     note_unused(&shown, &mut import.notes);
-    let wanted: Vec<(usize, usize, &Primitive)> = (meshes.iter().enumerate())
-        .filter(|&(m, _)| shown[m])
-        .flat_map(|(m, mesh)| mesh.primitives.iter().enumerate().map(move |(p, prim)| (m, p, prim)))
+    let skins = skins(reader, scene)?;
+    let mut shapes = Shapes::of(scene);
+    let wanted: Vec<(usize, usize, &Primitive)> = (shapes.shapes.iter().enumerate())
+        .flat_map(|(s, shape)| {
+            let primitives = meshes[shape.mesh].primitives.iter().enumerate();
+            primitives.map(move |(number, primitive)| (s, number, primitive))
+        })
         .collect();
     let read: Vec<Option<Read>> = wanted
         .par_iter()
-        .map(|&(mesh, number, primitive)| read(reader, mesh, number, primitive))
+        .map(|&(s, number, primitive)| {
+            let shape = &shapes.shapes[s];
+            let skin = shape.skin.and_then(|skin| skins.get(&skin));
+            read(reader, shape, skin, number, primitive)
+        })
         .collect::<Result<_, _>>()?;
-    let mut loaded: Vec<Vec<Option<Loaded>>> = Vec::new();
-    loaded.resize_with(meshes.len(), Vec::new);
-    for ((mesh, _, primitive), read) in wanted.into_iter().zip(read) {
-        let entry = match read {
-            Some(read) => Some(Loaded {
-                mesh: take(read, import, reader)?,
-                material: super::material::number(reader, primitive)?,
-            }),
-            None => {
-                note_no_triangles(&mut import.notes);
-                None
-            }
+    for ((s, number, primitive), read) in wanted.into_iter().zip(read) {
+        let Some(read) = read else {
+            note_no_triangles(&mut import.notes);
+            continue;
         };
-        loaded[mesh].push(entry);
+        let place = || place(reader, shapes.shapes[s].mesh, number);
+        let material = super::material::number(reader, primitive, place)?;
+        let skinned = read.skinned;
+        let mesh = take(read, import, reader)?;
+        shapes.primitives[s].push(Loaded { mesh, material, skinned });
     }
-    Ok(loaded)
+    Ok(shapes)
+}
+
+/// The skins that nodes of `scene` wear.
+fn skins(reader: &Reader<'_>, scene: &Scene) -> Result<BTreeMap<usize, Skin>, ImportError> {
+    let mut skins = BTreeMap::new();
+    for placed in &scene.meshes {
+        if let Some(index) = placed.shape.skin
+            && let Entry::Vacant(entry) = skins.entry(index)
+        {
+            entry.insert(Skin::read(reader, index, placed.node, &scene.pose)?);
+        }
+    }
+    Ok(skins)
 }
 
 /// Adds a mesh to `import`; its index.
@@ -104,19 +153,26 @@ fn note_no_triangles(notes: &mut Vec<Note>) {
     note::push(notes, Note::new(NoteKind::Unsupported, "primitives", message));
 }
 
-/// Reads and checks one primitive; `None` for points and lines.
-fn read(
-    reader: &Reader<'_>,
-    mesh: usize,
-    number: usize,
-    primitive: &Primitive,
-) -> Result<Option<Read>, ImportError> {
-    let name = reader.document.root.meshes[mesh].name.clone().unwrap_or_default();
-    let place = if name.is_empty() {
+/// What messages call a primitive.
+fn place(reader: &Reader<'_>, mesh: usize, number: usize) -> String {
+    let name = reader.document.root.meshes[mesh].name.as_deref().unwrap_or_default();
+    if name.is_empty() {
         format!("meshes[{mesh}].primitives[{number}]")
     } else {
         format!("meshes[{mesh}].primitives[{number}] (\"{name}\")")
-    };
+    }
+}
+
+/// Reads and checks one primitive of `shape`; `None` for points and lines.
+fn read(
+    reader: &Reader<'_>,
+    shape: &Shape,
+    skin: Option<&Skin>,
+    number: usize,
+    primitive: &Primitive,
+) -> Result<Option<Read>, ImportError> {
+    let name = reader.document.root.meshes[shape.mesh].name.clone().unwrap_or_default();
+    let place = place(reader, shape.mesh, number);
     let Checked::Valid(mode) = primitive.mode else {
         return Err(reader.damaged(place, "its mode is none that glTF knows"));
     };
@@ -136,36 +192,38 @@ fn read(
     let uvs = if wanted.uvs { part.uvs(&positions)? } else { Vec::new() };
     let colors =
         if wanted.colors { part.vertex_data(&Semantic::Colors(0), 1.0, &positions)? } else { None };
-    if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
-        part.note(NoteKind::Unsupported, "morph targets are not applied");
-    }
+    let Corners { positions, normals, skinned, mirrored } =
+        part.deformed(shape, skin, positions, normals)?;
+    let triangles = if mirrored { turned_over(&triangles) } else { triangles };
     let (mut copied, mut mapped) = cost(&triangles, triangles.len());
     let mut add = |(c, m): (u64, u64)| {
         copied += c;
         mapped += m;
     };
-    add(cost(positions.floats(), positions.len() * 3));
+    add(match &positions {
+        Positions::F32(positions) => cost(positions.floats(), positions.len() * 3),
+        Positions::F64(positions) => cost(positions, positions.len()),
+    });
     normals.iter().for_each(|v| add(cost(v.floats(), v.len() * 3)));
     uvs.iter().for_each(|v| add(cost(v.floats(), v.len() * 2)));
     colors.iter().for_each(|v| add(cost(v.floats(), v.len() * 4)));
-    let positions = Positions::F32(positions);
     let candidate =
         Candidate { name, place: part.place, positions, triangles, normals, uvs, colors };
     let admitted = admit(candidate, reader.file, reader.options)?;
-    Ok(Some(Read { admitted, copied, mapped, notes: part.notes }))
+    Ok(Some(Read { skinned, admitted, copied, mapped, notes: part.notes }))
 }
 
 /// A primitive being read.
-struct Part<'a> {
-    reader: &'a Reader<'a>,
-    primitive: &'a Primitive,
-    place: String,
+pub(super) struct Part<'a> {
+    pub reader: &'a Reader<'a>,
+    pub primitive: &'a Primitive,
+    pub place: String,
     notes: Vec<Note>,
 }
 
 impl<'a> Part<'a> {
     /// The floats of an attribute; `None` when the primitive has none.
-    fn attribute<const N: usize>(
+    pub(super) fn attribute<const N: usize>(
         &self,
         semantic: &Semantic,
         fill: f32,
@@ -273,7 +331,7 @@ impl<'a> Part<'a> {
         }
     }
 
-    fn irregular(&mut self, reason: &str, done: &str) -> Result<(), ImportError> {
+    pub(super) fn irregular(&mut self, reason: &str, done: &str) -> Result<(), ImportError> {
         if self.reader.options.strictness == Strictness::Strict {
             return Err(self.reader.damaged(
                 self.place.clone(),
@@ -285,7 +343,11 @@ impl<'a> Part<'a> {
     }
 
     fn note(&mut self, kind: NoteKind, message: &str) {
-        self.notes.push(Note::new(kind, self.place.clone(), message));
+        self.note_counted(kind, message, 1);
+    }
+
+    pub(super) fn note_counted(&mut self, kind: NoteKind, message: &str, count: u64) {
+        self.notes.push(Note::new(kind, self.place.clone(), message).counted(count));
     }
 
     /// A mesh of nothing.
@@ -293,8 +355,14 @@ impl<'a> Part<'a> {
         let positions = Positions::F32(Vertices::from_arrays(&[]));
         let mesh = etendue_geometry::Mesh::new(name, positions, Vec::new().into());
         let admitted = Admitted { mesh, dropped: 0, degenerate: 0, notes: Vec::new() };
-        Read { admitted, copied: 0, mapped: 0, notes: self.notes }
+        Read { skinned: false, admitted, copied: 0, mapped: 0, notes: self.notes }
     }
+}
+
+/// `triangles` with their backs in front.
+fn turned_over(triangles: &[[u32; 3]]) -> Buffer<[u32; 3]> {
+    let turned: Vec<[u32; 3]> = triangles.par_iter().map(|&[a, b, c]| [a, c, b]).collect();
+    turned.into()
 }
 
 /// Triangles from `len` corners (glTF 2.0, section 3.7.2.1): in strips, every other triangle is
