@@ -22,6 +22,7 @@ use etendue_geometry::{Geometry, MISS, RayBatch};
 
 use crate::single::{F32_EPSILON, Rays32, round};
 use crate::solve::{LANES, Lane, Lanes};
+use crate::triangle::{at, cross, cross_plane, dot, minus};
 
 /// What rounding may misplace a start by, per sum of its coordinates: half a unit in the last place of
 /// each, and half as much again for the triangle's.
@@ -101,25 +102,19 @@ fn measure(lanes: &Lanes, rays32: &Rays32, range: Range<usize>, out: &mut Clear)
         }
     }
     for i in 0..LANES {
-        let (dx, dy, dz) = (d[0][i], d[1][i], d[2][i]);
-        let (ax, ay, az) = (a[0][i], a[1][i], a[2][i]);
-        let (bx, by, bz) = (e1[0][i], e1[1][i], e1[2][i]);
-        let (cx, cy, cz) = (e2[0][i], e2[1][i], e2[2][i]);
-        let (nx, ny, nz) = (by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx);
-        let nn = nx * nx + ny * ny + nz * nz;
-        let length = nn.sqrt();
-        let cosine = (nx * dx + ny * dy + nz * dz).abs() / length;
+        let (b, c) = (at(e1, i), at(e2, i));
+        let n = cross(b, c);
+        // The start's own weights, times n·n: those of the line from it along the normal.
+        let foot = cross_plane(at(a, i), b, c, n);
+        let (nn, length) = (foot.along, foot.along.sqrt());
+        let cosine = dot(n, at(d, i)).abs() / length;
         let clear = ROUNDING * size[i] / cosine;
         // Distances from the edges, by the areas that the start makes with them.
-        let (mx, my, mz) = (ay * nz - az * ny, az * nx - ax * nz, ax * ny - ay * nx);
-        let u = mx * cx + my * cy + mz * cz;
-        let v = -(mx * bx + my * by + mz * bz);
-        let w = nn - u - v;
-        let (gx, gy, gz) = (cx - bx, cy - by, cz - bz);
+        let opposite = minus(c, b);
         let edges = [
-            u / (cx * cx + cy * cy + cz * cz).sqrt(),
-            v / (bx * bx + by * by + bz * bz).sqrt(),
-            w / (gx * gx + gy * gy + gz * gz).sqrt(),
+            foot.u / dot(c, c).sqrt(),
+            foot.v / dot(b, b).sqrt(),
+            (nn - foot.u - foot.v) / dot(opposite, opposite).sqrt(),
         ];
         let inside = edges[0].min(edges[1]).min(edges[2]) / length;
         // Comparisons with what is no number are false.

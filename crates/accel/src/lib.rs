@@ -30,6 +30,7 @@ mod single;
 #[cfg(feature = "embree")]
 mod solve;
 mod tree;
+mod triangle;
 mod watch;
 pub mod watertight;
 

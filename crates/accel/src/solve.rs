@@ -5,13 +5,12 @@
 //! `o = T − O` (exact when the camera is near, see [`etendue_geometry::Transform`]),
 //!
 //! ```text
-//! a = L p0 + o,   e1 = L (p1 − p0),   e2 = L (p2 − p0),   n = e1 × e2
-//! t = n·a / n·d,  u = (a × d)·e2 / n·d,  v = −(a × d)·e1 / n·d
+//! a = L p0 + o,   e1 = L (p1 − p0),   e2 = L (p2 − p0)
 //! ```
 //!
-//! (Möller & Trumbore 1997, with the distance from the plane, whose error does not grow with `|a|/|e|`:
-//! differences of f32 coordinates are exact in f64.) The relative error of `t` is a few 2⁻⁵³ over the
-//! cosine of incidence.
+//! go into the one formula of [`crate::triangle`]. Its distance comes from the plane, whose error does
+//! not grow with `|a|/|e|`: differences of f32 coordinates are exact in f64. The relative error of `t` is
+//! a few 2⁻⁵³ over the cosine of incidence.
 //!
 //! A hit is *valid* when `u`, `v` and `1 − u − v` are negative by no more than their own rounding
 //! error. Single precision picks the wrong one of two neighbours when a ray passes within about 10⁻⁷
@@ -20,6 +19,7 @@
 use etendue_geometry::glam::DMat3;
 use std::ops::Range;
 
+use crate::triangle::{Vector, at, cross_plane};
 use etendue_geometry::{
     Detail, Geometry, HitBatch, MISS, Mesh, Placement, Positions, RayBatch, Transform,
 };
@@ -281,7 +281,7 @@ fn turn(linear: &DMat3, vectors: &mut [Lane; 3], start: usize, end: usize) {
     }
 }
 
-/// The formulas of this module's head, one lane beside the other.
+/// Where each ray meets its triangle's plane, and whether that is inside of the triangle.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512vl",
     "x86_64+avx2",
@@ -290,26 +290,19 @@ fn turn(linear: &DMat3, vectors: &mut [Lane; 3], start: usize, end: usize) {
 fn measure(lanes: &mut Lanes, want_normal: bool) {
     let Lanes { a, e1, e2, d, magnitude, handedness, t, u, v, excess, front, n, .. } = lanes;
     for i in 0..LANES {
-        let (ax, ay, az) = (a[0][i], a[1][i], a[2][i]);
-        let (bx, by, bz) = (e1[0][i], e1[1][i], e1[2][i]);
-        let (cx, cy, cz) = (e2[0][i], e2[1][i], e2[2][i]);
-        let (dx, dy, dz) = (d[0][i], d[1][i], d[2][i]);
-        let (nx, ny, nz) = (by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx);
-        let along = nx * dx + ny * dy + nz * dz;
-        let inverse = 1.0 / along;
-        t[i] = (nx * ax + ny * ay + nz * az) * inverse;
-        front[i] = -along * handedness[i];
-        let (mx, my, mz) = (ay * dz - az * dy, az * dx - ax * dz, ax * dy - ay * dx);
-        let ui = (mx * cx + my * cy + mz * cz) * inverse;
-        let vi = -(mx * bx + my * by + mz * bz) * inverse;
+        let [p, b, c] = [at(a, i), at(e1, i), at(e2, i)];
+        let crossing = cross_plane(p, b, c, at(d, i));
+        let inverse = 1.0 / crossing.along;
+        t[i] = crossing.t * inverse;
+        front[i] = -crossing.along * handedness[i];
+        let (ui, vi) = (crossing.u * inverse, crossing.v * inverse);
         u[i] = ui;
         v[i] = vi;
-        let edges = (bx.abs() + by.abs() + bz.abs()).max(cx.abs() + cy.abs() + cz.abs());
+        let sum = |edge: Vector| edge[0].abs() + edge[1].abs() + edge[2].abs();
+        let edges = sum(b).max(sum(c));
         let tolerance = (ROUNDING * magnitude[i] * edges * inverse.abs()).min(WORST_TOLERANCE);
         excess[i] = (-ui).max(-vi).max(ui + vi - 1.0) - tolerance;
-        n[0][i] = nx;
-        n[1][i] = ny;
-        n[2][i] = nz;
+        (n[0][i], n[1][i], n[2][i]) = crossing.normal.into();
     }
     if want_normal {
         for i in 0..LANES {

@@ -31,6 +31,8 @@
 use etendue_geometry::glam::DVec3;
 use robust::{Coord3D, orient3d};
 
+use crate::triangle::{Vector, at, cross_plane, dot, minus};
+
 /// Where a ray meets a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
@@ -180,27 +182,10 @@ pub(crate) fn locate_many<const N: usize>(lines: &Lines<N>, wanted: u32) -> [[f6
     let mut careful = 0_u32;
     let [a, b, c] = &lines.corners;
     for i in 0..N {
-        let (ax, ay, az) = (a[0][i], a[1][i], a[2][i]);
-        let (dx, dy, dz) = (lines.direction[0][i], lines.direction[1][i], lines.direction[2][i]);
-        let (px, py, pz) = (b[0][i] - ax, b[1][i] - ay, b[2][i] - az);
-        let (qx, qy, qz) = (c[0][i] - ax, c[1][i] - ay, c[2][i] - az);
-        let (nx, ny, nz) = (py * qz - qy * pz, pz * qx - qz * px, px * qy - qx * py);
-        let nn = nx * nx + ny * ny + nz * nz;
-        let nd = nx * dx + ny * dy + nz * dz;
-        let (pp, qq) = (px * px + py * py + pz * pz, qx * qx + qy * qy + qz * qz);
-        let dd = dx * dx + dy * dy + dz * dz;
-        let slim = nn < SLIM * (pp * qq);
-        let grazed = nd * nd < SLIM * (nn * dd);
-        careful |= u32::from(slim | grazed | !((nn > 1e-250) & (nn < 1e250))) << i;
-        let (mx, my, mz) = (ay * dz - dy * az, az * dx - dz * ax, ax * dy - dx * ay);
-        let scale = 1.0 / nd;
-        t[i] = (nx * ax + ny * ay + nz * az) * scale;
-        u[i] = (mx * qx + my * qy + mz * qz) * scale;
-        v[i] = (-mx * px + -my * py + -mz * pz) * scale;
-    }
-    for i in 0..N {
-        u[i] = u[i].clamp(0.0, 1.0);
-        v[i] = v[i].max(0.0).min(1.0 - u[i]);
+        let corners = [at(a, i), at(b, i), at(c, i)];
+        let plain = locate_plainly(corners, at(&lines.direction, i));
+        (t[i], u[i], v[i]) = (plain.t, plain.u, plain.v);
+        careful |= u32::from(plain.is_delicate) << i;
     }
     careful &= wanted;
     while careful != 0 {
@@ -217,21 +202,33 @@ pub(crate) fn locate_many<const N: usize>(lines: &Lines<N>, wanted: u32) -> [[f6
 /// Distance and weights of a line that is known to meet the triangle.
 #[inline]
 fn locate(a: DVec3, b: DVec3, c: DVec3, d: DVec3, front: bool) -> Hit {
-    let (e1, e2) = (b - a, c - a);
-    let normal = e1.cross(e2);
-    let (nn, nd) = (normal.length_squared(), normal.dot(d));
-    let slim = nn < SLIM * (e1.length_squared() * e2.length_squared());
-    let grazed = nd * nd < SLIM * (nn * d.length_squared());
-    if slim || grazed || !(nn > 1e-250 && nn < 1e250) {
-        return locate_carefully([a, b, c], d, front);
-    }
-    // a + u e1 + v e2 = t d, each unknown by a product that makes the other two vanish. Edges are
-    // differences of neighbours, so they have no rounding to speak of.
-    let moment = a.cross(d);
+    let Plain { t, u, v, is_delicate } =
+        locate_plainly([a, b, c].map(|corner| corner.to_array()), d.to_array());
+    if is_delicate { locate_carefully([a, b, c], d, front) } else { Hit { t, u, v, front } }
+}
+
+/// What the plain formula says, and whether the careful one has to take over.
+struct Plain {
+    t: f64,
+    u: f64,
+    v: f64,
+    is_delicate: bool,
+}
+
+/// The plain formula. Edges are differences of neighbours, so they have no rounding to speak of.
+#[inline(always)]
+fn locate_plainly([a, b, c]: [Vector; 3], d: Vector) -> Plain {
+    let (e1, e2) = (minus(b, a), minus(c, a));
+    let crossing = cross_plane(a, e1, e2, d);
+    let (nn, nd) = (dot(crossing.normal, crossing.normal), crossing.along);
+    let slim = nn < SLIM * (dot(e1, e1) * dot(e2, e2));
+    let grazed = nd * nd < SLIM * (nn * dot(d, d));
+    let is_delicate = slim | grazed | !((nn > 1e-250) & (nn < 1e250));
     let scale = 1.0 / nd;
-    let u = (moment.dot(e2) * scale).clamp(0.0, 1.0);
-    let v = (-moment.dot(e1) * scale).clamp(0.0, 1.0 - u);
-    Hit { t: normal.dot(a) * scale, u, v, front }
+    let u = (crossing.u * scale).clamp(0.0, 1.0);
+    // Not `clamp`, which panics where `u` is no number.
+    let v = (crossing.v * scale).max(0.0).min(1.0 - u);
+    Plain { t: crossing.t * scale, u, v, is_delicate }
 }
 
 /// As [`locate`] for needles, grazed triangles and extreme sizes: works from the corner with the
