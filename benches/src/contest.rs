@@ -86,7 +86,8 @@ fn chunk_of<T>(all: &[T], chunk: usize, len: usize) -> &[T] {
 }
 
 fn touch(rays: &RayBatch) {
-    let arrays = rays.origin.iter().chain(&rays.direction).chain([&rays.t_min, &rays.t_max]);
+    let limits = [rays.t_min(), rays.t_max()];
+    let arrays = rays.origins().into_iter().chain(rays.directions()).chain(limits);
     black_box(arrays.map(|array| array.iter().sum::<f64>()).sum::<f64>());
 }
 

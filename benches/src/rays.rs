@@ -101,7 +101,7 @@ impl View {
 }
 
 fn coherent() -> RayBatch {
-    RayBatch { coherent: true, ..RayBatch::with_capacity(BATCH) }
+    RayBatch::with_capacity(BATCH).with_coherence(true)
 }
 
 /// The upper left corners of all tiles.
@@ -165,5 +165,5 @@ pub fn occlusion(accel: &dyn Accel, geometry: &Geometry, primary: &[RayBatch]) -
 /// The same rays, to be traced one by one.
 #[must_use]
 pub fn one_by_one(batches: &[RayBatch]) -> Vec<RayBatch> {
-    batches.iter().map(|rays| RayBatch { coherent: false, ..rays.clone() }).collect()
+    batches.iter().map(|rays| rays.clone().with_coherence(false)).collect()
 }

@@ -97,7 +97,7 @@ impl Embree {
 
     /// Whether the rays are to be decided in f64 where they start: those of surfaces.
     fn start_on_surfaces(rays: &RayBatch) -> bool {
-        let set_off = || !rays.coherent && rays.t_min.iter().any(|&t_min| t_min > 0.0);
+        let set_off = || !rays.coherent && rays.t_min().iter().any(|&t_min| t_min > 0.0);
         rays.from_surface || set_off()
     }
 

@@ -62,13 +62,11 @@ impl Ends {
         rays32: &mut Rays32,
         lanes: &mut Lanes,
     ) {
-        if rays.ends.len() != rays.len() {
-            return;
-        }
+        let Some(triangles) = rays.endpoint_triangles() else { return };
         self.placement.clear();
-        self.placement.extend(rays.ends.iter().map(|[left, _]| left[0]));
+        self.placement.extend(triangles.iter().map(|[left, _]| left[0]));
         self.triangle.clear();
-        self.triangle.extend(rays.ends.iter().map(|[left, _]| left[1]));
+        self.triangle.extend(triangles.iter().map(|[left, _]| left[1]));
         for start in (0..rays.len()).step_by(LANES) {
             let range = start..rays.len().min(start + LANES);
             let ids = (&self.placement[..], &self.triangle[..]);
@@ -77,7 +75,7 @@ impl Ends {
             for i in range {
                 let clear = self.clear.0[i - start];
                 // Most of a short ray is left for what may be in between.
-                let long = clear < 0.25 * rays.t_max[i] && clear >= rays.t_min[i];
+                let long = clear < 0.25 * rays.t_max()[i] && clear >= rays.t_min()[i];
                 if long && self.placement[i] != MISS {
                     let (near, far) = (&mut rays32.t_near[i], rays32.t_far[i]);
                     *near = near.max(round(clear - rays32.advance[i])).min(far);
@@ -101,14 +99,14 @@ fn measure(lanes: &Lanes, rays32: &Rays32, range: Range<usize>, out: &mut Clear)
             *size += f64::from(x).abs();
         }
     }
-    for i in 0..LANES {
+    for (i, (out, &size)) in out.0.iter_mut().zip(&size).enumerate() {
         let (b, c) = (at(e1, i), at(e2, i));
         let n = cross(b, c);
         // The start's own weights, times n·n: those of the line from it along the normal.
         let foot = cross_plane(at(a, i), b, c, n);
         let (nn, length) = (foot.along, foot.along.sqrt());
         let cosine = dot(n, at(d, i)).abs() / length;
-        let clear = ROUNDING * size[i] / cosine;
+        let clear = ROUNDING * size / cosine;
         // Distances from the edges, by the areas that the start makes with them.
         let opposite = minus(c, b);
         let edges = [
@@ -119,6 +117,6 @@ fn measure(lanes: &Lanes, rays32: &Rays32, range: Range<usize>, out: &mut Clear)
         let inside = edges[0].min(edges[1]).min(edges[2]) / length;
         // Comparisons with what is no number are false.
         let known = (cosine >= FLATTEST) & (inside > INSIDE * clear);
-        out.0[i] = if known { clear } else { f64::INFINITY };
+        *out = if known { clear } else { f64::INFINITY };
     }
 }

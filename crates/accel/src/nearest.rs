@@ -21,8 +21,8 @@ impl Query {
         let query = Self {
             origin: rays.origin(i),
             direction: rays.direction(i),
-            t_min: rays.t_min[i],
-            t_max: rays.t_max[i],
+            t_min: rays.t_min()[i],
+            t_max: rays.t_max()[i],
         };
         let sound = query.origin.is_finite()
             && query.direction.is_finite()

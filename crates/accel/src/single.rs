@@ -154,7 +154,7 @@ impl Rays32 {
         self.push_shifted(from, i, DVec3::ZERO);
         for axis in 0..3 {
             if let Some(last) = self.direction[axis].last_mut() {
-                *last = round(rays.direction[axis][i]);
+                *last = round(rays.directions()[axis][i]);
             }
         }
     }
@@ -176,10 +176,10 @@ pub(crate) fn round(x: f64) -> f32 {
     "aarch64+neon"
 ))]
 fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
-    let n = rays.t_min.len();
-    let [ox, oy, oz] = rays.origin.each_ref().map(|array| &array[..n]);
-    let [dx, dy, dz] = rays.direction.each_ref().map(|array| &array[..n]);
-    let (t_min, t_max) = (&rays.t_min[..n], &rays.t_max[..n]);
+    let n = rays.len();
+    let [ox, oy, oz] = rays.origins().map(|array| &array[..n]);
+    let [dx, dy, dz] = rays.directions().map(|array| &array[..n]);
+    let (t_min, t_max) = (&rays.t_min()[..n], &rays.t_max()[..n]);
     let [px, py, pz] = out.origin.each_mut().map(|array| &mut array[..n]);
     let [qx, qy, qz] = out.direction.each_mut().map(|array| &mut array[..n]);
     let (t_near, t_far) = (&mut out.t_near[..n], &mut out.t_far[..n]);

@@ -151,7 +151,7 @@ impl Lanes {
         range: Range<usize>,
     ) {
         for axis in 0..3 {
-            self.d[axis][..range.len()].copy_from_slice(&rays.direction[axis][range.clone()]);
+            self.d[axis][..range.len()].copy_from_slice(&rays.directions()[axis][range.clone()]);
         }
         let mut i = range.start;
         while i < range.end {
@@ -217,7 +217,7 @@ impl Lanes {
             moved_only: transform.linear == DMat3::IDENTITY,
             narrow,
         };
-        let origin = rays.origin.each_ref().map(|axis| &axis[run.clone()]);
+        let origin = rays.origins().map(|axis| &axis[run.clone()]);
         self.put(here, &place, origin);
     }
 
@@ -338,7 +338,7 @@ fn scatter(
 ) -> Seen {
     let range = start..start + count;
     let placement = &hits.placement[range.clone()];
-    let (t_min, t_max) = (&rays.t_min[range.clone()], &rays.t_max[range.clone()]);
+    let (t_min, t_max) = (&rays.t_min()[range.clone()], &rays.t_max()[range.clone()]);
     let (out, t) = (&mut hits.t[range.clone()], &lanes.t[..count]);
     let (excess, front) = (&lanes.excess[..count], &lanes.front[..count]);
     let valid_out = &mut solved.valid[range.clone()];

@@ -52,8 +52,8 @@ fn brute_force(geometry: &Geometry, rays: &RayBatch) -> Vec<(f64, u32, u32)> {
                 let to = |corner| placement.world_from_mesh.point_from(corner, rays.origin(i));
                 let [a, b, c] = mesh.corners(triangle).map(to);
                 if let Some(hit) = watertight::intersect(a, b, c, rays.direction(i))
-                    && hit.t >= rays.t_min[i]
-                    && hit.t <= rays.t_max[i]
+                    && hit.t >= rays.t_min()[i]
+                    && hit.t <= rays.t_max()[i]
                 {
                     let found = (hit.t, p as u32, triangle as u32);
                     best = if found < best { found } else { best };
@@ -89,13 +89,13 @@ fn assert_agreement(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str, found
             continue;
         }
         for coherent in [false, true] {
-            let rays = RayBatch { coherent, ..rays.clone() };
+            let rays = rays.clone().with_coherence(coherent);
             let hits = closest(&*accel, &rays);
             assert_eq!(hits.len(), rays.len());
             let mut at_edges = 0;
             for i in 0..rays.len() {
                 let context = || {
-                    let ray = (rays.origin(i), rays.direction(i), rays.t_min[i], rays.t_max[i]);
+                    let ray = (rays.origin(i), rays.direction(i), rays.t_min()[i], rays.t_max()[i]);
                     format!("{what}, {name}, coherent {coherent}: ray {i} {ray:?}")
                 };
                 let ours = (hits.t[i], hits.placement[i], hits.triangle[i]);
@@ -175,7 +175,7 @@ fn assert_bvh_equals_exact(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str
     let bvh = Bvh::build(Arc::clone(geometry), &options).expect("sound");
     let truth = closest(&exact, rays);
     for coherent in [false, true] {
-        let hits = closest(&bvh, &RayBatch { coherent, ..rays.clone() });
+        let hits = closest(&bvh, &rays.clone().with_coherence(coherent));
         for i in 0..rays.len() {
             let all = |h: &HitBatch| {
                 (h.t[i], h.placement[i], h.triangle[i], h.u[i], h.v[i], h.normal(i).to_array())
@@ -343,7 +343,7 @@ fn packets_agree_with_single_rays() {
         ("instances", instances(&mut random, 20)),
     ] {
         for (eye, width) in [(DVec3::new(0.0, 0.0, 4.0), 0.8), (DVec3::splat(0.02), 3.0)] {
-            let mut batch = RayBatch { coherent: true, ..RayBatch::default() };
+            let mut batch = RayBatch::default().with_coherence(true);
             for block in 0..64 {
                 for pixel in 0..64 {
                     let x = f64::from(block % 8 * 8 + pixel % 8) / 32.0 - 1.0;

@@ -41,8 +41,9 @@ fn rays_neither_stick_nor_leak() {
         });
         // What a spawned ray is off by: 32 roundings of the numbers involved.
         let off = 32.0 * f64::EPSILON * 3.0 * (scale + far);
-        let mut rays = RayBatch { from_surface: true, ..RayBatch::default() };
-        let (mut inward, mut leaves) = (Vec::new(), Vec::new());
+        let mut rays = RayBatch::default().from_surfaces();
+        let mut told_rays = rays.clone();
+        let mut inward = Vec::new();
         let golden = 2.399_963_229_728_653;
         for k in 0..4000_u32 {
             let share = (f64::from(k) + 0.5) / 4000.0;
@@ -59,16 +60,18 @@ fn rays_neither_stick_nor_leak() {
             let origin =
                 DVec3::splat(far) + DVec3::new(x, -1.0, z) * scale + DVec3::Y * (side * off);
             rays.push(origin, direction);
+            let limits = [0.0, f64::INFINITY];
             // The floor is triangles 4 and 5, on both sides of its diagonal.
-            leaves.push([[0, if x > z { 4 } else { 5 }], [MISS; 2]]);
+            let leaves = [[0, if x > z { 4 } else { 5 }], [MISS; 2]];
+            told_rays.push_between_triangles(origin, direction, limits, leaves);
             inward.push(side > 0.0);
         }
         for accel in backends(&geometry) {
             let name = accel.report().backend;
             // In packets or not, told which triangle each ray leaves or not.
             for (coherent, told) in [(false, false), (true, false), (false, true), (true, true)] {
-                rays.coherent = coherent;
-                rays.ends = if told { leaves.clone() } else { Vec::new() };
+                let rays = if told { &told_rays } else { &rays };
+                let rays = rays.clone().with_coherence(coherent);
                 let mut hits = HitBatch::new(Detail::Surface);
                 accel.closest(&rays, &mut hits);
                 let mut blocked = Vec::new();
@@ -89,8 +92,8 @@ fn rays_neither_stick_nor_leak() {
                 // A ray that ends a little before the wall it would meet is free.
                 let mut short = rays.clone();
                 for i in 0..short.len() {
-                    short.t_max[i] = hits.t[i].min(1e30) * (1.0 - 1e-9) - off * 8.0;
-                    short.t_max[i] = short.t_max[i].max(0.0);
+                    let near = hits.t[i].min(1e30) * (1.0 - 1e-9) - off * 8.0;
+                    short.arrays_mut().t_max[i] = near.max(0.0);
                 }
                 accel.occluded(&short, &mut blocked);
                 let stuck = blocked.iter().filter(|&&b| b).count();

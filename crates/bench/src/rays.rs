@@ -54,7 +54,7 @@ impl Rays {
     /// surface, by the cosine: as paths go on from matte surfaces. The same every time.
     #[must_use]
     pub fn scattered(&self, accel: &dyn Accel) -> Self {
-        let mut scattered = RayBatch { from_surface: true, ..RayBatch::default() };
+        let mut scattered = RayBatch::default().from_surfaces();
         let mut hits = HitBatch::new(Detail::Surface);
         let mut number = 0;
         for rays in self.batches(RENDER_WIDTH) {
@@ -103,17 +103,9 @@ impl Rays {
         let starts = (0..all.len()).step_by(width.max(1));
         starts
             .map(|start| {
-                let range = start..all.len().min(start + width.max(1));
-                let part = |array: &Vec<f64>| array[range.clone()].to_vec();
-                RayBatch {
-                    origin: all.origin.each_ref().map(part),
-                    direction: all.direction.each_ref().map(part),
-                    t_min: part(&all.t_min),
-                    t_max: part(&all.t_max),
-                    coherent: all.coherent,
-                    from_surface: all.from_surface,
-                    ends: all.ends.get(range.clone()).unwrap_or_default().to_vec(),
-                }
+                let mut batch = RayBatch::default();
+                batch.gather(all, start..all.len().min(start + width.max(1)));
+                batch
             })
             .collect()
     }
@@ -165,15 +157,16 @@ mod tests {
         let rays = Rays::primary(&camera, usize::MAX);
         assert_eq!(rays.len(), 40 * 21);
         let mut ends: Vec<[u64; 2]> = (0..rays.len())
-            .map(|i| [0, 1].map(|axis| rays.0.direction[axis][i].to_bits()))
+            .map(|i| [0, 1].map(|axis| rays.0.directions()[axis][i].to_bits()))
             .collect();
         ends.sort_unstable();
         ends.dedup();
         assert_eq!(ends.len(), 40 * 21, "every pixel has a direction of its own");
         for width in [1, 16, 100, 4096] {
             let batches = rays.batches(width);
-            let joined: Vec<f64> = batches.iter().flat_map(|b| b.direction[0].clone()).collect();
-            assert_eq!(joined, rays.0.direction[0], "{width}");
+            let joined: Vec<f64> =
+                batches.iter().flat_map(|b| b.directions()[0].to_vec()).collect();
+            assert_eq!(joined, rays.0.directions()[0], "{width}");
             assert!(batches.iter().all(|b| b.len() <= width && b.coherent));
         }
         // Every column and row of tiles has its share.
@@ -188,7 +181,7 @@ mod tests {
         for axis in 0..2 {
             let side = |k: &f64| usize::from(*k > 0.0);
             let mut halves = [0usize; 2];
-            some.0.direction[axis].iter().for_each(|k| halves[side(k)] += 1);
+            some.0.directions()[axis].iter().for_each(|k| halves[side(k)] += 1);
             assert!(halves[0].abs_diff(halves[1]) < 64 * 256 / 8, "{halves:?}");
         }
         // Whole tiles, no more than asked for.
@@ -228,7 +221,7 @@ mod tests {
         accel.closest(&scattered.0, &mut hits);
         assert!((0..hits.len()).all(|i| !hits.is_hit(i)), "they leave the side that was seen");
         // The mean of the cosine over its own distribution is 2/3, its deviation 0.24.
-        let mean = scattered.0.direction[2].iter().sum::<f64>() / 40_000.0;
+        let mean = scattered.0.directions()[2].iter().sum::<f64>() / 40_000.0;
         assert!((mean - 2.0 / 3.0).abs() < 4.0 * 0.24 / 200.0, "{mean}");
     }
 }

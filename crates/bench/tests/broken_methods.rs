@@ -31,7 +31,7 @@ fn aimed(geometry: &Geometry) -> Rays {
     let placement = &geometry.placements[0];
     let mesh = geometry.mesh_of(placement);
     let eye = placement.world_from_mesh.point(DVec3::new(0.02, -0.03, 0.01));
-    let mut rays = RayBatch { coherent: true, ..RayBatch::default() };
+    let mut rays = RayBatch::default().with_coherence(true);
     for triangle in mesh.triangles.iter() {
         let [a, b, c] =
             triangle.map(|i| placement.world_from_mesh.point(mesh.positions.get(i as usize)));

@@ -331,8 +331,9 @@ impl Camera {
     /// Directions have length 1; origins are the entrance pupil, or lie in the plane through the
     /// camera's origin for parallel rays.
     pub fn chief_rays(&self, block: PixelBlock, rays: &mut RayBatch) {
-        reset(rays, block.len());
-        let [columns, rows, _] = &mut rays.direction;
+        rays.reset(block.len());
+        rays.coherent = true;
+        let [columns, rows, _] = rays.arrays_mut().directions;
         for (((column, row), u), v) in block.pixels().zip(columns).zip(rows) {
             *u = f64::from(column) + 0.5;
             *v = f64::from(row) + 0.5;
@@ -345,9 +346,11 @@ impl Camera {
     /// a longer array's surplus is left out.
     pub fn rays_through(&self, columns: &[f64], rows: &[f64], rays: &mut RayBatch) {
         let len = columns.len().min(rows.len());
-        reset(rays, len);
-        rays.direction[0].copy_from_slice(&columns[..len]);
-        rays.direction[1].copy_from_slice(&rows[..len]);
+        rays.reset(len);
+        rays.coherent = true;
+        let [x, y, _] = rays.arrays_mut().directions;
+        x.copy_from_slice(&columns[..len]);
+        y.copy_from_slice(&rows[..len]);
         self.aim(rays);
     }
 
@@ -374,16 +377,4 @@ impl Camera {
             Projection::Lens(lens) => lens.aim(&self.pose, rays),
         }
     }
-}
-
-/// Makes room for `len` coherent rays without limits, whose origins and directions are to be set.
-fn reset(rays: &mut RayBatch, len: usize) {
-    for array in rays.origin.iter_mut().chain(&mut rays.direction) {
-        array.resize(len, 0.0);
-    }
-    rays.t_min.clear();
-    rays.t_min.resize(len, 0.0);
-    rays.t_max.clear();
-    rays.t_max.resize(len, f64::INFINITY);
-    rays.coherent = true;
 }

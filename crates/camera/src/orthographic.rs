@@ -1,6 +1,6 @@
 //! The orthographic camera: all rays are parallel to the axis.
 
-use etendue_geometry::RayBatch;
+use etendue_geometry::{RayBatch, RaysMut};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -85,8 +85,8 @@ impl Orthographic {
     /// the directions, into parallel rays. All arrays have the same length.
     pub(crate) fn aim(&self, pose: &Pose, rays: &mut RayBatch) {
         let (right, down, forward) = (pose.right(), -pose.up(), pose.forward());
-        let [dx, dy, dz] = &mut rays.direction;
-        for (axis, origins) in rays.origin.iter_mut().enumerate() {
+        let RaysMut { origins, directions: [dx, dy, dz], .. } = rays.arrays_mut();
+        for (axis, origins) in origins.into_iter().enumerate() {
             let (start, right, down) = (pose.position[axis], right[axis], down[axis]);
             for ((origin, u), v) in origins.iter_mut().zip(&*dx).zip(&*dy) {
                 let (x, y) = ((u - self.centre[0]) * self.pixel, (v - self.centre[1]) * self.pixel);

@@ -1,7 +1,7 @@
 //! The pinhole: every ray of the picture passes through one point.
 
-use etendue_geometry::RayBatch;
 use etendue_geometry::glam::DVec3;
+use etendue_geometry::{RayBatch, RaysMut};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -156,31 +156,32 @@ impl Pinhole {
     /// Turns places on the sensor (pixels from the corner), which stand in the first two arrays of
     /// the directions, into rays from the pinhole. All arrays have the same length.
     pub(crate) fn aim(&self, pose: &Pose, rays: &mut RayBatch) {
-        for (axis, origins) in rays.origin.iter_mut().enumerate() {
+        for (axis, origins) in rays.arrays_mut().origins.into_iter().enumerate() {
             origins.fill(pose.position[axis]);
         }
         match &self.distortion {
             None => {
                 let axes = [pose.right(), -pose.up(), pose.forward()];
-                aim_straight(&self.intrinsics, axes, &mut rays.direction);
+                aim_straight(&self.intrinsics, axes, rays.arrays_mut().directions);
             }
             Some(distortion) => self.aim_distorted(distortion, pose, rays),
         }
     }
 
     fn aim_distorted(&self, distortion: &Distortion, pose: &Pose, rays: &mut RayBatch) {
-        for i in 0..rays.len() {
-            let seen = self.intrinsics.tangents(rays.direction[0][i], rays.direction[1][i]);
+        let RaysMut { directions, t_max, .. } = rays.arrays_mut();
+        for i in 0..t_max.len() {
+            let seen = self.intrinsics.tangents(directions[0][i], directions[1][i]);
             let (direction, sees) = match distortion.undistort(seen) {
                 Some([x, y, z]) => (pose.right() * x - pose.up() * y + pose.forward() * z, true),
                 None => (pose.forward(), false),
             };
             for axis in 0..3 {
-                rays.direction[axis][i] = direction[axis];
+                directions[axis][i] = direction[axis];
             }
             if !sees {
                 // Nothing lies before a negative distance: the ray hits nothing.
-                rays.t_max[i] = -1.0;
+                t_max[i] = -1.0;
             }
         }
     }
@@ -196,7 +197,7 @@ impl Pinhole {
 fn aim_straight(
     intrinsics: &Intrinsics,
     [right, down, forward]: [DVec3; 3],
-    directions: &mut [Vec<f64>; 3],
+    directions: [&mut [f64]; 3],
 ) {
     let [dx, dy, dz] = directions;
     // The three arrays walk in step, so that the loop has no bounds to check and vectorises.

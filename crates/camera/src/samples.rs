@@ -83,26 +83,15 @@ impl CameraRays {
 
     /// Leaves out rays that were ended before they began: they see nothing.
     pub(crate) fn drop_unseen(&mut self) {
-        if self.rays.t_max.iter().all(|&t_max| t_max >= 0.0) {
+        let sees: Vec<bool> = self.rays.t_max().iter().map(|&t_max| t_max >= 0.0).collect();
+        if sees.iter().all(|&sees| sees) {
             return;
         }
-        let mut kept = 0;
-        for i in 0..self.rays.len() {
-            if self.rays.t_max[i] >= 0.0 {
-                for array in self.rays.origin.iter_mut().chain(&mut self.rays.direction) {
-                    array[kept] = array[i];
-                }
-                self.rays.t_min[kept] = self.rays.t_min[i];
-                self.rays.t_max[kept] = self.rays.t_max[i];
-                self.sample[kept] = self.sample[i];
-                kept += 1;
-            }
-        }
-        for array in self.rays.origin.iter_mut().chain(&mut self.rays.direction) {
-            array.truncate(kept);
-        }
-        self.rays.t_min.truncate(kept);
-        self.rays.t_max.truncate(kept);
-        self.sample.truncate(kept);
+        self.rays.retain(|i| sees[i]);
+        let mut i = 0;
+        self.sample.retain(|_| {
+            i += 1;
+            sees[i - 1]
+        });
     }
 }

@@ -32,11 +32,11 @@ fn chief(camera: &Camera, places: &[[f64; 2]]) -> RayBatch {
 }
 
 fn origin(rays: &RayBatch, i: usize) -> DVec3 {
-    DVec3::from_array([0, 1, 2].map(|k| rays.origin[k][i]))
+    DVec3::from_array([0, 1, 2].map(|k| rays.origins()[k][i]))
 }
 
 fn direction(rays: &RayBatch, i: usize) -> DVec3 {
-    DVec3::from_array([0, 1, 2].map(|k| rays.direction[k][i]))
+    DVec3::from_array([0, 1, 2].map(|k| rays.directions()[k][i]))
 }
 
 /// `count` rays from one place of the sensor, spread over the pupil by the R2 sequence and over wavelengths by the golden
@@ -81,7 +81,7 @@ fn a_thin_lens_is_registered_with_the_pinhole_of_its_field() {
         // Newton stops within 1e-11 mm of the stop's centre, 51 mm away.
         assert!((direction(&a, i) - direction(&b, i)).length() < 1e-12, "{i}");
         assert!((direction(&c, i) - direction(&b, i)).length() < 1e-12, "{i}");
-        assert!(origin(&a, i).length() < 1e-14 && a.t_min[i] < 1e-14, "{i}");
+        assert!(origin(&a, i).length() < 1e-14 && a.t_min()[i] < 1e-14, "{i}");
     }
     assert!(direction(&a, 2).x > 0.0 && direction(&a, 2).y > 0.0, "pictures are upright");
 }
@@ -171,7 +171,7 @@ fn an_unvignetted_pixel_on_the_axis_weighs_1_and_corners_are_vignetted() {
     }
     // The camera's origin is the entrance pupil; the front of the lens is before it.
     let rays = chief(&camera, &[[180.0, 120.0], [300.0, 40.0]]);
-    assert!(rays.t_min.iter().all(|&t| t > 0.01 && t < 0.05), "{:?}", rays.t_min);
+    assert!(rays.t_min().iter().all(|&t| t > 0.01 && t < 0.05), "{:?}", rays.t_min());
     assert!(origin(&rays, 0).length() < 1e-12);
     assert!(origin(&rays, 1).length() < 2e-3, "pupil aberration moves it a little");
     // Near the axis K is what is traced.
@@ -401,7 +401,7 @@ fn data_end_at_the_image_circle_of_a_shifted_lens_too() {
     for (i, [column, row]) in places.into_iter().enumerate() {
         // Pictures are upright, so the sensor's axes are turned.
         let off_axis = f64::hypot(-(column - 50.0) * 0.2 + 4.0, (row - 35.0) * 0.2 + 2.0);
-        let seen = rays.t_max[i] > 0.0;
+        let seen = rays.t_max()[i] > 0.0;
         // Edges are found to 0.5 %, and 32 of them are joined by straight lines.
         if off_axis < 0.97 * circle {
             inside += 1;

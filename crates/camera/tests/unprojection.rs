@@ -198,16 +198,16 @@ fn a_block_is_the_same_part_of_the_whole() {
         camera.chief_rays(PixelBlock { x: 0, y: 0, width, height }, &mut whole);
         // A used batch: nothing of its past may stay.
         let mut part = whole.clone();
-        part.t_max.fill(1.0);
+        part.arrays_mut().t_max.fill(1.0);
         let block = PixelBlock { x: 17, y: 33, width: 7, height: 5 };
         camera.chief_rays(block, &mut part);
         assert_eq!(part.len(), block.len());
-        assert_eq!(part.direction[2].len(), block.len());
+        assert_eq!(part.directions()[2].len(), block.len());
         for (i, (column, row)) in block.pixels().enumerate() {
             let there = (row * width + column) as usize;
             assert_eq!(part.origin(i), whole.origin(there));
             assert_eq!(part.direction(i), whole.direction(there));
-            assert_eq!((part.t_min[i], part.t_max[i]), (0.0, f64::INFINITY));
+            assert_eq!((part.t_min()[i], part.t_max()[i]), (0.0, f64::INFINITY));
         }
     }
 }
@@ -245,7 +245,7 @@ fn beyond_a_fisheyes_circle_rays_hit_nothing() {
         let (x, y) = ((i % 100) as f64 - 49.5, (i / 100) as f64 - 49.5);
         // 10 px a radian: half a turn is at 31.4 px.
         let inside = x.hypot(y) <= 10.0 * std::f64::consts::PI;
-        assert_eq!(rays.t_max[i] > rays.t_min[i], inside, "pixel {x}, {y}");
+        assert_eq!(rays.t_max()[i] > rays.t_min()[i], inside, "pixel {x}, {y}");
         assert!((rays.direction(i).length() - 1.0).abs() < 1e-15, "finite all the same");
     }
 }

@@ -6,26 +6,39 @@ use glam::DVec3;
 /// The placement and triangle of a ray that hit nothing.
 pub const MISS: u32 = u32::MAX;
 
-/// A batch of rays in world space (metres). All arrays have one entry a ray.
+/// A triangle of a placement, as [`RayBatch::push_between_triangles`] takes it: both numbers are [`MISS`]
+/// where there is none.
+pub type PlacedTriangle = [u32; 2];
+
+/// A batch of rays in world space (metres), one array a quantity. All arrays have one entry a ray: they
+/// are read as slices, and change through methods that keep them so.
 #[derive(Debug, Clone, Default)]
 pub struct RayBatch {
-    /// Origins (m), one array an axis.
-    pub origin: [Vec<f64>; 3],
-    /// Unit directions, one array an axis.
-    pub direction: [Vec<f64>; 3],
-    /// Nearest distance at which a hit counts (m, ≥ 0).
-    pub t_min: Vec<f64>,
-    /// Farthest distance at which a hit counts (m, may be +inf).
-    pub t_max: Vec<f64>,
+    origins: [Vec<f64>; 3],
+    directions: [Vec<f64>; 3],
+    t_min: Vec<f64>,
+    t_max: Vec<f64>,
+    /// Empty as long as no ray has any.
+    endpoint_triangles: Vec<[PlacedTriangle; 2]>,
     /// Neighbours in the batch run close together (pixels of one block, samples of one pixel), so
     /// they are worth tracing as packets. Scattered rays are traced one by one.
     pub coherent: bool,
     /// The rays start on surfaces, outside by no more than a hit's own error: near their ends only
     /// f64 can tell what counts. `false` for rays that start in the open.
     pub from_surface: bool,
-    /// The placement and the triangle at either end of each ray, which are not in between; [`MISS`]
-    /// for none, and empty when nobody says.
-    pub ends: Vec<[[u32; 2]; 2]>,
+}
+
+/// The arrays of a batch, to be filled in place: their length stays.
+#[derive(Debug)]
+pub struct RaysMut<'a> {
+    /// Origins (m), one array an axis.
+    pub origins: [&'a mut [f64]; 3],
+    /// Unit directions, one array an axis.
+    pub directions: [&'a mut [f64]; 3],
+    /// Nearest distances at which a hit counts (m, ≥ 0).
+    pub t_min: &'a mut [f64],
+    /// Farthest distances at which a hit counts (m, may be +inf).
+    pub t_max: &'a mut [f64],
 }
 
 impl RayBatch {
@@ -34,14 +47,26 @@ impl RayBatch {
     pub fn with_capacity(capacity: usize) -> Self {
         let array = || Vec::with_capacity(capacity);
         Self {
-            origin: [array(), array(), array()],
-            direction: [array(), array(), array()],
+            origins: [array(), array(), array()],
+            directions: [array(), array(), array()],
             t_min: array(),
             t_max: array(),
-            coherent: false,
-            from_surface: false,
-            ends: Vec::new(),
+            ..Self::default()
         }
+    }
+
+    /// The batch with [`Self::coherent`] set.
+    #[must_use]
+    pub fn with_coherence(mut self, coherent: bool) -> Self {
+        self.coherent = coherent;
+        self
+    }
+
+    /// The batch with [`Self::from_surface`] set to `true`.
+    #[must_use]
+    pub fn from_surfaces(mut self) -> Self {
+        self.from_surface = true;
+        self
     }
 
     /// The number of rays.
@@ -56,27 +81,114 @@ impl RayBatch {
         self.t_min.is_empty()
     }
 
+    /// Origins (m), one array an axis.
+    #[must_use]
+    pub fn origins(&self) -> [&[f64]; 3] {
+        self.origins.each_ref().map(Vec::as_slice)
+    }
+
+    /// Unit directions, one array an axis.
+    #[must_use]
+    pub fn directions(&self) -> [&[f64]; 3] {
+        self.directions.each_ref().map(Vec::as_slice)
+    }
+
+    /// Nearest distances at which a hit counts (m, ≥ 0).
+    #[must_use]
+    pub fn t_min(&self) -> &[f64] {
+        &self.t_min
+    }
+
+    /// Farthest distances at which a hit counts (m, may be +inf). A ray that ends before it begins
+    /// (below zero) hits nothing.
+    #[must_use]
+    pub fn t_max(&self) -> &[f64] {
+        &self.t_max
+    }
+
+    /// The triangles at the start and at the end of each ray, which are not in between; `None` when no
+    /// ray has any.
+    #[must_use]
+    pub fn endpoint_triangles(&self) -> Option<&[[PlacedTriangle; 2]]> {
+        (!self.endpoint_triangles.is_empty()).then_some(&*self.endpoint_triangles)
+    }
+
+    /// The origin of ray `i` (m).
+    #[must_use]
+    pub fn origin(&self, i: usize) -> DVec3 {
+        DVec3::new(self.origins[0][i], self.origins[1][i], self.origins[2][i])
+    }
+
+    /// The unit direction of ray `i`.
+    #[must_use]
+    pub fn direction(&self, i: usize) -> DVec3 {
+        DVec3::new(self.directions[0][i], self.directions[1][i], self.directions[2][i])
+    }
+
+    /// All arrays, to be filled in place.
+    #[must_use]
+    pub fn arrays_mut(&mut self) -> RaysMut<'_> {
+        RaysMut {
+            origins: self.origins.each_mut().map(Vec::as_mut_slice),
+            directions: self.directions.each_mut().map(Vec::as_mut_slice),
+            t_min: &mut self.t_min,
+            t_max: &mut self.t_max,
+        }
+    }
+
     /// Removes all rays and keeps the memory.
     pub fn clear(&mut self) {
-        for array in self.origin.iter_mut().chain(&mut self.direction) {
-            array.clear();
+        self.arrays().for_each(Vec::clear);
+        self.endpoint_triangles.clear();
+    }
+
+    /// Makes room for `len` rays without limits and without triangles at their ends, whose origins and
+    /// directions are to be set; memory is kept.
+    pub fn reset(&mut self, len: usize) {
+        for array in self.origins.iter_mut().chain(&mut self.directions) {
+            array.resize(len, 0.0);
         }
-        self.t_min.clear();
-        self.t_max.clear();
-        self.ends.clear();
+        refill(&mut self.t_min, len, 0.0);
+        refill(&mut self.t_max, len, f64::INFINITY);
+        self.endpoint_triangles.clear();
     }
 
     /// Takes the rays of `other`; memory is kept.
     pub fn copy_from(&mut self, other: &Self) {
-        let arrays = self.origin.iter_mut().chain(&mut self.direction);
-        for (own, other) in arrays.zip(other.origin.iter().chain(&other.direction)) {
-            own.clone_from(other);
-        }
-        self.t_min.clone_from(&other.t_min);
-        self.t_max.clone_from(&other.t_max);
+        self.arrays().zip(other.shared_arrays()).for_each(|(own, other)| own.clone_from(other));
+        self.endpoint_triangles.clone_from(&other.endpoint_triangles);
         self.coherent = other.coherent;
         self.from_surface = other.from_surface;
-        self.ends.clone_from(&other.ends);
+    }
+
+    /// Takes those rays of `other` whose numbers `order` gives, in that order; memory is kept.
+    pub fn gather(&mut self, other: &Self, order: impl Iterator<Item = usize> + Clone) {
+        for (own, other) in self.arrays().zip(other.shared_arrays()) {
+            own.clear();
+            own.extend(order.clone().map(|i| other[i]));
+        }
+        self.endpoint_triangles.clear();
+        if let Some(triangles) = other.endpoint_triangles() {
+            self.endpoint_triangles.extend(order.map(|i| triangles[i]));
+        }
+        self.coherent = other.coherent;
+        self.from_surface = other.from_surface;
+    }
+
+    /// Keeps the rays whose number `is_kept` says, in their order.
+    pub fn retain(&mut self, is_kept: impl Fn(usize) -> bool) {
+        let len = self.len();
+        let kept = || (0..len).filter(|&i| is_kept(i)).enumerate();
+        let count = kept().count();
+        for array in self.arrays() {
+            kept().for_each(|(to, from)| array[to] = array[from]);
+            array.truncate(count);
+        }
+        if !self.endpoint_triangles.is_empty() {
+            kept()
+                .for_each(|(to, from)| self.endpoint_triangles[to] = self.endpoint_triangles[from]);
+            self.endpoint_triangles.truncate(count);
+        }
     }
 
     /// Appends a ray from `origin` along the unit vector `direction`, without limits.
@@ -86,24 +198,62 @@ impl RayBatch {
 
     /// Appends a ray that counts hits at distances in `t_min..=t_max` (m).
     pub fn push_between(&mut self, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64) {
+        self.put(origin, direction, [t_min, t_max]);
+        if !self.endpoint_triangles.is_empty() {
+            self.endpoint_triangles.push([[MISS; 2]; 2]);
+        }
+    }
+
+    /// Appends a ray as [`Self::push_between`] does, which leaves the first of `triangles` and ends on the
+    /// second: neither is in between.
+    pub fn push_between_triangles(
+        &mut self,
+        origin: DVec3,
+        direction: DVec3,
+        [t_min, t_max]: [f64; 2],
+        triangles: [PlacedTriangle; 2],
+    ) {
+        // Rays that were pushed before without triangles have none.
+        self.endpoint_triangles.resize(self.len(), [[MISS; 2]; 2]);
+        self.put(origin, direction, [t_min, t_max]);
+        self.endpoint_triangles.push(triangles);
+    }
+
+    /// Appends the first `count` rays of a block, one array an axis, without limits.
+    pub fn extend_from_block<const N: usize>(
+        &mut self,
+        origins: &[[f64; N]; 3],
+        directions: &[[f64; N]; 3],
+        count: usize,
+    ) {
+        let from = origins.iter().chain(directions);
+        for (own, from) in self.origins.iter_mut().chain(&mut self.directions).zip(from) {
+            own.extend_from_slice(&from[..count]);
+        }
+        let len = self.t_min.len() + count;
+        self.t_min.resize(len, 0.0);
+        self.t_max.resize(len, f64::INFINITY);
+        if !self.endpoint_triangles.is_empty() {
+            self.endpoint_triangles.resize(len, [[MISS; 2]; 2]);
+        }
+    }
+
+    fn put(&mut self, origin: DVec3, direction: DVec3, [t_min, t_max]: [f64; 2]) {
         for axis in 0..3 {
-            self.origin[axis].push(origin[axis]);
-            self.direction[axis].push(direction[axis]);
+            self.origins[axis].push(origin[axis]);
+            self.directions[axis].push(direction[axis]);
         }
         self.t_min.push(t_min);
         self.t_max.push(t_max);
     }
 
-    /// The origin of ray `i` (m).
-    #[must_use]
-    pub fn origin(&self, i: usize) -> DVec3 {
-        DVec3::new(self.origin[0][i], self.origin[1][i], self.origin[2][i])
+    fn arrays(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+        let limits = [&mut self.t_min, &mut self.t_max];
+        self.origins.iter_mut().chain(&mut self.directions).chain(limits)
     }
 
-    /// The unit direction of ray `i`.
-    #[must_use]
-    pub fn direction(&self, i: usize) -> DVec3 {
-        DVec3::new(self.direction[0][i], self.direction[1][i], self.direction[2][i])
+    fn shared_arrays(&self) -> impl Iterator<Item = &Vec<f64>> {
+        self.origins.iter().chain(&self.directions).chain([&self.t_min, &self.t_max])
     }
 }
 
@@ -211,4 +361,50 @@ impl HitBatch {
 fn refill<T: Copy>(array: &mut Vec<T>, len: usize, value: T) {
     array.clear();
     array.resize(len, value);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ray(number: f64) -> (DVec3, DVec3) {
+        (DVec3::splat(number), DVec3::new(0.0, 0.0, number))
+    }
+
+    /// Every array of a batch has one entry a ray, or none for triangles that no ray has.
+    fn assert_sound(rays: &RayBatch) {
+        let len = rays.len();
+        assert!(rays.shared_arrays().all(|array| array.len() == len), "{rays:?}");
+        assert!(rays.endpoint_triangles().is_none_or(|all| all.len() == len), "{rays:?}");
+    }
+
+    #[test]
+    fn rays_with_and_without_triangles_mix() {
+        let mut rays = RayBatch::default();
+        let (origin, direction) = ray(1.0);
+        rays.push(origin, direction);
+        assert_eq!(rays.endpoint_triangles(), None);
+        rays.push_between_triangles(origin, direction, [0.0, 2.0], [[3, 4], [5, 6]]);
+        rays.push_between(origin, direction, 0.5, 1.0);
+        rays.extend_from_block(&[[7.0; 4]; 3], &[[1.0; 4]; 3], 2);
+        assert_sound(&rays);
+        let none = [[MISS; 2]; 2];
+        let all = [none, [[3, 4], [5, 6]], none, none, none];
+        assert_eq!(rays.endpoint_triangles(), Some(&all[..]));
+        assert_eq!(rays.t_max(), [f64::INFINITY, 2.0, 1.0, f64::INFINITY, f64::INFINITY]);
+
+        let mut picked = RayBatch::default();
+        picked.gather(&rays, [1, 4, 0].into_iter());
+        assert_sound(&picked);
+        assert_eq!(picked.endpoint_triangles(), Some(&[[[3, 4], [5, 6]], none, none][..]));
+        assert_eq!(picked.origin(1), DVec3::splat(7.0));
+
+        rays.retain(|i| i % 2 == 1);
+        assert_sound(&rays);
+        assert_eq!((rays.len(), rays.t_max()[0]), (2, 2.0));
+
+        rays.reset(3);
+        assert_sound(&rays);
+        assert_eq!((rays.endpoint_triangles(), rays.t_min()), (None, &[0.0; 3][..]));
+    }
 }

@@ -34,7 +34,7 @@ pub mod transform;
 pub mod units;
 pub mod world;
 
-pub use batch::{Detail, HitBatch, MISS, RayBatch};
+pub use batch::{Detail, HitBatch, MISS, PlacedTriangle, RayBatch, RaysMut};
 pub use bounds::Bounds;
 pub use buffer::Buffer;
 pub use mapped::MappedFile;

@@ -150,7 +150,7 @@ impl Surroundings<'_> {
 vectorised! {
     /// Cosines between rays and the triangles' normals.
     fn cosines(traced: Traced<'_>, run: Range<usize>, out: &mut [f64]) {
-        let [dx, dy, dz] = traced.rays.direction.each_ref().map(|array| &array[run.clone()]);
+        let [dx, dy, dz] = traced.rays.directions().map(|array| &array[run.clone()]);
         let [nx, ny, nz] = traced.hits.normal.each_ref().map(|array| &array[run.clone()]);
         for (i, out) in out[run].iter_mut().enumerate() {
             *out = (nx[i] * dx[i] + ny[i] * dy[i] + nz[i] * dz[i]).abs();
@@ -160,8 +160,8 @@ vectorised! {
 
 vectorised! {
     fn depths(traced: Traced<'_>, from: DVec3, forward: DVec3, out: &mut [f64]) {
-        let [ox, oy, oz] = traced.rays.origin.each_ref().map(|array| &array[..out.len()]);
-        let [dx, dy, dz] = traced.rays.direction.each_ref().map(|array| &array[..out.len()]);
+        let [ox, oy, oz] = traced.rays.origins().map(|array| &array[..out.len()]);
+        let [dx, dy, dz] = traced.rays.directions().map(|array| &array[..out.len()]);
         let t = &traced.hits.t[..out.len()];
         for i in 0..out.len() {
             let start = (ox[i] - from.x) * forward.x
@@ -179,7 +179,7 @@ vectorised! {
         let [a, b, c] = out;
         let len = a.len();
         let (b, c) = (&mut b[..len], &mut c[..len]);
-        let [dx, dy, dz] = traced.rays.direction.each_ref().map(|array| &array[..len]);
+        let [dx, dy, dz] = traced.rays.directions().map(|array| &array[..len]);
         let [nx, ny, nz] = traced.hits.normal.each_ref().map(|array| &array[..len]);
         for i in 0..len {
             let (x, y, z) = (nx[i], ny[i], nz[i]);

@@ -127,7 +127,7 @@ fn bounces(accel: &dyn Accel, primary: &[RayBatch]) -> Vec<RayBatch> {
 fn one_a_batch(rays: &RayBatch) -> impl Iterator<Item = RayBatch> + '_ {
     // A quarter is enough.
     (0..rays.len()).step_by(4).map(|i| {
-        let mut one = RayBatch { from_surface: true, ..RayBatch::default() };
+        let mut one = RayBatch::default().from_surfaces();
         one.push(rays.origin(i), rays.direction(i));
         one
     })

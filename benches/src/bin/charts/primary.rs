@@ -95,7 +95,7 @@ fn aimed(effort: Effort, page: &mut Page) -> anyhow::Result<()> {
     let geometry = meshes::blob(triangles)?;
     let eye = DVec3::new(0.02, -0.03, 0.01);
     let mesh = geometry.meshes.first().context("a mesh")?;
-    let mut rays = RayBatch { coherent: true, ..RayBatch::default() };
+    let mut rays = RayBatch::default().with_coherence(true);
     for triangle in mesh.triangles.iter() {
         let [a, b, _] = triangle.map(|corner| mesh.positions.get(corner as usize));
         for target in [a, 0.5 * (a + b)] {

@@ -43,12 +43,12 @@ impl<'a, S: Sink> Packet<'a, S> {
     /// The rays of a batch from `first` on; `None` when there are not enough.
     #[inline(always)]
     pub(super) fn of(rays: &'a RayBatch, first: usize) -> Option<Self> {
-        let [x, y, z] = &rays.origin;
+        let [x, y, z] = rays.origins();
         let origin = [chunk(x, first)?, chunk(y, first)?, chunk(z, first)?];
-        let [x, y, z] = &rays.direction;
+        let [x, y, z] = rays.directions();
         let direction = [chunk(x, first)?, chunk(y, first)?, chunk(z, first)?];
-        let t_min = chunk(&rays.t_min, first)?;
-        let t_max = *chunk(&rays.t_max, first)?;
+        let t_min = chunk(rays.t_min(), first)?;
+        let t_max = *chunk(rays.t_max(), first)?;
         let sound = soundness(origin, direction, t_min, &t_max);
         let sinks = t_max.map(S::new);
         Some(Self { origin, direction, t_min, t_max, sinks, active: sound, sound })

@@ -139,7 +139,8 @@ impl<'a> Judged<'a> {
 
     fn keeps(&mut self, hit: &Hit<'_>) -> bool {
         let i = hit.id();
-        if self.rays.ends.get(i).is_some_and(|ends| ends.contains(&hit.met())) {
+        let ends = self.rays.endpoint_triangles();
+        if ends.is_some_and(|ends| ends[i].contains(&hit.met())) {
             return false;
         }
         let Some(query) = Query::of(self.rays, i) else { return false };

@@ -347,7 +347,7 @@ impl Single {
     fn at(rays: &RayBatch, i: usize) -> Self {
         let (origin, direction) = (rays.origin(i).as_vec3(), rays.direction(i).as_vec3());
         #[expect(clippy::cast_possible_truncation, reason = "Embree's rays are single precision")]
-        let (tnear, tfar) = (rays.t_min[i] as f32, rays.t_max[i] as f32);
+        let (tnear, tfar) = (rays.t_min()[i] as f32, rays.t_max()[i] as f32);
         let mut query = sys::RTCRayHit::default();
         let ray = &mut query.ray;
         [ray.org_x, ray.org_y, ray.org_z] = origin.to_array();

@@ -12,7 +12,7 @@
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use etendue_geometry::RayBatch;
+use etendue_geometry::{RayBatch, RaysMut};
 use etendue_spectrum::{Curve, Lanes, Outside, Spread};
 use glam::{DVec2, DVec3};
 
@@ -220,8 +220,9 @@ impl LensCamera {
     /// the directions, into chief rays. They start where they pass the camera's origin, and see what
     /// is in front of the lens.
     pub(crate) fn aim(&self, pose: &Pose, rays: &mut RayBatch) {
-        for i in 0..rays.len() {
-            let place = self.focused.film().place(rays.direction[0][i], rays.direction[1][i]);
+        let RaysMut { origins, directions, t_min, t_max } = rays.arrays_mut();
+        for i in 0..t_min.len() {
+            let place = self.focused.film().place(directions[0][i], directions[1][i]);
             let chief = self.chief_ray(place);
             let (origin, direction) = match chief {
                 Some((point, direction)) => self.in_world(pose, point, direction),
@@ -238,13 +239,13 @@ impl LensCamera {
             };
             let start = origin + direction * back;
             for axis in 0..3 {
-                rays.origin[axis][i] = start[axis];
-                rays.direction[axis][i] = direction[axis];
+                origins[axis][i] = start[axis];
+                directions[axis][i] = direction[axis];
             }
-            rays.t_min[i] = (-back).max(0.0);
+            t_min[i] = (-back).max(0.0);
             if chief.is_none() {
                 // Nothing lies before a negative distance: the ray hits nothing.
-                rays.t_max[i] = -1.0;
+                t_max[i] = -1.0;
             }
         }
     }

@@ -119,10 +119,7 @@ impl LensCamera {
             let (block, count) = out.in_lens.block_at(start);
             let (position, direction) = to_world.block(block);
             if block.is_bright(count) {
-                for axis in 0..3 {
-                    out.rays.origin[axis].extend_from_slice(&position[axis][..count]);
-                    out.rays.direction[axis].extend_from_slice(&direction[axis][..count]);
-                }
+                out.rays.extend_from_block(&position, &direction, count);
                 out.weight.extend_from_slice(&block.throughput[..count]);
                 let from = first + start;
                 out.sample.copy_within(from..from + count, kept);
@@ -130,18 +127,14 @@ impl LensCamera {
                 continue;
             }
             for lane in (0..count).filter(|&lane| block.is_bright_at(lane)) {
-                for axis in 0..3 {
-                    out.rays.origin[axis].push(position[axis][lane]);
-                    out.rays.direction[axis].push(direction[axis][lane]);
-                }
+                let at = |axes: &[[f64; LANES]; 3]| DVec3::from_array(axes.map(|axis| axis[lane]));
+                out.rays.push(at(&position), at(&direction));
                 out.weight.push(block.throughput[lane]);
                 out.sample[kept] = out.sample[first + start + lane];
                 kept += 1;
             }
         }
         out.sample.truncate(kept);
-        out.rays.t_min.resize(kept, 0.0);
-        out.rays.t_max.resize(kept, f64::INFINITY);
     }
 }
 

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, MISS, RayBatch, disk};
+use etendue_geometry::{HitBatch, MISS, disk};
 
 use super::numbers::Draw;
 use super::paths::Paths;
@@ -128,8 +128,8 @@ impl Patch {
             self.path[lane] = (i, k);
             self.t[lane] = hits.t[i];
             for axis in 0..3 {
-                self.origin[axis][lane] = now.rays.origin[axis][i];
-                self.direction[axis][lane] = now.rays.direction[axis][i];
+                self.origin[axis][lane] = now.rays.origins()[axis][i];
+                self.direction[axis][lane] = now.rays.directions()[axis][i];
                 self.normal[axis][lane] = hits.normal[axis][i];
             }
             self.count += 1;
@@ -264,15 +264,14 @@ impl Tracing<'_> {
     ) {
         let away = &patch.away;
         let lit = || (0..patch.count).filter(|&lane| away.value[lane] > 0.0);
-        let RayBatch { origin, direction, t_min, t_max, ends, .. } = &mut shadows.rays;
-        let from = away.start.iter().chain(&away.along).chain([&away.reach]);
-        for (to, from) in origin.iter_mut().chain(direction).chain([t_max]).zip(from) {
-            to.extend(lit().map(|lane| from[lane]));
-        }
         for lane in lit() {
             let (i, _) = patch.path[lane];
-            t_min.push(0.0);
-            ends.push([[hits.placement[i], hits.triangle[i]], patch.lamps.chosen[lane].1]);
+            shadows.rays.push_between_triangles(
+                at(&away.start, lane),
+                at(&away.along, lane),
+                [0.0, away.reach[lane]],
+                [[hits.placement[i], hits.triangle[i]], patch.lamps.chosen[lane].1],
+            );
             shadows.ray.push(now.states[i].ray);
             let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
             shadows.brought.extend(brought(throughput, lane));

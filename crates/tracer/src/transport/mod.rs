@@ -330,16 +330,18 @@ impl Tracing<'_> {
         let balance = if toward.is_delta { 1.0 } else { power_heuristic(toward.density, density) };
         let factor = balance / toward.density;
         let origin = anchor.leave(toward.direction);
-        let mut met = [MISS; 2];
+        let rays = &mut shadows.rays;
         match toward.end {
-            End::Far => shadows.rays.push(origin, toward.direction),
-            End::Point(at) => push_to(&mut shadows.rays, origin, at),
-            End::Surface(end, id) => {
-                push_to(&mut shadows.rays, origin, end.leave(-toward.direction));
-                met = id;
+            End::Far => {
+                let limits = [0.0, f64::INFINITY];
+                let triangles = [left, [MISS; 2]];
+                rays.push_between_triangles(origin, toward.direction, limits, triangles);
+            }
+            End::Point(at) => push_to(rays, origin, at, [left, [MISS; 2]]),
+            End::Surface(end, triangle) => {
+                push_to(rays, origin, end.leave(-toward.direction), [left, triangle]);
             }
         }
-        shadows.rays.ends.push([left, met]);
         shadows.ray.push(ray);
         let lanes = radiance.iter().zip(throughput).enumerate();
         let brought = lanes.map(|(k, (l, t))| l * t * factor * in_lane(spectral, bsdf, value, k));

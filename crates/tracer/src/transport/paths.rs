@@ -53,8 +53,8 @@ impl Paths {
     pub(super) fn push(&mut self, ray: (DVec3, DVec3), left: [u32; 2], state: State) {
         self.rays.from_surface = true;
         self.rays.coherent = false;
-        self.rays.push(ray.0, ray.1);
-        self.rays.ends.push([left, [MISS; 2]]);
+        let limits = [0.0, f64::INFINITY];
+        self.rays.push_between_triangles(ray.0, ray.1, limits, [left, [MISS; 2]]);
         self.states.push(state);
     }
 }

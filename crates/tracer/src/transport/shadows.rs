@@ -1,7 +1,7 @@
 //! Rays to lights: what each brings, and whether anything is in between.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, RayBatch};
+use etendue_geometry::{HitBatch, MISS, PlacedTriangle, RayBatch};
 
 use super::{Scratch, Tracing};
 use crate::emitters::Emitters;
@@ -50,14 +50,7 @@ impl Shadows {
         order.sort_unstable();
         let order = || order.iter().map(|&key| (key & 0xffff_ffff) as usize);
         let Sorted { rays: to, ray: number, brought: light } = sorted;
-        to.clear();
-        let from = rays.origin.iter().chain(&rays.direction).chain([&rays.t_min, &rays.t_max]);
-        let arrays = to.origin.iter_mut().chain(&mut to.direction);
-        for (to, from) in arrays.chain([&mut to.t_min, &mut to.t_max]).zip(from) {
-            to.extend(order().map(|i| from[i]));
-        }
-        to.ends.extend(order().map(|i| rays.ends[i]));
-        to.coherent = rays.coherent;
+        to.gather(rays, order());
         number.clear();
         number.extend(order().map(|i| ray[i]));
         light.clear();
@@ -96,17 +89,20 @@ impl Tracing<'_> {
         for (i, state) in last.states.iter().enumerate() {
             let Some(weight) = self.met(last, hits, i, radiance) else { continue };
             let (origin, direction) = (last.rays.origin(i), last.rays.direction(i));
+            let left = last.rays.endpoint_triangles().map_or([MISS; 2], |ends| ends[i][0]);
+            let triangles = [left, [hits.placement[i], hits.triangle[i]]];
             match self.stage.surroundings.spot(hits, i) {
-                None => shadows.rays.push(origin, direction),
+                None => {
+                    let limits = [0.0, f64::INFINITY];
+                    shadows.rays.push_between_triangles(origin, direction, limits, triangles);
+                }
                 Some(spot) => {
                     let point = origin + direction * hits.t[i];
                     let end = Anchor::new(point, hits.normal(i), origin, spot.placement, spot.mesh);
-                    push_to(&mut shadows.rays, origin, end.leave(-direction));
+                    push_to(&mut shadows.rays, origin, end.leave(-direction), triangles);
                 }
             }
             let throughput = &last.throughput[i * self.count..(i + 1) * self.count];
-            let [left, _] = last.rays.ends[i];
-            shadows.rays.ends.push([left, [hits.placement[i], hits.triangle[i]]]);
             shadows.ray.push(state.ray);
             shadows.brought.extend(radiance.iter().zip(throughput).map(|(r, t)| r * t * weight));
         }
@@ -149,7 +145,7 @@ impl Tracing<'_> {
             if layer > 0 {
                 self.tally.shadow_rays += again.len() as u64;
             }
-            let mut onward = RayBatch { from_surface: true, ..RayBatch::default() };
+            let mut onward = RayBatch::default().from_surfaces();
             let mut still = Vec::new();
             for (k, &i) in open.iter().enumerate() {
                 let Some(met) = Met::new(&self.stage.surroundings, again, hits, k, None) else {
@@ -160,7 +156,7 @@ impl Tracing<'_> {
                 if *share > 0.0 {
                     let direction = again.direction(k);
                     let origin = met.anchor.leave(direction);
-                    let left = again.t_max[k] - (origin - again.origin(k)).length();
+                    let left = again.t_max()[k] - (origin - again.origin(k)).length();
                     onward.push_between(origin, direction, 0.0, left.max(0.0));
                     still.push(i);
                 }
@@ -175,13 +171,18 @@ impl Tracing<'_> {
     }
 }
 
-/// A ray from one point to another (m).
-pub(super) fn push_to(rays: &mut RayBatch, origin: DVec3, end: DVec3) {
+/// A ray from one point to another (m), on the triangles at its ends.
+pub(super) fn push_to(
+    rays: &mut RayBatch,
+    origin: DVec3,
+    end: DVec3,
+    triangles: [PlacedTriangle; 2],
+) {
     let offset = end - origin;
     let distance = offset.length();
     // Points that fall together see each other: a ray of no length meets nothing.
     let direction = if distance > 0.0 { offset / distance } else { DVec3::Z };
-    rays.push_between(origin, direction, 0.0, distance);
+    rays.push_between_triangles(origin, direction, [0.0, distance], triangles);
 }
 
 /// A cell of directions, of 64 by 64 over the unfolded octahedron (Meyer et al., "On Floating-Point

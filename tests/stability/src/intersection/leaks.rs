@@ -82,7 +82,7 @@ impl Aimed {
 
     fn push(&mut self, origin: DVec3, way: DVec3, coherent: bool) {
         if self.0.last().is_none_or(|(rays, _)| rays.len() == BATCH) {
-            let rays = RayBatch { coherent, ..RayBatch::with_capacity(BATCH) };
+            let rays = RayBatch::with_capacity(BATCH).with_coherence(coherent);
             self.0.push((rays, Vec::with_capacity(BATCH)));
         }
         if let Some((rays, distances)) = self.0.last_mut() {
