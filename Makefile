@@ -7,7 +7,7 @@ export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
 .PHONY: help setup render test test-embree4 bench bench-peers bench-light bench-lens bench-sensor docs-figures docs-charts \
-	docs-stability clean
+	docs-stability fingerprints clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -21,6 +21,7 @@ help:
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
 	@echo "make docs-stability  take every method to where it fails, at full scale, write docs/stability.md"
+	@echo "make fingerprints  fingerprints of pictures, sensor images and lens tables, to move code without changing them"
 	@echo "make clean         remove target/ and out/"
 
 setup:
@@ -80,6 +81,11 @@ docs-figures: setup docs-charts docs-stability
 # A few minutes: every case of tests/stability at full scale.
 docs-stability: setup
 	cargo run --release -p etendue-stability -- $(ARGS)
+
+# BASE=path/to/another/etendue compares the two and fails where they differ.
+fingerprints: setup
+	cargo build --release -p etendue
+	scripts/fingerprints.sh target/release/etendue $(BASE)
 
 clean:
 	rm -rf target out
