@@ -18,6 +18,7 @@
 //! | [`bounds`] | axis-aligned boxes |
 //! | [`buffer`] | plain values owned by a `Vec` or by a mapped file |
 //! | [`disk`] | the unit square on the unit disk |
+//! | [`files`] | the one place that opens files for reading |
 //! | [`mapped`] | the one place that maps files |
 //! | [`mesh`] | a triangle mesh and its vertex attributes |
 //! | [`transform`] | affine maps whose translation keeps 106 bits |
@@ -28,6 +29,7 @@ pub mod batch;
 pub mod bounds;
 pub mod buffer;
 pub mod disk;
+pub mod files;
 pub mod mapped;
 pub mod mesh;
 pub mod transform;

@@ -1,7 +1,6 @@
 //! The one place that maps files into memory.
 
 use std::fmt;
-use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -20,9 +19,10 @@ impl MappedFile {
     ///
     /// # Errors
     ///
-    /// When the file cannot be opened or mapped (an empty file maps to no bytes).
+    /// When the file cannot be opened or mapped (an empty file maps to no bytes), or is no regular
+    /// file.
     pub fn open(path: &Path) -> io::Result<Self> {
-        let file = File::open(path)?;
+        let file = crate::files::open(path)?;
         #[expect(unsafe_code, reason = "mapping a file is unsafe: another process may change it")]
         // SAFETY: the map is read-only and private, and is only ever read as plain bytes or as
         // numbers, for which every bit pattern is valid. Bytes that change under us can give a

@@ -5,6 +5,9 @@ use std::path::{Component, Path, PathBuf};
 use crate::SceneError;
 use crate::error::{did_you_mean, similar_name};
 
+/// The longest path that Linux takes (bytes).
+const LONGEST_PATH: usize = 4096;
+
 /// Whether a scene may read files outside its own folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Reach {
@@ -57,6 +60,10 @@ impl Folder {
             }
         }
         let path = self.path.join(written);
+        // Nor what lies behind a link out of it.
+        if self.reach == Reach::OwnFolder && !is_inside(&self.real, &path) {
+            return Err(outside("leads through a link out of "));
+        }
         let real = path.canonicalize().map_err(|error| match error.kind() {
             std::io::ErrorKind::NotFound => {
                 let near = similar_name(&path);
@@ -64,9 +71,6 @@ impl Folder {
             }
             _ => format!("\"{written}\" cannot be read: {error}"),
         })?;
-        if self.reach == Reach::OwnFolder && !real.starts_with(&self.real) {
-            return Err(outside("leads through a link out of "));
-        }
         Ok(Found { path, real })
     }
 
@@ -86,6 +90,37 @@ pub(crate) struct Found {
     pub(crate) path: PathBuf,
     /// Without links.
     pub(crate) real: PathBuf,
+}
+
+/// Whether `path` stays inside `root`, which has no links: by its text, and with the links of as much
+/// of it as exists. What exists outside does not change the answer.
+pub(crate) fn is_inside(root: &Path, path: &Path) -> bool {
+    // No file has such a name, wherever it is; taking it apart would be all that it costs.
+    if path.as_os_str().len() > LONGEST_PATH {
+        return true;
+    }
+    let real = path.ancestors().find_map(|part| {
+        let part = if part.as_os_str().is_empty() { Path::new(".") } else { part };
+        part.canonicalize().ok().map(|real| (real, path.strip_prefix(part).unwrap_or(path)))
+    });
+    let Some((real, missing)) = real else { return false };
+    // What does not exist has no links, so its text tells where it would be.
+    real.starts_with(root) && without_dots(&real.join(missing)).starts_with(root)
+}
+
+/// The path with `.` and `..` worked out by its text alone.
+fn without_dots(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir => {
+                plain.pop();
+            }
+            other => plain.push(other),
+        }
+    }
+    plain
 }
 
 enum Leaving {

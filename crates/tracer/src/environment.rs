@@ -10,7 +10,7 @@ use etendue_geometry::glam::DVec3;
 
 use crate::Color;
 use crate::sampling::AliasTable;
-use crate::texture::{ImageError, linear_from_srgb, read_image};
+use crate::texture::{ImageError, linear_from_srgb, read_file, read_image};
 
 /// The most cells of the grid that directions are chosen on, across and down.
 const CELLS: [usize; 2] = [1024, 512];
@@ -34,8 +34,7 @@ impl EnvironmentMap {
     /// When the file cannot be read or decoded.
     pub fn read(path: &Path) -> Result<Self, ImageError> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path)
-            .map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
+        let bytes = read_file(path)?;
         let decoded = read_image(&name, &bytes)?;
         let is_linear = matches!(
             decoded,

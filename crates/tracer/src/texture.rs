@@ -1,8 +1,8 @@
 //! Images over surfaces.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use etendue_geometry::Buffer;
+use etendue_geometry::{Buffer, files};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -124,6 +124,9 @@ pub enum ImageError {
 /// Side of the largest image that is decoded (texels). Above it a file is taken for broken or hostile.
 const MAX_SIDE: u32 = 32_768;
 
+/// The longest image file that is read (bytes): as many as [`MAX_SIDE`]² texels of four bytes have.
+const LONGEST: u64 = 1 << 32;
+
 impl Texture {
     /// The file that holds the image, when it is one of its own.
     #[must_use]
@@ -142,8 +145,7 @@ impl Texture {
             ImageSource::Missing => return Ok(Image::missing()),
             ImageSource::Bytes(bytes) => bytes,
             ImageSource::File(path) => {
-                read = std::fs::read(path)
-                    .map_err(|source| ImageError::Read { path: path.clone(), source })?;
+                read = read_file(path)?;
                 &read
             }
         };
@@ -154,6 +156,11 @@ impl Texture {
         let pyramids = [None, None];
         Ok(Image { width, height, texels, wrap, filter, pyramids, stands_in: false })
     }
+}
+
+/// The bytes of an image file.
+pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, ImageError> {
+    files::read(path, LONGEST).map_err(|source| ImageError::Read { path: path.to_owned(), source })
 }
 
 /// Decodes an image file of any kind that is read, within [`MAX_SIDE`].

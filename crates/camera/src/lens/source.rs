@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::path::Path;
 
+use etendue_geometry::files;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -38,7 +39,8 @@ impl LensSource {
             Self::File(written) => {
                 let error = |why: String| CameraError::new("lens", why);
                 let path = resolve(written).map_err(error)?;
-                let bytes = read_bytes(&path).map_err(|why| error(format!("{written}: {why}")))?;
+                let bytes = files::read(&path, LONGEST)
+                    .map_err(|why| error(format!("{written}: cannot be read: {why}")))?;
                 if ZemaxLens::is_named(&path) {
                     let fault = |why: String| error(format!("{written}, {why}"));
                     let lens = ZemaxLens::read(&bytes).map_err(|e| fault(e.to_string()))?;
@@ -59,17 +61,6 @@ impl LensSource {
             }
         }
     }
-}
-
-fn read_bytes(path: &Path) -> Result<Vec<u8>, String> {
-    let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
-    if !metadata.is_file() {
-        return Err("is not a regular file".to_owned());
-    }
-    if metadata.len() > LONGEST {
-        return Err(format!("has {} bytes, too many for a lens", metadata.len()));
-    }
-    std::fs::read(path).map_err(|e| format!("cannot be read: {e}"))
 }
 
 /// The fault of a lens that is written in the camera at `key`.

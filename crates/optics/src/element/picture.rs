@@ -1,8 +1,10 @@
 //! Grey pictures of a stated physical size: coded apertures and filter maps.
 
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use exr::prelude::{FlatSamples, read_first_flat_layer_from_file};
+use etendue_geometry::files;
+use exr::prelude::{FlatSamples, ReadChannels, ReadLayers, read};
 
 /// Where a lens file's own files are: from the name in the file to a path, or a sentence on why it
 /// may not be read.
@@ -91,8 +93,8 @@ impl Picture {
 type Pixels = ([usize; 2], Vec<f64>, f64);
 
 fn read_png(path: &Path) -> Result<Pixels, String> {
-    let image = image::ImageReader::open(path)
-        .and_then(image::ImageReader::with_guessed_format)
+    let image = files::open(path)
+        .and_then(|file| image::ImageReader::new(BufReader::new(file)).with_guessed_format())
         .map_err(|e| format!("cannot be read: {e}"))?
         .decode()
         .map_err(|e| format!("is not a picture that can be read: {e}"))?;
@@ -115,8 +117,15 @@ fn read_png(path: &Path) -> Result<Pixels, String> {
 }
 
 fn read_exr(path: &Path) -> Result<Pixels, String> {
-    let image =
-        read_first_flat_layer_from_file(path).map_err(|e| format!("cannot be read: {e}"))?;
+    let file = files::open(path).map_err(|e| format!("cannot be read: {e}"))?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(BufReader::new(file))
+        .map_err(|e| format!("cannot be read: {e}"))?;
     let layer = &image.layer_data;
     let pixels = [layer.size.0, layer.size.1];
     check_count(pixels)?;

@@ -11,9 +11,10 @@ mod settings;
 mod spec;
 
 use std::collections::BTreeMap;
-use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
+use etendue_geometry::files;
 use etendue_sensor::Sensor;
 use serde_json::{Value, json};
 
@@ -224,19 +225,11 @@ fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
 
 /// The bytes of a regular file of sensible size.
 fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
-    let unreadable = |source| SceneError::unreadable(path, source);
-    let metadata = fs::metadata(path).map_err(unreadable)?;
-    if !metadata.is_file() {
-        return Err(SceneError::NotAScene {
-            file: path.to_owned(),
-            reason: "is not a regular file".to_owned(),
-        });
-    }
-    if metadata.len() > LONGEST {
-        return Err(SceneError::NotAScene {
-            file: path.to_owned(),
-            reason: format!("has {} bytes, too many for a scene or a lens", metadata.len()),
-        });
-    }
-    fs::read(path).map_err(unreadable)
+    files::read(path, LONGEST).map_err(|source| match source.kind() {
+        // What the opener itself says: it is there but no file for us.
+        io::ErrorKind::Other => {
+            SceneError::NotAScene { file: path.to_owned(), reason: source.to_string() }
+        }
+        _ => SceneError::unreadable(path, source),
+    })
 }

@@ -1,13 +1,14 @@
 //! The files that a model names: where they are, whether they may be read, and their bytes.
 
 use std::collections::BTreeMap;
-use std::path::{Component, Path, PathBuf};
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::{fs, io};
 
 use etendue_geometry::MappedFile;
 
 use super::ImportError;
+use crate::paths;
 
 /// Opens files beside a model, each once, inside the allowed folder.
 #[derive(Debug)]
@@ -47,24 +48,34 @@ impl Files {
     }
 
     fn locate_in(&self, folder: &Path, written: &str) -> Result<Option<PathBuf>, ImportError> {
-        let mut path = folder.join(written);
-        if !path.exists() && written.contains('\\') {
-            path = folder.join(written.replace('\\', "/"));
+        let mut spellings = vec![folder.join(written)];
+        if written.contains('\\') {
+            spellings.push(folder.join(written.replace('\\', "/")));
         }
-        if let Some(root) = &self.root {
-            // Judged before anything else is said of it: a model must not learn which files exist.
-            let real = path
-                .canonicalize()
-                .or_else(|_| Ok(without_dots(&canonical(folder)?.join(written))))?;
-            if !real.starts_with(root) {
-                return Err(ImportError::Outside {
-                    file: self.model.clone(),
-                    written: written.to_owned(),
-                    root: root.clone(),
-                });
-            }
+        // All are judged before anything is said of one: a model must not learn which files exist.
+        if let Some(root) = &self.root
+            && !spellings.iter().all(|path| paths::is_inside(root, path))
+        {
+            return Err(ImportError::Outside {
+                file: self.model.clone(),
+                written: written.to_owned(),
+                root: root.clone(),
+            });
         }
-        Ok(path.is_file().then_some(path))
+        Ok(spellings.into_iter().find(|path| path.is_file()))
+    }
+
+    /// The bytes of the model at `path`, mapped; an empty file is none.
+    pub(super) fn map_model(&self, path: &Path) -> Result<Arc<MappedFile>, ImportError> {
+        let map = self.map(path)?;
+        if map.bytes().is_empty() {
+            return Err(ImportError::Damaged {
+                file: path.to_owned(),
+                place: "the file".to_owned(),
+                reason: "it is empty; copy or export it again".to_owned(),
+            });
+        }
+        Ok(map)
     }
 
     /// The bytes of the file at `path`, mapped.
@@ -73,7 +84,7 @@ impl Files {
         if let Some(file) = opened.get(path) {
             return Ok(Arc::clone(file));
         }
-        let file = Arc::new(open(path).map_err(|source| unreadable(path, source))?);
+        let file = Arc::new(MappedFile::open(path).map_err(|source| unreadable(path, source))?);
         opened.insert(path.to_owned(), Arc::clone(&file));
         Ok(file)
     }
@@ -85,34 +96,10 @@ impl Files {
     }
 }
 
-/// Maps a regular file: opening a pipe would wait for its writer.
-fn open(path: &Path) -> io::Result<MappedFile> {
-    if fs::metadata(path)?.is_file() {
-        MappedFile::open(path)
-    } else {
-        Err(io::Error::other("it is not a regular file"))
-    }
-}
-
 fn canonical(folder: &Path) -> Result<PathBuf, ImportError> {
     folder.canonicalize().map_err(|source| unreadable(folder, source))
 }
 
 fn unreadable(path: &Path, source: io::Error) -> ImportError {
     ImportError::Unreadable { file: path.to_owned(), source }
-}
-
-/// The path with `.` and `..` worked out by its text alone, for files that do not exist.
-fn without_dots(path: &Path) -> PathBuf {
-    let mut plain = PathBuf::new();
-    for component in path.components() {
-        match component {
-            Component::CurDir => {}
-            Component::ParentDir => {
-                plain.pop();
-            }
-            other => plain.push(other),
-        }
-    }
-    plain
 }
