@@ -291,8 +291,12 @@ fn png(image: &RawImage) -> Result<Vec<u8>, io::Error> {
     Ok(out)
 }
 
-/// Writes beside the name and renames, so that nobody sees half a file.
+/// Writes beside the name and renames, so that nobody sees half a file. Pipes and devices are
+/// written to.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), EmvaError> {
+    if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        return fs::write(path, bytes).map_err(failed(path));
+    }
     let mut beside = path.as_os_str().to_owned();
     beside.push(".part");
     let beside = PathBuf::from(beside);

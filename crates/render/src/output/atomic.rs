@@ -1,6 +1,9 @@
 //! Files that are whole or not there: written beside their place, under `.NAME.XXXXXX.part`, and
 //! renamed when complete. What stood there before stays until that moment.
 //!
+//! Only regular files are replaced. To a device, a named pipe, and what this process has as its
+//! standard output or error, the whole content is written once it is complete.
+//!
 //! The random middle of the name keeps two processes that write the same file apart; the last to
 //! finish wins. The rename is atomic for everyone who looks at the folder; data may still be on its
 //! way to the disk when it happens, so a power cut within seconds can lose it.
@@ -67,11 +70,31 @@ pub fn write_whole(
 /// A file on its way. Dropped without [`Self::finish`], it leaves nothing behind.
 #[derive(Debug)]
 pub struct PartFile {
-    file: NamedTempFile,
-    // After the file, so that the entry outlives it: a signal in between finds a path too many
-    // rather than a file too many.
-    _entry: Entry,
+    content: Content,
     target: PathBuf,
+}
+
+/// Where the content of a file is until it is complete.
+#[derive(Debug)]
+enum Content {
+    /// Beside its place, to be renamed.
+    Beside {
+        file: NamedTempFile,
+        // After the file, so that the entry outlives it: a signal in between finds a path too many
+        // rather than a file too many.
+        _entry: Entry,
+    },
+    /// In a file without a name, to be copied to where it goes.
+    Apart { file: File, to: Special },
+}
+
+/// A target that is no regular file to be replaced.
+#[derive(Debug)]
+enum Special {
+    /// A device, a pipe or a socket.
+    Device,
+    /// What this process writes to as its standard output or error.
+    Stream(File),
 }
 
 impl PartFile {
@@ -86,19 +109,25 @@ impl PartFile {
         if target.is_dir() || target.file_name().is_none() {
             return Err(refuse(io::ErrorKind::IsADirectory.into()));
         }
+        let target = target.to_owned();
+        if let Some(to) = Special::of(&target) {
+            let file = tempfile::tempfile().map_err(refuse)?;
+            return Ok(Self { content: Content::Apart { file, to }, target });
+        }
         // The set is locked until the new file is in it: a handler that reads it misses none.
         let mut open = open_set();
-        let file = open_beside(target).map_err(refuse)?;
+        let file = open_beside(&target).map_err(refuse)?;
         open.insert(file.path().to_owned());
         drop(open);
-        let entry = Entry(file.path().to_owned());
-        Ok(Self { file, _entry: entry, target: target.to_owned() })
+        let _entry = Entry(file.path().to_owned());
+        Ok(Self { content: Content::Beside { file, _entry }, target })
     }
 
-    /// Where the file is until it is finished.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        self.file.path()
+    fn file(&mut self) -> &mut File {
+        match &mut self.content {
+            Content::Beside { file, .. } => file.as_file_mut(),
+            Content::Apart { file, .. } => file,
+        }
     }
 
     /// Gives the file its name, in place of what had it before.
@@ -107,25 +136,72 @@ impl PartFile {
     ///
     /// [`OutputError::Io`] when it cannot be renamed; the part file is removed then.
     pub fn finish(self) -> Result<(), OutputError> {
-        let Self { file, _entry, target } = self;
-        let renamed = file.persist(&target).map_err(|failed| failed.error);
-        renamed.map(drop).map_err(|source| OutputError::io(&target, source))
+        let Self { content, target } = self;
+        let done = match content {
+            Content::Beside { file, _entry } => {
+                file.persist(&target).map(drop).map_err(|failed| failed.error)
+            }
+            Content::Apart { mut file, to } => to.fill(&target, &mut file),
+        };
+        done.map_err(|source| OutputError::io(&target, source))
     }
+}
+
+impl Special {
+    /// What `target` is when it is no regular file to be replaced.
+    fn of(target: &Path) -> Option<Self> {
+        let found = fs::metadata(target).ok()?;
+        match own_stream(&found) {
+            Some(stream) => Some(Self::Stream(stream)),
+            None => (!found.is_file()).then_some(Self::Device),
+        }
+    }
+
+    /// Writes all of `content`.
+    fn fill(self, target: &Path, content: &mut File) -> io::Result<()> {
+        content.rewind()?;
+        let mut to = match self {
+            Self::Stream(stream) => stream,
+            // Not made anew when it is gone: then it is no device any more.
+            Self::Device => File::options().write(true).open(target)?,
+        };
+        io::copy(content, &mut to)?;
+        to.flush()
+    }
+}
+
+/// The standard output or error of this process, when it goes to `target`: opened by its path, as
+/// /dev/stdout is, a file would be written from its start.
+#[cfg(unix)]
+fn own_stream(target: &fs::Metadata) -> Option<File> {
+    use std::os::fd::AsFd;
+    use std::os::unix::fs::MetadataExt;
+    let (out, error) = (io::stdout(), io::stderr());
+    [out.as_fd(), error.as_fd()].into_iter().find_map(|stream| {
+        let stream = File::from(stream.try_clone_to_owned().ok()?);
+        let found = stream.metadata().ok()?;
+        ((found.dev(), found.ino()) == (target.dev(), target.ino())).then_some(stream)
+    })
+}
+
+#[cfg(not(unix))]
+fn own_stream(_target: &fs::Metadata) -> Option<File> {
+    None
 }
 
 impl Write for PartFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.as_file_mut().write(bytes)
+        self.file().write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file.as_file_mut().flush()
+        self.file().flush()
     }
 }
 
 impl Seek for PartFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file.as_file_mut().seek(to)
+        self.file().seek(to)
     }
 }
 
@@ -178,10 +254,11 @@ mod tests {
         let mut part = PartFile::create(&target).unwrap();
         part.write_all(b"new").unwrap();
         assert_eq!(fs::read(&target).unwrap(), b"old");
-        assert_eq!(open_parts().iter().filter(|path| *path == part.path()).count(), 1);
-        let hidden = part.path().file_name().unwrap().to_str().unwrap().to_owned();
+        let ours: Vec<PathBuf> =
+            open_parts().into_iter().filter(|path| path.starts_with(folder.path())).collect();
+        let [path] = ours.try_into().unwrap();
+        let hidden = path.file_name().unwrap().to_str().unwrap().to_owned();
         assert!(hidden.starts_with(".depth.exr.") && hidden.ends_with(".part"), "{hidden}");
-        let path = part.path().to_owned();
         part.finish().unwrap();
         assert_eq!(fs::read(&target).unwrap(), b"new");
         assert_eq!(names(folder.path()), ["depth.exr"]);
@@ -223,6 +300,29 @@ mod tests {
         }
         assert!(names(folder.path()).is_empty());
         assert!(part.finish().is_err(), "there is nothing left to rename");
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn pipes_are_written_to_and_stay() {
+        use std::os::unix::fs::FileTypeExt;
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || fs::read(pipe).unwrap()
+        });
+        write_whole(&pipe, |part| {
+            // Out of order, as the writer of EXR files does.
+            part.write_all(b"a c")?;
+            part.seek(SeekFrom::Start(1))?;
+            part.write_all(b"b")
+        })
+        .unwrap();
+        assert_eq!(reader.join().unwrap(), b"abc");
+        assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo());
+        assert_eq!(names(folder.path()), ["pipe"]);
     }
 
     #[test]
