@@ -1,15 +1,15 @@
 //! Where the copies of an object stand: transforms of the scene file, or an NPY file of matrices.
 //!
-//! The file is what `numpy.save` writes of an array `[copy][row][column]` (Kern, *A Simple File
-//! Format for NumPy Arrays*, NEP 1, 2007), so a million copies cost 128 MB and no parsing.
+//! The file is what `numpy.save` writes of an array `[copy][row][column]`, so a million copies cost
+//! 128 MB and no parsing.
 
 use std::path::{Path, PathBuf};
 
 use etendue_geometry::{MappedFile, Transform};
-use npyz::{DType, NpyFile, Order, TypeChar};
 use rayon::prelude::*;
 
 use crate::file::{InstancesSpec, TransformSpec, join, join_index};
+use crate::npy;
 use crate::paths::Folder;
 
 /// The copies of an object.
@@ -54,52 +54,16 @@ impl Instances {
 /// The matrices of an NPY file; the error goes on after the file's name.
 fn read(path: &Path) -> Result<Vec<Transform>, String> {
     let map = MappedFile::open(path).map_err(|error| format!("cannot be read: {error}"))?;
-    let broken =
-        |error: std::io::Error| format!("is no whole NPY file ({error}); write it with numpy.save");
-    if !has_sane_shape(map.bytes()) {
-        return Err("has a shape of more numbers than a file can hold".to_owned());
-    }
-    let array = NpyFile::new(map.bytes()).map_err(broken)?;
-    let rows = match *array.shape() {
-        [_, 3, 4] => 3,
-        [_, 4, 4] => 4,
-        ref other => {
-            return Err(format!("has the shape {other:?} instead of n × 4 × 4 or n × 3 × 4"));
-        }
-    };
-    if array.order() != Order::C {
-        return Err("is in Fortran order; save numpy.ascontiguousarray of it".to_owned());
-    }
-    let whole = array.len().saturating_mul(4) <= map.bytes().len() as u64;
-    if !whole {
-        return Err("ends before its last matrix; write it with numpy.save".to_owned());
-    }
-    let numbers: Vec<f64> = match array.dtype() {
-        DType::Plain(kind) if kind.type_char() == TypeChar::Float && kind.size_field() == 8 => {
-            array.into_vec().map_err(broken)?
-        }
-        DType::Plain(kind) if kind.type_char() == TypeChar::Float && kind.size_field() == 4 => {
-            let numbers: Vec<f32> = array.into_vec().map_err(broken)?;
-            numbers.into_iter().map(f64::from).collect()
-        }
-        other => {
-            let kind = other.descr();
-            return Err(format!("holds {kind} instead of float32 or float64 numbers"));
-        }
-    };
-    let transforms = numbers.par_chunks_exact(4 * rows).enumerate().map(|(index, matrix)| {
+    let array = npy::read(map.bytes(), |shape| match shape {
+        [_, 3 | 4, 4] => Ok(()),
+        other => Err(format!("has the shape {other:?} instead of n × 4 × 4 or n × 3 × 4")),
+    })?;
+    let rows = array.shape[1];
+    let transforms = array.numbers.par_chunks_exact(4 * rows).enumerate().map(|(index, matrix)| {
         of_rows(matrix).build().map_err(|(_, why)| format!("has a matrix {index} that {why}"))
     });
     // In order, so that the first fault of the file is the one that is told.
     transforms.collect::<Vec<_>>().into_iter().collect()
-}
-
-/// Whether the product of the shape's numbers fits 64 bits, which the reader takes for granted.
-fn has_sane_shape(bytes: &[u8]) -> bool {
-    let header = &bytes[..bytes.len().min(1 << 16)];
-    let Some(start) = header.windows(5).position(|word| word == b"shape") else { return true };
-    let shape = header[start..].iter().take_while(|&&byte| byte != b')');
-    shape.filter(|byte| byte.is_ascii_digit()).count() <= 18
 }
 
 /// A matrix of three or four rows of four.

@@ -30,6 +30,7 @@ pub mod import;
 mod instances;
 mod load;
 mod looks;
+mod npy;
 mod parts;
 mod paths;
 pub mod scene;

@@ -350,13 +350,13 @@ fn files_of_copies_that_make_no_sense_are_refused() {
     let mut broken = moves(2);
     broken[15] = f64::NAN;
     let cases = [
-        (b"no array".to_vec(), "no whole NPY file"),
+        (b"no array".to_vec(), "no NPY file"),
         (Vec::new(), "NPY file"),
-        (npy("<f8", "False", "(2, 3, 4)", &sound)[..300].to_vec(), "no whole NPY file"),
+        (npy("<f8", "False", "(2, 3, 4)", &sound)[..300].to_vec(), "ends before its last number"),
         (npy("<f8", "False", "(2, 12)", &sound), "shape [2, 12] instead of n × 4 × 4"),
         (npy("<f8", "False", "(99999999999999999999, 3, 4)", &sound), "instances"),
         (npy("<f8", "False", "(9999999999999999, 3, 4)", &sound), "ends before"),
-        (npy("<f8", "False", "(9999999999, 9999999999, 4)", &sound), "more numbers"),
+        (npy("<f8", "False", "(9999999999, 9999999999, 4)", &sound), "has the shape"),
         (npy("<f8", "True", "(2, 3, 4)", &sound), "Fortran order"),
         (npy("<i8", "False", "(2, 3, 4)", &sound), "'<i8' instead of float32 or float64"),
         (npy("|O", "False", "(2, 3, 4)", &sound), "instances"),
