@@ -4,23 +4,31 @@
 //! Ears are clipped one by one (Meisters, *Polygons have ears*, 1975) in the coordinate plane that
 //! shows the polygon largest, with exact orientation tests (Shewchuk 1997). Polygons that touch
 //! themselves, as those do that reach a hole by a bridge, are cut inside as they should be.
+//!
+//! Small polygons are walked around corner by corner, which takes time with the cube of the corners
+//! at worst; for larger ones see [`large`].
+
+mod large;
 
 use etendue_geometry::glam::DVec3;
 use robust::{Coord, orient2d};
 
-/// Ear clipping takes time with the square of the corners; beyond this many a polygon is fanned.
-const MOST_CORNERS: usize = 20_000;
+/// The most corners of a polygon that is walked around.
+const SMALL: usize = 64;
 
 /// Triangles of the polygon `points`, as indices into it, onto the end of `triangles`.
 pub(super) fn triangulate(points: &[DVec3], triangles: &mut Vec<[u32; 3]>) {
     let flat = match flattened(points) {
-        Some(flat) if points.len() > 3 && points.len() <= MOST_CORNERS => flat,
+        Some(flat) if points.len() > 3 => flat,
         _ => return fan(points.len(), triangles),
     };
     if is_convex(&flat) {
-        return fan(points.len(), triangles);
+        fan(points.len(), triangles);
+    } else if flat.len() <= SMALL {
+        Clipper::new(&flat).clip(triangles);
+    } else {
+        large::clip(&flat, triangles);
     }
-    Clipper::new(&flat).clip(triangles);
 }
 
 /// All triangles from the first corner.
@@ -63,14 +71,14 @@ fn is_convex(polygon: &[Coord<f64>]) -> bool {
 }
 
 /// A polygon that loses its ears.
-struct Clipper<'a> {
+struct Ring<'a> {
     polygon: &'a [Coord<f64>],
     previous: Vec<usize>,
     next: Vec<usize>,
     left: usize,
 }
 
-impl<'a> Clipper<'a> {
+impl<'a> Ring<'a> {
     fn new(polygon: &'a [Coord<f64>]) -> Self {
         let n = polygon.len();
         Self {
@@ -81,31 +89,19 @@ impl<'a> Clipper<'a> {
         }
     }
 
-    fn clip(mut self, triangles: &mut Vec<[u32; 3]>) {
-        let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
-        let mut at = 0;
-        while self.left > 3 {
-            let ear = self.find(at);
-            let (before, behind) = (self.previous[ear], self.next[ear]);
-            triangles.push([index(before), index(ear), index(behind)]);
-            self.next[before] = behind;
-            self.previous[behind] = before;
-            self.left -= 1;
-            // One on, so that ears are taken around the polygon and not as a fan of needles.
-            at = self.next[behind];
-        }
-        triangles.push([index(self.previous[at]), index(at), index(self.next[at])]);
+    /// Cuts corner `i` off.
+    fn cut(&mut self, i: usize, triangles: &mut Vec<[u32; 3]>) {
+        let (before, behind) = (self.previous[i], self.next[i]);
+        triangles.push(self.triangle(i));
+        self.next[before] = behind;
+        self.previous[behind] = before;
+        self.left -= 1;
     }
 
-    /// The next ear from `from` on; where the polygon crosses itself and has none, a corner that
-    /// turns left at least, or any.
-    fn find(&self, from: usize) -> usize {
-        let around = || std::iter::successors(Some(from), |&i| Some(self.next[i])).take(self.left);
-        around()
-            .find(|&i| self.is_ear(i))
-            .or_else(|| around().find(|&i| self.turn(i) == 0.0))
-            .or_else(|| around().find(|&i| self.turn(i) > 0.0))
-            .unwrap_or(from)
+    /// The triangle at corner `i`.
+    fn triangle(&self, i: usize) -> [u32; 3] {
+        let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
+        [index(self.previous[i]), index(i), index(self.next[i])]
     }
 
     /// Positive where corner `i` turns left.
@@ -116,15 +112,6 @@ impl<'a> Clipper<'a> {
     /// Positive where `c` is to the left of the line from `a` to `b`.
     fn side(&self, a: usize, b: usize, c: usize) -> f64 {
         orient2d(self.polygon[a], self.polygon[b], self.polygon[c])
-    }
-
-    fn is_ear(&self, b: usize) -> bool {
-        if self.turn(b) <= 0.0 {
-            return false;
-        }
-        let corners = [self.previous[b], b, self.next[b]];
-        let others = std::iter::successors(Some(self.next[corners[2]]), |&i| Some(self.next[i]));
-        !others.take(self.left - 3).any(|other| self.blocks(corners, other))
     }
 
     /// Whether `other` lies in the triangle, or, where it is at one of its corners, whether the
@@ -146,6 +133,49 @@ impl<'a> Clipper<'a> {
         } else {
             [(a, b), (b, c), (c, a)].iter().all(|&(from, to)| self.side(from, to, other) >= 0.0)
         }
+    }
+}
+
+/// Clips a small polygon.
+struct Clipper<'a>(Ring<'a>);
+
+impl<'a> Clipper<'a> {
+    fn new(polygon: &'a [Coord<f64>]) -> Self {
+        Self(Ring::new(polygon))
+    }
+
+    fn clip(mut self, triangles: &mut Vec<[u32; 3]>) {
+        let mut at = 0;
+        while self.0.left > 3 {
+            let ear = self.find(at);
+            let behind = self.0.next[ear];
+            self.0.cut(ear, triangles);
+            // One on, so that ears are taken around the polygon and not as a fan of needles.
+            at = self.0.next[behind];
+        }
+        triangles.push(self.0.triangle(at));
+    }
+
+    /// The next ear from `from` on; where the polygon crosses itself and has none, a corner that
+    /// turns left at least, or any.
+    fn find(&self, from: usize) -> usize {
+        let ring = &self.0;
+        let around = || std::iter::successors(Some(from), |&i| Some(ring.next[i])).take(ring.left);
+        around()
+            .find(|&i| self.is_ear(i))
+            .or_else(|| around().find(|&i| ring.turn(i) == 0.0))
+            .or_else(|| around().find(|&i| ring.turn(i) > 0.0))
+            .unwrap_or(from)
+    }
+
+    fn is_ear(&self, b: usize) -> bool {
+        let ring = &self.0;
+        if ring.turn(b) <= 0.0 {
+            return false;
+        }
+        let corners = [ring.previous[b], b, ring.next[b]];
+        let others = std::iter::successors(Some(ring.next[corners[2]]), |&i| Some(ring.next[i]));
+        !others.take(ring.left - 3).any(|other| ring.blocks(corners, other))
     }
 }
 
@@ -245,5 +275,117 @@ mod tests {
         let mut triangles = Vec::new();
         triangulate(&star, &mut triangles);
         assert_eq!(triangles.len(), 3);
+    }
+
+    /// A comb of `teeth` thin teeth of length 9 on a back of height 1; a tooth and a gap are 1 wide.
+    fn comb(teeth: u32) -> Vec<DVec3> {
+        let width = f64::from(teeth);
+        let mut corners = vec![[0.0, 0.0], [width, 0.0]];
+        for tooth in (0..teeth).rev() {
+            let left = f64::from(tooth);
+            corners.extend([[left + 0.75, 1.0], [left + 0.75, 10.0], [left + 0.25, 10.0]]);
+            corners.push([left + 0.25, 1.0]);
+        }
+        corners.push([0.0, 1.0]);
+        // The right end of the back.
+        corners.insert(2, [width, 1.0]);
+        corners.iter().map(|&[x, y]| DVec3::new(x, y, 0.0)).collect()
+    }
+
+    #[test]
+    fn large_combs_and_spirals_keep_their_area() {
+        for teeth in [16, 100, 3000] {
+            check(&comb(teeth), f64::from(teeth) * (1.0 + 4.5));
+        }
+        // A band of width 1/2 that winds fifty times around; its area is that of its quadrangles.
+        let steps = 3000;
+        let at = |i: u32, radius: f64| {
+            let turn = 50.0 * f64::from(i) / f64::from(steps);
+            let (sin, cos) = (turn * std::f64::consts::TAU).sin_cos();
+            DVec3::new((radius + turn) * cos, (radius + turn) * sin, 0.0)
+        };
+        let outer: Vec<DVec3> = (0..=steps).map(|i| at(i, 1.5)).collect();
+        let inner: Vec<DVec3> = (0..=steps).map(|i| at(i, 1.0)).collect();
+        let triangle = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - a).z * 0.5;
+        let area: f64 = (0..steps as usize)
+            .map(|i| {
+                let [a, b, c, d] = [inner[i], outer[i], outer[i + 1], inner[i + 1]];
+                triangle(a, b, c) + triangle(a, c, d)
+            })
+            .sum();
+        let spiral: Vec<DVec3> = outer.into_iter().chain(inner.into_iter().rev()).collect();
+        check(&spiral, area);
+    }
+
+    #[test]
+    fn many_holes_reached_by_bridges_stay_open() {
+        // Square holes in a row, each reached by a bridge from the lower side.
+        let holes = 400;
+        let mut corners = vec![[0.0, 0.0]];
+        for hole in 0..holes {
+            let x = f64::from(hole) + 0.25;
+            corners.extend([[x, 0.0], [x, 0.25], [x, 0.75], [x + 0.5, 0.75], [x + 0.5, 0.25]]);
+            corners.extend([[x, 0.25], [x, 0.0]]);
+        }
+        let width = f64::from(holes);
+        corners.extend([[width, 0.0], [width, 1.0], [0.0, 1.0]]);
+        let corners: Vec<DVec3> = corners.iter().map(|&[x, y]| DVec3::new(x, y, 0.0)).collect();
+        check(&corners, width * 0.75);
+    }
+
+    #[test]
+    fn large_polygons_are_cut_as_small_ones_are_where_they_are_sound() {
+        // Not the same triangles, but the same area without overlaps.
+        for teeth in [3, 15] {
+            let points = comb(teeth);
+            let flat = flattened(&points).unwrap();
+            let mut triangles = Vec::new();
+            large::clip(&flat, &mut triangles);
+            assert_eq!(triangles.len(), points.len() - 2);
+            let (vector, total) = area(&points, &triangles);
+            assert!((vector.length() - total).abs() < 1e-12 * total);
+        }
+    }
+
+    #[test]
+    fn sides_of_many_corners_in_a_row_keep_them_all() {
+        let side = 500;
+        let along = |i: u32| f64::from(i) / f64::from(side);
+        let mut corners: Vec<[f64; 2]> = (0..side).map(|i| [along(i), 0.0]).collect();
+        corners.extend((0..side).map(|i| [1.0, along(i)]));
+        corners.extend((0..side).map(|i| [1.0 - along(i), 1.0]));
+        // Inwards, so that it is not convex.
+        corners.extend([[0.0, 1.0], [0.5, 0.5]]);
+        let corners: Vec<DVec3> = corners.iter().map(|&[x, y]| DVec3::new(x, y, 0.0)).collect();
+        // The square without its left quarter, which the last two sides cut off.
+        check(&corners, 1.0 - 0.25);
+    }
+
+    #[test]
+    fn large_broken_polygons_take_a_bounded_effort() {
+        let plane = |[x, y]: [f64; 2]| DVec3::new(x, y, 0.0);
+        let around = |n: u32, step: u32| {
+            (0..n).map(move |i| f64::from(i * step % n) / f64::from(n) * std::f64::consts::TAU)
+        };
+        // Few places visited many times, a star that crosses itself everywhere, all on a line, and
+        // back and forth on a line with a tip.
+        let places = [[0.0, 0.0], [1.0, 0.0], [0.4, 0.4], [0.0, 1.0], [0.3, 0.3]];
+        let repeated: Vec<DVec3> = (0..20_000).map(|i| plane(places[i % 5])).collect();
+        let star: Vec<DVec3> = around(19_999, 9_998).map(|a| plane([a.cos(), a.sin()])).collect();
+        let mut zigzag: Vec<DVec3> = (0..20_000).map(|i| plane([f64::from(i % 7), 0.0])).collect();
+        zigzag.push(plane([3.0, 1.0]));
+        zigzag.push(plane([2.0, 0.1]));
+        let noise: Vec<DVec3> = (0..20_000_u64)
+            .map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+            .map(|k| plane([(k >> 40) as f64, (k >> 16 & 0xff_ffff) as f64]))
+            .collect();
+        for points in [repeated, star, zigzag, noise] {
+            let flat = flattened(&points).unwrap();
+            let mut triangles = Vec::new();
+            let effort = large::clip(&flat, &mut triangles);
+            assert_eq!(triangles.len(), points.len() - 2);
+            let corners = points.len();
+            assert!(effort <= large::most_effort(corners) + 64, "{effort} for {corners}");
+        }
     }
 }
