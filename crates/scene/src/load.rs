@@ -267,6 +267,7 @@ impl SceneFile {
         files.dedup();
         let mut notes = parts.notes;
         notes.extend(self.unused_materials());
+        notes.extend(nothing_to_draw(&geometry));
         let sensor = self.sensor_behind(&camera)?;
         notes.extend(self.lens_notes(&camera, options.strictness)?);
         Ok(Scene {
@@ -427,4 +428,16 @@ fn of_shape(
         stats,
         ..Import::default()
     }))
+}
+
+/// The note on a scene without a triangle.
+fn nothing_to_draw(geometry: &Geometry) -> Option<Note> {
+    (geometry.triangles() == 0).then(|| Note {
+        kind: NoteKind::Empty,
+        subject: "scene".to_owned(),
+        message: "nothing to draw: there is no triangle, and all rays miss; check the export, or \
+                  give the scene objects"
+            .to_owned(),
+        count: 1,
+    })
 }

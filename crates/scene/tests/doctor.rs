@@ -63,7 +63,7 @@ fn an_empty_scene_is_well() {
     fs::write(&path, r#"{"etendue": 1}"#).unwrap();
     let found = check(&path);
     assert_eq!((found.triangles, found.bounds, found.precision), (0, None, None));
-    assert!(found.to_string().contains("empty"));
+    assert!(found.to_string().contains("nothing to draw"));
 }
 
 #[test]

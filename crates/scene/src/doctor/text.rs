@@ -20,7 +20,7 @@ impl fmt::Display for Diagnosis {
                 let size: [f64; 3] = std::array::from_fn(|k| extent.max[k] - extent.min[k]);
                 row(f, "size", &format!("{} m", point(size)))?;
             }
-            None => row(f, "bounds", &"empty: a render shows no hit")?,
+            None => row(f, "bounds", &"none")?,
         }
         row(f, "units", &self.units.remark)?;
         self.list_objects(f)?;
@@ -109,6 +109,7 @@ impl Finding {
             Kind::Unused => "unused",
             Kind::Assumed => "assumed",
             Kind::Irregular => "irregular",
+            Kind::Empty => "empty",
         }
     }
 }

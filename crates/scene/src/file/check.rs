@@ -61,6 +61,10 @@ pub(crate) fn nearest<'a>(
     wrong: &str,
     known: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
+    // Nobody mistypes a word of that length, and comparing takes its time.
+    if wrong.len() > 200 {
+        return None;
+    }
     let wrong = wrong.to_lowercase();
     let distance = |word: &str| strsim::damerau_levenshtein(&wrong, &word.to_lowercase());
     let best = known.into_iter().min_by_key(|word| distance(word))?;

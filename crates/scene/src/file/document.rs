@@ -1,6 +1,6 @@
 //! A JSON text, its values, and where in the text each of them stands.
 
-use std::collections::BTreeMap;
+use std::collections::HashSet;
 
 use serde_json::Value;
 
@@ -20,12 +20,13 @@ pub(crate) struct Fault {
     pub(crate) reason: String,
 }
 
+/// The longest key (bytes). Keys stand in the paths of all that is below them.
+const LONGEST_KEY: usize = 1000;
+
 /// A parsed text, without its values.
 #[derive(Debug, Clone)]
 pub(crate) struct Document {
     text: String,
-    /// The byte where each value's key (or the value, in an array) starts.
-    starts: BTreeMap<String, usize>,
 }
 
 impl Document {
@@ -39,18 +40,19 @@ impl Document {
             let place = character_place(&text, error.line(), error.column());
             Fault { place, reason: reason.to_owned() }
         })?;
-        let mut scanner = Scanner { text: &text, at: 0, starts: BTreeMap::new() };
-        if let Err((at, path)) = scanner.value("") {
-            let reason = format!("the key {path} stands here a second time; remove one of them");
+        let mut scanner = Scanner { text: &text, at: 0, wanted: None, found: None };
+        if let Err(Wrong { at, reason }) = scanner.value("") {
             return Err(Fault { place: place_of(&text, at), reason });
         }
-        let starts = scanner.starts;
-        Ok((Self { starts, text }, value))
+        Ok((Self { text }, value))
     }
 
     /// Where the value at `path` stands in the text.
     pub(crate) fn place(&self, path: &str) -> Option<Place> {
-        self.starts.get(path).map(|&at| place_of(&self.text, at))
+        let mut scanner = Scanner { text: &self.text, at: 0, wanted: Some(path), found: None };
+        // The text was walked through before, so nothing is wrong with it.
+        let _ = scanner.value("");
+        scanner.found.map(|at| place_of(&self.text, at))
     }
 }
 
@@ -111,11 +113,17 @@ fn place_of(text: &str, at: usize) -> Place {
 struct Scanner<'a> {
     text: &'a str,
     at: usize,
-    starts: BTreeMap<String, usize>,
+    /// The path to look for; without one, keys are checked.
+    wanted: Option<&'a str>,
+    /// The byte where the wanted value's key (or the value, in an array) starts.
+    found: Option<usize>,
 }
 
-/// The byte and path of a key that its object already had.
-type Twice = (usize, String);
+/// A key that may not be there: its byte, and why.
+struct Wrong {
+    at: usize,
+    reason: String,
+}
 
 impl Scanner<'_> {
     fn peek(&mut self) -> u8 {
@@ -126,7 +134,7 @@ impl Scanner<'_> {
         bytes.get(self.at).copied().unwrap_or(b'\0')
     }
 
-    fn value(&mut self, path: &str) -> Result<(), Twice> {
+    fn value(&mut self, path: &str) -> Result<(), Wrong> {
         match self.peek() {
             b'{' => self.object(path),
             b'[' => self.array(path),
@@ -143,17 +151,30 @@ impl Scanner<'_> {
         }
     }
 
-    fn object(&mut self, path: &str) -> Result<(), Twice> {
+    fn object(&mut self, path: &str) -> Result<(), Wrong> {
         self.at += 1;
+        let mut keys = HashSet::new();
         while self.peek() != b'}' && self.at < self.text.len() {
             if self.peek() == b',' {
                 self.at += 1;
                 continue;
             }
             let start = self.at;
-            let member = join(path, &self.string());
-            if self.starts.insert(member.clone(), start).is_some() {
-                return Err((start, member));
+            let key = self.string();
+            let member = self.step(start, || join(path, &key));
+            if self.wanted.is_none() {
+                let wrong = |reason| Wrong { at: start, reason };
+                if key.len() > LONGEST_KEY {
+                    let long = key.len();
+                    return Err(wrong(format!("a key of {long} bytes; {LONGEST_KEY} is the most")));
+                }
+                if keys.contains(&key) {
+                    let member = join(path, &key);
+                    let reason =
+                        format!("the key {member} stands here a second time; remove one of them");
+                    return Err(wrong(reason));
+                }
+                keys.insert(key);
             }
             if self.peek() == b':' {
                 self.at += 1;
@@ -164,7 +185,7 @@ impl Scanner<'_> {
         Ok(())
     }
 
-    fn array(&mut self, path: &str) -> Result<(), Twice> {
+    fn array(&mut self, path: &str) -> Result<(), Wrong> {
         self.at += 1;
         let mut index = 0;
         while self.peek() != b']' && self.at < self.text.len() {
@@ -172,13 +193,21 @@ impl Scanner<'_> {
                 self.at += 1;
                 continue;
             }
-            let element = join_index(path, index);
-            self.starts.insert(element.clone(), self.at);
+            let element = self.step(self.at, || join_index(path, index));
             self.value(&element)?;
             index += 1;
         }
         self.at += 1;
         Ok(())
+    }
+
+    /// The path of the value that starts at byte `at`.
+    fn step(&mut self, at: usize, path: impl FnOnce() -> String) -> String {
+        let path = path();
+        if self.wanted == Some(&*path) {
+            self.found.get_or_insert(at);
+        }
+        path
     }
 
     /// Passes over a string and gives what it says.
@@ -235,6 +264,15 @@ mod tests {
         let fault = Document::parse("{\"a\": {\"b\": 1,\n\"b\": 2}}".to_owned()).unwrap_err();
         assert_eq!(fault.place, Place { line: 2, column: 1 });
         assert!(fault.reason.contains("a.b"), "{}", fault.reason);
+    }
+
+    #[test]
+    fn a_key_that_all_below_would_repeat_is_refused() {
+        let text = |length: usize| format!("{{\"{}\": [1, 2, 3]}}", "k".repeat(length));
+        let fault = Document::parse(text(1001)).unwrap_err();
+        assert_eq!(fault.place, Place { line: 1, column: 2 });
+        assert!(fault.reason.contains("1001 bytes"), "{}", fault.reason);
+        assert!(Document::parse(text(1000)).is_ok());
     }
 
     #[test]

@@ -4,6 +4,9 @@ use serde_json::{Map, Value};
 
 use super::document::{join, join_index};
 
+/// The most steps of a path: half as many as the levels of a JSON text.
+const MOST_STEPS: usize = 64;
+
 /// Why a setting cannot be applied.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -16,6 +19,12 @@ pub enum OverrideError {
     Path {
         /// The path as given.
         path: String,
+    },
+    /// More steps than a scene has levels.
+    #[error("the path has {steps} steps; the format needs no more than {MOST_STEPS}")]
+    TooDeep {
+        /// Its steps.
+        steps: usize,
     },
     /// An index past the end.
     #[error("{array} has {len} entries, so there is no {array}[{index}]")]
@@ -53,6 +62,9 @@ pub enum OverrideError {
 /// When the path cannot be read or leads nowhere.
 pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<String, OverrideError> {
     let steps = split(path).ok_or_else(|| OverrideError::Path { path: path.to_owned() })?;
+    if steps.len() > MOST_STEPS {
+        return Err(OverrideError::TooDeep { steps: steps.len() });
+    }
     let mut here = root;
     let mut walked = String::new();
     for step in &steps {
@@ -161,6 +173,7 @@ mod tests {
         assert_eq!(error("objects[2].file"), "objects has 2 entries, so there is no objects[2]");
         assert!(error("objects.first").contains("no objects[first]"));
         assert_eq!(error("camera.fov.x"), "camera.fov is a number, which has no `x`");
+        assert!(error(&"a.".repeat(60_000).trim_end_matches('.')).contains("60000 steps"));
         for path in ["", ".", "a..b", "a.", "a[", "a[x]", "a[0]b", "[\"a\"", ".a"] {
             assert!(error(path).contains("is no path"), "{path}: {}", error(path));
         }

@@ -33,6 +33,8 @@ pub enum NoteKind {
     Assumed,
     /// Data that breaks the format's rules and could be read all the same.
     Irregular,
+    /// There is nothing to draw.
+    Empty,
 }
 
 impl Note {
@@ -58,13 +60,26 @@ pub(super) fn missing_image(written: String) -> Note {
     Note::new(NoteKind::MissingFile, written, message)
 }
 
-/// Adds `note`, or counts it to one that says the same of the same subject.
+/// The most notes of a kind that are kept apart: nobody reads more, and each is compared with all.
+const MOST: usize = 200;
+
+/// Adds `note`, or counts it to one that says the same of the same subject. Past [`MOST`] those of
+/// one kind are counted together.
 pub(super) fn push(notes: &mut Vec<Note>, note: Note) {
     let same = |n: &&mut Note| {
         n.kind == note.kind && n.subject == note.subject && n.message == note.message
     };
+    let is_full = notes.iter().filter(|n| n.kind == note.kind).count() >= MOST;
     match notes.iter_mut().find(same) {
         Some(known) => known.count += note.count,
-        None => notes.push(note),
+        None if !is_full => notes.push(note),
+        None => {
+            let rest = Note::new(note.kind, "…", "further notes of this kind are not listed");
+            let is_rest = |n: &&mut Note| n.kind == rest.kind && n.subject == rest.subject;
+            match notes.iter_mut().find(is_rest) {
+                Some(known) => known.count += note.count,
+                None => notes.push(rest.counted(note.count)),
+            }
+        }
     }
 }

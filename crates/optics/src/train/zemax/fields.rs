@@ -5,6 +5,9 @@ use super::sheet::Line;
 use crate::train::analysis::chief_height;
 use crate::train::{Focus, OpticalTrain};
 
+/// The most field points that are taken; designs have a dozen, and each is looked at with many rays.
+const MOST_FIELDS: usize = 100;
+
 /// The field points of a file.
 #[derive(Debug, Default)]
 pub(super) struct Fields {
@@ -35,7 +38,7 @@ impl Fields {
         object_z: Option<f64>,
     ) -> (Vec<f64>, Vec<String>) {
         let (mut angles, mut notes): (Vec<f64>, Vec<String>) = (Vec::new(), Vec::new());
-        for [x, y] in self.points() {
+        for [x, y] in self.points().take(MOST_FIELDS) {
             let height = unit * if x == 0.0 { y } else { x.hypot(y) };
             let found = match self.kind {
                 0 if x == 0.0 => Ok(y),
@@ -51,7 +54,13 @@ impl Fields {
                 Err(why) => notes.push(why),
             }
         }
-        (angles, notes.into_iter().map(|why| format!("fields left out: {why}")).collect())
+        let mut notes: Vec<String> =
+            notes.into_iter().map(|why| format!("fields left out: {why}")).collect();
+        let count = self.points().count();
+        if count > MOST_FIELDS {
+            notes.push(format!("of {count} fields the first {MOST_FIELDS} are taken"));
+        }
+        (angles, notes)
     }
 
     fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {

@@ -11,6 +11,9 @@ use super::place::Break;
 /// The most surfaces; large designs have a hundred.
 const MOST_SURFACES: usize = 4096;
 
+/// The most wavelengths, as OpticStudio has it.
+const MOST_WAVELENGTHS: usize = 24;
+
 /// A whole file.
 #[derive(Debug, Default)]
 pub(super) struct Sheet {
@@ -234,8 +237,8 @@ impl Sheet {
     }
 
     fn set_wavelength(&mut self, number: usize, micrometres: f64) {
-        // Numbered from 1; there are up to 24.
-        let slot = number.clamp(1, 64) - 1;
+        // Numbered from 1.
+        let slot = number.clamp(1, MOST_WAVELENGTHS) - 1;
         if self.wavelengths.len() <= slot {
             self.wavelengths.resize(slot + 1, micrometres);
         }
@@ -273,7 +276,7 @@ impl Sheet {
                 self.wavelengths.len() + 1 - fill.max(1)
             }
         };
-        let used = &self.wavelengths[..used.min(self.wavelengths.len())];
+        let used = &self.wavelengths[..used.min(self.wavelengths.len()).min(MOST_WAVELENGTHS)];
         let mut all: Vec<f64> = Vec::new();
         let primary = used.get(self.primary.max(1) - 1).or(used.first());
         for &micrometres in primary.into_iter().chain(used) {

@@ -169,7 +169,9 @@ impl Chunk {
 
     fn cut_corners(&mut self, len: usize) {
         self.corners.iter_mut().for_each(|indices| indices.truncate(len));
-        self.relative.retain(|&(_, corner, _)| corner < len);
+        // They came in the order of their corners.
+        let kept = self.relative.partition_point(|&(_, corner, _)| corner < len);
+        self.relative.truncate(kept);
     }
 
     /// Stores one index of a corner.

@@ -1,5 +1,6 @@
 //! From corners with three indices to vertices with one.
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
 
@@ -21,6 +22,9 @@ pub(super) struct Welder<'a> {
     /// For each position the last vertex at it, [`NONE`] before there is one.
     heads: Vec<u32>,
 }
+
+/// The most vertices at one position that are looked through one by one.
+const LONGEST_CHAIN: u32 = 32;
 
 /// A vertex: the indices of its position, texture coordinates and normal.
 type Key = [u32; 3];
@@ -123,25 +127,36 @@ impl<'a> Welder<'a> {
     }
 
     /// Numbers the different corners in the order of their first use. Those at one position are
-    /// chained, which takes no hashing: few differ.
+    /// chained, which takes no hashing as long as few differ.
     fn weld(&mut self, corners: &[[Key; 3]]) -> (Vec<[u32; 3]>, Vec<Key>) {
         self.heads.resize(self.pool.positions.len(), NONE);
         let mut keys: Vec<Key> = Vec::new();
         // For each vertex the one before it at its position.
         let mut earlier: Vec<u32> = Vec::new();
+        // Those beyond the longest chain of their position.
+        let mut crowded: HashMap<Key, u32> = HashMap::new();
         let heads = &mut self.heads;
         let mut vertex = |key: Key| {
             let head = &mut heads[key[V] as usize];
-            let mut at = *head;
+            let (mut at, mut length) = (*head, 0);
             while at != NONE {
                 if keys[at as usize] == key {
                     return at;
                 }
                 at = earlier[at as usize];
+                length += 1;
             }
             let new = u32::try_from(keys.len()).unwrap_or(NONE);
+            if length < LONGEST_CHAIN {
+                earlier.push(std::mem::replace(head, new));
+            } else {
+                let known = *crowded.entry(key).or_insert(new);
+                if known != new {
+                    return known;
+                }
+                earlier.push(NONE);
+            }
             keys.push(key);
-            earlier.push(std::mem::replace(head, new));
             new
         };
         let triangles = corners.iter().map(|triangle| triangle.map(&mut vertex)).collect();
