@@ -7,6 +7,7 @@ mod bench; // speed against accuracy on a tiny scene
 mod emva; // the characterisation of what the command writes
 mod exposures; // what a scene's sensor makes of a render
 mod figures; // models with skins, in the pose of their file
+mod files; // what is no file, what costs without end, what real programs write
 mod gltf_looks; // materials, lights and textures of models, with closed-form answers
 mod lens; // lenses against other software, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers

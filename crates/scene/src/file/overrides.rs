@@ -173,7 +173,7 @@ mod tests {
         assert_eq!(error("objects[2].file"), "objects has 2 entries, so there is no objects[2]");
         assert!(error("objects.first").contains("no objects[first]"));
         assert_eq!(error("camera.fov.x"), "camera.fov is a number, which has no `x`");
-        assert!(error(&"a.".repeat(60_000).trim_end_matches('.')).contains("60000 steps"));
+        assert!(error("a.".repeat(60_000).trim_end_matches('.')).contains("60000 steps"));
         for path in ["", ".", "a..b", "a.", "a[", "a[x]", "a[0]b", "[\"a\"", ".a"] {
             assert!(error(path).contains("is no path"), "{path}: {}", error(path));
         }

@@ -1,5 +1,6 @@
 //! Lines, words and numbers of text formats, from bytes and without copies.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use super::ImportError;
@@ -19,12 +20,17 @@ impl Fault {
 
     /// The fault with its line and column in `text`.
     pub(super) fn locate(self, file: &Path, text: &[u8]) -> ImportError {
-        let before = &text[..self.at.min(text.len())];
-        let start = before.iter().rposition(|&b| b == b'\n').map_or(0, |newline| newline + 1);
-        let line = text[start..].split(|&b| b == b'\n').next().unwrap_or_default();
+        let at = self.at.min(text.len());
+        // A carriage return ends a line, too, unless a newline follows.
+        let ends = |i: usize| {
+            text[i] == b'\n' || text[i..].starts_with(b"\r") && !text[i..].starts_with(b"\r\n")
+        };
+        let start = (0..at).rev().find(|&i| ends(i)).map_or(0, |end| end + 1);
+        let end = (start..text.len()).find(|&i| ends(i)).unwrap_or(text.len());
+        let line = &text[start..end];
         ImportError::Text {
             file: file.to_owned(),
-            line: before.iter().filter(|&&b| b == b'\n').count() + 1,
+            line: (0..at).filter(|&i| ends(i)).count() + 1,
             column: self.at.saturating_sub(start) + 1,
             reason: self.reason,
             text: String::from_utf8_lossy(&line[..line.len().min(80)]).trim_end().to_owned(),
@@ -149,7 +155,48 @@ impl<'a> Words<'a> {
 /// floating point numbers accurately*, 1990); the rest is left to the standard library.
 #[inline]
 pub(super) fn number(word: &[u8]) -> Option<f64> {
-    short_number(word).or_else(|| std::str::from_utf8(word).ok()?.parse().ok())
+    short_number(word)
+        .or_else(|| std::str::from_utf8(word).ok()?.parse().ok())
+        .or_else(|| not_finite(word))
+}
+
+/// What Microsoft's C library prints of numbers that are not finite: `1.#INF`, `-1.#IND`,
+/// `1.#QNAN0`, cut or filled to the digits asked for; newer ones print `-nan(ind)`.
+#[cold]
+fn not_finite(word: &[u8]) -> Option<f64> {
+    let (negative, rest) = match word {
+        [b'-', rest @ ..] => (true, rest),
+        [b'+', rest @ ..] => (false, rest),
+        _ => (false, word),
+    };
+    let is_filled = |tail: &[u8]| tail.iter().all(|byte| *byte == b'0');
+    if let Some(name) = rest.strip_prefix(b"1.#") {
+        let infinity = if negative { f64::NEG_INFINITY } else { f64::INFINITY };
+        if name.strip_prefix(b"INF").is_some_and(is_filled) {
+            return Some(infinity);
+        }
+        // One and two places leave `1.#J` (both rounded up) and `1.#IO`, or `1.#R` of QNAN.
+        let names: [&[u8]; 7] = [b"IND", b"QNAN", b"SNAN", b"J", b"IO", b"R", b"QO"];
+        let is_name = |known: &&[u8]| name.strip_prefix(*known).is_some_and(is_filled);
+        return names.iter().any(is_name).then_some(f64::NAN);
+    }
+    let inside = rest.to_ascii_lowercase();
+    let inside = inside.strip_prefix(b"nan(")?.strip_suffix(b")")?.to_vec();
+    inside.iter().all(u8::is_ascii_alphanumeric).then_some(f64::NAN)
+}
+
+/// The text behind a byte order mark, which some programs put before UTF-8.
+pub(super) fn without_mark(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text)
+}
+
+/// The text with newlines where all its lines end with carriage returns alone, byte for byte.
+pub(super) fn with_newlines(text: &[u8]) -> Cow<'_, [u8]> {
+    // Most texts have a newline near their start; without one there is no line to speak of.
+    if text.contains(&b'\n') || !text.contains(&b'\r') {
+        return Cow::Borrowed(text);
+    }
+    Cow::Owned(text.iter().map(|&byte| if byte == b'\r' { b'\n' } else { byte }).collect())
 }
 
 /// Powers of ten that f64 holds exactly.
@@ -238,7 +285,16 @@ mod tests {
             let expected = text.parse::<f64>().ok().map(f64::to_bits);
             assert_eq!(has, expected, "{text}");
         }
-        for text in ["", "-", ".", "1.2.3", "1,5", "0x10", "e5", "--1"] {
+        // Of Microsoft's C library.
+        for text in ["1.#IND", "-1.#IND00", "1.#QNAN", "1.#QNAN0", "1.#J", "-nan(ind)", "nan(snan)"]
+        {
+            assert!(number(text.as_bytes()).is_some_and(f64::is_nan), "{text}");
+        }
+        assert_eq!(number(b"1.#INF00"), Some(f64::INFINITY));
+        assert_eq!(number(b"-1.#INF"), Some(f64::NEG_INFINITY));
+        for text in
+            ["", "-", ".", "1.2.3", "1,5", "0x10", "e5", "--1", "1.#", "1.#IN", "2.#IND", "nan()x"]
+        {
             assert_eq!(number(text.as_bytes()), None, "{text}");
         }
         assert_eq!(whole(b"-12"), Some(-12));

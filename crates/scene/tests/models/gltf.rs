@@ -346,3 +346,10 @@ fn an_unused_nan_harms_nobody() {
         write(&folder, "nan.glb", builder.glb(json!({"meshes": [{"primitives": [primitive]}]})));
     assert_eq!(import_strict(&path).unwrap().meshes[0].triangles.len(), 1);
 }
+
+#[test]
+fn a_byte_order_mark_is_passed_over() {
+    let folder = folder();
+    let text = "\u{feff}{\"asset\": {\"version\": \"2.0\"}}";
+    assert!(load(&write(&folder, "a.gltf", text)).meshes.is_empty());
+}

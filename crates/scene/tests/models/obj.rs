@@ -80,7 +80,8 @@ fn broken_obj_is_refused_with_its_line() {
     assert_eq!(import.notes[0].count, 3, "{:?}", import.notes);
     let message = import_strict(&path).unwrap_err().to_string();
     assert!(message.contains("line 2, column 3") && message.contains("0 texture"), "{message}");
-    assert!(load(&write(&folder, "empty.obj", "")).meshes[0].triangles.is_empty());
+    assert!(load(&write(&folder, "blank.obj", "#\n")).meshes[0].triangles.is_empty());
+    assert!(error(&write(&folder, "empty.obj", "")).contains("it is empty"));
 }
 
 /// Each rule of `docs/light.md`: glass, mirrors, a coat over a matte base, thin surfaces, lamps.
@@ -145,4 +146,17 @@ fn mtl_materials_become_the_nearest_of_ours() {
     let message = import_strict(&folder.path().join("m.obj")).unwrap_err().to_string();
     assert!(message.contains("m.mtl") && message.contains("material \"thin\""), "{message}");
     assert!(["matte", "glazed", "dim", "bad"].iter().all(|name| of(name).emission.is_none()));
+}
+
+#[test]
+fn obj_lines_may_end_with_carriage_returns_alone() {
+    let folder = folder();
+    let text = "mtllib m.mtl\rv 0 0 0\rv 1 0 0\rv 0 1 0\rusemtl a\rf 1 2 3\r";
+    write(&folder, "m.mtl", "\u{feff}newmtl a\rKd 1 0 0\r");
+    let import = load(&write(&folder, "a.obj", text));
+    assert_eq!(import.meshes[0].triangles.len(), 1);
+    assert_eq!(import.materials[0].name, "a");
+    assert!(import.notes.is_empty(), "{:?}", import.notes);
+    let message = error(&write(&folder, "b.obj", text.replace("v 0 1 0", "v 0 x 0")));
+    assert!(message.contains("line 4, column 5"), "{message}");
 }

@@ -111,3 +111,76 @@ fn ply_strips_are_cut_at_minus_one() {
     let import = load(&write(&folder, "s.ply", text));
     assert_eq!(&import.meshes[0].triangles[..], [[0, 1, 2], [2, 1, 3], [2, 1, 0]]);
 }
+
+#[test]
+fn ply_lines_end_in_any_way() {
+    let folder = folder();
+    let expected = load(&write(&folder, "plain.ply", ply_text()));
+    for end in ["\r", "\r\n"] {
+        let header = PLY_HEADER.replace("FORMAT", "ascii").len();
+        let text = String::from_utf8(ply_text()).unwrap().replace('\n', end);
+        let import = load(&write(&folder, "text.ply", &text));
+        assert_eq!(points(&import.meshes[0]), points(&expected.meshes[0]), "{end:?}");
+        assert_eq!(import.meshes[0].triangles.len(), 3, "{end:?}");
+        // A program may write its header so and text as ever.
+        let file = ply_text();
+        let head = String::from_utf8(file[..header].to_vec()).unwrap().replace('\n', end);
+        let import =
+            load(&write(&folder, "mixed.ply", [head.as_bytes(), &file[header..]].concat()));
+        assert_eq!(points(&import.meshes[0]), points(&expected.meshes[0]), "{end:?}");
+        // Binary data starts right behind the header's last line, also with a byte like a newline.
+        for big in [false, true] {
+            let file = ply_binary(big);
+            let format = if big { "binary_big_endian" } else { "binary_little_endian" };
+            let at = PLY_HEADER.replace("FORMAT", format).len();
+            let head = String::from_utf8(file[..at].to_vec()).unwrap().replace('\n', end);
+            let mut data = file[at..].to_vec();
+            // The first number becomes 2⁻¹⁰⁷ or so, whose first byte is a newline's.
+            data[..4].copy_from_slice(&[0x0a; 4]);
+            let import = load(&write(&folder, "data.ply", [head.as_bytes(), &data].concat()));
+            let first = points(&import.meshes[0])[0].x;
+            assert_eq!(first, f64::from(f32::from_bits(0x0a0a_0a0a)), "{end:?}");
+            assert_eq!(import.meshes[0].triangles.len(), 3, "{end:?}");
+        }
+    }
+}
+
+#[test]
+fn ply_headers_of_real_programs_are_read() {
+    let folder = folder();
+    let text = String::from_utf8(ply_text()).unwrap();
+    for changed in [
+        // Blender 2.47 forgot the word `comment`.
+        text.replace(
+            "comment by hand",
+            "Created by Blender3D 247 - www.blender.org, source file: ",
+        ),
+        format!("\u{feff}{text}"),
+        text.replace("ply\n", "ply \n"),
+        text.replace("property float", "property float32").replace("uchar int", "uint8 int32"),
+        text.replace("element face", "obj_info num_cols 512\n\nelement face"),
+    ] {
+        let import = load(&write(&folder, "a.ply", &changed));
+        assert_eq!(import.meshes[0].triangles.len(), 3, "{changed}");
+    }
+    let endless = format!("ply\nformat ascii 1.0\n{}", "x y\n".repeat(300_000));
+    let message = error(&write(&folder, "c.ply", endless));
+    assert!(message.contains("no end"), "{message}");
+    let cr = text.replace('\n', "\r").replace("0.5", "o.5");
+    let message = error(&write(&folder, "d.ply", cr));
+    assert!(message.contains("line 16, column 1") && message.contains("o.5"), "{message}");
+}
+
+#[test]
+fn numbers_that_are_none_are_counted_in_any_spelling() {
+    let folder = folder();
+    for word in ["nan", "1.#IND", "-1.#IND00", "1.#QNAN", "1.#INF", "-nan(ind)"] {
+        let text =
+            String::from_utf8(ply_text()).unwrap().replace("0 0 9 ", &format!("0 {word} 9 "));
+        let import = load(&write(&folder, "a.ply", &text));
+        assert_eq!(import.stats.dropped, 1, "{word}");
+        let obj = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 {word} 0\nf 1 2 3\nf 1 2 4\n");
+        let import = load(&write(&folder, "a.obj", &obj));
+        assert_eq!(import.stats.dropped, 1, "{word}");
+    }
+}

@@ -8,6 +8,7 @@ use etendue_geometry::MappedFile;
 use super::buffers::Bytes;
 use super::damaged;
 use crate::import::ImportError;
+use crate::import::text::without_mark;
 
 const MAGIC: &[u8] = b"glTF";
 const JSON: u32 = 0x4E4F_534A;
@@ -26,11 +27,8 @@ pub(super) fn open<'a>(
     map: &'a Arc<MappedFile>,
 ) -> Result<Container<'a>, ImportError> {
     let bytes = map.bytes();
-    if bytes.is_empty() {
-        return Err(damaged(path, "the file", "it is empty; copy or export it again"));
-    }
     if !bytes.starts_with(MAGIC) {
-        return Ok(Container { json: bytes, binary: None });
+        return Ok(Container { json: without_mark(bytes), binary: None });
     }
     let broken = |reason: String| damaged(path, "GLB header", reason);
     let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
@@ -48,7 +46,7 @@ pub(super) fn open<'a>(
     };
     let mut chunks = Chunks { bytes, at: 12 };
     let json = match chunks.next(path)? {
-        Some((JSON, start, len)) => &bytes[start..start + len],
+        Some((JSON, start, len)) => without_mark(&bytes[start..start + len]),
         _ => return Err(broken("the first chunk is not JSON; export it again".into())),
     };
     let mut binary = None;

@@ -58,7 +58,7 @@ pub(super) fn import(
     wanted: Wanted,
     options: &Options,
 ) -> Result<Import, ImportError> {
-    let map = files.map(path)?;
+    let map = files.map_model(path)?;
     let container = glb::open(path, &map)?;
     let document = document::parse(path, container.json)?;
     let mut import = Import::default();

@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use super::admit::{self, Admitted};
 use super::files::Files;
 use super::note::{self, Note, NoteKind};
-use super::text::{Fault, pieces};
+use super::text::{Fault, pieces, with_newlines, without_mark};
 use super::{Import, ImportError, ImportedPlacement, Options, Wanted};
 use chunk::{Chunk, Wish};
 use pool::Pool;
@@ -43,8 +43,9 @@ pub(super) fn import(
     wanted: Wanted,
     options: &Options,
 ) -> Result<Import, ImportError> {
-    let map = files.map(path)?;
-    let text = map.bytes().strip_prefix(b"\xEF\xBB\xBF").unwrap_or(map.bytes());
+    let map = files.map_model(path)?;
+    let text = with_newlines(without_mark(map.bytes()));
+    let text: &[u8] = &text;
     let fault = |fault: Fault| fault.locate(path, text);
     let wish = Wish { uvs: wanted.uvs, normals: wanted.normals, colors: wanted.colors };
     let pieces = pieces(text, PIECE);

@@ -6,7 +6,7 @@
 //!
 //! Colours are taken as linear.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use etendue_tracer::material::{Alpha, GltfSurface};
@@ -20,7 +20,11 @@ use super::oddities;
 use super::segment::Segment;
 use crate::import::files::Files;
 use crate::import::note::{self, Note, NoteKind};
+use crate::import::text::with_newlines;
 use crate::import::{Import, ImportError, Strictness, Wanted};
+
+/// The most material files of a model that are looked for.
+const MOST_LIBRARIES: usize = 1000;
 
 /// A material and the file that defines it.
 struct Defined {
@@ -75,12 +79,19 @@ fn find(
     notes: &mut Vec<Note>,
 ) -> Result<Vec<PathBuf>, ImportError> {
     let mut found: Vec<PathBuf> = Vec::new();
-    for line in libraries {
+    let (mut seen, mut looked_for) = (HashSet::new(), 0);
+    for line in libraries.iter().filter(|line| seen.insert(**line)) {
         let names = match files.locate(line)? {
             Some(_) => vec![(*line).to_owned()],
             None => split_names(line),
         };
         for name in names {
+            looked_for += 1;
+            if looked_for > MOST_LIBRARIES {
+                let message = format!("only the first {MOST_LIBRARIES} material files are read");
+                note::push(notes, Note::new(NoteKind::Irregular, "mtllib", message));
+                return Ok(found);
+            }
             match files.locate(&name)? {
                 Some(file) if !found.contains(&file) => found.push(file),
                 Some(_) => {}
@@ -122,7 +133,7 @@ fn read(
 ) -> Result<Vec<tobj::Material>, ImportError> {
     let map = files.map(file)?;
     let mut text = String::new();
-    for (number, line) in String::from_utf8_lossy(map.bytes()).lines().enumerate() {
+    for (number, line) in String::from_utf8_lossy(&with_newlines(map.bytes())).lines().enumerate() {
         match fit(line.trim_start_matches('\u{feff}').trim()) {
             Some(line) => {
                 text.push_str(&line);

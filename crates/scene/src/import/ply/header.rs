@@ -1,6 +1,6 @@
 //! The header: what elements follow, and how they are written.
 
-use crate::import::text::{Fault, Words, whole};
+use crate::import::text::{Fault, Words, whole, without_mark};
 
 /// How the data is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,45 +97,87 @@ impl Element {
 }
 
 impl Header {
-    /// Reads the header at the start of `file`.
+    /// Reads the header at the start of `file`. Its lines end as the first one does, by a newline,
+    /// a carriage return, or both; lines of other words than the format's, which some programs
+    /// write, are passed over.
     pub(super) fn parse(file: &[u8]) -> Result<Self, Fault> {
-        let mut words = Words::new(file);
-        if words.word() != Some(b"ply") {
-            return Err(Fault::new(0, "a PLY file starts with the line `ply`; this one does not"));
-        }
-        words.end_line();
-        let (mut format, mut elements) = (None, Vec::new());
-        while !words.is_done() {
-            let start = words.at();
+        let mut lines = Lines::new(file)?;
+        let (mut format, mut elements, mut properties) = (None, Vec::new(), 0);
+        while let Some((start, line)) = lines.next() {
+            let mut words = Words::new(line);
             match words.word() {
                 Some(b"format") => format = Some(parse_format(&mut words, start)?),
                 Some(b"element") => elements.push(parse_element(&mut words, start)?),
                 Some(b"property") => {
                     let property = parse_property(&mut words, start)?;
+                    properties += 1;
                     match elements.last_mut() {
+                        _ if properties > MOST_PROPERTIES => {
+                            let reason = format!("more than {MOST_PROPERTIES} properties");
+                            return Err(Fault::new(start, reason));
+                        }
                         Some(Element { properties, .. }) => properties.push(property),
                         None => return Err(Fault::new(start, "a property before any element")),
                     }
                 }
                 Some(b"end_header") => {
-                    words.end_line();
                     let Some(format) = format else {
                         return Err(Fault::new(start, "the header has no `format` line"));
                     };
-                    return Ok(Self { format, elements, data: words.at() });
+                    return Ok(Self { format, elements, data: lines.at });
                 }
-                Some(b"comment" | b"obj_info") | None => {}
-                Some(other) => {
-                    let text = String::from_utf8_lossy(&other[..other.len().min(20)]);
-                    return Err(Fault::new(
-                        start,
-                        format!("unknown word \"{text}\" in the header"),
-                    ));
-                }
+                Some(_) | None => {}
             }
-            words.end_line();
+            if lines.at > LONGEST {
+                let reason = format!("the header has no end in its first {LONGEST} bytes");
+                return Err(Fault::new(start, reason));
+            }
         }
         Err(Fault::new(file.len(), "the file ends inside its header; copy or export it again"))
+    }
+}
+
+/// The most properties of all elements: splats have sixty.
+const MOST_PROPERTIES: usize = 1000;
+
+/// The longest header (bytes): lines that mean nothing are passed over, but not for ever.
+const LONGEST: usize = 1 << 20;
+
+/// The lines of a header.
+struct Lines<'a> {
+    file: &'a [u8],
+    at: usize,
+    end: u8,
+}
+
+impl<'a> Lines<'a> {
+    /// From behind the word `ply`, which is all of the first line.
+    fn new(file: &'a [u8]) -> Result<Self, Fault> {
+        let text = without_mark(file);
+        let rest = text.strip_prefix(b"ply").map(|rest| {
+            let blanks = rest.iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();
+            &rest[blanks..]
+        });
+        let end = match rest {
+            // A carriage return before a newline counts as a blank.
+            Some([b'\n', ..] | [b'\r', b'\n', ..]) => b'\n',
+            Some([b'\r', ..]) => b'\r',
+            _ => {
+                let reason = "a PLY file starts with the line `ply`; this one does not";
+                return Err(Fault::new(0, reason));
+            }
+        };
+        // The rest of the first line comes next, and is blank.
+        let at = file.len() - rest.map_or(0, <[u8]>::len);
+        Ok(Self { file, at, end })
+    }
+
+    /// The next whole line and where it starts.
+    fn next(&mut self) -> Option<(usize, &'a [u8])> {
+        let (start, rest) = (self.at, self.file.get(self.at..)?);
+        let length = rest.iter().position(|byte| *byte == self.end)?;
+        self.at += length + 1;
+        Some((start, &rest[..length]))
     }
 }
 

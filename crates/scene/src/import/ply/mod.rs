@@ -34,7 +34,7 @@ pub(super) fn import(
     wanted: Wanted,
     options: &Options,
 ) -> Result<Import, ImportError> {
-    let map = files.map(path)?;
+    let map = files.map_model(path)?;
     let fault = |fault: Fault| fault.locate(path, map.bytes());
     let header = Header::parse(map.bytes()).map_err(fault)?;
     let damaged = |reason: String| ImportError::Damaged {

@@ -7,7 +7,7 @@ use super::faces::{Faces, Lists};
 use super::header::{Element, Header};
 use super::vertices::{Columns, Table, VertexData};
 use crate::import::Wanted;
-use crate::import::text::{Fault, Words, number, pieces};
+use crate::import::text::{Fault, Words, number, pieces, with_newlines};
 
 /// Bytes that one task reads.
 const PIECE: usize = 1 << 20;
@@ -18,8 +18,8 @@ pub(super) fn read(
     header: &Header,
     wanted: Wanted,
 ) -> Result<(VertexData, Faces), Fault> {
-    let text = &map.bytes()[header.data..];
-    let pieces = pieces(text, PIECE);
+    let text = with_newlines(&map.bytes()[header.data..]);
+    let pieces = pieces(&text, PIECE);
     let lines: Vec<usize> = pieces.par_iter().map(|(_, piece)| count_rows(piece)).collect();
     let mut before = 0;
     let mut starts = Vec::with_capacity(lines.len());
