@@ -45,7 +45,14 @@ impl Random {
 
 /// One mesh where it is.
 fn alone(mesh: Mesh) -> Arc<Geometry> {
-    let here = Placement { mesh: 0, object: 0, material: 0, world_from_mesh: Transform::IDENTITY };
+    let here = Placement {
+        mesh: 0,
+        object: 0,
+        instance: 0,
+        node: 0,
+        material: 0,
+        world_from_mesh: Transform::IDENTITY,
+    };
     Arc::new(Geometry { meshes: vec![mesh], placements: vec![here] })
 }
 
@@ -98,6 +105,8 @@ pub fn forest(side: u32) -> Result<Arc<Geometry>, ShapeError> {
             placements.push(Placement {
                 mesh: 0,
                 object: 0,
+                instance: 0,
+                node: 0,
                 material: 0,
                 world_from_mesh: Transform::from_trs(place, turn, scale),
             });

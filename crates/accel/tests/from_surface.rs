@@ -37,7 +37,14 @@ fn rays_neither_stick_nor_leak() {
         let place = Transform::new(DMat3::IDENTITY * scale, DVec3::splat(far));
         let geometry = Arc::new(Geometry {
             meshes: vec![cube()],
-            placements: vec![Placement { mesh: 0, object: 0, material: 0, world_from_mesh: place }],
+            placements: vec![Placement {
+                mesh: 0,
+                object: 0,
+                instance: 0,
+                node: 0,
+                material: 0,
+                world_from_mesh: place,
+            }],
         });
         // What a spawned ray is off by: 32 roundings of the numbers involved.
         let off = 32.0 * f64::EPSILON * 3.0 * (scale + far);

@@ -204,8 +204,14 @@ mod tests {
             Positions::F32(Vertices::from_arrays(&corners)),
             vec![[0, 1, 2]].into(),
         );
-        let placement =
-            Placement { mesh: 0, object: 0, material: 0, world_from_mesh: Transform::IDENTITY };
+        let placement = Placement {
+            mesh: 0,
+            object: 0,
+            instance: 0,
+            node: 0,
+            material: 0,
+            world_from_mesh: Transform::IDENTITY,
+        };
         let geometry = Geometry { meshes: vec![mesh], placements: vec![placement] };
         let accel = Exact::build(Arc::new(geometry), &BuildOptions::default()).unwrap();
         let mut rays = RayBatch::default();

@@ -21,7 +21,8 @@ fn blob(place: DVec3) -> Arc<Geometry> {
     let mesh = shape.build(Wanted::NOTHING).unwrap();
     let mut world_from_mesh = Transform::IDENTITY;
     world_from_mesh.translation = place;
-    let placement = Placement { mesh: 0, object: 0, material: 0, world_from_mesh };
+    let placement =
+        Placement { mesh: 0, object: 0, instance: 0, node: 0, material: 0, world_from_mesh };
     Arc::new(Geometry { meshes: vec![mesh], placements: vec![placement] })
 }
 

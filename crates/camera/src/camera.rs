@@ -182,7 +182,7 @@ impl CameraSpec {
     /// # Errors
     ///
     /// When the description makes no camera: the error names the key.
-    pub fn build<S: Into<Subject>>(
+    pub fn build<'a, S: Into<Subject<'a>>>(
         &self,
         subject: impl FnOnce() -> S,
         resolve: Resolve<'_>,

@@ -1,5 +1,7 @@
 //! A sensible place for a camera that was given none: the whole model in the picture, upright.
 
+use std::fmt;
+
 use etendue_geometry::Bounds;
 use glam::DVec3;
 
@@ -17,13 +19,40 @@ const FLAT: [f64; 3] = [0.1, 0.02, 0.1];
 /// and above.
 const THREE_QUARTER: DVec3 = DVec3::new(0.6, 0.45, 1.0);
 
+/// The support function of a set of points: how far they reach.
+pub trait Support {
+    /// For each of `directions` (of any length), the greatest dot product of it with a point taken from
+    /// `origin`; −∞ without points.
+    fn support(&self, origin: DVec3, directions: &[DVec3]) -> Vec<f64>;
+}
+
+impl Support for Bounds {
+    fn support(&self, origin: DVec3, directions: &[DVec3]) -> Vec<f64> {
+        let corners = self.corners().map(|corner| corner - origin);
+        let most = |d: &DVec3| corners.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.dot(*d)));
+        directions.iter().map(most).collect()
+    }
+}
+
 /// What a camera that was given no place has to frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Subject {
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
     /// The tight box around all of it (m).
     pub bounds: Bounds,
     /// Where it is best looked at from.
     pub viewpoint: Viewpoint,
+    /// Its points; the corners of the box when absent.
+    pub points: Option<&'a dyn Support>,
+}
+
+impl fmt::Debug for Subject<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bounds, viewpoint, .. } = self;
+        f.debug_struct("Subject")
+            .field("bounds", bounds)
+            .field("viewpoint", viewpoint)
+            .finish_non_exhaustive()
+    }
 }
 
 /// Where something is looked at from.
@@ -37,14 +66,22 @@ pub enum Viewpoint {
     Within(DVec3),
 }
 
-impl From<Bounds> for Subject {
+impl From<Bounds> for Subject<'_> {
     /// Something to be looked at from the usual side.
     fn from(bounds: Bounds) -> Self {
-        Self { bounds, viewpoint: Viewpoint::Usual }
+        Self { bounds, viewpoint: Viewpoint::Usual, points: None }
     }
 }
 
-impl Subject {
+impl Subject<'_> {
+    /// Its support function.
+    fn support(&self, origin: DVec3, directions: &[DVec3]) -> Vec<f64> {
+        match self.points {
+            Some(points) => points.support(origin, directions),
+            None => self.bounds.support(origin, directions),
+        }
+    }
+
     /// The direction that it is looked at in; the position says nothing.
     #[must_use]
     pub fn view(&self) -> Pose {
@@ -130,13 +167,15 @@ fn upright(towards: DVec3) -> DVec3 {
     if towards.x == 0.0 && towards.z == 0.0 { DVec3::NEG_Z } else { DVec3::Y }
 }
 
-/// The nearest pose of a perspective camera that has the whole of its subject in the picture, unless
-/// it is seen from within.
+/// The nearest pose of a perspective camera that has the whole of its subject in the picture, with
+/// even margins, unless it is seen from within.
 ///
-/// With the view's direction fixed, each side of the picture is a plane that all corners of the box
-/// must lie inside of, which is linear in the camera's place: the two planes of an axis give the
-/// least distance and the middle. An empty box is looked at from 3 m.
-pub(crate) fn perspective(subject: Subject, reach: Reach) -> Pose {
+/// With the view's direction fixed, each side of the picture is a plane that all points must lie
+/// inside of. Where the planes of an axis touch the subject, given by its support function, is linear in
+/// the camera's place: two planes give the least distance and the middle. Along the axis that leaves room
+/// at that distance, the planes are brought in by one angle's share on both sides until they touch.
+/// An empty box is looked at from 3 m.
+pub(crate) fn perspective(subject: Subject<'_>, reach: Reach) -> Pose {
     let (bounds, view) = (subject.bounds, subject.view());
     if let Viewpoint::Within(position) = subject.viewpoint {
         return Pose { position, ..view };
@@ -145,29 +184,85 @@ pub(crate) fn perspective(subject: Subject, reach: Reach) -> Pose {
         return Pose { position: bounds.centre() + DVec3::Z * 3.0, ..Pose::IDENTITY };
     };
     let centre = bounds.centre();
-    let seen = bounds.corners().map(|corner| view.rotation.transpose() * (corner - centre));
-    let (near_x, x) = fit(seen.map(|p| (p.x, p.z)), reach.left, reach.right);
-    let (near_y, y) = fit(seen.map(|p| (p.y, p.z)), reach.down, reach.up);
-    let mut distance = near_x.max(near_y);
+    let touch = |across: DVec3, sides: &[[f64; 2]]| {
+        let planes = sides.iter().flat_map(|[low, high]| {
+            [across + DVec3::Z * *high, -across + DVec3::Z * *low].map(|d| view.rotation * d)
+        });
+        let far = subject.support(centre, &planes.collect::<Vec<_>>());
+        let sides = sides.iter().zip(far.as_chunks::<2>().0);
+        sides.map(|(&[low, high], &far)| Touch { low, high, far }).collect::<Vec<_>>()
+    };
+    let (x, y) = ([reach.left, reach.right], [reach.down, reach.up]);
+    let least = [(DVec3::X, x), (DVec3::Y, y)].map(|(axis, side)| touch(axis, &[side]));
+    let mut distance =
+        least.iter().flatten().fold(f64::NEG_INFINITY, |d, touch| d.max(touch.distance()));
     if bounds.diagonal() == 0.0 {
         distance = 1.0;
     }
-    let offset = DVec3::new(x(distance), y(distance), distance);
+    let middle = |axis: DVec3, side, least: &[Touch]| match least {
+        // The axis that decides has no room left.
+        [touch] if touch.distance() >= distance => touch.across(distance),
+        _ => even(distance, side, &|sides: &[[f64; 2]]| touch(axis, sides)),
+    };
+    let across = [middle(DVec3::X, x, &least[0]), middle(DVec3::Y, y, &least[1])];
+    let offset = DVec3::new(across[0], across[1], distance);
     Pose { position: centre + view.rotation * offset, ..view }
 }
 
-/// Along one axis of the picture: the least distance from which all points `(across, towards)` are
-/// inside, and where across the camera then stands at a given distance.
-fn fit(points: [(f64, f64); 8], low: f64, high: f64) -> (f64, impl Fn(f64) -> f64) {
-    let largest = points.iter().fold(f64::NEG_INFINITY, |m, (a, z)| m.max(a + z * high));
-    let smallest = points.iter().fold(f64::INFINITY, |m, (a, z)| m.min(a - z * low));
-    let distance = (largest - smallest) / (low + high);
-    (distance, move |d| 0.5 * ((largest - d * high) + (smallest + d * low)))
+/// Two opposite sides of the picture as planes, by their tangents, and how far the subject reaches
+/// towards each.
+#[derive(Debug, Clone, Copy)]
+struct Touch {
+    low: f64,
+    high: f64,
+    far: [f64; 2],
 }
 
-/// A pose of an orthographic camera outside `bounds`, and the height (m) of a picture of this
-/// width-to-height ratio that holds the whole box.
-pub(crate) fn orthographic(subject: Subject, aspect: f64) -> (Pose, f64) {
+impl Touch {
+    /// The distance from which both planes touch.
+    fn distance(&self) -> f64 {
+        (self.far[0] + self.far[1]) / (self.low + self.high)
+    }
+
+    /// Where across the camera then stands; between the two planes when it is farther off.
+    fn across(&self, distance: f64) -> f64 {
+        let [high, low] = self.far;
+        0.5 * ((high - distance * self.high) - (low - distance * self.low))
+    }
+}
+
+/// Where across a camera at `distance` stands so that the margins on both sides are the same share of
+/// the picture.
+fn even(distance: f64, [low, high]: [f64; 2], touch: &dyn Fn(&[[f64; 2]]) -> Vec<Touch>) -> f64 {
+    /// Margins that are tried at once; two rounds leave 1/128 of the picture, within which where the
+    /// planes touch is nearly linear.
+    const STEPS: u32 = 8;
+    let whole = low + high;
+    let narrowed = |margin: f64| [low - margin * whole, high - margin * whole];
+    let (mut from, mut step) = (0.0, 0.5 / f64::from(STEPS));
+    let mut between = Vec::new();
+    for _ in 0..2 {
+        let margins: Vec<f64> = (0..STEPS).map(|k| from + f64::from(k) * step).collect();
+        let tried = touch(&margins.iter().map(|margin| narrowed(*margin)).collect::<Vec<_>>());
+        let inside = tried.iter().take_while(|touch| touch.distance() <= distance).count();
+        let last = inside.saturating_sub(1);
+        from = margins[last];
+        between = tried[last..].iter().take(2).copied().collect();
+        step /= f64::from(STEPS);
+    }
+    match between[..] {
+        [a, b] if b.distance() > a.distance() => {
+            let share = ((distance - a.distance()) / (b.distance() - a.distance())).clamp(0.0, 1.0);
+            a.across(distance) * (1.0 - share) + b.across(distance) * share
+        }
+        [a, ..] => a.across(distance),
+        [] => 0.0,
+    }
+}
+
+/// A pose of an orthographic camera outside the subject's box, and the height (m) of a picture of this
+/// width-to-height ratio that holds all of it, in its middle.
+pub(crate) fn orthographic(subject: Subject<'_>, aspect: f64) -> (Pose, f64) {
     let bounds = subject.bounds;
     let Some(()) = usable(bounds) else {
         return (Pose { position: bounds.centre() + DVec3::Z * 3.0, ..Pose::IDENTITY }, 2.0);
@@ -175,20 +270,27 @@ pub(crate) fn orthographic(subject: Subject, aspect: f64) -> (Pose, f64) {
     let view = subject.view();
     let position = match subject.viewpoint {
         Viewpoint::Within(position) => position,
-        _ => bounds.centre() - view.forward() * bounds.diagonal().max(1e-3),
+        _ => {
+            let centre = bounds.centre();
+            let axes = [view.rotation.x_axis, view.rotation.y_axis];
+            let sides = [axes[0], -axes[0], axes[1], -axes[1]];
+            let far = subject.support(centre, &sides);
+            let middle = axes[0] * (0.5 * (far[0] - far[1])) + axes[1] * (0.5 * (far[2] - far[3]));
+            centre + middle - view.forward() * bounds.diagonal().max(1e-3)
+        }
     };
     let pose = Pose { position, ..view };
-    (pose, orthographic_height(bounds, &pose, aspect))
+    (pose, orthographic_height(subject, &pose, aspect))
 }
 
-/// The height (m) of an orthographic picture from `pose` that holds the whole box; 2 m for no box.
-pub(crate) fn orthographic_height(bounds: Bounds, pose: &Pose, aspect: f64) -> f64 {
+/// The height (m) of an orthographic picture from `pose` that holds the whole subject; 2 m for
+/// nothing.
+pub(crate) fn orthographic_height(subject: Subject<'_>, pose: &Pose, aspect: f64) -> f64 {
     let mut half = 0.0_f64;
-    if usable(bounds).is_some() {
-        for corner in bounds.corners() {
-            let seen = pose.rotation.transpose() * (corner - pose.position);
-            half = half.max(seen.y.abs()).max(seen.x.abs() / aspect);
-        }
+    if usable(subject.bounds).is_some() {
+        let axes = [pose.rotation.x_axis, pose.rotation.y_axis];
+        let sides = [axes[0] / aspect, -axes[0] / aspect, axes[1], -axes[1]];
+        half = subject.support(pose.position, &sides).into_iter().fold(half, f64::max);
     }
     if half > 0.0 { 2.0 * half / (1.0 - 2.0 * MARGIN) } else { 2.0 }
 }
@@ -238,6 +340,45 @@ mod tests {
         }
     }
 
+    /// A pyramid fills little of its box: its own corners, not the box's, touch the margins.
+    #[test]
+    fn margins_are_even_on_both_sides_of_both_axes() {
+        struct Points(Vec<DVec3>);
+        impl Support for Points {
+            fn support(&self, origin: DVec3, directions: &[DVec3]) -> Vec<f64> {
+                let dot = |d: &DVec3| {
+                    self.0.iter().map(|p| (*p - origin).dot(*d)).fold(f64::MIN, f64::max)
+                };
+                directions.iter().map(dot).collect()
+            }
+        }
+        let corners = [[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]];
+        for apex in [[0.0, 0.5, 0.0], [0.0, 6.0, 0.0], [0.9, 3.0, 0.9]] {
+            let points = Points(corners.iter().chain([&apex]).map(|p| DVec3::from(*p)).collect());
+            let mut bounds = Bounds::EMPTY;
+            points.0.iter().for_each(|p| bounds.include(*p));
+            for reach in [REACH, Reach { left: 0.1, right: 0.9, ..REACH }] {
+                let subject = Subject { points: Some(&points), ..bounds.into() };
+                let pose = perspective(subject, reach);
+                let shares = |low: f64, high: f64, axis: usize| {
+                    let seen =
+                        points.0.iter().map(|p| pose.rotation.transpose() * (*p - pose.position));
+                    let shares = seen.map(|p| (p[axis] / -p.z + low) / (low + high));
+                    shares.fold([f64::MAX, f64::MIN], |[a, b], s| [a.min(s), b.max(s)])
+                };
+                let across = shares(reach.left, reach.right, 0);
+                let upwards = shares(reach.down, reach.up, 1);
+                for [least, most] in [across, upwards] {
+                    // What is interpolated between two margins 1/128 apart.
+                    assert!((least - (1.0 - most)).abs() < 1e-3, "{apex:?}: {least} {most}");
+                    assert!(least > MARGIN - 1e-6, "{apex:?}: {least}");
+                }
+                let fullest = across[0].min(upwards[0]);
+                assert!((fullest - MARGIN).abs() < 1e-3, "no nearer place: {fullest}");
+            }
+        }
+    }
+
     #[test]
     fn solid_boxes_are_seen_from_the_front_right_above() {
         let pose = perspective(boxes()[0].into(), REACH);
@@ -283,11 +424,11 @@ mod tests {
     fn a_side_is_seen_face_on_and_a_room_from_within() {
         let bounds = boxes()[0];
         let side = Viewpoint::Side(DVec3::NEG_Z);
-        let pose = perspective(Subject { bounds, viewpoint: side }, REACH);
+        let pose = perspective(Subject { viewpoint: side, ..bounds.into() }, REACH);
         assert_eq!((pose.forward(), pose.up()), (DVec3::Z, DVec3::Y));
         assert!(pose.position.z < -1.0 && pose.position.x.abs() < 1e-12, "{}", pose.position);
         let place = DVec3::new(0.3, 0.2, 0.5);
-        let within = Subject { bounds, viewpoint: Viewpoint::Within(place) };
+        let within = Subject { viewpoint: Viewpoint::Within(place), ..bounds.into() };
         let usual = perspective(bounds.into(), REACH);
         for pose in [perspective(within, REACH), orthographic(within, 1.0).0] {
             assert_eq!((pose.position, pose.rotation), (place, usual.rotation));

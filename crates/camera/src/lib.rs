@@ -28,7 +28,7 @@ pub use camera::{Camera, CameraSpec, PixelBlock, PixelExtent, Projection};
 pub use camera_file::CameraFile;
 pub use distortion::{Distortion, DistortionSpec};
 pub use error::CameraError;
-pub use framing::{Subject, Viewpoint};
+pub use framing::{Subject, Support, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin};
 pub use lens::{
     ChromaticRealLensCameraSpec, LaneGroup, LensCamera, LensCameraSpec, RealLensCameraSpec,

@@ -36,9 +36,9 @@ pub struct Orthographic {
 
 impl OrthographicSpec {
     /// The pose and projection. `subject` is asked for only when something is to be chosen.
-    pub(crate) fn build(
+    pub(crate) fn build<'a>(
         &self,
-        subject: impl FnOnce() -> Subject,
+        subject: impl FnOnce() -> Subject<'a>,
     ) -> Result<(Pose, Orthographic), CameraError> {
         if let Some(Metres(height)) = self.height
             && !(height > 0.0 && height.is_finite())
@@ -50,9 +50,7 @@ impl OrthographicSpec {
         let given = self.pose.as_ref().map(PoseSpec::build).transpose()?;
         let (pose, height) = match (given, self.height) {
             (Some(pose), Some(Metres(height))) => (pose, height),
-            (Some(pose), None) => {
-                (pose, framing::orthographic_height(subject().bounds, &pose, aspect))
-            }
+            (Some(pose), None) => (pose, framing::orthographic_height(subject(), &pose, aspect)),
             (None, height) => {
                 let (pose, fitting) = framing::orthographic(subject(), aspect);
                 (pose, height.map_or(fitting, |Metres(height)| height))

@@ -48,9 +48,9 @@ pub struct Pinhole {
 
 impl PinholeSpec {
     /// The pose and projection. `subject` is asked for only when the pose is to be chosen.
-    pub(crate) fn build(
+    pub(crate) fn build<'a>(
         &self,
-        subject: impl FnOnce() -> Subject,
+        subject: impl FnOnce() -> Subject<'a>,
     ) -> Result<(Pose, Pinhole), CameraError> {
         let intrinsics = match (&self.intrinsics, self.fov) {
             (Some(_), Some(_)) => {

@@ -61,12 +61,14 @@ pub(crate) enum Command {
 
 const RENDER_HELP: &str = "\
 Files in the folder:
-  layers.exr         every layer, Layer.Channel, 32-bit float (ids: 32-bit integers)
+  layers.exr         every layer, Layer.Channel, 32-bit float
   NAME.npy           each layer as an array for numpy, 64-bit float where it is data
-  picture.png        the picture, 8 bits, sRGB
+  picture.png        the picture, 8 bits, sRGB; render.exposure (stops, or auto), render.tone_map
+                     (none, agx, aces) and render.alpha say how it shows the light
+  id_object.png, …   masks of ids, 16 bits: the numbers themselves
   NAME.preview.png   each layer to look at; not data
   camera.json        K, distortion and pose in OpenCV's convention
-  layers.json        what each layer means: definition, unit, frame, miss
+  layers.json        what each layer means: definition, unit, frame, miss, and what ids name
 and with a camera.sensor that is more than a grid of pixels, for each exposure:
   raw.png, .npy, .dng   digital numbers as the sensor's converter gave them
   raw.preview.png       the same to look at; not data
@@ -75,6 +77,8 @@ and with a camera.sensor that is more than a grid of pixels, for each exposure:
 Examples:
   etendue render scenes/first-light.json -o out/first-light
   etendue render model.glb -o out/model --layers depth,normal,ids
+  etendue render model.glb -o out/lit --set tracer.type=path --set render.exposure=auto --samples 64
+  etendue render scan.ply -o out/scan --up z
   etendue render scenes/cube.json -o out/cube --set camera.fov=30 --samples 16";
 
 const BENCH_HELP: &str = "\
@@ -161,6 +165,9 @@ pub(crate) struct LensArguments {
     /// Let the file name files outside its own folder
     #[arg(long)]
     pub(crate) allow_outside: bool,
+    /// Say nothing on standard error but errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
 }
 
 /// A scene, and what of it is overridden.
@@ -187,9 +194,12 @@ pub(crate) struct SceneArguments {
         value_delimiter = ',',
         value_parser = parse::layer,
         help = "Layers to write: depth, distance, normal, position, ids, coverage, flat, facing, \
-                albedo, uv, material_id"
+                albedo, uv, material_id, alpha"
     )]
     pub(crate) layers: Option<Vec<String>>,
+    /// Which axis points up in OBJ and PLY files, which do not say
+    #[arg(long, value_name = "AXIS", value_enum)]
+    pub(crate) up: Option<UpArgument>,
     /// Samples a pixel of colours; data layers take the pixel's centre
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576))]
     pub(crate) samples: Option<u32>,
@@ -215,6 +225,14 @@ pub(crate) enum SchemaArgument {
     Lens,
     /// Rays for `etendue lens --rays`
     Rays,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum UpArgument {
+    /// +Y, as in the scene
+    Y,
+    /// +Z, as in many CAD and scanning programs
+    Z,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -389,6 +407,13 @@ impl SceneArguments {
         if let Some(layers) = &self.layers {
             let names: Vec<String> = layers.iter().map(|name| format!("\"{name}\"")).collect();
             set("layers", format!("[{}]", names.join(",")));
+        }
+        if let Some(up) = self.up {
+            let axis = match up {
+                UpArgument::Y => "y",
+                UpArgument::Z => "z",
+            };
+            set("up", axis.to_owned());
         }
         if let Some(samples) = self.samples {
             set("render.samples", samples.to_string());

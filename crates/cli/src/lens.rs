@@ -65,7 +65,7 @@ fn report(lens: &ReadLens, arguments: &LensArguments) -> Result<(), Fault> {
         .map_err(|error| Fault::refused(format!("{}: {error}", arguments.lens.display())))?;
     report.notes.splice(..0, lens.notes.iter().cloned());
     if let Some(folder) = &arguments.output {
-        draw(&lens.train, &report, folder)?;
+        draw(&lens.train, &report, folder, arguments.quiet)?;
     }
     if arguments.json {
         warn(&report.out_of_range, arguments)?;
@@ -79,7 +79,12 @@ fn report(lens: &ReadLens, arguments: &LensArguments) -> Result<(), Fault> {
 }
 
 /// Draws a lens; each file appears when it is complete.
-fn draw(train: &OpticalTrain, report: &LensReport, folder: &Path) -> Result<(), Fault> {
+fn draw(
+    train: &OpticalTrain,
+    report: &LensReport,
+    folder: &Path,
+    quiet: bool,
+) -> Result<(), Fault> {
     let pictures = [
         ("layout.svg", drawing::layout(train, report)),
         ("spots.svg", drawing::spots(train, report)),
@@ -91,7 +96,9 @@ fn draw(train: &OpticalTrain, report: &LensReport, folder: &Path) -> Result<(), 
         let path = folder.join(name);
         write_whole(&path, |file| file.write_all(picture.as_bytes()))?;
         // Standard output has the numbers.
-        let _ = writeln!(std::io::stderr(), "wrote {}", path.display());
+        if !quiet {
+            let _ = writeln!(std::io::stderr(), "wrote {}", path.display());
+        }
     }
     Ok(())
 }
@@ -103,7 +110,7 @@ fn warn(out_of_range: &[String], arguments: &LensArguments) -> Result<(), Fault>
     {
         return Err(Fault::refused(format!("{}: {note}", arguments.lens.display())));
     }
-    for note in out_of_range {
+    for note in out_of_range.iter().filter(|_| !arguments.quiet) {
         // When standard error is gone there is nobody to tell.
         let _ = writeln!(std::io::stderr(), "warning: {note}");
     }

@@ -126,7 +126,7 @@ impl Lap {
 
 /// What stands in the header of every file.
 fn header(scene: &Scene) -> Result<Vec<(String, String)>, Fault> {
-    let mut header: Vec<(String, String)> = [
+    let header: Vec<(String, String)> = [
         ("scene_hash", scene.hash()?.to_string()),
         ("seed", scene.render.seed.to_string()),
         ("samples", scene.render.samples.to_string()),
@@ -135,10 +135,6 @@ fn header(scene: &Scene) -> Result<Vec<(String, String)>, Fault> {
     ]
     .map(|(key, value)| (key.to_owned(), value))
     .into();
-    if scene.layers.contains(&etendue_tracer::LayerSpec::Ids) {
-        let names = serde_json::to_string(&scene.objects).unwrap_or_default();
-        header.push(("objects".to_owned(), names));
-    }
     Ok(header)
 }
 
@@ -178,6 +174,10 @@ fn write(
                 _ => png::Bits::Eight,
             };
             png::write(&place(name), picture, &layer.name, bits)?;
+            let mask = folder.join(format!("{stem}.png"));
+            if png::has_mask(layer) && png::write_mask(&mask, picture, &layer.name)? {
+                place(format!("{stem}.png"));
+            }
         }
         if outputs.npy {
             npy::write(&place(format!("{stem}.npy")), picture, &layer.name)?;
@@ -188,13 +188,14 @@ fn write(
     Ok(files)
 }
 
-/// A layer's file name: `NormalCamera` is `normal_camera`, the picture `picture`.
+/// A layer's file name: `NormalCamera` is `normal_camera`, `Id.object` `id_object`, the picture
+/// `picture`.
 fn stem(layer: &str) -> String {
     if layer.is_empty() {
         return "picture".to_owned();
     }
     let mut stem = String::new();
-    for c in layer.chars() {
+    for c in layer.replace('.', "_").chars() {
         if c.is_ascii_uppercase() && !stem.is_empty() {
             stem.push('_');
         }
@@ -216,6 +217,7 @@ fn report(
     let (peak, private) = memory();
     let mut notes: Vec<String> = scene.notes.iter().map(in_words).collect();
     notes.extend(images.faults.iter().cloned());
+    notes.extend(rendered.notes.iter().cloned());
     if rendered.light.not_finite > 0 {
         let count = rendered.light.not_finite;
         notes.push(format!("{count} contributions of light were not finite and are left out"));

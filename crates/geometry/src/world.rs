@@ -9,8 +9,13 @@ use crate::{Bounds, Mesh, Transform};
 pub struct Placement {
     /// Index into [`Geometry::meshes`].
     pub mesh: u32,
-    /// Index of the scene's object that this belongs to (what `ids` writes).
+    /// Index of the scene's object that this belongs to. Of this number and the next two, the layer
+    /// `ids` writes each one more.
     pub object: u32,
+    /// Index of the copy that this belongs to, counted through all objects.
+    pub instance: u32,
+    /// Index of the model's node that this belongs to, counted through all objects.
+    pub node: u32,
     /// Index into the scene's materials.
     pub material: u32,
     /// From the mesh's frame to the world (m).

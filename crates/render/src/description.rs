@@ -13,15 +13,38 @@ pub(crate) struct Description {
     pub(crate) meaning: Vec<(&'static str, &'static str)>,
 }
 
+/// What each channel of [`LayerSpec::Ids`] counts.
+pub(crate) fn id_definition(channel: &str) -> &'static str {
+    match channel {
+        "object" => "number of the object in the scene, from 1",
+        "instance" => {
+            "number of the copy that was hit, from 1 through all objects; an object without copies \
+             has one"
+        }
+        "node" => "number of the model's node (or group) that was hit, from 1 through all objects",
+        _ => "number of the triangle in its mesh, from 1",
+    }
+}
+
 /// Where data layers look.
 const CHIEF_RAY: (&str, &str) = ("taken along", "the chief ray of the pixel's centre");
 
 /// The names and the meaning of a layer.
 #[expect(clippy::too_many_lines, reason = "a table, alone in its file")]
 pub(crate) fn describe(spec: LayerSpec) -> Description {
-    let world = ("frame", "world: right-handed, +Y up");
-    let camera = ("frame", "camera: right-handed, looking along -Z, +Y up, +X right");
-    let frame = |space| if space == Space::World { world } else { camera };
+    let frame = |space| match space {
+        Space::World => ("frame", "world: right-handed, +Y up"),
+        Space::Camera => (
+            "frame",
+            "camera, in OpenGL's convention: right-handed, looking along -Z, +Y up, +X right; \
+             camera.json has OpenCV's: turn the signs of y and z, or ask for \"space\": \"opencv\"",
+        ),
+        Space::Opencv => (
+            "frame",
+            "camera, in OpenCV's convention, as in camera.json: right-handed, looking along +Z, +Y \
+             down, +X right",
+        ),
+    };
     match spec {
         LayerSpec::Depth => Description {
             name: "Depth",
@@ -53,8 +76,10 @@ pub(crate) fn describe(spec: LayerSpec) -> Description {
             name: match (space, kind) {
                 (Space::World, NormalKind::Geometric) => "Normal",
                 (Space::Camera, NormalKind::Geometric) => "NormalCamera",
+                (Space::Opencv, NormalKind::Geometric) => "NormalOpencv",
                 (Space::World, NormalKind::Shading) => "NormalShading",
                 (Space::Camera, NormalKind::Shading) => "NormalShadingCamera",
+                (Space::Opencv, NormalKind::Shading) => "NormalShadingOpencv",
             },
             channels: &["X", "Y", "Z"],
             look: Look::Direction,
@@ -76,7 +101,11 @@ pub(crate) fn describe(spec: LayerSpec) -> Description {
             ],
         },
         LayerSpec::Position { space } => Description {
-            name: if space == Space::World { "Position" } else { "PositionCamera" },
+            name: match space {
+                Space::World => "Position",
+                Space::Camera => "PositionCamera",
+                Space::Opencv => "PositionOpencv",
+            },
             channels: &["X", "Y", "Z"],
             look: Look::Extent,
             meaning: vec![
@@ -89,17 +118,9 @@ pub(crate) fn describe(spec: LayerSpec) -> Description {
         },
         LayerSpec::Ids => Description {
             name: "Id",
-            channels: &["object", "primitive"],
+            channels: &["object", "instance", "node", "primitive"],
             look: Look::Ids,
-            meaning: vec![
-                (
-                    "definition",
-                    "number of the object in the scene, and of the triangle in its mesh, both \
-                     counted from 1",
-                ),
-                CHIEF_RAY,
-                ("miss", "0"),
-            ],
+            meaning: vec![CHIEF_RAY, ("miss", "0")],
         },
         LayerSpec::Coverage => Description {
             name: "Coverage",
@@ -158,12 +179,36 @@ pub(crate) fn describe(spec: LayerSpec) -> Description {
         },
         LayerSpec::MaterialId => Description {
             name: "MaterialId",
-            channels: &["material"],
+            channels: &["X"],
             look: Look::Ids,
             meaning: vec![
                 ("definition", "number of the material in the scene, counted from 1"),
                 CHIEF_RAY,
                 ("miss", "0"),
+            ],
+        },
+        LayerSpec::Alpha => Description {
+            name: "Alpha",
+            channels: &["A"],
+            look: Look::Share,
+            meaning: vec![(
+                "definition",
+                "share of the pixel's samples that hit something; holes that a texture's alpha cuts \
+                 count as surface",
+            )],
+        },
+        LayerSpec::Backdrop => Description {
+            name: "Backdrop",
+            channels: &["R", "G", "B"],
+            look: Look::Color,
+            meaning: vec![
+                (
+                    "definition",
+                    "the part of the picture that came from the environment past everything: the \
+                     picture less this is what to put over another background, by Alpha; 0 with \
+                     wavelengths other than RGB",
+                ),
+                ("unit", "1 (linear light, sRGB primaries)"),
             ],
         },
         LayerSpec::Radiance => Description {

@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use etendue_spectrum::Lanes;
 use etendue_tracer::LayerSpec;
 
-use crate::description::{Description, describe};
+use crate::description::{Description, describe, id_definition};
 use crate::expose::LaneFilm;
 use crate::output::{Channel, Layer, Values};
 
@@ -100,6 +100,8 @@ impl FilmLayer {
                 | LayerSpec::Facing
                 | LayerSpec::Albedo
                 | LayerSpec::Radiance
+                | LayerSpec::Alpha
+                | LayerSpec::Backdrop
                 | LayerSpec::Coverage,
                 _,
             )
@@ -130,17 +132,34 @@ impl FilmLayer {
         Some(film)
     }
 
-    /// The layer as it is written; `root` puts it at the root of the file, without a name.
-    pub(crate) fn into_layer(self, root: bool) -> Layer {
+    /// The planes alone.
+    pub(crate) fn into_planes(self) -> Vec<Values> {
+        self.planes
+    }
+
+    /// The layers as they are written; `root` puts the picture at the root of the file, without a
+    /// name. Each kind of id is a layer of its own, `Id.object.X`: the form that Blender reads.
+    pub(crate) fn into_layers(self, root: bool) -> Vec<Layer> {
         let Description { name, look, meaning, .. } = describe(self.spec);
-        let channels = self
-            .names
-            .into_iter()
-            .zip(self.planes)
-            .map(|(name, values)| Channel { name, values })
-            .collect();
-        let meaning = meaning.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
-        Layer { name: if root { String::new() } else { name.to_owned() }, look, channels, meaning }
+        let owned = |(k, v): &(&str, &str)| ((*k).to_owned(), (*v).to_owned());
+        let meaning: Vec<_> = meaning.iter().map(owned).collect();
+        let planes = self.names.into_iter().zip(self.planes);
+        if self.spec == LayerSpec::Ids {
+            let layer = |(channel, values): (String, Values)| {
+                let definition = id_definition(&channel);
+                let definition = ("definition".to_owned(), definition.to_owned());
+                Layer {
+                    name: format!("{name}.{channel}"),
+                    look,
+                    channels: vec![Channel { name: "X".to_owned(), values }],
+                    meaning: std::iter::once(definition).chain(meaning.clone()).collect(),
+                }
+            };
+            return planes.map(layer).collect();
+        }
+        let channels = planes.map(|(name, values)| Channel { name, values }).collect();
+        let name = if root { String::new() } else { name.to_owned() };
+        vec![Layer { name, look, channels, meaning }]
     }
 }
 

@@ -11,9 +11,12 @@
 //! | [`output`] | the named layers of a render, and EXR, PNG, NPY and JSON files of them |
 //! | [`report`] | what a render did and what it cost |
 
+mod backdrop;
 mod description;
 pub mod expose;
 mod film;
+mod lighting;
+mod names;
 pub mod output;
 pub mod plan;
 mod radiance;

@@ -323,6 +323,8 @@ fn source_words(scene: &Scene) -> (String, String) {
         (_, 0) => "named by the scene or its models, or chosen in their place".to_owned(),
         _ => format!("lights are chosen by power; {triangles} triangles shine too"),
     };
+    let more = "; a grey studio, too, where they leave what the camera sees in the dark";
+    let words = if scene.studio_if_dark { words + more } else { words };
     ((lights + triangles).to_string(), words)
 }
 

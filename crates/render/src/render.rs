@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildError, BuildOptions};
-use etendue_camera::PixelExtent;
+use etendue_camera::{Camera, PixelExtent};
 use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, TracerSpec};
@@ -17,11 +17,11 @@ use etendue_tracer::{
 use rayon::prelude::*;
 
 use crate::film::FilmLayer;
-use crate::output::{Layer, Picture, PictureError};
+use crate::output::{Development, Layer, Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::report::ImageSize;
 use crate::tiles::{Job, Sampling, Stopped, Traffic};
-use crate::{Plan, expose};
+use crate::{Plan, expose, lighting, names};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
 pub type Progress = Arc<dyn Fn(f64) -> bool + Send + Sync>;
@@ -89,6 +89,8 @@ pub struct Rendered {
     pub light: Tally,
     /// Wall time of the tracing alone.
     pub trace_time: Duration,
+    /// What a user should know of the picture.
+    pub notes: Vec<String>,
 }
 
 /// The accelerators that this program was built with, the best first.
@@ -263,10 +265,13 @@ pub fn render(
     let light_camera = if plan.lanes == Lanes::Rgb { camera.clone() } else { open(&plan.lanes)? };
     let surroundings = surroundings(scene, images, plan.samples);
     let spectral = Spectral::new(&plan.lanes);
+    let mut notes = Vec::new();
     let lit = match scene.tracer.and_then(tracer) {
         Some(tracer) if plan.layers.contains(&LayerSpec::Radiance) => {
-            let map = images.environment.clone();
-            let lights = Lights::new(&scene.lights, map, &surroundings, &spectral)
+            let (map, seen) = (images.environment.clone(), (accel, surroundings));
+            let found = lighting::settle(scene, map, &*tracer, seen, progress)?;
+            notes.extend(found.note);
+            let lights = Lights::new(&found.lights, found.map, &surroundings, &spectral)
                 .map_err(|error| RenderError::Lights(error.to_string()))?;
             Some((tracer, lights))
         }
@@ -310,15 +315,25 @@ pub fn render(
     let lane_film = film.iter_mut().find_map(|layer| layer.take_lanes(&plan.lanes));
     let mut layers: Vec<Layer> = film
         .into_iter()
-        .map(|layer| {
+        .flat_map(|layer| {
             let root = Some(layer.spec) == scene.picture;
-            layer.into_layer(root)
+            layer.into_layers(root)
         })
         .collect();
     layers.extend(expose::spectrum(scene, &layers, lane_film.as_ref()));
-    let picture = Picture::new(width, height, layers, header)?;
+    let picture = Picture::new(width, height, layers, header)?.with_names(names::tables(scene));
+    let development = Development::new(&scene.render, &picture);
+    let picture = picture.developed(development);
+    notes.extend(judged(scene, (&camera, accel), &picture));
     let rays = chief_rays + light.rays + light.shadow_rays;
-    Ok(Rendered { picture, lane_film, rays, light, fates, trace_time })
+    Ok(Rendered { picture, lane_film, rays, light, fates, trace_time, notes })
+}
+
+/// What a user should know of a finished picture.
+fn judged(scene: &Scene, seen: (&Camera, &dyn Accel), picture: &Picture) -> Vec<String> {
+    let is_light = scene.picture == Some(LayerSpec::Radiance);
+    let light = is_light.then(|| lighting::verdict(seen, picture)).flatten();
+    light.into_iter().chain(names::notes(picture)).collect()
 }
 
 fn surroundings<'a>(scene: &'a Scene, images: &'a Images, samples: u32) -> Surroundings<'a> {

@@ -14,6 +14,7 @@ use etendue_optics::element::FateCounts;
 use etendue_tracer::{LayerSpec, NormalKind, Surroundings, Tally, Traced};
 use rayon::prelude::*;
 
+use crate::backdrop;
 use crate::film::{Band, FilmLayer, Rows, bands, single};
 use crate::radiance::{LightBatch, LightPass};
 
@@ -94,8 +95,11 @@ impl Job<'_> {
         let (mut lit, seen): (Vec<_>, Vec<_>) = std::mem::take(&mut band.layers)
             .into_iter()
             .partition(|(layer, _)| *layer == LayerSpec::Radiance);
-        let (mut centre, mut mean): (Vec<_>, Vec<_>) =
-            seen.into_iter().partition(|(layer, _)| at_centre || !layer.is_averaged());
+        let (mut centre, mut mean): (Vec<_>, Vec<_>) = seen.into_iter().partition(|(layer, _)| {
+            // What is behind the picture is where the picture's own samples are.
+            let behind = matches!(layer, LayerSpec::Alpha | LayerSpec::Backdrop);
+            !layer.is_averaged() || (at_centre && !(behind && self.light.is_some()))
+        });
         for left in (0..width).step_by(TILE as usize) {
             let tile =
                 Tile { left, top: band.top, width: TILE.min(width - left), height: band.height };
@@ -163,8 +167,13 @@ impl Job<'_> {
             for (p, &(x, y)) in pixels.iter().enumerate() {
                 let index = tile.index(x, y, width);
                 let count = layers.len();
-                for (k, (_, planes)) in layers.iter_mut().enumerate() {
-                    for (plane, sum) in planes.iter_mut().zip(sums[p * count + k]) {
+                for (k, (layer, planes)) in layers.iter_mut().enumerate() {
+                    let sums = sums[p * count + k];
+                    if *layer == LayerSpec::Alpha {
+                        planes[0].put(index, backdrop::share(sums));
+                        continue;
+                    }
+                    for (plane, sum) in planes.iter_mut().zip(sums) {
                         plane.put(index, sum / f64::from(samples));
                     }
                 }
@@ -176,6 +185,8 @@ impl Job<'_> {
         match layer {
             LayerSpec::Facing => self.surroundings.facings(traced, out),
             LayerSpec::Albedo => self.surroundings.albedos(traced, out),
+            LayerSpec::Alpha => backdrop::alpha(traced, out),
+            LayerSpec::Backdrop => backdrop::radiance(self.light.as_ref(), traced, out),
             _ => self.surroundings.flats(traced, out),
         }
     }
@@ -196,7 +207,11 @@ impl Job<'_> {
                     plane.scatter(places, values);
                 }
             }
-            LayerSpec::Flat | LayerSpec::Facing | LayerSpec::Albedo => {
+            LayerSpec::Flat
+            | LayerSpec::Facing
+            | LayerSpec::Albedo
+            | LayerSpec::Alpha
+            | LayerSpec::Backdrop => {
                 self.colors(layer, traced, numbers);
                 for (plane, values) in planes.iter_mut().zip(numbers) {
                     plane.scatter(places, values);
@@ -228,7 +243,9 @@ impl Job<'_> {
             | LayerSpec::Distance
             | LayerSpec::Flat
             | LayerSpec::Facing
-            | LayerSpec::Albedo => {}
+            | LayerSpec::Albedo
+            | LayerSpec::Alpha
+            | LayerSpec::Backdrop => {}
             LayerSpec::Normal { space, kind } => {
                 each(planes, batch, index, |i| around.normal(traced, i, kind, space).to_array());
             }

@@ -1,4 +1,4 @@
-"""Reads what the test wrote with OpenEXR, numpy and xxhash, and compares it with the raw values.
+"""Reads what the test wrote with OpenEXR, OpenImageIO, numpy and xxhash, and compares it with the raw values.
 
 Called with a folder that holds `expected.json`, the files it names, and `NAME.raw` of each channel.
 """
@@ -9,6 +9,7 @@ import sys
 
 import numpy
 import OpenEXR
+import OpenImageIO
 import xxhash
 
 folder = pathlib.Path(sys.argv[1])
@@ -43,6 +44,16 @@ for name in expected["exr"]:
             assert header[key] == text, f"{name}: {key} is {header[key]!r} instead of {text!r}"
             if text.startswith("{"):
                 json.loads(text)
+
+    # As OpenImageIO reads by default: all channels of the file as floats.
+    image = OpenImageIO.ImageBuf(str(folder / name))
+    names = list(image.spec().channelnames)
+    assert sorted(names) == sorted(wanted), f"{name}: OpenImageIO names {names}"
+    pixels = image.get_pixels(OpenImageIO.FLOAT)
+    for channel, told in expected["channels"].items():
+        if told["stored"] == "float32":
+            found = numpy.ascontiguousarray(pixels[:, :, names.index(channel)])
+            same(f"{name} by OpenImageIO: {channel}", found, raw(channel).astype("<f4"))
 
 depth = raw("Depth.Z")
 assert numpy.isposinf(depth).any(), "the test has no miss"

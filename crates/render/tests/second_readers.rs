@@ -120,9 +120,10 @@ fn write_all(folder: &Path, picture: &Picture) {
         for channel in &layer.channels {
             let name = layer.full_name(channel);
             fs::write(folder.join(format!("{name}.raw")), raw(&channel.values)).unwrap();
-            let stored = match channel.values {
-                Values::F32(_) | Values::F64(_) => "float32",
-                Values::U16(_) | Values::U32(_) => "uint32",
+            // Integers that floats hold exactly are floats, for readers that know no others.
+            let stored = match &channel.values {
+                Values::U32(values) if values.iter().any(|value| *value > 1 << 24) => "uint32",
+                _ => "float32",
             };
             let kind = channel.values.type_name();
             channels.insert(name, json!({ "type": kind, "stored": stored }));
@@ -144,8 +145,8 @@ fn write_all(folder: &Path, picture: &Picture) {
 /// A Python with the readers, made once under the target folder; `None`, with the reason printed,
 /// when it cannot be made.
 fn python() -> Option<PathBuf> {
-    const PACKAGES: [&str; 3] = ["OpenEXR>=3.3", "numpy", "xxhash"];
-    let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python");
+    const PACKAGES: [&str; 4] = ["OpenEXR>=3.3", "OpenImageIO>=3", "numpy", "xxhash"];
+    let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-2");
     let python = home.join("bin").join("python");
     let ready = home.join("ready");
     fs::create_dir_all(&home).ok()?;
@@ -209,10 +210,11 @@ fn exrheader_shows_channels_and_meaning() {
         "lineOrder (type lineOrder): increasing y",
         "    Depth.Z, 32-bit floating-point, sampling 1 1",
         "    Distance.Z, 32-bit floating-point, sampling 1 1",
-        "    Id.object, 32-bit unsigned integer, sampling 1 1",
+        "    Id.object, 32-bit floating-point, sampling 1 1",
         "    Normal.X, 32-bit floating-point, sampling 1 1",
         "    R, 32-bit floating-point, sampling 1 1",
-        "    Raw.Y, 32-bit unsigned integer, sampling 1 1",
+        "    Id.primitive, 32-bit unsigned integer, sampling 1 1",
+        "    Raw.Y, 32-bit floating-point, sampling 1 1",
         "etendue:seed (type string): \"0\"",
         "etendue:scene_hash (type string): \"0123456789abcdef0123456789abcdef\"",
         "etendue:RGB (type string): \"{\"definition\":",

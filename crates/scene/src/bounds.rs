@@ -1,5 +1,9 @@
-//! The tight box around a scene.
+//! The tight box around a scene, and how far its vertices reach in any direction.
 
+use std::collections::BTreeSet;
+
+use etendue_camera::Support;
+use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, Placement};
 use rayon::prelude::*;
 
@@ -38,6 +42,67 @@ pub(crate) fn tight(geometry: &Geometry) -> Bounds {
     bounds
 }
 
+/// The vertices of all triangles in world space, as a camera that frames them asks.
+pub(crate) struct Vertices<'a>(pub(crate) &'a Geometry);
+
+impl Support for Vertices<'_> {
+    /// Visits the placements that may reach farthest first, and no other once their boxes do not.
+    fn support(&self, origin: DVec3, directions: &[DVec3]) -> Vec<f64> {
+        let geometry = self.0;
+        let mut most = vec![f64::NEG_INFINITY; directions.len()];
+        let boxes: Vec<Vec<f64>> = geometry
+            .placements
+            .par_iter()
+            .map(|placement| match loose(geometry, placement) {
+                bounds if bounds.is_empty() => Vec::new(),
+                bounds => bounds.support(origin, directions),
+            })
+            .collect();
+        let beyond =
+            |reach: &[f64], most: &[f64]| reach.iter().zip(most).any(|(reach, most)| reach > most);
+        let first = (0..directions.len()).filter_map(|k| {
+            let reaches = boxes.iter().enumerate().filter(|(_, reach)| !reach.is_empty());
+            reaches.max_by(|(_, a), (_, b)| a[k].total_cmp(&b[k])).map(|(index, _)| index)
+        });
+        let first: BTreeSet<usize> = first.collect();
+        let rest = (0..boxes.len()).filter(|index| !first.contains(index));
+        for index in first.iter().copied().chain(rest) {
+            if beyond(&boxes[index], &most) {
+                let found = farthest(geometry, &geometry.placements[index], origin, directions);
+                most.iter_mut().zip(found).for_each(|(most, found)| *most = most.max(found));
+            }
+        }
+        most
+    }
+}
+
+/// The support function of one placement's triangles.
+fn farthest(
+    geometry: &Geometry,
+    placement: &Placement,
+    origin: DVec3,
+    directions: &[DVec3],
+) -> Vec<f64> {
+    const CHUNK: usize = 1 << 15;
+    let mesh = geometry.mesh_of(placement);
+    let none = || vec![f64::NEG_INFINITY; directions.len()];
+    let chunks = mesh.triangles.par_chunks(CHUNK).map(|triangles| {
+        let mut most = none();
+        for &corner in triangles.iter().flatten() {
+            let local = mesh.positions.get(corner as usize);
+            let point = placement.world_from_mesh.point_from(local, origin);
+            for (most, direction) in most.iter_mut().zip(directions) {
+                *most = most.max(point.dot(*direction));
+            }
+        }
+        most
+    });
+    chunks.reduce(none, |mut a, b| {
+        a.iter_mut().zip(b).for_each(|(a, b)| *a = a.max(b));
+        a
+    })
+}
+
 fn loose(geometry: &Geometry, placement: &Placement) -> Bounds {
     let mut bounds = Bounds::EMPTY;
     let local = geometry.mesh_of(placement).bounds;
@@ -67,7 +132,7 @@ fn exact(geometry: &Geometry, placement: &Placement) -> Bounds {
 
 #[cfg(test)]
 mod tests {
-    use etendue_geometry::glam::{DMat3, DQuat, DVec3};
+    use etendue_geometry::glam::{DMat3, DQuat};
     use etendue_geometry::{Mesh, Positions, Transform, Vertices};
 
     use super::*;
@@ -88,6 +153,8 @@ mod tests {
             Placement {
                 mesh: 0,
                 object: 0,
+                instance: 0,
+                node: 0,
                 material: 0,
                 world_from_mesh: Transform::new(turned, at),
             }
@@ -96,6 +163,31 @@ mod tests {
             meshes: vec![Mesh::new("", positions, vec![[0, 1, 2]].into())],
             placements: (0..count).map(place).collect(),
         }
+    }
+
+    #[test]
+    fn support_is_that_of_every_corner() {
+        let directions = [DVec3::X, DVec3::new(-0.3, 0.9, 0.4), DVec3::new(0.1, -1.0, 2.0)];
+        let geometry = needles(200);
+        let origin = DVec3::new(1.0, 2.0, 3.0);
+        let mut expected = [f64::NEG_INFINITY; 3];
+        for placement in &geometry.placements {
+            for corner in geometry.meshes[0].corners(0) {
+                let point = placement.world_from_mesh.point(corner) - origin;
+                for (most, d) in expected.iter_mut().zip(directions) {
+                    *most = most.max(point.dot(d));
+                }
+            }
+        }
+        let found = Vertices(&geometry).support(origin, &directions);
+        for (found, expected) in found.iter().zip(expected) {
+            // A few roundings of numbers near 10.
+            assert!((found - expected).abs() < 1e-13, "{found} {expected}");
+        }
+        assert_eq!(
+            Vertices(&Geometry::default()).support(origin, &[DVec3::X]),
+            [f64::NEG_INFINITY]
+        );
     }
 
     #[test]

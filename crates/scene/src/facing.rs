@@ -8,7 +8,7 @@ use etendue_camera::{Pose, Subject, Viewpoint};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Geometry, Placement, Transform};
 
-use crate::bounds;
+use crate::bounds::{self, Vertices};
 
 /// Columns and rows of a coarse picture.
 const CELLS: usize = 48;
@@ -29,8 +29,9 @@ const MOST_TRIANGLES: u64 = 10_000_000;
 const INSIDE: f64 = 0.1;
 
 /// What a camera without a pose has to frame, and from where.
-pub(crate) fn subject(geometry: &Geometry) -> Subject {
-    let subject = Subject::from(bounds::tight(geometry));
+pub(crate) fn subject<'a>(vertices: &'a Vertices<'a>) -> Subject<'a> {
+    let geometry = vertices.0;
+    let subject = Subject { points: Some(vertices), ..Subject::from(bounds::tight(geometry)) };
     let bounds = subject.bounds;
     let is_box = !bounds.is_empty() && (bounds.max - bounds.min).is_finite();
     if !is_box || bounds.diagonal() == 0.0 || geometry.triangles() > MOST_TRIANGLES {
@@ -44,7 +45,7 @@ pub(crate) fn subject(geometry: &Geometry) -> Subject {
 }
 
 /// From where to look at something that turns its back to the usual view.
-fn viewpoint(geometry: &Geometry, subject: &Subject) -> Viewpoint {
+fn viewpoint(geometry: &Geometry, subject: &Subject<'_>) -> Viewpoint {
     let bounds = subject.bounds;
     if let Some(axis) = subject.flat_axis() {
         // Land is seen from above, whichever way its triangles face.
@@ -55,9 +56,9 @@ fn viewpoint(geometry: &Geometry, subject: &Subject) -> Viewpoint {
     }
     let mut is_closed = true;
     for side in [DVec3::Z, DVec3::NEG_Z, DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
-        let view = Subject { bounds, viewpoint: Viewpoint::Side(side) }.view();
+        let view = Subject { viewpoint: Viewpoint::Side(side), ..*subject }.view();
         let seen = Seen::of(geometry, bounds, &view);
-        if seen.backs() < 1.0 - MOSTLY {
+        if seen.backs() < 1.0 - MOSTLY && (side.y == 0.0 || seen.is_full() && is_low(bounds)) {
             return Viewpoint::Side(side);
         }
         is_closed &= seen.backs() > MOSTLY && seen.is_full();
@@ -66,6 +67,14 @@ fn viewpoint(geometry: &Geometry, subject: &Subject) -> Viewpoint {
         return Viewpoint::Within(place_within(geometry, bounds, subject.view().forward()));
     }
     Viewpoint::Usual
+}
+
+/// Whether something is no higher than it is wide or deep: only then is it looked at from above or
+/// below, into a room without a ceiling. Trees and towers are seen from the side, though their leaves
+/// and roofs show their fronts to the sky.
+fn is_low(bounds: Bounds) -> bool {
+    let size = bounds.max - bounds.min;
+    size.y <= size.x.max(size.z)
 }
 
 /// What a coarse parallel picture shows.
@@ -212,9 +221,13 @@ fn place_within(geometry: &Geometry, bounds: Bounds, forward: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
-    use etendue_geometry::{Mesh, Positions, Vertices};
+    use etendue_geometry::{Mesh, Positions, Vertices as Vertices3};
 
     use super::*;
+
+    fn viewpoint_of(geometry: &Geometry) -> Viewpoint {
+        subject(&Vertices(geometry)).viewpoint
+    }
 
     /// The corner of a box of these half-sides whose number's bits are x, y and z.
     fn corner(half: [f32; 3], number: u32) -> [f32; 3] {
@@ -231,12 +244,12 @@ mod tests {
             [[a, b, c], [a, c, d]]
         };
         let triangles: Vec<[u32; 3]> = sides.iter().flat_map(two).collect();
-        Mesh::new("", Positions::F32(Vertices::from_arrays(&positions)), triangles.into())
+        Mesh::new("", Positions::F32(Vertices3::from_arrays(&positions)), triangles.into())
     }
 
     fn at(mesh: u32, scale: DVec3, place: DVec3) -> Placement {
         let world_from_mesh = Transform::new(DMat3::from_diagonal(scale), place);
-        Placement { mesh, object: 0, material: 0, world_from_mesh }
+        Placement { mesh, object: 0, instance: 0, node: 0, material: 0, world_from_mesh }
     }
 
     /// A box of the given sides, turned inside out by a map that leaves its triangles alone, and what
@@ -261,9 +274,9 @@ mod tests {
                 meshes: vec![sides([1.0, 2.0, 3.0], &all)],
                 placements: vec![at(0, scale, DVec3::X)],
             };
-            assert_eq!(subject(&geometry).viewpoint, Viewpoint::Usual, "{scale}");
+            assert_eq!(viewpoint_of(&geometry), Viewpoint::Usual, "{scale}");
         }
-        assert_eq!(subject(&Geometry::default()).viewpoint, Viewpoint::Usual);
+        assert_eq!(viewpoint_of(&Geometry::default()), Viewpoint::Usual);
     }
 
     #[test]
@@ -272,7 +285,7 @@ mod tests {
         for open in 0..6 {
             let out = axes[open / 2] * if open % 2 == 0 { -1.0 } else { 1.0 };
             for furniture in [false, true] {
-                let found = subject(&room(&[open], furniture)).viewpoint;
+                let found = viewpoint_of(&room(&[open], furniture));
                 assert_eq!(found, Viewpoint::Side(out), "open at {out}");
             }
         }
@@ -281,7 +294,8 @@ mod tests {
     #[test]
     fn a_closed_room_is_seen_from_within() {
         let geometry = room(&[], true);
-        let subject = subject(&geometry);
+        let vertices = Vertices(&geometry);
+        let subject = subject(&vertices);
         let Viewpoint::Within(place) = subject.viewpoint else { panic!("{subject:?}") };
         let (low, high) = (subject.bounds.min, subject.bounds.max);
         assert!(place.cmpgt(low).all() && place.cmplt(high).all(), "{place}");
@@ -289,10 +303,41 @@ mod tests {
         assert!(ahead > 0.5, "the middle is in front: {ahead}");
     }
 
+    /// Leaves around the top of a trunk, tilted outwards: single triangles whose fronts look up.
+    fn palm(height: f32, leaves: u32) -> Geometry {
+        let mut positions = Vec::new();
+        let mut triangles = Vec::new();
+        for leaf in 0..leaves {
+            let angle = |k: f32| std::f32::consts::TAU * (leaf as f32 + k) / leaves as f32;
+            let first = u32::try_from(positions.len()).unwrap();
+            positions.push([0.0, height, 0.0]);
+            for k in [0.9, 0.0] {
+                let (sin, cos) = angle(k).sin_cos();
+                positions.push([cos, 0.5 * height, sin]);
+            }
+            triangles.push([first, first + 1, first + 2]);
+        }
+        let mesh =
+            Mesh::new("", Positions::F32(Vertices3::from_arrays(&positions)), triangles.into());
+        Geometry { meshes: vec![mesh], placements: vec![at(0, DVec3::ONE, DVec3::ZERO)] }
+    }
+
+    #[test]
+    fn a_tree_is_seen_from_the_side() {
+        for height in [2.0, 5.0] {
+            for leaves in [6, 40] {
+                let geometry = palm(height, leaves);
+                let vertices = Vertices(&geometry);
+                let up = subject(&vertices).view().forward().y.abs();
+                assert!(up < 0.7, "{leaves} leaves at {height}: looked at along {up}");
+            }
+        }
+    }
+
     /// Nothing tells an empty shell from a box whose triangles are wound the wrong way.
     #[test]
     fn an_empty_shell_is_seen_from_outside() {
-        assert_eq!(subject(&room(&[], false)).viewpoint, Viewpoint::Usual);
+        assert_eq!(viewpoint_of(&room(&[], false)), Viewpoint::Usual);
     }
 
     #[test]
@@ -304,12 +349,12 @@ mod tests {
                 meshes: vec![sides(half, &[side])],
                 placements: vec![at(0, DVec3::ONE, DVec3::ZERO)],
             };
-            assert_eq!(subject(&geometry).viewpoint, Viewpoint::Side(towards));
+            assert_eq!(viewpoint_of(&geometry), Viewpoint::Side(towards));
         }
         let land = Geometry {
             meshes: vec![sides([1.0, 0.0, 1.0], &[2])],
             placements: vec![at(0, DVec3::ONE, DVec3::ZERO)],
         };
-        assert_eq!(subject(&land).viewpoint, Viewpoint::Usual);
+        assert_eq!(viewpoint_of(&land), Viewpoint::Usual);
     }
 }

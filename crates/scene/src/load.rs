@@ -13,8 +13,9 @@ use etendue_spectrum::Lanes;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
 
+use crate::bounds::Vertices;
 use crate::cameras::{self, CameraOrigin, SceneCamera};
-use crate::file::{FileKind, ObjectSpec, SceneFile, Source, join, join_index, suggest};
+use crate::file::{FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index, suggest};
 use crate::identity::Ingredients;
 use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Strictness, Wanted};
 use crate::instances::Instances;
@@ -57,16 +58,20 @@ impl SceneFile {
         let imports = self.import_all(&origins, &objects, &folder, wanted, options)?;
         let mut parts = Parts::new(own.materials, own.textures, lights.clone().unwrap_or_default());
         let split_nodes = self.kind() == FileKind::Model;
+        for (spec, object) in self.spec.objects.iter().zip(&objects) {
+            let note = self.note_up(spec, &imports[object.origin]);
+            parts.notes.extend(note.filter(|note| !parts.notes.contains(note)));
+        }
         for import in imports {
             parts.add_import(import);
         }
         parts.files = instance_files;
         for (index, object) in objects.iter().enumerate() {
             self.check_overrides(&parts, object, index)?;
-            parts.place(object, split_nodes, index).map_err(|what| self.too_many(what))?;
+            parts.place(object, split_nodes).map_err(|what| self.too_many(what))?;
         }
         if self.spec.picture() == Some(LayerSpec::Radiance) && lights.is_none() {
-            parts.light_by_default();
+            parts.studio_if_dark = !parts.light_by_default();
         }
         self.finish(parts, &folder, options)
     }
@@ -154,13 +159,39 @@ impl SceneFile {
         let instances = Instances::resolve(spec.instances.as_ref(), &join(at, "instances"), folder)
             .map_err(|(at, why)| self.fault(&at, why))?;
         own.files.extend(instances.file);
-        let copies = instances.transforms.iter().map(|copy| world_from_object.then_inner(copy));
+        let turn = self.up_of(spec).turn();
+        let copies = instances.transforms.iter();
+        let copies = copies.map(|copy| world_from_object.then_inner(&copy.then_inner(&turn)));
         Ok(Object {
             title: spec.title(),
             origin,
             world_from_object: copies.collect(),
             material,
             overrides,
+        })
+    }
+
+    /// Which axis of an object's file points up.
+    fn up_of(&self, spec: &ObjectSpec) -> Up {
+        let silent = matches!(&spec.source, Source::File(path) if names_no_up(path));
+        spec.up.unwrap_or(if silent { self.spec.up } else { Up::Y })
+    }
+
+    /// That a model seems to lie on its back: a file that does not say which way is up, and whose box
+    /// stands on z = 0 with as much on one side of y = 0 as on the other.
+    fn note_up(&self, spec: &ObjectSpec, import: &Import) -> Option<Note> {
+        let Source::File(path) = &spec.source else { return None };
+        let said = spec.up.is_some() || self.value().get("up").is_some();
+        if said || !names_no_up(path) || !stands_on_z(import) {
+            return None;
+        }
+        let message = "its box stands on z = 0: if it lies on its back, +Z is up in this file; give \
+                       `--up z`, or its object `\"up\": \"z\"` (`\"y\"` for silence)";
+        Some(Note {
+            kind: NoteKind::Assumed,
+            subject: path.clone(),
+            message: message.to_owned(),
+            count: 1,
         })
     }
 
@@ -273,10 +304,13 @@ impl SceneFile {
         Ok(Scene {
             path: self.path().to_owned(),
             geometry,
-            objects: parts.objects,
+            objects: parts.register.objects,
+            nodes: parts.register.nodes,
+            copies: parts.register.copies,
             materials: parts.materials,
             textures: parts.textures,
             lights: parts.lights,
+            studio_if_dark: parts.studio_if_dark,
             tracer: self.spec.tracer,
             camera,
             sensor,
@@ -318,8 +352,9 @@ impl SceneFile {
             None if own.has_pose() => (own, CameraOrigin::Scene),
             None => (own, CameraOrigin::Framed),
         };
+        let vertices = Vertices(geometry);
         let camera = spec
-            .build(|| facing::subject(geometry), &|name| files.find(name))
+            .build(|| facing::subject(&vertices), &|name| files.find(name))
             .map_err(|error| self.camera_fault(&error))?;
         Ok((camera, origin))
     }
@@ -368,6 +403,29 @@ impl SceneFile {
             count: 1,
         })
     }
+}
+
+/// Whether a model's format leaves open which way is up.
+fn names_no_up(path: &str) -> bool {
+    let ending = path.rsplit_once('.').map_or("", |(_, ending)| ending);
+    ["obj", "ply"].iter().any(|known| ending.eq_ignore_ascii_case(known))
+}
+
+/// Whether the box of a model stands on the plane z = 0, and not on y = 0.
+fn stands_on_z(import: &Import) -> bool {
+    /// Shares of the box's own sides.
+    const ON_THE_GROUND: f64 = 0.01;
+    const OFF_CENTRE: f64 = 0.2;
+    let boxes = import.meshes.iter().map(|mesh| mesh.bounds);
+    let bounds = boxes.fold(Bounds::EMPTY, Bounds::union);
+    if bounds.is_empty() {
+        return false;
+    }
+    let size = bounds.max - bounds.min;
+    // A sheet says nothing.
+    size.min_element() > 0.05 * size.max_element()
+        && bounds.min.z.abs() <= ON_THE_GROUND * size.z
+        && bounds.centre().y.abs() <= OFF_CENTRE * size.y
 }
 
 /// What the scene file itself brings, while its objects are resolved.
@@ -422,6 +480,8 @@ fn of_shape(
             material: 0,
             model_from_mesh: Transform::IDENTITY,
             name: String::new(),
+            node: 0,
+            instance: None,
         }],
         meshes: vec![mesh],
         materials: vec![Material::unnamed()],

@@ -1,12 +1,13 @@
 //! A scene while it is put together: what the imports bring, and where the objects place it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
 use etendue_geometry::{Geometry, Placement, Transform};
-use etendue_tracer::{EnvironmentImage, Light, LightKind, Material, Texture, TextureScope};
+use etendue_tracer::{Light, Material, Texture, TextureScope};
 
 use crate::cameras::SceneCamera;
+use crate::ids::Register;
 use crate::import::{self, Import, ImportedPlacement, Note, NoteKind};
 use crate::scene::LoadStats;
 
@@ -35,10 +36,11 @@ struct Home {
 #[derive(Default)]
 pub(crate) struct Parts {
     pub(crate) geometry: Geometry,
-    pub(crate) objects: Vec<String>,
+    pub(crate) register: Register,
     pub(crate) materials: Vec<Material>,
     pub(crate) textures: Vec<Texture>,
     pub(crate) lights: Vec<Light>,
+    pub(crate) studio_if_dark: bool,
     pub(crate) cameras: Vec<SceneCamera>,
     pub(crate) notes: Vec<Note>,
     pub(crate) stats: LoadStats,
@@ -91,49 +93,37 @@ impl Parts {
 
     /// Places an object. A model that stands for a scene has an object for each of its nodes.
     /// The error names what there is too much of.
-    pub(crate) fn place(
-        &mut self,
-        object: &Object,
-        split_nodes: bool,
-        index: usize,
-    ) -> Result<(), &'static str> {
+    pub(crate) fn place(&mut self, object: &Object, split_nodes: bool) -> Result<(), &'static str> {
         let home = &self.homes[object.origin];
         let sum = |offset: usize, index: u32| u32::try_from(offset + index as usize).ok();
-        if !split_nodes {
-            self.objects.push(object.title.clone());
-        }
-        let mut last: Option<&ImportedPlacement> = None;
+        let mut numbers = Numbers::new(object, &home.placements, split_nodes, &mut self.register)?;
+        let first_object = numbers.first_object;
         for placement in &home.placements {
-            let starts_node = last.is_none_or(|last| !is_same_node(last, placement));
-            if split_nodes && starts_node {
-                let named = !placement.name.is_empty();
-                let name = if named { &placement.name } else { &object.title };
-                self.objects.push(name.clone());
-            }
-            last = Some(placement);
-            let number = if split_nodes { self.objects.len() - 1 } else { index };
             let own = sum(home.materials, placement.material).ok_or("materials")?;
             let named = self.materials.get(own as usize).map(|material| &material.name);
             let replaced = named.and_then(|name| object.overrides.get(name).copied());
             let material = replaced.or(object.material).unwrap_or(own);
             let mesh = sum(home.meshes, placement.mesh).ok_or("meshes")?;
-            let number = u32::try_from(number).map_err(|_| "objects")?;
-            let copies = object.world_from_object.iter().map(|copy| Placement {
-                mesh,
-                object: number,
-                material,
-                world_from_mesh: copy.then_inner(&placement.model_from_mesh),
-            });
+            let PlacedNode { object: number, node, first, each } = numbers.of(placement)?;
+            let first = first + placement.instance.unwrap_or(0);
+            let copies =
+                (0..).zip(&object.world_from_object).map(|(k, copy): (u32, _)| Placement {
+                    mesh,
+                    object: number,
+                    instance: first + k * each,
+                    node,
+                    material,
+                    world_from_mesh: copy.then_inner(&placement.model_from_mesh),
+                });
             self.geometry.placements.extend(copies);
         }
         if u32::try_from(self.geometry.placements.len()).is_err() {
             return Err("placements");
         }
-        let number = u32::try_from(index).map_err(|_| "objects")?;
         // A million copies of a model have one place to look from: the first one's.
         if let Some(first) = object.world_from_object.first() {
             let cameras = home.cameras.iter();
-            let placed = cameras.filter_map(|camera| SceneCamera::new(camera, number, first));
+            let placed = cameras.filter_map(|camera| SceneCamera::new(camera, first_object, first));
             self.cameras.extend(placed);
         }
         for copy in &object.world_from_object {
@@ -149,20 +139,16 @@ impl Parts {
         self.materials[home.materials..end].iter().map(|material| material.name.as_str())
     }
 
-    /// Lights the scene by the studio when nothing in it shines.
-    pub(crate) fn light_by_default(&mut self) {
+    /// Lights the scene by the studio when nothing in it shines; otherwise `false`.
+    pub(crate) fn light_by_default(&mut self) -> bool {
         let shines = |placement: &Placement| {
             let material = self.materials.get(placement.material as usize);
             material.is_some_and(|material| material.emission.is_some())
         };
         if !self.lights.is_empty() || self.geometry.placements.iter().any(shines) {
-            return;
+            return false;
         }
-        self.lights.push(Light {
-            kind: LightKind::Environment { image: EnvironmentImage::Studio, rotation: 0.0 },
-            color: [1.0; 3],
-            illuminant: None,
-        });
+        self.lights.push(Light::STUDIO);
         self.notes.push(Note {
             kind: NoteKind::Assumed,
             subject: "lights".to_owned(),
@@ -171,10 +157,83 @@ impl Parts {
                 .to_owned(),
             count: 1,
         });
+        true
     }
 }
 
-/// Whether two placements in a row are primitives of one node's mesh.
-fn is_same_node(a: &ImportedPlacement, b: &ImportedPlacement) -> bool {
-    a.name == b.name && a.mesh != b.mesh && a.model_from_mesh == b.model_from_mesh
+/// The numbers that the placements of one object get.
+struct Numbers<'a> {
+    object: &'a Object,
+    register: &'a mut Register,
+    /// The object's index; of a model split into its nodes, that of the first.
+    first_object: u32,
+    split_nodes: bool,
+    /// How many instances a node's own list makes of it.
+    instances: HashMap<u32, u32>,
+    nodes: HashMap<u32, PlacedNode>,
+    /// Index of the first copy of the whole object.
+    copies: Option<u32>,
+}
+
+/// A node that has its numbers.
+#[derive(Debug, Clone, Copy)]
+struct PlacedNode {
+    object: u32,
+    node: u32,
+    /// Index of its first copy, and how many there are in one copy of the object.
+    first: u32,
+    each: u32,
+}
+
+impl<'a> Numbers<'a> {
+    fn new(
+        object: &'a Object,
+        placements: &[ImportedPlacement],
+        split_nodes: bool,
+        register: &'a mut Register,
+    ) -> Result<Self, &'static str> {
+        let first_object = match split_nodes {
+            false => register.object(&object.title)?,
+            true => u32::try_from(register.objects.len()).map_err(|_| "objects")?,
+        };
+        let mut instances = HashMap::new();
+        for placement in placements {
+            if let Some(instance) = placement.instance {
+                let count = instances.entry(placement.node).or_insert(0);
+                *count = (instance.saturating_add(1)).max(*count);
+            }
+        }
+        let nodes = HashMap::new();
+        Ok(Self { object, register, first_object, split_nodes, instances, nodes, copies: None })
+    }
+
+    fn of(&mut self, placement: &ImportedPlacement) -> Result<PlacedNode, &'static str> {
+        if let Some(known) = self.nodes.get(&placement.node) {
+            return Ok(*known);
+        }
+        let title = &self.object.title;
+        let name = if placement.name.is_empty() { title } else { &placement.name };
+        let object = match self.split_nodes {
+            true => self.register.object(name)?,
+            false => self.first_object,
+        };
+        let node = self.register.node(name, object)?;
+        let own = self.instances.get(&placement.node).copied();
+        let each = own.unwrap_or(1);
+        let copies = self.object.world_from_object.len();
+        let first = match (own, self.copies) {
+            (None, Some(first)) if !self.split_nodes => first,
+            (None, _) if !self.split_nodes => self.register.copies(title, object, copies)?,
+            _ => {
+                let count = copies.checked_mul(each as usize).ok_or("instances")?;
+                self.register.copies(name, object, count)?
+            }
+        };
+        if own.is_none() {
+            self.copies = Some(first);
+        }
+        let placed = PlacedNode { object, node, first, each };
+        self.nodes.insert(placement.node, placed);
+        Ok(placed)
+    }
 }

@@ -10,6 +10,7 @@ use etendue_tracer::{LayerSpec, Light, Material, Texture};
 
 use crate::file::{RenderSpec, TracerSpec};
 use crate::identity::Ingredients;
+use crate::ids::{Copies, SceneNode};
 use crate::import::{Note, Strictness};
 use crate::paths::Reach;
 use crate::{CameraOrigin, SceneCamera, SceneError, SceneHash};
@@ -23,12 +24,19 @@ pub struct Scene {
     pub geometry: Arc<Geometry>,
     /// What each object is called; placements point here.
     pub objects: Vec<String>,
+    /// The nodes of models, object by object; placements point here.
+    pub nodes: Vec<SceneNode>,
+    /// The copies of objects, and of nodes that make their own; placements point to single ones.
+    pub copies: Vec<Copies>,
     /// Materials; placements point here.
     pub materials: Vec<Material>,
     /// Images that materials use, still encoded; empty unless wanted.
     pub textures: Vec<Texture>,
     /// Lights of the scene and of its models, beside emissive surfaces.
     pub lights: Vec<Light>,
+    /// Whether the studio is to light the scene where its own emitters and lamps do not, which shows
+    /// when it is rendered: the scene names no lights.
+    pub studio_if_dark: bool,
     /// What the picture shows, when the scene says so.
     pub tracer: Option<TracerSpec>,
     /// The camera.

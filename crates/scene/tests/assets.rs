@@ -24,6 +24,8 @@ fn geometry(import: &Import) -> Geometry {
     let placement = |p: &etendue_scene::import::ImportedPlacement| Placement {
         mesh: p.mesh,
         object: 0,
+        instance: 0,
+        node: 0,
         material: p.material,
         world_from_mesh: p.model_from_mesh,
     };

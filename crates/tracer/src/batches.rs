@@ -35,14 +35,8 @@ impl Surroundings<'_> {
             array.clear();
             array.resize(traced.rays.len(), 0.0);
         }
-        let axes = match space {
-            Space::World => [DVec3::X, DVec3::Y, DVec3::Z],
-            Space::Camera => {
-                let axes = self.view.axes;
-                [axes.x_axis, axes.y_axis, axes.z_axis]
-            }
-        };
-        normals(traced, axes, out);
+        let axes = self.view.axes_of(space);
+        normals(traced, [axes.x_axis, axes.y_axis, axes.z_axis], out);
     }
 
     /// Base colour under a headlight, of every ray: something to look at, not light transport. A

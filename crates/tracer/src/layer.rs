@@ -13,8 +13,10 @@ pub enum Space {
     /// The scene's own frame: right-handed, +Y up.
     #[default]
     World,
-    /// The camera's frame: looking along −Z, +Y up, +X right.
+    /// The camera's frame as OpenGL has it: looking along −Z, +Y up, +X right.
     Camera,
+    /// The camera's frame as OpenCV and `camera.json` have it: looking along +Z, +Y down, +X right.
+    Opencv,
 }
 
 /// Which of a surface's two normals.
@@ -50,7 +52,8 @@ pub enum LayerSpec {
         /// The frame.
         space: Space,
     },
-    /// `Id.object` and `Id.primitive`: which object, and which triangle of its mesh.
+    /// `Id.object.X`, `Id.instance.X`, `Id.node.X` and `Id.primitive.X`: which object, which copy of it,
+    /// which node of its model, and which triangle of its mesh.
     Ids,
     /// `Coverage.A`: 1 where the pixel's chief ray hits, else 0.
     Coverage,
@@ -62,8 +65,13 @@ pub enum LayerSpec {
     Albedo,
     /// `Uv.U V`: texture coordinates of the first set.
     Uv,
-    /// `MaterialId.material`: which material.
+    /// `MaterialId.X`: which material.
     MaterialId,
+    /// `Alpha.A`: share of the pixel's samples that hit something.
+    Alpha,
+    /// `Backdrop.R G B`: the part of the picture's radiance that came past everything. No file names
+    /// it; it comes with `render.alpha` and a tracer of light.
+    Backdrop,
     /// The picture of a tracer of light: radiance, one channel a spectral lane. No file names it;
     /// it comes with the tracer.
     Radiance,
@@ -92,11 +100,12 @@ enum Written {
     Albedo {},
     Uv {},
     MaterialId {},
+    Alpha {},
 }
 
 impl LayerSpec {
     /// Every layer by its plain name, in the order that help texts list them.
-    pub const NAMES: [&'static str; 11] = [
+    pub const NAMES: [&'static str; 12] = [
         "depth",
         "distance",
         "normal",
@@ -108,13 +117,14 @@ impl LayerSpec {
         "albedo",
         "uv",
         "material_id",
+        "alpha",
     ];
 
     /// Whether the layer is a mean over the samples of a pixel; the others are taken along the chief
     /// ray of its centre.
     #[must_use]
     pub fn is_averaged(self) -> bool {
-        matches!(self, Self::Flat | Self::Facing | Self::Radiance)
+        matches!(self, Self::Flat | Self::Facing | Self::Alpha | Self::Backdrop | Self::Radiance)
     }
 
     /// The layer of this plain name, with default options.
@@ -132,6 +142,7 @@ impl LayerSpec {
             "albedo" => Self::Albedo,
             "uv" => Self::Uv,
             "material_id" => Self::MaterialId,
+            "alpha" => Self::Alpha,
             _ => return None,
         })
     }
@@ -151,6 +162,7 @@ impl From<Written> for LayerSpec {
             Written::Albedo {} => Self::Albedo,
             Written::Uv {} => Self::Uv,
             Written::MaterialId {} => Self::MaterialId,
+            Written::Alpha {} => Self::Alpha,
         }
     }
 }

@@ -30,6 +30,13 @@ pub struct Light {
 }
 
 impl Light {
+    /// What lights a model that brings no light of its own.
+    pub const STUDIO: Self = Self {
+        kind: LightKind::Environment { image: EnvironmentImage::Studio, rotation: 0.0 },
+        color: [1.0; 3],
+        illuminant: None,
+    };
+
     /// The file of an environment's image.
     #[must_use]
     pub fn file(&self) -> Option<&std::path::PathBuf> {

@@ -27,6 +27,17 @@ impl View {
     pub fn forward(&self) -> DVec3 {
         -self.axes.z_axis
     }
+
+    /// The axes of a frame in the world.
+    #[must_use]
+    pub fn axes_of(&self, space: Space) -> DMat3 {
+        let DMat3 { x_axis, y_axis, z_axis } = self.axes;
+        match space {
+            Space::World => DMat3::IDENTITY,
+            Space::Camera => self.axes,
+            Space::Opencv => DMat3::from_cols(x_axis, -y_axis, -z_axis),
+        }
+    }
 }
 
 /// What looking at a hit needs to know of the scene.
@@ -74,8 +85,9 @@ impl Surroundings<'_> {
         let along = traced.rays.direction(i) * traced.hits.t[i];
         match space {
             Space::World => traced.rays.origin(i) + along,
-            Space::Camera => {
-                self.view.axes.transpose() * ((traced.rays.origin(i) - self.view.origin) + along)
+            Space::Camera | Space::Opencv => {
+                let from_camera = (traced.rays.origin(i) - self.view.origin) + along;
+                self.view.axes_of(space).transpose() * from_camera
             }
         }
     }
@@ -94,7 +106,7 @@ impl Surroundings<'_> {
         };
         match space {
             Space::World => normal * side,
-            Space::Camera => self.view.axes.transpose() * normal * side,
+            Space::Camera | Space::Opencv => self.view.axes_of(space).transpose() * normal * side,
         }
     }
 
@@ -124,13 +136,15 @@ impl Surroundings<'_> {
         (index != MISS).then(|| &self.geometry.placements[index as usize])
     }
 
-    /// Number of the object and of the triangle in its mesh that hit `i` met, both from 1; 0 for a
-    /// miss.
+    /// Numbers of the object, the copy, the node and the triangle in its mesh that hit `i` met, all
+    /// from 1; 0 for a miss.
     #[must_use]
-    pub fn ids(&self, hits: &HitBatch, i: usize) -> [u32; 2] {
+    pub fn ids(&self, hits: &HitBatch, i: usize) -> [u32; 4] {
         match self.placement(hits, i) {
-            Some(placement) => [placement.object + 1, hits.triangle[i] + 1],
-            None => [0, 0],
+            Some(Placement { object, instance, node, .. }) => {
+                [object, instance, node, &hits.triangle[i]].map(|index| index.saturating_add(1))
+            }
+            None => [0; 4],
         }
     }
 
@@ -385,7 +399,9 @@ impl LayerSpec {
             | Self::Position { .. }
             | Self::Ids
             | Self::MaterialId
+            | Self::Alpha
             | Self::Coverage => none,
+            Self::Backdrop => Needs { light: true, ..none },
             Self::Uv => Needs { surface: true, uvs: true, ..none },
             Self::Normal { kind, .. } => {
                 Needs { surface: true, normals: kind == NormalKind::Shading, ..none }

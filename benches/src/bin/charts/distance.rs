@@ -85,8 +85,14 @@ fn errors(
     let mut geometry = Geometry { meshes: near.meshes.clone(), placements: Vec::new() };
     let mut moved = Transform::IDENTITY;
     moved.translation = DVec3::new(distance, 0.0, 0.0);
-    let place =
-        |mesh, world_from_mesh| Placement { mesh, object: mesh, material: 0, world_from_mesh };
+    let place = |mesh, world_from_mesh| Placement {
+        mesh,
+        object: mesh,
+        instance: mesh,
+        node: mesh,
+        material: 0,
+        world_from_mesh,
+    };
     geometry.placements.push(place(0, moved));
     if is_wide {
         // A mesh of its own: placed twice it would be an instance.

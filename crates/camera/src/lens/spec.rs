@@ -125,9 +125,9 @@ fn is_zero<T: Default + PartialEq>(value: &T) -> bool {
 macro_rules! build_by_train {
     ($($name:ident),*) => {$(
         impl $name {
-            pub(crate) fn build(
+            pub(crate) fn build<'a>(
                 &self,
-                subject: impl FnOnce() -> Subject,
+                subject: impl FnOnce() -> Subject<'a>,
                 resolve: Resolve<'_>,
             ) -> Result<(Pose, LensCamera), CameraError> {
                 let mut setup = self.setup()?;
@@ -209,10 +209,10 @@ camera_with_a_lens! {
 }
 
 /// Focuses a lens and finds it a place.
-fn place(
+fn place<'a>(
     train: &OpticalTrain,
     setup: &Setup<'_>,
-    subject: impl FnOnce() -> Subject,
+    subject: impl FnOnce() -> Subject<'a>,
 ) -> Result<(Pose, LensCamera), CameraError> {
     let default = Focus::AsWritten;
     let focused = Focused::new(train.clone(), setup, setup.focus.unwrap_or(default))?;
@@ -241,7 +241,7 @@ fn place(
 }
 
 /// The nearest place from which the whole box is in the picture.
-fn frame(subject: Subject, lens: &LensCamera, setup: &Setup<'_>) -> Pose {
+fn frame(subject: Subject<'_>, lens: &LensCamera, setup: &Setup<'_>) -> Pose {
     match lens.focused().view() {
         View::Perspective(k) => {
             // 60° off the axis, as for distorted pinholes.
@@ -258,9 +258,9 @@ fn frame(subject: Subject, lens: &LensCamera, setup: &Setup<'_>) -> Pose {
 type Placed = (f64, ElementSpec);
 
 impl ThinLensCameraSpec {
-    pub(crate) fn build(
+    pub(crate) fn build<'a>(
         &self,
-        subject: impl FnOnce() -> Subject,
+        subject: impl FnOnce() -> Subject<'a>,
         resolve: Resolve<'_>,
     ) -> Result<(Pose, LensCamera), CameraError> {
         let mut setup = self.setup()?;

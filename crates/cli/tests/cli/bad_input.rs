@@ -259,7 +259,7 @@ fn an_empty_scene_is_a_picture_without_hits() {
         bench.write("empty.obj", b"# nothing\n");
         bench.render(&["--set", "camera.type=pinhole", "--set", "camera.sensor.resolution=[9,5]"]);
         assert!(bench.array("depth").iter().all(|z| *z == f64::INFINITY));
-        assert!(bench.array("id").iter().all(|id| *id == 0.0));
+        assert!(bench.array("id_object").iter().all(|id| *id == 0.0));
         assert!(bench.array("normal").iter().all(|n| *n == 0.0));
     }
 }

@@ -9,9 +9,13 @@ mod exposures; // what a scene's sensor makes of a render
 mod figures; // models with skins, in the pose of their file
 mod files; // what is no file, what costs without end, what real programs write
 mod gltf_looks; // materials, lights and textures of models, with closed-form answers
+mod ids; // numbers of objects, copies, nodes and materials, and their names
+mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // lenses against other software, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers
+mod pictures; // exposure, tone maps, transparency, and which light there is
 mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
 mod sensor; // presets, curves, series of a characterisation
-mod tools; // check, plan, schema, version
+mod tools;
+mod views; // where a camera without a pose stands, and which way is up // check, plan, schema, version

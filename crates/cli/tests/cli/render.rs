@@ -51,7 +51,7 @@ fn any_size_that_is_accepted_gives_the_same_ids() {
             "objects": [{{"shape": "blob", "triangles": 5000, "radius": {radius}}}]}}"#
         ));
         bench.render(&["--accel", accel]);
-        bench.array("id")
+        bench.array("id_primitive")
     };
     let expected = ids("1", "exact");
     for radius in ["6e-13", "1e-6", "1e6", "4e11"] {
@@ -102,7 +102,8 @@ fn a_wall_at_one_metre_reads_one_metre_wherever_the_scene_is() {
                 assert!((t - ray).abs() < 1e-12, "{camera} at {offset}: {t} for {ray}");
             }
             assert!(bench.array("coverage").iter().all(|a| *a == 1.0));
-            assert!(bench.array("id").chunks(2).all(|id| id[0] == 1.0 && id[1] > 0.0));
+            assert!(bench.array("id_object").iter().all(|id| *id == 1.0));
+            assert!(bench.array("id_primitive").iter().all(|id| *id > 0.0));
         }
     }
 }
@@ -169,7 +170,9 @@ fn all_accelerators_see_the_same_scene() {
         if cfg!(feature = "embree") { &["exact", "bvh", "embree"] } else { &["exact", "bvh"] };
     for accel in accelerators {
         bench.render(&["--accel", accel, "--outputs", "npy"]);
-        seen.push((bench.array("id"), bench.array("depth")));
+        let (objects, triangles) = (bench.array("id_object"), bench.array("id_primitive"));
+        let ids: Vec<f64> = objects.into_iter().zip(triangles).flat_map(|(a, b)| [a, b]).collect();
+        seen.push((ids, bench.array("depth")));
     }
     for (ids, depths) in &seen[1..] {
         // A handful of rays along silhouettes may be decided otherwise by single precision.

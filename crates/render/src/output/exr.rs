@@ -1,12 +1,14 @@
 //! EXR: all layers in one file of one part, every value kept to the bit.
 //!
 //! Channels are called `Layer.Channel` (`Depth.Z`, `Normal.X`, `Id.object`), those of the picture
-//! itself `R`, `G`, `B`: the form that Nuke, Blender and tev group into layers. Floats are written
-//! as 32-bit floats, integers as 32-bit unsigned integers, f64 rounded to the nearest f32.
+//! itself `R`, `G`, `B`: the form that Nuke, Blender and tev group into layers. All are written as
+//! 32-bit floats, f64 rounded to the nearest. Integers, too: they are exact up to 2²⁴, where `OpenImageIO`
+//! reads a channel of integers as shares of 2³² and Blender none at all. A channel with a larger number
+//! is written as 32-bit unsigned integers ([`beyond_floats`] tells which).
 //!
 //! The header says what the numbers mean. Each layer has an attribute `etendue:LAYER` with its
 //! meaning as JSON, each header entry an attribute `etendue:ENTRY`; the picture's attribute goes by
-//! its channels, `etendue:RGB`. `software` names the program.
+//! its channels, `etendue:RGB`. `etendue:names:LAYER` has what the numbers of a layer of ids name. `software` names the program.
 //!
 //! The crate `exr` knows the format's header and checks it. Blocks are packed here, because its own
 //! writer starts a thread pool beside the one that the render runs in, takes a slower deflate, and
@@ -131,14 +133,16 @@ fn block_head(row: usize, bytes: usize) -> Option<[u8; 8]> {
 struct Blocks<'a> {
     width: usize,
     height: usize,
-    channels: Vec<(String, &'a Values)>,
+    channels: Vec<(String, &'a Values, SampleType)>,
     compression: Compression,
 }
 
 impl<'a> Blocks<'a> {
     fn new(picture: &'a Picture, compression: Compression) -> Self {
         let (width, height) = (picture.width(), picture.height());
-        Self { width, height, channels: picture.sorted_channels(), compression }
+        let channels = picture.sorted_channels().into_iter();
+        let channels = channels.map(|(name, values)| (name, values, sample_type(values)));
+        Self { width, height, channels: channels.collect(), compression }
     }
 
     fn format(&self) -> attribute::Compression {
@@ -175,9 +179,9 @@ impl<'a> Blocks<'a> {
         let row_bytes = self.width * SAMPLE_BYTES;
         let mut bytes = vec![0; rows.len() * self.channels.len() * row_bytes];
         let lines = rows.flat_map(|row| self.channels.iter().map(move |channel| (row, channel)));
-        for (out, (row, (name, values))) in bytes.chunks_exact_mut(row_bytes).zip(lines) {
+        for (out, (row, (name, values, kind))) in bytes.chunks_exact_mut(row_bytes).zip(lines) {
             let pixels = row * self.width..(row + 1) * self.width;
-            if let Err((x, value)) = put_samples(values, pixels, out) {
+            if let Err((x, value)) = put_samples(values, *kind, pixels, out) {
                 return Err(OutputError::Overflow { channel: name.clone(), value, x, y: row });
             }
         }
@@ -188,21 +192,43 @@ impl<'a> Blocks<'a> {
 /// Bytes of a sample: all are written as 32-bit floats or integers.
 const SAMPLE_BYTES: usize = 4;
 
+/// The largest integer up to which f32 holds all.
+const LARGEST_EXACT: u32 = 1 << 24;
+
 fn sample_type(values: &Values) -> SampleType {
     match values {
-        Values::F32(_) | Values::F64(_) => SampleType::F32,
-        Values::U16(_) | Values::U32(_) => SampleType::U32,
+        Values::F32(_) | Values::F64(_) | Values::U16(_) => SampleType::F32,
+        Values::U32(_) if values.largest_integer() <= LARGEST_EXACT => SampleType::F32,
+        Values::U32(_) => SampleType::U32,
     }
+}
+
+/// The channels with numbers that floats do not hold exactly, which are written as integers.
+#[must_use]
+pub fn beyond_floats(picture: &Picture) -> Vec<String> {
+    let channels = picture.sorted_channels().into_iter();
+    let beyond = channels.filter(|(_, values)| sample_type(values) == SampleType::U32);
+    beyond.map(|(name, _)| name).collect()
 }
 
 /// Writes values `range` as samples. The error is the place and value of a finite number that f32
 /// would make infinite.
-fn put_samples(values: &Values, range: Range<usize>, out: &mut [u8]) -> Result<(), (usize, f64)> {
+fn put_samples(
+    values: &Values,
+    kind: SampleType,
+    range: Range<usize>,
+    out: &mut [u8],
+) -> Result<(), (usize, f64)> {
     match values {
         Values::F32(values) => put(&values[range], out, SAMPLE_BYTES, f32::to_le_bytes),
-        Values::U32(values) => put(&values[range], out, SAMPLE_BYTES, u32::to_le_bytes),
+        Values::U32(values) if kind == SampleType::U32 => {
+            put(&values[range], out, SAMPLE_BYTES, u32::to_le_bytes);
+        }
+        Values::U32(values) => {
+            put(&values[range], out, SAMPLE_BYTES, |value| narrow(value.into()).to_le_bytes());
+        }
         Values::U16(values) => {
-            put(&values[range], out, SAMPLE_BYTES, |value| u32::from(value).to_le_bytes());
+            put(&values[range], out, SAMPLE_BYTES, |value| f32::from(value).to_le_bytes());
         }
         Values::F64(values) => {
             let values = &values[range];
@@ -251,7 +277,7 @@ fn header(path: &Path, picture: &Picture, blocks: &Blocks<'_>) -> Result<Header,
     let channels = blocks
         .channels
         .iter()
-        .map(|(name, values)| ChannelDescription::new(text(name), sample_type(values), false));
+        .map(|(name, _, kind)| ChannelDescription::new(text(name), *kind, false));
     let mut header = Header::new(text(""), (blocks.width, blocks.height), channels.collect())
         .with_encoding(blocks.format(), BlockDescription::ScanLines, LineOrder::Increasing);
     let own = &mut header.own_attributes;
@@ -262,6 +288,10 @@ fn header(path: &Path, picture: &Picture, blocks: &Blocks<'_>) -> Result<Header,
         let meaning = serde_json::to_string(&Entries(&layer.meaning));
         let meaning = meaning.map_err(|error| OutputError::format(path, error))?;
         own.other.insert(attribute_name(&layer.title()), AttributeValue::Text(text(&meaning)));
+    }
+    for (layer, table) in picture.all_names() {
+        let name = attribute_name(&format!("names:{layer}"));
+        own.other.insert(name, AttributeValue::Text(text(&table.to_string())));
     }
     for (key, value) in picture.header() {
         own.other.insert(attribute_name(key), AttributeValue::Text(text(value)));

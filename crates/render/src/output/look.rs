@@ -118,7 +118,7 @@ pub(super) fn show(layer: &Layer, bits: Bits) -> Shown {
 
 impl Shown {
     /// Shades every pixel with `N` values in 0..=1, by all threads of the current rayon pool.
-    fn new<const N: usize>(
+    pub(super) fn new<const N: usize>(
         channels: Channels,
         bits: Bits,
         planes: &[&Values],
@@ -161,13 +161,13 @@ fn quantize(value: f32, max: f32) -> u16 {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "a preview has at most 16 bits")]
-fn unit(value: f64) -> f32 {
+pub(super) fn unit(value: f64) -> f32 {
     value as f32
 }
 
 /// The sRGB curve (IEC 61966-2-1:1999, 5.2), in f32: its error of some 10⁻⁷ is far below a step of
 /// 16 bits, and every value of a picture passes here.
-fn srgb(linear: f64) -> f32 {
+pub(super) fn srgb(linear: f64) -> f32 {
     let linear = unit(linear.clamp(0.0, 1.0));
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
@@ -305,6 +305,21 @@ fn id_color(id: f64) -> [f32; 3] {
         (2.0 - apart.min(6.0 - apart)).clamp(0.0, 1.0)
     };
     [0.0, 2.0, 4.0].map(|from| unit(value * (1.0 - saturation * (1.0 - wheel(from)))))
+}
+
+/// Numbers of a layer of ids as they are; `None` when one has more than 16 bits.
+pub(super) fn mask(layer: &Layer) -> Option<Shown> {
+    let plane = &layer.channels.first()?.values;
+    u16::try_from(plane.largest_integer()).ok()?;
+    let number = |i: usize| match plane {
+        Values::U16(values) => values[i].to_be_bytes(),
+        // The last two bytes are all of it.
+        Values::U32(values) => values[i].to_be_bytes()[2..].try_into().unwrap_or_default(),
+        Values::F32(_) | Values::F64(_) => [0; 2],
+    };
+    let bytes = fill(&[plane], |i| [number(i)]);
+    let note = "data: the numbers themselves, not scaled; 0 is nothing".into();
+    Some(Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes, note })
 }
 
 fn counts(planes: &[&Values], bits: u8) -> Shown {

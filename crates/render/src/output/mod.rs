@@ -36,6 +36,7 @@ pub mod png;
 pub mod sidecar;
 
 mod atomic;
+mod develop;
 mod error;
 mod hash;
 mod look;
@@ -43,6 +44,8 @@ mod outputs;
 mod picture;
 
 pub use atomic::{PartFile, open_parts, prepare_folder, remove_open_parts, write_whole};
+pub use develop::Development;
+pub(crate) use develop::luminance;
 pub use error::{OutputError, PictureError};
 pub use hash::ImageHash;
 pub use look::Look;

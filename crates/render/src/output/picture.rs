@@ -5,7 +5,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{Look, OutputError, PictureError};
+use serde_json::Value;
+
+use super::{Development, Look, OutputError, PictureError};
 
 /// Numbers of one channel, a pixel each: row-major, row 0 at the top.
 #[derive(Debug)]
@@ -56,6 +58,16 @@ impl Values {
             Self::U16(_) => 2,
             Self::F32(_) | Self::U32(_) => 4,
             Self::F64(_) => 8,
+        }
+    }
+
+    /// The largest value of integers; 0 for other types.
+    #[must_use]
+    pub fn largest_integer(&self) -> u32 {
+        match self {
+            Self::U16(values) => values.par_iter().max().copied().unwrap_or(0).into(),
+            Self::U32(values) => values.par_iter().max().copied().unwrap_or(0),
+            Self::F32(_) | Self::F64(_) => 0,
         }
     }
 
@@ -183,6 +195,8 @@ pub struct Picture {
     height: usize,
     layers: Vec<Layer>,
     header: Vec<(String, String)>,
+    names: Vec<(String, Value)>,
+    png: Development,
 }
 
 impl Picture {
@@ -214,7 +228,39 @@ impl Picture {
                 return Err(PictureError::NotANumber { channel, x: i % width, y: i / width });
             }
         }
-        Ok(Self { width, height, layers, header })
+        let (names, png) = Default::default();
+        Ok(Self { width, height, layers, header, names, png })
+    }
+
+    /// The same with tables of what the numbers of layers name, by the layers' names.
+    #[must_use]
+    pub fn with_names(mut self, names: Vec<(String, Value)>) -> Self {
+        self.names = names;
+        self
+    }
+
+    /// What the numbers of the layer called `name` stand for, if a table says so.
+    #[must_use]
+    pub fn names(&self, name: &str) -> Option<&Value> {
+        self.names.iter().find(|(layer, _)| layer == name).map(|(_, table)| table)
+    }
+
+    /// All tables of names, by the layers' names.
+    pub(super) fn all_names(&self) -> &[(String, Value)] {
+        &self.names
+    }
+
+    /// The same, its picture to be shown in this way where it is a PNG.
+    #[must_use]
+    pub fn developed(mut self, png: Development) -> Self {
+        self.png = png;
+        self
+    }
+
+    /// How a PNG of the picture shows its light.
+    #[must_use]
+    pub fn development(&self) -> &Development {
+        &self.png
     }
 
     /// Pixels a row.

@@ -13,7 +13,7 @@ use ::png::text_metadata::ITXtChunk;
 use ::png::{BitDepth, ColorType, EncodingError, Info, SrgbRenderingIntent};
 
 pub use super::look::Bits;
-use super::look::{Channels, Shown, show};
+use super::look::{Channels, Shown, mask, show};
 use super::{Layer, Look, OutputError, PartFile, Picture, SOFTWARE};
 
 /// Writes the layer called `name` (empty for the picture itself) to `path`. `bits` is the depth of
@@ -25,13 +25,45 @@ use super::{Layer, Look, OutputError, PartFile, Picture, SOFTWARE};
 /// be written.
 pub fn write(path: &Path, picture: &Picture, name: &str, bits: Bits) -> Result<(), OutputError> {
     let layer = picture.require(name)?;
+    let shown = match (layer.look, name) {
+        (Look::Color, "") => picture.development().show(picture, layer, bits),
+        _ => show(layer, bits),
+    };
+    write_shown(path, picture, layer, &shown)
+}
+
+/// Whether a layer's numbers are worth a mask: names of things, and not the numbers of triangles.
+#[must_use]
+pub fn has_mask(layer: &Layer) -> bool {
+    layer.look == Look::Ids && layer.name != "Id.primitive"
+}
+
+/// Writes the numbers of the layer of ids called `name` to `path`: 16 bits, grey, not scaled. `false`
+/// when a number needs more bits, and nothing is written.
+///
+/// # Errors
+///
+/// As [`write`].
+pub fn write_mask(path: &Path, picture: &Picture, name: &str) -> Result<bool, OutputError> {
+    let layer = picture.require(name)?;
+    match mask(layer) {
+        Some(shown) => write_shown(path, picture, layer, &shown).map(|()| true),
+        None => Ok(false),
+    }
+}
+
+fn write_shown(
+    path: &Path,
+    picture: &Picture,
+    layer: &Layer,
+    shown: &Shown,
+) -> Result<(), OutputError> {
     let [width, height] = [picture.width(), picture.height()].map(|side| {
         let side = i32::try_from(side).ok().map(i32::unsigned_abs);
         side.ok_or_else(|| OutputError::format(path, "a side is longer than 2147483647 pixels"))
     });
-    let shown = show(layer, bits);
     let mut info = Info::with_size(width?, height?);
-    info.utf8_text = texts(picture, layer, &shown);
+    info.utf8_text = texts(picture, layer, shown);
     info.color_type = match shown.channels {
         Channels::Grey => ColorType::Grayscale,
         Channels::Rgb => ColorType::Rgb,
@@ -64,6 +96,7 @@ fn encode(part: &mut PartFile, info: Info<'_>, bytes: &[u8]) -> Result<(), Encod
 fn texts(picture: &Picture, layer: &Layer, shown: &Shown) -> Vec<ITXtChunk> {
     let comment = match layer.look {
         Look::Counts { .. } => "data",
+        _ if shown.note.starts_with("data") => "data",
         _ => "preview, not data: the values are in the EXR and NPY files",
     };
     let title = layer.title();

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use serde::{Serialize, Serializer};
+use serde_json::Value;
 
 use super::{OutputError, Picture, SOFTWARE, write_whole};
 
@@ -25,6 +26,8 @@ struct Description<'a> {
     height: usize,
     rows: &'static str,
     header: Entries<'a>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    picture_png: Option<Value>,
     layers: Vec<LayerDescription<'a>>,
 }
 
@@ -35,10 +38,12 @@ struct LayerDescription<'a> {
     #[serde(rename = "type")]
     type_name: &'static str,
     meaning: Entries<'a>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    names: Option<&'a Value>,
 }
 
 /// Writes what `picture` holds to `path`: size, header entries, and of each layer the name, the
-/// channels (by their full names), numpy's type and the meaning.
+/// channels (by their full names), numpy's type, the meaning, and what its numbers name.
 ///
 /// # Errors
 ///
@@ -49,6 +54,7 @@ pub fn write(path: &Path, picture: &Picture) -> Result<(), OutputError> {
         channels: layer.channels.iter().map(|channel| layer.full_name(channel)).collect(),
         type_name: layer.type_name(),
         meaning: Entries(&layer.meaning),
+        names: picture.names(&layer.name),
     });
     let description = Description {
         software: SOFTWARE,
@@ -56,6 +62,7 @@ pub fn write(path: &Path, picture: &Picture) -> Result<(), OutputError> {
         height: picture.height(),
         rows: "row 0 is the top, pixels run from left to right",
         header: Entries(picture.header()),
+        picture_png: picture.layer("").map(|_| picture.development().in_json()),
         layers: layers.collect(),
     };
     write_json(path, &description)

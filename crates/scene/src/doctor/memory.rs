@@ -53,13 +53,19 @@ impl MemoryForecast {
 /// Values a pixel of a layer.
 fn values(layer: &LayerSpec) -> u64 {
     match layer {
-        LayerSpec::Depth | LayerSpec::Distance | LayerSpec::Coverage | LayerSpec::MaterialId => 1,
-        LayerSpec::Ids | LayerSpec::Uv => 2,
+        LayerSpec::Depth
+        | LayerSpec::Distance
+        | LayerSpec::Coverage
+        | LayerSpec::Alpha
+        | LayerSpec::MaterialId => 1,
+        LayerSpec::Uv => 2,
+        LayerSpec::Ids => 4,
         LayerSpec::Normal { .. }
         | LayerSpec::Position { .. }
         | LayerSpec::Flat
         | LayerSpec::Facing
         | LayerSpec::Albedo
+        | LayerSpec::Backdrop
         | LayerSpec::Radiance => 3,
     }
 }

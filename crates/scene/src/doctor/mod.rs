@@ -15,7 +15,9 @@ use etendue_geometry::Geometry;
 use serde::Serialize;
 
 use crate::import::{NoteKind, Wanted};
-use crate::{CameraOrigin, FileKind, LoadOptions, Note, Scene, SceneError, SceneFile, bounds};
+use crate::{
+    CameraOrigin, FileKind, IdName, LoadOptions, Note, Scene, SceneError, SceneFile, bounds,
+};
 
 pub use memory::MemoryForecast;
 pub use precision::Precision;
@@ -37,8 +39,12 @@ pub struct Diagnosis {
     pub bounds: Option<Extent>,
     /// Whether the size looks like metres, and what to do when not.
     pub units: Units,
-    /// The objects.
+    /// The objects, by the numbers of `Id.object`.
     pub objects: Vec<ObjectReport>,
+    /// The copies of objects, by the numbers of `Id.instance`.
+    pub instances: Vec<IdName>,
+    /// The nodes of models, by the numbers of `Id.node`.
+    pub nodes: Vec<IdName>,
     /// Triangles that are no good.
     pub defects: Defects,
     /// How exactly places can be told.
@@ -83,6 +89,8 @@ pub struct Units {
 /// One object.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ObjectReport {
+    /// Its number in `Id.object`, from 1.
+    pub id: u32,
     /// Its name.
     pub name: String,
     /// Its triangles, as often as they are placed.
@@ -167,6 +175,8 @@ impl Diagnosis {
                 .then(|| Extent { min: around.min.to_array(), max: around.max.to_array() }),
             units: units(&around, kind, &scene.path),
             objects: objects(scene),
+            instances: scene.instance_names(),
+            nodes: scene.node_names(),
             defects: Defects {
                 not_finite: scene.stats.dropped,
                 degenerate: scene.stats.degenerate.unwrap_or(0),
@@ -205,8 +215,9 @@ fn objects(scene: &Scene) -> Vec<ObjectReport> {
     for placement in &geometry.placements {
         triangles[placement.object as usize] += geometry.mesh_of(placement).triangles.len() as u64;
     }
-    let names = scene.objects.iter().cloned();
-    names.zip(triangles).map(|(name, triangles)| ObjectReport { name, triangles }).collect()
+    let names = scene.object_names().into_iter().zip(triangles);
+    let report = |(IdName { id, name, .. }, triangles)| ObjectReport { id, name, triangles };
+    names.map(report).collect()
 }
 
 /// Scenes between a millimetre and a kilometre are taken to be in metres.

@@ -93,6 +93,8 @@ mod tests {
             placements: vec![Placement {
                 mesh: 0,
                 object: 0,
+                instance: 0,
+                node: 0,
                 material: 0,
                 world_from_mesh: Transform::new(DMat3::IDENTITY * 0.5, DVec3::splat(1e7)),
             }],

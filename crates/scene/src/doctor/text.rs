@@ -89,7 +89,11 @@ impl Diagnosis {
     fn list_objects(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (index, object) in self.objects.iter().take(LISTED).enumerate() {
             let label = if index == 0 { "objects" } else { "" };
-            writeln!(f, "{label:<13} {index} \"{}\": {} triangles", object.name, object.triangles)?;
+            writeln!(
+                f,
+                "{label:<13} {} \"{}\": {} triangles",
+                object.id, object.name, object.triangles
+            )?;
         }
         match self.objects.len().checked_sub(LISTED) {
             Some(more) if more > 0 => writeln!(f, "{:<13} … and {more} more", ""),

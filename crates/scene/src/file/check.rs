@@ -11,6 +11,7 @@ use etendue_geometry::units::Dimension;
 use serde_json::{Map, Value};
 
 use super::document::{join, join_index};
+use super::lenient::NOTES;
 
 /// What is wrong, and where.
 #[derive(Debug, Clone, PartialEq)]
@@ -202,6 +203,7 @@ impl<'a> Checker<'a> {
                 (Some(schema), _) => self.visit(schema, member, &inside)?,
                 (None, Some(Value::Bool(false))) => {
                     let keys = known.into_iter().flatten().map(|(key, _)| key.as_str());
+                    let keys = keys.filter(|key| !NOTES.contains(key));
                     return problem(&inside, format!("unknown key{}", suggest(key, keys)));
                 }
                 (None, Some(schema @ Value::Object(_))) => self.visit(schema, member, &inside)?,

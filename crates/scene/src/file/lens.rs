@@ -11,7 +11,7 @@ use schemars::generate::SchemaSettings;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::{SceneFile, Written, check, read_document};
+use super::{SceneFile, Written, check, lenient, read_document};
 use crate::SceneError;
 use crate::paths::{Folder, Reach};
 
@@ -37,7 +37,9 @@ pub fn rays_schema() -> Value {
 fn schema_of<T: JsonSchema>(title: &str) -> Value {
     let mut schema = SchemaSettings::draft2020_12().into_generator().into_root_schema_for::<T>();
     schema.insert("title".to_owned(), title.into());
-    schema.to_value()
+    let mut schema = schema.to_value();
+    lenient::allow_notes(&mut schema);
+    schema
 }
 
 /// A lens, and what its file says beside it.
@@ -104,7 +106,8 @@ pub fn trace_rays(lens: &OpticalTrain, path: &Path) -> Result<TracedRays, SceneE
 }
 
 fn read(path: &Path) -> Result<(Written, Value), SceneError> {
-    let (document, value) = read_document(path).map_err(not_a_lens)?;
+    let (document, mut value) = read_document(path).map_err(not_a_lens)?;
+    lenient::tidy(&mut value);
     Ok((Written::new(path, Some(document)), value))
 }
 

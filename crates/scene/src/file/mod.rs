@@ -2,6 +2,7 @@
 
 mod check;
 mod document;
+mod lenient;
 mod lens;
 mod object;
 mod overrides;
@@ -20,11 +21,11 @@ use serde_json::{Value, json};
 
 pub use document::Place;
 pub use lens::{ReadLens, lens_schema, rays_schema, read_lens, trace_rays};
-pub use object::{InstancesSpec, ObjectSpec, Scale, Source, TransformSpec};
+pub use object::{InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
 pub use overrides::OverrideError;
 pub use schema::scene_schema;
 pub use sensor::SensorFile;
-pub use settings::{AccelName, RenderSpec, TracerSpec};
+pub use settings::{AccelName, Auto, Exposure, RenderSpec, ToneMap, TracerSpec};
 pub use spec::{SceneSpec, Version};
 
 pub(crate) use check::{nearest, suggest};
@@ -100,6 +101,9 @@ impl SceneFile {
         }
         let mut written = Written::new(path, document);
         written.set(&mut value, overrides)?;
+        lenient::tidy(&mut value);
+        lenient::read_resolution(&mut value, "camera.sensor.resolution")
+            .map_err(|why| written.fault("camera.sensor.resolution", why))?;
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
         Ok(file)

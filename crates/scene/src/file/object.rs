@@ -24,10 +24,36 @@ pub struct ObjectSpec {
     /// For materials of the model by name, the name of the material that replaces each; they go
     /// before [`Self::material`].
     pub materials: BTreeMap<String, String>,
+    /// Which axis of the model's file points up; the scene's word when absent.
+    pub up: Option<Up>,
     /// Where it stands.
     pub transform: TransformSpec,
     /// Where copies of it stand before `transform` moves them all; one, unmoved, when absent.
     pub instances: Option<InstancesSpec>,
+}
+
+/// Which axis of a file's coordinates points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Up {
+    /// +Y, as in glTF and in the scene.
+    #[default]
+    Y,
+    /// +Z: the model is turned by −90° about X, so that its +Z becomes +Y and its +Y becomes −Z.
+    Z,
+}
+
+impl Up {
+    /// From the file's coordinates to those with +Y up; exact.
+    pub(crate) fn turn(self) -> Transform {
+        match self {
+            Self::Y => Transform::IDENTITY,
+            Self::Z => {
+                let linear = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
+                Transform::new(linear, DVec3::ZERO)
+            }
+        }
+    }
 }
 
 /// Copies of an object.
@@ -62,6 +88,10 @@ struct Common {
     /// For materials of the model by name, the one of the scene's `materials` that replaces each.
     #[serde(default)]
     materials: BTreeMap<String, String>,
+    /// Which axis of the file's coordinates points up, before `transform`; the scene's `up` for OBJ and
+    /// PLY files when absent, and +Y for all else.
+    #[serde(default)]
+    up: Option<Up>,
     /// Where it stands.
     #[serde(default)]
     transform: TransformSpec,
@@ -96,12 +126,12 @@ impl<'de> Deserialize<'de> for ObjectSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let mut own = Map::<String, Value>::deserialize(deserializer)?;
         let mut common = Map::new();
-        for key in ["name", "material", "materials", "transform", "instances"] {
+        for key in ["name", "material", "materials", "up", "transform", "instances"] {
             if let Some(value) = own.remove(key) {
                 common.insert(key.to_owned(), value);
             }
         }
-        let Common { name, material, materials, transform, instances } =
+        let Common { name, material, materials, up, transform, instances } =
             serde_json::from_value(Value::Object(common)).map_err(D::Error::custom)?;
         let source = match own.remove("file") {
             Some(Value::String(path)) if own.is_empty() => Source::File(path),
@@ -114,7 +144,7 @@ impl<'de> Deserialize<'de> for ObjectSpec {
                 Source::Shape(shape.map_err(D::Error::custom)?)
             }
         };
-        Ok(Self { source, name, material, materials, transform, instances })
+        Ok(Self { source, name, material, materials, up, transform, instances })
     }
 }
 

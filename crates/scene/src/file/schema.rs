@@ -7,7 +7,7 @@ use etendue_sensor::SensorSpec;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value};
 
-use super::SceneSpec;
+use super::{SceneSpec, lenient};
 
 /// The JSON Schema (2020-12) of a scene file.
 ///
@@ -31,6 +31,7 @@ pub fn scene_schema() -> Value {
         }
         definitions.insert("SensorSpec".to_owned(), Value::Object(sensor));
     }
+    lenient::allow_notes(&mut schema);
     schema
 }
 
@@ -50,5 +51,9 @@ pub(crate) static SENSOR: LazyLock<Value> = LazyLock::new(|| {
         pitch.extend(members);
         *member = Value::Object(pitch);
     }
+    if let Some(member) = schema.pointer_mut("/properties/resolution") {
+        lenient::allow_resolution_words(member);
+    }
+    lenient::allow_notes(&mut schema);
     schema
 });

@@ -7,7 +7,7 @@ use etendue_sensor::{Sensor, SensorError, SensorSpec};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::{Written, check, read_document, schema};
+use super::{Written, check, lenient, read_document, schema};
 use crate::SceneError;
 
 /// Where a scene keeps its sensor.
@@ -59,8 +59,12 @@ impl SensorFile {
         overrides: &[(String, String)],
     ) -> Result<Self, SceneError> {
         written.set(&mut value, overrides)?;
+        lenient::tidy(&mut value);
         let in_scene = value.get("etendue").is_some() || value.get("camera").is_some();
         let place = if in_scene { IN_SCENE } else { "" };
+        let resolution = inside(place, "resolution");
+        lenient::read_resolution(&mut value, &resolution)
+            .map_err(|why| written.fault(&resolution, why))?;
         let object = if in_scene { value.pointer("/camera/sensor") } else { Some(&value) };
         let object = object.ok_or_else(|| {
             let why = "the scene has no sensor; give it one, such as { \"type\": \"raw\", \

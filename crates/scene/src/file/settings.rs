@@ -64,7 +64,7 @@ impl TracerSpec {
 }
 
 /// How the scene is rendered. The command line's options of the same names go before these.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RenderSpec {
     /// Rays a pixel of the picture (at least 1). Layers take the pixel's chief ray alone.
@@ -80,6 +80,59 @@ pub struct RenderSpec {
     /// What finds the hits; the best that was built in when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accel: Option<AccelName>,
+    /// How bright `picture.png` is: stops, each of which doubles the light, or `"auto"`. EXR and NPY
+    /// keep the radiance as it is.
+    #[serde(default)]
+    pub exposure: Exposure,
+    /// What brings light above full scale into the range of `picture.png`.
+    #[serde(default)]
+    pub tone_map: ToneMap,
+    /// Whether the background of `picture.png` is transparent; adds the layers `Alpha` and, with a
+    /// tracer of light, `Backdrop`.
+    #[serde(default)]
+    pub alpha: bool,
+}
+
+/// The exposure of a PNG.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Exposure {
+    /// Light is multiplied by 2 to this power.
+    Stops(#[schemars(range(min = -100, max = 100))] f64),
+    /// By the picture's own light.
+    Auto(Auto),
+}
+
+impl Exposure {
+    /// By the picture's own light.
+    pub const AUTO: Self = Self::Auto(Auto::Auto);
+}
+
+impl Default for Exposure {
+    fn default() -> Self {
+        Self::Stops(0.0)
+    }
+}
+
+/// The word `auto`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Auto {
+    /// The program chooses.
+    Auto,
+}
+
+/// What brings light above full scale into range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ToneMap {
+    /// Nothing: it is clipped.
+    #[default]
+    None,
+    /// Sobotka's `AgX`.
+    Agx,
+    /// The Academy's ACES.
+    Aces,
 }
 
 fn one() -> u32 {
@@ -88,7 +141,9 @@ fn one() -> u32 {
 
 impl Default for RenderSpec {
     fn default() -> Self {
-        Self { samples: 1, sampler: Sampler::default(), seed: 0, accel: None }
+        let sampler = Sampler::default();
+        let (exposure, tone_map) = Default::default();
+        Self { samples: 1, sampler, seed: 0, accel: None, exposure, tone_map, alpha: false }
     }
 }
 

@@ -9,7 +9,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::{ObjectSpec, RenderSpec, TracerSpec};
+use super::{ObjectSpec, RenderSpec, TracerSpec, Up};
 
 /// A scene as the file writes it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
@@ -27,6 +27,9 @@ pub struct SceneSpec {
     /// The layers to write beside the picture.
     #[serde(default)]
     pub layers: Vec<LayerSpec>,
+    /// Which axis points up in OBJ and PLY files, which do not say; an object's own `up` goes before.
+    #[serde(default)]
+    pub up: Up,
     /// What is in the scene; may be empty.
     #[serde(default)]
     pub objects: Vec<ObjectSpec>,
@@ -57,7 +60,14 @@ impl SceneSpec {
     #[must_use]
     pub fn all_layers(&self) -> Vec<LayerSpec> {
         let mut all = Vec::new();
-        for layer in self.picture().into_iter().chain(self.layers.iter().copied()) {
+        let picture = self.picture();
+        let behind = match picture.filter(|_| self.render.alpha) {
+            Some(LayerSpec::Radiance) => [Some(LayerSpec::Alpha), Some(LayerSpec::Backdrop)],
+            Some(_) => [Some(LayerSpec::Alpha), None],
+            None => [None; 2],
+        };
+        let wanted = self.layers.iter().copied().chain(behind.into_iter().flatten());
+        for layer in picture.into_iter().chain(wanted) {
             if !all.contains(&layer) {
                 all.push(layer);
             }

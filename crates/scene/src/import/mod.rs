@@ -123,6 +123,10 @@ pub struct ImportedPlacement {
     pub model_from_mesh: Transform,
     /// The node's or group's name; may be empty.
     pub name: String,
+    /// Which node or group of the file.
+    pub node: u32,
+    /// Which copy, of a node that names many places for its mesh (`EXT_mesh_gpu_instancing`).
+    pub instance: Option<u32>,
 }
 
 /// A light of the file.

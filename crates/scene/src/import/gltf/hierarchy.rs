@@ -143,12 +143,14 @@ pub(super) fn place(
             // glTF 2.0, section 3.7.3.3: only the joints place a skinned mesh.
             let model_from_node =
                 if primitive.skinned { Transform::IDENTITY } else { placed.model_from_node };
-            for node_from_instance in &instances {
+            for (k, node_from_instance) in (0..).zip(&instances) {
                 import.placements.push(ImportedPlacement {
                     mesh: primitive.mesh,
                     material: primitive.material,
                     model_from_mesh: model_from_node.then_inner(node_from_instance),
                     name: name.clone(),
+                    node: u32::try_from(placed.node).unwrap_or(u32::MAX),
+                    instance: instancing::has(node).then_some(k),
                 });
             }
         }

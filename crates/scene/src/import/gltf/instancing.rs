@@ -11,6 +11,11 @@ use crate::import::ImportError;
 
 const NAME: &str = "EXT_mesh_gpu_instancing";
 
+/// Whether `node` says so.
+pub(super) fn has(node: &Node) -> bool {
+    node.extensions.contains_key(NAME)
+}
+
 /// Where the instances of `node` stand in its frame: one at the node itself without the extension.
 pub(super) fn transforms(
     reader: &Reader<'_>,

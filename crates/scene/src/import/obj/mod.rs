@@ -19,6 +19,7 @@ mod pool;
 mod segment;
 mod weld;
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use etendue_geometry::Transform;
@@ -69,10 +70,13 @@ pub(super) fn import(
     let numbers = mtl::load(&libraries, &segments, files, wanted, options.strictness, &mut import)?;
     let mut welder = weld::Welder::new(&pool, &chunks);
     let single = segments.len() == 1;
+    let mut nodes: HashMap<&str, u32> = HashMap::new();
     for (segment, material) in segments.iter().zip(numbers) {
+        let next = u32::try_from(nodes.len()).unwrap_or(u32::MAX);
+        let node = *nodes.entry(&segment.name).or_insert(next);
         let candidate = welder.mesh(segment, path, single);
         let admitted = admit::admit(candidate, path, options)?;
-        place(admitted, segment, material, options, &mut import)?;
+        place(admitted, segment, [material, node], options, &mut import)?;
     }
     Ok(import)
 }
@@ -90,7 +94,7 @@ fn refuse_zero_bytes(text: &[u8]) -> Result<(), Fault> {
 fn place(
     admitted: Admitted,
     segment: &Segment,
-    material: u32,
+    [material, node]: [u32; 2],
     options: &Options,
     import: &mut Import,
 ) -> Result<(), ImportError> {
@@ -108,6 +112,8 @@ fn place(
         material,
         model_from_mesh: Transform::IDENTITY,
         name: segment.name.clone(),
+        node,
+        instance: None,
     });
     import.meshes.push(admitted.mesh);
     Ok(())

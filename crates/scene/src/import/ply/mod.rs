@@ -81,6 +81,8 @@ pub(super) fn import(
         material: 0,
         model_from_mesh: Transform::IDENTITY,
         name,
+        node: 0,
+        instance: None,
     });
     Ok(import)
 }

@@ -1,0 +1,49 @@
+//! What the numbers of id layers name, for every header.
+
+use etendue_scene::Scene;
+use etendue_tracer::LayerSpec;
+use serde_json::Value;
+
+use crate::output::{Picture, exr, png};
+
+/// A table of names for each layer of ids among those of `scene`.
+pub(crate) fn tables(scene: &Scene) -> Vec<(String, Value)> {
+    let mut tables = Vec::new();
+    let mut add = |layer: &str, names| {
+        // Numbers and strings alone, which always serialise.
+        let table = serde_json::to_value(names).unwrap_or_default();
+        tables.push((layer.to_owned(), table));
+    };
+    if scene.layers.contains(&LayerSpec::Ids) {
+        add("Id.object", scene.object_names());
+        add("Id.instance", scene.instance_names());
+        add("Id.node", scene.node_names());
+    }
+    if scene.layers.contains(&LayerSpec::MaterialId) {
+        add("MaterialId", scene.material_names());
+    }
+    tables
+}
+
+/// Where a file cannot hold the numbers of ids as it usually does.
+pub(crate) fn notes(picture: &Picture) -> Vec<String> {
+    let mut notes = Vec::new();
+    for name in exr::beyond_floats(picture) {
+        notes.push(format!(
+            "{name}: its numbers pass 16777216, the last that 32-bit floats hold exactly, so the EXR \
+             has it as 32-bit integers, which OpenImageIO reads as shares of 2^32 unless it is asked \
+             for integers; the NPY is plain"
+        ));
+    }
+    for layer in picture.layers() {
+        let largest = layer.channels.first().map_or(0, |c| c.values.largest_integer());
+        if png::has_mask(layer) && largest > u16::MAX.into() {
+            notes.push(format!(
+                "{}: its numbers reach {largest}, more than a 16-bit PNG holds, so there is no mask; \
+                 take the NPY or the EXR",
+                layer.name
+            ));
+        }
+    }
+    notes
+}
