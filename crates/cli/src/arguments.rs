@@ -159,6 +159,9 @@ pub(crate) struct LensArguments {
     /// Open or close the stop to this f-number
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub(crate) f_number: Option<f64>,
+    /// Look glasses up in this catalogue (Zemax' AGF format) first; the last one given is asked first
+    #[arg(long = "glass-catalog", value_name = "FILE")]
+    pub(crate) glass_catalogs: Vec<PathBuf>,
     /// Refuse wavelengths outside of what the glasses are stated for instead of warning
     #[arg(long)]
     pub(crate) strict: bool,
@@ -209,6 +212,9 @@ pub(crate) struct SceneArguments {
     /// What finds the hits
     #[arg(long, value_enum)]
     pub(crate) accel: Option<AccelArgument>,
+    /// Look glasses up in this catalogue (Zemax' AGF format) first; the last one given is asked first
+    #[arg(long = "glass-catalog", value_name = "FILE")]
+    pub(crate) glass_catalogs: Vec<PathBuf>,
     /// Refuse defects of the data (NaN positions, broken images) instead of dropping them
     #[arg(long)]
     pub(crate) strict: bool,
@@ -387,6 +393,20 @@ pub(crate) struct SensorArguments {
     /// Show no progress and no summary
     #[arg(short, long)]
     pub(crate) quiet: bool,
+}
+
+impl Command {
+    /// Catalogues of glasses of the user's.
+    pub(crate) fn glass_catalogs(&self) -> &[PathBuf] {
+        match self {
+            Self::Render(arguments) => &arguments.scene.glass_catalogs,
+            Self::Check(arguments) => &arguments.scene.glass_catalogs,
+            Self::Plan(arguments) => &arguments.scene.glass_catalogs,
+            Self::Bench(arguments) => &arguments.scene.glass_catalogs,
+            Self::Lens(arguments) => &arguments.glass_catalogs,
+            Self::Sensor(_) | Self::Schema { .. } => &[],
+        }
+    }
 }
 
 impl SceneArguments {

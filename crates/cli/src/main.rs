@@ -5,6 +5,7 @@ mod arguments;
 mod bench;
 mod check;
 mod fault;
+mod glasses;
 mod lens;
 mod plan;
 mod progress;
@@ -25,6 +26,10 @@ fn main() -> ExitCode {
     if cli.version {
         version::print();
         return ExitCode::SUCCESS;
+    }
+    if let Some(Err(fault)) = cli.command.as_ref().map(glasses::open) {
+        fault.print();
+        return fault.exit_code();
     }
     let done = match cli.command {
         Some(Command::Render(arguments)) => render::run(&arguments),

@@ -3,7 +3,9 @@
 //! # Sources
 //!
 //! W. Sellmeier, *Annalen der Physik* 219 (1871); A.-L. Cauchy, *Sur la réfraction et la réflexion
-//! de la lumière* (1830); the power series is the one glass makers publish.
+//! de la lumière* (1830); the power series is the one glass makers publish; M. Herzberger, *Optica
+//! Acta* 6 (1959); P. N. Robb and R. I. Mercado, "Calculation of refractive indices using Buchdahl's
+//! chromatic coordinate", *Applied Optics* 22 (1983).
 
 // Two decimals, as lens data is written: a lens analysed at "587.56 nm" here and elsewhere is the same
 // lens to the last digit, and `nd` is its index there.
@@ -14,6 +16,9 @@ pub const FRAUNHOFER_F: f64 = 486.13;
 pub const FRAUNHOFER_D: f64 = 587.56;
 /// Hydrogen's C line (nm).
 pub const FRAUNHOFER_C: f64 = 656.27;
+
+/// The wavelength (µm) at which Buchdahl's coordinate is 0 in Robb and Mercado's tables.
+const BUCHDAHL_ZERO: f64 = 0.574;
 
 /// A dispersion formula; wavelengths inside it are in micrometres.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +31,17 @@ pub enum Dispersion {
     Power(Vec<[f64; 2]>),
     /// `[a, p]`: n = Σ a λᵖ.
     Index(Vec<[f64; 2]>),
+    /// n² = Σ a λᵖ + Σ b λ^q/(λ² − c).
+    Poles {
+        /// `[a, p]`.
+        powers: Vec<[f64; 2]>,
+        /// `[b, q, c]`.
+        poles: Vec<[f64; 3]>,
+    },
+    /// n = A + B L + C L² + D λ² + E λ⁴ + F λ⁶ with L = 1/(λ² − 0.028).
+    Herzberger([f64; 6]),
+    /// `[a, p]`: n = Σ a ωᵖ with Buchdahl's chromatic coordinate ω = δ/(1 + 2.5 δ), δ = λ − 0.574.
+    Buchdahl(Vec<[f64; 2]>),
 }
 
 impl Dispersion {
@@ -58,6 +74,20 @@ impl Dispersion {
             }
             Self::Power(terms) => series(terms).sqrt(),
             Self::Index(terms) => series(terms),
+            Self::Poles { powers, poles } => {
+                let pole = |&[b, q, c]: &[f64; 3]| b * power(l, q) / (l * l - c);
+                (series(powers) + poles.iter().map(pole).sum::<f64>()).sqrt()
+            }
+            Self::Herzberger([a, b, c, d, e, f]) => {
+                let l2 = l * l;
+                let h = 1.0 / (l2 - 0.028);
+                a + b * h + c * h * h + l2 * (d + l2 * (e + l2 * f))
+            }
+            Self::Buchdahl(terms) => {
+                let delta = l - BUCHDAHL_ZERO;
+                let omega = delta / (1.0 + 2.5 * delta);
+                terms.iter().map(|&[a, p]| a * power(omega, p)).sum()
+            }
         };
         (n > 0.0 && n.is_finite() && wavelength > 0.0).then_some(n)
     }
@@ -68,9 +98,14 @@ impl Dispersion {
         match self {
             Self::Constant(_) => false,
             Self::Sellmeier(terms) => terms.iter().any(|&[b, c]| b != 0.0 && c != 0.0),
-            Self::Power(terms) | Self::Index(terms) => {
+            Self::Power(terms) | Self::Index(terms) | Self::Buchdahl(terms) => {
                 terms.iter().any(|&[a, p]| a != 0.0 && p != 0.0)
             }
+            Self::Poles { powers, poles } => {
+                let varies = |&[b, q, c]: &[f64; 3]| b != 0.0 && (q != 2.0 || c != 0.0);
+                powers.iter().any(|&[a, p]| a != 0.0 && p != 0.0) || poles.iter().any(varies)
+            }
+            Self::Herzberger(terms) => terms[1..].iter().any(|&term| term != 0.0),
         }
     }
 }

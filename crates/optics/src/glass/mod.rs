@@ -2,8 +2,10 @@
 //!
 //! Indices are relative to air, as makers measure them, so air is exactly 1.
 
+mod agf;
 mod catalogue;
 mod dispersion;
+mod names;
 
 use std::borrow::Cow;
 use std::fmt;
@@ -13,7 +15,8 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-pub use catalogue::{Entry, Makers, catalogue};
+pub use agf::{AgfCatalogue, AgfError};
+pub use catalogue::{Entry, Makers, add_catalogues, catalogue};
 pub use dispersion::{Dispersion, FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F};
 
 /// Why there is no index.
@@ -21,7 +24,7 @@ pub use dispersion::{Dispersion, FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F};
 #[non_exhaustive]
 pub enum GlassError {
     /// A name that no catalogue has.
-    #[error("unknown glass \"{name}\"; the nearest names known are {}", nearest.join(", "))]
+    #[error("unknown glass \"{name}\"; {}", names::offer(nearest))]
     Unknown {
         /// The name.
         name: String,
@@ -169,6 +172,11 @@ impl Glass {
     }
 }
 
+/// The extinction coefficient at `wavelength` (nm) of which `thickness` (mm) pass a share.
+fn extinction_of(wavelength: f64, passed: f64, thickness: f64) -> f64 {
+    -passed.ln() / thickness * wavelength * 1e-6 / (4.0 * std::f64::consts::PI)
+}
+
 impl GlassSpec {
     /// Looks the glass up.
     ///
@@ -177,6 +185,19 @@ impl GlassSpec {
     /// When the name is unknown or the numbers describe no glass.
     pub fn resolve(&self) -> Result<Glass, GlassError> {
         self.resolve_from(Makers::default())
+    }
+
+    /// Looks the glass up in `own` catalogues first, the last one before the others.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::resolve`].
+    pub fn resolve_in(&self, own: &[AgfCatalogue]) -> Result<Glass, GlassError> {
+        let found = match self {
+            Self::Named(name) => catalogue::find_in(own, name),
+            _ => None,
+        };
+        found.map_or_else(|| self.resolve(), |glass| Ok(glass.clone()))
     }
 
     /// Looks the glass up, with the order in which makers are asked for a plain name.

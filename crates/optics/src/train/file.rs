@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Element, LensError, OpticalTrain};
 use crate::element::{ElementSpec, Frame, LossesSpec, PartSpec, Resolve};
-use crate::glass::{FRAUNHOFER_D, Glass};
+use crate::glass::{AgfCatalogue, FRAUNHOFER_D, Glass};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
 
 /// A lens as its file writes it.
@@ -27,6 +27,10 @@ pub struct LensFile {
     /// How the sensor stands: tilted for Scheimpflug's rule, decentred for shift.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sensor: Option<SensorMount>,
+    /// Catalogues of glasses in Zemax' AGF format, by their paths from the lens file's folder; the last
+    /// is asked first, the built-in catalogue last.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub glass_catalogs: Vec<String>,
 }
 
 /// How a sensor stands in its lens.
@@ -69,13 +73,14 @@ impl LensFile {
         if !(wavelength > 0.0 && wavelength.is_finite()) {
             return Err(LensError::Wavelength(wavelength));
         }
+        let catalogues = self.catalogues(resolve)?;
         let mut media = vec![Glass::air()];
         let mut elements = Vec::with_capacity(self.elements.len());
         let mut z = 0.0;
         for (index, spec) in self.elements.iter().enumerate() {
             let error = |why| LensError::Element { index, why };
             elements.push(place(spec, z, resolve).map_err(error)?);
-            media.push(behind(spec, index, &media)?);
+            media.push(behind(spec, index, &media, &catalogues)?);
             z += spec.mount.thickness.0;
         }
         let train = OpticalTrain {
@@ -91,6 +96,17 @@ impl LensFile {
             notes: Vec::new(),
         };
         train.with_stop(self.stop()?)
+    }
+
+    fn catalogues(&self, resolve: Resolve<'_>) -> Result<Vec<AgfCatalogue>, LensError> {
+        let read = |(index, name): (usize, &String)| {
+            resolve(name)
+                .and_then(|path| {
+                    AgfCatalogue::open(&path).map_err(|error| format!("{name}: {error}"))
+                })
+                .map_err(|why| LensError::Catalogue { index, why })
+        };
+        self.glass_catalogs.iter().enumerate().map(read).collect()
     }
 
     /// The element marked as the stop, or the only aperture.
@@ -120,10 +136,17 @@ fn place(spec: &ElementSpec, z: f64, resolve: Resolve<'_>) -> Result<Element, St
 }
 
 /// The medium behind an element: a surface's glass or air, and what was there for a sheet.
-fn behind(spec: &ElementSpec, index: usize, media: &[Glass]) -> Result<Glass, LensError> {
+fn behind(
+    spec: &ElementSpec,
+    index: usize,
+    media: &[Glass],
+    catalogues: &[AgfCatalogue],
+) -> Result<Glass, LensError> {
     match &spec.part {
         PartSpec::Surface(surface) => match &surface.glass {
-            Some(glass) => glass.resolve().map_err(|source| LensError::Glass { index, source }),
+            Some(glass) => {
+                glass.resolve_in(catalogues).map_err(|source| LensError::Glass { index, source })
+            }
             None => Ok(Glass::air()),
         },
         _ => Ok(media[index].clone()),

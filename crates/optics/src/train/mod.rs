@@ -6,6 +6,7 @@
 //! | [`trace`] | rays through the train, in batches or one by one |
 //! | [`paraxial`] | focal lengths, principal planes and pupils |
 //! | [`focus`] | where the sensor goes |
+//! | [`opening`] | the widest beam that the rims let through |
 //! | [`aim`] | chief rays: aimed at the stop's centre |
 //! | [`analysis`] | spots, distortion, relative illumination, colour |
 //! | [`pupil`] | the exit pupil as seen from the sensor, and samples of it |
@@ -19,6 +20,7 @@ pub mod analysis;
 pub mod drawing;
 pub mod file;
 pub mod focus;
+pub mod opening;
 pub mod paraxial;
 pub mod pupil;
 pub mod rays_file;
@@ -33,6 +35,7 @@ pub use crate::element::Part;
 pub use aim::ChiefRay;
 pub use file::{LensFile, SensorMount};
 pub use focus::{Focus, FocusError};
+pub use opening::WidestOpening;
 pub use paraxial::{Paraxial, Pupil};
 pub use pupil::{ExitPupil, ExitPupilError, PupilSample};
 pub use rays_file::{GivenRay, RayError, RaysFile, TracedRays};
@@ -65,6 +68,14 @@ pub enum LensError {
         index: usize,
         /// Why.
         source: GlassError,
+    },
+    /// A catalogue of glasses that cannot be read.
+    #[error("glass_catalogs[{index}]: {why}")]
+    Catalogue {
+        /// Which, from 0.
+        index: usize,
+        /// Why.
+        why: String,
     },
     /// Two elements marked as the stop.
     #[error("elements[{second}].stop: elements[{first}] is the stop already")]
@@ -245,9 +256,16 @@ impl OpticalTrain {
     ///
     /// # Errors
     ///
-    /// When the lens has no focal length or no finite entrance pupil, or as
-    /// [`Self::with_stop_radius`].
+    /// When the lens has no focal length or no finite entrance pupil, when its other rims cut a beam
+    /// that wide ([`Self::widest_opening`]), or as [`Self::with_stop_radius`].
     pub fn with_f_number(self, f_number: f64) -> Result<Self, LensError> {
+        let radius = self.stop_radius_at(f_number)?;
+        self.check_opening(radius)?;
+        self.with_stop_radius(radius)
+    }
+
+    /// The stop's radius (mm) at a paraxial f-number.
+    pub(crate) fn stop_radius_at(&self, f_number: f64) -> Result<f64, LensError> {
         let error = |why: &str| LensError::Stop { index: self.stop, why: why.to_owned() };
         let paraxial = self.paraxial(self.wavelength).map_err(|e| error(&e.to_string()))?;
         let (Some(efl), Some(magnification)) = (paraxial.efl, paraxial.stop_magnification) else {
@@ -256,8 +274,7 @@ impl OpticalTrain {
         if !(f_number > 0.0 && f_number.is_finite()) {
             return Err(error("the f-number must be positive"));
         }
-        let radius = 0.5 * efl.abs() / f_number * magnification.abs();
-        self.with_stop_radius(radius)
+        Ok(0.5 * efl.abs() / f_number * magnification.abs())
     }
 
     /// The same lens analysed, focused and its stop set at another wavelength (nm).
@@ -334,6 +351,7 @@ impl OpticalTrain {
             }
         }
         notes.extend(self.crossings());
+        notes.extend(self.unfilled_stop());
         if !self.elements.iter().all(|e| e.frame.is_axial()) {
             notes.push(
                 "the paraxial analysis leaves tilts and decentrings out; rays do not".to_owned(),

@@ -179,6 +179,9 @@ fn fault(written: &Written, error: &LensError) -> SceneError {
             let why = format!("{} is the stop already; mark one of them", element(first));
             written.fault(&format!("{}.stop", element(second)), why)
         }
+        LensError::Catalogue { index, why } => {
+            written.fault(&format!("glass_catalogs[{index}]"), why)
+        }
         LensError::Wavelength(_) => written.fault("wavelength", error.to_string()),
         _ => written.fault("", error.to_string()),
     }

@@ -316,7 +316,11 @@ fn open_stop(
     };
     let opened = match (stop_radius.map_err(|why| ZemaxError::new(line, why))?, aperture) {
         (Some(radius), _) => train.with_stop_radius(radius).map_err(error)?,
-        (None, Aperture::FNumber(f_number)) => train.with_f_number(f_number).map_err(error)?,
+        (None, Aperture::FNumber(f_number)) => {
+            // What the file says; whether a beam fills it is among the lens' notes.
+            let radius = train.stop_radius_at(f_number).map_err(error)?;
+            train.with_stop_radius(radius).map_err(error)?
+        }
         (None, _) => train,
     };
     let radius = opened.stop_radius();

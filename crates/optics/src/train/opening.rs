@@ -1,0 +1,165 @@
+//! The widest opening of a lens: how large a beam on the axis its rims let through.
+
+use glam::{DVec2, DVec3};
+
+use super::aim::towards_lens;
+use super::pupil::without_dimming;
+use super::{Focus, LensError, OpticalTrain, Part, Side, TrainAt};
+use crate::element::{Clip, Fate, Ray};
+
+/// Directions across the axis in which a lens without rotational symmetry is looked at.
+const AZIMUTHS: u32 = 16;
+
+/// Rays among which a beam's edge is looked for before it is bisected.
+const RAYS: u32 = 128;
+
+/// How much wider than the lens an f-number may be (share): f-numbers are written with two or three
+/// digits, and half a percent changes the light by one.
+const NOMINAL: f64 = 5e-3;
+
+/// The widest beam from infinity on the axis that passes a lens when its stop is open.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WidestOpening {
+    /// Focal length over the diameter of that beam's entrance pupil.
+    pub f_number: f64,
+    /// The stop's radius that passes just that beam (mm).
+    pub stop_radius: f64,
+    /// The element that ends the rays beyond.
+    pub element: usize,
+}
+
+/// Where a beam ends.
+#[derive(Debug, Clone, Copy)]
+enum Edge {
+    /// Not before the last ray that was looked at.
+    Open,
+    /// At a place of the stop.
+    At {
+        /// From the stop's centre (mm).
+        stop_radius: f64,
+        /// What ends the next ray.
+        element: usize,
+    },
+}
+
+impl OpticalTrain {
+    /// The widest opening of the lens at its design wavelength: real rays from infinity on the axis,
+    /// and from the middle of their image, that all other rims let through. A stop that is an iris opens without end, the rim of a glass
+    /// does not; masks count as the rectangle that holds them.
+    ///
+    /// `None` when the lens has no f-number, nothing limits the beam, or the axis is dark.
+    #[must_use]
+    pub fn widest_opening(&self) -> Option<WidestOpening> {
+        let paraxial = self.paraxial(self.wavelength).ok()?;
+        let (efl, magnification) = (paraxial.efl?, paraxial.stop_magnification?);
+        let mut open = without_dimming(self);
+        if matches!(self.elements[self.stop].part, Part::Aperture(_)) {
+            open.elements[self.stop].part.set_clear_radius(f64::INFINITY).ok()?;
+        }
+        let azimuths = if open.is_rotationally_symmetric() { 1 } else { AZIMUTHS };
+        let turn = |i: u32| std::f64::consts::TAU * f64::from(i) / f64::from(azimuths);
+        let edges = (0..azimuths).map(|i| open.edge_of_axial_beam(DVec2::from_angle(turn(i))));
+        let edges: Option<Vec<(f64, usize)>> = edges.collect();
+        let (stop_radius, element) = edges?.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let f_number = 0.5 * (efl * magnification / stop_radius).abs();
+        f_number.is_finite().then_some(WidestOpening { f_number, stop_radius, element })
+    }
+
+    /// How far from the stop's centre the outermost ray of the axial beam passes in one direction
+    /// (mm), and which element ends the next one: of the beam from infinity and of that which the
+    /// image's middle on the sensor gathers, the narrower.
+    fn edge_of_axial_beam(&self, azimuth: DVec2) -> Option<(f64, usize)> {
+        let at = self.at(self.wavelength).ok()?;
+        let z = -self.far_in_front(0.0);
+        let parallel = |height: f64| ((azimuth * height).extend(z), DVec3::Z);
+        let from_object =
+            self.edge_of_rays(&at, Side::Object, parallel, 1.5 * self.lateral_scale())?;
+        let image = self.sensor_z(Focus::Infinity).ok();
+        let from_sensor = image.and_then(|image| {
+            let converging =
+                |slope: f64| (DVec3::new(0.0, 0.0, image), towards_lens(azimuth * slope));
+            let depth = (image - self.last_vertex()).abs().max(1e-3);
+            let widest = 1.5 * self.lateral_scale() / depth;
+            self.edge_of_rays(&at, Side::Sensor, converging, widest)
+        });
+        let edges = [from_object, from_sensor.unwrap_or(Edge::Open)].into_iter();
+        let ended = edges.filter_map(|edge| match edge {
+            Edge::Open => None,
+            Edge::At { stop_radius, element } => Some((stop_radius, element)),
+        });
+        ended.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// The outermost of the rays 0 to `limit` of a family that passes; `None` when the first one ends.
+    fn edge_of_rays(
+        &self,
+        at: &TrainAt,
+        from: Side,
+        ray: impl Fn(f64) -> (DVec3, DVec3),
+        limit: f64,
+    ) -> Option<Edge> {
+        let ended = |i: f64| {
+            let (position, direction) = ray(i);
+            match at.path(from, Clip::On, position, direction).fate {
+                Fate::Exited => None,
+                Fate::Missed { element }
+                | Fate::TotalInternalReflection { element }
+                | Fate::Vignetted { element } => Some(element),
+            }
+        };
+        if ended(0.0).is_some() {
+            return None;
+        }
+        let step = limit / f64::from(RAYS);
+        let Some(first) = (1..=RAYS).map(|i| step * f64::from(i)).find(|&i| ended(i).is_some())
+        else {
+            return Some(Edge::Open);
+        };
+        let (mut low, mut high) = (first - step, first);
+        let mut element = ended(high)?;
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            match ended(middle) {
+                None => low = middle,
+                Some(at) => (high, element) = (middle, at),
+            }
+        }
+        let (position, direction) = ray(low);
+        let [x, y] = at.crossing(from, self.stop, Ray::new(position, direction)?)?;
+        let stop_radius = x.hypot(y);
+        (stop_radius > 0.0).then_some(Edge::At { stop_radius, element })
+    }
+
+    /// Refuses a radius of the stop (mm) that no beam on the axis fills.
+    pub(super) fn check_opening(&self, stop_radius: f64) -> Result<(), LensError> {
+        match self.widest_opening() {
+            Some(widest) if stop_radius > widest.stop_radius * (1.0 + NOMINAL) => {
+                Err(LensError::Stop { index: self.stop, why: widest.to_string() })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A sentence on a stop that is open wider than any beam on the axis; `None` when the beam fills
+    /// it.
+    pub(super) fn unfilled_stop(&self) -> Option<String> {
+        let paper = self.paraxial(self.wavelength).ok()?.f_number?;
+        let widest = self.widest_opening()?;
+        // Two percent of the light: rims are often written as wide as the beam, to three digits.
+        (self.stop_radius() > widest.stop_radius * 1.01).then(|| {
+            format!("the stop is open to f/{paper:.2} on paper, but {widest}: the f-number is that on paper")
+        })
+    }
+}
+
+impl std::fmt::Display for WidestOpening {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // Rounded up, so that the number can be asked for.
+        let f_number = (100.0 * self.f_number).ceil() / 100.0;
+        let element = self.element;
+        write!(
+            f,
+            "the lens opens to f/{f_number} at most: elements[{element}] ends wider beams on the axis"
+        )
+    }
+}
