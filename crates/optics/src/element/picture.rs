@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use etendue_geometry::files;
 use exr::prelude::{FlatSamples, ReadChannels, ReadLayers, read};
+use glam::DVec2;
 
 /// Where a lens file's own files are: from the name in the file to a path, or a sentence on why it
 /// may not be read.
@@ -75,6 +76,19 @@ impl Picture {
             (0.0..=1.0).contains(&share).then(|| ((share * count as f64) as usize).min(count - 1))
         };
         Some(at(down, self.pixels[1])? * self.pixels[0] + at(across, self.pixels[0])?)
+    }
+
+    /// The lower left and the upper right corner of pixel `i` (mm).
+    pub(crate) fn bounds_of(&self, i: usize) -> [DVec2; 2] {
+        #[expect(clippy::cast_precision_loss, reason = "far fewer pixels than 2⁵³")]
+        let corner = |column: usize, row: usize| {
+            DVec2::new(
+                (column as f64 / self.pixels[0] as f64 - 0.5) * self.size[0],
+                (0.5 - row as f64 / self.pixels[1] as f64) * self.size[1],
+            )
+        };
+        let [column, row] = [i % self.pixels[0], i / self.pixels[0]];
+        [corner(column, row + 1), corner(column + 1, row)]
     }
 
     /// The grey value at a point (mm); 0 outside of the picture.

@@ -110,6 +110,31 @@ pub(crate) fn towards_lens(slopes: DVec2) -> DVec3 {
     DVec3::new(slopes.x, slopes.y, -1.0).normalize()
 }
 
+/// The slopes of the ray from a point of the sensor (mm) that crosses an element at a place in the
+/// element's own frame (mm), found from slopes that are near, or from the straight line.
+pub(crate) fn slopes_to(
+    train: &OpticalTrain,
+    at: &TrainAt,
+    film: DVec3,
+    (element, place): (usize, DVec2),
+    start: Option<DVec2>,
+) -> Option<DVec2> {
+    let miss = |film: DVec3, place: DVec2| {
+        move |slopes: DVec2| {
+            let ray = Ray::new(film, towards_lens(slopes))?;
+            at.crossing(Side::Sensor, element, ray).map(|there| DVec2::from(there) - place)
+        }
+    };
+    let target = train.elements[element].frame.point(place.extend(0.0));
+    let straight = (target - film).truncate() / (film.z - target.z).max(1e-9);
+    let shares =
+        |share: f64| miss(DVec3::new(film.x * share, film.y * share, film.z), place * share);
+    start
+        .and_then(|start| solve(miss(film, place), start, 1.0))
+        .or_else(|| solve(miss(film, place), straight, 1.0))
+        .or_else(|| follow(shares, DVec2::ZERO, 1.0))
+}
+
 /// Steps from the axis outwards, each begun where the last two point.
 fn follow<F: Fn(DVec2) -> Option<DVec2>>(
     at: impl Fn(f64) -> F,

@@ -3,6 +3,7 @@
 mod bench;
 mod fates;
 mod focus;
+mod masks;
 mod openings;
 mod random;
 
@@ -25,6 +26,8 @@ pub const METHOD: Method = Method {
         openings::CLOSED,
         openings::F_0_5,
         openings::ONE_PIXEL,
+        masks::WIDER_THAN_THE_LENS,
+        masks::LITTLE_OPEN,
         random::ANY_LENS,
     ],
 };

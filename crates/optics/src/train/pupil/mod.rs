@@ -25,14 +25,17 @@
 //! The bounds that this replaces: C. Kolb, D. Mitchell, P. Hanrahan, "A realistic camera model for
 //! computer graphics", 1995; M. Pharr, W. Jakob, G. Humphreys, *Physically Based Rendering*, 6.4.5.
 
+mod coded;
 mod disc;
+mod histogram;
 mod measure;
 mod place;
 mod search;
 
 use glam::{DVec2, DVec3};
 
-use self::place::{between, turn_of};
+use self::coded::Coded;
+use self::place::{Place, between, turn_of};
 use super::aim::towards_lens;
 use super::{OpticalTrain, Part, Side, TrainAt};
 use crate::element::{Clip, Fate, FateCounts, Frame, LensRays, LossesSpec, Opening};
@@ -99,6 +102,8 @@ pub struct ExitPupil {
     /// The pupil in closed form; there are no nodes then.
     disc: Option<Disc>,
     nodes: Vec<Outline>,
+    /// The first mask, which is sampled by what it passes.
+    coded: Option<Coded>,
     index2: f64,
     /// How far from the sensor's centre the nodes of a radial layout reach (mm).
     radius: f64,
@@ -162,10 +167,12 @@ impl ExitPupil {
             layout: if symmetric { Layout::Radial } else { Layout::Planar },
             disc: None,
             nodes: Vec::new(),
+            coded: None,
             index2: 1.0,
             radius: half_size.length(),
         };
-        let train = &without_masks(train);
+        let masked = train;
+        let train = &without_masks(masked);
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
         let Some(first) = lenses.first() else { return Err(ExitPupilError::Sensor) };
         pupil.index2 = first.index_before_sensor().powi(2);
@@ -178,6 +185,7 @@ impl ExitPupil {
             return Err(blocked(train, first, pupil.sensor.vertex));
         }
         pupil.widen_until_tight(&lenses);
+        pupil.coded = Coded::new(masked, train, &lenses, &pupil.sensor, half_size);
         Ok(pupil)
     }
 
@@ -205,40 +213,47 @@ impl ExitPupil {
         self.sensor.point(film.extend(0.0))
     }
 
-    /// The direction for the point `u` of the unit square, uniform in area over the bound, as seen
-    /// from `film` on the sensor (mm). `None` where no light arrives.
+    /// The direction for the point `u` of the unit square, as seen from `film` on the sensor (mm):
+    /// uniform in area over the bound, or towards what a mask passes, in proportion to it. `None` where
+    /// no light arrives.
     ///
     /// Neighbouring points of the square give neighbouring directions.
     #[must_use]
     pub fn sample(&self, film: DVec2, u: [f64; 2]) -> Option<PupilSample> {
-        let (disc_radius, turn) = concentric(u);
-        let (sine, cosine) = (turn * std::f64::consts::TAU).sin_cos();
-        let (mut centre, mut half, mut reach) = (DVec2::ZERO, DVec2::ZERO, 0.0);
-        let mut axis = DVec2::X;
-        if let Some(disc) = &self.disc {
-            let (middle, radius) = disc.seen_from(self.film_point(film));
-            (centre, half, reach) = (middle, DVec2::splat(radius), 1.0);
+        let bound = self.bound(film)?;
+        let Some(seen) = self.coded.as_ref().and_then(|coded| coded.seen_from(film)) else {
+            let (slopes, area) = bound.draw(u)?;
+            return Some(self.weigh(slopes, area));
+        };
+        let anywhere = |u| bound.draw(u).map_or(bound.centre(), |drawn| drawn.0);
+        let aimed = seen.aim(u, anywhere, |slopes| bound.density(slopes));
+        (aimed.density > 0.0).then(|| self.weigh(aimed.slopes, 1.0 / aimed.density))
+    }
+
+    /// The sample along slopes that stands for an area of slopes.
+    fn weigh(&self, slopes: DVec2, area: f64) -> PupilSample {
+        let direction = towards_lens(slopes);
+        let on_sensor = direction.dot(self.sensor.rotation.z_axis).abs();
+        let cosine = -direction.z;
+        let weight = self.index2 * area * cosine.powi(3) * on_sensor;
+        PupilSample { direction, weight }
+    }
+
+    /// The bound from a point of the sensor (mm); `None` where no light arrives.
+    fn bound(&self, film: DVec2) -> Option<Bound<'_>> {
+        let bound = if let Some(disc) = &self.disc {
+            let (centre, radius) = disc.seen_from(self.film_point(film));
+            Bound { nodes: &[], place: None, frame: [centre, DVec2::splat(radius)] }
         } else {
             let place = self.place(film)?;
-            axis = place.axis;
+            let mut frame = [DVec2::ZERO; 2];
             for (node, weight) in place.nodes {
-                let outline = &self.nodes[node];
-                centre += outline.centre * weight;
-                half += outline.half * weight;
-                reach += between(&outline.reach, turn) * weight;
+                frame[0] += self.nodes[node].centre * weight;
+                frame[1] += self.nodes[node].half * weight;
             }
-        }
-        if reach <= 0.0 || half.min_element() <= 0.0 {
-            return None;
-        }
-        let offset = DVec2::new(cosine, sine) * half * (reach * disc_radius);
-        let slopes = axis.rotate(centre + offset);
-        let area = std::f64::consts::PI * half.x * half.y * reach * reach;
-        let direction = towards_lens(slopes);
-        let cosine = -direction.z;
-        let on_sensor = direction.dot(self.sensor.rotation.z_axis).abs();
-        let weight = self.index2 * area * cosine.powi(3) * on_sensor;
-        Some(PupilSample { direction, weight })
+            Bound { nodes: &self.nodes, place: Some(place), frame }
+        };
+        (bound.frame[1].min_element() > 0.0).then_some(bound)
     }
 
     /// Appends one ray for each point of the sensor (mm) and point of the unit square, ready to be
@@ -300,6 +315,58 @@ impl ExitPupil {
             corners.push(place.turned(corner[0] + DVec2::from_angle(angle) * corner[1] * reach));
         }
         corners
+    }
+}
+
+/// The outline from one point of the sensor.
+struct Bound<'a> {
+    nodes: &'a [Outline],
+    /// Between which nodes; `None` for a disc.
+    place: Option<Place>,
+    /// Centre and half axes in slopes, as the nodes are turned.
+    frame: [DVec2; 2],
+}
+
+impl Bound<'_> {
+    /// The radius in the frame at a share of a full turn.
+    fn reach(&self, turn: f64) -> f64 {
+        self.place.as_ref().map_or(1.0, |place| {
+            let reach =
+                |&(node, weight): &(usize, f64)| between(&self.nodes[node].reach, turn) * weight;
+            place.nodes.iter().map(reach).sum()
+        })
+    }
+
+    fn turned(&self, slopes: DVec2) -> DVec2 {
+        self.place.as_ref().map_or(slopes, |place| place.turned(slopes))
+    }
+
+    fn centre(&self) -> DVec2 {
+        self.turned(self.frame[0])
+    }
+
+    /// Slopes for a place in the unit square, uniform in area at each angle, and the area of slopes that
+    /// they stand for; `None` when the bound is empty there.
+    fn draw(&self, u: [f64; 2]) -> Option<(DVec2, f64)> {
+        let (disc_radius, turn) = concentric(u);
+        let reach = self.reach(turn);
+        let [centre, half] = self.frame;
+        let angle = DVec2::from_angle(turn * std::f64::consts::TAU);
+        let area = std::f64::consts::PI * half.x * half.y * reach * reach;
+        (reach > 0.0).then(|| (self.turned(centre + angle * half * (reach * disc_radius)), area))
+    }
+
+    /// The density of [`Self::draw`] per area of slopes; 0 outside.
+    fn density(&self, slopes: DVec2) -> f64 {
+        let [centre, half] = self.frame;
+        let unturned = self.place.as_ref().map_or(slopes, |place| place.unturned(slopes));
+        let inside = (unturned - centre) / half;
+        let turn = (inside.to_angle() / std::f64::consts::TAU).rem_euclid(1.0);
+        let reach = self.reach(turn);
+        if !(reach > 0.0 && inside.length() <= reach) {
+            return 0.0;
+        }
+        1.0 / (std::f64::consts::PI * half.x * half.y * reach * reach)
     }
 }
 
