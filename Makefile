@@ -7,7 +7,7 @@ export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
 .PHONY: help setup render test test-embree4 bench bench-peers bench-light bench-lens bench-sensor docs-figures docs-charts \
-	docs-stability fingerprints clean
+	docs-stability fingerprints fuzz-smoke fuzz-seeds clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -22,6 +22,8 @@ help:
 	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
 	@echo "make docs-stability  take every method to where it fails, at full scale, write docs/stability.md"
 	@echo "make fingerprints  fingerprints of pictures, sensor images and lens tables, to move code without changing them"
+	@echo "make fuzz-smoke    changed inputs for every reader of files, a minute each"
+	@echo "make fuzz-seeds    write the inputs that cargo-fuzz starts from into fuzz/corpus"
 	@echo "make clean         remove target/ and out/"
 
 setup:
@@ -77,6 +79,16 @@ docs-figures: setup docs-charts docs-stability
 			--outputs png && \
 		install -D -m 644 out/docs-figures/$$kind/raw.preview.png docs/images/$$kind.png || exit 1; \
 	done
+
+# Every reader of files under changed inputs, each for a minute: ARGS="--seconds 600 obj ply" for more
+# of fewer. What fails is kept in out/fuzz.
+fuzz-smoke: setup
+	cargo build -p etendue-fuzz
+	target/debug/fuzz-smoke $(ARGS)
+
+# The seeds for `cargo +nightly fuzz run TARGET`, in fuzz/corpus.
+fuzz-seeds: setup
+	cargo run -p etendue-fuzz -- --write-seeds fuzz/corpus
 
 # A few minutes: every case of tests/stability at full scale.
 docs-stability: setup

@@ -31,9 +31,13 @@ step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 cargo test --workspace --doc
 
-if cargo deny --version >/dev/null 2>&1; then
-    step "licences and sources of dependencies"
-    cargo deny check bans licenses sources
+step "licences, sources and advisories of dependencies"
+cargo deny check bans licenses sources
+# The database of advisories is a repository of its own, which not every machine reaches.
+if timeout 120 cargo deny fetch db >/dev/null 2>&1; then
+    cargo deny check --disable-fetch advisories
+else
+    echo "advisories: passed over, https://github.com/RustSec/advisory-db cannot be had from here"
 fi
 
 step "tests without Embree"

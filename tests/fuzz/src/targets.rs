@@ -1,0 +1,198 @@
+//! One function a reader.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use etendue_geometry::Buffer;
+use etendue_optics::element::Picture;
+use etendue_optics::train::{Focus, Inquiry, LensFile, LensReport};
+use etendue_scene::file::{SensorFile, read_lens, trace_rays};
+use etendue_scene::import::{Options, import};
+use etendue_scene::{LoadOptions, Reach, SceneFile, Strictness, Wanted, doctor};
+use etendue_tracer::texture::{Filter, Wrap};
+use etendue_tracer::{EnvironmentMap, ImageSource, Texture};
+
+/// A reader under test.
+#[derive(Debug, Clone, Copy)]
+pub struct Target {
+    /// What it is called: the name of its file in `fuzz/fuzz_targets`.
+    pub name: &'static str,
+    /// Reads bytes, with a folder to put them in.
+    pub run: fn(&[u8], &Path),
+}
+
+/// All readers.
+pub const TARGETS: [Target; 18] = [
+    Target { name: "gltf", run: gltf },
+    Target { name: "glb", run: glb },
+    Target { name: "obj", run: obj },
+    Target { name: "mtl", run: mtl },
+    Target { name: "ply", run: ply },
+    Target { name: "npy", run: npy },
+    Target { name: "scene", run: scene },
+    Target { name: "set", run: set },
+    Target { name: "sensor", run: sensor },
+    Target { name: "lens", run: lens },
+    Target { name: "rays", run: rays },
+    Target { name: "zmx", run: zmx },
+    Target { name: "mask_png", run: mask_png },
+    Target { name: "mask_exr", run: mask_exr },
+    Target { name: "texture", run: texture },
+    Target { name: "environment_hdr", run: environment_hdr },
+    Target { name: "environment_exr", run: environment_exr },
+    Target { name: "doctor", run: doctor },
+];
+
+/// The target of that name.
+#[must_use]
+pub fn named(name: &str) -> Option<Target> {
+    TARGETS.into_iter().find(|target| target.name == name)
+}
+
+/// Writes a file anew: one that is mapped keeps its bytes.
+fn write(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
+    let path = folder.join(name);
+    // A folder that cannot be written to shows when the file is read.
+    let _ = fs::remove_file(&path);
+    let _ = fs::write(&path, bytes);
+    path
+}
+
+/// Imports a model under both rules and examines it.
+fn model(bytes: &[u8], folder: &Path, name: &str) {
+    let path = write(folder, name, bytes);
+    let options = Options {
+        strictness: Strictness::Strict,
+        root: Some(folder.to_owned()),
+        count_degenerate: false,
+    };
+    let _ = import(&path, Wanted::EVERYTHING, &options);
+    check(&path);
+}
+
+fn check(path: &Path) {
+    if let Ok(found) = doctor::check(path, &[], &LoadOptions::default()) {
+        let _ = found.to_string();
+    }
+}
+
+fn gltf(bytes: &[u8], folder: &Path) {
+    model(bytes, folder, "m.gltf");
+}
+
+fn glb(bytes: &[u8], folder: &Path) {
+    model(bytes, folder, "m.glb");
+}
+
+fn obj(bytes: &[u8], folder: &Path) {
+    model(bytes, folder, "m.obj");
+}
+
+fn mtl(bytes: &[u8], folder: &Path) {
+    write(folder, "m.mtl", bytes);
+    model(b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n", folder, "m.obj");
+}
+
+fn ply(bytes: &[u8], folder: &Path) {
+    model(bytes, folder, "m.ply");
+}
+
+fn npy(bytes: &[u8], folder: &Path) {
+    write(folder, "m.npy", bytes);
+    let scene = br#"{"etendue": 1, "objects": [{"shape": "rectangle", "instances": "m.npy"}]}"#;
+    check(&write(folder, "s.json", scene));
+}
+
+fn scene(bytes: &[u8], folder: &Path) {
+    check(&write(folder, "s.json", bytes));
+}
+
+/// A line a setting.
+fn set(bytes: &[u8], folder: &Path) {
+    let scene = br#"{"etendue": 1, "objects": [{"shape": "box"}], "layers": ["depth"],
+        "materials": {"m": {"type": "matte", "color": [0.5, 0.5, 0.5]}}}"#;
+    let path = write(folder, "s.json", scene);
+    let text = String::from_utf8_lossy(bytes);
+    let pairs = text.lines().filter_map(|line| line.split_once('='));
+    let settings: Vec<(String, String)> =
+        pairs.map(|(key, value)| (key.to_owned(), value.to_owned())).collect();
+    let _ = SceneFile::read(&path, &settings);
+    let _ = doctor::check(&path, &settings, &LoadOptions::default());
+}
+
+fn sensor(bytes: &[u8], folder: &Path) {
+    let _ = SensorFile::read(&write(folder, "sensor.json", bytes), &[]);
+}
+
+/// What `etendue lens` does.
+fn look_at_lens(path: &Path) {
+    let Ok(lens) = read_lens(path, Reach::OwnFolder) else { return };
+    let named = |list: Vec<f64>| (!list.is_empty()).then_some(list);
+    let inquiry = Inquiry {
+        wavelengths: named(lens.wavelengths),
+        fields: named(lens.fields),
+        focus: lens.focus,
+    };
+    if let Ok(report) = LensReport::new(&lens.train, &inquiry) {
+        let _ = report.to_string();
+    }
+}
+
+fn lens(bytes: &[u8], folder: &Path) {
+    look_at_lens(&write(folder, "lens.json", bytes));
+}
+
+fn zmx(bytes: &[u8], folder: &Path) {
+    look_at_lens(&write(folder, "lens.zmx", bytes));
+}
+
+fn rays(bytes: &[u8], folder: &Path) {
+    let elements = r#"{"elements": [{"type": "surface", "radius": 50, "thickness": 4,
+        "glass": "N-BK7", "semi_diameter": 9}, {"type": "surface", "radius": -50}]}"#;
+    let lens = LensFile::from_json(elements).and_then(|file| file.build(&|name| Err(name.into())));
+    if let Ok(lens) = lens {
+        let _ = trace_rays(&lens, &write(folder, "rays.json", bytes));
+        let _ = lens.sensor_z(Focus::AsWritten);
+    }
+}
+
+fn mask(bytes: &[u8], folder: &Path, name: &str) {
+    write(folder, name, bytes);
+    let _ = Picture::read(name, 10.0, None, &|name| Ok(folder.join(name)));
+}
+
+fn mask_png(bytes: &[u8], folder: &Path) {
+    mask(bytes, folder, "mask.png");
+}
+
+fn mask_exr(bytes: &[u8], folder: &Path) {
+    mask(bytes, folder, "mask.exr");
+}
+
+/// PNG and JPEG.
+fn texture(bytes: &[u8], _folder: &Path) {
+    let texture = Texture {
+        name: "texture".to_owned(),
+        source: ImageSource::Bytes(Buffer::from(bytes.to_vec())),
+        wrap: [Wrap::Repeat; 2],
+        filter: Filter::Bilinear,
+    };
+    let _ = texture.decode();
+}
+
+fn environment_hdr(bytes: &[u8], folder: &Path) {
+    let _ = EnvironmentMap::read(&write(folder, "sky.hdr", bytes));
+}
+
+fn environment_exr(bytes: &[u8], folder: &Path) {
+    let _ = EnvironmentMap::read(&write(folder, "sky.exr", bytes));
+}
+
+/// The files beside a model, which are looked through for names.
+fn doctor(bytes: &[u8], folder: &Path) {
+    for name in ["beside.gltf", "beside.glb", "beside.mtl", "beside.obj", "beside.json"] {
+        write(folder, name, bytes);
+    }
+    write(folder, "unused.png", b"");
+    check(&write(folder, "m.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+}
