@@ -104,7 +104,7 @@ fn part_of(rng: &mut Rng, bytes: &[u8]) -> std::ops::Range<usize> {
 /// The digits around byte `at`, or behind it.
 fn number_at(bytes: &[u8], at: usize) -> Option<std::ops::Range<usize>> {
     let is_part = |byte: &u8| byte.is_ascii_digit() || matches!(byte, b'.' | b'-' | b'e');
-    let start = at + bytes.get(at..)?.iter().position(|byte| is_part(byte))?;
+    let start = at + bytes.get(at..)?.iter().position(&is_part)?;
     let length = bytes[start..].iter().take_while(|byte| is_part(byte)).count();
     Some(start..start + length)
 }
