@@ -237,7 +237,8 @@ mod tests {
         assert!(agx.encode([0.18; 3]).iter().all(|c| (c - 0.497).abs() < 2e-3));
         // Far above 1 Hill's curve goes to 1/0.983729, times rows of the output matrix that add to 1.
         let aces = by(ToneMap::Aces, 0.0);
-        assert_eq!(aces.encode([1e9; 3]), [1.0; 3]);
+        // The sRGB curve rounds 1 to 1 − 6e-8 in f32.
+        assert!(aces.encode([1e9; 3]).iter().all(|c| *c > 0.999_999));
         assert_eq!(aces.encode([0.0; 3]), [0.0; 3]);
         // v = 0.18: (0.18 x 0.2045786 - 0.000090537)/(0.18 x 0.610022 + 0.238081) = 0.105591, in sRGB
         // 0.3585.
