@@ -9,6 +9,7 @@ use etendue_geometry::{Detail, Placement};
 use etendue_scene::Scene;
 use etendue_scene::file::TracerSpec;
 use etendue_scene::import::Wanted;
+use etendue_sensor::LaneChoice;
 use etendue_spectrum::Lanes;
 use etendue_tracer::{LayerSpec, Needs, TextureScope};
 use serde::Serialize;
@@ -92,7 +93,8 @@ impl Plan {
         let [width, height] = scene.camera.resolution();
         let pixels = u64::from(width) * u64::from(height);
         let samples = scene.render.samples;
-        let apart = scene.camera.lane_groups(&expose::lanes(scene)).len() as u64;
+        let chosen = expose::lanes(scene);
+        let apart = scene.camera.lane_groups(&chosen.lanes).len() as u64;
         let sampled = |yes| if yes { u64::from(samples) * apart } else { 0 };
         let rays = pixels
             * (u64::from(passes.centre)
@@ -115,10 +117,10 @@ impl Plan {
             rays,
             quality,
             precision,
-            lanes: expose::lanes(scene),
+            lanes: chosen.lanes.clone(),
             decisions: Vec::new(),
         };
-        plan.decisions = plan.explain(scene, needs, passes, triangles);
+        plan.decisions = plan.explain(scene, &chosen, (needs, passes), triangles);
         plan
     }
 
@@ -151,8 +153,8 @@ impl Plan {
     fn explain(
         &self,
         scene: &Scene,
-        needs: Needs,
-        passes: Passes,
+        chosen: &LaneChoice,
+        (needs, passes): (Needs, Passes),
         triangles: u64,
     ) -> Vec<Decision> {
         let mut decisions = Vec::new();
@@ -161,7 +163,7 @@ impl Plan {
         };
         let on = |yes| if yes { "on" } else { "off" };
         decide("rays", &self.rays.to_string(), self.ray_words(passes));
-        let (lanes, because) = expose::explain_lanes(scene, &self.lanes);
+        let (lanes, because) = expose::explain_lanes(scene, chosen);
         decide("wavelengths", &lanes, because);
         if let Some((choice, because)) = expose::explain_sensor(scene) {
             decide("sensor", &choice, because);

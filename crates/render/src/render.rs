@@ -61,7 +61,10 @@ pub enum RenderError {
         losses: Vec<String>,
     },
     /// A light's spectrum is of no use to the sensor.
-    #[error("a light's illuminant: {0}; give the light another one, or none")]
+    #[error(
+        "a light's illuminant: {0}; give the light `equal_energy`, `a` or {{\"black_body\": kelvin}}, \
+         which reach further, or the sensor a quantum_efficiency or bands that see it"
+    )]
     Lights(String),
     /// The caller asked to stop.
     #[error("stopped")]

@@ -212,7 +212,7 @@ fn refractive_index(spec: &IorSpec) -> Result<Ior, Fault> {
     let spec: GlassSpec = serde_json::from_value(words).map_err(|e| fault(e.to_string()))?;
     let glass = spec.resolve().map_err(|e| fault(e.to_string()))?;
     let step = 5.0;
-    let samples: Vec<[f64; 2]> = (60..=220)
+    let samples: Vec<[f64; 2]> = (50..=500)
         .map(|k| f64::from(k) * step)
         .filter_map(|nm| Some([nm, glass.index(nm).ok().filter(|n| *n >= 1.0)?]))
         .collect();

@@ -119,9 +119,9 @@ impl Sensor {
         Ok(Some(codes))
     }
 
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "2ᵇ − 1")]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 2ᵇ − 1")]
     fn white_level_of_file(&self) -> u16 {
-        self.white_level() as u16
+        self.saturation_level() as u16
     }
 
     /// `ColorMatrix1` (XYZ to channels, rows red, green, blue) and `AsShotNeutral`.

@@ -41,12 +41,12 @@ pub enum SensorError {
         /// What is wrong.
         fault: CurveError,
     },
-    /// The full well holds less than the black level stands for.
+    /// The full well holds less than the converter can tell from nothing.
     FullWell {
         /// The full well (e⁻).
         full_well: f64,
-        /// Black level over gain (e⁻).
-        black: f64,
+        /// The gain (DN/e⁻).
+        gain: f64,
     },
     /// A colour filter array that is not a rectangle of letters.
     Pattern(String),
@@ -70,6 +70,13 @@ pub enum SensorError {
         channel: String,
         /// The range of the lanes (nm).
         lanes: [f64; 2],
+    },
+    /// Light of which the sensor sees nothing.
+    Dark {
+        /// Where the sensor sees (nm).
+        sensor: [f64; 2],
+        /// Where the lights shine (nm).
+        light: [f64; 2],
     },
     /// A quantum efficiency of nothing at the wavelength of a characterisation.
     BlindAt {
@@ -116,6 +123,7 @@ impl SensorError {
             | Self::Blind { key, .. } => key,
             Self::Curve { key, .. } => key,
             Self::FullWell { .. } => "full_well",
+            Self::Dark { .. } => "quantum_efficiency",
             Self::Pattern(_) | Self::UnknownFilter { .. } => "cfa",
             Self::Channel { .. } => "channels",
             Self::BlindAt { .. } | Self::Film { .. } | Self::Steps { .. } => "",
@@ -132,9 +140,11 @@ impl SensorError {
             Self::Missing { why, .. } => format!("is missing: {why}"),
             Self::Misplaced { why, .. } => format!("is of no use here: {why}"),
             Self::Curve { fault, .. } => fault.to_string(),
-            Self::FullWell { full_well, black } => format!(
-                "{full_well} e⁻ is less than the black level's worth of {black} e⁻ (black_level / \
-                 system_gain): every pixel would be black"
+            Self::FullWell { full_well, gain } => format!(
+                "{} e⁻ times the system_gain of {} DN/e⁻ is not half a digital number: every pixel \
+                 would be black; one of the two is too small",
+                Shown(*full_well),
+                Shown(*gain)
             ),
             Self::Pattern(why) => why.clone(),
             Self::Channel { index, why } => format!("the name of channel {index} {why}"),
@@ -143,8 +153,14 @@ impl SensorError {
                  use r, g, b or w"
             ),
             Self::Blind { channel, lanes: [from, to], .. } => format!(
-                "the channel `{channel}` sees nothing of {from}..={to} nm, the wavelengths of the \
-                 render's spectral lanes: the image would be black; give a curve or bands inside"
+                "the channel `{channel}` sees nothing of {from}..={to} nm, the wavelengths that are \
+                 rendered: the image would be black; give it a curve (in `filters`, or as \
+                 `quantum_efficiency`) or `bands` that overlap; ideal r, g and b pass visible light alone"
+            ),
+            Self::Dark { sensor: [a, b], light: [from, to] } => format!(
+                "the sensor sees {a}..={b} nm, the lights shine at {from}..={to} nm: the image would be \
+                 black; give a light the illuminant `a`, `equal_energy` or {{\"black_body\": kelvin}}, \
+                 which reach further, or the sensor a curve that reaches into the light"
             ),
             Self::BlindAt { wavelength } => format!(
                 "the sensor has no quantum efficiency at {wavelength} nm: choose another --wavelength"

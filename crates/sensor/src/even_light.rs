@@ -37,7 +37,11 @@ impl EvenLight {
         let mut corner = sensor.clone().with_resolution([width.min(size[0]), height.min(size[1])]);
         corner.replace_response(Response {
             lanes: Lanes::Grey,
-            channels: vec![Channel { name: "Y".into(), electrons: vec![1.0] }],
+            channels: vec![Channel {
+                name: "Y".into(),
+                electrons: vec![1.0],
+                primaries: [1.0 / 3.0; 3],
+            }],
             pattern: Some(vec![vec![0]]),
         });
         Ok(Self { sensor: corner, efficiency })

@@ -9,7 +9,8 @@
 //! * The system gain K is in DN/e⁻; what data sheets call e⁻/DN is its inverse.
 //! * A film is `[row][column][lane]`, an image `[row][column][channel]`; row 0 is the top.
 //! * Fixed patterns follow from the serial number and the pixel, temporal noise from the seed, the
-//!   frame and the pixel: the same image for any number of threads, and a crop is a crop.
+//!   serial number, the frame and the pixel: the same image for any number of threads, and a crop is
+//!   a crop.
 //!
 //! # Example
 //!
@@ -37,6 +38,7 @@
 //! | [`spec`] | the sensor as a scene file writes it |
 //! | [`preset`] | sensors of the trade |
 //! | [`cfa`] | colour filter arrays |
+//! | [`bands`] | the fewest spectral bands that count electrons right |
 //! | [`film`] | what a sensor is given and gives back |
 //! | [`sensor`] | a sensor ready to expose, and pictures of what it saw |
 //! | [`demosaic`] | missing colours |
@@ -46,6 +48,7 @@
 //! | [`approximation`] | where the normal distribution is no substitute |
 
 pub mod approximation;
+pub mod bands;
 pub mod cfa;
 mod chain;
 mod clipping;
@@ -68,9 +71,11 @@ pub mod sensor;
 mod settings;
 pub mod spec;
 
+pub use bands::{Illumination, LaneChoice};
 pub use cfa::CfaSpec;
 pub use error::SensorError;
 pub use film::{Film, Flaws, Moments, RawImage, Shot};
+pub use philox::mixed_seed;
 pub use preset::{Model, Preset};
 pub use sensor::Sensor;
 pub use spec::{NoiseModel, Radiometry, SensorKind, SensorSpec};

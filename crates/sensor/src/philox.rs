@@ -35,6 +35,15 @@ impl Key {
         Self(even, odd)
     }
 
+    /// The sequence of temporal noise of one sensor: those of two serial numbers are as unlike as
+    /// those of two seeds.
+    #[expect(clippy::cast_possible_truncation, reason = "the halves of a word")]
+    pub(crate) fn temporal(seed: u64, serial: u64) -> Self {
+        let [a, b, ..] =
+            Self::new(seed).words([serial as u32, (serial >> 32) as u32, 0, Stage::Key as u32]);
+        Self::new(a | b << 32)
+    }
+
     /// 128 random bits for this counter, as four words in the low halves.
     #[inline(always)]
     pub(crate) fn words(&self, counter: [u32; 4]) -> [u64; 4] {
@@ -48,6 +57,22 @@ impl Key {
         }
         [a, b, c, d]
     }
+}
+
+/// A seed for whatever `identity` names: as unlike that of another identity as that of another seed.
+#[must_use]
+pub fn mixed_seed(seed: u64, identity: &[u8]) -> u64 {
+    let mut mixed = seed;
+    for part in identity.chunks(8) {
+        let mut bytes = [0; 8];
+        bytes[..part.len()].copy_from_slice(part);
+        let word = u64::from_le_bytes(bytes);
+        #[expect(clippy::cast_possible_truncation, reason = "the halves of a word")]
+        let counter = [word as u32, (word >> 32) as u32, part.len() as u32, Stage::Key as u32];
+        let [a, b, ..] = Key::new(mixed).words(counter);
+        mixed = a | b << 32;
+    }
+    mixed
 }
 
 /// What a random number is for. Two stages never share a counter.
@@ -66,6 +91,8 @@ pub(crate) enum Stage {
     Pattern = 5,
     /// How hot.
     HotPixel = 6,
+    /// Keys of other sequences. It is no pixel's: stages of pixels stand in the highest bits.
+    Key = 7,
 }
 
 /// Channels that a counter has room for.
@@ -126,6 +153,20 @@ mod tests {
         for (counter, seed, expected) in answers {
             assert_eq!(Key::new(seed).words(counter), expected);
         }
+    }
+
+    #[test]
+    fn seeds_of_other_identities_differ() {
+        let seeds: Vec<u64> =
+            [&b""[..], b"a", b"b", b"a\0", b"longer than a word", b"longer than a worf"]
+                .map(|identity| mixed_seed(3, identity))
+                .into();
+        for (i, seed) in seeds.iter().enumerate() {
+            assert!(!seeds[..i].contains(seed), "{seeds:?}");
+        }
+        assert_eq!((mixed_seed(3, b""), mixed_seed(3, b"a")), (3, mixed_seed(3, b"a")));
+        let key = |seed, serial| Key::temporal(seed, serial);
+        assert!(key(1, 2) != key(2, 1) && key(1, 2) != key(1, 3) && key(0, 1) != key(1, 0));
     }
 
     #[test]

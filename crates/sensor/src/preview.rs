@@ -9,11 +9,11 @@ use crate::demosaic::{Method, Mosaic};
 use crate::{RawImage, Sensor};
 
 impl Sensor {
-    /// What every channel makes of white light (1 in all lanes), the most sensitive being 1.
+    /// What every channel makes of white light (equal energy), the most sensitive being 1.
     #[must_use]
     pub fn white_response(&self) -> Vec<f64> {
-        let white = |channel: usize| self.electrons_per_unit(channel).iter().sum::<f64>();
-        let all: Vec<f64> = (0..self.channels().len()).map(white).collect();
+        let all: Vec<f64> =
+            self.response.channels.iter().map(|channel| channel.primaries.iter().sum()).collect();
         let most = all.iter().copied().fold(0.0, f64::max);
         all.into_iter().map(|value| value / most).collect()
     }
@@ -30,7 +30,7 @@ impl Sensor {
     #[must_use]
     pub fn srgb_from_channels(&self) -> Vec<[f64; 3]> {
         let white = self.white_response();
-        if let Lanes::Bands(_) = self.lanes()
+        if let Lanes::Bands(_) | Lanes::Weighted(_) = self.lanes()
             && self.channels().len() == self.lanes().count()
             && self.is_one_lane_a_channel()
         {
@@ -52,13 +52,8 @@ impl Sensor {
     /// [`Self::white_response`].
     #[must_use]
     pub fn response_to_primaries(&self) -> Vec<[f64; 3]> {
-        let from_rgb = self.lanes().from_rgb();
-        let all = (0..self.channels().len()).map(|channel| {
-            let electrons = self.electrons_per_unit(channel);
-            let of = |k: usize| from_rgb.iter().zip(electrons).map(|(row, e)| row[k] * e).sum();
-            std::array::from_fn::<f64, 3, _>(of)
-        });
-        let rows: Vec<[f64; 3]> = all.collect();
+        let rows: Vec<[f64; 3]> =
+            self.response.channels.iter().map(|channel| channel.primaries).collect();
         let most = rows.iter().map(|row| row.iter().sum::<f64>()).fold(0.0, f64::max);
         rows.into_iter().map(|row| row.map(|value| value / most)).collect()
     }
@@ -70,11 +65,11 @@ impl Sensor {
         })
     }
 
-    /// Numbers of an image as parts of full scale, black at 0, every channel at every pixel:
-    /// `[row][column][channel]`.
+    /// Numbers of an image as parts of what saturates a pixel, black at 0, every channel at every
+    /// pixel: `[row][column][channel]`.
     #[must_use]
     pub fn linear(&self, image: &RawImage, method: Method) -> Vec<f32> {
-        let range = self.white_level() - self.black_level();
+        let range = self.saturation_level() - self.black_level();
         #[expect(clippy::cast_possible_truncation, reason = "16 bits fit")]
         let part = |&y: &u16| ((f64::from(y) - self.black_level()) / range) as f32;
         let values: Vec<f32> = image.values.par_iter().map(part).collect();
@@ -87,18 +82,26 @@ impl Sensor {
         }
     }
 
-    /// An image in linear sRGB, white balanced: a pixel at full scale of a white light is (1, 1, 1).
+    /// An image in linear sRGB, white balanced: a pixel that a white light just saturates is (1, 1, 1).
+    ///
+    /// Above that light the most sensitive channel tells nothing any more. All channels are clipped
+    /// there, each at what it makes of that light, before they are balanced: the usual way of raw
+    /// converters, without which what is saturated in all channels would come out in the colour of the
+    /// balance (pink, as a rule).
     #[must_use]
     pub fn developed(&self, image: &RawImage, method: Method) -> Vec<[f32; 3]> {
         let weights = self.srgb_from_channels();
+        let white = self.white_response();
         let linear = self.linear(image, method);
         let pixels = linear.par_chunks_exact(weights.len());
         let colours = pixels.map(|channels| {
             std::array::from_fn(|k| {
-                let pairs = channels.iter().zip(&weights);
+                let pairs = channels.iter().zip(&weights).zip(&white);
+                let part = |((&value, weight), white): ((&f32, &[f64; 3]), &f64)| {
+                    f64::from(value).min(*white) * weight[k]
+                };
                 #[expect(clippy::cast_possible_truncation, reason = "to look at")]
-                let sum =
-                    pairs.map(|(&value, weight)| f64::from(value) * weight[k]).sum::<f64>() as f32;
+                let sum = pairs.map(part).sum::<f64>() as f32;
                 sum
             })
         });

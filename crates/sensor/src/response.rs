@@ -11,7 +11,7 @@
 //! so 1 in all lanes is 1 in that channel and less in others, as with white light on a real sensor.
 //! The grey value g = intensity·(2ᵇ − 1 − black) fixes μₑ = g/K, whatever the exposure time.
 
-use etendue_spectrum::{Curve, Grid, Lanes, PLANCK, SPEED_OF_LIGHT, VISIBLE, integral, rgb};
+use etendue_spectrum::{Band, Curve, Grid, Lanes, PLANCK, SPEED_OF_LIGHT, VISIBLE, integral, rgb};
 
 use crate::philox::MOST_CHANNELS;
 use crate::preset::nikon_d5100;
@@ -19,8 +19,8 @@ use crate::settings::Settings;
 use crate::spec::{FilterSet, Filters, Radiometry, SensorKind, SensorSpec};
 use crate::{CfaSpec, SensorError};
 
-/// The width of bands (nm) when nobody asks for any and curves have to be integrated. A test shows
-/// what it costs.
+/// The width of bands (nm) when nobody asks for any, curves have to be integrated and nothing is known
+/// of the light. A test shows what it costs.
 pub(crate) const BAND_WIDTH: f64 = 10.0;
 
 /// One kind of photosite.
@@ -31,6 +31,8 @@ pub(crate) struct Channel {
     /// Mean photo-electrons a unit of each lane makes: a second in physical mode, in digital mode
     /// all that there are.
     pub(crate) electrons: Vec<f64>,
+    /// The same of light that is red, green or blue, as the render's colours are, in no lanes.
+    pub(crate) primaries: [f64; 3],
 }
 
 /// What the sensor makes of light.
@@ -44,13 +46,78 @@ pub(crate) struct Response {
 
 /// What stands between the light and the silicon.
 #[derive(Debug, Clone, PartialEq)]
-enum Filter {
+pub(crate) enum Filter {
     Clear,
     /// One of the render's own colours.
     Primary(usize),
     Curve(Curve),
     /// One band, and nothing else.
-    Band(usize),
+    Band(Band),
+}
+
+impl Filter {
+    /// The curve, if it is one.
+    pub(crate) fn curve(&self) -> Option<&Curve> {
+        match self {
+            Self::Primary(k) => Some(&rgb::PRIMARIES[*k]),
+            Self::Curve(curve) => Some(curve),
+            Self::Clear | Self::Band(_) => None,
+        }
+    }
+
+    /// The share that passes at a wavelength (nm).
+    pub(crate) fn passes(&self, nm: f64) -> f64 {
+        match self {
+            Self::Clear => 1.0,
+            Self::Primary(k) => rgb::PRIMARIES[*k].at(nm).unwrap_or(0.0),
+            Self::Curve(curve) => curve.at(nm).unwrap_or(0.0),
+            Self::Band(band) => f64::from(u8::from((band.from..band.to).contains(&nm))),
+        }
+    }
+
+    /// The wavelengths that pass (nm); `None` for all of them.
+    fn range(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Clear => None,
+            Self::Primary(_) => Some(VISIBLE),
+            Self::Curve(curve) if curve.as_flat().is_some() => None,
+            Self::Curve(curve) => Some(extent(curve)),
+            Self::Band(band) => Some([band.from, band.to]),
+        }
+    }
+}
+
+/// Where a curve is not 0 (nm); its whole range when it is 0 everywhere.
+fn extent(curve: &Curve) -> [f64; 2] {
+    let samples = curve.samples();
+    let first = samples.iter().position(|sample| sample[1] > 0.0);
+    let last = samples.iter().rposition(|sample| sample[1] > 0.0);
+    match (first, last) {
+        (Some(first), Some(last)) => {
+            let last = (last + 1).min(samples.len() - 1);
+            [samples[first.saturating_sub(1)][0], samples[last][0]]
+        }
+        _ => curve.range(),
+    }
+}
+
+/// The wavelengths at which a sensor of this quantum efficiency behind these filters sees something
+/// (nm). A number for the quantum efficiency is a statement about visible light, and about what
+/// filters pass that have curves of their own.
+pub(crate) fn sensitive_range(efficiency: &Curve, filters: &[Filter]) -> Option<[f64; 2]> {
+    let silicon = match efficiency.as_flat() {
+        Some(_) => None,
+        None => Some(extent(efficiency)),
+    };
+    let seen = filters.iter().filter_map(|filter| match (silicon, filter.range()) {
+        (None, None) => Some(VISIBLE),
+        (Some(range), None) | (None, Some(range)) => Some(range),
+        (Some(a), Some(b)) => {
+            let [from, to] = [a[0].max(b[0]), a[1].min(b[1])];
+            (from < to).then_some([from, to])
+        }
+    });
+    seen.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
 }
 
 impl Response {
@@ -60,29 +127,17 @@ impl Response {
         settings: &Settings,
         given: Option<Lanes>,
     ) -> Result<Self, SensorError> {
-        let (names, filters, pattern) = match spec.kind {
-            SensorKind::Raw => raw(spec)?,
-            SensorKind::Rgb => {
-                let named = |letter| filter(letter, spec.filters.as_ref());
-                let filters = ['r', 'g', 'b'].map(named).into_iter().collect::<Result<_, _>>()?;
-                (["R", "G", "B"].map(String::from).into(), filters, None)
-            }
-            SensorKind::Multispectral => multispectral(spec)?,
-        };
+        let Filtered { names, filters, pattern } = filters(spec)?;
         let lanes = match given {
             Some(lanes) => lanes,
             None => fewest_lanes(spec, settings, &filters)?,
         };
         if filters.iter().any(|f| matches!(f, Filter::Band(_)))
-            && spec.bands.as_ref() != lanes.grid()
+            && !spec.bands.as_ref().is_some_and(|grid| divides(&lanes, grid))
         {
             let why = "the bands of a multispectral sensor are the lanes of its render";
             return Err(SensorError::Misplaced { key: "bands", why });
         }
-        let names = match (spec.kind, &spec.channels) {
-            (SensorKind::Multispectral, None) => lanes.names(),
-            _ => names,
-        };
         // Ideal primaries are compared with an ideal primary, unless other filters show that a
         // primary is less than all light.
         let own = |filter: &Filter| matches!(filter, Filter::Band(_) | Filter::Primary(_));
@@ -108,11 +163,38 @@ impl Response {
     }
 }
 
-type Filtered = (Vec<String>, Vec<Filter>, Option<Vec<Vec<usize>>>);
+/// Whether no lane lies across an edge of the bands, which are divided into lanes without a gap.
+fn divides(lanes: &Lanes, bands: &Grid) -> bool {
+    let Some(grid) = lanes.grid() else { return false };
+    let near = |edge: &f64| grid.edges().iter().any(|own| (own - edge).abs() <= 1e-9 * edge);
+    bands.edges().iter().all(near)
+}
+
+/// The kinds of photosites, what stands before each, and which pixel has which.
+pub(crate) struct Filtered {
+    names: Vec<String>,
+    pub(crate) filters: Vec<Filter>,
+    pattern: Option<Vec<Vec<usize>>>,
+}
+
+/// The filters of a sensor.
+pub(crate) fn filters(spec: &SensorSpec) -> Result<Filtered, SensorError> {
+    match spec.kind {
+        SensorKind::Raw => raw(spec),
+        SensorKind::Rgb => {
+            let named = |letter| filter(letter, spec.filters.as_ref());
+            let filters = ['r', 'g', 'b'].map(named).into_iter().collect::<Result<_, _>>()?;
+            let names = ["R", "G", "B"].map(String::from).into();
+            Ok(Filtered { names, filters, pattern: None })
+        }
+        SensorKind::Multispectral => multispectral(spec),
+    }
+}
 
 fn raw(spec: &SensorSpec) -> Result<Filtered, SensorError> {
     let Some(cfa) = &spec.cfa else {
-        return Ok((vec!["Y".into()], vec![Filter::Clear], Some(vec![vec![0]])));
+        let pattern = Some(vec![vec![0]]);
+        return Ok(Filtered { names: vec!["Y".into()], filters: vec![Filter::Clear], pattern });
     };
     let letters = cfa.letters();
     let filters = letters
@@ -120,7 +202,7 @@ fn raw(spec: &SensorSpec) -> Result<Filtered, SensorError> {
         .map(|&letter| filter(letter, spec.filters.as_ref()))
         .collect::<Result<_, _>>()?;
     let names = letters.iter().map(|letter| letter.to_uppercase().collect()).collect();
-    Ok((names, filters, Some(numbered(cfa, &letters))))
+    Ok(Filtered { names, filters, pattern: Some(numbered(cfa, &letters)) })
 }
 
 /// The pattern with each letter replaced by its number.
@@ -157,13 +239,15 @@ fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
             let key = || format!("channels.{}", channel.name);
             filters.push(Filter::Curve(transmission(&channel.curve, key)?));
         }
-        return Ok((channels.iter().map(|channel| channel.name.clone()).collect(), filters, None));
+        let names = channels.iter().map(|channel| channel.name.clone()).collect();
+        return Ok(Filtered { names, filters, pattern: None });
     }
     let Some(bands) = &spec.bands else {
         let why = "a multispectral sensor needs the edges of its bands (nm), or `channels`";
         return Err(SensorError::Missing { key: "bands", why });
     };
-    Ok((vec![String::new(); bands.len()], (0..bands.len()).map(Filter::Band).collect(), None))
+    let filters = bands.bands().map(Filter::Band).collect();
+    Ok(Filtered { names: Lanes::Bands(bands.clone()).names(), filters, pattern: None })
 }
 
 /// The filter of a letter: the user's curve, one of a named set, or an ideal one.
@@ -202,15 +286,15 @@ fn fewest_lanes(
         let coloured = filters.iter().any(|filter| *filter != Filter::Clear);
         return Ok(if coloured { Lanes::Rgb } else { Lanes::Grey });
     }
-    // Where the silicon is sensitive, within visible light: render's colours are known there only.
-    let [from, to] = settings.efficiency.range();
-    let [from, to] = [from.max(VISIBLE[0]), to.min(VISIBLE[1])];
-    let blind =
-        || SensorError::Blind { key: "quantum_efficiency", channel: "all".into(), lanes: VISIBLE };
-    if from >= to {
-        return Err(blind());
-    }
-    Grid::of_width(from, to, BAND_WIDTH).map(Lanes::Bands).map_err(|_| blind())
+    let blind = || SensorError::Blind {
+        key: "quantum_efficiency",
+        channel: "all".into(),
+        lanes: settings.efficiency.range(),
+    };
+    let [from, to] = sensitive_range(&settings.efficiency, filters).ok_or_else(blind)?;
+    // A curve may be given for more wavelengths than anybody renders.
+    let width = BAND_WIDTH.max((to - from) / 1000.0);
+    Grid::of_width(from, to, width).map(Lanes::Bands).map_err(|_| blind())
 }
 
 /// A channel's electrons: a second for physical light, else as a part of what the ideal one catches.
@@ -232,35 +316,77 @@ fn channel(
         };
         return Err(SensorError::Blind { key, channel: name, lanes: lanes.range() });
     }
-    let factor = match settings.radiometry {
-        Radiometry::Physical => {
+    // Weighted lanes stand for pieces of the light, not of white: colours are weighed without them.
+    let mut primaries = match lanes {
+        Lanes::Weighted(_) => of_primaries(filter, &settings.efficiency, lanes.range()),
+        Lanes::Grey | Lanes::Rgb | Lanes::Bands(_) => in_lanes(lanes, &electrons),
+    };
+    let factor = match (settings.radiometry, lanes) {
+        (Radiometry::Physical, _) => {
             let side = settings.pixel_pitch * 1e-6;
             side * side * 1e-9 / (PLANCK * SPEED_OF_LIGHT)
         }
-        Radiometry::Digital => {
+        (Radiometry::Digital, Lanes::Weighted(_)) => {
+            1.0 / of_primaries(ideal, &Curve::ONE, lanes.range()).iter().sum::<f64>()
+        }
+        (Radiometry::Digital, _) => {
             1.0 / (0..count).map(|i| photons_caught(lanes, i, ideal, &Curve::ONE)).sum::<f64>()
         }
     };
-    for value in &mut electrons {
+    for value in electrons.iter_mut().chain(&mut primaries) {
         *value *= factor;
     }
-    Ok(Channel { name, electrons })
+    Ok(Channel { name, electrons, primaries })
+}
+
+/// What red, green and blue make, from what lanes make.
+fn in_lanes(lanes: &Lanes, electrons: &[f64]) -> [f64; 3] {
+    let rows = lanes.from_rgb();
+    std::array::from_fn(|k| rows.iter().zip(electrons).map(|(row, e)| row[k] * e).sum())
+}
+
+/// The same from the curves, over a range of wavelengths (nm), beyond which there is no light.
+fn of_primaries(filter: &Filter, efficiency: &Curve, [from, to]: [f64; 2]) -> [f64; 3] {
+    let nm = Curve::sampled(vec![[from, from], [to, to]]).unwrap_or(Curve::ONE);
+    std::array::from_fn(|k| {
+        let held = rgb::PRIMARIES[k].held_over(from, to);
+        let curves = [&held, efficiency, &nm];
+        match filter {
+            Filter::Clear => integral(&curves, from, to),
+            Filter::Primary(_) | Filter::Curve(_) => {
+                let own = filter.curve().unwrap_or(&Curve::ONE);
+                integral(&[&held, efficiency, &nm, own], from, to)
+            }
+            Filter::Band(band) => integral(&curves, band.from.max(from), band.to.min(to)),
+        }
+    })
 }
 
 /// ∫ shape·η·filter·λ dλ (nm²): proportional to the photons of lane `i` that free an electron.
-fn photons_caught(lanes: &Lanes, i: usize, filter: &Filter, efficiency: &Curve) -> f64 {
-    let shape = lanes.shape(i);
+pub(crate) fn photons_caught(lanes: &Lanes, i: usize, filter: &Filter, efficiency: &Curve) -> f64 {
+    let mut shape = lanes.shape(i);
+    if *lanes == Lanes::Rgb && efficiency.as_flat().is_none() {
+        // Silicon may see what colours are not known for: they go on as they end.
+        let [from, to] = efficiency.range();
+        shape = shape.held_over(from, to);
+    }
     let [from, to] = shape.range();
     let ramp = [[from, from], [to, to]];
     let Ok(ramp) = Curve::sampled(ramp.to_vec()) else { return 0.0 };
     match filter {
         Filter::Clear => integral(&[&shape, efficiency, &ramp], from, to),
         Filter::Curve(curve) => integral(&[&shape, efficiency, curve, &ramp], from, to),
-        Filter::Band(band) if *band != i => 0.0,
-        Filter::Band(_) => integral(&[&shape, efficiency, &ramp], from, to),
+        Filter::Band(band) => {
+            // Edges that agree to rounding are one.
+            let middle = 0.5 * (from + to);
+            match (band.from..band.to).contains(&middle) {
+                true => integral(&[&shape, efficiency, &ramp], from, to),
+                false => 0.0,
+            }
+        }
         Filter::Primary(k) if *lanes == Lanes::Rgb && *k != i => 0.0,
         Filter::Primary(_) if *lanes == Lanes::Rgb => {
-            integral(&[&shape, efficiency, &ramp], from, to)
+            integral(&[&shape, efficiency, &ramp], VISIBLE[0], VISIBLE[1])
         }
         Filter::Primary(k) => integral(&[&shape, efficiency, &rgb::PRIMARIES[*k], &ramp], from, to),
     }
@@ -269,10 +395,14 @@ fn photons_caught(lanes: &Lanes, i: usize, filter: &Filter, efficiency: &Curve) 
 /// Digital mode: the most sensitive channel's value for 1 in all lanes becomes full scale, in
 /// electrons.
 fn to_full_scale(channels: &mut [Channel], settings: &Settings) {
-    let white = |channel: &Channel| channel.electrons.iter().sum::<f64>();
+    let white = |channel: &Channel| channel.primaries.iter().sum::<f64>();
     let most = channels.iter().map(white).fold(0.0, f64::max);
     let full_scale = (settings.white() - settings.black) / settings.gain;
-    for value in channels.iter_mut().flat_map(|channel| &mut channel.electrons) {
+    let all = |channel| {
+        let Channel { electrons, primaries, .. }: &mut Channel = channel;
+        electrons.iter_mut().chain(primaries)
+    };
+    for value in channels.iter_mut().flat_map(all) {
         *value *= full_scale / most;
     }
 }

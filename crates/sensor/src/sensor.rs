@@ -178,6 +178,60 @@ impl Sensor {
         self.settings.white()
     }
 
+    /// The digital number at which a pixel saturates: where the well is full, or the converter ends.
+    #[must_use]
+    pub fn saturation_level(&self) -> f64 {
+        self.settings.saturation_level()
+    }
+
+    /// Electrons of full scale in digital mode: of light 1 in the most sensitive channel (e⁻).
+    #[must_use]
+    pub fn full_scale(&self) -> f64 {
+        (self.settings.white() - self.settings.black) / self.settings.gain
+    }
+
+    /// Mean photo-electrons of a pixel, over all pixels and channels; what of the film is no light
+    /// counts as 0 (e⁻).
+    #[must_use]
+    pub fn mean_electrons(&self, film: Film<'_>, exposure: f64) -> f64 {
+        let lanes = self.response.lanes.count();
+        let [width, _] = self.settings.resolution.map(|side| side as usize);
+        let factor = match self.settings.radiometry {
+            Radiometry::Digital => 1.0,
+            Radiometry::Physical => exposure,
+        };
+        let rows = film.values.par_chunks(width.max(1) * lanes);
+        let row = |(row, values): (usize, &[f32])| -> f64 {
+            let pixels = values.chunks_exact(lanes).enumerate();
+            let pixel = |(column, light): (usize, &[f32])| -> f64 {
+                let electrons = |channel: usize| -> f64 {
+                    let electrons = self.electrons_per_unit(channel).iter().zip(light);
+                    let seen = electrons.filter(|(_, value)| **value > 0.0 && value.is_finite());
+                    seen.map(|(e, value)| e * f64::from(*value)).sum()
+                };
+                match &self.response.pattern {
+                    Some(_) => electrons(self.channel_at(row, column)),
+                    None => {
+                        let channels = self.response.channels.len();
+                        (0..channels).map(electrons).sum::<f64>() / channels as f64
+                    }
+                }
+            };
+            pixels.map(pixel).sum()
+        };
+        let pixels = film.values.len() / lanes;
+        factor * rows.enumerate().map(row).sum::<f64>() / pixels.max(1) as f64
+    }
+
+    /// Temporal dark noise: of the read-out, and of the dark current in an exposure of `exposure`
+    /// seconds (e⁻).
+    #[must_use]
+    pub fn dark_noise(&self, exposure: f64) -> f64 {
+        let s = &self.settings;
+        let offsets = s.row_noise.powi(2) + s.column_noise.powi(2);
+        (s.read_noise.powi(2) + offsets + s.dark_current * exposure).sqrt()
+    }
+
     /// Bits of the converter.
     #[must_use]
     pub fn bit_depth(&self) -> u32 {
@@ -269,7 +323,7 @@ impl Sensor {
             prnu: s.prnu,
             dsnu: s.dsnu,
             hot: s.hot_pixels.map(hot),
-            temporal: Key::new(seed),
+            temporal: Key::temporal(seed, s.serial),
             pattern: Key::new(s.serial),
         }
     }

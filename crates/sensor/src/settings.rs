@@ -57,6 +57,11 @@ impl Settings {
         f64::from((1u32 << self.bit_depth) - 1)
     }
 
+    /// Where a pixel saturates (DN): its well, or the converter.
+    pub(crate) fn saturation_level(&self) -> f64 {
+        (self.gain * self.full_well + self.black).round_ties_even().min(self.white())
+    }
+
     /// Fills and checks a spec.
     pub(crate) fn new(spec: &SensorSpec) -> Result<Self, SensorError> {
         let preset = spec.model.map(Model::preset);
@@ -81,8 +86,8 @@ impl Settings {
                 .unwrap_or(f64::INFINITY),
             black: spec.black_level.or(preset.map(|p| p.black_level.value)).unwrap_or(0.0),
             bit_depth: spec.bit_depth.or(preset.map(|p| p.bit_depth.value)).unwrap_or(16),
-            prnu: spec.prnu.unwrap_or(0.0),
-            dsnu: spec.dsnu.unwrap_or(0.0),
+            prnu: spec.prnu.or(preset.map(|p| p.prnu.value)).unwrap_or(0.0),
+            dsnu: spec.dsnu.or(preset.map(|p| p.dsnu.value)).unwrap_or(0.0),
             row_noise: spec.row_noise.unwrap_or(0.0),
             column_noise: spec.column_noise.unwrap_or(0.0),
             exposures: spec.exposures.clone().unwrap_or(vec![spec.exposure.unwrap_or(0.01)]),
@@ -154,9 +159,9 @@ impl Settings {
             let demand = "electrons, above 0 (1e-9 to 1e15)";
             within("full_well", capacity, [1e-9, 1e15], demand)?;
         }
-        let black = self.black / self.gain;
-        if self.full_well < black {
-            return Err(SensorError::FullWell { full_well: self.full_well, black });
+        if self.full_well * self.gain <= 0.5 {
+            let Self { full_well, gain, .. } = *self;
+            return Err(SensorError::FullWell { full_well, gain });
         }
         Ok(())
     }

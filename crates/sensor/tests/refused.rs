@@ -15,13 +15,13 @@ fn refused(spec: Value) -> SensorError {
 #[test]
 fn numbers_out_of_range() {
     for (keys, word) in [
-        (json!({ "quantum_efficiency": 1.01 }), "quantum_efficiency: the curve is 1.01"),
+        (json!({ "quantum_efficiency": 1.01 }), "the curve is 1.01 at every wavelength"),
         (json!({ "quantum_efficiency": -0.1 }), "must lie in 0..=1"),
         (json!({ "quantum_efficiency": [[400, 0.5], [500, 1.5]] }), "1.5 at 500 nm"),
         (json!({ "system_gain": 0 }), "sensor.system_gain: expected "),
         (json!({ "system_gain": -1 }), "above 0"),
         (json!({ "system_gain": 1e-300 }), "1e-9 to 1e9), found 1e-300"),
-        (json!({ "full_well": 50, "black_level": 100 }), "black level's worth of 100 e⁻"),
+        (json!({ "full_well": 0.4, "black_level": 100 }), "not half a digital number"),
         (json!({ "full_well": 0 }), "sensor.full_well: expected "),
         (json!({ "full_well": -5 }), "sensor.full_well: expected "),
         (json!({ "bit_depth": 0 }), "1 to 16 bits"),
@@ -82,8 +82,8 @@ fn curves_that_are_none() {
 fn blind_sensors_are_errors_and_never_black_images() {
     for (keys, word) in [
         (
-            json!({ "quantum_efficiency": [[900, 0.5], [1000, 0.5]] }),
-            "sees nothing of 380..=780 nm",
+            json!({ "quantum_efficiency": [[900, 0.5], [1000, 0.5]], "cfa": "rggb" }),
+            "sees nothing of 900..=1000 nm",
         ),
         (
             json!({ "quantum_efficiency": [[400, 0.5], [500, 0.5]], "bands": [600, 700] }),
@@ -91,11 +91,11 @@ fn blind_sensors_are_errors_and_never_black_images() {
         ),
         (json!({ "quantum_efficiency": 0 }), "sees nothing"),
         (
-            json!({ "cfa": "rggb", "filters": { "r": [[800, 0.5], [900, 0.5]] } }),
+            json!({ "cfa": "rggb", "filters": { "r": [[800, 0.5], [900, 0.5]] }, "bands": [400, 700] }),
             "the channel `R` sees nothing",
         ),
         (
-            json!({ "type": "multispectral", "channels":
+            json!({ "type": "multispectral", "bands": [400, 700], "channels":
                 [{ "name": "nir", "curve": [[800, 0.5], [900, 0.5]] }] }),
             "the channel `nir` sees nothing",
         ),

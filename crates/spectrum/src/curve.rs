@@ -78,10 +78,10 @@ pub enum CurveError {
         value: f64,
     },
     /// A value outside of the bounds that its meaning sets.
-    #[error("the curve is {value} at {wavelength} nm: it must lie in {low}..={high}")]
+    #[error("the curve is {value} at {}: it must lie in {low}..={high}", place(*wavelength))]
     OutOfBounds {
-        /// Where (nm; 0 for a flat curve).
-        wavelength: f64,
+        /// Where (nm; `None` for a number that holds everywhere).
+        wavelength: Option<f64>,
         /// The value there.
         value: f64,
         /// The least it may be.
@@ -89,6 +89,14 @@ pub enum CurveError {
         /// The most it may be.
         high: f64,
     },
+}
+
+/// Where a value stands.
+fn place(wavelength: Option<f64>) -> String {
+    match wavelength {
+        Some(nm) => format!("{nm} nm"),
+        None => "every wavelength".to_owned(),
+    }
 }
 
 impl Curve {
@@ -200,6 +208,22 @@ impl Curve {
         below + (above - below) * ((wavelength - left) / (right - left))
     }
 
+    /// The curve with the values at the ends of its range held over `from..=to` (nm) as far as it does
+    /// not reach them.
+    #[must_use]
+    pub fn held_over(&self, from: f64, to: f64) -> Self {
+        let Shape::Sampled(samples) = &self.shape else { return self.clone() };
+        let mut samples = samples.clone();
+        let [first, last] = [samples[0], samples[samples.len() - 1]];
+        if from > 0.0 && from < first[0] {
+            samples.insert(0, [from, first[1]]);
+        }
+        if to.is_finite() && to > last[0] {
+            samples.push([to, last[1]]);
+        }
+        Self { shape: Shape::Sampled(samples) }
+    }
+
     /// The least and the greatest value.
     #[must_use]
     pub fn extent(&self) -> [f64; 2] {
@@ -234,11 +258,13 @@ impl Curve {
     pub fn within(self, low: f64, high: f64) -> Result<Self, CurveError> {
         let outside = |value: f64| !(low..=high).contains(&value);
         let found = match &self.shape {
-            Shape::Flat(value) => outside(*value).then_some([0.0, *value]),
-            Shape::Sampled(samples) => samples.iter().copied().find(|s| outside(s[1])),
+            Shape::Flat(value) => outside(*value).then_some((None, *value)),
+            Shape::Sampled(samples) => {
+                samples.iter().find(|s| outside(s[1])).map(|s| (Some(s[0]), s[1]))
+            }
         };
         match found {
-            Some([wavelength, value]) => {
+            Some((wavelength, value)) => {
                 Err(CurveError::OutOfBounds { wavelength, value, low, high })
             }
             None => Ok(self),
@@ -433,7 +459,7 @@ mod tests {
         assert!(Curve::flat(f64::INFINITY).is_err());
         assert!(matches!(
             ramp().within(0.0, 0.9),
-            Err(CurveError::OutOfBounds { wavelength: 500.0, .. })
+            Err(CurveError::OutOfBounds { wavelength: Some(500.0), .. })
         ));
     }
 

@@ -65,15 +65,15 @@ impl Illuminant {
     }
 
     /// The power distribution, sampled every 5 nm: over [`Self::RANGE`] for daylight, over
-    /// 300..=1100 nm for those that a formula gives at any wavelength, flat for equal energy.
+    /// 250..=2500 nm for those that a formula gives at any wavelength, flat for equal energy.
     ///
     /// # Errors
     ///
     /// As [`Self::checked`].
     pub fn curve(self) -> Result<Curve, IlluminantError> {
         let by_formula = |power: &dyn Fn(f64) -> f64| {
-            let nm = |i: u32| 300.0 + 5.0 * f64::from(i);
-            Curve::trusted((0..=160).map(|i| [nm(i), power(nm(i)) / power(560.0)]).collect())
+            let nm = |i: u32| 250.0 + 5.0 * f64::from(i);
+            Curve::trusted((0..=450).map(|i| [nm(i), power(nm(i)) / power(560.0)]).collect())
         };
         Ok(match self.checked()? {
             Self::EqualEnergy => Curve::ONE,

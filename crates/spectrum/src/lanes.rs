@@ -5,11 +5,11 @@
 //! pixel is the sum of lanes times shapes, so a sensor integrates it against its quantum efficiency
 //! once and for all, and a flat sensor counts the same photons whatever the lanes.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
-use crate::colour::OBSERVER;
+use crate::colour::{Matrix3, OBSERVER, inverse};
 use crate::curve::integral;
-use crate::{Curve, Grid, rgb};
+use crate::{Curve, Grid, WeightedBands, rgb};
 
 /// Visible light (nm), where RGB assets are known.
 pub const VISIBLE: [f64; 2] = [380.0, 780.0];
@@ -24,6 +24,8 @@ pub enum Lanes {
     Rgb,
     /// The means over bands of wavelengths.
     Bands(Grid),
+    /// Such means, weighted for a sensor and a light.
+    Weighted(Arc<WeightedBands>),
 }
 
 /// What a curve is taken for where it is not known.
@@ -56,6 +58,7 @@ impl Lanes {
             Self::Grey => 1,
             Self::Rgb => 3,
             Self::Bands(grid) => grid.len(),
+            Self::Weighted(bands) => bands.grid().len(),
         }
     }
 
@@ -65,6 +68,7 @@ impl Lanes {
         match self {
             Self::Grey | Self::Rgb => VISIBLE,
             Self::Bands(grid) => grid.range(),
+            Self::Weighted(bands) => bands.grid().range(),
         }
     }
 
@@ -73,6 +77,7 @@ impl Lanes {
     pub fn grid(&self) -> Option<&Grid> {
         match self {
             Self::Bands(grid) => Some(grid),
+            Self::Weighted(bands) => Some(bands.grid()),
             Self::Grey | Self::Rgb => None,
         }
     }
@@ -81,21 +86,25 @@ impl Lanes {
     /// `450nm`, `452.5nm`.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
+        let of_grid =
+            |grid: &Grid| grid.centres().map(|nm| format!("{}nm", thousandth(nm))).collect();
         match self {
             Self::Grey => vec!["Y".into()],
             Self::Rgb => ["R", "G", "B"].map(String::from).into(),
-            Self::Bands(grid) => grid.centres().map(|nm| format!("{}nm", thousandth(nm))).collect(),
+            Self::Bands(grid) => of_grid(grid),
+            Self::Weighted(bands) => of_grid(bands.grid()),
         }
     }
 
     /// The wavelength that stands for lane `i` where only one can be traced (nm): a band's middle,
-    /// a primary's centroid, 555 nm for grey.
+    /// a weighted band's or a primary's centroid, 555 nm for grey.
     #[must_use]
     pub fn wavelength(&self, i: usize) -> f64 {
         match self {
             Self::Grey => 555.0,
             Self::Rgb => rgb::PRIMARY_WAVELENGTHS[i],
             Self::Bands(grid) => 0.5 * (grid.edges()[i] + grid.edges()[i + 1]),
+            Self::Weighted(bands) => bands.centroid(i),
         }
     }
 
@@ -107,7 +116,24 @@ impl Lanes {
             Self::Grey => one_over(VISIBLE[0], VISIBLE[1]),
             Self::Rgb => rgb::PRIMARIES[i].clone(),
             Self::Bands(grid) => one_over(grid.edges()[i], grid.edges()[i + 1]),
+            Self::Weighted(bands) => bands.shape(i),
         }
+    }
+
+    /// Parts of the lanes' light, `(lane, weight)`, whose sum is the plain mean over each band of
+    /// `grid`. Lanes that are not bands have none.
+    #[must_use]
+    pub fn means_over(&self, grid: &Grid) -> Vec<Vec<(usize, f64)>> {
+        let own = self.grid();
+        let lanes = 0..own.map_or(0, Grid::len);
+        let shapes: Vec<Curve> = lanes.clone().map(|i| self.shape(i)).collect();
+        let part = |i: usize, from: f64, to: f64| (i, shapes[i].integral(from, to) / (to - from));
+        grid.bands()
+            .map(|b| {
+                let parts = lanes.clone().map(|i| part(i, b.from, b.to));
+                parts.filter(|(_, weight)| *weight > 0.0).collect()
+            })
+            .collect()
     }
 
     /// Weights of linear sRGB in each lane: lane `i` of a colour is the dot product with row `i`.
@@ -123,27 +149,29 @@ impl Lanes {
                 let row = |e: &[f64]| std::array::from_fn(|k| primary(k, e[0], e[1]));
                 grid.edges().windows(2).map(row).map(normalised).collect()
             }
+            Self::Weighted(bands) => {
+                let primary = |i, k: usize| bands.mean(i, &rgb::PRIMARIES[k], Outside::Held);
+                let row = |i| std::array::from_fn(|k| primary(i, k));
+                (0..bands.grid().len()).map(row).map(normalised).collect()
+            }
         }
     }
 
     /// Weights of each lane in linear sRGB, for looking: the colour of a pixel is the sum of lanes
     /// times rows. 1 in every lane is white. Colours outside of sRGB have negative parts. Bands
-    /// that see too little of red, green or blue to tell colours apart come out grey.
+    /// that see too little of red, green or blue to tell colours apart come out grey; colours that
+    /// [`Self::from_rgb`] took into weighted bands come back exactly.
     #[must_use]
     pub fn to_rgb(&self) -> Vec<[f64; 3]> {
-        let Self::Bands(grid) = self else {
-            return match self {
-                Self::Grey => vec![[1.0; 3]],
-                _ => self.from_rgb(),
-            };
-        };
-        let rows: Vec<[f64; 3]> = grid.bands().map(|b| rgb::colour_of_band(b.from, b.to)).collect();
-        let white: [f64; 3] = std::array::from_fn(|k| rows.iter().map(|row| row[k]).sum());
-        if grid.len() < 3 || white.iter().any(|&part| part < 0.05) {
-            return vec![[1.0 / grid.len() as f64; 3]; grid.len()];
+        match self {
+            Self::Grey => vec![[1.0; 3]],
+            Self::Rgb => self.from_rgb(),
+            Self::Bands(grid) => colours_of(grid),
+            Self::Weighted(bands) => {
+                let rows = colours_of(bands.grid());
+                exact_for_primaries(&self.from_rgb(), &rows).unwrap_or(rows)
+            }
         }
-        let balanced = |row: [f64; 3]| std::array::from_fn(|k| row[k] / white[k]);
-        rows.into_iter().map(balanced).collect()
     }
 
     /// A spectrum in lanes: means over bands, or its colour with negative parts set to 0.
@@ -173,8 +201,36 @@ impl Lanes {
             Self::Bands(grid) => {
                 grid.bands().map(|band| mean(curve, band.from, band.to, outside)).collect()
             }
+            Self::Weighted(bands) => {
+                (0..bands.grid().len()).map(|i| bands.mean(i, curve, outside)).collect()
+            }
         })
     }
+}
+
+/// Weights of bands in linear sRGB, for looking.
+fn colours_of(grid: &Grid) -> Vec<[f64; 3]> {
+    let rows: Vec<[f64; 3]> = grid.bands().map(|b| rgb::colour_of_band(b.from, b.to)).collect();
+    let white: [f64; 3] = std::array::from_fn(|k| rows.iter().map(|row| row[k]).sum());
+    if grid.len() < 3 || white.iter().any(|&part| part < 0.05) {
+        return vec![[1.0 / grid.len() as f64; 3]; grid.len()];
+    }
+    let balanced = |row: [f64; 3]| std::array::from_fn(|k| row[k] / white[k]);
+    rows.into_iter().map(balanced).collect()
+}
+
+/// `rows` such that red, green and blue come back as they were; `None` when lanes blur them too much
+/// for that.
+fn exact_for_primaries(from_rgb: &[[f64; 3]], rows: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
+    // What each primary comes back as.
+    let back: Matrix3 = std::array::from_fn(|k| {
+        std::array::from_fn(|c| from_rgb.iter().zip(rows).map(|(from, to)| from[k] * to[c]).sum())
+    });
+    let mended = inverse(&back)?;
+    // A factor of a few sharpens the blur of wide bands, more would only sharpen noise.
+    let tame = mended.iter().flatten().all(|value| value.abs() < 4.0);
+    let row = |row: &[f64; 3]| std::array::from_fn(|c| (0..3).map(|k| row[k] * mended[k][c]).sum());
+    tame.then(|| rows.iter().map(row).collect())
 }
 
 /// λ itself over visible light: photons in a watt are proportional to it.
@@ -193,7 +249,7 @@ fn normalised(weights: [f64; 3]) -> [f64; 3] {
 }
 
 /// The mean of a curve over an interval (nm) that may reach beyond its range.
-fn mean(curve: &Curve, from: f64, to: f64, outside: Outside) -> f64 {
+pub(crate) fn mean(curve: &Curve, from: f64, to: f64, outside: Outside) -> f64 {
     let [low, high] = curve.range();
     let inside = curve.integral(from, to);
     let held = match outside {
@@ -208,19 +264,11 @@ fn mean(curve: &Curve, from: f64, to: f64, outside: Outside) -> f64 {
 }
 
 /// The curve with its ends held over `from..to` (nm), or itself where it is to be 0.
-fn known_everywhere(curve: &Curve, from: f64, to: f64, outside: Outside) -> Curve {
-    let [low, high] = curve.range();
-    if outside == Outside::Zero || curve.as_flat().is_some() {
+pub(crate) fn known_everywhere(curve: &Curve, from: f64, to: f64, outside: Outside) -> Curve {
+    if outside == Outside::Zero {
         return curve.clone();
     }
-    let mut samples = curve.samples().to_vec();
-    if from < low {
-        samples.insert(0, [from, curve.held(low)]);
-    }
-    if to > high {
-        samples.push([to, curve.held(high)]);
-    }
-    Curve::trusted(samples)
+    curve.held_over(from, to)
 }
 
 /// To a thousandth, for names.

@@ -36,6 +36,7 @@
 //! | [`rgb`] | from a colour to a spectrum and back |
 //! | [`lanes`] | the numbers that a ray of a render carries |
 //! | [`spread`] | wavelengths that stand for a wide lane |
+//! | [`weighted`] | bands for a given light and sensor |
 
 mod cie;
 pub mod colour;
@@ -46,12 +47,14 @@ pub mod lanes;
 mod mallett_yuksel;
 pub mod rgb;
 pub mod spread;
+pub mod weighted;
 
 pub use curve::{Curve, CurveError, integral};
 pub use grid::{Band, Grid, GridError};
 pub use illuminant::{Illuminant, IlluminantError};
 pub use lanes::{Lanes, NoOverlap, Outside, VISIBLE};
 pub use spread::Spread;
+pub use weighted::WeightedBands;
 
 /// Planck's constant (J·s), exact in the SI.
 pub const PLANCK: f64 = 6.626_070_15e-34;

@@ -27,13 +27,14 @@ impl Lanes {
     /// lane is narrow or no light is left. What depends on the wavelength linearly thus comes out as
     /// it does with all of the light.
     ///
-    /// The light of a lane is counted as photons, as a sensor does; that of red, green and blue as
-    /// the CIE 1931 observer's x̄ + ȳ + z̄ sees it.
+    /// The light of a lane is counted as photons, as a sensor does, that of weighted bands by their
+    /// weights; that of red, green and blue as the CIE 1931 observer's x̄ + ȳ + z̄ sees it.
     #[must_use]
     pub fn spread(&self, i: usize, filters: &[&Curve]) -> Spread {
         let [from, to] = match self {
             Self::Grey | Self::Rgb => VISIBLE,
             Self::Bands(grid) => [grid.edges()[i], grid.edges()[i + 1]],
+            Self::Weighted(bands) => [bands.grid().edges()[i], bands.grid().edges()[i + 1]],
         };
         let cell = (to - from) / f64::from(CELLS);
         let middle = |c: u32| from + (f64::from(c) + 0.5) * cell;
@@ -77,6 +78,7 @@ impl Lanes {
     fn light(&self, i: usize, nm: f64) -> f64 {
         match self {
             Self::Grey | Self::Bands(_) => nm,
+            Self::Weighted(bands) => bands.weight(nm),
             Self::Rgb => {
                 rgb::PRIMARIES[i].held(nm) * OBSERVER.iter().map(|c| c.held(nm)).sum::<f64>()
             }

@@ -1,5 +1,7 @@
 //! The sensor, from no electron to more than it holds.
 
+mod spectral;
+
 use anyhow::Result;
 use etendue_sensor::{Film, RawImage, Sensor, SensorSpec, Shot};
 use serde_json::{Value, json};
@@ -74,8 +76,73 @@ pub const METHOD: Method = Method {
             limit: None,
             run: exposures,
         },
+        Case {
+            name: "coloured_light",
+            regime: "physical radiometry under illuminant A, daylight and a 10 nm line; clear, ideal red, \
+                green and blue pixels; white, pure colours and two of them one behind the other; \
+                quantum efficiency as a number and as a curve",
+            must: "in the lanes that the plan chooses, electrons are those of a sum in steps of 0.1 nm to \
+                0.1 % (of a tenth of white for pure colours, of white for two)",
+            limit: None,
+            run: spectral::coloured_light,
+        },
+        Case {
+            name: "infrared",
+            regime: "silicon of 300 to 1100 nm and of 700 to 960 nm, under equal energy, illuminant A and a \
+                black body",
+            must: "light beyond the visible is counted as within it, to 0.1 %; light that no pixel sees is \
+                refused by a message that names both ranges",
+            limit: None,
+            run: spectral::infrared,
+        },
+        Case {
+            name: "two_cameras",
+            regime: "one seed, two serial numbers, two frames",
+            must: "temporal noise is as unlike as chance has it (4.5 standard errors); frames of one serial \
+                number share their pattern, other serial numbers do not",
+            limit: None,
+            run: two_cameras,
+        },
     ],
 };
+
+/// Pearson's correlation of two images.
+fn correlation(a: &RawImage, b: &RawImage) -> f64 {
+    let (ma, mb) = (mean(a), mean(b));
+    let pairs =
+        || a.values.iter().zip(&b.values).map(|(x, y)| (f64::from(*x) - ma, f64::from(*y) - mb));
+    let sum = |f: fn((f64, f64)) -> f64| pairs().map(f).sum::<f64>();
+    sum(|(x, y)| x * y) / (sum(|(x, _)| x * x) * sum(|(_, y)| y * y)).sqrt()
+}
+
+fn two_cameras(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    let frame = |serial: u32, dsnu: f64, number: u32| -> Result<RawImage> {
+        let keys = json!({ "system_gain": 1.0, "black_level": 1000, "read_noise": 5.0, "dsnu": dsnu, "serial": serial });
+        let sensor = sensor(side(scale), &keys)?;
+        let [width, height] = sensor.resolution();
+        #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+        let light = (400.0 / sensor.electrons_per_unit(0)[0]) as f32;
+        let film = vec![light; (width * height) as usize];
+        let shot = Shot { exposure: 0.01, frame: number };
+        Ok(sensor.expose(Film { values: &film }, shot, 7)?)
+    };
+    let one = frame(1, 0.0, 0)?;
+    let chance = 4.5 / (one.values.len() as f64).sqrt();
+    for (what, other) in [("serial number", frame(2, 0.0, 0)?), ("frame", frame(1, 0.0, 1)?)] {
+        let found = correlation(&one, &other);
+        outcome.must(found.abs() < chance, || format!("another {what} correlates by {found}"));
+        outcome.measured(format!("temporal noise of another {what} correlates by {found:+.5}"));
+    }
+    let patterned = frame(1, 100.0, 0)?;
+    let [same, other] =
+        [frame(1, 100.0, 1)?, frame(2, 100.0, 0)?].map(|b| correlation(&patterned, &b));
+    outcome.must(same > 0.9, || format!("frames share {same} of their pattern"));
+    outcome.must(other.abs() < chance, || format!("patterns of two serial numbers: {other}"));
+    outcome
+        .measured(format!("with a DSNU of 100 e⁻, {same:.3} of one sensor and {other:+.5} of two"));
+    Ok(outcome)
+}
 
 /// A monochrome sensor of `side` × `side` pixels with these keys besides the usual ones.
 fn sensor(side: u32, keys: &Value) -> Result<Sensor> {

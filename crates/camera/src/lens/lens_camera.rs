@@ -277,6 +277,16 @@ impl LensCamera {
         }
     }
 
+    /// Curves of the lens' filters that pass some wavelengths better than others.
+    #[must_use]
+    pub fn filter_curves(&self) -> Vec<Curve> {
+        let curves = self.focused.train().elements().iter().filter_map(|e| match &e.part {
+            Part::Filter(filter) => Some(&filter.curves),
+            _ => None,
+        });
+        curves.flatten().filter(|curve| curve.as_flat().is_none()).cloned().collect()
+    }
+
     /// What is odd about the lens, and what of it is not known at the wavelengths of `lanes`.
     #[must_use]
     pub fn out_of_range(&self, lanes: &Lanes) -> Vec<String> {

@@ -71,7 +71,7 @@ fn frames_share_the_light_and_the_pattern_but_not_the_noise() {
     let [a, b, c] = ["raw_000", "raw_001", "raw_002"].map(|name| bench.array(name));
     assert!(a != b && b != c && !exists(&bench, "raw_004.npy"));
     let (mean, variance) = (bench.array("mean_000"), bench.array("variance_000"));
-    assert_eq!(mean, bench.array("mean_001"), "one pattern");
+    assert_eq!(mean, bench.array("mean_001"), "in digital mode without dark current, one picture");
     // Poisson of 1638 e⁻, 1 e⁻ of read noise, rounding; 4096 pixels: 4 standard errors are 9 %.
     let residual: Vec<f64> = a.iter().zip(&mean).map(|(y, m)| (y - m).powi(2)).collect();
     let expected = variance.iter().sum::<f64>() / 4096.0;
@@ -165,7 +165,7 @@ fn a_scenes_sensor_is_refused_by_its_path() {
         (json!({ "type": "bayer" }), ["camera.sensor.type", "`raw`"]),
         (json!({ "red_noise": 1 }), ["camera.sensor.red_noise", "`read_noise`"]),
         (
-            json!({ "type": "raw", "quantum_efficiency": [[900, 0.5], [1000, 0.5]] }),
+            json!({ "type": "rgb", "quantum_efficiency": [[900, 0.5], [1000, 0.5]] }),
             ["camera.sensor.quantum_efficiency", "black"],
         ),
     ] {

@@ -8,7 +8,7 @@ use etendue_sensor::{Film, Flaws, RawImage, Sensor, SensorKind, SensorSpec, Shot
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{ExposeError, Exposed, LaneFilm};
+use super::{ExposeError, Exposed, LaneFilm, remarks};
 use crate::output::{
     Channel, Layer, Look, Outputs, Picture, PictureError, SOFTWARE, Values, npy, png, write_whole,
 };
@@ -29,6 +29,8 @@ pub(super) struct Writer<'a> {
     pub(super) header: &'a [(String, String)],
     /// Digits of a shot's number in names; 0 for none.
     pub(super) digits: usize,
+    /// Of each exposure time so far: its moments' files, which all of its frames share.
+    pub(super) moments: Vec<(f64, MomentFiles)>,
     pub(super) flaws: Flaws,
     pub(super) exposed: Exposed,
 }
@@ -57,6 +59,7 @@ impl Writer<'_> {
         let mut files = ShotFiles::new(shot);
         // Every shot sees the same film, so once is enough.
         self.flaws = image.flaws;
+        self.exposed.notes.extend(remarks::on(self.sensor, self.film(), &image, shot));
         let preview = self.preview(&image, shot)?;
         if self.outputs.dng && self.sensor.spec().kind == SensorKind::Raw {
             files.dng = self.dng(&image, shot)?;
@@ -80,7 +83,16 @@ impl Writer<'_> {
             files.npy = Some(name);
         }
         if self.sensor.spec().moments == Some(true) {
-            self.moments(shot, &mut files)?;
+            let known = self.moments.iter().find(|(exposure, _)| *exposure == shot.exposure);
+            let found = match known {
+                Some((_, found)) => found.clone(),
+                None => {
+                    let found = self.moments(shot)?;
+                    self.moments.push((shot.exposure, found.clone()));
+                    found
+                }
+            };
+            [files.mean, files.variance] = found.map(Some);
         }
         Ok(files)
     }
@@ -174,19 +186,33 @@ impl Writer<'_> {
             }
             (None, Err(error)) => Err(error.into()),
             (None, Ok(())) => {
+                self.exposed.notes.extend(remarks::on_pattern(self.sensor));
+                self.exposed.notes.dedup();
                 self.exposed.files.push(path);
                 Ok(Some(name))
             }
         }
     }
 
-    fn moments(&mut self, shot: Shot, files: &mut ShotFiles) -> Result<(), ExposeError> {
+    /// Writes expected value and variance of an exposure time, numbered as the exposure is.
+    fn moments(&mut self, shot: Shot) -> Result<MomentFiles, ExposeError> {
+        #[expect(clippy::cast_possible_truncation, reason = "fewer than shots")]
+        let number = self.moments.len() as u32;
+        let several = self.sensor.shots().any(|other| other.exposure != shot.exposure);
+        let name = |stem: &str| match several {
+            true => self.name(stem, number, "npy"),
+            false => format!("{stem}.npy"),
+        };
+        let names = [name("mean"), name("variance")];
         let moments = self.sensor.moments(self.film(), shot)?;
         let depth = moments.depth;
-        for (stem, definition, unit, values) in [
+        for ((stem, definition, unit, values), name) in [
             ("mean", "expected digital number", "DN", moments.mean),
             ("variance", "variance over frames, quantisation included", "DN^2", moments.variance),
-        ] {
+        ]
+        .into_iter()
+        .zip(&names)
+        {
             let plane = |k: usize| values.iter().skip(k).step_by(depth).copied().collect();
             let planes = (0..depth).map(|k| Values::F32(plane(k))).collect();
             let layer = Layer {
@@ -197,16 +223,14 @@ impl Writer<'_> {
             };
             let header = self.header.to_vec();
             let picture = Picture::new(moments.width, moments.height, vec![layer], header)?;
-            let name = self.name(stem, shot.frame, "npy");
-            npy::write(&self.place(&name), &picture, stem)?;
-            match stem {
-                "mean" => files.mean = Some(name),
-                _ => files.variance = Some(name),
-            }
+            npy::write(&self.place(name), &picture, stem)?;
         }
-        Ok(())
+        Ok(names)
     }
 }
+
+/// Names of the files of expected value and variance.
+pub(super) type MomentFiles = [String; 2];
 
 /// `sensor.json`.
 #[derive(Debug, Serialize)]
@@ -217,6 +241,7 @@ pub(super) struct Sidecar<'a> {
     bits: u32,
     black_level_dn: f64,
     white_level_dn: f64,
+    saturation_level_dn: f64,
     system_gain_dn_per_electron: f64,
     channels: Vec<&'a str>,
     white_balance: Vec<f64>,
@@ -236,6 +261,7 @@ impl<'a> Sidecar<'a> {
             bits: sensor.bit_depth(),
             black_level_dn: sensor.black_level(),
             white_level_dn: sensor.white_level(),
+            saturation_level_dn: sensor.saturation_level(),
             system_gain_dn_per_electron: sensor.system_gain(),
             channels: sensor.channels().collect(),
             white_balance: sensor.white_balance(),

@@ -3,7 +3,7 @@
 use etendue_camera::Projection;
 use etendue_scene::Scene;
 use etendue_sensor::{Radiometry, Sensor, SensorKind};
-use etendue_spectrum::Lanes;
+use etendue_spectrum::{Grid, Lanes};
 use rayon::prelude::*;
 
 use super::files::plain;
@@ -32,11 +32,19 @@ impl LaneFilm {
         Self { lanes, values }
     }
 
-    /// One plane a lane.
-    fn planes(&self) -> Vec<Vec<f32>> {
+    /// One plane a band of `grid`: the plain mean of the light over its wavelengths.
+    fn means_over(&self, grid: &Grid) -> Vec<Vec<f32>> {
         let count = self.lanes.count();
-        let plane = |k: usize| self.values.iter().skip(k).step_by(count).copied().collect();
-        (0..count).map(plane).collect()
+        let plane = |parts: &Vec<(usize, f64)>| {
+            let pixels = self.values.par_chunks(count);
+            let mean = |lanes: &[f32]| -> f64 {
+                parts.iter().map(|&(lane, weight)| weight * f64::from(lanes[lane])).sum()
+            };
+            #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+            let plane: Vec<f32> = pixels.map(|lanes| mean(lanes) as f32).collect();
+            plane
+        };
+        self.lanes.means_over(grid).iter().map(plane).collect()
     }
 
     /// The colours of the light, for looking: red, green and blue planes.
@@ -104,43 +112,38 @@ pub(super) fn colors(layers: &[Layer]) -> Option<[&[f32]; 3]> {
     }
 }
 
-/// The hyperspectral cube of a multispectral sensor's picture, channels named by wavelength.
+/// The hyperspectral cube of a multispectral sensor's picture, channels named by wavelength: its own
+/// bands where it has some, however finely they were rendered, else the lanes.
 pub(crate) fn spectrum(
     scene: &Scene,
     layers: &[Layer],
     lane_film: Option<&LaneFilm>,
 ) -> Option<Layer> {
     let sensor = scene.sensor.as_ref()?;
-    let lanes = sensor.lanes();
-    if sensor.spec().kind != SensorKind::Multispectral || lanes.grid().is_none() {
+    if sensor.spec().kind != SensorKind::Multispectral || sensor.lanes().grid().is_none() {
         return None;
     }
-    if let Some(film) = lane_film.filter(|film| film.lanes == *lanes) {
-        return Some(cube(lanes, film.planes()));
-    }
-    let colors = colors(layers)?;
-    let planes: Vec<Vec<f32>> = lanes
-        .from_rgb()
-        .par_iter()
-        .map(|row| {
-            let value = |i: usize| (0..3).map(|k| row[k] * f64::from(colors[k][i])).sum::<f64>();
-            #[expect(clippy::cast_possible_truncation, reason = "light is kept in f32")]
-            let plane = (0..colors[0].len()).map(|i| value(i) as f32).collect();
-            plane
-        })
-        .collect();
-    Some(cube(lanes, planes))
+    let from_colors;
+    let film = match lane_film.filter(|film| film.lanes.grid().is_some()) {
+        Some(film) => film,
+        None => {
+            from_colors = LaneFilm::from_rgb(sensor.lanes().clone(), &colors(layers)?);
+            &from_colors
+        }
+    };
+    let bands = sensor.spec().bands.as_ref().or(film.lanes.grid())?;
+    Some(cube(bands, film.means_over(bands)))
 }
 
-/// A layer of one plane a lane.
-fn cube(lanes: &Lanes, planes: Vec<Vec<f32>>) -> Layer {
-    let channels = lanes
+/// A layer of one plane a band.
+fn cube(bands: &Grid, planes: Vec<Vec<f32>>) -> Layer {
+    let channels = Lanes::Bands(bands.clone())
         .names()
         .iter()
         .zip(planes)
         .map(|(name, plane)| Channel { name: plain(name), values: Values::F32(plane) })
         .collect();
-    let edges = lanes.grid().map(|grid| format!("{:?}", grid.edges())).unwrap_or_default();
+    let edges = format!("{:?}", bands.edges());
     let meaning = [
         ("definition", "mean light of each band of wavelengths, over the pixel's samples"),
         ("unit", "as the picture's"),

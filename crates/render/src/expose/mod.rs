@@ -7,23 +7,25 @@
 //! | `raw.npy` | the same, `[h, w]` or `[h, w, channels]`, `u2` |
 //! | `raw.dng` | the same for raw converters, with pattern and levels (`raw` sensors of r, g, b or none) |
 //! | `raw.preview.png` | demosaiced, white balanced, sRGB; not data |
-//! | `mean.npy`, `variance.npy` | the expected value and variance of every pixel, when asked for |
+//! | `mean.npy`, `variance.npy` | the expected value and variance of every pixel, once an exposure time, when asked for |
 //! | `sensor.json` | what the numbers mean, and which file is which exposure |
 //!
 //! Several exposures or frames are numbered: `raw_000.png`, `raw_001.png`, …
 
 mod files;
 mod film;
+mod lanes;
+mod remarks;
 
 use std::path::{Path, PathBuf};
 
 use etendue_scene::Scene;
 use etendue_sensor::{Flaws, NoiseModel, Sensor, SensorError, SensorKind, Shot};
 use etendue_spectrum::Lanes;
-use etendue_tracer::LayerSpec;
 
 pub use film::LaneFilm;
 pub(crate) use film::spectrum;
+pub(crate) use lanes::{explain_lanes, lanes};
 
 use crate::output::{OutputError, Outputs, Picture, PictureError, sidecar};
 use files::{Sidecar, Writer};
@@ -45,35 +47,6 @@ pub enum ExposeError {
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
-}
-
-/// The lanes that the picture of `scene` is rendered in: base colours have three parts and no more,
-/// light has as many as the sensor tells apart.
-pub(crate) fn lanes(scene: &Scene) -> Lanes {
-    match (&scene.sensor, scene.picture) {
-        (None, _) | (_, None | Some(LayerSpec::Flat | LayerSpec::Facing)) => Lanes::Rgb,
-        (Some(sensor), _) => sensor.lanes().clone(),
-    }
-}
-
-/// How many lanes there are, and why.
-pub(crate) fn explain_lanes(scene: &Scene, lanes: &Lanes) -> (String, String) {
-    let choice = match lanes {
-        Lanes::Grey => "1".to_owned(),
-        Lanes::Rgb => "3 (RGB)".to_owned(),
-        Lanes::Bands(grid) => {
-            let [from, to] = grid.range();
-            format!("{} ({from} to {to} nm)", grid.len())
-        }
-    };
-    let because = match (&scene.sensor, scene.picture) {
-        (None, _) => "no sensor or glass in the scene tells more apart".to_owned(),
-        (Some(_), None | Some(LayerSpec::Flat | LayerSpec::Facing)) => {
-            "the picture is base colour, which has three parts".to_owned()
-        }
-        (Some(_), _) => "as many as the sensor can tell apart".to_owned(),
-    };
-    (choice, because)
 }
 
 /// What the sensor will do, and why.
@@ -141,8 +114,12 @@ pub fn write(
         exposed.notes.push(format!("camera.sensor is not used: {NOTHING_TO_EXPOSE}"));
         return Ok(exposed);
     };
-    let (sensor, film) = match lane_film.filter(|film| film.lanes == *sensor.lanes()) {
-        Some(film) => (sensor.clone(), film),
+    let own = lane_film.and_then(|film| {
+        exposed.notes.extend(lanes::unknown(scene, &film.lanes));
+        Some((sensor.clone().in_lanes(film.lanes.clone()).ok()?, film))
+    });
+    let (sensor, film) = match own {
+        Some(own) => own,
         None => {
             // In the picture's own three lanes where the sensor can: the same numbers from less
             // memory.
@@ -161,9 +138,10 @@ pub fn write(
         film: film.on_sensor(scene, &sensor),
         folder,
         outputs,
-        seed: scene.render.seed,
+        seed: noise_seed(scene),
         header: picture.header(),
         digits,
+        moments: Vec::new(),
         flaws: Flaws::default(),
         exposed,
     };
@@ -180,6 +158,14 @@ pub fn write(
     let path = writer.place("sensor.json");
     sidecar::write_json(&path, &sidecar)?;
     Ok(writer.exposed)
+}
+
+/// The seed of temporal noise: two cameras of a scene, and two places of one camera, draw noise of
+/// their own.
+fn noise_seed(scene: &Scene) -> u64 {
+    // A camera is made of numbers and words only, which always serialise.
+    let camera = serde_json::to_string(&scene.camera.opencv()).unwrap_or_default();
+    etendue_sensor::mixed_seed(scene.render.seed, camera.as_bytes())
 }
 
 /// What a film has that is no light, if anything.

@@ -1,0 +1,150 @@
+//! The spectral lanes in which a picture is rendered, chosen for the sensor, the lights and the
+//! colours of the scene.
+
+use etendue_scene::Scene;
+use etendue_scene::file::TracerSpec;
+use etendue_sensor::bands::TOLERANCE;
+use etendue_sensor::{Illumination, LaneChoice};
+use etendue_spectrum::{Curve, Illuminant, Lanes, VISIBLE};
+use etendue_tracer::{Color, EnvironmentImage, LayerSpec, LightKind, Material, Paint, Scattering};
+
+/// The lanes that the picture of `scene` is rendered in: base colours have three parts and no more,
+/// light has as many as it takes to count the sensor's electrons right.
+pub(crate) fn lanes(scene: &Scene) -> LaneChoice {
+    let rgb = || LaneChoice { lanes: Lanes::Rgb, error: None };
+    match (&scene.sensor, scene.picture) {
+        (None, _) | (_, None | Some(LayerSpec::Flat | LayerSpec::Facing)) => rgb(),
+        (Some(sensor), _) => sensor.lanes_under(&illumination(scene)).unwrap_or_else(|_| {
+            // The render refuses the light, and says which one.
+            LaneChoice { lanes: sensor.lanes().clone(), error: None }
+        }),
+    }
+}
+
+/// How many lanes there are, and why.
+pub(crate) fn explain_lanes(scene: &Scene, chosen: &LaneChoice) -> (String, String) {
+    let choice = match &chosen.lanes {
+        Lanes::Grey => "1".to_owned(),
+        Lanes::Rgb => "3 (RGB)".to_owned(),
+        Lanes::Bands(_) | Lanes::Weighted(_) => {
+            let [from, to] = chosen.lanes.range();
+            format!("{} ({from} to {to} nm)", chosen.lanes.count())
+        }
+    };
+    let because = match (&scene.sensor, scene.picture, chosen.error) {
+        (None, ..) => "no sensor or glass in the scene tells more apart".to_owned(),
+        (Some(_), None | Some(LayerSpec::Flat | LayerSpec::Facing), _) => {
+            "the picture is base colour, which has three parts".to_owned()
+        }
+        (Some(_), Some(_), None) => "as many as the sensor can tell apart".to_owned(),
+        (Some(_), Some(_), Some(error)) => in_words(error, &chosen.lanes),
+    };
+    (choice, because)
+}
+
+/// What lanes lose, in words.
+fn in_words(error: f64, lanes: &Lanes) -> String {
+    let percent = 100.0 * error;
+    let beyond = match beyond_visible(lanes) {
+        Some(_) => "; beyond visible light, colours are taken as they end there",
+        None => "",
+    };
+    let verdict = match error <= TOLERANCE {
+        true => "the fewest that keep electrons within 0.1 % of an integration by 1 nm",
+        false => "sensor.bands says so; leave it out for fewer errors: electrons are off",
+    };
+    format!("{verdict} ({percent:.2} % at most, for these lights, colours and this sensor){beyond}")
+}
+
+/// The range of lanes (nm), where it is more than visible light.
+fn beyond_visible(lanes: &Lanes) -> Option<[f64; 2]> {
+    let [from, to] = lanes.range();
+    (from < VISIBLE[0] || to > VISIBLE[1]).then_some([from, to])
+}
+
+/// What materials and glasses do not know of the wavelengths that are rendered.
+pub(super) fn unknown(scene: &Scene, lanes: &Lanes) -> Vec<String> {
+    let mut notes = Vec::new();
+    if let Some([from, to]) = beyond_visible(lanes) {
+        notes.push(format!(
+            "light of {from} to {to} nm is rendered, and colours are known from {} to {} nm: beyond, \
+             materials and coloured lights are grey, of the mean of their red, green and blue",
+            VISIBLE[0], VISIBLE[1]
+        ));
+    }
+    let said = |note: &String| scene.notes.iter().any(|known| known.message == *note);
+    let glass = scene.camera.lens().map(|lens| lens.out_of_range(lanes)).unwrap_or_default();
+    notes.extend(glass.into_iter().filter(|note| !said(note)));
+    notes
+}
+
+/// Lights, filters and colours that the lanes have to tell apart.
+fn illumination(scene: &Scene) -> Illumination {
+    let mut spectra: Vec<Curve> = Vec::new();
+    let mut add = |illuminant: Option<Illuminant>| {
+        let curve = illuminant.and_then(|i| i.curve().ok()).unwrap_or(Curve::ONE);
+        if !spectra.contains(&curve) {
+            spectra.push(curve);
+        }
+    };
+    let mut coloured_light = false;
+    for light in scene.lights.iter().filter(|light| light.color != [0.0; 3]) {
+        add(light.illuminant);
+        let image = match &light.kind {
+            LightKind::Environment { image, .. } => *image != EnvironmentImage::Constant,
+            LightKind::Point(_) | LightKind::Spot { .. } | LightKind::Directional(_) => false,
+        };
+        coloured_light |= image || !is_grey(&light.color);
+    }
+    let mut used = vec![false; scene.materials.len()];
+    let mut coloured = false;
+    for placement in &scene.geometry.placements {
+        let Some(material) = scene.materials.get(placement.material as usize) else { continue };
+        used[placement.material as usize] = true;
+        let vertices = scene.geometry.mesh_of(placement).colors.is_some();
+        coloured |= material.vertex_colors && vertices;
+    }
+    for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
+        if let Some(emission) = &material.emission {
+            add(emission.illuminant);
+            coloured_light |= is_coloured(&emission.radiance);
+        }
+        coloured |= reflects_colour(material);
+    }
+    let surfaces = match scene.tracer {
+        Some(TracerSpec::Path { max_bounces } | TracerSpec::Whitted { max_bounces }) => {
+            1 + usize::from(max_bounces > 1)
+        }
+        Some(TracerSpec::Direct {} | TracerSpec::Facing {} | TracerSpec::Flat {}) | None => 1,
+    };
+    let filters = scene.camera.lens().map(|lens| lens.filter_curves()).unwrap_or_default();
+    let colored = usize::from(coloured_light) + if coloured { surfaces } else { 0 };
+    Illumination { spectra, filters, colored }
+}
+
+fn is_grey([r, g, b]: &Color) -> bool {
+    r == g && g == b
+}
+
+fn is_coloured(paint: &Paint) -> bool {
+    match paint {
+        Paint::Plain(color) => !is_grey(color),
+        Paint::Checker { colors, .. } => !colors.iter().all(is_grey),
+        Paint::Image { .. } => true,
+    }
+}
+
+fn reflects_colour(material: &Material) -> bool {
+    let specular = match &material.scattering {
+        Scattering::Gltf(surface) => {
+            !is_grey(&surface.specular_color) || surface.specular_color_texture.is_some()
+        }
+        Scattering::Black
+        | Scattering::Matte
+        | Scattering::Unlit
+        | Scattering::Mirror
+        | Scattering::Metal { .. }
+        | Scattering::Dielectric(_) => false,
+    };
+    specular || is_coloured(&material.base_color)
+}

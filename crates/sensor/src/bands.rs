@@ -1,0 +1,489 @@
+//! The fewest spectral bands that count a sensor's electrons right.
+//!
+//! A render carries a few numbers a ray, and multiplies those of light and surfaces. That loses what
+//! happens within a band: the mean of a product is not the product of the means. How much it loses
+//! can be known beforehand, for light of known spectra, for filters, and for colours: red, green and
+//! blue alone and two of them one behind the other are the worst that can be, and every other colour
+//! is a sum of them. So bands are divided where they lose most until the electrons of every channel
+//! agree with an integration in steps of a nanometre at most, and joined again where that does no
+//! harm.
+//!
+//! Electrons count as right within [`TOLERANCE`] of themselves; of colours darker than a tenth of
+//! white, within that of a tenth of white, and behind two pure colours within that of white.
+
+use etendue_spectrum::{Curve, Grid, Lanes, Outside, WeightedBands, rgb};
+
+use crate::response::{Filter, Response, filters, photons_caught, sensitive_range};
+use crate::spec::{Radiometry, SensorKind};
+use crate::{Sensor, SensorError};
+
+/// By how much of themselves electrons may differ from an integration in steps of a nanometre.
+pub const TOLERANCE: f64 = 1e-3;
+
+/// Bands beyond which nobody divides.
+const MOST_BANDS: usize = 256;
+
+/// The steps of the integration (nm), at most.
+const STEP: f64 = 1.0;
+
+/// Steps from one sample of a curve to the next, at least: edges of filters are steep.
+const FINE: f64 = 4.0;
+
+/// Numbers beyond which a table is not made: sensors of very many channels.
+const MOST_NUMBERS: usize = 2_000_000;
+
+/// Places at which a band's division is tried.
+const PLACES: usize = 24;
+
+/// Parts of white: darker light need not be better than this part of it is, behind no colour, one and
+/// two. Two pure colours one behind the other are nearly black, and no surface's.
+const DARK: [f64; 3] = [1.0, 0.1, 1.0];
+
+/// What the bands of a render have to tell apart.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Illumination {
+    /// Spectra of the lights, to any factor; none for equal energy.
+    pub spectra: Vec<Curve>,
+    /// Curves of filters in front of the sensor, each of which may be what light passes.
+    pub filters: Vec<Curve>,
+    /// How many coloured factors light meets on its way to the sensor: its own colour and those of
+    /// surfaces; more than two count as two.
+    pub colored: usize,
+}
+
+/// Lanes for a sensor, and what they lose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LaneChoice {
+    /// The lanes.
+    pub lanes: Lanes,
+    /// The worst relative error of any channel's electrons under any light and colour; `None` where
+    /// nobody counts photons, or nobody worked it out.
+    pub error: Option<f64>,
+}
+
+impl Sensor {
+    /// The fewest lanes in which a render counts this sensor's electrons right, or its own `bands`.
+    ///
+    /// In digital mode a sensor without curves keeps the three colours, or the one, that it tells
+    /// apart: its light is a picture's.
+    ///
+    /// # Errors
+    ///
+    /// When the sensor sees nothing of the light.
+    pub fn lanes_under(&self, light: &Illumination) -> Result<LaneChoice, SensorError> {
+        let spec = self.spec();
+        let counts = self.settings.radiometry == Radiometry::Physical;
+        let ideal = matches!(self.response.lanes, Lanes::Grey | Lanes::Rgb);
+        let multispectral = spec.kind == SensorKind::Multispectral && spec.bands.is_some();
+        if !counts && (ideal || spec.bands.is_some()) {
+            return Ok(LaneChoice { lanes: self.response.lanes.clone(), error: None });
+        }
+        let filters = filters(spec)?.filters;
+        let given = spec.bands.as_ref().map(|grid| grid.edges().to_vec());
+        let range = match &given {
+            Some(edges) => [edges[0], edges[edges.len() - 1]],
+            None => lit_range(sensitive_range(&self.settings.efficiency, &filters), light)?,
+        };
+        let edges = given.clone().unwrap_or(range.to_vec());
+        let Some(table) = Table::new(self, &filters, light, range, &edges) else {
+            return Ok(LaneChoice { lanes: self.response.lanes.clone(), error: None });
+        };
+        if ideal {
+            let error = table.error_of(&self.response, &filters, &self.settings.efficiency, light);
+            if error <= TOLERANCE {
+                return Ok(LaneChoice { lanes: self.response.lanes.clone(), error: Some(error) });
+            }
+        }
+        let fixed = table.cells_at(&edges);
+        let may_divide = given.is_none() || multispectral;
+        let cells = if may_divide { table.divided(&fixed) } else { fixed };
+        let error = Some(table.worst(&cells));
+        let edges = cells.iter().map(|&cell| table.edges[cell]).collect();
+        let lanes = match Grid::from_edges(edges) {
+            Ok(grid) => Lanes::Weighted(
+                WeightedBands::new(grid, table.sensitivity, table.mean_light).into(),
+            ),
+            Err(_) => self.response.lanes.clone(),
+        };
+        Ok(LaneChoice { lanes, error })
+    }
+}
+
+/// Where the sensor sees and some light shines (nm).
+fn lit_range(sensor: Option<[f64; 2]>, light: &Illumination) -> Result<[f64; 2], SensorError> {
+    let Some(sensor) = sensor else {
+        let why = "the sensor sees nothing at any wavelength";
+        return Err(SensorError::Missing { key: "quantum_efficiency", why });
+    };
+    let all = light.spectra.iter().map(Curve::range);
+    let lit = all.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or([0.0, f64::INFINITY]);
+    let [from, to] = [sensor[0].max(lit[0]), sensor[1].min(lit[1])];
+    if from >= to {
+        return Err(SensorError::Dark { sensor, light: lit });
+    }
+    Ok([from, to])
+}
+
+/// Sums of something over all cells before each edge.
+type Sums = Vec<f64>;
+
+/// A light, a channel, a filter and up to two colours, and the electrons that they really make.
+struct Trial {
+    light: usize,
+    channel: usize,
+    filter: Option<usize>,
+    colors: [Option<usize>; 2],
+    exact: Sums,
+    /// What an error is a part of.
+    scale: f64,
+}
+
+/// Integrals over narrow cells, from which those over any band follow.
+struct Table {
+    /// Of the cells (nm).
+    edges: Vec<f64>,
+    /// The sensor's: of all channels together.
+    seen: Sums,
+    /// Of each light, by the sensor.
+    lights: Vec<Sums>,
+    /// Of the mean light, by the sensor.
+    weight: Sums,
+    /// Of each primary, by sensor and mean light.
+    primaries: [Sums; 3],
+    /// Of each filter, likewise.
+    filters: Vec<Sums>,
+    /// Of the mean light by each channel.
+    channels: Vec<Sums>,
+    trials: Vec<Trial>,
+    sensitivity: Curve,
+    mean_light: Curve,
+}
+
+/// A curve's value, 0 outside of its range.
+fn inside(curve: &Curve, nm: f64) -> f64 {
+    curve.at(nm).unwrap_or(0.0)
+}
+
+impl Table {
+    /// `None` when it would be too large.
+    fn new(
+        sensor: &Sensor,
+        filters: &[Filter],
+        light: &Illumination,
+        range: [f64; 2],
+        fixed: &[f64],
+    ) -> Option<Self> {
+        let efficiency = &sensor.settings.efficiency;
+        let even = [Curve::ONE];
+        let spectra = if light.spectra.is_empty() { &even[..] } else { &light.spectra };
+        let curves: Vec<&Curve> = (spectra.iter().chain(&light.filters))
+            .chain(filters.iter().filter_map(Filter::curve))
+            .chain([efficiency, &rgb::PRIMARIES[0]])
+            .collect();
+        let edges = cell_edges(&curves, range, fixed);
+        let products = [1, 4, 10][light.colored.min(2)];
+        let trials = spectra.len() * filters.len() * light.filters.len().max(1) * products;
+        if trials * edges.len() > MOST_NUMBERS {
+            return None;
+        }
+        let nodes = Nodes::of(&edges);
+        let responses: Vec<Vec<f64>> = filters
+            .iter()
+            .map(|filter| nodes.at(|nm| nm * inside(efficiency, nm) * filter.passes(nm)))
+            .collect();
+        let spectra: Vec<Vec<f64>> =
+            spectra.iter().map(|curve| nodes.at(|nm| inside(curve, nm))).collect();
+        let primaries: [Vec<f64>; 3] =
+            std::array::from_fn(|k| nodes.at(|nm| rgb::PRIMARIES[k].held(nm)));
+        let passed: Vec<Vec<f64>> =
+            light.filters.iter().map(|curve| nodes.at(|nm| curve.held(nm))).collect();
+        // Every channel and every light counts alike, however weak.
+        let all: Vec<f64> =
+            (0..nodes.nm.len()).map(|i| responses.iter().map(|r| r[i]).sum()).collect();
+        let mean_light = nodes.mean(&spectra, &all);
+        let seen = nodes.mean(&responses, &mean_light);
+        let weight = product(&[&seen, &mean_light]);
+        let mut table = Self {
+            seen: nodes.sums(&[&seen]),
+            lights: spectra.iter().map(|s| nodes.sums(&[&seen, s])).collect(),
+            weight: nodes.sums(&[&weight]),
+            primaries: std::array::from_fn(|k| nodes.sums(&[&weight, &primaries[k]])),
+            filters: passed.iter().map(|t| nodes.sums(&[&weight, t])).collect(),
+            channels: responses.iter().map(|r| nodes.sums(&[r, &mean_light])).collect(),
+            trials: Vec::new(),
+            sensitivity: nodes.curve(&seen)?.held_over(range[0], range[1]),
+            mean_light: nodes.curve(&mean_light)?.held_over(range[0], range[1]),
+            edges,
+        };
+        let factors = (&responses[..], &spectra[..], &passed[..], &primaries);
+        table.add_trials(&nodes, factors, light.colored);
+        Some(table)
+    }
+
+    fn add_trials(
+        &mut self,
+        nodes: &Nodes,
+        (responses, spectra, passed, primaries): (
+            &[Vec<f64>],
+            &[Vec<f64>],
+            &[Vec<f64>],
+            &[Vec<f64>; 3],
+        ),
+        colored: usize,
+    ) {
+        let filters: Vec<Option<usize>> = match passed.len() {
+            0 => vec![None],
+            count => (0..count).map(Some).collect(),
+        };
+        for (light, spectrum) in spectra.iter().enumerate() {
+            for (channel, response) in responses.iter().enumerate() {
+                for &filter in &filters {
+                    let mut base = product(&[spectrum, response]);
+                    if let Some(f) = filter {
+                        base = product(&[&base, &passed[f]]);
+                    }
+                    let white: f64 = nodes.sums(&[&base]).last().copied().unwrap_or(0.0);
+                    for colors in products(colored) {
+                        let mut values = base.clone();
+                        for k in colors.into_iter().flatten() {
+                            values = product(&[&values, &primaries[k]]);
+                        }
+                        let exact = nodes.sums(&[&values]);
+                        let total = exact.last().copied().unwrap_or(0.0);
+                        let pure = colors.into_iter().flatten().count();
+                        let scale = total.max(DARK[pure] * white);
+                        if scale > 0.0 {
+                            let trial = Trial { light, channel, filter, colors, exact, scale };
+                            self.trials.push(trial);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The electrons that a band of cells loses of a trial (or finds too many), as a part of its
+    /// scale.
+    fn lost(&self, trial: &Trial, [a, b]: [usize; 2]) -> f64 {
+        let over = |sums: &Sums| sums[b] - sums[a];
+        let (seen, weight) = (over(&self.seen), over(&self.weight));
+        let mut counted = 0.0;
+        if seen > 0.0 && weight > 0.0 {
+            // 1 in the lane is the mean light, scaled to a mean of 1.
+            counted = over(&self.channels[trial.channel]) * seen / weight;
+            counted *= over(&self.lights[trial.light]) / seen;
+            for k in trial.colors.into_iter().flatten() {
+                counted *= over(&self.primaries[k]) / weight;
+            }
+            if let Some(filter) = trial.filter {
+                counted *= over(&self.filters[filter]) / weight;
+            }
+        }
+        (counted - over(&trial.exact)) / trial.scale
+    }
+
+    /// The most that any trial is off in all bands together.
+    fn worst(&self, cells: &[usize]) -> f64 {
+        let total = |trial: &Trial| -> f64 {
+            cells.windows(2).map(|ends| self.lost(trial, [ends[0], ends[1]])).sum::<f64>().abs()
+        };
+        self.trials.iter().map(total).fold(0.0, f64::max)
+    }
+
+    /// The most that a band is off for any trial.
+    fn worst_of(&self, band: [usize; 2]) -> f64 {
+        self.trials.iter().map(|trial| self.lost(trial, band).abs()).fold(0.0, f64::max)
+    }
+
+    /// The cells that begin at these wavelengths, which are edges of cells.
+    fn cells_at(&self, edges: &[f64]) -> Vec<usize> {
+        let near = |edge: &f64| self.edges.partition_point(|nm| *nm < *edge - 1e-9);
+        let mut cells: Vec<usize> =
+            edges.iter().map(|edge| near(edge).min(self.edges.len() - 1)).collect();
+        cells.dedup();
+        cells
+    }
+
+    /// Bands divided until they are good, and joined where they stay so; `fixed` edges stay.
+    fn divided(&self, fixed: &[usize]) -> Vec<usize> {
+        let mut cells = fixed.to_vec();
+        while cells.len() <= MOST_BANDS && self.worst(&cells) > TOLERANCE {
+            let bands = cells.windows(2).filter(|ends| ends[1] - ends[0] > 1);
+            let lossy = bands
+                .map(|ends| [ends[0], ends[1]])
+                .max_by(|a, b| self.worst_of(*a).total_cmp(&self.worst_of(*b)));
+            let Some(band) = lossy else { break };
+            let cut = self.best_cut(band);
+            cells.insert(cells.partition_point(|cell| *cell < cut), cut);
+        }
+        let limit = self.worst(&cells).max(TOLERANCE);
+        self.joined(cells, fixed, limit)
+    }
+
+    /// Where to divide a band so that the worse of its halves is best.
+    fn best_cut(&self, [a, b]: [usize; 2]) -> usize {
+        let places = (b - a - 1).min(PLACES);
+        let cuts = (1..=places).map(|i| a + ((b - a) * i).div_ceil(places + 1).clamp(1, b - a - 1));
+        let loss = |cut: usize| {
+            let halves =
+                |trial: &Trial| self.lost(trial, [a, cut]).abs() + self.lost(trial, [cut, b]).abs();
+            self.trials.iter().map(halves).fold(0.0, f64::max)
+        };
+        cuts.map(|cut| (loss(cut), cut))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or(a + (b - a) / 2, |(_, cut)| cut)
+    }
+
+    /// Bands joined as long as that keeps the worst error below a limit.
+    fn joined(&self, mut cells: Vec<usize>, fixed: &[usize], limit: f64) -> Vec<usize> {
+        let lost = |trial: &Trial, ends: &[usize]| self.lost(trial, [ends[0], ends[1]]);
+        let total = |trial| -> f64 { cells.windows(2).map(|ends| lost(trial, ends)).sum() };
+        let mut totals: Vec<f64> = self.trials.iter().map(total).collect();
+        loop {
+            // What leaving out an edge changes.
+            let change = |trial: &Trial, i: usize, cells: &[usize]| {
+                self.lost(trial, [cells[i - 1], cells[i + 1]])
+                    - lost(trial, &cells[i - 1..=i])
+                    - lost(trial, &cells[i..=i + 1])
+            };
+            let worst = |i: usize| {
+                let each = self.trials.iter().zip(&totals);
+                each.map(|(trial, total)| (total + change(trial, i, &cells)).abs())
+                    .fold(0.0, f64::max)
+            };
+            let free = (1..cells.len() - 1).filter(|&i| !fixed.contains(&cells[i]));
+            let best = free.map(|i| (worst(i), i)).min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((_, i)) = best.filter(|(worst, _)| *worst <= limit) else { return cells };
+            for (trial, total) in self.trials.iter().zip(&mut totals) {
+                *total += change(trial, i, &cells);
+            }
+            cells.remove(i);
+        }
+    }
+
+    /// What a sensor loses in lanes that are not bands.
+    fn error_of(
+        &self,
+        response: &Response,
+        filters: &[Filter],
+        efficiency: &Curve,
+        light: &Illumination,
+    ) -> f64 {
+        let lanes = &response.lanes;
+        let count = lanes.count();
+        let in_lanes = |curve: &Curve, outside| {
+            lanes.from_curve(curve, outside).unwrap_or_else(|_| vec![0.0; count])
+        };
+        let electrons: Vec<Vec<f64>> = filters
+            .iter()
+            .map(|f| (0..count).map(|i| photons_caught(lanes, i, f, efficiency)).collect())
+            .collect();
+        let even = [Curve::ONE];
+        let spectra = if light.spectra.is_empty() { &even[..] } else { &light.spectra };
+        let spectra: Vec<_> = spectra.iter().map(|s| in_lanes(s, Outside::Zero)).collect();
+        let passed: Vec<_> = light.filters.iter().map(|t| in_lanes(t, Outside::Held)).collect();
+        let colors = lanes.from_rgb();
+        let off = |trial: &Trial| {
+            let counted = |i: usize| {
+                let colors = trial.colors.into_iter().flatten().map(|k| colors[i][k]);
+                let filter = trial.filter.map_or(1.0, |f| passed[f][i]);
+                electrons[trial.channel][i]
+                    * spectra[trial.light][i]
+                    * filter
+                    * colors.product::<f64>()
+            };
+            let exact = trial.exact.last().copied().unwrap_or(0.0);
+            (((0..count).map(counted).sum::<f64>() - exact) / trial.scale).abs()
+        };
+        self.trials.iter().map(off).fold(0.0, f64::max)
+    }
+}
+
+/// The colours that are tried: none, each primary, and each pair of them.
+fn products(colored: usize) -> Vec<[Option<usize>; 2]> {
+    let mut all = vec![[None; 2]];
+    if colored > 0 {
+        all.extend((0..3).map(|k| [Some(k), None]));
+    }
+    if colored > 1 {
+        all.extend((0..3).flat_map(|i| (i..3).map(move |k| [Some(i), Some(k)])));
+    }
+    all
+}
+
+fn product(factors: &[&[f64]]) -> Vec<f64> {
+    let count = factors.first().map_or(0, |factor| factor.len());
+    (0..count).map(|i| factors.iter().map(|factor| factor[i]).product()).collect()
+}
+
+/// Edges of cells at most [`STEP`] wide, between which curves are straight.
+fn cell_edges(curves: &[&Curve], [from, to]: [f64; 2], fixed: &[f64]) -> Vec<f64> {
+    let samples = curves.iter().flat_map(|curve| curve.samples()).map(|sample| sample[0]);
+    let mut knots: Vec<f64> = samples.chain(fixed.iter().copied()).collect();
+    knots.retain(|nm| *nm > from && *nm < to);
+    knots.extend([from, to]);
+    knots.sort_by(f64::total_cmp);
+    knots.dedup();
+    let mut edges = vec![from];
+    for ends in knots.windows(2) {
+        let [a, b] = [ends[0], ends[1]];
+        let parts = ((b - a) / STEP).ceil().clamp(FINE, 1e5);
+        let mut k = 1.0;
+        while k < parts {
+            edges.push(a + (b - a) * (k / parts));
+            k += 1.0;
+        }
+        edges.push(b);
+    }
+    edges
+}
+
+/// Two places in each cell, at which functions are evaluated: Gauss' rule, exact for cubics.
+struct Nodes {
+    nm: Vec<f64>,
+    /// Half the width of each cell (nm).
+    half: Vec<f64>,
+}
+
+impl Nodes {
+    fn of(edges: &[f64]) -> Self {
+        let cells = edges.windows(2).map(|e| (0.5 * (e[0] + e[1]), 0.5 * (e[1] - e[0])));
+        let offset = 1.0 / 3.0_f64.sqrt();
+        let nm = cells.clone().flat_map(|(mid, half)| [mid - half * offset, mid + half * offset]);
+        Self { nm: nm.collect(), half: cells.map(|(_, half)| half).collect() }
+    }
+
+    fn at(&self, f: impl Fn(f64) -> f64) -> Vec<f64> {
+        self.nm.iter().map(|&nm| f(nm)).collect()
+    }
+
+    /// Integrals of a product over all cells before each edge.
+    fn sums(&self, factors: &[&[f64]]) -> Sums {
+        let values = product(factors);
+        let mut sums = Vec::with_capacity(self.half.len() + 1);
+        let mut sum = 0.0;
+        sums.push(sum);
+        for (pair, half) in values.as_chunks::<2>().0.iter().zip(&self.half) {
+            sum += half * (pair[0] + pair[1]);
+            sums.push(sum);
+        }
+        sums
+    }
+
+    /// The mean of functions, each scaled so that all bring the same when weighted.
+    fn mean(&self, functions: &[Vec<f64>], weight: &[f64]) -> Vec<f64> {
+        let mut mean = vec![0.0; self.nm.len()];
+        for function in functions {
+            let total = self.sums(&[function, weight]).last().copied().unwrap_or(0.0);
+            if total > 0.0 {
+                mean.iter_mut().zip(function).for_each(|(sum, value)| *sum += value / total);
+            }
+        }
+        mean
+    }
+
+    /// The function through its values at the places.
+    fn curve(&self, values: &[f64]) -> Option<Curve> {
+        Curve::sampled(self.nm.iter().zip(values).map(|(&nm, &value)| [nm, value]).collect()).ok()
+    }
+}
