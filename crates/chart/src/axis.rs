@@ -1,5 +1,7 @@
 //! A logarithmic axis in pixels.
 
+use crate::chart::Axis;
+
 /// Room for zeros at the low end of an axis (pixels).
 const ZERO: f64 = 36.0;
 
@@ -18,19 +20,19 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// An axis over all positive `values`, and zeros when `with_zero` and there is one, from one of
+    /// `axis` over all positive `values`, and zeros when it names them and there is one, from one of
     /// `pixels` to the other.
     pub(crate) fn new(
         values: impl Iterator<Item = f64> + Clone,
-        with_zero: bool,
+        axis: &Axis,
         [from, to]: [f64; 2],
     ) -> Self {
-        let has_zero = with_zero && values.clone().any(|value| value == 0.0);
+        let has_zero = axis.zero.is_some() && values.clone().any(|value| value == 0.0);
         let positive = values.filter(|&value| value > 0.0 && value.is_finite());
         let [low, high] = positive
             .fold([f64::INFINITY, 0.0f64], |[low, high], value| [low.min(value), high.max(value)]);
         let [low, high] = if low <= high { [low, high] } else { [0.1, 1.0] };
-        let exponents = widened([low.log10(), high.log10()]);
+        let exponents = widened([low.log10(), high.log10()], axis.fits);
         let direction = (to - from).signum();
         let start = if has_zero { from + direction * ZERO } else { from };
         let zero = has_zero.then_some(from + direction * 0.4 * ZERO);
@@ -88,8 +90,11 @@ fn whole(value: f64) -> i32 {
 }
 
 /// A range of exponents with some room around, ending on ticks where these are far apart.
-fn widened([low, high]: [f64; 2]) -> [f64; 2] {
+fn widened([low, high]: [f64; 2], fits: bool) -> [f64; 2] {
     let span = high - low;
+    if fits && span > 1.0 {
+        return [low - 0.04 * span, high + 0.04 * span];
+    }
     if span > 3.0 {
         return [(low - 0.15).floor(), (high + 0.15).ceil()];
     }
@@ -126,23 +131,26 @@ mod tests {
     #[test]
     fn values_keep_their_order_and_zero_lies_below() {
         let values = [0.0, 1e-9, 3e-4, 2.0];
-        let scale = Scale::new(values.into_iter(), true, [400.0, 0.0]);
+        let named = Axis::new("error").with_zero("none");
+        let scale = Scale::new(values.into_iter(), &named, [400.0, 0.0]);
         let places: Vec<f64> = values.iter().map(|&v| scale.at(v).unwrap()).collect();
         // Upwards on a page is towards smaller numbers.
         assert!(places.is_sorted_by(|a, b| a > b), "{places:?}");
         assert!(places.iter().all(|y| (0.0..=400.0).contains(y)));
         assert!(places[0] > scale.start() && scale.start() >= places[1]);
         assert_eq!([scale.at(-1.0), scale.at(f64::NAN), scale.at(f64::INFINITY)], [None; 3]);
-        assert_eq!(Scale::new(values.into_iter(), false, [400.0, 0.0]).at(0.0), None);
+        assert_eq!(Scale::new(values.into_iter(), &Axis::new("error"), [400.0, 0.0]).at(0.0), None);
     }
 
     #[test]
     fn ticks_lie_inside_and_are_few() {
         for [low, high] in [[1.0, 1.0], [0.9, 7.0], [1e-3, 40.0], [1e-17, 1.0], [3e-300, 1e300]] {
-            let scale = Scale::new([low, high].into_iter(), false, [0.0, 600.0]);
-            let ticks = scale.ticks();
-            assert!((1..=12).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
-            assert!(ticks.iter().all(|(_, at)| (-0.1..=600.1).contains(at)), "{ticks:?}");
+            for axis in [Axis::new("error"), Axis::new("error").fitted()] {
+                let scale = Scale::new([low, high].into_iter(), &axis, [0.0, 600.0]);
+                let ticks = scale.ticks();
+                assert!((1..=12).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
+                assert!(ticks.iter().all(|(_, at)| (-0.1..=600.1).contains(at)), "{ticks:?}");
+            }
         }
         assert_eq!(
             [written(2.0, -3), written(5.0, 1), written(1.0, -12)],

@@ -28,6 +28,8 @@ pub struct Axis {
     /// What a value of exactly zero is called. With it, zeros have a place of their own below all
     /// other values; without it, they are left out.
     pub zero: Option<String>,
+    /// Whether it ends where the values do, and not at the next power of ten.
+    pub fits: bool,
 }
 
 /// Points of one name and colour.
@@ -96,7 +98,13 @@ impl Axis {
     /// An axis whose zeros are left out.
     #[must_use]
     pub fn new(label: impl Into<String>) -> Self {
-        Self { label: label.into(), zero: None }
+        Self { label: label.into(), zero: None, fits: false }
+    }
+
+    /// The same, ending where the values do.
+    #[must_use]
+    pub fn fitted(self) -> Self {
+        Self { fits: true, ..self }
     }
 
     /// The same with a place for zeros, called `name`.

@@ -82,8 +82,8 @@ impl Room {
         let drawing = Drawing {
             chart,
             frame,
-            x: Scale::new(values(0), x.zero.is_some(), [frame.left, frame.right]),
-            y: Scale::new(values(1), y.zero.is_some(), [frame.bottom, frame.top]),
+            x: Scale::new(values(0), x, [frame.left, frame.right]),
+            y: Scale::new(values(1), y, [frame.bottom, frame.top]),
         };
         let mut group = Group::new();
         drawing.heading(&mut group);

@@ -1,7 +1,8 @@
 //! The image series that a characterisation after EMVA 1288 wants, as files.
 //!
-//! Exposure times rise in equal steps to past saturation under a constant light, each with a pair of
-//! bright and a pair of dark frames (the standard's method 1); then 16 bright and 16 dark frames at
+//! Exposure times rise in equal steps to one past saturation under a constant light (more of them, with
+//! noise behind a full well, are taken for signal by evaluations that look for the greatest variance),
+//! each with a pair of bright and a pair of dark frames (the standard's method 1); then 16 bright and 16 dark frames at
 //! half saturation, for what differs between pixels. Sixteen-bit PNGs hold digital numbers as they
 //! are; beside them stand the descriptor of the reference implementation (`emva1288` of Python's package index) and
 //! `manifest.json`, which is written last.
@@ -29,9 +30,6 @@ use crate::{NoiseModel, RawImage, Sensor, SensorError};
 
 /// Frames of each kind at half saturation.
 const SPATIAL: u32 = 16;
-
-/// Where the steps end, in parts of saturation.
-const PAST_SATURATION: f64 = 1.15;
 
 /// What the descriptor of the reference implementation is called.
 pub const DESCRIPTOR: &str = "emva1288.txt";
@@ -145,7 +143,10 @@ impl Series {
         }
         let light = options.light(sensor)?;
         let longest = longest_exposure(sensor, options.steps);
-        let photons_a_second = PAST_SATURATION * sensor.saturation() / (light.efficiency * longest);
+        // Light and dark current together saturate pixels at the last step but one.
+        let saturating = longest * (1.0 - 1.0 / options.steps as f64);
+        let electrons = sensor.saturation() - sensor.dark_current() * saturating;
+        let photons_a_second = electrons / (light.efficiency * saturating);
         let step = |time: f64, prefix: &str, frames: u32| {
             let nanoseconds = nanoseconds(time);
             let exposure_s = nanoseconds as f64 * 1e-9;
@@ -159,7 +160,7 @@ impl Series {
         let count = options.steps;
         let each = |i: usize| step(longest * i as f64 / count as f64, &format!("{i:03}"), 2);
         let (steps, mut times): (Vec<Step>, Vec<u64>) = (1..=count).map(each).unzip();
-        let (spatial, time) = step(longest * 0.5 / PAST_SATURATION, "spatial", SPATIAL);
+        let (spatial, time) = step(0.5 * saturating, "spatial", SPATIAL);
         times.push(time);
         let manifest = Manifest { bits: sensor.bit_depth(), steps, spatial };
         Ok(Self { manifest, size: light.size(), nanoseconds: times })

@@ -83,39 +83,100 @@ impl PhotonTransfer {
         }
     }
 
-    /// Both curves as SVG.
-    #[must_use]
-    pub fn svg(&self) -> String {
-        const EXACT: Look = ("exact Poisson", 0, Stroke::Solid);
-        const NORMAL: Look = ("normal approximation", 2, Stroke::Dashed);
-        const MODEL: Look = ("linear model", GREY, Stroke::Dotted);
-        const IDEAL: Look = ("ideal sensor", 1, Stroke::Solid);
-        let line = |(name, colour, stroke): Look, point: &dyn Fn(&Point) -> [f64; 2]| Series {
-            colour,
-            stroke,
-            ..Series::curve(name, self.points.iter().map(point))
-        };
-        let transfer = Chart {
-            title: "Photon transfer".to_owned(),
-            axes: [Axis::new("signal (DN)"), Axis::new("temporal variance (DN²)")],
-            series: vec![
-                line(EXACT, &|p| [p.signal, p.variance]),
-                line(NORMAL, &|p| [p.signal, p.variance_normal]),
-                line(MODEL, &|p| [p.electrons * self.system_gain, p.variance_expected]),
-            ],
-            ..Chart::default()
-        };
-        let ratio = Chart {
-            title: "Signal to noise".to_owned(),
-            axes: [Axis::new("photons a pixel"), Axis::new("SNR")],
-            series: vec![
-                line(EXACT, &|p| [p.photons, p.snr]),
-                line(NORMAL, &|p| [p.photons, p.snr_normal]),
-                line(MODEL, &|p| [p.photons, p.snr_expected]),
-                line(IDEAL, &|p| [p.photons, p.snr_ideal]),
-            ],
-            ..Chart::default()
-        };
-        side_by_side(&[transfer, ratio], Theme::Reader)
+    /// Points at which nothing is clipped: beyond, less and less noise is no better signal.
+    pub(super) fn drawn(&self) -> impl Iterator<Item = &Point> {
+        self.points.iter().filter(|point| point.electrons <= 1.000_001 * self.unclipped_electrons)
     }
+
+    /// Both curves as SVG, under the sensor's `name`.
+    #[must_use]
+    pub fn svg(&self, name: &str) -> String {
+        side_by_side(&[self.transfer_chart(name), self.ratio_chart(name)], Theme::Reader)
+    }
+
+    fn line(&self, (name, colour, stroke): Look, point: &dyn Fn(&Point) -> [f64; 2]) -> Series {
+        Series { colour, stroke, ..Series::curve(name, self.drawn().map(point)) }
+    }
+
+    /// Variance against signal; where nothing shines, and where pixels are full.
+    fn transfer_chart(&self, name: &str) -> Chart {
+        let gain = self.system_gain;
+        let measured = match self.system_gain_measured {
+            Some(measured) => format!(" ({measured:.4} by the slope)"),
+            None => String::new(),
+        };
+        let dark = (gain * self.dark_noise).powi(2) + 1.0 / 12.0;
+        let full = gain * self.saturation_electrons;
+        let values = |value: fn(&Point) -> f64| self.drawn().map(value).filter(|v| *v > 0.0);
+        let left = values(|p| p.signal).fold(f64::INFINITY, f64::min);
+        let bottom = values(|p| p.variance).fold(dark, f64::min);
+        let top = values(|p| p.variance_expected).fold(dark, f64::max);
+        Chart {
+            title: format!("{name}: photon transfer"),
+            notes: vec![format!("K {gain:.4} DN/e⁻{measured}, σ_d {:.2} e⁻", self.dark_noise)],
+            axes: [
+                Axis::new("signal (DN)").fitted(),
+                Axis::new("temporal variance (DN²)").fitted(),
+            ],
+            series: vec![
+                self.line(EXACT, &|p| [p.signal, p.variance]),
+                self.line(NORMAL, &|p| [p.signal, p.variance_normal]),
+                self.line(MODEL, &|p| [p.electrons * gain, p.variance_expected]),
+                guide("dark: K²σ_d² + 1/12", [left, dark], [full, dark]),
+                guide("saturation", [full, bottom], [full, top]),
+            ],
+            ..Chart::default()
+        }
+    }
+
+    /// Signal to noise against photons, from the threshold to saturation.
+    fn ratio_chart(&self, name: &str) -> Chart {
+        let decibel = |ratio: f64| 20.0 * ratio.log10();
+        let (low, high) = (self.threshold_photons, self.saturation_photons);
+        let values = |value: fn(&Point) -> f64| self.drawn().map(value).filter(|v| *v > 0.0);
+        let bottom = values(|p| p.snr_expected).fold(1.0, f64::min);
+        let mark = |name: String, at: [f64; 2]| Series {
+            joined: false,
+            colour: GREY,
+            ..Series::line(name, [at])
+        };
+        Chart {
+            title: format!("{name}: signal to noise"),
+            notes: vec![format!(
+                "at {:.0} nm; saturation {:.0} e⁻, {high:.0} photons",
+                self.wavelength, self.saturation_electrons,
+            )],
+            axes: [Axis::new("photons a pixel").fitted(), Axis::new("SNR").fitted()],
+            series: vec![
+                self.line(EXACT, &|p| [p.photons, p.snr]),
+                self.line(NORMAL, &|p| [p.photons, p.snr_normal]),
+                self.line(MODEL, &|p| [p.photons, p.snr_expected]),
+                self.line(IDEAL, &|p| [p.photons, p.snr_ideal]),
+                mark(
+                    format!("SNR at most {:.1} ({:.1} dB)", self.snr_max, decibel(self.snr_max)),
+                    [high, self.snr_max],
+                ),
+                mark(format!("threshold: {low:.2} photons"), [low, 1.0]),
+                guide("saturation", [high, bottom], [high, self.snr_max]),
+                guide(
+                    &format!("dynamic range {:.1} dB", decibel(self.dynamic_range)),
+                    [low, bottom],
+                    [high, bottom],
+                ),
+            ],
+            ..Chart::default()
+        }
+    }
+}
+
+const EXACT: Look = ("exact Poisson", 0, Stroke::Solid);
+const NORMAL: Look = ("normal approximation", 2, Stroke::Dashed);
+const MODEL: Look = ("linear model", GREY, Stroke::Dotted);
+const IDEAL: Look = ("ideal sensor", 1, Stroke::Solid);
+
+/// A straight line that marks a figure, with places along it for its name.
+fn guide(name: &str, from: [f64; 2], to: [f64; 2]) -> Series {
+    let at = |k: usize, share: f64| from[k].powf(1.0 - share) * to[k].powf(share);
+    let points = (0..=8).map(|i| f64::from(i) / 8.0).map(|share| [at(0, share), at(1, share)]);
+    Series { colour: GREY, stroke: Stroke::Dashed, ..Series::curve(name, points) }
 }

@@ -7,7 +7,7 @@ mod reference;
 
 use std::collections::BTreeSet;
 
-use etendue_sensor::emva::{DESCRIPTOR, MANIFEST, Manifest, Options, Series};
+use etendue_sensor::emva::{DESCRIPTOR, MANIFEST, Manifest, Options, Series, Step};
 use etendue_sensor::{Sensor, SensorSpec};
 use serde_json::{Value, json};
 
@@ -43,9 +43,14 @@ fn a_series_is_what_a_characterisation_wants() {
     // The film rounds photons to 24 bits.
     assert!(flux.iter().all(|f| (f / flux[0] - 1.0).abs() < 1e-6), "constant light");
     let efficiency = sensor.quantum_efficiency().at(525.0).unwrap();
-    let most = manifest.steps[19].photons * efficiency / sensor.saturation();
-    assert!((most - 1.15).abs() < 1e-6, "ends at {most} of saturation");
-    let half = manifest.spatial.photons * efficiency / sensor.saturation();
+    // Of light and dark current together: saturated at the last step but one, and half of that.
+    let filled = |step: &Step| {
+        let dark = sensor.dark_current() * step.exposure_s;
+        (step.photons * efficiency + dark) / sensor.saturation()
+    };
+    let [last, before, half] =
+        [&manifest.steps[19], &manifest.steps[18], &manifest.spatial].map(filled);
+    assert!((before - 1.0).abs() < 1e-6 && (last - 20.0 / 19.0).abs() < 1e-6, "{before} {last}");
     assert!((half - 0.5).abs() < 1e-6, "{half}");
 
     let descriptor = std::fs::read_to_string(folder.path().join(DESCRIPTOR)).unwrap();
@@ -93,5 +98,48 @@ fn what_cannot_be_characterised_is_refused() {
     ] {
         let error = Series::plan(&sensor(spec), &Options::default()).unwrap_err().to_string();
         assert!(error.contains(word), "{error}");
+    }
+}
+
+/// Half the variance of the difference of two images (DN²).
+fn temporal_variance(folder: &std::path::Path, files: &[String]) -> f64 {
+    let read = |name: &String| image::open(folder.join(name)).unwrap().to_luma16().into_raw();
+    let [a, b] = [read(&files[0]), read(&files[1])];
+    let differences = || a.iter().zip(&b).map(|(a, b)| f64::from(*a) - f64::from(*b));
+    let mean = differences().sum::<f64>() / a.len() as f64;
+    0.5 * differences().map(|d| (d - mean).powi(2)).sum::<f64>() / a.len() as f64
+}
+
+#[test]
+fn whoever_looks_for_the_greatest_variance_finds_saturation() {
+    // A well that is full long before the converter ends, and noise of the read-out behind it.
+    let sensor = sensor(json!({
+        "type": "raw", "resolution": [128, 128], "system_gain": 0.5, "bit_depth": 12, "full_well": 5200,
+        "read_noise": 8, "black_level": 40, "dark_current": 10, "quantum_efficiency": 0.5,
+    }));
+    let options = Options { size: Some([128, 128]), ..Options::default() };
+    for seed in 0..4 {
+        let options = Options { seed, ..options };
+        let series = Series::plan(&sensor, &options).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        series.write(&sensor, &options, folder.path(), |_| true).unwrap();
+        let steps = &series.manifest.steps;
+        let variances: Vec<f64> =
+            steps.iter().map(|step| temporal_variance(folder.path(), &step.bright)).collect();
+        // The rule of the reference implementation (emva1288 1.0.2, `index_u_ysat`): from the end on
+        // to the first maximum that the step before it does not exceed.
+        let (mut most, mut found) = (0.0, 0);
+        for i in (0..steps.len()).rev() {
+            let before = variances[i.saturating_sub(1)];
+            if variances[i] >= most || before >= most {
+                (most, found) = (variances[i], i);
+            } else {
+                break;
+            }
+        }
+        let saturation = steps[found].photons * 0.5;
+        // Steps are a twenty-fourth of it apart, and the variance is greatest at the last or the last
+        // but one of those below.
+        assert!((0.91 * 5200.0..1.001 * 5200.0).contains(&saturation), "{seed}: {saturation} e⁻");
     }
 }
