@@ -56,6 +56,8 @@ struct Card {
     name: &'static str,
     kind: &'static str,
     facts: Vec<Figure>,
+    /// Keys of the figures that nobody has published or measured.
+    assumed: Vec<&'static str>,
     sources: &'static str,
 }
 
@@ -70,7 +72,8 @@ impl Card {
     fn new(preset: &'static Preset) -> Self {
         let figure = |(key, value, origin)| Figure { key, value, origin };
         let facts = preset.facts().into_iter().map(figure).collect();
-        Self { name: preset.name, kind: preset.kind, facts, sources: preset.sources }
+        let Preset { name, kind, sources, .. } = *preset;
+        Self { name, kind, facts, assumed: preset.assumed(), sources }
     }
 
     /// The preset as a paragraph, its sources wrapped.
@@ -79,8 +82,9 @@ impl Card {
         for Figure { key, value, origin } in &self.facts {
             let _ = writeln!(text, "  {key:<26} {value:<28} {}", word(*origin));
         }
+        let assumed = format!("assumed, without a source: {}. Sources: ", self.assumed.join(", "));
         let mut line = String::from(" ");
-        for word in self.sources.split_whitespace() {
+        for word in assumed.split_whitespace().chain(self.sources.split_whitespace()) {
             if line.chars().count() + word.chars().count() >= 100 {
                 let _ = writeln!(text, "{line}");
                 line = " ".to_owned();
@@ -97,7 +101,7 @@ fn word(origin: Origin) -> &'static str {
         Origin::Published => "published",
         Origin::Measured => "measured",
         Origin::Derived => "derived",
-        Origin::Estimated => "estimated",
+        Origin::Assumed => "assumed",
     }
 }
 
@@ -107,7 +111,7 @@ fn mark(origin: Origin) -> &'static str {
         Origin::Published => "p",
         Origin::Measured => "m",
         Origin::Derived => "d",
-        Origin::Estimated => "e",
+        Origin::Assumed => "a",
     }
 }
 
@@ -140,9 +144,7 @@ fn list(as_json: bool) -> Result<(), Fault> {
         }
         let _ = writeln!(text, "  {}", card.kind);
     }
-    text.push_str(
-        "p published, m measured, d derived, e estimated; etendue sensor NAME shows more",
-    );
+    text.push_str("p published, m measured, d derived, a assumed; etendue sensor NAME shows more");
     print_text(&text)
 }
 
@@ -170,7 +172,8 @@ fn curves(arguments: &SensorArguments, name: &str, file: &SensorFile) -> Result<
     let found = Curves { sensor: &file.spec, preset, notes: file.sensor.notes(), curves };
     if let Some(folder) = &arguments.output {
         let [svg, data] = ["curves.svg", "curves.json"].map(|name| folder.join(name));
-        let drawn = found.curves.svg();
+        let file_name = Path::new(name).file_name().unwrap_or_default().to_string_lossy();
+        let drawn = found.curves.svg(found.preset.as_ref().map_or(&*file_name, |card| card.name));
         write_whole(&svg, |part| part.write_all(drawn.as_bytes()))?;
         sidecar::write_json(&data, &found)?;
         if !arguments.quiet {

@@ -35,6 +35,14 @@ fn presets_are_listed() {
     assert!(cards.len() >= 10);
     for card in &cards {
         assert!(card["sources"].as_str().is_some_and(|text| !text.is_empty()));
+        let facts = card["facts"].as_array().expect("figures");
+        let assumed: Vec<&Value> = facts
+            .iter()
+            .filter(|fact| fact["origin"] == "assumed")
+            .map(|fact| &fact["key"])
+            .collect();
+        assert_eq!(card["assumed"].as_array().unwrap().iter().collect::<Vec<_>>(), assumed);
+        assert!(assumed.iter().any(|key| **key == "dsnu"), "{card}");
         // Whatever the list calls it, the command takes.
         assert!(table.contains(card["name"].as_str().unwrap()));
     }
@@ -46,7 +54,13 @@ fn a_preset_gives_curves_as_table_json_and_svg() {
     let output = bench.run(&["sensor", "KAF-8300", "-o", "out"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let table = text(&output.stdout);
-    for word in ["full_well", "estimated", "SNR at most", "normal approximation", "photons"] {
+    for word in [
+        "full_well",
+        "assumed, without a source: dark_current_temperature",
+        "SNR at most",
+        "normal approximation",
+        "photons",
+    ] {
         assert!(table.contains(word), "{word} in {table}");
     }
     let svg = std::fs::read_to_string(bench.path("out/curves.svg")).expect("curves");
@@ -125,7 +139,10 @@ fn a_series_has_the_files_that_its_manifest_names() {
 #[test]
 fn what_is_no_sensor_is_refused_by_file_path_and_remedy() {
     for (keys, words) in [
-        (json!({ "quantum_efficiency": 1.2 }), ["quantum_efficiency", "must lie in 0..=1"]),
+        (
+            json!({ "quantum_efficiency": 1.2 }),
+            ["quantum_efficiency", "1.2 at every wavelength: it must lie in 0..=1"],
+        ),
         (json!({ "quantum_efficiency": -0.1 }), ["quantum_efficiency", "must lie in 0..=1"]),
         (json!({ "quantum_efficiency": [] }), ["quantum_efficiency", "at least two samples"]),
         (
@@ -134,7 +151,7 @@ fn what_is_no_sensor_is_refused_by_file_path_and_remedy() {
         ),
         (json!({ "system_gain": 0 }), ["system_gain", "above 0 (1e-9 to 1e9), found 0"]),
         (json!({ "system_gain": -1 }), ["system_gain", "above 0 (1e-9 to 1e9), found -1"]),
-        (json!({ "full_well": 10 }), ["full_well", "black level's worth"]),
+        (json!({ "full_well": 0.5 }), ["full_well", "not half a digital number"]),
         (json!({ "bit_depth": 0 }), ["bit_depth", "1 to 16 bits, found 0"]),
         (json!({ "bit_depth": 17 }), ["bit_depth", "1 to 16 bits, found 17"]),
         (json!({ "exposure": 0 }), ["exposure", "seconds, above 0 (1e-12 to 1e9), found 0"]),
@@ -147,7 +164,7 @@ fn what_is_no_sensor_is_refused_by_file_path_and_remedy() {
         (json!({ "cfa": "rggb", "filters": { "x": 1 } }), ["filters", "no pixel has"]),
         (json!({ "read_noise": 1e300 }), ["read_noise", "up to 1e9, found 1e300"]),
         (
-            json!({ "quantum_efficiency": [[900, 0.5], [1000, 0.5]] }),
+            json!({ "quantum_efficiency": [[900, 0.5], [1000, 0.5]], "cfa": "rggb" }),
             ["quantum_efficiency", "the image would be black"],
         ),
     ] {
