@@ -26,6 +26,9 @@ const MOST_BANDS: usize = 256;
 /// The steps of the integration (nm), at most.
 const STEP: f64 = 1.0;
 
+/// Steps over all of the light, at least.
+const CELLS: f64 = 400.0;
+
 /// Steps from one sample of a curve to the next, at least: edges of filters are steep.
 const FINE: f64 = 4.0;
 
@@ -159,6 +162,14 @@ struct Table {
     mean_light: Curve,
 }
 
+/// Functions at the nodes of a table: of channels, lights, filters and primaries.
+struct Factors<'a> {
+    responses: &'a [Vec<f64>],
+    spectra: &'a [Vec<f64>],
+    passed: &'a [Vec<f64>],
+    primaries: &'a [Vec<f64>; 3],
+}
+
 /// A curve's value, 0 outside of its range.
 fn inside(curve: &Curve, nm: f64) -> f64 {
     curve.at(nm).unwrap_or(0.0)
@@ -191,8 +202,9 @@ impl Table {
             .iter()
             .map(|filter| nodes.at(|nm| nm * inside(efficiency, nm) * filter.passes(nm)))
             .collect();
+        let lights = spectra;
         let spectra: Vec<Vec<f64>> =
-            spectra.iter().map(|curve| nodes.at(|nm| inside(curve, nm))).collect();
+            lights.iter().map(|curve| nodes.at(|nm| inside(curve, nm))).collect();
         let primaries: [Vec<f64>; 3] =
             std::array::from_fn(|k| nodes.at(|nm| rgb::PRIMARIES[k].held(nm)));
         let passed: Vec<Vec<f64>> =
@@ -200,8 +212,12 @@ impl Table {
         // Every channel and every light counts alike, however weak.
         let all: Vec<f64> =
             (0..nodes.nm.len()).map(|i| responses.iter().map(|r| r[i]).sum()).collect();
-        let mean_light = nodes.mean(&spectra, &all);
-        let seen = nodes.mean(&responses, &mean_light);
+        let scales = nodes.scales(&spectra, &all);
+        let mean_light = mixed(&spectra, &scales);
+        let seen = mixed(&responses, &nodes.scales(&responses, &mean_light));
+        // Straight lines join the light's samples, all of which are edges.
+        let at_edge = |nm: f64| lights.iter().zip(&scales).map(|(s, k)| k * inside(s, nm)).sum();
+        let light_curve = Curve::sampled(edges.iter().map(|&nm| [nm, at_edge(nm)]).collect());
         let weight = product(&[&seen, &mean_light]);
         let mut table = Self {
             seen: nodes.sums(&[&seen]),
@@ -212,10 +228,15 @@ impl Table {
             channels: responses.iter().map(|r| nodes.sums(&[r, &mean_light])).collect(),
             trials: Vec::new(),
             sensitivity: nodes.curve(&seen)?.held_over(range[0], range[1]),
-            mean_light: nodes.curve(&mean_light)?.held_over(range[0], range[1]),
+            mean_light: light_curve.ok()?,
             edges,
         };
-        let factors = (&responses[..], &spectra[..], &passed[..], &primaries);
+        let factors = Factors {
+            responses: &responses,
+            spectra: &spectra,
+            passed: &passed,
+            primaries: &primaries,
+        };
         table.add_trials(&nodes, factors, light.colored);
         Some(table)
     }
@@ -223,12 +244,7 @@ impl Table {
     fn add_trials(
         &mut self,
         nodes: &Nodes,
-        (responses, spectra, passed, primaries): (
-            &[Vec<f64>],
-            &[Vec<f64>],
-            &[Vec<f64>],
-            &[Vec<f64>; 3],
-        ),
+        Factors { responses, spectra, passed, primaries }: Factors<'_>,
         colored: usize,
     ) {
         let filters: Vec<Option<usize>> = match passed.len() {
@@ -411,6 +427,12 @@ fn products(colored: usize) -> Vec<[Option<usize>; 2]> {
     all
 }
 
+/// The sum of functions times their scales.
+fn mixed(functions: &[Vec<f64>], scales: &[f64]) -> Vec<f64> {
+    let count = functions.first().map_or(0, Vec::len);
+    (0..count).map(|i| functions.iter().zip(scales).map(|(f, scale)| scale * f[i]).sum()).collect()
+}
+
 fn product(factors: &[&[f64]]) -> Vec<f64> {
     let count = factors.first().map_or(0, |factor| factor.len());
     (0..count).map(|i| factors.iter().map(|factor| factor[i]).product()).collect()
@@ -424,10 +446,12 @@ fn cell_edges(curves: &[&Curve], [from, to]: [f64; 2], fixed: &[f64]) -> Vec<f64
     knots.extend([from, to]);
     knots.sort_by(f64::total_cmp);
     knots.dedup();
+    // As fine for a narrow line as for all visible light.
+    let step = STEP.min((to - from) / CELLS);
     let mut edges = vec![from];
     for ends in knots.windows(2) {
         let [a, b] = [ends[0], ends[1]];
-        let parts = ((b - a) / STEP).ceil().clamp(FINE, 1e5);
+        let parts = ((b - a) / step).ceil().clamp(FINE, 1e5);
         let mut k = 1.0;
         while k < parts {
             edges.push(a + (b - a) * (k / parts));
@@ -470,16 +494,11 @@ impl Nodes {
         sums
     }
 
-    /// The mean of functions, each scaled so that all bring the same when weighted.
-    fn mean(&self, functions: &[Vec<f64>], weight: &[f64]) -> Vec<f64> {
-        let mut mean = vec![0.0; self.nm.len()];
-        for function in functions {
-            let total = self.sums(&[function, weight]).last().copied().unwrap_or(0.0);
-            if total > 0.0 {
-                mean.iter_mut().zip(function).for_each(|(sum, value)| *sum += value / total);
-            }
-        }
-        mean
+    /// Factors by which all functions bring the same when weighted; 0 for those that bring nothing.
+    fn scales(&self, functions: &[Vec<f64>], weight: &[f64]) -> Vec<f64> {
+        let total = |f: &Vec<f64>| self.sums(&[f, weight]).last().copied().unwrap_or(0.0);
+        let scale = |total: f64| if total > 0.0 { 1.0 / total } else { 0.0 };
+        functions.iter().map(|function| scale(total(function))).collect()
     }
 
     /// The function through its values at the places.

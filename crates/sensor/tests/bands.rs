@@ -6,6 +6,12 @@ use etendue_sensor::{Illumination, Sensor, SensorSpec};
 use etendue_spectrum::{Curve, Illuminant, Lanes, Outside, rgb};
 use serde_json::{Value, json};
 
+/// A channel's share of photons that become electrons, by wavelength (nm).
+type Channel<'a> = &'a dyn Fn(f64) -> f64;
+
+/// Keys of a sensor, lights, a filter, how many colours, channels and their wavelengths (nm).
+type Trial<'a> = (Value, Vec<&'a Curve>, &'a Curve, usize, Vec<Channel<'a>>, [f64; 2]);
+
 const HC: f64 = 6.626_070_15e-34 * 299_792_458.0;
 
 fn sensor(keys: &Value) -> Sensor {
@@ -88,8 +94,10 @@ fn electrons_are_those_of_an_integration_by_the_nanometre() {
     let primary = |k: usize| move |nm: f64| rgb::PRIMARIES[k].at(nm).unwrap_or(0.0);
     let (red, green, blue) = (primary(0), primary(1), primary(2));
     let of_silicon = |nm: f64| qe.at(nm).unwrap_or(0.0);
-    type Channel<'a> = &'a dyn Fn(f64) -> f64;
-    let cases: [(Value, Vec<&Curve>, &Curve, usize, Vec<Channel<'_>>, [f64; 2]); 9] = [
+    let narrow = Curve::sampled(vec![[584.0, 0.0], [589.0, 1.0], [594.0, 0.0]]).unwrap();
+    let rgbw: Vec<Channel<'_>> = vec![&red, &green, &blue, &clear];
+    let cases: [Trial<'_>; 10] = [
+        (json!({ "cfa": "rgbw" }), vec![&narrow], &one, 2, rgbw, visible),
         (json!({ "cfa": "rgbw" }), vec![&a], &one, 0, vec![&red, &green, &blue, &clear], visible),
         (json!({ "cfa": "rgbw" }), vec![&a], &one, 2, vec![&red, &green, &blue, &clear], visible),
         (json!({}), vec![&d65], &one, 2, vec![&clear], visible),
@@ -128,36 +136,41 @@ fn electrons_are_those_of_an_integration_by_the_nanometre() {
             visible,
         ),
     ];
-    for (keys, lights, filter, colored, channels, range) in cases {
-        let own = sensor(&keys);
-        let illumination = Illumination {
-            spectra: lights.iter().copied().cloned().collect(),
-            filters: if *filter == one { vec![] } else { vec![filter.clone()] },
-            colored,
-        };
-        let chosen = own.lanes_under(&illumination).unwrap();
-        let error = chosen.error.unwrap();
-        println!(
-            "{keys} {} lights, {colored} colours: {} lanes, {error:.1e}",
-            lights.len(),
-            chosen.lanes.count()
-        );
-        assert!(error <= TOLERANCE, "{keys}: {error}");
-        let lit = own.in_lanes(chosen.lanes).unwrap();
-        for (c, channel) in channels.iter().enumerate() {
-            for light in &lights {
-                let white = summed([light, filter], &[], *channel, range);
-                for colours in colours(colored) {
-                    let exact = summed([light, filter], &colours, *channel, range);
-                    let found = rendered(&lit, c, [light, filter], &colours);
-                    // The promise, and what steps of a quarter of a nanometre lose at edges of filters.
-                    let dark = [1.0, 0.1, 1.0][colours.len()];
-                    let within = 1.05 * TOLERANCE * exact.max(dark * white) + 1e-4 * exact;
-                    assert!(
-                        (found - exact).abs() <= within,
-                        "{keys} channel {c} {colours:?}: {found} {exact}"
-                    );
-                }
+    for trial in cases {
+        check(trial);
+    }
+}
+
+/// Chooses lanes for a trial and compares every light and colour in every channel.
+fn check((keys, lights, filter, colored, channels, range): Trial<'_>) {
+    let own = sensor(&keys);
+    let illumination = Illumination {
+        spectra: lights.iter().copied().cloned().collect(),
+        filters: if *filter == Curve::ONE { vec![] } else { vec![filter.clone()] },
+        colored,
+    };
+    let chosen = own.lanes_under(&illumination).unwrap();
+    let error = chosen.error.unwrap();
+    println!(
+        "{keys} {} lights, {colored} colours: {} lanes, {error:.1e}",
+        lights.len(),
+        chosen.lanes.count()
+    );
+    assert!(error <= TOLERANCE, "{keys}: {error}");
+    let lit = own.in_lanes(chosen.lanes).unwrap();
+    for (c, channel) in channels.iter().enumerate() {
+        for light in &lights {
+            let white = summed([light, filter], &[], *channel, range);
+            for colours in colours(colored) {
+                let exact = summed([light, filter], &colours, *channel, range);
+                let found = rendered(&lit, c, [light, filter], &colours);
+                // The promise, and what steps of a quarter of a nanometre lose at edges of filters.
+                let dark = [1.0, 0.1, 1.0][colours.len()];
+                let within = 1.05 * TOLERANCE * exact.max(dark * white) + 1e-4 * exact;
+                assert!(
+                    (found - exact).abs() <= within,
+                    "{keys} channel {c} {colours:?}: {found} {exact}"
+                );
             }
         }
     }

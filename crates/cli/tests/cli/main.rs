@@ -14,8 +14,8 @@ mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // lenses against other software, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers
 mod openings_and_glasses; // f-numbers that a lens lacks, glasses of earlier catalogues and of one's own
-mod pictures; // exposure, tone maps, transparency, and which light there is
 mod photons; // electrons and noise of sensors, against sums by the nanometre
+mod pictures; // exposure, tone maps, transparency, and which light there is
 mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
 mod sensor; // presets, curves, series of a characterisation
