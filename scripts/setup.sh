@@ -22,6 +22,7 @@ has_libclang() {
 }
 
 command -v cc >/dev/null || need "to link Rust programs" gcc libc6-dev
+command -v c++ >/dev/null || need "to build meshoptimizer, which decodes compressed glTF" g++
 has_embree || need "to intersect rays with meshes: Embree" libembree-dev
 has_libclang || need "to read Embree's header" libclang-dev
 [ -e /etc/ssl/certs/ca-certificates.crt ] || need "for cargo to fetch crates over TLS" ca-certificates

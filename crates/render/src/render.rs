@@ -185,7 +185,8 @@ impl Images {
         for result in results {
             images.decoded.push(result.map(|result| {
                 result.unwrap_or_else(|error| {
-                    images.faults.push(format!("{error}; shown as magenta squares"));
+                    let shown = "where it is a colour, magenta squares show it; data are left out";
+                    images.faults.push(format!("{error}; {shown}"));
                     Image::missing()
                 })
             }));

@@ -36,6 +36,8 @@ mod parts;
 mod paths;
 pub mod scene;
 pub mod shape;
+mod sniff;
+mod words;
 
 pub use cameras::{CameraOrigin, SceneCamera};
 pub use doctor::Diagnosis;

@@ -15,6 +15,7 @@ use crate::SceneError;
 use crate::file::{SceneFile, join, join_index};
 use crate::import::Wanted;
 use crate::paths::Folder;
+use crate::words::plain;
 
 /// The scene's own materials in the order of their names, and the images that they name.
 #[derive(Debug, Default)]
@@ -209,7 +210,7 @@ fn refractive_index(spec: &IorSpec) -> Result<Ior, Fault> {
         IorSpec::Glass(name) => Value::from(name.as_str()),
         IorSpec::Abbe(abbe) => serde_json::json!({ "nd": abbe.nd, "vd": abbe.vd }),
     };
-    let spec: GlassSpec = serde_json::from_value(words).map_err(|e| fault(e.to_string()))?;
+    let spec: GlassSpec = serde_json::from_value(words).map_err(|e| fault(plain(&e)))?;
     let glass = spec.resolve().map_err(|e| fault(e.to_string()))?;
     let step = 5.0;
     let samples: Vec<[f64; 2]> = (50..=500)

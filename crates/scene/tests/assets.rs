@@ -64,7 +64,8 @@ const GLTF: [(&str, u64, &str); 12] = [
     ("Cameras/Cameras.gltf", 2, "0 0 -0.70759 1 0.70662 0"),
     ("SphereLights/sphere_lights.gltf", 224, "-1 -1 -1 1 1 1"),
     ("Mirror/one_face_123_mirror.gltf", 1, "-3 -0.10998 0 -1 -0.01 0"),
-    ("Sundial/Sundial.glb", 15_546, "-0.55 -0.08854 -0.57288 0.55 0.45618 0.55"),
+    // Without the nodes that it hides, 6 192 triangles of its 15 546.
+    ("Sundial/Sundial.glb", 9_354, "-0.52666 0 -0.57288 0.52666 0.45618 0.42135"),
     ("WhackAMole/WhackAMole.glb", 85_698, "-0.5 0 -0.5 0.5 0.05966 0.5"),
     ("VertexCount32/01_vertex_count_32bit.gltf", 130_380, "-1 -1 -2.62654 1 1 2.8"),
     ("NodeHierarchy/02_node_hierarchy.gltf", 60, "-1 -1 -1 5 5 1"),

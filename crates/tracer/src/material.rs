@@ -93,6 +93,9 @@ pub struct GltfSurface {
     pub roughness: f64,
     /// Roughness in green, metal in blue (linear).
     pub metallic_roughness: Option<TextureUse>,
+    /// Glossiness in alpha, which makes the roughness 1 − (1 − roughness) · alpha in place of
+    /// [`Self::metallic_roughness`] (`KHR_materials_pbrSpecularGlossiness`).
+    pub glossiness_texture: Option<TextureUse>,
     /// Refractive index of the dielectric (`KHR_materials_ior`).
     pub ior: f64,
     /// Strength of the dielectric's reflection (`KHR_materials_specular`), 0..=1.
@@ -115,6 +118,7 @@ impl Default for GltfSurface {
             metallic: 1.0,
             roughness: 1.0,
             metallic_roughness: None,
+            glossiness_texture: None,
             ior: 1.5,
             specular: 1.0,
             specular_texture: None,
@@ -211,6 +215,7 @@ impl Material {
         }
         if let Scattering::Gltf(surface) = &mut self.scattering {
             uses.extend(surface.metallic_roughness.as_mut());
+            uses.extend(surface.glossiness_texture.as_mut());
             uses.extend(surface.specular_texture.as_mut());
             uses.extend(surface.specular_color_texture.as_mut());
             uses.extend(surface.transmission_texture.as_mut());

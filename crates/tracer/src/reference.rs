@@ -5,7 +5,6 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vertices};
 
 use crate::footprint::mean_of_squares;
-use crate::texture::Encoding;
 use crate::{
     Color, Footprint, Image, LayerSpec, Material, NormalKind, Paint, Pixel, Space, TextureUse,
 };
@@ -231,37 +230,49 @@ impl Surroundings<'_> {
                 [r, g, b, 1.0]
             }
             Paint::Image { factor, image } => {
-                let [r, g, b, a] = self.texel(image, spot);
+                let [r, g, b, a] = self.tint(image, spot);
                 [factor[0] * r, factor[1] * g, factor[2] * b, a]
             }
         }
     }
 
-    /// What a use of an image says at a spot; white without the image.
+    /// The colour that a use of an image has at a spot, whatever its encoding: the magenta checker
+    /// where the image cannot be had, white where nobody asked for it.
+    #[must_use]
+    pub fn tint(&self, image: &TextureUse, spot: &Spot<'_>) -> [f64; 4] {
+        self.decoded(image).map_or([1.0; 4], |pixels| Self::over(pixels, image, spot))
+    }
+
+    /// What an image of data (a roughness, a share) says at a spot; 1 without the image.
     #[must_use]
     pub fn texel(&self, image: &TextureUse, spot: &Spot<'_>) -> [f64; 4] {
         self.lookup(image, spot).unwrap_or([1.0; 4])
     }
 
-    /// What a use of an image says at a spot, averaged over the spot's footprint; `None` without the
-    /// image.
+    /// What an image of data says at a spot; `None` without the image.
     #[must_use]
     pub fn lookup(&self, image: &TextureUse, spot: &Spot<'_>) -> Option<[f64; 4]> {
-        let pixels = self.images.get(image.texture as usize)?.as_ref()?;
         // Magenta is for looking at, not a roughness or a tilt.
-        if pixels.stands_in() && image.encoding == Encoding::Linear {
-            return None;
-        }
+        let pixels = self.decoded(image).filter(|pixels| !pixels.stands_in())?;
+        Some(Self::over(pixels, image, spot))
+    }
+
+    fn decoded(&self, image: &TextureUse) -> Option<&Image> {
+        self.images.get(image.texture as usize)?.as_ref()
+    }
+
+    /// The pixels of a use of an image, averaged over the spot's footprint.
+    fn over(pixels: &Image, image: &TextureUse, spot: &Spot<'_>) -> [f64; 4] {
         let set = image.uv_set as usize;
         let [u, v] = spot.uv(set);
         let at = image.transform.map(|[a, b, c]| a * u + b * v + c);
-        Some(match spot.extent(set) {
+        match spot.extent(set) {
             None => pixels.sample(at, image.encoding),
             Some(axes) => {
                 let axes = axes.map(|[u, v]| image.transform.map(|[a, b, _]| a * u + b * v));
                 pixels.sample_over(at, axes, image.encoding)
             }
-        })
+        }
     }
 
     /// Share of ambient light that reaches hit `i`.

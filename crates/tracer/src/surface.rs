@@ -82,10 +82,15 @@ impl<'a> Met<'a> {
             None => [1.0; 4],
         };
         let rough = texel(&own.metallic_roughness);
-        let roughness = (own.roughness * rough[1]).clamp(0.0, 1.0);
+        let roughness = match &own.glossiness_texture {
+            Some(_) => 1.0 - (1.0 - own.roughness) * texel(&own.glossiness_texture)[3],
+            None => own.roughness * rough[1],
+        };
+        let roughness = roughness.clamp(0.0, 1.0);
         let specular = (own.specular * texel(&own.specular_texture)[3]).clamp(0.0, 1.0);
         let face_on = fresnel::normal_reflectance(own.ior);
-        let tint = texel(&own.specular_color_texture);
+        let tint = own.specular_color_texture.as_ref();
+        let tint = tint.map_or([1.0; 4], |image| around.tint(image, &self.spot));
         // The extension caps the reflectance face on at 1.
         let most = if face_on > 0.0 { 1.0 / face_on } else { f64::INFINITY };
         let highlight = std::array::from_fn(|k| (own.specular_color[k] * tint[k]).min(most));

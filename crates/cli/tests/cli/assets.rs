@@ -15,7 +15,8 @@ const MODELS: [(&str, u64, [f64; 6]); 13] = [
     ("gltf/Cameras/Cameras.gltf", 2, [0.0, 0.0, -0.70759, 1.0, 0.70662, 0.0]),
     ("gltf/SphereLights/sphere_lights.gltf", 224, [-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]),
     ("gltf/Mirror/one_face_123_mirror.gltf", 1, [-3.0, -0.10998, 0.0, -1.0, -0.01, 0.0]),
-    ("gltf/Sundial/Sundial.glb", 15546, [-0.55, -0.08854, -0.57288, 0.55, 0.45618, 0.55]),
+    // Without the nodes that it hides, 6192 triangles of its 15546.
+    ("gltf/Sundial/Sundial.glb", 9354, [-0.52666, 0.0, -0.57288, 0.52666, 0.45618, 0.42135]),
     ("gltf/WhackAMole/WhackAMole.glb", 85698, [-0.5, 0.0, -0.5, 0.5, 0.05966, 0.5]),
     (
         "gltf/VertexCount32/01_vertex_count_32bit.gltf",

@@ -54,6 +54,29 @@ fn textures_that_cannot_be_had_are_magenta_and_told_or_refused_when_strict() {
     }
 }
 
+/// A colour is a colour whatever its encoding; a roughness that cannot be had is left out.
+#[test]
+fn broken_images_of_linear_colours_are_magenta_too() {
+    for (encoding, ending) in [("srgb", "png"), ("linear", "png"), ("linear", "webp")] {
+        let image = format!("wood.{ending}");
+        let scene = serde_json::json!({
+            "etendue": 1, "tracer": {"type": "flat"},
+            "camera": {"type": "orthographic", "height": 1, "sensor": {"resolution": [8, 8]},
+                       "pose": {"from": [0, 0, 2], "look_at": [0, 0, 0]}},
+            "objects": [{"shape": "rectangle", "material": "m"}],
+            "materials": {"m": {"type": "matte", "color": {"image": image, "encoding": encoding}}}
+        });
+        let bench = Bench::with_scene(&scene.to_string());
+        bench.write(&image, b"not much of an image");
+        bench.render(&["--report", "report.json"]);
+        let picture = bench.array("picture");
+        let magenta = picture.chunks(3).filter(|p| **p == [1.0, 0.0, 1.0]).count();
+        assert_eq!(magenta, 32, "{encoding}: two of four squares");
+        let notes = bench.json("report.json")["notes"].to_string();
+        assert!(notes.contains("where it is a colour, magenta squares"), "{notes}");
+    }
+}
+
 #[test]
 fn images_that_the_scene_itself_names_have_to_be_there() {
     let scene = r#"{"etendue": 1, "tracer": {"type": "flat"},

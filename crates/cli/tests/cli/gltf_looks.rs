@@ -419,3 +419,92 @@ fn what_has_no_light_is_lit_by_the_studio_unless_it_shall_be_dark() {
     assert_eq!(notes.as_array().map(Vec::len), Some(1), "{notes}");
     assert!(notes[0].as_str().is_some_and(|note| note.contains("no light reaches")), "{notes}");
 }
+
+/// A specular-glossiness material.
+fn glossy(own: &Value) -> Value {
+    json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": own}})
+}
+
+#[test]
+fn specular_glossiness_is_a_reflectance_over_a_diffuse_colour() {
+    // A mirror face on reflects its reflectance of a sky of 1.
+    let mirror = json!({"diffuseFactor": [0, 0, 0, 1], "specularFactor": [0.5, 0.25, 1]});
+    let used = json!({"extensionsUsed": ["KHR_materials_pbrSpecularGlossiness"]});
+    let bench = stage(&glossy(&mirror), &used, &json!({}));
+    assert_shows(&bench, [0.5, 0.25, 1.0], "a mirror");
+    let notes = bench.json("report.json")["notes"].to_string();
+    assert!(notes.contains("read as KHR_materials_specular with ior 0"), "{notes}");
+
+    // The diffuse colour is the base colour.
+    let diffuse = json!({"diffuseFactor": [0.25, 0.5, 0.75, 1], "glossinessFactor": 0});
+    let bench = stage(&glossy(&diffuse), &used, &json!({"tracer": {"type": "flat"}}));
+    assert_shows(&bench, [0.25, 0.5, 0.75], "the base colour");
+
+    // Texel 128 is 0.2158605 by the sRGB curve (IEC 61966-2-1).
+    let texture = json!({"diffuseFactor": [0, 0, 0, 1], "specularGlossinessTexture": {"index": 0}});
+    let bench = stage(&glossy(&texture), &textured(&json!({})), &json!({}));
+    bench.write("t.png", &texels(GREY));
+    assert_shows(&bench, [0.215_860_5; 3], "a mirror by its texture");
+}
+
+#[test]
+fn glossiness_is_in_the_alpha_of_its_texture() {
+    let half = json!({"diffuseFactor": [0, 0, 0, 1], "specularGlossinessTexture": {"index": 0}});
+    let by_texture = stage(&glossy(&half), &textured(&json!({})), &lamp_in_front());
+    by_texture.write("t.png", &texels([[255, 255, 255, 102]; 4]));
+    // The same reflectance in the words of the metallic-roughness model: 1 − 102/255.
+    let rough = json!({
+        "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0,
+                                 "roughnessFactor": 0.6},
+        "extensions": {"KHR_materials_ior": {"ior": 0}, "KHR_materials_specular": {}}
+    });
+    let by_factor = stage(&rough, &json!({}), &lamp_in_front());
+    let (texture, factor) = (pixels(&by_texture), pixels(&by_factor));
+    assert!(factor.iter().any(|p| p[0] > 0.01), "the lamp is seen in it");
+    for (a, b) in texture.iter().zip(&factor) {
+        // Factors of glTF are f32; the same numbers of the sampler make the same picture.
+        assert!((a[0] - b[0]).abs() <= 1e-4 * b[0].max(1e-3), "{a:?} is not {b:?}");
+    }
+}
+
+/// A small lamp before the square and no other light.
+fn lamp_in_front() -> Value {
+    json!({
+        "lights": [],
+        "objects": [{"file": "m.gltf"},
+            {"shape": "rectangle", "width": 1, "height": 1, "material": "lamp",
+             "transform": {"translate": [0, 0, 6], "rotate": [0, 1, 0, 180]}}],
+        "materials": {"lamp": {"type": "emissive", "radiance": [1, 1, 1]}},
+    })
+}
+
+#[test]
+fn textures_in_webp_are_decoded() {
+    // 2 × 2 texels, red, green, blue and grey, by libwebp 1.6.0 without loss.
+    const WEBP: [u8; 56] = [
+        0x52, 0x49, 0x46, 0x46, 0x30, 0x00, 0x00, 0x00, 0x57, 0x45, 0x42, 0x50, 0x56, 0x50, 0x38,
+        0x4c, 0x23, 0x00, 0x00, 0x00, 0x2f, 0x01, 0x40, 0x00, 0x00, 0x1f, 0x20, 0x10, 0x20, 0x38,
+        0x77, 0x6e, 0x43, 0x40, 0x50, 0x74, 0xdd, 0x72, 0x02, 0x01, 0x82, 0x73, 0xe7, 0xe6, 0x3f,
+        0xf0, 0xc9, 0x51, 0xc1, 0x0d, 0x18, 0x22, 0xfa, 0x1f, 0x02, 0x00,
+    ];
+    let rest = json!({
+        "textures": [{"sampler": 0, "extensions": {"EXT_texture_webp": {"source": 0}}}],
+        "images": [{"uri": "t.webp", "mimeType": "image/webp"}],
+        "samplers": [{"magFilter": 9728}],
+        "extensionsUsed": ["EXT_texture_webp"], "extensionsRequired": ["EXT_texture_webp"]
+    });
+    let colour = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}});
+    let flat = json!({"tracer": {"type": "flat"}, "render": {"samples": 1}});
+    let bench = stage(&colour, &rest, &flat);
+    bench.write("t.webp", &WEBP);
+    let pixels = pixels(&bench);
+    assert_eq!(bench.json("report.json")["notes"], json!([]));
+    for (at, expected) in
+        [(0, [1.0, 0.0, 0.0]), (7, [0.0, 1.0, 0.0]), (56, [0.0, 0.0, 1.0]), (63, [0.215_860_5; 3])]
+    {
+        for k in 0..3 {
+            // Pictures are f32.
+            assert!((pixels[at][k] - expected[k]).abs() < 1e-6, "{:?}", pixels[at]);
+        }
+    }
+}

@@ -5,6 +5,7 @@
 //! with the key that was meant. Only the words of JSON Schema (2020-12) that our types produce are
 //! understood.
 
+mod allowed;
 mod choice;
 
 use etendue_geometry::units::Dimension;
@@ -109,7 +110,7 @@ impl<'a> Checker<'a> {
         if let Some(expected) = schema.get("const")
             && expected != value
         {
-            return problem(path, format!("{} is not {expected}", show(value)));
+            return problem(path, allowed::not_the_one(value, expected));
         }
         if let Some(words) = schema.get("enum").and_then(Value::as_array)
             && !words.contains(value)
@@ -147,8 +148,7 @@ impl<'a> Checker<'a> {
         if expected.iter().any(|kind| is_kind(kind, value)) {
             return Ok(());
         }
-        let reason = format!("expected {}, found {}", words_for(&expected), show(value));
-        problem(path, reason)
+        problem(path, allowed::wrong_kind(value, &expected))
     }
 
     fn range(schema: &Value, value: &Value, path: &str) -> Outcome {
@@ -219,7 +219,7 @@ impl<'a> Checker<'a> {
         Ok(())
     }
 
-    /// That `key` is missing, and what it is for.
+    /// That `key` is missing, what it is for, and what it may be.
     fn missing(&self, schema: &'a Value, key: &str) -> String {
         let member = schema.get("properties").and_then(|all| all.get(key));
         let about = member
@@ -228,10 +228,11 @@ impl<'a> Checker<'a> {
             })
             .and_then(Value::as_str)
             .map(|text| text.replace('\n', " "));
-        match about {
-            Some(about) => format!("the key `{key}` is missing: {about}"),
-            None => format!("the key `{key}` is missing"),
-        }
+        let about =
+            about.map_or_else(String::new, |text| format!(": {}", text.trim_end_matches('.')));
+        let allowed = member.and_then(|member| self.allowed(member));
+        let allowed = allowed.map_or_else(String::new, |allowed| format!("; give it {allowed}"));
+        format!("the key `{key}` is missing{about}{allowed}")
     }
 
     /// Whether `value` is of a kind that `schema` takes at all.

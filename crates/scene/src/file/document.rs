@@ -4,6 +4,8 @@ use std::collections::HashSet;
 
 use serde_json::Value;
 
+use crate::words::plain;
+
 /// A place in a text, both counted from 1; the column in characters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Place {
@@ -34,11 +36,8 @@ impl Document {
     /// has a key twice.
     pub(crate) fn parse(text: String) -> Result<(Self, Value), Fault> {
         let value: Value = serde_json::from_str(&text).map_err(|error| {
-            let reason = error.to_string();
-            // serde_json puts the place behind its sentence; ours stands in front.
-            let reason = reason.rsplit_once(" at line ").map_or(&*reason, |(head, _)| head);
             let place = character_place(&text, error.line(), error.column());
-            Fault { place, reason: reason.to_owned() }
+            Fault { place, reason: plain(&error) }
         })?;
         let mut scanner = Scanner { text: &text, at: 0, wanted: None, found: None };
         if let Err(Wrong { at, reason }) = scanner.value("") {

@@ -14,6 +14,7 @@ use serde_json::Value;
 use super::{SceneFile, Written, check, lenient, read_document};
 use crate::SceneError;
 use crate::paths::{Folder, Reach};
+use crate::words::plain;
 
 /// The keys of a scene that no lens file has.
 const SCENE_KEYS: [&str; 3] = ["etendue", "camera", "objects"];
@@ -120,7 +121,7 @@ fn read_as<T: DeserializeOwned>(
     serde_path_to_error::deserialize(value).map_err(|error| {
         let path = error.path().to_string();
         let path = if path == "." { "" } else { &path };
-        written.fault(path, error.inner().to_string())
+        written.fault(path, plain(error.inner()))
     })
 }
 

@@ -28,10 +28,12 @@ pub use sensor::SensorFile;
 pub use settings::{AccelName, Auto, Exposure, RenderSpec, ToneMap, TracerSpec};
 pub use spec::{SceneSpec, Version};
 
-pub(crate) use check::{nearest, suggest};
+pub(crate) use check::{kind_of, nearest, suggest};
 pub(crate) use document::{join, join_index};
 
 use crate::SceneError;
+use crate::sniff::what_it_is;
+use crate::words::plain;
 use document::{Document, excerpt};
 
 /// The endings of models that may stand in for a scene file.
@@ -117,7 +119,7 @@ impl SceneFile {
         let spec = serde_path_to_error::deserialize(&value).map_err(|error| {
             let path = error.path().to_string();
             let path = if path == "." { String::new() } else { path };
-            self.fault(&path, error.into_inner().to_string())
+            self.fault(&path, plain(error.inner()))
         })?;
         Ok((spec, sensor))
     }
@@ -214,9 +216,13 @@ fn is_model(path: &Path) -> bool {
 }
 
 fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
-    let text = String::from_utf8(read_bytes(path)?).map_err(|error| SceneError::NotAScene {
-        file: path.to_owned(),
-        reason: format!("is not UTF-8 text (byte {})", error.utf8_error().valid_up_to()),
+    let bytes = read_bytes(path)?;
+    let not_a_scene = |reason| SceneError::NotAScene { file: path.to_owned(), reason };
+    if let Some(what) = what_it_is(&bytes) {
+        return Err(not_a_scene(format!("is {what}, not JSON text")));
+    }
+    let text = String::from_utf8(bytes).map_err(|error| {
+        not_a_scene(format!("is not UTF-8 text (byte {})", error.utf8_error().valid_up_to()))
     })?;
     let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
     Document::parse(text.clone()).map_err(|fault| SceneError::Syntax {

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::{Written, check, lenient, read_document, schema};
 use crate::SceneError;
+use crate::words::plain;
 
 /// Where a scene keeps its sensor.
 const IN_SCENE: &str = "camera.sensor";
@@ -93,12 +94,12 @@ fn built(
     let mut object = object.clone();
     if let Some(pitch) = object.get_mut("pixel_pitch").filter(|pitch| pitch.is_string()) {
         let Micrometres(number) = Micrometres::deserialize(&*pitch)
-            .map_err(|error| written.fault(&inside(place, "pixel_pitch"), error.to_string()))?;
+            .map_err(|error| written.fault(&inside(place, "pixel_pitch"), plain(&error)))?;
         *pitch = number.into();
     }
     let spec: SensorSpec = serde_path_to_error::deserialize(&object).map_err(|error| {
         let path = inside(place, &error.path().to_string());
-        written.fault(&path, error.into_inner().to_string())
+        written.fault(&path, plain(error.inner()))
     })?;
     let sensor = Sensor::new(&spec)
         .map_err(|error| written.fault(&inside(place, error.at()), error.why()))?;

@@ -84,7 +84,13 @@ impl ImportError {
     }
 }
 
-/// The offending line below the message.
+/// The offending line below the message; nothing when it is no text that one could read.
 fn excerpt(text: &str) -> String {
-    if text.is_empty() { String::new() } else { format!("\n    {text}") }
+    let is_odd = |c: &char| c.is_control() || *c == char::REPLACEMENT_CHARACTER;
+    match text.chars().filter(is_odd).count() {
+        0 if text.is_empty() => String::new(),
+        0 => format!("\n    {text}"),
+        odd if odd * 8 > text.chars().count() => String::new(),
+        _ => format!("\n    {}", text.replace(char::is_control, " ")),
+    }
 }

@@ -29,6 +29,7 @@ use etendue_tracer::{Light, LightKind, Material, Texture};
 pub use error::ImportError;
 pub use note::{Note, NoteKind};
 
+use crate::sniff::what_it_is;
 use files::Files;
 
 /// What the render will look at; the rest of the file is left alone.
@@ -201,6 +202,18 @@ pub struct Stats {
     pub dropped: u64,
     /// Triangles of zero area, when they were to be counted.
     pub degenerate: Option<u64>,
+}
+
+/// Refuses a file whose bytes are those of something else than `wanted`.
+fn refuse_other_kind(file: &Path, bytes: &[u8], wanted: &str) -> Result<(), ImportError> {
+    match what_it_is(bytes) {
+        Some(what) => Err(ImportError::Damaged {
+            file: file.to_owned(),
+            place: "the file".to_owned(),
+            reason: format!("it is {what}, not {wanted}; name the model itself"),
+        }),
+        None => Ok(()),
+    }
 }
 
 /// Reads the model at `path`; its ending tells the format: `gltf`, `glb`, `obj` or `ply`.

@@ -353,3 +353,22 @@ fn a_byte_order_mark_is_passed_over() {
     let text = "\u{feff}{\"asset\": {\"version\": \"2.0\"}}";
     assert!(load(&write(&folder, "a.gltf", text)).meshes.is_empty());
 }
+
+#[test]
+fn hidden_nodes_hide_all_below_them() {
+    let folder = folder();
+    let hidden = json!({"KHR_node_visibility": {"visible": false}});
+    let nodes = json!([
+        {"extensions": hidden, "children": [1]},
+        {"mesh": 0, "camera": 0, "extensions": {"KHR_node_visibility": {"visible": true}}},
+        {"mesh": 0, "name": "seen", "extensions": {"KHR_node_visibility": {}}},
+    ]);
+    let rest = json!({
+        "nodes": nodes, "extensionsRequired": ["KHR_node_visibility"],
+        "cameras": [{"perspective": {"yfov": 1}}]
+    });
+    let import = load(&write(&folder, "hidden.glb", square_glb(json!({}), rest, |_| {})));
+    let names: Vec<&str> = import.placements.iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(names, ["seen"]);
+    assert_eq!(import.cameras.len(), 1, "cameras have nothing to show");
+}

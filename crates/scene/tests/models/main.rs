@@ -5,6 +5,7 @@ mod build;
 mod damaged;
 mod gltf;
 mod obj;
+mod packed;
 mod ply;
 mod skins;
 

@@ -2,7 +2,8 @@
 
 use serde_json::{Map, Value};
 
-use super::{Checker, Outcome, join, problem, show, suggest, words_for};
+use super::allowed::wrong_kind;
+use super::{Checker, Outcome, Problem, join, nearest, problem, show, suggest};
 
 impl<'a> Checker<'a> {
     /// Goes on in the branch that was meant: by tag, by the kind of value, or by the keys.
@@ -18,8 +19,7 @@ impl<'a> Checker<'a> {
         match (&fitting[..], value) {
             ([], _) => {
                 let kinds: Vec<&str> = branches.iter().flat_map(|b| self.kinds(b)).collect();
-                let reason = format!("expected {}, found {}", words_for(&kinds), show(value));
-                problem(path, reason)
+                problem(path, wrong_kind(value, &kinds))
             }
             ([branch], _) => self.visit(branch, value, path),
             (objects, Value::Object(members)) => self.choose_object(objects, members, path),
@@ -62,7 +62,9 @@ impl<'a> Checker<'a> {
                         let inner: Vec<&Value> = inner.iter().map(|b| self.resolve(b)).collect();
                         self.choose_object(&inner, members, path)
                     }
-                    None => self.object(branch, members, path),
+                    None => self
+                        .object(branch, members, path)
+                        .map_err(|found| at_home_elsewhere(found, branches, members, path, word)),
                 };
             }
         }
@@ -103,13 +105,20 @@ impl<'a> Checker<'a> {
             (Some(best), _) if score(best).1.0 == 0 || keys.is_empty() => {
                 self.object(best, members, path)
             }
-            (_, Some(tag)) => problem(path, self.say_what_it_is(branches, tag)),
+            (_, Some(tag)) => self.say_what_it_is(branches, tag, members, path),
             (best, None) => best.map_or(Ok(()), |best| self.object(best, members, path)),
         }
     }
 
-    /// That an object says not which of several things it is, with all ways to say so.
-    fn say_what_it_is(&self, branches: &[&'a Value], tag: &str) -> String {
+    /// That an object says not which of several things it is, with all ways to say so; and with the
+    /// key that was probably meant for one.
+    fn say_what_it_is(
+        &self,
+        branches: &[&'a Value],
+        tag: &'a str,
+        members: &Map<String, Value>,
+        path: &str,
+    ) -> Outcome {
         let mut ways = Vec::new();
         let mut words = Vec::new();
         for branch in branches {
@@ -122,7 +131,19 @@ impl<'a> Checker<'a> {
             }
         }
         ways.push(format!("`{tag}` (one of {})", words.join(", ")));
-        format!("says not what it is; give it {}", ways.join(" or "))
+        let ways = ways.join(" or ");
+        let known: Vec<&str> = branches.iter().flat_map(|branch| keys_of(branch)).collect();
+        match members.keys().find(|key| !known.contains(&key.as_str())) {
+            Some(key) => {
+                let near = match nearest(key, std::iter::once(tag).chain(known)) {
+                    Some(near) => format!("did you mean `{near}`? "),
+                    None => String::new(),
+                };
+                let reason = format!("unknown key; {near}give the object {ways}");
+                problem(&join(path, key), reason)
+            }
+            None => problem(path, format!("says not what it is; give it {ways}")),
+        }
     }
 
     pub(super) fn no_such_word(words: &[&Value], value: &Value, path: &str) -> Outcome {
@@ -132,5 +153,34 @@ impl<'a> Checker<'a> {
         let known = words.iter().filter_map(|word| word.as_str());
         let given = value.as_str().unwrap_or_default();
         problem(path, format!("{} is not known here{}", show(value), suggest(given, known)))
+    }
+}
+
+/// The keys that a branch knows.
+fn keys_of(branch: &Value) -> impl Iterator<Item = &str> {
+    let keys = branch.get("properties").and_then(Value::as_object);
+    keys.into_iter().flatten().map(|(key, _)| key.as_str())
+}
+
+/// A key that a branch refuses and another one knows does not go with the word that chose the branch.
+fn at_home_elsewhere(
+    found: Problem,
+    branches: &[&Value],
+    members: &Map<String, Value>,
+    path: &str,
+    word: &str,
+) -> Problem {
+    let Some(known) = found.reason.strip_prefix("unknown key") else { return found };
+    let elsewhere = |key: &&String| {
+        found.path == join(path, key)
+            && branches.iter().any(|b| keys_of(b).any(|k| k == key.as_str()))
+    };
+    match members.keys().find(elsewhere) {
+        Some(key) => {
+            let known = known.rsplit_once("known: ").map_or("", |(_, known)| known);
+            let reason = format!("`{key}` does not go with `{word}`; known: {known}");
+            Problem { path: found.path, reason }
+        }
+        None => found,
     }
 }

@@ -49,12 +49,16 @@ impl<'a> Reader<'a> {
     ) -> Result<Accessor<'a>, ImportError> {
         let place = format!("{place} (accessor {index})");
         let Some(accessor) = self.document.root.accessors.get(index) else {
-            return Err(self.damaged(place, "there is no such accessor; export the file again"));
+            let count = self.document.root.accessors.len();
+            return Err(self.absent(place, "accessor", index, count));
         };
         let (Checked::Valid(component), Checked::Valid(kind)) =
             (&accessor.component_type, &accessor.type_)
         else {
-            return Err(self.damaged(place, "its componentType or type is none that glTF knows"));
+            let reason = "its componentType is none of 5120, 5121, 5122, 5123, 5125 and 5126, or \
+                          its type none of SCALAR, VEC2, VEC3, VEC4, MAT2, MAT3 and MAT4; export \
+                          the file again";
+            return Err(self.damaged(place, reason));
         };
         let Some(count) = size(accessor.count).filter(|&count| u32::try_from(count).is_ok()) else {
             return Err(self.damaged(
@@ -99,7 +103,7 @@ impl<'a> Reader<'a> {
         offset: Option<usize>,
         place: &str,
     ) -> Result<(), ImportError> {
-        let view = self.view(view)?;
+        let view = self.view(view, place)?;
         let element = accessor.components * accessor.component.size();
         accessor.stride = view.stride.unwrap_or(element);
         if accessor.stride < element {

@@ -1,8 +1,9 @@
 //! Where the bytes of a glTF file are: in the GLB, in files beside it, in data URIs.
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
+use base64::DecodeError;
 use base64::Engine as _;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -11,6 +12,7 @@ use etendue_geometry::{Buffer, MappedFile};
 use gltf::json;
 
 use super::document::Document;
+use super::meshopt::Compressed;
 use super::{Reader, damaged};
 use crate::import::ImportError;
 use crate::import::files::Files;
@@ -60,6 +62,8 @@ impl Bytes {
 /// The buffers of a document; those that cannot be read say so once somebody needs them.
 pub(super) struct Buffers {
     buffers: Vec<Result<Bytes, Unread>>,
+    /// The bytes of compressed views, once somebody needs them.
+    decoded: Vec<OnceLock<Bytes>>,
 }
 
 /// A buffer without bytes of its own: another extension's placeholder.
@@ -75,7 +79,9 @@ impl Buffers {
     ) -> Result<Self, ImportError> {
         let mut used = vec![false; document.root.buffers.len()];
         for view in &document.root.buffer_views {
-            if let Some(used) = used.get_mut(view.buffer.value()) {
+            // The buffer of a compressed view itself is a placeholder, or holds it in plain.
+            let buffer = Compressed::of(view).and_then(|packed| packed.buffer());
+            if let Some(used) = used.get_mut(buffer.unwrap_or(view.buffer.value())) {
                 *used = true;
             }
         }
@@ -88,32 +94,44 @@ impl Buffers {
                 _ => Err(Unread),
             });
         }
-        Ok(Self { buffers })
+        let mut decoded = Vec::new();
+        decoded.resize_with(document.root.buffer_views.len(), OnceLock::new);
+        Ok(Self { buffers, decoded })
     }
 }
 
 impl Reader<'_> {
-    /// The bytes of buffer `index`.
-    fn buffer(&self, index: usize) -> Result<&Bytes, ImportError> {
+    /// The bytes of buffer `index`, which `from` names.
+    fn buffer(&self, index: usize, from: &str) -> Result<&Bytes, ImportError> {
         match self.buffers.buffers.get(index) {
             Some(Ok(bytes)) => Ok(bytes),
             Some(Err(Unread)) => Err(self.damaged(
                 format!("buffers[{index}]"),
                 "it has neither a uri nor a binary chunk; export the file again",
             )),
-            None => Err(self.damaged(format!("buffers[{index}]"), "there is no such buffer")),
+            None => Err(self.absent(
+                format!("{from}.buffer"),
+                "buffer",
+                index,
+                self.buffers.buffers.len(),
+            )),
         }
     }
 
-    /// The buffer of view `index`, and where in it the view starts and how long it is (bytes).
-    pub(super) fn view(&self, index: usize) -> Result<View<'_>, ImportError> {
+    /// The buffer of view `index`, and where in it the view starts and how long it is (bytes);
+    /// `from` is who names the view.
+    pub(super) fn view(&self, index: usize, from: &str) -> Result<View<'_>, ImportError> {
         let place = || format!("bufferViews[{index}]");
-        let Some(view) = self.document.root.buffer_views.get(index) else {
-            return Err(self.damaged(place(), "there is no such buffer view"));
+        let views = &self.document.root.buffer_views;
+        let Some(view) = views.get(index) else {
+            return Err(self.absent(from, "buffer view", index, views.len()));
         };
-        let buffer = self.buffer(view.buffer.value());
-        super::extensions::refuse_compressed_view(self.file, view, buffer.is_ok())?;
-        let bytes = buffer?;
+        let stride = view.byte_stride.map(|stride| stride.0).filter(|&stride| stride > 0);
+        if let Some(compressed) = Compressed::of(view) {
+            let bytes = self.decompressed(index, &compressed)?;
+            return Ok(View { bytes, start: 0, len: bytes.as_slice().len(), stride });
+        }
+        let bytes = self.buffer(view.buffer.value(), &place())?;
         let total = bytes.as_slice().len();
         let range = size(view.byte_offset.unwrap_or_default())
             .zip(size(view.byte_length))
@@ -129,8 +147,34 @@ impl Reader<'_> {
                 ),
             ));
         };
-        let stride = view.byte_stride.map(|stride| stride.0).filter(|&stride| stride > 0);
         Ok(View { bytes, start, len, stride })
+    }
+
+    /// The bytes of the compressed view `index`, decoded once.
+    fn decompressed(
+        &self,
+        index: usize,
+        compressed: &Compressed<'_>,
+    ) -> Result<&Bytes, ImportError> {
+        let known = &self.buffers.decoded[index];
+        if let Some(bytes) = known.get() {
+            return Ok(bytes);
+        }
+        let place = format!("bufferViews[{index}].extensions.{}", compressed.name);
+        let stream = compressed.stream().map_err(|reason| self.damaged(&place, reason))?;
+        let buffer = self.buffer(stream.buffer, &place)?.as_slice();
+        let end = stream.start.checked_add(stream.len);
+        let Some(packed) = end.and_then(|end| buffer.get(stream.start..end)) else {
+            let reason = format!(
+                "{} bytes from byte {} on lie outside its buffer of {} bytes; export the file again",
+                stream.len,
+                stream.start,
+                buffer.len()
+            );
+            return Err(self.damaged(place, reason));
+        };
+        let bytes = stream.decode(packed).map_err(|reason| self.damaged(place, reason))?;
+        Ok(known.get_or_init(|| Bytes::Memory(bytes.into())))
     }
 }
 
@@ -202,7 +246,23 @@ pub(super) fn data_uri(uri: &str) -> Option<Result<Vec<u8>, String>> {
     if !kind.ends_with(";base64") {
         return Some(Ok(percent_decoded_bytes(data)));
     }
-    Some(BASE64.decode(data).map_err(|error| format!("the data URI is not base64: {error}")))
+    Some(BASE64.decode(data).map_err(|error| not_base64(&error)))
+}
+
+fn not_base64(error: &DecodeError) -> String {
+    let why = match *error {
+        DecodeError::InvalidByte(at, byte) => {
+            format!("character {} is {:?}", at + 1, char::from(byte))
+        }
+        DecodeError::InvalidLength(len) => {
+            format!("{len} characters are no whole number of bytes; it is cut off")
+        }
+        DecodeError::InvalidLastSymbol { offset, .. } => {
+            format!("character {}, the last, cannot end it; it is cut off", offset + 1)
+        }
+        DecodeError::InvalidPadding => "the `=` at its end are too few or too many".to_owned(),
+    };
+    format!("the data URI is not sound base64: {why}; export the file again")
 }
 
 /// `uri` with its percent escapes (RFC 3986, section 2.1) undone; those that are none stay.

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use crate::import::ImportError;
+use crate::words::plain;
 
 /// A glTF document: crate `gltf`'s types, but for what is read in f64 here.
 pub(super) struct Document {
@@ -102,18 +103,10 @@ struct InF64 {
     skins: Vec<Skin>,
 }
 
-/// Reads the JSON of the glTF file at `path`.
-pub(super) fn parse(path: &Path, json: &[u8]) -> Result<Document, ImportError> {
-    let mut rest: Map<String, Value> = serde_json::from_slice(json).map_err(|error| {
-        let line = json.split(|&byte| byte == b'\n').nth(error.line().saturating_sub(1));
-        ImportError::Text {
-            file: path.to_owned(),
-            line: error.line(),
-            column: error.column(),
-            reason: format!("this is not the JSON of a glTF file: {}", reason(&error)),
-            text: excerpt(line.unwrap_or_default(), error.column()),
-        }
-    })?;
+/// Reads the JSON of the glTF file at `path`, whole or a chunk of a GLB.
+pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<Document, ImportError> {
+    let mut rest: Map<String, Value> =
+        serde_json::from_slice(json).map_err(|error| broken(path, json, in_glb, &error))?;
     require_version_2(path, &rest)?;
     let has_animations = rest.contains_key("animations");
     let mut taken = Map::new();
@@ -122,11 +115,15 @@ pub(super) fn parse(path: &Path, json: &[u8]) -> Result<Document, ImportError> {
             taken.insert(key, value);
         }
     }
-    let InF64 { nodes, scenes, cameras, skins } = typed(path, Value::Object(taken))?;
+    let whole = Value::Object(taken);
+    refuse_arrays(&whole, "").map_err(|place| not_an_object(path, place))?;
+    let InF64 { nodes, scenes, cameras, skins } = typed(path, whole)?;
     // The crate refuses documents for parts that are not wanted, as animations that extensions
     // point elsewhere than to nodes.
     rest.retain(|key, _| READ.contains(&key.as_str()));
-    let root = typed(path, Value::Object(rest))?;
+    let whole = Value::Object(rest);
+    refuse_arrays(&whole, "").map_err(|place| not_an_object(path, place))?;
+    let root = typed(path, whole)?;
     Ok(Document { root, nodes, scenes, cameras, skins, has_animations })
 }
 
@@ -152,21 +149,92 @@ fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), I
 /// `value` as a `T`, or where in the document it is not one.
 fn typed<T: for<'de> Deserialize<'de>>(path: &Path, value: Value) -> Result<T, ImportError> {
     serde_path_to_error::deserialize(value)
-        .map_err(|error| super::damaged(path, error.path().to_string(), reason(error.inner())))
+        .map_err(|error| super::damaged(path, error.path().to_string(), plain(error.inner())))
 }
 
-/// The error's sentence without its position, which is said elsewhere.
-fn reason(error: &serde_json::Error) -> String {
-    let text = error.to_string();
-    match text.rfind(" at line ") {
-        Some(end) => text[..end].to_owned(),
-        None => text,
+/// The error of a text that is no JSON.
+fn broken(path: &Path, json: &[u8], in_glb: bool, error: &serde_json::Error) -> ImportError {
+    let len = json.len();
+    let wrong = "its length in the GLB is wrong, or the file is damaged; export it again";
+    let reason = match plain(error) {
+        _ if in_glb && error.is_eof() => {
+            format!("the JSON chunk ends after {len} bytes, inside the document: {wrong}")
+        }
+        reason if in_glb => format!("the JSON chunk of {len} bytes is damaged: {reason}"),
+        reason => format!("this is not the JSON of a glTF file: {reason}"),
+    };
+    let line = json.split(|&byte| byte == b'\n').nth(error.line().saturating_sub(1));
+    ImportError::Text {
+        file: path.to_owned(),
+        line: error.line(),
+        column: error.column(),
+        reason,
+        text: excerpt(line.unwrap_or_default(), error.column()),
     }
+}
+
+/// The keys of glTF that hold an object, and those that hold a list of objects.
+const OBJECTS: [&str; 11] = [
+    "asset",
+    "pbrMetallicRoughness",
+    "baseColorTexture",
+    "metallicRoughnessTexture",
+    "normalTexture",
+    "occlusionTexture",
+    "emissiveTexture",
+    "attributes",
+    "sparse",
+    "perspective",
+    "orthographic",
+];
+const LISTS: [&str; 12] = [
+    "accessors",
+    "buffers",
+    "bufferViews",
+    "cameras",
+    "images",
+    "materials",
+    "meshes",
+    "primitives",
+    "samplers",
+    "scenes",
+    "skins",
+    "textures",
+];
+
+/// Finds an array where glTF has an object; its place. Derived readers would take the array's
+/// elements for the object's members in order, and complain about one of those.
+fn refuse_arrays(value: &Value, at: &str) -> Result<(), String> {
+    let Value::Object(members) = value else { return Ok(()) };
+    for (key, member) in members {
+        let inside = if at.is_empty() { key.clone() } else { format!("{at}.{key}") };
+        match member {
+            _ if key == "extensions" || key == "extras" => {}
+            Value::Array(_) if OBJECTS.contains(&key.as_str()) => return Err(inside),
+            Value::Array(elements) => {
+                let of_objects = LISTS.contains(&key.as_str()) || (at.is_empty() && key == "nodes");
+                for (index, element) in elements.iter().enumerate() {
+                    let place = || format!("{inside}[{index}]");
+                    match element {
+                        Value::Array(_) if of_objects => return Err(place()),
+                        Value::Object(_) => refuse_arrays(element, &place())?,
+                        _ => {}
+                    }
+                }
+            }
+            member => refuse_arrays(member, &inside)?,
+        }
+    }
+    Ok(())
+}
+
+fn not_an_object(path: &Path, place: String) -> ImportError {
+    super::damaged(path, place, "expected an object, found an array; export the file again")
 }
 
 /// At most 80 characters of a line around `column`.
 fn excerpt(line: &[u8], column: usize) -> String {
     let from = column.saturating_sub(50);
     let part = line.get(from..).unwrap_or_default();
-    String::from_utf8_lossy(&part[..part.len().min(80)]).trim().to_owned()
+    String::from_utf8_lossy(&part[..part.len().min(80)]).trim_ascii().to_owned()
 }

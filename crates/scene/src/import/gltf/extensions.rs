@@ -13,17 +13,22 @@ use crate::import::{ImportError, Wanted};
 enum Support {
     /// Done.
     Full,
-    /// Read without it; what that means.
+    /// Read as something else; as what.
+    As(&'static str),
+    /// Read without it, which a still picture bears; what that means.
     Without(&'static str),
+    /// Part of how a surface looks: refused where a file requires it and a picture would show it.
+    Look,
     /// Its data cannot be decoded; the command that converts the file, with `IN` for its name.
     Encoded(&'static str),
 }
 
 const DECOMPRESS: &str = "decompress it: npx @gltf-transform/cli copy IN decompressed.glb";
 const TO_PNG: &str = "convert its textures: npx @gltf-transform/cli ktxdecompress IN converted.glb (needs KTX-Software)";
-const FROM_WEBP: &str =
+const FROM_AVIF: &str =
     "convert its textures: npx @gltf-transform/cli png IN converted.glb --formats '*'";
 const LOOK: &str = "surfaces are shown without it";
+const UNKNOWN: &str = "export the file without it";
 
 /// What is known of an extension by its name; `None` for one that nobody has heard of here.
 fn support(name: &str) -> Option<Support> {
@@ -36,51 +41,60 @@ fn support(name: &str) -> Option<Support> {
         | "KHR_materials_ior"
         | "KHR_materials_transmission"
         | "KHR_materials_emissive_strength"
-        | "KHR_materials_specular" => Support::Full,
-        "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-            Support::Encoded(DECOMPRESS)
-        }
+        | "KHR_materials_specular"
+        | "EXT_meshopt_compression"
+        | "KHR_meshopt_compression"
+        | "KHR_node_visibility"
+        | "EXT_texture_webp" => Support::Full,
+        "KHR_draco_mesh_compression" => Support::Encoded(DECOMPRESS),
         "KHR_texture_basisu" => Support::Encoded(TO_PNG),
-        "EXT_texture_webp" | "EXT_texture_avif" => Support::Encoded(FROM_WEBP),
-        "KHR_node_visibility" => Support::Without("nodes that it hides are shown"),
+        "EXT_texture_avif" => Support::Encoded(FROM_AVIF),
         "KHR_materials_variants" => Support::Without("the default variant is shown"),
-        "KHR_materials_pbrSpecularGlossiness" => {
-            Support::Without("the metallic-roughness values beside it are used")
-        }
+        "KHR_materials_pbrSpecularGlossiness" => Support::As(
+            "read as KHR_materials_specular with ior 0, as that extension's text converts it",
+        ),
         "KHR_animation_pointer"
         | "KHR_interactivity"
         | "KHR_node_selectability"
         | "KHR_node_hoverability" => Support::Without("a still picture has no use for it"),
         "KHR_xmp_json_ld" | "KHR_xmp" => Support::Without("it holds descriptions only"),
         _ if name.starts_with("KHR_materials_") || name.starts_with("EXT_materials_") => {
-            Support::Without(LOOK)
+            Support::Look
         }
         _ => return None,
     })
 }
 
-/// Refuses what the document requires and is not supported, and notes what it merely uses.
+/// Refuses what the document requires and is not supported, and notes what it merely uses, or
+/// requires for what is not wanted.
 pub(super) fn check(
     path: &Path,
     document: &Document,
+    wanted: Wanted,
     notes: &mut Vec<Note>,
 ) -> Result<(), ImportError> {
     let mut missing = document.root.extensions_required.iter().filter_map(|name| {
         match support(name) {
-            // A required look (a sheen, say) changes no geometry: a note says what is missing.
-            Some(Support::Full | Support::Without(_)) => None,
-            // Draco's and meshopt's users often keep a plain copy that the primitives name.
+            Some(Support::Full | Support::As(_) | Support::Without(_)) => None,
+            // A required look (a sheen, say) changes no geometry.
+            Some(Support::Look) if !wanted.light => None,
+            Some(Support::Look) => Some(refused(path, name, UNKNOWN)),
+            // Draco's users often keep a plain copy that the primitives name.
             Some(Support::Encoded(command)) => Some(refused(path, name, command)),
-            None => Some(refused(path, name, "export the file without it")),
+            None => Some(refused(path, name, UNKNOWN)),
         }
     });
     if let Some(first) = missing.next() {
         return Err(missing.fold(first, ImportError::and));
     }
-    for name in &document.root.extensions_used {
+    let (used, required) = (&document.root.extensions_used, &document.root.extensions_required);
+    // What is required should be among what is used, and is not always.
+    for name in used.iter().chain(required.iter().filter(|name| !used.contains(name))) {
         let message = match support(name) {
             Some(Support::Full) => continue,
+            Some(Support::As(what)) => what.to_owned(),
             Some(Support::Without(meaning)) => format!("not supported: {meaning}"),
+            Some(Support::Look) => format!("not supported: {LOOK}"),
             Some(Support::Encoded(command)) => {
                 format!(
                     "not supported: its plain fallback is read; else {}",
@@ -106,22 +120,10 @@ pub(super) fn refuse_compressed_primitive(
     }
 }
 
-/// Refuses a buffer view whose bytes are compressed and that has no fallback: meshopt's extension
-/// says which buffer holds the compressed bytes, the view's own buffer is then a placeholder.
-pub(super) fn refuse_compressed_view(
-    path: &Path,
-    view: &json::buffer::View,
-    has_fallback: bool,
-) -> Result<(), ImportError> {
-    if has_fallback {
-        return Ok(());
-    }
-    for name in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
-        if view.extensions.as_ref().is_some_and(|e| e.others.contains_key(name)) {
-            return Err(refused(path, name, DECOMPRESS));
-        }
-    }
-    Ok(())
+/// The image that a texture has as `WebP`.
+pub(super) fn webp_image(texture: &json::Texture) -> Option<usize> {
+    let extension = texture.extensions.as_ref()?.others.get("EXT_texture_webp")?;
+    usize::try_from(extension.get("source")?.as_u64()?).ok()
 }
 
 /// What a texture without a plain image asks for: refused when its pixels are wanted.
@@ -130,11 +132,11 @@ pub(super) fn encoded_texture(
     texture: &json::Texture,
     wanted: Wanted,
 ) -> Result<Option<Note>, ImportError> {
-    for name in ["KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif"] {
+    for name in ["KHR_texture_basisu", "EXT_texture_avif"] {
         if !texture.extensions.as_ref().is_some_and(|e| e.others.contains_key(name)) {
             continue;
         }
-        let command = if name == "KHR_texture_basisu" { TO_PNG } else { FROM_WEBP };
+        let command = if name == "KHR_texture_basisu" { TO_PNG } else { FROM_AVIF };
         if wanted.textures {
             return Err(refused(path, name, command));
         }

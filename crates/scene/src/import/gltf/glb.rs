@@ -7,8 +7,8 @@ use etendue_geometry::MappedFile;
 
 use super::buffers::Bytes;
 use super::damaged;
-use crate::import::ImportError;
 use crate::import::text::without_mark;
+use crate::import::{ImportError, refuse_other_kind};
 
 const MAGIC: &[u8] = b"glTF";
 const JSON: u32 = 0x4E4F_534A;
@@ -17,6 +17,7 @@ const BIN: u32 = 0x004E_4942;
 /// A glTF file's JSON and, in a GLB, its bytes.
 pub(super) struct Container<'a> {
     pub json: &'a [u8],
+    pub in_glb: bool,
     pub binary: Option<Bytes>,
 }
 
@@ -28,7 +29,8 @@ pub(super) fn open<'a>(
 ) -> Result<Container<'a>, ImportError> {
     let bytes = map.bytes();
     if !bytes.starts_with(MAGIC) {
-        return Ok(Container { json: without_mark(bytes), binary: None });
+        refuse_other_kind(path, bytes, "glTF")?;
+        return Ok(Container { json: without_mark(bytes), in_glb: false, binary: None });
     }
     let broken = |reason: String| damaged(path, "GLB header", reason);
     let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
@@ -47,7 +49,16 @@ pub(super) fn open<'a>(
     let mut chunks = Chunks { bytes, at: 12 };
     let json = match chunks.next(path)? {
         Some((JSON, start, len)) => without_mark(&bytes[start..start + len]),
-        _ => return Err(broken("the first chunk is not JSON; export it again".into())),
+        Some((kind, ..)) => {
+            let kind = String::from_utf8_lossy(&kind.to_le_bytes()).escape_debug().to_string();
+            let reason =
+                format!("the first chunk is of kind \"{kind}\", not JSON; export it again");
+            return Err(broken(reason));
+        }
+        None => {
+            let reason = "the file ends before its first chunk; copy or export it again";
+            return Err(broken(reason.to_owned()));
+        }
     };
     let mut binary = None;
     while let Some((kind, start, len)) = chunks.next(path)? {
@@ -55,7 +66,7 @@ pub(super) fn open<'a>(
             binary = Some(Bytes::Mapped { file: Arc::clone(map), start, len });
         }
     }
-    Ok(Container { json, binary })
+    Ok(Container { json, in_glb: true, binary })
 }
 
 /// Walks the chunks of a file.
@@ -81,8 +92,10 @@ impl Chunks<'_> {
                 path,
                 format!("GLB chunk at byte {}", self.at),
                 format!(
-                    "it should be {len} bytes long but only {} follow; copy or export it again",
-                    self.bytes.len() - start
+                    "it should be {len} bytes long but only {} follow: this length is wrong, {}the \
+                     file is cut off; copy or export it again",
+                    self.bytes.len() - start,
+                    if self.at > 12 { "or that of the chunk before, or " } else { "or " }
                 ),
             ));
         }

@@ -7,7 +7,7 @@ use etendue_geometry::Transform;
 use super::document::{Document, Node};
 use super::pose::Pose;
 use super::primitive::Shapes;
-use super::{Reader, damaged, instancing};
+use super::{Reader, absent, damaged, instancing};
 use crate::import::note::Note;
 use crate::import::{
     Import, ImportError, ImportedCamera, ImportedLight, ImportedPlacement, Projection,
@@ -71,14 +71,15 @@ pub(super) fn walk(
     for &index in &pose.shown {
         let node = &document.nodes[index];
         let model_from_node = pose.of(index).unwrap_or_default();
-        if let Some(mesh) = node.mesh {
+        let hidden = pose.hidden[index];
+        if let Some(mesh) = node.mesh.filter(|_| !hidden) {
             let shape = Shape::of(document, node, mesh);
             scene.meshes.push(PlacedMesh { node: index, shape, model_from_node });
         }
         if let Some(camera) = node.camera {
             scene.cameras.push(placed_camera(path, document, index, camera, model_from_node)?);
         }
-        if let Some(light) = super::lights::placed(path, document, node, index, notes)? {
+        if !hidden && let Some(light) = super::lights::placed(path, document, node, index, notes)? {
             scene.lights.push(ImportedLight { light, model_from_light: model_from_node });
         }
     }
@@ -95,9 +96,8 @@ fn placed_camera(
 ) -> Result<ImportedCamera, ImportError> {
     let place = || format!("cameras[{index}]");
     let Some(camera) = document.cameras.get(index) else {
-        let count = document.cameras.len();
-        let reason = format!("there is no camera {index}; the file has {count}; export it again");
-        return Err(damaged(path, format!("nodes[{node}].camera"), reason));
+        let from = format!("nodes[{node}].camera");
+        return Err(absent(path, from, "camera", index, document.cameras.len()));
     };
     let positive = |value: f64| value.is_finite() && value > 0.0;
     let projection = match (&camera.perspective, &camera.orthographic) {

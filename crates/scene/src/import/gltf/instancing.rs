@@ -71,11 +71,16 @@ fn values<const N: usize>(
     };
     let place = place(name);
     let Some(index) = index.as_u64().and_then(|index| usize::try_from(index).ok()) else {
-        return Err(reader.damaged(place, "it should be the number of an accessor"));
+        return Err(
+            reader.damaged(place, "expected the number of an accessor; export the file again")
+        );
     };
     let accessor = reader.accessor(index, &place)?;
     match accessor.floats(0.0) {
         Some(values) if accessor.components == N => Ok(Some(values)),
-        _ => Err(reader.damaged(place, format!("it should have {N} components"))),
+        _ => Err(reader.damaged(
+            place,
+            format!("it has {} components, not {N}; export the file again", accessor.components),
+        )),
     }
 }

@@ -14,8 +14,10 @@ use serde_json::Value;
 
 use super::damaged;
 use super::document::{Document, Node};
+use crate::file::kind_of;
 use crate::import::ImportError;
 use crate::import::note::{self, Note, NoteKind};
+use crate::words::plain;
 
 const NAME: &str = "KHR_lights_punctual";
 
@@ -54,6 +56,20 @@ fn eighth_turn() -> f64 {
     FRAC_PI_4
 }
 
+/// Light `number` of the document.
+fn read(path: &Path, number: &Value, value: &Value) -> Result<Written, ImportError> {
+    let place = format!("extensions.{NAME}.lights[{number}]");
+    if !value.is_object() {
+        let reason = format!("expected an object, found {}; export the file again", kind_of(value));
+        return Err(damaged(path, place, reason));
+    }
+    serde_path_to_error::deserialize(value).map_err(|error| {
+        let inside = error.path().to_string();
+        let place = if inside == "." { place } else { format!("{place}.{inside}") };
+        damaged(path, place, plain(error.inner()))
+    })
+}
+
 /// The light of a node, at the origin of its frame; `None` when it has none, or a dark one.
 pub(super) fn placed(
     path: &Path,
@@ -70,10 +86,13 @@ pub(super) fn placed(
     let all = all.and_then(|e| e.get("lights")).and_then(Value::as_array);
     let found = number.as_u64().and_then(|n| usize::try_from(n).ok());
     let Some(value) = found.and_then(|n| all?.get(n)) else {
-        return Err(damaged(path, place(), "there is no such light; export the file again"));
+        let reason = format!(
+            "there is no light {number}; the file has {}; export it again",
+            all.map_or(0, Vec::len)
+        );
+        return Err(damaged(path, place() + ".light", reason));
     };
-    let written = Written::deserialize(value)
-        .map_err(|error| damaged(path, place(), format!("the light is damaged: {error}")))?;
+    let written = read(path, number, value)?;
     let color = written.color.map(|c| c * written.intensity);
     let named = written.name.clone().unwrap_or_else(place);
     if !color.iter().all(|c| (0.0..=BRIGHTEST).contains(c)) {

@@ -16,6 +16,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::buffers::{Bytes, data_uri, percent_decoded};
+use super::glossiness::Glossiness;
 use super::{Reader, extensions};
 use crate::import::note::{self, Note, NoteKind};
 use crate::import::{Import, ImportError, Strictness};
@@ -30,10 +31,7 @@ pub(super) fn number(
     let index = primitive.material.map_or(materials, |material| material.value());
     match u32::try_from(index) {
         Ok(number) if index < materials || primitive.material.is_none() => Ok(number),
-        _ => Err(reader.damaged(
-            format!("{}.material", place()),
-            format!("there is no material {index}; the file has {materials}; export it again"),
-        )),
+        _ => Err(reader.absent(place() + ".material", "material", index, materials)),
     }
 }
 
@@ -51,7 +49,7 @@ pub(super) fn load(reader: &Reader<'_>, import: &mut Import) -> Result<(), Impor
 }
 
 /// What becomes of numbers that no surface can have.
-struct Judge<'a> {
+pub(super) struct Judge<'a> {
     reader: &'a Reader<'a>,
     /// What the material is called in messages.
     subject: String,
@@ -59,7 +57,12 @@ struct Judge<'a> {
 
 impl Judge<'_> {
     /// Says that the material's `what` is wrong and what is done about it; refused when strict.
-    fn say(&self, what: &str, remedy: &str, import: &mut Import) -> Result<(), ImportError> {
+    pub(super) fn say(
+        &self,
+        what: &str,
+        remedy: &str,
+        import: &mut Import,
+    ) -> Result<(), ImportError> {
         if self.reader.options.strictness == Strictness::Strict {
             let place = format!("material \"{}\"", self.subject);
             return Err(self.reader.damaged(place, format!("its {what}; export it again")));
@@ -69,8 +72,13 @@ impl Judge<'_> {
         Ok(())
     }
 
+    /// What messages call a key of the material.
+    pub(super) fn place(&self, key: &str) -> String {
+        format!("material \"{}\".{key}", self.subject)
+    }
+
     /// A factor brought to `low..=high`.
-    fn factor(
+    pub(super) fn factor(
         &self,
         key: &str,
         value: f64,
@@ -116,11 +124,19 @@ fn read(
 ) -> Result<Material, ImportError> {
     let name = material.name.clone().unwrap_or_default();
     let surface = &material.pbr_metallic_roughness;
-    let [red, green, blue, alpha] = surface.base_color_factor.0.map(f64::from);
+    let glossiness = Glossiness::of(judge, material, import)?;
+    let (factor, key, texture) = match &glossiness {
+        Some(own) => (own.diffuse_factor, "diffuseTexture", &own.diffuse_texture),
+        None => {
+            let factor = surface.base_color_factor.0.map(f64::from);
+            (factor, "baseColorTexture", &surface.base_color_texture)
+        }
+    };
+    let [red, green, blue, alpha] = factor;
     let factor = reflectance(judge, [red, green, blue], import)?;
-    let image = match &surface.base_color_texture {
+    let image = match texture {
         Some(info) if images.reader.wanted.textures => {
-            images.use_of(info.index.value(), info, Encoding::Srgb, import)?
+            images.use_of(&judge.place(key), info, Encoding::Srgb, import)?
         }
         _ => None,
     };
@@ -142,13 +158,18 @@ fn read(
                 Alpha::Opaque
             }
         };
-        read.scattering = scattering(images, judge, material, import)?;
+        read.scattering = match &glossiness {
+            Some(_) if is_unlit(material) => Scattering::Unlit,
+            Some(own) => Scattering::Gltf(Box::new(own.surface(images, judge, import)?)),
+            None => scattering(images, judge, material, import)?,
+        };
         read.emission = emission(images, judge, material, import)?;
         read.normal_map = match &material.normal_texture {
             Some(normal) => {
                 let moved = normal.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));
                 let info = info_of(normal.index, normal.tex_coord, moved);
-                let image = images.use_of(normal.index.value(), &info, Encoding::Linear, import)?;
+                let from = judge.place("normalTexture");
+                let image = images.use_of(&from, &info, Encoding::Linear, import)?;
                 image.map(|image| NormalMap { image, scale: f64::from(normal.scale) })
             }
             None => None,
@@ -159,7 +180,8 @@ fn read(
     {
         let moved = occlusion.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));
         let info = info_of(occlusion.index, occlusion.tex_coord, moved);
-        let image = images.use_of(occlusion.index.value(), &info, Encoding::Linear, import)?;
+        let from = judge.place("occlusionTexture");
+        let image = images.use_of(&from, &info, Encoding::Linear, import)?;
         let strength = f64::from(occlusion.strength.0);
         read.occlusion = image.map(|image| Occlusion { image, strength });
     }
@@ -197,6 +219,15 @@ fn info_of(
     json::texture::Info { index, tex_coord, extensions, extras: json::Extras::default() }
 }
 
+fn is_unlit(material: &json::Material) -> bool {
+    let extensions = material.extensions.as_ref();
+    extensions.is_some_and(|extensions| extensions.others.contains_key("KHR_materials_unlit"))
+}
+
+/// The refractive index of what reflects all that its colour lets it. An index of 0 stands for it in
+/// `KHR_materials_ior`; glass of 10¹⁵ reflects as much.
+pub(super) const MIRROR: f64 = 1e15;
+
 /// The metallic-roughness surface and the extensions that change it.
 fn scattering(
     images: &mut Images<'_>,
@@ -205,7 +236,7 @@ fn scattering(
     import: &mut Import,
 ) -> Result<Scattering, ImportError> {
     let extension = |name: &str| material.extensions.as_ref().and_then(|e| e.others.get(name));
-    if extension("KHR_materials_unlit").is_some() {
+    if is_unlit(material) {
         return Ok(Scattering::Unlit);
     }
     let surface = &material.pbr_metallic_roughness;
@@ -222,11 +253,9 @@ fn scattering(
     let mut read = GltfSurface {
         metallic: judge.factor("metallicFactor", metallic, SHARE, import)?,
         roughness: judge.factor("roughnessFactor", roughness, SHARE, import)?,
-        // An index of 0 stands for a reflectance of 1 in the extension; glass of 10¹⁵ reflects as
-        // much.
         ior: match ior {
-            0.0 => 1e15,
-            ior => judge.factor("ior", ior, [1.0, f64::INFINITY], import)?.min(1e15),
+            0.0 => MIRROR,
+            ior => judge.factor("ior", ior, [1.0, f64::INFINITY], import)?.min(MIRROR),
         },
         specular: judge.factor("specularFactor", strength, SHARE, import)?,
         transmission: judge.factor("transmissionFactor", passes, SHARE, import)?,
@@ -235,18 +264,21 @@ fn scattering(
     if let Some(color) = extension(SPECULAR).and_then(|e| e.get("specularColorFactor")) {
         read.specular_color = specular_color(judge, color, import)?;
     }
-    let mut placed = |info: Option<&json::texture::Info>, encoding| match info {
-        Some(info) => images.use_of(info.index.value(), info, encoding, import),
+    let mut placed = |key: &str, info: Option<&json::texture::Info>, encoding| match info {
+        Some(info) => images.use_of(&judge.place(key), info, encoding, import),
         None => Ok(None),
     };
-    read.metallic_roughness =
-        placed(surface.metallic_roughness_texture.as_ref(), Encoding::Linear)?;
+    read.metallic_roughness = placed(
+        "metallicRoughnessTexture",
+        surface.metallic_roughness_texture.as_ref(),
+        Encoding::Linear,
+    )?;
     let info = texture(SPECULAR, "specularTexture");
-    read.specular_texture = placed(info.as_ref(), Encoding::Linear)?;
+    read.specular_texture = placed("specularTexture", info.as_ref(), Encoding::Linear)?;
     let info = texture(SPECULAR, "specularColorTexture");
-    read.specular_color_texture = placed(info.as_ref(), Encoding::Srgb)?;
+    read.specular_color_texture = placed("specularColorTexture", info.as_ref(), Encoding::Srgb)?;
     let info = texture(TRANSMISSION, "transmissionTexture");
-    read.transmission_texture = placed(info.as_ref(), Encoding::Linear)?;
+    read.transmission_texture = placed("transmissionTexture", info.as_ref(), Encoding::Linear)?;
     Ok(Scattering::Gltf(Box::new(read)))
 }
 
@@ -282,7 +314,9 @@ fn emission(
         return Ok(None);
     }
     let image = match &material.emissive_texture {
-        Some(info) => images.use_of(info.index.value(), info, Encoding::Srgb, import)?,
+        Some(info) => {
+            images.use_of(&judge.place("emissiveTexture"), info, Encoding::Srgb, import)?
+        }
         None => None,
     };
     let radiance = match image {
@@ -292,26 +326,30 @@ fn emission(
     Ok(Some(Emission { radiance, strength, illuminant: None, two_sided: true }))
 }
 
+/// What crate `gltf` puts for an image that a texture does not name.
+const NO_IMAGE: usize = u32::MAX as usize;
+
 /// The textures that materials name, each located once.
-struct Images<'a> {
+pub(super) struct Images<'a> {
     reader: &'a Reader<'a>,
     /// For each texture of the document: unseen, unusable, or its index in the import.
     of_texture: Vec<Option<Option<u32>>>,
 }
 
 impl Images<'_> {
-    fn use_of(
+    pub(super) fn use_of(
         &mut self,
-        index: usize,
+        from: &str,
         info: &json::texture::Info,
         encoding: Encoding,
         import: &mut Import,
     ) -> Result<Option<TextureUse>, ImportError> {
+        let index = info.index.value();
         let known = self.of_texture.get(index).copied().flatten();
         let texture = match known {
             Some(texture) => texture,
             None => {
-                let located = self.locate(index, import)?;
+                let located = self.locate(index, from, import)?;
                 if let Some(known) = self.of_texture.get_mut(index) {
                     *known = Some(located);
                 }
@@ -328,34 +366,40 @@ impl Images<'_> {
         }))
     }
 
-    /// Finds the image of texture `index`; `None`, with a note, when it cannot be used.
-    fn locate(&self, index: usize, import: &mut Import) -> Result<Option<u32>, ImportError> {
+    /// Finds the image of texture `index`, which `from` names; `None`, with a note, when it cannot be used.
+    fn locate(
+        &self,
+        index: usize,
+        from: &str,
+        import: &mut Import,
+    ) -> Result<Option<u32>, ImportError> {
         let reader = self.reader;
         let root = &reader.document.root;
         let place = || format!("textures[{index}]");
         let Some(texture) = root.textures.get(index) else {
-            return Err(reader.damaged(place(), "there is no such texture; export the file again"));
+            return Err(reader.absent(from, "texture", index, root.textures.len()));
         };
-        let Some(image) = root.images.get(texture.source.value()) else {
-            // Extensions put the image elsewhere and leave the plain one out.
+        // Extensions put the image elsewhere and may leave the plain one out.
+        let plain = Some(texture.source.value()).filter(|&source| source != NO_IMAGE);
+        let Some(source) = plain.or_else(|| extensions::webp_image(texture)) else {
             if let Some(note) = extensions::encoded_texture(reader.file, texture, reader.wanted)? {
                 note::push(&mut import.notes, note);
                 return Ok(None);
             }
             return Err(reader.damaged(place(), "it has no image; export the file again"));
         };
-        let Some(source) = self.source(texture.source.value(), image, import)? else {
+        let Some(image) = root.images.get(source) else {
+            return Err(reader.absent(place() + ".source", "image", source, root.images.len()));
+        };
+        let Some(source) = self.source(source, image, import)? else {
             return Ok(None);
         };
         let number = u32::try_from(import.textures.len())
             .map_err(|_| reader.damaged(place(), "there are more than 32 bits can count"))?;
         let sampler = match texture.sampler {
             Some(index) => Some(root.samplers.get(index.value()).ok_or_else(|| {
-                let number = index.value();
-                reader.damaged(
-                    place(),
-                    format!("there is no sampler {number}; export the file again"),
-                )
+                let from = place() + ".sampler";
+                reader.absent(from, "sampler", index.value(), root.samplers.len())
             })?),
             None => None,
         };
@@ -380,7 +424,7 @@ impl Images<'_> {
         let reader = self.reader;
         let place = || format!("images[{index}]");
         if let Some(view) = image.buffer_view {
-            let view = reader.view(view.value())?;
+            let view = reader.view(view.value(), &(place() + ".bufferView"))?;
             let bytes = match view.bytes {
                 Bytes::Mapped { .. } => view.bytes.view(view.start, view.len),
                 Bytes::Memory(_) => None,
@@ -390,7 +434,8 @@ impl Images<'_> {
             return Ok(Some(ImageSource::Bytes(bytes.unwrap_or_else(copied))));
         }
         let Some(uri) = &image.uri else {
-            return Err(reader.damaged(place(), "it has neither a uri nor a bufferView"));
+            let reason = "it has neither a uri nor a bufferView; export the file again";
+            return Err(reader.damaged(place(), reason));
         };
         if let Some(data) = data_uri(uri) {
             let bytes = data.map_err(|reason| reader.damaged(place(), reason))?;

@@ -14,10 +14,12 @@ mod deform;
 mod document;
 mod extensions;
 mod glb;
+mod glossiness;
 mod hierarchy;
 mod instancing;
 mod lights;
 mod material;
+mod meshopt;
 mod pose;
 mod primitive;
 mod skin;
@@ -45,6 +47,28 @@ impl Reader<'_> {
     fn damaged(&self, place: impl Into<String>, reason: impl Into<String>) -> ImportError {
         damaged(self.file, place, reason)
     }
+
+    /// The error that `from` names the `what` number `index`, of which there are only `count`.
+    fn absent(
+        &self,
+        from: impl Into<String>,
+        what: &str,
+        index: usize,
+        count: usize,
+    ) -> ImportError {
+        absent(self.file, from, what, index, count)
+    }
+}
+
+fn absent(
+    file: &Path,
+    from: impl Into<String>,
+    what: &str,
+    index: usize,
+    count: usize,
+) -> ImportError {
+    let reason = format!("there is no {what} {index}; the file has {count}; export it again");
+    damaged(file, from, reason)
 }
 
 fn damaged(file: &Path, place: impl Into<String>, reason: impl Into<String>) -> ImportError {
@@ -60,9 +84,9 @@ pub(super) fn import(
 ) -> Result<Import, ImportError> {
     let map = files.map_model(path)?;
     let container = glb::open(path, &map)?;
-    let document = document::parse(path, container.json)?;
+    let document = document::parse(path, container.json, container.in_glb)?;
     let mut import = Import::default();
-    extensions::check(path, &document, &mut import.notes)?;
+    extensions::check(path, &document, wanted, &mut import.notes)?;
 
     let scene = hierarchy::walk(path, &document, &mut import.notes)?;
     let buffers = Buffers::open(path, files, &document, container.binary)?;

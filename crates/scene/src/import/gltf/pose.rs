@@ -5,8 +5,8 @@ use std::path::Path;
 use etendue_geometry::Transform;
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 
-use super::damaged;
 use super::document::{Document, Node};
+use super::{absent, damaged};
 use crate::import::ImportError;
 
 /// The nodes of a document with each of them somewhere.
@@ -14,6 +14,9 @@ use crate::import::ImportError;
 pub(super) struct Pose {
     /// The nodes of the default scene, parents before children, in the order of the file.
     pub shown: Vec<usize>,
+    /// For each node whether it or one above it is hidden (`KHR_node_visibility`): its mesh and
+    /// light are not there, its camera is.
+    pub hidden: Vec<bool>,
     /// From each node's frame to the model's (m); `None` for nodes below a broken one that the
     /// default scene does not show.
     model_from_node: Vec<Option<Transform>>,
@@ -37,7 +40,8 @@ impl Pose {
         local: impl Fn(usize, &Node) -> Result<Transform, ImportError>,
     ) -> Result<Self, ImportError> {
         let count = document.nodes.len();
-        let mut pose = Self { shown: Vec::new(), model_from_node: vec![None; count] };
+        let (hidden, model_from_node) = (vec![false; count], vec![None; count]);
+        let mut pose = Self { shown: Vec::new(), hidden, model_from_node };
         // Last in, first out: pushed in reverse, nodes come in the order of the file.
         let mut open: Vec<(usize, Transform)> = Vec::new();
         open.extend(roots(path, document)?.into_iter().rev().map(|n| (n, Transform::IDENTITY)));
@@ -50,18 +54,20 @@ impl Pose {
             let model_from_node = model_from_parent.then_inner(&local(index, node)?);
             pose.model_from_node[index] = Some(model_from_node);
             pose.shown.push(index);
+            pose.hidden[index] |= is_hidden(node);
             for (place, &child) in node.children.iter().enumerate().rev() {
                 exists(path, child, count, || format!("nodes[{index}].children[{place}]"))?;
+                pose.hidden[child] |= pose.hidden[index];
                 open.push((child, model_from_node));
             }
         }
-        pose.evaluate_hidden(document, local);
+        pose.evaluate_others(document, local);
         Ok(pose)
     }
 
     /// Places what the default scene does not show, for joints of skins that stand there. Nobody
     /// sees these nodes: broken ones are passed over.
-    fn evaluate_hidden(
+    fn evaluate_others(
         &mut self,
         document: &Document,
         local: impl Fn(usize, &Node) -> Result<Transform, ImportError>,
@@ -97,8 +103,7 @@ pub(super) fn exists(
     if node < count {
         return Ok(());
     }
-    let reason = format!("there is no node {node}; the file has {count}; export it again");
-    Err(damaged(path, from(), reason))
+    Err(absent(path, from(), "node", node, count))
 }
 
 /// The roots of the default scene: the one that the document names, else its first; a document
@@ -109,8 +114,7 @@ fn roots(path: &Path, document: &Document) -> Result<Vec<usize>, ImportError> {
     }
     let default = document.root.scene.map_or(0, |scene| scene.value());
     let Some(scene) = document.scenes.get(default) else {
-        let reason = format!("there is no scene {default}; the file has {}", document.scenes.len());
-        return Err(damaged(path, "scene", reason));
+        return Err(absent(path, "scene", "scene", default, document.scenes.len()));
     };
     for (place, &node) in scene.nodes.iter().enumerate() {
         let from = || format!("scenes[{default}].nodes[{place}]");
@@ -128,6 +132,11 @@ fn orphans(document: &Document) -> Vec<usize> {
         }
     }
     (0..is_child.len()).filter(|&node| !is_child[node]).collect()
+}
+
+fn is_hidden(node: &Node) -> bool {
+    let visible = node.extensions.get("KHR_node_visibility").and_then(|e| e.get("visible"));
+    visible.and_then(serde_json::Value::as_bool) == Some(false)
 }
 
 /// From the node's frame to its parent's, as the file has it.

@@ -72,10 +72,8 @@ pub(super) fn load(
     let mut shown = vec![false; meshes.len()];
     for placed in &scene.meshes {
         let Some(shown) = shown.get_mut(placed.shape.mesh) else {
-            return Err(reader.damaged(
-                format!("nodes[{}].mesh", placed.node),
-                format!("there is no mesh {}; the file has {}", placed.shape.mesh, meshes.len()),
-            ));
+            let from = format!("nodes[{}].mesh", placed.node);
+            return Err(reader.absent(from, "mesh", placed.shape.mesh, meshes.len()));
         };
         *shown = true;
     }
@@ -174,7 +172,7 @@ fn read(
     let name = reader.document.root.meshes[shape.mesh].name.clone().unwrap_or_default();
     let place = place(reader, shape.mesh, number);
     let Checked::Valid(mode) = primitive.mode else {
-        return Err(reader.damaged(place, "its mode is none that glTF knows"));
+        return Err(reader.damaged(place, "its mode is none of 0 to 6; export the file again"));
     };
     if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
         return Ok(None);
@@ -308,7 +306,10 @@ impl<'a> Part<'a> {
         let place = format!("{}, indices", self.place);
         let accessor = self.reader.accessor(index.value(), &place)?;
         if !accessor.is_index() {
-            return Err(self.reader.damaged(place, "they are not u8, u16 or u32 scalars"));
+            return Err(self.reader.damaged(
+                place,
+                "they are not scalars of componentType 5121, 5123 or 5125; export the file again",
+            ));
         }
         self.whole_triangles(mode, accessor.count)?;
         if mode == Mode::Triangles

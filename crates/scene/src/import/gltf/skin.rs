@@ -35,13 +35,8 @@ impl Skin {
     ) -> Result<Self, ImportError> {
         let document = reader.document;
         let Some(skin) = document.skins.get(index) else {
-            return Err(reader.damaged(
-                format!("nodes[{user}].skin"),
-                format!(
-                    "there is no skin {index}; the file has {}; export it again",
-                    document.skins.len()
-                ),
-            ));
+            let from = format!("nodes[{user}].skin");
+            return Err(reader.absent(from, "skin", index, document.skins.len()));
         };
         let place = format!("skins[{index}].joints");
         match skin.joints.len() {

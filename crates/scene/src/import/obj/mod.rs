@@ -45,6 +45,7 @@ pub(super) fn import(
     options: &Options,
 ) -> Result<Import, ImportError> {
     let map = files.map_model(path)?;
+    super::refuse_other_kind(path, map.bytes(), "an OBJ model")?;
     let text = with_newlines(without_mark(map.bytes()));
     let text: &[u8] = &text;
     let fault = |fault: Fault| fault.locate(path, text);

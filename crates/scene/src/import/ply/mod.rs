@@ -35,6 +35,9 @@ pub(super) fn import(
     options: &Options,
 ) -> Result<Import, ImportError> {
     let map = files.map_model(path)?;
+    if !map.bytes().starts_with(b"ply") {
+        super::refuse_other_kind(path, map.bytes(), "a PLY model")?;
+    }
     let fault = |fault: Fault| fault.locate(path, map.bytes());
     let header = Header::parse(map.bytes()).map_err(fault)?;
     let damaged = |reason: String| ImportError::Damaged {
