@@ -10,7 +10,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 PATH=$PATH:/usr/sbin:/sbin
 root=target/trixie
-packages=libembree-dev,libclang-dev,gcc,libc6-dev,ca-certificates
+packages=libembree-dev,libclang-dev,gcc,g++,libc6-dev,ca-certificates
 
 # Without CI, not being able to is no failure, but is said.
 skip() {
@@ -47,7 +47,8 @@ if [ -e /usr/include/embree4/rtcore.h ] && [ -z "${EMBREE_DIR:-}" ]; then
 fi
 may_be_root || skip "making a Debian 13 root and entering it takes root, or sudo."
 why=$(in_namespace true 2>&1) || skip "this system lets not even root mount ($why)."
-[ -d "$root" ] || make_root || skip "debootstrap could not make the Debian 13 root; see above."
+# A root of an earlier time may lack the C++ compiler.
+[ -e "$root/usr/bin/g++" ] || make_root || skip "debootstrap could not make the Debian 13 root; see above."
 
 # Everything from here on is offline. The toolchain is entered directly: rustup stays outside.
 cargo fetch --locked --target "$(rustc --version --verbose | sed -n 's/^host: //p')"
