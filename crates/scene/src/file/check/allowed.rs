@@ -119,7 +119,7 @@ pub(super) fn not_the_one(value: &Value, expected: &Value) -> String {
         (Value::Number(number), Some(expected)) if number.as_f64() == Some(expected) => {
             "write it without a point".to_owned()
         }
-        (Value::String(text), Some(_)) if *text == expected.to_string() => {
+        (Value::String(text), Some(_)) if text.parse().ok().as_ref() == Some(expected) => {
             "write it without quotes".to_owned()
         }
         _ => format!("{} is all that this version reads", quoted(expected)),
