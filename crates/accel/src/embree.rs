@@ -162,19 +162,17 @@ impl Scene {
     ) -> Result<Self, BuildError> {
         let device = Device::new(options)?;
         let mut copied_bytes = 0;
-        let instanced = Instanced::of(&geometry);
+        let instanced = Instanced::of(&geometry, origin);
         let mut shared: Vec<Option<SceneHandle>> = Vec::with_capacity(geometry.meshes.len());
         for (mesh, &wanted) in geometry.meshes.iter().zip(&instanced.meshes) {
-            let scene = if wanted {
+            let mut scene = None;
+            let to_frame = Transform::new(DMat3::IDENTITY, -mesh_origin(mesh));
+            if wanted && let Some(shape) = Shape::mesh(&device, mesh, &to_frame, options)? {
                 let mut builder = SceneBuilder::new(&device, options)?;
-                let to_frame = Transform::new(DMat3::IDENTITY, -mesh_origin(mesh));
-                let shape = Shape::mesh(&device, mesh, &to_frame, options)?;
                 copied_bytes += shape.copied_bytes;
                 builder.attach(&shape, 0);
-                Some(builder.commit(options.progress.as_deref())?)
-            } else {
-                None
-            };
+                scene = Some(builder.commit(options.progress.as_deref())?);
+            }
             shared.push(scene);
         }
         let mut builder = SceneBuilder::new(&device, options)?;
@@ -187,10 +185,13 @@ impl Scene {
                 (Kind::LeftOut, _) => continue,
                 (Kind::Instance, Some(scene)) => {
                     let back = Transform::new(DMat3::IDENTITY, mesh_origin(mesh));
-                    Shape::instance(&device, scene, &to_frame.then_inner(&back), options)?
+                    Some(Shape::instance(&device, scene, &to_frame.then_inner(&back), options)?)
                 }
-                _ => Shape::mesh(&device, mesh, &to_frame, options)?,
+                (Kind::Instance | Kind::Baked, _) => {
+                    Shape::mesh(&device, mesh, &to_frame, options)?
+                }
             };
+            let Some(shape) = shape else { continue };
             copied_bytes += shape.copied_bytes;
             builder.attach(&shape, id);
         }

@@ -62,7 +62,7 @@ impl Layout {
         for (i, placement) in geometry.placements.iter().enumerate() {
             let i = index(i);
             let mesh = geometry.mesh_of(placement);
-            if mesh.triangles.is_empty() || !placement.world_from_mesh.is_finite() {
+            if !placement.world_from_mesh.is_finite() || !geometry.has_area(placement) {
                 continue;
             }
             let once = baking == Baking::UsedOnce && uses[placement.mesh as usize] == 1;

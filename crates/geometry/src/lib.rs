@@ -14,6 +14,7 @@
 //!
 //! | module | idea |
 //! |---|---|
+//! | [`area`] | which triangles have an area |
 //! | [`batch`] | [`RayBatch`] and [`HitBatch`], structures of arrays |
 //! | [`bounds`] | axis-aligned boxes |
 //! | [`buffer`] | plain values owned by a `Vec` or by a mapped file |
@@ -25,6 +26,7 @@
 //! | [`units`] | lengths, angles and times with their units, as files write them |
 //! | [`world`] | meshes and their placements |
 
+pub mod area;
 pub mod batch;
 pub mod bounds;
 pub mod buffer;
@@ -36,6 +38,7 @@ pub mod transform;
 pub mod units;
 pub mod world;
 
+pub use area::{AreaTest, is_degenerate};
 pub use batch::{Detail, HitBatch, MISS, PlacedTriangle, RayBatch, RaysMut};
 pub use bounds::Bounds;
 pub use buffer::Buffer;

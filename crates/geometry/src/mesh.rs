@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::{Bounds, Buffer};
+use crate::{Bounds, Buffer, is_degenerate};
 
 /// `N` f32 values a vertex, possibly interleaved with others.
 #[derive(Debug, Clone)]
@@ -131,10 +131,12 @@ pub struct Mesh {
     pub colors: Option<Vertices<4>>,
     /// The box of all positions that triangles use (m).
     pub bounds: Bounds,
+    /// How many triangles are points or lines ([`is_degenerate`]): accelerators leave them out.
+    pub degenerate: u64,
 }
 
 impl Mesh {
-    /// A mesh without attributes; the bounds are worked out here.
+    /// A mesh without attributes; bounds and triangles without area are worked out here.
     ///
     /// # Panics
     ///
@@ -142,8 +144,11 @@ impl Mesh {
     #[must_use]
     pub fn new(name: impl Into<String>, positions: Positions, triangles: Buffer<[u32; 3]>) -> Self {
         let mut bounds = Bounds::EMPTY;
-        for &i in triangles.iter().flatten() {
-            bounds.include(positions.get(i as usize));
+        let mut degenerate = 0;
+        for triangle in triangles.iter() {
+            let corners = triangle.map(|i| positions.get(i as usize));
+            corners.into_iter().for_each(|corner| bounds.include(corner));
+            degenerate += u64::from(is_degenerate(corners));
         }
         Self {
             name: name.into(),
@@ -153,6 +158,7 @@ impl Mesh {
             uvs: Vec::new(),
             colors: None,
             bounds,
+            degenerate,
         }
     }
 

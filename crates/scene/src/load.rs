@@ -239,7 +239,6 @@ impl SceneFile {
         let settings = import::Options {
             strictness: options.strictness,
             root: folder.limit().map(std::path::Path::to_owned),
-            count_degenerate: options.count_degenerate,
         };
         let goes_on = |origin: &Origin, done: usize| {
             let name = &objects[origin.user].title;

@@ -86,9 +86,6 @@ impl Parts {
         self.stats.bytes_mapped += stats.bytes_mapped;
         self.stats.bytes_copied += stats.bytes_copied;
         self.stats.dropped += stats.dropped;
-        if let Some(degenerate) = stats.degenerate {
-            self.stats.degenerate = Some(self.stats.degenerate.unwrap_or(0) + degenerate);
-        }
     }
 
     /// Places an object. A model that stands for a scene has an object for each of its nodes.

@@ -86,8 +86,6 @@ pub struct LoadStats {
     pub bytes_copied: u64,
     /// Triangles dropped because a corner is not finite.
     pub dropped: u64,
-    /// Triangles of zero area, when they were to be counted.
-    pub degenerate: Option<u64>,
 }
 
 /// How to load.
@@ -99,8 +97,6 @@ pub struct LoadOptions<'a> {
     pub reach: Reach,
     /// A camera of one of the models by name or number, instead of the scene's.
     pub camera: Option<&'a str>,
-    /// Count triangles of zero area.
-    pub count_degenerate: bool,
     /// Told now and then how far loading is; answering `false` stops it.
     pub progress: Option<&'a (dyn Fn(LoadProgress<'_>) -> bool + Sync)>,
 }
@@ -111,7 +107,6 @@ impl std::fmt::Debug for LoadOptions<'_> {
             .field("strictness", &self.strictness)
             .field("reach", &self.reach)
             .field("camera", &self.camera)
-            .field("count_degenerate", &self.count_degenerate)
             .finish_non_exhaustive()
     }
 }

@@ -64,7 +64,7 @@ fn model(bytes: &[u8], folder: &Path, name: &str) {
     let options = Options {
         strictness: Strictness::Strict,
         root: Some(folder.to_owned()),
-        count_degenerate: false,
+        ..Options::default()
     };
     let _ = import(&path, Wanted::EVERYTHING, &options);
     check(&path);

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Geometry, Placement, Transform};
+use etendue_geometry::{Bounds, Geometry, Placement, Transform};
 
 /// What becomes of a placement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,14 +25,20 @@ pub(super) struct Instanced {
 /// Rays are moved into a worse conditioned placement with an error that single precision cannot bear.
 const WORST_CONDITION: f64 = 1e3;
 
+/// An instance whose box is fewer of single precision's steps long is baked: Debian 12's Embree ends
+/// the process when it has to part instances whose boxes are one point
+/// (`heuristic_openmerge_array.h`, at low quality). Under half a step there is nothing to hit.
+const LEAST_STEPS: f64 = 4.0;
+
 impl Instanced {
-    pub(super) fn of(geometry: &Geometry) -> Self {
+    /// For coordinates relative to `origin`.
+    pub(super) fn of(geometry: &Geometry, origin: DVec3) -> Self {
         let uses = geometry.uses();
         let mut seen = HashSet::new();
         let mut meshes = vec![false; geometry.meshes.len()];
         let kind = |placement: &Placement| {
             let (mesh, transform) = (placement.mesh as usize, &placement.world_from_mesh);
-            if geometry.meshes[mesh].triangles.is_empty() || !transform.is_finite() {
+            if !transform.is_finite() || !geometry.has_area(placement) {
                 return Kind::LeftOut;
             }
             if uses[mesh] < 2 {
@@ -45,12 +51,28 @@ impl Instanced {
             if !is_sound(&transform.linear) {
                 return Kind::Baked;
             }
+            let steps = steps_of_f32(geometry.meshes[mesh].bounds, transform, origin);
+            if steps < LEAST_STEPS {
+                return if steps < 0.5 { Kind::LeftOut } else { Kind::Baked };
+            }
             meshes[mesh] = true;
             Kind::Instance
         };
         let placements = geometry.placements.iter().map(kind).collect();
         Self { placements, meshes }
     }
+}
+
+/// How many steps of single precision the box of a mesh is long where `transform` places it, seen from
+/// `origin`, on the axis on which it is most.
+fn steps_of_f32(bounds: Bounds, transform: &Transform, origin: DVec3) -> f64 {
+    let l = &transform.linear;
+    let size = bounds.max - bounds.min;
+    let extent = l.x_axis.abs() * size.x + l.y_axis.abs() * size.y + l.z_axis.abs() * size.z;
+    let place = transform.point_from(bounds.centre(), origin).abs() + extent;
+    let steps = extent / (place * f64::from(f32::EPSILON));
+    // 0 over 0 is NaN, which `max` passes over.
+    0.0_f64.max(steps.x).max(steps.y).max(steps.z)
 }
 
 fn bits_of(transform: &Transform) -> [u64; 15] {

@@ -4,7 +4,7 @@ use std::ptr::NonNull;
 
 use embree4_sys as sys;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Mesh, Positions, Transform, Vertices};
+use etendue_geometry::{AreaTest, MISS, Mesh, Positions, Transform, Vertices};
 use rayon::prelude::*;
 
 use super::SceneHandle;
@@ -37,28 +37,35 @@ impl Shape {
         Ok(Self { handle, copied_bytes: 0 })
     }
 
-    /// The triangles of `mesh`, moved by `to_frame`; the buffers are shared when nothing moves them.
-    /// `mesh` must outlive the scene that this is attached to.
+    /// The triangles of `mesh`, moved by `to_frame`; the buffers are shared when nothing moves them
+    /// and every triangle has an area. `None` when none has. `mesh` must outlive the scene that this
+    /// is attached to.
     pub(super) fn mesh(
         device: &Device,
         mesh: &Mesh,
         to_frame: &Transform,
         options: &BuildOptions,
-    ) -> Result<Self, BuildError> {
+    ) -> Result<Option<Self>, BuildError> {
         check_size(&mesh.name, mesh.triangles.len(), mesh.positions.len())?;
         let mut shape = Self::new(device, sys::RTC_GEOMETRY_TYPE_TRIANGLE, options)?;
-        shape.share_triangles(mesh);
-        match &mesh.positions {
+        let test = AreaTest::under(mesh, &to_frame.linear);
+        let kept = match &mesh.positions {
             Positions::F32(vertices) if to_frame.is_identity() && vertices.is_padded() => {
                 shape.share_vertices(vertices);
+                sift(mesh, test, &[])
             }
-            positions => shape.copy_positions(device, positions, to_frame)?,
+            positions => sift(mesh, test, shape.copy_positions(device, positions, to_frame)?),
+        };
+        match kept {
+            None => shape.share_triangles(mesh),
+            Some(kept) if !kept.contains(&true) => return Ok(None),
+            Some(kept) => shape.copy_triangles(device, mesh, &kept)?,
         }
         device.check("rtcSetGeometryBuffer")?;
         // SAFETY: the geometry is complete and not yet in use.
         unsafe { sys::rtcCommitGeometry(shape.handle.as_ptr()) };
         device.check("rtcCommitGeometry")?;
-        Ok(shape)
+        Ok(Some(shape))
     }
 
     /// Lets Embree read the triangles where they stand. `mesh` must outlive the scene.
@@ -81,6 +88,42 @@ impl Shape {
         }
     }
 
+    /// Copies the triangles into a buffer of Embree's own, where those that are not `kept` name a
+    /// vertex that does not exist: Embree passes over such, and the others keep their numbers.
+    fn copy_triangles(
+        &mut self,
+        device: &Device,
+        mesh: &Mesh,
+        kept: &[bool],
+    ) -> Result<(), BuildError> {
+        let triangles: &[[u32; 3]] = &mesh.triangles;
+        // SAFETY: the geometry is ours; Embree allocates `len` items of 12 bytes.
+        let data = unsafe {
+            sys::rtcSetNewGeometryBuffer(
+                self.handle.as_ptr(),
+                sys::RTC_BUFFER_TYPE_INDEX,
+                0,
+                sys::RTC_FORMAT_UINT3,
+                size_of::<[u32; 3]>(),
+                triangles.len(),
+            )
+        };
+        device.check("rtcSetNewGeometryBuffer")?;
+        if data.is_null() {
+            return Ok(());
+        }
+        // SAFETY: the buffer is `len` times three u32, aligned to 16 bytes, written by nobody else
+        // until the geometry is committed.
+        let out =
+            unsafe { std::slice::from_raw_parts_mut(data.cast::<[u32; 3]>(), triangles.len()) };
+        let given = triangles.par_iter().zip(kept).with_min_len(4096);
+        out.par_iter_mut().zip(given).for_each(|(out, (&triangle, &kept))| {
+            *out = if kept { triangle } else { [MISS; 3] };
+        });
+        self.copied_bytes += std::mem::size_of_val(triangles) as u64;
+        Ok(())
+    }
+
     /// Lets Embree read the corners where they stand. They must be padded, and outlive the scene.
     fn share_vertices(&mut self, vertices: &Vertices<3>) {
         assert!(vertices.is_padded(), "Embree reads 16 bytes at the last vertex");
@@ -101,13 +144,13 @@ impl Shape {
         }
     }
 
-    /// Moves the positions into a buffer of Embree's own, which it pads itself.
+    /// Moves the positions into a buffer of Embree's own, which it pads itself; as they are there.
     fn copy_positions(
         &mut self,
         device: &Device,
         positions: &Positions,
         to_frame: &Transform,
-    ) -> Result<(), BuildError> {
+    ) -> Result<&[[f32; 3]], BuildError> {
         let count = positions.len();
         // SAFETY: the geometry is ours; Embree allocates `count` items of 12 bytes and padding.
         let data = unsafe {
@@ -122,7 +165,7 @@ impl Shape {
         };
         device.check("rtcSetNewGeometryBuffer")?;
         if data.is_null() || count == 0 {
-            return Ok(());
+            return Ok(&[]);
         }
         // SAFETY: the buffer is `count` times three floats, aligned to 16 bytes, written by nobody
         // else until the geometry is committed.
@@ -130,8 +173,8 @@ impl Shape {
         out.par_iter_mut().with_min_len(4096).enumerate().for_each(|(i, corner)| {
             *corner = to_frame.point(positions.get(i)).as_vec3().to_array();
         });
-        self.copied_bytes = (count * size_of::<[f32; 3]>()) as u64;
-        Ok(())
+        self.copied_bytes += (count * size_of::<[f32; 3]>()) as u64;
+        Ok(out)
     }
 
     /// `scene` once more, moved by `to_frame`.
@@ -168,6 +211,23 @@ impl Drop for Shape {
         // SAFETY: releases the reference that `rtcNewGeometry` gave; scenes hold their own.
         unsafe { sys::rtcReleaseGeometry(self.handle.as_ptr()) };
     }
+}
+
+/// Which triangles Embree is to see, `None` for all: those that `test` finds an area in, and that
+/// single precision has not `moved` into a point, which no ray of Embree hits. Debian 12's Embree
+/// ends the process when trees of several meshes meet in a box without extent
+/// (`heuristic_openmerge_array.h`, at low quality).
+fn sift(mesh: &Mesh, test: AreaTest<'_>, moved: &[[f32; 3]]) -> Option<Vec<bool>> {
+    if test.keeps_all() && moved.is_empty() {
+        return None;
+    }
+    let is_point = |i: usize| {
+        let [a, b, c] = mesh.triangles[i].map(|corner| moved.get(corner as usize));
+        !moved.is_empty() && a == b && b == c
+    };
+    let keeps = |i: usize| (test.keeps_all() || test.keeps(i)) && !is_point(i);
+    let all = || (0..mesh.triangles.len()).into_par_iter().with_min_len(4096);
+    (!all().all(keeps)).then(|| all().map(keeps).collect())
 }
 
 /// Refuses what Embree's 32-bit numbers cannot count.

@@ -1,7 +1,7 @@
 //! Triangles in one frame, one at a time and as what trees are built from.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Geometry, MISS, Positions, Transform};
+use etendue_geometry::{AreaTest, Geometry, MISS, Positions, Transform};
 use rayon::prelude::*;
 
 use super::frame::{Frame, outward};
@@ -30,7 +30,7 @@ pub(crate) struct Part {
 pub(super) const MOST_TRIANGLES: usize = 90_000_000;
 
 impl Part {
-    /// The number of triangles.
+    /// The number of triangles, those without area included.
     pub(crate) fn len(&self, geometry: &Geometry) -> usize {
         match &self.members {
             Members::Mesh(mesh) => geometry.meshes[*mesh as usize].triangles.len(),
@@ -107,17 +107,37 @@ impl Part {
         }
     }
 
-    /// A ref for every triangle: its box in this frame, its placement ([`MISS`] for a shared
-    /// mesh) and its number.
+    /// Tells which triangles of one of this part's meshes have an area in this frame.
+    fn area_test<'a>(&self, geometry: &'a Geometry, placement: u32) -> AreaTest<'a> {
+        match &self.members {
+            Members::Mesh(mesh) => AreaTest::of(&geometry.meshes[*mesh as usize]),
+            Members::Baked(_) => {
+                let placement = &geometry.placements[placement as usize];
+                let linear = &placement.world_from_mesh.linear;
+                AreaTest::under(geometry.mesh_of(placement), linear)
+            }
+        }
+    }
+
+    /// A ref for every triangle that has an area: its box in this frame, its placement ([`MISS`]
+    /// for a shared mesh) and its number.
     pub(crate) fn refs(&self, geometry: &Geometry) -> Vec<Ref> {
         let mut refs = Vec::with_capacity(self.len(geometry));
         let mut append = |placement: u32| {
             let source = self.source(geometry, placement);
             let count = index(source.triangles.len());
-            refs.par_extend((0..count).into_par_iter().with_min_len(1 << 12).map(|triangle| {
+            let triangles = (0..count).into_par_iter().with_min_len(1 << 12);
+            let make = |triangle| {
                 let (lo, hi) = outward(source.corners(triangle));
                 Ref { lo, first: placement, hi, second: triangle }
-            }));
+            };
+            let test = self.area_test(geometry, placement);
+            if test.keeps_all() {
+                refs.par_extend(triangles.map(make));
+            } else {
+                let kept = triangles.filter(|&triangle| test.keeps(triangle as usize));
+                refs.par_extend(kept.map(make));
+            }
         };
         match &self.members {
             Members::Mesh(_) => append(MISS),

@@ -9,6 +9,7 @@ mod exposures; // what a scene's sensor makes of a render
 mod figures; // models with skins, in the pose of their file
 mod files; // what is no file, what costs without end, what real programs write
 mod gltf_looks; // materials, lights and textures of models, with closed-form answers
+mod hidden; // meshes of one point, nodes scaled to 0
 mod ids; // numbers of objects, copies, nodes and materials, and their names
 mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // lenses against other software, and what is refused

@@ -102,8 +102,11 @@ pub struct ObjectReport {
 pub struct Defects {
     /// Dropped because a corner is NaN or infinite; under `--strict` the file is refused.
     pub not_finite: u64,
-    /// Without area. They are kept and never hit.
+    /// Without area, each stored one once. Accelerators leave them out; the others keep their
+    /// numbers.
     pub degenerate: u64,
+    /// Placements that scale their mesh to a line or a point, as files hide objects.
+    pub collapsed: u64,
     /// With the same three corners as another one of their mesh.
     pub duplicate: u64,
     /// With a corner that does not exist. Always 0: such a file is refused.
@@ -154,8 +157,7 @@ pub fn check(
     options: &LoadOptions<'_>,
 ) -> Result<Diagnosis, SceneError> {
     let file = SceneFile::read(path, overrides)?;
-    let options = LoadOptions { count_degenerate: true, ..*options };
-    let scene = file.load(Wanted::EVERYTHING, &options)?;
+    let scene = file.load(Wanted::EVERYTHING, options)?;
     Ok(Diagnosis::of(&scene, file.kind()))
 }
 
@@ -179,7 +181,8 @@ impl Diagnosis {
             nodes: scene.node_names(),
             defects: Defects {
                 not_finite: scene.stats.dropped,
-                degenerate: scene.stats.degenerate.unwrap_or(0),
+                degenerate: geometry.meshes.iter().map(|mesh| mesh.degenerate).sum(),
+                collapsed: geometry.placements.iter().filter(|p| !p.has_extent()).count() as u64,
                 duplicate: geometry.meshes.iter().map(duplicates::count).sum(),
                 out_of_range: 0,
             },

@@ -75,7 +75,8 @@ impl Diagnosis {
     fn defects_in_words(&self) -> String {
         let named = [
             (self.defects.not_finite, "not finite (dropped)"),
-            (self.defects.degenerate, "without area (never hit)"),
+            (self.defects.degenerate, "without area (left out)"),
+            (self.defects.collapsed, "placements without extent (left out)"),
             (self.defects.duplicate, "twice there"),
         ];
         let found: Vec<String> = named

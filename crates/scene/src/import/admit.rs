@@ -5,7 +5,7 @@ use std::path::Path;
 
 use bytemuck::AnyBitPattern;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Buffer, Mesh, Positions, Vertices};
+use etendue_geometry::{Bounds, Buffer, Mesh, Positions, Vertices, is_degenerate};
 use rayon::prelude::*;
 
 use super::{ImportError, Note, NoteKind, Options, Strictness};
@@ -34,8 +34,6 @@ pub(super) struct Admitted {
     pub mesh: Mesh,
     /// Triangles dropped because a corner is not finite.
     pub dropped: u64,
-    /// Triangles of zero area, when they are to be counted.
-    pub degenerate: u64,
     pub notes: Vec<Note>,
 }
 
@@ -53,8 +51,8 @@ pub(super) fn admit(
     let mut gate =
         Gate { file, place: &candidate.place, strictness: options.strictness, notes: Vec::new() };
     let survey = gate.survey(&candidate.positions, &candidate.triangles)?;
-    let (triangles, bounds) = if survey.broken == 0 {
-        (candidate.triangles, survey.bounds)
+    let (triangles, bounds, degenerate) = if survey.broken == 0 {
+        (candidate.triangles, survey.bounds, survey.degenerate)
     } else {
         gate.defect(
             survey.broken,
@@ -64,12 +62,8 @@ pub(super) fn admit(
         )?;
         let kept = finite_triangles(&candidate.positions, &candidate.triangles);
         let bounds = bounds_of(&candidate.positions, &kept);
-        (kept.into(), bounds)
-    };
-    let degenerate = if options.count_degenerate {
-        count_degenerate(&candidate.positions, &triangles)
-    } else {
-        0
+        let degenerate = count_degenerate(&candidate.positions, &kept);
+        (kept.into(), bounds, degenerate)
     };
     let mesh = Mesh {
         normals: candidate.normals.map(|v| gate.finite(v, "normal", 0.0)).transpose()?,
@@ -83,8 +77,9 @@ pub(super) fn admit(
         positions: candidate.positions,
         triangles,
         bounds,
+        degenerate,
     };
-    Ok(Admitted { mesh, dropped: survey.broken, degenerate, notes: gate.notes })
+    Ok(Admitted { mesh, dropped: survey.broken, notes: gate.notes })
 }
 
 /// What one look at all triangles tells.
@@ -93,6 +88,8 @@ struct Survey {
     bounds: Bounds,
     /// Triangles with a corner that is not finite.
     broken: u64,
+    /// Triangles without area; not counted where any is broken.
+    degenerate: u64,
 }
 
 struct Gate<'a> {
@@ -133,13 +130,14 @@ impl Gate<'_> {
                 ((highest as usize) < vertices).then(|| survey_chunk(chunk, &position))
             })
             .collect();
-        let mut survey = Survey { bounds: Bounds::EMPTY, broken: 0 };
+        let mut survey = Survey { bounds: Bounds::EMPTY, broken: 0, degenerate: 0 };
         for (number, part) in parts.into_iter().enumerate() {
             let Some(part) = part else {
                 return Err(self.out_of_range(vertices, triangles, number * CHUNK));
             };
             survey.bounds = survey.bounds.union(part.bounds);
             survey.broken += part.broken;
+            survey.degenerate += part.degenerate;
         }
         Ok(survey)
     }
@@ -206,17 +204,21 @@ fn survey_chunk(chunk: &[[u32; 3]], position: &impl Fn(u32) -> DVec3) -> Survey 
     let mut bounds = Bounds::EMPTY;
     // 0 as long as everything is finite, NaN from then on: cheaper than a test a corner.
     let mut taint = DVec3::ZERO;
-    for &corner in chunk.as_flattened() {
-        let p = position(corner);
-        bounds.include(p);
-        taint += p * 0.0;
+    let mut degenerate = 0;
+    for triangle in chunk {
+        let corners = triangle.map(position);
+        for p in corners {
+            bounds.include(p);
+            taint += p * 0.0;
+        }
+        degenerate += u64::from(is_degenerate(corners));
     }
     if taint == DVec3::ZERO {
-        return Survey { bounds, broken: 0 };
+        return Survey { bounds, broken: 0, degenerate };
     }
     let broken =
         chunk.iter().filter(|t| !t.iter().all(|&corner| position(corner).is_finite())).count();
-    Survey { bounds, broken: broken as u64 }
+    Survey { bounds, broken: broken as u64, degenerate }
 }
 
 fn finite_triangles(positions: &Positions, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
@@ -236,13 +238,13 @@ pub(crate) fn bounds_of(positions: &Positions, triangles: &[[u32; 3]]) -> Bounds
     triangles.par_chunks(CHUNK).map(of_chunk).reduce(|| Bounds::EMPTY, Bounds::union)
 }
 
-/// Triangles without area: two corners equal, or all on a line to the precision of f64.
-fn count_degenerate(positions: &Positions, triangles: &[[u32; 3]]) -> u64 {
-    let is_degenerate = |t: &&[u32; 3]| {
-        let [a, b, c] = t.map(|corner| positions.get(corner as usize));
-        (b - a).cross(c - a) == DVec3::ZERO
+/// How many of `triangles`, whose indices exist, have no area.
+pub(crate) fn count_degenerate(positions: &Positions, triangles: &[[u32; 3]]) -> u64 {
+    let of_chunk = |chunk: &[[u32; 3]]| {
+        let corners = chunk.iter().map(|t| t.map(|corner| positions.get(corner as usize)));
+        corners.filter(|&corners| is_degenerate(corners)).count() as u64
     };
-    triangles.par_iter().filter(is_degenerate).count() as u64
+    triangles.par_chunks(CHUNK).map(of_chunk).sum()
 }
 
 /// Bytes that `buffer` holds in memory of its own and in a mapped file.

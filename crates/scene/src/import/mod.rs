@@ -29,6 +29,8 @@ use etendue_tracer::{Light, LightKind, Material, Texture};
 pub use error::ImportError;
 pub use note::{Note, NoteKind};
 
+pub(crate) use admit::count_degenerate;
+
 use crate::sniff::what_it_is;
 use files::Files;
 
@@ -88,8 +90,6 @@ pub struct Options {
     /// The folder that the files named inside the model may not leave (after links are followed);
     /// `None` allows any place.
     pub root: Option<PathBuf>,
-    /// Count triangles of zero area ([`Stats::degenerate`]). They are kept either way.
-    pub count_degenerate: bool,
 }
 
 /// What a model file holds.
@@ -200,8 +200,6 @@ pub struct Stats {
     pub bytes_copied: u64,
     /// Triangles dropped because a corner is not finite.
     pub dropped: u64,
-    /// Triangles of zero area, when they were to be counted.
-    pub degenerate: Option<u64>,
 }
 
 /// Refuses a file whose bytes are those of something else than `wanted`.

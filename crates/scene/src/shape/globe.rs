@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::GoOn;
 use super::relief::Relief;
 use super::turn::sin_cos_turns;
-use crate::import::Wanted;
+use crate::import::{Wanted, count_degenerate};
 
 /// Vertices that one task makes.
 const CHUNK: usize = 1 << 12;
@@ -80,6 +80,7 @@ impl Globe {
             false => None,
         };
         let uvs = if wanted.uvs { vec![vertices(places.uvs()?, count)] } else { Vec::new() };
+        let degenerate = count_degenerate(&positions, &triangles);
         let triangles = triangles.into();
         Some(Mesh {
             name: name.to_owned(),
@@ -89,6 +90,7 @@ impl Globe {
             uvs,
             colors: None,
             bounds,
+            degenerate,
         })
     }
 

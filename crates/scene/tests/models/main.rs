@@ -47,8 +47,7 @@ pub(crate) fn import_with(folder: &TempDir, name: &str, wanted: Wanted) -> Impor
 }
 
 pub(crate) fn super_import(path: &Path) -> Import {
-    let options = Options { count_degenerate: true, ..Options::default() };
-    import(path, Wanted::EVERYTHING, &options).unwrap()
+    import(path, Wanted::EVERYTHING, &Options::default()).unwrap()
 }
 
 pub(crate) fn import_strict(path: &Path) -> Result<Import, ImportError> {

@@ -128,9 +128,6 @@ fn take(read: Read, import: &mut Import, reader: &Reader<'_>) -> Result<u32, Imp
     import.stats.bytes_copied += read.copied;
     import.stats.bytes_mapped += read.mapped;
     import.stats.dropped += read.admitted.dropped;
-    if reader.options.count_degenerate {
-        *import.stats.degenerate.get_or_insert(0) += read.admitted.degenerate;
-    }
     for note in read.notes.into_iter().chain(read.admitted.notes) {
         note::push(&mut import.notes, note);
     }
@@ -355,7 +352,7 @@ impl<'a> Part<'a> {
     fn empty(self, name: String) -> Read {
         let positions = Positions::F32(Vertices::from_arrays(&[]));
         let mesh = etendue_geometry::Mesh::new(name, positions, Vec::new().into());
-        let admitted = Admitted { mesh, dropped: 0, degenerate: 0, notes: Vec::new() };
+        let admitted = Admitted { mesh, dropped: 0, notes: Vec::new() };
         Read { skinned: false, admitted, copied: 0, mapped: 0, notes: self.notes }
     }
 }

@@ -77,7 +77,7 @@ pub(super) fn import(
         let node = *nodes.entry(&segment.name).or_insert(next);
         let candidate = welder.mesh(segment, path, single);
         let admitted = admit::admit(candidate, path, options)?;
-        place(admitted, segment, [material, node], options, &mut import)?;
+        place(admitted, segment, [material, node], &mut import)?;
     }
     Ok(import)
 }
@@ -96,14 +96,10 @@ fn place(
     admitted: Admitted,
     segment: &Segment,
     [material, node]: [u32; 2],
-    options: &Options,
     import: &mut Import,
 ) -> Result<(), ImportError> {
     import.stats.bytes_copied += admitted.mesh.heap_bytes() as u64;
     import.stats.dropped += admitted.dropped;
-    if options.count_degenerate {
-        *import.stats.degenerate.get_or_insert(0) += admitted.degenerate;
-    }
     for note in admitted.notes {
         note::push(&mut import.notes, note);
     }

@@ -75,7 +75,6 @@ pub(super) fn import(
     };
     let admitted = admit::admit(candidate, path, options)?;
     import.stats.dropped = admitted.dropped;
-    import.stats.degenerate = options.count_degenerate.then_some(admitted.degenerate);
     import.notes.extend(admitted.notes);
     import.meshes.push(admitted.mesh);
     import.materials.push(Material::unnamed());
