@@ -374,7 +374,8 @@ impl SceneFile {
             message: message.clone(),
             count: 1,
         };
-        Ok(train.notes().iter().chain(&guesses).map(note).collect())
+        let implausible = lens.implausible();
+        Ok(train.notes().iter().chain(&implausible).chain(&guesses).map(note).collect())
     }
 
     /// The sensor with the pixels that the camera gives it.

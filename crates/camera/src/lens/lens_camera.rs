@@ -27,6 +27,12 @@ use etendue_optics::train::analysis::projected_solid_angle;
 use etendue_optics::train::pupil::{Disc, Window, blocked, without_dimming, without_filters};
 use etendue_optics::train::{ExitPupil, ExitPupilError, OpticalTrain, Part, Side, TrainAt};
 
+/// Focal lengths that lenses of cameras have (mm): from an endoscope's to a telescope's.
+const PLAUSIBLE_FOCAL_LENGTHS: std::ops::RangeInclusive<f64> = 0.2..=2e4;
+
+/// The least diagonal of a sensor that is not told (mm); those of endoscopes have 1.
+const LEAST_DIAGONAL: f64 = 2.0;
+
 /// Lanes whose rays run the same way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaneGroup {
@@ -287,21 +293,36 @@ impl LensCamera {
         curves.flatten().filter(|curve| curve.as_flat().is_none()).cloned().collect()
     }
 
+    /// Sizes that no camera has, in sentences: most likely a unit that was not meant.
+    #[must_use]
+    pub fn implausible(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        let efl = self.focused.paraxial().efl.map(f64::abs);
+        if let Some(efl) = efl.filter(|efl| !PLAUSIBLE_FOCAL_LENGTHS.contains(efl)) {
+            let meant = if efl < 1.0 { "metres" } else { "micrometres" };
+            notes.push(format!(
+                "the focal length is {efl:.4} mm: did you mean {meant}? Lengths inside a lens are \
+                 millimetres, or strings with a unit"
+            ));
+        }
+        let [width, height] = (2.0 * self.focused.film().half_size()).to_array();
+        if width.hypot(height) < LEAST_DIAGONAL {
+            notes.push(format!(
+                "the sensor is {width:.3} x {height:.3} mm with pixels of {:.4} um: a crop of \
+                 nearly any sensor; give more pixels, or their size by `sensor_height` or `fov`",
+                self.focused.pixel_pitch()
+            ));
+        }
+        notes
+    }
+
     /// What is odd about the lens, and what of it is not known at the wavelengths of `lanes`.
     #[must_use]
     pub fn out_of_range(&self, lanes: &Lanes) -> Vec<String> {
-        let train = self.focused.train();
-        let mut notes: Vec<String> = Vec::new();
-        for group in self.lane_groups(lanes) {
-            for wavelength in self.spread(lanes, &group).wavelengths {
-                for note in train.outside_of_range(wavelength) {
-                    if !notes.contains(&note) {
-                        notes.push(note);
-                    }
-                }
-            }
-        }
-        notes
+        let groups = self.lane_groups(lanes).into_iter();
+        let wavelengths: Vec<f64> =
+            groups.flat_map(|group| self.spread(lanes, &group).wavelengths).collect();
+        self.focused.train().outside_of_range(&wavelengths)
     }
 }
 

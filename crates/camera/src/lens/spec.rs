@@ -1,7 +1,10 @@
 //! The cameras with a lens as the scene file writes them, and the lens that each one is.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::focused::{Focused, View, positive};
 use super::lens_camera::LensCamera;
@@ -14,6 +17,46 @@ use etendue_optics::element::{
 };
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{Focus, LensFile, OpticalTrain};
+
+/// The distance of what is in focus (m); a file may write "infinity".
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FocusDistance(pub f64);
+
+/// How files write an object at infinity.
+const INFINITY: [&str; 2] = ["infinity", "inf"];
+
+impl Serialize for FocusDistance {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0 == f64::INFINITY {
+            true => serializer.serialize_str(INFINITY[0]),
+            false => Metres(self.0).serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for FocusDistance {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = serde_json::Value::deserialize(deserializer)?;
+        if value.as_str().is_some_and(|text| INFINITY.contains(&text.trim())) {
+            return Ok(Self(f64::INFINITY));
+        }
+        Metres::deserialize(value).map(|metres| Self(metres.0)).map_err(D::Error::custom)
+    }
+}
+
+impl JsonSchema for FocusDistance {
+    fn schema_name() -> Cow<'static, str> {
+        "FocusDistance".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut schema = Metres::json_schema(generator);
+        let about = "A number in m, a string with a unit, or \"infinity\".";
+        schema.insert("description".to_owned(), about.into());
+        schema.insert("x-also".to_owned(), INFINITY.as_slice().into());
+        schema
+    }
+}
 
 /// What the cameras with a lens have in common.
 #[derive(Debug, Clone, Copy)]
@@ -55,9 +98,10 @@ macro_rules! camera_with_a_lens {
             /// for an object at infinity.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub f_number: Option<f64>,
-            /// The distance of what is in focus (m), along the axis from the entrance pupil.
+            /// The distance of what is in focus (m, or "infinity"), along the axis from the entrance
+            /// pupil.
             #[serde(default, skip_serializing_if = "Option::is_none")]
-            pub focus_distance: Option<Metres>,
+            pub focus_distance: Option<FocusDistance>,
             /// Instead of `focus_distance`: from the lens' last vertex to the sensor (mm).
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub sensor_distance: Option<Millimetres>,
@@ -97,7 +141,7 @@ macro_rules! camera_with_a_lens {
                              of them",
                         ));
                     }
-                    (Some(Metres(distance)), None) => Some(Focus::Distance(distance)),
+                    (Some(FocusDistance(distance)), None) => Some(Focus::Distance(distance)),
                     (None, Some(Millimetres(distance))) => Some(Focus::Sensor(distance)),
                     (None, None) => None,
                 };

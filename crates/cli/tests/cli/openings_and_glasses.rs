@@ -143,3 +143,46 @@ fn at_least_150_of_174_public_lenses_find_their_glasses() {
     assert!(174 - 6 - files >= 150, "{files} may still be refused");
     println!("at least {} of 174 load", 174 - 6 - files);
 }
+
+#[test]
+fn a_scene_is_focused_at_infinity_by_that_word() {
+    let bench = Bench::new();
+    let thin = |focus: &str| {
+        format!(
+            r#""type": "thin_lens", "focal_length": 50, "f_number": 4, "sensor_height": 24,
+               "pose": {{"from": [0, 0, 5], "look_at": [0, 0, 0]}},
+               "sensor": {{"resolution": [4, 3]}}, "focus_distance": {focus}"#
+        )
+    };
+    camera(&bench, &thin(r#""infinity""#));
+    let output = bench.run(&["render", "scene.json", "-o", "out", "--outputs", "npy"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    // An object at infinity is none that JSON can write.
+    assert!(bench.json("out/camera.json")["focus_distance_m"].is_null());
+    camera(&bench, &thin(r#""2 parsecs""#));
+    let message = refused(&bench, &["plan", "scene.json"]);
+    assert!(message.contains("camera.focus_distance") && message.contains("parsecs"), "{message}");
+}
+
+#[test]
+fn sizes_that_no_camera_has_are_told_before_the_render() {
+    let bench = Bench::new();
+    let thin =
+        |more: &str| format!(r#""type": "thin_lens", "f_number": 4, "focus_distance": 2, {more}"#);
+    for (more, said) in [
+        (r#""focal_length": 0.05, "sensor_height": 24"#, "did you mean metres"),
+        (
+            r#""focal_length": 50, "sensor": {"resolution": [640, 480], "pixel_pitch": 2.4}"#,
+            "the sensor is 1.536 x 1.152 mm",
+        ),
+    ] {
+        camera(&bench, &thin(more));
+        let output = bench.run(&["check", "scene.json"]);
+        let words = text(&output.stdout) + &text(&output.stderr);
+        assert!(words.contains(said), "{more}: {words}");
+    }
+    camera(&bench, &thin(r#""focal_length": 50, "sensor_height": 24"#));
+    let output = bench.run(&["check", "scene.json"]);
+    let words = text(&output.stdout) + &text(&output.stderr);
+    assert!(!words.contains("did you mean") && !words.contains("a crop of"), "{words}");
+}

@@ -199,30 +199,35 @@ impl OpticalTrain {
         self.media.iter().any(Glass::is_dispersive)
     }
 
-    /// Sentences on glasses and filters that are not known at `wavelength` (nm): what is traced
-    /// there is their formula or their last value held.
+    /// Sentences on glasses and filters that are not known at some of `wavelengths` (nm), one for
+    /// each: what is traced there is their formula or their last value held.
     #[must_use]
-    pub fn outside_of_range(&self, wavelength: f64) -> Vec<String> {
+    pub fn outside_of_range(&self, wavelengths: &[f64]) -> Vec<String> {
         let mut notes = Vec::new();
-        for glass in &self.media {
-            let [from, to] = glass.range;
-            let note = format!(
-                "glass {} is known from {from} to {to} nm, and {wavelength} nm lies outside",
-                glass.name
-            );
-            if !glass.covers(wavelength) && !notes.contains(&note) {
+        let mut tell = |what: String, [from, to]: [f64; 2]| {
+            let mut outside: Vec<f64> = wavelengths.to_vec();
+            outside.retain(|nm| !(*nm >= from && *nm <= to));
+            outside.sort_by(f64::total_cmp);
+            outside.dedup();
+            let those = match outside[..] {
+                [] => return,
+                [one] => format!("{one} nm lies"),
+                [one, other] => format!("{one} and {other} nm lie"),
+                [first, .., last] => {
+                    format!("{} wavelengths from {first} to {last} nm lie", outside.len())
+                }
+            };
+            let note = format!("{what} is known from {from} to {to} nm, and {those} outside");
+            if !notes.contains(&note) {
                 notes.push(note);
             }
+        };
+        for glass in &self.media {
+            tell(format!("glass {}", glass.name), glass.range);
         }
         for (i, element) in self.elements.iter().enumerate() {
             if let Part::Filter(filter) = &element.part {
-                let [from, to] = filter.range();
-                if wavelength < from || wavelength > to {
-                    notes.push(format!(
-                        "the filter elements[{i}] is known from {from} to {to} nm, and \
-                         {wavelength} nm lies outside"
-                    ));
-                }
+                tell(format!("the filter elements[{i}]"), filter.range());
             }
         }
         notes

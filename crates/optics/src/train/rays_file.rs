@@ -15,7 +15,7 @@ use crate::glass::GlassError;
 const FARTHEST: f64 = 1e15;
 
 /// The most sentences on wavelengths out of range.
-const MOST_NOTES: usize = 20;
+const MOST_TOLD: usize = 20;
 
 /// Rays as their file writes them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -101,7 +101,7 @@ impl OpticalTrain {
         let clip = if file.clip { Clip::On } else { Clip::Off };
         let mut rays = Vec::with_capacity(file.rays.len());
         let mut lens: Option<TrainAt> = None;
-        let mut out_of_range = Vec::new();
+        let mut wavelengths: Vec<f64> = Vec::new();
         for (index, ray) in file.rays.iter().enumerate() {
             let error = |(key, why)| RayError { index, key, why };
             let [origin, direction] = ray.checked().map_err(error)?;
@@ -110,10 +110,8 @@ impl OpticalTrain {
             let at = match known {
                 Some(at) => at,
                 None => {
-                    for note in self.outside_of_range(ray.wavelength) {
-                        if out_of_range.len() < MOST_NOTES && !out_of_range.contains(&note) {
-                            out_of_range.push(note);
-                        }
+                    if wavelengths.len() < MOST_TOLD && !wavelengths.contains(&ray.wavelength) {
+                        wavelengths.push(ray.wavelength);
                     }
                     self.at(ray.wavelength)
                         .map_err(|why: GlassError| error(("wavelength", why.to_string())))?
@@ -122,7 +120,7 @@ impl OpticalTrain {
             rays.push(at.path(file.from, clip, origin, direction).into());
             lens = Some(at);
         }
-        Ok(TracedRays { rays, out_of_range })
+        Ok(TracedRays { rays, out_of_range: self.outside_of_range(&wavelengths) })
     }
 }
 

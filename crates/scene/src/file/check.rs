@@ -100,6 +100,11 @@ impl<'a> Checker<'a> {
     fn visit(&self, schema: &'a Value, value: &Value, path: &str) -> Outcome {
         let schema = self.resolve(schema);
         if let (Some(dimension), Some(text)) = (schema.get("x-quantity"), value.as_str()) {
+            // Words that stand for a quantity, such as "infinity".
+            let also = schema.get("x-also").and_then(Value::as_array);
+            if also.is_some_and(|words| words.contains(value)) {
+                return Ok(());
+            }
             return self.quantity(schema, dimension, text, path);
         }
         for choice in ["oneOf", "anyOf"] {

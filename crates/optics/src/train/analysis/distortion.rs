@@ -15,7 +15,8 @@ pub struct Distortion {
     pub y_real: f64,
     /// efl · tan(field) (mm).
     pub y_paraxial: f64,
-    /// (real − paraxial)/paraxial (percent); 0 on the axis.
+    /// (real − paraxial)/paraxial (percent), real counted from where the chief ray of field 0 lands,
+    /// which tilts and decentrings move; 0 on the axis.
     pub percent: f64,
 }
 
@@ -35,7 +36,14 @@ pub fn distortion(
         return None;
     }
     let y_paraxial = efl * field.to_radians().tan();
-    let percent = if y_paraxial == 0.0 { 0.0 } else { 100.0 * (y_real - y_paraxial) / y_paraxial };
+    let centre = match train.is_rotationally_symmetric() {
+        true => 0.0,
+        false => chief_height(train, at, 0.0, reference_z)?,
+    };
+    let percent = match y_paraxial == 0.0 {
+        true => 0.0,
+        false => 100.0 * (y_real - centre - y_paraxial) / y_paraxial,
+    };
     Some(Distortion { field, y_real, y_paraxial, percent })
 }
 

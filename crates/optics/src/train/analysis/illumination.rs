@@ -17,6 +17,10 @@ use crate::train::{OpticalTrain, Side, TrainAt};
 /// Cells a side over the rectangle of passing directions.
 const GRID: u32 = 500;
 
+/// Fractions of the golden ratio and of the root of 2, whose multiples are even over 0 to 1, and those
+/// of their sum and difference, too, so that diagonals fare as well.
+const SHIFTS: [f64; 2] = [0.618_033_988_749_895, 0.414_213_562_373_095];
+
 /// Illumination at one field angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Illumination {
@@ -63,7 +67,11 @@ pub fn projected_solid_angle(train: &OpticalTrain, at: &TrainAt, film: DVec3) ->
     for row in 0..GRID {
         rays.clear();
         for column in 0..GRID {
-            let cell = DVec2::new(f64::from(column) + 0.5, f64::from(row) + 0.5);
+            // Rows and columns are shifted against each other: on a straight grid the edge of a square
+            // stop would lie in or out of a whole line of cells at once.
+            let shift = |i: usize, line: u32| (SHIFTS[i] * (f64::from(line) + 0.5)).fract();
+            let cell =
+                DVec2::new(f64::from(column) + shift(0, row), f64::from(row) + shift(1, column));
             let slopes = window.min + cell * size;
             let cos2 = 1.0 / (1.0 + slopes.length_squared());
             rays.push_weighted(film, towards_lens(slopes), cos2 * cos2);

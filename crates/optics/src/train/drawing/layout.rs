@@ -44,7 +44,9 @@ pub fn layout(
     for (i, fan) in fans.iter().enumerate() {
         for ray in &fan.rays {
             let points: Vec<[f64; 2]> = ray.iter().map(|&point| view.pixel(point)).collect();
-            canvas.path(&points, &format!("c{}", i % COLOURS), 0.8);
+            for piece in view.pieces(&points) {
+                canvas.path(&piece, &format!("c{}", i % COLOURS), 0.8);
+            }
         }
     }
     for (i, element) in train.elements().iter().enumerate() {
@@ -54,7 +56,9 @@ pub fn layout(
         let half = view.sensor;
         canvas.path(&[view.pixel([z, -half]), view.pixel([z, half])], "ink", 2.5);
     }
-    legend(&mut canvas, &view, &fields);
+    let drawn = fields.iter().zip(&fans).enumerate().filter(|(_, (_, fan))| !fan.rays.is_empty());
+    let drawn: Vec<(usize, f64)> = drawn.map(|(i, (&field, _))| (i, field)).collect();
+    legend(&mut canvas, &view, &drawn);
     Ok(canvas.finish())
 }
 
@@ -90,7 +94,30 @@ fn fan(train: &OpticalTrain, at: &TrainAt, report: &LensReport, field: f64, end:
     };
     let (Some(low), Some(high)) = (edge(-1.0), edge(1.0)) else { return none };
     let place = |i: i32| low + (high - low) * f64::from(i) / f64::from(FAN - 1);
-    Fan { rays: (0..FAN).filter_map(|i| lit(place(i))).collect() }
+    let mut rays: Vec<Vec<[f64; 2]>> = (0..FAN).filter_map(|i| lit(place(i))).collect();
+    start_together(&mut rays, [chief.direction.z, chief.direction.y]);
+    Fan { rays }
+}
+
+/// The fan of a field, for tests.
+#[cfg(test)]
+pub(super) fn fan_of(
+    train: &OpticalTrain,
+    at: &TrainAt,
+    report: &LensReport,
+    field: f64,
+) -> Vec<Vec<[f64; 2]>> {
+    fan(train, at, report, field, report.sensor_z.unwrap_or_default()).rays
+}
+
+/// Moves the beginnings of parallel rays to a plane square to them, that of the one that begins first.
+fn start_together(rays: &mut [Vec<[f64; 2]>], direction: [f64; 2]) {
+    let along = |point: &[f64; 2]| point[0] * direction[0] + point[1] * direction[1];
+    let first = rays.iter().filter_map(|ray| ray.first()).map(along).fold(f64::INFINITY, f64::min);
+    for start in rays.iter_mut().filter_map(|ray| ray.first_mut()) {
+        let back = first - along(start);
+        *start = [start[0] + direction[0] * back, start[1] + direction[1] * back];
+    }
 }
 
 /// The way of a ray that leaves, from a little in front of the lens to the plane at `end`.
@@ -171,6 +198,43 @@ impl View {
         let spare = 0.5 * ((WIDTH - 2.0 * MARGIN) / scale - (right - left));
         let height = HEAD + FOOT + 2.0 * top * scale;
         Self { left: left - spare, right: right + spare, top, scale, height, sensor }
+    }
+
+    /// The pieces of a polyline (pixels) that lie on the picture.
+    fn pieces(&self, points: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
+        let mut pieces: Vec<Vec<[f64; 2]>> = Vec::new();
+        for [from, to] in points.windows(2).filter_map(|ends| self.clipped([ends[0], ends[1]])) {
+            match pieces.last_mut() {
+                Some(piece) if piece.last() == Some(&from) => piece.push(to),
+                _ => pieces.push(vec![from, to]),
+            }
+        }
+        pieces
+    }
+
+    /// What of a line (pixels) lies between the title and the legend (N. Liang and B. Barsky, "A new
+    /// concept and method for line clipping", 1984).
+    fn clipped(&self, [from, to]: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
+        let (low, high) = ([0.0, HEAD - 8.0], [WIDTH, self.height - FOOT + 6.0]);
+        let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+        for axis in 0..2 {
+            let step = to[axis] - from[axis];
+            let ends = [low[axis], high[axis]].map(|edge| (edge - from[axis]) / step);
+            if step == 0.0 {
+                if !(low[axis]..=high[axis]).contains(&from[axis]) {
+                    return None;
+                }
+            } else {
+                enter = enter.max(ends[0].min(ends[1]));
+                leave = leave.min(ends[0].max(ends[1]));
+            }
+        }
+        let at = |share: f64| match share {
+            0.0 => from,
+            1.0 => to,
+            _ => [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis])),
+        };
+        (enter < leave).then(|| [at(enter), at(leave)])
     }
 
     fn pixel(&self, [z, y]: [f64; 2]) -> [f64; 2] {
@@ -284,14 +348,14 @@ fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: 
     }
 }
 
-/// Fields by colour, and a scale.
-fn legend(canvas: &mut Canvas, view: &View, fields: &[f64]) {
+/// Fields of which rays were drawn, by the number of their colour, and a scale.
+fn legend(canvas: &mut Canvas, view: &View, fields: &[(usize, f64)]) {
     let y = view.height - 14.0;
     // Beams from the side may reach down here.
     canvas.cover([0.0, view.height - FOOT + 6.0], [WIDTH, FOOT]);
-    for (i, &field) in fields.iter().enumerate() {
-        let x = MARGIN + 90.0 * f64::from(u32::try_from(i).unwrap_or(0));
-        canvas.path(&[[x, y - 4.0], [x + 24.0, y - 4.0]], &format!("c{}", i % COLOURS), 2.0);
+    for (place, &(colour, field)) in (0_u32..).zip(fields) {
+        let x = MARGIN + 90.0 * f64::from(place);
+        canvas.path(&[[x, y - 4.0], [x + 24.0, y - 4.0]], &format!("c{}", colour % COLOURS), 2.0);
         canvas.text([x + 30.0, y], Anchor::Start, "small", &format!("{}\u{b0}", short(field)));
     }
     let length = round_length(140.0 / view.scale);

@@ -16,7 +16,7 @@ const HEAD: f64 = 76.0;
 const CAPTION: f64 = 40.0;
 
 /// The spots of a report's fields at its wavelengths, about the centroid of the main one, on the
-/// sensor. The dashed circle is the Airy disc, 1.22 λN in radius.
+/// sensor, with the RMS radius of all of them together. The dashed circle is the Airy disc, 1.22 λN in radius.
 ///
 /// # Errors
 ///
@@ -85,6 +85,17 @@ impl SpotBox {
         spot.points.iter().map(move |&point| point + shift)
     }
 
+    /// The root mean square radius (mm) of all wavelengths' rays together, about their centroid.
+    fn rms(&self) -> Option<f64> {
+        let points: Vec<DVec2> =
+            self.spots.iter().flatten().flat_map(|spot| self.points(spot)).collect();
+        #[expect(clippy::cast_precision_loss, reason = "a few thousand rays")]
+        let count = points.len() as f64;
+        let centroid = points.iter().sum::<DVec2>() / count;
+        let square: f64 = points.iter().map(|point| (*point - centroid).length_squared()).sum();
+        (!points.is_empty()).then(|| (square / count).sqrt())
+    }
+
     fn reach(&self) -> f64 {
         let points = self.spots.iter().flatten().flat_map(|spot| self.points(spot));
         points.map(|point| point.abs().max_element()).fold(0.0, f64::max)
@@ -104,8 +115,8 @@ impl SpotBox {
         if let Some(radius) = airy_radius(report) {
             canvas.airy(middle, radius * scale);
         }
-        let caption = match &self.main {
-            Some(spot) => format!("RMS {} \u{b5}m", short(1e3 * spot.rms)),
+        let caption = match self.rms() {
+            Some(rms) => format!("RMS {} \u{b5}m", short(1e3 * rms)),
             None => "no light".to_owned(),
         };
         let field = format!("{}\u{b0}", short(self.field));

@@ -204,6 +204,13 @@ impl LensReport {
     }
 
     fn note_missing_spots(&mut self) {
+        if self.paraxial.entrance_pupil.diameter == Some(0.0) {
+            self.notes.push(format!(
+                "the stop elements[{}] is closed: no light passes the lens, so there are no spots \
+                 and no f-number",
+                self.stop
+            ));
+        }
         if self.paraxial.entrance_pupil.diameter.is_none() && self.sensor_z.is_some() {
             self.notes.push(match self.paraxial.entrance_pupil.z {
                 Some(_) => "no spots: nothing limits the beam; give the stop a radius, or a \
@@ -263,9 +270,7 @@ fn farthest(train: &OpticalTrain, sensor_z: f64) -> f64 {
 
 /// What is not stated for the design wavelength, or for another one.
 fn out_of_range(train: &OpticalTrain, wavelengths: &[f64]) -> Vec<String> {
-    let others = wavelengths.iter().copied().filter(|&nm| nm != train.wavelength());
-    let all = std::iter::once(train.wavelength()).chain(others);
-    all.flat_map(|wavelength| train.outside_of_range(wavelength)).collect()
+    train.outside_of_range(&[&[train.wavelength()], wavelengths].concat())
 }
 
 fn colour(

@@ -226,6 +226,13 @@ impl Sheet {
         }
         let aperture = match line.command {
             "ENPD" => Aperture::EntrancePupil(value),
+            // The half angle of the cone of light at the object (degrees).
+            "OBNA" if line.number_or(1, 0.0)? == 1.0 => {
+                if value >= 90.0 {
+                    return Err(line.error(format!("a cone of {value} degrees must be below 90")));
+                }
+                Aperture::AtObject(value.to_radians().sin())
+            }
             "OBNA" if value >= 1.0 => {
                 return Err(line.error(format!("{value} must be below 1 in air")));
             }

@@ -285,6 +285,10 @@ fn an_aperture_given_at_the_object_sets_the_stop() {
     let pupil = train(&lens.file).paraxial(587.56).unwrap().entrance_pupil;
     let expected = 2.0 * 200.0 * 0.02_f64.asin().tan();
     assert!((pupil.diameter.unwrap() - expected).abs() < 1e-9, "{pupil:?}");
+    // The half angle of the cone in degrees.
+    let cone = near(200.0, &[&format!("OBNA {} 1", 0.02_f64.asin().to_degrees())], &SINGLET);
+    let radius = |lens: &ZemaxLens| train(&lens.file).stop_radius();
+    assert!((radius(&cone) - radius(&lens)).abs() < 1e-12, "degrees there and back");
     let far = refused(&file(&["OBNA 0.02 0"], &SINGLET));
     assert!(far.contains("line 3: OBNA: the object is at infinity"), "{far}");
     assert!(refused(&file(&["OBNA 1.2 0"], &SINGLET)).contains("below 1"));
