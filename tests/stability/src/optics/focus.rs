@@ -67,9 +67,9 @@ fn wavelength(_: Scale) -> Result<Outcome> {
            {"type": "surface", "radius": -44.64, "thickness": 2.5, "glass": "N-SF5", "semi_diameter": 12.5},
            {"type": "surface", "radius": -129.94, "semi_diameter": 12.5}"#,
     )?;
-    let inside = train.outside_of_range(550.0);
+    let inside = train.outside_of_range(&[550.0]);
     outcome.must(inside.is_empty(), || format!("at 550 nm: {inside:?}"));
-    let notes = train.outside_of_range(2600.0);
+    let notes = train.outside_of_range(&[2600.0]);
     let ranges = notes.iter().all(|note| note.contains("is known from"));
     outcome.must(notes.len() == 2 && ranges, || format!("at 2600 nm: {notes:?}"));
     outcome.must(train.at(2600.0).is_ok(), || "2600 nm is refused".to_owned());
