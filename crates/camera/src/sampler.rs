@@ -46,20 +46,14 @@ impl Sampler {
 
 impl PixelSamples {
     /// Sample `index` in the square 0..1, for the `pair`-th pair of dimensions (0: place in the
-    /// pixel, 1: place in the pupil).
+    /// pixel, 1: place in the pupil). Numbers are multiples of 2⁻⁵³, with every sampler: what a choice
+    /// among 2²⁴ leaves of one is still a number.
     #[must_use]
     pub fn square(&self, index: u32, pair: u32) -> [f64; 2] {
         let key = mix(self.seed.wrapping_add(u64::from(pair)));
         let random = |salt: u64| unit(mix(key ^ mix(u64::from(index) << 8 | salt)));
         match self.sampler {
-            Sampler::Sobol => {
-                let Key { index, seed } = self.sobol_key(index, pair);
-                let dimension = 2 * pair % DIMENSIONS;
-                // Four dimensions side by side take the time of one.
-                let four = sobol_burley::sample_4d(index, dimension / 4, seed);
-                let [a, b, c, d] = four.map(f64::from);
-                if dimension.is_multiple_of(4) { [a, b] } else { [c, d] }
-            }
+            Sampler::Sobol => sobol::pair(self.sobol_key(index, pair), 2 * pair % DIMENSIONS),
             Sampler::Independent => [random(0), random(1)],
             Sampler::Stratified => {
                 let [columns, rows] = self.grid();

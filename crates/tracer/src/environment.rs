@@ -9,11 +9,11 @@ use std::path::Path;
 use etendue_geometry::glam::DVec3;
 
 use crate::Color;
-use crate::sampling::AliasTable;
+use crate::sampling::GridDistribution;
 use crate::texture::{ImageError, linear_from_srgb, read_file, read_image};
 
 /// The most cells of the grid that directions are chosen on, across and down.
-const CELLS: [usize; 2] = [1024, 512];
+const CELLS: [usize; 2] = [2048, 1024];
 
 /// Radiance from all directions.
 #[derive(Debug, Clone)]
@@ -151,9 +151,7 @@ fn interpolated(bright: &[f64], [columns, rows]: [usize; 2], [x, y]: [usize; 2])
 /// Humphreys, *Physically Based Rendering*, 4th edition, section 12.5).
 #[derive(Debug, Clone)]
 pub struct MapSampler {
-    columns: usize,
-    rows: usize,
-    cells: AliasTable,
+    cells: GridDistribution,
     /// Mean radiance over all directions, the mean of the three colours.
     pub mean: f64,
 }
@@ -182,38 +180,24 @@ impl MapSampler {
         }
         // The mean of sin θ over rows is 2/π.
         let mean = mean / (columns * rows) as f64 * PI / 2.0;
-        Self { columns, rows, cells: AliasTable::new(&weights), mean }
+        Self { cells: GridDistribution::new(columns, &weights), mean }
     }
 
     /// A direction and its density (1/sr).
     #[must_use]
-    pub fn sample(&self, [u, v]: [f64; 2]) -> (DVec3, f64) {
-        let (cell, rest) = self.cells.pick(u);
-        let x = (cell % self.columns) as f64 + rest;
-        let y = (cell / self.columns) as f64 + v;
-        let d = direction([x / self.columns as f64, y / self.rows as f64]);
+    pub fn sample(&self, square: [f64; 2]) -> (DVec3, f64) {
+        let d = direction(self.cells.place(square));
         (d, self.density(d))
     }
 
     /// The density (1/sr) of a unit direction.
     #[must_use]
     pub fn density(&self, d: DVec3) -> f64 {
-        let [u, v] = place(d);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "u and v are in 0..=1"
-        )]
-        let [x, y] = [
-            ((u * self.columns as f64) as usize).min(self.columns - 1),
-            ((v * self.rows as f64) as usize).min(self.rows - 1),
-        ];
         let sin_theta = (d.x * d.x + d.z * d.z).sqrt();
         if sin_theta <= 0.0 {
             return 0.0;
         }
-        let share = self.cells.probability(y * self.columns + x);
-        share * (self.columns * self.rows) as f64 / (2.0 * PI * PI * sin_theta)
+        self.cells.density(place(d)) / (2.0 * PI * PI * sin_theta)
     }
 }
 

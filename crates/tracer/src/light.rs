@@ -13,7 +13,7 @@ use etendue_spectrum::{Illuminant, NoOverlap};
 use crate::environment::{EnvironmentMap, MapSampler};
 use crate::lamps::{self, EmissiveTriangle, Lamp, triangle_power};
 use crate::reference::{Spot, Surroundings};
-use crate::sampling::{AliasTable, sphere_direction, triangle_point};
+use crate::sampling::{DiscreteDistribution, sphere_direction, triangle_point};
 use crate::spawn::Anchor;
 use crate::spectral::Spectral;
 use crate::{Color, Material};
@@ -131,7 +131,7 @@ pub struct Lights {
     first: Vec<Option<u32>>,
     /// Placement and triangle of each emissive triangle, behind the lights.
     triangles: Vec<[u32; 2]>,
-    picker: AliasTable,
+    picker: DiscreteDistribution,
     /// The emissive triangles, where there are no other lights and each shines alike all over, and
     /// what they give off in all lanes.
     lamps: Vec<Lamp>,
@@ -218,7 +218,8 @@ impl Lights {
         };
         let tints = around.materials.iter().map(tint).collect::<Result<_, _>>()?;
         let lit = powers.iter().any(|&p| p > 0.0);
-        let picker = if lit { AliasTable::new(&powers) } else { AliasTable::default() };
+        let picker =
+            if lit { DiscreteDistribution::new(&powers) } else { DiscreteDistribution::default() };
         let lights = lights.to_vec();
         let (lamps, lamp_lanes) = Default::default();
         let mut all =

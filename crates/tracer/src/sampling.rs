@@ -5,7 +5,12 @@
 //! * Cosine-weighted directions: Shirley and Chiu, "A Low Distortion Map Between Disk and Square",
 //!   1997, projected up (Malley).
 //! * Orthonormal frames: Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
-//! * Choice by weight: Walker 1977 and Vose 1991 (alias tables), constant time for any number.
+//! * Choice by weight: inversion of the distribution function, with a guide table (Chen and Asau, "On
+//!   generating random variates from an empirical distribution", 1974). It takes constant time on
+//!   average, and neighbouring numbers choose neighbouring indices, so that what is stratified stays
+//!   so; an alias table (Walker 1977) would scatter them.
+//! * Choice on a grid: a row by the sums of rows, then a column within it (Pharr, Jakob and Humphreys,
+//!   *Physically Based Rendering*, 4th edition, section A.5).
 
 use std::f64::consts::{PI, TAU};
 
@@ -93,91 +98,124 @@ pub fn power_heuristic(of: f64, other: f64) -> f64 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// Indices by weight in constant time.
+/// Indices by weight in constant time on average.
 #[derive(Debug, Clone, Default)]
-pub struct AliasTable {
-    /// How much of a slot is its own index's, and whose the rest is.
-    slots: Vec<(f64, u32)>,
-    /// Probability of each index.
-    probability: Vec<f64>,
+pub struct DiscreteDistribution {
+    /// The sum of all probabilities before each index, and 1 at the end.
+    below: Vec<f64>,
+    /// For each of as many equal intervals of 0..1 as there are indices, the one that its start picks.
+    guide: Vec<u32>,
 }
 
-impl AliasTable {
-    /// A table of `weights`; those that are not finite or below zero count as zero. Without any
-    /// weight all are alike.
+impl DiscreteDistribution {
+    /// By `weights`, at most 2³² of them; those that are not finite or below zero count as zero.
+    /// Without any weight all are alike.
     #[must_use]
     pub fn new(weights: &[f64]) -> Self {
         let sound = |w: f64| if w.is_finite() && w > 0.0 { w } else { 0.0 };
-        // The largest first keeps the sum finite.
         let most = weights.iter().copied().map(sound).fold(0.0, f64::max);
-        let n = weights.len();
-        let mut probability: Vec<f64> = if most > 0.0 {
-            weights.iter().map(|&w| sound(w) / most).collect()
-        } else {
-            vec![1.0; n]
-        };
-        let total: f64 = probability.iter().sum();
-        probability.iter_mut().for_each(|p| *p /= total);
-        let mut slots: Vec<(f64, u32)> = Vec::with_capacity(n);
-        let (mut under, mut over): (Vec<u32>, Vec<u32>) = (Vec::new(), Vec::new());
-        for (i, p) in (0_u32..).zip(&probability) {
-            let share = p * n as f64;
-            slots.push((share, i));
-            if share < 1.0 { under.push(i) } else { over.push(i) }
+        let mut below = Vec::with_capacity(weights.len() + 1);
+        let mut sum = 0.0;
+        below.push(sum);
+        for &weight in weights {
+            // Shares of the largest, so that no sum overflows.
+            sum += if most > 0.0 { sound(weight) / most } else { 1.0 };
+            below.push(sum);
         }
-        while let (Some(&small), Some(&large)) = (under.last(), over.last()) {
-            under.pop();
-            slots[small as usize].1 = large;
-            let left = slots[large as usize].0 + slots[small as usize].0 - 1.0;
-            slots[large as usize].0 = left;
-            if left < 1.0 {
-                over.pop();
-                under.push(large);
+        below.iter_mut().for_each(|share| *share /= sum);
+        let mut guide = Vec::with_capacity(weights.len());
+        let mut index = 0_u32;
+        for k in 0..weights.len() {
+            let start = k as f64 / weights.len() as f64;
+            while below[index as usize + 1] <= start {
+                index += 1;
             }
+            guide.push(index);
         }
-        // What is left is whole but for rounding.
-        for i in under.into_iter().chain(over) {
-            slots[i as usize].0 = 1.0;
-        }
-        Self { slots, probability }
+        Self { below, guide }
     }
 
     /// How many indices there are.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.slots.len()
+        self.guide.len()
     }
 
     /// Whether there is no index.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.slots.is_empty()
+        self.guide.is_empty()
     }
 
-    /// The index for `u` in 0..1, and `u` stretched to 0..1 again for the next choice.
+    /// The index for `u` in 0..1, and `u` stretched to 0..1 again for the next choice. An index
+    /// without weight is never chosen.
     #[must_use]
     pub fn pick(&self, u: f64) -> (usize, f64) {
-        let n = self.slots.len();
-        let scaled = u * n as f64;
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "u is in 0..1, and the cast saturates"
         )]
-        let slot = (scaled as usize).min(n - 1);
-        let within = scaled - slot as f64;
-        let (own, other) = self.slots[slot];
-        if within < own {
-            (slot, (within / own).min(ONE_BELOW))
-        } else {
-            (other as usize, ((within - own) / (1.0 - own)).min(ONE_BELOW))
-        }
+        let interval = ((u * self.len() as f64) as usize).min(self.len() - 1);
+        let first = self.guide[interval] as usize;
+        let last = self.guide.get(interval + 1).map_or(self.len() - 1, |&index| index as usize);
+        // The first whose end is beyond u.
+        let index = first + self.below[first + 1..=last].partition_point(|&end| end <= u);
+        let (start, end) = (self.below[index], self.below[index + 1]);
+        (index, ((u - start) / (end - start)).clamp(0.0, ONE_BELOW))
     }
 
     /// The probability of `index`.
     #[must_use]
     pub fn probability(&self, index: usize) -> f64 {
-        self.probability[index]
+        self.below[index + 1] - self.below[index]
+    }
+}
+
+/// Places in the unit square by the weights of the cells of a grid, uniform within each.
+#[derive(Debug, Clone)]
+pub struct GridDistribution {
+    rows: DiscreteDistribution,
+    columns: Vec<DiscreteDistribution>,
+}
+
+impl GridDistribution {
+    /// By `weights`, row by row of `columns` each.
+    #[must_use]
+    pub fn new(columns: usize, weights: &[f64]) -> Self {
+        let rows: Vec<f64> = weights.chunks(columns).map(|row| row.iter().sum()).collect();
+        Self {
+            rows: DiscreteDistribution::new(&rows),
+            columns: weights.chunks(columns).map(DiscreteDistribution::new).collect(),
+        }
+    }
+
+    /// The place for `square`, its first number along columns. Neighbours in the square are
+    /// neighbours on the grid.
+    #[must_use]
+    pub fn place(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let (row, down) = self.rows.pick(v);
+        let columns = &self.columns[row];
+        let (column, across) = columns.pick(u);
+        let at = |cell: usize, rest: f64, cells: usize| {
+            ((cell as f64 + rest) / cells as f64).min(ONE_BELOW)
+        };
+        [at(column, across, columns.len()), at(row, down, self.columns.len())]
+    }
+
+    /// The density of places at one, over the unit square.
+    #[must_use]
+    pub fn density(&self, [u, v]: [f64; 2]) -> f64 {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "u and v are in 0..=1"
+        )]
+        let cell = |x: f64, cells: usize| ((x * cells as f64) as usize).min(cells - 1);
+        let row = cell(v, self.columns.len());
+        let columns = &self.columns[row];
+        let cells = (self.columns.len() * columns.len()) as f64;
+        self.rows.probability(row) * columns.probability(cell(u, columns.len())) * cells
     }
 }
 
@@ -191,7 +229,7 @@ mod tests {
     #[test]
     fn tables_pick_by_weight() {
         let weights = [1.0, 0.0, 3.0, f64::NAN, 4.0, -1.0];
-        let table = AliasTable::new(&weights);
+        let table = DiscreteDistribution::new(&weights);
         let mut counts = [0_u32; 6];
         let n = 80_000;
         for k in 0..n {
@@ -205,8 +243,46 @@ mod tests {
             assert!((share - expected / 8.0).abs() < 2e-4, "{counts:?}");
             assert!((table.probability(i) - expected / 8.0).abs() < 1e-15);
         }
-        let alike = AliasTable::new(&[0.0, 0.0]);
+        let alike = DiscreteDistribution::new(&[0.0, 0.0]);
         assert_eq!(alike.probability(1), 0.5);
+        // Neither are both ends of 0..1 given to indices without weight, nor is anything between.
+        let ends = DiscreteDistribution::new(&[0.0, 1e-300, 0.0, 1e308, 1e308, 0.0]);
+        assert_eq!([0.0, 0.25, 0.75, ONE_BELOW].map(|u| ends.pick(u).0), [3, 3, 4, 4]);
+    }
+
+    /// Every place of a number in its index's interval: what is left of it is the place.
+    #[test]
+    fn picks_are_monotone_and_what_is_left_is_stretched() {
+        let weights: Vec<f64> = (0..1_000).map(|k| f64::from(k * 7_919 % 1_000).powi(6)).collect();
+        let table = DiscreteDistribution::new(&weights);
+        let mut last = (0, 0.0);
+        for k in 0..100_000 {
+            let u = f64::from(k) / 100_000.0;
+            let (index, rest) = table.pick(u);
+            assert!((index, rest) >= last, "{last:?} and then {:?}", (index, rest));
+            last = (index, rest);
+            let back = table.below[index] + rest * table.probability(index);
+            assert!((back - u).abs() < 1e-15, "{u}: {back}");
+        }
+    }
+
+    #[test]
+    fn places_on_grids_have_their_density() {
+        let weights = [1.0, 0.0, 3.0, 0.0, 0.0, 0.0, 5.0, 0.0, 7.0];
+        let grid = GridDistribution::new(3, &weights);
+        let n = 400;
+        let mut counts = [0.0; 9];
+        for k in 0..n * n {
+            let square = [k % n, k / n].map(|i| (f64::from(i) + 0.5) / f64::from(n));
+            let place = grid.place(square);
+            let [x, y] = place.map(|c| (c * 3.0) as usize);
+            counts[y * 3 + x] += 1.0 / f64::from(n * n);
+            assert!((grid.density(place) - weights[y * 3 + x] * 9.0 / 16.0).abs() < 1e-12);
+        }
+        for (count, weight) in counts.iter().zip(weights) {
+            // A regular grid: within a step along each side of the cell's share of the square.
+            assert!((count - weight / 16.0).abs() < 4.0 / f64::from(n), "{counts:?}");
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use anyhow::Result;
 use etendue_camera::Sampler;
 
 use crate::rendered::Pixels;
+use crate::sampling::SAMPLERS;
 use crate::{Case, Method, Outcome, Scale};
 
 /// The film.
@@ -58,13 +59,6 @@ fn off(text: &str, sampler: Sampler, samples: u32, [dim, bright]: [f64; 2]) -> R
     let mean = sum / f64::from(samples);
     Ok(((Pixels::read(text)?.mean() / mean - 1.0).abs(), count))
 }
-
-const SAMPLERS: [(&str, Sampler); 4] = [
-    ("sobol", Sampler::Sobol),
-    ("stratified", Sampler::Stratified),
-    ("hammersley", Sampler::Hammersley),
-    ("independent", Sampler::Independent),
-];
 
 fn light(scale: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use anyhow::Result;
 
 use crate::rendered::{Pixels, load, patch};
+use crate::sampling::SAMPLERS;
 use crate::{Case, Outcome, Scale};
 
 pub(super) const ON_A_SURFACE: Case = Case {
@@ -39,6 +40,16 @@ pub(super) const ONE_BRIGHT_PIXEL: Case = Case {
         differ by no more than 10 % of it",
     limit: None,
     run: one_bright_pixel,
+};
+
+pub(super) const SMALL_SUN: Case = Case {
+    name: "sky_with_a_small_sun",
+    regime: "a sky of 0.0498 with a square of 1/16 of its width that shines 300, as an image of 256 × 128 \
+        to 2048 × 1024 pixels, by every sampler",
+    must: "a matte floor under it shows the integral of the image within 4 standard errors, which are \
+        below 0.2 %",
+    limit: None,
+    run: small_sun,
 };
 
 /// The form factor of a square of side 1 from a point under its middle, `h` below.
@@ -183,6 +194,54 @@ fn one_bright_pixel(scale: Scale) -> Result<Outcome> {
         }
     }
     Ok(outcome)
+}
+
+fn small_sun(scale: Scale) -> Result<Outcome> {
+    const SKY: f64 = 0.0498;
+    const SUN: f64 = 300.0;
+    let mut outcome = Outcome::default();
+    let sizes: &[u16] = scale.pick(&[1024], &[256, 1024, 2048]);
+    for &width in sizes {
+        let (height, side) = (width / 2, width / 16);
+        let (column, row) = (width / 3, height / 5);
+        let folder = tempfile::tempdir()?;
+        let mut sky = image::Rgb32FImage::from_pixel(width.into(), height.into(), grey(SKY));
+        for k in 0..u32::from(side) * u32::from(side) {
+            let [x, y] = [k % u32::from(side), k / u32::from(side)];
+            sky.put_pixel(u32::from(column) + x, u32::from(row) + y, grey(SUN));
+        }
+        write_exr(&folder.path().join("sky.exr"), &sky)?;
+        let size = [width, height].map(f64::from);
+        let rows: f64 = (row..row + side).map(|row| irradiance(f64::from(row), size)).sum();
+        let known = 0.5 / PI * (PI * SKY + (SUN - SKY) * rows * f64::from(side));
+        let mut off = Vec::new();
+        for (name, _) in SAMPLERS {
+            let rest = format!(
+                r#""lights": [{{"type": "environment", "image": "sky.exr"}}],
+                "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "m",
+                    "transform": {{"rotate": [1, 0, 0, -90]}}}}],
+                "materials": {{"m": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}}"#
+            );
+            let eye = [[0.5, 3.0, 1.0], [0.0; 3]];
+            let text = patch(r#"{"type": "direct"}"#, scale.pick(1_024, 16_384), eye, &rest);
+            let sampler = format!(r#""render": {{"sampler": "{name}", "#);
+            let text = text.replace(r#""render": {"#, &sampler);
+            let seen = Pixels::of(&load(folder.path(), &text)?)?;
+            let (mean, error) = (seen.mean(), seen.standard_error());
+            // The image is kept in f32, and the sun's edges are summed in a thousand steps.
+            let holds = (mean - known).abs() <= 4.0 * error + 1e-5 * known;
+            outcome.must(holds, || format!("{name}, {width}: {mean} ± {error}, not {known}"));
+            outcome.must(error <= 2e-3 * known, || format!("{name}, {width}: ± {error}"));
+            off.push(format!("{name} {:+.1e} ± {:.0e}", mean / known - 1.0, error / known));
+        }
+        outcome.measured(format!("{width} columns: {}", off.join(", ")));
+    }
+    Ok(outcome)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "an image of f32")]
+fn grey(value: f64) -> image::Rgb<f32> {
+    image::Rgb([value as f32; 3])
 }
 
 fn write_exr(path: &std::path::Path, image: &image::Rgb32FImage) -> Result<()> {

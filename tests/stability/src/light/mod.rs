@@ -16,6 +16,7 @@ pub const METHOD: Method = Method {
         lights::POINT_ON_A_SURFACE,
         lights::TOUCHING,
         lights::ONE_BRIGHT_PIXEL,
+        lights::SMALL_SUN,
         paths::FIREFLIES,
         paths::ROULETTE,
     ],

@@ -16,6 +16,7 @@ pub const METHOD: Method = Method {
         convergence::EDGE,
         convergence::ODD_COUNTS,
         running_out::BEYOND_THE_SEQUENCE,
+        running_out::LARGE_TABLES,
         running_out::MORE_THAN_ASKED_FOR,
         running_out::ONE,
         running_out::DIMENSIONS,
@@ -25,7 +26,7 @@ pub const METHOD: Method = Method {
 };
 
 /// The samplers by name.
-const SAMPLERS: [(&str, Sampler); 4] = [
+pub(crate) const SAMPLERS: [(&str, Sampler); 4] = [
     ("sobol", Sampler::Sobol),
     ("stratified", Sampler::Stratified),
     ("hammersley", Sampler::Hammersley),
