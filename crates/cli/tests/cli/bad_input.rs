@@ -130,7 +130,8 @@ fn settings_and_folders_that_cannot_be_say_why() {
 fn bytes_of_other_files_are_no_models_and_never_reach_the_terminal() {
     let bench = Bench::new();
     bench.write("noise.obj", b"\x7fELF\0\0\0\n\0\xff\n");
-    refused_command(&bench, &["render", "noise.obj", "-o", "out"], &["noise.obj", "line 1"]);
+    let words = ["noise.obj", "it is a program, not an OBJ model"];
+    refused_command(&bench, &["render", "noise.obj", "-o", "out"], &words);
     bench.write("colour.obj", b"v 1 2 \x1b[31mred\n");
     let output = bench.run(&["render", "colour.obj", "-o", "out"]);
     assert_eq!(output.status.code(), Some(2));
