@@ -29,14 +29,14 @@ fn end_to_end(criterion: &mut Criterion) {
         group.bench_function(BenchmarkId::new("build-and-render", mesh), |b| {
             b.iter(|| {
                 let accel = etendue_render::build(&scene, &plan, &options).expect("it builds");
-                etendue_render::render(&scene, &plan, &*accel, &images, Vec::new(), &|_| true)
+                etendue_render::render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true)
                     .expect("nothing stops it")
             });
         });
         let accel = etendue_render::build(&scene, &plan, &options).expect("it builds");
         group.bench_function(BenchmarkId::new("render", mesh), |b| {
             b.iter(|| {
-                etendue_render::render(&scene, &plan, &*accel, &images, Vec::new(), &|_| true)
+                etendue_render::render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true)
                     .expect("nothing stops it")
             });
         });

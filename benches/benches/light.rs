@@ -45,8 +45,15 @@ fn light(criterion: &mut Criterion) {
             group.throughput(Throughput::Elements(256 * 256 * 16));
             group.bench_function(BenchmarkId::new(name, light), |b| {
                 b.iter(|| {
-                    etendue_render::render(&scene, &plan, &*accel, &images, Vec::new(), &|_| true)
-                        .expect("nothing stops it")
+                    etendue_render::render(
+                        &scene,
+                        &plan,
+                        &*accel,
+                        &images,
+                        Vec::new(),
+                        &|_: f64| true,
+                    )
+                    .expect("nothing stops it")
                 });
             });
         }

@@ -107,7 +107,7 @@ impl<'a> Studio<'a> {
             self.accel,
             &self.images,
             Vec::new(),
-            &|_| true,
+            &|_: f64| true,
         )?;
         let seconds = rendered.trace_time.as_secs_f64();
         Ok(Taken { values: values(&rendered.picture), seconds })

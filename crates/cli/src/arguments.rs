@@ -284,6 +284,10 @@ pub(crate) struct RenderArguments {
     /// Write times, rays, memory and fingerprints as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
+    /// Write nothing of a picture that is stopped by Ctrl-C. Else what all pixels have by then is
+    /// written, marked as partial
+    #[arg(long)]
+    pub(crate) discard_partial: bool,
     /// Show no progress and no summary; the list of files and errors remain
     #[arg(short, long)]
     pub(crate) quiet: bool,

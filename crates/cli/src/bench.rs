@@ -14,14 +14,14 @@ use etendue_bench::samplers;
 use etendue_bench::{drawing, machine};
 use etendue_chart::Theme;
 use etendue_render::Plan;
-use etendue_render::output::{Outputs, prepare_folder, sidecar, write_whole};
+use etendue_render::output::{Ledger, MANIFEST, Outputs, sidecar, write_whole};
 use etendue_scene::Scene;
 use etendue_scene::file::SceneFile;
 
 use crate::arguments::{BenchArguments, PartArgument, SceneArguments};
 use crate::fault::{Fault, print_text};
-use crate::progress::Stages;
-use crate::{render, stop};
+use crate::progress::{Stages, say};
+use crate::{places, render, stop};
 
 /// All of a run, and of a quick one.
 const ROUNDS: [usize; 2] = [5, 3];
@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &BenchArguments) -> Result<(), Fault> {
 
 fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     let stages = Stages::new(arguments.quiet);
-    prepare_folder(&arguments.output)?;
+    places::folder(&arguments.output)?;
     let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     let has_pictures = has(PartArgument::Samplers) || has(PartArgument::Cameras);
     let mut notes = Vec::new();
@@ -54,6 +54,8 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
         true => render::load(&with_picture(&arguments.scene, &mut notes)?, stages)?,
         false => render::load(&arguments.scene, stages)?,
     };
+    let results = file_names().map(|name| arguments.output.join(name)).collect::<Vec<_>>();
+    places::keep_apart(&scene.inputs, &results)?;
     let mut findings = Findings {
         machine: machine::describe(),
         scene: about(&scene),
@@ -69,14 +71,13 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     if has_pictures {
         pictures(arguments, &scene, stages, &mut findings)?;
     }
-    let files = write(arguments, &findings)?;
+    let ledger = Ledger::open(&arguments.output, "bench");
+    let files = places::recorded(ledger, || write(arguments, &findings))?;
     print_text(&findings.text())?;
     if !arguments.quiet {
         let lines = findings.notes.iter().map(|note| format!("note: {note}"));
         let files = files.iter().map(|path| path.display().to_string());
-        let lines: Vec<String> = lines.chain(files).collect();
-        // When standard error is gone there is nobody to tell.
-        let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
+        lines.chain(files).for_each(|line| say(&line));
     }
     Ok(())
 }
@@ -211,6 +212,22 @@ fn sorted<T: Ord + Copy>(numbers: &[T]) -> Vec<T> {
     numbers.sort_unstable();
     numbers.dedup();
     numbers
+}
+
+/// The names of all files that a bench may write.
+fn file_names() -> impl Iterator<Item = String> {
+    let charts = [
+        "accelerators-hits",
+        "accelerators-depth",
+        "accelerators-batch",
+        "samplers-time",
+        "samplers-samples",
+        "cameras-time",
+    ];
+    let charts =
+        charts.into_iter().flat_map(|stem| ["svg", "png"].map(|end| format!("{stem}.{end}")));
+    let tables = ["accelerators", "samplers", "cameras"].map(|stem| format!("{stem}.csv"));
+    tables.into_iter().chain(charts).chain(["bench.json", MANIFEST].map(str::to_owned))
 }
 
 /// Writes all files; each appears when it is complete.

@@ -9,7 +9,11 @@ use etendue_render::RenderError;
 use etendue_render::expose::ExposeError;
 use etendue_render::output::OutputError;
 use etendue_scene::SceneError;
+use etendue_scene::escape::{printable, printable_json};
 use etendue_sensor::emva::EmvaError;
+
+use crate::progress::say;
+use crate::stop::STOPPED;
 
 /// Why a command failed.
 #[derive(Debug)]
@@ -25,6 +29,11 @@ impl Fault {
         Self::Refused(anyhow::Error::msg(message.into()))
     }
 
+    /// The user stopped it.
+    pub(crate) fn stopped(message: impl Into<String>) -> Self {
+        Self::Failed(anyhow::Error::msg(message.into()))
+    }
+
     pub(crate) fn print(&self) {
         let (Self::Refused(error) | Self::Failed(error)) = self;
         let mut message = error.to_string();
@@ -36,8 +45,7 @@ impl Fault {
                 message.push_str(&cause);
             }
         }
-        // When standard error is gone there is nobody to tell.
-        let _ = writeln!(std::io::stderr(), "error: {}", printable(&message));
+        say(&format!("error: {message}"));
     }
 
     pub(crate) fn exit_code(&self) -> ExitCode {
@@ -51,7 +59,7 @@ impl Fault {
 impl From<SceneError> for Fault {
     fn from(error: SceneError) -> Self {
         match error {
-            SceneError::Stopped => Self::Failed(anyhow::Error::msg(STOPPED)),
+            SceneError::Stopped => Self::stopped(STOPPED),
             error => Self::Refused(error.into()),
         }
     }
@@ -61,7 +69,7 @@ impl From<RenderError> for Fault {
     fn from(error: RenderError) -> Self {
         match error {
             RenderError::Stopped | RenderError::Build(BuildError::Stopped) => {
-                Self::Failed(anyhow::Error::msg(STOPPED))
+                Self::stopped(STOPPED)
             }
             RenderError::Picture(_) | RenderError::Build(BuildError::OutOfMemory { .. }) => {
                 Self::Failed(error.into())
@@ -74,8 +82,9 @@ impl From<RenderError> for Fault {
 impl From<OutputError> for Fault {
     fn from(error: OutputError) -> Self {
         match error {
-            OutputError::Stopped { .. } => Self::Failed(anyhow::Error::msg(STOPPED)),
-            // A folder that cannot be written to is the caller's to mend.
+            OutputError::Stopped { .. } => Self::stopped(STOPPED),
+            // Whether it can be written to was asked before: the disk is full, or the folder gone.
+            OutputError::Io { .. } => Self::Failed(error.into()),
             error => Self::Refused(error.into()),
         }
     }
@@ -85,7 +94,7 @@ impl From<ExposeError> for Fault {
     fn from(error: ExposeError) -> Self {
         match error {
             ExposeError::Output(error) => error.into(),
-            ExposeError::Stopped => Self::Failed(anyhow::Error::msg(STOPPED)),
+            ExposeError::Stopped => Self::stopped(STOPPED),
             error => Self::Failed(error.into()),
         }
     }
@@ -94,49 +103,44 @@ impl From<ExposeError> for Fault {
 impl From<BenchError> for Fault {
     fn from(error: BenchError) -> Self {
         match error {
-            BenchError::Stopped | BenchError::Build(BuildError::Stopped) => {
-                Self::Failed(anyhow::Error::msg(STOPPED))
-            }
+            BenchError::Stopped | BenchError::Build(BuildError::Stopped) => Self::stopped(STOPPED),
             BenchError::Drawing(_) => Self::Failed(error.into()),
             error => Self::Refused(error.into()),
         }
     }
 }
 
-/// `text` without what a damaged file might tell the terminal to do: control characters are spelled
-/// out.
-fn printable(text: &str) -> String {
-    let mut printable = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '\n' | '\t' => printable.push(c),
-            c if c.is_control() => printable.extend(c.escape_unicode()),
-            c => printable.push(c),
-        }
-    }
-    printable
-}
-
 impl From<EmvaError> for Fault {
     fn from(error: EmvaError) -> Self {
         match error {
-            EmvaError::Stopped => Self::Failed(anyhow::Error::msg(STOPPED)),
+            EmvaError::Stopped => Self::stopped(STOPPED),
+            EmvaError::Write { .. } => Self::Failed(error.into()),
             error => Self::Refused(error.into()),
         }
     }
 }
 
-const STOPPED: &str = "stopped; no unfinished file was left";
-
 /// Prints `value` as indented JSON to standard output.
 pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<(), Fault> {
     let json = serde_json::to_string_pretty(value).map_err(|error| Fault::Failed(error.into()))?;
-    print_text(&json)
+    print_raw(&printable_json(&json))
+}
+
+/// Prints `value` as JSON on one line to standard output.
+pub(crate) fn print_json_line(value: &impl serde::Serialize) -> Result<(), Fault> {
+    let json = serde_json::to_string(value).map_err(|error| Fault::Failed(error.into()))?;
+    print_raw(&printable_json(&json))
+}
+
+/// Prints `text` and a line end to standard output, without what a name in a file might tell the
+/// terminal to do.
+pub(crate) fn print_text(text: &str) -> Result<(), Fault> {
+    print_raw(&printable(text))
 }
 
 /// Prints `text` and a line end to standard output. A closed pipe is no fault: who closed it has had
 /// enough.
-pub(crate) fn print_text(text: &str) -> Result<(), Fault> {
+fn print_raw(text: &str) -> Result<(), Fault> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{}", text.trim_end_matches('\n')).and_then(|()| out.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {

@@ -5,16 +5,25 @@ use std::path::Path;
 
 use etendue_geometry::units::Dimension;
 use etendue_optics::train::{Focus, Inquiry, LensReport, OpticalTrain, drawing};
-use etendue_render::output::{prepare_folder, sidecar, write_whole};
+use etendue_render::output::{sidecar, write_whole};
 use etendue_scene::Reach;
+use etendue_scene::escape::one_line;
 use etendue_scene::file::{ReadLens, read_lens, trace_rays};
 
 use crate::arguments::LensArguments;
-use crate::fault::{Fault, print_json, print_text};
+use crate::fault::{Fault, print_json, print_json_line, print_text};
+use crate::places;
+use crate::progress::say;
 
 pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
     let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
     let mut lens = read_lens(&arguments.lens, reach)?;
+    let drawn = arguments.output.iter().flat_map(|folder| DRAWINGS.map(|name| folder.join(name)));
+    let results: Vec<_> = drawn.chain(arguments.save.clone()).collect();
+    places::keep_apart(lens.inputs.iter().chain(&arguments.rays), &results)?;
+    if let Some(path) = &arguments.save {
+        places::file(path)?;
+    }
     if let Some(path) = &arguments.save {
         let file = lens.file.as_ref().ok_or_else(|| {
             Fault::refused("--save: the lens of a scene cannot be saved; give its own file")
@@ -28,9 +37,7 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
             warn(&traced.out_of_range, arguments)?;
             match arguments.json {
                 // On one line: there may be millions of them.
-                true => print_text(
-                    &serde_json::to_string(&traced).map_err(|error| Fault::Failed(error.into()))?,
-                ),
+                true => print_json_line(&traced),
                 false => print_text(&traced.to_string()),
             }
         }
@@ -74,9 +81,17 @@ fn report(lens: &ReadLens, arguments: &LensArguments) -> Result<(), Fault> {
         if arguments.strict {
             warn(&report.out_of_range, arguments)?;
         }
+        // A name cannot add lines to the table.
+        report.name = one_line(&report.name).into_owned();
+        for text in report.notes.iter_mut().chain(&mut report.out_of_range) {
+            *text = one_line(text).into_owned();
+        }
         print_text(&report.to_string())
     }
 }
+
+/// What a lens is drawn into.
+const DRAWINGS: [&str; 3] = ["layout.svg", "spots.svg", "illumination.svg"];
 
 /// Draws a lens; each file appears when it is complete.
 fn draw(
@@ -86,18 +101,18 @@ fn draw(
     quiet: bool,
 ) -> Result<(), Fault> {
     let pictures = [
-        ("layout.svg", drawing::layout(train, report)),
-        ("spots.svg", drawing::spots(train, report)),
-        ("illumination.svg", drawing::falloff(train, report)),
+        drawing::layout(train, report),
+        drawing::spots(train, report),
+        drawing::falloff(train, report),
     ];
-    prepare_folder(folder)?;
-    for (name, picture) in pictures {
+    places::folder(folder)?;
+    for (name, picture) in DRAWINGS.into_iter().zip(pictures) {
         let picture = picture.map_err(|error| Fault::Refused(error.into()))?;
         let path = folder.join(name);
         write_whole(&path, |file| file.write_all(picture.as_bytes()))?;
         // Standard output has the numbers.
         if !quiet {
-            let _ = writeln!(std::io::stderr(), "wrote {}", path.display());
+            say(&format!("wrote {}", path.display()));
         }
     }
     Ok(())
@@ -111,8 +126,7 @@ fn warn(out_of_range: &[String], arguments: &LensArguments) -> Result<(), Fault>
         return Err(Fault::refused(format!("{}: {note}", arguments.lens.display())));
     }
     for note in out_of_range.iter().filter(|_| !arguments.quiet) {
-        // When standard error is gone there is nobody to tell.
-        let _ = writeln!(std::io::stderr(), "warning: {note}");
+        say(&format!("warning: {}", one_line(note)));
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ mod check;
 mod fault;
 mod glasses;
 mod lens;
+mod places;
 mod plan;
 mod progress;
 mod render;

@@ -1,15 +1,35 @@
 //! Progress bars on a terminal, and nothing in a pipe.
 
-use std::io::IsTerminal;
-use std::sync::Arc;
+use std::io::{IsTerminal, Write};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use etendue_render::Progress;
+use etendue_scene::escape::printable;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::stop;
 
 /// Steps of a bar: finer than any terminal is wide.
 const STEPS: u64 = 1000;
+
+/// The bar that is shown now.
+static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+fn shown() -> Option<ProgressBar> {
+    SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
+/// Writes a line to standard error, above the bar when there is one. When nobody reads it, nobody is
+/// told.
+pub(crate) fn say(line: &str) {
+    let write = || {
+        let _ = writeln!(std::io::stderr(), "{}", printable(line));
+    };
+    match shown() {
+        Some(bar) => bar.suspend(write),
+        None => write(),
+    }
+}
 
 /// Shows how far each stage is, one bar a stage.
 #[derive(Debug, Clone, Copy)]
@@ -31,6 +51,7 @@ impl Stages {
                 ProgressStyle::with_template("{prefix:>7} {wide_bar} {percent:>3} %  {eta}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar.set_prefix(name);
+            *SHOWN.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
             bar
         } else {
             ProgressBar::hidden()
@@ -52,5 +73,8 @@ struct Bar(ProgressBar);
 impl Drop for Bar {
     fn drop(&mut self) {
         self.0.finish_and_clear();
+        if !self.0.is_hidden() {
+            SHOWN.lock().unwrap_or_else(PoisonError::into_inner).take();
+        }
     }
 }

@@ -1,23 +1,27 @@
 //! `etendue render`: from a file to a folder of images.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_render::output::{
-    ImageHash, Look, Outputs, PartFile, Picture, SOFTWARE, exr, npy, png, prepare_folder, sidecar,
+    ImageHash, Ledger, Look, MANIFEST, Outputs, Picture, SOFTWARE, Temporary, exr, npy, png,
+    sidecar,
 };
 use etendue_render::report::{memory, seconds};
-use etendue_render::{Images, Plan, Rendered, Report, Seconds, expose, plan};
+use etendue_render::{
+    Images, Plan, Progress, Rendered, Report, Seconds, SoFar, Watch, expose, plan,
+};
+use etendue_scene::escape::one_line;
 use etendue_scene::file::{FileKind, SceneFile};
 use etendue_scene::import::Note;
 use etendue_scene::{LoadOptions, Scene};
 
 use crate::arguments::{AccelMode, RenderArguments, SceneArguments};
 use crate::fault::{Fault, print_text};
-use crate::progress::Stages;
-use crate::stop;
+use crate::progress::{Stages, say};
+use crate::{places, stop};
 
 pub(crate) fn run(arguments: &RenderArguments) -> Result<(), Fault> {
     stop::listen();
@@ -28,6 +32,9 @@ pub(crate) fn run(arguments: &RenderArguments) -> Result<(), Fault> {
         .build()
         .map_err(|error| Fault::refused(format!("--threads {}: {error}", arguments.threads)))?;
     let folder_is_new = !arguments.output.exists();
+    if folder_is_new {
+        stop::made(&arguments.output);
+    }
     let done = pool.install(|| render(arguments, outputs));
     if done.is_err() && folder_is_new {
         // Goes only when nothing was written into it.
@@ -59,13 +66,16 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let mut time = Seconds::default();
     let mut lap = Lap(start);
     let stages = Stages::new(arguments.quiet);
-    prepare_folder(&arguments.output)?;
+    let mut notes = Notes { said: !arguments.quiet, all: Vec::new() };
+    // Whether they can be written is better known now than after the render.
+    places::folder(&arguments.output)?;
     if let Some(path) = &arguments.report {
-        // Whether it can be written is better known now than after the render.
-        drop(PartFile::create(path)?);
+        places::file(path)?;
     }
     let scene = load(&arguments.scene, stages)?;
+    notes.add(scene.notes.iter().map(in_words));
     let plan = Plan::new(&scene, outputs);
+    keep_inputs(arguments, &scene, &plan, outputs)?;
     time.load = lap.take();
     let accel = etendue_render::build(&scene, &plan, &build_options(arguments, stages))?;
     time.build = lap.take();
@@ -75,31 +85,180 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     {
         return Err(Fault::refused(fault.clone()));
     }
+    notes.add(images.faults.iter().cloned());
     time.decode = lap.take();
     let header = header(&scene)?;
-    let progress = stages.begin("render");
-    let mut rendered = etendue_render::render(&scene, &plan, &*accel, &images, header, &*progress)?;
-    drop(progress);
+    let watching = Watching::new(arguments, stages, outputs);
+    let mut rendered = etendue_render::render(&scene, &plan, &*accel, &images, header, &watching)?;
+    drop(watching);
     time.render = lap.take();
-    let mut files = write(&arguments.output, &scene, &rendered.picture, outputs, stages)?;
-    let progress = stages.begin("expose");
+    let partial = heed_stop(&rendered, plan.samples, arguments)?;
+    notes.add(partial.clone());
+    notes.add(rendered.notes.iter().cloned());
+    notes.add(not_finite(&rendered));
     let folder = &arguments.output;
-    let light = (&rendered.picture, rendered.lane_film.take());
-    let exposed = expose::write(&scene, light, folder, outputs, &*progress)?;
-    drop(progress);
-    files.extend(exposed.files);
+    let (files, more) = places::recorded(Ledger::open(folder, "render"), || {
+        let mut files = write(folder, &scene, &rendered.picture, outputs, stages)?;
+        let progress = stages.begin("expose");
+        let light = (&rendered.picture, rendered.lane_film.take());
+        let exposed = expose::write(&scene, light, folder, outputs, &*progress)?;
+        files.extend(exposed.files);
+        Ok((files, exposed.notes))
+    })?;
+    notes.add(more);
     time.write = lap.take();
     time.total = seconds(start.elapsed());
     let mut report = report(&scene, &*accel, &images, &rendered, time, &files)?;
-    report.notes.extend(exposed.notes);
+    (report.samples_wanted, report.notes) = (plan.samples, notes.all);
     if let Some(path) = &arguments.report {
         sidecar::write_json(path, &report)?;
     }
     if !arguments.quiet {
-        say(&report);
+        summarise(&report);
     }
     let lines: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
-    print_text(&lines.join("\n"))
+    print_text(&lines.join("\n"))?;
+    match partial {
+        None => Ok(()),
+        Some(partial) => Err(Fault::stopped(format!(
+            "{partial}; the picture so far is in {}",
+            arguments.output.display()
+        ))),
+    }
+}
+
+/// Refuses to write over what the scene is made of, and the report over a result.
+fn keep_inputs(
+    arguments: &RenderArguments,
+    scene: &Scene,
+    plan: &Plan,
+    outputs: Outputs,
+) -> Result<(), Fault> {
+    let names = ["layers.exr", "camera.json", "layers.json", MANIFEST, SO_FAR].map(str::to_owned);
+    let mut results: Vec<PathBuf> = names
+        .into_iter()
+        .chain(plan.names(scene).iter().flat_map(|layer| layer_files(layer, outputs)))
+        .chain(expose::file_names(scene))
+        .map(|name| arguments.output.join(name))
+        .collect();
+    let results_folder = arguments.output.canonicalize().ok();
+    if let Some(report) = &arguments.report {
+        let folder = report.parent().map(|folder| match folder.as_os_str().is_empty() {
+            true => Path::new("."),
+            false => folder,
+        });
+        let is_inside = folder.and_then(|folder| folder.canonicalize().ok()) == results_folder;
+        if is_inside && results.iter().any(|path| path.file_name() == report.file_name()) {
+            return Err(Fault::refused(format!(
+                "--report {}: a result has this name; choose another one",
+                report.display()
+            )));
+        }
+        results.push(report.clone());
+    }
+    places::keep_apart(&scene.inputs, &results)
+}
+
+/// What a user should know, said as soon as it is known.
+struct Notes {
+    said: bool,
+    all: Vec<String>,
+}
+
+impl Notes {
+    fn add(&mut self, notes: impl IntoIterator<Item = String>) {
+        for note in notes {
+            if self.said {
+                say(&format!("note: {note}"));
+            }
+            self.all.push(note);
+        }
+    }
+}
+
+/// What a stop left of the picture, in words; `None` when it is complete.
+fn heed_stop(
+    rendered: &Rendered,
+    wanted: u32,
+    arguments: &RenderArguments,
+) -> Result<Option<String>, Fault> {
+    stop::saves(false);
+    if rendered.samples == wanted {
+        return Ok(None);
+    }
+    if arguments.discard_partial {
+        return Err(etendue_render::RenderError::Stopped.into());
+    }
+    // From here on only a second signal stops.
+    stop::heed();
+    Ok(Some(format!("stopped after {} of {wanted} samples a pixel", rendered.samples)))
+}
+
+/// The bar of a render, and the picture so far beside its results.
+struct Watching {
+    progress: Progress,
+    keeps: bool,
+    /// Where the picture so far is shown; nowhere when no PNG is wanted. It goes when this does, and
+    /// so does that of a run that was killed.
+    place: Option<(PathBuf, Temporary)>,
+    start: Instant,
+    /// How long it took to write it last, and when that was done.
+    shown: Mutex<Option<(Duration, Instant)>>,
+}
+
+/// The picture so far.
+const SO_FAR: &str = "picture.so-far.png";
+
+/// The picture so far is not written more often than takes this share of the time.
+const SHARE_OF_LOOKS: f64 = 0.01;
+
+impl Watching {
+    fn new(arguments: &RenderArguments, stages: Stages, outputs: Outputs) -> Self {
+        Self {
+            progress: stages.begin("render"),
+            keeps: !arguments.discard_partial,
+            place: outputs.png.then(|| {
+                let place = arguments.output.join(SO_FAR);
+                (place.clone(), Temporary::new(place))
+            }),
+            start: Instant::now(),
+            shown: Mutex::default(),
+        }
+    }
+
+    /// Whether a picture of so many pixels is worth its writing now.
+    fn is_due(&self, last: Option<(Duration, Instant)>, share: f64) -> bool {
+        let left = self.start.elapsed().as_secs_f64() * (1.0 / share.max(1e-9) - 1.0);
+        match last {
+            // Not for renders that are done before anybody has opened it.
+            None => left > 2.0,
+            Some((took, when)) => {
+                left > 2.0 && took.as_secs_f64() < SHARE_OF_LOOKS * when.elapsed().as_secs_f64()
+            }
+        }
+    }
+}
+
+impl Watch for Watching {
+    fn goes_on(&self, share: f64) -> bool {
+        (self.progress)(share)
+    }
+
+    fn look(&self, so_far: &SoFar<'_>) {
+        stop::saves(self.keeps);
+        let Some((place, _)) = &self.place else { return };
+        let Ok(mut shown) = self.shown.lock() else { return };
+        if !self.is_due(*shown, so_far.share) {
+            return;
+        }
+        let start = Instant::now();
+        // A look is a favour: the render goes on without it, and the results will say what is wrong
+        // with the folder.
+        if let Ok(picture) = so_far.picture() {
+            let _ = png::write(place, &picture, "", png::Bits::Eight);
+        }
+        *shown = Some((start.elapsed(), Instant::now()));
+    }
 }
 
 fn build_options(arguments: &RenderArguments, stages: Stages) -> BuildOptions {
@@ -129,7 +288,6 @@ fn header(scene: &Scene) -> Result<Vec<(String, String)>, Fault> {
     let header: Vec<(String, String)> = [
         ("scene_hash", scene.hash()?.to_string()),
         ("seed", scene.render.seed.to_string()),
-        ("samples", scene.render.samples.to_string()),
         ("pixel_origin", "pixel centres lie at half-integers from the picture's corner".to_owned()),
         ("camera", serde_json::to_string(&scene.camera.opencv()).unwrap_or_default()),
     ]
@@ -163,29 +321,44 @@ fn write(
         if !progress(0.5 + 0.5 * done as f64 / total) {
             return Err(etendue_render::RenderError::Stopped.into());
         }
-        let stem = stem(&layer.name);
+        let [image, array] = image_and_array(&layer.name);
         if outputs.png {
-            let name = match layer.name.as_str() {
-                "" => format!("{stem}.png"),
-                _ => format!("{stem}.preview.png"),
-            };
             let bits = match layer.look {
                 Look::Distance => png::Bits::Sixteen,
                 _ => png::Bits::Eight,
             };
-            png::write(&place(name), picture, &layer.name, bits)?;
-            let mask = folder.join(format!("{stem}.png"));
-            if png::has_mask(layer) && png::write_mask(&mask, picture, &layer.name)? {
-                place(format!("{stem}.png"));
+            png::write(&place(image), picture, &layer.name, bits)?;
+            let mask = format!("{}.png", stem(&layer.name));
+            if png::has_mask(layer) && png::write_mask(&folder.join(&mask), picture, &layer.name)? {
+                place(mask);
             }
         }
         if outputs.npy {
-            npy::write(&place(format!("{stem}.npy")), picture, &layer.name)?;
+            npy::write(&place(array), picture, &layer.name)?;
         }
     }
     sidecar::write_json(&place("camera.json".to_owned()), &scene.camera.opencv())?;
     sidecar::write(&place("layers.json".to_owned()), picture)?;
     Ok(files)
+}
+
+/// The files of a layer: to look at, and for numpy.
+fn image_and_array(layer: &str) -> [String; 2] {
+    let stem = stem(layer);
+    let image = match layer {
+        "" => format!("{stem}.png"),
+        _ => format!("{stem}.preview.png"),
+    };
+    [image, format!("{stem}.npy")]
+}
+
+/// Those of them that are wanted.
+fn layer_files(layer: &str, outputs: Outputs) -> Vec<String> {
+    let [image, array] = image_and_array(layer);
+    let has_mask = layer.starts_with("Id.") || layer == "MaterialId";
+    let mask = format!("{}.png", stem(layer));
+    let files = [(outputs.png, image), (outputs.npy, array), (outputs.png && has_mask, mask)];
+    files.into_iter().filter_map(|(wanted, name)| wanted.then_some(name)).collect()
 }
 
 /// A layer's file name: `NormalCamera` is `normal_camera`, `Id.object` `id_object`, the picture
@@ -215,13 +388,6 @@ fn report(
     let built = accel.report();
     let counts = accel.counts();
     let (peak, private) = memory();
-    let mut notes: Vec<String> = scene.notes.iter().map(in_words).collect();
-    notes.extend(images.faults.iter().cloned());
-    notes.extend(rendered.notes.iter().cloned());
-    if rendered.light.not_finite > 0 {
-        let count = rendered.light.not_finite;
-        notes.push(format!("{count} contributions of light were not finite and are left out"));
-    }
     let sizes = images.sizes(scene);
     Ok(Report {
         software: SOFTWARE,
@@ -239,6 +405,8 @@ fn report(
         build_quality: format!("{:?}", built.quality).to_lowercase(),
         threads: rayon::current_num_threads(),
         seed: scene.render.seed,
+        samples: rendered.samples,
+        samples_wanted: rendered.samples,
         seconds,
         rays: rendered.rays,
         lens_rays: rendered.fates.total(),
@@ -257,22 +425,30 @@ fn report(
         not_finite: rendered.light.not_finite,
         peak_memory_bytes: peak,
         peak_private_bytes: private,
-        notes,
+        notes: Vec::new(),
         files: files.to_vec(),
     })
 }
 
 /// A note as one line.
 fn in_words(note: &Note) -> String {
-    match note.count {
-        0 | 1 => format!("{}: {}", note.subject, note.message),
-        count => format!("{} (x{count}): {}", note.subject, note.message),
-    }
+    let Note { subject, message, .. } = note;
+    one_line(&match note.count {
+        0 | 1 => format!("{subject}: {message}"),
+        count => format!("{subject} (x{count}): {message}"),
+    })
+    .into_owned()
 }
 
-/// A few lines for a person, on standard error. When nobody reads it, nobody is told.
-fn say(report: &Report) {
-    let mut lines: Vec<String> = report.notes.iter().map(|note| format!("note: {note}")).collect();
+/// That some light was left out, if it was.
+fn not_finite(rendered: &Rendered) -> Option<String> {
+    let count = rendered.light.not_finite;
+    (count > 0).then(|| format!("{count} contributions of light were not finite and are left out"))
+}
+
+/// A few lines for a person, on standard error.
+fn summarise(report: &Report) {
+    let mut lines = Vec::new();
     let Seconds { load, build, decode, render, write, total } = report.seconds;
     lines.push(format!(
         "{} triangles ({} stored), {} rays at {:.1} Mrays/s through {}",
@@ -294,5 +470,5 @@ fn say(report: &Report) {
          {write:.2} s; {total:.2} s in all, {} MiB at most",
         report.peak_memory_bytes >> 20
     ));
-    let _ = writeln!(std::io::stderr(), "{}", lines.join("\n"));
+    say(&lines.join("\n"));
 }

@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
-use etendue_render::output::{prepare_folder, sidecar, write_whole};
+use etendue_render::output::{Ledger, note_finished, sidecar, write_whole};
 use etendue_scene::file::SensorFile;
 use etendue_sensor::emva::{DESCRIPTOR, EmvaError, MANIFEST, Options, Series};
 use etendue_sensor::photon_transfer::{self, PhotonTransfer};
@@ -15,8 +16,8 @@ use serde_json::json;
 
 use crate::arguments::SensorArguments;
 use crate::fault::{Fault, print_json, print_text};
-use crate::progress::Stages;
-use crate::stop;
+use crate::progress::{Stages, say};
+use crate::{places, stop};
 
 pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
     stop::listen();
@@ -25,8 +26,11 @@ pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
     };
     let file = find(name, &arguments.settings)?;
     if !arguments.quiet {
-        say(file.sensor.notes().iter().map(|note| format!("note: {note}")));
+        file.sensor.notes().iter().for_each(|note| say(&format!("note: {note}")));
     }
+    let inputs: Vec<PathBuf> = Path::new(name).exists().then(|| name.into()).into_iter().collect();
+    let drawn = arguments.output.iter().flat_map(|folder| CURVES.map(|name| folder.join(name)));
+    places::keep_apart(&inputs, &drawn.collect::<Vec<_>>())?;
     match &arguments.emva {
         Some(folder) => series(arguments, &file, folder),
         None => curves(arguments, name, &file),
@@ -164,20 +168,20 @@ fn curves(arguments: &SensorArguments, name: &str, file: &SensorFile) -> Result<
         ..photon_transfer::Options::default()
     };
     if let Some(folder) = &arguments.output {
-        prepare_folder(folder)?;
+        places::folder(folder)?;
     }
     let curves =
         PhotonTransfer::measure(&file.sensor, &options).map_err(|error| file.fault(&error))?;
     let preset = file.spec.model.map(|model| Card::new(model.preset()));
     let found = Curves { sensor: &file.spec, preset, notes: file.sensor.notes(), curves };
     if let Some(folder) = &arguments.output {
-        let [svg, data] = ["curves.svg", "curves.json"].map(|name| folder.join(name));
+        let [svg, data] = CURVES.map(|name| folder.join(name));
         let file_name = Path::new(name).file_name().unwrap_or_default().to_string_lossy();
         let drawn = found.curves.svg(found.preset.as_ref().map_or(&*file_name, |card| card.name));
         write_whole(&svg, |part| part.write_all(drawn.as_bytes()))?;
         sidecar::write_json(&data, &found)?;
         if !arguments.quiet {
-            say([svg, data].map(|path| path.display().to_string()));
+            [svg, data].iter().for_each(|path| say(&path.display().to_string()));
         }
     }
     if arguments.json {
@@ -190,6 +194,16 @@ fn curves(arguments: &SensorArguments, name: &str, file: &SensorFile) -> Result<
     print_text(&(heading + &found.curves.table()))
 }
 
+/// What the curves are written into.
+const CURVES: [&str; 2] = ["curves.svg", "curves.json"];
+
+/// The names of all files of a series.
+fn names(series: &Series) -> impl Iterator<Item = &str> {
+    let steps = series.manifest.steps.iter().chain([&series.manifest.spatial]);
+    let images = steps.flat_map(|step| step.bright.iter().chain(&step.dark));
+    images.map(String::as_str).chain([MANIFEST, DESCRIPTOR])
+}
+
 fn series(arguments: &SensorArguments, file: &SensorFile, folder: &Path) -> Result<(), Fault> {
     let options = Options {
         steps: arguments.steps,
@@ -198,34 +212,38 @@ fn series(arguments: &SensorArguments, file: &SensorFile, folder: &Path) -> Resu
         ..Options::default()
     };
     let series = Series::plan(&file.sensor, &options).map_err(|error| file.fault(&error))?;
-    prepare_folder(folder)?;
+    let files: Vec<PathBuf> = names(&series).map(|name| folder.join(name)).collect();
+    places::keep_apart([], &files)?;
+    places::folder(folder)?;
     let total = series.len();
     let progress = Stages::new(arguments.quiet).begin("expose");
-    series
-        .write(&file.sensor, &options, folder, |done| progress(done as f64 / total as f64))
-        .map_err(|error| match error {
-            EmvaError::Sensor(error) => Fault::from(file.fault(&error)),
-            error => error.into(),
-        })?;
+    let start = SystemTime::now();
+    places::recorded(Ledger::open(folder, "sensor --emva"), || {
+        let written = series
+            .write(&file.sensor, &options, folder, |done| progress(done as f64 / total as f64))
+            .map_err(|error| match error {
+                EmvaError::Sensor(error) => Fault::from(file.fault(&error)),
+                error => error.into(),
+            });
+        let is_new = |path: &PathBuf| {
+            let changed = path.metadata().and_then(|data| data.modified());
+            written.is_ok() || changed.is_ok_and(|when| when >= start)
+        };
+        files.into_iter().filter(is_new).for_each(note_finished);
+        written
+    })?;
     drop(progress);
     if !arguments.quiet {
         let [width, height] = series.size;
         let longest = series.manifest.steps.last().map_or(0.0, |step| step.exposure_s);
-        say([format!(
+        say(&format!(
             "{total} images of {width} x {height} pixels at {} nm, exposed for up to {longest} s",
             options.wavelength
-        )]);
+        ));
     }
     if arguments.json {
         return print_json(&series.manifest);
     }
     let files = [MANIFEST, DESCRIPTOR].map(|name| folder.join(name).display().to_string());
     print_text(&files.join("\n"))
-}
-
-/// Lines for a person, on standard error. When nobody reads it, nobody is told.
-fn say(lines: impl IntoIterator<Item = String>) {
-    for line in lines {
-        let _ = writeln!(std::io::stderr(), "{line}");
-    }
 }

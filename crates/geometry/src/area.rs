@@ -73,9 +73,7 @@ impl<'a> AreaTest<'a> {
         let [a, b, c] = self.mesh.corners(i);
         match self.linear {
             None => !is_degenerate([a, b, c]),
-            Some(linear) => {
-                !is_degenerate([DVec3::ZERO, *linear * (b - a), *linear * (c - a)])
-            }
+            Some(linear) => !is_degenerate([DVec3::ZERO, *linear * (b - a), *linear * (c - a)]),
         }
     }
 }

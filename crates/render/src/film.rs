@@ -1,6 +1,6 @@
 //! The film: the planes that a render fills, and the bands of rows that threads fill side by side.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use etendue_spectrum::Lanes;
 use etendue_tracer::LayerSpec;
@@ -19,7 +19,7 @@ pub enum Precision {
 }
 
 /// The planes of one layer while it is filled.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct FilmLayer {
     pub(crate) spec: LayerSpec,
     names: Vec<String>,
@@ -164,12 +164,12 @@ impl FilmLayer {
 }
 
 /// Bands of `band_height` rows over all `layers`, each to be taken by one thread.
-pub(crate) fn bands(
-    layers: &mut [FilmLayer],
+pub(crate) fn bands<'a>(
+    layers: &'a mut [&mut FilmLayer],
     [width, height]: [u32; 2],
     band_height: u32,
-) -> Vec<Mutex<Option<Band<'_>>>> {
-    let mut bands: Vec<Band<'_>> = (0..height.div_ceil(band_height))
+) -> Vec<Mutex<Option<Band<'a>>>> {
+    let mut bands: Vec<Band<'a>> = (0..height.div_ceil(band_height))
         .map(|k| {
             let top = k * band_height;
             Band { top, height: band_height.min(height - top), layers: Vec::new() }
@@ -195,4 +195,9 @@ pub(crate) fn bands(
         }
     }
     bands.into_iter().map(|band| Mutex::new(Some(band))).collect()
+}
+
+/// Takes what stands ready for one thread.
+pub(crate) fn take<T>(place: &Mutex<Option<T>>) -> Option<T> {
+    place.lock().unwrap_or_else(PoisonError::into_inner).take()
 }

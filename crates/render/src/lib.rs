@@ -10,6 +10,7 @@
 //! | [`expose`] | what the camera's sensor makes of the light |
 //! | [`output`] | the named layers of a render, and EXR, PNG, NPY and JSON files of them |
 //! | [`report`] | what a render did and what it cost |
+//! | [`Watch`] | who is told how far a render is, and may stop it |
 
 mod backdrop;
 mod description;
@@ -22,9 +23,12 @@ pub mod plan;
 mod radiance;
 pub mod render;
 pub mod report;
+mod samples;
 mod tiles;
+mod watch;
 
 pub use film::Precision;
 pub use plan::{Decision, Plan};
 pub use render::{Images, Progress, RenderError, Rendered, accelerators, build, render};
 pub use report::{Report, Seconds};
+pub use watch::{SoFar, Watch};

@@ -13,10 +13,12 @@ use etendue_tracer::{
 };
 
 use crate::film::{FilmLayer, Precision};
-use crate::output::{Picture, Values, luminance};
+use crate::output::{Picture, PictureError, Values, luminance};
 use crate::radiance::LightPass;
 use crate::render::RenderError;
-use crate::tiles::{Job, Sampling};
+use crate::samples::Sampling;
+use crate::tiles::Job;
+use crate::watch::Watcher;
 
 /// The longer side of the small picture, and of the grid of pixels that are looked at (pixels).
 const SIDE: u32 = 48;
@@ -105,6 +107,7 @@ fn lit_share(
     let layer = |spec| FilmLayer::new(spec, pixels, Precision::Single, &Lanes::Rgb);
     let mut film = [layer(LayerSpec::Radiance), layer(LayerSpec::Coverage)];
     let groups = camera.lane_groups(&Lanes::Rgb);
+    let pass: Vec<_> = std::iter::once(0..SAMPLES).collect();
     let job = Job {
         accel: stage.accel,
         camera: &camera,
@@ -117,9 +120,12 @@ fn lit_share(
             seed: scene.render.seed,
         },
         light: Some(LightPass { stage, tracer, camera: &camera, groups }),
-        progress: &|_| progress(0.0),
+        passes: &pass,
+        picture: &|_, _| Err(PictureError::Empty { what: "the look".to_owned() }),
     };
-    job.run(&mut film)?;
+    let watch = |_: f64| progress(0.0);
+    let watcher = Watcher::new(&watch, job.rays(&film));
+    job.run(&mut film, &watcher)?;
     let [light, coverage] = film.map(|layer| layer.into_planes());
     let (mut seen, mut lit) = (0_u32, 0_u32);
     for i in 0..pixels {

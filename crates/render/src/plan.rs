@@ -2,6 +2,7 @@
 //! nothing: it is not read, not traced, not written.
 
 use std::fmt;
+use std::ops::Range;
 
 use etendue_accel::Quality;
 use etendue_camera::LensCamera;
@@ -14,9 +15,11 @@ use etendue_spectrum::Lanes;
 use etendue_tracer::{LayerSpec, Needs, TextureScope};
 use serde::Serialize;
 
+use crate::description::{Description, describe};
 use crate::expose;
 use crate::film::Precision;
 use crate::output::Outputs;
+use crate::samples::{self, BYTES_OF_SUM};
 
 /// What of the models has to be read for `layers`: decided before they are opened.
 #[must_use]
@@ -60,6 +63,9 @@ pub struct Plan {
     pub footprint: bool,
     /// Rays a pixel for coloured layers.
     pub samples: u32,
+    /// Which of these are taken of every pixel before the next are taken of any. The picture does
+    /// not depend on it.
+    pub passes: Vec<Range<u32>>,
     /// Whether rays are spread over a pupil.
     pub pupil: bool,
     /// Rays in all.
@@ -81,6 +87,28 @@ const RAYS_PER_TRIANGLE: u64 = 50;
 /// Rays that a sample of light is counted as when the build quality is chosen: the camera's, one to a
 /// light, and one more bounce with its own.
 const RAYS_A_SAMPLE_OF_LIGHT: u64 = 4;
+
+/// The most memory that the sums of a film may take between passes. A larger film is gone over once.
+const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
+
+/// The passes in which the film is filled.
+fn sample_passes(scene: &Scene, passes: Passes, lanes: usize) -> Vec<Range<u32>> {
+    let samples = scene.render.samples;
+    let [width, height] = scene.camera.resolution().map(u64::from);
+    let colours = if passes.mean {
+        3 * scene.layers.iter().filter(|layer| layer.is_averaged()).count()
+    } else {
+        0
+    };
+    let lanes = if passes.light { lanes } else { 0 };
+    let bytes = (width * height).saturating_mul(BYTES_OF_SUM * (colours + lanes) as u64);
+    match samples::passes(samples) {
+        several if several.len() > 1 && bytes > MOST_BYTES_OF_SUMS => {
+            std::iter::once(0..samples).collect()
+        }
+        passes => passes,
+    }
+}
 
 impl Plan {
     /// The plan for `scene`, written as `outputs`.
@@ -113,6 +141,7 @@ impl Plan {
             images,
             footprint: images.is_some() && scene.camera.pixel_extent().is_some(),
             samples,
+            passes: sample_passes(scene, passes, chosen.lanes.count()),
             pupil: lens && (passes.mean || passes.light),
             rays,
             quality,
@@ -122,6 +151,21 @@ impl Plan {
         };
         plan.decisions = plan.explain(scene, &chosen, (needs, passes), triangles);
         plan
+    }
+
+    /// The layers of the picture by the names that they will have in files; the picture's is empty.
+    #[must_use]
+    pub fn names(&self, scene: &Scene) -> Vec<String> {
+        let names = |layer: &LayerSpec| -> Vec<String> {
+            let Description { name, channels, .. } = describe(*layer);
+            match *layer {
+                layer if Some(layer) == scene.picture => vec![String::new()],
+                LayerSpec::Ids => channels.iter().map(|id| format!("{name}.{id}")).collect(),
+                _ => vec![name.to_owned()],
+            }
+        };
+        let spectrum = expose::has_spectrum(scene).then(|| expose::SPECTRUM.to_owned());
+        self.layers.iter().flat_map(names).chain(spectrum).collect()
     }
 
     /// What the rays are for.
@@ -163,6 +207,9 @@ impl Plan {
         };
         let on = |yes| if yes { "on" } else { "off" };
         decide("rays", &self.rays.to_string(), self.ray_words(passes));
+        if let Some((choice, because)) = self.explain_passes(passes) {
+            decide("passes", &choice, because);
+        }
         let (lanes, because) = expose::explain_lanes(scene, chosen);
         decide("wavelengths", &lanes, because);
         if let Some((choice, because)) = expose::explain_sensor(scene) {
@@ -210,6 +257,25 @@ impl Plan {
             ),
         );
         decisions
+    }
+
+    /// How often the film is gone over, where samples are averaged.
+    fn explain_passes(&self, passes: Passes) -> Option<(String, String)> {
+        if !passes.mean && !passes.light {
+            return None;
+        }
+        let because = match &self.passes[..] {
+            [first, .., last] => format!(
+                "the picture can be seen after {} samples a pixel, and a stop loses {} at most",
+                first.end,
+                last.len()
+            ),
+            _ if samples::passes(self.samples).len() > 1 => {
+                format!("the sums of several would take more than {} MiB", MOST_BYTES_OF_SUMS >> 20)
+            }
+            _ => "too few samples to look at some of them".to_owned(),
+        };
+        Some((self.passes.len().to_string(), because))
     }
 
     fn explain_quality(&self, triangles: u64) -> (&'static str, String) {

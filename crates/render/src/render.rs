@@ -20,7 +20,9 @@ use crate::film::FilmLayer;
 use crate::output::{Development, Layer, Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::report::ImageSize;
-use crate::tiles::{Job, Sampling, Stopped, Traffic};
+use crate::samples::Sampling;
+use crate::tiles::{Done, Job, Traffic};
+use crate::watch::{Stopped, Watch, Watcher};
 use crate::{Plan, expose, lighting, names};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
@@ -82,6 +84,9 @@ impl From<Stopped> for RenderError {
 pub struct Rendered {
     /// The layers.
     pub picture: Picture,
+    /// Samples that every pixel of the picture has. Fewer than were asked for when it was stopped:
+    /// then the picture's header says so, by the entry `partial`.
+    pub samples: u32,
     /// The light of the picture in lanes other than red, green and blue, where it was traced so.
     pub lane_film: Option<expose::LaneFilm>,
     /// Rays traced, to lights included.
@@ -197,12 +202,24 @@ impl Images {
         images
     }
 
+    /// What is wrong with the first image of `scene` that cannot be decoded, whether a layer looks at
+    /// it or not.
+    #[must_use]
+    pub fn first_fault(scene: &Scene) -> Option<String> {
+        let faults: Vec<Option<String>> = scene
+            .textures
+            .par_iter()
+            .map(|texture| texture.decode().err().map(|error| error.to_string()))
+            .collect();
+        let environment = || match environment(scene)? {
+            EnvironmentImage::File(path) => EnvironmentMap::read(path).err().map(|e| e.to_string()),
+            EnvironmentImage::Studio | EnvironmentImage::Constant => None,
+        };
+        faults.into_iter().flatten().next().or_else(environment)
+    }
+
     fn read_environment(&mut self, scene: &Scene) {
-        let found = scene.lights.iter().find_map(|light| match &light.kind {
-            LightKind::Environment { image, .. } => Some(image),
-            _ => None,
-        });
-        let map = match found {
+        let map = match environment(scene) {
             Some(EnvironmentImage::Studio) => EnvironmentMap::studio(),
             Some(EnvironmentImage::File(path)) => match EnvironmentMap::read(path) {
                 Ok(map) => map,
@@ -240,19 +257,31 @@ impl Images {
     }
 }
 
+/// The image of the environment of `scene`, when it has one.
+fn environment(scene: &Scene) -> Option<&EnvironmentImage> {
+    scene.lights.iter().find_map(|light| match &light.kind {
+        LightKind::Environment { image, .. } => Some(image),
+        _ => None,
+    })
+}
+
 /// Renders `scene` as planned. Runs on the threads of the current rayon pool; the picture does not
-/// depend on how many there are.
+/// depend on how many there are. The file header gets the number of samples a pixel.
+///
+/// When `watch` asks to stop, the picture of the samples that every pixel has by then is returned, if
+/// there are any: see [`Rendered::samples`].
 ///
 /// # Errors
 ///
-/// When `progress` asks to stop, or no light gets through the camera's lens.
+/// When `watch` asks to stop before every pixel has samples, or no light gets through the camera's
+/// lens.
 pub fn render(
     scene: &Scene,
     plan: &Plan,
     accel: &dyn Accel,
     images: &Images,
     header: Vec<(String, String)>,
-    progress: &(dyn Fn(f64) -> bool + Sync),
+    watch: &dyn Watch,
 ) -> Result<Rendered, RenderError> {
     let [width, height] = scene.camera.resolution().map(|side| side as usize);
     let mut film: Vec<FilmLayer> = plan
@@ -273,7 +302,8 @@ pub fn render(
     let lit = match scene.tracer.and_then(tracer) {
         Some(tracer) if plan.layers.contains(&LayerSpec::Radiance) => {
             let (map, seen) = (images.environment.clone(), (accel, surroundings));
-            let found = lighting::settle(scene, map, &*tracer, seen, progress)?;
+            let found =
+                lighting::settle(scene, map, &*tracer, seen, &|share| watch.goes_on(share))?;
             notes.extend(found.note);
             let lights = Lights::new(&found.lights, found.map, &surroundings, &spectral)
                 .map_err(|error| RenderError::Lights(error.to_string()))?;
@@ -295,6 +325,7 @@ pub fn render(
         camera: &light_camera,
         groups: light_camera.lane_groups(&plan.lanes),
     });
+    let so_far = |layers: &[&FilmLayer], samples| so_far(scene, plan, &header, layers, samples);
     let job = Job {
         accel,
         camera: &camera,
@@ -306,16 +337,33 @@ pub fn render(
             sampler: scene.render.sampler,
             seed: scene.render.seed,
         },
+        passes: &plan.passes,
         light,
-        progress,
+        picture: &so_far,
     };
-    let Traffic { chief_rays, light, fates } = job.run(&mut film)?;
+    let watcher = Watcher::new(watch, job.rays(&film));
+    let Done { traffic: Traffic { chief_rays, light, fates }, samples } =
+        job.run(&mut film, &watcher)?;
     let trace_time = start.elapsed();
     if let (true, 0, Some(element)) =
         (fates.total() > 0, fates.exited, fates.farthest_from_sensor())
     {
         return Err(RenderError::Dark { element, losses: fates.losses() });
     }
+    let (picture, lane_film) = finished(scene, plan, film, marked(header, samples, plan.samples))?;
+    notes.extend(judged(scene, (&camera, accel), &picture));
+    let rays = chief_rays + light.rays + light.shadow_rays;
+    Ok(Rendered { picture, samples, lane_film, rays, light, fates, trace_time, notes })
+}
+
+/// What the film holds as a picture, and its light in lanes of its own.
+fn finished(
+    scene: &Scene,
+    plan: &Plan,
+    mut film: Vec<FilmLayer>,
+    header: Vec<(String, String)>,
+) -> Result<(Picture, Option<expose::LaneFilm>), PictureError> {
+    let [width, height] = scene.camera.resolution().map(|side| side as usize);
     let lane_film = film.iter_mut().find_map(|layer| layer.take_lanes(&plan.lanes));
     let mut layers: Vec<Layer> = film
         .into_iter()
@@ -327,10 +375,7 @@ pub fn render(
     layers.extend(expose::spectrum(scene, &layers, lane_film.as_ref()));
     let picture = Picture::new(width, height, layers, header)?.with_names(names::tables(scene));
     let development = Development::new(&scene.render, &picture);
-    let picture = picture.developed(development);
-    notes.extend(judged(scene, (&camera, accel), &picture));
-    let rays = chief_rays + light.rays + light.shadow_rays;
-    Ok(Rendered { picture, lane_film, rays, light, fates, trace_time, notes })
+    Ok((picture.developed(development), lane_film))
 }
 
 /// What a user should know of a finished picture.
@@ -338,6 +383,37 @@ fn judged(scene: &Scene, seen: (&Camera, &dyn Accel), picture: &Picture) -> Vec<
     let is_light = scene.picture == Some(LayerSpec::Radiance);
     let light = is_light.then(|| lighting::verdict(seen, picture)).flatten();
     light.into_iter().chain(names::notes(picture)).collect()
+}
+
+/// `header` with the number of samples that every pixel has, of those asked for.
+fn marked(mut header: Vec<(String, String)>, samples: u32, of: u32) -> Vec<(String, String)> {
+    header.push(("samples".to_owned(), samples.to_string()));
+    if samples < of {
+        let words = format!("stopped after {samples} of {of} samples a pixel");
+        header.push(("partial".to_owned(), words));
+    }
+    header
+}
+
+/// The picture as it is among the `layers` that are averaged, with `samples` of each pixel.
+fn so_far(
+    scene: &Scene,
+    plan: &Plan,
+    header: &[(String, String)],
+    layers: &[&FilmLayer],
+    samples: u32,
+) -> Result<Picture, PictureError> {
+    let [width, height] = scene.camera.resolution().map(|side| side as usize);
+    let is_picture = |layer: &&&FilmLayer| Some(layer.spec) == scene.picture;
+    let picture = layers.iter().filter(is_picture).flat_map(|layer| {
+        let mut layer = FilmLayer::clone(layer);
+        layer.take_lanes(&plan.lanes);
+        layer.into_layers(true)
+    });
+    let header = marked(header.to_vec(), samples, plan.samples);
+    let picture = Picture::new(width, height, picture.collect(), header)?;
+    let development = Development::new(&scene.render, &picture);
+    Ok(picture.developed(development))
 }
 
 fn surroundings<'a>(scene: &'a Scene, images: &'a Images, samples: u32) -> Surroundings<'a> {

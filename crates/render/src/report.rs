@@ -56,6 +56,10 @@ pub struct Report {
     pub threads: usize,
     /// The seed of the samples.
     pub seed: u64,
+    /// Samples that every pixel of the picture has.
+    pub samples: u32,
+    /// Samples a pixel that were asked for: more than it has when the render was stopped.
+    pub samples_wanted: u32,
     /// Wall time of each stage (s).
     pub seconds: Seconds,
     /// Rays traced.

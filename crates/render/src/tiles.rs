@@ -1,37 +1,31 @@
 //! The tile loop: batches of rays from the camera, through the accelerator, onto the film.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use etendue_accel::Accel;
-use etendue_camera::lens::LensCamera;
-use etendue_camera::{
-    Camera, CameraRays, FilmSamples, LaneGroup, PixelSamples, Sampler, squares_of_pair,
-};
+use etendue_camera::{Camera, CameraRays, LaneGroup};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_optics::element::FateCounts;
 use etendue_tracer::{LayerSpec, NormalKind, Surroundings, Tally, Traced};
 use rayon::prelude::*;
 
 use crate::backdrop;
-use crate::film::{Band, FilmLayer, Rows, bands, single};
-use crate::radiance::{LightBatch, LightPass};
+use crate::film::{Band, FilmLayer, Rows, bands, single, take};
+use crate::output::{Picture, PictureError};
+use crate::radiance::LightPass;
+use crate::samples::{Averaged, Averaging, Memory, Sampling};
+use crate::watch::{SoFar, Stopped, Watcher};
 
 /// Side of a tile (pixels): its rays are one batch.
-const TILE: u32 = 16;
+pub(crate) const TILE: u32 = 16;
 
-/// Rays a batch when several go through each pixel.
+/// Rays a batch of colours when several go through each pixel.
 const BATCH: u32 = TILE * TILE;
 
-/// How pixels are sampled.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Sampling {
-    /// Rays a pixel of coloured layers.
-    pub(crate) samples: u32,
-    pub(crate) sampler: Sampler,
-    pub(crate) seed: u64,
-}
+/// Makes a picture of layers with so many samples.
+pub(crate) type ToPicture<'a> =
+    dyn Fn(&[&FilmLayer], u32) -> Result<Picture, PictureError> + Sync + 'a;
 
 /// What rendering needs; nothing of it changes on the way.
 pub(crate) struct Job<'a> {
@@ -42,10 +36,12 @@ pub(crate) struct Job<'a> {
     pub(crate) surroundings: Surroundings<'a>,
     pub(crate) detail: Detail,
     pub(crate) sampling: Sampling,
+    /// Which samples are taken of every pixel before the next are taken of any.
+    pub(crate) passes: &'a [Range<u32>],
     /// What fills [`LayerSpec::Radiance`].
     pub(crate) light: Option<LightPass<'a>>,
-    /// Told the share done; answering `false` stops.
-    pub(crate) progress: &'a (dyn Fn(f64) -> bool + Sync),
+    /// The picture as it is on the film.
+    pub(crate) picture: &'a ToPicture<'a>,
 }
 
 /// What was traced.
@@ -59,126 +55,145 @@ pub(crate) struct Traffic {
     pub(crate) fates: FateCounts,
 }
 
-/// The render was stopped before it was done.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Stopped;
+impl Traffic {
+    /// Adds what one thread traced, and the fates of its rays.
+    pub(crate) fn add(all: &Mutex<Self>, own: Self, fates: &FateCounts) {
+        let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
+        all.chief_rays += own.chief_rays;
+        all.light += own.light;
+        all.fates.merge(&own.fates);
+        all.fates.merge(fates);
+    }
+}
+
+/// What of a job was done.
+#[derive(Debug)]
+pub(crate) struct Done {
+    pub(crate) traffic: Traffic,
+    /// Samples that every pixel has.
+    pub(crate) samples: u32,
+}
 
 impl Job<'_> {
-    /// Fills `layers` and returns what was traced.
-    pub(crate) fn run(&self, layers: &mut [FilmLayer]) -> Result<Traffic, Stopped> {
-        let [width, height] = self.camera.resolution();
-        let bands = bands(layers, [width, height], TILE);
-        let total = bands.len() as f64;
-        let done = AtomicU64::new(0);
+    /// Fills `film`: layers along the chief ray first, then those that are averaged, in passes. When
+    /// it is stopped after a pass, the layers hold the means of the samples until then.
+    pub(crate) fn run(
+        &self,
+        film: &mut [FilmLayer],
+        watcher: &Watcher<'_>,
+    ) -> Result<Done, Stopped> {
         let traffic = Mutex::new(Traffic::default());
-        bands
-            .par_iter()
-            .try_for_each(|band| {
-                let Some(mut band) = take(band) else { return Some(()) };
-                let mut batch = Batch::new(self.detail);
-                self.fill(&mut band, width, &mut batch);
-                let mut traffic = traffic.lock().unwrap_or_else(PoisonError::into_inner);
-                traffic.chief_rays += batch.traced;
-                traffic.light += batch.light.tally;
-                traffic.fates.merge(&batch.camera_rays.fates);
-                traffic.fates.merge(batch.light.fates());
-                drop(traffic);
-                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                (self.progress)(done as f64 / total).then_some(())
-            })
-            .ok_or(Stopped)?;
-        Ok(traffic.into_inner().unwrap_or_else(PoisonError::into_inner))
+        let (lit, seen): (Vec<_>, Vec<_>) =
+            film.iter_mut().partition(|layer| layer.spec == LayerSpec::Radiance);
+        let (mut mean, mut centre): (Vec<_>, Vec<_>) =
+            seen.into_iter().partition(|layer| self.is_averaged(layer.spec));
+        self.centres(&mut centre, watcher, &traffic)?;
+        let colors = Colors { job: self, layers: mean.iter().map(|layer| layer.spec).collect() };
+        let mut averaged = Vec::new();
+        let passes = self.passes.len();
+        if !mean.is_empty() {
+            let layers = std::mem::take(&mut mean);
+            averaged.push(Averaging::new(&colors, self.sampling, layers, passes));
+        }
+        if let (Some(light), false) = (&self.light, lit.is_empty()) {
+            averaged.push(Averaging::new(light, self.sampling, lit, passes));
+        }
+        let samples = self.passes(&mut averaged, watcher, &traffic)?;
+        let traffic = traffic.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(Done { traffic, samples })
     }
 
-    fn fill(&self, band: &mut Band<'_>, width: u32, batch: &mut Batch) {
-        let at_centre = self.sampling.samples == 1 && self.camera.lens().is_none();
-        let (mut lit, seen): (Vec<_>, Vec<_>) = std::mem::take(&mut band.layers)
-            .into_iter()
-            .partition(|(layer, _)| *layer == LayerSpec::Radiance);
-        let (mut centre, mut mean): (Vec<_>, Vec<_>) = seen.into_iter().partition(|(layer, _)| {
-            // What is behind the picture is where the picture's own samples are.
-            let behind = matches!(layer, LayerSpec::Alpha | LayerSpec::Backdrop);
-            !layer.is_averaged() || (at_centre && !(behind && self.light.is_some()))
-        });
-        for left in (0..width).step_by(TILE as usize) {
-            let tile =
-                Tile { left, top: band.top, width: TILE.min(width - left), height: band.height };
-            if !centre.is_empty() {
-                batch.aim_at_centres(self.camera, tile);
-                self.trace(batch);
-                for (layer, planes) in &mut centre {
-                    if !self.write_batch(*layer, planes, batch) {
-                        self.write(*layer, planes, batch, tile, width);
-                    }
-                }
+    /// The rays of the camera that filling `film` takes.
+    pub(crate) fn rays(&self, film: &[FilmLayer]) -> u64 {
+        let [width, height] = self.camera.resolution().map(u64::from);
+        let is_lit = |layer: &FilmLayer| layer.spec == LayerSpec::Radiance;
+        let is_mean = |layer: &FilmLayer| !is_lit(layer) && self.is_averaged(layer.spec);
+        let sampled = u64::from(film.iter().any(is_lit)) + u64::from(film.iter().any(is_mean));
+        let chief = film.iter().any(|layer| !is_lit(layer) && !is_mean(layer));
+        width * height * (u64::from(chief) + sampled * u64::from(self.sampling.samples))
+    }
+
+    /// Whether a layer without light is a mean over samples.
+    fn is_averaged(&self, layer: LayerSpec) -> bool {
+        let many = self.sampling.samples > 1 || self.camera.lens().is_some();
+        // What is behind the picture is where the picture's own samples are.
+        let behind = matches!(layer, LayerSpec::Alpha | LayerSpec::Backdrop);
+        layer.is_averaged() && (many || (behind && self.light.is_some()))
+    }
+
+    /// Takes the passes and returns the samples that every pixel has after the last that was
+    /// completed.
+    fn passes(
+        &self,
+        averaged: &mut [Averaging<'_>],
+        watcher: &Watcher<'_>,
+        traffic: &Mutex<Traffic>,
+    ) -> Result<u32, Stopped> {
+        let all = self.sampling.samples;
+        if averaged.is_empty() {
+            return Ok(all);
+        }
+        let mut samples = 0;
+        for pass in self.passes {
+            let done = averaged.iter_mut().try_for_each(|part| part.add(pass, watcher, traffic));
+            if let Err(stopped) = done {
+                return if samples > 0 { Ok(samples) } else { Err(stopped) };
             }
-            if !mean.is_empty() {
-                self.average(&mut mean, tile, width, batch);
-            }
-            if let (Some(pass), Some((_, planes))) = (&self.light, lit.first_mut()) {
-                pass.fill(tile, width, self.sampling, planes, &mut batch.light);
+            samples = pass.end;
+            averaged.iter_mut().for_each(|part| part.show(samples));
+            if samples < all {
+                let layers: Vec<&FilmLayer> = averaged.iter().flat_map(Averaging::layers).collect();
+                let picture = || (self.picture)(&layers, samples);
+                watcher.watch().look(&SoFar {
+                    samples: [samples, all],
+                    share: watcher.share(),
+                    picture: &picture,
+                });
             }
         }
+        Ok(samples)
     }
 
-    fn trace(&self, batch: &mut Batch) {
-        self.accel.closest(&batch.rays, &mut batch.hits);
-        batch.traced += batch.rays.len() as u64;
-    }
-
-    /// Means of coloured layers over the samples of each pixel of a tile.
-    fn average(
+    /// Fills layers along the chief ray of each pixel.
+    fn centres(
         &self,
-        layers: &mut [(LayerSpec, Vec<Rows<'_>>)],
-        tile: Tile,
+        layers: &mut [&mut FilmLayer],
+        watcher: &Watcher<'_>,
+        traffic: &Mutex<Traffic>,
+    ) -> Result<(), Stopped> {
+        if layers.is_empty() {
+            return Ok(());
+        }
+        let [width, height] = self.camera.resolution();
+        bands(layers, [width, height], TILE).par_iter().try_for_each(|band| {
+            let Some(mut band) = take(band) else { return Ok(()) };
+            let mut batch = Batch::new(self.detail);
+            let done = self.fill(&mut band, width, &mut batch, watcher);
+            let own = Traffic { chief_rays: batch.traced, ..Traffic::default() };
+            Traffic::add(traffic, own, &FateCounts::default());
+            done
+        })
+    }
+
+    fn fill(
+        &self,
+        band: &mut Band<'_>,
         width: u32,
         batch: &mut Batch,
-    ) {
-        let samples = self.sampling.samples;
-        let at_once = samples.min(BATCH);
-        let pixels_at_once = (BATCH / at_once) as usize;
-        let pixels: Vec<(u32, u32)> = tile.pixels().collect();
-        for pixels in pixels.chunks(pixels_at_once) {
-            let mut sums = vec![[0.0; 3]; pixels.len() * layers.len()];
-            for first in (0..samples).step_by(at_once as usize) {
-                let range = first..samples.min(first + at_once);
-                let Batch { numbered, samples: film, .. } = &mut *batch;
-                let wanted = (pixels, range.clone());
-                place_samples(self.camera, tile, wanted, self.sampling, numbered, film);
-                for group in &self.groups {
-                    batch.samples.wavelength = group.wavelength;
-                    self.camera.sample_rays(&batch.samples, &mut batch.camera_rays);
-                    let CameraRays { rays, weight, sample, .. } = &batch.camera_rays;
-                    self.accel.closest(rays, &mut batch.hits);
-                    batch.traced += rays.len() as u64;
-                    let traced = Traced { rays, hits: &batch.hits };
-                    for (k, (layer, _)) in layers.iter().enumerate() {
-                        self.colors(*layer, traced, &mut batch.numbers);
-                        for (i, (&weight, &sample)) in weight.iter().zip(sample).enumerate() {
-                            let pixel = sample as usize / range.len();
-                            let sum = &mut sums[pixel * layers.len() + k];
-                            for c in group.lanes.clone() {
-                                sum[c] += weight * batch.numbers[c][i];
-                            }
-                        }
-                    }
+        watcher: &Watcher<'_>,
+    ) -> Result<(), Stopped> {
+        for tile in Tile::across(width, band) {
+            batch.aim_at_centres(self.camera, tile);
+            self.accel.closest(&batch.rays, &mut batch.hits);
+            batch.traced += batch.rays.len() as u64;
+            for (layer, planes) in &mut band.layers {
+                if !self.write_batch(*layer, planes, batch) {
+                    self.write(*layer, planes, batch, tile, width);
                 }
             }
-            for (p, &(x, y)) in pixels.iter().enumerate() {
-                let index = tile.index(x, y, width);
-                let count = layers.len();
-                for (k, (layer, planes)) in layers.iter_mut().enumerate() {
-                    let sums = sums[p * count + k];
-                    if *layer == LayerSpec::Alpha {
-                        planes[0].put(index, backdrop::share(sums));
-                        continue;
-                    }
-                    for (plane, sum) in planes.iter_mut().zip(sums) {
-                        plane.put(index, sum / f64::from(samples));
-                    }
-                }
-            }
+            watcher.did(batch.rays.len() as u64)?;
         }
+        Ok(())
     }
 
     fn colors(&self, layer: LayerSpec, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
@@ -307,8 +322,45 @@ fn each<const N: usize>(
     }
 }
 
-fn take<'a>(band: &Mutex<Option<Band<'a>>>) -> Option<Band<'a>> {
-    band.lock().unwrap_or_else(PoisonError::into_inner).take()
+/// Coloured layers that are averaged over the samples of a pixel.
+struct Colors<'a> {
+    job: &'a Job<'a>,
+    layers: Vec<LayerSpec>,
+}
+
+impl Averaged for Colors<'_> {
+    fn camera(&self) -> &Camera {
+        self.job.camera
+    }
+
+    fn groups(&self) -> &[LaneGroup] {
+        &self.job.groups
+    }
+
+    fn shape(&self) -> [usize; 2] {
+        [self.layers.len(), 3]
+    }
+
+    fn batch(&self) -> u32 {
+        BATCH
+    }
+
+    fn trace(&self, lanes: &Range<usize>, memory: &mut Memory) {
+        let Memory { rays: CameraRays { rays, .. }, hits, colors, values, traffic, .. } = memory;
+        hits.detail = self.job.detail;
+        self.job.accel.closest(rays, hits);
+        traffic.chief_rays += rays.len() as u64;
+        let count = 3 * self.layers.len();
+        values.resize(rays.len() * count, 0.0);
+        for (k, layer) in self.layers.iter().enumerate() {
+            self.job.colors(*layer, Traced { rays, hits }, colors);
+            for c in lanes.clone() {
+                for (values, color) in values.chunks_mut(count).zip(&colors[c]) {
+                    values[3 * k + c] = *color;
+                }
+            }
+        }
+    }
 }
 
 /// A rectangle of the picture, at most [`TILE`] a side.
@@ -321,6 +373,13 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
+    /// The tiles of a band, from left to right.
+    pub(crate) fn across(width: u32, band: &Band<'_>) -> impl Iterator<Item = Self> + use<> {
+        let (top, height) = (band.top, band.height);
+        let lefts = (0..width).step_by(TILE as usize);
+        lefts.map(move |left| Self { left, top, width: TILE.min(width - left), height })
+    }
+
     /// Pixels from the tile's corner along a Z-order curve, so that any 4, 8 or 16 of them in a row,
     /// as many as go into a packet, are a block.
     pub(crate) fn pixels(self) -> impl Iterator<Item = (u32, u32)> {
@@ -340,58 +399,12 @@ fn even_bits(k: u32) -> u32 {
     k & 1 | k >> 1 & 2 | k >> 2 & 4 | k >> 3 & 8
 }
 
-/// Pairs of random numbers that the camera uses before light does: place in the pixel, place in the
-/// pupil, and of the third one number for the wavelength.
-pub(crate) const CAMERA_PAIRS: u32 = 3;
-
-/// Refills `film` with samples `range` of each of `pixels`, those of one pixel side by side, and
-/// `numbers` with what each of them is sampled by. A camera without a lens looks at places alone.
-pub(crate) fn place_samples(
-    camera: &Camera,
-    tile: Tile,
-    (pixels, range): (&[(u32, u32)], Range<u32>),
-    sampling: Sampling,
-    numbers: &mut Vec<(PixelSamples, u32)>,
-    film: &mut FilmSamples,
-) {
-    let Sampling { samples, sampler, seed } = sampling;
-    numbers.clear();
-    for &(x, y) in pixels {
-        let pixel = sampler.pixel(seed, tile.left + x, tile.top + y, samples);
-        numbers.extend(range.clone().map(|index| (pixel, index)));
-    }
-    let count = numbers.len();
-    let draw = |pair, out: &mut Vec<_>| squares_of_pair(numbers.iter().copied(), pair, out);
-    film.clear();
-    let mut places = Vec::new();
-    draw(0, &mut places);
-    for (&(x, y), places) in pixels.iter().zip(places.chunks(range.len().max(1))) {
-        let corner = [tile.left + x, tile.top + y].map(f64::from);
-        film.columns.extend(places.iter().map(|place| corner[0] + place[0]));
-        film.rows.extend(places.iter().map(|place| corner[1] + place[1]));
-    }
-    match camera.lens() {
-        Some(_) => draw(1, &mut film.pupil),
-        None => film.pupil.resize(count, [0.5; 2]),
-    }
-    if camera.lens().is_some_and(LensCamera::draws_wavelengths) {
-        draw(2, &mut places);
-        film.spectrum.extend(places.iter().map(|place| place[0]));
-    } else {
-        film.spectrum.resize(count, 0.5);
-    }
-}
-
 /// One thread's rays and hits.
 struct Batch {
     rays: RayBatch,
     hits: HitBatch,
     columns: Vec<f64>,
     rows: Vec<f64>,
-    samples: FilmSamples,
-    /// What each of the samples is sampled by.
-    numbered: Vec<(PixelSamples, u32)>,
-    camera_rays: CameraRays,
     /// The tile of the chief rays.
     tile: Option<Tile>,
     /// The pixel of each chief ray, from the tile's corner, and its place in the band's rows.
@@ -400,7 +413,6 @@ struct Batch {
     /// One number of each ray, three times.
     numbers: [Vec<f64>; 3],
     traced: u64,
-    light: LightBatch,
 }
 
 impl Batch {
@@ -410,15 +422,11 @@ impl Batch {
             hits: HitBatch::new(detail),
             columns: Vec::new(),
             rows: Vec::new(),
-            samples: FilmSamples::default(),
-            numbered: Vec::new(),
-            camera_rays: CameraRays::default(),
             tile: None,
             pixels: Vec::new(),
             places: Vec::new(),
             numbers: Default::default(),
             traced: 0,
-            light: LightBatch::default(),
         }
     }
 

@@ -20,7 +20,7 @@ fn picture(folder: &Path, text: &str) -> Vec<f64> {
     let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
     let images = Images::decode(&scene, &plan);
     assert!(images.faults.is_empty(), "{:?}", images.faults);
-    let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_| true).unwrap();
+    let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true).unwrap();
     match &done.picture.layers()[0].channels[0].values {
         Values::F32(values) => values.iter().map(|&v| f64::from(v)).collect(),
         other => panic!("a picture is f32: {other:?}"),

@@ -19,7 +19,7 @@ fn picture(folder: &Path, text: &str) -> (Vec<[f64; 2]>, Vec<u64>) {
     let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
     let images = Images::decode(&scene, &plan);
     assert!(images.faults.is_empty(), "{:?}", images.faults);
-    let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_| true).unwrap();
+    let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true).unwrap();
     let channel = |k: usize| match &done.picture.layers()[0].channels[k].values {
         Values::F32(values) => values.iter().map(|&v| f64::from(v)).collect::<Vec<_>>(),
         other => panic!("a picture is f32: {other:?}"),

@@ -17,12 +17,14 @@
 //! | [`import`] | glTF, OBJ and PLY |
 //! | [`shape`] | shapes made on load |
 //! | [`scene`] | the loaded scene |
+//! | [`escape`] | text out of files on its way to a terminal |
 //! | [`doctor`] | what a scene holds and what is wrong with it, without rendering |
 
 mod bounds;
 pub mod cameras;
 pub mod doctor;
 pub mod error;
+pub mod escape;
 mod facing;
 pub mod file;
 mod identity;

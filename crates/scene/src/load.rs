@@ -288,6 +288,8 @@ impl SceneFile {
         let images = parts.textures.iter().filter_map(Texture::file);
         let skies = parts.lights.iter().filter_map(Light::file);
         let others = parts.files.iter();
+        let mut inputs = vec![self.path().to_owned()];
+        inputs.extend(folder.found());
         let mut files: Vec<(String, PathBuf)> = opened
             .chain(camera_files.found.into_inner())
             .chain(images.chain(skies).chain(others).cloned())
@@ -295,6 +297,9 @@ impl SceneFile {
             .collect();
         files.sort();
         files.dedup();
+        inputs.extend(files.iter().map(|(_, path)| path.clone()));
+        inputs.sort();
+        inputs.dedup();
         let mut notes = parts.notes;
         notes.extend(self.unused_materials());
         notes.extend(nothing_to_draw(&geometry));
@@ -320,6 +325,7 @@ impl SceneFile {
             render: self.spec.render.clone(),
             notes,
             stats: parts.stats,
+            inputs,
             ingredients: Ingredients::new(self.value(), files),
         })
     }

@@ -1,6 +1,8 @@
 //! Paths that a scene file writes: relative to it, and inside its folder.
 
+use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::SceneError;
 use crate::error::{did_you_mean, similar_name};
@@ -25,12 +27,14 @@ pub(crate) struct Folder {
     /// Without links.
     real: PathBuf,
     reach: Reach,
+    /// What was looked for in it and is there.
+    found: Arc<Mutex<BTreeSet<PathBuf>>>,
 }
 
 impl Folder {
     pub(crate) fn open(path: &Path, reach: Reach) -> Result<Self, SceneError> {
         let real = path.canonicalize().map_err(|source| SceneError::unreadable(path, source))?;
-        Ok(Self { path: path.to_owned(), real, reach })
+        Ok(Self { path: path.to_owned(), real, reach, found: Arc::default() })
     }
 
     /// The folder that models may not leave either; none when they may.
@@ -71,7 +75,13 @@ impl Folder {
             }
             _ => format!("\"{written}\" cannot be read: {error}"),
         })?;
+        self.found.lock().unwrap_or_else(PoisonError::into_inner).insert(path.clone());
         Ok(Found { path, real })
+    }
+
+    /// The files that were found so far, each once.
+    pub(crate) fn found(&self) -> Vec<PathBuf> {
+        self.found.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
     }
 
     /// `file` as seen from the folder, for names that do not depend on the machine.

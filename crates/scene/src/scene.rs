@@ -58,6 +58,9 @@ pub struct Scene {
     pub notes: Vec<Note>,
     /// What loading cost.
     pub stats: LoadStats,
+    /// Every file that the scene is made of, whether it was read or only named: the scene file,
+    /// models with their buffers and material files, images, lenses, masks and arrays.
+    pub inputs: Vec<PathBuf>,
     pub(crate) ingredients: Ingredients,
 }
 

@@ -31,7 +31,7 @@ impl Pixels {
         let accel = build(scene, &plan, &BuildOptions::default())?;
         let images = Images::decode(scene, &plan);
         ensure!(images.faults.is_empty(), "{:?}", images.faults);
-        let done = render(scene, &plan, &*accel, &images, Vec::new(), &|_| true)?;
+        let done = render(scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true)?;
         let layer = done.picture.layers().first().context("a picture has a layer")?;
         let channel = layer.channels.first().context("a layer has a channel")?;
         let values = (0..channel.values.len()).map(|i| channel.values.at(i)).collect();

@@ -101,7 +101,7 @@ impl Prepared {
         let Self { scene, plan, accel, images } = self;
         let (seconds, rendered) = wall(|| {
             pool.install(|| {
-                etendue_render::render(scene, plan, &**accel, images, Vec::new(), &|_| true)
+                etendue_render::render(scene, plan, &**accel, images, Vec::new(), &|_: f64| true)
             })
         });
         // A render that failed has to be seen.

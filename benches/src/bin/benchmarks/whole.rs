@@ -170,7 +170,8 @@ pub(crate) fn print_memory(path: &Path) -> anyhow::Result<()> {
     let accel = etendue_render::build(&scene, &plan, &BuildOptions::default())?;
     let build = Memory::now();
     let images = Images::decode(&scene, &plan);
-    let rendered = etendue_render::render(&scene, &plan, &*accel, &images, Vec::new(), &|_| true)?;
+    let rendered =
+        etendue_render::render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true)?;
     let render = Memory::now();
     drop(rendered);
     let show = |memory: Memory| json!({"private": memory.private, "mapped": memory.mapped});

@@ -27,12 +27,7 @@ fn assert_survives(geometry: &Arc<Geometry>, rays: &RayBatch, what: &str) {
     }
 }
 
-fn assert_only_areas_are_hit(
-    geometry: &Geometry,
-    accel: &dyn Accel,
-    rays: &RayBatch,
-    what: &str,
-) {
+fn assert_only_areas_are_hit(geometry: &Geometry, accel: &dyn Accel, rays: &RayBatch, what: &str) {
     for coherent in [false, true] {
         let rays = rays.clone().with_coherence(coherent);
         let hits = closest(accel, &rays);

@@ -16,10 +16,13 @@ mod lens; // lenses against other software, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers
 mod messages; // what is wrong, in plain words
 mod openings_and_glasses; // f-numbers that a lens lacks, glasses of earlier catalogues and of one's own
+mod overwriting; // inputs, results of an earlier run, and files of others
 mod photons; // electrons and noise of sensors, against sums by the nanometre
 mod pictures; // exposure, tone maps, transparency, and which light there is
+mod printing; // what names in files do to a terminal
 mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
 mod sensor; // presets, curves, series of a characterisation
-mod tools;
-mod views; // where a camera without a pose stands, and which way is up // check, plan, schema, version
+mod stopping; // Ctrl-C and what it leaves
+mod tools; // check, plan, schema, version
+mod views; // where a camera without a pose stands, and which way is up

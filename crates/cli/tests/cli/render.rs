@@ -233,6 +233,7 @@ fn every_file_of_the_table_is_written_and_no_part_is_left() {
             "camera.json",
             "depth.npy",
             "depth.preview.png",
+            "etendue-manifest.json",
             "layers.exr",
             "layers.json",
             "normal.npy",

@@ -117,7 +117,7 @@ fn a_series_has_the_files_that_its_manifest_names() {
     assert_eq!(manifest["bits"], 12);
     let steps = manifest["steps"].as_array().unwrap();
     assert_eq!(steps.len(), 21);
-    let mut names = set(&["manifest.json", "emva1288.txt"]);
+    let mut names = set(&["manifest.json", "emva1288.txt", "etendue-manifest.json"]);
     for (step, count) in steps.iter().map(|s| (s, 2)).chain([(&manifest["spatial"], 16)]) {
         assert_eq!(keys(step), set(&["bright", "dark", "exposure_s", "photons"]));
         for kind in ["bright", "dark"] {

@@ -19,6 +19,14 @@ pub(super) fn plain(name: &str) -> String {
     name.chars().map(fit).collect()
 }
 
+/// `raw_003.png` of `raw` and `png` when there are several shots.
+pub(super) fn name(digits: usize, stem: &str, number: u32, ending: &str) -> String {
+    match digits {
+        0 => format!("{stem}.{ending}"),
+        digits => format!("{stem}_{number:0digits$}.{ending}"),
+    }
+}
+
 /// Writes one exposure after the other.
 pub(super) struct Writer<'a> {
     pub(super) sensor: &'a Sensor,
@@ -46,12 +54,8 @@ impl Writer<'_> {
         path
     }
 
-    /// `raw_003.png` of `raw` and `png` when there are several shots.
     fn name(&self, stem: &str, number: u32, ending: &str) -> String {
-        match self.digits {
-            0 => format!("{stem}.{ending}"),
-            digits => format!("{stem}_{number:0digits$}.{ending}"),
-        }
+        name(self.digits, stem, number, ending)
     }
 
     pub(super) fn shot(&mut self, shot: Shot) -> Result<ShotFiles, ExposeError> {

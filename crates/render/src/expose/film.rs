@@ -112,6 +112,16 @@ pub(super) fn colors(layers: &[Layer]) -> Option<[&[f32]; 3]> {
     }
 }
 
+/// What the layer of a hyperspectral cube is called.
+pub(crate) const SPECTRUM: &str = "Spectrum";
+
+/// Whether the picture has a hyperspectral cube.
+pub(crate) fn has_spectrum(scene: &Scene) -> bool {
+    scene.sensor.as_ref().is_some_and(|sensor| {
+        sensor.spec().kind == SensorKind::Multispectral && sensor.lanes().grid().is_some()
+    })
+}
+
 /// The hyperspectral cube of a multispectral sensor's picture, channels named by wavelength: its own
 /// bands where it has some, however finely they were rendered, else the lanes.
 pub(crate) fn spectrum(
@@ -120,7 +130,7 @@ pub(crate) fn spectrum(
     lane_film: Option<&LaneFilm>,
 ) -> Option<Layer> {
     let sensor = scene.sensor.as_ref()?;
-    if sensor.spec().kind != SensorKind::Multispectral || sensor.lanes().grid().is_none() {
+    if !has_spectrum(scene) {
         return None;
     }
     let from_colors;
@@ -150,5 +160,5 @@ fn cube(bands: &Grid, planes: Vec<Vec<f32>>) -> Layer {
         ("band edges nm", edges.as_str()),
     ];
     let meaning = meaning.map(|(key, text)| (key.to_owned(), text.to_owned())).into();
-    Layer { name: "Spectrum".to_owned(), look: Look::Cube, channels, meaning }
+    Layer { name: SPECTRUM.to_owned(), look: Look::Cube, channels, meaning }
 }

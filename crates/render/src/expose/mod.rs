@@ -24,7 +24,7 @@ use etendue_sensor::{Flaws, NoiseModel, Sensor, SensorError, SensorKind, Shot};
 use etendue_spectrum::Lanes;
 
 pub use film::LaneFilm;
-pub(crate) use film::spectrum;
+pub(crate) use film::{SPECTRUM, has_spectrum, spectrum};
 pub(crate) use lanes::{explain_lanes, lanes};
 
 use crate::output::{OutputError, Outputs, Picture, PictureError, sidecar};
@@ -129,10 +129,7 @@ pub fn write(
         }
     };
     let shots: Vec<Shot> = sensor.shots().collect();
-    let digits = match shots.len() {
-        1 => 0,
-        count => (count - 1).to_string().len().max(3),
-    };
+    let digits = digits(shots.len());
     let mut writer = Writer {
         sensor: &sensor,
         film: film.on_sensor(scene, &sensor),
@@ -166,6 +163,35 @@ fn noise_seed(scene: &Scene) -> u64 {
     // A camera is made of numbers and words only, which always serialise.
     let camera = serde_json::to_string(&scene.camera.opencv()).unwrap_or_default();
     etendue_sensor::mixed_seed(scene.render.seed, camera.as_bytes())
+}
+
+/// The names of all files that exposing `scene` may write.
+#[must_use]
+pub fn file_names(scene: &Scene) -> Vec<String> {
+    let Some(sensor) = &scene.sensor else { return Vec::new() };
+    let shots: Vec<Shot> = sensor.shots().collect();
+    let digits = digits(shots.len());
+    let kinds = [
+        ("raw", "png"),
+        ("raw", "preview.png"),
+        ("raw", "npy"),
+        ("raw", "dng"),
+        ("mean", "npy"),
+        ("variance", "npy"),
+    ];
+    let shot = |shot: &Shot| {
+        let frame = shot.frame;
+        kinds.map(|(stem, ending)| files::name(digits, stem, frame, ending))
+    };
+    shots.iter().flat_map(shot).chain(["sensor.json".to_owned()]).collect()
+}
+
+/// Digits of a shot's number in names; 0 for none.
+fn digits(shots: usize) -> usize {
+    match shots {
+        1 => 0,
+        count => (count - 1).to_string().len().max(3),
+    }
 }
 
 /// What a film has that is no light, if anything.

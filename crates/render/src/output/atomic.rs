@@ -7,6 +7,9 @@
 //! The random middle of the name keeps two processes that write the same file apart; the last to
 //! finish wins. The rename is atomic for everyone who looks at the folder; data may still be on its
 //! way to the disk when it happens, so a power cut within seconds can lose it.
+//!
+//! Part files are locked by the process that writes them. One that is not is left from a process that
+//! was killed, and the next one that writes into the folder removes it.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -17,10 +20,29 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{Builder, NamedTempFile};
 
-use super::OutputError;
+use super::{OutputError, refuse_inputs};
 
 /// The part files of this process, for a signal handler: what a signal ends is not dropped.
 static OPEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// The files that this process finished, until somebody asks.
+static FINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Notes that `path` was written whole, by other means than a [`PartFile`].
+pub fn note_finished(path: PathBuf) {
+    FINISHED.lock().unwrap_or_else(PoisonError::into_inner).insert(path);
+}
+
+/// The files of `folder` that were finished since this was last asked.
+pub(super) fn take_finished(folder: &Path) -> Vec<PathBuf> {
+    let mut finished = FINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    let here: Vec<PathBuf> =
+        finished.iter().filter(|path| path.parent() == Some(folder)).cloned().collect();
+    here.iter().for_each(|path| {
+        finished.remove(path);
+    });
+    here
+}
 
 fn open_set() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     OPEN.lock().unwrap_or_else(PoisonError::into_inner)
@@ -50,7 +72,36 @@ pub fn remove_open_parts() {
 pub fn prepare_folder(folder: &Path) -> Result<(), OutputError> {
     fs::create_dir_all(folder).map_err(|source| OutputError::io(folder, source))?;
     let probe = open_beside(&folder.join("etendue"));
-    probe.map(drop).map_err(|source| OutputError::io(folder, source))
+    probe.map(drop).map_err(|source| OutputError::io(folder, source))?;
+    remove_leftovers(folder, |target| ENDINGS.iter().any(|ending| target.ends_with(ending)));
+    Ok(())
+}
+
+/// The endings of the files that commands write into folders.
+const ENDINGS: [&str; 8] = [".exr", ".npy", ".png", ".dng", ".json", ".svg", ".csv", ".txt"];
+
+/// Removes part files of `folder` that no process writes to any more, of the targets that
+/// `is_ours` says. What cannot be looked at or removed stays.
+fn remove_leftovers(folder: &Path, is_ours: impl Fn(&str) -> bool) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let Some(target) = name.to_str().and_then(target_of_part) else { continue };
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if is_file
+            && is_ours(target)
+            && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok())
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// `depth.exr` of `.depth.exr.a1B2c3.part`.
+fn target_of_part(name: &str) -> Option<&str> {
+    let (target, random) = name.strip_prefix('.')?.strip_suffix(".part")?.rsplit_once('.')?;
+    let is_random = random.len() == 6 && random.bytes().all(|b| b.is_ascii_alphanumeric());
+    is_random.then_some(target)
 }
 
 /// Writes `target` with `write`; nothing changes there unless that and all else succeeds.
@@ -109,10 +160,14 @@ impl PartFile {
         if target.is_dir() || target.file_name().is_none() {
             return Err(refuse(io::ErrorKind::IsADirectory.into()));
         }
+        refuse_inputs([target])?;
         let target = target.to_owned();
         if let Some(to) = Special::of(&target) {
             let file = tempfile::tempfile().map_err(refuse)?;
             return Ok(Self { content: Content::Apart { file, to }, target });
+        }
+        if let (Some(name), Some(folder)) = (target.file_name(), folder_of(&target)) {
+            remove_leftovers(folder, |left| name == left);
         }
         // The set is locked until the new file is in it: a handler that reads it misses none.
         let mut open = open_set();
@@ -143,7 +198,9 @@ impl PartFile {
             }
             Content::Apart { mut file, to } => to.fill(&target, &mut file),
         };
-        done.map_err(|source| OutputError::io(&target, source))
+        done.map_err(|source| OutputError::io(&target, source))?;
+        note_finished(target);
+        Ok(())
     }
 }
 
@@ -205,6 +262,27 @@ impl Seek for PartFile {
     }
 }
 
+/// A whole file that is of use while the work lasts. It goes when this is dropped, and with the files
+/// that are not finished when a signal ends the process.
+#[derive(Debug)]
+pub struct Temporary(Entry);
+
+impl Temporary {
+    /// Of the file that is or will be at `path`.
+    #[must_use]
+    pub fn new(path: PathBuf) -> Self {
+        open_set().insert(path.clone());
+        Self(Entry(path))
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // It may never have been written.
+        let _ = fs::remove_file(&self.0.0);
+    }
+}
+
 /// A path in [`OPEN`], for as long as this lives.
 #[derive(Debug)]
 struct Entry(PathBuf);
@@ -215,20 +293,30 @@ impl Drop for Entry {
     }
 }
 
+/// The folder of `target`.
+fn folder_of(target: &Path) -> Option<&Path> {
+    let folder = target.parent()?;
+    Some(if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
+}
+
 /// A new file beside `target`, as readable as any new file is (`tempfile`'s own are private).
 fn open_beside(target: &Path) -> io::Result<NamedTempFile> {
     let mut prefix = OsString::from(".");
     prefix.push(target.file_name().unwrap_or_default());
     prefix.push(".");
-    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder_of(target).unwrap_or(Path::new("."));
     let mut refusal = None;
-    let made = Builder::new().prefix(&prefix).suffix(".part").make_in(
-        folder.unwrap_or(Path::new(".")),
-        |path| {
-            let opened = File::options().read(true).write(true).create_new(true).open(path);
-            opened.inspect_err(|error| refusal = error.raw_os_error())
-        },
-    );
+    let made = Builder::new().prefix(&prefix).suffix(".part").make_in(folder, |path| {
+        let opened = File::options().read(true).write(true).create_new(true).open(path);
+        let file = opened.inspect_err(|error| refusal = error.raw_os_error())?;
+        // Where files cannot be locked, they are not taken for leftovers either.
+        let _ = file.try_lock();
+        match path.exists() {
+            true => Ok(file),
+            // Another process took it for a leftover before it was locked: once more.
+            false => Err(io::ErrorKind::AlreadyExists.into()),
+        }
+    });
     // The system's own answer, without the hidden name that `tempfile` adds to it.
     made.map_err(|error| refusal.map_or(error, io::Error::from_raw_os_error))
 }
@@ -279,6 +367,28 @@ mod tests {
         assert_eq!(fs::read(&target).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["depth.exr"]);
         assert!(open_parts().iter().all(|path| !path.starts_with(folder.path())));
+    }
+
+    #[test]
+    fn parts_of_a_killed_process_go_and_those_of_a_living_one_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let put = |name: &str| fs::write(folder.path().join(name), "").unwrap();
+        let others =
+            [".depth.exr.abcdef.bak", ".depth.exr.abc.part", ".notes.abcdef.part", "a.part"];
+        others.iter().for_each(|name| put(name));
+        for left in [".depth.exr.abcdef.part", ".picture.preview.png.X1y2Z3.part"] {
+            put(left);
+        }
+        let living = PartFile::create(&folder.path().join("depth.exr")).unwrap();
+        assert!(!names(folder.path()).contains(&".depth.exr.abcdef.part".to_owned()));
+        prepare_folder(folder.path()).unwrap();
+        let mut expected: Vec<String> = others.map(str::to_owned).into();
+        let parts = open_parts().into_iter().filter(|path| path.starts_with(folder.path()));
+        expected.extend(parts.map(|path| path.file_name().unwrap().to_str().unwrap().to_owned()));
+        assert_eq!(expected.len(), others.len() + 1);
+        expected.sort();
+        assert_eq!(names(folder.path()), expected);
+        living.finish().unwrap();
     }
 
     #[test]

@@ -103,6 +103,19 @@ pub enum OutputError {
         /// What to do about it.
         remedy: &'static str,
     },
+    /// The file is an input.
+    #[error(
+        "{} would be written over, and is read by this command{}; nothing was written: choose \
+         another folder or name",
+        path.display(),
+        also_called(path, input)
+    )]
+    IsInput {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// The name under which it is read.
+        input: PathBuf,
+    },
     /// The format cannot hold the picture.
     #[error("{} cannot hold this picture: {message}", path.display())]
     Format {
@@ -140,6 +153,11 @@ pub enum OutputError {
         /// The file.
         path: PathBuf,
     },
+}
+
+/// The name that an input is read under, where it is another.
+fn also_called(path: &Path, input: &Path) -> String {
+    if path == input { String::new() } else { format!(" as {}", input.display()) }
 }
 
 impl OutputError {

@@ -39,15 +39,21 @@ mod atomic;
 mod develop;
 mod error;
 mod hash;
+mod inputs;
+mod ledger;
 mod look;
 mod outputs;
 mod picture;
 
-pub use atomic::{PartFile, open_parts, prepare_folder, remove_open_parts, write_whole};
+pub use atomic::{
+    PartFile, Temporary, note_finished, open_parts, prepare_folder, remove_open_parts, write_whole,
+};
 pub use develop::Development;
 pub(crate) use develop::luminance;
 pub use error::{OutputError, PictureError};
 pub use hash::ImageHash;
+pub use inputs::{protect_inputs, refuse_inputs};
+pub use ledger::{Ledger, MANIFEST};
 pub use look::Look;
 pub use outputs::Outputs;
 pub use picture::{Channel, Layer, Picture, Values};

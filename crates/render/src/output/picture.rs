@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::{Development, Look, OutputError, PictureError};
 
 /// Numbers of one channel, a pixel each: row-major, row 0 at the top.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub enum Values {
     /// Measured or computed values.
     F32(Vec<f32>),

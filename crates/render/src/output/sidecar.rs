@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
+use etendue_scene::escape::printable_json;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
@@ -74,10 +75,9 @@ pub fn write(path: &Path, picture: &Picture) -> Result<(), OutputError> {
 ///
 /// When the file cannot be written, or when `value` has no form in JSON.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), OutputError> {
-    let mut json =
-        serde_json::to_vec_pretty(value).map_err(|error| OutputError::format(path, error))?;
-    json.push(b'\n');
-    write_whole(path, |part| part.write_all(&json))
+    let json =
+        serde_json::to_string_pretty(value).map_err(|error| OutputError::format(path, error))?;
+    write_whole(path, |part| writeln!(part, "{}", printable_json(&json)))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::{Diagnosis, Finding};
+use crate::escape::one_line;
 
 /// The most objects and files that are listed by name.
 const LISTED: usize = 20;
@@ -42,7 +43,12 @@ impl fmt::Display for Diagnosis {
             row(f, "", &text)?;
         }
         for camera in &self.cameras {
-            let text = format!("--camera {} \"{}\" ({})", camera.index, camera.name, camera.kind);
+            let text = format!(
+                "--camera {} \"{}\" ({})",
+                camera.index,
+                one_line(&camera.name),
+                camera.kind
+            );
             row(f, "", &text)?;
         }
         if self.lights > 0 {
@@ -50,7 +56,7 @@ impl fmt::Display for Diagnosis {
         }
         row(f, "memory", &self.memory)?;
         for path in self.unused_files.iter().take(LISTED) {
-            row(f, "unused file", &path.display())?;
+            row(f, "unused file", &one_line(&path.to_string_lossy()))?;
         }
         for finding in self.extensions.iter().chain(&self.findings) {
             row(f, finding.word(), finding)?;
@@ -90,11 +96,8 @@ impl Diagnosis {
     fn list_objects(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (index, object) in self.objects.iter().take(LISTED).enumerate() {
             let label = if index == 0 { "objects" } else { "" };
-            writeln!(
-                f,
-                "{label:<13} {} \"{}\": {} triangles",
-                object.id, object.name, object.triangles
-            )?;
+            let (id, name) = (object.id, one_line(&object.name));
+            writeln!(f, "{label:<13} {id} \"{name}\": {} triangles", object.triangles)?;
         }
         match self.objects.len().checked_sub(LISTED) {
             Some(more) if more > 0 => writeln!(f, "{:<13} … and {more} more", ""),
@@ -121,7 +124,7 @@ impl Finding {
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.subject, self.message)?;
+        write!(f, "{}: {}", one_line(&self.subject), one_line(&self.message))?;
         if self.count > 1 { write!(f, " ({} times)", self.count) } else { Ok(()) }
     }
 }

@@ -1,6 +1,6 @@
 //! Lenses from files, and rays to trace through them: what `etendue lens` reads.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use etendue_optics::train::{
@@ -58,6 +58,8 @@ pub struct ReadLens {
     pub wavelengths: Vec<f64>,
     /// What was changed, assumed or left out when it was imported, in sentences.
     pub notes: Vec<String>,
+    /// Every file that it was read from.
+    pub inputs: Vec<PathBuf>,
 }
 
 /// Reads the lens of a lens file (`.json`), of a Zemax file (`.zmx`), or that of the camera of a
@@ -75,7 +77,8 @@ pub fn read_lens(path: &Path, reach: Reach) -> Result<ReadLens, SceneError> {
     if !SCENE_KEYS.iter().any(|key| value.get(key).is_some()) {
         return build(&written, &value, reach);
     }
-    let camera = SceneFile::read(path, &[])?.camera_alone(&folder(path, reach)?)?;
+    let folder = folder(path, reach)?;
+    let camera = SceneFile::read(path, &[])?.camera_alone(&folder)?;
     let Some(lens) = camera.lens() else {
         let kind = value.pointer("/camera/type").and_then(Value::as_str).unwrap_or("pinhole");
         let why = format!("a \"{kind}\" has no lens to look at; give a scene whose camera has");
@@ -90,6 +93,7 @@ pub fn read_lens(path: &Path, reach: Reach) -> Result<ReadLens, SceneError> {
         fields: Vec::new(),
         wavelengths: Vec::new(),
         notes: Vec::new(),
+        inputs: inputs(path, &folder),
     })
 }
 
@@ -130,6 +134,11 @@ fn folder(file: &Path, reach: Reach) -> Result<Folder, SceneError> {
     Folder::open(folder.unwrap_or(Path::new(".")), reach)
 }
 
+/// `file` and what was found in its folder.
+fn inputs(file: &Path, folder: &Folder) -> Vec<PathBuf> {
+    [vec![file.to_owned()], folder.found()].concat()
+}
+
 fn build(written: &Written, value: &Value, reach: Reach) -> Result<ReadLens, SceneError> {
     let file: LensFile = read_as(&LENS, written, value)?;
     let folder = folder(&written.path, reach)?;
@@ -143,6 +152,7 @@ fn build(written: &Written, value: &Value, reach: Reach) -> Result<ReadLens, Sce
         fields: Vec::new(),
         wavelengths: Vec::new(),
         notes: Vec::new(),
+        inputs: inputs(&written.path, &folder),
     })
 }
 
@@ -155,7 +165,8 @@ fn read_zemax(path: &Path) -> Result<ReadLens, SceneError> {
         .build(&|name| Err(format!("{name}: a Zemax file has no masks")))
         .map_err(|error| zemax(ZemaxError { line: 1, why: error.to_string() }))?;
     let focus = Focus::AsWritten;
-    Ok(ReadLens { train, file: Some(file), focus, fields, wavelengths, notes })
+    let inputs = vec![path.to_owned()];
+    Ok(ReadLens { train, file: Some(file), focus, fields, wavelengths, notes, inputs })
 }
 
 fn not_a_lens(error: SceneError) -> SceneError {

@@ -1,0 +1,183 @@
+//! What is already there: inputs, files of an earlier run, files of others, and folders that fail.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use crate::run::{Bench, text};
+
+const BOX: &str = r#"{"etendue": 1, "layers": ["depth", "ids"],
+    "camera": {"type": "pinhole", "sensor": {"resolution": [8, 8]}},
+    "objects": [{"shape": "box", "size": [1, 1, 1]}]}"#;
+
+/// A scene whose only object is a model with a texture.
+const MODEL: &[u8] = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\n\
+                       f 1/1 2/2 3/3\n";
+
+/// Every file below a folder with its bytes.
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry")) {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if entry.path().is_dir() {
+            let below = contents(&entry.path()).into_iter();
+            found.extend(below.map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
+        } else {
+            found.insert(name, fs::read(entry.path()).unwrap_or_default());
+        }
+    }
+    found
+}
+
+/// Runs a command that has to be refused by the name of a file, and has to change nothing.
+fn refuses(bench: &Bench, arguments: &[&str], name: &str) {
+    let before = contents(&bench.path(""));
+    let output = bench.run(arguments);
+    let err = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {err}");
+    assert!(err.contains(name) && err.contains("is read by this command"), "{arguments:?}: {err}");
+    assert!(err.contains("nothing was written"), "{err}");
+    assert!(contents(&bench.path("")) == before, "{arguments:?} changed something");
+}
+
+#[test]
+fn no_command_writes_over_what_it_reads() {
+    let bench = Bench::new();
+    for name in ["camera.json", "layers.json", "bench.json", "scene.json"] {
+        bench.write(name, BOX.as_bytes());
+    }
+    bench.write("model.obj", MODEL);
+    bench.write("m.mtl", b"newmtl m\nmap_Kd picture.png\n");
+    bench.write("picture.png", b"an image of the model's own, broken or not");
+    bench.write("curves.json", br#"{"type": "raw", "model": "imx183"}"#);
+    let achromat = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/lenses/achromat.json");
+    fs::copy(achromat, bench.path("lens.json")).expect("a lens");
+    bench.write("rays.json", br#"{"from": "object", "rays": []}"#);
+
+    refuses(&bench, &["render", "camera.json", "-o", "."], "camera.json");
+    refuses(&bench, &["render", "layers.json", "-o", "."], "layers.json");
+    refuses(&bench, &["render", "model.obj", "-o", "."], "picture.png");
+    refuses(&bench, &["render", "scene.json", "-o", "o", "--report", "scene.json"], "scene.json");
+    refuses(&bench, &["render", "model.obj", "-o", "o", "--report", "m.mtl"], "m.mtl");
+    refuses(&bench, &["bench", "bench.json", "-o", ".", "--quick"], "bench.json");
+    refuses(&bench, &["sensor", "curves.json", "-o", "."], "curves.json");
+    refuses(&bench, &["lens", "lens.json", "--save", "lens.json"], "lens.json");
+    let rays = ["lens", "lens.json", "--rays", "rays.json", "--save", "rays.json"];
+    refuses(&bench, &rays, "rays.json");
+    assert!(!bench.path("o").exists());
+}
+
+#[test]
+#[cfg(unix)]
+fn links_to_inputs_are_inputs() {
+    let bench = Bench::with_scene(BOX);
+    fs::create_dir(bench.path("out")).expect("a folder");
+    let link = bench.path("out/layers.json");
+    std::os::unix::fs::symlink("../scene.json", &link).expect("a link");
+    refuses(&bench, &["render", "scene.json", "-o", "out"], "out/layers.json");
+    fs::remove_file(&link).expect("a link");
+    fs::hard_link(bench.path("scene.json"), bench.path("out/depth.npy")).expect("a link");
+    refuses(&bench, &["render", "scene.json", "-o", "out"], "out/depth.npy");
+    fs::rename(bench.path("out/depth.npy"), bench.path("report")).expect("a file");
+    let report = ["render", "scene.json", "-o", "out", "--report", "report"];
+    refuses(&bench, &report, "report");
+}
+
+#[test]
+fn a_report_does_not_take_the_place_of_a_result() {
+    let bench = Bench::with_scene(BOX);
+    let output = bench.run(&["render", "scene.json", "-o", "out", "--report", "out/camera.json"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("a result has this name"));
+    bench.render(&["--report", "out/report.json"]);
+    bench.render(&["--report", "out/report.json"]);
+    assert!(bench.path("out/report.json").exists());
+}
+
+#[test]
+fn a_second_render_leaves_nothing_of_the_first_and_all_of_others() {
+    let bench = Bench::with_scene(BOX);
+    bench.render(&[]);
+    for (name, bytes) in [("notes.txt", "mine"), ("normal.npy", "mine, too")] {
+        bench.write(&format!("out/{name}"), bytes.as_bytes());
+    }
+    assert!(bench.path("out/id_object.npy").exists());
+    // A render that fails destroys nothing.
+    let before = contents(&bench.path("out"));
+    let failed = bench.run(&["render", "scene.json", "-o", "out", "--set", "objects[0].size=[0]"]);
+    assert_eq!(failed.status.code(), Some(2));
+    assert!(contents(&bench.path("out")) == before);
+    // One that was changed is nobody's to remove.
+    let mut changed = fs::read(bench.path("out/id_object.preview.png")).expect("a file");
+    *changed.last_mut().expect("bytes") ^= 1;
+    bench.write("out/id_object.preview.png", &changed);
+    bench.render(&["--layers", "depth", "--outputs", "npy"]);
+    let names: Vec<String> = contents(&bench.path("out")).into_keys().collect();
+    assert_eq!(
+        names,
+        [
+            "camera.json",
+            "depth.npy",
+            "etendue-manifest.json",
+            "id_object.preview.png",
+            "layers.json",
+            "normal.npy",
+            "notes.txt",
+        ]
+    );
+}
+
+#[test]
+fn what_a_killed_run_left_is_removed() {
+    let bench = Bench::with_scene(BOX);
+    fs::create_dir(bench.path("out")).expect("a folder");
+    bench.write("out/.depth.npy.a1B2c3.part", b"half");
+    bench.write("out/.mine.part", b"mine");
+    bench.render(&[]);
+    assert!(!bench.path("out/.depth.npy.a1B2c3.part").exists());
+    assert!(bench.path("out/.mine.part").exists());
+}
+
+/// Runs a script in namespaces of its own, where anybody may mount; `None` where that is not allowed.
+fn in_namespace(bench: &Bench, script: &str) -> Option<std::process::Output> {
+    let allowed = Command::new("unshare").args(["-rm", "true"]).output().ok()?;
+    if !allowed.status.success() {
+        return None;
+    }
+    let script = script.replace("etendue", env!("CARGO_BIN_EXE_etendue"));
+    let mut command = Command::new("unshare");
+    command.args(["-rm", "sh", "-c", &script]).current_dir(bench.path(""));
+    Some(command.output().expect("unshare runs"))
+}
+
+/// Exit code 1: it is not the input that has to be mended.
+#[test]
+fn a_full_disk_is_no_fault_of_the_input() {
+    let bench = Bench::with_scene(BOX);
+    fs::create_dir(bench.path("out")).expect("a folder");
+    let script = "mount -t tmpfs -o size=64k none out || exit 77
+        etendue render scene.json -o out --quiet --set 'camera.sensor.resolution=[256,256]'";
+    let Some(output) = in_namespace(&bench, script) else {
+        return println!("skipped: no namespaces");
+    };
+    let err = text(&output.stderr);
+    if output.status.code() == Some(77) {
+        return println!("skipped: {err}");
+    }
+    assert_eq!(output.status.code(), Some(1), "{err}");
+    assert!(err.contains("free some space"), "{err}");
+}
+
+#[test]
+fn strict_checks_decode_images() {
+    let bench = Bench::new();
+    bench.write("model.obj", MODEL);
+    bench.write("m.mtl", b"newmtl m\nmap_Kd broken.png\n");
+    bench.write("broken.png", b"\x89PNG\r\n\x1a\n and no more");
+    assert!(bench.run(&["check", "model.obj"]).status.success());
+    let output = bench.run(&["check", "model.obj", "--strict"]);
+    let err = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{err}");
+    assert!(err.contains("broken.png"), "{err}");
+}

@@ -1,0 +1,162 @@
+//! Ctrl-C and the signals like it: what is left, and what is said.
+
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::run::{Bench, text};
+
+/// A picture that nobody could wait for.
+const ENDLESS: &str = r#"{"etendue": 1, "tracer": {"type": "path"}, "layers": ["depth"],
+    "camera": {"type": "pinhole", "sensor": {"resolution": [48, 32]}},
+    "objects": [{"shape": "sphere"}, {"shape": "rectangle", "width": 9, "height": 9,
+        "transform": {"translate": [0, 0, -2]}}],
+    "render": {"samples": 1048576}}"#;
+
+/// A shape that takes its time.
+const LARGE: &str = r#"{"etendue": 1, "layers": ["depth"],
+    "camera": {"type": "pinhole", "sensor": {"resolution": [8, 8]}},
+    "objects": [{"shape": "blob", "triangles": 60000000}]}"#;
+
+/// A running command, killed when the test is done with it.
+struct Running(Child);
+
+impl Running {
+    fn start(bench: &Bench, arguments: &[&str]) -> Self {
+        Self::spawn(Command::new(env!("CARGO_BIN_EXE_etendue")).args(arguments), bench)
+    }
+
+    fn spawn(command: &mut Command, bench: &Bench) -> Self {
+        let command = command.current_dir(bench.path("")).stdout(Stdio::piped());
+        Self(command.stderr(Stdio::piped()).spawn().expect("the command runs"))
+    }
+
+    fn signal(&self, name: &str) {
+        let id = self.0.id().to_string();
+        let sent = Command::new("kill").args(["-s", name, &id]).status().expect("kill");
+        assert!(sent.success());
+    }
+
+    /// Waits for a file. The limit is there for a test that would hang.
+    fn wait_for(&mut self, file: &Path) {
+        let start = Instant::now();
+        while !file.exists() {
+            assert!(self.0.try_wait().expect("a child").is_none(), "ended before {file:?}");
+            assert!(start.elapsed() < Duration::from_secs(300), "no {file:?}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// What it leaves: exit status, standard output and standard error.
+    fn end(mut self) -> (ExitStatus, String, String) {
+        let start = Instant::now();
+        while self.0.try_wait().expect("a child").is_none() {
+            assert!(start.elapsed() < Duration::from_secs(300), "does not stop");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let read = |pipe: Option<&mut dyn std::io::Read>| {
+            let mut bytes = Vec::new();
+            pipe.expect("a pipe").read_to_end(&mut bytes).expect("output");
+            text(&bytes)
+        };
+        let (mut out, mut err) = (self.0.stdout.take(), self.0.stderr.take());
+        let status = self.0.wait().expect("a child");
+        (status, read(out.as_mut().map(|p| p as _)), read(err.as_mut().map(|p| p as _)))
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+const RENDER: [&str; 5] = ["render", "scene.json", "-o", "out", "--quiet"];
+
+#[test]
+fn a_stopped_picture_is_kept_and_says_what_it_is() {
+    for signal in ["INT", "TERM", "HUP"] {
+        let bench = Bench::with_scene(ENDLESS);
+        let arguments = [&RENDER[..], &["--report", "report.json"]].concat();
+        let mut running = Running::start(&bench, &arguments);
+        running.wait_for(&bench.path("out/picture.so-far.png"));
+        running.signal(signal);
+        let (status, out, err) = running.end();
+        assert_eq!(status.code(), Some(1), "{signal}: {err}");
+        let report = bench.json("report.json");
+        let samples = report["samples"].as_u64().expect("a number");
+        assert!(samples >= 4 && report["samples_wanted"] == 1_048_576, "{report}");
+        let words = format!("stopped after {samples} of 1048576 samples a pixel");
+        assert!(err.contains(&words) && err.contains("the picture so far is in out"), "{err}");
+        assert!(report["notes"].to_string().contains(&words), "{report}");
+        let header = &bench.json("out/layers.json")["header"];
+        assert_eq!(header["partial"], words);
+        assert_eq!(header["samples"], samples.to_string());
+        assert!(out.contains("out/layers.exr"), "{out}");
+        let file = std::fs::read(bench.path("out/layers.exr")).expect("an EXR");
+        let exr = exr::meta::MetaData::read_from_buffered(&file[..], false).expect("an EXR");
+        assert!(format!("{exr:?}").contains(&words), "the header of the EXR says so, too");
+        assert!(!bench.path("out/picture.so-far.png").exists());
+        // It is the picture of so many samples.
+        let partial = bench.array("picture");
+        bench.render(&["--samples", &samples.to_string()]);
+        assert_eq!(partial, bench.array("picture"), "{signal}");
+    }
+}
+
+#[test]
+fn nothing_is_left_where_nothing_is_to_be_kept() {
+    let bench = Bench::with_scene(ENDLESS);
+    let arguments = [&RENDER[..], &["--discard-partial"]].concat();
+    let mut running = Running::start(&bench, &arguments);
+    running.wait_for(&bench.path("out/picture.so-far.png"));
+    running.signal("INT");
+    let (status, out, err) = running.end();
+    assert_eq!((status.code(), out.as_str()), (Some(1), ""), "{err}");
+    assert!(err.contains("error: stopped; no unfinished file was left"), "{err}");
+    assert!(!bench.path("out").exists(), "a new folder goes when nothing was written into it");
+}
+
+#[test]
+fn loading_and_building_stop_too() {
+    let bench = Bench::with_scene(LARGE);
+    let mut running = Running::start(&bench, &RENDER);
+    running.wait_for(&bench.path("out"));
+    running.signal("INT");
+    let (status, out, err) = running.end();
+    assert_eq!((status.code(), out.as_str()), (Some(1), ""), "{err}");
+    assert_eq!(err, "error: stopped; no unfinished file was left\n");
+    assert!(!bench.path("out").exists());
+}
+
+#[test]
+fn the_second_signal_ends_at_once_and_one_that_nohup_ignores_does_nothing() {
+    let bench = Bench::with_scene(ENDLESS);
+    let script = format!(
+        "trap '' HUP; exec '{}' render scene.json -o out --quiet",
+        env!("CARGO_BIN_EXE_etendue")
+    );
+    let mut running = Running::spawn(Command::new("sh").args(["-c", &script]), &bench);
+    running.wait_for(&bench.path("out/picture.so-far.png"));
+    running.signal("HUP");
+    running.signal("INT");
+    let (status, _, err) = running.end();
+    assert_eq!(status.code(), Some(1), "{err}");
+    // Had the first been heard, the second would have ended it.
+    assert!(err.contains("the picture so far is in out"), "{err}");
+}
+
+/// Exit code 1: it is not the input that has to be mended.
+#[test]
+fn a_folder_that_vanishes_is_no_fault_of_the_input() {
+    let bench = Bench::with_scene(ENDLESS);
+    let mut running = Running::start(&bench, &RENDER);
+    running.wait_for(&bench.path("out/picture.so-far.png"));
+    // A look may be written into it just then.
+    while std::fs::remove_dir_all(bench.path("out")).is_err() {}
+    running.signal("INT");
+    let (status, _, err) = running.end();
+    assert_eq!(status.code(), Some(1), "{err}");
+    assert!(err.contains("error: cannot write out/"), "{err}");
+}

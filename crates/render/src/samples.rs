@@ -1,0 +1,376 @@
+//! Means over the samples of each pixel, taken in passes over the whole film: after each pass every
+//! pixel has the same number of samples, so the film holds a picture that can be looked at, or kept
+//! when the render is stopped.
+//!
+//! Sums are compensated (Neumaier, "Rundungsfehleranalyse einiger Verfahren zur Summation endlicher
+//! Summen", 1974), so the mean of a million samples is as exact as that of ten. They are added in the
+//! order of the samples, and kept from pass to pass with what rounding took from them: the picture is
+//! the same to the bit however many passes there are.
+
+use std::ops::Range;
+use std::sync::Mutex;
+
+use etendue_camera::{
+    Camera, CameraRays, FilmSamples, LaneGroup, LensCamera, PixelSamples, Sampler, squares_of_pair,
+};
+use etendue_geometry::HitBatch;
+use etendue_tracer::{LayerSpec, Scratch};
+use rayon::prelude::*;
+
+use crate::backdrop;
+use crate::film::{Band, FilmLayer, Rows, bands, take};
+use crate::radiance::Numbers;
+use crate::tiles::{TILE, Tile, Traffic};
+use crate::watch::{Stopped, Watcher};
+
+/// Samples of the first pass: they fill the batches of a tile.
+const FIRST_PASS: u32 = 4;
+
+/// The most samples of a pass.
+const LONGEST_PASS: u32 = 1024;
+
+/// A pass is no longer than this share of all: what a stopped render loses.
+const SHARE_OF_PASS: u32 = 16;
+
+/// Pairs of random numbers that the camera uses before light does: place in the pixel, place in the
+/// pupil, and of the third one number for the wavelength.
+pub(crate) const CAMERA_PAIRS: u32 = 3;
+
+/// Bytes that sums take a value of the film when there are several passes.
+pub(crate) const BYTES_OF_SUM: u64 = size_of::<Sum>() as u64;
+
+/// The passes of `samples` a pixel: the first has few, so that there is soon something to see, and
+/// each takes as many as all before it until they are a small share of all.
+pub(crate) fn passes(samples: u32) -> Vec<Range<u32>> {
+    let longest = (samples / SHARE_OF_PASS).clamp(FIRST_PASS, LONGEST_PASS);
+    let mut passes = Vec::new();
+    let mut start = 0;
+    while start < samples {
+        let length = start.clamp(FIRST_PASS, longest);
+        let left = samples - start;
+        // What would be left for a short pass is done by this one.
+        let length = if left < length + length / 2 { left } else { length };
+        passes.push(start..start + length);
+        start += length;
+    }
+    passes
+}
+
+/// How pixels are sampled.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sampling {
+    /// Rays a pixel of coloured layers.
+    pub(crate) samples: u32,
+    pub(crate) sampler: Sampler,
+    pub(crate) seed: u64,
+}
+
+/// What is averaged over the samples of a pixel: colours of surfaces, or light.
+pub(crate) trait Averaged: Sync {
+    /// The camera, opened for these lanes.
+    fn camera(&self) -> &Camera;
+    /// The lanes that the camera sends separate ways.
+    fn groups(&self) -> &[LaneGroup];
+    /// Layers, and the lanes of each.
+    fn shape(&self) -> [usize; 2];
+    /// Samples that are traced together.
+    fn batch(&self) -> u32;
+    /// Fills `memory.values`, `[ray][layer][lane]`, for the rays of one group of lanes.
+    fn trace(&self, lanes: &Range<usize>, memory: &mut Memory);
+}
+
+/// One thread's memory for it.
+#[derive(Debug, Default)]
+pub(crate) struct Memory {
+    /// What the samples of the batch are sampled by, and the sample of each ray.
+    pub(crate) numbers: Numbers,
+    pub(crate) rays: CameraRays,
+    pub(crate) values: Vec<f64>,
+    pub(crate) hits: HitBatch,
+    pub(crate) colors: [Vec<f64>; 3],
+    pub(crate) scratch: Scratch,
+    pub(crate) traffic: Traffic,
+    film: FilmSamples,
+    /// `[pixel of the tile][layer][lane]`.
+    sums: Vec<Sum>,
+    order: Vec<u32>,
+}
+
+/// A sum and what rounding took from it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Sum {
+    sum: f64,
+    lost: f64,
+}
+
+impl Sum {
+    fn add(&mut self, value: f64) {
+        let sum = self.sum + value;
+        self.lost += if self.sum.abs() >= value.abs() {
+            (self.sum - sum) + value
+        } else {
+            (value - sum) + self.sum
+        };
+        self.sum = sum;
+    }
+
+    fn total(self) -> f64 {
+        self.sum + self.lost
+    }
+}
+
+/// Layers on their way: what is averaged, and the sums between passes.
+pub(crate) struct Averaging<'a> {
+    what: &'a dyn Averaged,
+    sampling: Sampling,
+    layers: Vec<&'a mut FilmLayer>,
+    /// `[pixel][layer][lane]`; empty when there is one pass alone.
+    sums: Vec<Sum>,
+}
+
+impl<'a> Averaging<'a> {
+    pub(crate) fn new(
+        what: &'a dyn Averaged,
+        sampling: Sampling,
+        layers: Vec<&'a mut FilmLayer>,
+        passes: usize,
+    ) -> Self {
+        let [width, height] = what.camera().resolution().map(|side| side as usize);
+        let [count, lanes] = what.shape();
+        let kept = if passes > 1 { width * height * count * lanes } else { 0 };
+        Self { what, sampling, layers, sums: vec![Sum::default(); kept] }
+    }
+
+    /// Adds the samples `pass` of every pixel. Of several passes the layers see nothing until
+    /// [`Self::show`]; a single one fills them.
+    pub(crate) fn add(
+        &mut self,
+        pass: &Range<u32>,
+        watcher: &Watcher<'_>,
+        traffic: &Mutex<Traffic>,
+    ) -> Result<(), Stopped> {
+        let Self { what, sampling, layers, sums } = self;
+        let resolution = what.camera().resolution();
+        let kept = split(sums, *what, resolution);
+        let bands = bands(layers, resolution, TILE);
+        bands.par_iter().zip(&kept).try_for_each(|(band, kept)| {
+            let Some(mut band) = take(band) else { return Ok(()) };
+            let adding = Adding { what: *what, sampling: *sampling, pass, watcher };
+            let mut memory = Memory::default();
+            let done = adding.fill(&mut band, take(kept), &mut memory);
+            Traffic::add(traffic, memory.traffic, &memory.rays.fates);
+            done
+        })
+    }
+
+    /// The layers.
+    pub(crate) fn layers(&self) -> impl Iterator<Item = &FilmLayer> {
+        self.layers.iter().map(|layer| &**layer)
+    }
+
+    /// Writes to the layers the means of the first `samples` samples.
+    pub(crate) fn show(&mut self, samples: u32) {
+        let Self { what, layers, sums, .. } = self;
+        if sums.is_empty() {
+            return;
+        }
+        let resolution = what.camera().resolution();
+        let [count, lanes] = what.shape();
+        let kept = split(sums, *what, resolution);
+        bands(layers, resolution, TILE).par_iter().zip(&kept).for_each(|(band, kept)| {
+            let (Some(mut band), Some(sums)) = (take(band), take(kept)) else { return };
+            for (index, sums) in sums.chunks(count * lanes).enumerate() {
+                put(&mut band, index, sums, lanes, samples);
+            }
+        });
+    }
+}
+
+type Shared<T> = Mutex<Option<T>>;
+
+/// The sums of each band; of nothing when none are kept.
+fn split<'s>(
+    sums: &'s mut [Sum],
+    what: &dyn Averaged,
+    [width, height]: [u32; 2],
+) -> Vec<Shared<&'s mut [Sum]>> {
+    let [count, lanes] = what.shape();
+    if sums.is_empty() {
+        return (0..height.div_ceil(TILE)).map(|_| Mutex::new(None)).collect();
+    }
+    let a_band = width as usize * TILE as usize * count * lanes;
+    sums.chunks_mut(a_band.max(1)).map(|sums| Mutex::new(Some(sums))).collect()
+}
+
+/// Writes the means of a pixel of a band.
+fn put(band: &mut Band<'_>, index: usize, sums: &[Sum], lanes: usize, samples: u32) {
+    for ((layer, planes), sums) in band.layers.iter_mut().zip(sums.chunks(lanes)) {
+        if let (LayerSpec::Alpha, &[hit, all, none]) = (*layer, sums) {
+            planes[0].put(index, backdrop::share([hit, all, none].map(Sum::total)));
+            continue;
+        }
+        for (plane, sum) in planes.iter_mut().zip(sums) {
+            Rows::put(plane, index, sum.total() / f64::from(samples));
+        }
+    }
+}
+
+/// One pass of a band.
+struct Adding<'a> {
+    what: &'a dyn Averaged,
+    sampling: Sampling,
+    pass: &'a Range<u32>,
+    watcher: &'a Watcher<'a>,
+}
+
+impl Adding<'_> {
+    /// Adds to the sums that are kept, or else fills the layers.
+    fn fill(
+        &self,
+        band: &mut Band<'_>,
+        mut kept: Option<&mut [Sum]>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
+        let [width, _] = self.what.camera().resolution();
+        let [layers, lanes] = self.what.shape();
+        let count = layers * lanes;
+        for tile in Tile::across(width, band) {
+            let pixels: Vec<(u32, u32)> = tile.pixels().collect();
+            let places = pixels.iter().map(|&(x, y)| tile.index(x, y, width));
+            memory.sums.clear();
+            match &kept {
+                Some(kept) => places.clone().for_each(|at| {
+                    memory.sums.extend_from_slice(&kept[at * count..(at + 1) * count]);
+                }),
+                None => memory.sums.resize(pixels.len() * count, Sum::default()),
+            }
+            self.tile(tile, &pixels, memory)?;
+            for (at, sums) in places.zip(memory.sums.chunks(count)) {
+                match &mut kept {
+                    Some(kept) => kept[at * count..(at + 1) * count].copy_from_slice(sums),
+                    None => put(band, at, sums, lanes, self.pass.end),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn tile(&self, tile: Tile, pixels: &[(u32, u32)], memory: &mut Memory) -> Result<(), Stopped> {
+        let [layers, lanes] = self.what.shape();
+        let at_once = (self.pass.end - self.pass.start).clamp(1, self.what.batch());
+        let pixels_at_once = (self.what.batch() / at_once) as usize;
+        for (k, pixels) in pixels.chunks(pixels_at_once).enumerate() {
+            let start = k * pixels_at_once * layers * lanes;
+            for first in self.pass.clone().step_by(at_once as usize) {
+                let range = first..self.pass.end.min(first + at_once);
+                let a_pixel = range.len();
+                self.place(tile, (pixels, range), memory);
+                for group in self.what.groups() {
+                    memory.film.wavelength = group.wavelength;
+                    self.what.camera().sample_rays(&memory.film, &mut memory.rays);
+                    self.what.trace(&group.lanes, memory);
+                    memory.add(start, a_pixel, [layers, lanes], &group.lanes);
+                }
+                self.watcher.did(pixels.len() as u64 * a_pixel as u64)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refills the batch with samples `range` of each of `pixels`, those of one pixel side by side.
+    /// A camera without a lens looks at places alone.
+    fn place(&self, tile: Tile, (pixels, range): (&[(u32, u32)], Range<u32>), memory: &mut Memory) {
+        let Sampling { samples, sampler, seed } = self.sampling;
+        let Memory { numbers, film, .. } = memory;
+        let numbers: &mut Vec<(PixelSamples, u32)> = &mut numbers.samples;
+        numbers.clear();
+        for &(x, y) in pixels {
+            let pixel = sampler.pixel(seed, tile.left + x, tile.top + y, samples);
+            numbers.extend(range.clone().map(|index| (pixel, index)));
+        }
+        let count = numbers.len();
+        let draw = |pair, out: &mut Vec<_>| squares_of_pair(numbers.iter().copied(), pair, out);
+        film.clear();
+        let mut places = Vec::new();
+        draw(0, &mut places);
+        for (&(x, y), places) in pixels.iter().zip(places.chunks(range.len().max(1))) {
+            let corner = [tile.left + x, tile.top + y].map(f64::from);
+            film.columns.extend(places.iter().map(|place| corner[0] + place[0]));
+            film.rows.extend(places.iter().map(|place| corner[1] + place[1]));
+        }
+        let lens = self.what.camera().lens();
+        match lens {
+            Some(_) => draw(1, &mut film.pupil),
+            None => film.pupil.resize(count, [0.5; 2]),
+        }
+        if lens.is_some_and(LensCamera::draws_wavelengths) {
+            draw(2, &mut places);
+            film.spectrum.extend(places.iter().map(|place| place[0]));
+        } else {
+            film.spectrum.resize(count, 0.5);
+        }
+    }
+}
+
+impl Memory {
+    /// Adds the values of the batch's rays, sample by sample, to sums from `start` on.
+    fn add(
+        &mut self,
+        start: usize,
+        a_pixel: usize,
+        [layers, lanes]: [usize; 2],
+        group: &Range<usize>,
+    ) {
+        let Self { rays: CameraRays { sample, weight, .. }, values, sums, order, .. } = self;
+        let count = layers * lanes;
+        let mut add = |ray: usize| {
+            let at = start + sample[ray] as usize / a_pixel * count;
+            let sums = &mut sums[at..at + count];
+            let values = &values[ray * count..(ray + 1) * count];
+            for first in (0..count).step_by(lanes.max(1)) {
+                for k in first + group.start..first + group.end {
+                    sums[k].add(values[k] * weight[ray]);
+                }
+            }
+        };
+        if sample.is_sorted() {
+            return (0..sample.len()).for_each(add);
+        }
+        // A lens that disperses sorts its rays by wavelength.
+        order.clear();
+        order.extend(0..u32::try_from(sample.len()).unwrap_or(u32::MAX));
+        order.sort_unstable_by_key(|&ray| sample[ray as usize]);
+        order.iter().for_each(|&ray| add(ray as usize));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_cover_all_samples_once_and_none_is_a_large_share() {
+        for samples in (1..300).chain([1000, 1024, 4095, 4096, 65_537, 1 << 20]) {
+            let passes = passes(samples);
+            assert_eq!(passes[0].start, 0);
+            assert_eq!(passes.last().unwrap().end, samples);
+            assert!(passes.windows(2).all(|pair| pair[0].end == pair[1].start), "{passes:?}");
+            // Half of a pass more is the most that the last takes.
+            let most = (samples / SHARE_OF_PASS).max(FIRST_PASS) * 3 / 2;
+            assert!(passes.iter().all(|pass| pass.end - pass.start <= most), "{passes:?}");
+            assert!(samples < 6 || passes[0].end == FIRST_PASS, "{passes:?}");
+        }
+        assert_eq!((passes(5).len(), passes(64).len()), (1, 16));
+        assert_eq!(passes(256)[..4], [0..4, 4..8, 8..16, 16..32]);
+    }
+
+    #[test]
+    fn a_sum_keeps_what_rounding_takes() {
+        let mut sum = Sum::default();
+        for value in [1.0, 1e100, 1.0, -1e100] {
+            sum.add(value);
+        }
+        // The example of Neumaier's paper: naive summation gives 0.
+        assert_eq!(sum.total(), 2.0);
+    }
+}

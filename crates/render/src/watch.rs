@@ -1,0 +1,83 @@
+//! Who watches a render: told how far it is, shown the picture so far, asked whether to go on.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use crate::output::{Picture, PictureError};
+
+/// Watches a render. A function of the share done is enough for those who only want that.
+pub trait Watch: Sync {
+    /// Told the share done (0..=1) between batches of samples, from many threads; answering `false`
+    /// stops.
+    fn goes_on(&self, share: f64) -> bool;
+
+    /// Shown the picture so far when all its pixels have one more pass of their samples and not yet
+    /// all; nothing is rendered meanwhile.
+    fn look(&self, _so_far: &SoFar<'_>) {}
+}
+
+impl<F: Fn(f64) -> bool + Sync> Watch for F {
+    fn goes_on(&self, share: f64) -> bool {
+        self(share)
+    }
+}
+
+/// A picture on its way.
+#[allow(missing_debug_implementations, reason = "holds a function")]
+pub struct SoFar<'a> {
+    /// The samples that each pixel has, and is to have.
+    pub samples: [u32; 2],
+    /// The share of the work that is done.
+    pub share: f64,
+    pub(crate) picture: &'a dyn Fn() -> Result<Picture, PictureError>,
+}
+
+impl SoFar<'_> {
+    /// The picture alone, without the layers beside it, marked as partial.
+    ///
+    /// # Errors
+    ///
+    /// When it is no picture; a fault of this program.
+    pub fn picture(&self) -> Result<Picture, PictureError> {
+        (self.picture)()
+    }
+}
+
+/// The render was stopped before it was done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Stopped;
+
+/// Counts what is done of the work.
+pub(crate) struct Watcher<'a> {
+    watch: &'a dyn Watch,
+    done: AtomicU64,
+    total: u64,
+    stopped: AtomicBool,
+}
+
+impl<'a> Watcher<'a> {
+    /// Of work that has `total` rays of the camera.
+    pub(crate) fn new(watch: &'a dyn Watch, total: u64) -> Self {
+        Self { watch, done: AtomicU64::new(0), total, stopped: AtomicBool::new(false) }
+    }
+
+    /// Counts `rays` more.
+    pub(crate) fn did(&self, rays: u64) -> Result<(), Stopped> {
+        self.done.fetch_add(rays, Ordering::Relaxed);
+        if self.stopped.load(Ordering::Relaxed) {
+            return Err(Stopped);
+        }
+        if self.watch.goes_on(self.share()) {
+            return Ok(());
+        }
+        self.stopped.store(true, Ordering::Relaxed);
+        Err(Stopped)
+    }
+
+    pub(crate) fn share(&self) -> f64 {
+        self.done.load(Ordering::Relaxed) as f64 / self.total.max(1) as f64
+    }
+
+    pub(crate) fn watch(&self) -> &'a dyn Watch {
+        self.watch
+    }
+}
