@@ -278,7 +278,8 @@ pub(crate) struct RenderArguments {
     /// Make Embree use this instruction set: sse2, sse4.2, avx, avx2 or avx512
     #[arg(long, value_name = "NAME")]
     pub(crate) isa: Option<String>,
-    /// Stop a build whose structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
+    /// Refuse what would need more memory than this, e.g. 800M or 4G (bytes, 1024-based), before work
+    /// starts; without it, more than the system has free
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(crate) memory_limit: Option<u64>,
     /// Write times, rays, memory and fingerprints as JSON

@@ -50,9 +50,10 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     let has_pictures = has(PartArgument::Samplers) || has(PartArgument::Cameras);
     let mut notes = Vec::new();
+    let memory = render::Memory::Render(arguments.memory_limit);
     let scene = match has_pictures {
-        true => render::load(&with_picture(&arguments.scene, &mut notes)?, stages)?,
-        false => render::load(&arguments.scene, stages)?,
+        true => render::load(&with_picture(&arguments.scene, &mut notes)?, memory, stages)?,
+        false => render::load(&arguments.scene, memory, stages)?,
     };
     let results = file_names().map(|name| arguments.output.join(name)).collect::<Vec<_>>();
     places::keep_apart(&scene.inputs, &results)?;

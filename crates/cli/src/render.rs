@@ -43,8 +43,21 @@ pub(crate) fn run(arguments: &RenderArguments) -> Result<(), Fault> {
     done
 }
 
+/// What memory a scene is loaded for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Memory {
+    /// To be looked at.
+    Look,
+    /// To be rendered within so many bytes, or what the system has free.
+    Render(Option<u64>),
+}
+
 /// Reads a scene and all that its layers want of the models.
-pub(crate) fn load(arguments: &SceneArguments, stages: Stages) -> Result<Scene, Fault> {
+pub(crate) fn load(
+    arguments: &SceneArguments,
+    memory: Memory,
+    stages: Stages,
+) -> Result<Scene, Fault> {
     let mut overrides = arguments.overrides();
     let mut file = SceneFile::read(&arguments.scene, &overrides)?;
     if file.kind() == FileKind::Model && file.spec.layers.is_empty() && file.spec.tracer.is_none() {
@@ -56,6 +69,11 @@ pub(crate) fn load(arguments: &SceneArguments, stages: Stages) -> Result<Scene, 
     let progress = stages.begin("load");
     let options = LoadOptions {
         progress: Some(&|step| progress(step.done as f64 / step.total.max(1) as f64)),
+        memory_limit: match memory {
+            Memory::Look => None,
+            Memory::Render(limit) => limit,
+        },
+        to_render: matches!(memory, Memory::Render(_)),
         ..arguments.load_options()
     };
     Ok(file.load(plan::wanted(&file.spec.all_layers()), &options)?)
@@ -72,7 +90,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     if let Some(path) = &arguments.report {
         places::file(path)?;
     }
-    let scene = load(&arguments.scene, stages)?;
+    let scene = load(&arguments.scene, Memory::Render(arguments.memory_limit), stages)?;
     notes.add(scene.notes.iter().map(in_words));
     let plan = Plan::new(&scene, outputs);
     keep_inputs(arguments, &scene, &plan, outputs)?;
@@ -96,6 +114,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     notes.add(partial.clone());
     notes.add(rendered.notes.iter().cloned());
     notes.add(not_finite(&rendered));
+    notes.add(changed(&scene));
     let folder = &arguments.output;
     let (files, more) = places::recorded(Ledger::open(folder, "render"), || {
         let mut files = write(folder, &scene, &rendered.picture, outputs, stages)?;
@@ -438,6 +457,16 @@ fn in_words(note: &Note) -> String {
         count => format!("{subject} (x{count}): {message}"),
     })
     .into_owned()
+}
+
+/// Models that another program wrote to meanwhile.
+fn changed(scene: &Scene) -> impl Iterator<Item = String> {
+    scene.changed_files().into_iter().map(|path| {
+        let path = path.display();
+        format!(
+            "{path} changed while it was rendered: what is seen may be old or new; render again"
+        )
+    })
 }
 
 /// That some light was left out, if it was.

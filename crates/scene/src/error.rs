@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::ImportError;
 use crate::file::{Origin, OverrideError, Place, nearest};
+use crate::memory::TooMuch;
 
 /// Why a scene cannot be read or loaded. The message names the file, the place in it, and a remedy.
 #[derive(Debug, thiserror::Error)]
@@ -117,6 +118,16 @@ pub enum SceneError {
         what: &'static str,
         /// The most.
         limit: u64,
+    },
+    /// More memory than there may be.
+    #[error("{}: {what} {source}", file.display())]
+    Memory {
+        /// The scene file.
+        file: PathBuf,
+        /// What needs it.
+        what: String,
+        /// How much, and how much there is.
+        source: TooMuch,
     },
     /// The caller's progress function asked to stop.
     #[error("loading was stopped")]

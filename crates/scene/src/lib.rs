@@ -18,6 +18,7 @@
 //! | [`shape`] | shapes made on load |
 //! | [`scene`] | the loaded scene |
 //! | [`escape`] | text out of files on its way to a terminal |
+//! | [`memory`] | how much memory there may be, and an account of it |
 //! | [`doctor`] | what a scene holds and what is wrong with it, without rendering |
 
 mod bounds;
@@ -33,6 +34,7 @@ pub mod import;
 mod instances;
 mod load;
 mod looks;
+pub mod memory;
 mod npy;
 mod parts;
 mod paths;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::SystemTime;
 
 use etendue_camera::{Camera, CameraError, CameraSpec};
 use etendue_geometry::{Bounds, Geometry, Transform};
@@ -15,10 +16,12 @@ use rayon::prelude::*;
 
 use crate::bounds::Vertices;
 use crate::cameras::{self, CameraOrigin, SceneCamera};
+use crate::doctor::memory;
 use crate::file::{FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index, suggest};
 use crate::identity::Ingredients;
 use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Strictness, Wanted};
 use crate::instances::Instances;
+use crate::memory::Budget;
 use crate::parts::{Object, Parts};
 use crate::paths::{Folder, Found};
 use crate::scene::{LoadOptions, LoadProgress, Scene};
@@ -47,15 +50,23 @@ impl SceneFile {
     /// When a value makes no sense, a file is missing, leaves the scene's folder or cannot be
     /// imported; the message names the place.
     pub fn load(&self, wanted: Wanted, options: &LoadOptions<'_>) -> Result<Scene, SceneError> {
+        let since = SystemTime::now();
         let folder = Folder::open(self.folder(), options.reach)?;
         let own = self.named_materials(&folder, wanted)?;
         let lights = self.named_lights(&folder)?;
         // What can be checked without the models is; a bad camera need not wait for them.
-        self.camera_alone(&folder)?;
+        let camera = self.camera_alone(&folder)?;
+        let budget = Arc::new(Budget::new(options.memory_limit));
+        if options.to_render {
+            let size = camera.resolution();
+            let film = memory::film(size, &self.spec.all_layers());
+            let [width, height] = size;
+            self.take(&budget, film, || format!("a picture of {width} x {height} pixels"))?;
+        }
         let mut named = OwnParts { materials: &own.materials, files: Vec::new() };
         let (origins, objects) = self.resolve_objects(&folder, &mut named)?;
         let instance_files = named.files;
-        let imports = self.import_all(&origins, &objects, &folder, wanted, options)?;
+        let imports = self.import_all(&origins, &objects, &folder, wanted, options, &budget)?;
         let mut parts = Parts::new(own.materials, own.textures, lights.clone().unwrap_or_default());
         let split_nodes = self.kind() == FileKind::Model;
         for (spec, object) in self.spec.objects.iter().zip(&objects) {
@@ -68,12 +79,14 @@ impl SceneFile {
         parts.files = instance_files;
         for (index, object) in objects.iter().enumerate() {
             self.check_overrides(&parts, object, index)?;
+            let bytes = parts.bytes_to_place(object, split_nodes);
+            self.take(&budget, bytes, || format!("placing \"{}\"", object.title))?;
             parts.place(object, split_nodes).map_err(|what| self.too_many(what))?;
         }
         if self.spec.picture() == Some(LayerSpec::Radiance) && lights.is_none() {
             parts.studio_if_dark = !parts.light_by_default();
         }
-        self.finish(parts, &folder, options)
+        self.finish(parts, &folder, options, since)
     }
 
     /// The camera as far as it is known without the models: one that frames the scene sees nothing
@@ -83,6 +96,20 @@ impl SceneFile {
         self.camera_spec()
             .build(Bounds::default, &|name| files.find(name))
             .map_err(|error| self.camera_fault(&error))
+    }
+
+    /// Speaks for memory that `what` is about to take.
+    fn take(
+        &self,
+        budget: &Budget,
+        bytes: u64,
+        what: impl FnOnce() -> String,
+    ) -> Result<(), SceneError> {
+        budget.take(bytes).map_err(|source| SceneError::Memory {
+            file: self.path().to_owned(),
+            what: what(),
+            source,
+        })
     }
 
     fn too_many(&self, what: &'static str) -> SceneError {
@@ -234,16 +261,22 @@ impl SceneFile {
         folder: &Folder,
         wanted: Wanted,
         options: &LoadOptions<'_>,
+        budget: &Arc<Budget>,
     ) -> Result<Vec<Import>, SceneError> {
         let done = AtomicUsize::new(0);
         let settings = import::Options {
             strictness: options.strictness,
             root: folder.limit().map(std::path::Path::to_owned),
+            budget: Arc::clone(budget),
         };
         let goes_on = |origin: &Origin, done: usize| {
             let name = &objects[origin.user].title;
             let step = LoadProgress { name, done, total: origins.len() };
             options.progress.is_none_or(|progress| progress(step))
+        };
+        let structure = |triangles| match options.to_render {
+            true => memory::structure(triangles),
+            false => 0,
         };
         // All are waited for, so that the first fault in the file's order is the one reported.
         let imports: Vec<Result<Import, SceneError>> = origins
@@ -251,9 +284,25 @@ impl SceneFile {
             .map(|origin| {
                 let at = join_index("objects", origin.user);
                 let import = match &origin.kind {
-                    OriginKind::File(path) => import::import(path, wanted, &settings)
-                        .map_err(|source| self.import_fault(at, source))?,
+                    OriginKind::File(path) => {
+                        let import = import::import(path, wanted, &settings)
+                            .map_err(|source| self.import_fault(at, source))?;
+                        let triangles: usize =
+                            import.meshes.iter().map(|m| m.triangles.len()).sum();
+                        self.take(budget, structure(triangles as u64), || {
+                            format!(
+                                "the structure over {triangles} triangles of {}",
+                                path.display()
+                            )
+                        })?;
+                        import
+                    }
                     OriginKind::Shape(shape) => {
+                        let (triangles, bytes) = shape.cost(wanted);
+                        let bytes = bytes.saturating_add(structure(triangles));
+                        self.take(budget, bytes, || {
+                            format!("{at}: a {} of {triangles} triangles", shape.name())
+                        })?;
                         of_shape(shape, wanted, &|| goes_on(origin, done.load(Ordering::Relaxed)))
                             .map_err(|fault| self.fault(&join(&at, fault.key), fault.reason))?
                             .ok_or(SceneError::Stopped)?
@@ -279,6 +328,7 @@ impl SceneFile {
         parts: Parts,
         folder: &Folder,
         options: &LoadOptions<'_>,
+        since: SystemTime,
     ) -> Result<Scene, SceneError> {
         let geometry = Arc::new(parts.geometry);
         let camera_files = CameraFiles::new(folder);
@@ -326,6 +376,7 @@ impl SceneFile {
             notes,
             stats: parts.stats,
             inputs,
+            since,
             ingredients: Ingredients::new(self.value(), files),
         })
     }

@@ -88,6 +88,16 @@ impl Parts {
         self.stats.dropped += stats.dropped;
     }
 
+    /// Bytes that [`Self::place`] will take.
+    pub(crate) fn bytes_to_place(&self, object: &Object, split_nodes: bool) -> u64 {
+        let home = &self.homes[object.origin];
+        let name = |p: &ImportedPlacement| if split_nodes { p.name.len() + 24 } else { 0 };
+        let names: usize = home.placements.iter().map(name).sum();
+        let lights = home.lights.len() * size_of::<Light>();
+        let each = home.placements.len() * size_of::<Placement>() + lights;
+        (each as u64).saturating_mul(object.world_from_object.len() as u64) + names as u64
+    }
+
     /// Places an object. A model that stands for a scene has an object for each of its nodes.
     /// The error names what there is too much of.
     pub(crate) fn place(&mut self, object: &Object, split_nodes: bool) -> Result<(), &'static str> {

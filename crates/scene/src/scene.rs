@@ -1,7 +1,8 @@
 //! A scene, loaded and validated: all that a render needs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::SystemTime;
 
 use etendue_camera::Camera;
 use etendue_geometry::Geometry;
@@ -61,10 +62,24 @@ pub struct Scene {
     /// Every file that the scene is made of, whether it was read or only named: the scene file,
     /// models with their buffers and material files, images, lenses, masks and arrays.
     pub inputs: Vec<PathBuf>,
+    /// When loading began.
+    pub(crate) since: SystemTime,
     pub(crate) ingredients: Ingredients,
 }
 
 impl Scene {
+    /// The models that have gone, or were cut, written or replaced since loading began: they are used
+    /// where they are mapped, so what was rendered may be of their old or their new contents.
+    #[must_use]
+    pub fn changed_files(&self) -> Vec<&Path> {
+        let is_changed = |path: &Path, size: u64| match path.metadata() {
+            Ok(now) => now.len() != size || now.modified().is_ok_and(|at| at > self.since),
+            Err(_) => true,
+        };
+        let files = self.stats.files.iter();
+        files.filter(|(path, size)| is_changed(path, *size)).map(|(path, _)| &**path).collect()
+    }
+
     /// The scene's identity. Reads every file of the scene once more, from the system's cache as a
     /// rule.
     ///
@@ -100,6 +115,11 @@ pub struct LoadOptions<'a> {
     pub reach: Reach,
     /// A camera of one of the models by name or number, instead of the scene's.
     pub camera: Option<&'a str>,
+    /// The most memory that may be taken (bytes); `None` for what the system has free.
+    pub memory_limit: Option<u64>,
+    /// Speak for the picture and the accelerator as well, so that a render that would not fit is
+    /// refused before any work is done.
+    pub to_render: bool,
     /// Told now and then how far loading is; answering `false` stops it.
     pub progress: Option<&'a (dyn Fn(LoadProgress<'_>) -> bool + Sync)>,
 }
@@ -110,6 +130,8 @@ impl std::fmt::Debug for LoadOptions<'_> {
             .field("strictness", &self.strictness)
             .field("reach", &self.reach)
             .field("camera", &self.camera)
+            .field("memory_limit", &self.memory_limit)
+            .field("to_render", &self.to_render)
             .finish_non_exhaustive()
     }
 }

@@ -6,6 +6,7 @@ use etendue_tracer::LayerSpec;
 use serde::Serialize;
 
 use crate::Scene;
+use crate::memory::Size;
 
 /// Bytes of Embree's structure per triangle: 92, 90 and 88 for blobs of 0.1, 1 and 4 million at low
 /// quality, 63 and 70 for 0.1 and 0.3 million at medium. As `bvh_bytes` in the report of
@@ -40,14 +41,23 @@ impl MemoryForecast {
         let geometry: u64 = scene.geometry.meshes.iter().map(|mesh| mesh.heap_bytes() as u64).sum();
         let uses = scene.geometry.uses();
         let instances: u64 = uses.iter().filter(|&&n| n > 1).map(|&n| u64::from(n)).sum();
-        let structure = EMBREE_PER_TRIANGLE * scene.geometry.triangles_unique()
-            + EMBREE_PER_INSTANCE * instances;
-        let [width, height] = scene.camera.resolution().map(u64::from);
-        let values = scene.layers.iter().map(values).sum::<u64>();
-        let film = FILM_PER_VALUE * width * height * values;
+        let structure =
+            structure(scene.geometry.triangles_unique()) + EMBREE_PER_INSTANCE * instances;
+        let film = film(scene.camera.resolution(), &scene.layers);
         let mapped = scene.stats.bytes_mapped;
         Self { geometry, mapped, structure, film, total: geometry + structure + film }
     }
+}
+
+/// Bytes of the structure over so many triangles, estimated.
+pub(crate) fn structure(triangles: u64) -> u64 {
+    EMBREE_PER_TRIANGLE.saturating_mul(triangles)
+}
+
+/// Bytes of `layers` of a picture of so many columns and rows, files included.
+pub(crate) fn film([width, height]: [u32; 2], layers: &[LayerSpec]) -> u64 {
+    let pixels = u64::from(width) * u64::from(height);
+    FILM_PER_VALUE.saturating_mul(pixels).saturating_mul(layers.iter().map(values).sum())
 }
 
 /// Values a pixel of a layer.
@@ -81,24 +91,5 @@ impl fmt::Display for MemoryForecast {
             Size(self.film),
             Size(self.mapped)
         )
-    }
-}
-
-/// Bytes as people read them.
-struct Size(u64);
-
-impl fmt::Display for Size {
-    #[expect(clippy::cast_precision_loss, reason = "three digits are shown")]
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut value = self.0 as f64;
-        let mut unit = "B";
-        for next in ["KiB", "MiB", "GiB", "TiB"] {
-            if value < 1024.0 {
-                break;
-            }
-            value /= 1024.0;
-            unit = next;
-        }
-        if unit == "B" { write!(f, "{value} B") } else { write!(f, "{value:.1} {unit}") }
     }
 }

@@ -4,7 +4,7 @@
 mod duplicates;
 mod leftovers;
 mod lights;
-mod memory;
+pub(crate) mod memory;
 mod precision;
 mod text;
 

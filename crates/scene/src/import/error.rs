@@ -3,6 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::memory::TooMuch;
+
 /// Why a model could not be read. The message names the file, the place in it, and what to do.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -57,6 +59,16 @@ pub enum ImportError {
         place: String,
         /// What is wrong and what to do about it.
         reason: String,
+    },
+    /// More memory than there may be.
+    #[error("{}: {place}: what it makes {source}", file.display())]
+    Memory {
+        /// The file.
+        file: PathBuf,
+        /// Where in the file.
+        place: String,
+        /// How much, and how much there is.
+        source: TooMuch,
     },
     /// The file needs an extension that is not supported.
     #[error("{}: needs {name}, not supported: {remedy}", file.display())]

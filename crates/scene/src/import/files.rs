@@ -3,12 +3,21 @@
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use etendue_geometry::MappedFile;
 
-use super::ImportError;
+use super::{ImportError, Options};
+use crate::memory::{Budget, Size};
 use crate::paths;
+
+/// Bytes that a model may make appear, however small its files are.
+const MADE_OF_NOTHING: u64 = 512 << 20;
+
+/// As many more for each byte of its files: bytes become floats (4), corners of strips triangles (12),
+/// and instances transforms of nodes and placements.
+const MADE_PER_BYTE: u64 = 64;
 
 /// Opens files beside a model, each once, inside the allowed folder.
 #[derive(Debug)]
@@ -16,18 +25,62 @@ pub(super) struct Files {
     model: PathBuf,
     folder: PathBuf,
     root: Option<PathBuf>,
+    budget: Arc<Budget>,
+    /// Bytes that the model makes appear, beside what its files hold.
+    made: AtomicU64,
     opened: Mutex<BTreeMap<PathBuf, Arc<MappedFile>>>,
 }
 
 impl Files {
     /// For the model at `path`, whose relative paths start at its own folder.
-    pub(super) fn beside(path: &Path, root: Option<&Path>) -> Result<Self, ImportError> {
+    pub(super) fn beside(path: &Path, options: &Options) -> Result<Self, ImportError> {
         let folder = match path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
             _ => PathBuf::from("."),
         };
-        let root = root.map(canonical).transpose()?;
-        Ok(Self { model: path.to_owned(), folder, root, opened: Mutex::default() })
+        let root = options.root.as_deref().map(canonical).transpose()?;
+        Ok(Self {
+            model: path.to_owned(),
+            folder,
+            root,
+            budget: Arc::clone(&options.budget),
+            made: AtomicU64::new(0),
+            opened: Mutex::default(),
+        })
+    }
+
+    /// Speaks for `bytes` of memory that `place` of the model makes appear: numbers without data, or
+    /// in another form than the file's, instances, names.
+    ///
+    /// # Errors
+    ///
+    /// When they are over what there may be, or out of all proportion to the model's files.
+    pub(super) fn take(
+        &self,
+        bytes: u64,
+        place: impl FnOnce() -> String,
+    ) -> Result<(), ImportError> {
+        let made = self.made.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
+        if made > MADE_OF_NOTHING {
+            let held: u64 = self.opened().iter().map(|(_, size)| size).sum();
+            if made > MADE_OF_NOTHING.saturating_add(held.saturating_mul(MADE_PER_BYTE)) {
+                return Err(ImportError::Damaged {
+                    file: self.model.clone(),
+                    place: place(),
+                    reason: format!(
+                        "the model would take {} of memory and has {} of files; export it again, \
+                         with the data in the file and fewer instances",
+                        Size(made),
+                        Size(held)
+                    ),
+                });
+            }
+        }
+        self.budget.take(bytes).map_err(|source| ImportError::Memory {
+            file: self.model.clone(),
+            place: place(),
+            source,
+        })
     }
 
     /// Where `written`, a path inside the model, leads; see [`Self::locate_beside`].

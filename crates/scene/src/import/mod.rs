@@ -22,12 +22,15 @@ mod precision;
 mod text;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use etendue_geometry::{Mesh, Transform};
 use etendue_tracer::{Light, LightKind, Material, Texture};
 
 pub use error::ImportError;
 pub use note::{Note, NoteKind};
+
+use crate::memory::Budget;
 
 pub(crate) use admit::count_degenerate;
 
@@ -90,6 +93,8 @@ pub struct Options {
     /// The folder that the files named inside the model may not leave (after links are followed);
     /// `None` allows any place.
     pub root: Option<PathBuf>,
+    /// The account of what the models take; without a limit by default.
+    pub budget: Arc<Budget>,
 }
 
 /// What a model file holds.
@@ -221,7 +226,7 @@ fn refuse_other_kind(file: &Path, bytes: &[u8], wanted: &str) -> Result<(), Impo
 /// When the file, or one that it names, cannot be read, is damaged, leaves [`Options::root`], or
 /// needs an extension that is not supported; under [`Strictness::Strict`] also for defective data.
 pub fn import(path: &Path, wanted: Wanted, options: &Options) -> Result<Import, ImportError> {
-    let files = Files::beside(path, options.root.as_deref())?;
+    let files = Files::beside(path, options)?;
     let extension =
         path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let mut import = match extension.as_str() {

@@ -122,6 +122,19 @@ impl ShapeSpec {
         }
     }
 
+    /// How many triangles it is asked to have, and the bytes of memory that they take.
+    pub(crate) fn cost(&self, wanted: Wanted) -> (u64, u64) {
+        let triangles = match *self {
+            Self::Rectangle { .. } | Self::Box { .. } => 12,
+            Self::Sphere { triangles, .. }
+            | Self::Disk { triangles, .. }
+            | Self::Blob { triangles, .. } => triangles,
+        };
+        // Three indices a triangle, and a vertex for every other one (Euler's formula).
+        let vertex = 12 + if wanted.normals { 12 } else { 0 } + if wanted.uvs { 8 } else { 0 };
+        (triangles, triangles.saturating_mul(12 + vertex / 2))
+    }
+
     /// Makes the mesh, with normals and texture coordinates where `wanted`.
     ///
     /// # Errors

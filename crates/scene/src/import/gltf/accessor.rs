@@ -13,10 +13,6 @@ use super::Reader;
 use super::buffers::{View, size};
 use crate::import::ImportError;
 
-/// Elements of an accessor that has no bytes and so is all zeros. A file of a few bytes could
-/// otherwise ask for any amount of memory.
-const MOST_ZEROS: usize = 1 << 26;
-
 /// Floats that Embree reads from the start of the last vertex on.
 const LAST_READ: usize = 4;
 
@@ -84,10 +80,14 @@ impl<'a> Reader<'a> {
                 let offset = size(accessor.byte_offset.unwrap_or_default());
                 self.bind(&mut plain, view.value(), offset, &place)?;
             }
-            None if count > MOST_ZEROS => {
-                return Err(self.damaged(place, format!("{count} elements without any data")));
-            }
             None => {}
+        }
+        let in_place = matches!(plain.component, ComponentType::F32 | ComponentType::U32)
+            && plain.view.is_some()
+            && accessor.sparse.is_none();
+        if !in_place {
+            // Each component becomes four bytes.
+            self.files.take(4 * (count * plain.components) as u64, || place.clone())?;
         }
         if let Some(sparse) = &accessor.sparse {
             plain.sparse = Some(self.sparse(&plain, sparse, &place)?);

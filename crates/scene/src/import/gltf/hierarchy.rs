@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use etendue_geometry::Transform;
+use etendue_geometry::{Placement, Transform};
 
 use super::document::{Document, Node};
 use super::pose::Pose;
@@ -139,7 +139,10 @@ pub(super) fn place(
         let mesh = reader.document.root.meshes.get(placed.shape.mesh);
         let name = node.name.clone().or_else(|| mesh.and_then(|m| m.name.clone()));
         let name = name.unwrap_or_default();
+        let each = size_of::<ImportedPlacement>() + size_of::<Placement>() + 2 * name.len();
         for primitive in shapes.primitives(&placed.shape) {
+            let bytes = instances.len().saturating_mul(each) as u64;
+            reader.files.take(bytes, || format!("nodes[{}]", placed.node))?;
             // glTF 2.0, section 3.7.3.3: only the joints place a skinned mesh.
             let model_from_node =
                 if primitive.skinned { Transform::IDENTITY } else { placed.model_from_node };

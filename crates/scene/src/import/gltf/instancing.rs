@@ -42,6 +42,8 @@ pub(super) fn transforms(
             "they differ in their number of instances; export the file again",
         ));
     }
+    let bytes = (count * size_of::<Transform>()) as u64;
+    reader.files.take(bytes, || place("attributes"))?;
     let transform = |i: usize| {
         let translation =
             translations.as_ref().map_or(DVec3::ZERO, |v| v.get(i).map(f64::from).into());

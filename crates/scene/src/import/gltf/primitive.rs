@@ -302,6 +302,7 @@ impl<'a> Part<'a> {
         self.refuse_without_data(index.value())?;
         let place = format!("{}, indices", self.place);
         let accessor = self.reader.accessor(index.value(), &place)?;
+        self.reader.files.take(12 * accessor.count as u64 / 3, || place.clone())?;
         if !accessor.is_index() {
             return Err(self.reader.damaged(
                 place,

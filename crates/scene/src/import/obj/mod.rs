@@ -66,6 +66,8 @@ pub(super) fn import(
     let mut import = Import::default();
     note_leftovers(&chunks, missing, &mut import.notes);
     let segments = segment::divide(&chunks);
+    let names = segments.iter().map(|s| s.name.len() + s.material.as_ref().map_or(0, String::len));
+    files.take(4 * names.sum::<usize>() as u64, || "names of objects".to_owned())?;
     let pool = Pool::gather(&mut chunks);
     let libraries = segment::libraries(&chunks);
     let numbers = mtl::load(&libraries, &segments, files, wanted, options.strictness, &mut import)?;

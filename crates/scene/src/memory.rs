@@ -1,0 +1,224 @@
+//! How much memory a scene may take, and one account of what it will: whatever grows with a file is
+//! spoken for here before it is made.
+
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The most memory that may be taken (bytes), and who says so.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limit {
+    /// Bytes.
+    pub bytes: u64,
+    /// Who says so.
+    pub source: LimitSource,
+}
+
+/// Who limits memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LimitSource {
+    /// The user.
+    Given,
+    /// The machine has no more free.
+    Machine,
+    /// The control group (a container) that the process is in.
+    Group,
+    /// The shell's limit of addresses, `ulimit -v`.
+    Addresses,
+}
+
+impl Limit {
+    /// The limit that the user gave, else what the system has free now; `None` where it does not tell.
+    #[must_use]
+    pub fn of(given: Option<u64>) -> Option<Self> {
+        match given {
+            Some(bytes) => Some(Self { bytes, source: LimitSource::Given }),
+            None => Self::free(Path::new("/")),
+        }
+    }
+
+    /// What a Linux system whose files begin at `root` has free: the least of free memory, of what the
+    /// control group allows, and of the addresses left to this process.
+    fn free(root: &Path) -> Option<Self> {
+        let of = |bytes: Option<u64>, source| bytes.map(|bytes| Self { bytes, source });
+        [
+            of(kilobytes(&root.join("proc/meminfo"), "MemAvailable:"), LimitSource::Machine),
+            of(group_has_free(root), LimitSource::Group),
+            of(addresses_left(root), LimitSource::Addresses),
+        ]
+        .into_iter()
+        .flatten()
+        .min_by_key(|limit| limit.bytes)
+    }
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = Size(self.bytes);
+        match self.source {
+            LimitSource::Given => write!(f, "--memory-limit allows {size}"),
+            LimitSource::Machine => write!(f, "the machine has {size} free"),
+            LimitSource::Group => write!(f, "the container has {size} free"),
+            LimitSource::Addresses => write!(f, "the shell's limit (ulimit -v) leaves {size}"),
+        }
+    }
+}
+
+/// A line of `/proc`'s tables of kilobytes, in bytes.
+fn kilobytes(file: &Path, name: &str) -> Option<u64> {
+    let text = fs::read_to_string(file).ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
+}
+
+/// What the control groups (version 2) of this process leave; files that can be dropped count as free.
+fn group_has_free(root: &Path) -> Option<u64> {
+    let text = fs::read_to_string(root.join("proc/self/cgroup")).ok()?;
+    let own = text.lines().find_map(|line| line.strip_prefix("0::/"))?;
+    let top = root.join("sys/fs/cgroup");
+    let number = |file: PathBuf| fs::read_to_string(file).ok()?.trim().parse::<u64>().ok();
+    let free = |folder: &Path| {
+        let most = number(folder.join("memory.max"))?;
+        let used = number(folder.join("memory.current"))?;
+        let stat = fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
+        let cached = stat.lines().find_map(|line| line.strip_prefix("inactive_file "));
+        let cached = cached.and_then(|bytes| bytes.parse().ok()).unwrap_or(0);
+        Some(most.saturating_sub(used.saturating_sub(cached)))
+    };
+    let folder = top.join(own);
+    folder.ancestors().take_while(|folder| folder.starts_with(&top)).filter_map(free).min()
+}
+
+/// What `ulimit -v` leaves.
+fn addresses_left(root: &Path) -> Option<u64> {
+    let text = fs::read_to_string(root.join("proc/self/limits")).ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    let most: u64 = line.split_whitespace().next()?.parse().ok()?;
+    let held = kilobytes(&root.join("proc/self/status"), "VmSize:").unwrap_or(0);
+    Some(most.saturating_sub(held))
+}
+
+/// An account of memory under a limit, for many threads.
+#[derive(Debug, Default)]
+pub struct Budget {
+    limit: Option<Limit>,
+    taken: AtomicU64,
+}
+
+impl Budget {
+    /// Under the limit that the user gave, else under what the system has free now.
+    #[must_use]
+    pub fn new(given: Option<u64>) -> Self {
+        Self { limit: Limit::of(given), taken: AtomicU64::new(0) }
+    }
+
+    /// Speaks for `bytes` before they are taken.
+    ///
+    /// # Errors
+    ///
+    /// When they and all that was spoken for before are over the limit.
+    pub fn take(&self, bytes: u64) -> Result<(), TooMuch> {
+        let add = |taken: u64| Some(taken.saturating_add(bytes));
+        let before = self.taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
+        let before = before.unwrap_or_else(|taken| taken);
+        match self.limit {
+            Some(limit) if before.saturating_add(bytes) > limit.bytes => {
+                Err(TooMuch { bytes, before, limit })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// More memory than there may be. The sentence goes on after what needs it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "needs {}{}, and {limit}; ask for less (fewer pixels, layers, triangles or copies), or give it \
+     more memory",
+    Size(*bytes),
+    beside(*before)
+)]
+pub struct TooMuch {
+    /// What was to be taken (bytes).
+    pub bytes: u64,
+    /// What was spoken for before (bytes).
+    pub before: u64,
+    /// The limit.
+    pub limit: Limit,
+}
+
+fn beside(before: u64) -> String {
+    if before == 0 {
+        String::new()
+    } else {
+        format!(" of memory beside {} before it", Size(before))
+    }
+}
+
+/// Bytes as people read them.
+#[derive(Debug, Clone, Copy)]
+pub struct Size(
+    /// Bytes.
+    pub u64,
+);
+
+impl fmt::Display for Size {
+    #[expect(clippy::cast_precision_loss, reason = "three digits are shown")]
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut value = self.0 as f64;
+        let mut unit = "B";
+        for next in ["KiB", "MiB", "GiB", "TiB"] {
+            if value < 1024.0 {
+                break;
+            }
+            value /= 1024.0;
+            unit = next;
+        }
+        if unit == "B" { write!(f, "{value} B") } else { write!(f, "{value:.1} {unit}") }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A system in a folder: 8 GiB free, a container with a limit, addresses with one.
+    fn system(group: &str, addresses: &str) -> Option<Limit> {
+        let root = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            let path = root.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        };
+        write("proc/meminfo", "MemTotal: 9437184 kB\nMemAvailable: 8388608 kB\n");
+        write("proc/self/cgroup", "0::/box/inner\n");
+        write("sys/fs/cgroup/box/memory.max", group);
+        write("sys/fs/cgroup/box/memory.current", "3000");
+        write("sys/fs/cgroup/box/memory.stat", "anon 5\ninactive_file 1000\n");
+        write("sys/fs/cgroup/box/inner/memory.max", "max");
+        let limits =
+            format!("Limit  Soft  Hard\nMax address space   {addresses}   unlimited bytes\n");
+        write("proc/self/limits", &limits);
+        write("proc/self/status", "VmPeak: 9 kB\nVmSize: 2 kB\n");
+        Limit::free(root.path())
+    }
+
+    #[test]
+    fn the_least_of_what_the_system_has_free_counts() {
+        let limit = |bytes, source| Some(Limit { bytes, source });
+        assert_eq!(system("max", "unlimited"), limit(8 << 30, LimitSource::Machine));
+        assert_eq!(system("12000", "unlimited"), limit(10_000, LimitSource::Group));
+        assert_eq!(system("12000", "6144"), limit(4096, LimitSource::Addresses));
+    }
+
+    #[test]
+    fn an_account_is_kept_of_all_that_is_taken() {
+        let budget = Budget::new(Some(1 << 20));
+        assert!(budget.take(1 << 19).is_ok() && budget.take(1 << 19).is_ok());
+        let message = budget.take(1).unwrap_err().to_string();
+        assert!(message.contains("needs 1 B of memory beside 1.0 MiB"), "{message}");
+        assert!(message.contains("--memory-limit allows 1.0 MiB"), "{message}");
+        assert!(Budget::new(Some(1)).take(u64::MAX).is_err());
+    }
+}
