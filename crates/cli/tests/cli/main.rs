@@ -14,8 +14,8 @@ mod ids; // numbers of objects, copies, nodes and materials, and their names
 mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // lenses against other software, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers
-mod messages; // what is wrong, in plain words
 mod memory; // refused before it is taken
+mod messages; // what is wrong, in plain words
 mod openings_and_glasses; // f-numbers that a lens lacks, glasses of earlier catalogues and of one's own
 mod overwriting; // inputs, results of an earlier run, and files of others
 mod photons; // electrons and noise of sensors, against sums by the nanometre
