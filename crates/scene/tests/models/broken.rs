@@ -104,7 +104,7 @@ fn broken_accessors_are_refused_with_their_place() {
             d["accessors"][0] =
                 json!({"componentType": 5126, "type": "VEC3", "count": 4_000_000_000_u32});
         }),
-        &["without any data"],
+        &["of memory and has"],
     );
     refused(
         "length.glb",
