@@ -54,8 +54,4 @@ if [ "${1:-}" = test ]; then
         "cargo-${component/rustfmt/fmt}" --version >/dev/null 2>&1 ||
             rustup component add "$component"
     done
-    if ! cargo deny --version >/dev/null 2>&1; then
-        echo "missing: cargo-deny (to check licences and advisories of dependencies); building it"
-        cargo install cargo-deny --locked --quiet
-    fi
 fi

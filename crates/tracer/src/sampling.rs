@@ -267,6 +267,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "a column or row below three")]
     fn places_on_grids_have_their_density() {
         let weights = [1.0, 0.0, 3.0, 0.0, 0.0, 0.0, 5.0, 0.0, 7.0];
         let grid = GridDistribution::new(3, &weights);

@@ -45,6 +45,7 @@ fn model() -> Value {
     })
 }
 
+#[expect(clippy::cast_possible_truncation, reason = "ids are whole numbers below 2³²")]
 fn distinct(values: &[f64]) -> Vec<u32> {
     let set: BTreeSet<u32> = values.iter().map(|v| *v as u32).collect();
     set.into_iter().collect()
