@@ -75,12 +75,9 @@ impl<'a> Reader<'a> {
             normalized: accessor.normalized,
             sparse: None,
         };
-        match accessor.buffer_view {
-            Some(view) => {
-                let offset = size(accessor.byte_offset.unwrap_or_default());
-                self.bind(&mut plain, view.value(), offset, &place)?;
-            }
-            None => {}
+        if let Some(view) = accessor.buffer_view {
+            let offset = size(accessor.byte_offset.unwrap_or_default());
+            self.bind(&mut plain, view.value(), offset, &place)?;
         }
         let in_place = matches!(plain.component, ComponentType::F32 | ComponentType::U32)
             && plain.view.is_some()
