@@ -8,7 +8,7 @@
 //! the same to the bit however many passes there are.
 
 use std::ops::Range;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 use etendue_camera::{
     Camera, CameraRays, FilmSamples, LaneGroup, LensCamera, PixelSamples, Sampler, squares_of_pair,
@@ -30,7 +30,7 @@ const FIRST_PASS: u32 = 4;
 const LONGEST_PASS: u32 = 1024;
 
 /// A pass is no longer than this share of all: what a stopped render loses.
-const SHARE_OF_PASS: u32 = 16;
+const SHARE_OF_PASS: u32 = 8;
 
 /// Pairs of random numbers that the camera uses before light does: place in the pixel, place in the
 /// pupil, and of the third one number for the wavelength.
@@ -126,6 +126,8 @@ pub(crate) struct Averaging<'a> {
     layers: Vec<&'a mut FilmLayer>,
     /// `[pixel][layer][lane]`; empty when there is one pass alone.
     sums: Vec<Sum>,
+    /// Threads' memory between bands and passes: made anew each time, its pages are, too.
+    spare: Mutex<Vec<Memory>>,
 }
 
 impl<'a> Averaging<'a> {
@@ -138,7 +140,7 @@ impl<'a> Averaging<'a> {
         let [width, height] = what.camera().resolution().map(|side| side as usize);
         let [count, lanes] = what.shape();
         let kept = if passes > 1 { width * height * count * lanes } else { 0 };
-        Self { what, sampling, layers, sums: vec![Sum::default(); kept] }
+        Self { what, sampling, layers, sums: vec![Sum::default(); kept], spare: Mutex::default() }
     }
 
     /// Adds the samples `pass` of every pixel. Of several passes the layers see nothing until
@@ -149,16 +151,20 @@ impl<'a> Averaging<'a> {
         watcher: &Watcher<'_>,
         traffic: &Mutex<Traffic>,
     ) -> Result<(), Stopped> {
-        let Self { what, sampling, layers, sums } = self;
+        let Self { what, sampling, layers, sums, spare } = self;
+        let spare = &*spare;
         let resolution = what.camera().resolution();
         let kept = split(sums, *what, resolution);
         let bands = bands(layers, resolution, TILE);
         bands.par_iter().zip(&kept).try_for_each(|(band, kept)| {
             let Some(mut band) = take(band) else { return Ok(()) };
             let adding = Adding { what: *what, sampling: *sampling, pass, watcher };
-            let mut memory = Memory::default();
+            let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut memory = spare().pop().unwrap_or_default();
             let done = adding.fill(&mut band, take(kept), &mut memory);
-            Traffic::add(traffic, memory.traffic, &memory.rays.fates);
+            let fates = std::mem::take(&mut memory.rays.fates);
+            Traffic::add(traffic, std::mem::take(&mut memory.traffic), &fates);
+            spare().push(memory);
             done
         })
     }
@@ -360,7 +366,7 @@ mod tests {
             assert!(passes.iter().all(|pass| pass.end - pass.start <= most), "{passes:?}");
             assert!(samples < 6 || passes[0].end == FIRST_PASS, "{passes:?}");
         }
-        assert_eq!((passes(5).len(), passes(64).len()), (1, 16));
+        assert_eq!((passes(5).len(), passes(64).len()), (1, 9));
         assert_eq!(passes(256)[..4], [0..4, 4..8, 8..16, 16..32]);
     }
 

@@ -14,10 +14,14 @@ use etendue_scene::{LoadOptions, Scene};
 
 /// Blobs under a sky before a wall, larger than a tile and not a multiple of it.
 fn scene(tracer: &str, camera: &str, samples: u32, sampler: &str) -> Scene {
+    sized([37, 21], tracer, camera, samples, sampler)
+}
+
+fn sized(resolution: [u32; 2], tracer: &str, camera: &str, samples: u32, sampler: &str) -> Scene {
     let text = format!(
         r#"{{"etendue": 1, "tracer": {tracer}, "layers": ["depth"],
         "camera": {{{camera}, "pose": {{"from": [0.5, 1, 4], "look_at": [0, 0, 0]}},
-            "sensor": {{"resolution": [37, 21]}}}},
+            "sensor": {{"resolution": {resolution:?}}}}},
         "materials": {{"a": {{"type": "dielectric", "ior": 1.5}},
             "b": {{"type": "matte", "color": [0.8, 0.3, 0.2]}}}},
         "lights": [{{"type": "environment", "radiance": [0.5, 0.5, 0.5]}},
@@ -142,5 +146,24 @@ fn a_picture_without_a_whole_pass_is_none() {
     for samples in [1, 2, 64] {
         let found = rendered(&scene(PATH, PINHOLE, samples, "sobol"), None, &stop);
         assert!(matches!(found, Err(RenderError::Stopped)), "{samples}: {found:?}");
+    }
+}
+
+/// What passes cost: the least of many times, in turns, against one pass. Prints and asserts nothing:
+/// `cargo nextest run -p etendue-render --run-ignored only --no-capture what_passes_cost`.
+#[test]
+#[ignore = "a measurement"]
+fn what_passes_cost() {
+    for (tracer, samples) in [(r#"{"type": "facing"}"#, 64), (PATH, 64)] {
+        let scene = sized([256, 160], tracer, PINHOLE, samples, "sobol");
+        let single: Vec<_> = std::iter::once(0..samples).collect();
+        let mut best = [f64::INFINITY; 2];
+        for _ in 0..5 {
+            for (best, passes) in best.iter_mut().zip([Some(&single[..]), None]) {
+                let done = rendered(&scene, passes, &|_: f64| true).unwrap();
+                *best = best.min(done.trace_time.as_secs_f64());
+            }
+        }
+        println!("{tracer}, {samples} samples: {:.3} of one pass' time", best[1] / best[0]);
     }
 }
