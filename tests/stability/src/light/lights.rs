@@ -216,14 +216,12 @@ fn small_sun(scale: Scale) -> Result<Outcome> {
         let known = 0.5 / PI * (PI * SKY + (SUN - SKY) * rows * f64::from(side));
         let mut off = Vec::new();
         for (name, _) in SAMPLERS {
-            let rest = format!(
-                r#""lights": [{{"type": "environment", "image": "sky.exr"}}],
-                "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "m",
-                    "transform": {{"rotate": [1, 0, 0, -90]}}}}],
-                "materials": {{"m": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}}"#
-            );
+            let rest = r#""lights": [{"type": "environment", "image": "sky.exr"}],
+                "objects": [{"shape": "rectangle", "width": 9, "height": 9, "material": "m",
+                    "transform": {"rotate": [1, 0, 0, -90]}}],
+                "materials": {"m": {"type": "matte", "color": [0.5, 0.5, 0.5]}}"#;
             let eye = [[0.5, 3.0, 1.0], [0.0; 3]];
-            let text = patch(r#"{"type": "direct"}"#, scale.pick(1_024, 16_384), eye, &rest);
+            let text = patch(r#"{"type": "direct"}"#, scale.pick(1_024, 16_384), eye, rest);
             let sampler = format!(r#""render": {{"sampler": "{name}", "#);
             let text = text.replace(r#""render": {"#, &sampler);
             let seen = Pixels::of(&load(folder.path(), &text)?)?;
