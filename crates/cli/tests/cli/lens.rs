@@ -266,7 +266,7 @@ fn bad_lenses_are_refused_with_file_and_place() {
     lens("[]", &["expected an object"]);
     lens(&element(r#""radios": 5"#), &["elements[0]", "radios", "`radius`"]);
     lens(&element(r#""conic": "flat""#), &["elements[0].conic", "a number"]);
-    lens("\u{0}\u{1}", &["line 1"]);
+    lens("\u{0}\u{1}", &["binary data of no known kind"]);
     lens("{\"elements\": []}", &["elements", "at least one"]);
     lens(r#"{"elements": [{"type": "surface"}], "elements": []}"#, &["second time"]);
     lens(&element(r#""radius": NaN"#), &["line 1", "column"]);
