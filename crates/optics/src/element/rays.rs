@@ -243,7 +243,7 @@ pub struct Ray {
 
 impl Ray {
     /// With a direction of any length but 0; `None` unless all numbers are finite and the ray starts
-    /// within [`FARTHEST`].
+    /// within `1e150`.
     pub fn new(position: DVec3, direction: DVec3) -> Option<Self> {
         if !position.is_finite() || position.abs().max_element() > FARTHEST {
             return None;

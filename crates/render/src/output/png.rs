@@ -43,7 +43,7 @@ pub fn has_mask(layer: &Layer) -> bool {
 ///
 /// # Errors
 ///
-/// As [`write`].
+/// As [`write()`].
 pub fn write_mask(path: &Path, picture: &Picture, name: &str) -> Result<bool, OutputError> {
     let layer = picture.require(name)?;
     match mask(layer) {
