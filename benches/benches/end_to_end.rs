@@ -24,7 +24,7 @@ fn end_to_end(criterion: &mut Criterion) {
         let scene = file.load(wanted, &LoadOptions::default()).expect("the scene loads");
         let plan = Plan::new(&scene, Outputs { exr: true, png: false, npy: false, dng: false });
         let options = BuildOptions::default();
-        let images = Images::decode(&scene, &plan);
+        let images = Images::decode(&scene, &plan, None).unwrap();
         group.throughput(Throughput::Elements(plan.rays));
         group.bench_function(BenchmarkId::new("build-and-render", mesh), |b| {
             b.iter(|| {

@@ -41,7 +41,7 @@ fn light(criterion: &mut Criterion) {
             let plan = Plan::new(&scene, Outputs { exr: true, png: false, npy: false, dng: false });
             let options = BuildOptions::default();
             let accel = etendue_render::build(&scene, &plan, &options).expect("it builds");
-            let images = Images::decode(&scene, &plan);
+            let images = Images::decode(&scene, &plan, None).unwrap();
             group.throughput(Throughput::Elements(256 * 256 * 16));
             group.bench_function(BenchmarkId::new(name, light), |b| {
                 b.iter(|| {

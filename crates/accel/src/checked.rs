@@ -275,6 +275,9 @@ impl Accel for Embree {
                 let mut judged = Judged::new(geometry, rays, &scratch.rays, &mut scratch.doubtful);
                 self.scene.closest_from_surfaces(&scratch.rays, &mut judged, &mut scratch.found);
             } else {
+                if !self.checks() && Self::start_on_surfaces(rays) {
+                    scratch.rays.keep_clear(rays);
+                }
                 self.scene.closest(&scratch.rays, rays.coherent, &mut scratch.found);
             }
             std::mem::swap(&mut hits.placement, &mut scratch.found.placement);
@@ -298,6 +301,9 @@ impl Accel for Embree {
                 scratch;
             rays32.convert(rays, &self.frame);
             if !self.checks() {
+                if Self::start_on_surfaces(rays) {
+                    rays32.keep_clear(rays);
+                }
                 self.scene.occluded(rays32, rays.coherent, blocked);
                 return;
             }

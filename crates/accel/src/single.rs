@@ -123,6 +123,23 @@ impl Rays32 {
         self.t_far[i] > 0.0
     }
 
+    /// Starts and ends rays of surfaces clear of these, by what single precision's distances may be off:
+    /// for modes that do not look again, where each would meet the surface that it leaves. What is
+    /// nearer than that to either end is passed by.
+    pub(crate) fn keep_clear(&mut self, rays: &RayBatch) {
+        for i in 0..self.len() {
+            if !self.can_hit(i) {
+                continue;
+            }
+            let near = rays.t_min()[i] - self.advance[i] + self.slack(i, 0.0);
+            let end = rays.t_max()[i] - self.advance[i];
+            self.t_near[i] = round(near.max(0.0));
+            if end.is_finite() {
+                self.t_far[i] = round(end - self.slack(i, end)).max(self.t_near[i]);
+            }
+        }
+    }
+
     fn resize(&mut self, len: usize) {
         for array in self.origin.iter_mut().chain(&mut self.direction) {
             array.resize(len, 0.0);

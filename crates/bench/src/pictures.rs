@@ -52,7 +52,7 @@ impl<'a> Studio<'a> {
         let picture = scene.picture.ok_or(BenchError::NoPicture)?;
         let mut scene = scene.clone();
         (scene.layers, scene.sensor) = (vec![picture], None);
-        let images = Images::decode(&scene, &Plan::new(&scene, OUTPUTS));
+        let images = Images::decode(&scene, &Plan::new(&scene, OUTPUTS), None)?;
         let camera = opened(&scene.camera)?;
         Ok(Self { scene, camera, accel, images })
     }

@@ -97,7 +97,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     time.load = lap.take();
     let accel = etendue_render::build(&scene, &plan, &build_options(arguments, stages))?;
     time.build = lap.take();
-    let images = Images::decode(&scene, &plan);
+    let images = Images::decode(&scene, &plan, arguments.memory_limit)?;
     if arguments.scene.strict
         && let Some(fault) = images.faults.first()
     {

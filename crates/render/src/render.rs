@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildError, BuildOptions};
 use etendue_camera::{Camera, PixelExtent};
+use etendue_image::Limits;
 use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, TracerSpec};
@@ -68,6 +69,9 @@ pub enum RenderError {
          which reach further, or the sensor a quantum_efficiency or bands that see it"
     )]
     Lights(String),
+    /// The environment is no image that can be read.
+    #[error(transparent)]
+    Image(#[from] ImageError),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
@@ -150,10 +154,15 @@ pub struct Images {
 }
 
 impl Images {
-    /// Decodes side by side the textures that the plan's materials look at, and the environment. A
-    /// broken one becomes a magenta checker and a fault.
-    #[must_use]
-    pub fn decode(scene: &Scene, plan: &Plan) -> Self {
+    /// Decodes side by side the textures that the plan's materials look at, and the environment, each
+    /// within [`Limits::within`] of `memory` (bytes). A broken texture becomes a magenta checker and a
+    /// fault.
+    ///
+    /// # Errors
+    ///
+    /// When the environment cannot be read or decoded.
+    pub fn decode(scene: &Scene, plan: &Plan, memory: Option<u64>) -> Result<Self, RenderError> {
+        let limits = Limits::within(memory);
         let mut wanted = vec![false; scene.textures.len()];
         let mut filtered = vec![[None; 2]; scene.textures.len()];
         let mut seen = vec![false; scene.materials.len()];
@@ -179,56 +188,65 @@ impl Images {
             .zip(wanted.par_iter().zip(&filtered))
             .map(|(texture, (&wanted, encodings))| {
                 let decode = || -> Result<Image, ImageError> {
-                    let mut image = texture.decode()?;
-                    encodings.iter().flatten().for_each(|&e| image.filter_by_footprint(e));
+                    let mut image = texture.decode(limits)?;
+                    for &encoding in encodings.iter().flatten() {
+                        image.filter_by_footprint(encoding, &texture.name)?;
+                    }
                     Ok(image)
                 };
                 wanted.then(decode)
             })
             .collect();
         let mut images = Self::default();
-        for result in results {
-            images.decoded.push(result.map(|result| {
-                result.unwrap_or_else(|error| {
+        for (texture, result) in scene.textures.iter().zip(results) {
+            let image = match result {
+                Some(Err(error)) => {
                     let shown = "where it is a colour, magenta squares show it; data are left out";
                     images.faults.push(format!("{error}; {shown}"));
-                    Image::missing()
-                })
-            }));
+                    Some(Image::missing())
+                }
+                Some(Ok(image)) => Some(image),
+                None => None,
+            };
+            let dropped = image.as_ref().map_or(0, |image| image.dropped);
+            if dropped > 0 {
+                images.faults.push(format!(
+                    "{} has {dropped} texels that are not finite or below zero; they are black",
+                    texture.name
+                ));
+            }
+            images.decoded.push(image);
         }
         if plan.layers.contains(&LayerSpec::Radiance) {
-            images.read_environment(scene);
+            images.read_environment(scene, limits)?;
         }
-        images
+        Ok(images)
     }
 
     /// What is wrong with the first image of `scene` that cannot be decoded, whether a layer looks at
     /// it or not.
     #[must_use]
     pub fn first_fault(scene: &Scene) -> Option<String> {
+        let limits = Limits::default();
         let faults: Vec<Option<String>> = scene
             .textures
             .par_iter()
-            .map(|texture| texture.decode().err().map(|error| error.to_string()))
+            .map(|texture| texture.decode(limits).err().map(|error| error.to_string()))
             .collect();
         let environment = || match environment(scene)? {
-            EnvironmentImage::File(path) => EnvironmentMap::read(path).err().map(|e| e.to_string()),
+            EnvironmentImage::File(path) => {
+                EnvironmentMap::read(path, limits).err().map(|e| e.to_string())
+            }
             EnvironmentImage::Studio | EnvironmentImage::Constant => None,
         };
         faults.into_iter().flatten().next().or_else(environment)
     }
 
-    fn read_environment(&mut self, scene: &Scene) {
+    fn read_environment(&mut self, scene: &Scene, limits: Limits) -> Result<(), ImageError> {
         let map = match environment(scene) {
             Some(EnvironmentImage::Studio) => EnvironmentMap::studio(),
-            Some(EnvironmentImage::File(path)) => match EnvironmentMap::read(path) {
-                Ok(map) => map,
-                Err(error) => {
-                    self.faults.push(format!("{error}; the environment is dark"));
-                    EnvironmentMap::new([1, 1], vec![[0.0; 3]])
-                }
-            },
-            Some(EnvironmentImage::Constant) | None => return,
+            Some(EnvironmentImage::File(path)) => EnvironmentMap::read(path, limits)?,
+            Some(EnvironmentImage::Constant) | None => return Ok(()),
         };
         if map.dropped > 0 {
             self.faults.push(format!(
@@ -237,6 +255,7 @@ impl Images {
             ));
         }
         self.environment = Some(Arc::new(map));
+        Ok(())
     }
 
     /// Each decoded image: what it is called, columns, rows and bytes.

@@ -28,7 +28,7 @@ fn picture(mut scene: Scene, accel: AccelName) -> Vec<f64> {
     let outputs = Outputs::from_list("exr").unwrap();
     let plan = Plan::new(&scene, outputs);
     let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
-    let images = Images::decode(&scene, &plan);
+    let images = Images::decode(&scene, &plan, None).unwrap();
     let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true).unwrap();
     assert_eq!(done.light.not_finite, 0);
     match &done.picture.layers()[0].channels[0].values {
@@ -170,7 +170,7 @@ fn what_is_not_finite_is_counted_and_left_out() {
         scene.render.accel = Some(AccelName::Bvh);
         let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
         let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
-        let images = Images::decode(&scene, &plan);
+        let images = Images::decode(&scene, &plan, None).unwrap();
         let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true).unwrap();
         assert!(done.light.not_finite > 0, "{tracer}");
         for channel in &done.picture.layers()[0].channels {

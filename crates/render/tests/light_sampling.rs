@@ -18,7 +18,7 @@ fn picture(folder: &Path, text: &str) -> Vec<f64> {
     let scene = file.load(wanted, &LoadOptions::default()).unwrap();
     let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
     let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
-    let images = Images::decode(&scene, &plan);
+    let images = Images::decode(&scene, &plan, None).unwrap();
     assert!(images.faults.is_empty(), "{:?}", images.faults);
     let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true).unwrap();
     match &done.picture.layers()[0].channels[0].values {

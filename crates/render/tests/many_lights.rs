@@ -58,7 +58,7 @@ fn a_million_triangles_shine_as_the_plane_that_they_make() {
     assert_eq!(scene.geometry.triangles(), 1_000_002);
     let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
     let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
-    let images = Images::decode(&scene, &plan);
+    let images = Images::decode(&scene, &plan, None).unwrap();
     let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true).unwrap();
     let Values::F32(pixels) = &done.picture.layers()[0].channels[0].values else {
         panic!("a picture is f32")

@@ -53,7 +53,7 @@ fn rendered(
         plan.passes = passes.to_vec();
     }
     let accel = build(scene, &plan, &BuildOptions::default()).unwrap();
-    let images = Images::decode(scene, &plan);
+    let images = Images::decode(scene, &plan, None).unwrap();
     render(scene, &plan, &*accel, &images, Vec::new(), watch)
 }
 

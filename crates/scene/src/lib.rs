@@ -32,6 +32,7 @@ mod identity;
 mod ids;
 pub mod import;
 mod instances;
+mod light_notes;
 mod load;
 mod looks;
 pub mod memory;

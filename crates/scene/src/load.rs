@@ -26,7 +26,7 @@ use crate::parts::{Object, Parts};
 use crate::paths::{Folder, Found};
 use crate::scene::{LoadOptions, LoadProgress, Scene};
 use crate::shape::{GoOn, ShapeError, ShapeSpec};
-use crate::{SceneError, facing};
+use crate::{SceneError, facing, light_notes};
 
 /// Where triangles come from, once for all objects that share them.
 struct Origin {
@@ -353,6 +353,9 @@ impl SceneFile {
         let mut notes = parts.notes;
         notes.extend(self.unused_materials());
         notes.extend(nothing_to_draw(&geometry));
+        if self.spec.picture() == Some(LayerSpec::Radiance) {
+            notes.extend(light_notes::of(&geometry, &parts.materials, &parts.lights));
+        }
         let sensor = self.sensor_behind(&camera)?;
         notes.extend(self.lens_notes(&camera, options.strictness)?);
         Ok(Scene {

@@ -7,10 +7,11 @@ use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use etendue_geometry::glam::DVec3;
+use etendue_image::Limits;
 
 use crate::Color;
 use crate::sampling::GridDistribution;
-use crate::texture::{ImageError, linear_from_srgb, read_file, read_image};
+use crate::texture::{ImageError, read_file, read_image};
 
 /// The most cells of the grid that directions are chosen on, across and down.
 const CELLS: [usize; 2] = [2048, 1024];
@@ -31,25 +32,18 @@ impl EnvironmentMap {
     ///
     /// # Errors
     ///
-    /// When the file cannot be read or decoded.
-    pub fn read(path: &Path) -> Result<Self, ImageError> {
+    /// When the file cannot be read or decoded, or is over `limits`.
+    pub fn read(path: &Path, limits: Limits) -> Result<Self, ImageError> {
         let name = path.display().to_string();
         let bytes = read_file(path)?;
-        let decoded = read_image(&name, &bytes)?;
-        let is_linear = matches!(
-            decoded,
-            image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_)
-        );
-        let size = [decoded.width() as usize, decoded.height() as usize];
-        let texels = if is_linear {
-            decoded.into_rgb32f().pixels().map(|p| p.0).collect()
-        } else {
-            let encoded = decoded.into_rgb8();
+        let raster = read_image(&name, &bytes, limits)?;
+        drop(bytes);
+        let linear = |i| {
+            let [r, g, b, _] = raster.linear(i);
             #[expect(clippy::cast_possible_truncation, reason = "radiance is kept as f32")]
-            let linear = |c: u8| linear_from_srgb(c) as f32;
-            encoded.pixels().map(|p| p.0.map(linear)).collect()
+            [r, g, b].map(|c| c as f32)
         };
-        Ok(Self::new(size, texels))
+        Ok(Self::new(raster.size(), (0..raster.len()).map(linear).collect()))
     }
 
     /// From linear RGB, row by row from the top.

@@ -232,6 +232,21 @@ impl Material {
         self.base_color.needs_uv() || shines || !self.textures(TextureScope::ALL).is_empty()
     }
 
+    /// Whether it may be a smooth pane without thickness, which light passes straight
+    /// (`KHR_materials_transmission` without roughness).
+    #[must_use]
+    pub fn is_pane(&self) -> bool {
+        match &self.scattering {
+            Scattering::Gltf(surface) => surface.transmission > 0.0 && surface.metallic < 1.0,
+            Scattering::Black
+            | Scattering::Matte
+            | Scattering::Unlit
+            | Scattering::Mirror
+            | Scattering::Metal { .. }
+            | Scattering::Dielectric(_) => false,
+        }
+    }
+
     /// Whether rays may pass the surface as if it were not there.
     #[must_use]
     pub fn is_pierced(&self) -> bool {

@@ -2,7 +2,10 @@
 //! Parametrics", 1983).
 //!
 //! Means are of linear light, in 16 bits a channel: an 8-bit mean in the file's own curve would be off
-//! by half a percent. A pyramid takes two thirds of its image's memory.
+//! by half a percent. Those of floats, which have no upper end, are f32. A pyramid takes two thirds of
+//! the memory of its image, or a third where that has 16 bits or f32.
+
+use etendue_image::{DecodeError, Raster, Samples};
 
 use crate::texture::{Wrap, bilinear};
 
@@ -14,36 +17,32 @@ pub(crate) struct Pyramid {
 
 #[derive(Debug, Clone)]
 struct Level {
-    width: usize,
-    height: usize,
-    texels: Vec<[u16; 4]>,
-}
-
-/// Linear values while levels are made.
-struct Floats {
-    width: usize,
-    height: usize,
-    texels: Vec<[f32; 4]>,
+    raster: Raster,
 }
 
 impl Pyramid {
-    /// Over an image of `width` × `height` whose linear texel in a column and row is `texel`.
+    /// Over `image`, whose linear texel in a column and row is `texel`.
+    ///
+    /// # Errors
+    ///
+    /// When there is no memory for it.
     pub(crate) fn new(
-        [width, height]: [usize; 2],
-        texel: impl Fn(usize, usize) -> [f32; 4],
-    ) -> Self {
+        image: &Raster,
+        texel: impl Fn(usize, usize) -> [f64; 4],
+    ) -> Result<Self, DecodeError> {
         let mut levels = Vec::new();
-        if width * height <= 1 {
-            return Self { levels };
+        if image.len() <= 1 {
+            return Ok(Self { levels });
         }
-        let mut next = halved([width, height], texel);
+        let mut next = halved(image.size(), image.channels(), texel)?;
         loop {
-            levels.push(Level::new(&next));
-            if next.width * next.height == 1 {
-                return Self { levels };
+            levels.push(Level::new(&next, image.is_float())?);
+            if next.len() == 1 {
+                return Ok(Self { levels });
             }
-            let Floats { width, height, texels } = next;
-            next = halved([width, height], |x, y| texels[y * width + x]);
+            let width = next.size()[0];
+            let texel = |x: usize, y: usize| next.texel(y * width + x);
+            next = halved(next.size(), next.channels(), texel)?;
         }
     }
 
@@ -54,7 +53,7 @@ impl Pyramid {
 
     /// Bytes of all levels.
     pub(crate) fn bytes(&self) -> usize {
-        self.levels.iter().map(|level| level.texels.len() * size_of::<[u16; 4]>()).sum()
+        self.levels.iter().map(|level| level.raster.bytes()).sum()
     }
 
     /// The value at (u, v) of a level, counted from 1, interpolated.
@@ -62,38 +61,54 @@ impl Pyramid {
         let Some(level) = self.levels.get(level.min(self.levels.len()).wrapping_sub(1)) else {
             return [0.0, 0.0, 0.0, 1.0];
         };
-        let (x, y) = (u * level.width as f64 - 0.5, v * level.height as f64 - 0.5);
+        let [width, height] = level.raster.size();
+        let (x, y) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
         bilinear([x, y], |x, y| level.texel(x, y, wrap))
     }
 }
 
 impl Level {
-    fn new(floats: &Floats) -> Self {
+    /// Keeps `means`, in 16 bits where they have an upper end.
+    fn new(means: &Raster, is_float: bool) -> Result<Self, DecodeError> {
+        let Samples::F32(values) = means.samples() else { return Err(DecodeError::Channels) };
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "in 0..=65535; the cast saturates"
         )]
-        let texels = floats.texels.iter().map(|t| t.map(|c| (c * 65_535.0).round() as u16));
-        Self { width: floats.width, height: floats.height, texels: texels.collect() }
+        let samples = if is_float {
+            let mut kept = room(values.len())?;
+            kept.extend_from_slice(values);
+            Samples::F32(kept)
+        } else {
+            let mut kept = room(values.len())?;
+            kept.extend(values.iter().map(|c| (c * 65_535.0).round() as u16));
+            Samples::U16(kept)
+        };
+        Ok(Self { raster: Raster::new(means.size(), means.channels(), samples) })
     }
 
     fn texel(&self, x: f64, y: f64, wrap: [Wrap; 2]) -> [f64; 4] {
-        let column = wrap[0].apply(x, self.width);
-        let row = wrap[1].apply(y, self.height);
-        self.texels[row * self.width + column].map(|c| f64::from(c) / 65_535.0)
+        let [width, height] = self.raster.size();
+        let column = wrap[0].apply(x, width);
+        let row = wrap[1].apply(y, height);
+        self.raster.texel(row * width + column)
     }
 }
 
 /// Half as many columns and rows, rounded down; where that leaves a rest, texels are split among
 /// their neighbours, so that the mean of the image stays.
-fn halved([width, height]: [usize; 2], texel: impl Fn(usize, usize) -> [f32; 4]) -> Floats {
+fn halved(
+    [width, height]: [usize; 2],
+    channels: usize,
+    texel: impl Fn(usize, usize) -> [f64; 4],
+) -> Result<Raster, DecodeError> {
     let size = [(width / 2).max(1), (height / 2).max(1)];
     let (columns, rows) = (shares(width, size[0]), shares(height, size[1]));
-    let mut texels = Vec::with_capacity(size[0] * size[1]);
+    let mut values = room(size[0] * size[1] * channels)?;
     for row in &rows {
         for column in &columns {
-            let mut sum = [0.0_f32; 4];
+            let mut sum = [0.0; 4];
             for &(y, share_y) in row {
                 for &(x, share_x) in column {
                     let value = texel(x, y);
@@ -102,14 +117,29 @@ fn halved([width, height]: [usize; 2], texel: impl Fn(usize, usize) -> [f32; 4])
                     }
                 }
             }
-            texels.push(sum);
+            #[expect(clippy::cast_possible_truncation, reason = "means are kept in f32 or less")]
+            let [r, g, b, alpha] = sum.map(|c| c as f32);
+            match channels {
+                1 => values.push(r),
+                2 => values.extend([r, alpha]),
+                3 => values.extend([r, g, b]),
+                _ => values.extend([r, g, b, alpha]),
+            }
         }
     }
-    Floats { width: size[0], height: size[1], texels }
+    Ok(Raster::new(size, channels, Samples::F32(values)))
+}
+
+/// Room for so many values, where there is memory for them.
+fn room<T>(count: usize) -> Result<Vec<T>, DecodeError> {
+    let mut values = Vec::new();
+    let bytes = (count * size_of::<T>()) as u64;
+    values.try_reserve_exact(count).map_err(|_| DecodeError::Memory { bytes })?;
+    Ok(values)
 }
 
 /// For each of `to` intervals, which of `from` it covers and by what share of itself.
-fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
+fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     let wide = from as f64 / to as f64;
     (0..to)
         .map(|i| {
@@ -123,9 +153,7 @@ fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
             (first..last)
                 .map(|k| {
                     let covered = end.min((k + 1) as f64) - start.max(k as f64);
-                    #[expect(clippy::cast_possible_truncation, reason = "a weight")]
-                    let share = (covered / wide) as f32;
-                    (k, share)
+                    (k, covered / wide)
                 })
                 .filter(|(_, share)| *share > 0.0)
                 .collect()
@@ -141,20 +169,22 @@ mod tests {
     fn every_level_has_the_images_mean() {
         for (width, height) in [(8, 8), (7, 5), (1, 9), (13, 1), (6, 3)] {
             #[expect(clippy::cast_precision_loss, reason = "small numbers")]
-            let value = |x: usize, y: usize| ((x * 37 + y * 101) % 16) as f32 / 15.0;
-            let pyramid = Pyramid::new([width, height], |x, y| [value(x, y), 0.0, 1.0, 0.5]);
+            let value = |x: usize, y: usize| ((x * 37 + y * 101) % 16) as f64 / 15.0;
+            let image = Raster::new([width, height], 4, Samples::U8(vec![0; 4 * width * height]));
+            let pyramid = Pyramid::new(&image, |x, y| [value(x, y), 0.0, 1.0, 0.5]).unwrap();
             let count = f64::from(u32::try_from(width * height).unwrap());
-            let all = (0..width * height).map(|k| f64::from(value(k % width, k / width)));
+            let all = (0..width * height).map(|k| value(k % width, k / width));
             let mean: f64 = all.sum::<f64>() / count;
             for (number, level) in pyramid.levels.iter().enumerate() {
-                let sum: f64 = level.texels.iter().map(|t| f64::from(t[0])).sum();
-                let own = sum / level.texels.len() as f64 / 65_535.0;
+                let count = level.raster.len();
+                let sum: f64 = (0..count).map(|i| level.raster.texel(i)[0]).sum();
+                let own = sum / count as f64;
                 // Half a step of 16 bits, and a rounding of f32 a level.
                 assert!((own - mean).abs() < 1e-5, "{width} {height} level {number}: {own} {mean}");
             }
             let top = pyramid.levels.last().unwrap();
-            assert_eq!((top.width, top.height), (1, 1));
-            assert_eq!(top.texels[0][1..3], [0, 65_535]);
+            assert_eq!(top.raster.size(), [1, 1]);
+            assert_eq!(top.raster.texel(0)[1..3], [0.0, 1.0]);
         }
     }
 }

@@ -140,7 +140,7 @@ impl Default for PaintSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageSpec {
-    /// A PNG or JPEG file, relative to the scene file.
+    /// A PNG, JPEG, Radiance or EXR file, relative to the scene file.
     pub image: String,
     /// Multiplies the image: linear RGB.
     #[serde(default = "white")]

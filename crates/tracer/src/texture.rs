@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use etendue_geometry::{Buffer, files};
+use etendue_image::{DecodeError, Limits, Raster, Samples};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::pyramid::Pyramid;
 
-/// Where an image's bytes are, still encoded (PNG or JPEG).
+/// Where an image's bytes are, still encoded (PNG, JPEG, Radiance or EXR).
 #[derive(Debug, Clone)]
 pub enum ImageSource {
     /// A file.
@@ -88,15 +89,14 @@ impl TextureUse {
 /// A decoded image, ready to be looked up.
 #[derive(Debug, Clone)]
 pub struct Image {
-    width: usize,
-    height: usize,
-    /// RGBA as in the file, row 0 at the top.
-    texels: Vec<[u8; 4]>,
+    raster: Raster,
     wrap: [Wrap; 2],
     filter: Filter,
     /// For each encoding that is filtered by footprint.
     pyramids: [Option<Pyramid>; 2],
     stands_in: bool,
+    /// Texels that were not finite or below zero, and count as black.
+    pub dropped: u64,
 }
 
 /// Why an image could not be decoded.
@@ -117,14 +117,11 @@ pub enum ImageError {
         /// What the texture is called.
         name: String,
         /// Why.
-        source: image::ImageError,
+        source: DecodeError,
     },
 }
 
-/// Side of the largest image that is decoded (texels). Above it a file is taken for broken or hostile.
-const MAX_SIDE: u32 = 32_768;
-
-/// The longest image file that is read (bytes): as many as [`MAX_SIDE`]² texels of four bytes have.
+/// The longest image file that is read (bytes): twice what the largest image takes decoded.
 const LONGEST: u64 = 1 << 32;
 
 impl Texture {
@@ -134,12 +131,12 @@ impl Texture {
         if let ImageSource::File(path) = &self.source { Some(path) } else { None }
     }
 
-    /// Decodes the image.
+    /// Decodes the image, with the values that the file has: 8 or 16 bits, half or single precision.
     ///
     /// # Errors
     ///
-    /// When it cannot be read or decoded, or is over 32 768 texels a side.
-    pub fn decode(&self) -> Result<Image, ImageError> {
+    /// When it cannot be read or decoded, or is over `limits`.
+    pub fn decode(&self, limits: Limits) -> Result<Image, ImageError> {
         let read;
         let bytes: &[u8] = match &self.source {
             ImageSource::Missing => return Ok(Image::missing()),
@@ -149,12 +146,11 @@ impl Texture {
                 &read
             }
         };
-        let decoded = read_image(&self.name, bytes)?.into_rgba8();
-        let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-        let texels = bytemuck::cast_vec::<u8, [u8; 4]>(decoded.into_raw());
+        let mut raster = read_image(&self.name, bytes, limits)?;
+        let dropped = raster.drop_unsound();
+        let raster = raster.packed();
         let (wrap, filter) = (self.wrap, self.filter);
-        let pyramids = [None, None];
-        Ok(Image { width, height, texels, wrap, filter, pyramids, stands_in: false })
+        Ok(Image { raster, wrap, filter, pyramids: [None, None], stands_in: false, dropped })
     }
 }
 
@@ -163,19 +159,10 @@ pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, ImageError> {
     files::read(path, LONGEST).map_err(|source| ImageError::Read { path: path.to_owned(), source })
 }
 
-/// Decodes an image file of any kind that is read, within [`MAX_SIDE`].
-pub(crate) fn read_image(name: &str, bytes: &[u8]) -> Result<image::DynamicImage, ImageError> {
-    let decode = || {
-        let mut reader =
-            image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format()?;
-        let mut limits = image::Limits::default();
-        limits.max_image_width = Some(MAX_SIDE);
-        limits.max_image_height = Some(MAX_SIDE);
-        limits.max_alloc = Some(u64::from(MAX_SIDE) * u64::from(MAX_SIDE) * 4);
-        reader.limits(limits);
-        reader.decode()
-    };
-    decode().map_err(|source| ImageError::Decode { name: name.to_owned(), source })
+/// Decodes an image file of any kind that is read.
+pub(crate) fn read_image(name: &str, bytes: &[u8], limits: Limits) -> Result<Raster, ImageError> {
+    etendue_image::decode(bytes, limits)
+        .map_err(|source| ImageError::Decode { name: name.to_owned(), source })
 }
 
 /// What lies between the four texels around a place, whose centres are at whole numbers.
@@ -195,15 +182,15 @@ impl Image {
     /// The magenta and black checker that stands in for an image that cannot be had.
     #[must_use]
     pub fn missing() -> Self {
-        let (magenta, black) = ([255, 0, 255, 255], [0, 0, 0, 255]);
+        let (magenta, black) = ([255, 0, 255], [0; 3]);
+        let texels = [magenta, black, black, magenta].concat();
         Self {
-            width: 2,
-            height: 2,
-            texels: vec![magenta, black, black, magenta],
+            raster: Raster::new([2, 2], 3, Samples::U8(texels)),
             wrap: [Wrap::Repeat; 2],
             filter: Filter::Nearest,
             pyramids: [None, None],
             stands_in: true,
+            dropped: 0,
         }
     }
 
@@ -215,38 +202,48 @@ impl Image {
     }
 
     /// Makes ready for [`Self::sample_over`] in an encoding.
-    pub fn filter_by_footprint(&mut self, encoding: Encoding) {
-        if self.pyramids[encoding as usize].is_some() || self.texels.is_empty() {
-            return;
+    ///
+    /// # Errors
+    ///
+    /// When there is no memory for its means; `name` is what the texture is called.
+    pub fn filter_by_footprint(
+        &mut self,
+        encoding: Encoding,
+        name: &str,
+    ) -> Result<(), ImageError> {
+        if self.pyramids[encoding as usize].is_some() || self.raster.is_empty() {
+            return Ok(());
         }
-        let pyramid = Pyramid::new(self.size(), |x, y| {
-            #[expect(clippy::cast_possible_truncation, reason = "means are kept in 16 bits")]
-            decoded(self.texels[y * self.width + x], encoding).map(|c| c as f32)
-        });
+        let [width, _] = self.size();
+        let pyramid =
+            Pyramid::new(&self.raster, |x, y| decoded(&self.raster, y * width + x, encoding))
+                .map_err(|source| ImageError::Decode { name: name.to_owned(), source })?;
         self.pyramids[encoding as usize] = Some(pyramid);
+        Ok(())
     }
 
     /// Bytes of the decoded texels, those of means over several included.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let means: usize = self.pyramids.iter().flatten().map(Pyramid::bytes).sum();
-        self.texels.len() * 4 + means
+        self.raster.bytes() + means
     }
 
     /// Columns and rows.
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
-        [self.width, self.height]
+        self.raster.size()
     }
 
     /// Linear colour and alpha at (u, v): (0, 0) is the upper left corner of the upper left texel, as
     /// in glTF.
     #[must_use]
     pub fn sample(&self, [u, v]: [f64; 2], encoding: Encoding) -> [f64; 4] {
-        if !(u.is_finite() && v.is_finite()) || self.texels.is_empty() {
+        if !(u.is_finite() && v.is_finite()) || self.raster.is_empty() {
             return [0.0, 0.0, 0.0, 1.0];
         }
-        let (x, y) = (u * self.width as f64, v * self.height as f64);
+        let [width, height] = self.size();
+        let (x, y) = (u * width as f64, v * height as f64);
         match self.filter {
             Filter::Nearest => self.texel(x.floor(), y.floor(), encoding),
             Filter::Bilinear => bilinear([x - 0.5, y - 0.5], |x, y| self.texel(x, y, encoding)),
@@ -261,7 +258,8 @@ impl Image {
         let Some(pyramid) = &self.pyramids[encoding as usize] else {
             return self.sample(uv, encoding);
         };
-        let length = |[u, v]: [f64; 2]| f64::hypot(u * self.width as f64, v * self.height as f64);
+        let [width, height] = self.size();
+        let length = |[u, v]: [f64; 2]| f64::hypot(u * width as f64, v * height as f64);
         let lengths = axes.map(length);
         let (long, short, axis) = if lengths[0] >= lengths[1] {
             (lengths[0], lengths[1], axes[0])
@@ -304,22 +302,22 @@ impl Image {
 
     /// The texel in column `x` and row `y`, wrapped.
     fn texel(&self, x: f64, y: f64, encoding: Encoding) -> [f64; 4] {
-        let column = self.wrap[0].apply(x, self.width);
-        let row = self.wrap[1].apply(y, self.height);
-        decoded(self.texels[row * self.width + column], encoding)
+        let [width, height] = self.size();
+        let column = self.wrap[0].apply(x, width);
+        let row = self.wrap[1].apply(y, height);
+        decoded(&self.raster, row * width + column, encoding)
     }
 }
 
 /// Lookups along a footprint: beyond eight times as long as wide it is made wider.
 const MOST_LOOKUPS: f64 = 8.0;
 
-/// Linear colour and alpha of a texel.
-fn decoded([r, g, b, a]: [u8; 4], encoding: Encoding) -> [f64; 4] {
-    let [r, g, b] = match encoding {
-        Encoding::Srgb => [r, g, b].map(linear_from_srgb),
-        Encoding::Linear => [r, g, b].map(|value| f64::from(value) / 255.0),
-    };
-    [r, g, b, f64::from(a) / 255.0]
+/// Linear colour and alpha of a texel. Floats are linear light whatever a colour's encoding is.
+fn decoded(raster: &Raster, index: usize, encoding: Encoding) -> [f64; 4] {
+    match encoding {
+        Encoding::Srgb => raster.linear(index),
+        Encoding::Linear => raster.texel(index),
+    }
 }
 
 impl Wrap {
@@ -342,15 +340,4 @@ impl Wrap {
         let index = wrapped.clamp(0.0, n - 1.0) as usize;
         index.min(size - 1)
     }
-}
-
-/// Linear light of an 8-bit sRGB value (IEC 61966-2-1, section 5.2).
-pub(crate) fn linear_from_srgb(encoded: u8) -> f64 {
-    static TABLE: std::sync::LazyLock<[f64; 256]> = std::sync::LazyLock::new(|| {
-        std::array::from_fn(|i| {
-            let c = i as f64 / 255.0;
-            if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-        })
-    });
-    TABLE[usize::from(encoded)]
 }

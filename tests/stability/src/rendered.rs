@@ -29,7 +29,7 @@ impl Pixels {
     pub(crate) fn of(scene: &Scene) -> Result<Self> {
         let plan = Plan::new(scene, Outputs::from_list("exr").map_err(anyhow::Error::msg)?);
         let accel = build(scene, &plan, &BuildOptions::default())?;
-        let images = Images::decode(scene, &plan);
+        let images = Images::decode(scene, &plan, None)?;
         ensure!(images.faults.is_empty(), "{:?}", images.faults);
         let done = render(scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true)?;
         let layer = done.picture.layers().first().context("a picture has a layer")?;

@@ -92,7 +92,7 @@ impl Prepared {
         let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default())?;
         let plan = Plan::new(&scene, Outputs { exr: true, png: false, npy: false, dng: false });
         let accel = etendue_render::build(&scene, &plan, &BuildOptions::default())?;
-        let images = Images::decode(&scene, &plan);
+        let images = Images::decode(&scene, &plan, None)?;
         Ok(Self { scene, plan, accel, images })
     }
 

@@ -169,7 +169,7 @@ pub(crate) fn print_memory(path: &Path) -> anyhow::Result<()> {
     let load = Memory::now();
     let accel = etendue_render::build(&scene, &plan, &BuildOptions::default())?;
     let build = Memory::now();
-    let images = Images::decode(&scene, &plan);
+    let images = Images::decode(&scene, &plan, None)?;
     let rendered =
         etendue_render::render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true)?;
     let render = Memory::now();

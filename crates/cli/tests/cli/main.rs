@@ -11,6 +11,7 @@ mod files; // what is no file, what costs without end, what real programs write
 mod gltf_looks; // materials, lights and textures of models, with closed-form answers
 mod hidden; // meshes of one point, nodes scaled to 0
 mod ids; // numbers of objects, copies, nodes and materials, and their names
+mod images; // textures and environments of every kind and size
 mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // lenses against other software, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers
@@ -18,6 +19,7 @@ mod memory; // refused before it is taken
 mod messages; // what is wrong, in plain words
 mod openings_and_glasses; // f-numbers that a lens lacks, glasses of earlier catalogues and of one's own
 mod overwriting; // inputs, results of an earlier run, and files of others
+mod panes; // light that passes panes
 mod photons; // electrons and noise of sensors, against sums by the nanometre
 mod pictures; // exposure, tone maps, transparency, and which light there is
 mod printing; // what names in files do to a terminal

@@ -1,18 +1,21 @@
 //! Grey pictures of a stated physical size: coded apertures and filter maps.
 
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use etendue_geometry::files;
-use exr::prelude::{FlatSamples, ReadChannels, ReadLayers, read};
+use etendue_image::{Limits, Samples};
 use glam::DVec2;
 
 /// Where a lens file's own files are: from the name in the file to a path, or a sentence on why it
 /// may not be read.
 pub type Resolve<'a> = &'a dyn Fn(&str) -> Result<PathBuf, String>;
 
-/// The most pixels that a picture may have; a coded aperture has thousands.
-const MOST_PIXELS: usize = 1 << 26;
+/// The most bytes that a picture may take when it is decoded: a coded aperture has thousands of
+/// pixels, and this is 8192 × 8192 in 16-bit RGBA.
+const MOST_BYTES: u64 = 1 << 29;
+
+/// The longest file of a picture that is read (bytes).
+const LONGEST: u64 = 1 << 30;
 
 /// A grey picture centred on an element's axis. Row 0 is at the top (+y) and column 0 at −x, as seen
 /// from the sensor.
@@ -43,9 +46,7 @@ impl Picture {
         resolve: Resolve<'_>,
     ) -> Result<Self, String> {
         let path = resolve(file)?;
-        let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-        let (pixels, values, levels) = if is_exr { read_exr(&path) } else { read_png(&path) }
-            .map_err(|why| format!("{file}: {why}"))?;
+        let (pixels, values, levels) = read(&path).map_err(|why| format!("{file}: {why}"))?;
         #[expect(clippy::cast_precision_loss, reason = "far fewer pixels than 2⁵³")]
         let height = height.unwrap_or(width * pixels[1] as f64 / pixels[0] as f64);
         let good = |length: f64| length > 0.0 && length.is_finite();
@@ -106,70 +107,31 @@ impl Picture {
 
 type Pixels = ([usize; 2], Vec<f64>, f64);
 
-fn read_png(path: &Path) -> Result<Pixels, String> {
-    let image = files::open(path)
-        .and_then(|file| image::ImageReader::new(BufReader::new(file)).with_guessed_format())
-        .map_err(|e| format!("cannot be read: {e}"))?
-        .decode()
+fn read(path: &Path) -> Result<Pixels, String> {
+    let bytes = files::read(path, LONGEST).map_err(|e| format!("cannot be read: {e}"))?;
+    let limits = Limits { bytes: MOST_BYTES };
+    let raster = etendue_image::decode(&bytes, limits)
         .map_err(|e| format!("is not a picture that can be read: {e}"))?;
-    let deep = image.color().bytes_per_pixel() > image.color().channel_count();
-    let wide = image.to_rgba16();
-    let pixels = [wide.width() as usize, wide.height() as usize];
-    check_count(pixels)?;
-    let mut values = Vec::with_capacity(pixels[0] * pixels[1]);
-    for pixel in wide.pixels() {
-        let [red, green, blue, alpha] = pixel.0;
+    let mut values = Vec::with_capacity(raster.len());
+    for [red, green, blue, alpha] in (0..raster.len()).map(|i| raster.texel(i)) {
         if red != green || red != blue {
             return Err("is coloured; a mask must be grey".to_owned());
         }
-        if alpha != u16::MAX {
+        // The alpha of EXR files has never counted: masks are written with and without.
+        if alpha != 1.0 && !raster.is_float() {
             return Err("is transparent in places; a mask must be grey without alpha".to_owned());
         }
-        values.push(f64::from(red) / f64::from(u16::MAX));
-    }
-    Ok((pixels, values, if deep { 65_535.0 } else { 255.0 }))
-}
-
-fn read_exr(path: &Path) -> Result<Pixels, String> {
-    let file = files::open(path).map_err(|e| format!("cannot be read: {e}"))?;
-    let image = read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(BufReader::new(file))
-        .map_err(|e| format!("cannot be read: {e}"))?;
-    let layer = &image.layer_data;
-    let pixels = [layer.size.0, layer.size.1];
-    check_count(pixels)?;
-    let mut grey: Option<Vec<f64>> = None;
-    for channel in &layer.channel_data.list {
-        if channel.name == *"A" {
-            continue;
+        if !(0.0..=1.0).contains(&red) {
+            return Err(format!("has the value {red}; a mask's values lie in 0..=1"));
         }
-        let values: Vec<f64> = match &channel.sample_data {
-            FlatSamples::F16(v) => v.iter().map(|x| f64::from(x.to_f32())).collect(),
-            FlatSamples::F32(v) => v.iter().map(|&x| f64::from(x)).collect(),
-            FlatSamples::U32(v) => v.iter().map(|&x| f64::from(x)).collect(),
-        };
-        if grey.as_ref().is_some_and(|first| *first != values) {
-            return Err("is coloured; a mask must be grey".to_owned());
-        }
-        grey = Some(values);
+        values.push(red);
     }
-    let values = grey.ok_or("has no channel")?;
-    if let Some(bad) = values.iter().find(|v| !(0.0..=1.0).contains(*v)) {
-        return Err(format!("has the value {bad}; a mask's values lie in 0..=1"));
-    }
-    Ok((pixels, values, 1.0))
-}
-
-fn check_count([columns, rows]: [usize; 2]) -> Result<(), String> {
-    match columns.checked_mul(rows) {
-        Some(1..=MOST_PIXELS) => Ok(()),
-        _ => Err(format!("has {columns} x {rows} pixels; a mask has 1 to {MOST_PIXELS}")),
-    }
+    let levels = match raster.samples() {
+        Samples::U8(_) => 255.0,
+        Samples::U16(_) => 65_535.0,
+        Samples::F16(_) | Samples::F32(_) => 1.0,
+    };
+    Ok((raster.size(), values, levels))
 }
 
 #[cfg(test)]

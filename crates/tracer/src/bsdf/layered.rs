@@ -140,6 +140,13 @@ impl Layered {
         (share * self.passed(cosine, peaks) * value, density)
     }
 
+    /// What a smooth wall lets pass straight.
+    pub(super) fn straight_through(&self, wo: DVec3, peaks: &Peaks) -> Option<Weights> {
+        let share = (1.0 - self.metallic) * self.transmission;
+        let passes = self.alpha == 0.0 && share > 0.0 && wo.z > 0.0;
+        passes.then(|| Weights::base(share * self.passed(wo.z, peaks)))
+    }
+
     pub(super) fn sample(
         &self,
         wo: DVec3,
@@ -158,8 +165,7 @@ impl Layered {
             cosine_direction(square)
         } else if chances.through > 0.0 {
             if self.alpha == 0.0 {
-                let share = (1.0 - self.metallic) * self.transmission;
-                let weights = Weights::base(share * self.passed(wo.z, peaks) / chances.through);
+                let weights = self.straight_through(wo, peaks)?.times(1.0 / chances.through);
                 return Some(Found { wi: -wo, weights, density: f64::INFINITY });
             }
             let up = self.reflected(wo, square);

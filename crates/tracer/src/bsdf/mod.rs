@@ -205,6 +205,14 @@ impl Bsdf {
         }
     }
 
+    /// What passes a smooth pane without thickness straight on, over what arrives; `None` for all other
+    /// surfaces.
+    #[must_use]
+    pub fn straight_through(&self) -> Option<Weights> {
+        let Model::Layered(layered) = &self.model else { return None };
+        layered.straight_through(self.wo, &self.peaks())
+    }
+
     /// Reflects or refracts by Snell and Fresnel. Radiance is compressed by the square of the index
     /// (Veach 1997, section 5.2.2).
     fn boundary(&self, eta: f64, choice: f64) -> Option<Scattered> {

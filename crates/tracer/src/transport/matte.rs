@@ -273,6 +273,8 @@ impl Tracing<'_> {
                 [[hits.placement[i], hits.triangle[i]], patch.lamps.chosen[lane].1],
             );
             shadows.ray.push(now.states[i].ray);
+            // The lone point alone is on no triangle.
+            shadows.is_delta.push(patch.lamps.chosen[lane].1 == [MISS; 2]);
             let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
             shadows.brought.extend(brought(throughput, lane));
         }

@@ -74,6 +74,8 @@ pub struct Stage<'a> {
 pub struct Traits {
     /// Some surface is not wholly there ([`Material::is_pierced`]).
     pub is_pierced: bool,
+    /// Some surface is a smooth pane that light passes straight ([`Material::is_pane`]).
+    pub has_panes: bool,
     /// Some surface scatters light in several ways, among which is chosen.
     pub has_choice: bool,
 }
@@ -86,6 +88,7 @@ impl Traits {
         let placed = geometry.placements.iter().filter_map(|p| materials.get(p.material as usize));
         for material in placed {
             traits.is_pierced |= material.is_pierced();
+            traits.has_panes |= material.is_pane();
             traits.has_choice |=
                 matches!(material.scattering, Scattering::Dielectric(_) | Scattering::Gltf(_));
         }
@@ -343,6 +346,7 @@ impl Tracing<'_> {
             }
         }
         shadows.ray.push(ray);
+        shadows.is_delta.push(toward.is_delta);
         let lanes = radiance.iter().zip(throughput).enumerate();
         let brought = lanes.map(|(k, (l, t))| l * t * factor * in_lane(spectral, bsdf, value, k));
         shadows.brought.extend(brought);

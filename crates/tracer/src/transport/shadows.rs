@@ -3,7 +3,7 @@
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, MISS, PlacedTriangle, RayBatch};
 
-use super::{Scratch, Tracing};
+use super::{Scratch, Stage, Tracing, Traits, in_lane};
 use crate::emitters::Emitters;
 use crate::spawn::Anchor;
 use crate::surface::Met;
@@ -15,8 +15,9 @@ pub(super) struct Shadows {
     pub(super) ray: Vec<u32>,
     /// `[shadow][lane]`.
     pub(super) brought: Vec<f64>,
+    /// Their light can be met by no path that panes let through.
+    pub(super) is_delta: Vec<bool>,
     pub(super) blocked: Vec<bool>,
-    pub(super) passed: Vec<f64>,
     pub(super) hits: HitBatch,
     pub(super) again: RayBatch,
     pub(super) open: Vec<u32>,
@@ -30,6 +31,7 @@ struct Sorted {
     rays: RayBatch,
     ray: Vec<u32>,
     brought: Vec<f64>,
+    is_delta: Vec<bool>,
 }
 
 impl Shadows {
@@ -37,24 +39,28 @@ impl Shadows {
         self.rays.clear();
         self.ray.clear();
         self.brought.clear();
+        self.is_delta.clear();
     }
 
     /// Puts rays side by side that run in about the same direction, `count` lanes each, so that they
     /// are worth tracing as packets: those to a lamp of some size go all over it.
     pub(super) fn sort(&mut self, count: usize) {
-        let Self { rays, ray, brought, order, sorted, .. } = self;
+        let Self { rays, ray, brought, is_delta, order, sorted, .. } = self;
         order.clear();
         order.extend((0_u32..).zip(0..ray.len()).map(|(number, i)| {
             u64::from(octant_cell(rays.direction(i))) << 32 | u64::from(number)
         }));
         order.sort_unstable();
         let order = || order.iter().map(|&key| (key & 0xffff_ffff) as usize);
-        let Sorted { rays: to, ray: number, brought: light } = sorted;
+        let Sorted { rays: to, ray: number, brought: light, is_delta: delta } = sorted;
         to.gather(rays, order());
         number.clear();
         number.extend(order().map(|i| ray[i]));
         light.clear();
         light.extend(order().flat_map(|i| &brought[i * count..(i + 1) * count]));
+        delta.clear();
+        delta.extend(order().map(|i| is_delta[i]));
+        std::mem::swap(is_delta, delta);
         std::mem::swap(rays, to);
         std::mem::swap(ray, number);
         std::mem::swap(brought, light);
@@ -104,6 +110,7 @@ impl Tracing<'_> {
             }
             let throughput = &last.throughput[i * self.count..(i + 1) * self.count];
             shadows.ray.push(state.ray);
+            shadows.is_delta.push(false);
             shadows.brought.extend(radiance.iter().zip(throughput).map(|(r, t)| r * t * weight));
         }
         self.light(shadows, out);
@@ -116,27 +123,26 @@ impl Tracing<'_> {
         }
         shadows.rays.from_surface = true;
         self.tally.shadow_rays += shadows.rays.len() as u64;
-        if self.stage.traits.is_pierced {
+        let Traits { is_pierced, has_panes, .. } = self.stage.traits;
+        if is_pierced || (has_panes && shadows.is_delta.contains(&true)) {
             self.look_through(shadows);
         } else {
             self.stage.accel.occluded(&shadows.rays, &mut shadows.blocked);
         }
         for (k, &ray) in shadows.ray.iter().enumerate() {
-            let brought = &mut shadows.brought[k * self.count..(k + 1) * self.count];
-            if self.stage.traits.is_pierced {
-                brought.iter_mut().for_each(|lane| *lane *= shadows.passed[k]);
-            } else if shadows.blocked[k] {
-                continue;
+            if !shadows.blocked[k] {
+                self.add(&shadows.brought[k * self.count..(k + 1) * self.count], ray, out);
             }
-            self.add(brought, ray, out);
         }
     }
 
-    /// What share of each shadow ray passes the surfaces on its way.
+    /// Dims what each shadow ray brings by the surfaces on its way: by those that are only partly
+    /// there, and by panes where the light is a point or parallel. A light of some size is met through
+    /// panes by the paths themselves.
     fn look_through(&mut self, shadows: &mut Shadows) {
-        let Shadows { rays, passed, hits, again, open, .. } = shadows;
-        passed.clear();
-        passed.resize(rays.len(), 1.0);
+        let Shadows { rays, brought, is_delta, blocked, hits, again, open, .. } = shadows;
+        blocked.clear();
+        blocked.resize(rays.len(), true);
         open.clear();
         open.extend(0..u32::try_from(rays.len()).unwrap_or(u32::MAX));
         again.copy_from(rays);
@@ -149,11 +155,11 @@ impl Tracing<'_> {
             let mut still = Vec::new();
             for (k, &i) in open.iter().enumerate() {
                 let Some(met) = Met::new(&self.stage.surroundings, again, hits, k, None) else {
+                    blocked[i as usize] = false;
                     continue;
                 };
-                let share = &mut passed[i as usize];
-                *share *= 1.0 - met.opacity();
-                if *share > 0.0 {
+                let own = i as usize * self.count..(i as usize + 1) * self.count;
+                if self.dim(&met, is_delta[i as usize], &mut brought[own]) {
                     let direction = again.direction(k);
                     let origin = met.anchor.leave(direction);
                     let left = again.t_max()[k] - (origin - again.origin(k)).length();
@@ -167,7 +173,19 @@ impl Tracing<'_> {
                 return;
             }
         }
-        open.iter().for_each(|&i| passed[i as usize] = 0.0);
+    }
+
+    /// Dims light by what lets it pass a surface; whether any is left.
+    fn dim(&self, met: &Met<'_>, is_delta: bool, light: &mut [f64]) -> bool {
+        let Stage { surroundings: around, spectral, traits, .. } = self.stage;
+        let opacity = met.opacity();
+        let pane = (is_delta && traits.has_panes).then(|| met.bsdf(around, spectral.wavelength(0)));
+        let passed = pane.as_ref().and_then(|pane| Some((pane, pane.straight_through()?)));
+        for (k, lane) in light.iter_mut().enumerate() {
+            let pane = passed.map_or(0.0, |(pane, weights)| in_lane(spectral, pane, weights, k));
+            *lane *= 1.0 - opacity + opacity * pane;
+        }
+        light.iter().any(|lane| *lane > 0.0)
     }
 }
 

@@ -1,0 +1,206 @@
+#![forbid(unsafe_code)]
+//! Image files as arrays: textures, environments, masks and maps of filters.
+//!
+//! A few kilobytes can claim gigabytes, so a file's size is read and judged before anything is decoded
+//! ([`Limits`]), memory is asked for in a way that may be refused, and a decoder that panics is an
+//! error of its file. Values stay as the file has them: 8 or 16 bits, half or single precision.
+
+mod openexr;
+mod radiance;
+mod raster;
+
+use std::io::Cursor;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use bytemuck::Pod;
+use image::{ColorType, ImageDecoder, ImageReader};
+
+pub use raster::{Raster, Samples, linear_from_srgb};
+
+/// Side of the largest image that is decoded (texels).
+pub const MOST_SIDE: u64 = 32_768;
+
+/// Bytes that the largest image takes when it is decoded: 16 384 × 16 384 texels of 16-bit RGBA.
+pub const MOST_BYTES: u64 = 1 << 31;
+
+/// The most that an image may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of its decoded values.
+    pub bytes: u64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { bytes: MOST_BYTES }
+    }
+}
+
+impl Limits {
+    /// [`MOST_BYTES`], or less where a whole render may not take as much.
+    #[must_use]
+    pub fn within(memory: Option<u64>) -> Self {
+        Self { bytes: memory.unwrap_or(MOST_BYTES).min(MOST_BYTES) }
+    }
+
+    /// The number of texels of an image of `width` × `height`, each of which takes `texel` bytes.
+    fn judge(self, [width, height]: [u64; 2], texel: u64) -> Result<usize, DecodeError> {
+        if width == 0 || height == 0 {
+            return Err(DecodeError::Empty { width, height });
+        }
+        if width > MOST_SIDE || height > MOST_SIDE {
+            return Err(DecodeError::Side { width, height });
+        }
+        let bytes = width * height * texel;
+        if bytes > self.bytes {
+            return Err(DecodeError::Size { width, height, bytes, most: self.bytes });
+        }
+        usize::try_from(width * height).map_err(|_| DecodeError::Memory { bytes })
+    }
+}
+
+/// Why an image could not be decoded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DecodeError {
+    /// It has no texel.
+    #[error("it has {width} x {height} texels")]
+    Empty {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+    },
+    /// It is too wide or too high.
+    #[error(
+        "it has {width} x {height} texels, and {MOST_SIDE} a side are the most: make it smaller"
+    )]
+    Side {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+    },
+    /// It takes too much memory.
+    #[error(
+        "it has {width} x {height} texels, which take {:.2} GB decoded, and {:.2} GB are the most: \
+         make it smaller{}",
+        giga(*bytes),
+        giga(*most),
+        if *most < MOST_BYTES { ", or raise --memory-limit" } else { "" }
+    )]
+    Size {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+        /// Bytes that it takes.
+        bytes: u64,
+        /// Bytes that it may take.
+        most: u64,
+    },
+    /// The system has less memory than it takes.
+    #[error("it takes {:.2} GB decoded, and the system has less: make it smaller", giga(*bytes))]
+    Memory {
+        /// Bytes that it takes.
+        bytes: u64,
+    },
+    /// The decoder says so.
+    #[error(transparent)]
+    Decoder(#[from] image::ImageError),
+    /// The decoder of EXR files says so.
+    #[error(transparent)]
+    OpenExr(#[from] exr::error::Error),
+    /// The decoder gave up with a panic.
+    #[error("its decoder failed: the file is damaged, or of a kind that it does not know")]
+    Panic,
+    /// It is an EXR file without the channels of a colour.
+    #[error(
+        "it has no channels R, G and B, nor Y, nor a single one (multi-part and deep data are not read)"
+    )]
+    Channels,
+    /// It is coloured in a way that is not read.
+    #[error("its texels are {0:?}, which is not read")]
+    Texels(ColorType),
+    /// A header that scales all values by no positive number.
+    #[error("its header has {name} {value}, and a positive number is needed")]
+    Header {
+        /// The key.
+        name: &'static str,
+        /// Its value.
+        value: f32,
+    },
+}
+
+fn giga(bytes: u64) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "a number to be read")]
+    let bytes = bytes as f64;
+    bytes / 1e9
+}
+
+/// Decodes the bytes of a PNG, JPEG, Radiance or EXR file, of which the first bytes tell the kind.
+///
+/// # Errors
+///
+/// When it is over `limits`, of no kind that is read, or broken.
+pub fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {
+    // Decoders are others' code over hostile input. They get no state that a panic could leave broken:
+    // all that one has seen is dropped with it.
+    let decoded = catch_unwind(AssertUnwindSafe(|| decode_unguarded(bytes, limits)));
+    decoded.unwrap_or(Err(DecodeError::Panic))
+}
+
+fn decode_unguarded(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {
+    if bytes.starts_with(openexr::SIGNATURE) {
+        return openexr::decode(bytes, limits);
+    }
+    if bytes.starts_with(radiance::SIGNATURE) {
+        return radiance::decode(bytes, limits);
+    }
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(image::ImageError::IoError)?;
+    let mut own = image::Limits::default();
+    // What a decoder keeps beside the texels: lines, tables, profiles.
+    own.max_alloc = Some(limits.bytes.saturating_add(1 << 26));
+    reader.limits(own);
+    read(reader.into_decoder()?, limits)
+}
+
+/// Reads what `decoder` has, once its size is judged.
+fn read(decoder: impl ImageDecoder, limits: Limits) -> Result<Raster, DecodeError> {
+    let (width, height) = decoder.dimensions();
+    let color = decoder.color_type();
+    let texels = limits.judge([width, height].map(u64::from), color.bytes_per_pixel().into())?;
+    let channels = usize::from(color.channel_count());
+    let count = texels * channels;
+    let samples = match color {
+        ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
+            Samples::U8(filled(decoder, count)?)
+        }
+        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
+            Samples::U16(filled(decoder, count)?)
+        }
+        ColorType::Rgb32F | ColorType::Rgba32F => Samples::F32(filled(decoder, count)?),
+        other => return Err(DecodeError::Texels(other)),
+    };
+    Ok(Raster::new([width, height].map(|side| side as usize), channels, samples))
+}
+
+fn filled<T: Pod>(decoder: impl ImageDecoder, count: usize) -> Result<Vec<T>, DecodeError> {
+    let mut values = zeroed::<T>(count)?;
+    decoder.read_image(bytemuck::cast_slice_mut(&mut values))?;
+    Ok(values)
+}
+
+/// So many zeros, where there is memory for them.
+fn zeroed<T: Pod>(count: usize) -> Result<Vec<T>, DecodeError> {
+    let mut values = Vec::new();
+    let bytes = (count * size_of::<T>()) as u64;
+    values.try_reserve_exact(count).map_err(|_| DecodeError::Memory { bytes })?;
+    values.resize(count, T::zeroed());
+    Ok(values)
+}
+
+#[cfg(test)]
+mod tests;

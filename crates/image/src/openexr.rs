@@ -1,0 +1,122 @@
+//! OpenEXR files: colour, or luminance alone.
+
+use std::io::Cursor;
+// The prelude below has another.
+use std::result::Result;
+
+use exr::meta::MetaData;
+use exr::meta::header::Header;
+use exr::prelude::*;
+
+use crate::{DecodeError, Limits, Raster, Samples, zeroed};
+
+/// What every EXR file begins with.
+pub(crate) const SIGNATURE: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
+
+/// Where the texels of a layer go in its display window.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    size: [usize; 2],
+    /// The layer's corner in the display window.
+    corner: [i32; 2],
+    channels: usize,
+}
+
+impl Window {
+    /// The first value of a texel of the layer; `None` outside of the display window.
+    fn place(self, texel: Vec2<usize>) -> Option<usize> {
+        let at = |k: usize, index: usize| {
+            let place = i64::from(self.corner[k]) + i64::try_from(index).ok()?;
+            usize::try_from(place).ok().filter(|&place| place < self.size[k])
+        };
+        let (x, y) = (at(0, texel.x())?, at(1, texel.y())?);
+        Some((y * self.size[0] + x) * self.channels)
+    }
+}
+
+/// Decodes the first layer that has the channels R, G and B, or else Y, or else a single one; alpha
+/// beside them where it is. Texels of the display window that the layer does not cover are 0.
+pub(crate) fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {
+    let about = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
+    let flat = || about.headers.iter().filter(|header| !header.deep);
+    let rgb = |header: &&Header| ["R", "G", "B"].iter().all(|name| has(header, name));
+    if let Some(header) = flat().find(rgb) {
+        return colours(bytes, header, limits);
+    }
+    if let Some(header) = flat().find(|header| has(header, "Y") && !has(header, "RY")) {
+        return grey(bytes, header, &Text::from("Y"), limits);
+    }
+    let lone = |header: &Header| {
+        let mut names = header.channels.list.iter().map(|channel| &channel.name);
+        let name = names.find(|name| **name != Text::from("A"))?.clone();
+        names.all(|other| *other == Text::from("A")).then_some(name)
+    };
+    let found = flat().find_map(|header| Some((header, lone(header)?)));
+    let (header, name) = found.ok_or(DecodeError::Channels)?;
+    grey(bytes, header, &name, limits)
+}
+
+fn has(header: &Header, name: &str) -> bool {
+    header.channels.list.iter().any(|channel| channel.name == Text::from(name))
+}
+
+/// The window of `header`, with so many values that it and what the file itself has are within limits.
+fn window(header: &Header, channels: usize, limits: Limits) -> Result<Window, DecodeError> {
+    let shown = header.shared_attributes.display_window;
+    let texel = 4 * channels as u64;
+    let layer = [header.layer_size.x(), header.layer_size.y()].map(|side| side as u64);
+    limits.judge(layer, texel)?;
+    let size = [shown.size.x(), shown.size.y()];
+    limits.judge(size.map(|side| side as u64), texel)?;
+    let offset = |own: i32, display: i32| own.saturating_sub(display);
+    let own = header.own_attributes.layer_position;
+    let corner = [offset(own.x(), shown.position.x()), offset(own.y(), shown.position.y())];
+    // Memory is asked for here, where it may be refused; below the decoder asks for it.
+    drop(zeroed::<f32>(size[0] * size[1] * channels)?);
+    Ok(Window { size, corner, channels })
+}
+
+fn colours(bytes: &[u8], header: &Header, limits: Limits) -> Result<Raster, DecodeError> {
+    let window = window(header, if has(header, "A") { 4 } else { 3 }, limits)?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgba_channels(
+            move |_, _| vec![0.0_f32; window.size[0] * window.size[1] * window.channels],
+            move |values: &mut Vec<f32>, texel, (r, g, b, a): (f32, f32, f32, f32)| {
+                if let Some(first) = window.place(texel) {
+                    let own = &mut values[first..first + window.channels];
+                    own.copy_from_slice(&[r, g, b, a][..window.channels]);
+                }
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))?;
+    let values = image.layer_data.channel_data.pixels;
+    Ok(Raster::new(window.size, window.channels, Samples::F32(values)))
+}
+
+fn grey(bytes: &[u8], header: &Header, name: &Text, limits: Limits) -> Result<Raster, DecodeError> {
+    let window = window(header, if has(header, "A") { 2 } else { 1 }, limits)?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .specific_channels()
+        .required(name.clone())
+        .optional("A", 1.0_f32)
+        .collect_pixels(
+            move |_, _| vec![0.0_f32; window.size[0] * window.size[1] * window.channels],
+            move |values: &mut Vec<f32>, texel, (grey, alpha): (f32, f32)| {
+                if let Some(first) = window.place(texel) {
+                    let own = &mut values[first..first + window.channels];
+                    own.copy_from_slice(&[grey, alpha][..window.channels]);
+                }
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))?;
+    let values = image.layer_data.channel_data.pixels;
+    Ok(Raster::new(window.size, window.channels, Samples::F32(values)))
+}
