@@ -48,8 +48,8 @@ pub(crate) fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError
     }
     let lone = |header: &Header| {
         let mut names = header.channels.list.iter().map(|channel| &channel.name);
-        let name = names.find(|name| **name != Text::from("A"))?.clone();
-        names.all(|other| *other == Text::from("A")).then_some(name)
+        let name = names.find(|name| **name != *"A")?.clone();
+        names.all(|other| *other == *"A").then_some(name)
     };
     let found = flat().find_map(|header| Some((header, lone(header)?)));
     let (header, name) = found.ok_or(DecodeError::Channels)?;
@@ -57,7 +57,7 @@ pub(crate) fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError
 }
 
 fn has(header: &Header, name: &str) -> bool {
-    header.channels.list.iter().any(|channel| channel.name == Text::from(name))
+    header.channels.list.iter().any(|channel| channel.name == *name)
 }
 
 /// The window of `header`, with so many values that it and what the file itself has are within limits.

@@ -126,7 +126,7 @@ impl Raster {
             Samples::F16(_) | Samples::F32(_) => return self.texel(index),
         };
         // Alpha is linear.
-        let alpha = if self.channels % 2 == 0 { self.texel(index)[3] } else { alpha };
+        let alpha = if self.channels.is_multiple_of(2) { self.texel(index)[3] } else { alpha };
         [r, g, b, alpha]
     }
 

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use etendue_geometry::Buffer;
+use etendue_image::Limits;
 use etendue_optics::element::Picture;
 use etendue_optics::train::{Focus, Inquiry, LensFile, LensReport};
 use etendue_scene::file::{SensorFile, read_lens, trace_rays};
@@ -177,15 +178,15 @@ fn texture(bytes: &[u8], _folder: &Path) {
         wrap: [Wrap::Repeat; 2],
         filter: Filter::Bilinear,
     };
-    let _ = texture.decode();
+    let _ = texture.decode(Limits::default());
 }
 
 fn environment_hdr(bytes: &[u8], folder: &Path) {
-    let _ = EnvironmentMap::read(&write(folder, "sky.hdr", bytes));
+    let _ = EnvironmentMap::read(&write(folder, "sky.hdr", bytes), Limits::default());
 }
 
 fn environment_exr(bytes: &[u8], folder: &Path) {
-    let _ = EnvironmentMap::read(&write(folder, "sky.exr", bytes));
+    let _ = EnvironmentMap::read(&write(folder, "sky.exr", bytes), Limits::default());
 }
 
 /// The files beside a model, which are looked through for names.
