@@ -11,7 +11,11 @@ use etendue_stability::{Case, METHODS, Outcome, Scale, page};
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let scale = if words.iter().any(|word| word == "--quick") { Scale::Quick } else { Scale::Full };
-    let word = words.iter().find(|word| !word.starts_with("--"));
+    if let Some(unknown) = words.iter().find(|word| word.starts_with('-') && *word != "--quick") {
+        eprintln!("{unknown} is not known; give --quick, a word of the names of cases, or nothing");
+        return ExitCode::from(2);
+    }
+    let word = words.iter().find(|word| !word.starts_with('-'));
     match run(scale, word.map(String::as_str)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -154,8 +154,8 @@ impl OpticalTrain {
 
 impl std::fmt::Display for WidestOpening {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // Rounded up, so that the number can be asked for.
-        let f_number = (100.0 * self.f_number).ceil() / 100.0;
+        // Rounded up, so that the number can be asked for; f/2 but for rounding is f/2.
+        let f_number = (100.0 * self.f_number * (1.0 - NOMINAL)).ceil() / 100.0;
         let element = self.element;
         write!(
             f,

@@ -57,14 +57,14 @@ fn worst(
     light: &Curve,
     channels: &[Channel<'_>],
     range: [u32; 2],
-    scale: Scale,
 ) -> Result<(f64, usize)> {
     let own = counting(keys)?;
     let spectra = vec![light.clone()];
     let lanes = own.lanes_under(&Illumination { spectra, filters: vec![], colored: 2 })?.lanes;
     let count = lanes.count();
     let sensor = own.in_lanes(lanes)?;
-    let step = scale.pick(0.5, 0.1);
+    // Fine beside a line of 10 nm: in steps of 0.5 nm the sum itself is 0.03 % off.
+    let step = 0.1;
     let pairs = (0..3).flat_map(|i| (i..3).map(move |k| vec![i, k]));
     let colours: Vec<Vec<usize>> =
         std::iter::once(vec![]).chain((0..3).map(|k| vec![k])).chain(pairs).collect();
@@ -84,7 +84,7 @@ fn worst(
 /// What is promised, and what the sums' own steps may add to it.
 const LIMIT: f64 = 1.1e-3;
 
-pub(super) fn coloured_light(scale: Scale) -> Result<Outcome> {
+pub(super) fn coloured_light(_: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();
     let primary = |k: usize| move |nm: f64| rgb::PRIMARIES[k].at(nm).unwrap_or(0.0);
     let (red, green, blue) = (primary(0), primary(1), primary(2));
@@ -100,7 +100,7 @@ pub(super) fn coloured_light(scale: Scale) -> Result<Outcome> {
             json!({ "cfa": "rgbw" }),
             json!({ "cfa": "rgbw", "quantum_efficiency": [[380, 1], [780, 1]] }),
         ] {
-            let (off, lanes) = worst(&keys, &light, colours, [380, 780], scale)?;
+            let (off, lanes) = worst(&keys, &light, colours, [380, 780])?;
             outcome.must(off <= LIMIT, || format!("{name}, {keys}: {off}"));
             outcome.measured(format!("{name}: {:.3} % in {lanes} lanes", 100.0 * off));
         }
@@ -108,7 +108,7 @@ pub(super) fn coloured_light(scale: Scale) -> Result<Outcome> {
     Ok(outcome)
 }
 
-pub(super) fn infrared(scale: Scale) -> Result<Outcome> {
+pub(super) fn infrared(_: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();
     let silicon = json!([[300, 0.1], [550, 0.8], [900, 0.2], [1100, 0]]);
     let near = json!([[700, 0.3], [960, 0.6]]);
@@ -121,7 +121,7 @@ pub(super) fn infrared(scale: Scale) -> Result<Outcome> {
             ("A", Illuminant::A.curve()?),
             ("3200 K", Illuminant::BlackBody(3200.0).curve()?),
         ] {
-            let (off, lanes) = worst(&keys, &light, &[&seen], range, scale)?;
+            let (off, lanes) = worst(&keys, &light, &[&seen], range)?;
             outcome.must(off <= LIMIT, || format!("{name}, {range:?}: {off}"));
             let all = summed(&light, &[], &seen, range, 0.5);
             let visible = summed(&light, &[], &seen, [range[0].max(380), range[1].min(780)], 0.5);
