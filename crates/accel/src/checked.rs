@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
 
-use crate::embree::{Found, Judged, Scene, Search, version};
-use crate::ends::Ends;
+use crate::embree::{ExactFilter, Found, Scene, Search, version};
+use crate::end_triangles::EndTriangles;
 use crate::nearest::{Nearest, Query};
 use crate::recheck;
 use crate::single::{Frame, Rays32};
@@ -38,7 +38,7 @@ struct Scratch {
     found: Found,
     solved: Solved,
     lanes: Box<Lanes>,
-    ends: Ends,
+    ends: EndTriangles,
     suspects: Vec<u32>,
     doubtful: Vec<u32>,
 }
@@ -272,7 +272,8 @@ impl Accel for Embree {
             scratch.rays.convert(rays, &self.frame);
             if self.checks() && Self::start_on_surfaces(rays) {
                 scratch.ends.spare(geometry, rays, &mut scratch.rays, &mut scratch.lanes);
-                let mut judged = Judged::new(geometry, rays, &scratch.rays, &mut scratch.doubtful);
+                let mut judged =
+                    ExactFilter::new(geometry, rays, &scratch.rays, &mut scratch.doubtful);
                 self.scene.closest_from_surfaces(&scratch.rays, &mut judged, &mut scratch.found);
             } else {
                 if !self.checks() && Self::start_on_surfaces(rays) {
@@ -310,7 +311,7 @@ impl Accel for Embree {
             doubtful.clear();
             let geometry = self.scene.geometry();
             ends.spare(geometry, rays, rays32, lanes);
-            let mut judged = Judged::new(geometry, rays, rays32, doubtful);
+            let mut judged = ExactFilter::new(geometry, rays, rays32, doubtful);
             self.scene.occluded_exactly(rays32, rays.coherent, &mut judged, blocked);
             doubtful.retain(|&i| !blocked[i as usize]);
             let could_hit = |i| rays32.can_hit(i) && self.frame.may_meet(rays, i);

@@ -34,7 +34,7 @@ use crate::single;
 use crate::{BuildError, BuildOptions, Quality};
 
 pub use self::device::{Version, version};
-pub(crate) use self::filter::{Judged, Search};
+pub(crate) use self::filter::{ExactFilter, Search};
 pub(crate) use self::trace::Found;
 
 type ProgressFn = dyn Fn(f64) -> bool + Send + Sync;

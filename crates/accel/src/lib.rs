@@ -19,7 +19,7 @@ mod checked;
 #[cfg(feature = "embree")]
 mod embree;
 #[cfg(feature = "embree")]
-mod ends;
+mod end_triangles;
 mod exact;
 mod nearest;
 mod parts;

@@ -5,7 +5,7 @@ use etendue_camera::{Camera, Sampler};
 use etendue_render::output::{Outputs, Picture};
 use etendue_render::{Images, Plan, RenderError};
 use etendue_scene::Scene;
-use etendue_spectrum::Lanes;
+use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
 use crate::BenchError;
@@ -120,7 +120,7 @@ impl<'a> Studio<'a> {
 ///
 /// When no light gets through the lens.
 pub fn opened(camera: &Camera) -> Result<Camera, BenchError> {
-    let opened = camera.opened(&Lanes::Rgb);
+    let opened = camera.opened(&Bands::Rgb);
     opened.map_err(|error| BenchError::Render(RenderError::Camera(error.why)))
 }
 

@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use etendue_geometry::RayBatch;
-use etendue_spectrum::Lanes;
+use etendue_spectrum::Bands;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::framing::Subject;
 use crate::lens::focused::View;
 use crate::{
-    CameraError, CameraRays, ChromaticRealLensCameraSpec, Distortion, DistortionSpec, FilmSamples,
-    Intrinsics, LaneGroup, LensCamera, LensCameraSpec, Orthographic, OrthographicSpec, Pinhole,
+    BandGroup, CameraError, CameraRays, ChromaticRealLensCameraSpec, Distortion, DistortionSpec,
+    FilmSamples, Intrinsics, LensCamera, LensCameraSpec, Orthographic, OrthographicSpec, Pinhole,
     PinholeSpec, Pose, PoseSpec, RealLensCameraSpec, SensorSpec, ThinLensCameraSpec,
 };
 use etendue_geometry::units::{Degrees, Metres, Micrometres};
@@ -272,25 +272,25 @@ impl Camera {
         }
     }
 
-    /// Which of `lanes` have to be traced apart: all in one group unless the lens tells wavelengths
-    /// apart and there are several lanes.
+    /// Which of `bands` have to be traced apart: all in one group unless the lens tells wavelengths
+    /// apart and there are several bands.
     #[must_use]
-    pub fn lane_groups(&self, lanes: &Lanes) -> Vec<LaneGroup> {
+    pub fn band_groups(&self, bands: &Bands) -> Vec<BandGroup> {
         match &self.projection {
-            Projection::Lens(lens) => lens.lane_groups(lanes),
-            _ => vec![LaneGroup { lanes: 0..lanes.count(), wavelength: None }],
+            Projection::Lens(lens) => lens.band_groups(bands),
+            _ => vec![BandGroup { bands: 0..bands.count(), wavelength: None }],
         }
     }
 
-    /// The camera with all measured that sampling its pupil for `lanes` needs; to be done once,
+    /// The camera with all measured that sampling its pupil for `bands` needs; to be done once,
     /// before [`Self::sample_rays`] is asked from many threads.
     ///
     /// # Errors
     ///
     /// When no light gets through at these wavelengths: the error names what blocks it.
-    pub fn opened(&self, lanes: &Lanes) -> Result<Self, CameraError> {
+    pub fn opened(&self, bands: &Bands) -> Result<Self, CameraError> {
         let projection = match &self.projection {
-            Projection::Lens(lens) => Projection::Lens(Arc::new(lens.opened(lanes)?)),
+            Projection::Lens(lens) => Projection::Lens(Arc::new(lens.opened(bands)?)),
             other => other.clone(),
         };
         Ok(Self { projection, ..self.clone() })
@@ -357,7 +357,7 @@ impl Camera {
     /// The rays of `samples` that leave the camera, each with its weight: `out` is refilled.
     ///
     /// Places that a distorted camera does not see have no ray. A lens has rays for the wavelengths
-    /// of its [`lane_groups`](Self::lane_groups).
+    /// of its [`band_groups`](Self::band_groups).
     pub fn sample_rays(&self, samples: &FilmSamples, out: &mut CameraRays) {
         if let Projection::Lens(lens) = &self.projection {
             return lens.sample_rays(&self.pose, samples, out);

@@ -31,7 +31,7 @@ pub use error::CameraError;
 pub use framing::{Subject, Support, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin};
 pub use lens::{
-    ChromaticRealLensCameraSpec, LaneGroup, LensCamera, LensCameraSpec, RealLensCameraSpec,
+    BandGroup, ChromaticRealLensCameraSpec, LensCamera, LensCameraSpec, RealLensCameraSpec,
     ThinLensCameraSpec,
 };
 pub use orthographic::{Orthographic, OrthographicSpec};

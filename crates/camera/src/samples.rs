@@ -17,7 +17,7 @@ pub struct FilmSamples {
     /// Places in 0..1 of the light that the rays stand for, from its shortest wavelength to its
     /// longest; cameras whose lenses do not disperse do not look.
     pub spectrum: Vec<f64>,
-    /// The [`wavelength`](crate::LaneGroup::wavelength) of the lanes that the rays are for.
+    /// The [`wavelength`](crate::BandGroup::wavelength) of the bands that the rays are for.
     pub wavelength: Option<f64>,
 }
 

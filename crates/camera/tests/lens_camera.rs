@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use etendue_camera::{Camera, CameraRays, CameraSpec, FilmSamples};
 use etendue_geometry::{Bounds, RayBatch};
-use etendue_spectrum::{Grid, Lanes};
+use etendue_spectrum::{Bands, Grid};
 use glam::DVec3;
 
 fn try_build(json: &str) -> Result<Camera, String> {
@@ -88,7 +88,7 @@ fn a_thin_lens_is_registered_with_the_pinhole_of_its_field() {
 
 #[test]
 fn the_blur_of_a_thin_lens_camera_is_the_formula_at_ten_distances() {
-    // At distance d all rays of a point in focus at s are in a disc of diameter D |d − s|/s around
+    // At distance d all rays of a point in focus at s are in a disk of diameter D |d − s|/s around
     // the chief ray: similar triangles over the pupil D.
     let camera = at_origin(THIN);
     let (pupil, focus) = (0.025, 2.0);
@@ -104,7 +104,7 @@ fn the_blur_of_a_thin_lens_camera_is_the_formula_at_ten_distances() {
                 widest = widest.max(2.0 * (there - on_axis).length());
             }
             let formula = pupil * (distance - focus).abs() / focus;
-            // 4096 points leave the outermost 1/4096 of the disc's area free: 1e-4 of its radius,
+            // 4096 points leave the outermost 1/4096 of the disk's area free: 1e-4 of its radius,
             // more along the rim's own unevenness; rays are exact.
             let error = widest - formula;
             assert!(
@@ -219,12 +219,12 @@ fn wavelengths_are_traced_apart_only_where_they_differ() {
         ))
     };
     let plain = of(r#""type": "real_lens", "refractive_index": 1.5168"#);
-    assert_eq!(plain.lane_groups(&Lanes::Rgb).len(), 1);
+    assert_eq!(plain.band_groups(&Bands::Rgb).len(), 1);
     let glass = of(r#""type": "chromatic_real_lens", "glass": "N-BK7""#);
-    assert_eq!(glass.lane_groups(&Lanes::Grey).len(), 1);
-    let groups = glass.lane_groups(&Lanes::Rgb);
+    assert_eq!(glass.band_groups(&Bands::Grey).len(), 1);
+    let groups = glass.band_groups(&Bands::Rgb);
     assert_eq!(groups.len(), 3);
-    let opened = glass.opened(&Lanes::Rgb).unwrap();
+    let opened = glass.opened(&Bands::Rgb).unwrap();
     // Where the rays of the axis cross it in front of the lens: blue is focused nearest.
     let focus = |wavelength| {
         let found = vergences(&sampled(&opened, [30.0, 20.0], wavelength, 20_000));
@@ -262,14 +262,14 @@ fn crown_power(nm: f64) -> f64 {
 }
 
 #[test]
-fn a_grey_sensor_sees_all_the_wavelengths_of_its_lane() {
+fn a_grey_sensor_sees_all_the_wavelengths_of_its_band() {
     let crown = |elements: &str| {
         let camera = at_origin(&format!(
             r#""type": "chromatic_real_lens", "glass": "N-BK7", "front_radius": 50,
                "rear_radius": -50, "thickness": 6, "semi_diameter": 8, "sensor_distance": 48,
                "elements": [{elements}], "sensor": {{"resolution": [60, 40], "pixel_pitch": 50}}"#
         ));
-        camera.opened(&Lanes::Grey).unwrap()
+        camera.opened(&Bands::Grey).unwrap()
     };
     const COUNT: u32 = 20_000;
     let clear = sampled(&crown(""), [30.0, 20.0], None, COUNT);
@@ -306,16 +306,16 @@ fn a_grey_sensor_sees_all_the_wavelengths_of_its_lane() {
 }
 
 #[test]
-fn filters_dim_each_lane_by_its_own_mean() {
+fn filters_dim_each_band_by_its_own_mean() {
     let camera = at_origin(
         r#""type": "thin_lens", "focal_length": 50, "f_number": 4, "sensor_distance": 50,
            "elements": [{"type": "filter", "transmission": [[380, 0], [499, 0], [501, 1], [780, 1]], "at": -1}],
            "sensor": {"resolution": [30, 20], "pixel_pitch": 50}"#,
     );
-    let opened = camera.opened(&Lanes::Rgb).unwrap();
+    let opened = camera.opened(&Bands::Rgb).unwrap();
     const COUNT: u32 = 4096;
     let weights: Vec<f64> = opened
-        .lane_groups(&Lanes::Rgb)
+        .band_groups(&Bands::Rgb)
         .into_iter()
         .map(|g| mean_weight(&sampled(&opened, [15.0, 10.0], g.wavelength, COUNT), COUNT))
         .collect();
@@ -325,7 +325,7 @@ fn filters_dim_each_lane_by_its_own_mean() {
            "elements": [{"type": "filter", "transmission": 0.5, "at": 3}],
            "sensor": {"resolution": [30, 20], "pixel_pitch": 50}"#,
     );
-    assert_eq!(halves.lane_groups(&Lanes::Rgb).len(), 1, "a grey filter tells nothing apart");
+    assert_eq!(halves.band_groups(&Bands::Rgb).len(), 1, "a grey filter tells nothing apart");
     let half = mean_weight(&sampled(&halves, [15.0, 10.0], None, COUNT), COUNT);
     assert!((half - 0.5).abs() < 1e-3, "{half}");
 }
@@ -341,8 +341,8 @@ fn losses_are_those_of_the_surfaces_and_of_the_way_and_only_when_asked_for() {
     };
     const COUNT: u32 = 4096;
     let value = |camera: &Camera| {
-        // A lane so narrow that one wavelength stands for it.
-        let line = Lanes::Bands(Grid::from_edges(vec![580.0, 595.12]).unwrap());
+        // A band so narrow that one wavelength stands for it.
+        let line = Bands::Spectral(Grid::from_edges(vec![580.0, 595.12]).unwrap());
         let opened = camera.opened(&line).unwrap();
         mean_weight(&sampled(&opened, [15.0, 10.0], None, COUNT), COUNT)
     };
@@ -385,7 +385,7 @@ fn a_tilted_sensor_puts_a_tilted_plane_in_focus() {
 
 #[test]
 fn data_end_at_the_image_circle_of_a_shifted_lens_too() {
-    // Behind the lens light goes straight: the lens' disc (2 mm) and an aperture (3 mm) 30 mm behind
+    // Behind the lens light goes straight: the lens' disk (2 mm) and an aperture (3 mm) 30 mm behind
     // it overlap as seen from the sensor 50 mm behind it up to (2·20 + 3·50)/30 mm off the axis.
     let camera = at_origin(
         r#""type": "thin_lens", "focal_length": 50, "sensor_distance": 50,

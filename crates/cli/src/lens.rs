@@ -103,7 +103,7 @@ fn draw(
     let pictures = [
         drawing::layout(train, report),
         drawing::spots(train, report),
-        drawing::falloff(train, report),
+        drawing::relative_illumination(train, report),
     ];
     places::folder(folder)?;
     for (name, picture) in DRAWINGS.into_iter().zip(pictures) {

@@ -119,7 +119,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let (files, more) = places::recorded(Ledger::open(folder, "render"), || {
         let mut files = write(folder, &scene, &rendered.picture, outputs, stages)?;
         let progress = stages.begin("expose");
-        let light = (&rendered.picture, rendered.lane_film.take());
+        let light = (&rendered.picture, rendered.band_film.take());
         let exposed = expose::write(&scene, light, folder, outputs, &*progress)?;
         files.extend(exposed.files);
         Ok((files, exposed.notes))

@@ -5,11 +5,13 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use etendue_optics::element::{Clip, LensRays};
-use etendue_optics::train::{ExitPupil, Focus, LensFile, OpticalTrain, Registers, Side, TrainAt};
+use etendue_optics::train::{
+    ExitPupil, Focus, LensFile, MonochromaticTrain, OpticalTrain, Registers, Side,
+};
 use glam::{DVec2, DVec3};
 
 /// How a batch is taken through.
-type Way = fn(&TrainAt, &mut LensRays);
+type Way = fn(&MonochromaticTrain, &mut LensRays);
 
 /// A tile's worth of rays.
 const RAYS: u32 = 512;

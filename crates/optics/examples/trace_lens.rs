@@ -9,7 +9,7 @@ use std::error::Error;
 use std::hint::black_box;
 
 use etendue_optics::element::{Clip, LensRays};
-use etendue_optics::train::{LensFile, Part, Registers, Side, TrainAt};
+use etendue_optics::train::{LensFile, MonochromaticTrain, Part, Registers, Side};
 use glam::{DVec2, DVec3};
 use multiversion::multiversion;
 use rustix::time::{ClockId, clock_gettime};
@@ -71,7 +71,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("not every ray passes: the lens is too narrow for this beam".into());
     }
     let on = |registers| {
-        move |at: &TrainAt, rays: &mut LensRays| {
+        move |at: &MonochromaticTrain, rays: &mut LensRays| {
             at.trace_on(registers, Side::Object, Clip::On, rays);
         }
     };
@@ -87,7 +87,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 list.push(each.into());
             }
         };
-        let mut through = |name: &str, trace: &dyn Fn(&TrainAt, &mut LensRays)| {
+        let mut through = |name: &str, trace: &dyn Fn(&MonochromaticTrain, &mut LensRays)| {
             timed(name, &mut || {
                 work.clone_from(black_box(&rays));
                 trace(&at, &mut work);

@@ -58,7 +58,7 @@ fn of_the_rays_sampled_in_the_double_gauss_95_percent_leave_without_bias() {
 
 #[test]
 fn a_thin_lens_with_its_stop_has_the_irradiance_of_a_disc() {
-    // E = π/2 (1 − (h² + r² − a²)/√((h² + r² + a²)² − 4 r² a²)): a disc of radius a at distance h,
+    // E = π/2 (1 − (h² + r² − a²)/√((h² + r² + a²)² − 4 r² a²)): a disk of radius a at distance h,
     // r off the axis (E. Lommel's integral; W. J. Smith, *Modern Optical Engineering*, ch. 8).
     let (f, a) = (50.0, 12.5);
     let train = build(&format!(
@@ -117,7 +117,7 @@ fn lenses_without_symmetry_are_sampled_without_bias_too() {
 /// ∫ cos θ dΩ over a grid of directions wide enough for anything.
 fn tilted_irradiance(
     train: &OpticalTrain,
-    at: &etendue_optics::train::TrainAt,
+    at: &etendue_optics::train::MonochromaticTrain,
     film: DVec3,
     normal: DVec3,
 ) -> f64 {
@@ -278,7 +278,11 @@ fn masks_inside_of_a_lens_and_in_front_of_one_are_sampled_without_bias() {
 }
 
 /// The integral of cos dOmega over a grid of directions, fine around what passes on a coarser one.
-fn finely_summed(train: &OpticalTrain, at: &etendue_optics::train::TrainAt, film: DVec3) -> f64 {
+fn finely_summed(
+    train: &OpticalTrain,
+    at: &etendue_optics::train::MonochromaticTrain,
+    film: DVec3,
+) -> f64 {
     let centre = -film.truncate() / (film.z - train.last_vertex());
     let (mut low, mut high) = (centre - 0.6, centre + 0.6);
     let mut sum = 0.0;
@@ -298,7 +302,7 @@ fn finely_summed(train: &OpticalTrain, at: &etendue_optics::train::TrainAt, film
             at.trace(Side::Sensor, Clip::On, &mut rays);
             sum += rays.passed_throughput();
             for column in 0..cells {
-                if rays.fate(column as usize) == etendue_optics::element::Fate::Exited {
+                if rays.fate(column as usize) == etendue_optics::element::RayStatus::Exited {
                     (min, max) = (min.min(cell(column)), max.max(cell(column)));
                 }
             }

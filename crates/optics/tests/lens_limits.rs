@@ -1,6 +1,6 @@
 //! What lens files mean at their limits, and what is no lens. (Where tracing fails: the stability suite.)
 
-use etendue_optics::element::{Clip, Fate, LensRays};
+use etendue_optics::element::{Clip, LensRays, RayStatus};
 use etendue_optics::train::{Focus, FocusError, LensFile, OpticalTrain, Side};
 use glam::DVec3;
 
@@ -18,7 +18,7 @@ fn preset(name: &str) -> OpticalTrain {
     build(&std::fs::read_to_string(path).unwrap())
 }
 
-fn fate(train: &OpticalTrain, clip: Clip, origin: [f64; 3], direction: [f64; 3]) -> Fate {
+fn fate(train: &OpticalTrain, clip: Clip, origin: [f64; 3], direction: [f64; 3]) -> RayStatus {
     let at = train.at(587.56).unwrap();
     let path = at.path(Side::Object, clip, origin.into(), direction.into());
     assert!(path.points.iter().all(|p| p.is_finite()));
@@ -94,10 +94,14 @@ fn a_stop_may_be_drawn_behind_the_vertex_of_a_lens_that_bulges_past_it() {
             {"type": "surface", "radius": -4}]}"#,
     );
     for y in [0.0, 0.3, 0.9, 0.999] {
-        assert_eq!(fate(&train, Clip::On, [0.0, y, -5.0], [0.0, 0.0, 1.0]), Fate::Exited, "{y}");
+        assert_eq!(
+            fate(&train, Clip::On, [0.0, y, -5.0], [0.0, 0.0, 1.0]),
+            RayStatus::Exited,
+            "{y}"
+        );
     }
     let outside = fate(&train, Clip::On, [0.0, 1.001, -5.0], [0.0, 0.0, 1.0]);
-    assert_eq!(outside, Fate::Vignetted { element: 0 });
+    assert_eq!(outside, RayStatus::Vignetted { element: 0 });
 }
 
 #[test]

@@ -4,10 +4,10 @@
 use std::path::PathBuf;
 
 use etendue_geometry::units::Millimetres;
-use etendue_optics::element::{Clip, ElementSpec, Fate, LensRays, PartSpec, SurfaceSpec};
+use etendue_optics::element::{Clip, ElementSpec, LensRays, PartSpec, RayStatus, SurfaceSpec};
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::analysis::{colour_shifts, distortion, illumination, spot};
-use etendue_optics::train::{LensFile, OpticalTrain, Side, TrainAt};
+use etendue_optics::train::{LensFile, MonochromaticTrain, OpticalTrain, Side};
 use glam::DVec3;
 use serde_json::Value;
 
@@ -25,7 +25,7 @@ struct System {
 }
 
 impl System {
-    fn at(&self, wavelength: f64) -> TrainAt {
+    fn at(&self, wavelength: f64) -> MonochromaticTrain {
         self.train.at(wavelength).unwrap()
     }
 
@@ -123,9 +123,9 @@ fn every_ray_meets_every_surface_where_it_should() {
             let path = at.path(side(ray), Clip::Off, origin, direction);
             let what = format!("{} {}", system.name, ray["tag"]);
             let expected = match ray["status"].as_str().unwrap() {
-                "ok" => Fate::Exited,
-                "miss" => Fate::Missed { element: index(&ray["fail_surface"]) },
-                _ => Fate::TotalInternalReflection { element: index(&ray["fail_surface"]) },
+                "ok" => RayStatus::Exited,
+                "miss" => RayStatus::Missed { element: index(&ray["fail_surface"]) },
+                _ => RayStatus::TotalInternalReflection { element: index(&ray["fail_surface"]) },
             };
             assert_eq!(path.fate, expected, "{what}");
             let points = ray["points"].as_array().unwrap();
@@ -135,7 +135,7 @@ fn every_ray_meets_every_surface_where_it_should() {
                 assert!(difference < POINT, "{what}: {difference} mm");
                 worst_point = worst_point.max(difference);
             }
-            if expected == Fate::Exited {
+            if expected == RayStatus::Exited {
                 let difference =
                     (path.direction.unwrap() - vector(&ray["exit_dir"])).abs().max_element();
                 assert!(difference < COSINE, "{what}: {difference}");
@@ -156,14 +156,14 @@ fn rays_are_clipped_at_the_first_surface_that_they_meet_outside_its_rim() {
             let fate = at.path(side(ray), Clip::On, origin, direction).fate;
             let what = format!("{} {}", system.name, ray["tag"]);
             if !ray["contested"].is_null() {
-                assert_ne!(fate, Fate::Exited, "{what}: contested rays are dead");
+                assert_ne!(fate, RayStatus::Exited, "{what}: contested rays are dead");
                 continue;
             }
             match (&ray["clip_surface"], ray["status"].as_str().unwrap()) {
                 (element @ Value::Number(_), _) => {
-                    assert_eq!(fate, Fate::Vignetted { element: index(element) }, "{what}");
+                    assert_eq!(fate, RayStatus::Vignetted { element: index(element) }, "{what}");
                 }
-                (_, "ok") => assert_eq!(fate, Fate::Exited, "{what}"),
+                (_, "ok") => assert_eq!(fate, RayStatus::Exited, "{what}"),
                 (_, _) => assert_eq!(fate.element(), Some(index(&ray["fail_surface"])), "{what}"),
             }
         }

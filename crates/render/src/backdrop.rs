@@ -23,7 +23,7 @@ pub(crate) fn share([hit, all, _]: [f64; 3]) -> f64 {
 }
 
 /// Refills the arrays of `out`: the environment's radiance along each ray that hits nothing, in red,
-/// green and blue; 0 along others, without light, and with lanes other than these three.
+/// green and blue; 0 along others, without light, and with bands other than these three.
 pub(crate) fn radiance(light: Option<&LightPass<'_>>, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
     for array in out.iter_mut() {
         array.clear();

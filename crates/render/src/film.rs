@@ -1,12 +1,12 @@
-//! The film: the planes that a render fills, and the bands of rows that threads fill side by side.
+//! The film: the planes that a render fills, and the strips of rows that threads fill side by side.
 
 use std::sync::{Mutex, PoisonError};
 
-use etendue_spectrum::Lanes;
+use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
 use crate::description::{Description, describe, id_definition};
-use crate::expose::LaneFilm;
+use crate::expose::BandFilm;
 use crate::output::{Channel, Layer, Values};
 
 /// How finely data layers are kept.
@@ -79,9 +79,9 @@ pub(crate) fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// The rows that one thread fills: a band of all planes of all layers, layer by layer.
+/// The rows that one thread fills: a strip of all planes of all layers, layer by layer.
 #[derive(Debug)]
-pub(crate) struct Band<'a> {
+pub(crate) struct Strip<'a> {
     /// The topmost row.
     pub(crate) top: u32,
     /// Rows.
@@ -91,8 +91,8 @@ pub(crate) struct Band<'a> {
 }
 
 impl FilmLayer {
-    /// An empty layer; the picture of a tracer of light has a plane for each of `lanes`.
-    pub(crate) fn new(spec: LayerSpec, pixels: usize, precision: Precision, lanes: &Lanes) -> Self {
+    /// An empty layer; the picture of a tracer of light has a plane for each of `bands`.
+    pub(crate) fn new(spec: LayerSpec, pixels: usize, precision: Precision, bands: &Bands) -> Self {
         let plane = || match (spec, precision) {
             (LayerSpec::Ids | LayerSpec::MaterialId, _) => Values::U32(vec![0; pixels]),
             (
@@ -109,24 +109,24 @@ impl FilmLayer {
             (_, Precision::Double) => Values::F64(vec![0.0; pixels]),
         };
         let names: Vec<String> = match spec {
-            LayerSpec::Radiance => lanes.names(),
+            LayerSpec::Radiance => bands.names(),
             _ => describe(spec).channels.iter().map(|name| (*name).to_owned()).collect(),
         };
         let planes = names.iter().map(|_| plane()).collect();
         Self { spec, names, planes }
     }
 
-    /// Takes the light of a tracer out of its lanes, whose place red, green and blue take; `None`
-    /// when they are the lanes already.
-    pub(crate) fn take_lanes(&mut self, lanes: &Lanes) -> Option<LaneFilm> {
-        if self.spec != LayerSpec::Radiance || *lanes == Lanes::Rgb {
+    /// Takes the light of a tracer out of its bands, whose place red, green and blue take; `None`
+    /// when they are the bands already.
+    pub(crate) fn take_bands(&mut self, bands: &Bands) -> Option<BandFilm> {
+        if self.spec != LayerSpec::Radiance || *bands == Bands::Rgb {
             return None;
         }
         let planes = self.planes.iter().filter_map(|plane| match plane {
             Values::F32(values) => Some(values.as_slice()),
             _ => None,
         });
-        let film = LaneFilm::woven(lanes.clone(), &planes.collect::<Vec<_>>());
+        let film = BandFilm::woven(bands.clone(), &planes.collect::<Vec<_>>());
         self.names = ["R", "G", "B"].map(str::to_owned).into();
         self.planes = film.colors().map(Values::F32).into();
         Some(film)
@@ -163,22 +163,22 @@ impl FilmLayer {
     }
 }
 
-/// Bands of `band_height` rows over all `layers`, each to be taken by one thread.
-pub(crate) fn bands<'a>(
+/// Strips of `strip_height` rows over all `layers`, each to be taken by one thread.
+pub(crate) fn strips<'a>(
     layers: &'a mut [&mut FilmLayer],
     [width, height]: [u32; 2],
-    band_height: u32,
-) -> Vec<Mutex<Option<Band<'a>>>> {
-    let mut bands: Vec<Band<'a>> = (0..height.div_ceil(band_height))
+    strip_height: u32,
+) -> Vec<Mutex<Option<Strip<'a>>>> {
+    let mut strips: Vec<Strip<'a>> = (0..height.div_ceil(strip_height))
         .map(|k| {
-            let top = k * band_height;
-            Band { top, height: band_height.min(height - top), layers: Vec::new() }
+            let top = k * strip_height;
+            Strip { top, height: strip_height.min(height - top), layers: Vec::new() }
         })
         .collect();
-    let chunk = width as usize * band_height as usize;
+    let chunk = width as usize * strip_height as usize;
     for layer in layers {
-        for band in &mut bands {
-            band.layers.push((layer.spec, Vec::new()));
+        for strip in &mut strips {
+            strip.layers.push((layer.spec, Vec::new()));
         }
         for plane in &mut layer.planes {
             let rows: Vec<Rows<'_>> = match plane {
@@ -187,14 +187,14 @@ pub(crate) fn bands<'a>(
                 Values::U32(values) => values.chunks_mut(chunk).map(Rows::U32).collect(),
                 Values::U16(_) => Vec::new(),
             };
-            for (band, rows) in bands.iter_mut().zip(rows) {
-                if let Some((_, planes)) = band.layers.last_mut() {
+            for (strip, rows) in strips.iter_mut().zip(rows) {
+                if let Some((_, planes)) = strip.layers.last_mut() {
                     planes.push(rows);
                 }
             }
         }
     }
-    bands.into_iter().map(|band| Mutex::new(Some(band))).collect()
+    strips.into_iter().map(|strip| Mutex::new(Some(strip))).collect()
 }
 
 /// Takes what stands ready for one thread.

@@ -7,9 +7,9 @@ use etendue_accel::Accel;
 use etendue_camera::Camera;
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_scene::Scene;
-use etendue_spectrum::Lanes;
+use etendue_spectrum::Bands;
 use etendue_tracer::{
-    EnvironmentMap, LayerSpec, Light, Lights, Spectral, Stage, Surroundings, Tracer, Traits,
+    EnvironmentMap, LayerSpec, Light, LightingContext, Lights, SceneView, Spectral, Tracer, Traits,
 };
 
 use crate::film::{FilmLayer, Precision};
@@ -56,17 +56,17 @@ pub(crate) fn settle(
     scene: &Scene,
     map: Option<Arc<EnvironmentMap>>,
     tracer: &dyn Tracer,
-    (accel, surroundings): (&dyn Accel, Surroundings<'_>),
+    (accel, surroundings): (&dyn Accel, SceneView<'_>),
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<Lighting, RenderError> {
     let mut lighting = Lighting { lights: scene.lights.clone(), map, note: None };
     if !scene.studio_if_dark {
         return Ok(lighting);
     }
-    let spectral = Spectral::new(&Lanes::Rgb);
+    let spectral = Spectral::new(&Bands::Rgb);
     let lights = Lights::new(&lighting.lights, lighting.map.clone(), &surroundings, &spectral)
         .map_err(|error| RenderError::Lights(error.to_string()))?;
-    let stage = Stage {
+    let stage = LightingContext {
         accel,
         surroundings,
         lights: &lights,
@@ -93,20 +93,20 @@ pub(crate) fn settle(
 fn lit_share(
     scene: &Scene,
     tracer: &dyn Tracer,
-    stage: Stage<'_>,
+    stage: LightingContext<'_>,
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<Option<f64>, RenderError> {
     let [width, height] = scene.camera.resolution();
     let camera = scene.camera.coarser(width.max(height).div_ceil(SIDE));
     let camera = match camera.lens() {
-        Some(_) => camera.opened(&Lanes::Rgb).map_err(|e| RenderError::Camera(e.why))?,
+        Some(_) => camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?,
         None => camera,
     };
     let [width, height] = camera.resolution();
     let pixels = width as usize * height as usize;
-    let layer = |spec| FilmLayer::new(spec, pixels, Precision::Single, &Lanes::Rgb);
+    let layer = |spec| FilmLayer::new(spec, pixels, Precision::Single, &Bands::Rgb);
     let mut film = [layer(LayerSpec::Radiance), layer(LayerSpec::Coverage)];
-    let groups = camera.lane_groups(&Lanes::Rgb);
+    let groups = camera.band_groups(&Bands::Rgb);
     let pass: Vec<_> = std::iter::once(0..SAMPLES).collect();
     let job = Job {
         accel: stage.accel,

@@ -10,8 +10,8 @@ use etendue_geometry::{Detail, Placement};
 use etendue_scene::Scene;
 use etendue_scene::file::TracerSpec;
 use etendue_scene::import::Wanted;
-use etendue_sensor::LaneChoice;
-use etendue_spectrum::Lanes;
+use etendue_sensor::BandChoice;
+use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Needs, TextureScope};
 use serde::Serialize;
 
@@ -75,7 +75,7 @@ pub struct Plan {
     /// How finely data layers are kept.
     pub precision: Precision,
     /// What the numbers are that the picture's light is kept in.
-    pub lanes: Lanes,
+    pub bands: Bands,
     /// The decisions, in words.
     pub decisions: Vec<Decision>,
 }
@@ -92,7 +92,7 @@ const RAYS_A_SAMPLE_OF_LIGHT: u64 = 4;
 const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
 
 /// The passes in which the film is filled.
-fn sample_passes(scene: &Scene, passes: Passes, lanes: usize) -> Vec<Range<u32>> {
+fn sample_passes(scene: &Scene, passes: Passes, bands: usize) -> Vec<Range<u32>> {
     let samples = scene.render.samples;
     let [width, height] = scene.camera.resolution().map(u64::from);
     let colours = if passes.mean {
@@ -100,8 +100,8 @@ fn sample_passes(scene: &Scene, passes: Passes, lanes: usize) -> Vec<Range<u32>>
     } else {
         0
     };
-    let lanes = if passes.light { lanes } else { 0 };
-    let bytes = (width * height).saturating_mul(BYTES_OF_SUM * (colours + lanes) as u64);
+    let bands = if passes.light { bands } else { 0 };
+    let bytes = (width * height).saturating_mul(BYTES_OF_SUM * (colours + bands) as u64);
     match samples::passes(samples) {
         several if several.len() > 1 && bytes > MOST_BYTES_OF_SUMS => {
             std::iter::once(0..samples).collect()
@@ -121,8 +121,8 @@ impl Plan {
         let [width, height] = scene.camera.resolution();
         let pixels = u64::from(width) * u64::from(height);
         let samples = scene.render.samples;
-        let chosen = expose::lanes(scene);
-        let apart = scene.camera.lane_groups(&chosen.lanes).len() as u64;
+        let chosen = expose::bands(scene);
+        let apart = scene.camera.band_groups(&chosen.bands).len() as u64;
         let sampled = |yes| if yes { u64::from(samples) * apart } else { 0 };
         let rays = pixels
             * (u64::from(passes.centre)
@@ -141,12 +141,12 @@ impl Plan {
             images,
             footprint: images.is_some() && scene.camera.pixel_extent().is_some(),
             samples,
-            passes: sample_passes(scene, passes, chosen.lanes.count()),
+            passes: sample_passes(scene, passes, chosen.bands.count()),
             pupil: lens && (passes.mean || passes.light),
             rays,
             quality,
             precision,
-            lanes: chosen.lanes.clone(),
+            bands: chosen.bands.clone(),
             decisions: Vec::new(),
         };
         plan.decisions = plan.explain(scene, &chosen, (needs, passes), triangles);
@@ -197,7 +197,7 @@ impl Plan {
     fn explain(
         &self,
         scene: &Scene,
-        chosen: &LaneChoice,
+        chosen: &BandChoice,
         (needs, passes): (Needs, Passes),
         triangles: u64,
     ) -> Vec<Decision> {
@@ -210,8 +210,8 @@ impl Plan {
         if let Some((choice, because)) = self.explain_passes(passes) {
             decide("passes", &choice, because);
         }
-        let (lanes, because) = expose::explain_lanes(scene, chosen);
-        decide("wavelengths", &lanes, because);
+        let (bands, because) = expose::explain_bands(scene, chosen);
+        decide("wavelengths", &bands, because);
         if let Some((choice, because)) = expose::explain_sensor(scene) {
             decide("sensor", &choice, because);
         }
@@ -319,8 +319,8 @@ impl Plan {
     /// How wavelengths and the pupil of the camera's lens are sampled.
     fn explain_lens(&self, scene: &Scene) -> [(&'static str, &'static str, String); 2] {
         let lens = scene.camera.lens();
-        let groups = scene.camera.lane_groups(&self.lanes).len();
-        let each = lens.map_or(1, |lens| lens.wavelengths_a_group(&self.lanes));
+        let groups = scene.camera.band_groups(&self.bands).len();
+        let each = lens.map_or(1, |lens| lens.wavelengths_a_group(&self.bands));
         let apart = groups > 1 || each > 1;
         let rays = if apart && self.pupil { "their own" } else { "shared" };
         let (pupil, because) = pupil(lens, self.pupil, self.samples);
@@ -396,13 +396,13 @@ fn source_words(scene: &Scene) -> (String, String) {
     ((lights + triangles).to_string(), words)
 }
 
-/// Why wavelengths are traced together or apart, `each` of them a lane.
+/// Why wavelengths are traced together or apart, `each` of them a band.
 fn wavelengths(apart: bool, pupil: bool, each: usize) -> String {
     match (apart, pupil, each) {
         (false, ..) => "no glass or filter of a lens tells them apart".to_owned(),
         (true, true, 1) => "the lens bends or dims each in its own way".to_owned(),
         (true, true, _) => format!(
-            "the lens bends or dims each in its own way, and the widest lane's samples are drawn \
+            "the lens bends or dims each in its own way, and the widest band's samples are drawn \
              from {each} wavelengths"
         ),
         (true, false, _) => "the chief ray at the lens' design wavelength serves all".to_owned(),

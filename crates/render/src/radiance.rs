@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use etendue_camera::{Camera, LaneGroup, PixelSamples, squares, squares_of_pair};
-use etendue_tracer::transport::Beam;
-use etendue_tracer::{Samples, Stage, Tracer};
+use etendue_camera::{BandGroup, Camera, PixelSamples, squares, squares_of_pair};
+use etendue_tracer::transport::RaySamples;
+use etendue_tracer::{LightingContext, Samples, Tracer};
 
 use crate::samples::{Averaged, CAMERA_PAIRS, Memory};
 
@@ -15,12 +15,12 @@ const BATCH: u32 = 1024;
 /// What tracing light needs; nothing of it changes on the way.
 #[derive(Debug)]
 pub(crate) struct LightPass<'a> {
-    pub(crate) stage: Stage<'a>,
+    pub(crate) stage: LightingContext<'a>,
     pub(crate) tracer: &'a dyn Tracer,
-    /// The camera, opened for these lanes.
+    /// The camera, opened for these bands.
     pub(crate) camera: &'a Camera,
-    /// The lanes that the camera sends separate ways.
-    pub(crate) groups: Vec<LaneGroup>,
+    /// The bands that the camera sends separate ways.
+    pub(crate) groups: Vec<BandGroup>,
 }
 
 /// The random numbers of a batch of rays.
@@ -53,7 +53,7 @@ impl Averaged for LightPass<'_> {
         self.camera
     }
 
-    fn groups(&self) -> &[LaneGroup] {
+    fn groups(&self) -> &[BandGroup] {
         &self.groups
     }
 
@@ -65,10 +65,10 @@ impl Averaged for LightPass<'_> {
         BATCH
     }
 
-    fn trace(&self, lanes: &Range<usize>, memory: &mut Memory) {
+    fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
         let Memory { rays, numbers, scratch, values, traffic, .. } = memory;
         numbers.of_ray.clone_from(&rays.sample);
-        let beam = Beam { rays: &rays.rays, samples: numbers, lanes: lanes.clone() };
+        let beam = RaySamples { rays: &rays.rays, samples: numbers, bands: bands.clone() };
         traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, values);
     }
 }

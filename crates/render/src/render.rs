@@ -9,11 +9,12 @@ use etendue_image::Limits;
 use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, TracerSpec};
-use etendue_spectrum::Lanes;
+use etendue_spectrum::Bands;
 use etendue_tracer::texture::ImageError;
 use etendue_tracer::{
-    Direct, Emitters, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind, Lights,
-    Material, Path, Pixel, Spectral, Stage, Surroundings, Tally, Tracer, Traits, View, Whitted,
+    Direct, Emitters, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind,
+    LightingContext, Lights, Material, Path, Pixel, RayStats, SceneView, Spectral, Tracer, Traits,
+    View, Whitted,
 };
 use rayon::prelude::*;
 
@@ -22,7 +23,7 @@ use crate::output::{Development, Layer, Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::report::ImageSize;
 use crate::samples::Sampling;
-use crate::tiles::{Done, Job, Traffic};
+use crate::tiles::{Done, Job, RayCounts};
 use crate::watch::{Stopped, Watch, Watcher};
 use crate::{Plan, expose, lighting, names};
 
@@ -91,14 +92,14 @@ pub struct Rendered {
     /// Samples that every pixel of the picture has. Fewer than were asked for when it was stopped:
     /// then the picture's header says so, by the entry `partial`.
     pub samples: u32,
-    /// The light of the picture in lanes other than red, green and blue, where it was traced so.
-    pub lane_film: Option<expose::LaneFilm>,
+    /// The light of the picture in bands other than red, green and blue, where it was traced so.
+    pub band_film: Option<expose::BandFilm>,
     /// Rays traced, to lights included.
     pub rays: u64,
     /// What became of the rays inside the camera's lens; all 0 without one.
     pub fates: FateCounts,
     /// What of it was light's.
-    pub light: Tally,
+    pub light: RayStats,
     /// Wall time of the tracing alone.
     pub trace_time: Duration,
     /// What a user should know of the picture.
@@ -306,17 +307,17 @@ pub fn render(
     let mut film: Vec<FilmLayer> = plan
         .layers
         .iter()
-        .map(|&layer| FilmLayer::new(layer, width * height, plan.precision, &plan.lanes))
+        .map(|&layer| FilmLayer::new(layer, width * height, plan.precision, &plan.bands))
         .collect();
     let start = Instant::now();
-    let open = |lanes: &Lanes| match plan.pupil {
-        true => scene.camera.opened(lanes).map_err(|e| RenderError::Camera(e.why)),
+    let open = |bands: &Bands| match plan.pupil {
+        true => scene.camera.opened(bands).map_err(|e| RenderError::Camera(e.why)),
         false => Ok(scene.camera.clone()),
     };
-    let camera = open(&Lanes::Rgb)?;
-    let light_camera = if plan.lanes == Lanes::Rgb { camera.clone() } else { open(&plan.lanes)? };
+    let camera = open(&Bands::Rgb)?;
+    let light_camera = if plan.bands == Bands::Rgb { camera.clone() } else { open(&plan.bands)? };
     let surroundings = surroundings(scene, images, plan.samples);
-    let spectral = Spectral::new(&plan.lanes);
+    let spectral = Spectral::new(&plan.bands);
     let mut notes = Vec::new();
     let lit = match scene.tracer.and_then(tracer) {
         Some(tracer) if plan.layers.contains(&LayerSpec::Radiance) => {
@@ -332,7 +333,7 @@ pub fn render(
     };
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
     let light = lit.as_ref().map(|(tracer, lights)| LightPass {
-        stage: Stage {
+        stage: LightingContext {
             accel,
             surroundings,
             lights,
@@ -342,13 +343,13 @@ pub fn render(
         },
         tracer: &**tracer,
         camera: &light_camera,
-        groups: light_camera.lane_groups(&plan.lanes),
+        groups: light_camera.band_groups(&plan.bands),
     });
     let so_far = |layers: &[&FilmLayer], samples| so_far(scene, plan, &header, layers, samples);
     let job = Job {
         accel,
         camera: &camera,
-        groups: camera.lane_groups(&Lanes::Rgb),
+        groups: camera.band_groups(&Bands::Rgb),
         surroundings,
         detail: plan.detail,
         sampling: Sampling {
@@ -361,7 +362,7 @@ pub fn render(
         picture: &so_far,
     };
     let watcher = Watcher::new(watch, job.rays(&film));
-    let Done { traffic: Traffic { chief_rays, light, fates }, samples } =
+    let Done { traffic: RayCounts { chief_rays, light, fates }, samples } =
         job.run(&mut film, &watcher)?;
     let trace_time = start.elapsed();
     if let (true, 0, Some(element)) =
@@ -369,21 +370,21 @@ pub fn render(
     {
         return Err(RenderError::Dark { element, losses: fates.losses() });
     }
-    let (picture, lane_film) = finished(scene, plan, film, marked(header, samples, plan.samples))?;
+    let (picture, band_film) = finished(scene, plan, film, marked(header, samples, plan.samples))?;
     notes.extend(judged(scene, (&camera, accel), &picture));
     let rays = chief_rays + light.rays + light.shadow_rays;
-    Ok(Rendered { picture, samples, lane_film, rays, light, fates, trace_time, notes })
+    Ok(Rendered { picture, samples, band_film, rays, light, fates, trace_time, notes })
 }
 
-/// What the film holds as a picture, and its light in lanes of its own.
+/// What the film holds as a picture, and its light in bands of its own.
 fn finished(
     scene: &Scene,
     plan: &Plan,
     mut film: Vec<FilmLayer>,
     header: Vec<(String, String)>,
-) -> Result<(Picture, Option<expose::LaneFilm>), PictureError> {
+) -> Result<(Picture, Option<expose::BandFilm>), PictureError> {
     let [width, height] = scene.camera.resolution().map(|side| side as usize);
-    let lane_film = film.iter_mut().find_map(|layer| layer.take_lanes(&plan.lanes));
+    let band_film = film.iter_mut().find_map(|layer| layer.take_bands(&plan.bands));
     let mut layers: Vec<Layer> = film
         .into_iter()
         .flat_map(|layer| {
@@ -391,10 +392,10 @@ fn finished(
             layer.into_layers(root)
         })
         .collect();
-    layers.extend(expose::spectrum(scene, &layers, lane_film.as_ref()));
+    layers.extend(expose::spectrum(scene, &layers, band_film.as_ref()));
     let picture = Picture::new(width, height, layers, header)?.with_names(names::tables(scene));
     let development = Development::new(&scene.render, &picture);
-    Ok((picture.developed(development), lane_film))
+    Ok((picture.developed(development), band_film))
 }
 
 /// What a user should know of a finished picture.
@@ -426,7 +427,7 @@ fn so_far(
     let is_picture = |layer: &&&FilmLayer| Some(layer.spec) == scene.picture;
     let picture = layers.iter().filter(is_picture).flat_map(|layer| {
         let mut layer = FilmLayer::clone(layer);
-        layer.take_lanes(&plan.lanes);
+        layer.take_bands(&plan.bands);
         layer.into_layers(true)
     });
     let header = marked(header.to_vec(), samples, plan.samples);
@@ -435,7 +436,7 @@ fn so_far(
     Ok(picture.developed(development))
 }
 
-fn surroundings<'a>(scene: &'a Scene, images: &'a Images, samples: u32) -> Surroundings<'a> {
+fn surroundings<'a>(scene: &'a Scene, images: &'a Images, samples: u32) -> SceneView<'a> {
     let pose = scene.camera.pose();
     // The samples of a pixel share it.
     let share = 1.0 / f64::from(samples).sqrt();
@@ -446,7 +447,7 @@ fn surroundings<'a>(scene: &'a Scene, images: &'a Images, samples: u32) -> Surro
         PixelExtent::Angle(angle) => Pixel::Angle(angle * share),
         PixelExtent::Width(width) => Pixel::Width(width * share),
     });
-    Surroundings {
+    SceneView {
         geometry: &scene.geometry,
         materials: &scene.materials,
         images: &images.decoded,

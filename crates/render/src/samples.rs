@@ -11,16 +11,16 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use etendue_camera::{
-    Camera, CameraRays, FilmSamples, LaneGroup, LensCamera, PixelSamples, Sampler, squares_of_pair,
+    BandGroup, Camera, CameraRays, FilmSamples, LensCamera, PixelSamples, Sampler, squares_of_pair,
 };
 use etendue_geometry::HitBatch;
 use etendue_tracer::{LayerSpec, Scratch};
 use rayon::prelude::*;
 
 use crate::backdrop;
-use crate::film::{Band, FilmLayer, Rows, bands, take};
+use crate::film::{FilmLayer, Rows, Strip, strips, take};
 use crate::radiance::Numbers;
-use crate::tiles::{TILE, Tile, Traffic};
+use crate::tiles::{RayCounts, TILE, Tile};
 use crate::watch::{Stopped, Watcher};
 
 /// Samples of the first pass: they fill the batches of a tile.
@@ -67,16 +67,16 @@ pub(crate) struct Sampling {
 
 /// What is averaged over the samples of a pixel: colours of surfaces, or light.
 pub(crate) trait Averaged: Sync {
-    /// The camera, opened for these lanes.
+    /// The camera, opened for these bands.
     fn camera(&self) -> &Camera;
-    /// The lanes that the camera sends separate ways.
-    fn groups(&self) -> &[LaneGroup];
-    /// Layers, and the lanes of each.
+    /// The bands that the camera sends separate ways.
+    fn groups(&self) -> &[BandGroup];
+    /// Layers, and the bands of each.
     fn shape(&self) -> [usize; 2];
     /// Samples that are traced together.
     fn batch(&self) -> u32;
-    /// Fills `memory.values`, `[ray][layer][lane]`, for the rays of one group of lanes.
-    fn trace(&self, lanes: &Range<usize>, memory: &mut Memory);
+    /// Fills `memory.values`, `[ray][layer][band]`, for the rays of one group of bands.
+    fn trace(&self, bands: &Range<usize>, memory: &mut Memory);
 }
 
 /// One thread's memory for it.
@@ -89,9 +89,9 @@ pub(crate) struct Memory {
     pub(crate) hits: HitBatch,
     pub(crate) colors: [Vec<f64>; 3],
     pub(crate) scratch: Scratch,
-    pub(crate) traffic: Traffic,
+    pub(crate) traffic: RayCounts,
     film: FilmSamples,
-    /// `[pixel of the tile][layer][lane]`.
+    /// `[pixel of the tile][layer][band]`.
     sums: Vec<Sum>,
     order: Vec<u32>,
 }
@@ -124,9 +124,9 @@ pub(crate) struct Averaging<'a> {
     what: &'a dyn Averaged,
     sampling: Sampling,
     layers: Vec<&'a mut FilmLayer>,
-    /// `[pixel][layer][lane]`; empty when there is one pass alone.
+    /// `[pixel][layer][band]`; empty when there is one pass alone.
     sums: Vec<Sum>,
-    /// Threads' memory between bands and passes: made anew each time, its pages are, too.
+    /// Threads' memory between strips and passes: made anew each time, its pages are, too.
     spare: Mutex<Vec<Memory>>,
 }
 
@@ -138,8 +138,8 @@ impl<'a> Averaging<'a> {
         passes: usize,
     ) -> Self {
         let [width, height] = what.camera().resolution().map(|side| side as usize);
-        let [count, lanes] = what.shape();
-        let kept = if passes > 1 { width * height * count * lanes } else { 0 };
+        let [count, bands] = what.shape();
+        let kept = if passes > 1 { width * height * count * bands } else { 0 };
         Self { what, sampling, layers, sums: vec![Sum::default(); kept], spare: Mutex::default() }
     }
 
@@ -149,21 +149,21 @@ impl<'a> Averaging<'a> {
         &mut self,
         pass: &Range<u32>,
         watcher: &Watcher<'_>,
-        traffic: &Mutex<Traffic>,
+        traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
         let Self { what, sampling, layers, sums, spare } = self;
         let spare = &*spare;
         let resolution = what.camera().resolution();
         let kept = split(sums, *what, resolution);
-        let bands = bands(layers, resolution, TILE);
-        bands.par_iter().zip(&kept).try_for_each(|(band, kept)| {
-            let Some(mut band) = take(band) else { return Ok(()) };
+        let strips = strips(layers, resolution, TILE);
+        strips.par_iter().zip(&kept).try_for_each(|(strip, kept)| {
+            let Some(mut strip) = take(strip) else { return Ok(()) };
             let adding = Adding { what: *what, sampling: *sampling, pass, watcher };
             let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
             let mut memory = spare().pop().unwrap_or_default();
-            let done = adding.fill(&mut band, take(kept), &mut memory);
+            let done = adding.fill(&mut strip, take(kept), &mut memory);
             let fates = std::mem::take(&mut memory.rays.fates);
-            Traffic::add(traffic, std::mem::take(&mut memory.traffic), &fates);
+            RayCounts::add(traffic, std::mem::take(&mut memory.traffic), &fates);
             spare().push(memory);
             done
         })
@@ -181,12 +181,12 @@ impl<'a> Averaging<'a> {
             return;
         }
         let resolution = what.camera().resolution();
-        let [count, lanes] = what.shape();
+        let [count, bands] = what.shape();
         let kept = split(sums, *what, resolution);
-        bands(layers, resolution, TILE).par_iter().zip(&kept).for_each(|(band, kept)| {
-            let (Some(mut band), Some(sums)) = (take(band), take(kept)) else { return };
-            for (index, sums) in sums.chunks(count * lanes).enumerate() {
-                put(&mut band, index, sums, lanes, samples);
+        strips(layers, resolution, TILE).par_iter().zip(&kept).for_each(|(strip, kept)| {
+            let (Some(mut strip), Some(sums)) = (take(strip), take(kept)) else { return };
+            for (index, sums) in sums.chunks(count * bands).enumerate() {
+                put(&mut strip, index, sums, bands, samples);
             }
         });
     }
@@ -194,23 +194,23 @@ impl<'a> Averaging<'a> {
 
 type Shared<T> = Mutex<Option<T>>;
 
-/// The sums of each band; of nothing when none are kept.
+/// The sums of each strip; of nothing when none are kept.
 fn split<'s>(
     sums: &'s mut [Sum],
     what: &dyn Averaged,
     [width, height]: [u32; 2],
 ) -> Vec<Shared<&'s mut [Sum]>> {
-    let [count, lanes] = what.shape();
+    let [count, bands] = what.shape();
     if sums.is_empty() {
         return (0..height.div_ceil(TILE)).map(|_| Mutex::new(None)).collect();
     }
-    let a_band = width as usize * TILE as usize * count * lanes;
+    let a_band = width as usize * TILE as usize * count * bands;
     sums.chunks_mut(a_band.max(1)).map(|sums| Mutex::new(Some(sums))).collect()
 }
 
-/// Writes the means of a pixel of a band.
-fn put(band: &mut Band<'_>, index: usize, sums: &[Sum], lanes: usize, samples: u32) {
-    for ((layer, planes), sums) in band.layers.iter_mut().zip(sums.chunks(lanes)) {
+/// Writes the means of a pixel of a strip.
+fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usize, samples: u32) {
+    for ((layer, planes), sums) in strip.layers.iter_mut().zip(sums.chunks(bands)) {
         if let (LayerSpec::Alpha, &[hit, all, none]) = (*layer, sums) {
             planes[0].put(index, backdrop::share([hit, all, none].map(Sum::total)));
             continue;
@@ -221,7 +221,7 @@ fn put(band: &mut Band<'_>, index: usize, sums: &[Sum], lanes: usize, samples: u
     }
 }
 
-/// One pass of a band.
+/// One pass of a strip.
 struct Adding<'a> {
     what: &'a dyn Averaged,
     sampling: Sampling,
@@ -233,14 +233,14 @@ impl Adding<'_> {
     /// Adds to the sums that are kept, or else fills the layers.
     fn fill(
         &self,
-        band: &mut Band<'_>,
+        strip: &mut Strip<'_>,
         mut kept: Option<&mut [Sum]>,
         memory: &mut Memory,
     ) -> Result<(), Stopped> {
         let [width, _] = self.what.camera().resolution();
-        let [layers, lanes] = self.what.shape();
-        let count = layers * lanes;
-        for tile in Tile::across(width, band) {
+        let [layers, bands] = self.what.shape();
+        let count = layers * bands;
+        for tile in Tile::across(width, strip) {
             let pixels: Vec<(u32, u32)> = tile.pixels().collect();
             let places = pixels.iter().map(|&(x, y)| tile.index(x, y, width));
             memory.sums.clear();
@@ -254,7 +254,7 @@ impl Adding<'_> {
             for (at, sums) in places.zip(memory.sums.chunks(count)) {
                 match &mut kept {
                     Some(kept) => kept[at * count..(at + 1) * count].copy_from_slice(sums),
-                    None => put(band, at, sums, lanes, self.pass.end),
+                    None => put(strip, at, sums, bands, self.pass.end),
                 }
             }
         }
@@ -262,11 +262,11 @@ impl Adding<'_> {
     }
 
     fn tile(&self, tile: Tile, pixels: &[(u32, u32)], memory: &mut Memory) -> Result<(), Stopped> {
-        let [layers, lanes] = self.what.shape();
+        let [layers, bands] = self.what.shape();
         let at_once = (self.pass.end - self.pass.start).clamp(1, self.what.batch());
         let pixels_at_once = (self.what.batch() / at_once) as usize;
         for (k, pixels) in pixels.chunks(pixels_at_once).enumerate() {
-            let start = k * pixels_at_once * layers * lanes;
+            let start = k * pixels_at_once * layers * bands;
             for first in self.pass.clone().step_by(at_once as usize) {
                 let range = first..self.pass.end.min(first + at_once);
                 let a_pixel = range.len();
@@ -274,8 +274,8 @@ impl Adding<'_> {
                 for group in self.what.groups() {
                     memory.film.wavelength = group.wavelength;
                     self.what.camera().sample_rays(&memory.film, &mut memory.rays);
-                    self.what.trace(&group.lanes, memory);
-                    memory.add(start, a_pixel, [layers, lanes], &group.lanes);
+                    self.what.trace(&group.bands, memory);
+                    memory.add(start, a_pixel, [layers, bands], &group.bands);
                 }
                 self.watcher.did(pixels.len() as u64 * a_pixel as u64)?;
             }
@@ -324,16 +324,16 @@ impl Memory {
         &mut self,
         start: usize,
         a_pixel: usize,
-        [layers, lanes]: [usize; 2],
+        [layers, bands]: [usize; 2],
         group: &Range<usize>,
     ) {
         let Self { rays: CameraRays { sample, weight, .. }, values, sums, order, .. } = self;
-        let count = layers * lanes;
+        let count = layers * bands;
         let mut add = |ray: usize| {
             let at = start + sample[ray] as usize / a_pixel * count;
             let sums = &mut sums[at..at + count];
             let values = &values[ray * count..(ray + 1) * count];
-            for first in (0..count).step_by(lanes.max(1)) {
+            for first in (0..count).step_by(bands.max(1)) {
                 for k in first + group.start..first + group.end {
                     sums[k].add(values[k] * weight[ray]);
                 }

@@ -4,14 +4,14 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use etendue_accel::Accel;
-use etendue_camera::{Camera, CameraRays, LaneGroup};
+use etendue_camera::{BandGroup, Camera, CameraRays};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_optics::element::FateCounts;
-use etendue_tracer::{LayerSpec, NormalKind, Surroundings, Tally, Traced};
+use etendue_tracer::{LayerSpec, NormalKind, RayStats, SceneView, Traced};
 use rayon::prelude::*;
 
 use crate::backdrop;
-use crate::film::{Band, FilmLayer, Rows, bands, single, take};
+use crate::film::{FilmLayer, Rows, Strip, single, strips, take};
 use crate::output::{Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::samples::{Averaged, Averaging, Memory, Sampling};
@@ -32,8 +32,8 @@ pub(crate) struct Job<'a> {
     pub(crate) accel: &'a dyn Accel,
     pub(crate) camera: &'a Camera,
     /// The colours of coloured layers that the camera traces apart.
-    pub(crate) groups: Vec<LaneGroup>,
-    pub(crate) surroundings: Surroundings<'a>,
+    pub(crate) groups: Vec<BandGroup>,
+    pub(crate) surroundings: SceneView<'a>,
     pub(crate) detail: Detail,
     pub(crate) sampling: Sampling,
     /// Which samples are taken of every pixel before the next are taken of any.
@@ -46,16 +46,16 @@ pub(crate) struct Job<'a> {
 
 /// What was traced.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Traffic {
+pub(crate) struct RayCounts {
     /// Rays of the camera for layers without light.
     pub(crate) chief_rays: u64,
     /// Rays of the radiance pass.
-    pub(crate) light: Tally,
+    pub(crate) light: RayStats,
     /// What became of rays inside the camera's lens.
     pub(crate) fates: FateCounts,
 }
 
-impl Traffic {
+impl RayCounts {
     /// Adds what one thread traced, and the fates of its rays.
     pub(crate) fn add(all: &Mutex<Self>, own: Self, fates: &FateCounts) {
         let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
@@ -69,7 +69,7 @@ impl Traffic {
 /// What of a job was done.
 #[derive(Debug)]
 pub(crate) struct Done {
-    pub(crate) traffic: Traffic,
+    pub(crate) traffic: RayCounts,
     /// Samples that every pixel has.
     pub(crate) samples: u32,
 }
@@ -82,7 +82,7 @@ impl Job<'_> {
         film: &mut [FilmLayer],
         watcher: &Watcher<'_>,
     ) -> Result<Done, Stopped> {
-        let traffic = Mutex::new(Traffic::default());
+        let traffic = Mutex::new(RayCounts::default());
         let (lit, seen): (Vec<_>, Vec<_>) =
             film.iter_mut().partition(|layer| layer.spec == LayerSpec::Radiance);
         let (mut mean, mut centre): (Vec<_>, Vec<_>) =
@@ -127,7 +127,7 @@ impl Job<'_> {
         &self,
         averaged: &mut [Averaging<'_>],
         watcher: &Watcher<'_>,
-        traffic: &Mutex<Traffic>,
+        traffic: &Mutex<RayCounts>,
     ) -> Result<u32, Stopped> {
         let all = self.sampling.samples;
         if averaged.is_empty() {
@@ -159,34 +159,34 @@ impl Job<'_> {
         &self,
         layers: &mut [&mut FilmLayer],
         watcher: &Watcher<'_>,
-        traffic: &Mutex<Traffic>,
+        traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
         if layers.is_empty() {
             return Ok(());
         }
         let [width, height] = self.camera.resolution();
-        bands(layers, [width, height], TILE).par_iter().try_for_each(|band| {
-            let Some(mut band) = take(band) else { return Ok(()) };
+        strips(layers, [width, height], TILE).par_iter().try_for_each(|strip| {
+            let Some(mut strip) = take(strip) else { return Ok(()) };
             let mut batch = Batch::new(self.detail);
-            let done = self.fill(&mut band, width, &mut batch, watcher);
-            let own = Traffic { chief_rays: batch.traced, ..Traffic::default() };
-            Traffic::add(traffic, own, &FateCounts::default());
+            let done = self.fill(&mut strip, width, &mut batch, watcher);
+            let own = RayCounts { chief_rays: batch.traced, ..RayCounts::default() };
+            RayCounts::add(traffic, own, &FateCounts::default());
             done
         })
     }
 
     fn fill(
         &self,
-        band: &mut Band<'_>,
+        strip: &mut Strip<'_>,
         width: u32,
         batch: &mut Batch,
         watcher: &Watcher<'_>,
     ) -> Result<(), Stopped> {
-        for tile in Tile::across(width, band) {
+        for tile in Tile::across(width, strip) {
             batch.aim_at_centres(self.camera, tile);
             self.accel.closest(&batch.rays, &mut batch.hits);
             batch.traced += batch.rays.len() as u64;
-            for (layer, planes) in &mut band.layers {
+            for (layer, planes) in &mut strip.layers {
                 if !self.write_batch(*layer, planes, batch) {
                     self.write(*layer, planes, batch, tile, width);
                 }
@@ -333,7 +333,7 @@ impl Averaged for Colors<'_> {
         self.job.camera
     }
 
-    fn groups(&self) -> &[LaneGroup] {
+    fn groups(&self) -> &[BandGroup] {
         &self.job.groups
     }
 
@@ -345,7 +345,7 @@ impl Averaged for Colors<'_> {
         BATCH
     }
 
-    fn trace(&self, lanes: &Range<usize>, memory: &mut Memory) {
+    fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
         let Memory { rays: CameraRays { rays, .. }, hits, colors, values, traffic, .. } = memory;
         hits.detail = self.job.detail;
         self.job.accel.closest(rays, hits);
@@ -354,7 +354,7 @@ impl Averaged for Colors<'_> {
         values.resize(rays.len() * count, 0.0);
         for (k, layer) in self.layers.iter().enumerate() {
             self.job.colors(*layer, Traced { rays, hits }, colors);
-            for c in lanes.clone() {
+            for c in bands.clone() {
                 for (values, color) in values.chunks_mut(count).zip(&colors[c]) {
                     values[3 * k + c] = *color;
                 }
@@ -373,9 +373,9 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
-    /// The tiles of a band, from left to right.
-    pub(crate) fn across(width: u32, band: &Band<'_>) -> impl Iterator<Item = Self> + use<> {
-        let (top, height) = (band.top, band.height);
+    /// The tiles of a strip, from left to right.
+    pub(crate) fn across(width: u32, strip: &Strip<'_>) -> impl Iterator<Item = Self> + use<> {
+        let (top, height) = (strip.top, strip.height);
         let lefts = (0..width).step_by(TILE as usize);
         lefts.map(move |left| Self { left, top, width: TILE.min(width - left), height })
     }
@@ -388,7 +388,7 @@ impl Tile {
             .filter(move |&(x, y)| x < self.width && y < self.height)
     }
 
-    /// Where a pixel of the tile stands in the rows of its band.
+    /// Where a pixel of the tile stands in the rows of its strip.
     pub(crate) fn index(self, x: u32, y: u32, width: u32) -> usize {
         y as usize * width as usize + (self.left + x) as usize
     }
@@ -407,7 +407,7 @@ struct Batch {
     rows: Vec<f64>,
     /// The tile of the chief rays.
     tile: Option<Tile>,
-    /// The pixel of each chief ray, from the tile's corner, and its place in the band's rows.
+    /// The pixel of each chief ray, from the tile's corner, and its place in the strip's rows.
     pixels: Vec<(u32, u32)>,
     places: Vec<u32>,
     /// One number of each ray, three times.
@@ -431,7 +431,7 @@ impl Batch {
     }
 
     fn aim_at_centres(&mut self, camera: &Camera, tile: Tile) {
-        // Most tiles of a band are of one size, and their pixels stand in the same order.
+        // Most tiles of a strip are of one size, and their pixels stand in the same order.
         if self.tile.is_none_or(|last| (last.width, last.height) != (tile.width, tile.height)) {
             self.pixels.clear();
             self.pixels.extend(tile.pixels());

@@ -10,7 +10,7 @@ use etendue_render::output::{
 };
 use serde_json::{Map, Value, json};
 
-// Neither side a multiple of a block's 16 rows, nor of a vector's lanes.
+// Neither side a multiple of a block's 16 rows, nor of a vector's bands.
 const WIDTH: usize = 83;
 const HEIGHT: usize = 53;
 

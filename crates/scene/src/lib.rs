@@ -34,7 +34,7 @@ pub mod import;
 mod instances;
 mod light_notes;
 mod load;
-mod looks;
+mod materials;
 pub mod memory;
 mod npy;
 mod parts;

@@ -10,7 +10,7 @@ use std::time::SystemTime;
 use etendue_camera::{Camera, CameraError, CameraSpec};
 use etendue_geometry::{Bounds, Geometry, Transform};
 use etendue_sensor::Sensor;
-use etendue_spectrum::Lanes;
+use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
 
@@ -422,7 +422,7 @@ impl SceneFile {
     /// that is traced are an error when strict.
     fn lens_notes(&self, camera: &Camera, strictness: Strictness) -> Result<Vec<Note>, SceneError> {
         let Some(lens) = camera.lens() else { return Ok(Vec::new()) };
-        let guesses = lens.out_of_range(&Lanes::Rgb);
+        let guesses = lens.out_of_range(&Bands::Rgb);
         if let (Strictness::Strict, Some(guess)) = (strictness, guesses.first()) {
             return Err(self.fault("camera", guess.as_str()));
         }

@@ -2,7 +2,7 @@
 //! approximation?
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use etendue_sensor::{Film, NoiseModel, Sensor, Shot};
+use etendue_sensor::{Exposure, Film, NoiseModel, Sensor};
 use rayon::ThreadPoolBuilder;
 
 /// Columns and rows of a sensor of 20 megapixels.
@@ -23,7 +23,7 @@ fn sensor() -> Sensor {
 fn exposure(criterion: &mut Criterion) {
     let exact = sensor();
     let pixels = SIDES[0] as usize * SIDES[1] as usize;
-    let shot = Shot { exposure: 0.01, frame: 0 };
+    let shot = Exposure { exposure: 0.01, frame: 0 };
     let mut group = criterion.benchmark_group("exposure");
     group.sample_size(10).throughput(Throughput::Elements(pixels as u64));
     let even = |electrons: f32| vec![electrons / FULL; pixels];

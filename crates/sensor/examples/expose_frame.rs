@@ -9,7 +9,7 @@
 use std::error::Error;
 use std::time::Instant;
 
-use etendue_sensor::{Film, NoiseModel, Sensor, Shot};
+use etendue_sensor::{Exposure, Film, NoiseModel, Sensor};
 use rayon::ThreadPoolBuilder;
 
 /// Full scale (e⁻).
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for frame in 0..=rounds {
         for (sensor, seconds) in sensors.iter().zip(&mut seconds) {
             let start = Instant::now();
-            let shot = Shot { exposure: 0.01, frame };
+            let shot = Exposure { exposure: 0.01, frame };
             let image = pool.install(|| sensor.expose(Film { values: &film }, shot, 0))?;
             let taken = start.elapsed().as_secs_f64();
             assert_eq!(image.values.len(), film.len());

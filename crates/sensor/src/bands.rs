@@ -11,7 +11,7 @@
 //! Electrons count as right within [`TOLERANCE`] of themselves; of colours darker than a tenth of
 //! white, within that of a tenth of white, and behind two pure colours within that of white.
 
-use etendue_spectrum::{Curve, Grid, Lanes, Outside, WeightedBands, rgb};
+use etendue_spectrum::{Bands, Curve, Grid, Outside, WeightedBands, rgb};
 
 use crate::response::{Filter, Response, filters, photons_caught, sensitive_range};
 use crate::spec::{Radiometry, SensorKind};
@@ -54,18 +54,18 @@ pub struct Illumination {
     pub colored: usize,
 }
 
-/// Lanes for a sensor, and what they lose.
+/// Bands for a sensor, and what they lose.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LaneChoice {
-    /// The lanes.
-    pub lanes: Lanes,
+pub struct BandChoice {
+    /// The bands.
+    pub bands: Bands,
     /// The worst relative error of any channel's electrons under any light and colour; `None` where
     /// nobody counts photons, or nobody worked it out.
     pub error: Option<f64>,
 }
 
 impl Sensor {
-    /// The fewest lanes in which a render counts this sensor's electrons right, or its own `bands`.
+    /// The fewest bands in which a render counts this sensor's electrons right, or its own `bands`.
     ///
     /// In digital mode a sensor without curves keeps the three colours, or the one, that it tells
     /// apart: its light is a picture's.
@@ -73,13 +73,13 @@ impl Sensor {
     /// # Errors
     ///
     /// When the sensor sees nothing of the light.
-    pub fn lanes_under(&self, light: &Illumination) -> Result<LaneChoice, SensorError> {
+    pub fn bands_under(&self, light: &Illumination) -> Result<BandChoice, SensorError> {
         let spec = self.spec();
         let counts = self.settings.radiometry == Radiometry::Physical;
-        let ideal = matches!(self.response.lanes, Lanes::Grey | Lanes::Rgb);
+        let ideal = matches!(self.response.bands, Bands::Grey | Bands::Rgb);
         let multispectral = spec.kind == SensorKind::Multispectral && spec.bands.is_some();
         if !counts && (ideal || spec.bands.is_some()) {
-            return Ok(LaneChoice { lanes: self.response.lanes.clone(), error: None });
+            return Ok(BandChoice { bands: self.response.bands.clone(), error: None });
         }
         let filters = filters(spec)?.filters;
         let given = spec.bands.as_ref().map(|grid| grid.edges().to_vec());
@@ -89,12 +89,12 @@ impl Sensor {
         };
         let edges = given.clone().unwrap_or(range.to_vec());
         let Some(table) = Table::new(self, &filters, light, range, &edges) else {
-            return Ok(LaneChoice { lanes: self.response.lanes.clone(), error: None });
+            return Ok(BandChoice { bands: self.response.bands.clone(), error: None });
         };
         if ideal {
             let error = table.error_of(&self.response, &filters, &self.settings.efficiency, light);
             if error <= TOLERANCE {
-                return Ok(LaneChoice { lanes: self.response.lanes.clone(), error: Some(error) });
+                return Ok(BandChoice { bands: self.response.bands.clone(), error: Some(error) });
             }
         }
         let fixed = table.cells_at(&edges);
@@ -102,13 +102,13 @@ impl Sensor {
         let cells = if may_divide { table.divided(&fixed) } else { fixed };
         let error = Some(table.worst(&cells));
         let edges = cells.iter().map(|&cell| table.edges[cell]).collect();
-        let lanes = match Grid::from_edges(edges) {
-            Ok(grid) => Lanes::Weighted(
+        let bands = match Grid::from_edges(edges) {
+            Ok(grid) => Bands::Weighted(
                 WeightedBands::new(grid, table.sensitivity, table.mean_light).into(),
             ),
-            Err(_) => self.response.lanes.clone(),
+            Err(_) => self.response.bands.clone(),
         };
-        Ok(LaneChoice { lanes, error })
+        Ok(BandChoice { bands, error })
     }
 }
 
@@ -285,7 +285,7 @@ impl Table {
         let (seen, weight) = (over(&self.seen), over(&self.weight));
         let mut counted = 0.0;
         if seen > 0.0 && weight > 0.0 {
-            // 1 in the lane is the mean light, scaled to a mean of 1.
+            // 1 in the band is the mean light, scaled to a mean of 1.
             counted = over(&self.channels[trial.channel]) * seen / weight;
             counted *= over(&self.lights[trial.light]) / seen;
             for k in trial.colors.into_iter().flatten() {
@@ -324,8 +324,8 @@ impl Table {
     fn divided(&self, fixed: &[usize]) -> Vec<usize> {
         let mut cells = fixed.to_vec();
         while cells.len() <= MOST_BANDS && self.worst(&cells) > TOLERANCE {
-            let bands = cells.windows(2).filter(|ends| ends[1] - ends[0] > 1);
-            let lossy = bands
+            let pairs = cells.windows(2).filter(|ends| ends[1] - ends[0] > 1);
+            let lossy = pairs
                 .map(|ends| [ends[0], ends[1]])
                 .max_by(|a, b| self.worst_of(*a).total_cmp(&self.worst_of(*b)));
             let Some(band) = lossy else { break };
@@ -377,7 +377,7 @@ impl Table {
         }
     }
 
-    /// What a sensor loses in lanes that are not bands.
+    /// What a sensor loses in bands that are not bands.
     fn error_of(
         &self,
         response: &Response,
@@ -385,20 +385,20 @@ impl Table {
         efficiency: &Curve,
         light: &Illumination,
     ) -> f64 {
-        let lanes = &response.lanes;
-        let count = lanes.count();
-        let in_lanes = |curve: &Curve, outside| {
-            lanes.from_curve(curve, outside).unwrap_or_else(|_| vec![0.0; count])
+        let bands = &response.bands;
+        let count = bands.count();
+        let in_bands = |curve: &Curve, outside| {
+            bands.from_curve(curve, outside).unwrap_or_else(|_| vec![0.0; count])
         };
         let electrons: Vec<Vec<f64>> = filters
             .iter()
-            .map(|f| (0..count).map(|i| photons_caught(lanes, i, f, efficiency)).collect())
+            .map(|f| (0..count).map(|i| photons_caught(bands, i, f, efficiency)).collect())
             .collect();
         let even = [Curve::ONE];
         let spectra = if light.spectra.is_empty() { &even[..] } else { &light.spectra };
-        let spectra: Vec<_> = spectra.iter().map(|s| in_lanes(s, Outside::Zero)).collect();
-        let passed: Vec<_> = light.filters.iter().map(|t| in_lanes(t, Outside::Held)).collect();
-        let colors = lanes.from_rgb();
+        let spectra: Vec<_> = spectra.iter().map(|s| in_bands(s, Outside::Zero)).collect();
+        let passed: Vec<_> = light.filters.iter().map(|t| in_bands(t, Outside::Held)).collect();
+        let colors = bands.from_rgb();
         let off = |trial: &Trial| {
             let counted = |i: usize| {
                 let colors = trial.colors.into_iter().flatten().map(|k| colors[i][k]);

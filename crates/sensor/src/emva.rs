@@ -25,7 +25,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::even_light::EvenLight;
-use crate::film::Shot;
+use crate::film::Exposure;
 use crate::{NoiseModel, RawImage, Sensor, SensorError};
 
 /// Frames of each kind at half saturation.
@@ -123,7 +123,7 @@ pub struct Series {
 struct Picture<'a> {
     name: &'a str,
     photons: f64,
-    shot: Shot,
+    shot: Exposure,
 }
 
 impl Series {
@@ -242,7 +242,7 @@ impl Series {
         let numbered = named.zip(0..).map(|((exposure, photons, name), frame)| Picture {
             name,
             photons,
-            shot: Shot { exposure, frame },
+            shot: Exposure { exposure, frame },
         });
         numbered.collect()
     }

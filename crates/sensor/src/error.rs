@@ -62,14 +62,14 @@ pub enum SensorError {
         /// The letter.
         letter: char,
     },
-    /// A channel that sees nothing of the spectral lanes.
+    /// A channel that sees nothing of the spectral bands.
     Blind {
         /// Which key holds the curve.
         key: &'static str,
         /// Which channel.
         channel: String,
-        /// The range of the lanes (nm).
-        lanes: [f64; 2],
+        /// The range of the bands (nm).
+        bands: [f64; 2],
     },
     /// Light of which the sensor sees nothing.
     Dark {
@@ -91,8 +91,8 @@ pub enum SensorError {
         width: usize,
         /// Rows.
         height: usize,
-        /// Lanes of the sensor.
-        lanes: usize,
+        /// Bands of the sensor.
+        bands: usize,
     },
     /// A series that is too short to be characterised, or too long.
     Steps {
@@ -152,7 +152,7 @@ impl SensorError {
                 "names the filter `{letter}`, for which there is no curve: add it to `filters`, or \
                  use r, g, b or w"
             ),
-            Self::Blind { channel, lanes: [from, to], .. } => format!(
+            Self::Blind { channel, bands: [from, to], .. } => format!(
                 "the channel `{channel}` sees nothing of {from}..={to} nm, the wavelengths that are \
                  rendered: the image would be black; give it a curve (in `filters`, or as \
                  `quantum_efficiency`) or `bands` that overlap; ideal r, g and b pass visible light alone"
@@ -165,10 +165,10 @@ impl SensorError {
             Self::BlindAt { wavelength } => format!(
                 "the sensor has no quantum efficiency at {wavelength} nm: choose another --wavelength"
             ),
-            Self::Film { film, width, height, lanes } => format!(
-                "the film has {film} values, {width} × {height} pixels of {lanes} spectral lanes \
+            Self::Film { film, width, height, bands } => format!(
+                "the film has {film} values, {width} × {height} pixels of {bands} spectral bands \
                  need {}",
-                width * height * lanes
+                width * height * bands
             ),
             Self::Steps { steps } => {
                 format!("{steps} exposure steps asked for: a characterisation needs 20 to 10000")

@@ -1,8 +1,8 @@
 //! A sensor before an even light of known photons: what a characterisation looks at.
 
-use etendue_spectrum::Lanes;
+use etendue_spectrum::Bands;
 
-use crate::film::{Film, RawImage, Shot};
+use crate::film::{Exposure, Film, RawImage};
 use crate::response::{Channel, Response};
 use crate::spec::Radiometry;
 use crate::{Sensor, SensorError};
@@ -36,7 +36,7 @@ impl EvenLight {
         let [width, height] = sensor.resolution();
         let mut corner = sensor.clone().with_resolution([width.min(size[0]), height.min(size[1])]);
         corner.replace_response(Response {
-            lanes: Lanes::Grey,
+            bands: Bands::Grey,
             channels: vec![Channel {
                 name: "Y".into(),
                 electrons: vec![1.0],
@@ -61,7 +61,7 @@ impl EvenLight {
     pub(crate) fn frame(
         &self,
         photons: f64,
-        shot: Shot,
+        shot: Exposure,
         seed: u64,
     ) -> Result<RawImage, SensorError> {
         let [width, height] = self.size().map(|side| side as usize);
@@ -74,7 +74,7 @@ impl EvenLight {
         f64::from(self.film_value(photons)) / self.efficiency
     }
 
-    /// Electrons: one lane of light is worth one.
+    /// Electrons: one band of light is worth one.
     #[expect(clippy::cast_possible_truncation, reason = "films hold f32; `rounded` tells")]
     fn film_value(&self, photons: f64) -> f32 {
         (photons * self.efficiency).min(f64::from(f32::MAX)) as f32
@@ -82,7 +82,7 @@ impl EvenLight {
 }
 
 impl Sensor {
-    /// Electrons straight from the film: lanes are worth what `response` says, whatever the exposure.
+    /// Electrons straight from the film: bands are worth what `response` says, whatever the exposure.
     fn replace_response(&mut self, response: Response) {
         self.response = response;
         self.cfa = None;

@@ -2,16 +2,16 @@
 
 use serde::Serialize;
 
-/// The light of a render, as the sensor's [`lanes`](crate::Sensor::lanes) want it.
+/// The light of a render, as the sensor's [`bands`](crate::Sensor::bands) want it.
 #[derive(Debug, Clone, Copy)]
 pub struct Film<'a> {
-    /// `[row][column][lane]`: intensities (1 is full scale) or irradiances (W·m⁻²·nm⁻¹).
+    /// `[row][column][band]`: intensities (1 is full scale) or irradiances (W·m⁻²·nm⁻¹).
     pub values: &'a [f32],
 }
 
 /// One exposure of a film.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Shot {
+pub struct Exposure {
     /// Exposure time T (s).
     pub exposure: f64,
     /// Number of the frame: temporal noise differs from frame to frame.
@@ -30,7 +30,7 @@ pub struct RawImage {
     /// `[row][column][channel]` (DN).
     pub values: Vec<u16>,
     /// What of the film was no light.
-    pub flaws: Flaws,
+    pub invalid: InvalidValues,
 }
 
 /// The expected value and the variance of every pixel over frames.
@@ -47,26 +47,26 @@ pub struct Moments {
     /// `[row][column][channel]` (DN²).
     pub variance: Vec<f32>,
     /// What of the film was no light.
-    pub flaws: Flaws,
+    pub invalid: InvalidValues,
 }
 
 /// Values of a film that are no light and were taken for none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Flaws {
+pub struct InvalidValues {
     /// Negative values.
     pub negative: u64,
     /// Values that are NaN or infinite.
     pub not_finite: u64,
 }
 
-impl Flaws {
+impl InvalidValues {
     /// Whether there are any.
     #[must_use]
     pub fn any(self) -> bool {
         self.negative + self.not_finite > 0
     }
 
-    /// The flaws of these values.
+    /// The invalid ones of these values.
     pub(crate) fn of(values: &[f32]) -> Self {
         let count =
             |flaw: &dyn Fn(f32) -> bool| values.iter().filter(|value| flaw(**value)).count() as u64;

@@ -7,7 +7,7 @@
 //! * Numbers carry EMVA's names and units: electrons (e⁻), digital numbers (DN), seconds,
 //!   micrometres of pixel pitch, nanometres of wavelength, kelvin.
 //! * The system gain K is in DN/e⁻; what data sheets call e⁻/DN is its inverse.
-//! * A film is `[row][column][lane]`, an image `[row][column][channel]`; row 0 is the top.
+//! * A film is `[row][column][band]`, an image `[row][column][channel]`; row 0 is the top.
 //! * Fixed patterns follow from the serial number and the pixel, temporal noise from the seed, the
 //!   serial number, the frame and the pixel: the same image for any number of threads, and a crop is
 //!   a crop.
@@ -21,7 +21,7 @@
 //!     r#"{ "type": "raw", "model": "imx183", "quantum_efficiency": 0.8, "resolution": [64, 48] }"#,
 //! )?;
 //! let sensor = Sensor::new(&spec)?;
-//! let grey = vec![0.18; 64 * 48 * sensor.lanes().count()];
+//! let grey = vec![0.18; 64 * 48 * sensor.bands().count()];
 //! for shot in sensor.shots() {
 //!     let image = sensor.expose(Film { values: &grey }, shot, 0)?;
 //!     let mean = image.values.iter().map(|&y| f64::from(y)).sum::<f64>() / (64.0 * 48.0);
@@ -58,7 +58,6 @@ pub mod emva;
 mod error;
 mod even_light;
 pub mod film;
-mod light;
 mod normal;
 mod philox;
 pub mod photon_transfer;
@@ -67,14 +66,15 @@ pub mod preset;
 mod presets;
 mod preview;
 mod response;
+mod responsivity;
 pub mod sensor;
 mod settings;
 pub mod spec;
 
-pub use bands::{Illumination, LaneChoice};
+pub use bands::{BandChoice, Illumination};
 pub use cfa::CfaSpec;
 pub use error::SensorError;
-pub use film::{Film, Flaws, Moments, RawImage, Shot};
+pub use film::{Exposure, Film, InvalidValues, Moments, RawImage};
 pub use philox::mixed_seed;
 pub use preset::{Model, Preset};
 pub use sensor::Sensor;

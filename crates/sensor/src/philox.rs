@@ -16,7 +16,7 @@ const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 
 const ROUNDS: usize = 10;
 
-/// The low half of a 64-bit lane.
+/// The low half of a 64-bit band.
 const LOW: u64 = 0xFFFF_FFFF;
 
 /// A random sequence: the seed of temporal noise, or the serial number of a sensor.

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::approximation::electrons_needed;
 use crate::even_light::EvenLight;
-use crate::film::{RawImage, Shot};
+use crate::film::{Exposure, RawImage};
 use crate::{NoiseModel, Sensor, SensorError};
 
 /// How curves are taken.
@@ -164,7 +164,7 @@ impl Bench<'_> {
         let light = self.light.with_noise(noise);
         let frame = |photons, number: usize| {
             #[expect(clippy::cast_possible_truncation, reason = "four frames a point")]
-            let shot = Shot { exposure: self.exposure, frame: (4 * index + number) as u32 };
+            let shot = Exposure { exposure: self.exposure, frame: (4 * index + number) as u32 };
             light.frame(photons, shot, self.seed)
         };
         let [first, second] = [frame(photons, 0)?, frame(photons, 1)?];

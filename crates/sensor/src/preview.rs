@@ -1,7 +1,7 @@
 //! Pictures to look at: black taken away, missing colours found, white balanced, in sRGB. The raw
 //! image stays as it is.
 
-use etendue_spectrum::Lanes;
+use etendue_spectrum::Bands;
 use etendue_spectrum::colour::srgb_encode;
 use rayon::prelude::*;
 
@@ -30,11 +30,11 @@ impl Sensor {
     #[must_use]
     pub fn srgb_from_channels(&self) -> Vec<[f64; 3]> {
         let white = self.white_response();
-        if let Lanes::Bands(_) | Lanes::Weighted(_) = self.lanes()
-            && self.channels().len() == self.lanes().count()
-            && self.is_one_lane_a_channel()
+        if let Bands::Spectral(_) | Bands::Weighted(_) = self.bands()
+            && self.channels().len() == self.bands().count()
+            && self.is_one_band_a_channel()
         {
-            let rows = self.lanes().to_rgb();
+            let rows = self.bands().to_rgb();
             return rows
                 .iter()
                 .zip(white)
@@ -58,10 +58,10 @@ impl Sensor {
         rows.into_iter().map(|row| row.map(|value| value / most)).collect()
     }
 
-    fn is_one_lane_a_channel(&self) -> bool {
+    fn is_one_band_a_channel(&self) -> bool {
         (0..self.channels().len()).all(|channel| {
             let electrons = self.electrons_per_unit(channel).iter().enumerate();
-            electrons.filter(|(lane, value)| *lane != channel && **value > 0.0).count() == 0
+            electrons.filter(|(band, value)| *band != channel && **value > 0.0).count() == 0
         })
     }
 

@@ -1,17 +1,17 @@
-//! From the spectral lanes of a render to mean photo-electrons: which filter a pixel has, and what
-//! a lane is worth behind it.
+//! From the spectral bands of a render to mean photo-electrons: which filter a pixel has, and what
+//! a band is worth behind it.
 //!
 //! # The two modes
 //!
-//! *Physical*: a lane holds spectral irradiance E (W·m⁻²·nm⁻¹), and a pixel of area A exposed for T
+//! *Physical*: a band holds spectral irradiance E (W·m⁻²·nm⁻¹), and a pixel of area A exposed for T
 //! gets μₑ = T·A·Σ E·∫ shape(λ)·η(λ)·λ/(hc) dλ electrons, η being quantum efficiency times filter.
 //!
-//! *Digital*: a lane holds an intensity whose 1 is full scale. The same integral is divided by that
+//! *Digital*: a band holds an intensity whose 1 is full scale. The same integral is divided by that
 //! of a sensor which catches every photon of the channel, and by the most sensitive channel's value:
-//! so 1 in all lanes is 1 in that channel and less in others, as with white light on a real sensor.
+//! so 1 in all bands is 1 in that channel and less in others, as with white light on a real sensor.
 //! The grey value g = intensity·(2ᵇ − 1 − black) fixes μₑ = g/K, whatever the exposure time.
 
-use etendue_spectrum::{Band, Curve, Grid, Lanes, PLANCK, SPEED_OF_LIGHT, VISIBLE, integral, rgb};
+use etendue_spectrum::{Band, Bands, Curve, Grid, PLANCK, SPEED_OF_LIGHT, VISIBLE, integral, rgb};
 
 use crate::philox::MOST_CHANNELS;
 use crate::preset::nikon_d5100;
@@ -28,17 +28,17 @@ pub(crate) const BAND_WIDTH: f64 = 10.0;
 pub(crate) struct Channel {
     /// A filter's letter, or a band's wavelength.
     pub(crate) name: String,
-    /// Mean photo-electrons a unit of each lane makes: a second in physical mode, in digital mode
+    /// Mean photo-electrons a unit of each band makes: a second in physical mode, in digital mode
     /// all that there are.
     pub(crate) electrons: Vec<f64>,
-    /// The same of light that is red, green or blue, as the render's colours are, in no lanes.
+    /// The same of light that is red, green or blue, as the render's colours are, in no bands.
     pub(crate) primaries: [f64; 3],
 }
 
 /// What the sensor makes of light.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Response {
-    pub(crate) lanes: Lanes,
+    pub(crate) bands: Bands,
     pub(crate) channels: Vec<Channel>,
     /// For a sensor of one channel a pixel: which, by the pattern's rows and columns.
     pub(crate) pattern: Option<Vec<Vec<usize>>>,
@@ -121,21 +121,21 @@ pub(crate) fn sensitive_range(efficiency: &Curve, filters: &[Filter]) -> Option<
 }
 
 impl Response {
-    /// For the fewest lanes that the sensor can tell apart, or for given ones.
+    /// For the fewest bands that the sensor can tell apart, or for given ones.
     pub(crate) fn new(
         spec: &SensorSpec,
         settings: &Settings,
-        given: Option<Lanes>,
+        given: Option<Bands>,
     ) -> Result<Self, SensorError> {
         let Filtered { names, filters, pattern } = filters(spec)?;
-        let lanes = match given {
-            Some(lanes) => lanes,
-            None => fewest_lanes(spec, settings, &filters)?,
+        let bands = match given {
+            Some(bands) => bands,
+            None => fewest_bands(spec, settings, &filters)?,
         };
         if filters.iter().any(|f| matches!(f, Filter::Band(_)))
-            && !spec.bands.as_ref().is_some_and(|grid| divides(&lanes, grid))
+            && !spec.bands.as_ref().is_some_and(|grid| divides(&bands, grid))
         {
-            let why = "the bands of a multispectral sensor are the lanes of its render";
+            let why = "the bands of a multispectral sensor are the bands of its render";
             return Err(SensorError::Misplaced { key: "bands", why });
         }
         // Ideal primaries are compared with an ideal primary, unless other filters show that a
@@ -149,12 +149,12 @@ impl Response {
         let mut channels = Vec::with_capacity(filters.len());
         for (name, filter) in names.into_iter().zip(&filters) {
             let ideal = if alone { filter } else { &Filter::Clear };
-            channels.push(channel(name, holder, [filter, ideal], &lanes, settings)?);
+            channels.push(channel(name, holder, [filter, ideal], &bands, settings)?);
         }
         if settings.radiometry == Radiometry::Digital {
             to_full_scale(&mut channels, settings);
         }
-        Ok(Self { lanes, channels, pattern })
+        Ok(Self { bands, channels, pattern })
     }
 
     /// The channels at each pixel of an image: one behind filters, else all.
@@ -163,11 +163,11 @@ impl Response {
     }
 }
 
-/// Whether no lane lies across an edge of the bands, which are divided into lanes without a gap.
-fn divides(lanes: &Lanes, bands: &Grid) -> bool {
-    let Some(grid) = lanes.grid() else { return false };
+/// Whether no band of the render lies across an edge of the sensor's own, which are divided without a gap.
+fn divides(bands: &Bands, edges: &Grid) -> bool {
+    let Some(grid) = bands.grid() else { return false };
     let near = |edge: &f64| grid.edges().iter().any(|own| (own - edge).abs() <= 1e-9 * edge);
-    bands.edges().iter().all(near)
+    edges.edges().iter().all(near)
 }
 
 /// The kinds of photosites, what stands before each, and which pixel has which.
@@ -242,12 +242,12 @@ fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
         let names = channels.iter().map(|channel| channel.name.clone()).collect();
         return Ok(Filtered { names, filters, pattern: None });
     }
-    let Some(bands) = &spec.bands else {
+    let Some(grid) = &spec.bands else {
         let why = "a multispectral sensor needs the edges of its bands (nm), or `channels`";
         return Err(SensorError::Missing { key: "bands", why });
     };
-    let filters = bands.bands().map(Filter::Band).collect();
-    Ok(Filtered { names: Lanes::Bands(bands.clone()).names(), filters, pattern: None })
+    let filters = grid.bands().map(Filter::Band).collect();
+    Ok(Filtered { names: Bands::Spectral(grid.clone()).names(), filters, pattern: None })
 }
 
 /// The filter of a letter: the user's curve, one of a named set, or an ideal one.
@@ -272,29 +272,29 @@ fn transmission(curve: &Curve, key: impl Fn() -> String) -> Result<Curve, Sensor
     curve.clone().within(0.0, 1.0).map_err(|fault| SensorError::Curve { key: key(), fault })
 }
 
-/// The fewest lanes that the sensor can tell apart.
-fn fewest_lanes(
+/// The fewest bands that the sensor can tell apart.
+fn fewest_bands(
     spec: &SensorSpec,
     settings: &Settings,
     filters: &[Filter],
-) -> Result<Lanes, SensorError> {
-    if let Some(bands) = &spec.bands {
-        return Ok(Lanes::Bands(bands.clone()));
+) -> Result<Bands, SensorError> {
+    if let Some(grid) = &spec.bands {
+        return Ok(Bands::Spectral(grid.clone()));
     }
     let ideal = |f: &Filter| matches!(f, Filter::Clear | Filter::Primary(_));
     if settings.efficiency.as_flat().is_some() && filters.iter().all(ideal) {
         let coloured = filters.iter().any(|filter| *filter != Filter::Clear);
-        return Ok(if coloured { Lanes::Rgb } else { Lanes::Grey });
+        return Ok(if coloured { Bands::Rgb } else { Bands::Grey });
     }
     let blind = || SensorError::Blind {
         key: "quantum_efficiency",
         channel: "all".into(),
-        lanes: settings.efficiency.range(),
+        bands: settings.efficiency.range(),
     };
     let [from, to] = sensitive_range(&settings.efficiency, filters).ok_or_else(blind)?;
     // A curve may be given for more wavelengths than anybody renders.
     let width = BAND_WIDTH.max((to - from) / 1000.0);
-    Grid::of_width(from, to, width).map(Lanes::Bands).map_err(|_| blind())
+    Grid::of_width(from, to, width).map(Bands::Spectral).map_err(|_| blind())
 }
 
 /// A channel's electrons: a second for physical light, else as a part of what the ideal one catches.
@@ -303,34 +303,34 @@ fn channel(
     name: String,
     holder: &'static str,
     [filter, ideal]: [&Filter; 2],
-    lanes: &Lanes,
+    bands: &Bands,
     settings: &Settings,
 ) -> Result<Channel, SensorError> {
-    let count = lanes.count();
-    let caught = |i: usize| photons_caught(lanes, i, filter, &settings.efficiency);
+    let count = bands.count();
+    let caught = |i: usize| photons_caught(bands, i, filter, &settings.efficiency);
     let mut electrons: Vec<f64> = (0..count).map(caught).collect();
     if electrons.iter().all(|&value| value <= 0.0) {
         let key = match filter {
             Filter::Curve(_) => holder,
             _ => "quantum_efficiency",
         };
-        return Err(SensorError::Blind { key, channel: name, lanes: lanes.range() });
+        return Err(SensorError::Blind { key, channel: name, bands: bands.range() });
     }
-    // Weighted lanes stand for pieces of the light, not of white: colours are weighed without them.
-    let mut primaries = match lanes {
-        Lanes::Weighted(_) => of_primaries(filter, &settings.efficiency, lanes.range()),
-        Lanes::Grey | Lanes::Rgb | Lanes::Bands(_) => in_lanes(lanes, &electrons),
+    // Weighted bands stand for pieces of the light, not of white: colours are weighed without them.
+    let mut primaries = match bands {
+        Bands::Weighted(_) => of_primaries(filter, &settings.efficiency, bands.range()),
+        Bands::Grey | Bands::Rgb | Bands::Spectral(_) => in_bands(bands, &electrons),
     };
-    let factor = match (settings.radiometry, lanes) {
+    let factor = match (settings.radiometry, bands) {
         (Radiometry::Physical, _) => {
             let side = settings.pixel_pitch * 1e-6;
             side * side * 1e-9 / (PLANCK * SPEED_OF_LIGHT)
         }
-        (Radiometry::Digital, Lanes::Weighted(_)) => {
-            1.0 / of_primaries(ideal, &Curve::ONE, lanes.range()).iter().sum::<f64>()
+        (Radiometry::Digital, Bands::Weighted(_)) => {
+            1.0 / of_primaries(ideal, &Curve::ONE, bands.range()).iter().sum::<f64>()
         }
         (Radiometry::Digital, _) => {
-            1.0 / (0..count).map(|i| photons_caught(lanes, i, ideal, &Curve::ONE)).sum::<f64>()
+            1.0 / (0..count).map(|i| photons_caught(bands, i, ideal, &Curve::ONE)).sum::<f64>()
         }
     };
     for value in electrons.iter_mut().chain(&mut primaries) {
@@ -339,9 +339,9 @@ fn channel(
     Ok(Channel { name, electrons, primaries })
 }
 
-/// What red, green and blue make, from what lanes make.
-fn in_lanes(lanes: &Lanes, electrons: &[f64]) -> [f64; 3] {
-    let rows = lanes.from_rgb();
+/// What red, green and blue make, from what bands make.
+fn in_bands(bands: &Bands, electrons: &[f64]) -> [f64; 3] {
+    let rows = bands.from_rgb();
     std::array::from_fn(|k| rows.iter().zip(electrons).map(|(row, e)| row[k] * e).sum())
 }
 
@@ -362,10 +362,10 @@ fn of_primaries(filter: &Filter, efficiency: &Curve, [from, to]: [f64; 2]) -> [f
     })
 }
 
-/// ∫ shape·η·filter·λ dλ (nm²): proportional to the photons of lane `i` that free an electron.
-pub(crate) fn photons_caught(lanes: &Lanes, i: usize, filter: &Filter, efficiency: &Curve) -> f64 {
-    let mut shape = lanes.shape(i);
-    if *lanes == Lanes::Rgb && efficiency.as_flat().is_none() {
+/// ∫ shape·η·filter·λ dλ (nm²): proportional to the photons of band `i` that free an electron.
+pub(crate) fn photons_caught(bands: &Bands, i: usize, filter: &Filter, efficiency: &Curve) -> f64 {
+    let mut shape = bands.shape(i);
+    if *bands == Bands::Rgb && efficiency.as_flat().is_none() {
         // Silicon may see what colours are not known for: they go on as they end.
         let [from, to] = efficiency.range();
         shape = shape.held_over(from, to);
@@ -384,15 +384,15 @@ pub(crate) fn photons_caught(lanes: &Lanes, i: usize, filter: &Filter, efficienc
                 false => 0.0,
             }
         }
-        Filter::Primary(k) if *lanes == Lanes::Rgb && *k != i => 0.0,
-        Filter::Primary(_) if *lanes == Lanes::Rgb => {
+        Filter::Primary(k) if *bands == Bands::Rgb && *k != i => 0.0,
+        Filter::Primary(_) if *bands == Bands::Rgb => {
             integral(&[&shape, efficiency, &ramp], VISIBLE[0], VISIBLE[1])
         }
         Filter::Primary(k) => integral(&[&shape, efficiency, &rgb::PRIMARIES[*k], &ramp], from, to),
     }
 }
 
-/// Digital mode: the most sensitive channel's value for 1 in all lanes becomes full scale, in
+/// Digital mode: the most sensitive channel's value for 1 in all bands becomes full scale, in
 /// electrons.
 fn to_full_scale(channels: &mut [Channel], settings: &Settings) {
     let white = |channel: &Channel| channel.primaries.iter().sum::<f64>();

@@ -1,14 +1,14 @@
 //! A sensor ready to expose films.
 
-use etendue_spectrum::{Curve, Lanes};
+use etendue_spectrum::{Bands, Curve};
 use rayon::prelude::*;
 
 use crate::chain::{self, BLOCK, Chain, Lane, Place};
-use crate::film::{Film, Flaws, Moments, RawImage, Shot};
-use crate::light::Worth;
+use crate::film::{Exposure, Film, InvalidValues, Moments, RawImage};
 use crate::normal::pair;
 use crate::philox::{Key, Site, Stage};
 use crate::response::Response;
+use crate::responsivity::Responsivity;
 use crate::settings::Settings;
 use crate::spec::{HotPixels, NoiseModel, Radiometry, SensorSpec};
 use crate::{CfaSpec, SensorError};
@@ -62,14 +62,14 @@ impl Sensor {
         Self::new(&SensorSpec { pixel_pitch: Some(pitch), ..self.spec.clone() })
     }
 
-    /// The same sensor for a render in other lanes than it asks for: in three, say, where nothing in
+    /// The same sensor for a render in other bands than it asks for: in three, say, where nothing in
     /// the scene has a spectrum of its own.
     ///
     /// # Errors
     ///
-    /// When a channel sees none of the lanes, or they are not the bands of a multispectral sensor.
-    pub fn in_lanes(mut self, lanes: Lanes) -> Result<Self, SensorError> {
-        self.response = Response::new(&self.spec, &self.settings, Some(lanes))?;
+    /// When a channel sees none of the bands, or they are not the bands of a multispectral sensor.
+    pub fn in_bands(mut self, bands: Bands) -> Result<Self, SensorError> {
+        self.response = Response::new(&self.spec, &self.settings, Some(bands))?;
         Ok(self)
     }
 
@@ -79,10 +79,10 @@ impl Sensor {
         self.settings.pixel_pitch
     }
 
-    /// The spectral lanes that a film for this sensor has.
+    /// The spectral bands that a film for this sensor has.
     #[must_use]
-    pub fn lanes(&self) -> &Lanes {
-        &self.response.lanes
+    pub fn bands(&self) -> &Bands {
+        &self.response.bands
     }
 
     /// What the film's values mean.
@@ -122,7 +122,7 @@ impl Sensor {
         channels[column % channels.len()]
     }
 
-    /// Mean photo-electrons that a unit of each lane makes in a channel: a second in physical mode,
+    /// Mean photo-electrons that a unit of each band makes in a channel: a second in physical mode,
     /// in all in digital mode (e⁻).
     #[must_use]
     pub fn electrons_per_unit(&self, channel: usize) -> &[f64] {
@@ -194,15 +194,15 @@ impl Sensor {
     /// counts as 0 (e⁻).
     #[must_use]
     pub fn mean_electrons(&self, film: Film<'_>, exposure: f64) -> f64 {
-        let lanes = self.response.lanes.count();
+        let bands = self.response.bands.count();
         let [width, _] = self.settings.resolution.map(|side| side as usize);
         let factor = match self.settings.radiometry {
             Radiometry::Digital => 1.0,
             Radiometry::Physical => exposure,
         };
-        let rows = film.values.par_chunks(width.max(1) * lanes);
+        let rows = film.values.par_chunks(width.max(1) * bands);
         let row = |(row, values): (usize, &[f32])| -> f64 {
-            let pixels = values.chunks_exact(lanes).enumerate();
+            let pixels = values.chunks_exact(bands).enumerate();
             let pixel = |(column, light): (usize, &[f32])| -> f64 {
                 let electrons = |channel: usize| -> f64 {
                     let electrons = self.electrons_per_unit(channel).iter().zip(light);
@@ -219,7 +219,7 @@ impl Sensor {
             };
             pixels.map(pixel).sum()
         };
-        let pixels = film.values.len() / lanes;
+        let pixels = film.values.len() / bands;
         factor * rows.enumerate().map(row).sum::<f64>() / pixels.max(1) as f64
     }
 
@@ -251,10 +251,10 @@ impl Sensor {
     }
 
     /// What the scene asks for: every frame of every exposure, numbered through.
-    pub fn shots(&self) -> impl Iterator<Item = Shot> + '_ {
+    pub fn shots(&self) -> impl Iterator<Item = Exposure> + '_ {
         let exposures = self.settings.exposures.iter();
         let each = exposures.flat_map(|&exposure| (0..self.settings.frames).map(move |_| exposure));
-        each.zip(0..).map(|(exposure, frame)| Shot { exposure, frame })
+        each.zip(0..).map(|(exposure, frame)| Exposure { exposure, frame })
     }
 
     /// The same sensor drawing its electrons another way.
@@ -269,15 +269,21 @@ impl Sensor {
     ///
     /// # Errors
     ///
-    /// [`SensorError::Film`] when the film is not of the sensor's size and lanes.
-    pub fn expose(&self, film: Film<'_>, shot: Shot, seed: u64) -> Result<RawImage, SensorError> {
+    /// [`SensorError::Film`] when the film is not of the sensor's size and bands.
+    pub fn expose(
+        &self,
+        film: Film<'_>,
+        shot: Exposure,
+        seed: u64,
+    ) -> Result<RawImage, SensorError> {
         let (width, height, depth) = self.check(film)?;
         let exposing = Exposing::new(self, film, shot, seed);
         let mut values = vec![0; width * height * depth];
         let rows = values.par_chunks_mut(width * depth).enumerate();
-        let flaws =
-            rows.map(|(row, out)| exposing.row(row, out)).reduce(Flaws::default, Flaws::sum);
-        Ok(RawImage { width, height, depth, values, flaws })
+        let invalid = rows
+            .map(|(row, out)| exposing.row(row, out))
+            .reduce(InvalidValues::default, InvalidValues::sum);
+        Ok(RawImage { width, height, depth, values, invalid })
     }
 
     /// The expected value and the variance of every pixel over frames of this very sensor, fixed
@@ -287,24 +293,24 @@ impl Sensor {
     /// # Errors
     ///
     /// As [`Self::expose`].
-    pub fn moments(&self, film: Film<'_>, shot: Shot) -> Result<Moments, SensorError> {
+    pub fn moments(&self, film: Film<'_>, shot: Exposure) -> Result<Moments, SensorError> {
         let (width, height, depth) = self.check(film)?;
         let exposing = Exposing::new(self, film, shot, 0);
         let mut mean = vec![0.0; width * height * depth];
         let mut variance = vec![0.0; width * height * depth];
         let rows = mean.par_chunks_mut(width * depth).zip(variance.par_chunks_mut(width * depth));
-        let flaws = rows
+        let invalid = rows
             .enumerate()
             .map(|(row, (mean, variance))| exposing.moments_of_row(row, mean, variance))
-            .reduce(Flaws::default, Flaws::sum);
-        Ok(Moments { width, height, depth, mean, variance, flaws })
+            .reduce(InvalidValues::default, InvalidValues::sum);
+        Ok(Moments { width, height, depth, mean, variance, invalid })
     }
 
     fn check(&self, film: Film<'_>) -> Result<(usize, usize, usize), SensorError> {
         let [width, height] = self.settings.resolution.map(|side| side as usize);
-        let lanes = self.response.lanes.count();
-        if film.values.len() != width * height * lanes {
-            return Err(SensorError::Film { film: film.values.len(), width, height, lanes });
+        let bands = self.response.bands.count();
+        if film.values.len() != width * height * bands {
+            return Err(SensorError::Film { film: film.values.len(), width, height, bands });
         }
         Ok((width, height, self.depth()))
     }
@@ -335,14 +341,14 @@ struct Exposing<'a> {
     film: Film<'a>,
     frame: u32,
     chain: Chain,
-    /// What lanes are worth are multiplied by this: T in physical mode.
+    /// What bands are worth are multiplied by this: T in physical mode.
     factor: f64,
     /// What each column adds in this frame (e⁻); empty when nothing.
     columns: Vec<f64>,
 }
 
 impl<'a> Exposing<'a> {
-    fn new(sensor: &'a Sensor, film: Film<'a>, shot: Shot, seed: u64) -> Self {
+    fn new(sensor: &'a Sensor, film: Film<'a>, shot: Exposure, seed: u64) -> Self {
         let chain = sensor.chain(shot.exposure, seed);
         let factor = match sensor.settings.radiometry {
             Radiometry::Digital => 1.0,
@@ -357,7 +363,7 @@ impl<'a> Exposing<'a> {
         Self { sensor, film, frame: shot.frame, factor, columns, chain }
     }
 
-    fn row(&self, row: usize, out: &mut [u16]) -> Flaws {
+    fn row(&self, row: usize, out: &mut [u16]) -> InvalidValues {
         let depth = self.sensor.depth();
         let row_offset = self.row_offset(row);
         let mut numbers = [0; BLOCK];
@@ -372,7 +378,12 @@ impl<'a> Exposing<'a> {
         })
     }
 
-    fn moments_of_row(&self, row: usize, mean_out: &mut [f32], variance_out: &mut [f32]) -> Flaws {
+    fn moments_of_row(
+        &self,
+        row: usize,
+        mean_out: &mut [f32],
+        variance_out: &mut [f32],
+    ) -> InvalidValues {
         let depth = self.sensor.depth();
         let s = &self.sensor.settings;
         let shared = s.row_noise * s.row_noise + s.column_noise * s.column_noise;
@@ -394,21 +405,21 @@ impl<'a> Exposing<'a> {
         &self,
         row: usize,
         mut each: impl FnMut(Place, usize, usize, usize, &mut Lane),
-    ) -> Flaws {
+    ) -> InvalidValues {
         let width = self.sensor.settings.resolution[0] as usize;
-        let lanes = self.sensor.response.lanes.count();
-        let film = &self.film.values[row * width * lanes..][..width * lanes];
-        let worths: Vec<Worth> =
-            (0..self.sensor.depth()).map(|channel| self.worth(row, channel)).collect();
-        let mut flaws = Flaws::default();
+        let bands = self.sensor.response.bands.count();
+        let film = &self.film.values[row * width * bands..][..width * bands];
+        let responsivities: Vec<Responsivity> =
+            (0..self.sensor.depth()).map(|channel| self.responsivity(row, channel)).collect();
+        let mut invalid = InvalidValues::default();
         let mut mean = [0.0; BLOCK];
         for start in (0..width).step_by(BLOCK) {
             let count = BLOCK.min(width - start);
-            let values = &film[start * lanes..][..count * lanes];
-            for (channel, worth) in worths.iter().enumerate() {
-                let seen = worth.gather(values, start, &mut mean[..count]);
+            let values = &film[start * bands..][..count * bands];
+            for (channel, responsivity) in responsivities.iter().enumerate() {
+                let seen = responsivity.gather(values, start, &mut mean[..count]);
                 if channel == 0 {
-                    flaws = flaws.sum(seen);
+                    invalid = invalid.sum(seen);
                 }
                 // What is left of a short block repeats its last pixel and is thrown away.
                 let last = mean[count - 1];
@@ -418,11 +429,11 @@ impl<'a> Exposing<'a> {
                 each(Place { site, column: start as u32 }, start, channel, count, &mut mean);
             }
         }
-        flaws
+        invalid
     }
 
-    /// What lanes are worth along a row: by the filters' turns, or in one channel of the image.
-    fn worth(&self, row: usize, channel: usize) -> Worth {
+    /// What bands are worth along a row: by the filters' turns, or in one channel of the image.
+    fn responsivity(&self, row: usize, channel: usize) -> Responsivity {
         let response = &self.sensor.response;
         let channels = match &response.pattern {
             Some(pattern) => pattern[row % pattern.len()].as_slice(),
@@ -430,7 +441,7 @@ impl<'a> Exposing<'a> {
         };
         let electrons = channels.iter().flat_map(|&channel| &response.channels[channel].electrons);
         let electrons = electrons.map(|electrons| electrons * self.factor).collect();
-        Worth { lanes: response.lanes.count(), electrons }
+        Responsivity { bands: response.bands.count(), electrons }
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "sides have 16 bits, channels 12")]

@@ -1,9 +1,9 @@
-//! The lanes that a sensor chooses count its electrons as an integration in steps of a nanometre
+//! The bands that a sensor chooses count its electrons as an integration in steps of a nanometre
 //! does, which is done here by a plain sum.
 
 use etendue_sensor::bands::TOLERANCE;
 use etendue_sensor::{Illumination, Sensor, SensorSpec};
-use etendue_spectrum::{Curve, Illuminant, Lanes, Outside, rgb};
+use etendue_spectrum::{Bands, Curve, Illuminant, Outside, rgb};
 use serde_json::{Value, json};
 
 /// A channel's share of photons that become electrons, by wavelength (nm).
@@ -50,10 +50,10 @@ fn summed(
 
 /// The same as a render would count it.
 fn rendered(lit: &Sensor, channel: usize, [light, filter]: [&Curve; 2], colours: &[usize]) -> f64 {
-    let lanes = lit.lanes();
-    let light = lanes.from_curve(light, Outside::Zero).unwrap();
-    let filter = lanes.from_curve(filter, Outside::Held).unwrap();
-    let rows = lanes.from_rgb();
+    let bands = lit.bands();
+    let light = bands.from_curve(light, Outside::Zero).unwrap();
+    let filter = bands.from_curve(filter, Outside::Held).unwrap();
+    let rows = bands.from_rgb();
     let electrons = lit.electrons_per_unit(channel).iter().enumerate();
     electrons
         .map(|(i, e)| {
@@ -141,7 +141,7 @@ fn electrons_are_those_of_an_integration_by_the_nanometre() {
     }
 }
 
-/// Chooses lanes for a trial and compares every light and colour in every channel.
+/// Chooses bands for a trial and compares every light and colour in every channel.
 fn check((keys, lights, filter, colored, channels, range): Trial<'_>) {
     let own = sensor(&keys);
     let illumination = Illumination {
@@ -149,15 +149,15 @@ fn check((keys, lights, filter, colored, channels, range): Trial<'_>) {
         filters: if *filter == Curve::ONE { vec![] } else { vec![filter.clone()] },
         colored,
     };
-    let chosen = own.lanes_under(&illumination).unwrap();
+    let chosen = own.bands_under(&illumination).unwrap();
     let error = chosen.error.unwrap();
     println!(
-        "{keys} {} lights, {colored} colours: {} lanes, {error:.1e}",
+        "{keys} {} lights, {colored} colours: {} bands, {error:.1e}",
         lights.len(),
-        chosen.lanes.count()
+        chosen.bands.count()
     );
     assert!(error <= TOLERANCE, "{keys}: {error}");
-    let lit = own.in_lanes(chosen.lanes).unwrap();
+    let lit = own.in_bands(chosen.bands).unwrap();
     for (c, channel) in channels.iter().enumerate() {
         for light in &lights {
             let white = summed([light, filter], &[], *channel, range);
@@ -181,30 +181,30 @@ fn one_light_on_grey_takes_one_band_whatever_the_sensor() {
     let silicon = json!([[350, 0.1], [530, 0.8], [1000, 0.05]]);
     let own = sensor(&json!({ "quantum_efficiency": silicon }));
     let lit = |spectra: Vec<Curve>| Illumination { spectra, ..Illumination::default() };
-    let chosen = own.lanes_under(&lit(vec![curve(Illuminant::BlackBody(3200.0))])).unwrap();
-    assert_eq!(chosen.lanes.count(), 1);
+    let chosen = own.bands_under(&lit(vec![curve(Illuminant::BlackBody(3200.0))])).unwrap();
+    assert_eq!(chosen.bands.count(), 1);
     assert!(chosen.error.unwrap() < 1e-12);
-    assert_eq!(chosen.lanes.range(), [350.0, 1000.0]);
+    assert_eq!(chosen.bands.range(), [350.0, 1000.0]);
     // Daylight is known up to 830 nm.
-    let chosen = own.lanes_under(&lit(vec![curve(Illuminant::D65)])).unwrap();
-    assert_eq!(chosen.lanes.range(), [350.0, 830.0]);
+    let chosen = own.bands_under(&lit(vec![curve(Illuminant::D65)])).unwrap();
+    assert_eq!(chosen.bands.range(), [350.0, 830.0]);
 }
 
 #[test]
 fn bands_that_somebody_asked_for_stay_and_their_error_is_told() {
     let bands = json!({ "from": 400, "to": 700, "count": 6 });
     let light = Illumination { spectra: vec![curve(Illuminant::A)], filters: vec![], colored: 2 };
-    let coarse = sensor(&json!({ "bands": bands })).lanes_under(&light).unwrap();
-    assert_eq!(coarse.lanes.count(), 6);
+    let coarse = sensor(&json!({ "bands": bands })).bands_under(&light).unwrap();
+    assert_eq!(coarse.bands.count(), 6);
     assert!(coarse.error.unwrap() > TOLERANCE, "{coarse:?}");
     // The channels of a multispectral sensor are divided, and end where they are to end.
     let own = sensor(&json!({ "type": "multispectral", "bands": bands }));
-    let chosen = own.lanes_under(&light).unwrap();
-    let edges = chosen.lanes.grid().unwrap().edges().to_vec();
+    let chosen = own.bands_under(&light).unwrap();
+    let edges = chosen.bands.grid().unwrap().edges().to_vec();
     assert!(edges.len() > 7 && (0..=6).all(|i| edges.contains(&(400.0 + 50.0 * f64::from(i)))));
     let error = chosen.error.unwrap();
-    assert!(error <= TOLERANCE, "{error} in {} lanes", edges.len() - 1);
-    let lit = own.in_lanes(chosen.lanes).unwrap();
+    assert!(error <= TOLERANCE, "{error} in {} bands", edges.len() - 1);
+    let lit = own.in_bands(chosen.bands).unwrap();
     assert_eq!(
         lit.channels().collect::<Vec<_>>(),
         ["425nm", "475nm", "525nm", "575nm", "625nm", "675nm"]
@@ -223,8 +223,8 @@ fn infrared_alone_is_seen_and_where_it_cannot_be_the_remedy_is_named() {
     let own = sensor(&json!({ "quantum_efficiency": [[900, 0.5], [1000, 0.5]] }));
     let lit =
         |illuminant| Illumination { spectra: vec![curve(illuminant)], ..Illumination::default() };
-    assert_eq!(own.lanes_under(&lit(Illuminant::A)).unwrap().lanes.range(), [900.0, 1000.0]);
-    let error = own.lanes_under(&lit(Illuminant::D65)).unwrap_err().to_string();
+    assert_eq!(own.bands_under(&lit(Illuminant::A)).unwrap().bands.range(), [900.0, 1000.0]);
+    let error = own.bands_under(&lit(Illuminant::D65)).unwrap_err().to_string();
     for word in ["900..=1000 nm", "300..=830 nm", "black_body"] {
         assert!(error.contains(word), "{error}");
     }
@@ -232,5 +232,5 @@ fn infrared_alone_is_seen_and_where_it_cannot_be_the_remedy_is_named() {
         json!({ "type": "raw", "cfa": "rggb", "quantum_efficiency": [[900, 0.5], [1000, 0.5]] });
     let error = Sensor::new(&serde_json::from_value(spec).unwrap()).unwrap_err().to_string();
     assert!(error.contains("ideal r, g and b pass visible light alone"), "{error}");
-    assert!(matches!(own.lanes(), Lanes::Bands(_)));
+    assert!(matches!(own.bands(), Bands::Spectral(_)));
 }

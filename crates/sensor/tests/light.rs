@@ -1,11 +1,11 @@
-//! What sensors make of light: full scale in digital mode, closed forms in physical mode, lanes and
+//! What sensors make of light: full scale in digital mode, closed forms in physical mode, bands and
 //! colours.
 
 #![expect(clippy::cast_possible_truncation, reason = "films hold f32")]
 
 use etendue_sensor::demosaic::Method;
-use etendue_sensor::{Film, Model, RawImage, Sensor, SensorSpec, Shot};
-use etendue_spectrum::{Curve, Grid, Lanes, integral};
+use etendue_sensor::{Exposure, Film, Model, RawImage, Sensor, SensorSpec};
+use etendue_spectrum::{Bands, Curve, Grid, integral};
 use serde_json::{Value, json};
 
 fn sensor(spec: Value) -> Sensor {
@@ -14,17 +14,17 @@ fn sensor(spec: Value) -> Sensor {
     Sensor::new(&spec).unwrap_or_else(|e| panic!("{spec:?}: {e}"))
 }
 
-/// Even light of this value in every lane.
+/// Even light of this value in every band.
 fn exposed(sensor: &Sensor, light: f32, exposure: f64) -> RawImage {
     let [width, height] = sensor.resolution().map(|side| side as usize);
-    let film = vec![light; width * height * sensor.lanes().count()];
-    sensor.expose(Film { values: &film }, Shot { exposure, frame: 0 }, 0).unwrap()
+    let film = vec![light; width * height * sensor.bands().count()];
+    sensor.expose(Film { values: &film }, Exposure { exposure, frame: 0 }, 0).unwrap()
 }
 
 #[test]
-fn full_scale_is_one_whatever_the_lanes() {
+fn full_scale_is_one_whatever_the_bands() {
     let bands = json!({ "from": 400, "to": 700, "count": 31 });
-    for (spec, lanes, channels) in [
+    for (spec, bands, channels) in [
         (json!({ "type": "raw" }), 1, vec![1.0]),
         (json!({ "type": "raw", "quantum_efficiency": 0.3 }), 1, vec![1.0]),
         (json!({ "type": "raw", "cfa": "rggb" }), 3, vec![1.0; 3]),
@@ -39,7 +39,7 @@ fn full_scale_is_one_whatever_the_lanes() {
         full["bit_depth"] = json!(12);
         full["black_level"] = json!(95);
         let sensor = sensor(full);
-        assert_eq!(sensor.lanes().count(), lanes, "{spec}");
+        assert_eq!(sensor.bands().count(), bands, "{spec}");
         for (white, expected) in sensor.white_response().iter().zip(&channels) {
             assert!((white - expected).abs() < 1e-9, "{spec}: {white}");
         }
@@ -121,7 +121,7 @@ fn ten_nanometres_are_fine_enough_for_every_preset() {
                 spec["filters"] = json!("nikon_d5100");
             }
             let coarse = sensor(spec.clone());
-            let Lanes::Bands(grid) = coarse.lanes() else {
+            let Bands::Spectral(grid) = coarse.bands() else {
                 panic!("{model:?} has flat efficiency")
             };
             let [from, to] = grid.range();
@@ -140,19 +140,19 @@ fn ten_nanometres_are_fine_enough_for_every_preset() {
 }
 
 #[test]
-fn a_sensor_may_be_asked_to_make_do_with_other_lanes() {
+fn a_sensor_may_be_asked_to_make_do_with_other_bands() {
     let spec = json!({ "type": "raw", "model": "imx183", "cfa": "rggb", "filters": "nikon_d5100" });
     let own = sensor(spec);
-    let three = own.clone().in_lanes(Lanes::Rgb).unwrap();
-    assert_eq!(three.lanes(), &Lanes::Rgb);
+    let three = own.clone().in_bands(Bands::Rgb).unwrap();
+    assert_eq!(three.bands(), &Bands::Rgb);
     let [own, three] = [own.response_to_primaries(), three.response_to_primaries()];
     for (own, three) in own.iter().flatten().zip(three.iter().flatten()) {
         // As far as bands of 10 nm blur the primaries, and the silicon's curve ends at 404 nm.
         assert!((own - three).abs() < 3e-3, "{own} {three}");
     }
     let bands = sensor(json!({ "type": "multispectral", "bands": [400, 500, 600] }));
-    let error = bands.in_lanes(Lanes::Rgb).unwrap_err().to_string();
-    assert!(error.contains("are the lanes of its render"), "{error}");
+    let error = bands.in_bands(Bands::Rgb).unwrap_err().to_string();
+    assert!(error.contains("are the bands of its render"), "{error}");
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn channels_of_a_multispectral_sensor_may_be_curves() {
         ],
     }));
     assert_eq!(sensor.channels().collect::<Vec<_>>(), ["green", "nir"]);
-    assert_eq!((sensor.depth(), sensor.lanes().count()), (2, 50));
+    assert_eq!((sensor.depth(), sensor.bands().count()), (2, 50));
     let nir = sensor.electrons_per_unit(1);
     assert!(nir[..30].iter().all(|&e| e == 0.0) && nir[40] > 0.0);
     let curve = Curve::sampled(vec![[500.0, 0.0], [550.0, 0.5], [600.0, 0.0]]).unwrap();
@@ -196,13 +196,13 @@ fn colours_come_back_in_the_preview() {
         full["noise"] = json!("none");
         let sensor = sensor(full);
         for colour in colours {
-            let lanes: Vec<f32> = sensor
-                .lanes()
+            let bands: Vec<f32> = sensor
+                .bands()
                 .from_rgb()
                 .iter()
                 .map(|row| (0..3).map(|k| row[k] * colour[k]).sum::<f64>() as f32)
                 .collect();
-            let film: Vec<f32> = lanes.iter().copied().cycle().take(64 * lanes.len()).collect();
+            let film: Vec<f32> = bands.iter().copied().cycle().take(64 * bands.len()).collect();
             let image =
                 sensor.expose(Film { values: &film }, sensor.shots().next().unwrap(), 0).unwrap();
             let preview = sensor.preview(&image, Method::Malvar, 1.0);

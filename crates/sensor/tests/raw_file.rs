@@ -7,17 +7,17 @@ use std::io::Cursor;
 use std::process::Command;
 
 use etendue_sensor::dng::DngError;
-use etendue_sensor::{Film, RawImage, Sensor, SensorSpec, Shot};
+use etendue_sensor::{Exposure, Film, RawImage, Sensor, SensorSpec};
 use serde_json::{Value, json};
 
 fn taken(spec: Value) -> (Sensor, RawImage) {
     let spec: SensorSpec = serde_json::from_value(spec).unwrap();
     let sensor = Sensor::new(&spec).unwrap();
     let [width, height] = sensor.resolution();
-    let count = width as usize * height as usize * sensor.lanes().count();
+    let count = width as usize * height as usize * sensor.bands().count();
     let film: Vec<f32> = (0..count).map(|i| (i % 50) as f32 / 50.0).collect();
     let image =
-        sensor.expose(Film { values: &film }, Shot { exposure: 0.01, frame: 0 }, 0).unwrap();
+        sensor.expose(Film { values: &film }, Exposure { exposure: 0.01, frame: 0 }, 0).unwrap();
     (sensor, image)
 }
 
@@ -136,16 +136,16 @@ print(json.dumps({
             "filters": "nikon_d5100",
         });
         let sensor = Sensor::new(&serde_json::from_value(spec).unwrap()).unwrap();
-        let rows = sensor.lanes().from_rgb();
+        let rows = sensor.bands().from_rgb();
         let film: Vec<f32> = (0..96 * 64)
             .flat_map(|i| {
                 let colour = colours[(i / 96 / 32) * 2 + i % 96 / 48];
                 #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
-                let lane = |row: &[f64; 3]| (0..3).map(|k| row[k] * colour[k]).sum::<f64>() as f32;
-                rows.iter().map(lane).collect::<Vec<f32>>()
+                let band = |row: &[f64; 3]| (0..3).map(|k| row[k] * colour[k]).sum::<f64>() as f32;
+                rows.iter().map(band).collect::<Vec<f32>>()
             })
             .collect();
-        let shot = Shot { exposure: 0.01, frame: 0 };
+        let shot = Exposure { exposure: 0.01, frame: 0 };
         let image = sensor.expose(Film { values: &film }, shot, 0).unwrap();
         std::fs::write(&path, written(&sensor, &image).unwrap()).unwrap();
         let out = Command::new(&python).args(["-c", program]).arg(&path).output().unwrap();

@@ -1,6 +1,6 @@
 //! What is no sensor, no light or no film is refused, with the key and the remedy.
 
-use etendue_sensor::{Film, Flaws, Sensor, SensorError, SensorSpec};
+use etendue_sensor::{Film, InvalidValues, Sensor, SensorError, SensorSpec};
 use serde_json::{Value, json};
 
 fn refused(spec: Value) -> SensorError {
@@ -161,8 +161,8 @@ fn light_that_is_none_is_counted_and_dark() {
     let film = [f32::NAN, -1.0, 1.0, f32::INFINITY, f32::NEG_INFINITY, -0.0];
     let image = sensor.expose(Film { values: &film }, shot, 0).unwrap();
     assert_eq!(image.values, [0, 0, 65535, 0, 0, 0]);
-    assert_eq!(image.flaws, Flaws { negative: 1, not_finite: 3 });
-    assert_eq!(sensor.moments(Film { values: &film }, shot).unwrap().flaws, image.flaws);
+    assert_eq!(image.invalid, InvalidValues { negative: 1, not_finite: 3 });
+    assert_eq!(sensor.moments(Film { values: &film }, shot).unwrap().invalid, image.invalid);
     let short = sensor.expose(Film { values: &film[..5] }, shot, 0).unwrap_err();
-    assert!(short.to_string().contains("has 5 values, 2 × 1 pixels of 3 spectral lanes need 6"));
+    assert!(short.to_string().contains("has 5 values, 2 × 1 pixels of 3 spectral bands need 6"));
 }

@@ -1,4 +1,4 @@
-//! Consecutive bands of wavelengths: the spectral lanes of a render, the channels of a sensor.
+//! Consecutive bands of wavelengths: the spectral bands of a render, the channels of a sensor.
 
 use std::fmt;
 

@@ -8,19 +8,19 @@
 //! * A curve says where it is known. What lies outside is not guessed: the caller chooses whether
 //!   it is nothing, or held at the curve's end.
 //! * RGB is linear sRGB. Its white, (1, 1, 1), is the flat spectrum, for lights and surfaces alike:
-//!   radiance 1 in every wavelength is radiance 1 in every lane of every sensor.
+//!   radiance 1 in every wavelength is radiance 1 in every band of every sensor.
 //!
 //! # Example
 //!
 //! ```
-//! use etendue_spectrum::{Grid, Illuminant, Lanes, Outside};
+//! use etendue_spectrum::{Grid, Illuminant, Bands, Outside};
 //!
-//! let lanes = Lanes::Bands(Grid::equal(400.0, 700.0, 30)?);
-//! let lamp = lanes.from_curve(&Illuminant::A.curve()?, Outside::Zero)?;
+//! let bands = Bands::Spectral(Grid::equal(400.0, 700.0, 30)?);
+//! let lamp = bands.from_curve(&Illuminant::A.curve()?, Outside::Zero)?;
 //! let brick = [0.5, 0.2, 0.1];
 //! let paint: Vec<f64> =
-//!     lanes.from_rgb().iter().map(|w| w[0] * brick[0] + w[1] * brick[1] + w[2] * brick[2]).collect();
-//! assert_eq!(lanes.names()[0], "405nm");
+//!     bands.from_rgb().iter().map(|w| w[0] * brick[0] + w[1] * brick[1] + w[2] * brick[2]).collect();
+//! assert_eq!(bands.names()[0], "405nm");
 //! assert!(lamp[29] * paint[29] > 10.0 * lamp[0] * paint[0]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -34,25 +34,25 @@
 //! | [`illuminant`] | lights by name, and Planck's law |
 //! | [`colour`] | the CIE 1931 observer and sRGB |
 //! | [`rgb`] | from a colour to a spectrum and back |
-//! | [`lanes`] | the numbers that a ray of a render carries |
-//! | [`spread`] | wavelengths that stand for a wide lane |
+//! | [`bands`] | the numbers that a ray of a render carries |
+//! | [`spread`] | wavelengths that stand for a wide band |
 //! | [`weighted`] | bands for a given light and sensor |
 
+pub mod bands;
 mod cie;
 pub mod colour;
 pub mod curve;
 pub mod grid;
 pub mod illuminant;
-pub mod lanes;
 mod mallett_yuksel;
 pub mod rgb;
 pub mod spread;
 pub mod weighted;
 
+pub use bands::{Bands, NoOverlap, Outside, VISIBLE};
 pub use curve::{Curve, CurveError, integral};
 pub use grid::{Band, Grid, GridError};
 pub use illuminant::{Illuminant, IlluminantError};
-pub use lanes::{Lanes, NoOverlap, Outside, VISIBLE};
 pub use spread::Spread;
 pub use weighted::WeightedBands;
 

@@ -1,19 +1,19 @@
-//! Wavelengths that together stand for a wide lane, where one in its middle would hide what happens
+//! Wavelengths that together stand for a wide band, where one in its middle would hide what happens
 //! within it: a lens of glass is sharp at one of them and blurs the others.
 
 use crate::colour::OBSERVER;
-use crate::{Curve, Lanes, VISIBLE, rgb};
+use crate::{Bands, Curve, VISIBLE, rgb};
 
-/// The width of a lane (nm) that one wavelength may stand for.
+/// The width of a band (nm) that one wavelength may stand for.
 const STEP: f64 = 25.0;
 
-/// Cells in which light is summed over a lane: far narrower than the narrowest band of a filter.
+/// Cells in which light is summed over a band: far narrower than the narrowest band of a filter.
 const CELLS: u32 = 4000;
 
 /// Wavelengths of equal weight, and what filters leave of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spread {
-    /// In ascending order (nm), each the mean of an equal share of the lane's light behind the
+    /// In ascending order (nm), each the mean of an equal share of the band's light behind the
     /// filters. So their own mean is that of the light.
     pub wavelengths: Vec<f64>,
     /// What passes all filters one behind the other, over the product of what passes each of them
@@ -21,19 +21,19 @@ pub struct Spread {
     pub overlap: f64,
 }
 
-impl Lanes {
-    /// Wavelengths that stand for lane `i` behind `filters`: one for each 25 nm of a wide lane, each
+impl Bands {
+    /// Wavelengths that stand for band `i` behind `filters`: one for each 25 nm of a wide band, each
     /// the mean of an equal share of its light, or [`wavelength`](Self::wavelength) alone when the
-    /// lane is narrow or no light is left. What depends on the wavelength linearly thus comes out as
+    /// band is narrow or no light is left. What depends on the wavelength linearly thus comes out as
     /// it does with all of the light.
     ///
-    /// The light of a lane is counted as photons, as a sensor does, that of weighted bands by their
+    /// The light of a band is counted as photons, as a sensor does, that of weighted bands by their
     /// weights; that of red, green and blue as the CIE 1931 observer's x̄ + ȳ + z̄ sees it.
     #[must_use]
     pub fn spread(&self, i: usize, filters: &[&Curve]) -> Spread {
         let [from, to] = match self {
             Self::Grey | Self::Rgb => VISIBLE,
-            Self::Bands(grid) => [grid.edges()[i], grid.edges()[i + 1]],
+            Self::Spectral(grid) => [grid.edges()[i], grid.edges()[i + 1]],
             Self::Weighted(bands) => [bands.grid().edges()[i], bands.grid().edges()[i + 1]],
         };
         let cell = (to - from) / f64::from(CELLS);
@@ -74,10 +74,10 @@ impl Lanes {
         Spread { wavelengths: ends.map(mean).collect(), overlap }
     }
 
-    /// The light of lane `i` at a wavelength (nm), to a factor.
+    /// The light of band `i` at a wavelength (nm), to a factor.
     fn light(&self, i: usize, nm: f64) -> f64 {
         match self {
-            Self::Grey | Self::Bands(_) => nm,
+            Self::Grey | Self::Spectral(_) => nm,
             Self::Weighted(bands) => bands.weight(nm),
             Self::Rgb => {
                 rgb::PRIMARIES[i].held(nm) * OBSERVER.iter().map(|c| c.held(nm)).sum::<f64>()
@@ -97,8 +97,8 @@ mod tests {
     }
 
     #[test]
-    fn narrow_lanes_keep_their_middle_and_wide_ones_spread_over_all_of_their_light() {
-        let bands = Lanes::Bands(Grid::from_edges(vec![400.0, 425.0, 525.0]).unwrap());
+    fn narrow_bands_keep_their_middle_and_wide_ones_spread_over_all_of_their_light() {
+        let bands = Bands::Spectral(Grid::from_edges(vec![400.0, 425.0, 525.0]).unwrap());
         assert_eq!(bands.spread(0, &[]).wavelengths, [412.5]);
         let wide = bands.spread(1, &[]).wavelengths;
         assert_eq!(wide.len(), 4);
@@ -110,15 +110,15 @@ mod tests {
             // Cells are 0.025 nm wide.
             assert!((nm - mean).abs() < 1e-4, "{wide:?}");
         }
-        let grey = Lanes::Grey.spread(0, &[]).wavelengths;
+        let grey = Bands::Grey.spread(0, &[]).wavelengths;
         assert!(grey.len() == 16 && grey[0] < 400.0 && grey[15] > 765.0, "{grey:?}");
     }
 
     #[test]
     fn the_mean_of_the_wavelengths_is_that_of_the_light() {
         let nm = Curve::sampled(vec![[380.0, 380.0], [780.0, 780.0]]).unwrap();
-        let check = |lanes: Lanes, i: usize, filters: &[&Curve], [moment, light]: [f64; 2]| {
-            let found = lanes.spread(i, filters).wavelengths;
+        let check = |bands: Bands, i: usize, filters: &[&Curve], [moment, light]: [f64; 2]| {
+            let found = bands.spread(i, filters).wavelengths;
             assert!(found.is_sorted() && found.len() == 16, "{found:?}");
             // The midpoints of cells of 0.1 nm are off by about its square.
             let (found, centroid) = (mean(&found), moment / light);
@@ -129,14 +129,14 @@ mod tests {
             OBSERVER.iter().map(|c| integral(&[curves, &[c]].concat(), 380.0, 780.0)).sum()
         };
         for (i, primary) in rgb::PRIMARIES.iter().enumerate() {
-            check(Lanes::Rgb, i, &[], [seen(&[&nm, primary]), seen(&[primary])]);
+            check(Bands::Rgb, i, &[], [seen(&[&nm, primary]), seen(&[primary])]);
         }
         // and of photons behind a filter.
         let skewed = [[380.0, 0.9], [450.0, 0.0], [520.0, 1.0], [700.0, 0.05], [780.0, 0.3]];
         let filter = Curve::sampled(skewed.to_vec()).unwrap();
         let passed = |curves: &[&Curve]| integral(curves, 380.0, 780.0);
         let expected = [passed(&[&nm, &nm, &filter]), passed(&[&nm, &filter])];
-        check(Lanes::Grey, 0, &[&filter], expected);
+        check(Bands::Grey, 0, &[&filter], expected);
     }
 
     #[test]
@@ -154,17 +154,17 @@ mod tests {
             .unwrap()
         };
         let [line, low, high] = [band(500.0, 510.0), band(400.0, 600.0), band(550.0, 700.0)];
-        let through = Lanes::Grey.spread(0, &[&line]);
+        let through = Bands::Grey.spread(0, &[&line]);
         assert!(through.wavelengths.iter().all(|nm| (499.0..511.0).contains(nm)), "{through:?}");
         assert!((through.overlap - 1.0).abs() < 1e-12);
         // Photons of 550..600 nm, by ∫ λ dλ, over the product of both alone.
         let photons =
             |from: f64, to: f64| (to * to - from * from) / (780f64.powi(2) - 380f64.powi(2));
-        let both = Lanes::Grey.spread(0, &[&low, &high]);
+        let both = Bands::Grey.spread(0, &[&low, &high]);
         let expected = photons(550.0, 600.0) / (photons(400.0, 600.0) * photons(550.0, 700.0));
         // Cells are 0.1 nm wide.
         assert!((both.overlap / expected - 1.0).abs() < 2e-3, "{} {expected}", both.overlap);
-        let none = Lanes::Grey.spread(0, &[&line, &high]);
+        let none = Bands::Grey.spread(0, &[&line, &high]);
         assert_eq!((none.wavelengths.as_slice(), none.overlap), ([555.0].as_slice(), 0.0));
     }
 }

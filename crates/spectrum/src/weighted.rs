@@ -1,14 +1,14 @@
 //! Bands for a given light and a given sensor: wide, and yet they count its photons.
 //!
-//! A lane of a plain band is a mean over its wavelengths, each counting alike, and stands for an
+//! A band of a plain band is a mean over its wavelengths, each counting alike, and stands for an
 //! even spectrum. Both are wrong for a tungsten lamp before silicon, the more so the wider the band.
 //! Here the mean is weighted by what the sensor makes of each wavelength, a reflectance's also by
-//! the light that falls on it, and a lane stands for a piece of that light. One light on a white
+//! the light that falls on it, and a band stands for a piece of that light. One light on a white
 //! surface is then counted exactly however few the bands; how many there must be is decided by the
 //! colours alone.
 
+use crate::bands::{known_everywhere, mean};
 use crate::curve::integral;
-use crate::lanes::{known_everywhere, mean};
 use crate::{Curve, Grid, Outside, VISIBLE};
 
 /// Consecutive bands whose means are weighted by a sensor and a light.
@@ -49,7 +49,7 @@ impl WeightedBands {
         integral(&[&[&known], weights].concat(), from, to) / total
     }
 
-    /// The spectrum that 1 in lane `i` stands for: the light's own within the band.
+    /// The spectrum that 1 in band `i` stands for: the light's own within the band.
     pub(crate) fn shape(&self, i: usize) -> Curve {
         let [from, to] = self.edges(i);
         let even = || Curve::trusted(vec![[from, 1.0], [to, 1.0]]);
@@ -97,26 +97,26 @@ impl WeightedBands {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Illuminant, Lanes};
+    use crate::{Bands, Illuminant};
 
     #[test]
     fn one_band_counts_a_lamp_exactly() {
         let lamp = Illuminant::A.curve().unwrap();
         let silicon = Curve::sampled(vec![[400.0, 100.0], [550.0, 500.0], [900.0, 90.0]]).unwrap();
         let grid = Grid::from_edges(vec![400.0, 900.0]).unwrap();
-        let lanes = Lanes::Weighted(WeightedBands::new(grid, silicon.clone(), lamp.clone()).into());
+        let bands = Bands::Weighted(WeightedBands::new(grid, silicon.clone(), lamp.clone()).into());
         let exact = integral(&[&lamp, &silicon], 400.0, 900.0);
-        let light = lanes.from_curve(&lamp, Outside::Zero).unwrap()[0];
-        let counted = light * integral(&[&lanes.shape(0), &silicon], 400.0, 900.0);
+        let light = bands.from_curve(&lamp, Outside::Zero).unwrap()[0];
+        let counted = light * integral(&[&bands.shape(0), &silicon], 400.0, 900.0);
         // Two ways to add up the same polygons.
         assert!((counted / exact - 1.0).abs() < 1e-12, "{counted} {exact}");
         let red = &crate::rgb::PRIMARIES[0];
         let held = known_everywhere(red, 400.0, 900.0, Outside::Held);
-        let through = lanes.from_curve(red, Outside::Held).unwrap()[0];
+        let through = bands.from_curve(red, Outside::Held).unwrap()[0];
         let expected = integral(&[&held, &lamp, &silicon], 400.0, 900.0) / exact;
         assert!((through - expected).abs() < 1e-12, "{through} {expected}");
         // White is 1 whatever the weights.
-        let white: f64 = lanes.from_rgb()[0].iter().sum();
+        let white: f64 = bands.from_rgb()[0].iter().sum();
         assert!((white - 1.0).abs() < 1e-14);
     }
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{HitBatch, MISS, Placement};
 
-use crate::{Color, Paint, Space, Surroundings, Traced};
+use crate::{Color, Paint, SceneView, Space, Traced};
 
 /// Vector units that loops are compiled for beside the portable ones.
 macro_rules! vectorised {
@@ -20,15 +20,15 @@ macro_rules! vectorised {
     };
 }
 
-impl Surroundings<'_> {
-    /// [`Surroundings::depth`] of every ray (m): `out` is refilled.
+impl SceneView<'_> {
+    /// [`SceneView::depth`] of every ray (m): `out` is refilled.
     pub fn depths(&self, traced: Traced<'_>, out: &mut Vec<f64>) {
         out.clear();
         out.resize(traced.rays.len(), f64::INFINITY);
         depths(traced, self.view.origin, self.view.forward(), out);
     }
 
-    /// [`Surroundings::normal`] of every ray, of the triangles' planes: the arrays of `out` are
+    /// [`SceneView::normal`] of every ray, of the triangles' planes: the arrays of `out` are
     /// refilled.
     pub fn geometric_normals(&self, traced: Traced<'_>, space: Space, out: &mut [Vec<f64>; 3]) {
         for array in out.iter_mut() {
@@ -67,12 +67,12 @@ impl Surroundings<'_> {
         }
     }
 
-    /// [`Surroundings::flat`] of every ray: the arrays of `out` are refilled.
+    /// [`SceneView::flat`] of every ray: the arrays of `out` are refilled.
     pub fn flats(&self, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
         self.colors(traced, |i| self.flat(traced, i), out);
     }
 
-    /// [`Surroundings::albedo`] of every ray: the arrays of `out` are refilled.
+    /// [`SceneView::albedo`] of every ray: the arrays of `out` are refilled.
     pub fn albedos(&self, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
         self.colors(traced, |i| self.albedo(traced.hits, i), out);
     }

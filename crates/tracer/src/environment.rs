@@ -181,17 +181,17 @@ impl MapSampler {
     #[must_use]
     pub fn sample(&self, square: [f64; 2]) -> (DVec3, f64) {
         let d = direction(self.cells.place(square));
-        (d, self.density(d))
+        (d, self.pdf(d))
     }
 
     /// The density (1/sr) of a unit direction.
     #[must_use]
-    pub fn density(&self, d: DVec3) -> f64 {
+    pub fn pdf(&self, d: DVec3) -> f64 {
         let sin_theta = (d.x * d.x + d.z * d.z).sqrt();
         if sin_theta <= 0.0 {
             return 0.0;
         }
-        self.cells.density(place(d)) / (2.0 * PI * PI * sin_theta)
+        self.cells.pdf(place(d)) / (2.0 * PI * PI * sin_theta)
     }
 }
 
@@ -219,14 +219,14 @@ mod tests {
         for k in 0..n * n {
             let square = [((k % n) as f64 + 0.5) / n as f64, ((k / n) as f64 + 0.5) / n as f64];
             let d = crate::sampling::sphere_direction(square);
-            integral += sampler.density(d) * 4.0 * PI / (n * n) as f64;
+            integral += sampler.pdf(d) * 4.0 * PI / (n * n) as f64;
             mean += map.radiance(d)[0] / (n * n) as f64;
         }
         // A bright texel is 16 × 16 points wide here: its edges are met to one in sixteen of 1 − ε.
         assert!((integral - 1.0).abs() < 0.02, "{integral}");
         assert!((sampler.mean / mean - 1.0).abs() < 0.02, "{} {mean}", sampler.mean);
         let bright = direction([20.5 / 64.0, 10.5 / 32.0]);
-        assert!(sampler.density(bright) > 50.0 * sampler.density(DVec3::X));
+        assert!(sampler.pdf(bright) > 50.0 * sampler.pdf(DVec3::X));
     }
 
     #[test]

@@ -11,7 +11,7 @@
 
 use etendue_geometry::glam::DVec3;
 
-use crate::reference::{Spot, View};
+use crate::reference::{SurfacePoint, View};
 
 /// Grazing rays see no more of a surface than this (a cosine).
 const LEAST_COSINE: f64 = 1e-4;
@@ -69,7 +69,7 @@ pub struct Footprint {
     pub width: f64,
 }
 
-impl Spot<'_> {
+impl SurfacePoint<'_> {
     /// The axes of the ellipse that the footprint covers, in texture coordinates of a set; `None`
     /// where there is no footprint or no texture coordinates.
     #[must_use]

@@ -6,7 +6,7 @@ use etendue_geometry::Placement;
 use etendue_geometry::glam::DVec3;
 
 use crate::light::mean;
-use crate::reference::{Spot, Surroundings};
+use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::magnitudes;
 use crate::{Material, Paint};
 
@@ -26,7 +26,7 @@ pub(crate) struct Shape {
 
 impl Shape {
     /// The triangle of a spot; `None` without area.
-    fn of(spot: &Spot<'_>) -> Option<Self> {
+    fn of(spot: &SurfacePoint<'_>) -> Option<Self> {
         let place = &spot.placement.world_from_mesh;
         let [a, b, c] = spot.mesh.corners(spot.triangle);
         let edges = [place.linear * (b - a), place.linear * (c - a)];
@@ -40,7 +40,7 @@ impl Shape {
 /// A triangle that shines, as seen from a point.
 pub(crate) struct EmissiveTriangle<'a> {
     pub(crate) id: [u32; 2],
-    pub(crate) spot: Spot<'a>,
+    pub(crate) spot: SurfacePoint<'a>,
     /// The first corner from the point (m).
     pub(crate) corner: DVec3,
     pub(crate) shape: Shape,
@@ -48,13 +48,13 @@ pub(crate) struct EmissiveTriangle<'a> {
 
 impl<'a> EmissiveTriangle<'a> {
     pub(crate) fn new(
-        around: &Surroundings<'a>,
+        around: &SceneView<'a>,
         number: u32,
         triangle: u32,
         from: DVec3,
     ) -> Option<Self> {
         let placement = around.geometry.placements.get(number as usize)?;
-        let spot = Spot::corner(around.geometry, placement, triangle as usize);
+        let spot = SurfacePoint::corner(around.geometry, placement, triangle as usize);
         let [corner, ..] = spot.mesh.corners(spot.triangle);
         let corner = placement.world_from_mesh.point_from(corner, from);
         Some(Self { id: [number, triangle], corner, shape: Shape::of(&spot)?, spot })
@@ -63,7 +63,7 @@ impl<'a> EmissiveTriangle<'a> {
 
 /// A triangle that shines alike all over.
 #[derive(Debug, Clone)]
-pub(crate) struct Lamp {
+pub(crate) struct AreaLight {
     /// Placement and triangle.
     pub(crate) id: [u32; 2],
     /// The first corner, turned into the world, and the placement's translation (m): its high part
@@ -76,11 +76,11 @@ pub(crate) struct Lamp {
     pub(crate) magnitudes: DVec3,
 }
 
-impl Lamp {
+impl AreaLight {
     /// Triangle `id`; `None` when its radiance is not alike all over, or it has no area.
-    pub(crate) fn new(around: &Surroundings<'_>, id: [u32; 2]) -> Option<Self> {
+    pub(crate) fn new(around: &SceneView<'_>, id: [u32; 2]) -> Option<Self> {
         let placement = around.geometry.placements.get(id[0] as usize)?;
-        let spot = Spot::corner(around.geometry, placement, id[1] as usize);
+        let spot = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
         let emission = around.material(&spot)?.emission.as_ref()?;
         let Paint::Plain(_) = emission.radiance else { return None };
         let place = &placement.world_from_mesh;
@@ -98,19 +98,19 @@ impl Lamp {
 
 /// Power of an emissive triangle (W), by the paint at its middle and corners.
 pub(crate) fn triangle_power(
-    around: &Surroundings<'_>,
+    around: &SceneView<'_>,
     placement: &Placement,
     triangle: usize,
     material: &Material,
 ) -> f64 {
     let Some(emission) = &material.emission else { return 0.0 };
-    let spot = Spot::corner(around.geometry, placement, triangle);
+    let spot = SurfacePoint::corner(around.geometry, placement, triangle);
     let Some(Shape { area, .. }) = Shape::of(&spot) else { return 0.0 };
     let third = 1.0 / 3.0;
     let weights = [[third, third, third], [0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]];
     let radiance: f64 = weights
         .map(|weights| {
-            let [r, g, b, _] = around.paint(&emission.radiance, &Spot { weights, ..spot });
+            let [r, g, b, _] = around.paint(&emission.radiance, &SurfacePoint { weights, ..spot });
             mean(&[r, g, b])
         })
         .iter()

@@ -72,7 +72,7 @@ pub enum LayerSpec {
     /// `Backdrop.R G B`: the part of the picture's radiance that came past everything. No file names
     /// it; it comes with `render.alpha` and a tracer of light.
     Backdrop,
-    /// The picture of a tracer of light: radiance, one channel a spectral lane. No file names it;
+    /// The picture of a tracer of light: radiance, one channel a spectral band. No file names it;
     /// it comes with the tracer.
     Radiance,
 }

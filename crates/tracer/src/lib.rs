@@ -20,7 +20,7 @@
 //! | [`spawn`] | where a ray that leaves a surface starts |
 //! | [`transport`] | batches of paths, and what tracers share |
 //! | [`direct`], [`whitted`], [`path`] | the tracers |
-//! | [`spectral`], [`sampling`] | colours to lanes, numbers to directions |
+//! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
 mod batches;
 pub mod bsdf;
@@ -52,9 +52,9 @@ pub use layer::{LayerSpec, NormalKind, Space};
 pub use light::{EnvironmentImage, Light, LightKind, Lights};
 pub use material::{Color, Emission, Ior, Material, Paint, Scattering, TextureScope};
 pub use path::Path;
-pub use reference::{Needs, Spot, Surroundings, Traced, View};
+pub use reference::{Needs, SceneView, SurfacePoint, Traced, View};
 pub use spec::{LightSpec, MaterialSpec};
 pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
-pub use transport::{Samples, Scratch, Stage, Tally, Tracer, Traits};
+pub use transport::{LightingContext, RayStats, Samples, Scratch, Tracer, Traits};
 pub use whitted::Whitted;

@@ -11,8 +11,8 @@ use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{Illuminant, NoOverlap};
 
 use crate::environment::{EnvironmentMap, MapSampler};
-use crate::lamps::{self, EmissiveTriangle, Lamp, triangle_power};
-use crate::reference::{Spot, Surroundings};
+use crate::lamps::{self, AreaLight, EmissiveTriangle, triangle_power};
+use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::{DiscreteDistribution, sphere_direction, triangle_point};
 use crate::spawn::Anchor;
 use crate::spectral::Spectral;
@@ -96,11 +96,11 @@ fn spot_falloff(cosine: f64, cos_outer: f64, cos_inner: f64) -> f64 {
 
 /// A point's view of one light.
 #[derive(Debug, Clone, Copy)]
-pub struct Toward {
+pub struct LightSample {
     /// From the point to the light (unit).
     pub direction: DVec3,
     /// Density (1/sr) times the light's chance; of a light that is a point, its chance alone.
-    pub density: f64,
+    pub pdf: f64,
     /// The light can be met by a direction in no other way.
     pub is_delta: bool,
     /// Where the light is (m); a surface knows how exactly. `None` far away.
@@ -122,10 +122,10 @@ pub enum End {
 #[derive(Debug)]
 pub struct Lights {
     lights: Vec<Light>,
-    /// The lanes of each light, one light after the other.
-    lanes: Vec<f64>,
+    /// The bands of each light, one light after the other.
+    bands: Vec<f64>,
     environment: Option<Environment>,
-    /// The lanes by which each material's emission is multiplied, where it has an illuminant.
+    /// The bands by which each material's emission is multiplied, where it has an illuminant.
     tints: Vec<Option<Vec<f64>>>,
     /// For each placement, where its triangles start among the choices.
     first: Vec<Option<u32>>,
@@ -133,9 +133,9 @@ pub struct Lights {
     triangles: Vec<[u32; 2]>,
     picker: DiscreteDistribution,
     /// The emissive triangles, where there are no other lights and each shines alike all over, and
-    /// what they give off in all lanes.
-    lamps: Vec<Lamp>,
-    lamp_lanes: Vec<f64>,
+    /// what they give off in all bands.
+    lamps: Vec<AreaLight>,
+    lamp_bands: Vec<f64>,
 }
 
 #[derive(Debug)]
@@ -167,20 +167,20 @@ impl Lights {
     ///
     /// # Errors
     ///
-    /// When an illuminant is known at no wavelength of the lanes.
+    /// When an illuminant is known at no wavelength of the bands.
     pub fn new(
         lights: &[Light],
         map: Option<Arc<EnvironmentMap>>,
-        around: &Surroundings<'_>,
+        around: &SceneView<'_>,
         spectral: &Spectral,
     ) -> Result<Self, NoOverlap> {
         let count = spectral.count();
-        let mut lanes = vec![0.0; lights.len() * count];
-        for (light, lanes) in lights.iter().zip(lanes.chunks_mut(count)) {
-            spectral.spread(&light.color, lanes);
+        let mut bands = vec![0.0; lights.len() * count];
+        for (light, bands) in lights.iter().zip(bands.chunks_mut(count)) {
+            spectral.spread(&light.color, bands);
             if let Some(illuminant) = light.illuminant {
                 let tint = spectral.illuminant(illuminant)?;
-                lanes.iter_mut().zip(&tint).for_each(|(lane, tint)| *lane *= tint);
+                bands.iter_mut().zip(&tint).for_each(|(band, tint)| *band *= tint);
             }
         }
         let environment = lights.iter().enumerate().find_map(|(index, light)| match light.kind {
@@ -221,34 +221,34 @@ impl Lights {
         let picker =
             if lit { DiscreteDistribution::new(&powers) } else { DiscreteDistribution::default() };
         let lights = lights.to_vec();
-        let (lamps, lamp_lanes) = Default::default();
+        let (lamps, lamp_bands) = Default::default();
         let mut all =
-            Self { lights, lanes, environment, tints, first, triangles, picker, lamps, lamp_lanes };
+            Self { lights, bands, environment, tints, first, triangles, picker, lamps, lamp_bands };
         all.light_lamps(around, spectral);
         Ok(all)
     }
 
     /// Keeps emissive triangles ready, if all that there is to choose from is of that kind.
-    fn light_lamps(&mut self, around: &Surroundings<'_>, spectral: &Spectral) {
+    fn light_lamps(&mut self, around: &SceneView<'_>, spectral: &Spectral) {
         if !self.lights.is_empty() || self.is_dark() || self.triangles.len() > lamps::MOST {
             return;
         }
-        let lamps: Option<Vec<Lamp>> =
-            self.triangles.iter().map(|&id| Lamp::new(around, id)).collect();
+        let lamps: Option<Vec<AreaLight>> =
+            self.triangles.iter().map(|&id| AreaLight::new(around, id)).collect();
         let Some(lamps) = lamps else { return };
         let count = spectral.count();
-        let mut lanes = vec![0.0; lamps.len() * count];
-        for (lamp, lanes) in lamps.iter().zip(lanes.chunks_mut(count)) {
+        let mut bands = vec![0.0; lamps.len() * count];
+        for (lamp, bands) in lamps.iter().zip(bands.chunks_mut(count)) {
             let placement = &around.geometry.placements[lamp.id[0] as usize];
-            let spot = Spot::corner(around.geometry, placement, lamp.id[1] as usize);
-            self.emitted(around, spectral, &spot, true, lanes);
+            let spot = SurfacePoint::corner(around.geometry, placement, lamp.id[1] as usize);
+            self.emitted(around, spectral, &spot, true, bands);
         }
-        (self.lamps, self.lamp_lanes) = (lamps, lanes);
+        (self.lamps, self.lamp_bands) = (lamps, bands);
     }
 
     /// The lamp for `choice`: its number, itself and its chance; `None` where lights have to be asked
     /// one by one.
-    pub(crate) fn lamp(&self, choice: f64) -> Option<(usize, &Lamp, f64)> {
+    pub(crate) fn lamp(&self, choice: f64) -> Option<(usize, &AreaLight, f64)> {
         if self.lamps.is_empty() {
             return None;
         }
@@ -256,9 +256,9 @@ impl Lights {
         Some((index, &self.lamps[index], self.picker.probability(index)))
     }
 
-    /// What a lamp gives off in `count` lanes.
-    pub(crate) fn lanes_of_lamp(&self, lamp: usize, count: usize) -> &[f64] {
-        &self.lamp_lanes[lamp * count..(lamp + 1) * count]
+    /// What a lamp gives off in `count` bands.
+    pub(crate) fn bands_of_lamp(&self, lamp: usize, count: usize) -> &[f64] {
+        &self.lamp_bands[lamp * count..(lamp + 1) * count]
     }
 
     /// Whether [`Self::lamp`] has one.
@@ -274,7 +274,7 @@ impl Lights {
 
     /// Whether a ray that nobody aimed may come upon a light: not upon points and parallel light.
     #[must_use]
-    pub fn can_be_met(&self) -> bool {
+    pub fn is_hittable(&self) -> bool {
         self.environment.is_some() || !self.triangles.is_empty()
     }
 
@@ -290,11 +290,11 @@ impl Lights {
         self.environment.is_some()
     }
 
-    /// The only light there is, when that is a point (m), with its intensity in `count` lanes.
+    /// The only light there is, when that is a point (m), with its intensity in `count` bands.
     pub(crate) fn lone_point(&self, count: usize) -> Option<(DVec3, &[f64])> {
         match self.lights[..] {
             [Light { kind: LightKind::Point(at), .. }] if self.picker.len() == 1 => {
-                Some((at, self.lanes_of(0, count)))
+                Some((at, self.bands_of(0, count)))
             }
             _ => None,
         }
@@ -306,8 +306,8 @@ impl Lights {
         self.triangles.len()
     }
 
-    fn lanes_of(&self, light: usize, count: usize) -> &[f64] {
-        &self.lanes[light * count..(light + 1) * count]
+    fn bands_of(&self, light: usize, count: usize) -> &[f64] {
+        &self.bands[light * count..(light + 1) * count]
     }
 
     /// Chooses a light for `from` by `choice` and a direction to it by `square` (in 0..1); its
@@ -315,13 +315,13 @@ impl Lights {
     /// not shine there.
     pub fn sample(
         &self,
-        around: &Surroundings<'_>,
+        around: &SceneView<'_>,
         spectral: &Spectral,
         from: &Anchor,
         choice: f64,
         square: [f64; 2],
         radiance: &mut [f64],
-    ) -> Option<Toward> {
+    ) -> Option<LightSample> {
         if self.picker.is_empty() {
             return None;
         }
@@ -332,13 +332,13 @@ impl Lights {
             let place = EmissiveTriangle::new(around, placement, triangle, from.point)?;
             return self.toward_triangle(around, spectral, from, &place, square, chance, radiance);
         };
-        radiance.copy_from_slice(self.lanes_of(index, radiance.len()));
+        radiance.copy_from_slice(self.bands_of(index, radiance.len()));
         let point = |at: DVec3, factor: f64, radiance: &mut [f64]| {
             let offset = at - from.point;
             let squared = offset.length_squared();
             let direction = offset.try_normalize()?;
-            radiance.iter_mut().for_each(|lane| *lane *= factor / squared);
-            Some(Toward { direction, density: chance, is_delta: true, end: End::Point(at) })
+            radiance.iter_mut().for_each(|band| *band *= factor / squared);
+            Some(LightSample { direction, pdf: chance, is_delta: true, end: End::Point(at) })
         };
         match light.kind {
             LightKind::Point(at) => point(at, 1.0, radiance),
@@ -348,23 +348,23 @@ impl Lights {
                 if factor > 0.0 { point(at, factor, radiance) } else { None }
             }
             LightKind::Directional(along) => {
-                Some(Toward { direction: -along, density: chance, is_delta: true, end: End::Far })
+                Some(LightSample { direction: -along, pdf: chance, is_delta: true, end: End::Far })
             }
             LightKind::Environment { .. } => {
                 let environment = self.environment.as_ref()?;
-                let (direction, density) = match &environment.map {
+                let (direction, pdf) = match &environment.map {
                     Some((_, sampler)) => {
-                        let (local, density) = sampler.sample(square);
-                        (environment.world(local), density)
+                        let (local, pdf) = sampler.sample(square);
+                        (environment.world(local), pdf)
                     }
                     None => (sphere_direction(square), 0.25 / PI),
                 };
-                if density <= 0.0 {
+                if pdf <= 0.0 {
                     return None;
                 }
                 self.environment(spectral, direction, radiance);
-                let density = density * chance;
-                Some(Toward { direction, density, is_delta: false, end: End::Far })
+                let pdf = pdf * chance;
+                Some(LightSample { direction, pdf, is_delta: false, end: End::Far })
             }
         }
     }
@@ -372,23 +372,23 @@ impl Lights {
     #[expect(clippy::too_many_arguments, reason = "one step of `sample`, taken out to be read")]
     fn toward_triangle(
         &self,
-        around: &Surroundings<'_>,
+        around: &SceneView<'_>,
         spectral: &Spectral,
         from: &Anchor,
         place: &EmissiveTriangle<'_>,
         square: [f64; 2],
         chance: f64,
         radiance: &mut [f64],
-    ) -> Option<Toward> {
+    ) -> Option<LightSample> {
         let [u, v] = triangle_point(square);
         let offset = place.corner + place.shape.edges[0] * u + place.shape.edges[1] * v;
         let direction = offset.try_normalize()?;
-        let spot = Spot { weights: [1.0 - u - v, u, v], ..place.spot };
+        let spot = SurfacePoint { weights: [1.0 - u - v, u, v], ..place.spot };
         let facing = -direction.dot(place.shape.normal);
         if !self.emitted(around, spectral, &spot, facing > 0.0, radiance) {
             return None;
         }
-        let density = chance * offset.length_squared() / (facing.abs() * place.shape.area);
+        let pdf = chance * offset.length_squared() / (facing.abs() * place.shape.area);
         let end = Anchor::new(
             from.point + offset,
             place.shape.normal,
@@ -396,9 +396,9 @@ impl Lights {
             spot.placement,
             spot.mesh,
         );
-        density.is_finite().then_some(Toward {
+        pdf.is_finite().then_some(LightSample {
             direction,
-            density,
+            pdf,
             is_delta: false,
             end: End::Surface(end, place.id),
         })
@@ -407,9 +407,9 @@ impl Lights {
     /// Radiance that a surface gives off to its front or back; `false` when it is dark.
     pub fn emitted(
         &self,
-        around: &Surroundings<'_>,
+        around: &SceneView<'_>,
         spectral: &Spectral,
-        spot: &Spot<'_>,
+        spot: &SurfacePoint<'_>,
         front: bool,
         radiance: &mut [f64],
     ) -> bool {
@@ -419,7 +419,7 @@ impl Lights {
         let [r, g, b, _] = around.paint(&emission.radiance, spot);
         spectral.spread(&[r, g, b].map(|c| c * emission.strength), radiance);
         if let Some(tint) = &self.tints[number] {
-            radiance.iter_mut().zip(tint).for_each(|(lane, tint)| *lane *= tint);
+            radiance.iter_mut().zip(tint).for_each(|(band, tint)| *band *= tint);
         }
         true
     }
@@ -427,11 +427,11 @@ impl Lights {
     /// The density (1/sr), chance included, with which [`Self::sample`] gives the direction from
     /// `from` to `spot`, where it was met by a ray along `direction`.
     #[must_use]
-    pub fn density_of_surface(
+    pub fn pdf_of_surface(
         &self,
-        around: &Surroundings<'_>,
+        around: &SceneView<'_>,
         placement: u32,
-        spot: &Spot<'_>,
+        spot: &SurfacePoint<'_>,
         from: DVec3,
         direction: DVec3,
     ) -> f64 {
@@ -446,22 +446,22 @@ impl Lights {
         let chance = self.picker.probability(*first as usize + spot.triangle);
         let [_, u, v] = spot.weights;
         let offset = place.corner + place.shape.edges[0] * u + place.shape.edges[1] * v;
-        let density = chance * offset.length_squared()
+        let pdf = chance * offset.length_squared()
             / (direction.dot(place.shape.normal).abs() * place.shape.area);
-        if density.is_finite() { density } else { 0.0 }
+        if pdf.is_finite() { pdf } else { 0.0 }
     }
 
     /// Radiance that comes from the unit `direction` without meeting anything; `false` when it is
     /// dark there.
     pub fn environment(&self, spectral: &Spectral, direction: DVec3, radiance: &mut [f64]) -> bool {
         let Some(environment) = &self.environment else { return false };
-        let own = self.lanes_of(environment.index, radiance.len());
+        let own = self.bands_of(environment.index, radiance.len());
         match &environment.map {
             None => radiance.copy_from_slice(own),
             Some((map, _)) => {
                 let color = map.radiance(environment.local(direction));
-                for (i, lane) in radiance.iter_mut().enumerate() {
-                    *lane = own[i] * spectral.lane(&color, i);
+                for (i, band) in radiance.iter_mut().enumerate() {
+                    *band = own[i] * spectral.band(&color, i);
                 }
             }
         }
@@ -471,16 +471,16 @@ impl Lights {
     /// The density (1/sr), chance included, with which [`Self::sample`] gives a direction of the
     /// environment.
     #[must_use]
-    pub fn density_of_environment(&self, direction: DVec3) -> f64 {
+    pub fn pdf_of_environment(&self, direction: DVec3) -> f64 {
         let Some(environment) = self.environment.as_ref().filter(|_| !self.picker.is_empty())
         else {
             return 0.0;
         };
-        let density = match &environment.map {
-            Some((_, sampler)) => sampler.density(environment.local(direction)),
+        let pdf = match &environment.map {
+            Some((_, sampler)) => sampler.pdf(environment.local(direction)),
             None => 0.25 / PI,
         };
-        density * self.picker.probability(environment.index)
+        pdf * self.picker.probability(environment.index)
     }
 }
 

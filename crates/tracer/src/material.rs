@@ -249,7 +249,7 @@ impl Material {
 
     /// Whether rays may pass the surface as if it were not there.
     #[must_use]
-    pub fn is_pierced(&self) -> bool {
+    pub fn has_alpha(&self) -> bool {
         self.alpha != Alpha::Opaque
     }
 }

@@ -1,7 +1,9 @@
 //! Global illumination: all paths from the camera to light (Kajiya, "The Rendering Equation", 1986),
 //! lights asked at each surface and weighed against directions that meet them by themselves.
 
-use crate::transport::{Beam, Follow, Rules, Scratch, Stage, Tally, Tracer, trace};
+use crate::transport::{
+    Follow, LightingContext, RaySamples, RayStats, Rules, Scratch, Tracer, trace,
+};
 
 /// Surfaces after which dim paths end by chance.
 const ROULETTE_AFTER: u32 = 4;
@@ -16,11 +18,11 @@ pub struct Path {
 impl Tracer for Path {
     fn radiance(
         &self,
-        stage: &Stage<'_>,
-        beam: &Beam<'_>,
+        stage: &LightingContext<'_>,
+        beam: &RaySamples<'_>,
         scratch: &mut Scratch,
         out: &mut Vec<f64>,
-    ) -> Tally {
+    ) -> RayStats {
         let roulette = Some(ROULETTE_AFTER);
         let rules = Rules { bounces: self.max_bounces, follow: Follow::All, roulette };
         trace(rules, stage, beam, scratch, out)

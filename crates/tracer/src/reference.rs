@@ -41,7 +41,7 @@ impl View {
 
 /// What looking at a hit needs to know of the scene.
 #[derive(Debug, Clone, Copy)]
-pub struct Surroundings<'a> {
+pub struct SceneView<'a> {
     /// Meshes and placements.
     pub geometry: &'a Geometry,
     /// Materials, by the index that placements name.
@@ -61,7 +61,7 @@ pub struct Traced<'a> {
     pub hits: &'a HitBatch,
 }
 
-impl Surroundings<'_> {
+impl SceneView<'_> {
     /// Depth of hit `i` along the camera's axis (m), `+inf` for a miss.
     #[must_use]
     pub fn depth(&self, traced: Traced<'_>, i: usize) -> f64 {
@@ -116,17 +116,17 @@ impl Surroundings<'_> {
 
     /// Where hit `i` is on its mesh; `None` for a miss.
     #[must_use]
-    pub fn spot(&self, hits: &HitBatch, i: usize) -> Option<Spot<'_>> {
+    pub fn spot(&self, hits: &HitBatch, i: usize) -> Option<SurfacePoint<'_>> {
         let placement = self.placement(hits, i)?;
         let (u, v) = (hits.u[i], hits.v[i]);
         let weights = [1.0 - u - v, u, v];
-        let spot = Spot::corner(self.geometry, placement, hits.triangle[i] as usize);
-        Some(Spot { weights, ..spot })
+        let spot = SurfacePoint::corner(self.geometry, placement, hits.triangle[i] as usize);
+        Some(SurfacePoint { weights, ..spot })
     }
 
     /// The material of a spot.
     #[must_use]
-    pub fn material(&self, spot: &Spot<'_>) -> Option<&Material> {
+    pub fn material(&self, spot: &SurfacePoint<'_>) -> Option<&Material> {
         self.materials.get(spot.placement.material as usize)
     }
 
@@ -148,11 +148,11 @@ impl Surroundings<'_> {
     }
 
     /// Where ray `i` of the camera hit, with its footprint; `None` for a miss.
-    fn seen(&self, traced: Traced<'_>, i: usize) -> Option<Spot<'_>> {
+    fn seen(&self, traced: Traced<'_>, i: usize) -> Option<SurfacePoint<'_>> {
         let direction = traced.rays.direction(i);
         let cone = self.view.cone(direction).map(|cone| cone.after(traced.hits.t[i]));
         let footprint = cone.map(|cone| Footprint { direction, width: cone.width });
-        Some(Spot { footprint, ..self.spot(traced.hits, i)? })
+        Some(SurfacePoint { footprint, ..self.spot(traced.hits, i)? })
     }
 
     /// Base colour without light at hit `i` of the camera's rays, averaged over their footprint;
@@ -191,9 +191,9 @@ impl Surroundings<'_> {
     /// Where alpha cuts holes there is no mean over a footprint: the mean of alpha against a cut-off
     /// is not the share that is cut.
     #[must_use]
-    pub fn base_color(&self, material: &Material, spot: &Spot<'_>) -> [f64; 4] {
-        let mut color = if material.is_pierced() {
-            self.paint(&material.base_color, &Spot { footprint: None, ..*spot })
+    pub fn base_color(&self, material: &Material, spot: &SurfacePoint<'_>) -> [f64; 4] {
+        let mut color = if material.has_alpha() {
+            self.paint(&material.base_color, &SurfacePoint { footprint: None, ..*spot })
         } else {
             self.paint(&material.base_color, spot)
         };
@@ -207,7 +207,7 @@ impl Surroundings<'_> {
 
     /// A paint's colour and alpha.
     #[must_use]
-    pub fn paint(&self, paint: &Paint, spot: &Spot<'_>) -> [f64; 4] {
+    pub fn paint(&self, paint: &Paint, spot: &SurfacePoint<'_>) -> [f64; 4] {
         match paint {
             Paint::Plain([r, g, b]) => [*r, *g, *b, 1.0],
             Paint::Checker { colors, squares } => {
@@ -239,19 +239,19 @@ impl Surroundings<'_> {
     /// The colour that a use of an image has at a spot, whatever its encoding: the magenta checker
     /// where the image cannot be had, white where nobody asked for it.
     #[must_use]
-    pub fn tint(&self, image: &TextureUse, spot: &Spot<'_>) -> [f64; 4] {
+    pub fn tint(&self, image: &TextureUse, spot: &SurfacePoint<'_>) -> [f64; 4] {
         self.decoded(image).map_or([1.0; 4], |pixels| Self::over(pixels, image, spot))
     }
 
     /// What an image of data (a roughness, a share) says at a spot; 1 without the image.
     #[must_use]
-    pub fn texel(&self, image: &TextureUse, spot: &Spot<'_>) -> [f64; 4] {
+    pub fn texel(&self, image: &TextureUse, spot: &SurfacePoint<'_>) -> [f64; 4] {
         self.lookup(image, spot).unwrap_or([1.0; 4])
     }
 
     /// What an image of data says at a spot; `None` without the image.
     #[must_use]
-    pub fn lookup(&self, image: &TextureUse, spot: &Spot<'_>) -> Option<[f64; 4]> {
+    pub fn lookup(&self, image: &TextureUse, spot: &SurfacePoint<'_>) -> Option<[f64; 4]> {
         // Magenta is for looking at, not a roughness or a tilt.
         let pixels = self.decoded(image).filter(|pixels| !pixels.stands_in())?;
         Some(Self::over(pixels, image, spot))
@@ -262,7 +262,7 @@ impl Surroundings<'_> {
     }
 
     /// The pixels of a use of an image, averaged over the spot's footprint.
-    fn over(pixels: &Image, image: &TextureUse, spot: &Spot<'_>) -> [f64; 4] {
+    fn over(pixels: &Image, image: &TextureUse, spot: &SurfacePoint<'_>) -> [f64; 4] {
         let set = image.uv_set as usize;
         let [u, v] = spot.uv(set);
         let at = image.transform.map(|[a, b, c]| a * u + b * v + c);
@@ -287,7 +287,7 @@ impl Surroundings<'_> {
 
 /// A place on a mesh.
 #[derive(Debug, Clone, Copy)]
-pub struct Spot<'a> {
+pub struct SurfacePoint<'a> {
     /// Which placement.
     pub placement: &'a Placement,
     /// Its mesh.
@@ -300,7 +300,7 @@ pub struct Spot<'a> {
     pub footprint: Option<Footprint>,
 }
 
-impl<'a> Spot<'a> {
+impl<'a> SurfacePoint<'a> {
     /// The first corner of a triangle.
     #[must_use]
     pub fn corner(geometry: &'a Geometry, placement: &'a Placement, triangle: usize) -> Self {
@@ -323,7 +323,7 @@ impl<'a> Spot<'a> {
         self.mesh.uvs.get(set).map_or([0.0; 2], |uvs| self.mix(uvs))
     }
 
-    /// The mesh's colour, when it has any; what is outside 0..=1 is brought there.
+    /// The mesh's colour, when it has any; what is outside 0..=1 is contribution there.
     #[must_use]
     pub fn vertex_color(&self) -> Option<[f64; 4]> {
         let colors = self.mesh.colors.as_ref()?;

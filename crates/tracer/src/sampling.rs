@@ -205,7 +205,7 @@ impl GridDistribution {
 
     /// The density of places at one, over the unit square.
     #[must_use]
-    pub fn density(&self, [u, v]: [f64; 2]) -> f64 {
+    pub fn pdf(&self, [u, v]: [f64; 2]) -> f64 {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -278,7 +278,7 @@ mod tests {
             let place = grid.place(square);
             let [x, y] = place.map(|c| (c * 3.0) as usize);
             counts[y * 3 + x] += 1.0 / f64::from(n * n);
-            assert!((grid.density(place) - weights[y * 3 + x] * 9.0 / 16.0).abs() < 1e-12);
+            assert!((grid.pdf(place) - weights[y * 3 + x] * 9.0 / 16.0).abs() < 1e-12);
         }
         for (count, weight) in counts.iter().zip(weights) {
             // A regular grid: within a step along each side of the cell's share of the square.

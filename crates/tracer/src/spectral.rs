@@ -1,47 +1,47 @@
-//! From colours to the lanes that a ray carries.
+//! From colours to the bands that a ray carries.
 
-use etendue_spectrum::{Curve, Illuminant, Lanes, NoOverlap, Outside};
+use etendue_spectrum::{Bands, Curve, Illuminant, NoOverlap, Outside};
 
 use crate::Color;
 
-/// The lanes of a render, and the way from linear RGB to them.
+/// The bands of a render, and the way from linear RGB to them.
 #[derive(Debug, Clone)]
 pub struct Spectral {
-    lanes: Lanes,
+    bands: Bands,
     from_rgb: Vec<[f64; 3]>,
     is_rgb: bool,
 }
 
 impl Spectral {
-    /// For these lanes.
+    /// For these bands.
     #[must_use]
-    pub fn new(lanes: &Lanes) -> Self {
-        let from_rgb = lanes.from_rgb();
-        Self { is_rgb: *lanes == Lanes::Rgb, from_rgb, lanes: lanes.clone() }
+    pub fn new(bands: &Bands) -> Self {
+        let from_rgb = bands.from_rgb();
+        Self { is_rgb: *bands == Bands::Rgb, from_rgb, bands: bands.clone() }
     }
 
-    /// The lanes.
+    /// The bands.
     #[must_use]
-    pub fn lanes(&self) -> &Lanes {
-        &self.lanes
+    pub fn bands(&self) -> &Bands {
+        &self.bands
     }
 
-    /// How many lanes a ray has.
+    /// How many bands a ray has.
     #[must_use]
     pub fn count(&self) -> usize {
         self.from_rgb.len()
     }
 
-    /// The wavelength that stands for lane `i` (nm).
+    /// The wavelength that stands for band `i` (nm).
     #[must_use]
     pub fn wavelength(&self, i: usize) -> f64 {
-        self.lanes.wavelength(i)
+        self.bands.wavelength(i)
     }
 
-    /// Lane `i` of a linear sRGB colour.
+    /// Row `i` of a linear sRGB colour.
     #[must_use]
     #[inline]
-    pub fn lane(&self, color: &Color, i: usize) -> f64 {
+    pub fn band(&self, color: &Color, i: usize) -> f64 {
         if self.is_rgb {
             return color[i];
         }
@@ -49,22 +49,22 @@ impl Spectral {
         row[0] * color[0] + row[1] * color[1] + row[2] * color[2]
     }
 
-    /// A colour in all lanes.
+    /// A colour in all bands.
     #[inline]
     pub fn spread(&self, color: &Color, out: &mut [f64]) {
         for (i, out) in out.iter_mut().enumerate() {
-            *out = self.lane(color, i);
+            *out = self.band(color, i);
         }
     }
 
-    /// An illuminant, 1 at 560 nm, in all lanes.
+    /// An illuminant, 1 at 560 nm, in all bands.
     ///
     /// # Errors
     ///
-    /// When it is known at no wavelength of any lane.
+    /// When it is known at no wavelength of any band.
     pub fn illuminant(&self, illuminant: Illuminant) -> Result<Vec<f64>, NoOverlap> {
         // Checked when the scene was read; a flat spectrum stands in for what cannot be.
         let curve = illuminant.curve().unwrap_or(Curve::ONE);
-        self.lanes.from_curve(&curve, Outside::Zero)
+        self.bands.from_curve(&curve, Outside::Zero)
     }
 }

@@ -5,14 +5,14 @@ use etendue_geometry::{HitBatch, RayBatch};
 
 use crate::bsdf::{Bsdf, Layered, Model, fresnel};
 use crate::material::{Alpha, GltfSurface, NormalMap};
-use crate::reference::{Spot, Surroundings};
+use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::Anchor;
 use crate::{Color, Footprint, Material, Scattering};
 
 /// A hit seen from its ray.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Met<'a> {
-    pub(crate) spot: Spot<'a>,
+pub(crate) struct SurfaceInteraction<'a> {
+    pub(crate) spot: SurfacePoint<'a>,
     pub(crate) material: &'a Material,
     pub(crate) anchor: Anchor,
     /// The ray came from the triangle's front.
@@ -22,16 +22,16 @@ pub(crate) struct Met<'a> {
     wo: DVec3,
 }
 
-impl<'a> Met<'a> {
+impl<'a> SurfaceInteraction<'a> {
     /// Hit `i`; `None` for a miss.
     pub(crate) fn new(
-        around: &'a Surroundings<'a>,
+        around: &'a SceneView<'a>,
         rays: &RayBatch,
         hits: &HitBatch,
         i: usize,
         footprint: Option<Footprint>,
     ) -> Option<Self> {
-        let spot = Spot { footprint, ..around.spot(hits, i)? };
+        let spot = SurfacePoint { footprint, ..around.spot(hits, i)? };
         let material = around.material(&spot)?;
         let (origin, direction) = (rays.origin(i), rays.direction(i));
         let normal = hits.normal(i);
@@ -51,14 +51,14 @@ impl<'a> Met<'a> {
         }
     }
 
-    /// The base colour alone, brought to what a surface can reflect.
+    /// The base colour alone, contribution to what a surface can reflect.
     pub(crate) fn color(&self) -> Color {
         let [r, g, b, _] = self.base;
         [r, g, b].map(|c| c.clamp(0.0, 1.0))
     }
 
     /// How it scatters light of the wavelength (nm).
-    pub(crate) fn bsdf(&self, around: &Surroundings<'_>, wavelength: f64) -> Bsdf {
+    pub(crate) fn bsdf(&self, around: &SceneView<'_>, wavelength: f64) -> Bsdf {
         let side = if self.front { 1.0 } else { -1.0 };
         let geometric = self.anchor.normal * side;
         let model = match &self.material.scattering {
@@ -76,7 +76,7 @@ impl<'a> Met<'a> {
         Bsdf::new(model, [geometric, shading], self.wo, [self.color(), [1.0; 3]])
     }
 
-    fn layered(&self, around: &Surroundings<'_>, own: &GltfSurface, geometric: DVec3) -> Bsdf {
+    fn layered(&self, around: &SceneView<'_>, own: &GltfSurface, geometric: DVec3) -> Bsdf {
         let texel = |image: &Option<_>| match image {
             Some(image) => around.texel(image, &self.spot),
             None => [1.0; 4],
@@ -108,7 +108,7 @@ impl<'a> Met<'a> {
 
     /// The shading normal on the viewer's side; the geometric one where the viewer would see its
     /// back.
-    fn shading(&self, around: &Surroundings<'_>, geometric: DVec3) -> DVec3 {
+    fn shading(&self, around: &SceneView<'_>, geometric: DVec3) -> DVec3 {
         let front = self.anchor.normal;
         let mut normal = self.spot.shading_normal(front).unwrap_or(front);
         if let Some(map) = &self.material.normal_map {
@@ -122,7 +122,7 @@ impl<'a> Met<'a> {
 
     /// The normal tilted by a normal map: +x along u, +y up the image, against v (glTF 2.0, section
     /// 3.9.3).
-    fn tilted(&self, around: &Surroundings<'_>, map: &NormalMap, normal: DVec3) -> DVec3 {
+    fn tilted(&self, around: &SceneView<'_>, map: &NormalMap, normal: DVec3) -> DVec3 {
         let Some([along_u, along_v]) = self.spot.texture_axes(map.image.uv_set as usize) else {
             return normal;
         };
@@ -142,7 +142,7 @@ impl<'a> Met<'a> {
 /// tilted mirror would be black there (Keller et al., "The Iray Light Transport Simulation and
 /// Rendering System", 2017, appendix A.3). All unit; `normal` and `geometric` face the viewer.
 fn outward(normal: DVec3, geometric: DVec3, wo: DVec3) -> DVec3 {
-    /// How far above the surface the mirrored direction is raised before it is brought back to unit
+    /// How far above the surface the mirrored direction is raised before it is contribution back to unit
     /// length, as a share of the viewer's elevation: enough to stay above it in rounding.
     const LEAST: f64 = 0.05;
     let mirrored = 2.0 * normal.dot(wo) * normal - wo;

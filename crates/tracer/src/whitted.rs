@@ -2,7 +2,9 @@
 //! Shaded Display", 1980). Where a boundary reflects and refracts, one of the two is followed, by
 //! Fresnel's share.
 
-use crate::transport::{Beam, Follow, Rules, Scratch, Stage, Tally, Tracer, trace};
+use crate::transport::{
+    Follow, LightingContext, RaySamples, RayStats, Rules, Scratch, Tracer, trace,
+};
 
 /// Direct light seen through any number of mirrors and clear boundaries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,11 +16,11 @@ pub struct Whitted {
 impl Tracer for Whitted {
     fn radiance(
         &self,
-        stage: &Stage<'_>,
-        beam: &Beam<'_>,
+        stage: &LightingContext<'_>,
+        beam: &RaySamples<'_>,
         scratch: &mut Scratch,
         out: &mut Vec<f64>,
-    ) -> Tally {
+    ) -> RayStats {
         let rules = Rules { bounces: self.max_bounces, follow: Follow::Single, roulette: None };
         trace(rules, stage, beam, scratch, out)
     }

@@ -3,7 +3,7 @@
 mod spectral;
 
 use anyhow::Result;
-use etendue_sensor::{Film, RawImage, Sensor, SensorSpec, Shot};
+use etendue_sensor::{Exposure, Film, RawImage, Sensor, SensorSpec};
 use serde_json::{Value, json};
 
 use crate::{Case, Method, Outcome, Scale};
@@ -81,7 +81,7 @@ pub const METHOD: Method = Method {
             regime: "physical radiometry under illuminant A, daylight and a 10 nm line; clear, ideal red, \
                 green and blue pixels; white, pure colours and two of them one behind the other; \
                 quantum efficiency as a number and as a curve",
-            must: "in the lanes that the plan chooses, electrons are those of a sum in steps of 0.1 nm to \
+            must: "in the bands that the plan chooses, electrons are those of a sum in steps of 0.1 nm to \
                 0.1 % (of a tenth of white for pure colours, of white for two)",
             limit: None,
             run: spectral::coloured_light,
@@ -124,7 +124,7 @@ fn two_cameras(scale: Scale) -> Result<Outcome> {
         #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
         let light = (400.0 / sensor.electrons_per_unit(0)[0]) as f32;
         let film = vec![light; (width * height) as usize];
-        let shot = Shot { exposure: 0.01, frame: number };
+        let shot = Exposure { exposure: 0.01, frame: number };
         Ok(sensor.expose(Film { values: &film }, shot, 7)?)
     };
     let one = frame(1, 0.0, 0)?;
@@ -162,7 +162,7 @@ fn even(sensor: &Sensor, electrons: f64, exposure: f64) -> Result<(RawImage, f64
     let light = (electrons / worth) as f32;
     let [width, height] = sensor.resolution();
     let film = vec![light; (width * height) as usize];
-    let image = sensor.expose(Film { values: &film }, Shot { exposure, frame: 0 }, 7)?;
+    let image = sensor.expose(Film { values: &film }, Exposure { exposure, frame: 0 }, 7)?;
     Ok((image, f64::from(light) * worth))
 }
 
@@ -326,7 +326,7 @@ fn exposures(scale: Scale) -> Result<Outcome> {
         // As much light as makes 20 000 electrons in this time.
         #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
         let light = (2e4 / (worth * seconds)) as f32;
-        let shot = Shot { exposure: seconds, frame: 0 };
+        let shot = Exposure { exposure: seconds, frame: 0 };
         let moments = sensor.moments(Film { values: &[light] }, shot)?;
         let expected = f64::from(light) * worth * seconds;
         let off = f64::from(moments.mean[0]) / expected - 1.0;

@@ -14,7 +14,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_scene::import::Wanted;
 use etendue_scene::{LoadOptions, SceneFile};
-use etendue_spectrum::Lanes;
+use etendue_spectrum::Bands;
 use serde_json::json;
 
 /// Side of a tile of pixels.
@@ -28,7 +28,7 @@ const ONE_IN: u32 = 8;
 pub(crate) fn print_bound(path: &Path, triangles: u64, light: DVec3) -> anyhow::Result<()> {
     let file = SceneFile::read(path, &[])?;
     let scene = file.load(Wanted::NOTHING, &LoadOptions::default())?;
-    let camera = scene.camera.opened(&Lanes::Rgb).context("the camera")?;
+    let camera = scene.camera.opened(&Bands::Rgb).context("the camera")?;
     let primary = camera_rays(&camera, scene.render.samples, &scene.render);
     let geometry = meshes::blob(triangles)?;
     let accel = Embree::build(geometry.clone(), &BuildOptions::default())?;

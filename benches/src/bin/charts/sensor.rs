@@ -6,7 +6,7 @@ use etendue_bench::rounds::{Turn, take_turns, wall};
 use etendue_benches::effort::Effort;
 use etendue_chart::{Axis, Chart, Mark, Point, Series};
 use etendue_sensor::approximation::Deviation;
-use etendue_sensor::{Film, NoiseModel, Sensor, Shot};
+use etendue_sensor::{Exposure, Film, NoiseModel, Sensor};
 
 use crate::page::Page;
 
@@ -43,7 +43,7 @@ pub(crate) fn measure(effort: Effort, page: &mut Page) -> anyhow::Result<()> {
         for film in &films {
             let (sensor, fault) = (exact.clone().with_noise(noise), &fault);
             turns.push(Box::new(move || {
-                let shot = Shot { exposure: 0.01, frame: 0 };
+                let shot = Exposure { exposure: 0.01, frame: 0 };
                 let (seconds, image) = wall(|| sensor.expose(Film { values: film }, shot, 0));
                 if let Err(error) = image {
                     fault.borrow_mut().get_or_insert(error);
@@ -91,7 +91,7 @@ fn chart(poisson: &[f64], normal: &[f64]) -> Chart {
         series.push(one(format!("normal, {mean} e⁻"), 4, [approximate, distance]));
     }
     Chart {
-        title: "Shot noise: error against time".to_owned(),
+        title: "Exposure noise: error against time".to_owned(),
         axes: [
             Axis::new("wall time a pixel (ns), all threads"),
             Axis::new("Kolmogorov's distance to the true distribution").with_zero("exact"),

@@ -109,7 +109,7 @@ fn verdict(geometry: &Geometry, query: &Query, triangle: &Triangle) -> Verdict {
 
 /// The rays of a query whose hits are decided one by one.
 #[repr(C)]
-pub(crate) struct Judged<'a> {
+pub(crate) struct ExactFilter<'a> {
     /// First, because this is what Embree hands on.
     context: sys::RTCRayQueryContext,
     geometry: &'a Geometry,
@@ -120,7 +120,7 @@ pub(crate) struct Judged<'a> {
     pub(super) doubtful: &'a mut Vec<u32>,
 }
 
-impl<'a> Judged<'a> {
+impl<'a> ExactFilter<'a> {
     pub(crate) fn new(
         geometry: &'a Geometry,
         rays: &'a RayBatch,
@@ -164,11 +164,11 @@ impl<'a> Judged<'a> {
 ///
 /// # Safety
 ///
-/// For Embree, in queries whose context is a [`Judged`].
+/// For Embree, in queries whose context is a [`ExactFilter`].
 pub(super) unsafe extern "C" fn keep_exact(args: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: Embree's own arguments, and the query's context, which nobody else uses meanwhile.
     let (lanes, judged) =
-        unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<Judged<'_>>()) };
+        unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<ExactFilter<'_>>()) };
     lanes.judge(|hit| judged.keeps(&hit));
 }
 
@@ -180,7 +180,7 @@ pub(super) unsafe extern "C" fn keep_exact(args: *const sys::RTCFilterFunctionNA
 pub(super) unsafe extern "C" fn keep_clear(args: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: as in `keep_exact`.
     let (lanes, judged) =
-        unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<Judged<'_>>()) };
+        unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<ExactFilter<'_>>()) };
     lanes.judge(|hit| judged.is_clear(&hit) || judged.keeps(&hit));
 }
 

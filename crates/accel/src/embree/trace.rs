@@ -4,7 +4,7 @@ use embree4_sys as sys;
 use etendue_geometry::{Geometry, MISS, Mesh, Positions};
 
 use super::Scene;
-use super::filter::{self, Judged, Search};
+use super::filter::{self, ExactFilter, Search};
 use crate::single::Rays32;
 
 /// What single precision found for a batch of rays.
@@ -37,7 +37,7 @@ impl Scene {
     pub(crate) fn closest_from_surfaces(
         &self,
         rays: &Rays32,
-        judged: &mut Judged<'_>,
+        judged: &mut ExactFilter<'_>,
         found: &mut Found,
     ) {
         let mut arguments = intersect_arguments(false);
@@ -83,7 +83,7 @@ impl Scene {
         &self,
         rays: &Rays32,
         coherent: bool,
-        judged: &mut Judged<'_>,
+        judged: &mut ExactFilter<'_>,
         blocked: &mut [bool],
     ) {
         let mut arguments = occluded_arguments(coherent);

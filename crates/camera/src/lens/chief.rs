@@ -6,7 +6,7 @@
 use glam::{DVec2, DVec3};
 
 use super::focused::Focused;
-use etendue_optics::train::TrainAt;
+use etendue_optics::train::MonochromaticTrain;
 
 /// Nodes over the half diagonal, for lenses with rotational symmetry.
 const RADIAL_NODES: u32 = 257;
@@ -25,7 +25,7 @@ pub(crate) struct ChiefTable {
 
 impl ChiefTable {
     /// Solves the nodes.
-    pub(crate) fn new(focused: &Focused, at: &TrainAt) -> Self {
+    pub(crate) fn new(focused: &Focused, at: &MonochromaticTrain) -> Self {
         let half_size = focused.film().half_size();
         let radius = half_size.length();
         if focused.train().is_rotationally_symmetric() {
@@ -45,7 +45,12 @@ impl ChiefTable {
     }
 
     /// The direction from a place on the sensor (mm from its centre) to the stop's centre.
-    pub(crate) fn direction(&self, focused: &Focused, at: &TrainAt, film: DVec2) -> Option<DVec3> {
+    pub(crate) fn direction(
+        &self,
+        focused: &Focused,
+        at: &MonochromaticTrain,
+        film: DVec2,
+    ) -> Option<DVec3> {
         let start = match self.half_size {
             None => self.radial_start(film),
             Some(half_size) => self.planar_start(film / half_size),
@@ -80,7 +85,7 @@ impl ChiefTable {
 
 /// From the axis outwards, each begun where the last two point; there is nothing behind the first
 /// that cannot be solved.
-fn along_radius(focused: &Focused, at: &TrainAt, radius: f64) -> Vec<Option<DVec2>> {
+fn along_radius(focused: &Focused, at: &MonochromaticTrain, radius: f64) -> Vec<Option<DVec2>> {
     let mut nodes: Vec<Option<DVec2>> = vec![None; RADIAL_NODES as usize];
     for i in 0..RADIAL_NODES as usize {
         #[expect(clippy::cast_precision_loss, reason = "a few hundred nodes")]

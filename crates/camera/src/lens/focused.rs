@@ -6,7 +6,9 @@ use super::spec::Setup;
 use crate::{CameraError, Intrinsics};
 use etendue_optics::element::Frame;
 use etendue_optics::train::analysis::chief_height;
-use etendue_optics::train::{Focus, LensError, OpticalTrain, Paraxial, SensorMount, TrainAt};
+use etendue_optics::train::{
+    Focus, LensError, MonochromaticTrain, OpticalTrain, Paraxial, SensorMount,
+};
 
 /// Entrance pupils farther away than this many times the lens' own size (mm) count as infinitely
 /// far: rays towards the object are parallel.
@@ -195,7 +197,7 @@ impl Focused {
     }
 
     /// The lens at its design wavelength.
-    pub(crate) fn at_design(&self) -> Result<TrainAt, CameraError> {
+    pub(crate) fn at_design(&self) -> Result<MonochromaticTrain, CameraError> {
         self.train
             .at(self.train.wavelength())
             .map_err(|fault| CameraError::new("lens", fault.to_string()))

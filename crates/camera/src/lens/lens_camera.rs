@@ -13,19 +13,21 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use etendue_geometry::{RayBatch, RaysMut};
-use etendue_spectrum::{Curve, Lanes, Outside, Spread};
+use etendue_spectrum::{Bands, Curve, Outside, Spread};
 use glam::{DVec2, DVec3};
 
 use super::chief::ChiefTable;
 use super::focused::{Focused, View};
-use super::lit_area::LitArea;
+use super::image_circle::ImageCircle;
 
 use crate::{CameraError, Pose};
-use etendue_optics::element::{Clip, Fate, Ray, Reflection};
+use etendue_optics::element::{Clip, Ray, RayStatus, Reflection};
 use etendue_optics::glass::GlassError;
 use etendue_optics::train::analysis::projected_solid_angle;
-use etendue_optics::train::pupil::{Disc, Window, blocked, without_dimming, without_filters};
-use etendue_optics::train::{ExitPupil, ExitPupilError, OpticalTrain, Part, Side, TrainAt};
+use etendue_optics::train::pupil::{Disk, Window, blocked, without_dimming, without_filters};
+use etendue_optics::train::{
+    ExitPupil, ExitPupilError, MonochromaticTrain, OpticalTrain, Part, Side,
+};
 
 /// Focal lengths that lenses of cameras have (mm): from an endoscope's to a telescope's.
 const PLAUSIBLE_FOCAL_LENGTHS: std::ops::RangeInclusive<f64> = 0.2..=2e4;
@@ -33,12 +35,12 @@ const PLAUSIBLE_FOCAL_LENGTHS: std::ops::RangeInclusive<f64> = 0.2..=2e4;
 /// The least diagonal of a sensor that is not told (mm); those of endoscopes have 1.
 const LEAST_DIAGONAL: f64 = 2.0;
 
-/// Lanes whose rays run the same way.
+/// Bands whose rays run the same way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LaneGroup {
-    /// The lanes.
-    pub lanes: Range<usize>,
-    /// What to ask [`Camera::sample_rays`](crate::Camera::sample_rays) for: `None` when all lanes
+pub struct BandGroup {
+    /// The bands.
+    pub bands: Range<usize>,
+    /// What to ask [`Camera::sample_rays`](crate::Camera::sample_rays) for: `None` when all bands
     /// are in one group.
     pub wavelength: Option<f64>,
 }
@@ -47,10 +49,10 @@ pub struct LaneGroup {
 #[derive(Debug, Clone)]
 pub struct LensCamera {
     pub(super) focused: Focused,
-    design: TrainAt,
+    design: MonochromaticTrain,
     chief: ChiefTable,
     /// Where on the sensor light arrives.
-    lit: LitArea,
+    lit: ImageCircle,
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
     pub(super) solid_angle: f64,
     pub(super) opened: OnceLock<Option<Arc<Opened>>>,
@@ -59,18 +61,18 @@ pub struct LensCamera {
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
 pub(super) struct Opened {
-    lanes: Lanes,
+    bands: Bands,
     pub(super) groups: Vec<OpenedGroup>,
     pub(super) pupil: ExitPupil,
 }
 
-/// The lens as it is for a group of lanes.
+/// The lens as it is for a group of bands.
 #[derive(Debug)]
 pub(super) struct OpenedGroup {
-    /// As in [`LaneGroup`].
+    /// As in [`BandGroup`].
     pub(super) wavelength: Option<f64>,
     /// One, or as many as share the group's light.
-    pub(super) lenses: Vec<TrainAt>,
+    pub(super) lenses: Vec<MonochromaticTrain>,
 }
 
 impl PartialEq for LensCamera {
@@ -101,7 +103,7 @@ impl LensCamera {
         if !lit_from(DVec2::ZERO) && !places.into_iter().flatten().any(lit_from) {
             return Err(dark(blocked(train, &clear, frame.vertex)));
         }
-        let lit = LitArea::measure(train, &clear, frame, half);
+        let lit = ImageCircle::measure(train, &clear, frame, half);
         let solid_angle = unvignetted(focused.train(), &design, &focused);
         let chief = ChiefTable::new(&focused, &design);
         Ok(Self { focused, design, chief, lit, solid_angle, opened: OnceLock::new() })
@@ -125,45 +127,45 @@ impl LensCamera {
         self.solid_angle
     }
 
-    /// Which of `lanes` need rays of their own: each where the lens tells wavelengths apart and there
+    /// Which of `bands` need rays of their own: each where the lens tells wavelengths apart and there
     /// are several, else none.
     #[must_use]
-    pub fn lane_groups(&self, lanes: &Lanes) -> Vec<LaneGroup> {
-        let count = lanes.count();
+    pub fn band_groups(&self, bands: &Bands) -> Vec<BandGroup> {
+        let count = bands.count();
         if count < 2 || !tells_wavelengths_apart(self.focused.train()) {
-            return vec![LaneGroup { lanes: 0..count, wavelength: None }];
+            return vec![BandGroup { bands: 0..count, wavelength: None }];
         }
-        let group = |i| LaneGroup { lanes: i..i + 1, wavelength: Some(lanes.wavelength(i)) };
+        let group = |i| BandGroup { bands: i..i + 1, wavelength: Some(bands.wavelength(i)) };
         (0..count).map(group).collect()
     }
 
-    /// The same camera with its exit pupil measured for `lanes`, which takes a moment when it is not
+    /// The same camera with its exit pupil measured for `bands`, which takes a moment when it is not
     /// yet.
-    pub(crate) fn opened(&self, lanes: &Lanes) -> Result<Self, CameraError> {
+    pub(crate) fn opened(&self, bands: &Bands) -> Result<Self, CameraError> {
         if let Some(Some(opened)) = self.opened.get()
-            && opened.lanes == *lanes
+            && opened.bands == *bands
         {
             return Ok(self.clone());
         }
-        let opened = OnceLock::from(Some(Arc::new(self.open(lanes)?)));
+        let opened = OnceLock::from(Some(Arc::new(self.open(bands)?)));
         Ok(Self { opened, ..self.clone() })
     }
 
-    pub(super) fn open(&self, lanes: &Lanes) -> Result<Opened, CameraError> {
+    pub(super) fn open(&self, bands: &Bands) -> Result<Opened, CameraError> {
         let fault = |why: String| CameraError::new("", why);
         let train = self.focused.train();
         for (i, element) in train.elements().iter().enumerate() {
             let Part::Filter(filter) = &element.part else { continue };
             for curve in &filter.curves {
-                lanes
+                bands
                     .from_curve(curve, Outside::Held)
                     .map_err(|error| fault(format!("the filter elements[{i}]: {error}")))?;
             }
         }
         let (mut groups, mut measured) = (Vec::new(), Vec::new());
-        for group in self.lane_groups(lanes) {
-            let Spread { wavelengths, overlap } = self.spread(lanes, &group);
-            let lenses = through_filters(train, lanes, group.lanes.start, &wavelengths, overlap)
+        for group in self.band_groups(bands) {
+            let Spread { wavelengths, overlap } = self.spread(bands, &group);
+            let lenses = through_filters(train, bands, group.bands.start, &wavelengths, overlap)
                 .map_err(|error| fault(error.to_string()))?;
             // Between its ends and its middle the pupil changes as little as the index.
             let last = wavelengths.len() - 1;
@@ -176,17 +178,17 @@ impl LensCamera {
         let z = self.focused.sensor_z();
         let pupil = ExitPupil::new(&without_filters(train), &measured, z, half_size)
             .map_err(|error| fault(error.to_string()))?;
-        Ok(Opened { lanes: lanes.clone(), groups, pupil })
+        Ok(Opened { bands: bands.clone(), groups, pupil })
     }
 
-    /// The wavelengths at which the rays of a group run: several for wide lanes where the lens bends
+    /// The wavelengths at which the rays of a group run: several for wide bands where the lens bends
     /// or dims each in its own way.
-    fn spread(&self, lanes: &Lanes, group: &LaneGroup) -> Spread {
+    fn spread(&self, bands: &Bands, group: &BandGroup) -> Spread {
         let train = self.focused.train();
-        let spread = lanes.spread(group.lanes.start, &uniform_filters(train));
+        let spread = bands.spread(group.bands.start, &uniform_filters(train));
         let one = |nm| Spread { wavelengths: vec![nm], overlap: spread.overlap };
         match group.wavelength {
-            _ if !tells_wavelengths_apart(train) || group.lanes.len() > 1 => {
+            _ if !tells_wavelengths_apart(train) || group.bands.len() > 1 => {
                 Spread { wavelengths: vec![train.wavelength()], overlap: 1.0 }
             }
             Some(nm) if !runs_apart(train) => one(nm),
@@ -201,7 +203,7 @@ impl LensCamera {
     pub fn has_round_pupil(&self) -> bool {
         let film = self.focused.film();
         let train = without_filters(self.focused.train());
-        Disc::of(&train, &film.frame, film.half_size()).is_some()
+        Disk::of(&train, &film.frame, film.half_size()).is_some()
     }
 
     /// Whether rays of a sample run at a wavelength that is drawn.
@@ -210,11 +212,11 @@ impl LensCamera {
         opened.is_none_or(|opened| opened.groups.iter().any(|group| group.lenses.len() > 1))
     }
 
-    /// How many wavelengths the rays of each of [`Self::lane_groups`] are drawn from, at most.
+    /// How many wavelengths the rays of each of [`Self::band_groups`] are drawn from, at most.
     #[must_use]
-    pub fn wavelengths_a_group(&self, lanes: &Lanes) -> usize {
-        let groups = self.lane_groups(lanes).into_iter();
-        groups.map(|group| self.spread(lanes, &group).wavelengths.len()).max().unwrap_or(1)
+    pub fn wavelengths_a_group(&self, bands: &Bands) -> usize {
+        let groups = self.band_groups(bands).into_iter();
+        groups.map(|group| self.spread(bands, &group).wavelengths.len()).max().unwrap_or(1)
     }
 
     fn in_world(&self, pose: &Pose, point: DVec3, direction: DVec3) -> (DVec3, DVec3) {
@@ -267,7 +269,7 @@ impl LensCamera {
         let start = self.focused.film().frame.point(film.extend(0.0));
         let end = self.design.run(Side::Sensor, Clip::Off, Ray::new(start, direction)?);
         let ray = end.ray;
-        (end.fate == Fate::Exited).then(|| (ray.position.into(), ray.direction.into()))
+        (end.fate == RayStatus::Exited).then(|| (ray.position.into(), ray.direction.into()))
     }
 
     /// The slopes (right, down) at which a place of the picture (pixels) is seen; infinite when it is
@@ -316,12 +318,12 @@ impl LensCamera {
         notes
     }
 
-    /// What is odd about the lens, and what of it is not known at the wavelengths of `lanes`.
+    /// What is odd about the lens, and what of it is not known at the wavelengths of `bands`.
     #[must_use]
-    pub fn out_of_range(&self, lanes: &Lanes) -> Vec<String> {
-        let groups = self.lane_groups(lanes).into_iter();
+    pub fn out_of_range(&self, bands: &Bands) -> Vec<String> {
+        let groups = self.band_groups(bands).into_iter();
         let wavelengths: Vec<f64> =
-            groups.flat_map(|group| self.spread(lanes, &group).wavelengths).collect();
+            groups.flat_map(|group| self.spread(bands, &group).wavelengths).collect();
         self.focused.train().outside_of_range(&wavelengths)
     }
 }
@@ -347,23 +349,23 @@ fn uniform_filters(train: &OpticalTrain) -> Vec<&Curve> {
     filters.filter(|curve| curve.as_flat().is_none()).collect()
 }
 
-/// The lens at each of a lane's wavelengths, with filters that pass what they pass of the lane.
+/// The lens at each of a band's wavelengths, with filters that pass what they pass of the band.
 ///
 /// The wavelengths are already those that uniform filters leave, so these pass their mean over the
-/// lane, all of them together the mean of their product. What a picture of filters passes differs
+/// band, all of them together the mean of their product. What a picture of filters passes differs
 /// from wavelength to wavelength, about the same mean.
 fn through_filters(
     train: &OpticalTrain,
-    lanes: &Lanes,
-    lane: usize,
+    bands: &Bands,
+    band: usize,
     wavelengths: &[f64],
     overlap: f64,
-) -> Result<Vec<TrainAt>, GlassError> {
+) -> Result<Vec<MonochromaticTrain>, GlassError> {
     let uniform = uniform_filters(train);
     let each = overlap.powf(1.0 / uniform.len().max(1) as f64);
     let lens = |&nm: &f64| {
         let passes = |curve: &Curve| {
-            let mean = lanes.from_curve(curve, Outside::Held).map_or(0.0, |means| means[lane]);
+            let mean = bands.from_curve(curve, Outside::Held).map_or(0.0, |means| means[band]);
             if uniform.contains(&curve) {
                 return mean * each;
             }
@@ -395,13 +397,13 @@ fn runs_apart(train: &OpticalTrain) -> bool {
 
 /// The pupil as seen from the axis with all filters and masks clear; from elsewhere when the axis is
 /// dark.
-fn unvignetted(train: &OpticalTrain, at: &TrainAt, focused: &Focused) -> f64 {
+fn unvignetted(train: &OpticalTrain, at: &MonochromaticTrain, focused: &Focused) -> f64 {
     let clear = without_dimming(train);
     let lens = clear.at(at.wavelength()).unwrap_or_else(|_| at.clone());
     let z = focused.sensor_z();
     let half = focused.film().half_size();
-    let disc = Disc::of(&clear, &focused.film().frame, half);
-    if let Some(angle) = disc.and_then(|disc| disc.solid_angle_from(z)) {
+    let disk = Disk::of(&clear, &focused.film().frame, half);
+    if let Some(angle) = disk.and_then(|disk| disk.solid_angle_from(z)) {
         return angle * lens.index_before_sensor().powi(2);
     }
     let on_axis = projected_solid_angle(&clear, &lens, DVec3::new(0.0, 0.0, z));

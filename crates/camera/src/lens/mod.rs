@@ -9,20 +9,20 @@
 //! | [`source`] | a lens by its file or in place, and parts put on its axis |
 //! | [`focused`] | a lens and its sensor: where pixels lie, and the paraxial camera of both |
 //! | [`chief`] | the chief rays of a whole sensor |
-//! | `lit_area` | the part of the sensor that light reaches |
+//! | `image_circle` | the part of the sensor that light reaches |
 //! | [`lens_camera`] | chief rays for data, and what is measured for pictures |
 //! | `rays` | weighted rays of the pupil for pictures |
 
 pub mod chief;
 pub mod focused;
+mod image_circle;
 pub mod lens_camera;
-mod lit_area;
 mod rays;
 pub mod source;
 pub mod spec;
 
 pub use focused::Focused;
-pub use lens_camera::{LaneGroup, LensCamera};
+pub use lens_camera::{BandGroup, LensCamera};
 pub use source::{LensSource, PlacedSpec};
 pub use spec::{
     ChromaticRealLensCameraSpec, LensCameraSpec, RealLensCameraSpec, ThinLensCameraSpec,

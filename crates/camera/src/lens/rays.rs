@@ -2,21 +2,21 @@
 
 use std::sync::Arc;
 
-use etendue_spectrum::Lanes;
+use etendue_spectrum::Bands;
 use glam::{DMat3, DVec3};
 
 use super::lens_camera::LensCamera;
 use crate::{CameraRays, FilmSamples, Pose};
 use etendue_optics::element::{Block, Clip, LANES};
-use etendue_optics::train::pupil::{Bundle, Disc};
-use etendue_optics::train::{ExitPupil, Side, TrainAt};
+use etendue_optics::train::pupil::{Bundle, Disk};
+use etendue_optics::train::{ExitPupil, MonochromaticTrain, Side};
 
 impl LensCamera {
     /// The rays of `samples` that leave the lens.
     pub(crate) fn sample_rays(&self, pose: &Pose, samples: &FilmSamples, out: &mut CameraRays) {
         out.clear();
         // Not opened yet: at the design wavelength of RGB.
-        let opened = self.opened.get_or_init(|| self.open(&Lanes::Rgb).ok().map(Arc::new));
+        let opened = self.opened.get_or_init(|| self.open(&Bands::Rgb).ok().map(Arc::new));
         let Some(opened) = opened else { return };
         let wanted = opened.groups.iter().find(|group| group.wavelength == samples.wavelength);
         let Some(group) = wanted.or(opened.groups.first()) else { return };
@@ -39,15 +39,15 @@ impl LensCamera {
     fn trace_samples(
         &self,
         pose: &Pose,
-        (pupil, lens): (&ExitPupil, &TrainAt),
+        (pupil, lens): (&ExitPupil, &MonochromaticTrain),
         samples: &FilmSamples,
         numbers: impl Iterator<Item = u32>,
         out: &mut CameraRays,
     ) {
         let first = out.sample.len();
         out.sample.extend(numbers);
-        match pupil.disc() {
-            Some(disc) => self.aim_at_disc((pupil, disc), samples, first, out),
+        match pupil.disk() {
+            Some(disk) => self.aim_at_disk((pupil, disk), samples, first, out),
             None => self.aim_at_pupil(pupil, samples, first, out),
         }
         lens.trace(Side::Sensor, Clip::On, &mut out.in_lens);
@@ -57,9 +57,9 @@ impl LensCamera {
 
     /// Starts rays for the samples that `out` names from `first` on, towards a pupil known in closed
     /// form.
-    fn aim_at_disc(
+    fn aim_at_disk(
         &self,
-        (pupil, disc): (&ExitPupil, &Disc),
+        (pupil, disk): (&ExitPupil, &Disk),
         samples: &FilmSamples,
         first: usize,
         out: &mut CameraRays,
@@ -78,7 +78,7 @@ impl LensCamera {
         }
         let scale = pupil.index2() / self.solid_angle;
         let bundle = Bundle { sensor: &film.frame, scale, film: [x, y], squares: &out.squares };
-        disc.fill(&bundle, &mut out.in_lens);
+        disk.fill(&bundle, &mut out.in_lens);
     }
 
     /// Starts rays for the samples that `out` names from `first` on, and leaves out those of places

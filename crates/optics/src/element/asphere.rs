@@ -6,8 +6,8 @@
 //! crosses from behind, or one that Newton does not find, is looked for again by bisection of the
 //! part of the ray that runs near the surface, from its start on.
 
-use super::rays::{Block, Fate, LANES, PENDING, Ray, at_lane};
-use super::refract::{Crossing, Refraction, Root, TOUCH, meet_conic};
+use super::rays::{Block, LANES, PENDING, Ray, RayStatus, at_lane};
+use super::refract::{Refracted, Refraction, Root, TOUCH, meet_conic};
 
 const SETTLED: f64 = 1e-10;
 const MOST_STEPS: usize = 20;
@@ -43,7 +43,7 @@ impl Refraction {
         z: f64,
         clip2: f64,
     ) -> bool {
-        let vignetted = Fate::Vignetted { element }.code();
+        let vignetted = RayStatus::Vignetted { element }.code();
         let domain2 = self.surface.domain().powi(2);
         let mut pending = 0;
         for lane in 0..LANES {
@@ -75,14 +75,14 @@ impl Refraction {
     }
 
     /// A ray in the asphere's frame: Newton first, then the search.
-    pub(crate) fn at_asphere(&self, ray: Ray, clip2: f64) -> Crossing {
+    pub(crate) fn at_asphere(&self, ray: Ray, clip2: f64) -> Refracted {
         let met = self.newton(ray).or_else(|| self.search(ray, clip2));
         let Some((there, slope)) = met else {
-            return Crossing { ray, t: 0.0, hit: false, clear: false, through: false };
+            return Refracted { ray, t: 0.0, hit: false, clear: false, through: false };
         };
         let [x, y, _] = there.position;
         let (out, through) = self.at_slope(there, slope);
-        Crossing { ray: out, t: 0.0, hit: true, clear: x * x + y * y <= clip2, through }
+        Refracted { ray: out, t: 0.0, hit: true, clear: x * x + y * y <= clip2, through }
     }
 
     fn newton(&self, ray: Ray) -> Option<(Ray, f64)> {

@@ -30,7 +30,7 @@ pub use frame::Frame;
 pub use losses::{Coating, LossesSpec, Plain, Reflection};
 pub use part::{Part, PartSpec};
 pub use picture::{Picture, Resolve};
-pub use rays::{Fate, FateCounts, LensRays};
+pub use rays::{FateCounts, LensRays, RayStatus};
 pub use step::Clip;
 pub use surface::{Surface, SurfaceSpec};
 pub use thin_lens::{ThinLens, ThinLensSpec};

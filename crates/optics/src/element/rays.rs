@@ -9,7 +9,7 @@ pub const LANES: usize = 32;
 
 /// What became of a ray. Elements count from 0 on the object side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Fate {
+pub enum RayStatus {
     /// It left the train.
     Exited,
     /// It does not meet the element, or its image by a thin lens is not in front of it.
@@ -37,7 +37,7 @@ const IDLE: u64 = 4 << 32;
 /// Left by a vector kernel for the scalar one to decide; never seen outside of a trace.
 pub(crate) const PENDING: u64 = 5 << 32;
 
-impl Fate {
+impl RayStatus {
     /// The element at which the ray ended; `None` when it left.
     #[must_use]
     pub fn element(self) -> Option<usize> {
@@ -93,15 +93,15 @@ impl FateCounts {
     }
 
     /// Counts one ray.
-    pub fn add(&mut self, fate: Fate) {
+    pub fn add(&mut self, fate: RayStatus) {
         let (counts, element) = match fate {
-            Fate::Exited => {
+            RayStatus::Exited => {
                 self.exited += 1;
                 return;
             }
-            Fate::Missed { element } => (&mut self.missed, element),
-            Fate::TotalInternalReflection { element } => (&mut self.reflected, element),
-            Fate::Vignetted { element } => (&mut self.vignetted, element),
+            RayStatus::Missed { element } => (&mut self.missed, element),
+            RayStatus::TotalInternalReflection { element } => (&mut self.reflected, element),
+            RayStatus::Vignetted { element } => (&mut self.vignetted, element),
         };
         if counts.len() <= element {
             counts.resize(element + 1, 0);
@@ -116,7 +116,7 @@ impl FateCounts {
             if outcomes.iter().all(|&code| code == EXITED) {
                 self.exited += outcomes.len() as u64;
             } else {
-                outcomes.iter().for_each(|&code| self.add(Fate::from_code(code)));
+                outcomes.iter().for_each(|&code| self.add(RayStatus::from_code(code)));
             }
         }
     }
@@ -332,7 +332,7 @@ impl LensRays {
                 block.set_ray(lane, ray);
                 block.outcome[lane] = EXITED;
             }
-            None => block.outcome[lane] = Fate::Missed { element: 0 }.code(),
+            None => block.outcome[lane] = RayStatus::Missed { element: 0 }.code(),
         }
         block.throughput[lane] = throughput;
         self.len += 1;
@@ -361,14 +361,14 @@ impl LensRays {
         self.blocks[i / LANES].throughput[i % LANES]
     }
 
-    /// What became of ray `i`; [`Fate::Exited`] as long as nothing ended it.
+    /// What became of ray `i`; [`RayStatus::Exited`] as long as nothing ended it.
     #[must_use]
-    pub fn fate(&self, i: usize) -> Fate {
-        Fate::from_code(self.blocks[i / LANES].outcome[i % LANES])
+    pub fn fate(&self, i: usize) -> RayStatus {
+        RayStatus::from_code(self.blocks[i / LANES].outcome[i % LANES])
     }
 
-    /// Ends ray `i` in the given way; [`Fate::Exited`] revives it.
-    pub fn set_fate(&mut self, i: usize, fate: Fate) {
+    /// Ends ray `i` in the given way; [`RayStatus::Exited`] revives it.
+    pub fn set_fate(&mut self, i: usize, fate: RayStatus) {
         self.blocks[i / LANES].outcome[i % LANES] = fate.code();
     }
 
@@ -400,10 +400,10 @@ mod tests {
         assert_eq!((rays.len(), rays.exited()), (LANES + 3, LANES + 3));
         assert_eq!(rays.position(LANES + 1), DVec3::new(33.0, 1.0, 2.0));
         assert_eq!(rays.direction(7), DVec3::Z);
-        rays.set_fate(33, Fate::Vignetted { element: 4 });
-        rays.set_fate(34, Fate::TotalInternalReflection { element: 70_000 });
-        assert_eq!(rays.fate(33), Fate::Vignetted { element: 4 });
-        assert_eq!(rays.fate(34), Fate::TotalInternalReflection { element: 70_000 });
+        rays.set_fate(33, RayStatus::Vignetted { element: 4 });
+        rays.set_fate(34, RayStatus::TotalInternalReflection { element: 70_000 });
+        assert_eq!(rays.fate(33), RayStatus::Vignetted { element: 4 });
+        assert_eq!(rays.fate(34), RayStatus::TotalInternalReflection { element: 70_000 });
         let mut counts = FateCounts::new(5);
         counts.add_all(&rays);
         assert_eq!((counts.exited, counts.total()), (33, 35));
@@ -417,7 +417,7 @@ mod tests {
         rays.push(DVec3::ZERO, DVec3::ZERO);
         rays.push(DVec3::ZERO, DVec3::new(0.0, f64::INFINITY, 1.0));
         for i in 0..3 {
-            assert_eq!(rays.fate(i), Fate::Missed { element: 0 });
+            assert_eq!(rays.fate(i), RayStatus::Missed { element: 0 });
             assert!(rays.position(i).is_finite() && rays.direction(i).is_finite());
         }
         rays.push(DVec3::ZERO, DVec3::new(0.0, 3e-300, 4e-300));

@@ -17,7 +17,7 @@
 //! where σ is the sign of d·m. |d·m| is √D, and |m|² is 1 − k c² r² on a conic, 1 on a sphere. Equal
 //! indices leave every direction as it is, to the last bit.
 
-use super::rays::{Block, Fate, LANES, PENDING, Ray};
+use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
 use super::surface::Surface;
 
 /// Steps that end this little before the last element (mm) still count, so that elements may touch.
@@ -35,7 +35,7 @@ pub(crate) struct Refraction {
 
 /// What a ray does at a surface.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Crossing {
+pub(crate) struct Refracted {
     /// Where it meets the surface, and how it goes on.
     pub(crate) ray: Ray,
     /// How far it went (mm).
@@ -67,7 +67,7 @@ impl Refraction {
     /// Refracts at `ray`'s position, where the normal is `m` with |m|² = `length2`, d·m has the
     /// sign of `sign`, and (d·m)² = `along2` with the root `along`.
     #[inline(always)]
-    fn bend(&self, ray: Ray, m: [f64; 3], length2: f64, along2: f64, along: f64) -> (Ray, bool) {
+    fn refract(&self, ray: Ray, m: [f64; 3], length2: f64, along2: f64, along: f64) -> (Ray, bool) {
         let behind2 = self.rest * length2 + self.ratio * self.ratio * along2;
         let g = (behind2.sqrt().copysign(along) - self.ratio * along) / length2;
         let direction = [
@@ -80,15 +80,15 @@ impl Refraction {
 
     /// A ray in the surface's frame at a plane.
     #[inline(always)]
-    pub(crate) fn at_plane(&self, ray: Ray, clip2: f64) -> Crossing {
+    pub(crate) fn at_plane(&self, ray: Ray, clip2: f64) -> Refracted {
         let w = ray.direction[2];
         let t = -ray.position[2] / w;
         let mut there = ray.advanced(t);
         there.position[2] = 0.0;
         let [x, y, _] = there.position;
-        let (out, through) = self.bend(there, [0.0, 0.0, 1.0], 1.0, w * w, w);
+        let (out, through) = self.refract(there, [0.0, 0.0, 1.0], 1.0, w * w, w);
         let hit = (t > -TOUCH) & (t < f64::INFINITY);
-        Crossing { ray: out, t, hit, clear: x * x + y * y <= clip2, through }
+        Refracted { ray: out, t, hit, clear: x * x + y * y <= clip2, through }
     }
 
     /// A ray in the surface's frame at a conic; with `SPHERE` the conic constant is taken to be 0.
@@ -98,21 +98,21 @@ impl Refraction {
         ray: Ray,
         clip2: f64,
         which: Root,
-    ) -> Crossing {
+    ) -> Refracted {
         let met = meet_conic::<SPHERE>(&self.surface, ray, which);
         let [x, y, z] = met.ray.position;
         let (c, k) = (self.surface.curvature, self.surface.conic);
         let r2 = x * x + y * y;
         let (stretch, length2) = if SPHERE { (1.0, 1.0) } else { (1.0 + k, 1.0 - k * c * c * r2) };
         let m = [-c * x, -c * y, 1.0 - stretch * c * z];
-        let (out, through) = self.bend(met.ray, m, length2, met.along2, met.along);
+        let (out, through) = self.refract(met.ray, m, length2, met.along2, met.along);
         // A ray that misses has a NaN for a root, which is not greater than anything.
         let hit = (met.t > -TOUCH) & (met.t < f64::INFINITY) & (m[2] >= 0.0);
-        Crossing { ray: out, t: met.t, hit, clear: r2 <= clip2, through }
+        Refracted { ray: out, t: met.t, hit, clear: r2 <= clip2, through }
     }
 
     /// A ray in the frame of any surface but an asphere, exactly by the rule.
-    pub(crate) fn exactly(&self, ray: Ray, clip2: f64) -> Crossing {
+    pub(crate) fn exactly(&self, ray: Ray, clip2: f64) -> Refracted {
         if self.surface.is_plane() {
             self.at_plane(ray, clip2)
         } else if self.surface.conic == 0.0 {
@@ -123,7 +123,7 @@ impl Refraction {
     }
 
     #[inline(always)]
-    fn at_nearest<const SPHERE: bool>(&self, ray: Ray, clip2: f64) -> Crossing {
+    fn at_nearest<const SPHERE: bool>(&self, ray: Ray, clip2: f64) -> Refracted {
         let near = self.at_near_root::<SPHERE>(ray, clip2);
         if near.hit {
             return near;
@@ -136,10 +136,10 @@ impl Refraction {
     /// A ray in the surface's frame at the near root of a conic; no hit where that might not be the
     /// nearest, for [`Self::exactly`] to decide.
     #[inline(always)]
-    pub(crate) fn at_near_root<const SPHERE: bool>(&self, ray: Ray, clip2: f64) -> Crossing {
+    pub(crate) fn at_near_root<const SPHERE: bool>(&self, ray: Ray, clip2: f64) -> Refracted {
         let crossing = self.at_conic::<SPHERE>(ray, clip2, Root::Near);
         let clear = rival_is_elsewhere::<SPHERE>(&self.surface, ray);
-        Crossing { hit: crossing.hit & clear, ..crossing }
+        Refracted { hit: crossing.hit & clear, ..crossing }
     }
 
     /// A ray at a point of an asphere in its frame, with (∂z/∂x)/x = `slope` there.
@@ -149,13 +149,13 @@ impl Refraction {
         let [u, v, w] = ray.direction;
         let m = [-slope * x, -slope * y, 1.0];
         let along = u * m[0] + v * m[1] + w;
-        self.bend(ray, m, 1.0 + slope * slope * (x * x + y * y), along * along, along)
+        self.refract(ray, m, 1.0 + slope * slope * (x * x + y * y), along * along, along)
     }
 }
 
 /// Where a ray meets a conic.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Meeting {
+pub(crate) struct Intersection {
     /// The ray, moved there.
     pub(crate) ray: Ray,
     /// Distance from where it was.
@@ -194,14 +194,14 @@ fn quadratic<const SPHERE: bool>(s: &Surface, ray: Ray) -> Quadratic {
 }
 
 #[inline(always)]
-pub(crate) fn meet_conic<const SPHERE: bool>(s: &Surface, ray: Ray, which: Root) -> Meeting {
+pub(crate) fn meet_conic<const SPHERE: bool>(s: &Surface, ray: Ray, which: Root) -> Intersection {
     let Quadratic { moved, foot, a, d, along2, along, q } = quadratic::<SPHERE>(s, ray);
     // m is minus half the gradient of the conic, hence the signs.
     let (t, along) = match which {
         Root::Near => (d / q, -along),
         Root::Far => (q / a, along),
     };
-    Meeting { ray: moved.advanced(t), t: foot + t, along2, along }
+    Intersection { ray: moved.advanced(t), t: foot + t, along2, along }
 }
 
 /// Whether the far root comes after the near one, or lies on the other sheet; without a division.
@@ -222,9 +222,9 @@ pub(crate) fn each_lane(
     block: &mut Block,
     element: usize,
     z: f64,
-    cross: impl Fn(Ray) -> Crossing,
+    cross: impl Fn(Ray) -> Refracted,
 ) -> bool {
-    let vignetted = Fate::Vignetted { element }.code();
+    let vignetted = RayStatus::Vignetted { element }.code();
     let mut pending = 0;
     for lane in 0..LANES {
         let old = block.ray(lane);

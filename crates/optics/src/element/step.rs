@@ -10,8 +10,8 @@ use super::aperture::Opening;
 use super::filter::Filter;
 use super::frame::Frame;
 use super::losses::Loss;
-use super::rays::{Block, Fate, LANES, PENDING, Ray};
-use super::refract::{Crossing, Refraction, each_lane};
+use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
+use super::refract::{Refracted, Refraction, each_lane};
 use super::thin_lens::at_thin_lens;
 
 /// Whether clear apertures stop rays.
@@ -71,9 +71,9 @@ impl Action {
 
 /// What became of a single ray at an element.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Passage {
-    pub(crate) fate: Fate,
-    /// The ray as it goes on; as it came unless [`Fate::Exited`].
+pub(crate) struct Traversal {
+    pub(crate) fate: RayStatus,
+    /// The ray as it goes on; as it came unless [`RayStatus::Exited`].
     pub(crate) ray: Ray,
     /// Where it met the element, in lens coordinates; `None` when it missed.
     pub(crate) point: Option<[f64; 3]>,
@@ -200,8 +200,8 @@ impl Step {
 
     #[inline(always)]
     fn sheet(&self, block: &mut Block, z: f64, open: impl Fn(f64, f64) -> bool) {
-        let vignetted = Fate::Vignetted { element: self.element }.code();
-        let missed = Fate::Missed { element: self.element }.code();
+        let vignetted = RayStatus::Vignetted { element: self.element }.code();
+        let missed = RayStatus::Missed { element: self.element }.code();
         for lane in 0..LANES {
             let Ray { position, direction } = block.ray(lane);
             let t = (z - position[2]) / direction[2];
@@ -221,7 +221,7 @@ impl Step {
             if block.outcome[lane] == PENDING {
                 let passage = self.pass_one(block.ray(lane), clip);
                 let mut ray = passage.ray;
-                if let (Fate::Vignetted { .. }, Some(point)) = (passage.fate, passage.point)
+                if let (RayStatus::Vignetted { .. }, Some(point)) = (passage.fate, passage.point)
                     && self.moves()
                 {
                     ray.position = point;
@@ -240,16 +240,16 @@ impl Step {
 
     /// Takes one ray through the element.
     #[inline]
-    pub(crate) fn run_one(&self, ray: Ray, clip: Clip) -> Passage {
+    pub(crate) fn run_one(&self, ray: Ray, clip: Clip) -> Traversal {
         let mut passage = self.pass_one(ray, clip);
-        if let (Some(loss), Fate::Exited) = (&self.loss, passage.fate) {
+        if let (Some(loss), RayStatus::Exited) = (&self.loss, passage.fate) {
             passage.transmission *= loss.share(ray, passage.ray);
         }
         passage
     }
 
     #[inline]
-    fn pass_one(&self, ray: Ray, clip: Clip) -> Passage {
+    fn pass_one(&self, ray: Ray, clip: Clip) -> Traversal {
         if self.axial {
             let z = self.frame.vertex.z;
             let mut local = ray;
@@ -268,15 +268,15 @@ impl Step {
     }
 
     /// Rays that end, and rays that only pass a sheet, stay as they came to the last bit.
-    fn settle(&self, ray: Ray, passage: Passage) -> Passage {
-        if passage.fate == Fate::Exited && self.moves() {
+    fn settle(&self, ray: Ray, passage: Traversal) -> Traversal {
+        if passage.fate == RayStatus::Exited && self.moves() {
             passage
         } else {
-            Passage { ray, ..passage }
+            Traversal { ray, ..passage }
         }
     }
 
-    fn local(&self, ray: Ray, clip: Clip) -> Passage {
+    fn local(&self, ray: Ray, clip: Clip) -> Traversal {
         match &self.action {
             Action::Plane(refraction) | Action::Sphere(refraction) | Action::Conic(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
@@ -300,16 +300,16 @@ impl Step {
         }
     }
 
-    fn crossed(&self, crossing: Crossing) -> Passage {
+    fn crossed(&self, crossing: Refracted) -> Traversal {
         let element = self.element;
         let fate = match crossing {
-            Crossing { hit: false, .. } => Fate::Missed { element },
-            Crossing { clear: false, .. } => Fate::Vignetted { element },
-            Crossing { through: false, .. } => Fate::TotalInternalReflection { element },
-            _ => Fate::Exited,
+            Refracted { hit: false, .. } => RayStatus::Missed { element },
+            Refracted { clear: false, .. } => RayStatus::Vignetted { element },
+            Refracted { through: false, .. } => RayStatus::TotalInternalReflection { element },
+            _ => RayStatus::Exited,
         };
         let point = crossing.hit.then_some(crossing.ray.position);
-        Passage { fate, ray: crossing.ray, point, transmission: 1.0 }
+        Traversal { fate, ray: crossing.ray, point, transmission: 1.0 }
     }
 
     fn sheet_crossed(
@@ -317,17 +317,22 @@ impl Step {
         ray: Ray,
         clip: Clip,
         transmission: impl Fn([f64; 2]) -> f64,
-    ) -> Passage {
+    ) -> Traversal {
         let element = self.element;
         let t = -ray.position[2] / ray.direction[2];
         if !t.is_finite() {
-            return Passage { fate: Fate::Missed { element }, ray, point: None, transmission: 0.0 };
+            return Traversal {
+                fate: RayStatus::Missed { element },
+                ray,
+                point: None,
+                transmission: 0.0,
+            };
         }
         let mut point = ray.advanced(t).position;
         point[2] = 0.0;
         let transmission = transmission([point[0], point[1]]);
         let passes = transmission > 0.0 || clip == Clip::Off;
-        let fate = if passes { Fate::Exited } else { Fate::Vignetted { element } };
-        Passage { fate, ray, point: Some(point), transmission }
+        let fate = if passes { RayStatus::Exited } else { RayStatus::Vignetted { element } };
+        Traversal { fate, ray, point: Some(point), transmission }
     }
 }

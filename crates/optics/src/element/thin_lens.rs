@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::rays::Ray;
-use super::refract::{Crossing, TOUCH};
+use super::refract::{Refracted, TOUCH};
 use super::surface::{LARGEST_CURVATURE, SMALLEST_RADIUS};
 use etendue_geometry::units::Millimetres;
 
@@ -57,7 +57,7 @@ impl ThinLensSpec {
 
 /// Light from the object meets `power`, light traced from the sensor `−power`.
 #[inline(always)]
-pub(crate) fn at_thin_lens(power: f64, ray: Ray, clip2: f64) -> Crossing {
+pub(crate) fn at_thin_lens(power: f64, ray: Ray, clip2: f64) -> Refracted {
     let w = ray.direction[2];
     let t = -ray.position[2] / w;
     let mut there = ray.advanced(t);
@@ -69,7 +69,7 @@ pub(crate) fn at_thin_lens(power: f64, ray: Ray, clip2: f64) -> Crossing {
     let scale = if power == 0.0 { 1.0 } else { 1.0 / length };
     there.direction = [u * scale, v * scale, w * scale];
     let hit = (t > -TOUCH) & (t < f64::INFINITY) & (length < f64::INFINITY);
-    Crossing { ray: there, t, hit, clear: x * x + y * y <= clip2, through: true }
+    Refracted { ray: there, t, hit, clear: x * x + y * y <= clip2, through: true }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{OpticalTrain, Side, TrainAt};
+use super::{MonochromaticTrain, OpticalTrain, Side};
 use crate::element::Ray;
 
 /// How near the stop's centre a chief ray passes (mm).
@@ -27,7 +27,7 @@ impl OpticalTrain {
     ///
     /// `None` when the stop's centre cannot be seen from there.
     #[must_use]
-    pub fn chief_ray(&self, at: &TrainAt, field: f64) -> Option<ChiefRay> {
+    pub fn chief_ray(&self, at: &MonochromaticTrain, field: f64) -> Option<ChiefRay> {
         // The ray is (0, 0, pupil) plus an offset square to it.
         let pupil = self.paraxial(at.wavelength()).ok()?.entrance_pupil.z.unwrap_or(0.0);
         let back = self.far_in_front(pupil);
@@ -56,14 +56,14 @@ impl OpticalTrain {
     ///
     /// `None` when the stop's centre cannot be seen from there.
     #[must_use]
-    pub fn chief_direction(&self, at: &TrainAt, film: DVec3) -> Option<DVec3> {
+    pub fn chief_direction(&self, at: &MonochromaticTrain, film: DVec3) -> Option<DVec3> {
         self.chief_direction_from(at, film, None)
     }
 
     /// As [`Self::chief_direction`], begun from slopes that are known to be near.
     pub(crate) fn chief_direction_from(
         &self,
-        at: &TrainAt,
+        at: &MonochromaticTrain,
         film: DVec3,
         start: Option<DVec2>,
     ) -> Option<DVec3> {
@@ -83,12 +83,17 @@ impl OpticalTrain {
 
     /// The slopes of the chief ray of a point of the sensor (mm), found from slopes that are near or
     /// not at all.
-    pub fn chief_slopes_near(&self, at: &TrainAt, film: DVec3, start: DVec2) -> Option<DVec2> {
+    pub fn chief_slopes_near(
+        &self,
+        at: &MonochromaticTrain,
+        film: DVec3,
+        start: DVec2,
+    ) -> Option<DVec2> {
         solve(|slopes| self.on_stop(at, film, slopes), start, 1.0)
     }
 
     /// Where a ray from the sensor crosses the stop (mm).
-    fn on_stop(&self, at: &TrainAt, film: DVec3, slopes: DVec2) -> Option<DVec2> {
+    fn on_stop(&self, at: &MonochromaticTrain, film: DVec3, slopes: DVec2) -> Option<DVec2> {
         let ray = Ray::new(film, towards_lens(slopes))?;
         at.crossing(Side::Sensor, self.stop, ray).map(DVec2::from)
     }
@@ -114,7 +119,7 @@ pub(crate) fn towards_lens(slopes: DVec2) -> DVec3 {
 /// element's own frame (mm), found from slopes that are near, or from the straight line.
 pub(crate) fn slopes_to(
     train: &OpticalTrain,
-    at: &TrainAt,
+    at: &MonochromaticTrain,
     film: DVec3,
     (element, place): (usize, DVec2),
     start: Option<DVec2>,

@@ -40,7 +40,7 @@ pub use paraxial::{Paraxial, Pupil};
 pub use pupil::{ExitPupil, ExitPupilError, PupilSample};
 pub use rays_file::{GivenRay, RayError, RaysFile, TracedRays};
 pub use report::{Inquiry, LensReport, ReportError};
-pub use trace::{RayPath, Registers, Side, TrainAt};
+pub use trace::{MonochromaticTrain, RayPath, Registers, Side};
 pub use zemax::{ZemaxError, ZemaxLens};
 
 /// Why a lens file makes no lens.

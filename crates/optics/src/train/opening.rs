@@ -4,8 +4,8 @@ use glam::{DVec2, DVec3};
 
 use super::aim::towards_lens;
 use super::pupil::without_dimming;
-use super::{Focus, LensError, OpticalTrain, Part, Side, TrainAt};
-use crate::element::{Clip, Fate, Ray};
+use super::{Focus, LensError, MonochromaticTrain, OpticalTrain, Part, Side};
+use crate::element::{Clip, Ray, RayStatus};
 
 /// Directions across the axis in which a lens without rotational symmetry is looked at.
 const AZIMUTHS: u32 = 16;
@@ -93,7 +93,7 @@ impl OpticalTrain {
     /// The outermost of the rays 0 to `limit` of a family that passes; `None` when the first one ends.
     fn edge_of_rays(
         &self,
-        at: &TrainAt,
+        at: &MonochromaticTrain,
         from: Side,
         ray: impl Fn(f64) -> (DVec3, DVec3),
         limit: f64,
@@ -101,10 +101,10 @@ impl OpticalTrain {
         let ended = |i: f64| {
             let (position, direction) = ray(i);
             match at.path(from, Clip::On, position, direction).fate {
-                Fate::Exited => None,
-                Fate::Missed { element }
-                | Fate::TotalInternalReflection { element }
-                | Fate::Vignetted { element } => Some(element),
+                RayStatus::Exited => None,
+                RayStatus::Missed { element }
+                | RayStatus::TotalInternalReflection { element }
+                | RayStatus::Vignetted { element } => Some(element),
             }
         };
         if ended(0.0).is_some() {

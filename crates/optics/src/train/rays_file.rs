@@ -7,8 +7,8 @@ use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{OpticalTrain, RayPath, Side, TrainAt};
-use crate::element::{Clip, Fate};
+use super::{MonochromaticTrain, OpticalTrain, RayPath, Side};
+use crate::element::{Clip, RayStatus};
 use crate::glass::GlassError;
 
 /// The farthest that a ray may start (mm). A double's steps are a tenth of a millimetre there.
@@ -100,7 +100,7 @@ impl OpticalTrain {
     pub fn trace_file(&self, file: &RaysFile) -> Result<TracedRays, RayError> {
         let clip = if file.clip { Clip::On } else { Clip::Off };
         let mut rays = Vec::with_capacity(file.rays.len());
-        let mut lens: Option<TrainAt> = None;
+        let mut lens: Option<MonochromaticTrain> = None;
         let mut wavelengths: Vec<f64> = Vec::new();
         for (index, ray) in file.rays.iter().enumerate() {
             let error = |(key, why)| RayError { index, key, why };
@@ -150,10 +150,10 @@ impl GivenRay {
 impl From<RayPath> for TracedRay {
     fn from(path: RayPath) -> Self {
         let fate = match path.fate {
-            Fate::Exited => FateName::Exited,
-            Fate::Missed { .. } => FateName::Missed,
-            Fate::TotalInternalReflection { .. } => FateName::TotalInternalReflection,
-            Fate::Vignetted { .. } => FateName::Vignetted,
+            RayStatus::Exited => FateName::Exited,
+            RayStatus::Missed { .. } => FateName::Missed,
+            RayStatus::TotalInternalReflection { .. } => FateName::TotalInternalReflection,
+            RayStatus::Vignetted { .. } => FateName::Vignetted,
         };
         Self {
             fate,

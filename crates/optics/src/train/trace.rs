@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::OpticalTrain;
-use crate::element::{Action, Block, Clip, Fate, LensRays, Loss, Ray, Step};
+use crate::element::{Action, Block, Clip, LensRays, Loss, Ray, RayStatus, Step};
 use crate::glass::GlassError;
 
 /// Where rays come from.
@@ -22,7 +22,7 @@ pub enum Side {
 
 /// A lens at one wavelength.
 #[derive(Debug, Clone)]
-pub struct TrainAt {
+pub struct MonochromaticTrain {
     wavelength: f64,
     indices: Vec<f64>,
     forward: Vec<Step>,
@@ -33,7 +33,7 @@ pub struct TrainAt {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayPath {
     /// What became of it.
-    pub fate: Fate,
+    pub fate: RayStatus,
     /// Where it met each element that it reached (mm), in the order in which it met them. The last
     /// one is where it was vignetted or totally reflected, if it was.
     pub points: Vec<DVec3>,
@@ -50,7 +50,7 @@ impl OpticalTrain {
     ///
     /// When a glass has no index there. Being outside of a glass' stated range is no error here;
     /// see [`Self::outside_of_range`].
-    pub fn at(&self, wavelength: f64) -> Result<TrainAt, GlassError> {
+    pub fn at(&self, wavelength: f64) -> Result<MonochromaticTrain, GlassError> {
         self.at_with(wavelength, &|curve| curve.held(wavelength))
     }
 
@@ -63,7 +63,7 @@ impl OpticalTrain {
         &self,
         wavelength: f64,
         transmission: &dyn Fn(&Curve) -> f64,
-    ) -> Result<TrainAt, GlassError> {
+    ) -> Result<MonochromaticTrain, GlassError> {
         let indices = self.indices(wavelength)?;
         let (mut forward, mut backward) = (Vec::new(), Vec::new());
         for (element, placed) in self.elements.iter().enumerate() {
@@ -83,7 +83,7 @@ impl OpticalTrain {
             add(&mut backward, towards_object, loss([behind, before], element + 1));
         }
         backward.reverse();
-        Ok(TrainAt { wavelength, indices, forward, backward })
+        Ok(MonochromaticTrain { wavelength, indices, forward, backward })
     }
 
     /// The index of each medium at `wavelength` (nm), from the object's to the sensor's.
@@ -92,7 +92,7 @@ impl OpticalTrain {
     }
 }
 
-impl TrainAt {
+impl MonochromaticTrain {
     /// The wavelength (nm).
     #[must_use]
     pub fn wavelength(&self) -> f64 {
@@ -143,7 +143,7 @@ impl TrainAt {
     pub fn trace_singly(&self, from: Side, clip: Clip, rays: &mut LensRays) {
         for block in &mut rays.blocks {
             for lane in 0..block.outcome.len() {
-                if block.outcome[lane] == Fate::Exited.code() {
+                if block.outcome[lane] == RayStatus::Exited.code() {
                     let end = self.run(from, clip, block.ray(lane));
                     block.set_ray(lane, end.ray);
                     block.throughput[lane] *= end.throughput;
@@ -157,7 +157,7 @@ impl TrainAt {
     #[must_use]
     pub fn path(&self, from: Side, clip: Clip, position: DVec3, direction: DVec3) -> RayPath {
         let mut path = RayPath {
-            fate: Fate::Missed { element: 0 },
+            fate: RayStatus::Missed { element: 0 },
             points: Vec::new(),
             direction: None,
             throughput: 1.0,
@@ -169,11 +169,11 @@ impl TrainAt {
             path.throughput *= passage.transmission;
             path.fate = passage.fate;
             ray = passage.ray;
-            if passage.fate != Fate::Exited {
+            if passage.fate != RayStatus::Exited {
                 return path;
             }
         }
-        path.fate = Fate::Exited;
+        path.fate = RayStatus::Exited;
         path.direction = Some(ray.direction.into());
         path
     }
@@ -181,14 +181,14 @@ impl TrainAt {
     /// One ray to its end.
     #[inline]
     pub fn run(&self, from: Side, clip: Clip, ray: Ray) -> End {
-        let mut end = End { fate: Fate::Exited, ray, throughput: 1.0 };
+        let mut end = End { fate: RayStatus::Exited, ray, throughput: 1.0 };
         for step in self.steps(from) {
             let passage = step.run_one(end.ray, clip);
             end.throughput *= passage.transmission;
             end.fate = passage.fate;
             end.ray = passage.ray;
-            if passage.fate != Fate::Exited {
-                if let (Fate::Vignetted { .. }, Some(point)) = (passage.fate, passage.point)
+            if passage.fate != RayStatus::Exited {
+                if let (RayStatus::Vignetted { .. }, Some(point)) = (passage.fate, passage.point)
                     && step.moves()
                 {
                     end.ray.position = point;
@@ -209,7 +209,7 @@ impl TrainAt {
                     * (DVec3::from(passage.point?) - step.frame.vertex);
                 return Some([local.x, local.y]);
             }
-            if passage.fate != Fate::Exited {
+            if passage.fate != RayStatus::Exited {
                 return None;
             }
             ray = passage.ray;
@@ -222,7 +222,7 @@ impl TrainAt {
 #[derive(Debug, Clone, Copy)]
 pub struct End {
     /// Outcome: where and how the ray ended.
-    pub fate: Fate,
+    pub fate: RayStatus,
     /// The ray as it leaves, or where it ended (mm).
     pub ray: Ray,
     pub(crate) throughput: f64,

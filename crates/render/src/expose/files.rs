@@ -4,11 +4,11 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use etendue_sensor::dng::DngError;
-use etendue_sensor::{Film, Flaws, RawImage, Sensor, SensorKind, SensorSpec, Shot};
+use etendue_sensor::{Exposure, Film, InvalidValues, RawImage, Sensor, SensorKind, SensorSpec};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{ExposeError, Exposed, LaneFilm, remarks};
+use super::{BandFilm, ExposeError, Exposed, remarks};
 use crate::output::{
     Channel, Layer, Look, Outputs, Picture, PictureError, SOFTWARE, Values, npy, png, write_whole,
 };
@@ -30,7 +30,7 @@ pub(super) fn name(digits: usize, stem: &str, number: u32, ending: &str) -> Stri
 /// Writes one exposure after the other.
 pub(super) struct Writer<'a> {
     pub(super) sensor: &'a Sensor,
-    pub(super) film: LaneFilm,
+    pub(super) film: BandFilm,
     pub(super) folder: &'a Path,
     pub(super) outputs: Outputs,
     pub(super) seed: u64,
@@ -39,7 +39,7 @@ pub(super) struct Writer<'a> {
     pub(super) digits: usize,
     /// Of each exposure time so far: its moments' files, which all of its frames share.
     pub(super) moments: Vec<(f64, MomentFiles)>,
-    pub(super) flaws: Flaws,
+    pub(super) invalid: InvalidValues,
     pub(super) exposed: Exposed,
 }
 
@@ -58,11 +58,11 @@ impl Writer<'_> {
         name(self.digits, stem, number, ending)
     }
 
-    pub(super) fn shot(&mut self, shot: Shot) -> Result<ShotFiles, ExposeError> {
+    pub(super) fn shot(&mut self, shot: Exposure) -> Result<ShotFiles, ExposeError> {
         let image = self.sensor.expose(self.film(), shot, self.seed)?;
         let mut files = ShotFiles::new(shot);
         // Every shot sees the same film, so once is enough.
-        self.flaws = image.flaws;
+        self.invalid = image.invalid;
         self.exposed.notes.extend(remarks::on(self.sensor, self.film(), &image, shot));
         let preview = self.preview(&image, shot)?;
         if self.outputs.dng && self.sensor.spec().kind == SensorKind::Raw {
@@ -102,7 +102,7 @@ impl Writer<'_> {
     }
 
     /// The numbers as a picture of one layer.
-    fn raw(&self, image: RawImage, shot: Shot) -> Result<Picture, PictureError> {
+    fn raw(&self, image: RawImage, shot: Exposure) -> Result<Picture, PictureError> {
         let RawImage { width, height, depth, values, .. } = image;
         let planes = if depth == 1 {
             vec![Values::U16(values)]
@@ -131,7 +131,7 @@ impl Writer<'_> {
         names.into_iter().zip(planes).map(|(name, values)| Channel { name, values }).collect()
     }
 
-    fn meaning(&self, definition: &str, unit: &str, shot: Shot) -> Vec<(String, String)> {
+    fn meaning(&self, definition: &str, unit: &str, shot: Exposure) -> Vec<(String, String)> {
         let sensor = self.sensor;
         [
             ("definition", definition.to_owned()),
@@ -145,7 +145,7 @@ impl Writer<'_> {
         .into()
     }
 
-    fn preview(&self, image: &RawImage, shot: Shot) -> Result<Picture, PictureError> {
+    fn preview(&self, image: &RawImage, shot: Exposure) -> Result<Picture, PictureError> {
         let method = self.sensor.spec().demosaic.unwrap_or_default();
         let developed = if self.outputs.png {
             self.sensor.developed(image, method)
@@ -164,7 +164,7 @@ impl Writer<'_> {
     }
 
     /// A DNG where the format has words for the sensor; else a note, once.
-    fn dng(&mut self, image: &RawImage, shot: Shot) -> Result<Option<String>, ExposeError> {
+    fn dng(&mut self, image: &RawImage, shot: Exposure) -> Result<Option<String>, ExposeError> {
         let name = self.name("raw", shot.frame, "dng");
         let path = self.folder.join(&name);
         let model = self.sensor.spec().model.map_or("etendue", |model| model.preset().name);
@@ -199,7 +199,7 @@ impl Writer<'_> {
     }
 
     /// Writes expected value and variance of an exposure time, numbered as the exposure is.
-    fn moments(&mut self, shot: Shot) -> Result<MomentFiles, ExposeError> {
+    fn moments(&mut self, shot: Exposure) -> Result<MomentFiles, ExposeError> {
         #[expect(clippy::cast_possible_truncation, reason = "fewer than shots")]
         let number = self.moments.len() as u32;
         let several = self.sensor.shots().any(|other| other.exposure != shot.exposure);
@@ -249,9 +249,9 @@ pub(super) struct Sidecar<'a> {
     system_gain_dn_per_electron: f64,
     channels: Vec<&'a str>,
     white_balance: Vec<f64>,
-    lanes: Vec<String>,
+    bands: Vec<String>,
     seed: u64,
-    pub(super) flaws: Flaws,
+    pub(super) invalid: InvalidValues,
     pub(super) notes: Vec<String>,
     pub(super) shots: Vec<ShotFiles>,
 }
@@ -269,9 +269,9 @@ impl<'a> Sidecar<'a> {
             system_gain_dn_per_electron: sensor.system_gain(),
             channels: sensor.channels().collect(),
             white_balance: sensor.white_balance(),
-            lanes: sensor.lanes().names(),
+            bands: sensor.bands().names(),
             seed,
-            flaws: Flaws::default(),
+            invalid: InvalidValues::default(),
             notes: Vec::new(),
             shots: Vec::new(),
         }
@@ -298,7 +298,7 @@ pub(super) struct ShotFiles {
 }
 
 impl ShotFiles {
-    fn new(Shot { exposure, frame }: Shot) -> Self {
+    fn new(Exposure { exposure, frame }: Exposure) -> Self {
         Self {
             exposure_s: exposure,
             frame,

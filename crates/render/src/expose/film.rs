@@ -1,27 +1,27 @@
-//! The light of a picture in the lanes of a sensor.
+//! The light of a picture in the bands of a sensor.
 
 use etendue_camera::Projection;
 use etendue_scene::Scene;
 use etendue_sensor::{Radiometry, Sensor, SensorKind};
-use etendue_spectrum::{Grid, Lanes};
+use etendue_spectrum::{Bands, Grid};
 use rayon::prelude::*;
 
 use super::files::plain;
 use crate::output::{Channel, Layer, Look, Values};
 
-/// Light in spectral lanes, as a sensor is given it.
+/// Light in spectral bands, as a sensor is given it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LaneFilm {
-    /// What the lanes are.
-    pub lanes: Lanes,
-    /// `[row][column][lane]`.
+pub struct BandFilm {
+    /// What the bands are.
+    pub bands: Bands,
+    /// `[row][column][band]`.
     pub values: Vec<f32>,
 }
 
-impl LaneFilm {
-    /// One plane a lane, woven together.
+impl BandFilm {
+    /// One plane a band, woven together.
     #[must_use]
-    pub fn woven(lanes: Lanes, planes: &[&[f32]]) -> Self {
+    pub fn woven(bands: Bands, planes: &[&[f32]]) -> Self {
         let pixels = planes.first().map_or(0, |plane| plane.len());
         let mut values = vec![0.0; pixels * planes.len()];
         values.par_chunks_mut(planes.len().max(1)).enumerate().for_each(|(i, pixel)| {
@@ -29,36 +29,36 @@ impl LaneFilm {
                 *value = plane[i];
             }
         });
-        Self { lanes, values }
+        Self { bands, values }
     }
 
     /// One plane a band of `grid`: the plain mean of the light over its wavelengths.
     fn means_over(&self, grid: &Grid) -> Vec<Vec<f32>> {
-        let count = self.lanes.count();
+        let count = self.bands.count();
         let plane = |parts: &Vec<(usize, f64)>| {
             let pixels = self.values.par_chunks(count);
-            let mean = |lanes: &[f32]| -> f64 {
-                parts.iter().map(|&(lane, weight)| weight * f64::from(lanes[lane])).sum()
+            let mean = |bands: &[f32]| -> f64 {
+                parts.iter().map(|&(band, weight)| weight * f64::from(bands[band])).sum()
             };
             #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
-            let plane: Vec<f32> = pixels.map(|lanes| mean(lanes) as f32).collect();
+            let plane: Vec<f32> = pixels.map(|bands| mean(bands) as f32).collect();
             plane
         };
-        self.lanes.means_over(grid).iter().map(plane).collect()
+        self.bands.means_over(grid).iter().map(plane).collect()
     }
 
     /// The colours of the light, for looking: red, green and blue planes.
     #[must_use]
     pub fn colors(&self) -> [Vec<f32>; 3] {
-        let rows = self.lanes.to_rgb();
+        let rows = self.bands.to_rgb();
         let count = rows.len();
         let plane = |k: usize| {
             let pixels = self.values.par_chunks(count);
-            let mix = |lanes: &[f32]| -> f64 {
-                lanes.iter().zip(&rows).map(|(lane, row)| f64::from(*lane) * row[k]).sum()
+            let mix = |bands: &[f32]| -> f64 {
+                bands.iter().zip(&rows).map(|(band, row)| f64::from(*band) * row[k]).sum()
             };
             #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
-            let plane: Vec<f32> = pixels.map(|lanes| mix(lanes) as f32).collect();
+            let plane: Vec<f32> = pixels.map(|bands| mix(bands) as f32).collect();
             plane
         };
         [plane(0), plane(1), plane(2)]
@@ -79,24 +79,24 @@ impl LaneFilm {
         self
     }
 
-    /// A picture's linear sRGB in other lanes. Exact for colours that were not mixed by light on
-    /// their way: a lane is linear in the colour.
+    /// A picture's linear sRGB in other bands. Exact for colours that were not mixed by light on
+    /// their way: a band is linear in the colour.
     #[must_use]
-    pub fn from_rgb(lanes: Lanes, colors: &[&[f32]; 3]) -> Self {
-        if lanes == Lanes::Rgb {
-            return Self::woven(lanes, colors);
+    pub fn from_rgb(bands: Bands, colors: &[&[f32]; 3]) -> Self {
+        if bands == Bands::Rgb {
+            return Self::woven(bands, colors);
         }
-        let rows = lanes.from_rgb();
+        let rows = bands.from_rgb();
         let mut values = vec![0.0; colors[0].len() * rows.len()];
         values.par_chunks_mut(rows.len().max(1)).enumerate().for_each(|(i, pixel)| {
             let color = colors.map(|plane| f64::from(plane[i]));
             for (value, row) in pixel.iter_mut().zip(&rows) {
                 #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
-                let lane = row.iter().zip(color).map(|(w, c)| w * c).sum::<f64>() as f32;
-                *value = lane;
+                let band = row.iter().zip(color).map(|(w, c)| w * c).sum::<f64>() as f32;
+                *value = band;
             }
         });
-        Self { lanes, values }
+        Self { bands, values }
     }
 }
 
@@ -118,42 +118,42 @@ pub(crate) const SPECTRUM: &str = "Spectrum";
 /// Whether the picture has a hyperspectral cube.
 pub(crate) fn has_spectrum(scene: &Scene) -> bool {
     scene.sensor.as_ref().is_some_and(|sensor| {
-        sensor.spec().kind == SensorKind::Multispectral && sensor.lanes().grid().is_some()
+        sensor.spec().kind == SensorKind::Multispectral && sensor.bands().grid().is_some()
     })
 }
 
 /// The hyperspectral cube of a multispectral sensor's picture, channels named by wavelength: its own
-/// bands where it has some, however finely they were rendered, else the lanes.
+/// bands where it has some, however finely they were rendered, else the bands.
 pub(crate) fn spectrum(
     scene: &Scene,
     layers: &[Layer],
-    lane_film: Option<&LaneFilm>,
+    band_film: Option<&BandFilm>,
 ) -> Option<Layer> {
     let sensor = scene.sensor.as_ref()?;
     if !has_spectrum(scene) {
         return None;
     }
     let from_colors;
-    let film = match lane_film.filter(|film| film.lanes.grid().is_some()) {
+    let film = match band_film.filter(|film| film.bands.grid().is_some()) {
         Some(film) => film,
         None => {
-            from_colors = LaneFilm::from_rgb(sensor.lanes().clone(), &colors(layers)?);
+            from_colors = BandFilm::from_rgb(sensor.bands().clone(), &colors(layers)?);
             &from_colors
         }
     };
-    let bands = sensor.spec().bands.as_ref().or(film.lanes.grid())?;
-    Some(cube(bands, film.means_over(bands)))
+    let grid = sensor.spec().bands.as_ref().or(film.bands.grid())?;
+    Some(cube(grid, film.means_over(grid)))
 }
 
 /// A layer of one plane a band.
-fn cube(bands: &Grid, planes: Vec<Vec<f32>>) -> Layer {
-    let channels = Lanes::Bands(bands.clone())
+fn cube(grid: &Grid, planes: Vec<Vec<f32>>) -> Layer {
+    let channels = Bands::Spectral(grid.clone())
         .names()
         .iter()
         .zip(planes)
         .map(|(name, plane)| Channel { name: plain(name), values: Values::F32(plane) })
         .collect();
-    let edges = format!("{:?}", bands.edges());
+    let edges = format!("{:?}", grid.edges());
     let meaning = [
         ("definition", "mean light of each band of wavelengths, over the pixel's samples"),
         ("unit", "as the picture's"),

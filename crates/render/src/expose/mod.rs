@@ -12,20 +12,20 @@
 //!
 //! Several exposures or frames are numbered: `raw_000.png`, `raw_001.png`, …
 
+mod bands;
 mod files;
 mod film;
-mod lanes;
 mod remarks;
 
 use std::path::{Path, PathBuf};
 
 use etendue_scene::Scene;
-use etendue_sensor::{Flaws, NoiseModel, Sensor, SensorError, SensorKind, Shot};
-use etendue_spectrum::Lanes;
+use etendue_sensor::{Exposure, InvalidValues, NoiseModel, Sensor, SensorError, SensorKind};
+use etendue_spectrum::Bands;
 
-pub use film::LaneFilm;
+pub(crate) use bands::{bands, explain_bands};
+pub use film::BandFilm;
 pub(crate) use film::{SPECTRUM, has_spectrum, spectrum};
-pub(crate) use lanes::{explain_lanes, lanes};
 
 use crate::output::{OutputError, Outputs, Picture, PictureError, sidecar};
 use files::{Sidecar, Writer};
@@ -93,7 +93,7 @@ pub struct Exposed {
     pub notes: Vec<String>,
 }
 
-/// Exposes the picture of `scene`, or its light in the sensor's own lanes where there is any, and
+/// Exposes the picture of `scene`, or its light in the sensor's own bands where there is any, and
 /// writes what its sensor gives into `folder`; nothing when the scene has no sensor. Told the share
 /// done, `progress` answers whether to go on.
 ///
@@ -102,7 +102,7 @@ pub struct Exposed {
 /// When a file cannot be written, or `progress` says stop.
 pub fn write(
     scene: &Scene,
-    (picture, lane_film): (&Picture, Option<LaneFilm>),
+    (picture, band_film): (&Picture, Option<BandFilm>),
     folder: &Path,
     outputs: Outputs,
     progress: &dyn Fn(f64) -> bool,
@@ -114,21 +114,21 @@ pub fn write(
         exposed.notes.push(format!("camera.sensor is not used: {NOTHING_TO_EXPOSE}"));
         return Ok(exposed);
     };
-    let own = lane_film.and_then(|film| {
-        exposed.notes.extend(lanes::unknown(scene, &film.lanes));
-        Some((sensor.clone().in_lanes(film.lanes.clone()).ok()?, film))
+    let own = band_film.and_then(|film| {
+        exposed.notes.extend(bands::unknown(scene, &film.bands));
+        Some((sensor.clone().in_bands(film.bands.clone()).ok()?, film))
     });
     let (sensor, film) = match own {
         Some(own) => own,
         None => {
-            // In the picture's own three lanes where the sensor can: the same numbers from less
+            // In the picture's own three bands where the sensor can: the same numbers from less
             // memory.
-            let sensor = sensor.clone().in_lanes(Lanes::Rgb).unwrap_or_else(|_| sensor.clone());
-            let film = LaneFilm::from_rgb(sensor.lanes().clone(), &colors);
+            let sensor = sensor.clone().in_bands(Bands::Rgb).unwrap_or_else(|_| sensor.clone());
+            let film = BandFilm::from_rgb(sensor.bands().clone(), &colors);
             (sensor, film)
         }
     };
-    let shots: Vec<Shot> = sensor.shots().collect();
+    let shots: Vec<Exposure> = sensor.shots().collect();
     let digits = digits(shots.len());
     let mut writer = Writer {
         sensor: &sensor,
@@ -139,7 +139,7 @@ pub fn write(
         header: picture.header(),
         digits,
         moments: Vec::new(),
-        flaws: Flaws::default(),
+        invalid: InvalidValues::default(),
         exposed,
     };
     let mut sidecar = Sidecar::new(&sensor, scene.render.seed);
@@ -149,8 +149,8 @@ pub fn write(
         }
         sidecar.shots.push(writer.shot(*shot)?);
     }
-    sidecar.flaws = writer.flaws;
-    writer.exposed.notes.extend(in_words(sidecar.flaws));
+    sidecar.invalid = writer.invalid;
+    writer.exposed.notes.extend(in_words(sidecar.invalid));
     sidecar.notes.clone_from(&writer.exposed.notes);
     let path = writer.place("sensor.json");
     sidecar::write_json(&path, &sidecar)?;
@@ -169,7 +169,7 @@ fn noise_seed(scene: &Scene) -> u64 {
 #[must_use]
 pub fn file_names(scene: &Scene) -> Vec<String> {
     let Some(sensor) = &scene.sensor else { return Vec::new() };
-    let shots: Vec<Shot> = sensor.shots().collect();
+    let shots: Vec<Exposure> = sensor.shots().collect();
     let digits = digits(shots.len());
     let kinds = [
         ("raw", "png"),
@@ -179,7 +179,7 @@ pub fn file_names(scene: &Scene) -> Vec<String> {
         ("mean", "npy"),
         ("variance", "npy"),
     ];
-    let shot = |shot: &Shot| {
+    let shot = |shot: &Exposure| {
         let frame = shot.frame;
         kinds.map(|(stem, ending)| files::name(digits, stem, frame, ending))
     };
@@ -195,9 +195,9 @@ fn digits(shots: usize) -> usize {
 }
 
 /// What a film has that is no light, if anything.
-fn in_words(flaws: Flaws) -> Option<String> {
-    let Flaws { negative, not_finite } = flaws;
-    flaws.any().then(|| {
+fn in_words(invalid: InvalidValues) -> Option<String> {
+    let InvalidValues { negative, not_finite } = invalid;
+    invalid.any().then(|| {
         format!(
             "{negative} negative and {not_finite} infinite or NaN values of the film are no light \
              and were taken for none"

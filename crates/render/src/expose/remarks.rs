@@ -1,13 +1,18 @@
 //! What a user should know of an exposure: that nothing can be seen in it, and what would mend it.
 
-use etendue_sensor::{Film, Radiometry, RawImage, Sensor, Shot};
+use etendue_sensor::{Exposure, Film, Radiometry, RawImage, Sensor};
 
 /// Standard deviations of the dark noise within which a pixel tells nothing from black or from
 /// saturation: of 10⁸ pixels less than one is further off by chance.
 const SIGMAS: f64 = 6.0;
 
 /// A sentence on an image that is saturated or black all over.
-pub(super) fn on(sensor: &Sensor, film: Film<'_>, image: &RawImage, shot: Shot) -> Option<String> {
+pub(super) fn on(
+    sensor: &Sensor,
+    film: Film<'_>,
+    image: &RawImage,
+    shot: Exposure,
+) -> Option<String> {
     let gain = sensor.system_gain();
     let dark = gain * sensor.dark_current() * shot.exposure;
     let [_, dsnu] = sensor.non_uniformity();
@@ -35,7 +40,7 @@ pub(super) fn on(sensor: &Sensor, film: Film<'_>, image: &RawImage, shot: Shot) 
 }
 
 /// How to get less than saturation.
-fn less(sensor: &Sensor, film: Film<'_>, shot: Shot) -> String {
+fn less(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
     let dark = sensor.dark_current() * shot.exposure;
     if dark >= 0.5 * sensor.saturation() {
         return format!(
@@ -62,7 +67,7 @@ fn less(sensor: &Sensor, film: Film<'_>, shot: Shot) -> String {
 }
 
 /// How to see something.
-fn more(sensor: &Sensor, film: Film<'_>, shot: Shot) -> String {
+fn more(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
     let mean = sensor.mean_electrons(film, shot.exposure);
     if mean <= 0.0 {
         return "no light falls on the sensor; look at the lights and at where the camera looks"

@@ -9,7 +9,7 @@ mod patterns;
 mod reference;
 mod repeatability;
 
-use etendue_sensor::{Film, RawImage, Sensor, SensorSpec, Shot};
+use etendue_sensor::{Exposure, Film, RawImage, Sensor, SensorSpec};
 use serde_json::{Value, json};
 
 /// A monochrome sensor with these keys besides the usual ones.
@@ -25,13 +25,13 @@ fn sensor(side: u32, keys: Value) -> Sensor {
 /// A frame of a digital monochrome sensor under even light of about `electrons` a pixel, and how
 /// many it really is after rounding to the film's f32.
 fn even_frame(sensor: &Sensor, electrons: f64, frame: u32, seed: u64) -> (RawImage, f64) {
-    let worth = sensor.electrons_per_unit(0)[0];
-    let light = (electrons / worth) as f32;
+    let responsivity = sensor.electrons_per_unit(0)[0];
+    let light = (electrons / responsivity) as f32;
     let [width, height] = sensor.resolution();
     let film = vec![light; (width * height) as usize];
-    let shot = Shot { exposure: 0.01, frame };
+    let shot = Exposure { exposure: 0.01, frame };
     let image = sensor.expose(Film { values: &film }, shot, seed).unwrap();
-    (image, f64::from(light) * worth)
+    (image, f64::from(light) * responsivity)
 }
 
 /// Mean and variance of numbers.

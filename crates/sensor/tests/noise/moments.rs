@@ -1,6 +1,6 @@
 //! Means and variances within four standard errors, and the images of them.
 
-use etendue_sensor::{Film, NoiseModel, Shot};
+use etendue_sensor::{Exposure, Film, NoiseModel};
 use serde_json::json;
 
 use crate::{even_frame, moments, sensor};
@@ -48,11 +48,12 @@ fn moments_agree_with_many_frames() {
         "serial": 9,
     });
     let sensor = sensor(32, keys);
-    let worth = sensor.electrons_per_unit(0)[0];
+    let responsivity = sensor.electrons_per_unit(0)[0];
     // From darkness, where black is clipped, to beyond the full well.
-    let film: Vec<f32> = (0..32 * 32).map(|i| (550.0 * i as f64 / 1024.0 / worth) as f32).collect();
+    let film: Vec<f32> =
+        (0..32 * 32).map(|i| (550.0 * i as f64 / 1024.0 / responsivity) as f32).collect();
     let film = Film { values: &film };
-    let shot = |frame| Shot { exposure: 0.01, frame };
+    let shot = |frame| Exposure { exposure: 0.01, frame };
     let expected = sensor.moments(film, shot(0)).unwrap();
     let frames = 4000;
     let mut sums = vec![[0.0; 2]; 1024];

@@ -1,6 +1,6 @@
 //! The same bits whatever the threads, and a crop is a crop.
 
-use etendue_sensor::{Film, Sensor, SensorSpec, Shot};
+use etendue_sensor::{Exposure, Film, Sensor, SensorSpec};
 use serde_json::json;
 
 fn busy(keys: serde_json::Value) -> Sensor {
@@ -18,8 +18,8 @@ fn busy(keys: serde_json::Value) -> Sensor {
 /// Light from none to beyond saturation.
 fn ramp(sensor: &Sensor) -> Vec<f32> {
     let [width, height] = sensor.resolution().map(|side| side as usize);
-    let lanes = sensor.lanes().count();
-    (0..width * height * lanes).map(|i| 1.2 * ((i * 7919) % 10_007) as f32 / 10_007.0).collect()
+    let bands = sensor.bands().count();
+    (0..width * height * bands).map(|i| 1.2 * ((i * 7919) % 10_007) as f32 / 10_007.0).collect()
 }
 
 #[test]
@@ -32,7 +32,7 @@ fn threads_do_not_matter() {
     ] {
         let sensor = busy(keys.clone());
         let film = ramp(&sensor);
-        let shot = Shot { exposure: 0.02, frame: 6 };
+        let shot = Exposure { exposure: 0.02, frame: 6 };
         let images = [1, 2, 7].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| sensor.expose(Film { values: &film }, shot, 99).unwrap())
@@ -49,7 +49,7 @@ fn a_crop_from_the_corner_has_the_pixels_of_the_whole() {
     let crop = whole.clone().with_resolution([130, 40]);
     let film = ramp(&whole);
     let part: Vec<f32> = film.chunks(331).take(40).flat_map(|row| &row[..130]).copied().collect();
-    let shot = Shot { exposure: 0.02, frame: 0 };
+    let shot = Exposure { exposure: 0.02, frame: 0 };
     let image = whole.expose(Film { values: &film }, shot, 1).unwrap();
     let cropped = crop.expose(Film { values: &part }, shot, 1).unwrap();
     for (whole, part) in image.values.chunks(331).zip(cropped.values.chunks(130)) {
@@ -61,7 +61,7 @@ fn a_crop_from_the_corner_has_the_pixels_of_the_whole() {
 fn channels_have_their_own_noise() {
     let sensor = busy(json!({ "type": "rgb", "quantum_efficiency": 1, "prnu": 0, "dsnu": 0 }));
     let film = vec![0.5; 331 * 97 * 3];
-    let shot = Shot { exposure: 0.02, frame: 0 };
+    let shot = Exposure { exposure: 0.02, frame: 0 };
     let image = sensor.expose(Film { values: &film }, shot, 1).unwrap();
     let equal = image.values.chunks(3).filter(|rgb| rgb[0] == rgb[1] || rgb[1] == rgb[2]).count();
     // Noise of ±25 DN: two of three numbers agree in a few pixels of a hundred.
@@ -87,7 +87,7 @@ fn any_machine_gives_the_same_bits() {
     ] {
         let sensor = busy(keys);
         let film = ramp(&sensor);
-        let shot = Shot { exposure: 0.02, frame: 3 };
+        let shot = Exposure { exposure: 0.02, frame: 3 };
         let image = sensor.expose(Film { values: &film }, shot, 2026).unwrap();
         assert_eq!(fingerprint(&image.values), expected, "{:#x}", fingerprint(&image.values));
     }

@@ -30,7 +30,7 @@ pub struct Layered {
     pub transmission: f64,
 }
 
-/// The largest lanes of a surface's colours.
+/// The largest bands of a surface's colours.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Peaks {
     pub(super) base: f64,
@@ -42,7 +42,7 @@ pub(super) struct Peaks {
 pub(super) struct Found {
     pub(super) wi: DVec3,
     pub(super) weights: Weights,
-    pub(super) density: f64,
+    pub(super) pdf: f64,
 }
 
 /// Probabilities of the three parts as seen from one direction.
@@ -116,28 +116,28 @@ impl Layered {
             if self.transmission == 0.0 || self.alpha == 0.0 {
                 return (Weights::default(), 0.0);
             }
-            let (value, density) = self.through(wo, wi, peaks);
-            return (Weights::base(value), density * chances.through);
+            let (value, pdf) = self.through(wo, wi, peaks);
+            return (Weights::base(value), pdf * chances.through);
         }
         let mut weights = Weights::base(self.matte(wo, wi, peaks));
-        let mut density = chances.base * wi.z / PI;
+        let mut pdf = chances.base * wi.z / PI;
         if self.alpha > 0.0 {
             let (value, facets) = ggx::reflection(wo, wi, self.alpha);
             let cosine = (wo + wi).try_normalize().map_or(0.0, |h| wo.dot(h));
             weights = weights.plus(self.sheet(cosine).times(value));
-            density += chances.sheet * facets;
+            pdf += chances.sheet * facets;
         }
-        (weights, density)
+        (weights, pdf)
     }
 
     /// Value times cosine, and density, of what comes through the wall from `wi` below: as a
     /// reflection turned to the other side (`KHR_materials_transmission`).
     fn through(&self, wo: DVec3, wi: DVec3, peaks: &Peaks) -> (f64, f64) {
         let turned = DVec3::new(wi.x, wi.y, -wi.z);
-        let (value, density) = ggx::reflection(wo, turned, self.alpha);
+        let (value, pdf) = ggx::reflection(wo, turned, self.alpha);
         let cosine = (wo + turned).try_normalize().map_or(0.0, |h| wo.dot(h));
         let share = (1.0 - self.metallic) * self.transmission;
-        (share * self.passed(cosine, peaks) * value, density)
+        (share * self.passed(cosine, peaks) * value, pdf)
     }
 
     /// What a smooth wall lets pass straight.
@@ -158,7 +158,7 @@ impl Layered {
         let wi = if choice < chances.sheet {
             if self.alpha == 0.0 {
                 let weights = self.sheet(wo.z).times(1.0 / chances.sheet);
-                return Some(Found { wi: mirrored(wo), weights, density: f64::INFINITY });
+                return Some(Found { wi: mirrored(wo), weights, pdf: f64::INFINITY });
             }
             self.reflected(wo, square)
         } else if choice < chances.sheet + chances.base {
@@ -166,7 +166,7 @@ impl Layered {
         } else if chances.through > 0.0 {
             if self.alpha == 0.0 {
                 let weights = self.straight_through(wo, peaks)?.times(1.0 / chances.through);
-                return Some(Found { wi: -wo, weights, density: f64::INFINITY });
+                return Some(Found { wi: -wo, weights, pdf: f64::INFINITY });
             }
             let up = self.reflected(wo, square);
             DVec3::new(up.x, up.y, -up.z)
@@ -177,8 +177,8 @@ impl Layered {
         if (wi.z < 0.0) != below || wi.z == 0.0 {
             return None;
         }
-        let (weights, density) = self.evaluate(wo, wi, peaks);
-        (density > 0.0).then(|| Found { wi, weights: weights.times(1.0 / density), density })
+        let (weights, pdf) = self.evaluate(wo, wi, peaks);
+        (pdf > 0.0).then(|| Found { wi, weights: weights.times(1.0 / pdf), pdf })
     }
 
     fn reflected(&self, wo: DVec3, square: [f64; 2]) -> DVec3 {

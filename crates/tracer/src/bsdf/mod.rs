@@ -3,7 +3,7 @@
 //!
 //! Every model's value is a sum of three colours, white, the surface's own and that of its highlights,
 //! times plain numbers ([`Weights`]). So directions, Fresnel terms and facets are worked out once a
-//! hit, whatever the number of lanes, and a lane costs two multiplications.
+//! hit, whatever the number of bands, and a band costs two multiplications.
 //!
 //! Directions point away from the surface; `wo` is where the light goes (to the viewer), `wi` where it
 //! comes from. Reflection and transmission are told apart by the geometric normal, lengths are
@@ -107,13 +107,13 @@ pub struct Bsdf {
 
 /// A direction that light comes from, chosen in proportion to what it contributes.
 #[derive(Debug, Clone, Copy)]
-pub struct Scattered {
+pub struct BsdfSample {
     /// Where from (unit, world).
     pub direction: DVec3,
     /// Value times cosine over density.
     pub weights: Weights,
     /// Density per solid angle (1/sr); `+inf` for a direction that only this model can give.
-    pub density: f64,
+    pub pdf: f64,
 }
 
 impl Bsdf {
@@ -158,8 +158,8 @@ impl Bsdf {
         match self.model {
             Model::Matte if !transmits => (Weights::base(local.z / PI), local.z / PI),
             Model::Metal { alpha } if !transmits && alpha > 0.0 => {
-                let (value, density) = ggx::reflection(self.wo, local, alpha);
-                (metal(self.wo, local).times(value), density)
+                let (value, pdf) = ggx::reflection(self.wo, local, alpha);
+                (metal(self.wo, local).times(value), pdf)
             }
             Model::Layered(layered) => layered.evaluate(self.wo, local, &self.peaks()),
             _ => (Weights::default(), 0.0),
@@ -169,7 +169,7 @@ impl Bsdf {
     /// A direction by `square`, after `choice` (both in 0..1) has picked among the model's parts;
     /// `None` when the light is lost.
     #[must_use]
-    pub fn sample(&self, choice: f64, square: [f64; 2]) -> Option<Scattered> {
+    pub fn sample(&self, choice: f64, square: [f64; 2]) -> Option<BsdfSample> {
         if self.wo.z <= 0.0 {
             return None;
         }
@@ -187,19 +187,19 @@ impl Bsdf {
             Model::Metal { alpha } => {
                 let h = ggx::sample_visible(self.wo, square, alpha);
                 let wi = 2.0 * self.wo.dot(h) * h - self.wo;
-                let (value, density) = ggx::reflection(self.wo, wi, alpha);
-                if density <= 0.0 {
+                let (value, pdf) = ggx::reflection(self.wo, wi, alpha);
+                if pdf <= 0.0 {
                     return None;
                 }
-                self.given(wi, metal(self.wo, wi).times(value / density), density)
+                self.given(wi, metal(self.wo, wi).times(value / pdf), pdf)
             }
             Model::Dielectric { eta } => self.boundary(eta, choice),
             Model::Layered(layered) => {
                 let found = layered.sample(self.wo, choice, square, &self.peaks())?;
-                if found.density == f64::INFINITY {
+                if found.pdf == f64::INFINITY {
                     self.single(found.wi, found.weights)
                 } else {
-                    self.given(found.wi, found.weights, found.density)
+                    self.given(found.wi, found.weights, found.pdf)
                 }
             }
         }
@@ -215,7 +215,7 @@ impl Bsdf {
 
     /// Reflects or refracts by Snell and Fresnel. Radiance is compressed by the square of the index
     /// (Veach 1997, section 5.2.2).
-    fn boundary(&self, eta: f64, choice: f64) -> Option<Scattered> {
+    fn boundary(&self, eta: f64, choice: f64) -> Option<BsdfSample> {
         let (reflectance, cos_out) = fresnel::dielectric(self.wo.z, eta);
         match cos_out {
             Some(cos_out) if choice >= reflectance => {
@@ -226,23 +226,23 @@ impl Bsdf {
         }
     }
 
-    /// The largest lanes of the two colours, for choosing among parts.
+    /// The largest bands of the two colours, for choosing among parts.
     fn peaks(&self) -> layered::Peaks {
         let peak = |c: &Color| c[0].max(c[1]).max(c[2]);
         layered::Peaks { base: peak(&self.base), highlight: peak(&self.highlight) }
     }
 
-    fn given(&self, local: DVec3, weights: Weights, density: f64) -> Option<Scattered> {
+    fn given(&self, local: DVec3, weights: Weights, pdf: f64) -> Option<BsdfSample> {
         let direction = self.frame.world(local).try_normalize()?;
         // The shading normal may lean a reflection through the surface.
         let transmits = direction.dot(self.geometric) < 0.0;
-        if transmits != (local.z < 0.0) || density <= 0.0 || weights.is_zero() {
+        if transmits != (local.z < 0.0) || pdf <= 0.0 || weights.is_zero() {
             return None;
         }
-        Some(Scattered { direction, weights, density })
+        Some(BsdfSample { direction, weights, pdf })
     }
 
-    fn single(&self, local: DVec3, weights: Weights) -> Option<Scattered> {
+    fn single(&self, local: DVec3, weights: Weights) -> Option<BsdfSample> {
         self.given(local, weights, f64::INFINITY)
     }
 }

@@ -160,12 +160,12 @@ fn sampling_has_the_density_it_states() {
             };
             for _ in 0..n {
                 let Some(s) = surface.sample(random(), [random(), random()]) else { continue };
-                if s.density == f64::INFINITY {
+                if s.pdf == f64::INFINITY {
                     continue;
                 }
-                let (value, density) = surface.evaluate(s.direction);
-                assert!((density / s.density - 1.0).abs() < 1e-6, "{name} {model:?}");
-                assert!((total(value) / density / total(s.weights) - 1.0).abs() < 1e-6);
+                let (value, pdf) = surface.evaluate(s.direction);
+                assert!((pdf / s.pdf - 1.0).abs() < 1e-6, "{name} {model:?}");
+                assert!((total(value) / pdf / total(s.weights) - 1.0).abs() < 1e-6);
                 counts[cell(s.direction)] += 1.0;
             }
             // Expected counts by the midpoint rule on a finer grid.

@@ -13,7 +13,7 @@ use super::paths::Paths;
 use super::shadows::Shadows;
 use super::{Follow, Scratch, Tracing};
 use crate::bsdf::{Bsdf, Model};
-use crate::lamps::Lamp;
+use crate::lamps::AreaLight;
 use crate::light::Lights;
 use crate::sampling::triangle_point;
 use crate::spawn::{Anchor, ROUNDINGS, magnitudes};
@@ -22,7 +22,7 @@ use crate::{Color, Paint, Scattering};
 /// Hits worked on side by side.
 const LANES: usize = 64;
 
-type Lane = [f64; LANES];
+type Row = [f64; LANES];
 
 /// A placement whose surface is matte and alike all over.
 #[derive(Debug, Clone, Copy)]
@@ -38,50 +38,50 @@ pub(super) struct Patch {
     count: usize,
     /// Of each path: its number, and which of those that go on it is.
     path: [(usize, usize); LANES],
-    origin: [Lane; 3],
-    direction: [Lane; 3],
-    t: Lane,
+    origin: [Row; 3],
+    direction: [Row; 3],
+    t: Row,
     /// On the viewer's side.
-    normal: [Lane; 3],
-    point: [Lane; 3],
-    error: Lane,
+    normal: [Row; 3],
+    point: [Row; 3],
+    error: Row,
     away: Away,
     lamps: Chosen,
 }
 
-/// The lamps that the hits of a patch ask, as [`Lamp`] has them.
+/// The lamps that the hits of a patch ask, as [`AreaLight`] has them.
 #[derive(Debug)]
 struct Chosen {
     /// Which lamp, and its placement and triangle.
     chosen: [(usize, [u32; 2]); LANES],
     /// The place on it, as the weights of two of its corners.
-    weights: [Lane; 2],
-    corner: [Lane; 3],
-    translation: [[Lane; 3]; 2],
-    edges: [[Lane; 3]; 2],
-    normal: [Lane; 3],
-    magnitudes: [Lane; 3],
+    weights: [Row; 2],
+    corner: [Row; 3],
+    translation: [[Row; 3]; 2],
+    edges: [[Row; 3]; 2],
+    normal: [Row; 3],
+    magnitudes: [Row; 3],
     /// Its chance over its area (1/m²).
-    density: Lane,
+    pdf: Row,
     /// 1 when it shines on both sides.
-    two_sided: Lane,
+    two_sided: Row,
 }
 
 /// Rays that leave a patch.
 #[derive(Debug)]
 struct Away {
-    start: [Lane; 3],
-    along: [Lane; 3],
+    start: [Row; 3],
+    along: [Row; 3],
     /// How far (m).
-    reach: Lane,
+    reach: Row,
     /// The share of light that the surface turns to the viewer per colour, over the density of the
     /// direction; or the density itself where the direction was drawn.
-    value: Lane,
+    value: Row,
 }
 
 impl Default for Patch {
     fn default() -> Self {
-        const ZERO: Lane = [0.0; LANES];
+        const ZERO: Row = [0.0; LANES];
         Self {
             count: 0,
             path: [(0, 0); LANES],
@@ -100,7 +100,7 @@ impl Default for Patch {
                 edges: [[ZERO; 3]; 2],
                 normal: [ZERO; 3],
                 magnitudes: [ZERO; 3],
-                density: ZERO,
+                pdf: ZERO,
                 two_sided: ZERO,
             },
         }
@@ -160,7 +160,7 @@ impl Patch {
 }
 
 impl Chosen {
-    fn set(&mut self, lane: usize, (index, lamp): (usize, &Lamp), chance: f64) {
+    fn set(&mut self, lane: usize, (index, lamp): (usize, &AreaLight), chance: f64) {
         self.chosen[lane] = (index, lamp.id);
         for axis in 0..3 {
             self.corner[axis][lane] = lamp.corner[axis];
@@ -171,12 +171,12 @@ impl Chosen {
                 self.edges[k][axis][lane] = lamp.shape.edges[k][axis];
             }
         }
-        self.density[lane] = chance / lamp.shape.area;
+        self.pdf[lane] = chance / lamp.shape.area;
         self.two_sided[lane] = f64::from(u8::from(lamp.two_sided));
     }
 }
 
-fn at(axes: &[Lane; 3], lane: usize) -> DVec3 {
+fn at(axes: &[Row; 3], lane: usize) -> DVec3 {
     DVec3::new(axes[0][lane], axes[1][lane], axes[2][lane])
 }
 
@@ -189,7 +189,7 @@ impl Tracing<'_> {
         let mesh = around.geometry.mesh_of(placement);
         let colored = material.vertex_colors && mesh.colors.is_some();
         let tilted = material.normal_map.is_some() || mesh.normals.is_some();
-        if material.scattering != Scattering::Matte || material.is_pierced() || colored || tilted {
+        if material.scattering != Scattering::Matte || material.has_alpha() || colored || tilted {
             return None;
         }
         let Paint::Plain(color) = material.base_color else { return None };
@@ -216,10 +216,10 @@ impl Tracing<'_> {
     /// Asks one light for each hit.
     fn ask_from(&mut self, scratch: &mut Scratch, matte: &Matte) {
         let lights = self.stage.lights;
-        if let Some((light, lanes)) = lights.lone_point(self.count) {
+        if let Some((light, bands)) = lights.lone_point(self.count) {
             aim_at(&mut scratch.patch, light);
-            for (k, lane) in scratch.radiance.iter_mut().enumerate() {
-                *lane = lanes[k] * self.stage.spectral.lane(&matte.color, k);
+            for (k, band) in scratch.radiance.iter_mut().enumerate() {
+                *band = bands[k] * self.stage.spectral.band(&matte.color, k);
             }
             let Scratch { now, hits, shadows, radiance, patch, .. } = scratch;
             patch.lamps.chosen.fill((0, [MISS; 2]));
@@ -235,7 +235,7 @@ impl Tracing<'_> {
             let (color, value) = (&*radiance, &patch.away.value);
             self.note_shadows((now, hits, patch), shadows, |throughput, lane| {
                 let (lamp, _) = patch.lamps.chosen[lane];
-                let light = lights.lanes_of_lamp(lamp, self.count).iter().zip(throughput);
+                let light = lights.bands_of_lamp(lamp, self.count).iter().zip(throughput);
                 light.zip(color).map(move |((l, t), c)| l * t * c * value[lane])
             });
         } else if !lights.is_dark() {
@@ -249,18 +249,25 @@ impl Tracing<'_> {
                 let left = [hits.placement[i], hits.triangle[i]];
                 let ray = now.states[i].ray;
                 let numbers = numbers.of(k);
-                self.ask(&bsdf, (&anchor, left), (throughput, ray), &numbers, shadows, radiance);
+                self.sample_light(
+                    &bsdf,
+                    (&anchor, left),
+                    (throughput, ray),
+                    &numbers,
+                    shadows,
+                    radiance,
+                );
             }
         }
     }
 
     /// Notes the rays of a patch to its lights. What the surface turns of their light to the viewer is
-    /// `brought`, by path and lane of the patch.
+    /// `contribution`, by path and lane of the patch.
     fn note_shadows<'a, L: Iterator<Item = f64> + 'a>(
         &self,
         (now, hits, patch): (&'a Paths, &HitBatch, &'a Patch),
         shadows: &mut Shadows,
-        brought: impl Fn(&'a [f64], usize) -> L,
+        contribution: impl Fn(&'a [f64], usize) -> L,
     ) {
         let away = &patch.away;
         let lit = || (0..patch.count).filter(|&lane| away.value[lane] > 0.0);
@@ -276,7 +283,7 @@ impl Tracing<'_> {
             // The lone point alone is on no triangle.
             shadows.is_delta.push(patch.lamps.chosen[lane].1 == [MISS; 2]);
             let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
-            shadows.brought.extend(brought(throughput, lane));
+            shadows.contribution.extend(contribution(throughput, lane));
         }
     }
 
@@ -286,7 +293,7 @@ impl Tracing<'_> {
         let lights = self.stage.lights;
         let Scratch { now, next, last, hits, numbers, patch, .. } = scratch;
         let ends = |i: usize| now.states[i].bounces + 1 >= self.rules.bounces || !follows_any;
-        if !lights.can_be_met() && patch.path[..patch.count].iter().all(|&(i, _)| ends(i)) {
+        if !lights.is_hittable() && patch.path[..patch.count].iter().all(|&(i, _)| ends(i)) {
             return;
         }
         let mut squares = [[0.5; 2]; LANES];
@@ -298,18 +305,18 @@ impl Tracing<'_> {
         for lane in 0..patch.count {
             let (i, k) = patch.path[lane];
             let is_last = ends(i);
-            let density = patch.away.value[lane];
-            if density <= 0.0 || (is_last && !lights.can_be_met()) {
+            let pdf = patch.away.value[lane];
+            if pdf <= 0.0 || (is_last && !lights.is_hittable()) {
                 continue;
             }
             let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
-            for (k, lane) in throughput.iter_mut().enumerate() {
-                *lane *= self.stage.spectral.lane(&matte.color, k);
+            for (k, band) in throughput.iter_mut().enumerate() {
+                *band *= self.stage.spectral.band(&matte.color, k);
             }
             let state = super::State {
                 steps: now.states[i].steps + 1,
                 bounces: now.states[i].bounces + 1,
-                density,
+                pdf,
                 vertex: patch.point(lane),
                 is_last,
                 cone: None,
@@ -417,10 +424,10 @@ fn aim_at_lamps(patch: &mut Patch) {
         let inverse = 1.0 / squared[i].sqrt();
         let (cosine, shown) = (turned[i] * inverse, facing[i] * inverse);
         let shines = (shown > 0.0) | ((shown < 0.0) & (lamps.two_sided[i] > 0.0));
-        let density = lamps.density[i] * squared[i] / shown.abs();
-        let ratio = cosine / PI / density;
-        let value = cosine / PI / ((1.0 + ratio * ratio) * density);
-        let counts = shines & (cosine > 0.0) & (density < f64::INFINITY);
+        let pdf = lamps.pdf[i] * squared[i] / shown.abs();
+        let ratio = cosine / PI / pdf;
+        let value = cosine / PI / ((1.0 + ratio * ratio) * pdf);
+        let counts = shines & (cosine > 0.0) & (pdf < f64::INFINITY);
         away.value[i] = if counts { value } else { 0.0 };
         blur[i] *= if shown < 0.0 { -ROUNDINGS } else { ROUNDINGS };
     }

@@ -3,10 +3,10 @@
 use etendue_geometry::{HitBatch, MISS};
 
 use super::paths::{Paths, State};
-use super::{Scratch, Stage, Tracing};
-use crate::reference::Spot;
+use super::{LightingContext, Scratch, Tracing};
+use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
-use crate::surface::Met;
+use crate::surface::SurfaceInteraction;
 use crate::{Material, Scattering};
 
 /// The most steps of a path: surfaces that let it pass count, and may be many.
@@ -53,11 +53,11 @@ impl Tracing<'_> {
             return false;
         }
         let around = &self.stage.surroundings;
-        let pierced = || {
+        let has_alpha = || {
             let spot = around.spot(hits, i);
-            spot.and_then(|spot| around.material(&spot)).is_some_and(Material::is_pierced)
+            spot.and_then(|spot| around.material(&spot)).is_some_and(Material::has_alpha)
         };
-        !state.is_last || (self.stage.traits.is_pierced && pierced())
+        !state.is_last || (self.stage.traits.has_alpha && has_alpha())
     }
 
     /// The light that ray `i` met, and its weight against having asked for it; `None` if none.
@@ -68,26 +68,27 @@ impl Tracing<'_> {
         i: usize,
         radiance: &mut [f64],
     ) -> Option<f64> {
-        let Stage { lights, surroundings: around, spectral, .. } = self.stage;
+        let LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
         let (state, direction) = (&now.states[i], now.rays.direction(i));
-        let asked = |density: f64| match state.density {
+        let asked = |pdf: f64| match state.pdf {
             f64::INFINITY => 1.0,
-            own => power_heuristic(own, density),
+            own => power_heuristic(own, pdf),
         };
         let Some(spot) = around.spot(hits, i) else {
             let shines = lights.environment(spectral, direction, radiance);
-            return shines.then(|| asked(lights.density_of_environment(direction)));
+            return shines.then(|| asked(lights.pdf_of_environment(direction)));
         };
         let front = hits.normal(i).dot(direction) <= 0.0;
         let material = around.material(&spot)?;
-        let spot = Spot { footprint: now.footprint(hits, i), ..spot };
+        let spot = SurfacePoint { footprint: now.footprint(hits, i), ..spot };
         // A surface that is only partly there shines by as much.
-        let there = || match material.is_pierced() {
-            true => Met::new(around, &now.rays, hits, i, None).map_or(1.0, |met| met.opacity()),
+        let there = || match material.has_alpha() {
+            true => SurfaceInteraction::new(around, &now.rays, hits, i, None)
+                .map_or(1.0, |met| met.opacity()),
             false => 1.0,
         };
         if material.scattering == Scattering::Unlit {
-            if state.density != f64::INFINITY {
+            if state.pdf != f64::INFINITY {
                 return None;
             }
             let [r, g, b, _] = around.base_color(material, &spot);
@@ -97,8 +98,7 @@ impl Tracing<'_> {
         if !lights.emitted(around, spectral, &spot, front, radiance) {
             return None;
         }
-        let density =
-            lights.density_of_surface(around, hits.placement[i], &spot, state.vertex, direction);
-        Some(asked(density) * there())
+        let pdf = lights.pdf_of_surface(around, hits.placement[i], &spot, state.vertex, direction);
+        Some(asked(pdf) * there())
     }
 }

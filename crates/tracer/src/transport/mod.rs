@@ -32,36 +32,36 @@ use self::shadows::{Shadows, push_to};
 use crate::bsdf::{Bsdf, Weights};
 use crate::emitters::Emitters;
 use crate::light::{End, Lights};
-use crate::reference::Surroundings;
+use crate::reference::SceneView;
 use crate::sampling::power_heuristic;
 use crate::spawn::Anchor;
 use crate::spectral::Spectral;
-use crate::surface::Met;
+use crate::surface::SurfaceInteraction;
 use crate::{Ior, Material, Scattering};
 
 /// A tracer of light.
 pub trait Tracer: Send + Sync + Debug {
-    /// The radiance that arrives along each ray against its direction, in `beam.lanes`: `out` is
-    /// `[ray][lane]` with all lanes of the stage, and is refilled; other lanes are 0.
+    /// The radiance that arrives along each ray against its direction, in `beam.bands`: `out` is
+    /// `[ray][band]` with all bands of the stage, and is refilled; other bands are 0.
     fn radiance(
         &self,
-        stage: &Stage<'_>,
-        beam: &Beam<'_>,
+        stage: &LightingContext<'_>,
+        beam: &RaySamples<'_>,
         scratch: &mut Scratch,
         out: &mut Vec<f64>,
-    ) -> Tally;
+    ) -> RayStats;
 }
 
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
-pub struct Stage<'a> {
+pub struct LightingContext<'a> {
     /// What finds the hits.
     pub accel: &'a dyn Accel,
     /// Meshes, materials and images.
-    pub surroundings: Surroundings<'a>,
+    pub surroundings: SceneView<'a>,
     /// Where light comes from.
     pub lights: &'a Lights,
-    /// The lanes.
+    /// The bands.
     pub spectral: &'a Spectral,
     /// What its surfaces make tracers do.
     pub traits: Traits,
@@ -72,8 +72,8 @@ pub struct Stage<'a> {
 /// What no surface of a scene asks for is not done.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Traits {
-    /// Some surface is not wholly there ([`Material::is_pierced`]).
-    pub is_pierced: bool,
+    /// Some surface is not wholly there ([`Material::has_alpha`]).
+    pub has_alpha: bool,
     /// Some surface is a smooth pane that light passes straight ([`Material::is_pane`]).
     pub has_panes: bool,
     /// Some surface scatters light in several ways, among which is chosen.
@@ -87,7 +87,7 @@ impl Traits {
         let mut traits = Self::default();
         let placed = geometry.placements.iter().filter_map(|p| materials.get(p.material as usize));
         for material in placed {
-            traits.is_pierced |= material.is_pierced();
+            traits.has_alpha |= material.has_alpha();
             traits.has_panes |= material.is_pane();
             traits.has_choice |=
                 matches!(material.scattering, Scattering::Dielectric(_) | Scattering::Gltf(_));
@@ -98,13 +98,13 @@ impl Traits {
 
 /// A batch of rays with what they carry.
 #[derive(Debug, Clone)]
-pub struct Beam<'a> {
+pub struct RaySamples<'a> {
     /// The rays.
     pub rays: &'a RayBatch,
     /// Random numbers of each ray.
     pub samples: &'a dyn Samples,
-    /// The lanes that these rays stand for: all, unless the camera sends wavelengths separate ways.
-    pub lanes: Range<usize>,
+    /// The bands that these rays stand for: all, unless the camera sends wavelengths separate ways.
+    pub bands: Range<usize>,
 }
 
 /// Random numbers by ray and pair of dimensions, many at a time.
@@ -116,7 +116,7 @@ pub trait Samples: Debug {
 
 /// What became of a batch.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Tally {
+pub struct RayStats {
     /// Rays traced for their closest hit.
     pub rays: u64,
     /// Rays traced to a light.
@@ -125,7 +125,7 @@ pub struct Tally {
     pub not_finite: u64,
 }
 
-impl AddAssign for Tally {
+impl AddAssign for RayStats {
     fn add_assign(&mut self, other: Self) {
         self.rays += other.rays;
         self.shadow_rays += other.shadow_rays;
@@ -171,15 +171,15 @@ pub struct Scratch {
 /// Traces `beam` by `rules`.
 pub(crate) fn trace(
     rules: Rules,
-    stage: &Stage<'_>,
-    beam: &Beam<'_>,
+    stage: &LightingContext<'_>,
+    beam: &RaySamples<'_>,
     scratch: &mut Scratch,
     out: &mut Vec<f64>,
-) -> Tally {
+) -> RayStats {
     let count = stage.spectral.count();
     out.clear();
     out.resize(beam.rays.len() * count, 0.0);
-    let mut tracing = Tracing { rules, stage, count, tally: Tally::default() };
+    let mut tracing = Tracing { rules, stage, count, tally: RayStats::default() };
     scratch.hits.detail = Detail::Surface;
     scratch.shadows.hits.detail = Detail::Surface;
     scratch.radiance.resize(count, 0.0);
@@ -197,11 +197,11 @@ pub(crate) fn trace(
         // From neighbouring places to lights: as coherent as what they start from.
         scratch.shadows.rays.coherent = scratch.now.rays.coherent;
         tracing.step_all(scratch);
-        if stage.lights.can_be_met() {
+        if stage.lights.is_hittable() {
             scratch.shadows.sort(count);
         }
         tracing.light(&mut scratch.shadows, out);
-        tracing.glimpse(scratch, out);
+        tracing.trace_emitters(scratch, out);
         std::mem::swap(&mut scratch.now, &mut scratch.next);
     }
     tracing.tally
@@ -209,13 +209,13 @@ pub(crate) fn trace(
 
 struct Tracing<'a> {
     rules: Rules,
-    stage: &'a Stage<'a>,
+    stage: &'a LightingContext<'a>,
     count: usize,
-    tally: Tally,
+    tally: RayStats,
 }
 
 impl Tracing<'_> {
-    fn start(&self, beam: &Beam<'_>, paths: &mut Paths) {
+    fn start(&self, beam: &RaySamples<'_>, paths: &mut Paths) {
         paths.clear();
         paths.rays.copy_from(beam.rays);
         paths.rays.from_surface = false;
@@ -224,31 +224,31 @@ impl Tracing<'_> {
                 ray: u32::try_from(i).unwrap_or(u32::MAX),
                 steps: 0,
                 bounces: 0,
-                density: f64::INFINITY,
+                pdf: f64::INFINITY,
                 vertex: beam.rays.origin(i),
-                lane: None,
+                band: None,
                 is_last: false,
                 cone: self.stage.surroundings.view.cone(beam.rays.direction(i)),
             });
-            let lanes = 0..self.count;
-            paths.throughput.extend(lanes.map(|k| f64::from(u8::from(beam.lanes.contains(&k)))));
+            let bands = 0..self.count;
+            paths.throughput.extend(bands.map(|k| f64::from(u8::from(beam.bands.contains(&k)))));
         }
     }
 
     /// What the next step of any of `states` may draw.
     fn needs(&self, states: &[State]) -> impl Fn(Draw) -> bool {
-        let Stage { lights, traits, .. } = self.stage;
+        let LightingContext { lights, traits, .. } = self.stage;
         let most = states.iter().map(|state| state.bounces + 1).max().unwrap_or(0);
         let least = states.iter().map(|state| state.bounces + 1).min().unwrap_or(0);
         let goes_on = self.rules.follow == Follow::All && least < self.rules.bounces;
-        let follows = goes_on || lights.can_be_met() || traits.has_choice;
+        let follows = goes_on || lights.is_hittable() || traits.has_choice;
         let roulette = self.rules.roulette.is_some_and(|after| most >= after);
-        let [several, extended] = [lights.are_several(), lights.can_be_met()];
+        let [several, extended] = [lights.are_several(), lights.is_hittable()];
         move |draw| match draw {
             Draw::Choice => several || traits.has_choice,
             Draw::Light => extended || traits.has_choice,
             Draw::Direction => follows,
-            Draw::Chance => roulette || traits.is_pierced,
+            Draw::Chance => roulette || traits.has_alpha,
         }
     }
 
@@ -274,14 +274,16 @@ impl Tracing<'_> {
         let i = alive[k] as usize;
         let around = &self.stage.surroundings;
         let footprint = now.footprint(hits, i);
-        let Some(met) = Met::new(around, &now.rays, hits, i, footprint) else { return };
+        let Some(met) = SurfaceInteraction::new(around, &now.rays, hits, i, footprint) else {
+            return;
+        };
         let numbers = numbers.of(k);
         let left = [hits.placement[i], hits.triangle[i]];
         let mut state = now.states[i];
         state.steps += 1;
         state.cone = state.cone.map(|cone| cone.after(hits.t[i]));
         let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
-        if met.material.is_pierced() && numbers[Draw::Chance as usize][0] >= met.opacity() {
+        if met.material.has_alpha() && numbers[Draw::Chance as usize][0] >= met.opacity() {
             let direction = now.rays.direction(i);
             next.push((met.anchor.leave(direction), direction), left, state);
             next.throughput.extend_from_slice(throughput);
@@ -296,18 +298,18 @@ impl Tracing<'_> {
             // A boundary asks no light: its numbers are free.
             split(throughput, &mut state, numbers[Draw::Light as usize][0]);
         }
-        let wavelength = self.stage.spectral.wavelength(state.lane.unwrap_or(0) as usize);
+        let wavelength = self.stage.spectral.wavelength(state.band.unwrap_or(0) as usize);
         let bsdf = met.bsdf(around, wavelength);
         state.bounces += 1;
         if !bsdf.is_delta() {
             let path = (&*throughput, state.ray);
-            self.ask(&bsdf, (&met.anchor, left), path, &numbers, shadows, radiance);
+            self.sample_light(&bsdf, (&met.anchor, left), path, &numbers, shadows, radiance);
         }
         self.scatter(&bsdf, (&met.anchor, left), throughput, state, &numbers, [next, last]);
     }
 
     /// Chooses a light and notes the ray to it.
-    fn ask(
+    fn sample_light(
         &mut self,
         bsdf: &Bsdf,
         (anchor, left): (&Anchor, [u32; 2]),
@@ -316,7 +318,7 @@ impl Tracing<'_> {
         shadows: &mut Shadows,
         radiance: &mut [f64],
     ) {
-        let Stage { lights, surroundings: around, spectral, .. } = self.stage;
+        let LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
         let toward = lights.sample(
             around,
             spectral,
@@ -326,12 +328,12 @@ impl Tracing<'_> {
             radiance,
         );
         let Some(toward) = toward else { return };
-        let (value, density) = bsdf.evaluate(toward.direction);
+        let (value, pdf) = bsdf.evaluate(toward.direction);
         if value.is_zero() {
             return;
         }
-        let balance = if toward.is_delta { 1.0 } else { power_heuristic(toward.density, density) };
-        let factor = balance / toward.density;
+        let balance = if toward.is_delta { 1.0 } else { power_heuristic(toward.pdf, pdf) };
+        let factor = balance / toward.pdf;
         let origin = anchor.leave(toward.direction);
         let rays = &mut shadows.rays;
         match toward.end {
@@ -347,9 +349,10 @@ impl Tracing<'_> {
         }
         shadows.ray.push(ray);
         shadows.is_delta.push(toward.is_delta);
-        let lanes = radiance.iter().zip(throughput).enumerate();
-        let brought = lanes.map(|(k, (l, t))| l * t * factor * in_lane(spectral, bsdf, value, k));
-        shadows.brought.extend(brought);
+        let bands = radiance.iter().zip(throughput).enumerate();
+        let contribution =
+            bands.map(|(k, (l, t))| l * t * factor * in_band(spectral, bsdf, value, k));
+        shadows.contribution.extend(contribution);
     }
 
     /// Chooses a direction and notes the path along it.
@@ -364,7 +367,7 @@ impl Tracing<'_> {
     ) {
         let ends = state.bounces >= self.rules.bounces;
         if (ends || self.rules.follow == Follow::Single)
-            && !self.stage.lights.can_be_met()
+            && !self.stage.lights.is_hittable()
             && !bsdf.has_single()
         {
             return;
@@ -373,20 +376,20 @@ impl Tracing<'_> {
         let Some(scattered) = bsdf.sample(choice, numbers[Draw::Direction as usize]) else {
             return;
         };
-        let single = scattered.density == f64::INFINITY;
+        let single = scattered.pdf == f64::INFINITY;
         let follows = single || self.rules.follow == Follow::All;
         state.is_last = ends || !follows;
-        if state.is_last && !single && !self.stage.lights.can_be_met() {
+        if state.is_last && !single && !self.stage.lights.is_hittable() {
             return;
         }
-        for (k, lane) in throughput.iter_mut().enumerate() {
-            *lane *= in_lane(self.stage.spectral, bsdf, scattered.weights, k);
+        for (k, band) in throughput.iter_mut().enumerate() {
+            *band *= in_band(self.stage.spectral, bsdf, scattered.weights, k);
         }
         if !single {
             // Seen by chance from one point, a surface is a point.
             state.cone = None;
         }
-        state.density = scattered.density;
+        state.pdf = scattered.pdf;
         state.vertex = anchor.point;
         let ray = (anchor.leave(scattered.direction), scattered.direction);
         let chance = numbers[Draw::Chance as usize][1];
@@ -403,10 +406,10 @@ impl Tracing<'_> {
         (state, chance): (State, f64),
         [next, last]: [&mut Paths; 2],
     ) {
-        let single = state.density == f64::INFINITY;
-        let glimpses = state.is_last && !single && self.glimpses();
+        let single = state.pdf == f64::INFINITY;
+        let traces_emitters = state.is_last && !single && self.traces_emitters();
         let most = throughput.iter().copied().fold(0.0, f64::max);
-        if most <= 0.0 || (glimpses && !self.may_shine(ray)) {
+        if most <= 0.0 || (traces_emitters && !self.may_shine(ray)) {
             return;
         }
         if self.rules.roulette.is_some_and(|after| state.bounces >= after) && !state.is_last {
@@ -414,45 +417,45 @@ impl Tracing<'_> {
             if chance >= survival {
                 return;
             }
-            throughput.iter_mut().for_each(|lane| *lane /= survival);
+            throughput.iter_mut().for_each(|band| *band /= survival);
         }
-        let next = if glimpses { last } else { next };
+        let next = if traces_emitters { last } else { next };
         next.push(ray, left, state);
         next.throughput.extend_from_slice(throughput);
     }
 
     fn add(&mut self, light: &[f64], ray: u32, out: &mut [f64]) {
-        if !light.iter().all(|lane| lane.is_finite()) {
+        if !light.iter().all(|band| band.is_finite()) {
             self.tally.not_finite += 1;
             return;
         }
         let start = ray as usize * self.count;
-        out[start..start + self.count].iter_mut().zip(light).for_each(|(sum, lane)| *sum += lane);
+        out[start..start + self.count].iter_mut().zip(light).for_each(|(sum, band)| *sum += band);
     }
 }
 
-/// The value in lane `k`.
-fn in_lane(spectral: &Spectral, bsdf: &Bsdf, value: Weights, k: usize) -> f64 {
+/// The value in band `k`.
+fn in_band(spectral: &Spectral, bsdf: &Bsdf, value: Weights, k: usize) -> f64 {
     let mut sum = value.white;
     if value.base != 0.0 {
-        sum += value.base * spectral.lane(&bsdf.base, k);
+        sum += value.base * spectral.band(&bsdf.base, k);
     }
     if value.highlight != 0.0 {
-        sum += value.highlight * spectral.lane(&bsdf.highlight, k);
+        sum += value.highlight * spectral.band(&bsdf.highlight, k);
     }
     sum
 }
 
-/// Keeps one lane, chosen by `u` among those that carry anything, at as many times its throughput.
+/// Keeps one band, chosen by `u` among those that carry anything, at as many times its throughput.
 fn split(throughput: &mut [f64], state: &mut State, u: f64) {
-    if state.lane.is_some() {
+    if state.band.is_some() {
         return;
     }
     let live: Vec<usize> = (0..throughput.len()).filter(|&k| throughput[k] > 0.0).collect();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "u is in 0..1")]
     let Some(&kept) = live.get((u * live.len() as f64) as usize) else { return };
-    for (k, lane) in throughput.iter_mut().enumerate() {
-        *lane = if k == kept { *lane * live.len() as f64 } else { 0.0 };
+    for (k, band) in throughput.iter_mut().enumerate() {
+        *band = if k == kept { *band * live.len() as f64 } else { 0.0 };
     }
-    state.lane = u32::try_from(kept).ok();
+    state.band = u32::try_from(kept).ok();
 }

@@ -8,7 +8,7 @@ use super::paths::State;
 pub(super) enum Draw {
     /// Choosing a light, and among the ways in which a surface scatters.
     Choice,
-    /// A place on the light; or the lane that stays where glass splits them.
+    /// A place on the light; or the band that stays where glass splits them.
     Light,
     /// The direction to follow.
     Direction,

@@ -10,7 +10,7 @@ use crate::footprint::{Cone, Footprint};
 pub(super) struct Paths {
     pub(super) rays: RayBatch,
     pub(super) states: Vec<State>,
-    /// `[path][lane]`.
+    /// `[path][band]`.
     pub(super) throughput: Vec<f64>,
 }
 
@@ -24,11 +24,11 @@ pub(super) struct State {
     /// Surfaces that have scattered light.
     pub(super) bounces: u32,
     /// Density (1/sr) of the direction; `+inf` when no light can be asked instead.
-    pub(super) density: f64,
+    pub(super) pdf: f64,
     /// The surface that it left (m).
     pub(super) vertex: DVec3,
-    /// The one lane left, after a glass has split them.
-    pub(super) lane: Option<u32>,
+    /// The one band left, after a glass has split them.
+    pub(super) band: Option<u32>,
     /// Looks for light and goes no farther.
     pub(super) is_last: bool,
     /// What the path stands for, as long as it only met mirrors and clear boundaries; as wide as at

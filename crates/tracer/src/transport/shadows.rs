@@ -3,18 +3,18 @@
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, MISS, PlacedTriangle, RayBatch};
 
-use super::{Scratch, Stage, Tracing, Traits, in_lane};
+use super::{LightingContext, Scratch, Tracing, Traits, in_band};
 use crate::emitters::Emitters;
 use crate::spawn::Anchor;
-use crate::surface::Met;
+use crate::surface::SurfaceInteraction;
 
 /// Rays to lights and what each brings if nothing is in between.
 #[derive(Debug, Default)]
 pub(super) struct Shadows {
     pub(super) rays: RayBatch,
     pub(super) ray: Vec<u32>,
-    /// `[shadow][lane]`.
-    pub(super) brought: Vec<f64>,
+    /// `[shadow][band]`.
+    pub(super) contribution: Vec<f64>,
     /// Their light can be met by no path that panes let through.
     pub(super) is_delta: Vec<bool>,
     pub(super) blocked: Vec<bool>,
@@ -30,7 +30,7 @@ pub(super) struct Shadows {
 struct Sorted {
     rays: RayBatch,
     ray: Vec<u32>,
-    brought: Vec<f64>,
+    contribution: Vec<f64>,
     is_delta: Vec<bool>,
 }
 
@@ -38,32 +38,32 @@ impl Shadows {
     pub(super) fn clear(&mut self) {
         self.rays.clear();
         self.ray.clear();
-        self.brought.clear();
+        self.contribution.clear();
         self.is_delta.clear();
     }
 
-    /// Puts rays side by side that run in about the same direction, `count` lanes each, so that they
+    /// Puts rays side by side that run in about the same direction, `count` bands each, so that they
     /// are worth tracing as packets: those to a lamp of some size go all over it.
     pub(super) fn sort(&mut self, count: usize) {
-        let Self { rays, ray, brought, is_delta, order, sorted, .. } = self;
+        let Self { rays, ray, contribution, is_delta, order, sorted, .. } = self;
         order.clear();
         order.extend((0_u32..).zip(0..ray.len()).map(|(number, i)| {
             u64::from(octant_cell(rays.direction(i))) << 32 | u64::from(number)
         }));
         order.sort_unstable();
         let order = || order.iter().map(|&key| (key & 0xffff_ffff) as usize);
-        let Sorted { rays: to, ray: number, brought: light, is_delta: delta } = sorted;
+        let Sorted { rays: to, ray: number, contribution: light, is_delta: delta } = sorted;
         to.gather(rays, order());
         number.clear();
         number.extend(order().map(|i| ray[i]));
         light.clear();
-        light.extend(order().flat_map(|i| &brought[i * count..(i + 1) * count]));
+        light.extend(order().flat_map(|i| &contribution[i * count..(i + 1) * count]));
         delta.clear();
         delta.extend(order().map(|i| is_delta[i]));
         std::mem::swap(is_delta, delta);
         std::mem::swap(rays, to);
         std::mem::swap(ray, number);
-        std::mem::swap(brought, light);
+        std::mem::swap(contribution, light);
     }
 }
 
@@ -73,8 +73,8 @@ const MOST_LAYERS: u32 = 256;
 impl Tracing<'_> {
     /// Whether paths that only look for light ask what shines before they ask the scene. Through
     /// surfaces that are partly there they have to be followed.
-    pub(super) fn glimpses(&self) -> bool {
-        self.stage.emitters.is_some() && !self.stage.traits.is_pierced
+    pub(super) fn traces_emitters(&self) -> bool {
+        self.stage.emitters.is_some() && !self.stage.traits.has_alpha
     }
 
     /// Whether there may be light along a ray that asks what shines.
@@ -84,7 +84,7 @@ impl Tracing<'_> {
     }
 
     /// Adds the light that the last directions of paths meet.
-    pub(super) fn glimpse(&mut self, scratch: &mut Scratch, out: &mut [f64]) {
+    pub(super) fn trace_emitters(&mut self, scratch: &mut Scratch, out: &mut [f64]) {
         let Scratch { last, hits, shadows, radiance, .. } = scratch;
         let Some(emitters) = self.stage.emitters.filter(|_| !last.states.is_empty()) else {
             return;
@@ -111,7 +111,9 @@ impl Tracing<'_> {
             let throughput = &last.throughput[i * self.count..(i + 1) * self.count];
             shadows.ray.push(state.ray);
             shadows.is_delta.push(false);
-            shadows.brought.extend(radiance.iter().zip(throughput).map(|(r, t)| r * t * weight));
+            shadows
+                .contribution
+                .extend(radiance.iter().zip(throughput).map(|(r, t)| r * t * weight));
         }
         self.light(shadows, out);
     }
@@ -123,15 +125,15 @@ impl Tracing<'_> {
         }
         shadows.rays.from_surface = true;
         self.tally.shadow_rays += shadows.rays.len() as u64;
-        let Traits { is_pierced, has_panes, .. } = self.stage.traits;
-        if is_pierced || (has_panes && shadows.is_delta.contains(&true)) {
-            self.look_through(shadows);
+        let Traits { has_alpha, has_panes, .. } = self.stage.traits;
+        if has_alpha || (has_panes && shadows.is_delta.contains(&true)) {
+            self.transmittance(shadows);
         } else {
             self.stage.accel.occluded(&shadows.rays, &mut shadows.blocked);
         }
         for (k, &ray) in shadows.ray.iter().enumerate() {
             if !shadows.blocked[k] {
-                self.add(&shadows.brought[k * self.count..(k + 1) * self.count], ray, out);
+                self.add(&shadows.contribution[k * self.count..(k + 1) * self.count], ray, out);
             }
         }
     }
@@ -139,8 +141,8 @@ impl Tracing<'_> {
     /// Dims what each shadow ray brings by the surfaces on its way: by those that are only partly
     /// there, and by panes where the light is a point or parallel. A light of some size is met through
     /// panes by the paths themselves.
-    fn look_through(&mut self, shadows: &mut Shadows) {
-        let Shadows { rays, brought, is_delta, blocked, hits, again, open, .. } = shadows;
+    fn transmittance(&mut self, shadows: &mut Shadows) {
+        let Shadows { rays, contribution, is_delta, blocked, hits, again, open, .. } = shadows;
         blocked.clear();
         blocked.resize(rays.len(), true);
         open.clear();
@@ -154,12 +156,14 @@ impl Tracing<'_> {
             let mut onward = RayBatch::default().from_surfaces();
             let mut still = Vec::new();
             for (k, &i) in open.iter().enumerate() {
-                let Some(met) = Met::new(&self.stage.surroundings, again, hits, k, None) else {
+                let Some(met) =
+                    SurfaceInteraction::new(&self.stage.surroundings, again, hits, k, None)
+                else {
                     blocked[i as usize] = false;
                     continue;
                 };
                 let own = i as usize * self.count..(i as usize + 1) * self.count;
-                if self.dim(&met, is_delta[i as usize], &mut brought[own]) {
+                if self.dim(&met, is_delta[i as usize], &mut contribution[own]) {
                     let direction = again.direction(k);
                     let origin = met.anchor.leave(direction);
                     let left = again.t_max()[k] - (origin - again.origin(k)).length();
@@ -176,16 +180,16 @@ impl Tracing<'_> {
     }
 
     /// Dims light by what lets it pass a surface; whether any is left.
-    fn dim(&self, met: &Met<'_>, is_delta: bool, light: &mut [f64]) -> bool {
-        let Stage { surroundings: around, spectral, traits, .. } = self.stage;
+    fn dim(&self, met: &SurfaceInteraction<'_>, is_delta: bool, light: &mut [f64]) -> bool {
+        let LightingContext { surroundings: around, spectral, traits, .. } = self.stage;
         let opacity = met.opacity();
         let pane = (is_delta && traits.has_panes).then(|| met.bsdf(around, spectral.wavelength(0)));
         let passed = pane.as_ref().and_then(|pane| Some((pane, pane.straight_through()?)));
-        for (k, lane) in light.iter_mut().enumerate() {
-            let pane = passed.map_or(0.0, |(pane, weights)| in_lane(spectral, pane, weights, k));
-            *lane *= 1.0 - opacity + opacity * pane;
+        for (k, band) in light.iter_mut().enumerate() {
+            let pane = passed.map_or(0.0, |(pane, weights)| in_band(spectral, pane, weights, k));
+            *band *= 1.0 - opacity + opacity * pane;
         }
-        light.iter().any(|lane| *lane > 0.0)
+        light.iter().any(|band| *band > 0.0)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, anyhow};
 use etendue_geometry::glam::DVec3;
-use etendue_optics::element::{Clip, Fate, LensRays};
+use etendue_optics::element::{Clip, LensRays, RayStatus};
 use etendue_optics::train::{LensFile, OpticalTrain, Side};
 
 /// The yellow line of helium (nm).
@@ -16,7 +16,12 @@ pub(super) fn lens(json: &str) -> Result<OpticalTrain> {
 
 /// What becomes of a ray from the object side. A batch of one has to end as the single ray does, and
 /// all numbers have to be finite.
-pub(super) fn fate(train: &OpticalTrain, clip: Clip, from: DVec3, along: DVec3) -> Result<Fate> {
+pub(super) fn fate(
+    train: &OpticalTrain,
+    clip: Clip,
+    from: DVec3,
+    along: DVec3,
+) -> Result<RayStatus> {
     let at = train.at(YELLOW)?;
     let path = at.path(Side::Object, clip, from, along);
     let mut rays = LensRays::default();
@@ -37,7 +42,7 @@ pub(super) fn fate(train: &OpticalTrain, clip: Clip, from: DVec3, along: DVec3) 
 }
 
 /// What becomes of a ray parallel to the axis at the height `y` (mm).
-pub(super) fn parallel(train: &OpticalTrain, clip: Clip, y: f64) -> Result<Fate> {
+pub(super) fn parallel(train: &OpticalTrain, clip: Clip, y: f64) -> Result<RayStatus> {
     fate(train, clip, DVec3::new(0.0, y, -5.0), DVec3::Z)
 }
 
@@ -50,7 +55,11 @@ pub(super) fn greatest_height(
 ) -> Result<f64> {
     while low.next_up() < high {
         let middle = f64::midpoint(low, high);
-        if parallel(train, clip, middle)? == Fate::Exited { low = middle } else { high = middle }
+        if parallel(train, clip, middle)? == RayStatus::Exited {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     Ok(low)
 }

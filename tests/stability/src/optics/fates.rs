@@ -4,7 +4,7 @@ use anyhow::Result;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::units::Millimetres;
 use etendue_optics::element::ElementSpec;
-use etendue_optics::element::{Clip, Fate, LensRays, PartSpec, SurfaceSpec};
+use etendue_optics::element::{Clip, LensRays, PartSpec, RayStatus, SurfaceSpec};
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{Focus, FocusError, LensFile, Side};
 
@@ -90,10 +90,10 @@ fn total_reflection(_: Scale) -> Result<Outcome> {
     outcome.measured(format!("the last ray that gets through is {off:.0e} mm off 10/1.5 mm"));
     outcome.must(off <= 1e-12, || format!("{found} mm"));
     let beyond = parallel(&train, Clip::Off, 6.7)?;
-    let expected = Fate::TotalInternalReflection { element: 1 };
+    let expected = RayStatus::TotalInternalReflection { element: 1 };
     outcome.must(beyond == expected, || format!("at 6.7 mm: {beyond:?}"));
     let past = parallel(&train, Clip::Off, 10.1)?;
-    outcome.must(past == Fate::Missed { element: 1 }, || format!("at 10.1 mm: {past:?}"));
+    outcome.must(past == RayStatus::Missed { element: 1 }, || format!("at 10.1 mm: {past:?}"));
     Ok(outcome)
 }
 
@@ -105,9 +105,9 @@ fn missed(_: Scale) -> Result<Outcome> {
     outcome.measured(format!("the last ray that meets it is {off:.0e} mm off the rim"));
     outcome.must(off <= 1e-12, || format!("{found} mm"));
     let beside = parallel(&train, Clip::Off, 10.001)?;
-    outcome.must(beside == Fate::Missed { element: 0 }, || format!("beside it: {beside:?}"));
+    outcome.must(beside == RayStatus::Missed { element: 0 }, || format!("beside it: {beside:?}"));
     let across = fate(&train, Clip::Off, DVec3::new(0.0, -30.0, -5.0), DVec3::Y)?;
-    outcome.must(across == Fate::Missed { element: 0 }, || format!("across: {across:?}"));
+    outcome.must(across == RayStatus::Missed { element: 0 }, || format!("across: {across:?}"));
     Ok(outcome)
 }
 
@@ -123,7 +123,7 @@ fn wrong_root(scale: Scale) -> Result<Outcome> {
             let from = DVec3::new(0.0, 6.0 * share(i), 4.5 + 5.0 * share(k));
             let ends = fate(&train, Clip::Off, from, DVec3::new(0.0, 0.1 * share(k), 1.0))?;
             asked += 1;
-            wrong += usize::from(ends != Fate::Missed { element: 0 });
+            wrong += usize::from(ends != RayStatus::Missed { element: 0 });
         }
     }
     outcome.measured(format!("{wrong} of {asked} rays meet the back half"));
@@ -159,8 +159,8 @@ fn steep_asphere(scale: Scale) -> Result<Outcome> {
             worst = worst.max((met.z - sagitta(met.truncate().length())).abs());
         }
         match path.fate {
-            Fate::Exited => ends[0] += 1,
-            Fate::Missed { .. } => ends[1] += 1,
+            RayStatus::Exited => ends[0] += 1,
+            RayStatus::Missed { .. } => ends[1] += 1,
             _ => ends[2] += 1,
         }
     }
@@ -182,7 +182,7 @@ fn rim_beyond_the_radius(_: Scale) -> Result<Outcome> {
     let note = train.notes().first().cloned().unwrap_or_default();
     outcome.must(note.contains("its surface ends 10 mm"), || format!("the note is \"{note}\""));
     let beyond = parallel(&train, Clip::On, 11.0)?;
-    outcome.must(beyond == Fate::Missed { element: 0 }, || format!("at 11 mm: {beyond:?}"));
+    outcome.must(beyond == RayStatus::Missed { element: 0 }, || format!("at 11 mm: {beyond:?}"));
     outcome.measured(format!("“{note}”"));
     Ok(outcome)
 }
@@ -215,7 +215,8 @@ fn flat(_: Scale) -> Result<Outcome> {
         for sign in [1.0, -1.0] {
             let curved = trace(Some(sign * radius))?;
             for i in 0..plane.len() {
-                outcome.must(curved.fate(i) == Fate::Exited, || format!("{:?}", curved.fate(i)));
+                outcome
+                    .must(curved.fate(i) == RayStatus::Exited, || format!("{:?}", curved.fate(i)));
                 worst = worst.max((curved.direction(i) - plane.direction(i)).length());
             }
         }
@@ -258,6 +259,6 @@ fn crossing_edges(_: Scale) -> Result<Outcome> {
     outcome.measured(format!("“{note}”; the last ray through is {off:.0e} mm off the cut"));
     outcome.must(off <= 1e-8, || format!("{found} mm"));
     let beyond = parallel(&train, Clip::On, 4.6)?;
-    outcome.must(beyond == Fate::Missed { element: 1 }, || format!("at 4.6 mm: {beyond:?}"));
+    outcome.must(beyond == RayStatus::Missed { element: 1 }, || format!("at 4.6 mm: {beyond:?}"));
     Ok(outcome)
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use etendue_geometry::glam::{DVec2, DVec3};
-use etendue_optics::element::{Clip, Fate, LensRays};
+use etendue_optics::element::{Clip, LensRays, RayStatus};
 use etendue_optics::train::{
     ExitPupil, ExitPupilError, Focus, LensFile, OpticalTrain, PupilSample, Side,
 };
@@ -56,9 +56,10 @@ fn closed(_: Scale) -> Result<Outcome> {
     let message = pupil.err().map(|error| error.to_string()).unwrap_or_default();
     outcome.measured(format!("“{message}”"));
     let axis = parallel(&closed, Clip::On, 0.0)?;
-    outcome.must(axis == Fate::Exited, || format!("the axis: {axis:?}"));
+    outcome.must(axis == RayStatus::Exited, || format!("the axis: {axis:?}"));
     let beside = parallel(&closed, Clip::On, 1e-9)?;
-    outcome.must(beside == Fate::Vignetted { element: 1 }, || format!("beside it: {beside:?}"));
+    outcome
+        .must(beside == RayStatus::Vignetted { element: 1 }, || format!("beside it: {beside:?}"));
     Ok(outcome)
 }
 
@@ -92,8 +93,8 @@ fn f_0_5(scale: Scale) -> Result<Outcome> {
     for i in 0..120 {
         let from = DVec3::new(0.0, 0.1 * f64::from(i), -9.0);
         let ends = fate(&real, Clip::On, from, DVec3::Z)?;
-        outcome.must(i > 0 || ends == Fate::Exited, || format!("the axis: {ends:?}"));
-        lost += u32::from(ends != Fate::Exited);
+        outcome.must(i > 0 || ends == RayStatus::Exited, || format!("the axis: {ends:?}"));
+        lost += u32::from(ends != RayStatus::Exited);
     }
     outcome.measured(format!("{lost} of 120 rays across the thick lens end in it, by name"));
     outcome.must(lost > 0, || "no ray is lost".to_owned());

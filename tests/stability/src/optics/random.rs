@@ -7,7 +7,7 @@ use anyhow::{Result, anyhow};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_optics::element::{
-    Clip, ElementSpec, Fate, LensRays, PartSpec, SurfaceSpec, ThinLensSpec,
+    Clip, ElementSpec, LensRays, PartSpec, RayStatus, SurfaceSpec, ThinLensSpec,
 };
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{LensFile, OpticalTrain, Side};
@@ -133,7 +133,7 @@ fn trace(train: &OpticalTrain, shower: &Shower, exited: &Cell<u64>) -> TestCaseR
         let (p, d) = (batch.position(i), batch.direction(i));
         prop_assert!(p.is_finite() && d.is_finite(), "{p} {d}");
         prop_assert!(batch.throughput(i).is_finite());
-        if batch.fate(i) == Fate::Exited {
+        if batch.fate(i) == RayStatus::Exited {
             // Each of up to 8 elements rounds a direction a few times.
             prop_assert!((d.length() - 1.0).abs() < 1e-9, "{}", d.length() - 1.0);
             exited.set(exited.get() + 1);

@@ -18,7 +18,7 @@ pub(super) const SMOOTH: Case = Case {
 
 pub(super) const EDGE: Case = Case {
     name: "convergence_edge",
-    regime: "the area of a quarter disc, an edge across the square, by every power of two to 2²⁰",
+    regime: "the area of a quarter disk, an edge across the square, by every power of two to 2²⁰",
     must: "the error falls at least as n^−0.65 with `sobol` to 2¹⁶ samples, `stratified` and \
         `hammersley`, n^−0.5 ± 0.05 with `independent`",
     limit: None,

@@ -39,7 +39,7 @@ fn smooth([x, y]: [f64; 2]) -> f64 {
     (x + y).exp() / (norm * norm)
 }
 
-/// 1 within a quarter of the unit disc, over its area.
+/// 1 within a quarter of the unit disk, over its area.
 fn edge([x, y]: [f64; 2]) -> f64 {
     if x * x + y * y < 1.0 { 4.0 / std::f64::consts::PI } else { 0.0 }
 }

@@ -41,17 +41,17 @@ fn summed(
     1e-15 * sum * step / (PLANCK * SPEED_OF_LIGHT)
 }
 
-/// Electrons a second as a render adds them up in lanes.
-fn in_lanes(sensor: &Sensor, channel: usize, light: &Curve, colours: &[usize]) -> Result<f64> {
-    let lanes = sensor.lanes();
-    let (light, rows) = (lanes.from_curve(light, Outside::Zero)?, lanes.from_rgb());
+/// Electrons a second as a render adds them up in bands.
+fn in_bands(sensor: &Sensor, channel: usize, light: &Curve, colours: &[usize]) -> Result<f64> {
+    let bands = sensor.bands();
+    let (light, rows) = (bands.from_curve(light, Outside::Zero)?, bands.from_rgb());
     let electrons = sensor.electrons_per_unit(channel).iter().zip(light).zip(rows);
     let colour = |row: [f64; 3]| colours.iter().map(|&k| row[k]).product::<f64>();
     Ok(electrons.map(|((e, light), row)| e * light * colour(row)).sum())
 }
 
 /// The worst error of a sensor's channels under one light, as a part of what is promised to be small,
-/// and how many lanes it took.
+/// and how many bands it took.
 fn worst(
     keys: &Value,
     light: &Curve,
@@ -60,9 +60,9 @@ fn worst(
 ) -> Result<(f64, usize)> {
     let own = counting(keys)?;
     let spectra = vec![light.clone()];
-    let lanes = own.lanes_under(&Illumination { spectra, filters: vec![], colored: 2 })?.lanes;
-    let count = lanes.count();
-    let sensor = own.in_lanes(lanes)?;
+    let bands = own.bands_under(&Illumination { spectra, filters: vec![], colored: 2 })?.bands;
+    let count = bands.count();
+    let sensor = own.in_bands(bands)?;
     // Fine beside a line of 10 nm: in steps of 0.5 nm the sum itself is 0.03 % off.
     let step = 0.1;
     let pairs = (0..3).flat_map(|i| (i..3).map(move |k| vec![i, k]));
@@ -74,7 +74,7 @@ fn worst(
         for colours in &colours {
             let exact = summed(light, colours, *channel, range, step);
             let part = [1.0, 0.1, 1.0][colours.len()];
-            let off = in_lanes(&sensor, c, light, colours)? - exact;
+            let off = in_bands(&sensor, c, light, colours)? - exact;
             worst = worst.max(off.abs() / exact.max(part * white));
         }
     }
@@ -100,9 +100,9 @@ pub(super) fn coloured_light(_: Scale) -> Result<Outcome> {
             json!({ "cfa": "rgbw" }),
             json!({ "cfa": "rgbw", "quantum_efficiency": [[380, 1], [780, 1]] }),
         ] {
-            let (off, lanes) = worst(&keys, &light, colours, [380, 780])?;
+            let (off, bands) = worst(&keys, &light, colours, [380, 780])?;
             outcome.must(off <= LIMIT, || format!("{name}, {keys}: {off}"));
-            outcome.measured(format!("{name}: {:.3} % in {lanes} lanes", 100.0 * off));
+            outcome.measured(format!("{name}: {:.3} % in {bands} bands", 100.0 * off));
         }
     }
     Ok(outcome)
@@ -121,12 +121,12 @@ pub(super) fn infrared(_: Scale) -> Result<Outcome> {
             ("A", Illuminant::A.curve()?),
             ("3200 K", Illuminant::BlackBody(3200.0).curve()?),
         ] {
-            let (off, lanes) = worst(&keys, &light, &[&seen], range)?;
+            let (off, bands) = worst(&keys, &light, &[&seen], range)?;
             outcome.must(off <= LIMIT, || format!("{name}, {range:?}: {off}"));
             let all = summed(&light, &[], &seen, range, 0.5);
             let visible = summed(&light, &[], &seen, [range[0].max(380), range[1].min(780)], 0.5);
             outcome.measured(format!(
-                "{name} on {} to {} nm: {:.3} % off in {lanes} lanes ({:.0} % of it visible)",
+                "{name} on {} to {} nm: {:.3} % off in {bands} bands ({:.0} % of it visible)",
                 range[0],
                 range[1],
                 100.0 * off,
@@ -137,7 +137,7 @@ pub(super) fn infrared(_: Scale) -> Result<Outcome> {
     let blind = counting(&json!({ "quantum_efficiency": [[900, 0.3], [1000, 0.3]] }))?;
     let spectra = vec![Illuminant::D65.curve()?];
     let light = Illumination { spectra, ..Illumination::default() };
-    let error = blind.lanes_under(&light).err().context("daylight in the dark is accepted")?;
+    let error = blind.bands_under(&light).err().context("daylight in the dark is accepted")?;
     let message = error.to_string();
     let named = message.contains("900..=1000 nm") && message.contains("300..=830 nm");
     outcome.must(named, || format!("\"{message}\""));

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::element::Clip;
-use crate::train::{OpticalTrain, Side, TrainAt};
+use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 
 /// Distortion at one field angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
@@ -26,7 +26,7 @@ pub struct Distortion {
 #[must_use]
 pub fn distortion(
     train: &OpticalTrain,
-    at: &TrainAt,
+    at: &MonochromaticTrain,
     field: f64,
     reference_z: f64,
 ) -> Option<Distortion> {
@@ -51,7 +51,7 @@ pub fn distortion(
 /// `reference_z`, through the lens without clipping.
 pub fn chief_height(
     train: &OpticalTrain,
-    at: &TrainAt,
+    at: &MonochromaticTrain,
     field: f64,
     reference_z: f64,
 ) -> Option<f64> {

@@ -12,7 +12,7 @@ use super::distortion::chief_height;
 use crate::element::{Clip, LensRays};
 use crate::train::aim::towards_lens;
 use crate::train::pupil::Window;
-use crate::train::{OpticalTrain, Side, TrainAt};
+use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 
 /// Cells a side over the rectangle of passing directions.
 const GRID: u32 = 500;
@@ -40,7 +40,7 @@ pub struct Illumination {
 #[must_use]
 pub fn illumination(
     train: &OpticalTrain,
-    at: &TrainAt,
+    at: &MonochromaticTrain,
     fields: &[f64],
     sensor_z: f64,
 ) -> Vec<Illumination> {
@@ -59,7 +59,7 @@ pub fn illumination(
 /// ∫ cos θ dΩ over the directions in which rays from `film` (mm) leave the lens, weighted with what
 /// apertures and filters pass, for a sensor square to the axis.
 #[must_use]
-pub fn projected_solid_angle(train: &OpticalTrain, at: &TrainAt, film: DVec3) -> f64 {
+pub fn projected_solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3) -> f64 {
     let Some(window) = Window::find(train, at, film) else { return 0.0 };
     let size = (window.max - window.min) / f64::from(GRID);
     let mut rays = LensRays::with_capacity(GRID as usize);
@@ -85,7 +85,12 @@ pub fn projected_solid_angle(train: &OpticalTrain, at: &TrainAt, film: DVec3) ->
 /// The greatest distance from the axis on a sensor at `sensor_z` (mm) from which light can leave
 /// the lens; `None` when none can from the axis, or the distance has no end below `limit` (mm).
 #[must_use]
-pub fn image_circle(train: &OpticalTrain, at: &TrainAt, sensor_z: f64, limit: f64) -> Option<f64> {
+pub fn image_circle(
+    train: &OpticalTrain,
+    at: &MonochromaticTrain,
+    sensor_z: f64,
+    limit: f64,
+) -> Option<f64> {
     let lit = |r: f64| Window::find(train, at, DVec3::new(0.0, r, sensor_z)).is_some();
     if !lit(0.0) || lit(limit) {
         return None;
@@ -102,7 +107,12 @@ pub fn image_circle(train: &OpticalTrain, at: &TrainAt, sensor_z: f64, limit: f6
 /// from its centre: half the field of view when that is the image circle's edge. It is that of the
 /// ray in the middle of the beam; `None` when there is no light.
 #[must_use]
-pub fn half_field(train: &OpticalTrain, at: &TrainAt, sensor_z: f64, radius: f64) -> Option<f64> {
+pub fn half_field(
+    train: &OpticalTrain,
+    at: &MonochromaticTrain,
+    sensor_z: f64,
+    radius: f64,
+) -> Option<f64> {
     let film = DVec3::new(0.0, radius, sensor_z);
     let window = Window::find(train, at, film)?;
     let outside = |slopes: DVec2| {

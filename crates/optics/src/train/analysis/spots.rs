@@ -4,8 +4,8 @@ use glam::{DVec2, DVec3};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::element::{Clip, Fate, LensRays};
-use crate::train::{OpticalTrain, Side, TrainAt};
+use crate::element::{Clip, LensRays, RayStatus};
+use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 
 /// Cells across the square around the entrance pupil.
 const GRID: u32 = 32;
@@ -44,10 +44,15 @@ pub struct Spot {
 ///
 /// `None` when the lens has no finite entrance pupil or no ray passes.
 #[must_use]
-pub fn spot(train: &OpticalTrain, at: &TrainAt, field: f64, reference_z: f64) -> Option<Spot> {
+pub fn spot(
+    train: &OpticalTrain,
+    at: &MonochromaticTrain,
+    field: f64,
+    reference_z: f64,
+) -> Option<Spot> {
     let rays = beam(train, at, field)?;
     let mut hits = Vec::with_capacity(rays.len());
-    for i in (0..rays.len()).filter(|&i| rays.fate(i) == Fate::Exited) {
+    for i in (0..rays.len()).filter(|&i| rays.fate(i) == RayStatus::Exited) {
         let (position, direction) = (rays.position(i), rays.direction(i));
         let slopes = direction.truncate() / direction.z;
         let place = position.truncate() + slopes * (reference_z - position.z);
@@ -87,7 +92,7 @@ pub fn spot(train: &OpticalTrain, at: &TrainAt, field: f64, reference_z: f64) ->
 }
 
 /// The beam of a field angle, traced.
-fn beam(train: &OpticalTrain, at: &TrainAt, field: f64) -> Option<LensRays> {
+fn beam(train: &OpticalTrain, at: &MonochromaticTrain, field: f64) -> Option<LensRays> {
     let pupil = train.paraxial(at.wavelength()).ok()?.entrance_pupil;
     let (z, radius) = (pupil.z?, 0.5 * pupil.diameter?);
     let (sine, cosine) = field.to_radians().sin_cos();

@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::{Anchor, COLOURS, Canvas, round_length, short, title};
-use crate::element::{Clip, Fate};
-use crate::train::{Element, LensReport, OpticalTrain, Part, Side, TrainAt};
+use crate::element::{Clip, RayStatus};
+use crate::train::{Element, LensReport, MonochromaticTrain, OpticalTrain, Part, Side};
 
 /// The picture's width and the most of its height (pixels).
 const WIDTH: f64 = 960.0;
@@ -78,7 +78,13 @@ struct Fan {
     rays: Vec<Vec<[f64; 2]>>,
 }
 
-fn fan(train: &OpticalTrain, at: &TrainAt, report: &LensReport, field: f64, end: f64) -> Fan {
+fn fan(
+    train: &OpticalTrain,
+    at: &MonochromaticTrain,
+    report: &LensReport,
+    field: f64,
+    end: f64,
+) -> Fan {
     let none = Fan { rays: Vec::new() };
     let Some(chief) = train.chief_ray(at, field) else { return none };
     // Vignetting decides which of the rays there are; twice the pupil finds them at wide angles.
@@ -103,7 +109,7 @@ fn fan(train: &OpticalTrain, at: &TrainAt, report: &LensReport, field: f64, end:
 #[cfg(test)]
 pub(super) fn fan_of(
     train: &OpticalTrain,
-    at: &TrainAt,
+    at: &MonochromaticTrain,
     report: &LensReport,
     field: f64,
 ) -> Vec<Vec<[f64; 2]>> {
@@ -123,13 +129,13 @@ fn start_together(rays: &mut [Vec<[f64; 2]>], direction: [f64; 2]) {
 /// The way of a ray that leaves, from a little in front of the lens to the plane at `end`.
 fn trace(
     train: &OpticalTrain,
-    at: &TrainAt,
+    at: &MonochromaticTrain,
     position: DVec3,
     direction: DVec3,
     end: f64,
 ) -> Option<Vec<[f64; 2]>> {
     let path = at.path(Side::Object, Clip::On, position, direction);
-    let (Fate::Exited, Some(out)) = (path.fate, path.direction) else { return None };
+    let (RayStatus::Exited, Some(out)) = (path.fate, path.direction) else { return None };
     let (first, last) = (*path.points.first()?, *path.points.last()?);
     let lead = 0.25 * (end.abs() + train.lateral_scale());
     let start = first - direction * lead;
@@ -257,7 +263,13 @@ fn section(element: &Element, height: f64) -> Vec<[f64; 2]> {
 }
 
 /// The bodies of glass between surfaces.
-fn glasses(canvas: &mut Canvas, view: &View, train: &OpticalTrain, at: &TrainAt, heights: &[f64]) {
+fn glasses(
+    canvas: &mut Canvas,
+    view: &View,
+    train: &OpticalTrain,
+    at: &MonochromaticTrain,
+    heights: &[f64],
+) {
     let surfaces: Vec<usize> = (0..heights.len())
         .filter(|&i| matches!(train.elements()[i].part, Part::Surface(_)))
         .collect();

@@ -6,8 +6,8 @@
 //! | [`spots`] | spot diagrams by field and wavelength |
 //! | [`falloff`] | relative illumination over the sensor |
 
-mod falloff;
 mod layout;
+mod relative_illumination;
 mod spots;
 
 use super::LensReport;
@@ -15,8 +15,8 @@ use svg::node::element::path::Data;
 use svg::node::element::{Circle, Line, Path, Rectangle, Style, Text};
 use svg::{Document, Node};
 
-pub use falloff::falloff;
 pub use layout::layout;
+pub use relative_illumination::relative_illumination;
 pub use spots::spots;
 
 /// Colours by theme. A program that knows no themes shows the light one.

@@ -16,7 +16,7 @@ const HEAD: f64 = 76.0;
 const CAPTION: f64 = 40.0;
 
 /// The spots of a report's fields at its wavelengths, about the centroid of the main one, on the
-/// sensor, with the RMS radius of all of them together. The dashed circle is the Airy disc, 1.22 λN in radius.
+/// sensor, with the RMS radius of all of them together. The dashed circle is the Airy disk, 1.22 λN in radius.
 ///
 /// # Errors
 ///

@@ -12,7 +12,11 @@ fn preset(name: &str) -> (OpticalTrain, LensReport) {
 }
 
 fn all(train: &OpticalTrain, report: &LensReport) -> [String; 3] {
-    [layout(train, report).unwrap(), spots(train, report).unwrap(), falloff(train, report).unwrap()]
+    [
+        layout(train, report).unwrap(),
+        spots(train, report).unwrap(),
+        relative_illumination(train, report).unwrap(),
+    ]
 }
 
 #[test]

@@ -25,9 +25,9 @@
 use glam::{DMat2, DVec2, DVec3};
 
 use super::histogram::Histogram;
-use crate::element::{Clip, Fate, Frame, Opening, Picture, Ray};
+use crate::element::{Clip, Frame, Opening, Picture, Ray, RayStatus};
 use crate::train::aim::{slopes_to, towards_lens};
-use crate::train::{OpticalTrain, Part, Side, TrainAt};
+use crate::train::{MonochromaticTrain, OpticalTrain, Part, Side};
 
 /// Intervals between nodes over each side of the sensor and of the mask.
 const FILM: usize = 12;
@@ -89,7 +89,7 @@ impl Coded {
     pub(super) fn new(
         train: &OpticalTrain,
         clear: &OpticalTrain,
-        lenses: &[TrainAt],
+        lenses: &[MonochromaticTrain],
         sensor: &Frame,
         half_size: DVec2,
     ) -> Option<Self> {
@@ -156,7 +156,12 @@ impl Coded {
     }
 
     /// How far from where they are aimed rays land, between the nodes (mm on the mask, x and y).
-    fn greatest_miss(&self, lenses: &[TrainAt], element: usize, sensor: &Frame) -> DVec2 {
+    fn greatest_miss(
+        &self,
+        lenses: &[MonochromaticTrain],
+        element: usize,
+        sensor: &Frame,
+    ) -> DVec2 {
         let mut greatest = DVec2::ZERO;
         for interval in 0..FILM * FILM {
             let shift = DVec2::new((interval % FILM) as f64, (interval / FILM) as f64) + 0.5;
@@ -395,7 +400,7 @@ struct Node {
 /// A lens with its masks clear, and the mask in it.
 struct View<'a> {
     clear: &'a OpticalTrain,
-    lens: &'a TrainAt,
+    lens: &'a MonochromaticTrain,
     element: usize,
 }
 
@@ -428,7 +433,7 @@ impl View<'_> {
                 let found = to(target, Some(guess).filter(|guess| guess.is_finite()));
                 node.slopes[y][x] = found.unwrap_or(guess);
                 let ray = Ray::new(film, towards_lens(node.slopes[y][x]))?;
-                let passes = self.lens.run(Side::Sensor, Clip::On, ray).fate == Fate::Exited;
+                let passes = self.lens.run(Side::Sensor, Clip::On, ray).fate == RayStatus::Exited;
                 node.passes[y][x] = found.is_some() && passes;
             }
         }

@@ -6,9 +6,9 @@ use super::search::Window;
 use super::{
     ANGLES, ExitPupil, Layout, Outline, PLANAR_INTERVALS, RADIAL_INTERVALS, between, turn_of,
 };
-use crate::element::{Clip, Fate, LensRays};
+use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
-use crate::train::{OpticalTrain, Side, TrainAt};
+use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 
 /// Added to every radius, as a share of it: what rays measured on a grid may be short of.
 const MARGIN: f64 = 0.004;
@@ -50,7 +50,7 @@ impl ExitPupil {
         }
     }
 
-    pub(super) fn measure(&mut self, train: &OpticalTrain, lenses: &[TrainAt]) {
+    pub(super) fn measure(&mut self, train: &OpticalTrain, lenses: &[MonochromaticTrain]) {
         if self.layout == Layout::Radial {
             self.radius = lit_radius(train, lenses, self.sensor.vertex.z, self.radius);
         }
@@ -160,7 +160,7 @@ impl ExitPupil {
     }
 
     /// Radii at all nodes of the fine grid, each in the frame that the bound has there.
-    fn measure_fine(&self, lenses: &[TrainAt]) -> Vec<[f64; 2 * ANGLES]> {
+    fn measure_fine(&self, lenses: &[MonochromaticTrain]) -> Vec<[f64; 2 * ANGLES]> {
         let [columns, rows] = self.intervals();
         let mut fine = Vec::new();
         for row in 0..=2 * rows {
@@ -192,7 +192,7 @@ impl ExitPupil {
 
     /// Looks for rays that pass just outside of the bound, and widens it around them until there
     /// are none.
-    pub(super) fn widen_until_tight(&mut self, lenses: &[TrainAt]) {
+    pub(super) fn widen_until_tight(&mut self, lenses: &[MonochromaticTrain]) {
         for round in 0..4 {
             let found: Vec<Stray> =
                 lenses.iter().flat_map(|lens| self.strays(lens, round * CHECKS)).collect();
@@ -206,7 +206,7 @@ impl ExitPupil {
     }
 
     /// Random rays outside of the bound that pass.
-    pub(super) fn strays(&self, lens: &TrainAt, first: u32) -> Vec<Stray> {
+    pub(super) fn strays(&self, lens: &MonochromaticTrain, first: u32) -> Vec<Stray> {
         let mut rays = LensRays::with_capacity(CHECKS as usize);
         let mut strays = Vec::with_capacity(CHECKS as usize);
         for i in first..first + CHECKS {
@@ -225,7 +225,7 @@ impl ExitPupil {
             strays.push(Stray { nodes: place.nodes, turn: u[1], radius });
         }
         lens.trace(Side::Sensor, Clip::On, &mut rays);
-        let passed = |i: &usize| rays.fate(*i) == Fate::Exited;
+        let passed = |i: &usize| rays.fate(*i) == RayStatus::Exited;
         (0..rays.len()).filter(passed).map(|i| strays[i]).collect()
     }
 
@@ -264,7 +264,7 @@ pub(super) struct Stray {
 }
 
 /// How far from the axis there is light, up to `limit` (mm), and a little more.
-pub fn lit_radius(train: &OpticalTrain, lenses: &[TrainAt], z: f64, limit: f64) -> f64 {
+pub fn lit_radius(train: &OpticalTrain, lenses: &[MonochromaticTrain], z: f64, limit: f64) -> f64 {
     let lit = |r: f64| {
         let film = DVec3::new(r, 0.0, z);
         lenses.iter().any(|lens| Window::find(train, lens, film).is_some())
@@ -283,7 +283,7 @@ pub fn lit_radius(train: &OpticalTrain, lenses: &[TrainAt], z: f64, limit: f64) 
 /// The frame around what passes at any of the wavelengths, begun from the node before.
 fn frame_at(
     train: &OpticalTrain,
-    lenses: &[TrainAt],
+    lenses: &[MonochromaticTrain],
     film: DVec3,
     previous: Option<&Outline>,
 ) -> Outline {
@@ -314,7 +314,12 @@ fn frame_at(
 }
 
 /// Raises `radii` to the outermost passing ray of each angle from `film` in the frame.
-fn widen(radii: &mut [f64; 2 * ANGLES], lens: &TrainAt, film: DVec3, [centre, half]: [DVec2; 2]) {
+fn widen(
+    radii: &mut [f64; 2 * ANGLES],
+    lens: &MonochromaticTrain,
+    film: DVec3,
+    [centre, half]: [DVec2; 2],
+) {
     const SCANNED: u32 = 32;
     const HALVINGS: u32 = 12;
     // The frame's corners are √2 from its centre.
@@ -327,7 +332,7 @@ fn widen(radii: &mut [f64; 2 * ANGLES], lens: &TrainAt, film: DVec3, [centre, ha
             rays.push(film, towards_lens(centre + directions[i] * radius));
         }
         lens.trace(Side::Sensor, Clip::On, &mut rays);
-        (0..rays.len()).map(|i| rays.fate(i) == Fate::Exited).collect()
+        (0..rays.len()).map(|i| rays.fate(i) == RayStatus::Exited).collect()
     };
     let step = OUTERMOST / f64::from(SCANNED);
     let scan: Vec<(usize, f64)> =

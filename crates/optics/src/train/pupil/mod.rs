@@ -26,7 +26,7 @@
 //! computer graphics", 1995; M. Pharr, W. Jakob, G. Humphreys, *Physically Based Rendering*, 6.4.5.
 
 mod coded;
-mod disc;
+mod disk;
 mod histogram;
 mod measure;
 mod place;
@@ -37,11 +37,11 @@ use glam::{DVec2, DVec3};
 use self::coded::Coded;
 use self::place::{Place, between, turn_of};
 use super::aim::towards_lens;
-use super::{OpticalTrain, Part, Side, TrainAt};
-use crate::element::{Clip, Fate, FateCounts, Frame, LensRays, LossesSpec, Opening};
+use super::{MonochromaticTrain, OpticalTrain, Part, Side};
+use crate::element::{Clip, FateCounts, Frame, LensRays, LossesSpec, Opening, RayStatus};
 use crate::glass::GlassError;
 
-pub use disc::{Bundle, Disc};
+pub use disk::{Bundle, Disk};
 pub use measure::lit_radius;
 pub use search::Window;
 
@@ -100,7 +100,7 @@ pub struct ExitPupil {
     half_size: DVec2,
     layout: Layout,
     /// The pupil in closed form; there are no nodes then.
-    disc: Option<Disc>,
+    disk: Option<Disk>,
     nodes: Vec<Outline>,
     /// The first mask, which is sampled by what it passes.
     coded: Option<Coded>,
@@ -165,7 +165,7 @@ impl ExitPupil {
             sensor: train.sensor_frame(sensor_z),
             half_size,
             layout: if symmetric { Layout::Radial } else { Layout::Planar },
-            disc: None,
+            disk: None,
             nodes: Vec::new(),
             coded: None,
             index2: 1.0,
@@ -176,8 +176,8 @@ impl ExitPupil {
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
         let Some(first) = lenses.first() else { return Err(ExitPupilError::Sensor) };
         pupil.index2 = first.index_before_sensor().powi(2);
-        pupil.disc = Disc::of(train, &pupil.sensor, half_size);
-        if pupil.disc.is_some() {
+        pupil.disk = Disk::of(train, &pupil.sensor, half_size);
+        if pupil.disk.is_some() {
             return Ok(pupil);
         }
         pupil.measure(train, &lenses);
@@ -197,8 +197,8 @@ impl ExitPupil {
     }
 
     /// The pupil in closed form, if it has one.
-    pub fn disc(&self) -> Option<&Disc> {
-        self.disc.as_ref()
+    pub fn disk(&self) -> Option<&Disk> {
+        self.disk.as_ref()
     }
 
     /// The square of the index before the sensor.
@@ -241,8 +241,8 @@ impl ExitPupil {
 
     /// The bound from a point of the sensor (mm); `None` where no light arrives.
     fn bound(&self, film: DVec2) -> Option<Bound<'_>> {
-        let bound = if let Some(disc) = &self.disc {
-            let (centre, radius) = disc.seen_from(self.film_point(film));
+        let bound = if let Some(disk) = &self.disk {
+            let (centre, radius) = disk.seen_from(self.film_point(film));
             Bound { nodes: &[], place: None, frame: [centre, DVec2::splat(radius)] }
         } else {
             let place = self.place(film)?;
@@ -266,7 +266,7 @@ impl ExitPupil {
                 Some(sample) => rays.push_weighted(at, sample.direction, sample.weight),
                 None => {
                     rays.push_weighted(at, DVec3::NEG_Z, 0.0);
-                    rays.set_fate(rays.len() - 1, Fate::Vignetted { element: 0 });
+                    rays.set_fate(rays.len() - 1, RayStatus::Vignetted { element: 0 });
                 }
             }
         }
@@ -278,7 +278,7 @@ impl ExitPupil {
     pub fn chief_direction(
         &self,
         train: &OpticalTrain,
-        at: &TrainAt,
+        at: &MonochromaticTrain,
         film: DVec2,
     ) -> Option<DVec3> {
         let start = self.place(film).and_then(|place| {
@@ -295,8 +295,8 @@ impl ExitPupil {
     /// empty where no light arrives.
     #[must_use]
     pub fn outline(&self, film: DVec2) -> Vec<DVec2> {
-        if let Some(disc) = &self.disc {
-            let (centre, radius) = disc.seen_from(self.film_point(film));
+        if let Some(disk) = &self.disk {
+            let (centre, radius) = disk.seen_from(self.film_point(film));
             let angle = |i| DVec2::from_angle(turn_of(i) * std::f64::consts::TAU);
             return (0..ANGLES).map(|i| centre + angle(i) * radius).collect();
         }
@@ -321,7 +321,7 @@ impl ExitPupil {
 /// The outline from one point of the sensor.
 struct Bound<'a> {
     nodes: &'a [Outline],
-    /// Between which nodes; `None` for a disc.
+    /// Between which nodes; `None` for a disk.
     place: Option<Place>,
     /// Centre and half axes in slopes, as the nodes are turned.
     frame: [DVec2; 2],
@@ -370,7 +370,7 @@ impl Bound<'_> {
     }
 }
 
-/// From the unit square to the disc: radius and share of a full turn, with equal areas staying
+/// From the unit square to the disk: radius and share of a full turn, with equal areas staying
 /// equal (P. Shirley and K. Chiu, "A low distortion map between disk and square", 1997).
 fn concentric(u: [f64; 2]) -> (f64, f64) {
     let [a, b] = u.map(|x| 2.0 * x - 1.0);
@@ -413,7 +413,7 @@ pub fn without_dimming(train: &OpticalTrain) -> OpticalTrain {
 }
 
 /// The error that names what blocks the light.
-pub fn blocked(train: &OpticalTrain, lens: &TrainAt, film: DVec3) -> ExitPupilError {
+pub fn blocked(train: &OpticalTrain, lens: &MonochromaticTrain, film: DVec3) -> ExitPupilError {
     let mut counts = FateCounts::new(train.elements.len());
     match Window::probe(train, film) {
         Some(mut rays) => {
@@ -423,7 +423,7 @@ pub fn blocked(train: &OpticalTrain, lens: &TrainAt, film: DVec3) -> ExitPupilEr
         // There is no direction to the nearest rim: it is closed.
         None => {
             let closed = train.elements.iter().rposition(|e| e.clear_radius() == 0.0);
-            counts.add(Fate::Vignetted { element: closed.unwrap_or(train.stop) });
+            counts.add(RayStatus::Vignetted { element: closed.unwrap_or(train.stop) });
         }
     }
     // Where the last rays end: nothing gets past it.
@@ -452,7 +452,7 @@ mod tests {
             assert!((0.0..=1.0).contains(&radius) && (0.0..1.0).contains(&turn));
             inside += u32::from(radius <= 0.5);
         }
-        assert_eq!(inside, 2500, "a quarter of the disc's area is a quarter of the square's");
+        assert_eq!(inside, 2500, "a quarter of the disk's area is a quarter of the square's");
         assert_eq!(concentric([0.5, 0.5]), (0.0, 0.0));
         assert_eq!(concentric([1.0, 0.5]), (1.0, 0.0));
         assert_eq!(concentric([0.5, 1.0]), (1.0, 0.25));

@@ -3,9 +3,9 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::element::{Clip, Fate, LensRays};
+use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
-use crate::train::{OpticalTrain, Side, TrainAt};
+use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 
 /// Cells a side of a search grid.
 const GRID: u32 = 48;
@@ -35,7 +35,7 @@ impl Window {
 
     /// The window of all directions from `film` (mm) in which rays leave the lens, wider than
     /// needed by at most a cell of 1/48 on each side; `None` when there are none.
-    pub fn find(train: &OpticalTrain, at: &TrainAt, film: DVec3) -> Option<Self> {
+    pub fn find(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3) -> Option<Self> {
         Self::first_guesses(train, at, film)
             .into_iter()
             .find_map(|guess| guess.grown(at, film))
@@ -44,7 +44,12 @@ impl Window {
     }
 
     /// As [`Self::find`], begun from a guess; `None` when the guess holds nothing.
-    pub(crate) fn near(centre: DVec2, half: DVec2, at: &TrainAt, film: DVec3) -> Option<Self> {
+    pub(crate) fn near(
+        centre: DVec2,
+        half: DVec2,
+        at: &MonochromaticTrain,
+        film: DVec3,
+    ) -> Option<Self> {
         let found = Self::around(centre, half).grown(at, film)?;
         Some(found.tightened(at, film))
     }
@@ -55,7 +60,7 @@ impl Window {
     }
 
     /// Around the chief ray, around the paraxial exit pupil, and the whole rear of the lens.
-    fn first_guesses(train: &OpticalTrain, at: &TrainAt, film: DVec3) -> Vec<Self> {
+    fn first_guesses(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3) -> Vec<Self> {
         let mut guesses = Vec::new();
         if let Ok(paraxial) = train.paraxial(at.wavelength())
             && let (Some(z), Some(diameter)) = (paraxial.exit_pupil.z, paraxial.exit_pupil.diameter)
@@ -82,7 +87,7 @@ impl Window {
     }
 
     /// The passing part of the window, looked for in wider windows as long as it touches the edge.
-    fn grown(self, at: &TrainAt, film: DVec3) -> Option<Self> {
+    fn grown(self, at: &MonochromaticTrain, film: DVec3) -> Option<Self> {
         let mut outer = self;
         let mut found = outer.passing(at, film, GRID)?;
         for _ in 0..12 {
@@ -97,7 +102,7 @@ impl Window {
     }
 
     /// Narrowed until the grid's cells are small against it.
-    fn tightened(self, at: &TrainAt, film: DVec3) -> Self {
+    fn tightened(self, at: &MonochromaticTrain, film: DVec3) -> Self {
         let mut window = self;
         for _ in 0..6 {
             let Some(next) = window.passing(at, film, GRID) else { break };
@@ -125,12 +130,12 @@ impl Window {
     }
 
     /// The cells of a grid whose centres pass, and one more on each side.
-    fn passing(self, at: &TrainAt, film: DVec3, grid: u32) -> Option<Self> {
+    fn passing(self, at: &MonochromaticTrain, film: DVec3, grid: u32) -> Option<Self> {
         let size = (self.max - self.min) / f64::from(grid);
         let mut rays = self.rays(film, grid);
         at.trace(Side::Sensor, Clip::On, &mut rays);
         let (mut min, mut max) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        for i in (0..grid * grid).filter(|&i| rays.fate(i as usize) == Fate::Exited) {
+        for i in (0..grid * grid).filter(|&i| rays.fate(i as usize) == RayStatus::Exited) {
             min = min.min(self.cell(i, grid));
             max = max.max(self.cell(i, grid));
         }

@@ -9,7 +9,7 @@ use super::analysis::{
     Distortion, Illumination, Spot, colour_shifts, distortion, half_field, illumination,
     image_circle, spot,
 };
-use super::{Focus, OpticalTrain, Paraxial, Part, TrainAt};
+use super::{Focus, MonochromaticTrain, OpticalTrain, Paraxial, Part};
 use crate::element::Opening;
 use crate::glass::{FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F, GlassError};
 
@@ -195,7 +195,7 @@ impl LensReport {
         Ok(report)
     }
 
-    fn look_at_fields(&mut self, train: &OpticalTrain, at: &TrainAt, z: f64) {
+    fn look_at_fields(&mut self, train: &OpticalTrain, at: &MonochromaticTrain, z: f64) {
         for &field in &self.fields {
             self.spots.extend(spot(train, at, field, z));
             self.distortion.extend(distortion(train, at, field, z));
@@ -295,7 +295,7 @@ fn colour(
     shifts.into_iter().map(row).collect()
 }
 
-fn rows(train: &OpticalTrain, at: &TrainAt, sensor_z: Option<f64>) -> Vec<ElementRow> {
+fn rows(train: &OpticalTrain, at: &MonochromaticTrain, sensor_z: Option<f64>) -> Vec<ElementRow> {
     let finite = |length: f64| length.is_finite().then_some(length);
     let elements = train.elements();
     let row = |(i, element): (usize, &super::Element)| {

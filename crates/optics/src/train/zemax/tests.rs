@@ -5,7 +5,7 @@ use std::fmt::Write;
 use glam::DVec3;
 
 use super::*;
-use crate::element::{Clip, Fate};
+use crate::element::{Clip, RayStatus};
 use crate::train::Side;
 use crate::train::analysis::chief_height;
 
@@ -178,11 +178,11 @@ fn a_coordinate_break_and_back_tilts_one_element() {
         singlet(r#", "decentre": [0.1, -0.2], "tilt": [3, -2]"#).at(587.56).unwrap(),
     );
     for (x, y) in [(0.0, 0.0), (3.0, -4.0), (-7.0, 2.0)] {
-        let path = |at: &crate::train::TrainAt| {
+        let path = |at: &crate::train::MonochromaticTrain| {
             at.path(Side::Object, Clip::On, DVec3::new(x, y, -20.0), DVec3::new(0.01, 0.02, 1.0))
         };
         let (a, b) = (path(&ours), path(&theirs));
-        assert_eq!((a.fate, b.fate), (Fate::Exited, Fate::Exited));
+        assert_eq!((a.fate, b.fate), (RayStatus::Exited, RayStatus::Exited));
         // A few roundings of lengths near 20 mm.
         assert!((a.points[1] - b.points[1]).length() < 1e-13);
         assert!((a.direction.unwrap() - b.direction.unwrap()).length() < 1e-15);
@@ -414,12 +414,12 @@ fn a_double_gauss_comes_back_as_it_went() {
     let mut exited = 0;
     for i in 0..400 {
         let (x, y) = (f64::from(i % 20) - 9.5, f64::from(i / 20) - 9.5);
-        let path = |at: &crate::train::TrainAt| {
+        let path = |at: &crate::train::MonochromaticTrain| {
             at.path(Side::Object, Clip::On, DVec3::new(x, y, -20.0), DVec3::new(0.0, 0.1, 1.0))
         };
         let (a, b) = (path(&a), path(&b));
         assert_eq!(a.fate, b.fate);
-        exited += u32::from(a.fate == Fate::Exited);
+        exited += u32::from(a.fate == RayStatus::Exited);
         for (p, q) in a.points.iter().zip(&b.points) {
             assert!((*p - *q).length() < 1e-13, "a radius and its inverse's inverse");
         }

@@ -36,7 +36,7 @@ const FLATTEST: f64 = 0.25;
 
 /// What a batch's rays leave.
 #[derive(Debug, Default)]
-pub(crate) struct Ends {
+pub(crate) struct EndTriangles {
     placement: Vec<u32>,
     triangle: Vec<u32>,
     clear: Clear,
@@ -53,7 +53,7 @@ impl Default for Clear {
     }
 }
 
-impl Ends {
+impl EndTriangles {
     /// Begins `rays32` where they are clear of the triangles that `rays` leave.
     pub(crate) fn spare(
         &mut self,

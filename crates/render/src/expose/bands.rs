@@ -1,34 +1,34 @@
-//! The spectral lanes in which a picture is rendered, chosen for the sensor, the lights and the
+//! The spectral bands in which a picture is rendered, chosen for the sensor, the lights and the
 //! colours of the scene.
 
 use etendue_scene::Scene;
 use etendue_scene::file::TracerSpec;
 use etendue_sensor::bands::TOLERANCE;
-use etendue_sensor::{Illumination, LaneChoice};
-use etendue_spectrum::{Curve, Illuminant, Lanes, VISIBLE};
+use etendue_sensor::{BandChoice, Illumination};
+use etendue_spectrum::{Bands, Curve, Illuminant, VISIBLE};
 use etendue_tracer::{Color, EnvironmentImage, LayerSpec, LightKind, Material, Paint, Scattering};
 
-/// The lanes that the picture of `scene` is rendered in: base colours have three parts and no more,
+/// The bands that the picture of `scene` is rendered in: base colours have three parts and no more,
 /// light has as many as it takes to count the sensor's electrons right.
-pub(crate) fn lanes(scene: &Scene) -> LaneChoice {
-    let rgb = || LaneChoice { lanes: Lanes::Rgb, error: None };
+pub(crate) fn bands(scene: &Scene) -> BandChoice {
+    let rgb = || BandChoice { bands: Bands::Rgb, error: None };
     match (&scene.sensor, scene.picture) {
         (None, _) | (_, None | Some(LayerSpec::Flat | LayerSpec::Facing)) => rgb(),
-        (Some(sensor), _) => sensor.lanes_under(&illumination(scene)).unwrap_or_else(|_| {
+        (Some(sensor), _) => sensor.bands_under(&illumination(scene)).unwrap_or_else(|_| {
             // The render refuses the light, and says which one.
-            LaneChoice { lanes: sensor.lanes().clone(), error: None }
+            BandChoice { bands: sensor.bands().clone(), error: None }
         }),
     }
 }
 
-/// How many lanes there are, and why.
-pub(crate) fn explain_lanes(scene: &Scene, chosen: &LaneChoice) -> (String, String) {
-    let choice = match &chosen.lanes {
-        Lanes::Grey => "1".to_owned(),
-        Lanes::Rgb => "3 (RGB)".to_owned(),
-        Lanes::Bands(_) | Lanes::Weighted(_) => {
-            let [from, to] = chosen.lanes.range();
-            format!("{} ({from} to {to} nm)", chosen.lanes.count())
+/// How many bands there are, and why.
+pub(crate) fn explain_bands(scene: &Scene, chosen: &BandChoice) -> (String, String) {
+    let choice = match &chosen.bands {
+        Bands::Grey => "1".to_owned(),
+        Bands::Rgb => "3 (RGB)".to_owned(),
+        Bands::Spectral(_) | Bands::Weighted(_) => {
+            let [from, to] = chosen.bands.range();
+            format!("{} ({from} to {to} nm)", chosen.bands.count())
         }
     };
     let because = match (&scene.sensor, scene.picture, chosen.error) {
@@ -37,15 +37,15 @@ pub(crate) fn explain_lanes(scene: &Scene, chosen: &LaneChoice) -> (String, Stri
             "the picture is base colour, which has three parts".to_owned()
         }
         (Some(_), Some(_), None) => "as many as the sensor can tell apart".to_owned(),
-        (Some(_), Some(_), Some(error)) => in_words(error, &chosen.lanes),
+        (Some(_), Some(_), Some(error)) => in_words(error, &chosen.bands),
     };
     (choice, because)
 }
 
-/// What lanes lose, in words.
-fn in_words(error: f64, lanes: &Lanes) -> String {
+/// What bands lose, in words.
+fn in_words(error: f64, bands: &Bands) -> String {
     let percent = 100.0 * error;
-    let beyond = match beyond_visible(lanes) {
+    let beyond = match beyond_visible(bands) {
         Some(_) => "; beyond visible light, colours are taken as they end there",
         None => "",
     };
@@ -56,16 +56,16 @@ fn in_words(error: f64, lanes: &Lanes) -> String {
     format!("{verdict} ({percent:.2} % at most, for these lights, colours and this sensor){beyond}")
 }
 
-/// The range of lanes (nm), where it is more than visible light.
-fn beyond_visible(lanes: &Lanes) -> Option<[f64; 2]> {
-    let [from, to] = lanes.range();
+/// The range of bands (nm), where it is more than visible light.
+fn beyond_visible(bands: &Bands) -> Option<[f64; 2]> {
+    let [from, to] = bands.range();
     (from < VISIBLE[0] || to > VISIBLE[1]).then_some([from, to])
 }
 
 /// What materials and glasses do not know of the wavelengths that are rendered.
-pub(super) fn unknown(scene: &Scene, lanes: &Lanes) -> Vec<String> {
+pub(super) fn unknown(scene: &Scene, bands: &Bands) -> Vec<String> {
     let mut notes = Vec::new();
-    if let Some([from, to]) = beyond_visible(lanes) {
+    if let Some([from, to]) = beyond_visible(bands) {
         notes.push(format!(
             "light of {from} to {to} nm is rendered, and colours are known from {} to {} nm: beyond, \
              materials and coloured lights are grey, of the mean of their red, green and blue",
@@ -73,12 +73,12 @@ pub(super) fn unknown(scene: &Scene, lanes: &Lanes) -> Vec<String> {
         ));
     }
     let said = |note: &String| scene.notes.iter().any(|known| known.message == *note);
-    let glass = scene.camera.lens().map(|lens| lens.out_of_range(lanes)).unwrap_or_default();
+    let glass = scene.camera.lens().map(|lens| lens.out_of_range(bands)).unwrap_or_default();
     notes.extend(glass.into_iter().filter(|note| !said(note)));
     notes
 }
 
-/// Lights, filters and colours that the lanes have to tell apart.
+/// Lights, filters and colours that the bands have to tell apart.
 fn illumination(scene: &Scene) -> Illumination {
     let mut spectra: Vec<Curve> = Vec::new();
     let mut add = |illuminant: Option<Illuminant>| {

@@ -21,7 +21,10 @@ const POINTS: u32 = 28;
 /// # Errors
 ///
 /// When a glass has no index at the lens' wavelength.
-pub fn falloff(train: &OpticalTrain, report: &LensReport) -> Result<String, GlassError> {
+pub fn relative_illumination(
+    train: &OpticalTrain,
+    report: &LensReport,
+) -> Result<String, GlassError> {
     let mut canvas = Canvas::new(WIDTH, HEIGHT, &title(report));
     let curve = curve(train, report)?;
     let widest = curve.iter().map(|point| point.height).fold(0.0, f64::max);

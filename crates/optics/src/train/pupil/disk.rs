@@ -1,5 +1,5 @@
 //! Pupils that are known in closed form: a round opening as the only rim, with nothing between it and
-//! the sensor that bends rays. From each point of the sensor light comes from all over the disc and
+//! the sensor that bends rays. From each point of the sensor light comes from all over the disk and
 //! from nowhere else, so no ray is lost at the rim.
 //!
 //! Samples of a batch are worked out side by side, in loops that vectorise.
@@ -9,12 +9,12 @@ use std::f64::consts::PI;
 use etendue_geometry::disk;
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::element::{Block, Fate, Frame, LANES, LensRays, Opening};
+use crate::element::{Block, Frame, LANES, LensRays, Opening, RayStatus};
 use crate::train::{OpticalTrain, Part};
 
 /// A round opening square to the axis (mm).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Disc {
+pub struct Disk {
     centre: DVec3,
     radius: f64,
 }
@@ -32,22 +32,22 @@ pub struct Bundle<'a> {
     pub squares: &'a [[f64; 2]],
 }
 
-impl Disc {
-    /// The disc of a lens that has such a pupil, as long as it stands before all of a sensor of half
+impl Disk {
+    /// The disk of a lens that has such a pupil, as long as it stands before all of a sensor of half
     /// width and half height `half_size` (mm).
     pub fn of(train: &OpticalTrain, sensor: &Frame, half_size: DVec2) -> Option<Self> {
-        let mut disc = None;
+        let mut disk = None;
         for element in train.elements() {
             if element.frame.rotation != DMat3::IDENTITY {
                 return None;
             }
             match &element.part {
                 // What bends rays behind the opening would move its image.
-                Part::ThinLens(lens) if lens.semi_diameter == f64::INFINITY && disc.is_none() => {}
+                Part::ThinLens(lens) if lens.semi_diameter == f64::INFINITY && disk.is_none() => {}
                 Part::Aperture(opening) => match **opening {
                     Opening::Circle { radius: f64::INFINITY } => {}
-                    Opening::Circle { radius } if radius > 0.0 && disc.is_none() => {
-                        disc = Some(Self { centre: element.frame.vertex, radius });
+                    Opening::Circle { radius } if radius > 0.0 && disk.is_none() => {
+                        disk = Some(Self { centre: element.frame.vertex, radius });
                     }
                     _ => return None,
                 },
@@ -56,11 +56,11 @@ impl Disc {
         }
         let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
         let corners = corners.map(|c| sensor.point((DVec2::from(c) * half_size).extend(0.0)));
-        disc.filter(|disc| corners.iter().all(|corner| corner.z > disc.centre.z))
+        disk.filter(|disk| corners.iter().all(|corner| corner.z > disk.centre.z))
     }
 
-    /// The projected solid angle (sr) of the disc from a point of the axis, for what stands square to
-    /// the axis: π sin²θ. `None` when the disc is not centred on the axis.
+    /// The projected solid angle (sr) of the disk from a point of the axis, for what stands square to
+    /// the axis: π sin²θ. `None` when the disk is not centred on the axis.
     pub fn solid_angle_from(&self, z: f64) -> Option<f64> {
         let distance = z - self.centre.z;
         let squared = self.radius * self.radius;
@@ -68,7 +68,7 @@ impl Disc {
         centred.then(|| PI * squared / (squared + distance * distance))
     }
 
-    /// Centre and radius of the disc in slopes, from a point of the sensor (mm).
+    /// Centre and radius of the disk in slopes, from a point of the sensor (mm).
     pub(super) fn seen_from(&self, film: DVec3) -> (DVec2, f64) {
         let distance = film.z - self.centre.z;
         ((self.centre - film).truncate() / distance, self.radius / distance)
@@ -86,11 +86,11 @@ impl Disc {
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn fill_blocks(disc: &Disc, bundle: &Bundle<'_>, blocks: &mut [Block]) {
+fn fill_blocks(disk: &Disk, bundle: &Bundle<'_>, blocks: &mut [Block]) {
     let Bundle { sensor, scale, film, squares } = *bundle;
     let Frame { vertex, rotation } = *sensor;
     let (right, up, normal) = (rotation.x_axis, rotation.y_axis, rotation.z_axis);
-    let factor = scale * PI * disc.radius * disc.radius;
+    let factor = scale * PI * disk.radius * disk.radius;
     for (b, block) in blocks.iter_mut().enumerate() {
         let range = b * LANES..squares.len().min((b + 1) * LANES);
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
@@ -104,12 +104,12 @@ fn fill_blocks(disc: &Disc, bundle: &Bundle<'_>, blocks: &mut [Block]) {
             let pz = vertex.z + (right.z * x[i] + up.z * y[i]);
             let [a, b] = disk::point(square[i]);
             let (u, v) =
-                (disc.centre.x + a * disc.radius - px, disc.centre.y + b * disc.radius - py);
-            let w = disc.centre.z - pz;
+                (disk.centre.x + a * disk.radius - px, disk.centre.y + b * disk.radius - py);
+            let w = disk.centre.z - pz;
             let length2 = u * u + v * v + w * w;
             let inverse = 1.0 / length2.sqrt();
             let (dx, dy, dz) = (u * inverse, v * inverse, w * inverse);
-            // dΩ = dA cos θ / r², as the disc is square to the axis, under the sensor's own cosine.
+            // dΩ = dA cos θ / r², as the disk is square to the axis, under the sensor's own cosine.
             let on_sensor = (dx * normal.x + dy * normal.y + dz * normal.z).abs();
             block.position[0][i] = px;
             block.position[1][i] = py;
@@ -119,6 +119,6 @@ fn fill_blocks(disc: &Disc, bundle: &Bundle<'_>, blocks: &mut [Block]) {
             block.direction[2][i] = dz;
             block.throughput[i] = factor * -dz / length2 * on_sensor;
         }
-        block.outcome[..range.len()].fill(Fate::Exited.code());
+        block.outcome[..range.len()].fill(RayStatus::Exited.code());
     }
 }

@@ -199,7 +199,7 @@ fn checked(illuminant: Option<Illuminant>) -> Result<Option<Illuminant>, Fault> 
     checked.map_err(|error| ("illuminant".to_owned(), error.to_string()))
 }
 
-/// The index of a glass, by the lens files' own words, sampled where lanes may be.
+/// The index of a glass, by the lens files' own words, sampled where bands may be.
 fn refractive_index(spec: &IorSpec) -> Result<Ior, Fault> {
     let fault = |why: String| ("ior".to_owned(), why);
     let words = match spec {

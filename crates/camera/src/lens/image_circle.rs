@@ -5,7 +5,7 @@ use glam::DVec2;
 
 use etendue_optics::element::Frame;
 use etendue_optics::train::pupil::{Window, lit_radius};
-use etendue_optics::train::{OpticalTrain, TrainAt};
+use etendue_optics::train::{MonochromaticTrain, OpticalTrain};
 
 /// Directions from the sensor's centre in which its edge is looked for.
 const DIRECTIONS: usize = 32;
@@ -19,7 +19,7 @@ const CLOSE: f64 = 5e-3;
 
 /// How far from the sensor's centre light arrives (mm).
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum LitArea {
+pub(crate) enum ImageCircle {
     /// The same in all directions.
     Circle(f64),
     /// By direction, evenly over a full turn from +x; straight lines join them.
@@ -37,9 +37,14 @@ pub(crate) struct Reach {
     ends: bool,
 }
 
-impl LitArea {
+impl ImageCircle {
     /// Measures it on a sensor of half width and height `half` (mm) that stands at `frame`.
-    pub(crate) fn measure(train: &OpticalTrain, lens: &TrainAt, frame: Frame, half: DVec2) -> Self {
+    pub(crate) fn measure(
+        train: &OpticalTrain,
+        lens: &MonochromaticTrain,
+        frame: Frame,
+        half: DVec2,
+    ) -> Self {
         if train.is_rotationally_symmetric() {
             let lenses = std::slice::from_ref(lens);
             return Self::Circle(lit_radius(train, lenses, frame.vertex.z, half.length()));
