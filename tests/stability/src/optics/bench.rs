@@ -56,9 +56,9 @@ pub(super) fn greatest_height(
     while low.next_up() < high {
         let middle = f64::midpoint(low, high);
         if parallel(train, clip, middle)? == RayStatus::Exited {
-            low = middle
+            low = middle;
         } else {
-            high = middle
+            high = middle;
         }
     }
     Ok(low)
