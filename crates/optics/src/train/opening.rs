@@ -155,7 +155,7 @@ impl OpticalTrain {
 impl std::fmt::Display for WidestOpening {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         // Rounded up, so that the number can be asked for; f/2 but for rounding is f/2.
-        let f_number = (100.0 * self.f_number * (1.0 - NOMINAL)).ceil() / 100.0;
+        let f_number = (100.0 * self.f_number * (1.0 - 1e-6)).ceil() / 100.0;
         let element = self.element;
         write!(
             f,
