@@ -423,6 +423,7 @@ fn pupil(lens: Option<&LensCamera>, spread: bool, samples: u32) -> (&'static str
     };
     let symmetric = lens.focused().train().is_rotationally_symmetric();
     let bound = match symmetric {
+        _ if lens.lenslets().is_some() => "that of the lens before the array, through each lenslet",
         _ if lens.has_round_pupil() => "known exactly: a disk",
         true => "bounded along a radius of the sensor",
         false => "bounded on a grid of the sensor",

@@ -5,8 +5,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::focused::Focused;
-use etendue_optics::train::MonochromaticTrain;
+use etendue_optics::element::Frame;
+use etendue_optics::train::{MonochromaticTrain, OpticalTrain};
 
 /// Nodes over the half diagonal, for lenses with rotational symmetry.
 const RADIAL_NODES: u32 = 257;
@@ -24,12 +24,16 @@ pub(crate) struct ChiefTable {
 }
 
 impl ChiefTable {
-    /// Solves the nodes.
-    pub(crate) fn new(focused: &Focused, at: &MonochromaticTrain) -> Self {
-        let half_size = focused.film().half_size();
+    /// Solves the nodes for a sensor of half width and height `half_size` (mm) that stands at `frame`.
+    pub(crate) fn new(
+        train: &OpticalTrain,
+        frame: &Frame,
+        half_size: DVec2,
+        at: &MonochromaticTrain,
+    ) -> Self {
         let radius = half_size.length();
-        if focused.train().is_rotationally_symmetric() {
-            let nodes = along_radius(focused, at, radius);
+        if train.is_rotationally_symmetric() {
+            let nodes = along_radius(train, frame, at, radius);
             return Self { nodes, half_size: None, radius };
         }
         let mut nodes = Vec::new();
@@ -37,8 +41,8 @@ impl ChiefTable {
         for row in 0..PLANAR_NODES {
             for column in 0..PLANAR_NODES {
                 let film = DVec2::new(share(column), share(row)) * half_size;
-                let point = focused.film().frame.point(film.extend(0.0));
-                nodes.push(focused.train().chief_direction(at, point).map(slopes_of));
+                let point = frame.point(film.extend(0.0));
+                nodes.push(train.chief_direction(at, point).map(slopes_of));
             }
         }
         Self { nodes, half_size: Some(half_size), radius }
@@ -47,17 +51,21 @@ impl ChiefTable {
     /// The direction from a place on the sensor (mm from its centre) to the stop's centre.
     pub(crate) fn direction(
         &self,
-        focused: &Focused,
+        (train, frame): (&OpticalTrain, &Frame),
         at: &MonochromaticTrain,
         film: DVec2,
     ) -> Option<DVec3> {
-        let start = match self.half_size {
+        let point = frame.point(film.extend(0.0));
+        let slopes = train.chief_slopes_near(at, point, self.nearly(film)?)?;
+        Some(slopes.extend(-1.0).normalize())
+    }
+
+    /// The slopes of that direction to about a millionth.
+    pub(crate) fn nearly(&self, film: DVec2) -> Option<DVec2> {
+        match self.half_size {
             None => self.radial_start(film),
             Some(half_size) => self.planar_start(film / half_size),
-        }?;
-        let point = focused.film().frame.point(film.extend(0.0));
-        let slopes = focused.train().chief_slopes_near(at, point, start)?;
-        Some(slopes.extend(-1.0).normalize())
+        }
     }
 
     fn radial_start(&self, film: DVec2) -> Option<DVec2> {
@@ -85,18 +93,22 @@ impl ChiefTable {
 
 /// From the axis outwards, each begun where the last two point; there is nothing behind the first
 /// that cannot be solved.
-fn along_radius(focused: &Focused, at: &MonochromaticTrain, radius: f64) -> Vec<Option<DVec2>> {
+fn along_radius(
+    train: &OpticalTrain,
+    frame: &Frame,
+    at: &MonochromaticTrain,
+    radius: f64,
+) -> Vec<Option<DVec2>> {
     let mut nodes: Vec<Option<DVec2>> = vec![None; RADIAL_NODES as usize];
     for i in 0..RADIAL_NODES as usize {
         #[expect(clippy::cast_precision_loss, reason = "a few hundred nodes")]
         let film = DVec2::new(radius * i as f64 / f64::from(RADIAL_NODES - 1), 0.0);
-        let point = focused.film().frame.point(film.extend(0.0));
+        let point = frame.point(film.extend(0.0));
         let before = |steps: usize| i.checked_sub(steps).and_then(|i| nodes[i]);
         let guess = match (before(1), before(2)) {
             (Some(last), Some(one)) => Some(last + (last - one)),
             (last, _) => last,
         };
-        let train = focused.train();
         let found = match guess {
             None => train.chief_direction(at, point).map(slopes_of),
             Some(guess) => train

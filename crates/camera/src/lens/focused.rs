@@ -7,7 +7,7 @@ use crate::{CameraError, Intrinsics};
 use etendue_optics::element::Frame;
 use etendue_optics::train::analysis::chief_height;
 use etendue_optics::train::{
-    Focus, LensError, MonochromaticTrain, OpticalTrain, Paraxial, SensorMount,
+    Focus, FocusError, LensError, MonochromaticTrain, OpticalTrain, Paraxial, SensorMount,
 };
 
 /// Entrance pupils farther away than this many times the lens' own size (mm) count as infinitely
@@ -87,13 +87,22 @@ impl Focused {
             .check()
             .map_err(|(key, why)| CameraError::new(format!("losses.{key}"), why))?;
         let train = stopped(train, setup)?.with_sensor(mount(setup)?).with_losses(setup.losses);
-        let z = train.sensor_z(focus).map_err(|fault| {
+        let unfocused = |fault: FocusError| {
             let key = match focus {
                 Focus::Sensor(_) => "sensor_distance",
                 _ => "focus_distance",
             };
             CameraError::new(key, fault.to_string())
-        })?;
+        };
+        // Lenslets are focused with the sensor behind them.
+        let (train, focus) = match focus {
+            Focus::Distance(distance) if train.behind_lenslets().is_some() => {
+                let focused = train.with_lenslets_focused(distance).map_err(unfocused)?;
+                (focused, Focus::AsWritten)
+            }
+            _ => (train, focus),
+        };
+        let z = train.sensor_z(focus).map_err(unfocused)?;
         let fault =
             |error: etendue_optics::glass::GlassError| CameraError::new("lens", error.to_string());
         let paraxial = train.paraxial(train.wavelength()).map_err(fault)?;
@@ -125,7 +134,11 @@ impl Focused {
             return Err(CameraError::new("sensor_distance", why));
         }
         let origin = pupil.unwrap_or(0.0);
-        let object_distance = 1e-3 * (all.conjugate() + origin);
+        let sharp = match train.behind_lenslets() {
+            Some(view) => view.main.to_plane(view.picture_z(z)).map_err(fault)?,
+            None => all,
+        };
+        let object_distance = 1e-3 * (sharp.conjugate() + origin);
         Ok(Self { train, paraxial, film, view, object_distance, origin })
     }
 

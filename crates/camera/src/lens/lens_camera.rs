@@ -19,15 +19,14 @@ use glam::{DVec2, DVec3};
 use super::chief::ChiefTable;
 use super::focused::{Focused, View};
 use super::image_circle::ImageCircle;
+use super::lenslets::LensletChiefs;
 
 use crate::{CameraError, Pose};
 use etendue_optics::element::{Clip, Ray, RayStatus, Reflection};
 use etendue_optics::glass::GlassError;
 use etendue_optics::train::analysis::projected_solid_angle;
 use etendue_optics::train::pupil::{Disk, Window, blocked, without_dimming, without_filters};
-use etendue_optics::train::{
-    ExitPupil, ExitPupilError, MonochromaticTrain, OpticalTrain, Part, Side,
-};
+use etendue_optics::train::{ExitPupil, ExitPupilError, MonochromaticTrain, OpticalTrain, Side};
 
 /// Focal lengths that lenses of cameras have (mm): from an endoscope's to a telescope's.
 const PLAUSIBLE_FOCAL_LENGTHS: std::ops::RangeInclusive<f64> = 0.2..=2e4;
@@ -51,6 +50,8 @@ pub struct LensCamera {
     pub(super) focused: Focused,
     design: MonochromaticTrain,
     chief: ChiefTable,
+    /// The lenslets that the sensor looks through.
+    lenslets: Option<LensletChiefs>,
     /// Where on the sensor light arrives.
     lit: ImageCircle,
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
@@ -86,9 +87,17 @@ impl LensCamera {
     /// Solves chief rays and finds out whether there is light at all.
     pub(crate) fn new(focused: Focused) -> Result<Self, CameraError> {
         let dark = |error: ExitPupilError| CameraError::new("", error.to_string());
-        let design = focused.at_design()?;
+        let lenslets = LensletChiefs::new(&focused)?;
+        // Chief rays of whole pictures go straight through arrays of lenslets.
+        let unbent = focused.train().without_arrays();
+        let design = match lenslets {
+            Some(_) => focused.at_design()?,
+            None => unbent
+                .at(unbent.wavelength())
+                .map_err(|fault| CameraError::new("lens", fault.to_string()))?,
+        };
         // A filter may be dark at the design wavelength and pass others.
-        let train = &without_filters(focused.train());
+        let train = &without_filters(&unbent);
         let clear = train
             .at(train.wavelength())
             .map_err(|fault| CameraError::new("", fault.to_string()))?;
@@ -105,8 +114,9 @@ impl LensCamera {
         }
         let lit = ImageCircle::measure(train, &clear, frame, half);
         let solid_angle = unvignetted(focused.train(), &design, &focused);
-        let chief = ChiefTable::new(&focused, &design);
-        Ok(Self { focused, design, chief, lit, solid_angle, opened: OnceLock::new() })
+        let straight = unbent.at(unbent.wavelength()).unwrap_or_else(|_| design.clone());
+        let chief = ChiefTable::new(&unbent, &frame, half, &straight);
+        Ok(Self { focused, design, chief, lenslets, lit, solid_angle, opened: OnceLock::new() })
     }
 
     /// The lens and its sensor.
@@ -120,8 +130,14 @@ impl LensCamera {
         Self { focused: self.focused.coarser(factor), ..self.clone() }
     }
 
-    /// The projected solid angle (sr) of the unvignetted pupil seen from the axis: times the mean of
-    /// weight times radiance, it is the irradiance.
+    /// The lenslets that the sensor looks through, if it does.
+    #[must_use]
+    pub fn lenslets(&self) -> Option<&LensletChiefs> {
+        self.lenslets.as_ref()
+    }
+
+    /// The projected solid angle (sr) of the unvignetted pupil seen from the axis, or of one lenslet from
+    /// below its middle: times the mean of weight times radiance, it is the irradiance.
     #[must_use]
     pub fn solid_angle(&self) -> f64 {
         self.solid_angle
@@ -155,8 +171,7 @@ impl LensCamera {
         let fault = |why: String| CameraError::new("", why);
         let train = self.focused.train();
         for (i, element) in train.elements().iter().enumerate() {
-            let Part::Filter(filter) = &element.part else { continue };
-            for curve in &filter.curves {
+            for curve in element.part.curves() {
                 bands
                     .from_curve(curve, Outside::Held)
                     .map_err(|error| fault(format!("the filter elements[{i}]: {error}")))?;
@@ -265,9 +280,17 @@ impl LensCamera {
         if !self.lit.contains(film) {
             return None;
         }
-        let direction = self.chief.direction(&self.focused, &self.design, film)?;
-        let start = self.focused.film().frame.point(film.extend(0.0));
-        let end = self.design.run(Side::Sensor, Clip::Off, Ray::new(start, direction)?);
+        let frame = &self.focused.film().frame;
+        let start = frame.point(film.extend(0.0));
+        // What is seen through a lenslet ends where the lens before it does.
+        let (direction, clip) = match &self.lenslets {
+            Some(lenslets) => (lenslets.direction(start)?, Clip::On),
+            None => {
+                let train = self.focused.train();
+                (self.chief.direction((train, frame), &self.design, film)?, Clip::Off)
+            }
+        };
+        let end = self.design.run(Side::Sensor, clip, Ray::new(start, direction)?);
         let ray = end.ray;
         (end.fate == RayStatus::Exited).then(|| (ray.position.into(), ray.direction.into()))
     }
@@ -276,7 +299,13 @@ impl LensCamera {
     /// not seen or is seen 90° or more off the axis.
     pub(crate) fn tangents(&self, column: f64, row: f64) -> [f64; 2] {
         let place = self.focused.film().place(column, row);
-        match self.chief_ray(place) {
+        let seen = match &self.lenslets {
+            Some(lenslets) => {
+                lenslets.seen_from(self.focused.film().frame.point(place.extend(0.0)))
+            }
+            None => self.chief_ray(place),
+        };
+        match seen {
             Some((_, d)) if d.z < 0.0 => [-d.x / d.z, d.y / d.z],
             _ => {
                 let turned = place * self.focused.film().turn;
@@ -288,11 +317,8 @@ impl LensCamera {
     /// Curves of the lens' filters that pass some wavelengths better than others.
     #[must_use]
     pub fn filter_curves(&self) -> Vec<Curve> {
-        let curves = self.focused.train().elements().iter().filter_map(|e| match &e.part {
-            Part::Filter(filter) => Some(&filter.curves),
-            _ => None,
-        });
-        curves.flatten().filter(|curve| curve.as_flat().is_none()).cloned().collect()
+        let curves = self.focused.train().elements().iter().flat_map(|e| e.part.curves());
+        curves.filter(|curve| curve.as_flat().is_none()).cloned().collect()
     }
 
     /// Sizes that no camera has, in sentences: most likely a unit that was not meant.
@@ -342,10 +368,7 @@ impl OpenedGroup {
 
 /// Curves of filters that are the same all over and pass some wavelengths better than others.
 fn uniform_filters(train: &OpticalTrain) -> Vec<&Curve> {
-    let filters = train.elements().iter().filter_map(|element| match &element.part {
-        Part::Filter(filter) if filter.is_uniform() => filter.curves.first(),
-        _ => None,
-    });
+    let filters = train.elements().iter().filter_map(|element| element.part.uniform_curve());
     filters.filter(|curve| curve.as_flat().is_none()).collect()
 }
 
@@ -380,11 +403,8 @@ fn through_filters(
 
 /// Whether rays of other wavelengths run differently, or lose another share on the way.
 fn tells_wavelengths_apart(train: &OpticalTrain) -> bool {
-    let filters = train.elements().iter().any(|element| match &element.part {
-        Part::Filter(filter) => filter.curves.iter().any(|curve| curve.as_flat().is_none()),
-        _ => false,
-    });
-    filters || runs_apart(train)
+    let mut curves = train.elements().iter().flat_map(|element| element.part.curves());
+    curves.any(|curve| curve.as_flat().is_none()) || runs_apart(train)
 }
 
 /// Whether glass, or what it loses, makes another lens of each wavelength.
@@ -398,6 +418,9 @@ fn runs_apart(train: &OpticalTrain) -> bool {
 /// The pupil as seen from the axis with all filters and masks clear; from elsewhere when the axis is
 /// dark.
 fn unvignetted(train: &OpticalTrain, at: &MonochromaticTrain, focused: &Focused) -> f64 {
+    if let Some(view) = train.behind_lenslets() {
+        return view.solid_angle(focused.sensor_z()) * at.index_before_sensor().powi(2);
+    }
     let clear = without_dimming(train);
     let lens = clear.at(at.wavelength()).unwrap_or_else(|_| at.clone());
     let z = focused.sensor_z();

@@ -10,6 +10,7 @@
 //! | [`focused`] | a lens and its sensor: where pixels lie, and the paraxial camera of both |
 //! | [`chief`] | the chief rays of a whole sensor |
 //! | `image_circle` | the part of the sensor that light reaches |
+//! | [`lenslets`] | which lenslet a place on the sensor belongs to |
 //! | [`lens_camera`] | chief rays for data, and what is measured for pictures |
 //! | `rays` | weighted rays of the pupil for pictures |
 
@@ -17,12 +18,14 @@ pub mod chief;
 pub mod focused;
 mod image_circle;
 pub mod lens_camera;
+pub mod lenslets;
 mod rays;
 pub mod source;
 pub mod spec;
 
 pub use focused::Focused;
 pub use lens_camera::{BandGroup, LensCamera};
+pub use lenslets::LensletChiefs;
 pub use source::{LensSource, PlacedSpec};
 pub use spec::{
     ChromaticRealLensCameraSpec, LensCameraSpec, RealLensCameraSpec, ThinLensCameraSpec,

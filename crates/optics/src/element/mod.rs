@@ -6,7 +6,10 @@ mod aperture;
 mod asphere;
 mod filter;
 mod frame;
+mod lattice;
+mod lenslets;
 mod losses;
+mod microlens_array;
 mod part;
 mod picture;
 mod rays;
@@ -27,7 +30,11 @@ use etendue_geometry::units::{Degrees, Millimetres};
 pub use aperture::{ApertureSpec, CircularSpec, MaskSpec, Opening, PolygonSpec};
 pub use filter::{Filter, FilterSpec};
 pub use frame::Frame;
+pub use lattice::{Cell, Grid, Lattice};
 pub use losses::{Coating, LossesSpec, Plain, Reflection};
+pub use microlens_array::{
+    Gaps, Lenslet, LensletShape, LensletSpec, MicrolensArray, MicrolensArraySpec, clipped,
+};
 pub use part::{Part, PartSpec};
 pub use picture::{Picture, Resolve};
 pub use rays::{FateCounts, LensRays, RayStatus};
@@ -218,7 +225,7 @@ mod tests {
         let schema = schemars::schema_for!(ElementSpec).to_value();
         let mut kinds = Vec::new();
         leaves(&schema, &mut kinds);
-        assert_eq!(kinds.len(), 6, "three shapes of apertures");
+        assert_eq!(kinds.len(), 7, "three shapes of apertures");
         for kind in kinds {
             assert_eq!(kind["additionalProperties"], false, "{kind}");
             let keys = kind["properties"].as_object().unwrap();

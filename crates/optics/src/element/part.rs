@@ -7,10 +7,11 @@ use etendue_spectrum::Curve;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::lenslets::Lenslets;
 use super::step::Action;
 use super::{
-    ApertureSpec, CircularSpec, Filter, FilterSpec, Opening, Refraction, Resolve, Surface,
-    SurfaceSpec, ThinLens, ThinLensSpec,
+    ApertureSpec, CircularSpec, Filter, FilterSpec, Gaps, MicrolensArray, MicrolensArraySpec,
+    Opening, Refraction, Resolve, Surface, SurfaceSpec, ThinLens, ThinLensSpec,
 };
 use crate::glass::GlassSpec;
 use etendue_geometry::units::Millimetres;
@@ -27,6 +28,8 @@ pub enum PartSpec {
     Aperture(ApertureSpec),
     /// A sheet that absorbs.
     Filter(FilterSpec),
+    /// An array of lenslets.
+    MicrolensArray(MicrolensArraySpec),
 }
 
 /// What an element is, ready to be traced.
@@ -40,6 +43,8 @@ pub enum Part {
     Aperture(Arc<Opening>),
     /// A sheet that absorbs.
     Filter(Arc<Filter>),
+    /// An array of lenslets.
+    MicrolensArray(Arc<MicrolensArray>),
 }
 
 impl From<SurfaceSpec> for PartSpec {
@@ -74,6 +79,7 @@ impl PartSpec {
             Self::ThinLens(lens) => Part::ThinLens(lens.build()?),
             Self::Aperture(aperture) => Part::Aperture(aperture.build(resolve)?.into()),
             Self::Filter(filter) => Part::Filter(filter.build(resolve)?.into()),
+            Self::MicrolensArray(array) => Part::MicrolensArray(array.build()?.into()),
         })
     }
 }
@@ -87,6 +93,7 @@ impl Part {
             Self::ThinLens(_) => "thin_lens",
             Self::Aperture(_) => "aperture",
             Self::Filter(_) => "filter",
+            Self::MicrolensArray(_) => "microlens_array",
         }
     }
 
@@ -98,6 +105,7 @@ impl Part {
             Self::ThinLens(lens) => lens.semi_diameter,
             Self::Aperture(opening) => opening.radius(),
             Self::Filter(filter) => filter.radius(),
+            Self::MicrolensArray(array) => array.radius(),
         }
     }
 
@@ -115,6 +123,7 @@ impl Part {
                 let opening = Arc::make_mut(opening);
                 *opening = opening.with_radius(radius).ok_or("it is a mask")?;
             }
+            Self::MicrolensArray(_) => return Err("it is a microlens array"),
         }
         Ok(())
     }
@@ -126,15 +135,40 @@ impl Part {
             Self::Surface(_) | Self::ThinLens(_) => true,
             Self::Aperture(opening) => opening.is_round(),
             Self::Filter(filter) => filter.is_uniform(),
+            Self::MicrolensArray(_) => false,
         }
     }
 
-    /// The paraxial power (1/mm) between media of index `before` and `behind`.
+    /// The curves that its filters have.
+    #[must_use]
+    pub fn curves(&self) -> &[Curve] {
+        match self {
+            Self::Filter(filter) => &filter.curves,
+            Self::MicrolensArray(array) => &array.curves,
+            Self::Surface(_) | Self::ThinLens(_) | Self::Aperture(_) => &[],
+        }
+    }
+
+    /// The curve of all of its light, when it dims all places alike.
+    #[must_use]
+    pub fn uniform_curve(&self) -> Option<&Curve> {
+        match self {
+            Self::Filter(filter) if filter.is_uniform() => filter.curves.first(),
+            Self::MicrolensArray(array) if array.gaps == Gaps::Opaque => match &array.curves[..] {
+                [one] => Some(one),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// The paraxial power (1/mm) between media of index `before` and `behind`. An array of lenslets has
+    /// none: what is paraxial is the picture that the lens before it makes, which its lenslets sample.
     pub(crate) fn power(&self, before: f64, behind: f64) -> f64 {
         match self {
             Self::Surface(surface) => (behind - before) * surface.paraxial_curvature(),
             Self::ThinLens(lens) => before * lens.power,
-            Self::Aperture(_) | Self::Filter(_) => 0.0,
+            Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => 0.0,
         }
     }
 
@@ -158,6 +192,13 @@ impl Part {
             Self::Filter(filter) => {
                 let transmissions = filter.curves.iter().map(transmission).collect();
                 both(Action::Filter { filter: Arc::clone(filter), transmissions })
+            }
+            Self::MicrolensArray(array) => {
+                let passes: Vec<f64> = array.curves.iter().map(transmission).collect();
+                [
+                    Action::Lenslets(Lenslets::new(array, [before, behind], 1.0, passes.clone())),
+                    Action::Lenslets(Lenslets::new(array, [behind, before], -1.0, passes)),
+                ]
             }
         }
     }

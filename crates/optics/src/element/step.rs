@@ -9,6 +9,7 @@ use std::sync::Arc;
 use super::aperture::Opening;
 use super::filter::Filter;
 use super::frame::Frame;
+use super::lenslets::Lenslets;
 use super::losses::Loss;
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
 use super::refract::{Refracted, Refraction, each_lane};
@@ -46,6 +47,7 @@ pub(crate) enum Action {
     ThinLens { power: f64, semi_diameter: f64 },
     Opening(Arc<Opening>),
     Filter { filter: Arc<Filter>, transmissions: Vec<f64> },
+    Lenslets(Lenslets),
 }
 
 impl Action {
@@ -157,6 +159,13 @@ impl Step {
                 false
             }
             Action::Filter { .. } => {
+                self.run_placed(block, clip);
+                false
+            }
+            Action::Lenslets(lenslets) if lenslets.transmissions.is_empty() => {
+                lenslets.lanes(block, self.element, z, clip)
+            }
+            Action::Lenslets(_) => {
                 self.run_placed(block, clip);
                 false
             }
@@ -297,6 +306,11 @@ impl Step {
                 let inside = x * x + y * y <= limit(filter.semi_diameter, clip);
                 filter.curve_at(x, y).filter(|_| inside).map_or(0.0, |i| transmissions[i])
             }),
+            Action::Lenslets(lenslets) => {
+                let (crossing, kind) = lenslets.exactly(ray, clip);
+                let passes = kind.and_then(|kind| lenslets.transmissions.get(kind).copied());
+                Traversal { transmission: passes.unwrap_or(1.0), ..self.crossed(crossing) }
+            }
         }
     }
 

@@ -135,20 +135,23 @@ fn place(spec: &ElementSpec, z: f64, resolve: Resolve<'_>) -> Result<Element, St
     Ok(Element { part, frame: Frame::placed(z, decentre, tilt) })
 }
 
-/// The medium behind an element: a surface's glass or air, and what was there for a sheet.
+/// The medium behind an element: a surface's glass or air, and what was there for a sheet. Faces of
+/// lenslets are surfaces.
 fn behind(
     spec: &ElementSpec,
     index: usize,
     media: &[Glass],
     catalogues: &[AgfCatalogue],
 ) -> Result<Glass, LensError> {
-    match &spec.part {
-        PartSpec::Surface(surface) => match &surface.glass {
-            Some(glass) => {
-                glass.resolve_in(catalogues).map_err(|source| LensError::Glass { index, source })
-            }
-            None => Ok(Glass::air()),
-        },
-        _ => Ok(media[index].clone()),
+    let glass = match &spec.part {
+        PartSpec::Surface(surface) => &surface.glass,
+        PartSpec::MicrolensArray(array) if array.has_faces() => &array.glass,
+        _ => return Ok(media[index].clone()),
+    };
+    match glass {
+        Some(glass) => {
+            glass.resolve_in(catalogues).map_err(|source| LensError::Glass { index, source })
+        }
+        None => Ok(Glass::air()),
     }
 }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`file`](mod@file) | the lens file |
 //! | [`trace`] | rays through the train, in batches or one by one |
+//! | [`lenslets`] | arrays of lenslets: the lens without them, and the lens as each lenslet sees it |
 //! | [`paraxial`] | focal lengths, principal planes and pupils |
 //! | [`focus`] | where the sensor goes |
 //! | [`opening`] | the widest beam that the rims let through |
@@ -20,6 +21,7 @@ pub mod analysis;
 pub mod drawing;
 pub mod file;
 pub mod focus;
+pub mod lenslets;
 pub mod opening;
 pub mod paraxial;
 pub mod pupil;
@@ -35,6 +37,7 @@ pub use crate::element::Part;
 pub use aim::ChiefRay;
 pub use file::{LensFile, SensorMount};
 pub use focus::{Focus, FocusError};
+pub use lenslets::BehindLenslets;
 pub use opening::WidestOpening;
 pub use paraxial::{Paraxial, Pupil};
 pub use pupil::{ExitPupil, ExitPupilError, PupilSample};
@@ -183,7 +186,8 @@ impl OpticalTrain {
     /// Whether nothing in it aberrates: thin lenses and sheets, centred and square to the axis.
     #[must_use]
     pub fn is_ideal(&self) -> bool {
-        let flat = |e: &Element| e.frame.is_axial() && !matches!(e.part, Part::Surface(_));
+        let bends = |part: &Part| matches!(part, Part::Surface(_) | Part::MicrolensArray(_));
+        let flat = |e: &Element| e.frame.is_axial() && !bends(&e.part);
         self.sensor.tilt == SensorMount::default().tilt && self.elements.iter().all(flat)
     }
 
@@ -226,8 +230,13 @@ impl OpticalTrain {
             tell(format!("glass {}", glass.name), glass.range);
         }
         for (i, element) in self.elements.iter().enumerate() {
-            if let Part::Filter(filter) = &element.part {
-                tell(format!("the filter elements[{i}]"), filter.range());
+            match &element.part {
+                Part::Filter(filter) => tell(format!("the filter elements[{i}]"), filter.range()),
+                part => {
+                    for curve in part.curves() {
+                        tell(format!("a filter of the lenslets elements[{i}]"), curve.range());
+                    }
+                }
             }
         }
         notes
@@ -357,6 +366,12 @@ impl OpticalTrain {
         }
         notes.extend(self.crossings());
         notes.extend(self.unfilled_stop());
+        if let Some(array) = self.first_array() {
+            notes.push(format!(
+                "elements[{array}] is a microlens array: paraxial data and analysis are those of the lens \
+                 without it; rays do meet its lenslets"
+            ));
+        }
         if !self.elements.iter().all(|e| e.frame.is_axial()) {
             notes.push(
                 "the paraxial analysis leaves tilts and decentrings out; rays do not".to_owned(),

@@ -52,7 +52,7 @@ impl OpticalTrain {
     pub fn widest_opening(&self) -> Option<WidestOpening> {
         let paraxial = self.paraxial(self.wavelength).ok()?;
         let (efl, magnification) = (paraxial.efl?, paraxial.stop_magnification?);
-        let mut open = without_dimming(self);
+        let mut open = without_dimming(self).without_arrays();
         if matches!(self.elements[self.stop].part, Part::Aperture(_)) {
             open.elements[self.stop].part.set_clear_radius(f64::INFINITY).ok()?;
         }

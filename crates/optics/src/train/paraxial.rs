@@ -68,18 +68,18 @@ pub struct Abcd {
 }
 
 impl Abcd {
-    const ONE: Self = Self { a: 1.0, b: 0.0, c: 0.0, d: 1.0 };
+    pub(crate) const ONE: Self = Self { a: 1.0, b: 0.0, c: 0.0, d: 1.0 };
 
-    fn power(power: f64) -> Self {
+    pub(crate) fn power(power: f64) -> Self {
         Self { c: -power, ..Self::ONE }
     }
 
-    fn gap(reduced: f64) -> Self {
+    pub(crate) fn gap(reduced: f64) -> Self {
         Self { b: reduced, ..Self::ONE }
     }
 
     /// First `self`, then `next`.
-    fn then(self, next: Self) -> Self {
+    pub(crate) fn then(self, next: Self) -> Self {
         Self {
             a: next.a * self.a + next.b * self.c,
             b: next.a * self.b + next.b * self.d,

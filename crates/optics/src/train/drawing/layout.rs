@@ -345,7 +345,7 @@ fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: 
                 line(canvas, &[at(side * height, 0.0), at(side * outer, 0.0)], 3.0);
             }
         }
-        Part::Filter(_) => {
+        Part::Filter(_) | Part::MicrolensArray(_) => {
             let half = 1.5 / view.scale;
             for z in [-half, half] {
                 line(canvas, &[at(-height, z), at(height, z)], 0.8);

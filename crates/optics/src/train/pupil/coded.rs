@@ -448,7 +448,7 @@ fn first_mask(train: &OpticalTrain) -> Option<(usize, &Picture)> {
             Opening::Image(mask) if mask.values.iter().any(|v| *v < 1.0) => Some((i, mask)),
             Opening::Image(_) | Opening::Circle { .. } | Opening::Polygon { .. } => None,
         },
-        Part::Surface(_) | Part::ThinLens(_) | Part::Filter(_) => None,
+        Part::Surface(_) | Part::ThinLens(_) | Part::Filter(_) | Part::MicrolensArray(_) => None,
     })
 }
 

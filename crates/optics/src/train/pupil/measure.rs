@@ -251,7 +251,7 @@ impl ExitPupil {
 
 /// Steps of the additive recurrence of the plastic number's kin in four dimensions (M. Roberts,
 /// *The unreasonable effectiveness of quasirandom sequences*, 2018).
-const ROBERTS: [f64; 4] =
+pub(super) const ROBERTS: [f64; 4] =
     [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_037_806, 0.538_597_270_645_735];
 
 /// A ray that passes outside of the bound.

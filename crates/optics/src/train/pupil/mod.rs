@@ -28,6 +28,7 @@
 mod coded;
 mod disk;
 mod histogram;
+mod lenslets;
 mod measure;
 mod place;
 mod search;
@@ -42,6 +43,7 @@ use crate::element::{Clip, FateCounts, Frame, LensRays, LossesSpec, Opening, Ray
 use crate::glass::GlassError;
 
 pub use disk::{Bundle, Disk};
+pub use lenslets::LensletPupil;
 pub use measure::lit_radius;
 pub use search::Window;
 
@@ -75,6 +77,15 @@ pub enum ExitPupilError {
          semi_diameter"
     )]
     Unbounded,
+    /// Not one ray gets through an array of lenslets.
+    #[error(
+        "no light gets through the microlens array elements[{element}] to the sensor: it stands outside \
+         of the light of the lens before it, or its lenslets are closed"
+    )]
+    Array {
+        /// The array.
+        element: usize,
+    },
     /// A sensor without size, or before the lens.
     #[error("the sensor must lie behind the last element and have a finite size")]
     Sensor,
@@ -104,6 +115,8 @@ pub struct ExitPupil {
     nodes: Vec<Outline>,
     /// The first mask, which is sampled by what it passes.
     coded: Option<Coded>,
+    /// The lenslets through which light comes; there are no nodes then.
+    lenslets: Option<Box<LensletPupil>>,
     index2: f64,
     /// How far from the sensor's centre the nodes of a radial layout reach (mm).
     radius: f64,
@@ -160,6 +173,9 @@ impl ExitPupil {
         if train.elements.iter().all(|e| !e.clear_radius().is_finite()) {
             return Err(ExitPupilError::Unbounded);
         }
+        if wavelengths.is_empty() {
+            return Err(ExitPupilError::Sensor);
+        }
         let symmetric = train.is_rotationally_symmetric();
         let mut pupil = Self {
             sensor: train.sensor_frame(sensor_z),
@@ -168,9 +184,18 @@ impl ExitPupil {
             disk: None,
             nodes: Vec::new(),
             coded: None,
+            lenslets: None,
             index2: 1.0,
             radius: half_size.length(),
         };
+        if let Some(view) = train.behind_lenslets() {
+            pupil.index2 = train.at(wavelengths[0])?.index_before_sensor().powi(2);
+            let lenslets = LensletPupil::new(train, view, wavelengths, &pupil)?;
+            return Ok(Self { lenslets: Some(Box::new(lenslets)), ..pupil });
+        }
+        if let Some(first) = train.first_array() {
+            return Self::of_rear(train, first, wavelengths, sensor_z, half_size.to_array());
+        }
         let masked = train;
         let train = &without_masks(masked);
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
@@ -187,6 +212,28 @@ impl ExitPupil {
         pupil.widen_until_tight(&lenses);
         pupil.coded = Coded::new(masked, train, &lenses, &pupil.sensor, half_size);
         Ok(pupil)
+    }
+
+    /// As [`Self::new`], with rays aimed at all of element `first` of the lens from behind, wherever they
+    /// may end: what serves where outlines do not follow from place to place, and checks what does.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::new`].
+    pub fn of_rear(
+        train: &OpticalTrain,
+        first: usize,
+        wavelengths: &[f64],
+        sensor_z: f64,
+        half_size: [f64; 2],
+    ) -> Result<Self, ExitPupilError> {
+        Self::new(&train.rear_part(first), wavelengths, sensor_z, half_size)
+    }
+
+    /// The lenslets through which light comes, if it does.
+    #[must_use]
+    pub fn lenslets(&self) -> Option<&LensletPupil> {
+        self.lenslets.as_deref()
     }
 
     /// Whether one radius of nodes serves the whole sensor; otherwise a coarser grid of nodes does,
@@ -220,6 +267,10 @@ impl ExitPupil {
     /// Neighbouring points of the square give neighbouring directions.
     #[must_use]
     pub fn sample(&self, film: DVec2, u: [f64; 2]) -> Option<PupilSample> {
+        if let Some(lenslets) = &self.lenslets {
+            let (slopes, area) = lenslets.draw(self.film_point(film), u)?;
+            return Some(self.weigh(slopes, area));
+        }
         let bound = self.bound(film)?;
         let Some(seen) = self.coded.as_ref().and_then(|coded| coded.seen_from(film)) else {
             let (slopes, area) = bound.draw(u)?;
@@ -399,6 +450,9 @@ fn without_masks(train: &OpticalTrain) -> OpticalTrain {
 pub fn without_filters(train: &OpticalTrain) -> OpticalTrain {
     let mut train = train.clone();
     for element in &mut train.elements {
+        if let Part::MicrolensArray(array) = &element.part {
+            element.part = Part::MicrolensArray(array.without_filters());
+        }
         if let Part::Filter(filter) = &element.part {
             let opening = Opening::Circle { radius: filter.radius() };
             element.part = Part::Aperture(opening.into());

@@ -339,7 +339,12 @@ fn shape_of(element: &super::Element) -> String {
                 words.push(format!("mask of {} x {} pixels", picture.pixels[0], picture.pixels[1]));
             }
         },
-        _ => {}
+        Part::MicrolensArray(array) => {
+            let [width, height] = array.half_size.map(|half| 2.0 * half);
+            let pitch = array.lattice.pitch;
+            words.push(format!("lenslets every {pitch} mm on {width} x {height} mm"));
+        }
+        Part::ThinLens(_) | Part::Filter(_) => {}
     }
     if !element.frame.is_axial() {
         words.push("tilted or decentred".to_owned());

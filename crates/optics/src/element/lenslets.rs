@@ -1,0 +1,270 @@
+//! Rays at an array of lenslets: one arithmetic for blocks and for single rays.
+//!
+//! Openings lie in the array's plane. A block's rays are taken to the faces of the cells in which they
+//! cross the plane; those that leave such a cell on the way are left for the single-ray code, which takes
+//! them to the face of the cell that they get to.
+
+use std::sync::Arc;
+
+use super::lattice::Grid;
+use super::microlens_array::{Gaps, Lenslet, LensletShape, MicrolensArray};
+use super::rays::{Block, Ray};
+use super::refract::{Refracted, Refraction, each_lane};
+use super::step::Clip;
+use super::surface::Surface;
+
+/// Cells that a ray is followed into on its way from the plane to a face.
+const MOST_CELLS: u32 = 4;
+
+/// An array at one wavelength, met from one side.
+#[derive(Debug, Clone)]
+pub(crate) struct Lenslets {
+    pub(crate) array: Arc<MicrolensArray>,
+    kinds: Kinds,
+    /// The share of light that each type passes; all of it when empty.
+    pub(crate) transmissions: Vec<f64>,
+}
+
+/// What each type of lenslet does, in the order of the types.
+#[derive(Debug, Clone)]
+enum Kinds {
+    /// Thin lenses of these powers (1/mm).
+    Thin(Vec<f64>),
+    /// Faces, and what is between them.
+    Faces { faces: Vec<Refraction>, flat: Refraction },
+}
+
+/// A point of the array's plane.
+struct Place {
+    /// Which cell.
+    index: [f64; 2],
+    /// From the lenslet's centre (mm).
+    away: [f64; 2],
+    /// The lenslet acts.
+    open: bool,
+    /// Light goes on.
+    clear: bool,
+}
+
+impl Lenslets {
+    /// `before` and `behind` are indices in the direction of travel; `sign` is −1 for light that is
+    /// traced from the sensor.
+    pub(crate) fn new(
+        array: &Arc<MicrolensArray>,
+        [before, behind]: [f64; 2],
+        sign: f64,
+        transmissions: Vec<f64>,
+    ) -> Self {
+        let (mut powers, mut faces) = (Vec::new(), Vec::new());
+        for one in &array.types {
+            match one {
+                Lenslet::Thin(power) => powers.push(sign * power),
+                Lenslet::Face(face) => faces.push(Refraction::new(face.clone(), before, behind)),
+            }
+        }
+        let flat = Refraction::new(Surface::sphere(0.0), before, behind);
+        let kinds =
+            if faces.is_empty() { Kinds::Thin(powers) } else { Kinds::Faces { faces, flat } };
+        Self { array: Arc::clone(array), kinds, transmissions }
+    }
+
+    /// Takes a block through an array on the axis at `z` (mm); says whether rays are left to be decided
+    /// one by one.
+    #[inline(always)]
+    pub(crate) fn lanes(&self, block: &mut Block, element: usize, z: f64, clip: Clip) -> bool {
+        use Grid::{Hexagonal as Hex, Square as Quad};
+        use LensletShape::{Hexagonal, Round, Square};
+        // A kernel for each packing and shape, in which there is nothing to choose.
+        match (self.array.lattice.grid, self.array.shape) {
+            (Quad, Square) => self.lanes_of((Quad, Square), block, element, z, clip),
+            (Quad, Round) => self.lanes_of((Quad, Round), block, element, z, clip),
+            (Quad, Hexagonal) => self.lanes_of((Quad, Hexagonal), block, element, z, clip),
+            (Hex, Square) => self.lanes_of((Hex, Square), block, element, z, clip),
+            (Hex, Round) => self.lanes_of((Hex, Round), block, element, z, clip),
+            (Hex, Hexagonal) => self.lanes_of((Hex, Hexagonal), block, element, z, clip),
+        }
+    }
+
+    #[inline(always)]
+    fn lanes_of(
+        &self,
+        form: (Grid, LensletShape),
+        block: &mut Block,
+        element: usize,
+        z: f64,
+        clip: Clip,
+    ) -> bool {
+        match &self.kinds {
+            Kinds::Thin(powers) => match powers[..] {
+                [power] => {
+                    each_lane(block, element, z, |ray| self.at_thin(form, ray, clip, |_| power))
+                }
+                _ => each_lane(block, element, z, |ray| {
+                    self.at_thin(form, ray, clip, |index| powers[self.array.type_at(index)])
+                }),
+            },
+            Kinds::Faces { faces, flat } => match &faces[..] {
+                [one] if one.surface.curvature != 0.0 && one.surface.conic == 0.0 => {
+                    each_lane(block, element, z, |ray| {
+                        let near = |ray| one.at_near_root::<true>(ray, f64::INFINITY);
+                        self.at_face(form, ray, clip, (near, flat))
+                    })
+                }
+                _ => each_lane(block, element, z, |ray| Refracted {
+                    hit: false,
+                    ..flat.at_plane(ray, f64::INFINITY)
+                }),
+            },
+        }
+    }
+
+    #[inline(always)]
+    fn place(&self, (grid, shape): (Grid, LensletShape), [x, y]: [f64; 2], clip: Clip) -> Place {
+        let array = &*self.array;
+        let cell = array.lattice.cell_of(grid, x, y);
+        let passes_gaps = array.gaps == Gaps::Clear;
+        let inside = array.is_open_as(shape, cell.local);
+        let off = clip == Clip::Off;
+        Place {
+            index: cell.index,
+            away: cell.away,
+            open: inside | (off & !passes_gaps),
+            clear: off | (array.is_inside(x, y) & (inside | passes_gaps)),
+        }
+    }
+
+    #[inline(always)]
+    fn at_thin(
+        &self,
+        form: (Grid, LensletShape),
+        ray: Ray,
+        clip: Clip,
+        power: impl Fn([f64; 2]) -> f64,
+    ) -> Refracted {
+        let (there, t) = to_plane(ray);
+        let [x, y, _] = there.position;
+        let place = self.place(form, [x, y], clip);
+        let power = if place.open { power(place.index) } else { 0.0 };
+        let [u, v, w] = ray.direction;
+        let (u, v) = (u - place.away[0] * power * w, v - place.away[1] * power * w);
+        let length = (u * u + v * v + w * w).sqrt();
+        let scale = if power == 0.0 { 1.0 } else { 1.0 / length };
+        let direction = [u * scale, v * scale, w * scale];
+        let hit = goes_there(t) & (length < f64::INFINITY);
+        Refracted { ray: Ray { direction, ..there }, t, hit, clear: place.clear, through: true }
+    }
+
+    /// A ray at the face of the cell in which it crosses the plane; no hit where the face is met in
+    /// another cell.
+    #[inline(always)]
+    fn at_face(
+        &self,
+        form: (Grid, LensletShape),
+        ray: Ray,
+        clip: Clip,
+        (face, flat): (impl Fn(Ray) -> Refracted, &Refraction),
+    ) -> Refracted {
+        let (there, _) = to_plane(ray);
+        let [x, y, _] = there.position;
+        let place = self.place(form, [x, y], clip);
+        let centre = [x - place.away[0], y - place.away[1]];
+        let met = moved(face(moved(ray, [-centre[0], -centre[1]])), centre);
+        let cell = self.array.lattice.cell_of(form.0, met.ray.position[0], met.ray.position[1]);
+        let same = (cell.index[0] == place.index[0]) & (cell.index[1] == place.index[1]);
+        let gap = flat.at_plane(ray, f64::INFINITY);
+        let met = Refracted { hit: met.hit & same, ..met };
+        // Where nothing passes, a ray ends in the plane.
+        let on_face = place.open & place.clear;
+        Refracted { clear: place.clear, ..if on_face { met } else { gap } }
+    }
+
+    /// A ray in the array's frame, exactly by the rule, and the type of lenslet that it meets.
+    pub(crate) fn exactly(&self, ray: Ray, clip: Clip) -> (Refracted, Option<usize>) {
+        let form = (self.array.lattice.grid, self.array.shape);
+        let (there, _) = to_plane(ray);
+        let [x, y, _] = there.position;
+        let place = self.place(form, [x, y], clip);
+        let kind = self.array.type_at(place.index);
+        let acting = place.open.then_some(kind);
+        match &self.kinds {
+            Kinds::Thin(powers) => {
+                (self.at_thin(form, ray, clip, |index| powers[self.array.type_at(index)]), acting)
+            }
+            Kinds::Faces { flat, .. } if !(place.open && place.clear) => {
+                (Refracted { clear: place.clear, ..flat.at_plane(ray, f64::INFINITY) }, acting)
+            }
+            Kinds::Faces { faces, .. } => {
+                let centre = [x - place.away[0], y - place.away[1]];
+                (self.on_faces(faces, ray, place.index, centre), acting)
+            }
+        }
+    }
+
+    /// A ray at the faces, from the cell on in which it crosses the plane.
+    fn on_faces(
+        &self,
+        faces: &[Refraction],
+        ray: Ray,
+        mut index: [f64; 2],
+        mut centre: [f64; 2],
+    ) -> Refracted {
+        let array = &*self.array;
+        let mut last = None;
+        for _ in 0..MOST_CELLS {
+            let face = &faces[array.type_at(index)];
+            let local = moved(ray, [-centre[0], -centre[1]]);
+            let met = moved(face.exactly(local, f64::INFINITY), centre);
+            if !met.hit {
+                return Refracted { clear: true, ..met };
+            }
+            let [x, y, _] = met.ray.position;
+            let found = array.lattice.cell(x, y).index;
+            if found == index {
+                return Refracted { clear: true, ..met };
+            }
+            (last, index, centre) = (Some(met), found, array.lattice.centre(found));
+        }
+        // It runs into a wall between two faces.
+        let blocked = Refracted { ray, t: 0.0, hit: true, clear: false, through: true };
+        last.map_or(blocked, |met| Refracted { clear: false, ..met })
+    }
+}
+
+#[inline(always)]
+fn goes_there(t: f64) -> bool {
+    (t > -super::refract::TOUCH) & (t < f64::INFINITY)
+}
+
+#[inline(always)]
+fn to_plane(ray: Ray) -> (Ray, f64) {
+    let t = -ray.position[2] / ray.direction[2];
+    let mut there = ray.advanced(t);
+    there.position[2] = 0.0;
+    (there, t)
+}
+
+/// What is moved across the axis.
+trait Across {
+    fn across(self, by: [f64; 2]) -> Self;
+}
+
+impl Across for Ray {
+    #[inline(always)]
+    fn across(mut self, by: [f64; 2]) -> Self {
+        self.position[0] += by[0];
+        self.position[1] += by[1];
+        self
+    }
+}
+
+impl Across for Refracted {
+    #[inline(always)]
+    fn across(self, by: [f64; 2]) -> Self {
+        Self { ray: self.ray.across(by), ..self }
+    }
+}
+
+#[inline(always)]
+fn moved<T: Across>(what: T, by: [f64; 2]) -> T {
+    what.across(by)
+}
