@@ -8,6 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use etendue_optics::train::Focus;
 use etendue_scene::import::Strictness;
 use etendue_scene::{LoadOptions, Reach};
+use etendue_tracer::LayerSpec;
 
 use crate::lens::parse_focus;
 
@@ -196,8 +197,7 @@ pub(crate) struct SceneArguments {
         value_name = "LIST",
         value_delimiter = ',',
         value_parser = parse::layer,
-        help = "Layers to write: depth, distance, normal, position, ids, coverage, flat, facing, \
-                albedo, uv, material_id, alpha"
+        help = format!("Layers to write: {}", LayerSpec::NAMES.join(", "))
     )]
     pub(crate) layers: Option<Vec<String>>,
     /// Which axis points up in OBJ and PLY files, which do not say

@@ -4,8 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
+use etendue_tracer::layer::{self, Kept, Taken};
 
-use crate::description::{Description, describe, id_definition};
 use crate::expose::BandFilm;
 use crate::output::{Channel, Layer, Values};
 
@@ -22,6 +22,7 @@ pub enum Precision {
 #[derive(Debug, Clone)]
 pub(crate) struct FilmLayer {
     pub(crate) spec: LayerSpec,
+    row: layer::Layer,
     names: Vec<String>,
     planes: Vec<Values>,
 }
@@ -63,19 +64,11 @@ impl Rows<'_> {
             Self::U32(rows) => pairs.for_each(|(&at, &value)| rows[at as usize] = value as u32),
         }
     }
-
-    pub(crate) fn f32(&mut self) -> Option<&mut [f32]> {
-        if let Self::F32(rows) = self { Some(rows) } else { None }
-    }
-
-    pub(crate) fn f64(&mut self) -> Option<&mut [f64]> {
-        if let Self::F64(rows) = self { Some(rows) } else { None }
-    }
 }
 
 /// The nearest f32.
 #[expect(clippy::cast_possible_truncation, reason = "single precision was asked for")]
-pub(crate) fn single(value: f64) -> f32 {
+fn single(value: f64) -> f32 {
     value as f32
 }
 
@@ -86,34 +79,35 @@ pub(crate) struct Strip<'a> {
     pub(crate) top: u32,
     /// Rows.
     pub(crate) height: u32,
-    /// Each layer's planes.
-    pub(crate) layers: Vec<(LayerSpec, Vec<Rows<'a>>)>,
+    /// Each layer's part.
+    pub(crate) layers: Vec<StripLayer<'a>>,
+}
+
+/// The part of one layer in a strip.
+#[derive(Debug)]
+pub(crate) struct StripLayer<'a> {
+    pub(crate) spec: LayerSpec,
+    pub(crate) taken: Taken,
+    pub(crate) planes: Vec<Rows<'a>>,
 }
 
 impl FilmLayer {
     /// An empty layer; the picture of a tracer of light has a plane for each of `bands`.
     pub(crate) fn new(spec: LayerSpec, pixels: usize, precision: Precision, bands: &Bands) -> Self {
-        let plane = || match (spec, precision) {
-            (LayerSpec::Ids | LayerSpec::MaterialId, _) => Values::U32(vec![0; pixels]),
-            (
-                LayerSpec::Flat
-                | LayerSpec::Facing
-                | LayerSpec::Albedo
-                | LayerSpec::Radiance
-                | LayerSpec::Alpha
-                | LayerSpec::Backdrop
-                | LayerSpec::Coverage,
-                _,
-            )
-            | (_, Precision::Single) => Values::F32(vec![0.0; pixels]),
-            (_, Precision::Double) => Values::F64(vec![0.0; pixels]),
+        let row = spec.row();
+        let plane = || match (row.kept, precision) {
+            (Kept::Counted, _) => Values::U32(vec![0; pixels]),
+            (Kept::Shown, _) | (Kept::Measured, Precision::Single) => {
+                Values::F32(vec![0.0; pixels])
+            }
+            (Kept::Measured, Precision::Double) => Values::F64(vec![0.0; pixels]),
         };
         let names: Vec<String> = match spec {
             LayerSpec::Radiance => bands.names(),
-            _ => describe(spec).channels.iter().map(|name| (*name).to_owned()).collect(),
+            _ => row.channels.iter().map(|name| (*name).to_owned()).collect(),
         };
         let planes = names.iter().map(|_| plane()).collect();
-        Self { spec, names, planes }
+        Self { spec, row, names, planes }
     }
 
     /// Takes the light of a tracer out of its bands, whose place red, green and blue take; `None`
@@ -138,27 +132,24 @@ impl FilmLayer {
     }
 
     /// The layers as they are written; `root` puts the picture at the root of the file, without a
-    /// name. Each kind of id is a layer of its own, `Id.object.X`: the form that Blender reads.
+    /// name.
     pub(crate) fn into_layers(self, root: bool) -> Vec<Layer> {
-        let Description { name, look, meaning, .. } = describe(self.spec);
+        let files = self.row.names_in_files();
+        let layer::Layer { name, look, meaning, apart, .. } = self.row;
         let owned = |(k, v): &(&str, &str)| ((*k).to_owned(), (*v).to_owned());
         let meaning: Vec<_> = meaning.iter().map(owned).collect();
-        let planes = self.names.into_iter().zip(self.planes);
-        if self.spec == LayerSpec::Ids {
-            let layer = |(channel, values): (String, Values)| {
-                let definition = id_definition(&channel);
-                let definition = ("definition".to_owned(), definition.to_owned());
-                Layer {
-                    name: format!("{name}.{channel}"),
-                    look,
-                    channels: vec![Channel { name: "X".to_owned(), values }],
-                    meaning: std::iter::once(definition).chain(meaning.clone()).collect(),
-                }
+        if let Some(definitions) = apart {
+            let layer = |((name, values), definition): ((String, Values), &&str)| {
+                let definition = owned(&("definition", definition));
+                let channels = vec![Channel { name: "X".to_owned(), values }];
+                let meaning = std::iter::once(definition).chain(meaning.clone()).collect();
+                Layer { name, look, channels, meaning }
             };
-            return planes.map(layer).collect();
+            return files.into_iter().zip(self.planes).zip(definitions).map(layer).collect();
         }
+        let planes = self.names.into_iter().zip(self.planes);
         let channels = planes.map(|(name, values)| Channel { name, values }).collect();
-        let name = if root { String::new() } else { name.to_owned() };
+        let name = if root { String::new() } else { name.into_owned() };
         vec![Layer { name, look, channels, meaning }]
     }
 }
@@ -178,7 +169,8 @@ pub(crate) fn strips<'a>(
     let chunk = width as usize * strip_height as usize;
     for layer in layers {
         for strip in &mut strips {
-            strip.layers.push((layer.spec, Vec::new()));
+            let (spec, taken) = (layer.spec, layer.row.taken);
+            strip.layers.push(StripLayer { spec, taken, planes: Vec::new() });
         }
         for plane in &mut layer.planes {
             let rows: Vec<Rows<'_>> = match plane {
@@ -188,8 +180,8 @@ pub(crate) fn strips<'a>(
                 Values::U16(_) => Vec::new(),
             };
             for (strip, rows) in strips.iter_mut().zip(rows) {
-                if let Some((_, planes)) = strip.layers.last_mut() {
-                    planes.push(rows);
+                if let Some(layer) = strip.layers.last_mut() {
+                    layer.planes.push(rows);
                 }
             }
         }

@@ -12,8 +12,6 @@
 //! | [`report`] | what a render did and what it cost |
 //! | [`Watch`] | who is told how far a render is, and may stop it |
 
-mod backdrop;
-mod description;
 pub mod expose;
 mod film;
 mod lighting;

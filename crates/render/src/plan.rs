@@ -15,7 +15,6 @@ use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Needs, TextureScope};
 use serde::Serialize;
 
-use crate::description::{Description, describe};
 use crate::expose;
 use crate::film::Precision;
 use crate::output::Outputs;
@@ -156,13 +155,9 @@ impl Plan {
     /// The layers of the picture by the names that they will have in files; the picture's is empty.
     #[must_use]
     pub fn names(&self, scene: &Scene) -> Vec<String> {
-        let names = |layer: &LayerSpec| -> Vec<String> {
-            let Description { name, channels, .. } = describe(*layer);
-            match *layer {
-                layer if Some(layer) == scene.picture => vec![String::new()],
-                LayerSpec::Ids => channels.iter().map(|id| format!("{name}.{id}")).collect(),
-                _ => vec![name.to_owned()],
-            }
+        let names = |layer: &LayerSpec| match Some(*layer) == scene.picture {
+            true => vec![String::new()],
+            false => layer.row().names_in_files(),
         };
         let spectrum = expose::has_spectrum(scene).then(|| expose::SPECTRUM.to_owned());
         self.layers.iter().flat_map(names).chain(spectrum).collect()

@@ -14,10 +14,10 @@ use etendue_camera::{
     BandGroup, Camera, CameraRays, FilmSamples, LensCamera, PixelSamples, Sampler, squares_of_pair,
 };
 use etendue_geometry::HitBatch;
-use etendue_tracer::{LayerSpec, Scratch};
+use etendue_tracer::Scratch;
+use etendue_tracer::layer::{Columns, Taken};
 use rayon::prelude::*;
 
-use crate::backdrop;
 use crate::film::{FilmLayer, Rows, Strip, strips, take};
 use crate::radiance::Numbers;
 use crate::tiles::{RayCounts, TILE, Tile};
@@ -87,7 +87,7 @@ pub(crate) struct Memory {
     pub(crate) rays: CameraRays,
     pub(crate) values: Vec<f64>,
     pub(crate) hits: HitBatch,
-    pub(crate) colors: [Vec<f64>; 3],
+    pub(crate) columns: Columns,
     pub(crate) scratch: Scratch,
     pub(crate) traffic: RayCounts,
     film: FilmSamples,
@@ -210,12 +210,14 @@ fn split<'s>(
 
 /// Writes the means of a pixel of a strip.
 fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usize, samples: u32) {
-    for ((layer, planes), sums) in strip.layers.iter_mut().zip(sums.chunks(bands)) {
-        if let (LayerSpec::Alpha, &[hit, all, none]) = (*layer, sums) {
-            planes[0].put(index, backdrop::share([hit, all, none].map(Sum::total)));
+    for (layer, sums) in strip.layers.iter_mut().zip(sums.chunks(bands)) {
+        if let (Taken::PictureShare, &[part, all, _]) = (layer.taken, sums) {
+            let (part, all) = (part.total(), all.total());
+            let share = if all > 0.0 { (part / all).clamp(0.0, 1.0) } else { 0.0 };
+            layer.planes[0].put(index, share);
             continue;
         }
-        for (plane, sum) in planes.iter_mut().zip(sums) {
+        for (plane, sum) in layer.planes.iter_mut().zip(sums) {
             Rows::put(plane, index, sum.total() / f64::from(samples));
         }
     }

@@ -7,11 +7,11 @@ use etendue_accel::Accel;
 use etendue_camera::{BandGroup, Camera, CameraRays};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_optics::element::FateCounts;
-use etendue_tracer::{LayerSpec, NormalKind, RayStats, SceneView, Traced};
+use etendue_tracer::layer::{Columns, Seen};
+use etendue_tracer::{LayerSpec, RayStats, SceneView, Traced};
 use rayon::prelude::*;
 
-use crate::backdrop;
-use crate::film::{FilmLayer, Rows, Strip, single, strips, take};
+use crate::film::{FilmLayer, Strip, strips, take};
 use crate::output::{Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::samples::{Averaged, Averaging, Memory, Sampling};
@@ -116,9 +116,8 @@ impl Job<'_> {
     /// Whether a layer without light is a mean over samples.
     fn is_averaged(&self, layer: LayerSpec) -> bool {
         let many = self.sampling.samples > 1 || self.camera.lens().is_some();
-        // What is behind the picture is where the picture's own samples are.
-        let behind = matches!(layer, LayerSpec::Alpha | LayerSpec::Backdrop);
-        layer.is_averaged() && (many || (behind && self.light.is_some()))
+        let lit = self.light.is_some() && layer.row().taken.with_picture();
+        layer.is_averaged() && (many || lit)
     }
 
     /// Takes the passes and returns the samples that every pixel has after the last that was
@@ -186,9 +185,12 @@ impl Job<'_> {
             batch.aim_at_centres(self.camera, tile);
             self.accel.closest(&batch.rays, &mut batch.hits);
             batch.traced += batch.rays.len() as u64;
-            for (layer, planes) in &mut strip.layers {
-                if !self.write_batch(*layer, planes, batch) {
-                    self.write(*layer, planes, batch, tile, width);
+            let Batch { rays, hits, places, values, .. } = &mut *batch;
+            let seen = self.seen(Traced { rays, hits });
+            for layer in &mut strip.layers {
+                layer.spec.fill(&seen, values);
+                for (plane, values) in layer.planes.iter_mut().zip(&*values) {
+                    plane.scatter(places, values);
                 }
             }
             watcher.did(batch.rays.len() as u64)?;
@@ -196,129 +198,9 @@ impl Job<'_> {
         Ok(())
     }
 
-    fn colors(&self, layer: LayerSpec, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
-        match layer {
-            LayerSpec::Facing => self.surroundings.facings(traced, out),
-            LayerSpec::Albedo => self.surroundings.albedos(traced, out),
-            LayerSpec::Alpha => backdrop::alpha(traced, out),
-            LayerSpec::Backdrop => backdrop::radiance(self.light.as_ref(), traced, out),
-            _ => self.surroundings.flats(traced, out),
-        }
-    }
-
-    /// Writes the layers that most renders have, a whole batch at a time; `false` for others.
-    fn write_batch(&self, layer: LayerSpec, planes: &mut [Rows<'_>], batch: &mut Batch) -> bool {
-        let Batch { rays, hits, places, numbers, .. } = batch;
-        let traced = Traced { rays, hits };
-        match layer {
-            LayerSpec::Distance => planes[0].scatter(places, &hits.t),
-            LayerSpec::Depth => {
-                self.surroundings.depths(traced, &mut numbers[0]);
-                planes[0].scatter(places, &numbers[0]);
-            }
-            LayerSpec::Normal { space, kind: NormalKind::Geometric } => {
-                self.surroundings.geometric_normals(traced, space, numbers);
-                for (plane, values) in planes.iter_mut().zip(numbers) {
-                    plane.scatter(places, values);
-                }
-            }
-            LayerSpec::Flat
-            | LayerSpec::Facing
-            | LayerSpec::Albedo
-            | LayerSpec::Alpha
-            | LayerSpec::Backdrop => {
-                self.colors(layer, traced, numbers);
-                for (plane, values) in planes.iter_mut().zip(numbers) {
-                    plane.scatter(places, values);
-                }
-            }
-            _ => return false,
-        }
-        true
-    }
-
-    /// Writes one layer of a tile whose chief rays were traced.
-    fn write(
-        &self,
-        layer: LayerSpec,
-        planes: &mut [Rows<'_>],
-        batch: &Batch,
-        tile: Tile,
-        width: u32,
-    ) {
-        let traced = Traced { rays: &batch.rays, hits: &batch.hits };
-        let around = &self.surroundings;
-        let index = |i: usize| {
-            let (x, y) = batch.pixels[i];
-            tile.index(x, y, width)
-        };
-        match layer {
-            // Written a batch at a time.
-            LayerSpec::Depth
-            | LayerSpec::Distance
-            | LayerSpec::Flat
-            | LayerSpec::Facing
-            | LayerSpec::Albedo
-            | LayerSpec::Alpha
-            | LayerSpec::Backdrop => {}
-            LayerSpec::Normal { space, kind } => {
-                each(planes, batch, index, |i| around.normal(traced, i, kind, space).to_array());
-            }
-            LayerSpec::Position { space } => {
-                each(planes, batch, index, |i| around.position(traced, i, space).to_array());
-            }
-            LayerSpec::Ids => {
-                each(planes, batch, index, |i| around.ids(&batch.hits, i).map(f64::from));
-            }
-            LayerSpec::Coverage => {
-                each(planes, batch, index, |i| [f64::from(u8::from(batch.hits.is_hit(i)))]);
-            }
-            LayerSpec::Uv => each(planes, batch, index, |i| around.first_uv(&batch.hits, i)),
-            LayerSpec::MaterialId => {
-                each(planes, batch, index, |i| [f64::from(around.material_id(&batch.hits, i))]);
-            }
-            // Filled by the radiance pass.
-            LayerSpec::Radiance => {}
-        }
-    }
-}
-
-/// Puts `value` of each ray at its pixel. All planes of a layer are of one type, so it is asked for
-/// once a batch.
-fn each<const N: usize>(
-    planes: &mut [Rows<'_>],
-    batch: &Batch,
-    index: impl Fn(usize) -> usize,
-    value: impl Fn(usize) -> [f64; N],
-) {
-    let rays = 0..batch.rays.len();
-    match planes.first() {
-        Some(Rows::F64(_)) => {
-            let mut planes: Vec<&mut [f64]> = planes.iter_mut().filter_map(Rows::f64).collect();
-            for i in rays {
-                let index = index(i);
-                for (plane, value) in planes.iter_mut().zip(value(i)) {
-                    plane[index] = value;
-                }
-            }
-        }
-        Some(Rows::F32(_)) => {
-            let mut planes: Vec<&mut [f32]> = planes.iter_mut().filter_map(Rows::f32).collect();
-            for i in rays {
-                let index = index(i);
-                for (plane, value) in planes.iter_mut().zip(value(i)) {
-                    plane[index] = single(value);
-                }
-            }
-        }
-        _ => {
-            for i in rays {
-                let index = index(i);
-                for (plane, value) in planes.iter_mut().zip(value(i)) {
-                    plane.put(index, value);
-                }
-            }
-        }
+    /// What layers are filled from.
+    fn seen<'b>(&'b self, traced: Traced<'b>) -> Seen<'b> {
+        Seen { scene: self.surroundings, traced, light: self.light.as_ref().map(|pass| pass.stage) }
     }
 }
 
@@ -346,16 +228,16 @@ impl Averaged for Colors<'_> {
     }
 
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
-        let Memory { rays: CameraRays { rays, .. }, hits, colors, values, traffic, .. } = memory;
+        let Memory { rays: CameraRays { rays, .. }, hits, columns, values, traffic, .. } = memory;
         hits.detail = self.job.detail;
         self.job.accel.closest(rays, hits);
         traffic.chief_rays += rays.len() as u64;
         let count = 3 * self.layers.len();
         values.resize(rays.len() * count, 0.0);
         for (k, layer) in self.layers.iter().enumerate() {
-            self.job.colors(*layer, Traced { rays, hits }, colors);
+            layer.fill(&self.job.seen(Traced { rays, hits }), columns);
             for c in bands.clone() {
-                for (values, color) in values.chunks_mut(count).zip(&colors[c]) {
+                for (values, color) in values.chunks_mut(count).zip(&columns[c]) {
                     values[3 * k + c] = *color;
                 }
             }
@@ -410,8 +292,7 @@ struct Batch {
     /// The pixel of each chief ray, from the tile's corner, and its place in the strip's rows.
     pixels: Vec<(u32, u32)>,
     places: Vec<u32>,
-    /// One number of each ray, three times.
-    numbers: [Vec<f64>; 3],
+    values: Columns,
     traced: u64,
 }
 
@@ -425,7 +306,7 @@ impl Batch {
             tile: None,
             pixels: Vec::new(),
             places: Vec::new(),
-            numbers: Default::default(),
+            values: Columns::default(),
             traced: 0,
         }
     }

@@ -10,7 +10,7 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`layer`] | the layers of a render, by name |
+//! | [`layer`] | the table of layers, and what fills each |
 //! | [`reference`](mod@reference) | what a ray meets first, without light |
 //! | [`spec`] | materials and lights as scene files write them |
 //! | [`material`], [`texture`] | surfaces, ready to be looked up |
@@ -22,7 +22,6 @@
 //! | [`direct`], [`whitted`], [`path`] | the tracers |
 //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
-mod batches;
 pub mod bsdf;
 pub mod direct;
 pub mod emitters;
@@ -48,7 +47,7 @@ pub use direct::Direct;
 pub use emitters::Emitters;
 pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};
-pub use layer::{LayerSpec, NormalKind, Space};
+pub use layer::{Layer, LayerSpec, NormalKind, Space};
 pub use light::{EnvironmentImage, Light, LightKind, Lights};
 pub use material::{Color, Emission, Ior, Material, Paint, Scattering, TextureScope};
 pub use path::Path;

@@ -5,9 +5,7 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vertices};
 
 use crate::footprint::mean_of_squares;
-use crate::{
-    Color, Footprint, Image, LayerSpec, Material, NormalKind, Paint, Pixel, Space, TextureUse,
-};
+use crate::{Color, Footprint, Image, Material, NormalKind, Paint, Pixel, Space, TextureUse};
 
 /// The frame that depths and camera-space vectors refer to.
 #[derive(Debug, Clone, Copy)]
@@ -62,18 +60,6 @@ pub struct Traced<'a> {
 }
 
 impl SceneView<'_> {
-    /// Depth of hit `i` along the camera's axis (m), `+inf` for a miss.
-    #[must_use]
-    pub fn depth(&self, traced: Traced<'_>, i: usize) -> f64 {
-        let t = traced.hits.t[i];
-        if t == f64::INFINITY {
-            return t;
-        }
-        let forward = self.view.forward();
-        let start = (traced.rays.origin(i) - self.view.origin).dot(forward);
-        start + t * traced.rays.direction(i).dot(forward)
-    }
-
     /// The point that ray `i` hit (m), `+inf` for a miss. In camera space nothing is lost far from
     /// the world's origin.
     #[must_use]
@@ -395,39 +381,6 @@ impl Needs {
             uvs: self.uvs || other.uvs,
             light: self.light || other.light,
             ambient: self.ambient || other.ambient,
-        }
-    }
-}
-
-impl LayerSpec {
-    /// What this layer needs.
-    #[must_use]
-    pub fn needs(self) -> Needs {
-        let none = Needs::default();
-        match self {
-            Self::Depth
-            | Self::Distance
-            | Self::Position { .. }
-            | Self::Ids
-            | Self::MaterialId
-            | Self::Alpha
-            | Self::Coverage => none,
-            Self::Backdrop => Needs { light: true, ..none },
-            Self::Uv => Needs { surface: true, uvs: true, ..none },
-            Self::Normal { kind, .. } => {
-                Needs { surface: true, normals: kind == NormalKind::Shading, ..none }
-            }
-            Self::Flat | Self::Albedo => {
-                Needs { surface: true, materials: true, uvs: true, ..none }
-            }
-            Self::Facing | Self::Radiance => Needs {
-                surface: true,
-                normals: true,
-                materials: true,
-                uvs: true,
-                light: self == Self::Radiance,
-                ambient: self == Self::Facing,
-            },
         }
     }
 }

@@ -13,11 +13,13 @@ use etendue_tracer::{Color, EnvironmentImage, LayerSpec, LightKind, Material, Pa
 pub(crate) fn bands(scene: &Scene) -> BandChoice {
     let rgb = || BandChoice { bands: Bands::Rgb, error: None };
     match (&scene.sensor, scene.picture) {
-        (None, _) | (_, None | Some(LayerSpec::Flat | LayerSpec::Facing)) => rgb(),
-        (Some(sensor), _) => sensor.bands_under(&illumination(scene)).unwrap_or_else(|_| {
-            // The render refuses the light, and says which one.
-            BandChoice { bands: sensor.bands().clone(), error: None }
-        }),
+        (Some(sensor), Some(LayerSpec::Radiance)) => {
+            sensor.bands_under(&illumination(scene)).unwrap_or_else(|_| {
+                // The render refuses the light, and says which one.
+                BandChoice { bands: sensor.bands().clone(), error: None }
+            })
+        }
+        _ => rgb(),
     }
 }
 
@@ -33,11 +35,11 @@ pub(crate) fn explain_bands(scene: &Scene, chosen: &BandChoice) -> (String, Stri
     };
     let because = match (&scene.sensor, scene.picture, chosen.error) {
         (None, ..) => "no sensor or glass in the scene tells more apart".to_owned(),
-        (Some(_), None | Some(LayerSpec::Flat | LayerSpec::Facing), _) => {
-            "the picture is base colour, which has three parts".to_owned()
+        (Some(_), Some(LayerSpec::Radiance), None) => {
+            "as many as the sensor can tell apart".to_owned()
         }
-        (Some(_), Some(_), None) => "as many as the sensor can tell apart".to_owned(),
-        (Some(_), Some(_), Some(error)) => in_words(error, &chosen.bands),
+        (Some(_), Some(LayerSpec::Radiance), Some(error)) => in_words(error, &chosen.bands),
+        (Some(_), ..) => "the picture is base colour, which has three parts".to_owned(),
     };
     (choice, because)
 }

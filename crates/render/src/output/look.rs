@@ -1,60 +1,29 @@
 //! From values to colours: how a layer is made visible in a preview.
 
+pub use etendue_tracer::layer::Look;
 use rayon::prelude::*;
 
 use super::{Layer, Values};
 
-/// What the numbers of a layer are, and so how a preview shows them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Look {
-    /// Linear light, one channel (grey) or three (red, green, blue), 1 being full scale. Shown
-    /// through the sRGB curve; what is brighter than 1 is clipped.
-    Color,
-    /// One channel of distances: the nearest hundredth white, farther ones darker, linear in the
-    /// reciprocal; a miss (not finite) black.
-    Distance,
-    /// Three channels of a unit vector n, shown as (n + 1)/2; a miss (the zero vector)
-    /// transparent.
-    Direction,
-    /// One to three channels, each stretched from its least to its greatest finite value: positions,
-    /// texture coordinates. A pixel that is not finite is transparent.
-    Extent,
-    /// Integers that name things, each in a colour of its own; 0 (a miss) transparent. Only the
-    /// first channel is shown.
-    Ids,
-    /// One channel of shares in 0..=1, linear grey: coverage, vignetting.
-    Share,
-    /// Any number of channels of linear light, shown as the grey of their mean.
-    Cube,
-    /// One channel or three of a sensor's digital numbers of so many bits. Not a preview: a PNG
-    /// holds the numbers themselves, unscaled, in 16 bits.
-    Counts {
-        /// Bits of a number, 1 to 16.
-        bits: u8,
-    },
-}
-
-impl Look {
-    /// What `layer` lacks to be shown this way, if anything.
-    pub(super) fn lacks(self, layer: &Layer) -> Option<&'static str> {
-        let channels = layer.channels.len();
-        let (fits, needs) = match self {
-            Self::Color => (channels == 1 || channels == 3, "one channel or three"),
-            Self::Distance | Self::Share => (channels == 1, "one channel"),
-            Self::Direction => (channels == 3, "three channels"),
-            Self::Extent => ((1..=3).contains(&channels), "one to three channels"),
-            Self::Cube => (true, ""),
-            Self::Ids => (matches!(layer.type_name(), "u2" | "u4"), "integers"),
-            Self::Counts { bits } => (
-                (channels == 1 || channels == 3)
-                    && layer.type_name() == "u2"
-                    && (1..=16).contains(&bits)
-                    && layer.channels.iter().all(|channel| fits_bits(&channel.values, bits)),
-                "one channel or three of 16-bit integers, none larger than its 1 to 16 bits hold",
-            ),
-        };
-        (!fits).then_some(needs)
-    }
+/// What `layer` lacks to be shown as it looks, if anything.
+pub(super) fn lacks(layer: &Layer) -> Option<&'static str> {
+    let channels = layer.channels.len();
+    let (fits, needs) = match layer.look {
+        Look::Color => (channels == 1 || channels == 3, "one channel or three"),
+        Look::Distance | Look::Share => (channels == 1, "one channel"),
+        Look::Direction => (channels == 3, "three channels"),
+        Look::Extent => ((1..=3).contains(&channels), "one to three channels"),
+        Look::Cube => (true, ""),
+        Look::Ids => (matches!(layer.type_name(), "u2" | "u4"), "integers"),
+        Look::Counts { bits } => (
+            (channels == 1 || channels == 3)
+                && layer.type_name() == "u2"
+                && (1..=16).contains(&bits)
+                && layer.channels.iter().all(|channel| fits_bits(&channel.values, bits)),
+            "one channel or three of 16-bit integers, none larger than its 1 to 16 bits hold",
+        ),
+    };
+    (!fits).then_some(needs)
 }
 
 fn fits_bits(values: &Values, bits: u8) -> bool {
@@ -323,7 +292,7 @@ pub(super) fn mask(layer: &Layer) -> Option<Shown> {
 }
 
 fn counts(planes: &[&Values], bits: u8) -> Shown {
-    // `Look::lacks` has seen to the type.
+    // `lacks` has seen to the type.
     fn number(plane: &Values, i: usize) -> [u8; 2] {
         let Values::U16(values) = plane else { return [0; 2] };
         values[i].to_be_bytes()
@@ -453,14 +422,11 @@ mod tests {
     #[test]
     fn a_look_says_what_it_needs() {
         let one = || Values::F32(vec![1.0]);
-        assert_eq!(
-            Look::Direction.lacks(&layer(Look::Direction, vec![one()])),
-            Some("three channels")
-        );
-        assert_eq!(Look::Ids.lacks(&layer(Look::Ids, vec![one()])), Some("integers"));
+        assert_eq!(lacks(&layer(Look::Direction, vec![one()])), Some("three channels"));
+        assert_eq!(lacks(&layer(Look::Ids, vec![one()])), Some("integers"));
         let over = |bits| {
             let look = Look::Counts { bits };
-            look.lacks(&layer(look, vec![Values::U16(vec![4095])])).is_some()
+            lacks(&layer(look, vec![Values::U16(vec![4095])])).is_some()
         };
         assert_eq!(
             [over(0), over(11), over(12), over(16), over(17)],

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use serde_json::Value;
 
+use super::look::lacks;
 use super::{Development, Look, OutputError, PictureError};
 
 /// Numbers of one channel, a pixel each: row-major, row 0 at the top.
@@ -336,7 +337,7 @@ fn check_shape(layer: &Layer, pixels: usize) -> Result<(), PictureError> {
             return Err(PictureError::Length { channel, found, expected: pixels });
         }
     }
-    if let Some(needs) = layer.look.lacks(layer) {
+    if let Some(needs) = lacks(layer) {
         let look = format!("{:?}", layer.look);
         return Err(PictureError::Look { layer: layer.title(), look, needs });
     }

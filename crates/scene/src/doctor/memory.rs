@@ -57,27 +57,8 @@ pub(crate) fn structure(triangles: u64) -> u64 {
 /// Bytes of `layers` of a picture of so many columns and rows, files included.
 pub(crate) fn film([width, height]: [u32; 2], layers: &[LayerSpec]) -> u64 {
     let pixels = u64::from(width) * u64::from(height);
-    FILM_PER_VALUE.saturating_mul(pixels).saturating_mul(layers.iter().map(values).sum())
-}
-
-/// Values a pixel of a layer.
-fn values(layer: &LayerSpec) -> u64 {
-    match layer {
-        LayerSpec::Depth
-        | LayerSpec::Distance
-        | LayerSpec::Coverage
-        | LayerSpec::Alpha
-        | LayerSpec::MaterialId => 1,
-        LayerSpec::Uv => 2,
-        LayerSpec::Ids => 4,
-        LayerSpec::Normal { .. }
-        | LayerSpec::Position { .. }
-        | LayerSpec::Flat
-        | LayerSpec::Facing
-        | LayerSpec::Albedo
-        | LayerSpec::Backdrop
-        | LayerSpec::Radiance => 3,
-    }
+    let values = layers.iter().map(|layer| layer.row().channels.len() as u64).sum();
+    FILM_PER_VALUE.saturating_mul(pixels).saturating_mul(values)
 }
 
 impl fmt::Display for MemoryForecast {

@@ -1,11 +1,13 @@
-//! Layers worked out a whole batch at a time, in loops that vectorise: what most renders write.
+//! The functions that fill layers, a whole batch at a time: those that most renders write in loops that
+//! vectorise.
 
 use std::ops::Range;
 
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{HitBatch, MISS, Placement};
 
-use crate::{Color, Paint, SceneView, Space, Traced};
+use super::{Columns, NormalKind, Seen, Space};
+use crate::{Color, Paint, SceneView, Traced};
 
 /// Vector units that loops are compiled for beside the portable ones.
 macro_rules! vectorised {
@@ -20,44 +22,74 @@ macro_rules! vectorised {
     };
 }
 
-impl SceneView<'_> {
-    /// [`SceneView::depth`] of every ray (m): `out` is refilled.
-    pub fn depths(&self, traced: Traced<'_>, out: &mut Vec<f64>) {
-        out.clear();
-        out.resize(traced.rays.len(), f64::INFINITY);
-        depths(traced, self.view.origin, self.view.forward(), out);
-    }
-
-    /// [`SceneView::normal`] of every ray, of the triangles' planes: the arrays of `out` are
-    /// refilled.
-    pub fn geometric_normals(&self, traced: Traced<'_>, space: Space, out: &mut [Vec<f64>; 3]) {
-        for array in out.iter_mut() {
-            array.clear();
-            array.resize(traced.rays.len(), 0.0);
+impl Seen<'_> {
+    /// Refills the first columns with `value` of each ray.
+    pub(super) fn each<const N: usize>(
+        &self,
+        out: &mut Columns,
+        value: impl Fn(usize) -> [f64; N],
+    ) {
+        let columns = self.clear(&mut out[..N], 0.0);
+        for i in 0..self.traced.rays.len() {
+            for (column, value) in columns.iter_mut().zip(value(i)) {
+                column[i] = value;
+            }
         }
-        let axes = self.view.axes_of(space);
-        normals(traced, [axes.x_axis, axes.y_axis, axes.z_axis], out);
     }
 
-    /// Base colour under a headlight, of every ray: something to look at, not light transport. A
-    /// little of it does not depend on the colour, so that black things show their shape as well.
-    /// Misses are black. The arrays of `out` are refilled.
-    pub fn facings(&self, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
-        self.flats(traced, out);
+    /// Sets `columns` to `value` for each ray.
+    fn clear<'c>(&self, columns: &'c mut [Vec<f64>], value: f64) -> &'c mut [Vec<f64>] {
+        for column in &mut *columns {
+            column.clear();
+            column.resize(self.traced.rays.len(), value);
+        }
+        columns
+    }
+
+    /// Distances along the camera's axis (m), `+inf` for a miss.
+    pub(super) fn depths(&self, [out, ..]: &mut Columns) {
+        self.clear(std::slice::from_mut(out), f64::INFINITY);
+        depths(self.traced, self.scene.view.origin, self.scene.view.forward(), out);
+    }
+
+    /// Distances along the rays (m), `+inf` for a miss.
+    pub(super) fn distances(&self, [out, ..]: &mut Columns) {
+        out.clone_from(&self.traced.hits.t);
+    }
+
+    /// Unit normals on the side that the rays came from, zero for a miss.
+    pub(super) fn normals(&self, space: Space, kind: NormalKind, out: &mut Columns) {
+        match kind {
+            NormalKind::Shading => {
+                self.each(out, |i| self.scene.normal(self.traced, i, kind, space).to_array());
+            }
+            NormalKind::Geometric => {
+                self.clear(&mut out[..3], 0.0);
+                let axes = self.scene.view.axes_of(space);
+                normals(self.traced, [axes.x_axis, axes.y_axis, axes.z_axis], out);
+            }
+        }
+    }
+
+    /// Base colour under a headlight: something to look at, not light transport. A little of it does
+    /// not depend on the colour, so that black things show their shape as well. Misses are black.
+    pub(super) fn facings(&self, out: &mut Columns) {
+        let Self { scene, traced, .. } = *self;
+        self.flats(out);
         let mut cosine = vec![0.0; traced.rays.len()];
         let mut ambient = vec![0.15; traced.rays.len()];
-        for (run, placement) in self.runs(traced.hits) {
-            let material = self.materials.get(placement.material as usize);
+        for (run, placement) in scene.runs(traced.hits) {
+            let material = scene.materials.get(placement.material as usize);
             if material.is_some_and(|material| material.occlusion.is_some()) {
-                run.clone().for_each(|i| ambient[i] *= self.unoccluded(traced, i));
+                run.clone().for_each(|i| ambient[i] *= scene.unoccluded(traced, i));
             }
-            match &self.geometry.mesh_of(placement).normals {
+            match &scene.geometry.mesh_of(placement).normals {
                 None => cosines(traced, run, &mut cosine),
-                Some(_) => self.shading_cosines(traced, run, placement, &mut cosine),
+                Some(_) => scene.shading_cosines(traced, run, placement, &mut cosine),
             }
         }
         let hits = &traced.hits.placement;
-        for array in out {
+        for array in &mut out[..3] {
             let light =
                 cosine.iter().zip(&ambient).map(|(cosine, ambient)| ambient + 0.85 * cosine);
             for ((color, light), &hit) in array.iter_mut().zip(light).zip(hits) {
@@ -67,37 +99,58 @@ impl SceneView<'_> {
         }
     }
 
-    /// [`SceneView::flat`] of every ray: the arrays of `out` are refilled.
-    pub fn flats(&self, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
-        self.colors(traced, |i| self.flat(traced, i), out);
+    /// Base colours over the footprint of each ray; misses are black.
+    pub(super) fn flats(&self, out: &mut Columns) {
+        self.colors(|i| self.scene.flat(self.traced, i), out);
     }
 
-    /// [`SceneView::albedo`] of every ray: the arrays of `out` are refilled.
-    pub fn albedos(&self, traced: Traced<'_>, out: &mut [Vec<f64>; 3]) {
-        self.colors(traced, |i| self.albedo(traced.hits, i), out);
+    /// Base colours at the very points that were hit; misses are black.
+    pub(super) fn albedos(&self, out: &mut Columns) {
+        self.colors(|i| self.scene.albedo(self.traced.hits, i), out);
+    }
+
+    /// 1 where a ray hits something, 1 for every ray, and 0: of weighted sums, the first is a share of
+    /// the second. A lens that lets less through in the corners of the picture does not make them
+    /// transparent.
+    pub(super) fn shares(&self, out: &mut Columns) {
+        let hits = &self.traced.hits.placement;
+        self.each(out, |i| [f64::from(u8::from(hits[i] != MISS)), 1.0, 0.0]);
+    }
+
+    /// The environment's radiance along each ray that hits nothing, in red, green and blue; 0 along
+    /// others, without light, and with bands other than these three.
+    pub(super) fn backdrops(&self, out: &mut Columns) {
+        let light = self.light.filter(|light| light.spectral.count() == 3);
+        self.each(out, |i| {
+            let mut color = [0.0; 3];
+            if let (Some(light), MISS) = (light, self.traced.hits.placement[i]) {
+                let direction = self.traced.rays.direction(i);
+                light.lights.environment(light.spectral, direction, &mut color);
+            }
+            color
+        });
     }
 
     /// Base colours, by `color` where a placement has several.
-    fn colors(&self, traced: Traced<'_>, color: impl Fn(usize) -> Color, out: &mut [Vec<f64>; 3]) {
-        for array in out.iter_mut() {
-            array.clear();
-            array.resize(traced.rays.len(), 0.0);
-        }
-        for (run, placement) in self.runs(traced.hits) {
-            if let Some(color) = self.plain_color(placement) {
-                for (array, c) in out.iter_mut().zip(color) {
+    fn colors(&self, color: impl Fn(usize) -> Color, out: &mut Columns) {
+        let columns = self.clear(&mut out[..3], 0.0);
+        for (run, placement) in self.scene.runs(self.traced.hits) {
+            if let Some(color) = self.scene.plain_color(placement) {
+                for (array, c) in columns.iter_mut().zip(color) {
                     array[run.clone()].fill(c);
                 }
                 continue;
             }
             for i in run {
-                for (array, c) in out.iter_mut().zip(color(i)) {
+                for (array, c) in columns.iter_mut().zip(color(i)) {
                     array[i] = c;
                 }
             }
         }
     }
+}
 
+impl SceneView<'_> {
     /// Runs of rays that hit the same placement.
     fn runs(&self, hits: &HitBatch) -> impl Iterator<Item = (Range<usize>, &Placement)> {
         let mut start = 0;
@@ -169,8 +222,8 @@ vectorised! {
 }
 
 vectorised! {
-    fn normals(traced: Traced<'_>, axes: [DVec3; 3], out: &mut [Vec<f64>; 3]) {
-        let [a, b, c] = out;
+    fn normals(traced: Traced<'_>, axes: [DVec3; 3], out: &mut Columns) {
+        let [a, b, c, _] = out;
         let len = a.len();
         let (b, c) = (&mut b[..len], &mut c[..len]);
         let [dx, dy, dz] = traced.rays.directions().map(|array| &array[..len]);

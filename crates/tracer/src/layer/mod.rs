@@ -1,0 +1,215 @@
+//! The layers that a render may write beside its picture: one [table](self::table) says all that is
+//! known of each, and everything else reads it.
+
+mod fill;
+mod look;
+mod meaning;
+pub mod table;
+
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+
+pub use self::look::Look;
+pub use self::table::LayerSpec;
+use crate::{LightingContext, Needs, SceneView, Traced};
+
+/// The frame of a vector-valued layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Space {
+    /// The scene's own frame: right-handed, +Y up.
+    #[default]
+    World,
+    /// The camera's frame as OpenGL has it: looking along −Z, +Y up, +X right.
+    Camera,
+    /// The camera's frame as OpenCV and `camera.json` have it: looking along +Z, +Y down, +X right.
+    Opencv,
+}
+
+/// Which of a surface's two normals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NormalKind {
+    /// The plane of the triangle.
+    #[default]
+    Geometric,
+    /// Interpolated from the file's vertex normals, where it has them.
+    Shading,
+}
+
+/// A row of the table of layers: what is known of a layer without rendering it.
+#[derive(Debug, Clone)]
+pub struct Layer {
+    /// The name in files.
+    pub name: Cow<'static, str>,
+    /// The channels in files, in order. [`LayerSpec::Radiance`] has one a band instead, where the
+    /// bands are others than red, green and blue.
+    pub channels: &'static [&'static str],
+    /// What the numbers are kept as.
+    pub kept: Kept,
+    /// Which rays of a pixel they are taken from.
+    pub taken: Taken,
+    /// How a preview shows them.
+    pub look: Look,
+    /// What filling it needs of the meshes and of hits.
+    pub needs: Needs,
+    /// What the numbers mean, by key: `definition`, `unit`, `frame`, `miss` and their like.
+    pub meaning: Vec<(&'static str, &'static str)>,
+    /// The definition of each channel, where each is a layer of its own in files, `Id.object.X`:
+    /// the form that Blender reads.
+    pub apart: Option<&'static [&'static str]>,
+}
+
+impl Layer {
+    /// The names of the layers that it is in files.
+    #[must_use]
+    pub fn names_in_files(&self) -> Vec<String> {
+        match self.apart {
+            Some(_) => self.channels.iter().map(|c| format!("{}.{c}", self.name)).collect(),
+            None => vec![self.name.clone().into_owned()],
+        }
+    }
+}
+
+/// What numbers are kept as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kept {
+    /// As 64-bit floats where a file is wanted that holds them, else 32-bit: measurements.
+    Measured,
+    /// As 32-bit floats: colours and shares.
+    Shown,
+    /// As 32-bit integers, counted from 1: names of things.
+    Counted,
+}
+
+/// Which rays of a pixel a layer is taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Taken {
+    /// The chief ray of its centre.
+    ChiefRay,
+    /// The mean over its samples. What is averaged is three numbers a ray, of which the camera sends
+    /// each its own way where wavelengths part, as it does with red, green and blue.
+    Samples,
+    /// The mean over the samples of the picture, even if that is one alone: what the picture is to
+    /// be judged by.
+    PictureSamples,
+    /// The sum of the first number over the samples of the picture, as a share of the sum of the
+    /// second.
+    PictureShare,
+}
+
+impl Taken {
+    /// Whether the layer is taken where the picture's own samples are.
+    #[must_use]
+    pub fn with_picture(self) -> bool {
+        match self {
+            Self::ChiefRay | Self::Samples => false,
+            Self::PictureSamples | Self::PictureShare => true,
+        }
+    }
+}
+
+/// What layers are filled from: the rays of a batch, what they hit, and the scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a> {
+    /// The scene.
+    pub scene: SceneView<'a>,
+    /// The batch.
+    pub traced: Traced<'a>,
+    /// The scene's light, where it is traced.
+    pub light: Option<LightingContext<'a>>,
+}
+
+/// One number of each ray, as many times as a layer has channels.
+pub type Columns = [Vec<f64>; 4];
+
+impl LayerSpec {
+    /// Whether the layer is a mean over the samples of a pixel; the others are taken along the chief
+    /// ray of its centre.
+    #[must_use]
+    pub fn is_averaged(self) -> bool {
+        self.row().taken != Taken::ChiefRay
+    }
+
+    /// What this layer needs.
+    #[must_use]
+    pub fn needs(self) -> Needs {
+        self.row().needs
+    }
+}
+
+impl<'de> Deserialize<'de> for LayerSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match serde_json::Value::deserialize(deserializer)? {
+            serde_json::Value::String(name) => Self::from_name(&name).ok_or_else(|| {
+                D::Error::custom(format!(
+                    "unknown layer `{name}`, expected one of {}",
+                    Self::NAMES.map(|name| format!("`{name}`")).join(", ")
+                ))
+            }),
+            other => table::Written::deserialize(other).map(Self::from).map_err(D::Error::custom),
+        }
+    }
+}
+
+impl JsonSchema for LayerSpec {
+    fn schema_name() -> Cow<'static, str> {
+        "Layer".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let object = generator.subschema_for::<table::Written>();
+        json_schema!({ "anyOf": [{ "type": "string", "enum": Self::NAMES }, object] })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_and_an_object_mean_the_same_layer() {
+        for name in LayerSpec::NAMES {
+            let short: LayerSpec = serde_json::from_value(name.into()).unwrap();
+            let long: LayerSpec =
+                serde_json::from_value(serde_json::json!({ "type": name })).unwrap();
+            assert_eq!(short, long);
+        }
+        let camera: LayerSpec =
+            serde_json::from_str(r#"{"type": "normal", "space": "camera"}"#).unwrap();
+        assert_ne!(LayerSpec::from_name("normal"), Some(camera));
+    }
+
+    #[test]
+    fn every_name_is_a_layer_and_others_are_refused() {
+        for name in LayerSpec::NAMES {
+            assert!(LayerSpec::from_name(name).is_some(), "{name}");
+        }
+        let error = serde_json::from_str::<LayerSpec>("\"dept\"").unwrap_err().to_string();
+        assert!(error.contains("`depth`"), "{error}");
+        assert!(serde_json::from_str::<LayerSpec>(r#"{"type": "depth", "space": 1}"#).is_err());
+        assert!(serde_json::from_str::<LayerSpec>(r#"{"type": "radiance"}"#).is_err());
+    }
+
+    #[test]
+    fn layers_of_files_have_names_of_their_own() {
+        let frames = [Space::World, Space::Camera, Space::Opencv];
+        let kinds = [NormalKind::Geometric, NormalKind::Shading];
+        let normals = frames
+            .iter()
+            .flat_map(|&space| kinds.iter().map(move |&kind| LayerSpec::Normal { space, kind }));
+        let positions = frames.iter().map(|&space| LayerSpec::Position { space });
+        let plain = LayerSpec::NAMES.iter().filter_map(|name| LayerSpec::from_name(name));
+        let mut layers: Vec<LayerSpec> = plain.chain(normals).chain(positions).collect();
+        layers.extend([LayerSpec::Backdrop, LayerSpec::Radiance]);
+        layers.dedup();
+        let rows = layers.into_iter().collect::<std::collections::HashSet<_>>();
+        let count: usize = rows.iter().map(|layer| layer.row().names_in_files().len()).sum();
+        let names: std::collections::HashSet<_> =
+            rows.iter().flat_map(|layer| layer.row().names_in_files()).collect();
+        assert_eq!(names.len(), count, "{names:?}");
+    }
+}

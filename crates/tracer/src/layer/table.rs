@@ -1,0 +1,330 @@
+//! The table of layers: a row each, and at the end of the row the function that fills it.
+//!
+//! To add a layer, add a row. Files name it as the row does, `render.layers` and `--layers` accept
+//! it, headers say its meaning, and the compiler asks for nothing else. The function that fills it
+//! stands in `fill.rs` beside this file when it is longer than a line.
+
+use serde::{Deserialize, Serialize};
+
+use super::meaning::{CHIEF_RAY, LINEAR, definition_of_normals, frame, name_in, name_of_normals};
+use super::{Columns, Kept, Layer, Look, NormalKind, Seen, Space, Taken};
+use crate::Needs;
+
+/// Makes [`LayerSpec`], what files may write of it, and its [`Layer`]s out of the table.
+macro_rules! layers {
+    (
+        files name {$(
+            $(#[$doc:meta])*
+            $named:ident $({ $($(#[$option_doc:meta])* $option:ident: $kind:ty),* })?
+                = $key:literal: $row:expr, |$seen:ident, $out:ident| $fill:expr;
+        )*}
+        no file names {$(
+            $(#[$own_doc:meta])* $own:ident: $own_row:expr, |$own_seen:ident, $own_out:ident| $own_fill:expr;
+        )*}
+    ) => {
+        /// A layer as the scene file writes it: a name (`"depth"`), or an object with a `type` and
+        /// options (`{"type": "normal", "space": "camera"}`).
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+        #[serde(tag = "type", rename_all = "snake_case")]
+        pub enum LayerSpec {
+            $($(#[$doc])* $named $({ $($(#[$option_doc])* $option: $kind),* })?,)*
+            $($(#[$own_doc])* $own,)*
+        }
+
+        /// The same, with every option optional and unknown keys refused: what is read.
+        #[derive(Deserialize, schemars::JsonSchema)]
+        #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+        pub(super) enum Written {
+            $($named { $($(#[serde(default)] $option: $kind),*)? },)*
+        }
+
+        impl From<Written> for LayerSpec {
+            fn from(written: Written) -> Self {
+                match written {
+                    $(Written::$named { $($($option),*)? } =>
+                        Self::$named $({ $($option),* })?,)*
+                }
+            }
+        }
+
+        impl LayerSpec {
+            /// Every layer by its plain name, in the order that help texts list them.
+            pub const NAMES: [&'static str; [$($key),*].len()] = [$($key),*];
+
+            /// The layer of this plain name, with default options.
+            #[must_use]
+            pub fn from_name(name: &str) -> Option<Self> {
+                Some(match name {
+                    $($key => Self::$named $({ $($option: <$kind>::default()),* })?,)*
+                    _ => return None,
+                })
+            }
+
+            /// What is known of the layer without rendering it.
+            #[must_use]
+            pub fn row(self) -> Layer {
+                match self {
+                    $(Self::$named $({ $($option),* })? => $row,)*
+                    $(Self::$own => $own_row,)*
+                }
+            }
+
+            /// Refills the first columns with the layer's channels, a number for each ray. A layer
+            /// that is averaged refills three.
+            pub fn fill(self, seen: &Seen<'_>, out: &mut Columns) {
+                match self {
+                    $(Self::$named $({ $($option),* })? => {
+                        let ($seen, $out) = (seen, out);
+                        $fill
+                    })*
+                    $(Self::$own => {
+                        let ($own_seen, $own_out) = (seen, out);
+                        $own_fill
+                    })*
+                }
+            }
+        }
+    };
+}
+
+/// A row to begin with: a measurement along the chief ray.
+fn measured(name: &'static str, channels: &'static [&'static str], look: Look) -> Layer {
+    Layer {
+        name: name.into(),
+        channels,
+        kept: Kept::Measured,
+        taken: Taken::ChiefRay,
+        look,
+        needs: Needs::default(),
+        meaning: Vec::new(),
+        apart: None,
+    }
+}
+
+/// A row to begin with: a colour, averaged over the samples.
+fn colour(name: &'static str) -> Layer {
+    Layer {
+        kept: Kept::Shown,
+        taken: Taken::Samples,
+        ..measured(name, &["R", "G", "B"], Look::Color)
+    }
+}
+
+const SURFACE: Needs = Needs {
+    surface: true,
+    normals: false,
+    materials: false,
+    uvs: false,
+    light: false,
+    ambient: false,
+};
+const BASE_COLOUR: Needs = Needs { materials: true, uvs: true, ..SURFACE };
+
+layers! {
+    files name {
+        /// `Depth.Z`: distance along the camera's axis from the entrance pupil (m).
+        Depth = "depth": Layer {
+            meaning: vec![
+                ("definition", "distance along the camera's axis from the entrance pupil"),
+                ("unit", "m"),
+                CHIEF_RAY,
+                ("miss", "+inf"),
+            ],
+            ..measured("Depth", &["Z"], Look::Distance)
+        }, |seen, out| seen.depths(out);
+
+        /// `Distance.Z`: distance along the ray from the entrance pupil, or for parallel rays from the
+        /// plane through the camera's origin (m).
+        Distance = "distance": Layer {
+            meaning: vec![
+                (
+                    "definition",
+                    "distance along the ray from the entrance pupil (parallel rays: from the plane \
+                     through the camera's origin)",
+                ),
+                ("unit", "m"),
+                CHIEF_RAY,
+                ("miss", "+inf"),
+            ],
+            ..measured("Distance", &["Z"], Look::Distance)
+        }, |seen, out| seen.distances(out);
+
+        /// `Normal.X Y Z`: unit normal that faces the viewer.
+        Normal {
+            /// The frame.
+            space: Space,
+            /// Which normal.
+            kind: NormalKind
+        } = "normal": Layer {
+            name: name_of_normals(space, kind),
+            needs: Needs { normals: kind == NormalKind::Shading, ..SURFACE },
+            meaning: vec![
+                definition_of_normals(kind),
+                ("unit", "1"),
+                frame(space),
+                CHIEF_RAY,
+                ("miss", "0 0 0"),
+            ],
+            ..measured("", &["X", "Y", "Z"], Look::Direction)
+        }, |seen, out| seen.normals(space, kind, out);
+
+        /// `Position.X Y Z`: the point that was hit (m).
+        Position {
+            /// The frame.
+            space: Space
+        } = "position": Layer {
+            name: name_in(space, "Position"),
+            meaning: vec![
+                ("definition", "the point that was hit"),
+                ("unit", "m"),
+                frame(space),
+                CHIEF_RAY,
+                ("miss", "+inf"),
+            ],
+            ..measured("", &["X", "Y", "Z"], Look::Extent)
+        }, |seen, out| {
+            seen.each(out, |i| seen.scene.position(seen.traced, i, space).to_array());
+        };
+
+        /// `Id.object.X`, `Id.instance.X`, `Id.node.X` and `Id.primitive.X`: which object, which copy
+        /// of it, which node of its model, and which triangle of its mesh.
+        Ids = "ids": Layer {
+            kept: Kept::Counted,
+            meaning: vec![CHIEF_RAY, ("miss", "0")],
+            apart: Some(&[
+                "number of the object in the scene, from 1",
+                "number of the copy that was hit, from 1 through all objects; an object without \
+                 copies has one",
+                "number of the model's node (or group) that was hit, from 1 through all objects",
+                "number of the triangle in its mesh, from 1",
+            ]),
+            ..measured("Id", &["object", "instance", "node", "primitive"], Look::Ids)
+        }, |seen, out| {
+            seen.each(out, |i| seen.scene.ids(seen.traced.hits, i).map(f64::from));
+        };
+
+        /// `Coverage.A`: 1 where the pixel's chief ray hits, else 0.
+        Coverage = "coverage": Layer {
+            kept: Kept::Shown,
+            meaning: vec![("definition", "1 where something was hit, else 0"), CHIEF_RAY],
+            ..measured("Coverage", &["A"], Look::Share)
+        }, |seen, out| {
+            seen.each(out, |i| [f64::from(u8::from(seen.traced.hits.is_hit(i)))]);
+        };
+
+        /// `Flat.R G B`: base colour without light.
+        Flat = "flat": Layer {
+            needs: BASE_COLOUR,
+            meaning: vec![
+                ("definition", "base colour without light, mean over the pixel's samples"),
+                LINEAR,
+                ("miss", "0 0 0"),
+            ],
+            ..colour("Flat")
+        }, |seen, out| seen.flats(out);
+
+        /// `Facing.R G B`: base colour under a headlight, to look at.
+        Facing = "facing": Layer {
+            needs: Needs { normals: true, ambient: true, ..BASE_COLOUR },
+            meaning: vec![
+                (
+                    "definition",
+                    "base colour under a headlight, mean over the pixel's samples: to look at, not \
+                     a measurement",
+                ),
+                LINEAR,
+                ("miss", "0 0 0"),
+            ],
+            ..colour("Facing")
+        }, |seen, out| seen.facings(out);
+
+        /// `Albedo.R G B`: base colour along the chief ray, not averaged.
+        Albedo = "albedo": Layer {
+            taken: Taken::ChiefRay,
+            needs: BASE_COLOUR,
+            meaning: vec![
+                ("definition", "base colour without light"),
+                LINEAR,
+                CHIEF_RAY,
+                ("miss", "0 0 0"),
+            ],
+            ..colour("Albedo")
+        }, |seen, out| seen.albedos(out);
+
+        /// `Uv.U V`: texture coordinates of the first set.
+        Uv = "uv": Layer {
+            needs: Needs { uvs: true, ..SURFACE },
+            meaning: vec![
+                (
+                    "definition",
+                    "texture coordinates of the first set, v down; 0 0 on meshes without any",
+                ),
+                ("unit", "1"),
+                CHIEF_RAY,
+                ("miss", "0 0"),
+            ],
+            ..measured("Uv", &["U", "V"], Look::Extent)
+        }, |seen, out| {
+            seen.each(out, |i| seen.scene.first_uv(seen.traced.hits, i));
+        };
+
+        /// `MaterialId.X`: which material.
+        MaterialId = "material_id": Layer {
+            kept: Kept::Counted,
+            meaning: vec![
+                ("definition", "number of the material in the scene, counted from 1"),
+                CHIEF_RAY,
+                ("miss", "0"),
+            ],
+            ..measured("MaterialId", &["X"], Look::Ids)
+        }, |seen, out| {
+            seen.each(out, |i| [f64::from(seen.scene.material_id(seen.traced.hits, i))]);
+        };
+
+        /// `Alpha.A`: share of the pixel's samples that hit something.
+        Alpha = "alpha": Layer {
+            kept: Kept::Shown,
+            taken: Taken::PictureShare,
+            meaning: vec![(
+                "definition",
+                "share of the pixel's samples that hit something; holes that a texture's alpha cuts \
+                 count as surface",
+            )],
+            ..measured("Alpha", &["A"], Look::Share)
+        }, |seen, out| seen.shares(out);
+    }
+    no file names {
+        /// `Backdrop.R G B`: the part of the picture's radiance that came past everything. No file
+        /// names it; it comes with `render.alpha` and a tracer of light.
+        Backdrop: Layer {
+            taken: Taken::PictureSamples,
+            needs: Needs { light: true, ..Needs::default() },
+            meaning: vec![
+                (
+                    "definition",
+                    "the part of the picture that came from the environment past everything: the \
+                     picture less this is what to put over another background, by Alpha; 0 with \
+                     wavelengths other than RGB",
+                ),
+                LINEAR,
+            ],
+            ..colour("Backdrop")
+        }, |seen, out| seen.backdrops(out);
+
+        /// The picture of a tracer of light: radiance, one channel a spectral band. No file names it;
+        /// it comes with the tracer, which fills it.
+        Radiance: Layer {
+            needs: Needs { normals: true, light: true, ..BASE_COLOUR },
+            meaning: vec![
+                (
+                    "definition",
+                    "radiance that the camera gathers, mean over the pixel's samples; 1 is full \
+                     scale",
+                ),
+                ("unit", "1 (linear light; R G B: sRGB primaries)"),
+                ("miss", "the environment's radiance"),
+            ],
+            ..colour("Radiance")
+        }, |_seen, _out| {};
+    }
+}
