@@ -71,6 +71,17 @@ impl Seen<'_> {
         }
     }
 
+    /// Angles of incidence on the triangles (radians, 0 to π/2), `+inf` for a miss.
+    pub(super) fn incidences(&self, out: &mut Columns) {
+        let Traced { rays, hits } = self.traced;
+        self.each(out, |i| {
+            let (normal, direction) = (hits.normal(i), rays.direction(i));
+            // The arc cosine would lose half of the digits near 0.
+            let angle = normal.cross(direction).length().atan2(normal.dot(direction).abs());
+            [if hits.is_hit(i) { angle } else { f64::INFINITY }]
+        });
+    }
+
     /// Base colour under a headlight: something to look at, not light transport. A little of it does
     /// not depend on the colour, so that black things show their shape as well. Misses are black.
     pub(super) fn facings(&self, out: &mut Columns) {

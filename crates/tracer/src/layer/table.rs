@@ -168,6 +168,18 @@ layers! {
             ..measured("", &["X", "Y", "Z"], Look::Direction)
         }, |seen, out| seen.normals(space, kind, out);
 
+        /// `Incidence.X`: angle between the ray and the triangle's normal (radians).
+        Incidence = "incidence": Layer {
+            needs: SURFACE,
+            meaning: vec![
+                ("definition", "angle between the ray and the normal of the triangle"),
+                ("unit", "rad"),
+                CHIEF_RAY,
+                ("miss", "+inf"),
+            ],
+            ..measured("Incidence", &["X"], Look::Extent)
+        }, |seen, out| seen.incidences(out);
+
         /// `Position.X Y Z`: the point that was hit (m).
         Position {
             /// The frame.

@@ -1,0 +1,70 @@
+//! Layers of scenes whose values have a closed form.
+
+use std::f64::consts::FRAC_PI_2;
+
+use etendue_accel::BuildOptions;
+use etendue_render::output::Outputs;
+use etendue_render::{Images, Plan, build, plan, render};
+use etendue_scene::LoadOptions;
+use etendue_scene::file::SceneFile;
+
+/// The values of each layer of a scene, channel by channel.
+fn layers(scene: &str) -> Vec<Vec<f64>> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.json");
+    std::fs::write(&path, scene).unwrap();
+    let file = SceneFile::read(&path, &[]).unwrap();
+    let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).unwrap();
+    let plan = Plan::new(&scene, Outputs::ALL);
+    let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
+    let images = Images::decode(&scene, &plan, None).unwrap();
+    let rendered = render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true).unwrap();
+    let channels = rendered.picture.layers().iter().flat_map(|layer| &layer.channels);
+    channels.map(|c| (0..c.values.len()).map(|i| c.values.at(i)).collect()).collect()
+}
+
+#[test]
+fn the_incidence_of_parallel_rays_is_the_tilt_of_what_they_hit() {
+    for tilt in [0.0, 1e-6, 30.0, 89.0_f64] {
+        let [incidence]: [Vec<f64>; 1] = layers(&format!(
+            r#"{{"etendue": 1, "layers": ["incidence"],
+                "camera": {{"type": "orthographic", "height": 1,
+                    "pose": {{"from": [0, 0, 100], "look_at": [0, 0, 0]}},
+                    "sensor": {{"resolution": [8, 8]}}}},
+                "objects": [{{"shape": "rectangle", "width": 1, "height": 100,
+                    "transform": {{"rotate": [1, 0, 0, {tilt}]}}}}]}}"#
+        ))
+        .try_into()
+        .unwrap();
+        for angle in incidence {
+            // The mesh's corners are rounded to 32 bits: 6e-8 of its length.
+            assert!((angle - tilt.to_radians()).abs() < 1e-7, "{tilt}: {angle}");
+        }
+    }
+}
+
+#[test]
+fn the_incidence_on_a_wall_is_the_field_angle_and_a_miss_is_infinite() {
+    let channels = layers(
+        r#"{"etendue": 1, "layers": ["incidence", "position"],
+            "camera": {"type": "pinhole", "fov": 80,
+                "pose": {"from": [0, 0, 0], "look_at": [0, 0, -1]},
+                "sensor": {"resolution": [32, 16]}},
+            "objects": [{"shape": "rectangle", "width": 2, "height": 9,
+                "transform": {"translate": [0, 0, -2]}}]}"#,
+    );
+    let [incidence, x, y, _] = &channels[..] else { panic!("{}", channels.len()) };
+    let (mut hits, mut misses) = (0, 0);
+    for ((angle, x), y) in incidence.iter().zip(x).zip(y) {
+        if x.is_finite() {
+            // Rounding alone: both are worked out in 64 bits.
+            assert!((angle - x.hypot(*y).atan2(2.0)).abs() < 1e-12, "{x} {y}: {angle}");
+            assert!((0.0..=FRAC_PI_2).contains(angle));
+            hits += 1;
+        } else {
+            assert_eq!(*angle, f64::INFINITY);
+            misses += 1;
+        }
+    }
+    assert!(hits > 100 && misses > 100, "{hits} {misses}");
+}
