@@ -161,6 +161,17 @@ impl Opening {
         }
     }
 
+    /// A word on how it differs from a round hole.
+    pub(crate) fn shape(&self) -> Option<String> {
+        match self {
+            Self::Circle { .. } => None,
+            Self::Polygon { normals, .. } => Some(format!("{} blades", normals.len())),
+            Self::Image(Picture { pixels: [width, height], .. }) => {
+                Some(format!("mask of {width} x {height} pixels"))
+            }
+        }
+    }
+
     /// Whether a turn about the axis changes nothing.
     #[must_use]
     pub fn is_round(&self) -> bool {

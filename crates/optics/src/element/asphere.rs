@@ -9,8 +9,8 @@
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus, at_lane};
 use super::refract::{Refracted, Refraction, Root, TOUCH, meet_conic};
 
-const SETTLED: f64 = 1e-10;
-const MOST_STEPS: usize = 20;
+pub(super) const SETTLED: f64 = 1e-10;
+pub(super) const MOST_STEPS: usize = 20;
 
 /// How many pieces of a ray are looked at for a change of sign.
 const PIECES: u32 = 256;
@@ -116,22 +116,10 @@ impl Refraction {
         (sag - z, at.direction[2] - slope * (x * at.direction[0] + y * at.direction[1]), slope)
     }
 
-    /// The first root ahead, among changes of sign between [`PIECES`] places on the part of the ray
-    /// that runs through the box around the surface.
+    /// The first root ahead on the part of the ray that runs through the box around the surface.
     fn search(&self, ray: Ray, clip2: f64) -> Option<(Ray, f64)> {
-        let [from, to] = self.stretch(ray, clip2)?;
-        let at = |t: f64| -self.residual(ray.advanced(t)).0;
-        let place = |i: u32| from + (to - from) * f64::from(i) / f64::from(PIECES);
-        let (mut low, mut high) = (1..=PIECES)
-            .map(|i| (place(i - 1), place(i)))
-            .find(|&(a, b)| (at(a) <= 0.0) != (at(b) <= 0.0))?;
-        let before = at(low) <= 0.0;
-        // 2⁻⁶⁰ of a stretch of metres is less than the last bit of a millimetre.
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if (at(middle) <= 0.0) == before { low = middle } else { high = middle }
-        }
-        let there = ray.advanced(0.5 * (low + high));
+        let stretch = self.stretch(ray, clip2)?;
+        let there = ray.advanced(first_root(stretch, |t| -self.residual(ray.advanced(t)).0)?);
         let [x, y, _] = there.position;
         let inside = x * x + y * y <= self.surface.domain().powi(2);
         inside.then(|| (there, self.residual(there).2))
@@ -162,8 +150,23 @@ impl Refraction {
     }
 }
 
+/// The first root of `at` from `from` to `to`, among changes of sign between [`PIECES`] places.
+pub(super) fn first_root([from, to]: [f64; 2], at: impl Fn(f64) -> f64) -> Option<f64> {
+    let place = |i: u32| from + (to - from) * f64::from(i) / f64::from(PIECES);
+    let (mut low, mut high) = (1..=PIECES)
+        .map(|i| (place(i - 1), place(i)))
+        .find(|&(a, b)| (at(a) <= 0.0) != (at(b) <= 0.0))?;
+    let before = at(low) <= 0.0;
+    // 2⁻⁶⁰ of a stretch of metres is less than the last bit of a millimetre.
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if (at(middle) <= 0.0) == before { low = middle } else { high = middle }
+    }
+    Some(0.5 * (low + high))
+}
+
 /// Where a t² + 2b t + c ≤ 0.
-fn interval(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
+pub(super) fn interval(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
     if a <= 0.0 {
         return (c <= 0.0).then_some([f64::NEG_INFINITY, f64::INFINITY]);
     }

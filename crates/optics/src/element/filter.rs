@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::picture::{Picture, Resolve};
+use super::surface::checked_semi_diameter;
 use etendue_geometry::units::Millimetres;
 
 /// A filter as a lens file writes it.
@@ -61,10 +62,7 @@ impl FilterSpec {
     ///
     /// A sentence on what is missing, or on the curve or file that makes no filter.
     pub fn build(&self, resolve: Resolve<'_>) -> Result<Filter, String> {
-        let semi_diameter = self.semi_diameter.map_or(f64::INFINITY, |s| s.0);
-        if semi_diameter.is_nan() || semi_diameter < 0.0 {
-            return Err(format!("semi_diameter is {semi_diameter} mm; it must not be negative"));
-        }
+        let semi_diameter = checked_semi_diameter(self.semi_diameter)?;
         let sound = |curve: &Curve| curve.clone().within(0.0, 1.0).map_err(|e| e.to_string());
         match (&self.transmission, &self.image, self.width) {
             (Some(curve), None, None) if self.curves.is_empty() && self.height.is_none() => {

@@ -35,7 +35,7 @@ pub use losses::{Coating, LossesSpec, Plain, Reflection};
 pub use microlens_array::{
     Gaps, Lenslet, LensletShape, LensletSpec, MicrolensArray, MicrolensArraySpec, clipped,
 };
-pub use part::{Part, PartSpec};
+pub use part::{Part, PartSpec, Symbol};
 pub use picture::{Picture, Resolve};
 pub use rays::{FateCounts, LensRays, RayStatus};
 pub use step::Clip;

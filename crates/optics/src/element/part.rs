@@ -47,6 +47,22 @@ pub enum Part {
     MicrolensArray(Arc<MicrolensArray>),
 }
 
+/// How drawings show a part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Symbol {
+    /// By its section: a boundary between media.
+    Surface,
+    /// By a line with arrow heads.
+    ThinLens {
+        /// 1 when they point outwards, −1 inwards.
+        converging: f64,
+    },
+    /// By what is beside the opening.
+    Opening,
+    /// By two lines.
+    Sheet,
+}
+
 impl From<SurfaceSpec> for PartSpec {
     fn from(spec: SurfaceSpec) -> Self {
         Self::Surface(spec)
@@ -66,6 +82,17 @@ impl PartSpec {
         let radius = radius.is_finite().then_some(Millimetres(radius));
         let semi_diameter = semi_diameter.is_finite().then_some(Millimetres(semi_diameter));
         Self::Surface(SurfaceSpec { radius, glass, semi_diameter, ..SurfaceSpec::default() })
+    }
+
+    /// What follows it on the sensor's side: `None` for a sheet, which changes no medium, and
+    /// `Some(None)` for air.
+    #[must_use]
+    pub fn medium_behind(&self) -> Option<Option<&GlassSpec>> {
+        match self {
+            Self::Surface(surface) => Some(surface.glass.as_ref()),
+            Self::MicrolensArray(array) => array.has_faces().then_some(array.glass.as_ref()),
+            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => None,
+        }
     }
 
     /// The part, ready to be traced.
@@ -126,6 +153,85 @@ impl Part {
             Self::MicrolensArray(_) => return Err("it is a microlens array"),
         }
         Ok(())
+    }
+
+    /// Whether it aberrates nothing.
+    #[must_use]
+    pub fn is_ideal(&self) -> bool {
+        match self {
+            Self::Surface(_) | Self::MicrolensArray(_) => false,
+            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => true,
+        }
+    }
+
+    /// The opening that it is, if it is nothing else.
+    #[must_use]
+    pub fn opening(&self) -> Option<&Opening> {
+        match self {
+            Self::Aperture(opening) => Some(opening),
+            Self::Surface(_) | Self::ThinLens(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
+                None
+            }
+        }
+    }
+
+    /// The greatest distance from its axis at which it exists (mm).
+    #[must_use]
+    pub fn domain(&self) -> f64 {
+        match self {
+            Self::Surface(surface) => surface.domain(),
+            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
+                f64::INFINITY
+            }
+        }
+    }
+
+    /// z at a place across its axis (mm); `None` where it does not exist.
+    #[must_use]
+    pub fn sag(&self, [x, y]: [f64; 2]) -> Option<f64> {
+        match self {
+            Self::Surface(surface) => surface.sag(x.hypot(y)),
+            Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
+                Some(0.0)
+            }
+        }
+    }
+
+    /// The length that tables give of it (mm): the radius of curvature at the vertex, or the focal
+    /// length; infinite without any.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        match self {
+            Self::Surface(surface) => 1.0 / surface.curvature,
+            Self::ThinLens(lens) => 1.0 / lens.power,
+            Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => f64::INFINITY,
+        }
+    }
+
+    /// Words on how it differs from a sphere or a round hole.
+    #[must_use]
+    pub fn shape(&self) -> Vec<String> {
+        match self {
+            Self::Surface(surface) => surface.shape(),
+            Self::Aperture(opening) => opening.shape().into_iter().collect(),
+            Self::MicrolensArray(array) => {
+                let [width, height] = array.half_size.map(|half| 2.0 * half);
+                let pitch = array.lattice.pitch;
+                vec![format!("lenslets every {pitch} mm on {width} x {height} mm")]
+            }
+            Self::ThinLens(_) | Self::Filter(_) => Vec::new(),
+        }
+    }
+
+    /// How drawings show it.
+    #[must_use]
+    pub fn symbol(&self) -> Symbol {
+        match self {
+            Self::Surface(_) => Symbol::Surface,
+            Self::ThinLens(lens) => Symbol::ThinLens { converging: lens.power.signum() },
+            Self::Aperture(_) => Symbol::Opening,
+            Self::Filter(_) | Self::MicrolensArray(_) => Symbol::Sheet,
+        }
     }
 
     /// Whether a turn about its axis changes nothing.

@@ -27,10 +27,16 @@ pub(crate) const TOUCH: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(crate) struct Refraction {
     pub(crate) surface: Surface,
+    pub(crate) media: Media,
+}
+
+/// The media on both sides of a surface at one wavelength, met from one side.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Media {
     /// The index before over the index behind, in the direction of travel.
-    pub(crate) ratio: f64,
+    ratio: f64,
     /// 1 − μ².
-    pub(crate) rest: f64,
+    rest: f64,
 }
 
 /// What a ray does at a surface.
@@ -57,17 +63,24 @@ pub(crate) enum Root {
     Far,
 }
 
-impl Refraction {
+impl Media {
     /// From a medium of index `before` into one of index `behind`.
-    pub(crate) fn new(surface: Surface, before: f64, behind: f64) -> Self {
+    pub(crate) fn new(before: f64, behind: f64) -> Self {
         let ratio = before / behind;
-        Self { surface, ratio, rest: (1.0 - ratio) * (1.0 + ratio) }
+        Self { ratio, rest: (1.0 - ratio) * (1.0 + ratio) }
     }
 
     /// Refracts at `ray`'s position, where the normal is `m` with |m|² = `length2`, d·m has the
     /// sign of `sign`, and (d·m)² = `along2` with the root `along`.
     #[inline(always)]
-    fn refract(&self, ray: Ray, m: [f64; 3], length2: f64, along2: f64, along: f64) -> (Ray, bool) {
+    pub(crate) fn refract(
+        &self,
+        ray: Ray,
+        m: [f64; 3],
+        length2: f64,
+        along2: f64,
+        along: f64,
+    ) -> (Ray, bool) {
         let behind2 = self.rest * length2 + self.ratio * self.ratio * along2;
         let g = (behind2.sqrt().copysign(along) - self.ratio * along) / length2;
         let direction = [
@@ -76,6 +89,13 @@ impl Refraction {
             self.ratio * ray.direction[2] + g * m[2],
         ];
         (Ray { direction, ..ray }, (0.0..f64::INFINITY).contains(&behind2))
+    }
+}
+
+impl Refraction {
+    /// From a medium of index `before` into one of index `behind`.
+    pub(crate) fn new(surface: Surface, before: f64, behind: f64) -> Self {
+        Self { surface, media: Media::new(before, behind) }
     }
 
     /// A ray in the surface's frame at a plane.
@@ -86,7 +106,7 @@ impl Refraction {
         let mut there = ray.advanced(t);
         there.position[2] = 0.0;
         let [x, y, _] = there.position;
-        let (out, through) = self.refract(there, [0.0, 0.0, 1.0], 1.0, w * w, w);
+        let (out, through) = self.media.refract(there, [0.0, 0.0, 1.0], 1.0, w * w, w);
         let hit = (t > -TOUCH) & (t < f64::INFINITY);
         Refracted { ray: out, t, hit, clear: x * x + y * y <= clip2, through }
     }
@@ -105,7 +125,7 @@ impl Refraction {
         let r2 = x * x + y * y;
         let (stretch, length2) = if SPHERE { (1.0, 1.0) } else { (1.0 + k, 1.0 - k * c * c * r2) };
         let m = [-c * x, -c * y, 1.0 - stretch * c * z];
-        let (out, through) = self.refract(met.ray, m, length2, met.along2, met.along);
+        let (out, through) = self.media.refract(met.ray, m, length2, met.along2, met.along);
         // A ray that misses has a NaN for a root, which is not greater than anything.
         let hit = (met.t > -TOUCH) & (met.t < f64::INFINITY) & (m[2] >= 0.0);
         Refracted { ray: out, t: met.t, hit, clear: r2 <= clip2, through }
@@ -149,7 +169,7 @@ impl Refraction {
         let [u, v, w] = ray.direction;
         let m = [-slope * x, -slope * y, 1.0];
         let along = u * m[0] + v * m[1] + w;
-        self.refract(ray, m, 1.0 + slope * slope * (x * x + y * y), along * along, along)
+        self.media.refract(ray, m, 1.0 + slope * slope * (x * x + y * y), along * along, along)
     }
 }
 

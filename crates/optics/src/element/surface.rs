@@ -71,45 +71,16 @@ impl SurfaceSpec {
     ///
     /// A sentence on the first number that describes no surface.
     pub fn build(&self) -> Result<Surface, String> {
-        let semi_diameter = self.semi_diameter.map_or(f64::INFINITY, |s| s.0);
-        if semi_diameter.is_nan() || semi_diameter < 0.0 {
-            return Err(format!("semi_diameter is {semi_diameter} mm; it must not be negative"));
-        }
+        let semi_diameter = checked_semi_diameter(self.semi_diameter)?;
         if !self.conic.is_finite() {
             return Err("conic must be finite".to_owned());
         }
         Ok(Surface {
-            curvature: self.vertex_curvature()?,
+            curvature: vertex_curvature(self.radius, self.curvature)?,
             conic: self.conic,
             aspheric: self.coefficients()?,
             semi_diameter,
         })
-    }
-
-    fn vertex_curvature(&self) -> Result<f64, String> {
-        let curvature = match (self.radius, self.curvature) {
-            (Some(_), Some(_)) => return Err("give either radius or curvature".to_owned()),
-            (Some(Millimetres(0.0)), None) => {
-                return Err("radius is 0; a flat surface has no radius".to_owned());
-            }
-            // An infinite radius is a plane: 1/∞ = 0.
-            (Some(Millimetres(radius)), None) if radius.abs() < SMALLEST_RADIUS => {
-                return Err(format!(
-                    "radius is {radius:e} mm; it must be at least {SMALLEST_RADIUS:e} mm, or absent for \
-                     a flat surface"
-                ));
-            }
-            (Some(Millimetres(radius)), None) => 1.0 / radius,
-            (None, Some(curvature)) => curvature,
-            (None, None) => 0.0,
-        };
-        if curvature.abs() <= LARGEST_CURVATURE {
-            Ok(curvature)
-        } else {
-            Err(format!(
-                "the curvature is {curvature:e} 1/mm; it must be at most {LARGEST_CURVATURE:e} 1/mm"
-            ))
-        }
     }
 
     fn coefficients(&self) -> Result<Vec<f64>, String> {
@@ -138,6 +109,45 @@ impl SurfaceSpec {
     }
 }
 
+/// A semi-diameter (mm) as a file writes it; infinite without one.
+pub(super) fn checked_semi_diameter(written: Option<Millimetres>) -> Result<f64, String> {
+    let semi_diameter = written.map_or(f64::INFINITY, |s| s.0);
+    if semi_diameter.is_nan() || semi_diameter < 0.0 {
+        return Err(format!("semi_diameter is {semi_diameter} mm; it must not be negative"));
+    }
+    Ok(semi_diameter)
+}
+
+/// The curvature (1/mm) by a radius or by itself; 0 when neither is given.
+pub(super) fn vertex_curvature(
+    radius: Option<Millimetres>,
+    curvature: Option<f64>,
+) -> Result<f64, String> {
+    let curvature = match (radius, curvature) {
+        (Some(_), Some(_)) => return Err("give either radius or curvature".to_owned()),
+        (Some(Millimetres(0.0)), None) => {
+            return Err("radius is 0; a flat surface has no radius".to_owned());
+        }
+        // An infinite radius is a plane: 1/∞ = 0.
+        (Some(Millimetres(radius)), None) if radius.abs() < SMALLEST_RADIUS => {
+            return Err(format!(
+                "radius is {radius:e} mm; it must be at least {SMALLEST_RADIUS:e} mm, or absent for \
+                 a flat surface"
+            ));
+        }
+        (Some(Millimetres(radius)), None) => 1.0 / radius,
+        (None, Some(curvature)) => curvature,
+        (None, None) => 0.0,
+    };
+    if curvature.abs() <= LARGEST_CURVATURE {
+        Ok(curvature)
+    } else {
+        Err(format!(
+            "the curvature is {curvature:e} 1/mm; it must be at most {LARGEST_CURVATURE:e} 1/mm"
+        ))
+    }
+}
+
 impl Surface {
     /// A sphere, or a plane of curvature 0, without limits.
     #[must_use]
@@ -149,6 +159,14 @@ impl Surface {
     #[must_use]
     pub fn is_plane(&self) -> bool {
         self.curvature == 0.0 && self.aspheric.is_empty()
+    }
+
+    /// Words on how it differs from a sphere.
+    pub(crate) fn shape(&self) -> Vec<String> {
+        let conic = (self.conic != 0.0).then(|| format!("conic {}", self.conic));
+        let terms = self.aspheric.len();
+        let aspheric = (terms > 0).then(|| format!("aspheric to r^{}", 2 * terms));
+        conic.into_iter().chain(aspheric).collect()
     }
 
     /// The curvature at the vertex with the aspheric terms (1/mm), which is what the paraxial

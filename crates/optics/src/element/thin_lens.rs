@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::rays::Ray;
 use super::refract::{Refracted, TOUCH};
-use super::surface::{LARGEST_CURVATURE, SMALLEST_RADIUS};
+use super::surface::{LARGEST_CURVATURE, SMALLEST_RADIUS, checked_semi_diameter};
 use etendue_geometry::units::Millimetres;
 
 /// A thin lens as a lens file writes it.
@@ -38,10 +38,7 @@ impl ThinLensSpec {
     ///
     /// A sentence on the number that describes no lens.
     pub fn build(&self) -> Result<ThinLens, String> {
-        let semi_diameter = self.semi_diameter.map_or(f64::INFINITY, |s| s.0);
-        if semi_diameter.is_nan() || semi_diameter < 0.0 {
-            return Err(format!("semi_diameter is {semi_diameter} mm; it must not be negative"));
-        }
+        let semi_diameter = checked_semi_diameter(self.semi_diameter)?;
         // An infinite focal length is a lens without power.
         let power = 1.0 / self.focal_length.0;
         if power.abs() <= LARGEST_CURVATURE {

@@ -143,15 +143,11 @@ fn behind(
     media: &[Glass],
     catalogues: &[AgfCatalogue],
 ) -> Result<Glass, LensError> {
-    let glass = match &spec.part {
-        PartSpec::Surface(surface) => &surface.glass,
-        PartSpec::MicrolensArray(array) if array.has_faces() => &array.glass,
-        _ => return Ok(media[index].clone()),
-    };
-    match glass {
-        Some(glass) => {
+    match spec.part.medium_behind() {
+        Some(Some(glass)) => {
             glass.resolve_in(catalogues).map_err(|source| LensError::Glass { index, source })
         }
-        None => Ok(Glass::air()),
+        Some(None) => Ok(Glass::air()),
+        None => Ok(media[index].clone()),
     }
 }

@@ -30,7 +30,7 @@ pub mod report;
 pub mod trace;
 pub mod zemax;
 
-use crate::element::{Frame, LossesSpec};
+use crate::element::{Frame, LossesSpec, Symbol};
 use crate::glass::{Glass, GlassError};
 
 pub use crate::element::Part;
@@ -186,9 +186,8 @@ impl OpticalTrain {
     /// Whether nothing in it aberrates: thin lenses and sheets, centred and square to the axis.
     #[must_use]
     pub fn is_ideal(&self) -> bool {
-        let bends = |part: &Part| matches!(part, Part::Surface(_) | Part::MicrolensArray(_));
-        let flat = |e: &Element| e.frame.is_axial() && !bends(&e.part);
-        self.sensor.tilt == SensorMount::default().tilt && self.elements.iter().all(flat)
+        let is_ideal = |e: &Element| e.frame.is_axial() && e.part.is_ideal();
+        self.sensor.tilt == SensorMount::default().tilt && self.elements.iter().all(is_ideal)
     }
 
     /// What its glass takes from light.
@@ -352,15 +351,11 @@ impl OpticalTrain {
             }
         }
         for (i, element) in self.elements.iter().enumerate() {
-            if let Part::Surface(surface) = &element.part
-                && surface.semi_diameter.is_finite()
-                && surface.semi_diameter > surface.domain()
-            {
+            let (rim, domain) = (element.clear_radius(), element.part.domain());
+            if rim.is_finite() && rim > domain {
                 notes.push(format!(
-                    "elements[{i}] has a semi_diameter of {} mm, and its surface ends {} mm from \
-                     the axis: rays beyond miss it",
-                    surface.semi_diameter,
-                    surface.domain()
+                    "elements[{i}] has a semi_diameter of {rim} mm, and its surface ends {domain} mm \
+                     from the axis: rays beyond miss it"
                 ));
             }
         }
@@ -384,17 +379,17 @@ impl OpticalTrain {
     fn crossings(&self) -> Vec<String> {
         let mut notes = Vec::new();
         for (i, pair) in self.elements.windows(2).enumerate() {
-            let (Part::Surface(a), Part::Surface(b)) = (&pair[0].part, &pair[1].part) else {
-                continue;
-            };
-            let reach = a.semi_diameter.min(b.semi_diameter);
-            if !reach.is_finite() || !pair.iter().all(|e| e.frame.is_axial()) {
+            let [a, b] = [&pair[0].part, &pair[1].part];
+            let reach = a.clear_radius().min(b.clear_radius());
+            let of_glass = [a, b].iter().all(|part| part.symbol() == Symbol::Surface);
+            if !of_glass || !reach.is_finite() || !pair.iter().all(|e| e.frame.is_axial()) {
                 continue;
             }
             let thickness = pair[1].frame.vertex.z - pair[0].frame.vertex.z;
-            let gap = |r: f64| Some(thickness + b.sag(r)? - a.sag(r)?);
-            let heights = (0..=64).map(|step| reach * f64::from(step) / 64.0);
-            if let Some(r) = heights.into_iter().find(|&r| gap(r).is_some_and(|g| g < 0.0)) {
+            let gap = |place| Some(thickness + b.sag(place)? - a.sag(place)?);
+            let is_cut = |place| gap(place).is_some_and(|gap| gap < 0.0);
+            let mut heights = (0..=64).map(|step| reach * f64::from(step) / 64.0);
+            if let Some(r) = heights.find(|&r| is_cut([0.0, r]) || is_cut([r, 0.0])) {
                 notes.push(format!(
                     "elements[{i}] and elements[{}] cut through each other {r:.3} mm from the \
                      axis: rays beyond miss the second",

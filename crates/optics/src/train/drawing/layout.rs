@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::{Anchor, COLOURS, Canvas, round_length, short, title};
-use crate::element::{Clip, RayStatus};
-use crate::train::{Element, LensReport, MonochromaticTrain, OpticalTrain, Part, Side};
+use crate::element::{Clip, RayStatus, Symbol};
+use crate::train::{Element, LensReport, MonochromaticTrain, OpticalTrain, Side};
 
 /// The picture's width and the most of its height (pixels).
 const WIDTH: f64 = 960.0;
@@ -155,10 +155,7 @@ fn heights(train: &OpticalTrain, fans: &[Fan]) -> Vec<f64> {
     let height = |(i, element): (usize, &Element)| {
         let rim = element.clear_radius();
         let rim = if rim.is_finite() { rim } else { reach(i).max(0.05 * train.lateral_scale()) };
-        match &element.part {
-            Part::Surface(surface) => rim.min(surface.domain()),
-            _ => rim,
-        }
+        rim.min(element.part.domain())
     };
     train.elements().iter().enumerate().map(height).collect()
 }
@@ -250,13 +247,9 @@ impl View {
 
 /// Points (z, y) of a surface from its lower rim to its upper.
 fn section(element: &Element, height: f64) -> Vec<[f64; 2]> {
-    let sag = |r: f64| match &element.part {
-        Part::Surface(surface) => surface.sag(r),
-        _ => Some(0.0),
-    };
     let points = (-SECTION..=SECTION).filter_map(|i| {
         let y = height * f64::from(i) / f64::from(SECTION);
-        let point = element.frame.point(DVec3::new(0.0, y, sag(y)?));
+        let point = element.frame.point(DVec3::new(0.0, y, element.part.sag([0.0, y])?));
         Some([point.z, point.y])
     });
     points.collect()
@@ -271,7 +264,7 @@ fn glasses(
     heights: &[f64],
 ) {
     let surfaces: Vec<usize> = (0..heights.len())
-        .filter(|&i| matches!(train.elements()[i].part, Part::Surface(_)))
+        .filter(|&i| train.elements()[i].part.symbol() == Symbol::Surface)
         .collect();
     for pair in surfaces.windows(2) {
         let [front, back] = [pair[0], pair[1]];
@@ -321,14 +314,14 @@ fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: 
         canvas.path(&points, "ink", width);
     };
     let at = |y: f64, z: f64| DVec3::new(0.0, y, z);
-    match &element.part {
-        Part::Surface(_) => {
+    match element.part.symbol() {
+        Symbol::Surface => {
             let points: Vec<[f64; 2]> =
                 section(element, height).iter().map(|&point| view.pixel(point)).collect();
             canvas.path(&points, "ink", 1.2);
         }
-        Part::ThinLens(lens) => {
-            let tip = 0.05 * height * lens.power.signum();
+        Symbol::ThinLens { converging } => {
+            let tip = 0.05 * height * converging;
             line(canvas, &[at(-height, 0.0), at(height, 0.0)], 1.2);
             for side in [-1.0, 1.0] {
                 let inner = side * (height - tip);
@@ -339,13 +332,13 @@ fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: 
                 );
             }
         }
-        Part::Aperture(_) => {
+        Symbol::Opening => {
             let outer = height + (0.2 * height).max(8.0 / view.scale);
             for side in [-1.0, 1.0] {
                 line(canvas, &[at(side * height, 0.0), at(side * outer, 0.0)], 3.0);
             }
         }
-        Part::Filter(_) | Part::MicrolensArray(_) => {
+        Symbol::Sheet => {
             let half = 1.5 / view.scale;
             for z in [-half, half] {
                 line(canvas, &[at(-height, z), at(height, z)], 0.8);
@@ -355,7 +348,7 @@ fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: 
     if stop {
         let top = element.frame.point(at(-height, 0.0));
         let [x, y] = view.pixel([top.z, top.y]);
-        let below = if matches!(element.part, Part::Aperture(_)) { 26.0 } else { 14.0 };
+        let below = if element.part.symbol() == Symbol::Opening { 26.0 } else { 14.0 };
         canvas.text([x, y + below], Anchor::Middle, "small", "stop");
     }
 }

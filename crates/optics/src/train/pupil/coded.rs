@@ -27,7 +27,7 @@ use glam::{DMat2, DVec2, DVec3};
 use super::histogram::Histogram;
 use crate::element::{Clip, Frame, Opening, Picture, Ray, RayStatus};
 use crate::train::aim::{slopes_to, towards_lens};
-use crate::train::{MonochromaticTrain, OpticalTrain, Part, Side};
+use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 
 /// Intervals between nodes over each side of the sensor and of the mask.
 const FILM: usize = 12;
@@ -443,12 +443,9 @@ impl View<'_> {
 
 /// The first mask that stops or dims anything.
 fn first_mask(train: &OpticalTrain) -> Option<(usize, &Picture)> {
-    train.elements.iter().enumerate().find_map(|(i, element)| match &element.part {
-        Part::Aperture(opening) => match &**opening {
-            Opening::Image(mask) if mask.values.iter().any(|v| *v < 1.0) => Some((i, mask)),
-            Opening::Image(_) | Opening::Circle { .. } | Opening::Polygon { .. } => None,
-        },
-        Part::Surface(_) | Part::ThinLens(_) | Part::Filter(_) | Part::MicrolensArray(_) => None,
+    train.elements.iter().enumerate().find_map(|(i, element)| match element.part.opening()? {
+        Opening::Image(mask) if mask.values.iter().any(|v| *v < 1.0) => Some((i, mask)),
+        Opening::Image(_) | Opening::Circle { .. } | Opening::Polygon { .. } => None,
     })
 }
 

@@ -9,8 +9,7 @@ use super::analysis::{
     Distortion, Illumination, Spot, colour_shifts, distortion, half_field, illumination,
     image_circle, spot,
 };
-use super::{Focus, MonochromaticTrain, OpticalTrain, Paraxial, Part};
-use crate::element::Opening;
+use super::{Focus, MonochromaticTrain, OpticalTrain, Paraxial};
 use crate::glass::{FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F, GlassError};
 
 /// Field angles of a lens whose image circle has no end (degrees).
@@ -301,15 +300,10 @@ fn rows(train: &OpticalTrain, at: &MonochromaticTrain, sensor_z: Option<f64>) ->
     let row = |(i, element): (usize, &super::Element)| {
         let z = element.frame.vertex.z;
         let next = elements.get(i + 1).map(|next| next.frame.vertex.z).or(sensor_z);
-        let radius = match &element.part {
-            Part::Surface(surface) => finite(1.0 / surface.curvature),
-            Part::ThinLens(lens) => finite(1.0 / lens.power),
-            _ => None,
-        };
         ElementRow {
             kind: element.part.type_name(),
             z,
-            radius,
+            radius: finite(element.part.radius()),
             shape: shape_of(element),
             thickness: next.map(|next| next - z),
             medium: train.media()[i + 1].name.clone(),
@@ -322,30 +316,7 @@ fn rows(train: &OpticalTrain, at: &MonochromaticTrain, sensor_z: Option<f64>) ->
 
 /// A word on how an element differs from a centred sphere or a round hole; empty when it does not.
 fn shape_of(element: &super::Element) -> String {
-    let mut words = Vec::new();
-    match &element.part {
-        Part::Surface(surface) => {
-            if surface.conic != 0.0 {
-                words.push(format!("conic {}", surface.conic));
-            }
-            if !surface.aspheric.is_empty() {
-                words.push(format!("aspheric to r^{}", 2 * surface.aspheric.len()));
-            }
-        }
-        Part::Aperture(opening) => match &**opening {
-            Opening::Circle { .. } => {}
-            Opening::Polygon { normals, .. } => words.push(format!("{} blades", normals.len())),
-            Opening::Image(picture) => {
-                words.push(format!("mask of {} x {} pixels", picture.pixels[0], picture.pixels[1]));
-            }
-        },
-        Part::MicrolensArray(array) => {
-            let [width, height] = array.half_size.map(|half| 2.0 * half);
-            let pitch = array.lattice.pitch;
-            words.push(format!("lenslets every {pitch} mm on {width} x {height} mm"));
-        }
-        Part::ThinLens(_) | Part::Filter(_) => {}
-    }
+    let mut words = element.part.shape();
     if !element.frame.is_axial() {
         words.push("tilted or decentred".to_owned());
     }
