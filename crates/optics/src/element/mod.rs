@@ -4,6 +4,7 @@
 
 mod aperture;
 mod asphere;
+mod biconic;
 mod filter;
 mod frame;
 mod lattice;
@@ -28,6 +29,7 @@ use serde_json::{Map, Value};
 use etendue_geometry::units::{Degrees, Millimetres};
 
 pub use aperture::{ApertureSpec, CircularSpec, MaskSpec, Opening, PolygonSpec};
+pub use biconic::{Biconic, BiconicSpec};
 pub use filter::{Filter, FilterSpec};
 pub use frame::Frame;
 pub use lattice::{Cell, Grid, Lattice};

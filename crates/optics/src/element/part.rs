@@ -8,10 +8,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::lenslets::Lenslets;
+use super::refract::Media;
 use super::step::Action;
 use super::{
-    ApertureSpec, CircularSpec, Filter, FilterSpec, Gaps, MicrolensArray, MicrolensArraySpec,
-    Opening, Refraction, Resolve, Surface, SurfaceSpec, ThinLens, ThinLensSpec,
+    ApertureSpec, Biconic, BiconicSpec, CircularSpec, Filter, FilterSpec, Gaps, MicrolensArray,
+    MicrolensArraySpec, Opening, Refraction, Resolve, Surface, SurfaceSpec, ThinLens, ThinLensSpec,
 };
 use crate::glass::GlassSpec;
 use etendue_geometry::units::Millimetres;
@@ -22,6 +23,8 @@ use etendue_geometry::units::Millimetres;
 pub enum PartSpec {
     /// A refracting surface.
     Surface(SurfaceSpec),
+    /// A refracting surface of two curvatures.
+    Biconic(BiconicSpec),
     /// An ideal thin lens.
     ThinLens(ThinLensSpec),
     /// An opening in an opaque sheet.
@@ -37,6 +40,8 @@ pub enum PartSpec {
 pub enum Part {
     /// A refracting surface between the media before and behind it.
     Surface(Surface),
+    /// A refracting surface of two curvatures.
+    Biconic(Biconic),
     /// An ideal thin lens.
     ThinLens(ThinLens),
     /// An opening in an opaque sheet.
@@ -90,6 +95,7 @@ impl PartSpec {
     pub fn medium_behind(&self) -> Option<Option<&GlassSpec>> {
         match self {
             Self::Surface(surface) => Some(surface.glass.as_ref()),
+            Self::Biconic(surface) => Some(surface.glass.as_ref()),
             Self::MicrolensArray(array) => array.has_faces().then_some(array.glass.as_ref()),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => None,
         }
@@ -103,6 +109,7 @@ impl PartSpec {
     pub fn build(&self, resolve: Resolve<'_>) -> Result<Part, String> {
         Ok(match self {
             Self::Surface(surface) => Part::Surface(surface.build()?),
+            Self::Biconic(surface) => Part::Biconic(surface.build()?),
             Self::ThinLens(lens) => Part::ThinLens(lens.build()?),
             Self::Aperture(aperture) => Part::Aperture(aperture.build(resolve)?.into()),
             Self::Filter(filter) => Part::Filter(filter.build(resolve)?.into()),
@@ -117,6 +124,7 @@ impl Part {
     pub fn type_name(&self) -> &'static str {
         match self {
             Self::Surface(_) => "surface",
+            Self::Biconic(_) => "biconic",
             Self::ThinLens(_) => "thin_lens",
             Self::Aperture(_) => "aperture",
             Self::Filter(_) => "filter",
@@ -129,6 +137,7 @@ impl Part {
     pub fn clear_radius(&self) -> f64 {
         match self {
             Self::Surface(surface) => surface.semi_diameter,
+            Self::Biconic(surface) => surface.semi_diameter,
             Self::ThinLens(lens) => lens.semi_diameter,
             Self::Aperture(opening) => opening.radius(),
             Self::Filter(filter) => filter.radius(),
@@ -144,6 +153,7 @@ impl Part {
     pub(crate) fn set_clear_radius(&mut self, radius: f64) -> Result<(), &'static str> {
         match self {
             Self::Surface(surface) => surface.semi_diameter = radius,
+            Self::Biconic(surface) => surface.semi_diameter = radius,
             Self::ThinLens(lens) => lens.semi_diameter = radius,
             Self::Filter(filter) => Arc::make_mut(filter).semi_diameter = radius,
             Self::Aperture(opening) => {
@@ -159,8 +169,19 @@ impl Part {
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         match self {
-            Self::Surface(_) | Self::MicrolensArray(_) => false,
+            Self::Surface(_) | Self::Biconic(_) | Self::MicrolensArray(_) => false,
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) => true,
+        }
+    }
+
+    /// Whether it is a plane at which nothing but the media bends light.
+    #[must_use]
+    pub fn is_plane(&self) -> bool {
+        match self {
+            Self::Surface(surface) => surface.is_plane(),
+            Self::Biconic(surface) => surface.curvature == [0.0; 2],
+            Self::Aperture(_) | Self::Filter(_) => true,
+            Self::ThinLens(_) | Self::MicrolensArray(_) => false,
         }
     }
 
@@ -169,9 +190,11 @@ impl Part {
     pub fn opening(&self) -> Option<&Opening> {
         match self {
             Self::Aperture(opening) => Some(opening),
-            Self::Surface(_) | Self::ThinLens(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
-                None
-            }
+            Self::Surface(_)
+            | Self::Biconic(_)
+            | Self::ThinLens(_)
+            | Self::Filter(_)
+            | Self::MicrolensArray(_) => None,
         }
     }
 
@@ -180,6 +203,7 @@ impl Part {
     pub fn domain(&self) -> f64 {
         match self {
             Self::Surface(surface) => surface.domain(),
+            Self::Biconic(surface) => surface.domain(),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
                 f64::INFINITY
             }
@@ -191,6 +215,7 @@ impl Part {
     pub fn sag(&self, [x, y]: [f64; 2]) -> Option<f64> {
         match self {
             Self::Surface(surface) => surface.sag(x.hypot(y)),
+            Self::Biconic(surface) => surface.sag([x, y]),
             Self::ThinLens(_) | Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => {
                 Some(0.0)
             }
@@ -203,6 +228,7 @@ impl Part {
     pub fn radius(&self) -> f64 {
         match self {
             Self::Surface(surface) => 1.0 / surface.curvature,
+            Self::Biconic(surface) => 1.0 / surface.curvature[1],
             Self::ThinLens(lens) => 1.0 / lens.power,
             Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => f64::INFINITY,
         }
@@ -213,6 +239,7 @@ impl Part {
     pub fn shape(&self) -> Vec<String> {
         match self {
             Self::Surface(surface) => surface.shape(),
+            Self::Biconic(surface) => surface.shape(),
             Self::Aperture(opening) => opening.shape().into_iter().collect(),
             Self::MicrolensArray(array) => {
                 let [width, height] = array.half_size.map(|half| 2.0 * half);
@@ -227,7 +254,7 @@ impl Part {
     #[must_use]
     pub fn symbol(&self) -> Symbol {
         match self {
-            Self::Surface(_) => Symbol::Surface,
+            Self::Surface(_) | Self::Biconic(_) => Symbol::Surface,
             Self::ThinLens(lens) => Symbol::ThinLens { converging: lens.power.signum() },
             Self::Aperture(_) => Symbol::Opening,
             Self::Filter(_) | Self::MicrolensArray(_) => Symbol::Sheet,
@@ -239,6 +266,7 @@ impl Part {
     pub fn is_round(&self) -> bool {
         match self {
             Self::Surface(_) | Self::ThinLens(_) => true,
+            Self::Biconic(surface) => surface.is_round(),
             Self::Aperture(opening) => opening.is_round(),
             Self::Filter(filter) => filter.is_uniform(),
             Self::MicrolensArray(_) => false,
@@ -251,7 +279,7 @@ impl Part {
         match self {
             Self::Filter(filter) => &filter.curves,
             Self::MicrolensArray(array) => &array.curves,
-            Self::Surface(_) | Self::ThinLens(_) | Self::Aperture(_) => &[],
+            Self::Surface(_) | Self::Biconic(_) | Self::ThinLens(_) | Self::Aperture(_) => &[],
         }
     }
 
@@ -273,6 +301,8 @@ impl Part {
     pub(crate) fn power(&self, before: f64, behind: f64) -> f64 {
         match self {
             Self::Surface(surface) => (behind - before) * surface.paraxial_curvature(),
+            // As drawings and tables, it sees the section along y.
+            Self::Biconic(surface) => (behind - before) * surface.curvature[1],
             Self::ThinLens(lens) => before * lens.power,
             Self::Aperture(_) | Self::Filter(_) | Self::MicrolensArray(_) => 0.0,
         }
@@ -292,6 +322,12 @@ impl Part {
                 Action::refract(Refraction::new(surface.clone(), before, behind)),
                 Action::refract(Refraction::new(surface.clone(), behind, before)),
             ],
+            Self::Biconic(surface) => {
+                [[before, behind], [behind, before]].map(|[before, behind]| {
+                    let (surface, media) = (surface.clone(), Media::new(before, behind));
+                    Action::Biconic { surface, media }
+                })
+            }
             Self::ThinLens(lens) => [lens.power, -lens.power]
                 .map(|power| Action::ThinLens { power, semi_diameter: lens.semi_diameter }),
             Self::Aperture(opening) => both(Action::Opening(Arc::clone(opening))),

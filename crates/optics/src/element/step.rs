@@ -7,12 +7,13 @@
 use std::sync::Arc;
 
 use super::aperture::Opening;
+use super::biconic::Biconic;
 use super::filter::Filter;
 use super::frame::Frame;
 use super::lenslets::Lenslets;
 use super::losses::Loss;
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
-use super::refract::{Refracted, Refraction, each_lane};
+use super::refract::{Media, Refracted, Refraction, each_lane};
 use super::thin_lens::at_thin_lens;
 
 /// Whether clear apertures stop rays.
@@ -44,6 +45,7 @@ pub(crate) enum Action {
     Sphere(Refraction),
     Conic(Refraction),
     Asphere(Refraction),
+    Biconic { surface: Biconic, media: Media },
     ThinLens { power: f64, semi_diameter: f64 },
     Opening(Arc<Opening>),
     Filter { filter: Arc<Filter>, transmissions: Vec<f64> },
@@ -145,6 +147,10 @@ impl Step {
             Action::Asphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
                 refraction.asphere_lanes(block, self.element, z, clip2)
+            }
+            Action::Biconic { surface, media } => {
+                let clip2 = limit(surface.semi_diameter, clip);
+                each_lane(block, self.element, z, |ray| surface.refract(*media, ray, clip2))
             }
             Action::ThinLens { power, semi_diameter } => {
                 let clip2 = limit(*semi_diameter, clip);
@@ -294,6 +300,10 @@ impl Step {
             Action::Asphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
                 self.crossed(refraction.at_asphere(ray, clip2))
+            }
+            Action::Biconic { surface, media } => {
+                let clip2 = limit(surface.semi_diameter, clip);
+                self.crossed(surface.refract(*media, ray, clip2))
             }
             Action::ThinLens { power, semi_diameter } => {
                 self.crossed(at_thin_lens(*power, ray, limit(*semi_diameter, clip)))

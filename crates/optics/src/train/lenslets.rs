@@ -143,9 +143,7 @@ impl OpticalTrain {
                         && other.types.len() == array.types.len()
                         && element.frame.vertex.truncate() == decentre
                 }
-                Part::Surface(surface) => surface.is_plane(),
-                Part::Aperture(_) | Part::Filter(_) => true,
-                Part::ThinLens(_) => false,
+                part => part.is_plane(),
             };
             if !fits {
                 return None;

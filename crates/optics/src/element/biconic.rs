@@ -1,0 +1,340 @@
+//! A biconic surface: a conic section along x and another along y, as toric and cylindrical lenses
+//! and anamorphs have.
+//!
+//! z = (cₓ x² + c_y y²) / (1 + √(1 − (1 + kₓ) cₓ² x² − (1 + k_y) c_y² y²)): the biconic of Zemax'
+//! OpticStudio (*User Manual*, "Biconic"; `BICONICX` in its files). With equal sections it is the
+//! conic.
+//!
+//! Rays are met by Newton's method from where they meet the vertex' plane; a root that it does not find
+//! is looked for by bisection, as with an [asphere](super::asphere).
+
+use std::f64::consts::TAU;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::asphere::{MOST_STEPS, SETTLED, first_root, interval};
+use super::rays::Ray;
+use super::refract::{Media, Refracted, TOUCH};
+use super::surface::{checked_semi_diameter, vertex_curvature};
+use crate::glass::GlassSpec;
+use etendue_geometry::units::Millimetres;
+
+/// A biconic surface as a lens file writes it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct BiconicSpec {
+    /// Radius of curvature along y (mm), positive when its centre lies on the sensor's side. Flat
+    /// along y without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<Millimetres>,
+    /// The conic constant along y.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub conic: f64,
+    /// Radius of curvature along x (mm). Flat along x without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_x: Option<Millimetres>,
+    /// The conic constant along x.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub conic_x: f64,
+    /// What follows the surface, on the sensor's side; air when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub glass: Option<GlassSpec>,
+    /// Half the clear diameter (mm): rays farther from the axis are stopped. Unlimited when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub semi_diameter: Option<Millimetres>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// A biconic surface in its own frame: the vertex at the origin, the axis along z (mm).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Biconic {
+    /// Curvatures at the vertex along x and y (1/mm).
+    pub curvature: [f64; 2],
+    /// The conic constants along x and y.
+    pub conic: [f64; 2],
+    /// Half the clear diameter (mm); infinite when unlimited.
+    pub semi_diameter: f64,
+}
+
+impl BiconicSpec {
+    /// The shape.
+    ///
+    /// # Errors
+    ///
+    /// A sentence on the first number that describes no surface.
+    pub fn build(&self) -> Result<Biconic, String> {
+        let semi_diameter = checked_semi_diameter(self.semi_diameter)?;
+        for (key, conic) in [("conic", self.conic), ("conic_x", self.conic_x)] {
+            if !conic.is_finite() {
+                return Err(format!("{key} must be finite"));
+            }
+        }
+        let along_x = vertex_curvature(self.radius_x, None).map_err(|why| format!("x: {why}"))?;
+        let along_y = vertex_curvature(self.radius, None)?;
+        Ok(Biconic {
+            curvature: [along_x, along_y],
+            conic: [self.conic_x, self.conic],
+            semi_diameter,
+        })
+    }
+}
+
+impl Biconic {
+    /// (1 + k) c² along x and y.
+    fn limits(&self) -> [f64; 2] {
+        std::array::from_fn(|i| (1.0 + self.conic[i]) * self.curvature[i] * self.curvature[i])
+    }
+
+    /// The distance from the axis up to which it exists all around (mm).
+    #[must_use]
+    pub fn domain(&self) -> f64 {
+        let limit = self.limits().into_iter().fold(0.0, f64::max);
+        limit.sqrt().recip()
+    }
+
+    /// Whether a turn about its axis changes nothing.
+    #[must_use]
+    pub fn is_round(&self) -> bool {
+        self.curvature[0] == self.curvature[1] && self.conic[0] == self.conic[1]
+    }
+
+    /// z at a place across the axis (mm); `None` where the surface does not exist.
+    #[must_use]
+    pub fn sag(&self, place: [f64; 2]) -> Option<f64> {
+        self.exists(place).then(|| self.profile(place).0).filter(|sag| sag.is_finite())
+    }
+
+    /// Words on how it differs from a sphere.
+    pub(crate) fn shape(&self) -> Vec<String> {
+        let [x, y] = self.curvature.map(|curvature| match curvature {
+            0.0 => "flat".to_owned(),
+            curvature => format!("radius {}", 1.0 / curvature),
+        });
+        let along_x = format!("{x} along x");
+        let conics = (self.conic != [0.0; 2])
+            .then(|| format!("conics {} along x, {} along y", self.conic[0], self.conic[1]));
+        std::iter::once(format!("{along_x}, {y} along y")).chain(conics).collect()
+    }
+
+    fn exists(&self, [x, y]: [f64; 2]) -> bool {
+        let [a, b] = self.limits();
+        a * x * x + b * y * y <= 1.0
+    }
+
+    /// The sag, and its derivatives by x and y. Beyond its domain it goes on as if at the edge, which
+    /// keeps an iteration going and is refused in the end.
+    fn profile(&self, [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
+        let [a, b] = self.limits();
+        let [c, d] = self.curvature;
+        let rise = c * x * x + d * y * y;
+        let root = (1.0 - a * x * x - b * y * y).max(0.0).sqrt();
+        let below = 1.0 + root;
+        // d/dx of rise/below: the root's own derivative is −a x/root.
+        let bend = rise / (below * below * root.max(1e-12));
+        (rise / below, [x * (2.0 * c / below + a * bend), y * (2.0 * d / below + b * bend)])
+    }
+
+    /// sag − z, and −d/dt of it, at a place of a ray.
+    fn residual(&self, at: Ray) -> (f64, f64) {
+        let [x, y, z] = at.position;
+        let (sag, [along_x, along_y]) = self.profile([x, y]);
+        let [u, v, w] = at.direction;
+        (sag - z, w - along_x * u - along_y * v)
+    }
+
+    /// A ray in the surface's frame.
+    pub(crate) fn refract(&self, media: Media, ray: Ray, clip2: f64) -> Refracted {
+        let Some(there) = self.newton(ray).or_else(|| self.search(ray, clip2)) else {
+            return Refracted { ray, t: 0.0, hit: false, clear: false, through: false };
+        };
+        let [x, y, _] = there.position;
+        let (_, [along_x, along_y]) = self.profile([x, y]);
+        let normal = [-along_x, -along_y, 1.0];
+        let along: f64 = (0..3).map(|i| there.direction[i] * normal[i]).sum();
+        let length2 = 1.0 + along_x * along_x + along_y * along_y;
+        let (ray, through) = media.refract(there, normal, length2, along * along, along);
+        Refracted { ray, t: 0.0, hit: true, clear: x * x + y * y <= clip2, through }
+    }
+
+    fn newton(&self, ray: Ray) -> Option<Ray> {
+        let mut travel = -ray.position[2] / ray.direction[2];
+        let mut at = ray.advanced(travel);
+        for _ in 0..MOST_STEPS {
+            let (short, along) = self.residual(at);
+            let step = short / along;
+            if !step.is_finite() {
+                return None;
+            }
+            at = at.advanced(step);
+            travel += step;
+            if step.abs() <= SETTLED {
+                let [x, y, _] = at.position;
+                let forwards = self.residual(at).1 * at.direction[2] > 0.0;
+                return (self.exists([x, y]) && forwards && travel > -TOUCH).then_some(at);
+            }
+        }
+        None
+    }
+
+    /// The first root ahead, among changes of sign on the part of the ray that runs through the box
+    /// around the surface.
+    fn search(&self, ray: Ray, clip2: f64) -> Option<Ray> {
+        let Ray { position: [x, y, z], direction: [u, v, w] } = ray;
+        // Where neither the domain nor the rim ends the surface, its greater radius twice over does.
+        let radii = self.curvature.iter().filter(|c| **c != 0.0).map(|c| (2.0 / c).abs());
+        let own = radii.fold(0.0, f64::max).max(10.0);
+        let foot = ray.advanced(-(x * u + y * v + z * w)).position;
+        let near = 4.0 * foot[0].hypot(foot[1]) + own;
+        let clear = if clip2.is_finite() { 2.0 * clip2.sqrt() } else { f64::INFINITY };
+        let ends = self.limits().into_iter().filter(|limit| *limit > 0.0);
+        let far = ends.fold(f64::INFINITY, f64::min).sqrt().recip();
+        let far = if far > 0.0 { far } else { f64::INFINITY };
+        let reach = far.min(clear).min(near);
+        let across = interval(u * u + v * v, x * u + y * v, x * x + y * y - reach * reach)?;
+        // Sections through the axis are monotonous, so the extremes are at the vertex and the rim.
+        let rim = (0..64).map(|i| (TAU * f64::from(i) / 64.0).sin_cos());
+        let sags = rim.map(|(sine, cosine)| self.profile([reach * cosine, reach * sine]).0);
+        let (low, high) = sags.fold((0.0_f64, 0.0_f64), |(l, h), sag| (l.min(sag), h.max(sag)));
+        let slack = 0.1 * (high - low) + 1e-6;
+        let mut range = [across[0].max(-TOUCH), across[1]];
+        if w != 0.0 {
+            let ends = [(low - slack - z) / w, (high + slack - z) / w];
+            range = [range[0].max(ends[0].min(ends[1])), range[1].min(ends[0].max(ends[1]))];
+        }
+        if !(range[0] < range[1] && range.iter().all(|end| end.is_finite())) {
+            return None;
+        }
+        let there = ray.advanced(first_root(range, |t| -self.residual(ray.advanced(t)).0)?);
+        let [x, y, _] = there.position;
+        self.exists([x, y]).then_some(there)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::SurfaceSpec;
+    use crate::element::refract::Refraction;
+
+    fn read(json: &str) -> Result<Biconic, String> {
+        serde_json::from_str::<BiconicSpec>(json).map_err(|e| e.to_string())?.build()
+    }
+
+    fn ray(position: [f64; 3], direction: [f64; 3]) -> Ray {
+        Ray::new(position.into(), direction.into()).unwrap()
+    }
+
+    #[test]
+    fn equal_sections_are_the_conic() {
+        let biconic =
+            read(r#"{"radius": 20, "radius_x": 20, "conic": -0.6, "conic_x": -0.6}"#).unwrap();
+        let spec =
+            SurfaceSpec { radius: Some(Millimetres(20.0)), conic: -0.6, ..SurfaceSpec::default() };
+        let conic = Refraction::new(spec.build().unwrap(), 1.0, 1.5);
+        assert!(biconic.is_round());
+        let domain = conic.surface.domain();
+        assert!((biconic.domain() / domain - 1.0).abs() < 1e-15);
+        for (x, y) in [(0.0, 0.0), (3.0, -4.0), (-12.0, 9.0)] {
+            let start = ray([x, y, -30.0], [0.1, -0.05, 1.0]);
+            let ours = biconic.refract(conic.media, start, 1e9);
+            let theirs = conic.exactly(start, 1e9);
+            assert!(ours.hit && ours.through);
+            for axis in 0..3 {
+                // Newton leaves about (1e-10)² of curvature; rounding of 30 mm is 4e-15.
+                assert!((ours.ray.position[axis] - theirs.ray.position[axis]).abs() < 1e-13);
+                assert!((ours.ray.direction[axis] - theirs.ray.direction[axis]).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_sag() {
+        let s = read(r#"{"radius": 20, "radius_x": -35, "conic": -0.6, "conic_x": 1.5}"#).unwrap();
+        for [x, y] in [[3.0, 7.0], [-8.0, 2.0], [0.0, 11.0]] {
+            let (_, slopes) = s.profile([x, y]);
+            let by = |h: [f64; 2]| {
+                let at = |sign: f64| s.sag([x + sign * h[0], y + sign * h[1]]).unwrap();
+                (at(1.0) - at(-1.0)) / 2e-5
+            };
+            // A central difference of 1e-5 mm is good to about (1e-5)² ≈ 1e-10.
+            assert!((slopes[0] - by([1e-5, 0.0])).abs() < 1e-9);
+            assert!((slopes[1] - by([0.0, 1e-5])).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn each_meridian_focuses_as_its_own_ellipse_does() {
+        // k = −1/n² brings a parallel beam in air to a point at n R/(n − 1) inside the glass, at any
+        // height; along each axis the rays stay in its plane.
+        let n: f64 = 1.5;
+        let conic = -1.0 / (n * n);
+        let s = Biconic {
+            curvature: [1.0 / 30.0, 1.0 / 20.0],
+            conic: [conic; 2],
+            semi_diameter: f64::INFINITY,
+        };
+        for (axis, radius) in [(0, 30.0), (1, 20.0)] {
+            let focus = n * radius / (n - 1.0);
+            for height in [0.1, 3.0, 9.0, 14.0] {
+                let mut start = [0.0, 0.0, -3.0];
+                start[axis] = height;
+                let media = Media::new(1.0, n);
+                let out = s.refract(media, ray(start, [0.0, 0.0, 1.0]), 1e9).ray;
+                let t = -out.position[axis] / out.direction[axis];
+                assert!((out.position[2] + t * out.direction[2] - focus).abs() < 1e-11, "{height}");
+                assert_eq!(out.direction[1 - axis], 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_cylinder_bends_along_one_axis_alone_and_is_met_beside_its_domain() {
+        let s = read(r#"{"radius_x": 10}"#).unwrap();
+        let media = Media::new(1.0, 1.5);
+        let out = s.refract(media, ray([3.0, 50.0, -5.0], [0.0, 0.2, 1.0]), 1e9);
+        assert!(out.hit && (out.ray.position[2] - (10.0 - 91.0_f64.sqrt())).abs() < 1e-14);
+        // Snell along the cylinder: the component of n d along its axis is kept.
+        let along = 0.2 / (1.0_f64 + 0.04).sqrt();
+        assert!((out.ray.direction[1] - along / 1.5).abs() < 1e-15);
+        assert!(!s.refract(media, ray([11.0, 0.0, -5.0], [0.0, 0.0, 1.0]), 1e9).hit);
+        assert_eq!((s.sag([11.0, 0.0]), s.sag([0.0, 99.0])), (None, Some(0.0)));
+    }
+
+    #[test]
+    fn what_is_found_lies_on_the_surface_and_steep_rays_are_no_nonsense() {
+        let s = read(r#"{"radius": 12, "radius_x": -15, "conic": 0.5}"#).unwrap();
+        let media = Media::new(1.0, 1.5);
+        let mut hits = 0;
+        for i in -20..20 {
+            for j in -20..20 {
+                let start = ray(
+                    [f64::from(i), f64::from(j), -20.0],
+                    [0.08 * f64::from(j), 0.05 * f64::from(i), 1.0],
+                );
+                let at = s.refract(media, start, 1e9);
+                let [x, y, z] = at.ray.position;
+                if at.hit {
+                    hits += 1;
+                    assert!((z - s.sag([x, y]).unwrap()).abs() < 1e-9, "{x} {y}");
+                    assert!(at.ray.direction.iter().all(|d| d.is_finite()) || !at.through);
+                }
+            }
+        }
+        assert!(hits > 200, "{hits}");
+    }
+
+    #[test]
+    fn what_is_no_surface_is_refused_in_words() {
+        let error = |json| read(json).unwrap_err();
+        assert!(error(r#"{"radius_x": 0}"#).contains("x: radius is 0"));
+        assert!(error(r#"{"radius": 1e-300}"#).contains("at least 1e-9 mm"));
+        assert!(error(r#"{"semi_diameter": -1}"#).contains("negative"));
+        assert!(error(r#"{"radius_y": 1}"#).contains("unknown field `radius_y`"));
+        assert!(read("{}").unwrap().sag([3.0, 4.0]) == Some(0.0), "a plane");
+    }
+}
