@@ -356,8 +356,12 @@ impl Camera {
 
     /// The rays of `samples` that leave the camera, each with its weight: `out` is refilled.
     ///
-    /// Places that a distorted camera does not see have no ray. A lens has rays for the wavelengths
-    /// of its [`band_groups`](Self::band_groups).
+    /// Places that a distorted camera does not see have no ray.
+    ///
+    /// # Panics
+    ///
+    /// When a camera with a lens was not [opened](Self::opened), or has no such
+    /// [group](FilmSamples::group) of the bands that it was opened for.
     pub fn sample_rays(&self, samples: &FilmSamples, out: &mut CameraRays) {
         if let Projection::Lens(lens) = &self.projection {
             return lens.sample_rays(&self.pose, samples, out);

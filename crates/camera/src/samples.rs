@@ -17,8 +17,9 @@ pub struct FilmSamples {
     /// Places in 0..1 of the light that the rays stand for, from its shortest wavelength to its
     /// longest; cameras whose lenses do not disperse do not look.
     pub spectrum: Vec<f64>,
-    /// The [`wavelength`](crate::BandGroup::wavelength) of the bands that the rays are for.
-    pub wavelength: Option<f64>,
+    /// Which of the camera's [`band_groups`](crate::Camera::band_groups), for the bands that it was
+    /// opened for, the rays are for.
+    pub group: usize,
 }
 
 /// The rays of a batch of samples that leave the camera. Samples whose rays are blocked on the way

@@ -273,8 +273,8 @@ impl Adding<'_> {
                 let range = first..self.pass.end.min(first + at_once);
                 let a_pixel = range.len();
                 self.place(tile, (pixels, range), memory);
-                for group in self.what.groups() {
-                    memory.film.wavelength = group.wavelength;
+                for (number, group) in self.what.groups().iter().enumerate() {
+                    memory.film.group = number;
                     self.what.camera().sample_rays(&memory.film, &mut memory.rays);
                     self.what.trace(&group.bands, memory);
                     memory.add(start, a_pixel, [layers, bands], &group.bands);

@@ -14,7 +14,7 @@ use crate::{BuildError, BuildOptions};
 #[derive(Default)]
 struct Watch {
     /// The first error since it was last taken.
-    error: Mutex<Option<String>>,
+    error: Mutex<Option<(sys::RTCError, String)>>,
     /// Bytes that Embree holds now.
     bytes: AtomicI64,
     limit: Option<i64>,
@@ -96,18 +96,16 @@ impl Device {
     /// Fails with what Embree reported since the last call, if anything.
     pub(super) fn check(&self, call: &'static str) -> Result<(), BuildError> {
         let message = self.watch.error.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let Some(message) = message else { return Ok(()) };
+        let Some((code, message)) = message else { return Ok(()) };
         if self.watch.over_limit.load(Ordering::Relaxed) {
             let limit = u64::try_from(self.watch.limit.unwrap_or(0)).unwrap_or(0);
             return Err(BuildError::MemoryLimit { backend: "Embree", limit });
         }
-        if message.starts_with(STOPPED) {
-            return Err(BuildError::Stopped);
-        }
-        if message.starts_with(OUT_OF_MEMORY) {
-            return Err(BuildError::OutOfMemory { backend: "Embree", call });
-        }
-        Err(BuildError::Library { call, message })
+        Err(match code {
+            sys::RTC_ERROR_CANCELLED => BuildError::Stopped,
+            sys::RTC_ERROR_OUT_OF_MEMORY => BuildError::OutOfMemory { backend: "Embree", call },
+            _ => BuildError::Library { call, message },
+        })
     }
 }
 
@@ -128,9 +126,6 @@ impl fmt::Debug for Device {
     }
 }
 
-const STOPPED: &str = "cancelled";
-const OUT_OF_MEMORY: &str = "out of memory";
-
 unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError, text: *const c_char) {
     // SAFETY: `user` is the `Watch` that `Device::new` registered; the text is a C string or null.
     let (watch, text) = unsafe {
@@ -140,14 +135,14 @@ unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError, text: *con
     let name = match code {
         sys::RTC_ERROR_INVALID_ARGUMENT => "invalid argument",
         sys::RTC_ERROR_INVALID_OPERATION => "invalid operation",
-        sys::RTC_ERROR_OUT_OF_MEMORY => OUT_OF_MEMORY,
+        sys::RTC_ERROR_OUT_OF_MEMORY => "out of memory",
         sys::RTC_ERROR_UNSUPPORTED_CPU => "unsupported CPU",
-        sys::RTC_ERROR_CANCELLED => STOPPED,
+        sys::RTC_ERROR_CANCELLED => "cancelled",
         _ => "unknown error",
     };
     let mut slot = watch.error.lock().unwrap_or_else(PoisonError::into_inner);
     slot.get_or_insert_with(|| {
-        if text.is_empty() { name.to_owned() } else { format!("{name}: {text}") }
+        (code, if text.is_empty() { name.to_owned() } else { format!("{name}: {text}") })
     });
 }
 

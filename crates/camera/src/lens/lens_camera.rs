@@ -10,7 +10,7 @@
 //! are lost.
 
 use std::ops::Range;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use etendue_geometry::{RayBatch, RaysMut};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
@@ -39,8 +39,7 @@ const LEAST_DIAGONAL: f64 = 2.0;
 pub struct BandGroup {
     /// The bands.
     pub bands: Range<usize>,
-    /// What to ask [`Camera::sample_rays`](crate::Camera::sample_rays) for: `None` when all bands
-    /// are in one group.
+    /// At which wavelength their rays run (nm): `None` when all bands are in one group.
     pub wavelength: Option<f64>,
 }
 
@@ -56,13 +55,14 @@ pub struct LensCamera {
     lit: ImageCircle,
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
     pub(super) solid_angle: f64,
-    pub(super) opened: OnceLock<Option<Arc<Opened>>>,
+    pub(super) opened: Option<Arc<Opened>>,
 }
 
 /// The exit pupil measured at the wavelengths that are wanted.
 #[derive(Debug)]
 pub(super) struct Opened {
     bands: Bands,
+    /// In the order of [`LensCamera::band_groups`].
     pub(super) groups: Vec<OpenedGroup>,
     pub(super) pupil: ExitPupil,
 }
@@ -70,8 +70,6 @@ pub(super) struct Opened {
 /// The lens as it is for a group of bands.
 #[derive(Debug)]
 pub(super) struct OpenedGroup {
-    /// As in [`BandGroup`].
-    pub(super) wavelength: Option<f64>,
     /// One, or as many as share the group's light.
     pub(super) lenses: Vec<MonochromaticTrain>,
 }
@@ -116,7 +114,7 @@ impl LensCamera {
         let solid_angle = unvignetted(focused.train(), &design, &focused);
         let straight = unbent.at(unbent.wavelength()).unwrap_or_else(|_| design.clone());
         let chief = ChiefTable::new(&unbent, &frame, half, &straight);
-        Ok(Self { focused, design, chief, lenslets, lit, solid_angle, opened: OnceLock::new() })
+        Ok(Self { focused, design, chief, lenslets, lit, solid_angle, opened: None })
     }
 
     /// The lens and its sensor.
@@ -158,16 +156,13 @@ impl LensCamera {
     /// The same camera with its exit pupil measured for `bands`, which takes a moment when it is not
     /// yet.
     pub(crate) fn opened(&self, bands: &Bands) -> Result<Self, CameraError> {
-        if let Some(Some(opened)) = self.opened.get()
-            && opened.bands == *bands
-        {
+        if self.opened.as_ref().is_some_and(|opened| opened.bands == *bands) {
             return Ok(self.clone());
         }
-        let opened = OnceLock::from(Some(Arc::new(self.open(bands)?)));
-        Ok(Self { opened, ..self.clone() })
+        Ok(Self { opened: Some(Arc::new(self.open(bands)?)), ..self.clone() })
     }
 
-    pub(super) fn open(&self, bands: &Bands) -> Result<Opened, CameraError> {
+    fn open(&self, bands: &Bands) -> Result<Opened, CameraError> {
         let fault = |why: String| CameraError::new("", why);
         let train = self.focused.train();
         for (i, element) in train.elements().iter().enumerate() {
@@ -187,7 +182,7 @@ impl LensCamera {
             let mut few = vec![wavelengths[0], wavelengths[last / 2], wavelengths[last]];
             few.dedup();
             measured.extend(few);
-            groups.push(OpenedGroup { wavelength: group.wavelength, lenses });
+            groups.push(OpenedGroup { lenses });
         }
         let half_size = self.focused.film().half_size().to_array();
         let z = self.focused.sensor_z();
@@ -223,8 +218,8 @@ impl LensCamera {
 
     /// Whether rays of a sample run at a wavelength that is drawn.
     pub fn draws_wavelengths(&self) -> bool {
-        let opened = self.opened.get().and_then(Option::as_ref);
-        opened.is_none_or(|opened| opened.groups.iter().any(|group| group.lenses.len() > 1))
+        let groups = self.opened.iter().flat_map(|opened| &opened.groups);
+        groups.into_iter().any(|group| group.lenses.len() > 1)
     }
 
     /// How many wavelengths the rays of each of [`Self::band_groups`] are drawn from, at most.

@@ -1,8 +1,5 @@
 //! From samples of the film to weighted rays in the world, through the lens.
 
-use std::sync::Arc;
-
-use etendue_spectrum::Bands;
 use glam::{DMat3, DVec3};
 
 use super::lens_camera::LensCamera;
@@ -12,14 +9,11 @@ use etendue_optics::train::pupil::{Bundle, Disk};
 use etendue_optics::train::{ExitPupil, MonochromaticTrain, Side};
 
 impl LensCamera {
-    /// The rays of `samples` that leave the lens.
+    /// The rays of `samples` that leave the lens, which was opened.
     pub(crate) fn sample_rays(&self, pose: &Pose, samples: &FilmSamples, out: &mut CameraRays) {
         out.clear();
-        // Not opened yet: at the design wavelength of RGB.
-        let opened = self.opened.get_or_init(|| self.open(&Bands::Rgb).ok().map(Arc::new));
-        let Some(opened) = opened else { return };
-        let wanted = opened.groups.iter().find(|group| group.wavelength == samples.wavelength);
-        let Some(group) = wanted.or(opened.groups.first()) else { return };
+        let opened = self.opened.as_ref().expect("the camera is opened before it is sampled");
+        let group = &opened.groups[samples.group];
         let mut order = std::mem::take(&mut out.order);
         order.clear();
         order.extend(samples.spectrum.iter().zip(0..).map(|(&u, i)| (group.lens_at(u), i)));

@@ -155,14 +155,20 @@ impl Bsdf {
         if transmits != (local.z < 0.0) || local.z == 0.0 || self.wo.z <= 0.0 {
             return (Weights::default(), 0.0);
         }
+        let black = (Weights::default(), 0.0);
         match self.model {
-            Model::Matte if !transmits => (Weights::base(local.z / PI), local.z / PI),
-            Model::Metal { alpha } if !transmits && alpha > 0.0 => {
+            Model::Layered(layered) => layered.evaluate(self.wo, local, &self.peaks()),
+            Model::Matte | Model::Metal { .. } if transmits => black,
+            Model::Matte => (Weights::base(local.z / PI), local.z / PI),
+            // All of their directions are single rays.
+            Model::Black
+            | Model::Mirror
+            | Model::Metal { alpha: 0.0 }
+            | Model::Dielectric { .. } => black,
+            Model::Metal { alpha } => {
                 let (value, pdf) = ggx::reflection(self.wo, local, alpha);
                 (metal(self.wo, local).times(value), pdf)
             }
-            Model::Layered(layered) => layered.evaluate(self.wo, local, &self.peaks()),
-            _ => (Weights::default(), 0.0),
         }
     }
 
