@@ -9,7 +9,7 @@ use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use etendue_tracer::{
-    EnvironmentMap, LayerSpec, Light, LightingContext, Lights, SceneView, Spectral, Tracer, Traits,
+    EnvironmentMap, LayerSpec, Light, LightingContext, Lights, Rules, SceneView, Spectral, Traits,
 };
 
 use crate::film::{FilmLayer, Precision};
@@ -55,7 +55,7 @@ pub(crate) struct Lighting {
 pub(crate) fn settle(
     scene: &Scene,
     map: Option<Arc<EnvironmentMap>>,
-    tracer: &dyn Tracer,
+    tracer: Rules,
     (accel, surroundings): (&dyn Accel, SceneView<'_>),
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<Lighting, RenderError> {
@@ -92,7 +92,7 @@ pub(crate) fn settle(
 /// sees nothing.
 fn lit_share(
     scene: &Scene,
-    tracer: &dyn Tracer,
+    tracer: Rules,
     stage: LightingContext<'_>,
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<Option<f64>, RenderError> {

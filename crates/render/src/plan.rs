@@ -8,7 +8,7 @@ use etendue_accel::Quality;
 use etendue_camera::LensCamera;
 use etendue_geometry::{Detail, Placement};
 use etendue_scene::Scene;
-use etendue_scene::file::TracerSpec;
+use etendue_scene::file::{TracerRow, TracerSpec};
 use etendue_scene::import::Wanted;
 use etendue_sensor::BandChoice;
 use etendue_spectrum::Bands;
@@ -355,20 +355,13 @@ impl Passes {
 
 /// What becomes of light, and why.
 fn light_words(scene: &Scene, needs: Needs) -> (String, String) {
-    let tracer = scene.tracer.filter(|_| needs.light);
-    match tracer {
-        Some(TracerSpec::Direct {}) => {
-            ("1 bounce".to_owned(), "the tracer is `direct`: light of one surface".to_owned())
+    match scene.tracer.filter(|_| needs.light).map(TracerSpec::row) {
+        Some(TracerRow { name, light: Some(light), .. }) => {
+            (light.reach, format!("the tracer is `{name}`: {}", light.shows))
         }
-        Some(TracerSpec::Whitted { max_bounces }) => (
-            format!("at most {max_bounces} mirrors"),
-            "the tracer is `whitted`: direct light through mirrors and glass".to_owned(),
-        ),
-        Some(TracerSpec::Path { max_bounces }) => {
-            let more = "the tracer is `path`: light of any number of surfaces, up to its limit";
-            (format!("at most {max_bounces}"), more.to_owned())
+        Some(TracerRow { light: None, .. }) | None => {
+            ("off".to_owned(), "no layer looks at light".to_owned())
         }
-        _ => ("off".to_owned(), "no layer looks at light".to_owned()),
     }
 }
 

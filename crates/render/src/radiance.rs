@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use etendue_camera::{BandGroup, Camera, PixelSamples, squares, squares_of_pair};
 use etendue_tracer::transport::RaySamples;
-use etendue_tracer::{LightingContext, Samples, Tracer};
+use etendue_tracer::{LightingContext, Rules, Samples};
 
 use crate::samples::{Averaged, CAMERA_PAIRS, Memory};
 
@@ -16,7 +16,7 @@ const BATCH: u32 = 1024;
 #[derive(Debug)]
 pub(crate) struct LightPass<'a> {
     pub(crate) stage: LightingContext<'a>,
-    pub(crate) tracer: &'a dyn Tracer,
+    pub(crate) tracer: Rules,
     /// The camera, opened for these bands.
     pub(crate) camera: &'a Camera,
     /// The bands that the camera sends separate ways.

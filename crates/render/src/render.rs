@@ -8,13 +8,12 @@ use etendue_camera::{Camera, PixelExtent};
 use etendue_image::Limits;
 use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
-use etendue_scene::file::{AccelName, TracerSpec};
+use etendue_scene::file::{AccelName, LightRow};
 use etendue_spectrum::Bands;
 use etendue_tracer::texture::ImageError;
 use etendue_tracer::{
-    Direct, Emitters, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind,
-    LightingContext, Lights, Material, Path, Pixel, RayStats, SceneView, Spectral, Tracer, Traits,
-    View, Whitted,
+    Emitters, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind, LightingContext,
+    Lights, Material, Pixel, RayStats, SceneView, Spectral, Traits, View,
 };
 use rayon::prelude::*;
 
@@ -319,20 +318,19 @@ pub fn render(
     let surroundings = surroundings(scene, images, plan.samples);
     let spectral = Spectral::new(&plan.bands);
     let mut notes = Vec::new();
-    let lit = match scene.tracer.and_then(tracer) {
-        Some(tracer) if plan.layers.contains(&LayerSpec::Radiance) => {
+    let lit = match scene.tracer.and_then(|tracer| tracer.row().light) {
+        Some(LightRow { rules, .. }) if plan.layers.contains(&LayerSpec::Radiance) => {
             let (map, seen) = (images.environment.clone(), (accel, surroundings));
-            let found =
-                lighting::settle(scene, map, &*tracer, seen, &|share| watch.goes_on(share))?;
+            let found = lighting::settle(scene, map, rules, seen, &|share| watch.goes_on(share))?;
             notes.extend(found.note);
             let lights = Lights::new(&found.lights, found.map, &surroundings, &spectral)
                 .map_err(|error| RenderError::Lights(error.to_string()))?;
-            Some((tracer, lights))
+            Some((rules, lights))
         }
         _ => None,
     };
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
-    let light = lit.as_ref().map(|(tracer, lights)| LightPass {
+    let light = lit.as_ref().map(|(rules, lights)| LightPass {
         stage: LightingContext {
             accel,
             surroundings,
@@ -341,7 +339,7 @@ pub fn render(
             traits: Traits::of(&scene.geometry, &scene.materials),
             emitters: emitters.as_ref(),
         },
-        tracer: &**tracer,
+        tracer: *rules,
         camera: &light_camera,
         groups: light_camera.band_groups(&plan.bands),
     });
@@ -452,15 +450,5 @@ fn surroundings<'a>(scene: &'a Scene, images: &'a Images, samples: u32) -> Scene
         materials: &scene.materials,
         images: &images.decoded,
         view: View { origin: pose.position, axes: pose.rotation, pixel },
-    }
-}
-
-/// What traces light, if the scene's tracer does.
-fn tracer(spec: TracerSpec) -> Option<Box<dyn Tracer>> {
-    match spec {
-        TracerSpec::Facing {} | TracerSpec::Flat {} => None,
-        TracerSpec::Direct {} => Some(Box::new(Direct)),
-        TracerSpec::Whitted { max_bounces } => Some(Box::new(Whitted { max_bounces })),
-        TracerSpec::Path { max_bounces } => Some(Box::new(Path { max_bounces })),
     }
 }

@@ -18,12 +18,10 @@
 //! | [`bsdf`] | how surfaces scatter light |
 //! | [`light`], [`emitters`], [`environment`] | where light comes from |
 //! | [`spawn`] | where a ray that leaves a surface starts |
-//! | [`transport`] | batches of paths, and what tracers share |
-//! | [`direct`], [`whitted`], [`path`] | the tracers |
-//! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
+//! | [`transport`] | batches of paths, and the rules of each tracer of light |
+//! //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
 pub mod bsdf;
-pub mod direct;
 pub mod emitters;
 pub mod environment;
 pub mod footprint;
@@ -31,7 +29,6 @@ mod lamps;
 pub mod layer;
 pub mod light;
 pub mod material;
-pub mod path;
 mod pyramid;
 pub mod reference;
 pub mod sampling;
@@ -41,19 +38,15 @@ pub mod spectral;
 mod surface;
 pub mod texture;
 pub mod transport;
-pub mod whitted;
 
-pub use direct::Direct;
 pub use emitters::Emitters;
 pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};
 pub use layer::{Layer, LayerSpec, NormalKind, Space};
 pub use light::{EnvironmentImage, Light, LightKind, Lights};
 pub use material::{Color, Emission, Ior, Material, Paint, Scattering, TextureScope};
-pub use path::Path;
 pub use reference::{Needs, SceneView, SurfacePoint, Traced, View};
 pub use spec::{LightSpec, MaterialSpec};
 pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
-pub use transport::{LightingContext, RayStats, Samples, Scratch, Tracer, Traits};
-pub use whitted::Whitted;
+pub use transport::{LightingContext, RayStats, Rules, Samples, Scratch, Traits};

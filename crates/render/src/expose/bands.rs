@@ -2,7 +2,6 @@
 //! colours of the scene.
 
 use etendue_scene::Scene;
-use etendue_scene::file::TracerSpec;
 use etendue_sensor::bands::TOLERANCE;
 use etendue_sensor::{BandChoice, Illumination};
 use etendue_spectrum::{Bands, Curve, Illuminant, VISIBLE};
@@ -113,12 +112,8 @@ fn illumination(scene: &Scene) -> Illumination {
         }
         coloured |= reflects_colour(material);
     }
-    let surfaces = match scene.tracer {
-        Some(TracerSpec::Path { max_bounces } | TracerSpec::Whitted { max_bounces }) => {
-            1 + usize::from(max_bounces > 1)
-        }
-        Some(TracerSpec::Direct {} | TracerSpec::Facing {} | TracerSpec::Flat {}) | None => 1,
-    };
+    let light = scene.tracer.and_then(|tracer| tracer.row().light);
+    let surfaces = 1 + usize::from(light.is_some_and(|light| light.rules.bounces > 1));
     let filters = scene.camera.lens().map(|lens| lens.filter_curves()).unwrap_or_default();
     let colored = usize::from(coloured_light) + if coloured { surfaces } else { 0 };
     Illumination { spectra, filters, colored }

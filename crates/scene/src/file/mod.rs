@@ -25,7 +25,9 @@ pub use object::{InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
 pub use overrides::OverrideError;
 pub use schema::scene_schema;
 pub use sensor::SensorFile;
-pub use settings::{AccelName, Auto, Exposure, RenderSpec, ToneMap, TracerSpec};
+pub use settings::{
+    AccelName, Auto, Exposure, LightRow, RenderSpec, ToneMap, TracerRow, TracerSpec,
+};
 pub use spec::{SceneSpec, Version};
 
 pub(crate) use check::{kind_of, nearest, suggest};

@@ -1,7 +1,7 @@
 //! What is made of a scene: the picture, and how it is rendered.
 
 use etendue_camera::sampler::Sampler;
-use etendue_tracer::LayerSpec;
+use etendue_tracer::{LayerSpec, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -39,27 +39,68 @@ fn default_path_bounces() -> u32 {
     32
 }
 
+/// A row of the table of tracers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TracerRow {
+    /// The word behind `type` in the file.
+    pub name: &'static str,
+    /// The layer that holds the picture.
+    pub layer: LayerSpec,
+    /// How it traces light, if it does.
+    pub light: Option<LightRow>,
+}
+
+/// How a tracer of light goes about it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LightRow {
+    /// Where its paths end.
+    pub rules: Rules,
+    /// How far it follows light, in words.
+    pub reach: String,
+    /// Which light it shows, in words.
+    pub shows: &'static str,
+}
+
 impl TracerSpec {
+    /// What there is to know of it. A picture without light is a layer that is filled for itself.
+    #[must_use]
+    pub fn row(self) -> TracerRow {
+        let seen = |name, layer| TracerRow { name, layer, light: None };
+        let lit = |name, rules, reach, shows| {
+            let light = Some(LightRow { rules, reach, shows });
+            TracerRow { name, layer: LayerSpec::Radiance, light }
+        };
+        match self {
+            Self::Facing {} => seen("facing", LayerSpec::Facing),
+            Self::Flat {} => seen("flat", LayerSpec::Flat),
+            Self::Direct {} => {
+                lit("direct", Rules::direct(), "1 bounce".to_owned(), "light of one surface")
+            }
+            Self::Whitted { max_bounces } => lit(
+                "whitted",
+                Rules::whitted(max_bounces),
+                format!("at most {max_bounces} mirrors"),
+                "direct light through mirrors and glass",
+            ),
+            Self::Path { max_bounces } => lit(
+                "path",
+                Rules::path(max_bounces),
+                format!("at most {max_bounces}"),
+                "light of any number of surfaces, up to its limit",
+            ),
+        }
+    }
+
     /// The layer that holds the picture.
     #[must_use]
     pub fn layer(self) -> LayerSpec {
-        match self {
-            Self::Facing {} => LayerSpec::Facing,
-            Self::Flat {} => LayerSpec::Flat,
-            Self::Direct {} | Self::Whitted { .. } | Self::Path { .. } => LayerSpec::Radiance,
-        }
+        self.row().layer
     }
 
     /// The word behind `type` in the file.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Facing {} => "facing",
-            Self::Flat {} => "flat",
-            Self::Direct {} => "direct",
-            Self::Whitted { .. } => "whitted",
-            Self::Path { .. } => "path",
-        }
+        self.row().name
     }
 }
 

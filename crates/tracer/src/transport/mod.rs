@@ -16,6 +16,7 @@ mod matte;
 mod meet;
 mod numbers;
 mod paths;
+mod rules;
 mod shadows;
 
 use std::fmt::Debug;
@@ -28,6 +29,7 @@ use etendue_geometry::{Detail, Geometry, HitBatch, MISS, RayBatch};
 use self::matte::Patch;
 use self::numbers::{DRAWS, Draw, Numbers};
 use self::paths::{Paths, State};
+pub use self::rules::{Follow, Rules};
 use self::shadows::{Shadows, push_to};
 use crate::bsdf::{Bsdf, Weights};
 use crate::emitters::Emitters;
@@ -38,19 +40,6 @@ use crate::spawn::Anchor;
 use crate::spectral::Spectral;
 use crate::surface::SurfaceInteraction;
 use crate::{Ior, Material, Scattering};
-
-/// A tracer of light.
-pub trait Tracer: Send + Sync + Debug {
-    /// The radiance that arrives along each ray against its direction, in `beam.bands`: `out` is
-    /// `[ray][band]` with all bands of the stage, and is refilled; other bands are 0.
-    fn radiance(
-        &self,
-        stage: &LightingContext<'_>,
-        beam: &RaySamples<'_>,
-        scratch: &mut Scratch,
-        out: &mut Vec<f64>,
-    ) -> RayStats;
-}
 
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
@@ -133,26 +122,6 @@ impl AddAssign for RayStats {
     }
 }
 
-/// Where a tracer's paths end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Rules {
-    /// The most surfaces that scatter light on a path.
-    pub(crate) bounces: u32,
-    /// Which directions are followed beyond the first light that they meet.
-    pub(crate) follow: Follow,
-    /// Surfaces after which dim paths may end by chance.
-    pub(crate) roulette: Option<u32>,
-}
-
-/// Which scattered directions a tracer follows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Follow {
-    /// Those of mirrors and clear glass alone.
-    Single,
-    /// All.
-    All,
-}
-
 /// Memory of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub struct Scratch {
@@ -169,7 +138,7 @@ pub struct Scratch {
 }
 
 /// Traces `beam` by `rules`.
-pub(crate) fn trace(
+fn trace(
     rules: Rules,
     stage: &LightingContext<'_>,
     beam: &RaySamples<'_>,

@@ -1,0 +1,63 @@
+//! The tracers of light: one body, and the rules by which its paths end.
+
+use super::{LightingContext, RaySamples, RayStats, Scratch, trace};
+
+/// Surfaces after which dim paths of [`Rules::path`] end by chance.
+const ROULETTE_AFTER: u32 = 4;
+
+/// A tracer of light: where its paths end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rules {
+    /// The most surfaces that scatter light on a path.
+    pub bounces: u32,
+    /// Which directions are followed beyond the first light that they meet.
+    pub follow: Follow,
+    /// Surfaces after which dim paths may end by chance.
+    pub roulette: Option<u32>,
+}
+
+/// Which scattered directions a tracer follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Follow {
+    /// Those of mirrors and clear glass alone.
+    Single,
+    /// All.
+    All,
+}
+
+impl Rules {
+    /// Direct light: what lights send to the first surface, with shadows, and what it shows of them
+    /// as a mirror.
+    #[must_use]
+    pub fn direct() -> Self {
+        Self { bounces: 1, follow: Follow::Single, roulette: None }
+    }
+
+    /// Direct light seen through any number of mirrors and clear boundaries, at most `bounces`
+    /// (Whitted, "An Improved Illumination Model for Shaded Display", 1980). Where a boundary reflects
+    /// and refracts, one of the two is followed, by Fresnel's share.
+    #[must_use]
+    pub fn whitted(bounces: u32) -> Self {
+        Self { bounces, follow: Follow::Single, roulette: None }
+    }
+
+    /// Global illumination: all paths from the camera to light of at most `bounces` surfaces (Kajiya,
+    /// "The Rendering Equation", 1986). Lights are sampled at each surface and weighed against
+    /// directions that meet them by themselves.
+    #[must_use]
+    pub fn path(bounces: u32) -> Self {
+        Self { bounces, follow: Follow::All, roulette: Some(ROULETTE_AFTER) }
+    }
+
+    /// The radiance that arrives along each ray against its direction, in `beam.bands`: `out` is
+    /// `[ray][band]` with all bands of the stage, and is refilled; other bands are 0.
+    pub fn radiance(
+        self,
+        stage: &LightingContext<'_>,
+        beam: &RaySamples<'_>,
+        scratch: &mut Scratch,
+        out: &mut Vec<f64>,
+    ) -> RayStats {
+        trace(self, stage, beam, scratch, out)
+    }
+}
