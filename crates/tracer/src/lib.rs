@@ -12,7 +12,7 @@
 //! |---|---|
 //! | [`layer`] | the table of layers, and what fills each |
 //! | [`reference`](mod@reference) | what a ray meets first, without light |
-//! | [`spec`] | materials and lights as scene files write them |
+//! | [`spec`], [`build`] | materials and lights as scene files write them, and which surfaces they are |
 //! | [`material`], [`texture`] | surfaces, ready to be looked up |
 //! | [`footprint`] | how much of a surface a sample stands for |
 //! | [`bsdf`] | how surfaces scatter light |
@@ -22,6 +22,7 @@
 //! //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
 pub mod bsdf;
+pub mod build;
 pub mod emitters;
 pub mod environment;
 pub mod footprint;

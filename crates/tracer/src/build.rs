@@ -1,0 +1,215 @@
+//! From materials and lights as the scene file writes them to those that are traced: the limits of
+//! their values, and which surface each is.
+
+use std::path::PathBuf;
+
+use etendue_geometry::glam::DVec3;
+use etendue_spectrum::Illuminant;
+
+use crate::material::{Alpha, GltfSurface};
+use crate::spec::{BRIGHTEST, ImageSpec, IorSpec, PaintSpec};
+use crate::{
+    Color, Emission, EnvironmentImage, Ior, Light, LightKind, LightSpec, Material, MaterialSpec,
+    Paint, Scattering,
+};
+
+/// What is wrong with a value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// The key below the material or light.
+    pub key: String,
+    /// Why.
+    pub why: String,
+}
+
+impl Fault {
+    /// The key that is wrong, and the reason.
+    pub fn new(key: impl Into<String>, why: impl Into<String>) -> Self {
+        Self { key: key.into(), why: why.into() }
+    }
+}
+
+/// What specifications name that stands elsewhere: files, and glasses of a catalogue.
+pub trait Supply {
+    /// An image as a paint.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such file; keys are those of the image.
+    fn image(&mut self, spec: &ImageSpec) -> Result<Paint, Fault>;
+
+    /// A file by the name that the scene gives it.
+    ///
+    /// # Errors
+    ///
+    /// A sentence on why there is none.
+    fn file(&mut self, written: &str) -> Result<PathBuf, String>;
+
+    /// A refractive index.
+    ///
+    /// # Errors
+    ///
+    /// A sentence on the glass that is not known, or the number that is no index.
+    fn index(&mut self, spec: &IorSpec) -> Result<Ior, String>;
+}
+
+/// What a colour may be.
+#[derive(Clone, Copy, PartialEq)]
+enum Bound {
+    /// A reflectance.
+    One,
+    /// A radiance.
+    None,
+}
+
+impl MaterialSpec {
+    /// The surface, called `name`.
+    ///
+    /// # Errors
+    ///
+    /// On the first value that describes no surface.
+    pub fn build(&self, name: &str, supply: &mut dyn Supply) -> Result<Material, Fault> {
+        Ok(match self {
+            Self::Matte { color } => {
+                Material::new(name, paint("color", color, Bound::One, supply)?, Scattering::Matte)
+            }
+            Self::Mirror { color } => {
+                Material::new(name, paint("color", color, Bound::One, supply)?, Scattering::Mirror)
+            }
+            Self::Metal { color, roughness } => {
+                let scattering = Scattering::Metal { roughness: *roughness };
+                Material::new(name, paint("color", color, Bound::One, supply)?, scattering)
+            }
+            Self::Dielectric { ior, color } => {
+                let index = supply.index(ior).map_err(|why| Fault::new("ior", why))?;
+                let scattering = Scattering::Dielectric(index);
+                Material::new(name, paint("color", color, Bound::One, supply)?, scattering)
+            }
+            Self::Gltf { color, metallic, roughness, ior, transmission, opacity } => {
+                let surface = GltfSurface {
+                    metallic: *metallic,
+                    roughness: *roughness,
+                    ior: *ior,
+                    transmission: *transmission,
+                    ..GltfSurface::default()
+                };
+                let paint = paint("color", color, Bound::One, supply)?;
+                let plain = Material::new(name, paint, Scattering::Gltf(Box::new(surface)));
+                let alpha =
+                    if *opacity < 1.0 { Alpha::Blend { factor: *opacity } } else { Alpha::Opaque };
+                Material { alpha, ..plain }
+            }
+            Self::Emissive { radiance, illuminant, two_sided } => {
+                let radiance = paint("radiance", radiance, Bound::None, supply)?;
+                let emission = Emission {
+                    radiance: radiance.clone(),
+                    strength: 1.0,
+                    illuminant: checked(*illuminant)?,
+                    two_sided: *two_sided,
+                };
+                let plain = Material::new(name, radiance, Scattering::Black);
+                Material { emission: Some(emission), ..plain }
+            }
+            Self::Checker { colors, squares } => {
+                for color in colors {
+                    in_bounds("colors", color, Bound::One)?;
+                }
+                if squares.is_nan() || *squares <= 0.0 {
+                    return Err(Fault::new("squares", format!("{squares} is not above zero")));
+                }
+                let paint = Paint::Checker { colors: *colors, squares: *squares };
+                Material::new(name, paint, Scattering::Matte)
+            }
+        })
+    }
+}
+
+impl LightSpec {
+    /// The light.
+    ///
+    /// # Errors
+    ///
+    /// On the first value that describes no light.
+    pub fn build(&self, supply: &mut dyn Supply) -> Result<Light, Fault> {
+        let (key, color, illuminant) = match self {
+            Self::Point { intensity, illuminant, .. }
+            | Self::Spot { intensity, illuminant, .. } => ("intensity", intensity, illuminant),
+            Self::Directional { irradiance, illuminant, .. } => {
+                ("irradiance", irradiance, illuminant)
+            }
+            Self::Environment { radiance, illuminant, .. } => ("radiance", radiance, illuminant),
+        };
+        in_bounds(key, color, Bound::None)?;
+        let unit = |key: &str, v: DVec3| {
+            v.try_normalize().ok_or_else(|| Fault::new(key, "gives no direction"))
+        };
+        let kind = match self {
+            Self::Point { at, .. } => LightKind::Point(DVec3::from(*at)),
+            Self::Spot { at, look_at, cone, inner_cone, .. } => {
+                let at = DVec3::from(*at);
+                if inner_cone > cone {
+                    let why = format!("{inner_cone} is wider than `cone`, {cone}");
+                    return Err(Fault::new("inner_cone", why));
+                }
+                LightKind::Spot {
+                    at,
+                    axis: unit("look_at", DVec3::from(*look_at) - at)?,
+                    cos_outer: cone.to_radians().cos(),
+                    cos_inner: inner_cone.to_radians().cos(),
+                }
+            }
+            Self::Directional { direction, .. } => {
+                LightKind::Directional(unit("direction", DVec3::from(*direction))?)
+            }
+            Self::Environment { image, rotate, .. } => {
+                let image = match image {
+                    None => EnvironmentImage::Constant,
+                    Some(written) => {
+                        let found = supply.file(written).map_err(|why| Fault::new("image", why))?;
+                        EnvironmentImage::File(found)
+                    }
+                };
+                LightKind::Environment { image, rotation: rotate.to_radians() }
+            }
+        };
+        Ok(Light { kind, color: *color, illuminant: checked(*illuminant)? })
+    }
+}
+
+fn paint(
+    key: &str,
+    spec: &PaintSpec,
+    bound: Bound,
+    supply: &mut dyn Supply,
+) -> Result<Paint, Fault> {
+    match spec {
+        PaintSpec::Color(color) => {
+            in_bounds(key, color, bound)?;
+            Ok(Paint::Plain(*color))
+        }
+        PaintSpec::Image(image) => {
+            in_bounds(&format!("{key}.factor"), &image.factor, bound)?;
+            let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
+            supply.image(image).map_err(below)
+        }
+    }
+}
+
+fn in_bounds(key: &str, color: &Color, bound: Bound) -> Result<(), Fault> {
+    let fault = |why: String| Err(Fault::new(key, why));
+    if !color.iter().all(|c| *c >= 0.0 && c.is_finite()) {
+        return fault(format!("{color:?} has a part below zero"));
+    }
+    if !color.iter().all(|c| *c <= BRIGHTEST) {
+        return fault(format!("{color:?} is above {BRIGHTEST:e}; pictures hold no more"));
+    }
+    if bound == Bound::One && !color.iter().all(|c| *c <= 1.0) {
+        return fault(format!("{color:?} is outside 0 to 1; a surface reflects no more"));
+    }
+    Ok(())
+}
+
+fn checked(illuminant: Option<Illuminant>) -> Result<Option<Illuminant>, Fault> {
+    let checked = illuminant.map(Illuminant::checked).transpose();
+    checked.map_err(|error| Fault::new("illuminant", error.to_string()))
+}
