@@ -14,6 +14,7 @@ const ROOT3: f64 = 1.732_050_807_568_877_2;
 /// How lenslets are packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
+#[schemars(rename = "LensletGrid")]
 pub enum Grid {
     /// In columns and rows.
     #[default]

@@ -227,7 +227,7 @@ mod tests {
         let schema = schemars::schema_for!(ElementSpec).to_value();
         let mut kinds = Vec::new();
         leaves(&schema, &mut kinds);
-        assert_eq!(kinds.len(), 7, "three shapes of apertures");
+        assert_eq!(kinds.len(), 8, "three shapes of apertures");
         for kind in kinds {
             assert_eq!(kind["additionalProperties"], false, "{kind}");
             let keys = kind["properties"].as_object().unwrap();
