@@ -1,4 +1,4 @@
-//! The layers that a render may write beside its picture: one [table](self::table) says all that is
+//! The layers that a render may write beside its picture: one [`table`] says all that is
 //! known of each, and everything else reads it.
 
 mod fill;

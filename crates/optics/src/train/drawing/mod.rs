@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`layout`] | the lens cut along y and z, with fans of rays |
 //! | [`spots`] | spot diagrams by field and wavelength |
-//! | [`falloff`] | relative illumination over the sensor |
+//! | [`relative_illumination`] | relative illumination over the sensor |
 
 mod layout;
 mod relative_illumination;
