@@ -1,7 +1,7 @@
 //! A biconic surface: a conic section along x and another along y, as toric and cylindrical lenses
 //! and anamorphs have.
 //!
-//! z = (cₓ x² + c_y y²) / (1 + √(1 − (1 + kₓ) cₓ² x² − (1 + k_y) c_y² y²)): the biconic of Zemax'
+//! `z = (cₓ x² + c_y y²) / (1 + √(1 − (1 + kₓ) cₓ² x² − (1 + k_y) c_y² y²))`: the biconic of Zemax'
 //! OpticStudio (*User Manual*, "Biconic"; `BICONICX` in its files). With equal sections it is the
 //! conic.
 //!
