@@ -282,6 +282,10 @@ pub(crate) struct RenderArguments {
     /// starts; without it, more than the system has free
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(crate) memory_limit: Option<u64>,
+    /// Read models into memory instead of using them where their files are mapped: other programs may
+    /// then change them while they are rendered
+    #[arg(long)]
+    pub(crate) copy: bool,
     /// Write times, rays, memory and fingerprints as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,

@@ -50,7 +50,7 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     let has_pictures = has(PartArgument::Samplers) || has(PartArgument::Cameras);
     let mut notes = Vec::new();
-    let memory = render::Memory::Render(arguments.memory_limit);
+    let memory = render::Memory::Render { limit: arguments.memory_limit, copy: false };
     let scene = match has_pictures {
         true => render::load(&with_picture(&arguments.scene, &mut notes)?, memory, stages)?,
         false => render::load(&arguments.scene, memory, stages)?,

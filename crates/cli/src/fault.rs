@@ -7,7 +7,7 @@ use etendue_accel::BuildError;
 use etendue_bench::BenchError;
 use etendue_render::RenderError;
 use etendue_render::expose::ExposeError;
-use etendue_render::output::OutputError;
+use etendue_render::output::{OutputError, PictureError};
 use etendue_scene::SceneError;
 use etendue_scene::escape::{printable, printable_json};
 use etendue_sensor::emva::EmvaError;
@@ -71,9 +71,8 @@ impl From<RenderError> for Fault {
             RenderError::Stopped | RenderError::Build(BuildError::Stopped) => {
                 Self::stopped(STOPPED)
             }
-            RenderError::Picture(_) | RenderError::Build(BuildError::OutOfMemory { .. }) => {
-                Self::Failed(error.into())
-            }
+            RenderError::Picture(PictureError::Memory(_)) => Self::Refused(error.into()),
+            RenderError::Picture(_) => Self::Failed(error.into()),
             error => Self::Refused(error.into()),
         }
     }
@@ -95,6 +94,9 @@ impl From<ExposeError> for Fault {
         match error {
             ExposeError::Output(error) => error.into(),
             ExposeError::Stopped => Self::stopped(STOPPED),
+            ExposeError::Memory(_) | ExposeError::Picture(PictureError::Memory(_)) => {
+                Self::Refused(error.into())
+            }
             error => Self::Failed(error.into()),
         }
     }

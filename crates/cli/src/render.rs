@@ -16,6 +16,7 @@ use etendue_render::{
 use etendue_scene::escape::one_line;
 use etendue_scene::file::{FileKind, SceneFile};
 use etendue_scene::import::Note;
+use etendue_scene::memory::Budget;
 use etendue_scene::{LoadOptions, Scene};
 
 use crate::arguments::{AccelMode, RenderArguments, SceneArguments};
@@ -48,8 +49,13 @@ pub(crate) fn run(arguments: &RenderArguments) -> Result<(), Fault> {
 pub(crate) enum Memory {
     /// To be looked at.
     Look,
-    /// To be rendered within so many bytes, or what the system has free.
-    Render(Option<u64>),
+    /// To be rendered.
+    Render {
+        /// The most bytes to take; what the system has free without it.
+        limit: Option<u64>,
+        /// Read models into memory instead of mapping them.
+        copy: bool,
+    },
 }
 
 /// Reads a scene and all that its layers want of the models.
@@ -71,9 +77,10 @@ pub(crate) fn load(
         progress: Some(&|step| progress(step.done as f64 / step.total.max(1) as f64)),
         memory_limit: match memory {
             Memory::Look => None,
-            Memory::Render(limit) => limit,
+            Memory::Render { limit, .. } => limit,
         },
-        to_render: matches!(memory, Memory::Render(_)),
+        to_render: matches!(memory, Memory::Render { .. }),
+        copy: matches!(memory, Memory::Render { copy: true, .. }),
         ..arguments.load_options()
     };
     Ok(file.load(plan::wanted(&file.spec.all_layers()), &options)?)
@@ -90,10 +97,12 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     if let Some(path) = &arguments.report {
         places::file(path)?;
     }
-    let scene = load(&arguments.scene, Memory::Render(arguments.memory_limit), stages)?;
+    let memory = Memory::Render { limit: arguments.memory_limit, copy: arguments.copy };
+    let scene = load(&arguments.scene, memory, stages)?;
     notes.add(scene.notes.iter().map(in_words));
     let plan = Plan::new(&scene, outputs);
     keep_inputs(arguments, &scene, &plan, outputs)?;
+    fits(&scene, &plan, arguments.memory_limit)?;
     time.load = lap.take();
     let accel = etendue_render::build(&scene, &plan, &build_options(arguments, stages))?;
     time.build = lap.take();
@@ -144,6 +153,27 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
             arguments.output.display()
         ))),
     }
+}
+
+/// Refuses what will not fit into the memory that is allowed, or else free.
+fn fits(scene: &Scene, plan: &Plan, limit: Option<u64>) -> Result<(), Fault> {
+    let memory = &plan.memory;
+    let bytes = match limit {
+        Some(_) => memory.total - memory.program,
+        // What was loaded is no longer free.
+        None => memory.to_come(),
+    };
+    let Err(error) = Budget::new(limit).take(bytes) else { return Ok(()) };
+    let [width, height] = scene.camera.resolution();
+    let images = scene.textures.iter().map(|texture| (texture.decoded_bytes(), &texture.name));
+    let largest = match images.max() {
+        Some((bytes, name)) if 2 * bytes > memory.total => {
+            format!(" (most of it for the image {})", one_line(name))
+        }
+        _ => String::new(),
+    };
+    let path = scene.path.display();
+    Err(Fault::refused(format!("{path}: a picture of {width} x {height} pixels{largest} {error}")))
 }
 
 /// Refuses to write over what the scene is made of, and the report over a result.

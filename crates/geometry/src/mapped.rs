@@ -4,14 +4,19 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A whole file mapped read-only. Nothing is read until it is touched, and the pages are the
-/// system's cache, not this process' heap.
+/// A whole file mapped read-only, or a copy of it. Of a mapped one nothing is read until it is touched,
+/// and the pages are the system's cache, not this process' heap.
 ///
-/// The file must not be truncated while it is mapped: the system then ends a process that reads
+/// A mapped file must not be truncated while it is mapped: the system then ends a process that reads
 /// past the new end. Changing its bytes changes what is rendered.
 pub struct MappedFile {
     path: PathBuf,
-    map: memmap2::Mmap,
+    contents: Contents,
+}
+
+enum Contents {
+    Mapped(memmap2::Mmap),
+    Copied(Vec<u8>),
 }
 
 impl MappedFile {
@@ -29,7 +34,17 @@ impl MappedFile {
         // wrong picture but no invalid value: indices are checked when the mesh is loaded and
         // again wherever Rust reads through them. Truncation by another process is documented.
         let map = unsafe { memmap2::Mmap::map(&file)? };
-        Ok(Self { path: path.to_owned(), map })
+        Ok(Self { path: path.to_owned(), contents: Contents::Mapped(map) })
+    }
+
+    /// Reads the file at `path` into memory: what other programs do to it later changes nothing.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be opened or read, is no regular file, or there is no memory for it.
+    pub fn copy(path: &Path) -> io::Result<Self> {
+        let bytes = crate::files::read(path, u64::MAX)?;
+        Ok(Self { path: path.to_owned(), contents: Contents::Copied(bytes) })
     }
 
     /// Where the file is.
@@ -41,7 +56,10 @@ impl MappedFile {
     /// The file's bytes.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
-        &self.map
+        match &self.contents {
+            Contents::Mapped(map) => map,
+            Contents::Copied(bytes) => bytes,
+        }
     }
 }
 
@@ -49,7 +67,7 @@ impl fmt::Debug for MappedFile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("MappedFile")
             .field("path", &self.path)
-            .field("len", &self.map.len())
+            .field("len", &self.bytes().len())
             .finish()
     }
 }

@@ -9,7 +9,7 @@ mod openexr;
 mod radiance;
 mod raster;
 
-use std::io::Cursor;
+use std::io::{BufRead, Cursor, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use bytemuck::Pod;
@@ -148,6 +148,34 @@ pub fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {
     // all that one has seen is dropped with it.
     let decoded = catch_unwind(AssertUnwindSafe(|| decode_unguarded(bytes, limits)));
     decoded.unwrap_or(Err(DecodeError::Panic))
+}
+
+/// Bytes that an image takes when it is decoded, by its header alone; `None` where that is none that
+/// is read.
+pub fn decoded_bytes(file: impl BufRead + Seek) -> Option<u64> {
+    catch_unwind(AssertUnwindSafe(|| bytes_by_header(file))).ok().flatten()
+}
+
+fn bytes_by_header(mut file: impl BufRead + Seek) -> Option<u64> {
+    let start = file.fill_buf().ok()?;
+    if start.starts_with(openexr::SIGNATURE) {
+        return openexr::decoded_bytes(file);
+    }
+    if start.starts_with(radiance::SIGNATURE) {
+        return radiance::decoded_bytes(file);
+    }
+    let mut reader = ImageReader::new(file).with_guessed_format().ok()?;
+    let mut limits = image::Limits::no_limits();
+    limits.max_alloc = Some(1 << 26);
+    reader.limits(limits);
+    Some(bytes_of(&reader.into_decoder().ok()?))
+}
+
+/// Bytes of what `decoder` will read.
+fn bytes_of(decoder: &impl ImageDecoder) -> u64 {
+    let (width, height) = decoder.dimensions();
+    let texel = u64::from(decoder.color_type().bytes_per_pixel());
+    u64::from(width).saturating_mul(height.into()).saturating_mul(texel)
 }
 
 fn decode_unguarded(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {

@@ -1,6 +1,6 @@
 //! OpenEXR files: colour, or luminance alone.
 
-use std::io::Cursor;
+use std::io::{BufRead, Cursor};
 // The prelude below has another.
 use std::result::Result;
 
@@ -54,6 +54,15 @@ pub(crate) fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError
     let found = flat().find_map(|header| Some((header, lone(header)?)));
     let (header, name) = found.ok_or(DecodeError::Channels)?;
     grey(bytes, header, &name, limits)
+}
+
+/// Bytes that the first layer takes, with no more than four channels.
+pub(crate) fn decoded_bytes(file: impl BufRead) -> Option<u64> {
+    let about = MetaData::read_from_buffered(file, false).ok()?;
+    let header = about.headers.first()?;
+    let size = header.shared_attributes.display_window.size;
+    let channels = header.channels.list.len().min(4) as u64;
+    (size.x() as u64).checked_mul(size.y() as u64)?.checked_mul(4 * channels)
 }
 
 fn has(header: &Header, name: &str) -> bool {

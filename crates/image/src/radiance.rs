@@ -1,14 +1,17 @@
 //! Radiance pictures (`.hdr`, `.pic`): G. Ward, "Real Pixels", Graphics Gems II, 1991, and the
 //! header keys of Radiance's file formats.
 
-use std::io::{Cursor, Read};
+use std::io::{BufRead, Cursor, Read};
 
 use image::codecs::hdr::HdrDecoder;
 
-use crate::{DecodeError, Limits, Raster, Samples, read};
+use crate::{DecodeError, Limits, Raster, Samples, bytes_of, read};
 
 /// What every Radiance file begins with; a program's name follows, `RADIANCE` or `RGBE` mostly.
 pub(crate) const SIGNATURE: &[u8] = b"#?";
+
+/// Bytes of the line with the program's name.
+const LONGEST_NAME: u64 = 1 << 10;
 
 /// Decodes a picture. Its values are divided by the product of all `EXPOSURE` and `COLORCORR` lines,
 /// which say by what they have been multiplied.
@@ -36,4 +39,12 @@ pub(crate) fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError
         }
     }
     Ok(Raster::new(size, channels, Samples::F32(values)))
+}
+
+/// Bytes that a picture takes.
+pub(crate) fn decoded_bytes(mut file: impl BufRead) -> Option<u64> {
+    let mut line = Vec::new();
+    file.by_ref().take(LONGEST_NAME).read_until(b'\n', &mut line).ok()?;
+    let file = Cursor::new(&b"#?RADIANCE\n"[..]).chain(file);
+    Some(bytes_of(&HdrDecoder::new(file).ok()?))
 }

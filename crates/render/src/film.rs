@@ -2,6 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use etendue_scene::memory::Size;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 use etendue_tracer::layer::{self, Kept, Taken};
@@ -16,6 +17,50 @@ pub enum Precision {
     Single,
     /// 64 bits, as an NPY may: accurate to the input's own coordinates.
     Double,
+}
+
+/// What the values of a plane are while it is filled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum PlaneKind {
+    F32,
+    F64,
+    U32,
+}
+
+fn kind_of_plane(spec: LayerSpec, precision: Precision) -> PlaneKind {
+    match (spec.row().kept, precision) {
+        (Kept::Counted, _) => PlaneKind::U32,
+        (Kept::Shown, _) | (Kept::Measured, Precision::Single) => PlaneKind::F32,
+        (Kept::Measured, Precision::Double) => PlaneKind::F64,
+    }
+}
+
+/// Bytes of a pixel of one plane of a layer.
+pub(crate) fn bytes_of_plane(spec: LayerSpec, precision: Precision) -> u64 {
+    match kind_of_plane(spec, precision) {
+        PlaneKind::F32 | PlaneKind::U32 => 4,
+        PlaneKind::F64 => 8,
+    }
+}
+
+/// The system has less memory than the film takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the system has too little memory for {} more of the film; ask for fewer pixels, layers or bands",
+    Size(*bytes)
+)]
+pub struct NoMemory {
+    /// What could not be had (bytes).
+    pub bytes: u64,
+}
+
+/// `count` times `value`, where there is memory for it.
+pub(crate) fn filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>, NoMemory> {
+    let mut values = Vec::new();
+    let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
+    values.try_reserve_exact(count).map_err(|_| NoMemory { bytes })?;
+    values.resize(count, value);
+    Ok(values)
 }
 
 /// The planes of one layer while it is filled.
@@ -92,38 +137,46 @@ pub(crate) struct StripLayer<'a> {
 }
 
 impl FilmLayer {
-    /// An empty layer; the picture of a tracer of light has a plane for each of `bands`.
-    pub(crate) fn new(spec: LayerSpec, pixels: usize, precision: Precision, bands: &Bands) -> Self {
+    /// An empty layer; the picture of a tracer of light has a plane for each of `bands`. `Err` when there
+    /// is no memory for it.
+    pub(crate) fn new(
+        spec: LayerSpec,
+        pixels: usize,
+        precision: Precision,
+        bands: &Bands,
+    ) -> Result<Self, NoMemory> {
         let row = spec.row();
-        let plane = || match (row.kept, precision) {
-            (Kept::Counted, _) => Values::U32(vec![0; pixels]),
-            (Kept::Shown, _) | (Kept::Measured, Precision::Single) => {
-                Values::F32(vec![0.0; pixels])
-            }
-            (Kept::Measured, Precision::Double) => Values::F64(vec![0.0; pixels]),
+        let plane = || {
+            Ok(match kind_of_plane(spec, precision) {
+                PlaneKind::U32 => Values::U32(filled(0, pixels)?),
+                PlaneKind::F32 => Values::F32(filled(0.0, pixels)?),
+                PlaneKind::F64 => Values::F64(filled(0.0, pixels)?),
+            })
         };
         let names: Vec<String> = match spec {
             LayerSpec::Radiance => bands.names(),
             _ => row.channels.iter().map(|name| (*name).to_owned()).collect(),
         };
-        let planes = names.iter().map(|_| plane()).collect();
-        Self { spec, row, names, planes }
+        let planes = names.iter().map(|_| plane()).collect::<Result<_, _>>()?;
+        Ok(Self { spec, row, names, planes })
     }
 
     /// Takes the light of a tracer out of its bands, whose place red, green and blue take; `None`
     /// when they are the bands already.
-    pub(crate) fn take_bands(&mut self, bands: &Bands) -> Option<BandFilm> {
+    pub(crate) fn take_bands(&mut self, bands: &Bands) -> Result<Option<BandFilm>, NoMemory> {
         if self.spec != LayerSpec::Radiance || *bands == Bands::Rgb {
-            return None;
+            return Ok(None);
         }
         let planes = self.planes.iter().filter_map(|plane| match plane {
             Values::F32(values) => Some(values.as_slice()),
             _ => None,
         });
-        let film = BandFilm::woven(bands.clone(), &planes.collect::<Vec<_>>());
+        let film = BandFilm::woven(bands.clone(), &planes.collect::<Vec<_>>())?;
+        // Bands are not kept twice while colours are made of them.
+        self.planes.clear();
         self.names = ["R", "G", "B"].map(str::to_owned).into();
-        self.planes = film.colors().map(Values::F32).into();
-        Some(film)
+        self.planes = film.colors()?.map(Values::F32).into();
+        Ok(Some(film))
     }
 
     /// The planes alone.

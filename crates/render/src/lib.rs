@@ -14,6 +14,7 @@
 
 pub mod expose;
 mod film;
+mod forecast;
 mod lighting;
 mod names;
 pub mod output;
@@ -25,7 +26,7 @@ mod samples;
 mod tiles;
 mod watch;
 
-pub use film::Precision;
+pub use film::{NoMemory, Precision};
 pub use plan::{Decision, Plan};
 pub use render::{Images, Progress, RenderError, Rendered, accelerators, build, render};
 pub use report::{Report, Seconds};

@@ -105,7 +105,7 @@ fn lit_share(
     let [width, height] = camera.resolution();
     let pixels = width as usize * height as usize;
     let layer = |spec| FilmLayer::new(spec, pixels, Precision::Single, &Bands::Rgb);
-    let mut film = [layer(LayerSpec::Radiance), layer(LayerSpec::Coverage)];
+    let mut film = [layer(LayerSpec::Radiance)?, layer(LayerSpec::Coverage)?];
     let groups = camera.band_groups(&Bands::Rgb);
     let pass: Vec<_> = std::iter::once(0..SAMPLES).collect();
     let job = Job {

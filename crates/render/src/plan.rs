@@ -7,9 +7,9 @@ use std::ops::Range;
 use etendue_accel::Quality;
 use etendue_camera::LensCamera;
 use etendue_geometry::{Detail, Placement};
-use etendue_scene::Scene;
 use etendue_scene::file::{TracerRow, TracerSpec};
 use etendue_scene::import::Wanted;
+use etendue_scene::{MemoryForecast, Scene};
 use etendue_sensor::BandChoice;
 use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Needs, TextureScope};
@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use crate::expose;
 use crate::film::Precision;
+use crate::forecast::forecast;
 use crate::output::Outputs;
 use crate::samples::{self, BYTES_OF_SUM};
 
@@ -75,6 +76,8 @@ pub struct Plan {
     pub precision: Precision,
     /// What the numbers are that the picture's light is kept in.
     pub bands: Bands,
+    /// What it will take, by counts and headers alone: within 1.5 of the peak of the example scenes.
+    pub memory: MemoryForecast,
     /// The decisions, in words.
     pub decisions: Vec<Decision>,
 }
@@ -146,8 +149,10 @@ impl Plan {
             quality,
             precision,
             bands: chosen.bands.clone(),
+            memory: MemoryForecast::default(),
             decisions: Vec::new(),
         };
+        plan.memory = forecast(scene, &plan, outputs);
         plan.decisions = plan.explain(scene, &chosen, (needs, passes), triangles);
         plan
     }
@@ -251,6 +256,9 @@ impl Plan {
                 "NPY files hold what was computed",
             ),
         );
+        let memory = self.memory.to_string();
+        let (total, parts) = memory.split_once(" (").unwrap_or((&memory, ""));
+        decide("memory", total, parts.replacen(')', "", 1));
         decisions
     }
 

@@ -10,14 +10,14 @@ use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightRow};
 use etendue_spectrum::Bands;
-use etendue_tracer::texture::ImageError;
+use etendue_tracer::texture::{Encoding, ImageError};
 use etendue_tracer::{
     Emitters, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind, LightingContext,
     Lights, Material, Pixel, RayStats, SceneView, Spectral, Traits, View,
 };
 use rayon::prelude::*;
 
-use crate::film::FilmLayer;
+use crate::film::{FilmLayer, NoMemory};
 use crate::output::{Development, Layer, Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::report::ImageSize;
@@ -63,13 +63,16 @@ pub enum RenderError {
         /// Which share of the rays ended where.
         losses: Vec<String>,
     },
+    /// The system has less memory than the film takes.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
     /// A light's spectrum is of no use to the sensor.
     #[error(
         "a light's illuminant: {0}; give the light `equal_energy`, `a` or {{\"black_body\": kelvin}}, \
          which reach further, or the sensor a quantum_efficiency or bands that see it"
     )]
     Lights(String),
-    /// The environment is no image that can be read.
+    /// The environment is no image that can be read, or an image of the scene is too large.
     #[error(transparent)]
     Image(#[from] ImageError),
     /// The caller asked to stop.
@@ -160,46 +163,33 @@ impl Images {
     ///
     /// # Errors
     ///
-    /// When the environment cannot be read or decoded.
+    /// When the environment cannot be read or decoded, or an image that the scene itself names is too
+    /// large.
     pub fn decode(scene: &Scene, plan: &Plan, memory: Option<u64>) -> Result<Self, RenderError> {
         let limits = Limits::within(memory);
-        let mut wanted = vec![false; scene.textures.len()];
-        let mut filtered = vec![[None; 2]; scene.textures.len()];
-        let mut seen = vec![false; scene.materials.len()];
-        for placement in &scene.geometry.placements {
-            if let Some(seen) = seen.get_mut(placement.material as usize) {
-                *seen = true;
-            }
-        }
-        if let Some(scope) = plan.images {
-            for (material, _) in scene.materials.iter().zip(&seen).filter(|(_, seen)| **seen) {
-                for (texture, encoding) in material.textures(scope) {
-                    if let Some(wanted) = wanted.get_mut(texture as usize) {
-                        *wanted = true;
-                        filtered[texture as usize][encoding as usize] =
-                            plan.footprint.then_some(encoding);
-                    }
-                }
-            }
-        }
+        let wanted = wanted_images(scene, plan);
         let results: Vec<_> = scene
             .textures
             .par_iter()
-            .zip(wanted.par_iter().zip(&filtered))
-            .map(|(texture, (&wanted, encodings))| {
-                let decode = || -> Result<Image, ImageError> {
+            .zip(&wanted)
+            .map(|(texture, encodings)| {
+                let decode = |encodings: &Encodings| -> Result<Image, ImageError> {
                     let mut image = texture.decode(limits)?;
                     for &encoding in encodings.iter().flatten() {
                         image.filter_by_footprint(encoding, &texture.name)?;
                     }
                     Ok(image)
                 };
-                wanted.then(decode)
+                encodings.as_ref().map(decode)
             })
             .collect();
         let mut images = Self::default();
         for (texture, result) in scene.textures.iter().zip(results) {
             let image = match result {
+                // Who writes a scene can choose a smaller image; who renders a model often cannot.
+                Some(Err(error)) if texture.named_by_scene && error.is_too_large() => {
+                    return Err(error.into());
+                }
                 Some(Err(error)) => {
                     let shown = "where it is a colour, magenta squares show it; data are left out";
                     images.faults.push(format!("{error}; {shown}"));
@@ -276,8 +266,32 @@ impl Images {
     }
 }
 
+/// The encodings in which an image is averaged over footprints.
+type Encodings = [Option<Encoding>; 2];
+
+/// Which of the scene's images the plan's materials look at.
+pub(crate) fn wanted_images(scene: &Scene, plan: &Plan) -> Vec<Option<Encodings>> {
+    let mut wanted = vec![None; scene.textures.len()];
+    let Some(scope) = plan.images else { return wanted };
+    let mut seen = vec![false; scene.materials.len()];
+    for placement in &scene.geometry.placements {
+        if let Some(seen) = seen.get_mut(placement.material as usize) {
+            *seen = true;
+        }
+    }
+    for (material, _) in scene.materials.iter().zip(&seen).filter(|(_, seen)| **seen) {
+        for (texture, encoding) in material.textures(scope) {
+            if let Some(wanted) = wanted.get_mut(texture as usize) {
+                let encodings = wanted.get_or_insert([None; 2]);
+                encodings[encoding as usize] = plan.footprint.then_some(encoding);
+            }
+        }
+    }
+    wanted
+}
+
 /// The image of the environment of `scene`, when it has one.
-fn environment(scene: &Scene) -> Option<&EnvironmentImage> {
+pub(crate) fn environment(scene: &Scene) -> Option<&EnvironmentImage> {
     scene.lights.iter().find_map(|light| match &light.kind {
         LightKind::Environment { image, .. } => Some(image),
         _ => None,
@@ -307,7 +321,7 @@ pub fn render(
         .layers
         .iter()
         .map(|&layer| FilmLayer::new(layer, width * height, plan.precision, &plan.bands))
-        .collect();
+        .collect::<Result<_, _>>()?;
     let start = Instant::now();
     let open = |bands: &Bands| match plan.pupil {
         true => scene.camera.opened(bands).map_err(|e| RenderError::Camera(e.why)),
@@ -382,7 +396,10 @@ fn finished(
     header: Vec<(String, String)>,
 ) -> Result<(Picture, Option<expose::BandFilm>), PictureError> {
     let [width, height] = scene.camera.resolution().map(|side| side as usize);
-    let band_film = film.iter_mut().find_map(|layer| layer.take_bands(&plan.bands));
+    let mut band_film = None;
+    for layer in &mut film {
+        band_film = band_film.or(layer.take_bands(&plan.bands)?);
+    }
     let mut layers: Vec<Layer> = film
         .into_iter()
         .flat_map(|layer| {
@@ -390,7 +407,7 @@ fn finished(
             layer.into_layers(root)
         })
         .collect();
-    layers.extend(expose::spectrum(scene, &layers, band_film.as_ref()));
+    layers.extend(expose::spectrum(scene, &layers, band_film.as_ref())?);
     let picture = Picture::new(width, height, layers, header)?.with_names(names::tables(scene));
     let development = Development::new(&scene.render, &picture);
     Ok((picture.developed(development), band_film))
@@ -422,14 +439,17 @@ fn so_far(
     samples: u32,
 ) -> Result<Picture, PictureError> {
     let [width, height] = scene.camera.resolution().map(|side| side as usize);
-    let is_picture = |layer: &&&FilmLayer| Some(layer.spec) == scene.picture;
-    let picture = layers.iter().filter(is_picture).flat_map(|layer| {
-        let mut layer = FilmLayer::clone(layer);
-        layer.take_bands(&plan.bands);
-        layer.into_layers(true)
-    });
+    let picture = layers.iter().find(|layer| Some(layer.spec) == scene.picture);
+    let layers = match picture {
+        Some(layer) => {
+            let mut layer = FilmLayer::clone(layer);
+            layer.take_bands(&plan.bands)?;
+            layer.into_layers(true)
+        }
+        None => Vec::new(),
+    };
     let header = marked(header.to_vec(), samples, plan.samples);
-    let picture = Picture::new(width, height, picture.collect(), header)?;
+    let picture = Picture::new(width, height, layers, header)?;
     let development = Development::new(&scene.render, &picture);
     Ok(picture.developed(development))
 }

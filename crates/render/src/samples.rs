@@ -18,7 +18,7 @@ use etendue_tracer::Scratch;
 use etendue_tracer::layer::{Columns, Taken};
 use rayon::prelude::*;
 
-use crate::film::{FilmLayer, Rows, Strip, strips, take};
+use crate::film::{FilmLayer, NoMemory, Rows, Strip, filled, strips, take};
 use crate::radiance::Numbers;
 use crate::tiles::{RayCounts, TILE, Tile};
 use crate::watch::{Stopped, Watcher};
@@ -136,11 +136,12 @@ impl<'a> Averaging<'a> {
         sampling: Sampling,
         layers: Vec<&'a mut FilmLayer>,
         passes: usize,
-    ) -> Self {
+    ) -> Result<Self, NoMemory> {
         let [width, height] = what.camera().resolution().map(|side| side as usize);
         let [count, bands] = what.shape();
         let kept = if passes > 1 { width * height * count * bands } else { 0 };
-        Self { what, sampling, layers, sums: vec![Sum::default(); kept], spare: Mutex::default() }
+        let sums = filled(Sum::default(), kept)?;
+        Ok(Self { what, sampling, layers, sums, spare: Mutex::default() })
     }
 
     /// Adds the samples `pass` of every pixel. Of several passes the layers see nothing until

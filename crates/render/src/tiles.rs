@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use crate::film::{FilmLayer, Strip, strips, take};
 use crate::output::{Picture, PictureError};
 use crate::radiance::LightPass;
+use crate::render::RenderError;
 use crate::samples::{Averaged, Averaging, Memory, Sampling};
 use crate::watch::{SoFar, Stopped, Watcher};
 
@@ -81,7 +82,7 @@ impl Job<'_> {
         &self,
         film: &mut [FilmLayer],
         watcher: &Watcher<'_>,
-    ) -> Result<Done, Stopped> {
+    ) -> Result<Done, RenderError> {
         let traffic = Mutex::new(RayCounts::default());
         let (lit, seen): (Vec<_>, Vec<_>) =
             film.iter_mut().partition(|layer| layer.spec == LayerSpec::Radiance);
@@ -93,10 +94,10 @@ impl Job<'_> {
         let passes = self.passes.len();
         if !mean.is_empty() {
             let layers = std::mem::take(&mut mean);
-            averaged.push(Averaging::new(&colors, self.sampling, layers, passes));
+            averaged.push(Averaging::new(&colors, self.sampling, layers, passes)?);
         }
         if let (Some(light), false) = (&self.light, lit.is_empty()) {
-            averaged.push(Averaging::new(light, self.sampling, lit, passes));
+            averaged.push(Averaging::new(light, self.sampling, lit, passes)?);
         }
         let samples = self.passes(&mut averaged, watcher, &traffic)?;
         let traffic = traffic.into_inner().unwrap_or_else(PoisonError::into_inner);

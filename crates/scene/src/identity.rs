@@ -1,9 +1,10 @@
 //! A number that tells whether two renders were of the same scene.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
 
-use etendue_geometry::MappedFile;
+use etendue_geometry::files;
 use serde_json::Value;
 use xxhash_rust::xxh3::Xxh3Default;
 
@@ -49,9 +50,7 @@ impl Ingredients {
         add(&mut hash, camera.as_bytes());
         for (name, path) in &self.files {
             add(&mut hash, name.as_bytes());
-            let file =
-                MappedFile::open(path).map_err(|source| SceneError::unreadable(path, source))?;
-            add(&mut hash, file.bytes());
+            add_file(&mut hash, path).map_err(|source| SceneError::unreadable(path, source))?;
         }
         Ok(SceneHash(hash.digest128()))
     }
@@ -61,6 +60,22 @@ impl Ingredients {
 fn add(hash: &mut Xxh3Default, part: &[u8]) {
     hash.update(&(part.len() as u64).to_le_bytes());
     hash.update(part);
+}
+
+/// Adds a file behind its length, piece by piece: a file that another program cuts meanwhile is none
+/// that may be mapped for it.
+fn add_file(hash: &mut Xxh3Default, path: &Path) -> io::Result<()> {
+    let mut file = files::open(path)?;
+    hash.update(&file.metadata()?.len().to_le_bytes());
+    let mut piece = vec![0; 1 << 20];
+    loop {
+        match file.read(&mut piece) {
+            Ok(0) => return Ok(()),
+            Ok(length) => hash.update(&piece[..length]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
 }
 
 /// JSON with sorted keys, whatever order the map keeps.

@@ -45,7 +45,7 @@ mod sniff;
 mod words;
 
 pub use cameras::{CameraOrigin, SceneCamera};
-pub use doctor::Diagnosis;
+pub use doctor::{Diagnosis, MemoryForecast};
 pub use error::SceneError;
 pub use file::{FileKind, SceneFile, SceneSpec, scene_schema};
 pub use identity::SceneHash;

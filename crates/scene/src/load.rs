@@ -268,6 +268,7 @@ impl SceneFile {
             strictness: options.strictness,
             root: folder.limit().map(std::path::Path::to_owned),
             budget: Arc::clone(budget),
+            copy: options.copy,
         };
         let goes_on = |origin: &Origin, done: usize| {
             let name = &objects[origin.user].title;
@@ -379,6 +380,7 @@ impl SceneFile {
             notes,
             stats: parts.stats,
             inputs,
+            is_copy: options.copy,
             since,
             ingredients: Ingredients::new(self.value(), files),
         })

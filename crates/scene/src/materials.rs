@@ -87,6 +87,7 @@ impl Supply for Named<'_> {
                 source: ImageSource::File(path.clone()),
                 wrap: [spec.wrap; 2],
                 filter: spec.filter,
+                named_by_scene: true,
             });
             self.textures.len() - 1
         });

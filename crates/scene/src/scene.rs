@@ -62,6 +62,8 @@ pub struct Scene {
     /// Every file that the scene is made of, whether it was read or only named: the scene file,
     /// models with their buffers and material files, images, lenses, masks and arrays.
     pub inputs: Vec<PathBuf>,
+    /// Whether models were read into memory.
+    pub(crate) is_copy: bool,
     /// When loading began.
     pub(crate) since: SystemTime,
     pub(crate) ingredients: Ingredients,
@@ -72,6 +74,9 @@ impl Scene {
     /// where they are mapped, so what was rendered may be of their old or their new contents.
     #[must_use]
     pub fn changed_files(&self) -> Vec<&Path> {
+        if self.is_copy {
+            return Vec::new();
+        }
         let is_changed = |path: &Path, size: u64| match path.metadata() {
             Ok(now) => now.len() != size || now.modified().is_ok_and(|at| at > self.since),
             Err(_) => true,
@@ -120,6 +125,8 @@ pub struct LoadOptions<'a> {
     /// Speak for the picture and the accelerator as well, so that a render that would not fit is
     /// refused before any work is done.
     pub to_render: bool,
+    /// Read models into memory instead of using them where their files are mapped.
+    pub copy: bool,
     /// Told now and then how far loading is; answering `false` stops it.
     pub progress: Option<&'a (dyn Fn(LoadProgress<'_>) -> bool + Sync)>,
 }
@@ -132,6 +139,7 @@ impl std::fmt::Debug for LoadOptions<'_> {
             .field("camera", &self.camera)
             .field("memory_limit", &self.memory_limit)
             .field("to_render", &self.to_render)
+            .field("copy", &self.copy)
             .finish_non_exhaustive()
     }
 }

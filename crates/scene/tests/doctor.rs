@@ -41,7 +41,7 @@ fn counts_are_of_what_is_placed() {
     assert!(found.units.plausible);
     assert_eq!(found.objects[0].name, "a");
     assert_eq!(found.objects[1].triangles, 12);
-    assert_eq!(found.memory.film, 12 * 64 * 48 * 4, "z and three of the normal");
+    assert_eq!(found.memory.film, 4 * 64 * 48 * 4, "z and three of the normal");
     assert_eq!(found.memory.structure, 92 * 12 + 132 * 2, "one mesh, two instances");
     assert_eq!(found.findings.len(), 1, "the material that nothing uses: {:?}", found.findings);
     let json = serde_json::to_value(&found).unwrap();

@@ -1,5 +1,6 @@
 //! Images over surfaces.
 
+use std::io::{BufReader, Cursor};
 use std::path::{Path, PathBuf};
 
 use etendue_geometry::{Buffer, files};
@@ -66,6 +67,8 @@ pub struct Texture {
     pub wrap: [Wrap; 2],
     /// How texels are read.
     pub filter: Filter,
+    /// Whether the scene file itself names it, and not one of its models.
+    pub named_by_scene: bool,
 }
 
 /// One use of a texture by a material.
@@ -121,6 +124,22 @@ pub enum ImageError {
     },
 }
 
+impl ImageError {
+    /// Whether the image is larger than it may be, rather than broken.
+    #[must_use]
+    pub fn is_too_large(&self) -> bool {
+        matches!(
+            self,
+            Self::Decode {
+                source: DecodeError::Side { .. }
+                    | DecodeError::Size { .. }
+                    | DecodeError::Memory { .. },
+                ..
+            }
+        )
+    }
+}
+
 /// The longest image file that is read (bytes): twice what the largest image takes decoded.
 const LONGEST: u64 = 1 << 32;
 
@@ -129,6 +148,18 @@ impl Texture {
     #[must_use]
     pub fn file(&self) -> Option<&PathBuf> {
         if let ImageSource::File(path) = &self.source { Some(path) } else { None }
+    }
+
+    /// Bytes that the image takes when it is decoded, by its header; 0 where that cannot be read.
+    #[must_use]
+    pub fn decoded_bytes(&self) -> u64 {
+        match &self.source {
+            ImageSource::Missing => 0,
+            ImageSource::Bytes(bytes) => {
+                etendue_image::decoded_bytes(Cursor::new(&**bytes)).unwrap_or(0)
+            }
+            ImageSource::File(path) => decoded_bytes(path),
+        }
     }
 
     /// Decodes the image, with the values that the file has: 8 or 16 bits, half or single precision.
@@ -152,6 +183,13 @@ impl Texture {
         let (wrap, filter) = (self.wrap, self.filter);
         Ok(Image { raster, wrap, filter, pyramids: [None, None], stands_in: false, dropped })
     }
+}
+
+/// Bytes that an image file takes when it is decoded, by its header; 0 where that cannot be read.
+#[must_use]
+pub fn decoded_bytes(path: &Path) -> u64 {
+    let file = files::open(path).ok().map(BufReader::new);
+    file.and_then(etendue_image::decoded_bytes).unwrap_or(0)
 }
 
 /// The bytes of an image file.

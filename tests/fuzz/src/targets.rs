@@ -177,6 +177,7 @@ fn texture(bytes: &[u8], _folder: &Path) {
         source: ImageSource::Bytes(Buffer::from(bytes.to_vec())),
         wrap: [Wrap::Repeat; 2],
         filter: Filter::Bilinear,
+        named_by_scene: false,
     };
     let _ = texture.decode(Limits::default());
 }

@@ -72,7 +72,6 @@ fn skies_that_are_none_are_refused() {
     }
 }
 
-/// Headers of PNGs without any texel: what is judged is the size alone.
 #[test]
 fn large_images_are_refused_by_their_size_before_they_are_decoded() {
     let rest = r#""lights": [{"type": "environment"}],
@@ -84,19 +83,56 @@ fn large_images_are_refused_by_their_size_before_they_are_decoded() {
     ];
     for (side, arguments, words) in cases {
         let bench = plane(rest);
-        let mut file = Vec::new();
-        let mut encoder = png::Encoder::new(&mut file, side, side);
-        encoder.set_color(png::ColorType::Rgb);
-        drop(encoder.write_header().expect("a header"));
-        // Chunks of the texels without any, and the end.
-        file.truncate(33);
-        file.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e");
+        let file = header_of_png(side, png::ColorType::Rgb);
         bench.write("large.png", &file);
         let command = [&["render", "scene.json", "-o", "out", "--strict"], arguments].concat();
         let output = bench.run(&command);
         let message = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{message}");
         assert!(message.contains("large.png") && message.contains(words), "{words}: {message}");
+    }
+}
+
+/// The start of a PNG of `side` × `side` grey or coloured texels, and none of them: what is judged is
+/// the size alone.
+fn header_of_png(side: u32, color: png::ColorType) -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, side, side);
+    encoder.set_color(color);
+    drop(encoder.write_header().expect("a header"));
+    // Signature and header; then a chunk of the texels without any.
+    file.truncate(33);
+    file.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e");
+    file
+}
+
+#[test]
+fn images_that_a_scene_names_are_refused_when_they_are_too_large() {
+    let grey = r#""materials": {"m": {"type": "matte", "color": [0.5, 0.5, 0.5]}}"#;
+    let texture = r#""lights": [{"type": "environment"}],
+        "materials": {"m": {"type": "matte", "color": {"image": "huge.png"}}}"#;
+    let sky = format!(r#""lights": [{{"type": "environment", "image": "huge.png"}}], {grey}"#);
+    let mask = Bench::with_scene(&format!(
+        r#"{{"etendue": 1, "tracer": {{"type": "path"}}, {grey},
+        "objects": [{{"shape": "sphere", "material": "m"}}],
+        "camera": {{"type": "lens", "focus_distance": 3, "sensor": {{"resolution": [4, 4]}},
+            "lens": {{"elements": [{{"type": "thin_lens", "focal_length": 50, "semi_diameter": 10}},
+                {{"type": "image", "file": "huge.png", "width": 10}}]}}}}}}"#
+    ));
+    let rgb = || header_of_png(32_768, png::ColorType::Rgb);
+    let cases = [
+        ("texture", plane(texture), rgb()),
+        ("sky", plane(&sky), rgb()),
+        ("mask", mask, header_of_png(32_768, png::ColorType::Grayscale)),
+    ];
+    for (what, bench, file) in cases {
+        bench.write("huge.png", &file);
+        let output = bench.run(&["render", "scene.json", "-o", "out"]);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{what}: {message}");
+        assert!(message.contains("huge.png"), "{what}: {message}");
+        assert!(message.contains("32768 x 32768 texels"), "{what}: {message}");
+        assert!(!bench.path("out").exists(), "{what} left a folder");
     }
 }
 

@@ -131,3 +131,101 @@ fn models_that_change_while_they_are_rendered_are_named() {
     let notes = bench.json("report.json")["notes"].to_string();
     assert!(notes.contains("a.obj changed while it was rendered"), "{notes}");
 }
+
+/// What was read before anything was traced may change: no note, and the same picture.
+#[test]
+fn copies_of_models_may_change_while_they_are_rendered() {
+    let bench = Bench::with_scene(
+        r#"{"etendue": 1, "objects": [{"file": "a.ply"}], "layers": ["depth"],
+            "camera": {"type": "pinhole", "sensor": {"resolution": [8, 8]}}}"#,
+    );
+    let mut ply = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n\
+        property float y\nproperty float z\nelement face 1\n\
+        property list uchar int vertex_indices\nend_header\n"
+        .to_vec();
+    ply.extend(
+        [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_le_bytes()),
+    );
+    ply.push(3);
+    ply.extend([0_i32, 1, 2].iter().flat_map(|i| i.to_le_bytes()));
+    bench.write("a.ply", &ply);
+    let tomorrow = std::time::SystemTime::now() + std::time::Duration::from_secs(86_400);
+    let file = std::fs::File::options().write(true).open(bench.path("a.ply")).unwrap();
+    file.set_modified(tomorrow).unwrap();
+    let seen = |arguments: &[&str]| {
+        bench.render(&[&["--report", "report.json"], arguments].concat());
+        let report = bench.json("report.json");
+        (report["notes"].as_array().map(Vec::len), report["image_hash"].clone())
+    };
+    let (mapped, copied) = (seen(&[]), seen(&["--copy"]));
+    assert_eq!((mapped.0, copied.0), (Some(1), Some(0)));
+    assert_eq!(mapped.1, copied.1);
+}
+
+/// The peak that the system tells, against the forecast, for the example scenes: layers alone, a
+/// million triangles, placements, and passes over the picture.
+#[test]
+fn forecasts_are_within_half_as_much_again_of_the_peak() {
+    let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let fewer = ["--set", "render.samples=8"];
+    let cases: [(&str, &[&str]); 6] = [
+        ("cube.json", &[]),
+        ("first-light.json", &[]),
+        ("instances.json", &[]),
+        ("orthographic.json", &[]),
+        ("opencv.json", &[]),
+        ("double-gauss.json", &fewer),
+    ];
+    let bench = Bench::new();
+    for (name, more) in cases {
+        let scene = scenes.join(name);
+        let scene = scene.to_string_lossy();
+        let check = bench.run(&[&["check", &scene, "--json"], more].concat());
+        assert!(check.status.success(), "{name}: {}", text(&check.stderr));
+        let check: serde_json::Value = serde_json::from_slice(&check.stdout).expect("JSON");
+        let forecast = check["memory"]["total"].as_f64().expect("a number");
+        let render = ["render", &scene, "-o", "out", "--quiet", "--report", "report.json"];
+        let output = bench.run(&[&render, more].concat());
+        assert!(output.status.success(), "{name}: {}", text(&output.stderr));
+        let peak = bench.json("report.json")["peak_memory_bytes"].as_f64().expect("a number");
+        let ratio = forecast / peak;
+        println!("{name}: forecast {forecast:.0}, peak {peak:.0} bytes: {ratio:.2}");
+        assert!((1.0 / 1.5..=1.5).contains(&ratio), "{name}: {forecast} for {peak}");
+    }
+}
+
+#[test]
+fn plans_and_checks_tell_what_memory_a_render_takes() {
+    let bench = Bench::with_scene(BOX);
+    let output = bench.run(&["plan", "scene.json"]);
+    let plan = text(&output.stdout);
+    let line = plan.lines().find(|line| line.trim_start().starts_with("memory"));
+    let line = line.unwrap_or_else(|| panic!("{plan}"));
+    assert!(line.contains("MiB") && plan.contains("structure"), "{plan}");
+    let of = |more: &[&str], key: &str| {
+        let output = bench.run(&[&["check", "scene.json", "--json"], more].concat());
+        let check: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        check["memory"][key].as_u64().expect("a number")
+    };
+    let size = ["--set", "camera.sensor.resolution=[100,100]"];
+    // Three f32 of the picture, and f64: one of depth, three of the normal.
+    assert_eq!(of(&size, "film"), 10_000 * (12 + 32));
+    assert_eq!(of(&size, "sums"), 0);
+    let samples = [size.as_slice(), &["--set", "render.samples=16"]].concat();
+    assert_eq!(of(&samples, "sums"), 10_000 * 3 * 16, "a sum and its remainder for each colour");
+}
+
+/// A skinned mesh of few bytes a vertex and a mesh whose long name each of its primitives has.
+#[test]
+fn names_of_meshes_are_spoken_for() {
+    let bench = Bench::new();
+    let primitives = vec![json!({"attributes": {"POSITION": 0}}); 20_000];
+    let model = json!({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "accessors": [{"componentType": 5126, "count": 3, "type": "VEC3"}],
+        "meshes": [{"name": "n".repeat(1 << 16), "primitives": primitives}],
+    });
+    bench.write("names.gltf", model.to_string().as_bytes());
+    let arguments = ["check", "names.gltf"];
+    refused(&bench, &arguments, &["names.gltf", "of memory"]);
+}

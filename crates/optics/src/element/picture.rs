@@ -14,6 +14,9 @@ pub type Resolve<'a> = &'a dyn Fn(&str) -> Result<PathBuf, String>;
 /// pixels, and this is 8192 × 8192 in 16-bit RGBA.
 const MOST_BYTES: u64 = 1 << 29;
 
+/// The most pixels of one: their values take 0.5 GiB.
+const MOST_PIXELS: usize = 1 << 26;
+
 /// The longest file of a picture that is read (bytes).
 const LONGEST: u64 = 1 << 30;
 
@@ -112,7 +115,14 @@ fn read(path: &Path) -> Result<Pixels, String> {
     let limits = Limits { bytes: MOST_BYTES };
     let raster = etendue_image::decode(&bytes, limits)
         .map_err(|e| format!("is not a picture that can be read: {e}"))?;
-    let mut values = Vec::with_capacity(raster.len());
+    if raster.len() > MOST_PIXELS {
+        let [width, height] = raster.size();
+        return Err(format!(
+            "has {width} x {height} texels, and a mask has {MOST_PIXELS} at most: make it smaller"
+        ));
+    }
+    let mut values = Vec::new();
+    values.try_reserve_exact(raster.len()).map_err(|_| "does not fit into memory".to_owned())?;
     for [red, green, blue, alpha] in (0..raster.len()).map(|i| raster.texel(i)) {
         if red != green || red != blue {
             return Err("is coloured; a mask must be grey".to_owned());

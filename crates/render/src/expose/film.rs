@@ -7,6 +7,7 @@ use etendue_spectrum::{Bands, Grid};
 use rayon::prelude::*;
 
 use super::files::plain;
+use crate::film::{NoMemory, filled};
 use crate::output::{Channel, Layer, Look, Values};
 
 /// Light in spectral bands, as a sensor is given it.
@@ -20,16 +21,19 @@ pub struct BandFilm {
 
 impl BandFilm {
     /// One plane a band, woven together.
-    #[must_use]
-    pub fn woven(bands: Bands, planes: &[&[f32]]) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// When there is no memory for it.
+    pub fn woven(bands: Bands, planes: &[&[f32]]) -> Result<Self, NoMemory> {
         let pixels = planes.first().map_or(0, |plane| plane.len());
-        let mut values = vec![0.0; pixels * planes.len()];
+        let mut values = filled(0.0, pixels * planes.len())?;
         values.par_chunks_mut(planes.len().max(1)).enumerate().for_each(|(i, pixel)| {
             for (value, plane) in pixel.iter_mut().zip(planes) {
                 *value = plane[i];
             }
         });
-        Self { bands, values }
+        Ok(Self { bands, values })
     }
 
     /// One plane a band of `grid`: the plain mean of the light over its wavelengths.
@@ -48,20 +52,24 @@ impl BandFilm {
     }
 
     /// The colours of the light, for looking: red, green and blue planes.
-    #[must_use]
-    pub fn colors(&self) -> [Vec<f32>; 3] {
+    ///
+    /// # Errors
+    ///
+    /// When there is no memory for them.
+    pub fn colors(&self) -> Result<[Vec<f32>; 3], NoMemory> {
         let rows = self.bands.to_rgb();
         let count = rows.len();
         let plane = |k: usize| {
-            let pixels = self.values.par_chunks(count);
             let mix = |bands: &[f32]| -> f64 {
                 bands.iter().zip(&rows).map(|(band, row)| f64::from(*band) * row[k]).sum()
             };
+            let mut plane = filled(0.0, self.values.len() / count.max(1))?;
+            let pixels = plane.par_iter_mut().zip(self.values.par_chunks(count));
             #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
-            let plane: Vec<f32> = pixels.map(|bands| mix(bands) as f32).collect();
-            plane
+            pixels.for_each(|(value, bands)| *value = mix(bands) as f32);
+            Ok(plane)
         };
-        [plane(0), plane(1), plane(2)]
+        Ok([plane(0)?, plane(1)?, plane(2)?])
     }
 
     /// What falls on the sensor: in physical mode the light of a lens camera is radiance
@@ -81,13 +89,16 @@ impl BandFilm {
 
     /// A picture's linear sRGB in other bands. Exact for colours that were not mixed by light on
     /// their way: a band is linear in the colour.
-    #[must_use]
-    pub fn from_rgb(bands: Bands, colors: &[&[f32]; 3]) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// When there is no memory for them.
+    pub fn from_rgb(bands: Bands, colors: &[&[f32]; 3]) -> Result<Self, NoMemory> {
         if bands == Bands::Rgb {
             return Self::woven(bands, colors);
         }
         let rows = bands.from_rgb();
-        let mut values = vec![0.0; colors[0].len() * rows.len()];
+        let mut values = filled(0.0, colors[0].len() * rows.len())?;
         values.par_chunks_mut(rows.len().max(1)).enumerate().for_each(|(i, pixel)| {
             let color = colors.map(|plane| f64::from(plane[i]));
             for (value, row) in pixel.iter_mut().zip(&rows) {
@@ -96,7 +107,7 @@ impl BandFilm {
                 *value = band;
             }
         });
-        Self { bands, values }
+        Ok(Self { bands, values })
     }
 }
 
@@ -128,21 +139,21 @@ pub(crate) fn spectrum(
     scene: &Scene,
     layers: &[Layer],
     band_film: Option<&BandFilm>,
-) -> Option<Layer> {
-    let sensor = scene.sensor.as_ref()?;
-    if !has_spectrum(scene) {
-        return None;
-    }
+) -> Result<Option<Layer>, NoMemory> {
+    let Some(sensor) = scene.sensor.as_ref().filter(|_| has_spectrum(scene)) else {
+        return Ok(None);
+    };
     let from_colors;
     let film = match band_film.filter(|film| film.bands.grid().is_some()) {
         Some(film) => film,
         None => {
-            from_colors = BandFilm::from_rgb(sensor.bands().clone(), &colors(layers)?);
+            let Some(colors) = colors(layers) else { return Ok(None) };
+            from_colors = BandFilm::from_rgb(sensor.bands().clone(), &colors)?;
             &from_colors
         }
     };
-    let grid = sensor.spec().bands.as_ref().or(film.bands.grid())?;
-    Some(cube(grid, film.means_over(grid)))
+    let Some(grid) = sensor.spec().bands.as_ref().or(film.bands.grid()) else { return Ok(None) };
+    Ok(Some(cube(grid, film.means_over(grid))))
 }
 
 /// A layer of one plane a band.

@@ -27,6 +27,7 @@ pub(crate) use bands::{bands, explain_bands};
 pub use film::BandFilm;
 pub(crate) use film::{SPECTRUM, has_spectrum, spectrum};
 
+use crate::film::NoMemory;
 use crate::output::{OutputError, Outputs, Picture, PictureError, sidecar};
 use files::{Sidecar, Writer};
 use film::colors;
@@ -44,6 +45,9 @@ pub enum ExposeError {
     /// An image is no picture; a fault of this program.
     #[error(transparent)]
     Picture(#[from] PictureError),
+    /// The system has less memory than the light takes in the sensor's bands.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
@@ -124,7 +128,7 @@ pub fn write(
             // In the picture's own three bands where the sensor can: the same numbers from less
             // memory.
             let sensor = sensor.clone().in_bands(Bands::Rgb).unwrap_or_else(|_| sensor.clone());
-            let film = BandFilm::from_rgb(sensor.bands().clone(), &colors);
+            let film = BandFilm::from_rgb(sensor.bands().clone(), &colors)?;
             (sensor, film)
         }
     };

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::film::NoMemory;
+
 /// Why layers do not make a picture.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -15,6 +17,9 @@ pub enum PictureError {
         /// Rows.
         height: usize,
     },
+    /// The system has less memory than it takes.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
     /// No layer, or a layer of no channels.
     #[error("{what} is empty; ask for at least one")]
     Empty {

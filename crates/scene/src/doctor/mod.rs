@@ -162,7 +162,10 @@ pub fn check(
 }
 
 impl Diagnosis {
-    fn of(scene: &Scene, kind: FileKind) -> Self {
+    /// What there is to tell of a scene that was loaded with [`Wanted::EVERYTHING`] from a file of this
+    /// kind. Its forecast of memory is [`MemoryForecast::of`].
+    #[must_use]
+    pub fn of(scene: &Scene, kind: FileKind) -> Self {
         let geometry = &*scene.geometry;
         let around = bounds::tight(geometry);
         let is_extension = |note: &&Note| note.kind == NoteKind::Extension;

@@ -26,6 +26,7 @@ pub(super) struct Files {
     folder: PathBuf,
     root: Option<PathBuf>,
     budget: Arc<Budget>,
+    copy: bool,
     /// Bytes that the model makes appear, beside what its files hold.
     made: AtomicU64,
     opened: Mutex<BTreeMap<PathBuf, Arc<MappedFile>>>,
@@ -44,6 +45,7 @@ impl Files {
             folder,
             root,
             budget: Arc::clone(&options.budget),
+            copy: options.copy,
             made: AtomicU64::new(0),
             opened: Mutex::default(),
         })
@@ -131,13 +133,24 @@ impl Files {
         Ok(map)
     }
 
-    /// The bytes of the file at `path`, mapped.
+    /// The bytes of the file at `path`, mapped, or copied where that is asked for.
     pub(super) fn map(&self, path: &Path) -> Result<Arc<MappedFile>, ImportError> {
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(file) = opened.get(path) {
             return Ok(Arc::clone(file));
         }
-        let file = Arc::new(MappedFile::open(path).map_err(|source| unreadable(path, source))?);
+        let file = if self.copy {
+            let length = path.metadata().map_or(0, |about| about.len());
+            self.budget.take(length).map_err(|source| ImportError::Memory {
+                file: path.to_owned(),
+                place: "a copy of it".to_owned(),
+                source,
+            })?;
+            MappedFile::copy(path)
+        } else {
+            MappedFile::open(path)
+        };
+        let file = Arc::new(file.map_err(|source| unreadable(path, source))?);
         opened.insert(path.to_owned(), Arc::clone(&file));
         Ok(file)
     }

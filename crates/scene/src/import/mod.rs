@@ -95,6 +95,8 @@ pub struct Options {
     pub root: Option<PathBuf>,
     /// The account of what the models take; without a limit by default.
     pub budget: Arc<Budget>,
+    /// Read files into memory instead of mapping them, so that they may change meanwhile.
+    pub copy: bool,
 }
 
 /// What a model file holds.

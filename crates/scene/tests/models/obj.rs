@@ -160,3 +160,34 @@ fn obj_lines_may_end_with_carriage_returns_alone() {
     let message = error(&write(&folder, "b.obj", text.replace("v 0 1 0", "v 0 x 0")));
     assert!(message.contains("line 4, column 5"), "{message}");
 }
+
+/// A room 2 m high with a lamp of 1 m at a height: on which sides it shines.
+#[test]
+fn flat_lamps_under_a_ceiling_shine_into_the_room_alone() {
+    let folder = folder();
+    write(&folder, "m.mtl", "newmtl white\nKd 1 1 1\nnewmtl lamp\nKd 1 1 1\nKe 9 9 9\n");
+    let room = "mtllib m.mtl\nusemtl white\n\
+        v 0 0 0\nv 2 0 0\nv 2 0 2\nv 0 0 2\nf 4 3 2 1\nv 0 2 0\nv 2 2 0\nv 2 2 2\nv 0 2 2\nf 5 6 7 8\n";
+    let lamp = |height: f64, face: &str| {
+        format!(
+            "usemtl lamp\nv 0.5 {height} 0.5\nv 1.5 {height} 0.5\nv 1.5 {height} 1.5\n\
+             v 0.5 {height} 1.5\n{face}\n"
+        )
+    };
+    let (down, up) = ("f -4 -3 -2 -1", "f -1 -2 -3 -4");
+    let both_sides = |text: &str| {
+        let import = load(&write(&folder, "a.obj", text));
+        let lamp = import.materials.iter().find(|material| material.name == "lamp");
+        lamp.and_then(|lamp| lamp.emission.as_ref()).expect("a lamp").two_sided
+    };
+    assert!(!both_sides(&format!("{room}{}", lamp(1.99, down))), "under the ceiling");
+    assert!(!both_sides(&format!("{room}{}", lamp(0.01, up))), "in the floor");
+    assert!(
+        both_sides(&format!("{room}{}", lamp(1.99, up))),
+        "else it would light the ceiling alone"
+    );
+    assert!(both_sides(&format!("{room}{}", lamp(1.5, down))), "half a metre of room behind it");
+    let bent = "v 1 1.9 1\nf -1 -2 -3";
+    assert!(both_sides(&format!("{room}{}{bent}", lamp(1.99, down))), "not flat");
+    assert!(both_sides(&format!("mtllib m.mtl\n{}", lamp(1.99, down))), "a lamp alone");
+}

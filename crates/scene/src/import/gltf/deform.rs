@@ -28,6 +28,9 @@ pub(super) struct Corners {
     pub mirrored: bool,
 }
 
+/// Bytes that a position or normal takes while it is moved: as it is moved, and as it is kept.
+const BYTES_PER_VECTOR: u64 = 2 * size_of::<DVec3>() as u64;
+
 /// The numbers and weights of the joints that carry each vertex, four a set.
 struct Influences {
     sets: Vec<[Vertices<4>; 2]>,
@@ -52,6 +55,8 @@ impl Part<'_> {
             let positions = Positions::F32(positions);
             return Ok(Corners { positions, normals, skinned: false, mirrored: false });
         }
+        let vertices = (positions.len() + normals.as_ref().map_or(0, Vertices::len)) as u64;
+        self.reader.files.take(vertices * BYTES_PER_VECTOR, || self.place.clone())?;
         let mut points = doubles(&positions);
         self.morph(&mut points, &weights, "POSITION", |target| &target.positions)?;
         let mut directions = normals.as_ref().map(doubles);

@@ -411,6 +411,7 @@ impl Images<'_> {
                 Some(Checked::Valid(MagFilter::Nearest)) => Filter::Nearest,
                 _ => Filter::Bilinear,
             },
+            named_by_scene: false,
         });
         Ok(Some(number))
     }

@@ -168,6 +168,8 @@ fn read(
 ) -> Result<Option<Read>, ImportError> {
     let name = reader.document.root.meshes[shape.mesh].name.clone().unwrap_or_default();
     let place = place(reader, shape.mesh, number);
+    // Each primitive has the mesh's name for itself, and another one in messages.
+    reader.files.take(2 * name.len() as u64, || format!("meshes[{}].name", shape.mesh))?;
     let Checked::Valid(mode) = primitive.mode else {
         return Err(reader.damaged(place, "its mode is none of 0 to 6; export the file again"));
     };

@@ -13,6 +13,7 @@
 //! Wavefront Technologies, *Object Files (.obj)*, appendix B1 of the Advanced Visualizer manual.
 
 mod chunk;
+mod lamps;
 mod mtl;
 mod oddities;
 mod pool;
@@ -34,6 +35,9 @@ use chunk::{Chunk, Wish};
 use pool::Pool;
 use segment::Segment;
 
+/// Bytes that a byte of text becomes: a line `v 0 0 0` three f64, a corner of a face an index or three.
+const PARSED_PER_BYTE: u64 = 3;
+
 /// Bytes that one task reads.
 const PIECE: usize = 1 << 20;
 
@@ -50,6 +54,8 @@ pub(super) fn import(
     let text: &[u8] = &text;
     let fault = |fault: Fault| fault.locate(path, text);
     let wish = Wish { uvs: wanted.uvs, normals: wanted.normals, colors: wanted.colors };
+    let bytes = PARSED_PER_BYTE * text.len() as u64;
+    files.take(bytes, || "the numbers of the text".to_owned())?;
     let pieces = pieces(text, PIECE);
     let mut chunks: Vec<Chunk> = pieces
         .par_iter()
@@ -77,10 +83,11 @@ pub(super) fn import(
     for (segment, material) in segments.iter().zip(numbers) {
         let next = u32::try_from(nodes.len()).unwrap_or(u32::MAX);
         let node = *nodes.entry(&segment.name).or_insert(next);
-        let candidate = welder.mesh(segment, path, single);
+        let candidate = welder.mesh(segment, path, files, single)?;
         let admitted = admit::admit(candidate, path, options)?;
         place(admitted, segment, [material, node], &mut import)?;
     }
+    lamps::darken_backs(&mut import);
     Ok(import)
 }
 

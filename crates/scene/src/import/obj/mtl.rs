@@ -237,7 +237,8 @@ fn resolve(
 /// The roughness of 2 and 3 is that whose GGX peak is as wide as Phong's of exponent `Ns`, α² =
 /// 2 / (Ns + 2) (Walter et al. 2007, section 5.2). `d` (or 1 − `Tr`) below 1 leaves that share of 2 to 4 in place.
 /// `Ke` shines from both sides whatever else the surface does; so does `Ka` above 1, which can be no
-/// reflectance and is how lamps were written before `Ke`.
+/// reflectance and is how lamps were written before `Ke`. Of flat lamps at the rim of the model the backs
+/// are left dark afterwards, see `lamps`.
 fn nearest(material: &tobj::Material, plain: Material) -> Material {
     let sound = |color: Option<[f64; 3]>| {
         let color = color.filter(|c| c.iter().all(|v| v.is_finite()));
@@ -326,6 +327,7 @@ impl Maps<'_> {
                 source,
                 wrap: [wrap; 2],
                 filter: Filter::Bilinear,
+                named_by_scene: false,
             });
             next
         });

@@ -11,7 +11,9 @@ use rayon::prelude::*;
 use super::chunk::{Chunk, NONE, Polygon, V, VN, VT};
 use super::pool::Pool;
 use super::segment::Segment;
+use crate::import::ImportError;
 use crate::import::admit::Candidate;
+use crate::import::files::Files;
 use crate::import::polygon;
 use crate::import::precision::precise_enough;
 
@@ -36,7 +38,13 @@ impl<'a> Welder<'a> {
 
     /// The mesh of `segment`. The `only` one of a file uses all vertices of the file in their order
     /// where corners have nothing but a position, which saves the looking up.
-    pub(super) fn mesh(&mut self, segment: &Segment, path: &Path, only: bool) -> Candidate {
+    pub(super) fn mesh(
+        &mut self,
+        segment: &Segment,
+        path: &Path,
+        files: &Files,
+        only: bool,
+    ) -> Result<Candidate, ImportError> {
         let (has_uvs, has_normals) = (self.has(segment, VT), self.has(segment, VN));
         let title = if segment.name.is_empty() { stem(path) } else { segment.name.clone() };
         let place = match &segment.material {
@@ -44,9 +52,19 @@ impl<'a> Welder<'a> {
             None => format!("\"{title}\""),
         };
         let pool = self.pool;
-        if only && !has_uvs && !has_normals {
+        let take = |count: usize, each: usize| {
+            files.take((count as u64).saturating_mul(each as u64), || place.clone())
+        };
+        let plain = only && !has_uvs && !has_normals;
+        // Polygons have two triangles less than corners, and triangles a third as many as corners.
+        let corners: usize = segment.runs.iter().map(|(_, range)| range.len()).sum();
+        take(corners, if plain { size_of::<[u32; 3]>() } else { size_of::<[Key; 3]>() })?;
+        if plain {
+            take(pool.positions.len(), size_of::<[f64; 3]>())?;
+        }
+        if plain {
             let triangles = self.corners(segment, |chunk, corner| chunk.corners[V][corner]);
-            return Candidate {
+            return Ok(Candidate {
                 name: title,
                 place,
                 positions: precise_enough(&pool.positions),
@@ -54,7 +72,7 @@ impl<'a> Welder<'a> {
                 normals: None,
                 uvs: Vec::new(),
                 colors: opaque(pool.colors.iter()),
-            };
+            });
         }
         let index = |chunk: &Chunk, kind: usize, corner: usize| {
             chunk.corners[kind].get(corner).copied().unwrap_or(NONE)
@@ -62,9 +80,10 @@ impl<'a> Welder<'a> {
         let corners = self
             .corners(segment, |chunk, corner| [V, VT, VN].map(|kind| index(chunk, kind, corner)));
         let (triangles, keys) = self.weld(&corners);
+        take(keys.len(), 2 * size_of::<[f64; 3]>() + size_of::<[f32; 5]>())?;
         let positions: Vec<[f64; 3]> =
             keys.par_iter().map(|key| pool.positions[key[V] as usize]).collect();
-        Candidate {
+        Ok(Candidate {
             name: title,
             place,
             positions: precise_enough(&positions),
@@ -72,7 +91,7 @@ impl<'a> Welder<'a> {
             normals: has_normals.then(|| pick(&keys, VN, &pool.normals)),
             uvs: if has_uvs { vec![pick(&keys, VT, &pool.uvs)] } else { Vec::new() },
             colors: opaque(keys.iter().filter_map(|key| pool.colors.get(key[V] as usize))),
-        }
+        })
     }
 
     /// Whether any corner of `segment` has an index of this kind.

@@ -70,6 +70,12 @@ impl Faces {
         self.ends.extend(other.ends.iter().map(|end| before + end));
     }
 
+    /// Bytes of the triangles that polygons are cut into.
+    pub(super) fn bytes_to_cut(&self) -> u64 {
+        let triangles = self.corners.len().saturating_sub(2 * self.ends.len());
+        (triangles * size_of::<[u32; 3]>()) as u64
+    }
+
     /// All faces as triangles: triangles in the order of the file, then those of polygons.
     pub(super) fn triangles(mut self, positions: &Positions) -> Buffer<[u32; 3]> {
         let mut start = 0;

@@ -96,10 +96,35 @@ impl Element {
     }
 }
 
+/// Bytes of a vertex with position, normal, texture coordinates and colour.
+const BYTES_PER_VERTEX: u64 = 3 * 8 + (3 + 2 + 4) * 4;
+
 impl Header {
     /// Reads the header at the start of `file`. Its lines end as the first one does, by a newline,
     /// a carriage return, or both; lines of other words than the format's, which some programs
     /// write, are passed over.
+    /// Bytes that the numbers of a file of `length` bytes take when they are converted: as many as the
+    /// header promises, and no more than the file can hold.
+    pub(super) fn bytes_to_make(&self, length: usize) -> u64 {
+        // Text has a digit and a blank for each number.
+        let in_text = matches!(self.format, Format::Text);
+        let row = |element: &Element| -> usize {
+            let sizes = element.properties.iter().map(|p| p.list.unwrap_or(p.kind).size());
+            if in_text { 2 * element.properties.len() } else { sizes.sum() }
+        };
+        let made = |element: &Element| -> u64 {
+            let rows = element.count.min(length / row(element).max(1)) as u64;
+            let kept: u64 = match element.name.as_str() {
+                // Text is read into a table of f64 first.
+                "vertex" if in_text => 8 * element.properties.len() as u64 + BYTES_PER_VERTEX,
+                "vertex" => BYTES_PER_VERTEX,
+                _ => size_of::<[u32; 3]>() as u64,
+            };
+            rows.saturating_mul(kept)
+        };
+        self.elements.iter().map(made).fold(0, u64::saturating_add)
+    }
+
     pub(super) fn parse(file: &[u8]) -> Result<Self, Fault> {
         let mut lines = Lines::new(file)?;
         let (mut format, mut elements, mut properties) = (None, Vec::new(), 0);

@@ -45,10 +45,13 @@ pub(super) fn import(
         place: "PLY data".to_owned(),
         reason,
     };
+    let bytes = header.bytes_to_make(map.bytes().len());
+    files.take(bytes, || "vertices and faces".to_owned())?;
     let (vertices, faces) = match header.format {
         Format::Text => text::read(&map, &header, wanted).map_err(fault)?,
         Format::Binary(order) => binary::read(&map, &header, order, wanted).map_err(damaged)?,
     };
+    files.take(faces.bytes_to_cut(), || "faces cut into triangles".to_owned())?;
     let triangles = faces.triangles(&vertices.positions);
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut import = Import::default();

@@ -1,0 +1,113 @@
+//! How much memory a render will take, from counts and headers alone.
+
+use etendue_scene::{MemoryForecast, Scene};
+use etendue_sensor::{Sensor, SensorKind};
+use etendue_spectrum::Bands;
+use etendue_tracer::{EnvironmentImage, LayerSpec, texture};
+
+use crate::film::bytes_of_plane;
+use crate::output::Outputs;
+use crate::render::{environment, wanted_images};
+use crate::samples::BYTES_OF_SUM;
+use crate::{Plan, expose};
+
+const F32: u64 = size_of::<f32>() as u64;
+const U16: u64 = size_of::<u16>() as u64;
+
+/// Bytes of a texel of an environment (three f32), of the image that it is made from, and of a cell of
+/// the table that directions are chosen by.
+const ENVIRONMENT: f64 = 2.7;
+
+/// Bytes that the pixels of a PNG take while they are packed.
+const PNG: u64 = 6;
+
+/// What rendering `scene` as planned will take, written as `outputs`.
+pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryForecast {
+    let [width, height] = scene.camera.resolution().map(u64::from);
+    let pixels = width.saturating_mul(height);
+    let each = |bytes: u64| pixels.saturating_mul(bytes);
+    let picture = plan.layers.iter().find(|layer| Some(**layer) == scene.picture);
+    let picture = picture.map_or(0, |layer| bytes_of_layer(*layer, plan));
+    let woven = match (&plan.bands, plan.layers.contains(&LayerSpec::Radiance)) {
+        // The light in its bands once more, and red, green and blue of it.
+        (bands, true) if *bands != Bands::Rgb => F32 * (bands.count() as u64 + 3),
+        _ => 0,
+    };
+    let is_gone_over = plan.passes.len() > 1;
+    let look = if is_gone_over && outputs.png { picture + woven + PNG } else { 0 };
+    let png = if outputs.png { PNG } else { 0 };
+    let sensor = scene.sensor.as_ref().filter(|_| scene.picture.is_some());
+    let sensor = sensor.map_or(0, |sensor| bytes_of_sensor(scene, sensor, plan));
+    let film = plan.layers.iter().map(|layer| bytes_of_layer(*layer, plan)).sum();
+    MemoryForecast {
+        images: images(scene, plan),
+        film: each(film),
+        sums: each(if is_gone_over { BYTES_OF_SUM * averaged(plan) } else { 0 }),
+        sensor: each(if sensor > 0 { sensor.max(woven) } else { 0 }),
+        files: each(look.max(png).max(if sensor > 0 { 0 } else { woven })),
+        ..MemoryForecast::of(scene)
+    }
+    .summed()
+}
+
+/// Values of a pixel that are averaged over samples.
+fn averaged(plan: &Plan) -> u64 {
+    let values = |layer: &LayerSpec| match layer {
+        LayerSpec::Radiance => plan.bands.count() as u64,
+        _ => 3,
+    };
+    plan.layers.iter().filter(|layer| layer.is_averaged()).map(values).sum()
+}
+
+/// Bytes a pixel of the planes of a layer.
+fn bytes_of_layer(layer: LayerSpec, plan: &Plan) -> u64 {
+    let planes = match layer {
+        LayerSpec::Radiance => plan.bands.count(),
+        _ => layer.row().channels.len(),
+    };
+    planes as u64 * bytes_of_plane(layer, plan.precision)
+}
+
+/// Bytes a pixel of what a sensor makes of the light: its bands, the numbers, their preview, and
+/// expected values and variances.
+fn bytes_of_sensor(scene: &Scene, sensor: &Sensor, plan: &Plan) -> u64 {
+    let (bands, depth) = (plan.bands.count() as u64, sensor.depth() as u64);
+    let channels = match sensor.spec().kind {
+        SensorKind::Raw => 3,
+        SensorKind::Rgb | SensorKind::Multispectral => depth,
+    };
+    let cube = if expose::has_spectrum(scene) { bands } else { 0 };
+    let numbers = U16 * depth * if depth > 1 { 2 } else { 1 };
+    // Demosaiced, then in linear sRGB, pixel by pixel and plane by plane.
+    let preview = F32 * (channels + 3 + 3) + PNG;
+    let moments = match sensor.spec().moments {
+        Some(true) => 2 * size_of::<f64>() as u64 * depth + F32 * depth,
+        _ => 0,
+    };
+    F32 * (bands + cube) + numbers + preview.max(moments)
+}
+
+/// Bytes of the images that the plan's materials look at, and of the environment.
+fn images(scene: &Scene, plan: &Plan) -> u64 {
+    let wanted = wanted_images(scene, plan);
+    let pairs = scene.textures.iter().zip(&wanted).filter(|(_, wanted)| wanted.is_some());
+    let textures = pairs.map(|(texture, _)| {
+        let bytes = texture.decoded_bytes();
+        // The pyramid of means, of 16 bits a channel.
+        if plan.footprint { bytes.saturating_add(bytes / 3 * 2) } else { bytes }
+    });
+    let textures = textures.fold(0, u64::saturating_add);
+    match environment(scene) {
+        Some(EnvironmentImage::File(path)) if plan.layers.contains(&LayerSpec::Radiance) => {
+            #[expect(
+                clippy::cast_precision_loss,
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a forecast"
+            )]
+            let bytes = (texture::decoded_bytes(path) as f64 * ENVIRONMENT) as u64;
+            textures.saturating_add(bytes)
+        }
+        _ => textures,
+    }
+}
