@@ -73,6 +73,11 @@ docs-figures: setup docs-charts docs-stability
 	cargo run --release -p etendue -- render scenes/paper/fig3.json -o out/docs-figures/fig3 \
 		--samples 256 --outputs png
 	install -D -m 644 out/docs-figures/fig3/picture.png docs/images/fig3.png
+	for kind in fig6a fig6b; do \
+		cargo run --release -p etendue -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind \
+			--set 'camera.sensor.resolution=[480,360]' --outputs png && \
+		install -D -m 644 out/docs-figures/$$kind/picture.png docs/images/$$kind.png || exit 1; \
+	done
 	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
 	for kind in fig5a fig5b fig5c fig7a-raw fig7b-rgb fig7c-multispectral; do \
 		cargo run --release -p etendue -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind \

@@ -54,4 +54,10 @@ if [ "${1:-}" = test ]; then
         "cargo-${component/rustfmt/fmt}" --version >/dev/null 2>&1 ||
             rustup component add "$component"
     done
+    # Not optimised: that takes a third of the time, and it runs for seconds.
+    if ! cargo deny --version >/dev/null 2>&1; then
+        echo "cargo-deny is missing, which checks licences and advisories: installing it takes some minutes, once"
+        cargo install cargo-deny --locked --debug --quiet ||
+            echo "cargo-deny could not be installed: licences and advisories will not be checked" >&2
+    fi
 fi

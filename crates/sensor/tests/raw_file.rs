@@ -52,6 +52,17 @@ fn shorts(bytes: &[u8]) -> Vec<u16> {
     bytes.as_chunks().0.iter().map(|b| u16::from_le_bytes(*b)).collect()
 }
 
+/// The well of an IMX250 is full before its converter ends: what a raw converter must take for white.
+#[test]
+fn white_is_where_the_first_of_well_and_converter_ends() {
+    for (model, white) in [("imx250", 3779), ("imx183", 4095)] {
+        let spec = json!({"type": "raw", "model": model, "resolution": [8, 6]});
+        let (sensor, image) = taken(spec);
+        let tags = directory(&written(&sensor, &image).unwrap());
+        assert_eq!(shorts(&tags[&50_717]), [white], "{model}");
+    }
+}
+
 #[test]
 fn numbers_pattern_and_levels_come_back() {
     let spec = json!({

@@ -117,7 +117,8 @@ fn images_that_a_scene_names_are_refused_when_they_are_too_large() {
         "objects": [{{"shape": "sphere", "material": "m"}}],
         "camera": {{"type": "lens", "focus_distance": 3, "sensor": {{"resolution": [4, 4]}},
             "lens": {{"elements": [{{"type": "thin_lens", "focal_length": 50, "semi_diameter": 10}},
-                {{"type": "image", "file": "huge.png", "width": 10}}]}}}}}}"#
+                {{"type": "aperture", "shape": "image", "file": "huge.png", "width": 10,
+                 "height": 10}}]}}}}}}"#
     ));
     let rgb = || header_of_png(32_768, png::ColorType::Rgb);
     let cases = [

@@ -444,3 +444,58 @@ fn options_out_of_range_are_refused() {
     refused(&bench, &["lens.json", "--focus", "0.001"], &["focus"]);
     refused(&bench, &["lens.json", "--f-number", "0"], &["--f-number", "positive"]);
 }
+
+/// A `.zmx` of windows in air behind a singlet.
+fn long_zmx(surfaces: usize, fields: usize) -> String {
+    let mut text = format!("MODE SEQ\nUNIT MM\nENPD 5\nFTYP 0 0 {fields} 1\nYFLN");
+    (0..fields).for_each(|i| text += &format!(" {}", 10.0 * i as f64 / fields as f64));
+    text += "\nWAVM 1 0.55 1\nPWAV 1\nSURF 0\n  CURV 0\n  DISZ INFINITY\n";
+    for i in 1..surfaces {
+        let curvature = [0.0, 0.02, -0.02].get(i).copied().unwrap_or(0.0);
+        let stop = if i == 1 { "  STOP\n" } else { "" };
+        let glass = if i % 2 == 1 { "  GLAS N-BK7\n" } else { "" };
+        text += &format!("SURF {i}\n{stop}  CURV {curvature}\n  DISZ 0.01\n  DIAM 10\n{glass}");
+    }
+    text + &format!("SURF {surfaces}\n  CURV 0\n  DISZ 0\n")
+}
+
+#[test]
+fn lenses_of_absurdly_many_elements_or_fields_are_refused_or_cut() {
+    let bench = Bench::new();
+    bench.write("long.zmx", long_zmx(4000, 3000).as_bytes());
+    let output = bench.run(&["lens", "long.zmx"]);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("more than 1000 surfaces"), "{message}");
+
+    bench.write("fields.zmx", long_zmx(400, 3000).as_bytes());
+    let output = bench.run(&["lens", "fields.zmx", "--json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert!(report["notes"].to_string().contains("of 3000 fields the first 25 are taken"));
+    assert!(report["fields"].as_array().is_some_and(|fields| fields.len() == 25));
+
+    let window = serde_json::json!({"type": "surface", "thickness": 1});
+    let lens = serde_json::json!({"elements": vec![window; 1001]});
+    bench.write("lens.json", lens.to_string().as_bytes());
+    let output = bench.run(&["lens", "lens.json"]);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("1001 elements, and 1000 are the most"), "{message}");
+}
+
+/// Glasses that disperse leave focal lengths at the d line where they were.
+#[test]
+fn the_double_gauss_and_the_fisheye_disperse() {
+    let lenses = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/lenses");
+    // Focal lengths of the lenses with constant indices, by the same command.
+    for (name, efl) in [("double-gauss", 50.3582), ("fisheye", 9.99142)] {
+        let path = lenses.join(format!("{name}.json"));
+        let output = Bench::new().run(&["lens", &path.to_string_lossy(), "--json"]);
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let own = report["paraxial"]["efl"].as_f64().expect("a number");
+        assert!((own / efl - 1.0).abs() < 1e-6, "{name}: {own}");
+        let blue = report["colour"][0]["longitudinal"].as_f64().expect("a number");
+        assert!(blue.abs() > 0.005 && blue.abs() < 0.01 * efl, "{name}: {blue} mm");
+    }
+}

@@ -181,6 +181,18 @@ fn sizes_that_no_camera_has_are_told_before_the_render() {
         let words = text(&output.stdout) + &text(&output.stderr);
         assert!(words.contains(said), "{more}: {words}");
     }
+    // A render that comes to nothing, by an image that is decoded before it, has said so already.
+    let scene = serde_json::json!({
+        "etendue": 1, "objects": [{"shape": "box"}], "tracer": {"type": "path"},
+        "lights": [{"type": "environment", "image": "sky.hdr"}],
+        "camera": {"type": "thin_lens", "f_number": 4, "focus_distance": 2, "focal_length": 0.05,
+                   "sensor_height": 24, "sensor": {"resolution": [4, 3]}},
+    });
+    bench.write("scene.json", scene.to_string().as_bytes());
+    bench.write("sky.hdr", b"not a sky");
+    let message = refused(&bench, &["render", "scene.json", "-o", "out"]);
+    let [note, error] = ["did you mean metres", "sky.hdr"].map(|words| message.find(words));
+    assert!(note.is_some() && note < error, "{message}");
     camera(&bench, &thin(r#""focal_length": 50, "sensor_height": 24"#));
     let output = bench.run(&["check", "scene.json"]);
     let words = text(&output.stdout) + &text(&output.stderr);

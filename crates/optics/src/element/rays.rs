@@ -202,6 +202,12 @@ impl Block {
         lanes.fold(true, |all, (&code, &throughput)| all & (code == EXITED) & (throughput > 0.0))
     }
 
+    /// Whether every ray has ended.
+    #[inline(always)]
+    pub(crate) fn is_over(&self) -> bool {
+        self.outcome.iter().fold(true, |all, &code| all & (code != EXITED))
+    }
+
     const EMPTY: Self = Self {
         position: [[0.0; LANES]; 3],
         direction: [[0.0; LANES]; 3],

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Element, LensError, OpticalTrain};
+use super::{Element, LensError, MOST_ELEMENTS, OpticalTrain};
 use crate::element::{ElementSpec, Frame, LossesSpec, PartSpec, Resolve};
 use crate::glass::{AgfCatalogue, FRAUNHOFER_D, Glass};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
@@ -68,6 +68,9 @@ impl LensFile {
     pub fn build(&self, resolve: Resolve<'_>) -> Result<OpticalTrain, LensError> {
         if self.elements.is_empty() {
             return Err(LensError::Empty);
+        }
+        if self.elements.len() > MOST_ELEMENTS {
+            return Err(LensError::TooMany(self.elements.len()));
         }
         let wavelength = self.wavelength.map_or(FRAUNHOFER_D, |nm| nm.0);
         if !(wavelength > 0.0 && wavelength.is_finite()) {

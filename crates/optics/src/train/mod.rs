@@ -33,6 +33,9 @@ pub mod zemax;
 use crate::element::{Frame, LossesSpec, Symbol};
 use crate::glass::{Glass, GlassError};
 
+/// The most elements that a lens may have: the largest that were built have a hundred.
+pub const MOST_ELEMENTS: usize = 1000;
+
 pub use crate::element::Part;
 pub use aim::ChiefRay;
 pub use file::{LensFile, SensorMount};
@@ -56,6 +59,11 @@ pub enum LensError {
     /// No element at all.
     #[error("the lens has no elements")]
     Empty,
+    /// More elements than [`MOST_ELEMENTS`].
+    #[error(
+        "the lens has {0} elements, and {MOST_ELEMENTS} are the most; leave out what bends no light"
+    )]
+    TooMany(usize),
     /// A part that cannot be made.
     #[error("elements[{index}]: {why}")]
     Element {

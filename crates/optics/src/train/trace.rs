@@ -10,6 +10,9 @@ use super::OpticalTrain;
 use crate::element::{Action, Block, Clip, LensRays, Loss, Ray, RayStatus, Step};
 use crate::glass::GlassError;
 
+/// More elements than these make a train long: the largest zoom lenses have some fifty surfaces.
+const LONG: usize = 64;
+
 /// Where rays come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -97,6 +100,11 @@ impl MonochromaticTrain {
     #[must_use]
     pub fn wavelength(&self) -> f64 {
         self.wavelength
+    }
+
+    /// Whether it has more elements than lenses have that somebody built.
+    pub(crate) fn is_long(&self) -> bool {
+        self.forward.len() > LONG
     }
 
     /// The index of the medium between the last element and the sensor.
@@ -255,11 +263,19 @@ fn trace_blocks_of_four(blocks: &mut [Block], steps: &[Step], clip: Clip) {
     all_blocks(blocks, steps, clip);
 }
 
+/// Elements between looks at whether any ray of a block is still on its way.
+const STEPS_BETWEEN_LOOKS: usize = 8;
+
 #[inline(always)]
 fn all_blocks(blocks: &mut [Block], steps: &[Step], clip: Clip) {
     for block in blocks {
-        for step in steps {
-            step.run(block, clip);
+        for some in steps.chunks(STEPS_BETWEEN_LOOKS) {
+            if block.is_over() {
+                break;
+            }
+            for step in some {
+                step.run(block, clip);
+            }
         }
     }
 }

@@ -17,6 +17,18 @@ use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 /// Cells a side over the rectangle of passing directions.
 const GRID: u32 = 500;
 
+/// The same in the least, for the longest trains.
+const LEAST_GRID: u32 = 100;
+
+/// Rays times elements that one point is worth: a train of more than 64 elements gets a coarser grid.
+const WORK: u32 = 64 * GRID * GRID;
+
+/// Cells a side for a train of so many elements.
+fn grid(elements: usize) -> u32 {
+    let rays = WORK / u32::try_from(elements.max(1)).unwrap_or(u32::MAX);
+    rays.isqrt().clamp(LEAST_GRID, GRID)
+}
+
 /// Fractions of the golden ratio and of the root of 2, whose multiples are even over 0 to 1, and those
 /// of their sum and difference, too, so that diagonals fare as well.
 const SHIFTS: [f64; 2] = [0.618_033_988_749_895, 0.414_213_562_373_095];
@@ -61,12 +73,13 @@ pub fn illumination(
 #[must_use]
 pub fn projected_solid_angle(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3) -> f64 {
     let Some(window) = Window::find(train, at, film) else { return 0.0 };
-    let size = (window.max - window.min) / f64::from(GRID);
-    let mut rays = LensRays::with_capacity(GRID as usize);
+    let grid = grid(train.elements().len());
+    let size = (window.max - window.min) / f64::from(grid);
+    let mut rays = LensRays::with_capacity(grid as usize);
     let mut sum = 0.0;
-    for row in 0..GRID {
+    for row in 0..grid {
         rays.clear();
-        for column in 0..GRID {
+        for column in 0..grid {
             // Rows and columns are shifted against each other: on a straight grid the edge of a square
             // stop would lie in or out of a whole line of cells at once.
             let shift = |i: usize, line: u32| (SHIFTS[i] * (f64::from(line) + 0.5)).fract();

@@ -8,6 +8,10 @@ use crate::train::{Focus, OpticalTrain};
 /// The most field points that are taken; designs have a dozen, and each is looked at with many rays.
 const MOST_FIELDS: usize = 100;
 
+/// Elements times fields that are taken in the most, and fields that are taken in any case.
+const MOST_WORK: usize = 10_000;
+const FEWEST_FIELDS: usize = 10;
+
 /// The field points of a file.
 #[derive(Debug, Default)]
 pub(super) struct Fields {
@@ -37,8 +41,10 @@ impl Fields {
         train: &OpticalTrain,
         object_z: Option<f64>,
     ) -> (Vec<f64>, Vec<String>) {
+        let affordable = MOST_WORK / train.elements().len().max(1);
+        let most = affordable.clamp(FEWEST_FIELDS, MOST_FIELDS);
         let (mut angles, mut notes): (Vec<f64>, Vec<String>) = (Vec::new(), Vec::new());
-        for [x, y] in self.points().take(MOST_FIELDS) {
+        for [x, y] in self.points().take(most) {
             let height = unit * if x == 0.0 { y } else { x.hypot(y) };
             let found = match self.kind {
                 0 if x == 0.0 => Ok(y),
@@ -57,8 +63,8 @@ impl Fields {
         let mut notes: Vec<String> =
             notes.into_iter().map(|why| format!("fields left out: {why}")).collect();
         let count = self.points().count();
-        if count > MOST_FIELDS {
-            notes.push(format!("of {count} fields the first {MOST_FIELDS} are taken"));
+        if count > most {
+            notes.push(format!("of {count} fields the first {most} are taken"));
         }
         (angles, notes)
     }

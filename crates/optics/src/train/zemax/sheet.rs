@@ -8,8 +8,8 @@ use super::ZemaxError;
 use super::fields::Fields;
 use super::place::Break;
 
-/// The most surfaces; large designs have a hundred.
-const MOST_SURFACES: usize = 4096;
+/// The most surfaces.
+const MOST_SURFACES: usize = crate::train::MOST_ELEMENTS;
 
 /// The most wavelengths, as OpticStudio has it.
 const MOST_WAVELENGTHS: usize = 24;
@@ -227,6 +227,8 @@ impl Sheet {
         let aperture = match line.command {
             "ENPD" => Aperture::EntrancePupil(value),
             // The half angle of the cone of light at the object (degrees).
+            // OpticStudio's aperture type 5, "object cone angle": the marginal ray's angle off the axis in
+            // degrees (its help on SYPR code 10 and on system apertures); type 2 is the numerical aperture.
             "OBNA" if line.number_or(1, 0.0)? == 1.0 => {
                 if value >= 90.0 {
                     return Err(line.error(format!("a cone of {value} degrees must be below 90")));

@@ -381,8 +381,8 @@ fn written(lens: &LensFile) -> String {
             PartSpec::Surface(surface) => {
                 let curvature = surface.radius.map_or(0.0, |radius| 1.0 / radius.0);
                 row.push(format!("CURV {curvature:e} 0 0 0 0 \"\""));
-                if let Some(GlassSpec::Constant(n)) = surface.glass {
-                    row.push(format!("GLAS ___BLANK 1 0 {n} 0 0 0 0 0 0 0"));
+                if let Some(GlassSpec::Abbe { nd, vd }) = surface.glass {
+                    row.push(format!("GLAS ___BLANK 1 0 {nd} {vd} 0 0 0 0 0 0"));
                 }
                 row.push(format!("DIAM {:e} 1 0 0 1 \"\"", surface.semi_diameter.unwrap().0));
             }
