@@ -165,11 +165,12 @@ fn an_unvignetted_pixel_on_the_axis_weighs_1_and_corners_are_vignetted() {
     let tangent: f64 = 21.6 / 50.0;
     let cosine4 = (1.0 + tangent * tangent).powi(-2);
     assert!(weight < 0.6 * cosine4 && weight > 0.1, "{weight} against {cosine4}");
-    // Focused: rays of the axis meet within the lens' spot, 1/30 of the pupil, at 1.5 m.
+    // Focused: rays of the axis meet within the lens' spot, 1.2 mm at 1.5 m, and what its colours add:
+    // blue is focused 0.05 mm nearer, 0.05 / 50² · 1500 mm of the pupil's radius of 12.4 mm.
     for i in 0..axis.rays.len() {
         let (o, d) = (origin(&axis.rays, i), direction(&axis.rays, i));
         let there = o + d * ((1.5 + o.z) / -d.z);
-        assert!(there.truncate().length() < 1.2e-3, "{there}");
+        assert!(there.truncate().length() < 1.6e-3, "{there}");
     }
     // The camera's origin is the entrance pupil; the front of the lens is before it.
     let rays = chief(&camera, &[[180.0, 120.0], [300.0, 40.0]]);
