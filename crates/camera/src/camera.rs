@@ -11,8 +11,9 @@ use crate::framing::Subject;
 use crate::lens::focused::View;
 use crate::{
     BandGroup, CameraError, CameraRays, ChromaticRealLensCameraSpec, Distortion, DistortionSpec,
-    FilmSamples, Intrinsics, LensCamera, LensCameraSpec, Orthographic, OrthographicSpec, Pinhole,
-    PinholeSpec, Pose, PoseSpec, RealLensCameraSpec, SensorSpec, ThinLensCameraSpec,
+    FilmSamples, Intrinsics, LensCamera, LensCameraSpec, LightField, LightFieldSpec, Orthographic,
+    OrthographicSpec, Pinhole, PinholeSpec, Pose, PoseSpec, RealLensCameraSpec, SensorSpec,
+    ThinLensCameraSpec, ViewGrid,
 };
 use etendue_geometry::units::{Degrees, Metres, Micrometres};
 use etendue_optics::element::Resolve;
@@ -36,6 +37,10 @@ pub enum CameraSpec {
     ChromaticRealLens(ChromaticRealLensCameraSpec),
     /// Any lens, by its file or in place.
     Lens(LensCameraSpec),
+    /// A lens with an array of microlenses where its picture is: a plenoptic camera.
+    LightField(LightFieldSpec),
+    /// The views that the same camera takes, as an ideal lens has them, in one picture.
+    LightFieldReference(LightFieldSpec),
 }
 
 /// The same expression for every kind of camera.
@@ -48,6 +53,7 @@ macro_rules! for_each_kind {
             Self::RealLens($spec) => $value,
             Self::ChromaticRealLens($spec) => $value,
             Self::Lens($spec) => $value,
+            Self::LightField($spec) | Self::LightFieldReference($spec) => $value,
         }
     };
 }
@@ -58,6 +64,7 @@ pub struct Camera {
     pose: Pose,
     sensor: SensorSpec,
     projection: Projection,
+    light_field: Option<Arc<LightField>>,
 }
 
 /// How a camera's rays run in its own frame.
@@ -69,6 +76,8 @@ pub enum Projection {
     Orthographic(Orthographic),
     /// Through a lens.
     Lens(Arc<LensCamera>),
+    /// From a grid of viewpoints, each in its own part of the picture.
+    Views(Arc<ViewGrid>),
 }
 
 /// What a pixel covers of the scene.
@@ -155,6 +164,8 @@ impl CameraSpec {
             Self::RealLens(_) => "real_lens",
             Self::ChromaticRealLens(_) => "chromatic_real_lens",
             Self::Lens(_) => "lens",
+            Self::LightField(_) => "light_field",
+            Self::LightFieldReference(_) => "light_field_reference",
         }
     }
 
@@ -189,6 +200,7 @@ impl CameraSpec {
     ) -> Result<Camera, CameraError> {
         self.sensor().check()?;
         let subject = || subject().into();
+        let (mut sensor, mut light_field) = (self.sensor().clone(), None);
         let lens = |(pose, lens)| (pose, Projection::Lens(Arc::new(lens)));
         let (pose, projection) = match self {
             Self::Pinhole(spec) => {
@@ -203,11 +215,24 @@ impl CameraSpec {
             Self::RealLens(spec) => lens(spec.build(subject, resolve)?),
             Self::ChromaticRealLens(spec) => lens(spec.build(subject, resolve)?),
             Self::Lens(spec) => lens(spec.build(subject, resolve)?),
+            Self::LightField(spec) => {
+                let (pose, lens, views) = spec.build(subject, resolve)?;
+                light_field = Some(Arc::new(views));
+                (pose, Projection::Lens(Arc::new(lens)))
+            }
+            Self::LightFieldReference(spec) => {
+                let (pose, lens, views) = spec.build(subject, resolve)?;
+                let grid = ViewGrid::new(&lens, &views)?;
+                sensor = SensorSpec { resolution: grid.resolution(), pixel_pitch: None };
+                sensor.check()?;
+                light_field = Some(Arc::new(views));
+                (pose, Projection::Views(Arc::new(grid)))
+            }
         };
         if !pose.is_finite() {
             return Err(CameraError::new("pose", "no finite place frames a scene of this size"));
         }
-        Ok(Camera { pose, sensor: self.sensor().clone(), projection })
+        Ok(Camera { pose, sensor, projection, light_field })
     }
 }
 
@@ -226,6 +251,56 @@ impl Camera {
     #[must_use]
     pub fn resolution(&self) -> [u32; 2] {
         self.sensor.resolution
+    }
+
+    /// The views of a light-field camera.
+    #[must_use]
+    pub fn light_field(&self) -> Option<&LightField> {
+        self.light_field.as_deref()
+    }
+
+    /// A light-field camera's views as an ideal lens has them.
+    ///
+    /// # Errors
+    ///
+    /// When the camera has no views, or they have no places.
+    pub fn reference_views(&self) -> Result<Self, CameraError> {
+        let none = || CameraError::new("type", "is no light_field: it has no views");
+        let light_field = self.light_field.as_ref().ok_or_else(none)?;
+        let lens = self.lens().ok_or_else(none)?;
+        let grid = ViewGrid::new(lens, light_field)?;
+        Ok(self.looking(grid))
+    }
+
+    /// The middle view of a reference camera.
+    #[must_use]
+    pub fn central_view(&self) -> Option<Self> {
+        match &self.projection {
+            Projection::Views(views) => Some(self.looking(views.central())),
+            _ => None,
+        }
+    }
+
+    fn looking(&self, grid: ViewGrid) -> Self {
+        let sensor = SensorSpec { resolution: grid.resolution(), pixel_pitch: None };
+        let projection = Projection::Views(Arc::new(grid));
+        Self { sensor, projection, ..self.clone() }
+    }
+
+    /// Whether rays are spread over a pupil.
+    #[must_use]
+    pub fn has_pupil(&self) -> bool {
+        matches!(self.projection, Projection::Lens(_) | Projection::Views(_))
+    }
+
+    /// The projected solid angle (sr) that a pixel's value is relative to, of cameras with a pupil.
+    #[must_use]
+    pub fn pupil_solid_angle(&self) -> Option<f64> {
+        match &self.projection {
+            Projection::Lens(lens) => Some(lens.solid_angle()),
+            Projection::Views(views) => Some(views.solid_angle()),
+            _ => None,
+        }
     }
 
     /// From one pixel's centre to the next (µm): as the file says, or as the lens and its field of
@@ -256,6 +331,7 @@ impl Camera {
             Projection::Orthographic(parallel) => {
                 Some(PixelExtent::Width(parallel.metres_per_pixel()))
             }
+            Projection::Views(views) => Some(PixelExtent::Angle(1.0 / views.focal_length())),
             Projection::Lens(lens) => Some(match lens.focused().view() {
                 View::Perspective(k) => perspective(k),
                 View::Parallel { metres_per_pixel, .. } => PixelExtent::Width(metres_per_pixel),
@@ -306,12 +382,13 @@ impl Camera {
             Projection::Pinhole(pinhole) => Projection::Pinhole(pinhole.coarser(times)),
             Projection::Orthographic(parallel) => Projection::Orthographic(parallel.coarser(times)),
             Projection::Lens(lens) => Projection::Lens(Arc::new(lens.coarser(times))),
+            Projection::Views(views) => Projection::Views(Arc::new(views.coarser(times))),
         };
         let sensor = SensorSpec {
             resolution: self.sensor.resolution.map(|side| (side / factor).max(1)),
             pixel_pitch: self.sensor.pixel_pitch.map(|pitch| Micrometres(pitch.0 * times)),
         };
-        Self { pose: self.pose, sensor, projection }
+        Self { pose: self.pose, sensor, projection, light_field: self.light_field.clone() }
     }
 
     /// Place and axes. `z` depths are measured from its position along its forward axis.
@@ -366,6 +443,9 @@ impl Camera {
         if let Projection::Lens(lens) = &self.projection {
             return lens.sample_rays(&self.pose, samples, out);
         }
+        if let Projection::Views(views) = &self.projection {
+            return views.sample_rays(&self.pose, samples, out);
+        }
         self.rays_through(&samples.columns, &samples.rows, &mut out.rays);
         out.sample.clear();
         out.sample.extend(0..u32::try_from(samples.len()).unwrap_or(u32::MAX));
@@ -379,6 +459,7 @@ impl Camera {
             Projection::Pinhole(pinhole) => pinhole.aim(&self.pose, rays),
             Projection::Orthographic(orthographic) => orthographic.aim(&self.pose, rays),
             Projection::Lens(lens) => lens.aim(&self.pose, rays),
+            Projection::Views(views) => views.aim(&self.pose, rays),
         }
     }
 }

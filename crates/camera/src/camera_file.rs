@@ -79,6 +79,8 @@ pub enum ProjectionName {
     Lens,
     /// In parallel.
     Orthographic,
+    /// From many points, each in its own part of the picture: `geometry.json` has them.
+    Views,
 }
 
 /// Lens distortion for OpenCV.
@@ -149,6 +151,7 @@ impl Camera {
                         Some(OrthographicFile { metres_per_pixel, principal_point });
                 }
             },
+            Projection::Views(_) => file.projection = ProjectionName::Views,
             Projection::Orthographic(orthographic) => {
                 file.projection = ProjectionName::Orthographic;
                 file.orthographic = Some(OrthographicFile {
@@ -170,6 +173,9 @@ impl LensFacts {
         let k_is = match focused.view() {
             View::Perspective(_) if focused.train().is_ideal() => {
                 "exact for what is in focus: the lens is ideal"
+            }
+            View::Perspective(_) if lens.lenslets().is_some() => {
+                "the paraxial camera of the lens before the lenslets, whose picture they cut up"
             }
             View::Perspective(_) => {
                 "the paraxial camera: what the lens does near its axis, without its distortion"

@@ -16,6 +16,7 @@ pub mod error;
 pub mod framing;
 pub mod intrinsics;
 pub mod lens;
+pub mod light_field;
 pub mod orthographic;
 pub mod pinhole;
 pub mod pose;
@@ -34,6 +35,7 @@ pub use lens::{
     BandGroup, ChromaticRealLensCameraSpec, LensCamera, LensCameraSpec, RealLensCameraSpec,
     ThinLensCameraSpec,
 };
+pub use light_field::{LightField, LightFieldSpec, ViewGrid};
 pub use orthographic::{Orthographic, OrthographicSpec};
 pub use pinhole::{Pinhole, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};

@@ -5,7 +5,7 @@ use std::fmt;
 use std::ops::Range;
 
 use etendue_accel::Quality;
-use etendue_camera::LensCamera;
+use etendue_camera::{LensCamera, Projection};
 use etendue_geometry::{Detail, Placement};
 use etendue_scene::file::{TracerRow, TracerSpec};
 use etendue_scene::import::Wanted;
@@ -118,7 +118,7 @@ impl Plan {
     pub fn new(scene: &Scene, outputs: Outputs) -> Self {
         let layers = scene.layers.clone();
         let needs = needs(&layers);
-        let lens = scene.camera.lens().is_some();
+        let lens = scene.camera.has_pupil();
         let passes = Passes::of(&layers, scene.render.samples, lens);
         let [width, height] = scene.camera.resolution();
         let pixels = u64::from(width) * u64::from(height);
@@ -326,7 +326,12 @@ impl Plan {
         let each = lens.map_or(1, |lens| lens.wavelengths_a_group(&self.bands));
         let apart = groups > 1 || each > 1;
         let rays = if apart && self.pupil { "their own" } else { "shared" };
-        let (pupil, because) = pupil(lens, self.pupil, self.samples);
+        let (pupil, because) = match scene.camera.projection() {
+            Projection::Views(_) if self.pupil => {
+                ("on", "each view is averaged over its own part of the opening".to_owned())
+            }
+            _ => pupil(lens, self.pupil, self.samples),
+        };
         [
             ("rays of a wavelength", rays, wavelengths(apart, self.pupil, each)),
             ("pupil", pupil, because),

@@ -308,9 +308,9 @@ impl Adding<'_> {
             film.rows.extend(places.iter().map(|place| corner[1] + place[1]));
         }
         let lens = self.what.camera().lens();
-        match lens {
-            Some(_) => draw(1, &mut film.pupil),
-            None => film.pupil.resize(count, [0.5; 2]),
+        match self.what.camera().has_pupil() {
+            true => draw(1, &mut film.pupil),
+            false => film.pupil.resize(count, [0.5; 2]),
         }
         if lens.is_some_and(LensCamera::draws_wavelengths) {
             draw(2, &mut places);

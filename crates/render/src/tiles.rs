@@ -116,7 +116,7 @@ impl Job<'_> {
 
     /// Whether a layer without light is a mean over samples.
     fn is_averaged(&self, layer: LayerSpec) -> bool {
-        let many = self.sampling.samples > 1 || self.camera.lens().is_some();
+        let many = self.sampling.samples > 1 || self.camera.has_pupil();
         let lit = self.light.is_some() && layer.row().taken.with_picture();
         layer.is_averaged() && (many || lit)
     }

@@ -186,6 +186,27 @@ impl Focused {
         1e3 * self.film.pitch
     }
 
+    /// −1 where pictures are upside down on the sensor, as behind most lenses; else 1.
+    #[must_use]
+    pub fn turn(&self) -> f64 {
+        self.film.turn
+    }
+
+    /// Where a point of the sensor's plane (mm across the axis) is in the picture (pixels from the
+    /// corner).
+    #[must_use]
+    pub fn pixel_of(&self, at: DVec2) -> [f64; 2] {
+        let film = &self.film;
+        let place = (at - film.frame.vertex.truncate()) / (film.turn * film.pitch);
+        [film.centre.x + place.x, film.centre.y - place.y]
+    }
+
+    /// The middle of the sensor in lens coordinates (mm).
+    #[must_use]
+    pub fn sensor_point(&self) -> DVec3 {
+        self.film.frame.vertex
+    }
+
     /// The distance of what is in focus (m) from the camera's origin: infinite for infinity.
     #[must_use]
     pub fn object_distance(&self) -> f64 {

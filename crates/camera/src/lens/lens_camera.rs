@@ -328,6 +328,7 @@ impl LensCamera {
                  millimetres, or strings with a unit"
             ));
         }
+        notes.extend(self.mismatch());
         let [width, height] = (2.0 * self.focused.film().half_size()).to_array();
         if width.hypot(height) < LEAST_DIAGONAL {
             notes.push(format!(
@@ -337,6 +338,27 @@ impl LensCamera {
             ));
         }
         notes
+    }
+
+    /// A sentence on lenslets whose f-number is not that of the lens before them.
+    fn mismatch(&self) -> Option<String> {
+        let [diameter, pitch] = self.lenslets.as_ref()?.fit();
+        let share = diameter / pitch;
+        let [diameter, pitch] = [diameter, pitch].map(|length| 1e3 * length);
+        if share > 1.02 {
+            return Some(format!(
+                "the main lens is faster than the lenslets: its opening's images are {diameter:.2} um \
+                 wide and {pitch:.2} um apart, so neighbours overlap; close the main lens, or put the \
+                 sensor nearer to the lenslets"
+            ));
+        }
+        (share < 0.9).then(|| {
+            format!(
+                "the main lens is slower than the lenslets: its opening's images are {diameter:.2} um \
+                 wide and {pitch:.2} um apart, so pixels between them are dark; open the main lens, or \
+                 put the sensor farther from the lenslets"
+            )
+        })
     }
 
     /// What is odd about the lens, and what of it is not known at the wavelengths of `bands`.

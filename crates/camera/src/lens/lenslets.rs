@@ -55,6 +55,19 @@ impl LensletChiefs {
         self.view.image_centre(cell, self.sensor_z, |at| self.chief_slopes(at))
     }
 
+    /// The same to about a millionth of the way from pupil to array.
+    #[must_use]
+    pub fn image_centre_nearly(&self, cell: [f64; 2]) -> Option<DVec2> {
+        self.view.image_centre(cell, self.sensor_z, |at| self.table.nearly(at))
+    }
+
+    /// The slope in front of a lenslet of the ray through its middle, per distance from there to the
+    /// sensor's point (1/mm), and where it meets the rearmost array.
+    #[must_use]
+    pub fn central(&self) -> [f64; 2] {
+        self.view.sight(0, self.sensor_z).central(self.view.principal_distance(0))
+    }
+
     /// The cell of the lenslet that a point of the sensor (mm, in lens coordinates) belongs to.
     #[must_use]
     pub fn own_cell(&self, film: DVec3) -> Option<[f64; 2]> {

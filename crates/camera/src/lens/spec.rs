@@ -253,7 +253,7 @@ camera_with_a_lens! {
 }
 
 /// Focuses a lens and finds it a place.
-fn place<'a>(
+pub(crate) fn place<'a>(
     train: &OpticalTrain,
     setup: &Setup<'_>,
     subject: impl FnOnce() -> Subject<'a>,

@@ -108,6 +108,28 @@ impl OpticalTrain {
         train
     }
 
+    /// The same lens with another one `gap` (mm) behind its last vertex, and the sensor where that one has
+    /// it.
+    #[must_use]
+    pub fn followed_by(mut self, rear: &Self, gap: f64) -> Self {
+        let start = self.last_vertex() + gap;
+        self.elements.extend(rear.elements.iter().cloned().map(|mut element| {
+            element.frame.vertex.z += start;
+            element
+        }));
+        self.media.extend(rear.media.iter().skip(1).cloned());
+        self.end = start + rear.end;
+        self.notes = self.oddities();
+        self
+    }
+
+    /// The same lens with the sensor `distance` (mm) behind its last vertex.
+    #[must_use]
+    pub fn with_end(mut self, distance: f64) -> Self {
+        self.end = self.last_vertex() + distance;
+        self
+    }
+
     /// The part of the lens from element `first` on, its arrays open.
     pub(crate) fn rear_part(&self, first: usize) -> Self {
         let mut train = self.without_arrays();
@@ -361,11 +383,31 @@ impl BehindLenslets {
         let sight = self.sight(0, sensor_z);
         // The rays of the sensor's point on the axis of a lenslet: c − p = 0.
         let away = -sight.height[0] / sight.slope[0];
-        if away.is_finite() && away.abs() < UNFOCUSED * sight.distance {
+        if away.is_finite() && away.abs() < UNFOCUSED * sight.distance.abs() {
             self.front_z - away
         } else {
             self.front_z - self.principal_distance(0)
         }
+    }
+
+    /// Where the sensor has to stand (mm behind the last vertex) so that the first type of lenslets images
+    /// onto it what is `picture` (mm) in front of their front principal plane; infinitely far for 0, at
+    /// which they stand in the picture themselves.
+    #[must_use]
+    pub fn sensor_distance(&self, picture: f64) -> f64 {
+        let all = &self.kinds[0].all;
+        // Height in front of the first element plus slope times distance must not depend on the slope
+        // behind: a + c m + (b + d m)/B = 0, with the reduced distance B from the rearmost array.
+        let m = (picture + self.principal_distance(0)) / self.index;
+        let reduced = if picture == 0.0 {
+            -all.d / all.c
+        } else {
+            -(all.b + all.d * m) / (all.a + all.c * m)
+        };
+        let last = self.behind.len() - 1;
+        let covers: f64 =
+            self.behind[..last].iter().map(|&[from, to, index]| (to - from) / index).sum();
+        (reduced - covers) * self.behind[last][2]
     }
 
     /// The focal length of a type of lenslet (mm).

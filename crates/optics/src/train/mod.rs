@@ -346,7 +346,7 @@ impl OpticalTrain {
         Ok((0..self.elements.len()).min_by(|&a, &b| share(a).total_cmp(&share(b))).unwrap_or(0))
     }
 
-    fn oddities(&self) -> Vec<String> {
+    pub(crate) fn oddities(&self) -> Vec<String> {
         let mut notes = Vec::new();
         for glass in self.media.iter().filter(|g| !g.namesakes.is_empty()) {
             let others = glass.namesakes.join(" and ");

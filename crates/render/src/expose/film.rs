@@ -1,6 +1,5 @@
 //! The light of a picture in the bands of a sensor.
 
-use etendue_camera::Projection;
 use etendue_scene::Scene;
 use etendue_sensor::{Radiometry, Sensor, SensorKind};
 use etendue_spectrum::{Bands, Grid};
@@ -77,11 +76,11 @@ impl BandFilm {
     /// (W·m⁻²·nm⁻¹) of it. Cameras without an aperture give irradiance as it is.
     #[must_use]
     pub(super) fn on_sensor(mut self, scene: &Scene, sensor: &Sensor) -> Self {
-        if let (Radiometry::Physical, Projection::Lens(lens)) =
-            (sensor.radiometry(), scene.camera.projection())
+        if let (Radiometry::Physical, Some(angle)) =
+            (sensor.radiometry(), scene.camera.pupil_solid_angle())
         {
             #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
-            let angle = lens.solid_angle() as f32;
+            let angle = angle as f32;
             self.values.par_iter_mut().for_each(|value| *value *= angle);
         }
         self

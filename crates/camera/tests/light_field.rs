@@ -1,0 +1,207 @@
+//! Light-field cameras: what their sensor sees through lenslets, against the views of an ideal lens.
+
+use etendue_camera::{Camera, CameraRays, CameraSpec, FilmSamples, Projection};
+use etendue_geometry::{Bounds, RayBatch};
+use glam::DVec3;
+
+fn camera(json: &str) -> Result<Camera, String> {
+    let spec: CameraSpec = serde_json::from_str(json).map_err(|e| e.to_string())?;
+    let text = serde_json::to_string(&spec).unwrap();
+    assert_eq!(spec, serde_json::from_str(&text).unwrap(), "{text}");
+    spec.build(|| Bounds::EMPTY, &|name| Err(format!("{name}: no files")))
+        .map_err(|e| e.to_string())
+}
+
+/// A camera of 20 mm f/4, with keys of the microlenses and of the camera.
+fn light_field(microlenses: &str, more: &str) -> Result<Camera, String> {
+    camera(&format!(
+        r#"{{"type": "light_field", "focal_length": 20, "f_number": 4, "focus_distance": 0.5,
+            "microlenses": {{"pitch": 0.1, {microlenses} }}, {more}
+            "pose": {{"from": [0, 0, 0.5], "look_at": [0, 0, 0]}},
+            "sensor": {{"resolution": [240, 200], "pixel_pitch": 10}}}}"#
+    ))
+}
+
+fn ray(camera: &Camera, [column, row]: [f64; 2]) -> Option<(DVec3, DVec3)> {
+    let mut rays = RayBatch::default();
+    camera.rays_through(&[column], &[row], &mut rays);
+    (rays.t_max()[0] > 0.0).then(|| (rays.origin(0), rays.direction(0)))
+}
+
+/// Where a ray is at z (m).
+fn at(z: f64, (origin, direction): (DVec3, DVec3)) -> DVec3 {
+    origin + direction * ((z - origin.z) / direction.z)
+}
+
+/// The pixel under a lenslet and the pixel of the view see along the same line: all grids, both set-ups.
+#[test]
+fn a_pixel_under_a_lenslet_looks_along_the_ray_of_its_view() {
+    let cases = [
+        r#""rotation": 0"#,
+        r#""rotation": 3, "offset": [0.02, -0.03]"#,
+        r#""rotation": 45"#,
+        r#""grid": "hexagonal", "rotation": -2, "aperture": "round""#,
+        r#""picture_distance": 2, "focal_length": 0.3"#,
+        r#""picture_distance": -1, "focal_length": 0.5"#,
+    ];
+    for microlenses in cases {
+        let raw = light_field(microlenses, r#""views": 5,"#).unwrap();
+        let views = raw.reference_views().unwrap();
+        let light_field = raw.light_field().unwrap();
+        let (rows, cols) = (light_field.grid.rows, light_field.grid.cols);
+        assert!(rows > 5 && cols > 5, "{microlenses}: {rows} x {cols}");
+        assert_eq!(views.resolution(), [5 * cols, 5 * rows]);
+        for (row, col) in [(0, 0), (rows / 2, cols / 2), (rows - 1, 1), (3, cols - 1)] {
+            let centre = light_field.centre(raw.lens().unwrap(), row, col).unwrap();
+            for (across, down) in [(2, 2), (0, 2), (4, 1), (1, 3)] {
+                let [right, below] = light_field.offset(across, down);
+                let seen = ray(&raw, [centre[0] + right, centre[1] + below]).unwrap();
+                let place = [f64::from(across * cols + col), f64::from(down * rows + row)];
+                let expected = ray(&views, place.map(|x| x + 0.5)).unwrap();
+                for z in [0.4, 0.0, -2.0] {
+                    let off = (at(z, seen) - at(z, expected)).length();
+                    // The lens is ideal; Newton's method leaves 1e-9 mm on the stop.
+                    assert!(off < 1e-9, "{microlenses} {row} {col} {across} {down} {z}: {off}");
+                }
+            }
+        }
+    }
+}
+
+/// Disparities by rays: a point that the middle view sees is seen from the next view where the formula
+/// says.
+#[test]
+fn disparity_follows_the_formula_at_five_depths() {
+    let raw = light_field(r#""f_number": 4"#, "").unwrap();
+    let camera = raw.reference_views().unwrap();
+    let Projection::Views(views) = camera.projection() else { panic!() };
+    assert!((views.focus() - 0.5).abs() < 1e-12, "{}", views.focus());
+    assert_eq!(views.disparity(views.focus()), 0.0);
+    let [cols, rows] = views.view_resolution().map(f64::from);
+    let middle = f64::from(views.views() / 2);
+    for depth in [0.3, 0.4, 0.5, 0.8, 3.0] {
+        let (column, row) = ((0.5 * cols).floor(), (0.5 * rows).floor());
+        let point = at(
+            0.5 - depth,
+            ray(&camera, [middle * cols + column + 0.5, middle * rows + row + 0.5]).unwrap(),
+        );
+        let disparity = views.disparity(depth);
+        let next = [(middle + 1.0) * cols + column + 0.5, middle * rows + row + 0.5];
+        // A view's picture is linear in the column: from the ray of one column to the next.
+        let here = at(0.5 - depth, ray(&camera, next).unwrap());
+        let right = at(0.5 - depth, ray(&camera, [next[0] + 1.0, next[1]]).unwrap());
+        let shift = (point - here).x / (right - here).x;
+        assert!((shift + disparity).abs() < 1e-9, "{depth}: {shift} and {disparity}");
+    }
+}
+
+/// The focal length that makes images touch, and the sentences when they do not.
+#[test]
+fn distances_follow_from_f_numbers_and_mismatches_are_told() {
+    let matched = light_field("\"fill\": 1", "").unwrap();
+    let lens = matched.lens().unwrap();
+    let [diameter, pitch] = lens.lenslets().unwrap().fit();
+    assert!((diameter / pitch - 1.0).abs() < 1e-12, "{diameter} {pitch}");
+    // The image of 0.5 m is 20.8333 mm behind the lens; b = p D/(d − p).
+    let distance = 1.0 / (1.0 / 20.0 - 1.0 / 500.0);
+    let expected = 0.1 * distance / (5.0 - 0.1);
+    let focused = lens.focused();
+    let b = focused.sensor_z() - focused.train().last_vertex();
+    assert!((b - expected).abs() < 1e-12, "{b} {expected}");
+    assert!((focused.object_distance() - 0.5).abs() < 1e-12);
+    let told = |camera: &Camera| camera.lens().unwrap().implausible().join("; ");
+    assert!(!told(&matched).contains("lenslets"), "{}", told(&matched));
+    assert!(told(&light_field(r#""f_number": 6"#, "").unwrap()).contains("overlap"));
+    assert!(told(&light_field(r#""f_number": 3"#, "").unwrap()).contains("dark"));
+}
+
+#[test]
+fn thick_lenslets_stand_where_they_see_the_picture_sharp() {
+    let thick = light_field(
+        r#""grid": "hexagonal", "radii": [0.3, null], "thickness": 0.4, "glass": "N-BK7""#,
+        "",
+    )
+    .unwrap();
+    let focused = thick.lens().unwrap().focused();
+    assert!((focused.object_distance() - 0.5).abs() < 1e-9, "{}", focused.object_distance());
+    // Parallel light of a lenslet comes together on the sensor: n R/(n − 1) in glass.
+    let n = 1.516_80;
+    let in_air = (n * 0.3 / (n - 1.0) - 0.4) / n;
+    let b = focused.sensor_z() - focused.train().last_vertex();
+    assert!((b - in_air).abs() < 1e-4, "{b} {in_air}: the index is that to 5 digits");
+}
+
+/// The light of a lenslet's image, by its middle: the sum over samples of all pixels around it.
+#[test]
+fn the_centroid_of_a_white_image_is_the_lenslets_centre() {
+    for microlenses in [r#""rotation": 3"#, r#""grid": "hexagonal", "aperture": "round""#] {
+        let raw = light_field(microlenses, "").unwrap();
+        let light_field = raw.light_field().unwrap();
+        for (row, col) in [(0, 0), (light_field.grid.rows - 1, 2)] {
+            let [x, y] = light_field.centre(raw.lens().unwrap(), row, col).unwrap();
+            let mut samples = FilmSamples::default();
+            let half = 0.5 * light_field.image_pitch;
+            for k in 0..40_000_u32 {
+                let r = |alpha: f64| (0.5 + alpha * f64::from(k)).fract();
+                let away = [r(0.856_674_883), r(0.733_891_857)].map(|u| (2.0 * u - 1.0) * half);
+                samples.push([x + away[0], y + away[1]], [r(0.628_706_721), r(0.538_597_270)], 0.5);
+            }
+            let mut rays = CameraRays::default();
+            raw.sample_rays(&samples, &mut rays);
+            let (mut sum, mut mean) = (0.0, [0.0; 2]);
+            for (weight, sample) in rays.weight.iter().zip(&rays.sample) {
+                let i = *sample as usize;
+                // What comes through the lenslet's neighbours is outside of the circle.
+                let away = [samples.columns[i] - x, samples.rows[i] - y];
+                if away[0].hypot(away[1]) < half {
+                    sum += weight;
+                    mean = [mean[0] + weight * away[0], mean[1] + weight * away[1]];
+                }
+            }
+            let off = (mean[0] / sum).hypot(mean[1] / sum);
+            // cos⁴ falls across an image by 4 × 0.06 × 1/8 of its light at slope 0.06 off the axis, which
+            // moves its centroid by 0.0375 of 1 pixel.
+            assert!(off < 0.045, "{microlenses} {row} {col}: {off} px");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_light_field_is_refused_in_words() {
+    let error = |microlenses: &str, more: &str| light_field(microlenses, more).unwrap_err();
+    assert!(error("\"fill\": 2", "").contains("fill is 2"), "{}", error("\"fill\": 2", ""));
+    let views = error("\"fill\": 1", "\"views\": 20,");
+    assert!(views.starts_with("views: 20 views") && views.contains("fewer"), "{views}");
+    assert!(error("\"focal_length\": 1, \"f_number\": 2", "").contains("remove one"));
+    assert!(error("\"picture_distance\": -30", "").starts_with("microlenses.picture_distance"));
+    assert!(error("\"picture_distance\": 1, \"focal_length\": 2", "").contains("sensor_distance"));
+    assert!(error("\"size\": [0.05, 0.05]", "").contains("not one lenslet"));
+    assert!(error("\"radii\": [0.3, null]", "").contains("missing beside `radii`"));
+    let base = |keys: &str| camera(&format!(r#"{{"type": "light_field", {keys}}}"#)).unwrap_err();
+    let sensor = r#""sensor": {"resolution": [240, 200], "pixel_pitch": 10}"#;
+    assert!(
+        base(&format!(
+            r#""microlenses": {{"pitch": 0}}, "focal_length": 9, "f_number": 2, {sensor}"#
+        ))
+        .contains("not above zero")
+    );
+    assert!(
+        base(&format!(
+            r#""microlenses": {{"pitch": 0.015}}, "focal_length": 9, "f_number": 2, {sensor}"#
+        ))
+        .contains("pixels apart")
+    );
+    assert!(
+        base(&format!(
+            r#""microlenses": {{"pitch": 5}}, "focal_length": 9, "f_number": 2, {sensor}"#
+        ))
+        .contains("exit pupil")
+    );
+    assert!(
+        base(&format!(r#""microlenses": {{"pitch": 0.1}}, {sensor}"#)).contains("focal_length")
+    );
+    assert!(
+        base(r#""microlenses": {"pitch": 0.1}, "focal_length": 9, "f_number": 2"#)
+            .contains("pixel_pitch")
+    );
+}
