@@ -8,6 +8,8 @@ use etendue_bench::BenchError;
 use etendue_render::RenderError;
 use etendue_render::expose::ExposeError;
 use etendue_render::output::{OutputError, PictureError};
+use etendue_render::light_field::LightFieldError;
+use etendue_render::output::OutputError;
 use etendue_scene::SceneError;
 use etendue_scene::escape::{printable, printable_json};
 use etendue_sensor::emva::EmvaError;
@@ -97,6 +99,16 @@ impl From<ExposeError> for Fault {
             ExposeError::Memory(_) | ExposeError::Picture(PictureError::Memory(_)) => {
                 Self::Refused(error.into())
             }
+            error => Self::Failed(error.into()),
+        }
+    }
+}
+
+impl From<LightFieldError> for Fault {
+    fn from(error: LightFieldError) -> Self {
+        match error {
+            LightFieldError::Render(error) => error.into(),
+            LightFieldError::Output(error) => error.into(),
             error => Self::Failed(error.into()),
         }
     }

@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildOptions};
+use etendue_render::light_field::{self, Rendering};
 use etendue_render::output::{
     ImageHash, Ledger, Look, MANIFEST, Outputs, Picture, SOFTWARE, Temporary, exr, npy, png,
     sidecar,
@@ -131,7 +132,11 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
         let light = (&rendered.picture, rendered.band_film.take());
         let exposed = expose::write(&scene, light, folder, outputs, &*progress)?;
         files.extend(exposed.files);
-        Ok((files, exposed.notes))
+        let rendering = Rendering { scene: &scene, accel: &*accel, images: &images };
+        let progress = stages.begin("light field");
+        let set = light_field::write(rendering, &rendered.picture, folder, outputs, &*progress)?;
+        files.extend(set.files);
+        Ok((files, [exposed.notes, set.notes].concat()))
     })?;
     notes.add(more);
     time.write = lap.take();
@@ -188,6 +193,7 @@ fn keep_inputs(
         .into_iter()
         .chain(plan.names(scene).iter().flat_map(|layer| layer_files(layer, outputs)))
         .chain(expose::file_names(scene))
+        .chain(light_field::file_names(scene))
         .map(|name| arguments.output.join(name))
         .collect();
     let results_folder = arguments.output.canonicalize().ok();

@@ -8,6 +8,7 @@
 //! | [`plan`] | what a scene needs, decided in one place, with reasons |
 //! | [`render`](mod@render) | build, decode, trace: from a loaded scene to a picture |
 //! | [`expose`] | what the camera's sensor makes of the light |
+//! | [`light_field`] | what a light-field camera leaves beside its picture |
 //! | [`output`] | the named layers of a render, and EXR, PNG, NPY and JSON files of them |
 //! | [`report`] | what a render did and what it cost |
 //! | [`Watch`] | who is told how far a render is, and may stop it |
@@ -15,6 +16,7 @@
 pub mod expose;
 mod film;
 mod forecast;
+pub mod light_field;
 mod lighting;
 mod names;
 pub mod output;

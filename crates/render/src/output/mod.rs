@@ -5,6 +5,7 @@
 //! | EXR | the data | all layers in one part, `Layer.Channel`, 32-bit, lossless |
 //! | NPY | the data, for numpy | one layer, `[h, w]` or `[h, w, c]`, little-endian, f64 too |
 //! | PNG | looking, and a sensor's digital numbers | one layer, 8 or 16 bits |
+//! | PFM | disparities, for light-field benchmarks | one plane, f32 |
 //! | JSON | what the others mean | definition, unit, frame, miss … of each layer |
 //!
 //! Conventions of all of them:
@@ -32,6 +33,7 @@
 
 pub mod exr;
 pub mod npy;
+pub mod pfm;
 pub mod png;
 pub mod sidecar;
 

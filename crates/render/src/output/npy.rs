@@ -29,17 +29,37 @@ pub fn write(path: &Path, picture: &Picture, name: &str) -> Result<(), OutputErr
     })
 }
 
+/// Writes `values` as an array of any number of dimensions, row-major.
+///
+/// # Errors
+///
+/// When the file cannot be written.
+pub fn write_array(path: &Path, shape: &[u64], values: &[f32]) -> Result<(), OutputError> {
+    write_whole(path, |part| {
+        let mut file = BufWriter::with_capacity(1 << 20, part);
+        header(&mut file, "<f4", shape)?;
+        for value in values {
+            file.write_all(&value.to_le_bytes())?;
+        }
+        file.flush()
+    })
+}
+
 fn write_header(file: &mut impl Write, picture: &Picture, layer: &Layer) -> io::Result<()> {
     let mut shape = vec![picture.height() as u64, picture.width() as u64];
     if layer.channels.len() > 1 {
         shape.push(layer.channels.len() as u64);
     }
-    let dtype: TypeStr = format!("<{}", layer.type_name())
+    header(file, &format!("<{}", layer.type_name()), &shape)
+}
+
+fn header(file: &mut impl Write, dtype: &str, shape: &[u64]) -> io::Result<()> {
+    let dtype: TypeStr = dtype
         .parse()
         .map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, format!("{error}")))?;
     npyz::WriteOptions::new_header_only()
         .dtype(DType::Plain(dtype))
-        .shape(&shape)
+        .shape(shape)
         .writer(file)
         .write_header_only()
         .map(drop)

@@ -54,7 +54,8 @@ pub struct LensletPupil {
     opening: Vec<DVec2>,
     /// The same of the other arrays, by kind and array.
     others: Vec<Vec<DVec2>>,
-    /// The radius of the circle around it (mm).
+    /// Its area (mm²), and the radius of the circle around it (mm).
+    area: f64,
     around: f64,
     /// How the slopes towards the pupil change over the array (1/mm).
     drift: f64,
@@ -64,7 +65,9 @@ pub struct LensletPupil {
 /// What is aimed at of one lenslet, or of what is between them.
 #[derive(Debug, Clone)]
 enum Region {
-    /// All of a square opening, or of a polygon.
+    /// All of an opening that is a polygon.
+    Whole { centre: DVec2, area: f64, cell: Option<[f64; 2]>, checked: bool },
+    /// A polygon.
     Polygon { cell: Option<[f64; 2]>, corners: Vec<DVec2>, area: f64, checked: bool },
     /// All of a round opening.
     Disk { centre: DVec2, radius: f64 },
@@ -78,41 +81,45 @@ impl Region {
 
     fn area(&self) -> f64 {
         match self {
-            Self::Polygon { area, .. } => *area,
+            Self::Polygon { area, .. } | Self::Whole { area, .. } => *area,
             Self::Disk { radius, .. } => std::f64::consts::PI * radius * radius,
         }
     }
 
     /// A point for a place in the unit square, even in area.
-    fn draw(&self, [u, v]: [f64; 2]) -> DVec2 {
+    fn draw(&self, [u, v]: [f64; 2], opening: &[DVec2]) -> DVec2 {
         match self {
+            Self::Whole { centre, area, .. } => *centre + in_polygon(opening, *area, [u, v]),
             Self::Disk { centre, radius } => {
                 let [x, y] = etendue_geometry::disk::point([u, v]);
                 *centre + DVec2::new(x, y) * *radius
             }
-            Self::Polygon { corners, area, .. } => {
-                if let [a, b, c, d] = corners[..]
-                    && (a + c - b - d).length_squared() < 1e-18 * area
-                {
-                    return a + (b - a) * u + (d - a) * v;
-                }
-                // A fan of triangles around the first corner.
-                let mut left = u * 2.0 * area;
-                let last = corners.len() - 2;
-                for k in 1..=last {
-                    let (b, c) = (corners[k] - corners[0], corners[k + 1] - corners[0]);
-                    let twice = b.perp_dot(c);
-                    if left <= twice || k == last {
-                        let share = (left / twice).clamp(0.0, 1.0);
-                        let root = v.sqrt();
-                        return corners[0] + (b + (c - b) * share) * root;
-                    }
-                    left -= twice;
-                }
-                corners[0]
-            }
+            Self::Polygon { corners, area, .. } => in_polygon(corners, *area, [u, v]),
         }
     }
+}
+
+/// A point of a convex polygon for a place in the unit square, even in area.
+fn in_polygon(corners: &[DVec2], area: f64, [u, v]: [f64; 2]) -> DVec2 {
+    if let [a, b, c, d] = *corners
+        && (a + c - b - d).length_squared() < 1e-18 * area
+    {
+        return a + (b - a) * u + (d - a) * v;
+    }
+    // A fan of triangles around the first corner.
+    let mut left = u * 2.0 * area;
+    let last = corners.len() - 2;
+    for k in 1..=last {
+        let (b, c) = (corners[k] - corners[0], corners[k + 1] - corners[0]);
+        let twice = b.perp_dot(c);
+        if left <= twice || k == last {
+            let share = (left / twice).clamp(0.0, 1.0);
+            let root = v.sqrt();
+            return corners[0] + (b + (c - b) * share) * root;
+        }
+        left -= twice;
+    }
+    corners[0]
 }
 
 fn area_of(corners: &[DVec2]) -> f64 {
@@ -146,7 +153,8 @@ impl LensletPupil {
         };
         let table = Table::new(&main, &view, wavelengths, pupil, drift)?;
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
-        let mut own = Self { view, table, opening, others, around, drift, margin: MARGIN };
+        let area = area_of(&opening);
+        let mut own = Self { view, table, opening, others, area, around, drift, margin: MARGIN };
         own.widen_until_tight(&lenses, pupil)?;
         Ok(own)
     }
@@ -163,7 +171,7 @@ impl LensletPupil {
         for (i, region) in regions.iter().enumerate() {
             let area = region.area();
             if left <= area || i == last {
-                let at = region.draw([(left / area).clamp(0.0, 1.0), v]);
+                let at = region.draw([(left / area).clamp(0.0, 1.0), v], &self.opening);
                 if !self.owns(region, at) {
                     return None;
                 }
@@ -177,7 +185,11 @@ impl LensletPupil {
 
     /// Whether a point of a region belongs to it.
     fn owns(&self, region: &Region, at: DVec2) -> bool {
-        let Region::Polygon { cell, checked: true, .. } = region else { return true };
+        let (Region::Polygon { cell, checked: true, .. }
+        | Region::Whole { cell, checked: true, .. }) = region
+        else {
+            return true;
+        };
         let local = at - self.view.decentre;
         let found = self.view.array.lattice.cell(local.x, local.y);
         match cell {
@@ -191,6 +203,11 @@ impl LensletPupil {
         let sight = self.view.sight(0, film.z);
         self.regions(film, &sight).iter().any(|region| match region {
             Region::Disk { centre, radius } => at.distance(*centre) <= *radius,
+            Region::Whole { cell, .. } => {
+                let local = at - self.view.decentre;
+                let found = self.view.array.lattice.cell(local.x, local.y);
+                Some(found.index) == *cell && self.view.array.is_open(found.local)
+            }
             Region::Polygon { corners, .. } => {
                 let side = |k: usize| {
                     let (a, b) = (corners[k], corners[(k + 1) % corners.len()]);
@@ -287,8 +304,8 @@ impl LensletPupil {
             if round {
                 return Some(Region::Disk { centre, radius: array.reach });
             }
-            let corners = self.opening.iter().map(|p| centre + *p).collect();
-            return Region::polygon(Some(cell), corners, checked);
+            let area = self.area;
+            return Some(Region::Whole { centre, area, cell: Some(cell), checked });
         }
         let mut corners: Vec<[f64; 2]> = self.opening.iter().map(|p| p.to_array()).collect();
         if cut {

@@ -1,0 +1,173 @@
+//! `geometry.json`: where the lenslets' images are, which views there are, and how disparity follows from
+//! depth.
+
+use etendue_camera::{Camera, LensCamera, LightField, PixelOrigin, ViewGrid};
+use etendue_optics::element::Grid;
+use serde::Serialize;
+
+/// What a decoder needs, and what it may be scored against.
+#[derive(Debug, Serialize)]
+pub(super) struct Geometry {
+    /// What pixel coordinates count from.
+    pixel_origin: PixelOrigin,
+    /// `rect` or `hex`.
+    grid: &'static str,
+    /// From the middle of a lenslet's image to its next neighbour's along a row.
+    pitch_px: f64,
+    /// From row to row.
+    row_pitch_px: f64,
+    /// How rows are turned from right towards down.
+    rotation_rad: f64,
+    /// The middle of the image of lenslet (0, 0), the one in the first row and column.
+    offset_px: Option<[f64; 2]>,
+    /// Rows and columns of lenslets whose images are whole, which are those of a view.
+    rows: u32,
+    cols: u32,
+    /// Views along each side.
+    views: u32,
+    /// From a view to the next on the sensor.
+    step_px: f64,
+    /// The diameter of the image of the main lens' opening.
+    lens_image_diameter_px: f64,
+    /// The disparity at the middle of the middle view; `null` where it sees nothing.
+    expected_disparity: Option<f64>,
+    disparity: Disparity,
+    array: Option<ArrayFacts>,
+    /// The middles of the lenslets' images by chief ray, `[row][column]`: x, y in pixels.
+    centres_px: Option<Vec<Vec<[f64; 2]>>>,
+    /// The lenslets' own centres, seen square to the sensor, in pixels.
+    lenslet_centres_px: Option<Vec<Vec<[f64; 2]>>>,
+    about: [&'static str; 4],
+}
+
+/// How disparity follows from depth.
+#[derive(Debug, Serialize)]
+struct Disparity {
+    formula: &'static str,
+    sign: &'static str,
+    unit: &'static str,
+    depth: &'static str,
+    baseline_m: f64,
+    focal_length_px: f64,
+    /// `null` for infinity.
+    focus_m: Option<f64>,
+    /// Of what the middle view sees: the least, and the greatest.
+    range: Option<[f64; 2]>,
+}
+
+/// The array behind the main lens.
+#[derive(Debug, Serialize)]
+struct ArrayFacts {
+    pitch_mm: f64,
+    focal_length_mm: f64,
+    /// From the array to the sensor.
+    sensor_distance_mm: f64,
+    /// From the main lens' exit pupil to the array; `null` for infinity.
+    exit_pupil_distance_mm: Option<f64>,
+    pixel_pitch_um: f64,
+    first_lenslet_mm: [f64; 2],
+}
+
+const ABOUT: [&str; 4] = [
+    "x runs right and y down; the picture is upright, so the sensor behind it is turned by 180 degrees",
+    "view (u, v) takes the pixel at centre + step_px (u - (views - 1)/2, v - (views - 1)/2); u counts from \
+     the left, v from the top, and its viewpoint is that far right and down in the opening",
+    "row r, column c of a view is the lenslet at offset_px + pitch_px c (cos, sin) + row_pitch_px r (-sin, \
+     cos) of rotation_rad; in a hex grid odd rows are half a pitch further along the row",
+    "the chief ray of the main lens through a lenslet's middle ends in its image's middle: centres_px",
+];
+
+impl Geometry {
+    pub(super) fn new(
+        camera: &Camera,
+        light_field: &LightField,
+        grid: &ViewGrid,
+        depth: &[f64],
+    ) -> Self {
+        let lenslets = &light_field.grid;
+        let lens = camera.lens();
+        let height = match lenslets.grid {
+            Grid::Square => 1.0,
+            Grid::Hexagonal => 0.75_f64.sqrt(),
+        };
+        let centres = lens.map(|lens| {
+            by_rows(light_field, |row, col| light_field.centre(lens, row, col).map(from_centre))
+        });
+        let disparities = || depth.iter().filter(|z| z.is_finite()).map(|&z| grid.disparity(z));
+        let middle = (lenslets.rows / 2 * lenslets.cols + lenslets.cols / 2) as usize;
+        let focus = grid.focus();
+        let range = disparities().fold(None, |range: Option<[f64; 2]>, d| {
+            Some(range.map_or([d, d], |[low, high]| [low.min(d), high.max(d)]))
+        });
+        Self {
+            pixel_origin: PixelOrigin::Center,
+            grid: match lenslets.grid {
+                Grid::Square => "rect",
+                Grid::Hexagonal => "hex",
+            },
+            pitch_px: light_field.image_pitch,
+            row_pitch_px: light_field.image_pitch * height,
+            rotation_rad: light_field.rotation,
+            offset_px: centres.as_ref().map(|centres| centres[0][0]),
+            rows: lenslets.rows,
+            cols: lenslets.cols,
+            views: light_field.views,
+            step_px: light_field.step,
+            lens_image_diameter_px: light_field.image_diameter,
+            expected_disparity: depth
+                .get(middle)
+                .filter(|z| z.is_finite())
+                .map(|&z| grid.disparity(z)),
+            disparity: Disparity {
+                formula: "baseline_m * focal_length_px * (1 / depth_m - 1 / focus_m)",
+                sign: "positive in front of the focus: what is at column x of a view is at x - disparity \
+                       in the next view on the right, and at row y - disparity (divided by the height of a \
+                       row in columns) in the next one below",
+                unit: "columns of a view per step from a view to the next",
+                depth: "along the axis from the entrance pupil, in metres",
+                baseline_m: grid.baseline(),
+                focal_length_px: grid.focal_length(),
+                focus_m: focus.is_finite().then_some(focus),
+                range,
+            },
+            array: lens.and_then(|lens| ArrayFacts::of(lens, light_field)),
+            lenslet_centres_px: lens.and_then(|lens| {
+                let view = lens.lenslets()?.view();
+                Some(by_rows(light_field, |row, col| {
+                    let at = view.centre(lenslets.cell(row, col));
+                    Some(from_centre(lens.focused().pixel_of(at)))
+                }))
+            }),
+            centres_px: centres,
+            about: ABOUT,
+        }
+    }
+}
+
+impl ArrayFacts {
+    fn of(lens: &LensCamera, light_field: &LightField) -> Option<Self> {
+        let view = lens.lenslets()?.view();
+        Some(Self {
+            pitch_mm: view.array.lattice.pitch,
+            focal_length_mm: view.focal_length(0),
+            sensor_distance_mm: lens.focused().sensor_z() - lens.focused().train().last_vertex(),
+            exit_pupil_distance_mm: view.exit_pupil_z().map(|z| view.front_z - z),
+            pixel_pitch_um: lens.focused().pixel_pitch(),
+            first_lenslet_mm: view.centre(light_field.grid.cell(0, 0)).to_array(),
+        })
+    }
+}
+
+/// A place counted from the middle of the first pixel.
+fn from_centre(place: [f64; 2]) -> [f64; 2] {
+    place.map(|x| x - PixelOrigin::Center.to_corner())
+}
+
+fn by_rows(
+    light_field: &LightField,
+    place: impl Fn(u32, u32) -> Option<[f64; 2]>,
+) -> Vec<Vec<[f64; 2]>> {
+    let grid = &light_field.grid;
+    let row = |row: u32| (0..grid.cols).map(|col| place(row, col).unwrap_or_default()).collect();
+    (0..grid.rows).map(row).collect()
+}

@@ -1,0 +1,336 @@
+//! What a light-field camera leaves beside its picture: a white image, where the lenslets' images lie,
+//! the views decoded from the picture, the views of an ideal lens, depth and disparity of the middle one,
+//! and all of it in the layout of the HCI 4D light-field benchmark.
+//!
+//! | module | idea |
+//! |---|---|
+//! | `geometry` | `geometry.json`: grid, centres, views, and the formula of disparities |
+//! | `white` | the same camera before a uniform light |
+//! | `views` | views as an array of five dimensions, from the raw picture and from a picture of views |
+//! | `hci` | the folder of the benchmark's layout |
+//!
+//! The layout: K. Honauer, O. Johannsen, D. Kondermann, B. Goldluecke, "A dataset and evaluation
+//! methodology for depth estimation on 4D light fields", 2016.
+
+mod geometry;
+mod hci;
+mod views;
+mod white;
+
+use std::path::{Path, PathBuf};
+
+use etendue_accel::Accel;
+use etendue_camera::{Camera, Projection, ViewGrid};
+use etendue_scene::Scene;
+use etendue_tracer::LayerSpec;
+
+use crate::expose::SPECTRUM;
+use crate::output::{
+    Channel, Layer, Ledger, Look, OutputError, Outputs, Picture, PictureError, Values, exr, npy,
+    pfm, png, prepare_folder, sidecar,
+};
+use crate::{Images, Plan, RenderError, render};
+
+use geometry::Geometry;
+use views::Views;
+
+/// Why the set is not complete.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LightFieldError {
+    /// The reference views could not be rendered, or it was stopped.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A file could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+impl From<PictureError> for LightFieldError {
+    fn from(error: PictureError) -> Self {
+        Self::Render(error.into())
+    }
+}
+
+/// What was written.
+#[derive(Debug, Default)]
+pub struct LightFieldSet {
+    /// The files, in the order they were written.
+    pub files: Vec<PathBuf>,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// The scene, its structure and its images, as they were rendered.
+#[derive(Clone, Copy)]
+#[expect(missing_debug_implementations, reason = "holds an accelerator")]
+pub struct Rendering<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its structure.
+    pub accel: &'a dyn Accel,
+    /// Its images.
+    pub images: &'a Images,
+}
+
+/// The names of the files of the set, in the folder of the results and below it.
+#[must_use]
+pub fn file_names(scene: &Scene) -> Vec<String> {
+    let Some(light_field) = scene.camera.light_field() else { return Vec::new() };
+    let stems = ["white", "views", "reference", "central_depth", "central_disparity"];
+    let endings = ["png", "npy", "exr", "pfm"];
+    let plain = stems.iter().flat_map(|stem| endings.map(|ending| format!("{stem}.{ending}")));
+    let spectra = ["views_spectrum.npy", "reference_spectrum.npy", "geometry.json"];
+    let n = light_field.views;
+    let single = (0..n * n).flat_map(|k| {
+        let name = view_name(k % n, k / n);
+        [format!("views/{name}"), format!("reference/{name}"), format!("hci/{}", hci::view_name(k))]
+    });
+    let hci = hci::FILES.map(|name| format!("hci/{name}"));
+    plain.chain(spectra.map(str::to_owned)).chain(single).chain(hci).collect()
+}
+
+fn view_name(across: u32, down: u32) -> String {
+    format!("view_{down:02}_{across:02}.png")
+}
+
+/// Writes the set of a light-field camera's `picture` into `folder`; nothing for other cameras. Told the
+/// share done, `progress` answers whether to go on.
+///
+/// # Errors
+///
+/// When the reference views cannot be rendered, a file cannot be written, or `progress` says stop.
+pub fn write(
+    rendering: Rendering<'_>,
+    picture: &Picture,
+    folder: &Path,
+    outputs: Outputs,
+    progress: &(dyn Fn(f64) -> bool + Sync),
+) -> Result<LightFieldSet, LightFieldError> {
+    let scene = rendering.scene;
+    let mut set = Writer { folder, outputs, written: LightFieldSet::default() };
+    let Some(light_field) = scene.camera.light_field() else { return Ok(set.written) };
+    let reference = match scene.camera.projection() {
+        Projection::Views(_) => scene.camera.clone(),
+        _ => scene
+            .camera
+            .reference_views()
+            .map_err(|error| RenderError::Camera(error.to_string()))?,
+    };
+    let Projection::Views(grid) = reference.projection() else { return Ok(set.written) };
+    let raw = scene.camera.lens();
+    let depth = central_depth(rendering, &reference, outputs, &|share| progress(0.1 * share))?;
+    let geometry = Geometry::new(&scene.camera, light_field, grid, &depth);
+    sidecar::write_json(&set.place("geometry.json"), &geometry)?;
+    set.depth(grid, &depth)?;
+    if raw.is_some() {
+        let white = white::picture(&scene.camera, &scene.render)?;
+        set.picture("white", &white)?;
+    }
+    if picture.layer("").is_none() {
+        let why = "there is no picture (no tracer): views are left out of the light field's files";
+        set.written.notes.push(why.to_owned());
+        return Ok(set.written);
+    }
+    let truth = match raw {
+        None => None,
+        Some(lens) => {
+            let decoded = Views::decoded(picture, lens, light_field, grid)?;
+            set.views("views", &decoded, picture)?;
+            let truth = reference_picture(rendering, &reference, outputs, &|share| {
+                progress(0.1 + 0.9 * share)
+            })?;
+            Some(truth)
+        }
+    };
+    let truth = truth.as_ref().unwrap_or(picture);
+    let views = Views::split(truth, grid);
+    set.views(if raw.is_some() { "reference" } else { "views" }, &views, truth)?;
+    if outputs.png {
+        set.hci(scene, grid, &views, truth, &depth)?;
+    }
+    Ok(set.written)
+}
+
+/// A scene that shows `layers` to another camera.
+fn shown_to(scene: &Scene, camera: Camera, layers: Vec<LayerSpec>) -> Scene {
+    let picture = scene.picture.filter(|layer| layers.contains(layer));
+    let tracer = scene.tracer.filter(|_| picture.is_some());
+    let sensor = scene.sensor.clone().map(|sensor| sensor.with_resolution(camera.resolution()));
+    let mut shown = scene.clone();
+    (shown.camera, shown.layers, shown.sensor) = (camera, layers, sensor);
+    (shown.picture, shown.tracer) = (picture, tracer);
+    shown
+}
+
+/// The picture of all views by an ideal lens.
+fn reference_picture(
+    Rendering { scene, accel, images }: Rendering<'_>,
+    reference: &Camera,
+    outputs: Outputs,
+    progress: &(dyn Fn(f64) -> bool + Sync),
+) -> Result<Picture, LightFieldError> {
+    let scene = shown_to(scene, reference.clone(), scene.picture.into_iter().collect());
+    let plan = Plan::new(&scene, outputs);
+    Ok(render(&scene, &plan, accel, images, Vec::new(), &progress)?.picture)
+}
+
+/// z of what the middle view sees (m), row by row; infinite where it sees nothing.
+fn central_depth(
+    Rendering { scene, accel, images }: Rendering<'_>,
+    reference: &Camera,
+    outputs: Outputs,
+    progress: &(dyn Fn(f64) -> bool + Sync),
+) -> Result<Vec<f64>, LightFieldError> {
+    let Some(central) = reference.central_view() else { return Ok(Vec::new()) };
+    let scene = shown_to(scene, central, vec![LayerSpec::Depth]);
+    let plan = Plan::new(&scene, Outputs { npy: true, ..outputs });
+    let picture = render(&scene, &plan, accel, images, Vec::new(), &progress)?.picture;
+    let layer = picture.layer("Depth").and_then(|layer| layer.channels.first());
+    let values = layer.map(|channel| &channel.values);
+    Ok(values.map_or_else(Vec::new, |values| (0..values.len()).map(|i| values.at(i)).collect()))
+}
+
+/// Where the set goes.
+struct Writer<'a> {
+    folder: &'a Path,
+    outputs: Outputs,
+    written: LightFieldSet,
+}
+
+impl Writer<'_> {
+    fn place(&mut self, name: &str) -> PathBuf {
+        let path = self.folder.join(name);
+        self.written.files.push(path.clone());
+        path
+    }
+
+    /// A picture in all formats that are wanted.
+    fn picture(&mut self, stem: &str, picture: &Picture) -> Result<(), LightFieldError> {
+        if self.outputs.exr {
+            exr::write(&self.place(&format!("{stem}.exr")), picture, &exr::Options::default())?;
+        }
+        if self.outputs.png {
+            png::write(&self.place(&format!("{stem}.png")), picture, "", png::Bits::Eight)?;
+        }
+        if self.outputs.npy {
+            npy::write(&self.place(&format!("{stem}.npy")), picture, "")?;
+        }
+        Ok(())
+    }
+
+    /// Views side by side, as one array, and one file each; `shown` says how.
+    fn views(&mut self, stem: &str, views: &Views, shown: &Picture) -> Result<(), LightFieldError> {
+        let side_by_side = views.side_by_side()?.developed(*shown.development());
+        if self.outputs.exr {
+            let place = self.place(&format!("{stem}.exr"));
+            exr::write(&place, &side_by_side, &exr::Options::default())?;
+        }
+        if self.outputs.npy {
+            let place = self.place(&format!("{stem}.npy"));
+            npy::write_array(&place, &views.shape(&views.colors), &views.colors.values)?;
+            if let Some(spectrum) = &views.spectrum {
+                let place = self.place(&format!("{stem}_spectrum.npy"));
+                npy::write_array(&place, &views.shape(spectrum), &spectrum.values)?;
+            }
+        }
+        if self.outputs.png {
+            png::write(&self.place(&format!("{stem}.png")), &side_by_side, "", png::Bits::Eight)?;
+            self.below(stem, |set, folder| {
+                for down in 0..views.views {
+                    for across in 0..views.views {
+                        let path = folder.join(view_name(across, down));
+                        let view = views.single(across, down)?.developed(*shown.development());
+                        png::write(&path, &view, "", png::Bits::Eight)?;
+                        set.written.files.push(path);
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Depth and disparity of the middle view.
+    fn depth(&mut self, grid: &ViewGrid, depth: &[f64]) -> Result<(), LightFieldError> {
+        let [cols, rows] = grid.view_resolution();
+        let disparity: Vec<f64> = depth.iter().map(|&z| grid.disparity(z)).collect();
+        for (stem, values, unit) in [
+            ("central_depth", depth, "m"),
+            ("central_disparity", &disparity[..], "pixels of a view per view"),
+        ] {
+            let picture = plane(stem, unit, [cols, rows], values)?;
+            if self.outputs.npy {
+                npy::write(&self.place(&format!("{stem}.npy")), &picture, NAME)?;
+            }
+            if self.outputs.png {
+                let place = self.place(&format!("{stem}.png"));
+                png::write(&place, &picture, NAME, png::Bits::Eight)?;
+            }
+            pfm::write(&self.place(&format!("{stem}.pfm")), [cols, rows], values)?;
+        }
+        Ok(())
+    }
+
+    /// The benchmark's layout.
+    fn hci(
+        &mut self,
+        scene: &Scene,
+        grid: &ViewGrid,
+        views: &Views,
+        shown: &Picture,
+        depth: &[f64],
+    ) -> Result<(), LightFieldError> {
+        self.below("hci", |set, folder| {
+            set.written.files.extend(hci::write(folder, scene, grid, views, shown, depth)?);
+            Ok(())
+        })
+    }
+
+    /// Fills a folder in the folder; files of an earlier run that are not written again go.
+    fn below(
+        &mut self,
+        name: &str,
+        fill: impl FnOnce(&mut Self, &Path) -> Result<(), LightFieldError>,
+    ) -> Result<(), LightFieldError> {
+        let folder = self.folder.join(name);
+        prepare_folder(&folder)?;
+        let mut ledger = Ledger::open(&folder, "render");
+        let filled = fill(self, &folder);
+        let recorded = ledger.record();
+        filled?;
+        recorded?;
+        ledger.clear()?;
+        Ok(())
+    }
+}
+
+/// The name of the layer of a picture of one plane.
+const NAME: &str = "Plane";
+
+/// Numbers as a picture of one plane.
+fn plane(
+    what: &str,
+    unit: &str,
+    [width, height]: [u32; 2],
+    values: &[f64],
+) -> Result<Picture, PictureError> {
+    let channels = vec![Channel { name: "Z".to_owned(), values: Values::F64(values.to_vec()) }];
+    let meaning = [("definition", what), ("unit", unit)].map(|(k, v)| (k.to_owned(), v.to_owned()));
+    let layer =
+        Layer { name: NAME.to_owned(), look: Look::Distance, channels, meaning: meaning.into() };
+    Picture::new(width as usize, height as usize, vec![layer], Vec::new())
+}
+
+/// The planes of a picture's own colours, and of its spectrum.
+fn planes<'a>(picture: &'a Picture, layer: &str) -> Option<Vec<&'a [f32]>> {
+    let layer = picture.layer(layer)?;
+    let plane = |channel: &'a Channel| match &channel.values {
+        Values::F32(values) => Some(values.as_slice()),
+        _ => None,
+    };
+    layer.channels.iter().map(plane).collect()
+}
+
+/// The name of the layer that holds a picture's bands.
+const BANDS: &str = SPECTRUM;

@@ -1,0 +1,189 @@
+//! Views as arrays: `[down][across][row][column][channel]`, from the raw picture by cubic sampling at
+//! the middles of the lenslets' images, or out of a picture that shows them side by side.
+//!
+//! Cubic sampling: R. Keys, "Cubic convolution interpolation for digital image processing", 1981, with
+//! a = −1/2.
+
+use etendue_camera::{LensCamera, LightField, ViewGrid};
+use rayon::prelude::*;
+
+use super::{BANDS, planes};
+use crate::output::{Channel, Layer, Look, Picture, PictureError, Values};
+
+/// The values of all views.
+#[derive(Debug, Clone)]
+pub(super) struct Array {
+    /// `[down][across][row][column][channel]`.
+    pub(super) values: Vec<f32>,
+    channels: usize,
+}
+
+/// All views of a light field.
+#[derive(Debug, Clone)]
+pub(super) struct Views {
+    /// Along each side.
+    pub(super) views: u32,
+    /// Columns and rows of each.
+    pub(super) size: [u32; 2],
+    /// Red, green and blue.
+    pub(super) colors: Array,
+    /// The bands of a spectrum, where the picture has one.
+    pub(super) spectrum: Option<Array>,
+}
+
+impl Views {
+    /// The views in a raw picture.
+    pub(super) fn decoded(
+        picture: &Picture,
+        lens: &LensCamera,
+        light_field: &LightField,
+        grid: &ViewGrid,
+    ) -> Result<Self, PictureError> {
+        let [cols, rows] = grid.view_resolution();
+        let centres: Vec<[f64; 2]> = (0..rows * cols)
+            .into_par_iter()
+            .map(|k| light_field.centre(lens, k / cols, k % cols).unwrap_or([0.0; 2]))
+            .collect();
+        let n = light_field.views;
+        let decode = |planes: &[&[f32]]| {
+            let view = |k: u32| {
+                let [right, below] = light_field.offset(k % n, k / n);
+                let at = centres.iter().map(move |[x, y]| [x + right, y + below]);
+                let size = [picture.width(), picture.height()];
+                at.flat_map(|at| planes.iter().map(move |plane| sampled(plane, size, at)))
+                    .collect::<Vec<f32>>()
+            };
+            let views: Vec<Vec<f32>> = (0..n * n).into_par_iter().map(view).collect();
+            Array { values: views.concat(), channels: planes.len() }
+        };
+        let empty = || PictureError::Empty { what: "the raw picture".to_owned() };
+        let colors = decode(&planes(picture, "").ok_or_else(empty)?);
+        let spectrum = planes(picture, BANDS).map(|planes| decode(&planes));
+        Ok(Self { views: n, size: [cols, rows], colors, spectrum })
+    }
+
+    /// The views that a picture shows side by side.
+    pub(super) fn split(picture: &Picture, grid: &ViewGrid) -> Self {
+        let [cols, rows] = grid.view_resolution();
+        let n = grid.views();
+        let split = |planes: &[&[f32]]| {
+            let mut values = Vec::with_capacity(planes.len() * picture.width() * picture.height());
+            for k in 0..n * n {
+                let (left, top) = (k % n * cols, k / n * rows);
+                for row in top..top + rows {
+                    for col in left..left + cols {
+                        let at = row as usize * picture.width() + col as usize;
+                        values.extend(planes.iter().map(|plane| plane[at]));
+                    }
+                }
+            }
+            Array { values, channels: planes.len() }
+        };
+        let colors = split(&planes(picture, "").unwrap_or_default());
+        let spectrum = planes(picture, BANDS).map(|planes| split(&planes));
+        Self { views: n, size: [cols, rows], colors, spectrum }
+    }
+
+    /// The shape of one of its arrays.
+    pub(super) fn shape(&self, array: &Array) -> [u64; 5] {
+        let [cols, rows] = self.size.map(u64::from);
+        let views = u64::from(self.views);
+        [views, views, rows, cols, array.channels as u64]
+    }
+
+    /// The colours of a pixel of a view.
+    fn color(&self, view: u32, pixel: usize, channel: usize) -> f32 {
+        let [cols, rows] = self.size.map(|side| side as usize);
+        let count = self.colors.channels;
+        self.colors.values[(view as usize * rows * cols + pixel) * count + channel]
+    }
+
+    /// One view as a picture.
+    pub(super) fn single(&self, across: u32, down: u32) -> Result<Picture, PictureError> {
+        let [cols, rows] = self.size.map(|side| side as usize);
+        let view = down * self.views + across;
+        let value = |k, channel| self.color(view, k, channel);
+        picture([cols, rows], value)
+    }
+
+    /// All views as one picture.
+    pub(super) fn side_by_side(&self) -> Result<Picture, PictureError> {
+        let [cols, rows] = self.size.map(|side| side as usize);
+        let n = self.views as usize;
+        let value = |k: usize, channel| {
+            let (x, y) = (k % (n * cols), k / (n * cols));
+            #[expect(clippy::cast_possible_truncation, reason = "at most 255 views a side")]
+            let view = (y / rows * n + x / cols) as u32;
+            self.color(view, y % rows * cols + x % cols, channel)
+        };
+        picture([n * cols, n * rows], value)
+    }
+}
+
+/// A picture of three colours.
+fn picture(
+    [width, height]: [usize; 2],
+    value: impl Fn(usize, usize) -> f32,
+) -> Result<Picture, PictureError> {
+    let channel = |(k, name): (usize, &str)| {
+        let values = (0..width * height).map(|i| value(i, k)).collect();
+        Channel { name: name.to_owned(), values: Values::F32(values) }
+    };
+    let channels = ["R", "G", "B"].into_iter().enumerate().map(channel).collect();
+    let meaning = vec![("definition".to_owned(), "views of a light field".to_owned())];
+    let layer = Layer { name: String::new(), look: Look::Color, channels, meaning };
+    Picture::new(width, height, vec![layer], Vec::new())
+}
+
+/// The weights of four neighbours for a place between the middle two, `t` in 0..=1.
+fn weights(t: f64) -> [f64; 4] {
+    let near = |x: f64| (1.5 * x - 2.5) * x * x + 1.0;
+    let far = |x: f64| ((-0.5 * x + 2.5) * x - 4.0) * x + 2.0;
+    [far(1.0 + t), near(t), near(1.0 - t), far(2.0 - t)]
+}
+
+/// A plane at a place (pixels from the corner).
+fn sampled(plane: &[f32], [width, height]: [usize; 2], [x, y]: [f64; 2]) -> f32 {
+    let split = |at: f64| {
+        let low = (at - 0.5).floor();
+        (low, weights(at - 0.5 - low))
+    };
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the picture"
+    )]
+    let clamped = |at: f64, side: usize| at.clamp(0.0, (side - 1) as f64) as usize;
+    let ((left, across), (top, down)) = (split(x), split(y));
+    let mut sum = 0.0;
+    for (j, wy) in (0_u32..).zip(down) {
+        let row = clamped(top - 1.0 + f64::from(j), height) * width;
+        for (i, wx) in (0_u32..).zip(across) {
+            let column = clamped(left - 1.0 + f64::from(i), width);
+            sum += wx * wy * f64::from(plane[row + column]);
+        }
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+    let sum = sum as f32;
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cubic convolution gives second-degree polynomials back exactly.
+    #[test]
+    fn sampling_is_exact_for_parabolas() {
+        let f = |x: f64, y: f64| 0.3 * x * x - x * y + 0.2 * y * y + 2.0 * y - 1.0;
+        #[expect(clippy::cast_possible_truncation, reason = "a test's numbers")]
+        let plane: Vec<f32> =
+            (0..100).map(|k| f(f64::from(k % 10) + 0.5, f64::from(k / 10) + 0.5) as f32).collect();
+        for (x, y) in [(4.5, 5.5), (4.7, 5.1), (3.0, 6.0), (5.99, 4.01)] {
+            let found = f64::from(sampled(&plane, [10, 10], [x, y]));
+            // f32 has 7 digits of numbers up to 60.
+            assert!((found - f(x, y)).abs() < 2e-5, "{x} {y}: {found} {}", f(x, y));
+        }
+        assert_eq!(weights(0.0), [0.0, 1.0, 0.0, 0.0]);
+    }
+}

@@ -1,0 +1,67 @@
+//! The white image: the same camera before a uniform light, of which no scene is asked.
+
+use std::ops::Range;
+
+use etendue_camera::{Camera, CameraRays, FilmSamples, squares_of_pair};
+use etendue_scene::file::RenderSpec;
+use etendue_spectrum::Bands;
+use rayon::prelude::*;
+
+use super::LightFieldError;
+use crate::RenderError;
+use crate::output::{Channel, Layer, Look, Picture, Values};
+
+/// Samples a pixel, at the fewest and at the most: only pixels at the rims of images have noise.
+const SAMPLES: [u32; 2] = [16, 64];
+
+/// What a picture of radiance 1 everywhere is.
+pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, LightFieldError> {
+    let camera = camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
+    let groups = camera.band_groups(&Bands::Rgb);
+    let [width, height] = camera.resolution();
+    let samples = spec.samples.clamp(SAMPLES[0], SAMPLES[1]);
+    let row = |row: u32| -> [Vec<f32>; 3] {
+        let mut sums = vec![[0.0; 3]; width as usize];
+        let (mut film, mut rays) = (FilmSamples::default(), CameraRays::default());
+        for column in 0..width {
+            film.clear();
+            place(&mut film, spec, [column, row], samples);
+            for group in &groups {
+                film.wavelength = group.wavelength;
+                camera.sample_rays(&film, &mut rays);
+                let light: f64 = rays.weight.iter().sum();
+                let bands: Range<usize> = group.bands.clone();
+                sums[column as usize][bands].fill(light / f64::from(samples));
+            }
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+        let plane = |k: usize| sums.iter().map(|sum| sum[k] as f32).collect();
+        [plane(0), plane(1), plane(2)]
+    };
+    let rows: Vec<[Vec<f32>; 3]> = (0..height).into_par_iter().map(row).collect();
+    let channel = |(k, name): (usize, &str)| {
+        let values = rows.iter().flat_map(|row| row[k].iter().copied()).collect();
+        Channel { name: name.to_owned(), values: Values::F32(values) }
+    };
+    let channels = ["R", "G", "B"].into_iter().enumerate().map(channel).collect();
+    let meaning = vec![(
+        "definition".to_owned(),
+        "the picture of a radiance of 1 from everywhere".to_owned(),
+    )];
+    let layer = Layer { name: String::new(), look: Look::Color, channels, meaning };
+    Ok(Picture::new(width as usize, height as usize, vec![layer], Vec::new())?)
+}
+
+/// The samples of a pixel.
+fn place(film: &mut FilmSamples, spec: &RenderSpec, [column, row]: [u32; 2], samples: u32) {
+    let pixel = spec.sampler.pixel(spec.seed, column, row, samples);
+    let numbers = (0..samples).map(|index| (pixel, index));
+    let mut squares = [Vec::new(), Vec::new(), Vec::new()];
+    for (pair, out) in (0..).zip(&mut squares) {
+        squares_of_pair(numbers.clone(), pair, out);
+    }
+    let [places, pupil, spectrum] = squares;
+    for ((place, pupil), spectrum) in places.iter().zip(pupil).zip(spectrum) {
+        film.push([f64::from(column) + place[0], f64::from(row) + place[1]], pupil, spectrum[0]);
+    }
+}
