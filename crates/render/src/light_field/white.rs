@@ -11,27 +11,39 @@ use super::LightFieldError;
 use crate::RenderError;
 use crate::output::{Channel, Layer, Look, Picture, Values};
 
-/// Samples a pixel, at the fewest and at the most: only pixels at the rims of images have noise.
-const SAMPLES: [u32; 2] = [16, 64];
+/// Samples a pixel: few where all of them get through alike, many at the rims of images.
+const SAMPLES: [u32; 2] = [16, 256];
+
+/// How much the weights of a pixel may differ to be alike.
+const ALIKE: f64 = 0.02;
 
 /// What a picture of radiance 1 everywhere is.
 pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, LightFieldError> {
     let camera = camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
     let groups = camera.band_groups(&Bands::Rgb);
     let [width, height] = camera.resolution();
-    let samples = spec.samples.clamp(SAMPLES[0], SAMPLES[1]);
     let row = |row: u32| -> [Vec<f32>; 3] {
         let mut sums = vec![[0.0; 3]; width as usize];
         let (mut film, mut rays) = (FilmSamples::default(), CameraRays::default());
         for column in 0..width {
-            film.clear();
-            place(&mut film, spec, [column, row], samples);
             for group in &groups {
                 film.wavelength = group.wavelength;
-                camera.sample_rays(&film, &mut rays);
-                let light: f64 = rays.weight.iter().sum();
+                let mut light = 0.0;
+                for samples in SAMPLES {
+                    film.clear();
+                    place(&mut film, spec, [column, row], samples);
+                    camera.sample_rays(&film, &mut rays);
+                    light = rays.weight.iter().sum::<f64>() / f64::from(samples);
+                    let [low, high] = rays
+                        .weight
+                        .iter()
+                        .fold([f64::MAX, 0.0_f64], |[low, high], w| [low.min(*w), high.max(*w)]);
+                    if rays.weight.len() == samples as usize && high - low <= ALIKE * high {
+                        break;
+                    }
+                }
                 let bands: Range<usize> = group.bands.clone();
-                sums[column as usize][bands].fill(light / f64::from(samples));
+                sums[column as usize][bands].fill(light);
             }
         }
         #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]

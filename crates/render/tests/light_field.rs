@@ -1,0 +1,190 @@
+//! What a light-field camera leaves, read back: the views decoded from its raw picture are those of an
+//! ideal lens, and things stand in them where the formula says.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use etendue_accel::BuildOptions;
+use etendue_render::light_field::{self, Rendering};
+use etendue_render::output::Outputs;
+use etendue_render::{Images, Plan, build, plan, render};
+use etendue_scene::LoadOptions;
+use etendue_scene::file::SceneFile;
+
+const OUTPUTS: Outputs = Outputs { exr: false, png: false, npy: true, dng: false };
+
+/// Writes the set of a camera of 20 mm f/4 that looks at a wall of squares at `depth` (m), each of which
+/// is 3.5 columns of a view wide.
+fn write(folder: &Path, depth: f64, camera: &str, microlenses: &str) -> serde_json::Value {
+    // A column of 0.1 mm at 20.8333 mm behind the lens.
+    let square = 3.5 * depth * 0.1 / (1.0 / (1.0 / 20.0 - 1.0 / 500.0));
+    let (width, z) = (80.0 * square, 0.5 - depth);
+    // Stripes, nearly: a row sees one square above the other at most once.
+    let height = 40.0 * width;
+    let text = format!(
+        r#"{{"etendue": 1, "tracer": {{"type": "flat"}}, "render": {{"samples": 32}},
+        "camera": {{"type": "{camera}", "focal_length": 20, "f_number": 4, "focus_distance": 0.5,
+            "microlenses": {{"pitch": 0.1 {microlenses}}},
+            "pose": {{"from": [0, 0, 0.5], "look_at": [0, 0, 0]}},
+            "sensor": {{"resolution": [640, 100], "pixel_pitch": 8}}}},
+        "materials": {{"a": {{"type": "checker", "colors": [[0.9, 0.8, 0.7], [0.1, 0.2, 0.3]], "squares": 80}}}},
+        "objects": [{{"shape": "rectangle", "width": {width}, "height": {height}, "material": "a",
+            "transform": {{"translate": [0.0003, 0.0007, {z}]}}}}]}}"#
+    );
+    let path = folder.join("scene.json");
+    std::fs::write(&path, text).unwrap();
+    let file = SceneFile::read(&path, &[]).unwrap();
+    let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).unwrap();
+    let plan = Plan::new(&scene, OUTPUTS);
+    let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();
+    let images = Images::decode(&scene, &plan, None).unwrap();
+    let rendered = render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true).unwrap();
+    let rendering = Rendering { scene: &scene, accel: &*accel, images: &images };
+    let set =
+        light_field::write(rendering, &rendered.picture, folder, OUTPUTS, &|_: f64| true).unwrap();
+    let promised = light_field::file_names(&scene);
+    for file in &set.files {
+        let name = file.strip_prefix(folder).unwrap().to_str().unwrap();
+        assert!(promised.iter().any(|promised| promised == name), "{name}");
+        assert!(file.exists(), "{name}");
+    }
+    serde_json::from_slice(&std::fs::read(folder.join("geometry.json")).unwrap()).unwrap()
+}
+
+/// An array of f32 of a file: its shape and values.
+fn array(path: &Path) -> (Vec<usize>, Vec<f64>) {
+    let bytes = std::fs::read(path).unwrap();
+    let end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = std::str::from_utf8(&bytes[10..end]).unwrap();
+    let shape = header.split('(').nth(1).unwrap().split(')').next().unwrap();
+    let shape = shape.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+    let numbers = bytes[end..].chunks(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()).into());
+    (shape, numbers.collect())
+}
+
+/// Green of one view, row by row.
+fn view(shape: &[usize], values: &[f64], across: usize, down: usize) -> Vec<Vec<f64>> {
+    let [_, n, rows, cols, channels] = shape[..] else { panic!("{shape:?}") };
+    let start = (down * n + across) * rows * cols * channels;
+    let row = |row: usize| {
+        (0..cols).map(|col| values[start + (row * cols + col) * channels + 1]).collect()
+    };
+    (0..rows).map(row).collect()
+}
+
+/// How far the squares of one view are moved to the right against those of another (columns): by the
+/// phase of their fundamental period of 7 columns, in a Hann window.
+fn shift(from: &[Vec<f64>], to: &[Vec<f64>]) -> f64 {
+    let wave = |row: &[f64]| {
+        let n = row.len() as f64;
+        let window = |i: usize| 1.0 - (TAU * (i as f64 + 0.5) / n).cos();
+        // Without its mean, of which the window would let some through.
+        let mean: f64 = row.iter().enumerate().map(|(i, v)| window(i) * v).sum::<f64>() / n;
+        row.iter().enumerate().fold([0.0; 2], |[re, im], (i, value)| {
+            let (sine, cosine) = (TAU * i as f64 / 7.0).sin_cos();
+            let value = window(i) * (value - mean);
+            [re + value * cosine, im - value * sine]
+        })
+    };
+    let pairs = from.iter().zip(to).map(|(a, b)| (wave(a), wave(b)));
+    let [re, im] = pairs.fold([0.0; 2], |[re, im], (a, b)| {
+        [re + a[0] * b[0] + a[1] * b[1], im + a[0] * b[1] - a[1] * b[0]]
+    });
+    -im.atan2(re) * 7.0 / TAU
+}
+
+#[test]
+fn decoded_views_are_those_of_an_ideal_lens() {
+    for microlenses in ["", r#", "rotation": 2"#, r#", "grid": "hexagonal", "aperture": "round""#] {
+        let folder = tempfile::tempdir().unwrap();
+        let geometry = write(folder.path(), 0.45, "light_field", microlenses);
+        let (shape, decoded) = array(&folder.path().join("views.npy"));
+        let (same, reference) = array(&folder.path().join("reference.npy"));
+        assert_eq!(shape, same);
+        assert_eq!(geometry["views"], shape[0] as u64);
+        let size = shape[2..].iter().product::<usize>();
+        let psnr = decoded.chunks(size).zip(reference.chunks(size)).map(|(a, b)| {
+            let squares: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
+            -10.0 * (squares / size as f64).log10()
+        });
+        let worst = psnr.fold(f64::INFINITY, f64::min);
+        println!("{microlenses}: worst view {worst:.1} dB");
+        assert!(worst > 40.0, "{microlenses}: {worst}");
+    }
+}
+
+#[test]
+fn disparity_against_depth_has_the_slope_of_the_formula() {
+    let mut points = Vec::new();
+    for depth in [0.36, 0.42, 0.5, 0.8, 1.5] {
+        let folder = tempfile::tempdir().unwrap();
+        let geometry = write(folder.path(), depth, "light_field", "");
+        let (shape, views) = array(&folder.path().join("views.npy"));
+        let n = shape[0];
+        let middle = n / 2;
+        let [first, last] = [0, n - 1].map(|across| view(&shape, &views, across, middle));
+        let measured = -shift(&first, &last) / (n - 1) as f64;
+        let expected = geometry["expected_disparity"].as_f64().unwrap();
+        let [baseline, focal] = ["baseline_m", "focal_length_px"]
+            .map(|key| geometry["disparity"][key].as_f64().unwrap());
+        assert!((expected - baseline * focal * (1.0 / depth - 2.0)).abs() < 1e-9, "{depth}");
+        println!("{depth} m: {measured:.5} and {expected:.5}");
+        // cos⁴ falls across each lenslet, by 4 s/b of its light a length at slope s: its middle moves by
+        // that times pitch²/12, which is 0.0016 columns a view. The rest is what the phase of sampled
+        // squares is short of; the formula itself holds ray by ray (camera/tests/light_field.rs).
+        assert!((measured - expected - 0.0016).abs() < 1.5e-3, "{depth}: {measured} {expected}");
+        points.push([expected, measured]);
+        let pfm = std::fs::read(folder.path().join("central_disparity.pfm")).unwrap();
+        let value = f32::from_le_bytes(pfm[pfm.len() - 4..].try_into().unwrap());
+        assert!((f64::from(value) - expected).abs() < 1e-6, "a wall square to the axis");
+    }
+    let count = points.len() as f64;
+    let mean = [0, 1].map(|k| points.iter().map(|p| p[k]).sum::<f64>() / count);
+    let sum =
+        |k: usize| -> f64 { points.iter().map(|p| (p[0] - mean[0]) * (p[k] - mean[k])).sum() };
+    let slope = sum(1) / sum(0);
+    println!("slope {slope:.5} of the formula's");
+    assert!((slope - 1.0).abs() < 0.01, "{slope}");
+}
+
+#[test]
+fn a_reference_camera_leaves_its_views_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let geometry = write(folder.path(), 0.4, "light_field_reference", "");
+    let (shape, _) = array(&folder.path().join("views.npy"));
+    assert_eq!(geometry["rows"], shape[2] as u64);
+    assert!(geometry["centres_px"].is_null(), "there is no raw picture");
+    assert!(!folder.path().join("white.npy").exists());
+    assert!(!folder.path().join("reference.npy").exists());
+}
+
+/// The light of a whole cell around a lenslet's image: its middle is the one written.
+#[test]
+fn white_images_stand_where_the_geometry_says() {
+    let folder = tempfile::tempdir().unwrap();
+    // Lenslets that are slower than the main lens leave dark pixels between their images.
+    let geometry = write(folder.path(), 0.4, "light_field", r#", "f_number": 3.4, "rotation": 1"#);
+    let (shape, white) = array(&folder.path().join("white.npy"));
+    let width = shape[1];
+    let centres = geometry["centres_px"].as_array().unwrap();
+    let reach = 0.5 * geometry["pitch_px"].as_f64().unwrap() + 0.5;
+    let mut worst = 0.0_f64;
+    for centre in centres.iter().flat_map(|row| row.as_array().unwrap()) {
+        let [x, y] = [0, 1].map(|k| centre[k].as_f64().unwrap());
+        // Further out cos⁴ moves the centroid by more: 4 × slope × 0.1 × a quarter of the radius.
+        if (x - 320.0).abs() > 120.0 {
+            continue;
+        }
+        let (mut sum, mut mean) = (0.0, [0.0; 2]);
+        for (k, value) in white.iter().skip(1).step_by(3).enumerate() {
+            let away = [(k % width) as f64 - x, (k / width) as f64 - y];
+            if away[0].hypot(away[1]) < reach {
+                sum += value;
+                mean = [mean[0] + value * away[0], mean[1] + value * away[1]];
+            }
+        }
+        worst = worst.max((mean[0] / sum).hypot(mean[1] / sum));
+    }
+    println!("worst of {} rows: {worst:.4} px", centres.len());
+    assert!(worst < 0.05, "{worst}");
+}
