@@ -2,6 +2,7 @@
 
 use etendue_camera::{Camera, CameraRays, CameraSpec, FilmSamples, Projection};
 use etendue_geometry::{Bounds, RayBatch};
+use etendue_spectrum::Bands;
 use glam::DVec3;
 
 fn camera(json: &str) -> Result<Camera, String> {
@@ -147,7 +148,7 @@ fn the_centroid_of_a_white_image_is_the_lenslets_centre() {
                 samples.push([x + away[0], y + away[1]], [r(0.628_706_721), r(0.538_597_270)], 0.5);
             }
             let mut rays = CameraRays::default();
-            raw.sample_rays(&samples, &mut rays);
+            raw.opened(&Bands::Rgb).unwrap().sample_rays(&samples, &mut rays);
             let (mut sum, mut mean) = (0.0, [0.0; 2]);
             for (weight, sample) in rays.weight.iter().zip(&rays.sample) {
                 let i = *sample as usize;

@@ -26,11 +26,11 @@ pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, Lig
         let mut sums = vec![[0.0; 3]; width as usize];
         let (mut film, mut rays) = (FilmSamples::default(), CameraRays::default());
         for column in 0..width {
-            for group in &groups {
-                film.wavelength = group.wavelength;
+            for (number, group) in groups.iter().enumerate() {
                 let mut light = 0.0;
                 for samples in SAMPLES {
                     film.clear();
+                    film.group = number;
                     place(&mut film, spec, [column, row], samples);
                     camera.sample_rays(&film, &mut rays);
                     light = rays.weight.iter().sum::<f64>() / f64::from(samples);
