@@ -1,7 +1,9 @@
 //! Arrays of lenslets against closed forms, and their pupils against rays aimed at the whole array.
 
 use etendue_optics::element::{Clip, LensRays, RayStatus};
-use etendue_optics::train::{ExitPupil, Focus, LensFile, MonochromaticTrain, OpticalTrain, Side};
+use etendue_optics::train::{
+    ExitPupil, Focus, Inquiry, LensFile, LensReport, MonochromaticTrain, OpticalTrain, Side,
+};
 use glam::{DVec2, DVec3};
 
 fn lens(json: &str) -> OpticalTrain {
@@ -356,7 +358,8 @@ fn paraxial_data_and_focus_are_those_of_the_lens_before_the_array() {
     let focused = plenoptic(r#""size": [2.4, 1.8], "pitch": 0.25, "focal_length": 1"#, 1.25);
     let near = focused.with_lenslets_focused(1.0).unwrap();
     assert!((near.elements()[2].frame.vertex.z - image - 5.0).abs() < 1e-9);
-    assert!(train.notes().iter().any(|note| note.contains("microlens array")));
+    let report = LensReport::new(&train, &Inquiry::default()).unwrap();
+    assert!(report.notes.iter().any(|note| note.contains("microlens array")));
 }
 
 #[test]

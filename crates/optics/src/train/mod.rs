@@ -369,12 +369,6 @@ impl OpticalTrain {
         }
         notes.extend(self.crossings());
         notes.extend(self.unfilled_stop());
-        if let Some(array) = self.first_array() {
-            notes.push(format!(
-                "elements[{array}] is a microlens array: paraxial data and analysis are those of the lens \
-                 without it; rays do meet its lenslets"
-            ));
-        }
         if !self.elements.iter().all(|e| e.frame.is_axial()) {
             notes.push(
                 "the paraxial analysis leaves tilts and decentrings out; rays do not".to_owned(),

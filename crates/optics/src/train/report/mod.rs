@@ -157,6 +157,12 @@ impl LensReport {
         let paraxial = train.paraxial(train.wavelength())?;
         let wavelengths = inquiry.wavelengths(train)?;
         let mut notes = train.notes().to_vec();
+        notes.extend(train.first_array().map(|array| {
+            format!(
+                "elements[{array}] is a microlens array: paraxial data are those of the lens without \
+                 it; rays do meet its lenslets"
+            )
+        }));
         let sensor_z = match (train.sensor_z(inquiry.focus), inquiry.focus) {
             (Ok(z), _) => Some(z),
             (Err(error), Focus::AsWritten) => {
