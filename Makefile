@@ -30,7 +30,7 @@ setup:
 	@scripts/setup.sh
 
 render: setup
-	cargo run --release -p etendue -- render scenes/first-light.json -o out/first-light
+	cargo run --release -p etendue-cli -- render scenes/first-light.json -o out/first-light
 	@echo "The files are in $(CURDIR)/out/first-light:"
 	@ls -lh out/first-light
 
@@ -43,15 +43,15 @@ test-embree4: setup
 
 # ARGS=--quick takes lighter meshes; benches of single questions: cargo bench -p etendue-benches
 bench: setup
-	cargo build --release -p etendue -p etendue-benches
+	cargo build --release -p etendue-cli -p etendue-benches
 	cargo run --release -p etendue-benches --bin benchmarks -- $(ARGS)
 
 bench-peers: setup
-	cargo build --release -p etendue -p etendue-benches
+	cargo build --release -p etendue-cli -p etendue-benches
 	scripts/bench-peers.sh peers.py $(ARGS)
 
 bench-light: setup
-	cargo build --release -p etendue -p etendue-benches
+	cargo build --release -p etendue-cli -p etendue-benches
 	scripts/bench-peers.sh light_peers.py $(ARGS)
 
 bench-lens:
@@ -67,10 +67,10 @@ docs-charts: setup
 	cargo run --release -p etendue-benches --bin charts -- $(ARGS)
 
 docs-figures: setup docs-charts docs-stability
-	cargo run --release -p etendue -- render scenes/first-light.json -o out/docs-figures \
+	cargo run --release -p etendue-cli -- render scenes/first-light.json -o out/docs-figures \
 		--set 'camera.sensor.resolution=[640,640]' --samples 16 --outputs png
 	install -D -m 644 out/docs-figures/picture.png docs/images/first-light.png
-	cargo run --release -p etendue -- render scenes/paper/fig3.json -o out/docs-figures/fig3 \
+	cargo run --release -p etendue-cli -- render scenes/paper/fig3.json -o out/docs-figures/fig3 \
 		--samples 256 --outputs png
 	install -D -m 644 out/docs-figures/fig3/picture.png docs/images/fig3.png
 	for kind in fig6a fig6b; do \
@@ -80,7 +80,7 @@ docs-figures: setup docs-charts docs-stability
 	done
 	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
 	for kind in fig5a fig5b fig5c fig7a-raw fig7b-rgb fig7c-multispectral; do \
-		cargo run --release -p etendue -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind \
+		cargo run --release -p etendue-cli -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind \
 			--outputs png && \
 		install -D -m 644 out/docs-figures/$$kind/raw.preview.png docs/images/$$kind.png || exit 1; \
 	done
@@ -101,7 +101,7 @@ docs-stability: setup
 
 # BASE=path/to/another/etendue compares the two and fails where they differ.
 fingerprints: setup
-	cargo build --release -p etendue
+	cargo build --release -p etendue-cli
 	scripts/fingerprints.sh target/release/etendue $(BASE)
 
 clean:

@@ -63,6 +63,6 @@ in_namespace '
     [ -z "$assets" ] || mount --bind -o ro "$assets" /mnt/assets
     exec chroot --userspec="$user" /mnt env -i HOME=/tmp LANG=C.UTF-8 PATH=/toolchain/bin:/usr/bin:/bin \
         CARGO_HOME=/cargo CARGO_TARGET_DIR=/target ${assets:+ETENDUE_ASSETS=/assets} \
-        sh -c "cd /checkout; exec cargo test --offline --locked -p embree4-sys -p etendue-accel -p etendue-stability -p etendue"
+        sh -c "cd /checkout; exec cargo test --offline --locked -p embree4-sys -p etendue-accel -p etendue-stability -p etendue -p etendue-cli"
 ' "$PWD/$root" "${CARGO_HOME:-$HOME/.cargo}" "$(rustc --print sysroot)" "${ETENDUE_ASSETS:-}" \
     "$(id -u):$(id -g)"

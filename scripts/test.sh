@@ -24,7 +24,7 @@ cargo clippy --workspace --all-targets -- -D warnings
 
 # An empty EMBREE_DIR would stop the bindings' build, so this also shows that nothing asks for them.
 step "lints without Embree"
-EMBREE_DIR=/nonexistent cargo clippy -p etendue-accel -p etendue --no-default-features \
+EMBREE_DIR=/nonexistent cargo clippy -p etendue-accel -p etendue -p etendue-cli --no-default-features \
     --all-targets -- -D warnings
 
 step "documentation"
@@ -43,7 +43,7 @@ if cargo deny --version >/dev/null 2>&1; then
 fi
 
 step "tests without Embree"
-EMBREE_DIR=/nonexistent run_tests -p etendue-accel -p etendue --no-default-features
+EMBREE_DIR=/nonexistent run_tests -p etendue-accel -p etendue -p etendue-cli --no-default-features
 
 step "tests against Embree 4"
 scripts/test-embree4.sh

@@ -9,12 +9,12 @@ struct Embree {
 }
 
 const NO_EMBREE: &str = "Embree was not found: install it with `apt install libembree-dev` (or set \
-    EMBREE_DIR to a folder with include/ and lib/), or build without it: `cargo build -p etendue \
+    EMBREE_DIR to a folder with include/ and lib/), or build without it: `cargo build -p etendue-cli \
     --no-default-features`";
 
 const NO_LIBCLANG: &str = "libclang, which reads Embree's header, was not found: install it with \
     `apt install libclang-dev` (or set LIBCLANG_PATH to its folder), or build without Embree: \
-    `cargo build -p etendue --no-default-features`";
+    `cargo build -p etendue-cli --no-default-features`";
 
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(embree3, embree4)");

@@ -134,7 +134,9 @@ impl<'a> SceneBuilder<'a> {
 pub(crate) struct Scene {
     // The order matters: the scene lets go of the buffers, then the device, then the geometry.
     handle: SceneHandle,
-    device: Device,
+    /// The scenes of meshes that have one of their own.
+    shared: Vec<Option<Arc<SceneHandle>>>,
+    device: Arc<Device>,
     geometry: Arc<Geometry>,
     /// Some meshes are scenes of their own.
     has_instances: bool,
@@ -154,24 +156,36 @@ impl fmt::Debug for Scene {
 }
 
 impl Scene {
-    /// Builds the scene of `geometry` with coordinates relative to `origin`.
+    /// Builds the scene of `geometry` with coordinates relative to `origin`. After `before`, of which
+    /// something was moved or replaced, large meshes get scenes of their own, and those that `before`
+    /// has of the same meshes are kept.
     pub(crate) fn build(
         geometry: Arc<Geometry>,
         origin: DVec3,
         options: &BuildOptions,
+        before: Option<&Self>,
     ) -> Result<Self, BuildError> {
-        let device = Device::new(options)?;
+        let device = match before {
+            Some(before) => Arc::clone(&before.device),
+            None => Arc::new(Device::new(options)?),
+        };
         let mut copied_bytes = 0;
-        let instanced = Instanced::of(&geometry, origin);
-        let mut shared: Vec<Option<SceneHandle>> = Vec::with_capacity(geometry.meshes.len());
-        for (mesh, &wanted) in geometry.meshes.iter().zip(&instanced.meshes) {
+        let instanced = Instanced::of(&geometry, origin, before.is_some());
+        let mut shared: Vec<Option<Arc<SceneHandle>>> = Vec::with_capacity(geometry.meshes.len());
+        for (index, (mesh, &wanted)) in geometry.meshes.iter().zip(&instanced.meshes).enumerate() {
+            // While both geometries live, buffers of one address are one buffer, which the new geometry
+            // keeps alive as well.
+            if wanted && let Some(kept) = before.and_then(|before| before.scene_of(index, mesh)) {
+                shared.push(Some(kept));
+                continue;
+            }
             let mut scene = None;
             let to_frame = Transform::new(DMat3::IDENTITY, -mesh_origin(mesh));
             if wanted && let Some(shape) = Shape::mesh(&device, mesh, &to_frame, options)? {
                 let mut builder = SceneBuilder::new(&device, options)?;
                 copied_bytes += shape.copied_bytes;
                 builder.attach(&shape, 0);
-                scene = Some(builder.commit(options.progress.as_deref())?);
+                scene = Some(Arc::new(builder.commit(options.progress.as_deref())?));
             }
             shared.push(scene);
         }
@@ -198,7 +212,13 @@ impl Scene {
         device.check("rtcAttachGeometry")?;
         let handle = builder.commit(options.progress.as_deref())?;
         let has_instances = instanced.meshes.contains(&true);
-        Ok(Self { handle, device, geometry, has_instances, copied_bytes })
+        Ok(Self { handle, shared, device, geometry, has_instances, copied_bytes })
+    }
+
+    /// The scene of mesh `index`, where that is `mesh`.
+    fn scene_of(&self, index: usize, mesh: &Mesh) -> Option<Arc<SceneHandle>> {
+        let is_same = self.geometry.meshes.get(index)?.has_surface_of(mesh);
+        self.shared.get(index)?.as_ref().filter(|_| is_same).map(Arc::clone)
     }
 
     /// The geometry whose buffers are shared.

@@ -60,6 +60,16 @@ pub trait Accel: Send + Sync + fmt::Debug {
     /// Whether anything lies between each ray's `t_min` and `t_max`. `blocked` is resized.
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>);
 
+    /// The structure over `geometry`, some of whose placements were moved, added or replaced since this
+    /// one was built, with all of this one that has not changed; `None` for backends that build anew.
+    fn rebuilt(
+        &self,
+        _geometry: Arc<Geometry>,
+        _options: &BuildOptions,
+    ) -> Option<Result<Box<dyn Accel>, BuildError>> {
+        None
+    }
+
     /// How the build went.
     fn report(&self) -> BuildReport;
 

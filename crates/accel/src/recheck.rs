@@ -38,10 +38,10 @@ pub(crate) fn bundle(direction: DVec3, radius: f64, turn: usize) -> [DVec3; BUND
     })
 }
 
-/// One sideways offset (m), for a second opinion.
-pub(crate) fn nudge(direction: DVec3, radius: f64) -> DVec3 {
+/// Sideways offsets (m) that lie on different sides of `direction`, for a second opinion and a third.
+pub(crate) fn nudges(direction: DVec3, radius: f64) -> [DVec3; 2] {
     let (x, y) = direction.any_orthonormal_pair();
-    (x * 0.6 + y * 0.8) * radius
+    [(x * 0.6 + y * 0.8) * radius, (y * 0.6 - x * 0.8) * radius]
 }
 
 /// The misses of a batch that mostly hits, where `in_box` says that the ray crosses the scene's box:

@@ -3,7 +3,8 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use etendue_accel::{BuildOptions, Quality};
+use etendue::{Options, Session, places};
+use etendue_accel::{Accel, BuildOptions, Quality};
 use etendue_bench::BenchError;
 use etendue_bench::accelerators::{self, Method};
 use etendue_bench::cameras;
@@ -21,7 +22,7 @@ use etendue_scene::file::SceneFile;
 use crate::arguments::{BenchArguments, PartArgument, SceneArguments};
 use crate::fault::{Fault, print_text};
 use crate::progress::{Stages, say};
-use crate::{places, render, stop};
+use crate::{render, stop};
 
 /// All of a run, and of a quick one.
 const ROUNDS: [usize; 2] = [5, 3];
@@ -50,16 +51,20 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     let has_pictures = has(PartArgument::Samplers) || has(PartArgument::Cameras);
     let mut notes = Vec::new();
-    let memory = render::Memory::Render { limit: arguments.memory_limit, copy: false };
-    let scene = match has_pictures {
-        true => render::load(&with_picture(&arguments.scene, &mut notes)?, memory, stages)?,
-        false => render::load(&arguments.scene, memory, stages)?,
+    let scene_arguments = match has_pictures {
+        true => with_picture(&arguments.scene, &mut notes)?,
+        false => arguments.scene.clone(),
     };
+    let options =
+        Options { memory_limit: arguments.memory_limit, ..render::options(&scene_arguments) };
+    let mut session = Session::open_with(&scene_arguments.scene, options)?;
+    let progress = stages.progress(false);
+    let scene = session.scene(&progress)?;
     let results = file_names().map(|name| arguments.output.join(name)).collect::<Vec<_>>();
     places::keep_apart(&scene.inputs, &results)?;
     let mut findings = Findings {
         machine: machine::describe(),
-        scene: about(&scene),
+        scene: about(scene),
         rounds: arguments.rounds.unwrap_or(ROUNDS[usize::from(arguments.quick)]),
         accelerators: Vec::new(),
         samplers: None,
@@ -67,10 +72,11 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
         notes,
     };
     if has(PartArgument::Accelerators) {
-        accelerators(arguments, &scene, stages, &mut findings)?;
+        accelerators(arguments, scene, stages, &mut findings)?;
     }
     if has_pictures {
-        pictures(arguments, &scene, stages, &mut findings)?;
+        let (scene, accel) = session.scene_and_accel(&progress)?;
+        pictures(arguments, (scene, accel), stages, &mut findings)?;
     }
     let ledger = Ledger::open(&arguments.output, "bench");
     let files = places::recorded(ledger, || write(arguments, &findings))?;
@@ -150,14 +156,11 @@ fn with_picture(
 /// The samplers, and the models of the lens when there is one.
 fn pictures(
     arguments: &BenchArguments,
-    scene: &Scene,
+    (scene, accel): (&Scene, &dyn Accel),
     stages: Stages,
     findings: &mut Findings,
 ) -> Result<(), Fault> {
     let quick = usize::from(arguments.quick);
-    let options = BuildOptions { memory_limit: arguments.memory_limit, ..BuildOptions::default() };
-    let plan = Plan::new(scene, Outputs::ALL);
-    let accel = etendue_render::build(scene, &plan, &options)?;
     let counts = match &arguments.sample_counts {
         Some(counts) => sorted(counts),
         None => SAMPLES[quick].to_vec(),
@@ -171,13 +174,13 @@ fn pictures(
     let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     if has(PartArgument::Samplers) && scene.picture.is_some_and(is_sampled) {
         let progress = stages.begin("sample");
-        let mut studio = Studio::new(scene, &*accel)?;
+        let mut studio = Studio::new(scene, accel)?;
         findings.samplers =
             Some(samplers::measure(&mut studio, &effort, &|share| progress(share))?);
     }
     if has(PartArgument::Cameras) {
         let progress = stages.begin("camera");
-        let mut studio = Studio::new(scene, &*accel)?;
+        let mut studio = Studio::new(scene, accel)?;
         match cameras::measure(&mut studio, &effort, &|share| progress(share)) {
             Ok(cameras) => {
                 findings.notes.extend(cameras.notes.iter().cloned());

@@ -57,6 +57,16 @@ impl Fault {
     }
 }
 
+impl From<etendue::Error> for Fault {
+    fn from(error: etendue::Error) -> Self {
+        match error {
+            error if error.is_stopped() => Self::stopped(STOPPED),
+            error if error.is_refused() => Self::Refused(error.into()),
+            error => Self::Failed(error.into()),
+        }
+    }
+}
+
 impl From<SceneError> for Fault {
     fn from(error: SceneError) -> Self {
         match error {

@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
+use etendue::places;
 use etendue_geometry::units::Dimension;
 use etendue_optics::train::{Focus, Inquiry, LensReport, OpticalTrain, drawing};
 use etendue_render::output::{sidecar, write_whole};
@@ -12,7 +13,6 @@ use etendue_scene::file::{ReadLens, read_lens, trace_rays};
 
 use crate::arguments::LensArguments;
 use crate::fault::{Fault, print_json, print_json_line, print_text};
-use crate::places;
 use crate::progress::say;
 
 pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {

@@ -7,7 +7,6 @@ mod check;
 mod fault;
 mod glasses;
 mod lens;
-mod places;
 mod plan;
 mod progress;
 mod render;

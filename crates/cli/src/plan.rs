@@ -1,15 +1,16 @@
 //! `etendue plan`: what a render would do, and why.
 
-use etendue_render::Plan;
-use etendue_render::output::Outputs;
+use etendue::{Options, Session};
 
 use crate::arguments::PlanArguments;
 use crate::fault::{Fault, print_json, print_text};
 use crate::progress::Stages;
-use crate::render::{Memory, load};
+use crate::render::options;
 
 pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
-    let scene = load(&arguments.scene, Memory::Look, Stages::new(arguments.json))?;
-    let plan = Plan::new(&scene, Outputs::ALL);
+    let progress = Stages::new(arguments.json).progress(false);
+    let options = Options { to_render: false, ..options(&arguments.scene) };
+    let mut session = Session::open_with(&arguments.scene.scene, options)?;
+    let plan = session.plan(&progress)?;
     if arguments.json { print_json(&plan.decisions) } else { print_text(&plan.to_string()) }
 }

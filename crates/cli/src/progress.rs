@@ -3,6 +3,7 @@
 use std::io::{IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use etendue::Stage;
 use etendue_render::Progress;
 use etendue_scene::escape::printable;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -40,6 +41,27 @@ pub(crate) struct Stages {
 impl Stages {
     pub(crate) fn new(quiet: bool) -> Self {
         Self { shown: !quiet && std::io::stderr().is_terminal() }
+    }
+
+    /// The bars of all stages of a render, one after the other, and notes above them where they are
+    /// `said`.
+    pub(crate) fn progress(self, says_notes: bool) -> etendue::Progress {
+        let shown: Mutex<Option<(Stage, Progress)>> = Mutex::default();
+        let told = move |stage: Stage, share: f64| {
+            let mut shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
+            if shown.as_ref().is_none_or(|(of, _)| *of != stage) {
+                // The old bar goes before the new one comes.
+                *shown = None;
+                *shown = Some((stage, self.begin(stage.name())));
+            }
+            shown.as_ref().is_none_or(|(_, bar)| bar(share))
+        };
+        let note = move |note: &str| {
+            if says_notes {
+                say(&format!("note: {note}"));
+            }
+        };
+        etendue::Progress::new(told).with_notes(note)
     }
 
     /// Begins a stage. The function is told the share done and answers whether to go on; the bar

@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use etendue::places;
 use etendue_render::output::{Ledger, note_finished, sidecar, write_whole};
 use etendue_scene::file::SensorFile;
 use etendue_sensor::emva::{DESCRIPTOR, EmvaError, MANIFEST, Options, Series};
@@ -17,7 +18,7 @@ use serde_json::json;
 use crate::arguments::SensorArguments;
 use crate::fault::{Fault, print_json, print_text};
 use crate::progress::{Stages, say};
-use crate::{places, stop};
+use crate::stop;
 
 pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
     stop::listen();

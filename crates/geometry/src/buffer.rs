@@ -33,6 +33,12 @@ impl<T: AnyBitPattern> Buffer<T> {
         Some(Self { owner: Owner::Mapped { file: Arc::clone(file), offset, len } })
     }
 
+    /// Whether both are the same values in the same place.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.as_ptr() == other.as_ptr() && self.len() == other.len()
+    }
+
     /// Whether the values are part of a mapped file.
     #[must_use]
     pub fn is_mapped(&self) -> bool {

@@ -5,7 +5,36 @@
 
 use std::fs::{self, File, Metadata};
 use std::io::{self, Read};
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+use std::time::SystemTime;
+
+/// A file's length, time of change and identity: what tells whether it is as it was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stamp {
+    length: u64,
+    modified: Option<SystemTime>,
+    /// Device and number there.
+    node: [u64; 2],
+}
+
+impl Stamp {
+    /// `None` when the file is not to be had.
+    #[must_use]
+    pub fn of(path: &Path) -> Option<Self> {
+        path.metadata().ok().map(|metadata| Self::from(&metadata))
+    }
+}
+
+impl From<&Metadata> for Stamp {
+    fn from(metadata: &Metadata) -> Self {
+        Self {
+            length: metadata.len(),
+            modified: metadata.modified().ok(),
+            node: [metadata.dev(), metadata.ino()],
+        }
+    }
+}
 
 /// Opens the regular file at `path` for reading.
 ///

@@ -55,6 +55,13 @@ impl<const N: usize> Vertices<N> {
         std::array::from_fn(|k| self.floats[start + k])
     }
 
+    /// Whether both are the same values in the same place.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.floats.is_same(&other.floats)
+            && (self.stride, self.count) == (other.stride, other.count)
+    }
+
     /// The values behind the vertices, for a reader that keeps its own loop.
     #[must_use]
     pub fn floats(&self) -> &Buffer<f32> {
@@ -159,6 +166,90 @@ impl Mesh {
             colors: None,
             bounds,
             degenerate,
+        }
+    }
+
+    /// A mesh of three coordinates a vertex (m) and three vertices a triangle. Kept in single precision where
+    /// that rounds nothing off.
+    ///
+    /// # Errors
+    ///
+    /// When a triangle names a vertex that is not there, or one that is not finite.
+    pub fn from_arrays(
+        name: impl Into<String>,
+        vertices: &[[f64; 3]],
+        triangles: &[[u32; 3]],
+    ) -> Result<Self, String> {
+        for (number, triangle) in triangles.iter().enumerate() {
+            for &corner in triangle {
+                let Some(vertex) = vertices.get(corner as usize) else {
+                    let count = vertices.len();
+                    return Err(format!("triangle {number} names vertex {corner} of {count}"));
+                };
+                if !vertex.iter().all(|value| value.is_finite()) {
+                    return Err(format!("vertex {corner} of triangle {number} is {vertex:?}"));
+                }
+            }
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "checked to be exact")]
+        let narrow: Vec<[f32; 3]> = vertices.iter().map(|v| v.map(|x| x as f32)).collect();
+        let is_exact = |(wide, narrow): (&[f64; 3], &[f32; 3])| {
+            narrow.map(|x| f64::from(x).to_bits()) == wide.map(f64::to_bits)
+        };
+        let positions = match vertices.iter().zip(&narrow).all(is_exact) {
+            true => Positions::F32(Vertices::from_arrays(&narrow)),
+            false => Positions::F64(vertices.to_vec().into()),
+        };
+        Ok(Self::new(name, positions, triangles.to_vec().into()))
+    }
+
+    /// Whether corners and triangles are those of `other`, in the same place in memory.
+    #[must_use]
+    pub fn has_surface_of(&self, other: &Self) -> bool {
+        let positions = match (&self.positions, &other.positions) {
+            (Positions::F32(own), Positions::F32(other)) => own.is_same(other),
+            (Positions::F64(own), Positions::F64(other)) => own.is_same(other),
+            (Positions::F32(_), Positions::F64(_)) | (Positions::F64(_), Positions::F32(_)) => false,
+        };
+        positions && self.triangles.is_same(&other.triangles)
+    }
+
+    /// Whether all values are those of `other`, in the same place in memory.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        fn same<const N: usize>(own: Option<&Vertices<N>>, other: Option<&Vertices<N>>) -> bool {
+            match (own, other) {
+                (Some(own), Some(other)) => own.is_same(other),
+                (None, None) => true,
+                (Some(_), None) | (None, Some(_)) => false,
+            }
+        }
+        self.has_surface_of(other)
+            && self.name == other.name
+            && same(self.normals.as_ref(), other.normals.as_ref())
+            && same(self.colors.as_ref(), other.colors.as_ref())
+            && self.uvs.len() == other.uvs.len()
+            && self.uvs.iter().zip(&other.uvs).all(|(own, other)| own.is_same(other))
+    }
+
+    /// Takes the corners and triangles of `other` in place of its own where they have the same values,
+    /// so that they are in memory once.
+    pub fn share_surface(&mut self, other: &Self) {
+        let is_equal = self.positions.len() == other.positions.len()
+            && self.triangles[..] == other.triangles[..]
+            && match (&self.positions, &other.positions) {
+                (Positions::F32(own), Positions::F32(other)) => {
+                    (0..own.len()).all(|i| own.get(i).map(f32::to_bits) == other.get(i).map(f32::to_bits))
+                }
+                (Positions::F64(own), Positions::F64(other)) => {
+                    let bits = |p: &[f64; 3]| p.map(f64::to_bits);
+                    own.iter().map(bits).eq(other.iter().map(bits))
+                }
+                (Positions::F32(_), Positions::F64(_)) | (Positions::F64(_), Positions::F32(_)) => false,
+            };
+        if is_equal {
+            self.positions = other.positions.clone();
+            self.triangles = other.triangles.clone();
         }
     }
 

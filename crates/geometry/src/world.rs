@@ -32,6 +32,24 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// Whether a ray meets the same triangles in the same places as in `other`, whose meshes are the same
+    /// in memory.
+    #[must_use]
+    pub fn has_surfaces_of(&self, other: &Self) -> bool {
+        let stands = |p: &Placement| (p.mesh, p.world_from_mesh);
+        self.meshes.len() == other.meshes.len()
+            && self.meshes.iter().zip(&other.meshes).all(|(own, other)| own.has_surface_of(other))
+            && self.placements.iter().map(stands).eq(other.placements.iter().map(stands))
+    }
+
+    /// Whether all is as in `other`, whose meshes are the same in memory.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.meshes.len() == other.meshes.len()
+            && self.meshes.iter().zip(&other.meshes).all(|(own, other)| own.is_same(other))
+            && self.placements == other.placements
+    }
+
     /// Triangles, each stored one once.
     #[must_use]
     pub fn triangles_unique(&self) -> u64 {

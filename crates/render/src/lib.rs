@@ -30,6 +30,6 @@ mod watch;
 
 pub use film::{NoMemory, Precision};
 pub use plan::{Decision, Plan};
-pub use render::{Images, Progress, RenderError, Rendered, accelerators, build, render};
+pub use render::{Images, Progress, RenderError, Rendered, accelerators, build, rebuild, render};
 pub use report::{Report, Seconds};
 pub use watch::{SoFar, Watch};

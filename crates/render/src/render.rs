@@ -5,15 +5,16 @@ use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildError, BuildOptions};
 use etendue_camera::{Camera, PixelExtent};
+use etendue_geometry::files::Stamp;
 use etendue_image::Limits;
 use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightRow};
 use etendue_spectrum::Bands;
-use etendue_tracer::texture::{Encoding, ImageError};
+use etendue_tracer::texture::{Encoding, Filter, ImageError, Wrap};
 use etendue_tracer::{
-    Emitters, EnvironmentImage, EnvironmentMap, Image, LayerSpec, LightKind, LightingContext,
-    Lights, Material, Pixel, RayStats, SceneView, Spectral, Traits, View,
+    Emitters, EnvironmentImage, EnvironmentMap, Image, ImageSource, LayerSpec, LightKind,
+    LightingContext, Lights, Material, Pixel, RayStats, SceneView, Spectral, Texture, Traits, View,
 };
 use rayon::prelude::*;
 
@@ -145,13 +146,37 @@ pub fn build(
     })
 }
 
+/// As [`build`], after `before` was built for the same scene, of which parts have changed since: what of
+/// it has not is kept, where the backend can.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn rebuild(
+    scene: &Scene,
+    plan: &Plan,
+    options: &BuildOptions,
+    before: Option<&dyn Accel>,
+) -> Result<Box<dyn Accel>, RenderError> {
+    let with_quality = BuildOptions { quality: plan.quality, ..options.clone() };
+    let again = |before: &dyn Accel| before.rebuilt(Arc::clone(&scene.geometry), &with_quality);
+    match before.and_then(again) {
+        Some(rebuilt) => Ok(rebuilt?),
+        None => build(scene, plan, options),
+    }
+}
+
 /// Images of a scene's materials and its environment, decoded; what could not be is told.
 #[derive(Debug, Default)]
 pub struct Images {
     /// One a texture; `None` where no layer looks at it.
-    pub decoded: Vec<Option<Image>>,
+    pub decoded: Vec<Option<Arc<Image>>>,
     /// The image of the environment.
     pub environment: Option<Arc<EnvironmentMap>>,
+    /// What each texture was decoded from, and what is wrong with it.
+    origins: Vec<Option<Origin>>,
+    /// What the environment was read from, and its file as it was.
+    sky: Option<(EnvironmentImage, Option<Stamp>)>,
     /// What could not be decoded, in words.
     pub faults: Vec<String>,
 }
@@ -166,51 +191,53 @@ impl Images {
     /// When the environment cannot be read or decoded, or an image that the scene itself names is too
     /// large.
     pub fn decode(scene: &Scene, plan: &Plan, memory: Option<u64>) -> Result<Self, RenderError> {
+        Self::default().renewed(scene, plan, memory)
+    }
+
+    /// As [`Self::decode`], with what these images have already.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::decode`].
+    pub fn renewed(
+        &self,
+        scene: &Scene,
+        plan: &Plan,
+        memory: Option<u64>,
+    ) -> Result<Self, RenderError> {
         let limits = Limits::within(memory);
         let wanted = wanted_images(scene, plan);
         let results: Vec<_> = scene
             .textures
             .par_iter()
             .zip(&wanted)
-            .map(|(texture, encodings)| {
-                let decode = |encodings: &Encodings| -> Result<Image, ImageError> {
-                    let mut image = texture.decode(limits)?;
-                    for &encoding in encodings.iter().flatten() {
-                        image.filter_by_footprint(encoding, &texture.name)?;
-                    }
-                    Ok(image)
-                };
-                encodings.as_ref().map(decode)
+            .enumerate()
+            .map(|(i, (texture, encodings))| {
+                let encodings = (*encodings)?;
+                let origin = Origin::of(texture, encodings);
+                Some(match self.known(i, &origin) {
+                    Some(known) => Ok(known),
+                    None => decoded(texture, origin, limits),
+                })
             })
             .collect();
         let mut images = Self::default();
-        for (texture, result) in scene.textures.iter().zip(results) {
-            let image = match result {
-                // Who writes a scene can choose a smaller image; who renders a model often cannot.
-                Some(Err(error)) if texture.named_by_scene && error.is_too_large() => {
-                    return Err(error.into());
-                }
-                Some(Err(error)) => {
-                    let shown = "where it is a colour, magenta squares show it; data are left out";
-                    images.faults.push(format!("{error}; {shown}"));
-                    Some(Image::missing())
-                }
-                Some(Ok(image)) => Some(image),
-                None => None,
-            };
-            let dropped = image.as_ref().map_or(0, |image| image.dropped);
-            if dropped > 0 {
-                images.faults.push(format!(
-                    "{} has {dropped} texels that are not finite or below zero; they are black",
-                    texture.name
-                ));
-            }
+        for result in results {
+            let (image, origin) = result.transpose()?.unzip();
+            images.faults.extend(origin.iter().filter_map(|origin| origin.fault.clone()));
             images.decoded.push(image);
+            images.origins.push(origin);
         }
         if plan.layers.contains(&LayerSpec::Radiance) {
-            images.read_environment(scene, limits)?;
+            images.read_environment(scene, limits, self)?;
         }
         Ok(images)
+    }
+
+    /// The image of texture `i`, where it was decoded from the same.
+    fn known(&self, i: usize, origin: &Origin) -> Option<(Arc<Image>, Origin)> {
+        let known = self.origins.get(i)?.as_ref().filter(|known| known.is_same(origin))?;
+        Some((Arc::clone(self.decoded.get(i)?.as_ref()?), known.clone()))
     }
 
     /// What is wrong with the first image of `scene` that cannot be decoded, whether a layer looks at
@@ -232,11 +259,24 @@ impl Images {
         faults.into_iter().flatten().next().or_else(environment)
     }
 
-    fn read_environment(&mut self, scene: &Scene, limits: Limits) -> Result<(), ImageError> {
-        let map = match environment(scene) {
-            Some(EnvironmentImage::Studio) => EnvironmentMap::studio(),
-            Some(EnvironmentImage::File(path)) => EnvironmentMap::read(path, limits)?,
-            Some(EnvironmentImage::Constant) | None => return Ok(()),
+    fn read_environment(
+        &mut self,
+        scene: &Scene,
+        limits: Limits,
+        before: &Self,
+    ) -> Result<(), ImageError> {
+        let Some(image) = environment(scene) else { return Ok(()) };
+        let stamp = match image {
+            EnvironmentImage::File(path) => Stamp::of(path),
+            EnvironmentImage::Studio | EnvironmentImage::Constant => None,
+        };
+        self.sky = Some((image.clone(), stamp));
+        let known = before.environment.as_ref().filter(|_| before.sky == self.sky);
+        let map = match (known, image) {
+            (Some(known), _) => Arc::clone(known),
+            (None, EnvironmentImage::Studio) => Arc::new(EnvironmentMap::studio()),
+            (None, EnvironmentImage::File(path)) => Arc::new(EnvironmentMap::read(path, limits)?),
+            (None, EnvironmentImage::Constant) => return Ok(()),
         };
         if map.dropped > 0 {
             self.faults.push(format!(
@@ -244,7 +284,7 @@ impl Images {
                 map.dropped
             ));
         }
-        self.environment = Some(Arc::new(map));
+        self.environment = Some(map);
         Ok(())
     }
 
@@ -288,6 +328,81 @@ pub(crate) fn wanted_images(scene: &Scene, plan: &Plan) -> Vec<Option<Encodings>
         }
     }
     wanted
+}
+
+/// What an image was decoded from, and what is wrong with it.
+#[derive(Debug, Clone)]
+struct Origin {
+    source: ImageSource,
+    /// The file as it was.
+    stamp: Option<Stamp>,
+    wrap: [Wrap; 2],
+    filter: Filter,
+    /// How it is filtered by footprint.
+    encodings: Encodings,
+    fault: Option<String>,
+}
+
+impl Origin {
+    fn of(texture: &Texture, encodings: Encodings) -> Self {
+        Self {
+            source: texture.source.clone(),
+            stamp: texture.file().and_then(|path| Stamp::of(path)),
+            wrap: texture.wrap,
+            filter: texture.filter,
+            encodings,
+            fault: None,
+        }
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        let source = match (&self.source, &other.source) {
+            (ImageSource::File(own), ImageSource::File(other)) => own == other,
+            (ImageSource::Bytes(own), ImageSource::Bytes(other)) => own.is_same(other),
+            (ImageSource::Missing, ImageSource::Missing) => true,
+            (ImageSource::File(_) | ImageSource::Bytes(_) | ImageSource::Missing, _) => false,
+        };
+        source
+            && self.stamp == other.stamp
+            && (self.wrap, self.filter) == (other.wrap, other.filter)
+            && self.encodings == other.encodings
+    }
+}
+
+/// Decodes a texture; a broken one becomes a magenta checker and a fault.
+///
+/// # Errors
+///
+/// When it is too large and the scene itself names it: who writes a scene can choose a smaller image, who
+/// renders a model often cannot.
+fn decoded(
+    texture: &Texture,
+    mut origin: Origin,
+    limits: Limits,
+) -> Result<(Arc<Image>, Origin), ImageError> {
+    let decode = || -> Result<Image, ImageError> {
+        let mut image = texture.decode(limits)?;
+        for encoding in origin.encodings.into_iter().flatten() {
+            image.filter_by_footprint(encoding, &texture.name)?;
+        }
+        Ok(image)
+    };
+    let image = match decode() {
+        Err(error) if texture.named_by_scene && error.is_too_large() => return Err(error),
+        Err(error) => {
+            let shown = "where it is a colour, magenta squares show it; data are left out";
+            origin.fault = Some(format!("{error}; {shown}"));
+            Image::missing()
+        }
+        Ok(image) => image,
+    };
+    if image.dropped > 0 {
+        origin.fault = Some(format!(
+            "{} has {} texels that are not finite or below zero; they are black",
+            texture.name, image.dropped
+        ));
+    }
+    Ok((Arc::new(image), origin))
 }
 
 /// The image of the environment of `scene`, when it has one.

@@ -1,20 +1,21 @@
 //! A number that tells whether two renders were of the same scene.
 
 use std::fmt;
-use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::Arc;
 
-use etendue_geometry::files;
 use serde_json::Value;
 use xxhash_rust::xxh3::Xxh3Default;
 
 use crate::SceneError;
+use crate::cache::Digests;
 
 /// The identity of a scene: XXH3-128 (Collet, *xxHash fast digest algorithm*, 2020) of
 ///
 /// 1. the scene's JSON after all settings, with sorted keys and no blanks,
 /// 2. the camera as it was built, in the words of `camera.json`,
-/// 3. name (relative to the scene's folder), length and **contents** of every file that was read.
+/// 3. name (relative to the scene's folder) and XXH3-128 of the **contents** of every file that was
+///    read, and of every mesh that is in no file.
 ///
 /// It does not see files that the render did not want, such as an image that no layer shows.
 /// Formatting, machine, folder and time do not change it. It is no protection against forgery.
@@ -34,14 +35,22 @@ pub(crate) struct Ingredients {
     json: String,
     /// Files by the name that the scene's folder gives them, sorted.
     files: Vec<(String, PathBuf)>,
+    /// Fingerprints of meshes that are in no file, by their names.
+    meshes: Vec<(String, u128)>,
+    digests: Arc<Digests>,
 }
 
 impl Ingredients {
-    pub(crate) fn new(value: &Value, mut files: Vec<(String, PathBuf)>) -> Self {
+    pub(crate) fn new(
+        value: &Value,
+        mut files: Vec<(String, PathBuf)>,
+        meshes: Vec<(String, u128)>,
+        digests: Arc<Digests>,
+    ) -> Self {
         files.sort();
         let mut json = String::new();
         canonical(value, &mut json);
-        Self { json, files }
+        Self { json, files, meshes, digests }
     }
 
     pub(crate) fn hash(&self, camera: &str) -> Result<SceneHash, SceneError> {
@@ -50,7 +59,11 @@ impl Ingredients {
         add(&mut hash, camera.as_bytes());
         for (name, path) in &self.files {
             add(&mut hash, name.as_bytes());
-            add_file(&mut hash, path).map_err(|source| SceneError::unreadable(path, source))?;
+            add(&mut hash, &self.digests.of(path)?.to_le_bytes());
+        }
+        for (name, digest) in &self.meshes {
+            add(&mut hash, name.as_bytes());
+            add(&mut hash, &digest.to_le_bytes());
         }
         Ok(SceneHash(hash.digest128()))
     }
@@ -60,22 +73,6 @@ impl Ingredients {
 fn add(hash: &mut Xxh3Default, part: &[u8]) {
     hash.update(&(part.len() as u64).to_le_bytes());
     hash.update(part);
-}
-
-/// Adds a file behind its length, piece by piece: a file that another program cuts meanwhile is none
-/// that may be mapped for it.
-fn add_file(hash: &mut Xxh3Default, path: &Path) -> io::Result<()> {
-    let mut file = files::open(path)?;
-    hash.update(&file.metadata()?.len().to_le_bytes());
-    let mut piece = vec![0; 1 << 20];
-    loop {
-        match file.read(&mut piece) {
-            Ok(0) => return Ok(()),
-            Ok(length) => hash.update(&piece[..length]),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
 }
 
 /// JSON with sorted keys, whatever order the map keeps.

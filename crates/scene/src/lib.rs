@@ -17,11 +17,13 @@
 //! | [`import`] | glTF, OBJ and PLY |
 //! | [`shape`] | shapes made on load |
 //! | [`scene`] | the loaded scene |
+//! | [`Cache`] | what is kept from one load to the next |
 //! | [`escape`] | text out of files on its way to a terminal |
 //! | [`memory`] | how much memory there may be, and an account of it |
 //! | [`doctor`] | what a scene holds and what is wrong with it, without rendering |
 
 mod bounds;
+mod cache;
 pub mod cameras;
 pub mod doctor;
 pub mod error;
@@ -44,6 +46,7 @@ pub mod shape;
 mod sniff;
 mod words;
 
+pub use cache::Cache;
 pub use cameras::{CameraOrigin, SceneCamera};
 pub use doctor::{Diagnosis, MemoryForecast};
 pub use error::SceneError;

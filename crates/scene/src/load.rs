@@ -8,13 +8,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::SystemTime;
 
 use etendue_camera::{Camera, CameraError, CameraSpec};
-use etendue_geometry::{Bounds, Geometry, Transform};
+use etendue_geometry::{Bounds, Geometry};
 use etendue_sensor::Sensor;
 use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
 
 use crate::bounds::Vertices;
+use crate::cache::{KeptCamera, Manner};
 use crate::cameras::{self, CameraOrigin, SceneCamera};
 use crate::doctor::memory;
 use crate::file::{FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index, suggest};
@@ -26,7 +27,7 @@ use crate::parts::{Object, Parts};
 use crate::paths::{Folder, Found};
 use crate::scene::{LoadOptions, LoadProgress, Scene};
 use crate::shape::{GoOn, ShapeError, ShapeSpec};
-use crate::{SceneError, facing, light_notes};
+use crate::{Cache, SceneError, cache, facing, light_notes};
 
 /// Where triangles come from, once for all objects that share them.
 struct Origin {
@@ -39,6 +40,22 @@ struct Origin {
 enum OriginKind {
     File(PathBuf),
     Shape(ShapeSpec),
+    /// In no file, by its name.
+    Given(String),
+}
+
+impl OriginKind {
+    /// As the cache knows it.
+    fn kept(&self) -> Option<cache::Origin> {
+        match self {
+            Self::File(path) => Some(cache::Origin::File(path.clone())),
+            // Shapes are made of numbers and words, which always serialise.
+            Self::Shape(shape) => {
+                Some(cache::Origin::Shape(serde_json::to_string(shape).unwrap_or_default()))
+            }
+            Self::Given(_) => None,
+        }
+    }
 }
 
 impl SceneFile {
@@ -51,22 +68,23 @@ impl SceneFile {
     /// imported; the message names the place.
     pub fn load(&self, wanted: Wanted, options: &LoadOptions<'_>) -> Result<Scene, SceneError> {
         let since = SystemTime::now();
+        let fresh = Cache::default();
+        let kept = options.cache.unwrap_or(&fresh);
         let folder = Folder::open(self.folder(), options.reach)?;
         let own = self.named_materials(&folder, wanted)?;
         let lights = self.named_lights(&folder)?;
         // What can be checked without the models is; a bad camera need not wait for them.
-        let camera = self.camera_alone(&folder)?;
+        let size = self.resolution(&folder, options, kept)?;
         let budget = Arc::new(Budget::new(options.memory_limit));
         if options.to_render {
-            let size = camera.resolution();
             let film = memory::film(size, &self.spec.all_layers());
             let [width, height] = size;
             self.take(&budget, film, || format!("a picture of {width} x {height} pixels"))?;
         }
-        let mut named = OwnParts { materials: &own.materials, files: Vec::new() };
+        let mut named = OwnParts { materials: &own.materials, files: Vec::new(), kept };
         let (origins, objects) = self.resolve_objects(&folder, &mut named)?;
         let instance_files = named.files;
-        let imports = self.import_all(&origins, &objects, &folder, wanted, options, &budget)?;
+        let imports = self.import_all(&origins, &objects, &folder, wanted, options, &budget, kept)?;
         let mut parts = Parts::new(own.materials, own.textures, lights.clone().unwrap_or_default());
         let split_nodes = self.kind() == FileKind::Model;
         for (spec, object) in self.spec.objects.iter().zip(&objects) {
@@ -86,7 +104,9 @@ impl SceneFile {
         if self.spec.picture() == Some(LayerSpec::Radiance) && lights.is_none() {
             parts.studio_if_dark = !parts.light_by_default();
         }
-        self.finish(parts, &folder, options, since)
+        let scene = self.finish(parts, &folder, options, kept, since)?;
+        kept.sweep();
+        Ok(scene)
     }
 
     /// The camera as far as it is known without the models: one that frames the scene sees nothing
@@ -136,6 +156,13 @@ impl SceneFile {
         for (index, spec) in self.spec.objects.iter().enumerate() {
             let at = join_index("objects", index);
             let origin = match &spec.source {
+                Source::File(written) if own.kept.given(written).is_some() => {
+                    let kind = OriginKind::Given(written.clone());
+                    origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
+                        origins.push(Origin { kind, user: index });
+                        origins.len() - 1
+                    })
+                }
                 Source::File(written) => {
                     let found = self.find(folder, index, written)?;
                     *files.entry(found.real).or_insert_with(|| {
@@ -262,6 +289,7 @@ impl SceneFile {
         wanted: Wanted,
         options: &LoadOptions<'_>,
         budget: &Arc<Budget>,
+        kept: &Cache,
     ) -> Result<Vec<Import>, SceneError> {
         let done = AtomicUsize::new(0);
         let settings = import::Options {
@@ -279,12 +307,25 @@ impl SceneFile {
             true => memory::structure(triangles),
             false => 0,
         };
+        let manner = Manner {
+            wanted,
+            strictness: options.strictness,
+            root: folder.limit().map(std::path::Path::to_owned),
+        };
         // All are waited for, so that the first fault in the file's order is the one reported.
         let imports: Vec<Result<Import, SceneError>> = origins
             .par_iter()
             .map(|origin| {
                 let at = join_index("objects", origin.user);
-                let import = match &origin.kind {
+                let known = origin.kind.kept();
+                if let Some(import) = known.as_ref().and_then(|known| kept.model(known, &manner)) {
+                    return self.again(&import, budget, &objects[origin.user].title, structure);
+                }
+                let mut import = match &origin.kind {
+                    OriginKind::Given(name) => {
+                        let import = kept.given(name).cloned().unwrap_or_default();
+                        return self.again(&import, budget, name, structure);
+                    }
                     OriginKind::File(path) => {
                         let import = import::import(path, wanted, &settings)
                             .map_err(|source| self.import_fault(at, source))?;
@@ -309,11 +350,31 @@ impl SceneFile {
                             .ok_or(SceneError::Stopped)?
                     }
                 };
+                if let Some(known) = known {
+                    kept.keep(known, manner.clone(), &mut import);
+                }
                 let done = done.fetch_add(1, Ordering::Relaxed) + 1;
                 if goes_on(origin, done) { Ok(import) } else { Err(SceneError::Stopped) }
             })
             .collect();
         imports.into_iter().collect()
+    }
+
+    /// A model that is in memory already. Only where the user set a limit is that counted: what the
+    /// system has free is without it.
+    fn again(
+        &self,
+        import: &Import,
+        budget: &Budget,
+        title: &str,
+        structure: impl Fn(u64) -> u64,
+    ) -> Result<Import, SceneError> {
+        if budget.is_given() {
+            let triangles: usize = import.meshes.iter().map(|m| m.triangles.len()).sum();
+            let bytes = import.stats.bytes_copied.saturating_add(structure(triangles as u64));
+            self.take(budget, bytes, || format!("\"{title}\" of {triangles} triangles"))?;
+        }
+        Ok(import.clone())
     }
 
     fn import_fault(&self, at: String, source: import::ImportError) -> SceneError {
@@ -329,20 +390,21 @@ impl SceneFile {
         parts: Parts,
         folder: &Folder,
         options: &LoadOptions<'_>,
+        kept: &Cache,
         since: SystemTime,
     ) -> Result<Scene, SceneError> {
-        let geometry = Arc::new(parts.geometry);
-        let camera_files = CameraFiles::new(folder);
-        let (camera, camera_origin) =
-            self.camera(&geometry, &parts.cameras, &camera_files, options)?;
+        let built = self.kept_camera(parts.geometry, &parts.cameras, (folder, options), kept)?;
+        let KeptCamera { geometry, camera, origin: camera_origin, files: camera_files, .. } = built;
         let opened = parts.stats.files.iter().map(|(path, _)| path.clone());
         let images = parts.textures.iter().filter_map(Texture::file);
         let skies = parts.lights.iter().filter_map(Light::file);
         let others = parts.files.iter();
-        let mut inputs = vec![self.path().to_owned()];
-        inputs.extend(folder.found());
+        let mut inputs = folder.found();
+        if !self.is_in_memory() {
+            inputs.push(self.path().to_owned());
+        }
         let mut files: Vec<(String, PathBuf)> = opened
-            .chain(camera_files.found.into_inner())
+            .chain(camera_files.into_iter().map(|(path, _)| path))
             .chain(images.chain(skies).chain(others).cloned())
             .map(|path| (folder.relative(&path), path))
             .collect();
@@ -382,8 +444,61 @@ impl SceneFile {
             inputs,
             is_copy: options.copy,
             since,
-            ingredients: Ingredients::new(self.value(), files),
+            ingredients: Ingredients::new(
+                self.value(),
+                files,
+                kept.digests_of_given().collect(),
+                kept.digests(),
+            ),
         })
+    }
+
+    /// The picture's columns and rows, known without the models.
+    fn resolution(
+        &self,
+        folder: &Folder,
+        options: &LoadOptions<'_>,
+        kept: &Cache,
+    ) -> Result<[u32; 2], SceneError> {
+        match kept.camera(&self.camera_words(options)) {
+            Some(known) => Ok(known.camera.resolution()),
+            None => Ok(self.camera_alone(folder)?.resolution()),
+        }
+    }
+
+    /// All that makes the camera but the geometry.
+    fn camera_words(&self, options: &LoadOptions<'_>) -> String {
+        format!("{:?} {}", options.camera, self.value().get("camera").unwrap_or_default())
+    }
+
+    /// The camera over `geometry`; the one before when nothing has changed that it depends on.
+    fn kept_camera(
+        &self,
+        geometry: Geometry,
+        cameras: &[SceneCamera],
+        (folder, options): (&Folder, &LoadOptions<'_>),
+        kept: &Cache,
+    ) -> Result<KeptCamera, SceneError> {
+        let words = self.camera_words(options);
+        let known = kept.camera(&words);
+        let geometry = match &known {
+            Some(known) if known.geometry.is_same(&geometry) => Arc::clone(&known.geometry),
+            _ => Arc::new(geometry),
+        };
+        if let Some(known) = known
+            && (Arc::ptr_eq(&known.geometry, &geometry) && options.camera.is_none()
+                || known.origin == CameraOrigin::Scene)
+        {
+            let same = KeptCamera { geometry, ..known };
+            kept.keep_camera(same.clone());
+            return Ok(same);
+        }
+        let files = CameraFiles::new(folder);
+        let (camera, origin) = self.camera(&geometry, cameras, &files, options)?;
+        let files = cache::stamps(&files.found.into_inner());
+        let built = KeptCamera { words, geometry, camera, origin, files };
+        kept.keep_camera(built.clone());
+        Ok(built)
     }
 
     fn camera(
@@ -495,6 +610,7 @@ struct OwnParts<'a> {
     materials: &'a [Material],
     /// Files that objects name beside their models.
     files: Vec<PathBuf>,
+    kept: &'a Cache,
 }
 
 /// That the scene has no material of this name, and which it has.
@@ -537,14 +653,7 @@ fn of_shape(
     let Some(mesh) = shape.build_while(wanted, go_on)? else { return Ok(None) };
     let stats = import::Stats { bytes_copied: mesh.heap_bytes() as u64, ..Default::default() };
     Ok(Some(Import {
-        placements: vec![ImportedPlacement {
-            mesh: 0,
-            material: 0,
-            model_from_mesh: Transform::IDENTITY,
-            name: String::new(),
-            node: 0,
-            instance: None,
-        }],
+        placements: vec![ImportedPlacement::whole(0)],
         meshes: vec![mesh],
         materials: vec![Material::unnamed()],
         stats,

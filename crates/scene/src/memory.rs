@@ -113,6 +113,12 @@ impl Budget {
         Self { limit: Limit::of(given), taken: AtomicU64::new(0) }
     }
 
+    /// Whether the limit is the user's: then what is held already counts, too.
+    #[must_use]
+    pub fn is_given(&self) -> bool {
+        self.limit.is_some_and(|limit| limit.source == LimitSource::Given)
+    }
+
     /// Speaks for `bytes` before they are taken.
     ///
     /// # Errors

@@ -14,6 +14,7 @@ use crate::identity::Ingredients;
 use crate::ids::{Copies, SceneNode};
 use crate::import::{Note, Strictness};
 use crate::paths::Reach;
+use crate::cache::Cache;
 use crate::{CameraOrigin, SceneCamera, SceneError, SceneHash};
 
 /// A scene ready to be rendered.
@@ -86,7 +87,7 @@ impl Scene {
     }
 
     /// The scene's identity. Reads every file of the scene once more, from the system's cache as a
-    /// rule.
+    /// rule; in later loads with the same [`Cache`](crate::Cache) only those that have changed.
     ///
     /// # Errors
     ///
@@ -127,6 +128,8 @@ pub struct LoadOptions<'a> {
     pub to_render: bool,
     /// Read models into memory instead of using them where their files are mapped.
     pub copy: bool,
+    /// What earlier loads left, and models that are in no file.
+    pub cache: Option<&'a Cache>,
     /// Told now and then how far loading is; answering `false` stops it.
     pub progress: Option<&'a (dyn Fn(LoadProgress<'_>) -> bool + Sync)>,
 }

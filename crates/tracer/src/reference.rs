@@ -1,6 +1,8 @@
 //! The reference tracers (paper, section 4.2): distance, normal, position, ids and base colour of
 //! what a ray meets first. No light, no averaging: what a batch hit is written as it is.
 
+use std::sync::Arc;
+
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vertices};
 
@@ -45,7 +47,7 @@ pub struct SceneView<'a> {
     /// Materials, by the index that placements name.
     pub materials: &'a [Material],
     /// Decoded images, by the index that materials name; `None` where the plan needed none.
-    pub images: &'a [Option<Image>],
+    pub images: &'a [Option<Arc<Image>>],
     /// The camera's frame.
     pub view: View,
 }
@@ -244,7 +246,7 @@ impl SceneView<'_> {
     }
 
     fn decoded(&self, image: &TextureUse) -> Option<&Image> {
-        self.images.get(image.texture as usize)?.as_ref()
+        self.images.get(image.texture as usize)?.as_deref()
     }
 
     /// The pixels of a use of an image, averaged over the spot's footprint.

@@ -30,10 +30,16 @@ const WORST_CONDITION: f64 = 1e3;
 /// (`heuristic_openmerge_array.h`, at low quality). Under half a step there is nothing to hit.
 const LEAST_STEPS: f64 = 4.0;
 
+/// Triangles from which a mesh is worth a scene of its own when things move: below it, building takes a
+/// few milliseconds.
+const LARGE: usize = 10_000;
+
 impl Instanced {
-    /// For coordinates relative to `origin`.
-    pub(super) fn of(geometry: &Geometry, origin: DVec3) -> Self {
+    /// For coordinates relative to `origin`. Where things `move`, large meshes that are used once are
+    /// instances, too: what has not changed is then not built again.
+    pub(super) fn of(geometry: &Geometry, origin: DVec3, moves: bool) -> Self {
         let uses = geometry.uses();
+        let is_large = |mesh: usize| geometry.meshes[mesh].triangles.len() >= LARGE;
         let mut seen = HashSet::new();
         let mut meshes = vec![false; geometry.meshes.len()];
         let kind = |placement: &Placement| {
@@ -41,7 +47,7 @@ impl Instanced {
             if !transform.is_finite() || !geometry.has_area(placement) {
                 return Kind::LeftOut;
             }
-            if uses[mesh] < 2 {
+            if uses[mesh] < 2 && !(moves && is_large(mesh)) {
                 return Kind::Baked;
             }
             // Of several in the very same place the first is the one that is seen.

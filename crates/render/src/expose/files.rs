@@ -8,7 +8,7 @@ use etendue_sensor::{Exposure, Film, InvalidValues, RawImage, Sensor, SensorKind
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{BandFilm, ExposeError, Exposed, remarks};
+use super::{ExposeError, Exposed, SensorLight, remarks};
 use crate::output::{
     Channel, Layer, Look, Outputs, Picture, PictureError, SOFTWARE, Values, npy, png, write_whole,
 };
@@ -30,11 +30,9 @@ pub(super) fn name(digits: usize, stem: &str, number: u32, ending: &str) -> Stri
 /// Writes one exposure after the other.
 pub(super) struct Writer<'a> {
     pub(super) sensor: &'a Sensor,
-    pub(super) film: BandFilm,
+    pub(super) light: &'a SensorLight,
     pub(super) folder: &'a Path,
     pub(super) outputs: Outputs,
-    pub(super) seed: u64,
-    pub(super) header: &'a [(String, String)],
     /// Digits of a shot's number in names; 0 for none.
     pub(super) digits: usize,
     /// Of each exposure time so far: its moments' files, which all of its frames share.
@@ -45,7 +43,7 @@ pub(super) struct Writer<'a> {
 
 impl Writer<'_> {
     fn film(&self) -> Film<'_> {
-        Film { values: &self.film.values }
+        self.light.film()
     }
 
     pub(super) fn place(&mut self, name: &str) -> PathBuf {
@@ -59,7 +57,7 @@ impl Writer<'_> {
     }
 
     pub(super) fn shot(&mut self, shot: Exposure) -> Result<ShotFiles, ExposeError> {
-        let image = self.sensor.expose(self.film(), shot, self.seed)?;
+        let image = self.light.expose(shot)?;
         let mut files = ShotFiles::new(shot);
         // Every shot sees the same film, so once is enough.
         self.invalid = image.invalid;
@@ -120,7 +118,7 @@ impl Writer<'_> {
             channels: self.named(planes),
             meaning: self.meaning("digital numbers as the converter gave them", "DN", shot),
         };
-        Picture::new(width, height, vec![layer], self.header.to_vec())
+        Picture::new(width, height, vec![layer], self.light.header.clone())
     }
 
     fn named(&self, planes: Vec<Values>) -> Vec<Channel> {
@@ -160,7 +158,7 @@ impl Writer<'_> {
             .collect();
         let meaning = self.meaning("demosaiced and white balanced", "1", shot);
         let layer = Layer { name: String::new(), look: Look::Color, channels, meaning };
-        Picture::new(image.width, image.height, vec![layer], self.header.to_vec())
+        Picture::new(image.width, image.height, vec![layer], self.light.header.clone())
     }
 
     /// A DNG where the format has words for the sensor; else a note, once.
@@ -225,7 +223,7 @@ impl Writer<'_> {
                 channels: self.named(planes),
                 meaning: self.meaning(definition, unit, shot),
             };
-            let header = self.header.to_vec();
+            let header = self.light.header.clone();
             let picture = Picture::new(moments.width, moments.height, vec![layer], header)?;
             npy::write(&self.place(name), &picture, stem)?;
         }

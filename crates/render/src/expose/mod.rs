@@ -20,7 +20,9 @@ mod remarks;
 use std::path::{Path, PathBuf};
 
 use etendue_scene::Scene;
-use etendue_sensor::{Exposure, InvalidValues, NoiseModel, Sensor, SensorError, SensorKind};
+use etendue_sensor::{
+    Exposure, Film, InvalidValues, NoiseModel, RawImage, Sensor, SensorError, SensorKind,
+};
 use etendue_spectrum::Bands;
 
 pub(crate) use bands::{bands, explain_bands};
@@ -97,56 +99,102 @@ pub struct Exposed {
     pub notes: Vec<String>,
 }
 
-/// Exposes the picture of `scene`, or its light in the sensor's own bands where there is any, and
-/// writes what its sensor gives into `folder`; nothing when the scene has no sensor. Told the share
-/// done, `progress` answers whether to go on.
+/// The light of a rendered scene on its camera's sensor, to be exposed as often as anybody wants.
+#[derive(Debug, Clone)]
+pub struct SensorLight {
+    sensor: Sensor,
+    film: BandFilm,
+    /// Of the scene's samples, and of temporal noise.
+    seeds: [u64; 2],
+    header: Vec<(String, String)>,
+    notes: Vec<String>,
+}
+
+impl SensorLight {
+    /// The picture of `scene`, or its light in the sensor's own bands where there is any, as it falls
+    /// on the sensor.
+    ///
+    /// Where there is nothing to expose, what a user should know of it: no sensor (then it is empty), or no
+    /// picture.
+    ///
+    /// # Errors
+    ///
+    /// When there is no memory for it.
+    pub fn new(
+        scene: &Scene,
+        (picture, band_film): (&Picture, Option<BandFilm>),
+    ) -> Result<Result<Self, Vec<String>>, ExposeError> {
+        let Some(sensor) = &scene.sensor else { return Ok(Err(Vec::new())) };
+        let mut notes = sensor.notes().to_vec();
+        let Some(colors) = colors(picture.layers()) else {
+            notes.push(format!("camera.sensor is not used: {NOTHING_TO_EXPOSE}"));
+            return Ok(Err(notes));
+        };
+        let own = band_film.and_then(|film| {
+            notes.extend(bands::unknown(scene, &film.bands));
+            Some((sensor.clone().in_bands(film.bands.clone()).ok()?, film))
+        });
+        let (sensor, film) = match own {
+            Some(own) => own,
+            None => {
+                // In the picture's own three bands where the sensor can: the same numbers from less
+                // memory.
+                let sensor = sensor.clone().in_bands(Bands::Rgb).unwrap_or_else(|_| sensor.clone());
+                let film = BandFilm::from_rgb(sensor.bands().clone(), &colors)?;
+                (sensor, film)
+            }
+        };
+        let film = film.on_sensor(scene, &sensor);
+        let seeds = [scene.render.seed, noise_seed(scene)];
+        Ok(Ok(Self { sensor, film, seeds, header: picture.header().to_vec(), notes }))
+    }
+
+    /// The sensor, in the bands of the light.
+    #[must_use]
+    pub fn sensor(&self) -> &Sensor {
+        &self.sensor
+    }
+
+    /// One exposure: the same numbers whenever it is asked for.
+    ///
+    /// # Errors
+    ///
+    /// When the film is not the sensor's; a fault of this program.
+    pub fn expose(&self, exposure: Exposure) -> Result<RawImage, SensorError> {
+        self.sensor.expose(self.film(), exposure, self.seeds[1])
+    }
+
+    fn film(&self) -> Film<'_> {
+        Film { values: &self.film.values }
+    }
+}
+
+/// Writes what the sensor makes of `light` into `folder`. Told the share done, `progress` answers
+/// whether to go on.
 ///
 /// # Errors
 ///
 /// When a file cannot be written, or `progress` says stop.
 pub fn write(
-    scene: &Scene,
-    (picture, band_film): (&Picture, Option<BandFilm>),
+    light: &SensorLight,
     folder: &Path,
     outputs: Outputs,
     progress: &dyn Fn(f64) -> bool,
 ) -> Result<Exposed, ExposeError> {
-    let mut exposed = Exposed::default();
-    let Some(sensor) = &scene.sensor else { return Ok(exposed) };
-    exposed.notes.extend_from_slice(sensor.notes());
-    let Some(colors) = colors(picture.layers()) else {
-        exposed.notes.push(format!("camera.sensor is not used: {NOTHING_TO_EXPOSE}"));
-        return Ok(exposed);
-    };
-    let own = band_film.and_then(|film| {
-        exposed.notes.extend(bands::unknown(scene, &film.bands));
-        Some((sensor.clone().in_bands(film.bands.clone()).ok()?, film))
-    });
-    let (sensor, film) = match own {
-        Some(own) => own,
-        None => {
-            // In the picture's own three bands where the sensor can: the same numbers from less
-            // memory.
-            let sensor = sensor.clone().in_bands(Bands::Rgb).unwrap_or_else(|_| sensor.clone());
-            let film = BandFilm::from_rgb(sensor.bands().clone(), &colors)?;
-            (sensor, film)
-        }
-    };
+    let sensor = light.sensor();
     let shots: Vec<Exposure> = sensor.shots().collect();
     let digits = digits(shots.len());
     let mut writer = Writer {
-        sensor: &sensor,
-        film: film.on_sensor(scene, &sensor),
+        sensor,
+        light,
         folder,
         outputs,
-        seed: noise_seed(scene),
-        header: picture.header(),
         digits,
         moments: Vec::new(),
         invalid: InvalidValues::default(),
-        exposed,
+        exposed: Exposed { files: Vec::new(), notes: light.notes.clone() },
     };
-    let mut sidecar = Sidecar::new(&sensor, scene.render.seed);
+    let mut sidecar = Sidecar::new(sensor, light.seeds[0]);
     for (done, shot) in shots.iter().enumerate() {
         if !progress(done as f64 / shots.len() as f64) {
             return Err(ExposeError::Stopped);

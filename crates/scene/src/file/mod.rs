@@ -41,6 +41,9 @@ use document::{Document, excerpt};
 /// The endings of models that may stand in for a scene file.
 const MODELS: [&str; 4] = ["gltf", "glb", "obj", "ply"];
 
+/// What messages call a scene that stands in no file.
+const IN_MEMORY: &str = "scene in memory";
+
 /// The longest text that is read as a scene (bytes): scenes name their meshes, they do not hold
 /// them.
 const LONGEST: u64 = 64 << 20;
@@ -103,7 +106,39 @@ impl SceneFile {
         if let Value::Object(members) = &mut value {
             members.entry("camera").or_insert_with(|| json!({ "type": "pinhole" }));
         }
-        let mut written = Written::new(path, document);
+        Self::of(Written::new(path, document), kind, value, overrides)
+    }
+
+    /// The scene that `value` describes, which stands in no file. What it names lies in `folder`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`].
+    pub fn from_json(folder: &Path, mut value: Value) -> Result<Self, SceneError> {
+        if let Value::Object(members) = &mut value {
+            members.entry("etendue").or_insert_with(|| json!(1));
+            members.entry("camera").or_insert_with(|| json!({ "type": "pinhole" }));
+        }
+        let written = Written::new(&folder.join(IN_MEMORY), None);
+        Self::of(written, FileKind::Scene, value, &[])
+    }
+
+    /// The scene with settings on top of those that it has, as in [`Self::read`]. The file is not read
+    /// again.
+    ///
+    /// # Errors
+    ///
+    /// When the format does not know what they say; the message names the setting.
+    pub fn with(&self, overrides: &[(String, String)]) -> Result<Self, SceneError> {
+        Self::of(self.written.clone(), self.kind, self.value.clone(), overrides)
+    }
+
+    fn of(
+        mut written: Written,
+        kind: FileKind,
+        mut value: Value,
+        overrides: &[(String, String)],
+    ) -> Result<Self, SceneError> {
         written.set(&mut value, overrides)?;
         lenient::tidy(&mut value);
         lenient::read_resolution(&mut value, "camera.sensor.resolution")
@@ -111,6 +146,12 @@ impl SceneFile {
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
         Ok(file)
+    }
+
+    /// Whether the scene stands in no file.
+    #[must_use]
+    pub fn is_in_memory(&self) -> bool {
+        self.kind == FileKind::Scene && self.written.document.is_none()
     }
 
     fn check(&self) -> Result<(SceneSpec, Option<Sensor>), SceneError> {

@@ -137,6 +137,20 @@ pub struct ImportedPlacement {
     pub instance: Option<u32>,
 }
 
+impl ImportedPlacement {
+    /// A mesh without a name where it is, of the first material.
+    pub(crate) fn whole(mesh: u32) -> Self {
+        Self {
+            mesh,
+            material: 0,
+            model_from_mesh: Transform::IDENTITY,
+            name: String::new(),
+            node: 0,
+            instance: None,
+        }
+    }
+}
+
 /// A light of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedLight {

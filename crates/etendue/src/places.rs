@@ -1,29 +1,40 @@
 //! Where results go: made, and checked against the inputs, before any work is done.
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use etendue_render::output::{
     Ledger, OutputError, PartFile, prepare_folder, protect_inputs, refuse_inputs,
 };
 
-use crate::fault::Fault;
+use crate::Error;
 
 /// Makes `folder` and checks that it can be written to.
-pub(crate) fn folder(folder: &Path) -> Result<(), Fault> {
-    prepare_folder(folder).map_err(refused)
+///
+/// # Errors
+///
+/// When it cannot.
+pub fn folder(folder: &Path) -> Result<(), Error> {
+    prepare_folder(folder).map_err(Error::Place)
 }
 
 /// Checks that `file` can be written.
-pub(crate) fn file(file: &Path) -> Result<(), Fault> {
-    PartFile::create(file).map(drop).map_err(refused)
+///
+/// # Errors
+///
+/// When it cannot.
+pub fn file(file: &Path) -> Result<(), Error> {
+    PartFile::create(file).map(drop).map_err(Error::Place)
 }
 
 /// Refuses to write to any of `outputs` that is one of `inputs`, also through links.
-pub(crate) fn keep_apart<'p>(
+///
+/// # Errors
+///
+/// When one is; the message names it.
+pub fn keep_apart<'p>(
     inputs: impl IntoIterator<Item = &'p PathBuf>,
     outputs: &[PathBuf],
-) -> Result<(), Fault> {
+) -> Result<(), Error> {
     protect_inputs(inputs.into_iter().map(PathBuf::as_path));
     Ok(refuse_inputs(outputs.iter().map(PathBuf::as_path))?)
 }
@@ -31,26 +42,18 @@ pub(crate) fn keep_apart<'p>(
 /// Runs `write`, and sees to it that the files which it wrote into the ledger's folder stand in the
 /// manifest, also when it failed half-way. Those that the command wrote there before and not again
 /// are removed when it did not.
-pub(crate) fn recorded<T>(
+///
+/// # Errors
+///
+/// Those of `write`, and when the manifest cannot be written.
+pub fn recorded<T, E: From<OutputError>>(
     mut ledger: Ledger,
-    write: impl FnOnce() -> Result<T, Fault>,
-) -> Result<T, Fault> {
+    write: impl FnOnce() -> Result<T, E>,
+) -> Result<T, E> {
     let written = write();
     let recorded = ledger.record();
     let written = written?;
     recorded?;
     ledger.clear()?;
     Ok(written)
-}
-
-/// A place that cannot be written to is the caller's to mend, unless there is no room.
-fn refused(error: OutputError) -> Fault {
-    match error {
-        OutputError::Io { ref source, .. }
-            if matches!(source.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded) =>
-        {
-            Fault::Failed(error.into())
-        }
-        error => Fault::Refused(error.into()),
-    }
 }

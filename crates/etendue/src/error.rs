@@ -1,0 +1,73 @@
+//! Why something could not be done.
+
+use std::io;
+
+use etendue_accel::BuildError;
+use etendue_render::RenderError;
+use etendue_render::expose::ExposeError;
+use etendue_render::output::OutputError;
+use etendue_scene::SceneError;
+
+/// Why a scene could not be opened, changed, rendered or written. The message is a sentence that names
+/// the file, the place in it and the remedy, as on the command line.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The scene, or something that it names.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The build or the render.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A file could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The sensor's images.
+    #[error(transparent)]
+    Expose(#[from] ExposeError),
+    /// A place for results that cannot be written to, known before any work.
+    #[error(transparent)]
+    Place(OutputError),
+    /// Something else that the caller can mend.
+    #[error("{0}")]
+    Refused(String),
+}
+
+impl Error {
+    /// Whether it is no fault: the caller asked to stop.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        matches!(
+            self,
+            Self::Scene(SceneError::Stopped)
+                | Self::Render(RenderError::Stopped | RenderError::Build(BuildError::Stopped))
+                | Self::Output(OutputError::Stopped { .. })
+                | Self::Expose(ExposeError::Stopped | ExposeError::Output(OutputError::Stopped { .. }))
+        )
+    }
+
+    /// Whether the caller can mend it by another scene, setting or place. What is left are stops, full
+    /// disks, want of memory and faults of this program.
+    #[must_use]
+    pub fn is_refused(&self) -> bool {
+        match self {
+            _ if self.is_stopped() => false,
+            Self::Scene(_) | Self::Refused(_) => true,
+            Self::Render(error) => !matches!(
+                error,
+                RenderError::Picture(_) | RenderError::Build(BuildError::OutOfMemory { .. })
+            ),
+            // Whether it can be written to was asked before: the disk is full, or the folder gone.
+            Self::Output(error) | Self::Expose(ExposeError::Output(error)) => {
+                !matches!(error, OutputError::Io { .. })
+            }
+            Self::Expose(_) => false,
+            Self::Place(error) => !has_no_room(error),
+        }
+    }
+}
+
+fn has_no_room(error: &OutputError) -> bool {
+    use io::ErrorKind::{QuotaExceeded, StorageFull};
+    matches!(error, OutputError::Io { source, .. } if matches!(source.kind(), StorageFull | QuotaExceeded))
+}

@@ -1,0 +1,281 @@
+//! A render's result: layers as arrays, the sensor's images, files of them, and a report.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use etendue_render::expose::{self, BandFilm, SensorLight};
+use etendue_render::output::{
+    Layer, Ledger, Look, MANIFEST, Outputs, Picture, exr, npy, png, sidecar,
+};
+use etendue_render::report::seconds;
+use etendue_render::{Plan, RenderError, Report};
+use etendue_scene::Scene;
+use etendue_sensor::{Exposure, RawImage};
+
+use crate::progress::Stage;
+use crate::{Error, Progress, places};
+
+/// A rendered picture with all its layers, and what the camera's sensor makes of its light.
+#[derive(Debug)]
+pub struct Rendering {
+    pub(crate) scene: Arc<Scene>,
+    pub(crate) picture: Picture,
+    pub(crate) light: Option<SensorLight>,
+    /// Notes on a sensor that has nothing to expose.
+    pub(crate) idle_notes: Vec<String>,
+    pub(crate) report: Report,
+}
+
+/// What was written.
+#[derive(Debug, Clone, Default)]
+pub struct Written {
+    /// The files, in the order in which they were written.
+    pub files: Vec<PathBuf>,
+    /// What a user should know of them.
+    pub notes: Vec<String>,
+    /// How long it took.
+    pub time: Duration,
+}
+
+impl Rendering {
+    pub(crate) fn new(
+        scene: Arc<Scene>,
+        picture: Picture,
+        band_film: Option<BandFilm>,
+        report: Report,
+    ) -> Self {
+        let (light, idle_notes) = match SensorLight::new(&scene, (&picture, band_film)) {
+            Ok(light) => (Some(light), Vec::new()),
+            Err(notes) => (None, notes),
+        };
+        Self { scene, picture, light, idle_notes, report }
+    }
+
+    /// The scene as it was rendered.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Columns and rows.
+    #[must_use]
+    pub fn resolution(&self) -> [usize; 2] {
+        [self.picture.width(), self.picture.height()]
+    }
+
+    /// All layers with the header of their files.
+    #[must_use]
+    pub fn picture(&self) -> &Picture {
+        &self.picture
+    }
+
+    /// The layers, the picture first where there is one.
+    #[must_use]
+    pub fn layers(&self) -> &[Layer] {
+        self.picture.layers()
+    }
+
+    /// The layer of this name, as files have it: `Depth`, `Normal`, `Id.object`; the picture's is empty.
+    #[must_use]
+    pub fn layer(&self, name: &str) -> Option<&Layer> {
+        self.layers().iter().find(|layer| layer.name == name)
+    }
+
+    /// The light on the sensor; `None` for an ideal camera, or a scene without a picture.
+    #[must_use]
+    pub fn sensor_light(&self) -> Option<&SensorLight> {
+        self.light.as_ref()
+    }
+
+    /// The exposures that the scene asks for: exposure times and frames.
+    pub fn exposures(&self) -> impl Iterator<Item = Exposure> + '_ {
+        self.light.iter().flat_map(|light| light.sensor().shots())
+    }
+
+    /// The sensor's digital numbers for one exposure, rows from the top; `None` where there is no sensor.
+    /// The same whenever it is asked for.
+    ///
+    /// # Errors
+    ///
+    /// None that a caller can cause.
+    pub fn raw(&self, exposure: Exposure) -> Result<Option<RawImage>, Error> {
+        let light = self.light.as_ref();
+        Ok(light.map(|light| light.expose(exposure)).transpose().map_err(expose::ExposeError::from)?)
+    }
+
+    /// What the render did and cost. Its files and the time to write them are not in it.
+    #[must_use]
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// What a user should know.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.report.notes
+    }
+
+    /// That it was stopped before all samples were taken, in words.
+    #[must_use]
+    pub fn partial(&self) -> Option<String> {
+        let (has, of) = (self.report.samples, self.report.samples_wanted);
+        (has < of).then(|| format!("stopped after {has} of {of} samples a pixel"))
+    }
+
+    /// Writes all files into `folder`, which is made when it is missing; each appears when it is complete.
+    /// Files that an earlier render left there and this one does not write again are removed, when they are
+    /// as they were.
+    ///
+    /// # Errors
+    ///
+    /// When the folder cannot be written to, or a file of the scene would be overwritten.
+    pub fn write(&self, folder: impl AsRef<Path>, outputs: Outputs) -> Result<Written, Error> {
+        places::folder(folder.as_ref())?;
+        self.write_with(folder.as_ref(), outputs, &Progress::none())
+    }
+
+    /// As [`Self::write`], into a folder that is there, with progress, which can stop it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::write`], and when it is stopped.
+    pub fn write_with(
+        &self,
+        folder: &Path,
+        outputs: Outputs,
+        progress: &Progress,
+    ) -> Result<Written, Error> {
+        let start = Instant::now();
+        let names = self.picture.layers().iter().map(|layer| layer.name.clone());
+        let results = files_of(&self.scene, names, outputs);
+        let results: Vec<PathBuf> = results.map(|name| folder.join(name)).collect();
+        places::keep_apart(&self.scene.inputs, &results)?;
+        let mut written = places::recorded(Ledger::open(folder, "render"), || {
+            let mut files = self.write_layers(folder, outputs, progress)?;
+            let mut notes = self.idle_notes.clone();
+            if let Some(light) = &self.light {
+                let goes_on = |share| progress.goes_on(Stage::Expose, share);
+                let exposed = expose::write(light, folder, outputs, &goes_on)?;
+                files.extend(exposed.files);
+                notes.extend(exposed.notes);
+            }
+            Ok::<_, Error>(Written { files, notes, time: Duration::ZERO })
+        })?;
+        written.notes.iter().for_each(|note| progress.note(note));
+        written.time = start.elapsed();
+        Ok(written)
+    }
+
+    /// The report with the files that were written, as `--report` has it.
+    #[must_use]
+    pub fn report_of(&self, written: &Written) -> Report {
+        let mut report = self.report.clone();
+        report.seconds.write = seconds(written.time);
+        report.seconds.total += report.seconds.write;
+        report.notes.extend(written.notes.iter().cloned());
+        report.files.clone_from(&written.files);
+        report
+    }
+
+    fn write_layers(
+        &self,
+        folder: &Path,
+        outputs: Outputs,
+        progress: &Progress,
+    ) -> Result<Vec<PathBuf>, Error> {
+        let (picture, camera) = (&self.picture, &self.scene.camera);
+        let mut files = Vec::new();
+        let mut place = |name: String| {
+            let path = folder.join(name);
+            files.push(path.clone());
+            path
+        };
+        if outputs.exr {
+            let goes_on = |share: f64| progress.goes_on(Stage::Write, share * 0.5);
+            let options = exr::Options { progress: Some(&goes_on), ..Default::default() };
+            exr::write(&place("layers.exr".to_owned()), picture, &options)?;
+        }
+        let total = picture.layers().len() as f64;
+        for (done, layer) in picture.layers().iter().enumerate() {
+            if !progress.goes_on(Stage::Write, 0.5 + 0.5 * done as f64 / total) {
+                return Err(RenderError::Stopped.into());
+            }
+            let [image, array] = image_and_array(&layer.name);
+            if outputs.png {
+                let bits = match layer.look {
+                    Look::Distance => png::Bits::Sixteen,
+                    _ => png::Bits::Eight,
+                };
+                png::write(&place(image), picture, &layer.name, bits)?;
+                let mask = mask_of(&layer.name);
+                if png::has_mask(layer)
+                    && png::write_mask(&folder.join(&mask), picture, &layer.name)?
+                {
+                    place(mask);
+                }
+            }
+            if outputs.npy {
+                npy::write(&place(array), picture, &layer.name)?;
+            }
+        }
+        sidecar::write_json(&place("camera.json".to_owned()), &camera.opencv())?;
+        sidecar::write(&place("layers.json".to_owned()), picture)?;
+        Ok(files)
+    }
+}
+
+/// The names of all files that a render of `scene` may write, as planned.
+pub(crate) fn file_names(scene: &Scene, plan: &Plan, outputs: Outputs) -> Vec<String> {
+    files_of(scene, plan.names(scene), outputs).collect()
+}
+
+fn files_of(
+    scene: &Scene,
+    layers: impl IntoIterator<Item = String>,
+    outputs: Outputs,
+) -> impl Iterator<Item = String> {
+    let always = ["layers.exr", "camera.json", "layers.json", MANIFEST].map(str::to_owned);
+    let layers = layers.into_iter().flat_map(move |layer| layer_files(&layer, outputs));
+    always.into_iter().chain(layers).chain(expose::file_names(scene))
+}
+
+/// The files of a layer: to look at, and for numpy.
+fn image_and_array(layer: &str) -> [String; 2] {
+    let stem = stem(layer);
+    let image = match layer {
+        "" => format!("{stem}.png"),
+        _ => format!("{stem}.preview.png"),
+    };
+    [image, format!("{stem}.npy")]
+}
+
+/// The file of a layer's numbers, where they are identities.
+fn mask_of(layer: &str) -> String {
+    format!("{}.png", stem(layer))
+}
+
+/// Those of them that are wanted.
+fn layer_files(layer: &str, outputs: Outputs) -> Vec<String> {
+    let [image, array] = image_and_array(layer);
+    let has_mask = layer.starts_with("Id.") || layer == "MaterialId";
+    let files =
+        [(outputs.png, image), (outputs.npy, array), (outputs.png && has_mask, mask_of(layer))];
+    files.into_iter().filter_map(|(wanted, name)| wanted.then_some(name)).collect()
+}
+
+/// A layer's file name: `NormalCamera` is `normal_camera`, `Id.object` `id_object`, the picture
+/// `picture`.
+fn stem(layer: &str) -> String {
+    if layer.is_empty() {
+        return "picture".to_owned();
+    }
+    let mut stem = String::new();
+    for c in layer.replace('.', "_").chars() {
+        if c.is_ascii_uppercase() && !stem.is_empty() {
+            stem.push('_');
+        }
+        stem.push(c.to_ascii_lowercase());
+    }
+    stem
+}

@@ -1,0 +1,525 @@
+//! A scene that is opened once and rendered often.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use etendue_accel::{Accel, BuildOptions};
+use etendue_geometry::{Geometry, Mesh};
+use etendue_render::output::{ImageHash, Layer, Outputs, SOFTWARE};
+use etendue_render::report::memory;
+use etendue_render::{Images, Plan, Rendered, Report, Seconds, plan};
+use etendue_scene::escape::one_line;
+use etendue_scene::file::{AccelName, FileKind, SceneFile};
+use etendue_scene::import::Note;
+use etendue_scene::{Cache, LoadOptions, Reach, Scene, Strictness};
+use serde_json::Value;
+
+use crate::progress::Stage;
+use crate::rendering::file_names;
+use crate::{Error, Progress, Rendering, places};
+
+/// How a scene is opened and built.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Settings of the scene's values, as pairs of a path and JSON: (`camera.fov`, `30`).
+    pub settings: Vec<(String, String)>,
+    /// What becomes of defects in the data.
+    pub strictness: Strictness,
+    /// Whether files outside of the scene's folder may be read.
+    pub reach: Reach,
+    /// A camera of one of the models by name or number, in place of the scene's.
+    pub camera: Option<String>,
+    /// The most memory that may be taken (bytes); `None` for what the system has free.
+    pub memory_limit: Option<u64>,
+    /// What is to be written of the pictures: without NPY data layers are kept in single precision.
+    pub outputs: Outputs,
+    /// Whether the structure is watertight (see [`BuildOptions::robust`]).
+    pub robust: bool,
+    /// One of Embree's instruction sets (see [`BuildOptions::isa`]).
+    pub isa: Option<String>,
+    /// Whether memory for the picture and the structure is spoken for when the scene is loaded, so that a
+    /// render that would not fit is refused before any work is done.
+    pub to_render: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            settings: Vec::new(),
+            strictness: Strictness::default(),
+            reach: Reach::default(),
+            camera: None,
+            memory_limit: None,
+            outputs: Outputs::ALL,
+            robust: true,
+            isa: None,
+            to_render: true,
+        }
+    }
+}
+
+/// A scene that is opened once, changed by [`set`](Self::set) and rendered as often as one likes.
+///
+/// Models, images and the acceleration structure are made when they are first needed and kept. After a
+/// change only what it touches is made anew: the camera, the sensor, the tracer and lights leave meshes
+/// and structure as they are, and an object that is moved leaves the meshes. Pictures are the same, to
+/// the bit, as those of a new session of the changed scene.
+///
+/// A render runs on the threads of the rayon pool that it is called in.
+pub struct Session {
+    file: SceneFile,
+    options: Options,
+    cache: Cache,
+    loaded: Option<Loaded>,
+    built: Option<Built>,
+    images: Images,
+    /// What was set since it was opened.
+    settings: Vec<(String, String)>,
+    /// What was done since the last render.
+    seconds: Seconds,
+}
+
+/// The scene as it is now.
+struct Loaded {
+    scene: Arc<Scene>,
+    plan: Plan,
+    notes: Vec<String>,
+    /// Images are those of this scene.
+    is_decoded: bool,
+}
+
+/// A structure, and what it was built over.
+struct Built {
+    accel: Box<dyn Accel>,
+    geometry: Arc<Geometry>,
+    name: Option<AccelName>,
+}
+
+impl fmt::Debug for Session {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Session").field("file", &self.file.path()).finish_non_exhaustive()
+    }
+}
+
+impl Session {
+    /// Opens a scene (`.json`), or a model to frame by itself (`.gltf`, `.glb`, `.obj`, `.ply`). The text
+    /// is read and checked; nothing that it names is opened yet.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be read or says something that the format does not know.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::open_with(path, Options::default())
+    }
+
+    /// As [`Self::open`], with options.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`].
+    pub fn open_with(path: impl AsRef<Path>, options: Options) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let mut file = SceneFile::read(path, &options.settings)?;
+        let says_nothing = file.spec.layers.is_empty() && file.spec.tracer.is_none();
+        if file.kind() == FileKind::Model && says_nothing {
+            // A bare model gets a picture and the two layers that most people come for.
+            let mut settings = options.settings.clone();
+            settings.push(("tracer".to_owned(), r#"{"type": "facing"}"#.to_owned()));
+            settings.push(("layers".to_owned(), r#"["depth", "normal"]"#.to_owned()));
+            file = SceneFile::read(path, &settings)?;
+        }
+        Ok(Self::of(file, options))
+    }
+
+    /// A scene that stands in no file: `scene` in the words of the scene format, in which the file of an
+    /// object may be the name of a mesh that [`insert_mesh`](Self::insert_mesh) brings. Other files that it
+    /// names lie in `folder`.
+    ///
+    /// # Errors
+    ///
+    /// When the scene says something that the format does not know.
+    pub fn from_json(folder: impl AsRef<Path>, scene: Value) -> Result<Self, Error> {
+        Self::from_json_with(folder, scene, Options::default())
+    }
+
+    /// As [`Self::from_json`], with options.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::from_json`].
+    pub fn from_json_with(
+        folder: impl AsRef<Path>,
+        scene: Value,
+        options: Options,
+    ) -> Result<Self, Error> {
+        let file = SceneFile::from_json(folder.as_ref(), scene)?;
+        let file = if options.settings.is_empty() { file } else { file.with(&options.settings)? };
+        Ok(Self::of(file, options))
+    }
+
+    fn of(file: SceneFile, options: Options) -> Self {
+        Self {
+            file,
+            options,
+            cache: Cache::default(),
+            loaded: None,
+            built: None,
+            images: Images::default(),
+            settings: Vec::new(),
+            seconds: Seconds::default(),
+        }
+    }
+
+    /// Adds a mesh, or replaces it: objects whose `file` is `name` are made of it. Three coordinates a
+    /// vertex (m) and three vertices a triangle, counter-clockwise from its front.
+    ///
+    /// # Errors
+    ///
+    /// When a triangle names a vertex that is not there, or has a corner that is not finite.
+    pub fn insert_mesh(
+        &mut self,
+        name: &str,
+        vertices: &[[f64; 3]],
+        triangles: &[[u32; 3]],
+    ) -> Result<(), Error> {
+        let mesh = Mesh::from_arrays(name, vertices, triangles)
+            .map_err(|why| Error::Refused(format!("mesh \"{name}\": {why}")))?;
+        self.cache.insert_mesh(name, mesh);
+        self.loaded = None;
+        Ok(())
+    }
+
+    /// Sets a value of the scene, at any path: `camera.f_number`, `objects[0].transform.translate`,
+    /// `lights`. What is missing on the way is made. When it is refused, the session is as it was.
+    ///
+    /// # Errors
+    ///
+    /// When the path leads nowhere, or the format does not know the value; the message names both.
+    pub fn set(&mut self, path: &str, value: impl Into<Value>) -> Result<(), Error> {
+        self.set_all([(path, value.into())])
+    }
+
+    /// Sets several values at once, the later the stronger: for changes that make sense together alone.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::set`].
+    pub fn set_all<'p>(
+        &mut self,
+        values: impl IntoIterator<Item = (&'p str, Value)>,
+    ) -> Result<(), Error> {
+        let values = values.into_iter();
+        let settings: Vec<(String, String)> =
+            values.map(|(path, value)| (path.to_owned(), value.to_string())).collect();
+        self.file = self.file.with(&settings)?;
+        // What was set before at the same path is of no effect any more.
+        self.settings.retain(|(path, _)| settings.iter().all(|(other, _)| other != path));
+        self.settings.extend(settings);
+        self.loaded = None;
+        Ok(())
+    }
+
+    /// Reads the scene's file again, with all that was set since, and at the next render the models and
+    /// images that have changed on disk. When it is refused, the session is as it was.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`]; a scene that stands in no file is as it was.
+    pub fn reload(&mut self) -> Result<(), Error> {
+        if !self.file.is_in_memory() {
+            let mut again = Self::open_with(self.file.path(), self.options.clone())?.file;
+            if !self.settings.is_empty() {
+                again = again.with(&self.settings)?;
+            }
+            self.file = again;
+        }
+        self.loaded = None;
+        Ok(())
+    }
+
+    /// All values of the scene as they are now, in the words of the scene format.
+    #[must_use]
+    pub fn values(&self) -> &Value {
+        self.file.value()
+    }
+
+    /// The scene file as it is now.
+    #[must_use]
+    pub fn file(&self) -> &SceneFile {
+        &self.file
+    }
+
+    /// The loaded scene: read now when it is not, or has changed.
+    ///
+    /// # Errors
+    ///
+    /// When a value makes no sense, a file is missing or cannot be imported, there is too little memory, or
+    /// it is stopped.
+    pub fn scene(&mut self, progress: &Progress) -> Result<&Scene, Error> {
+        self.load(progress)?;
+        Ok(&self.loaded()?.scene)
+    }
+
+    /// What a render will do, and why.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::scene`].
+    pub fn plan(&mut self, progress: &Progress) -> Result<&Plan, Error> {
+        self.load(progress)?;
+        Ok(&self.loaded()?.plan)
+    }
+
+    /// The scene and the acceleration structure over its geometry: built now when it is not.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::scene`]; when the structure cannot be built; when it is stopped.
+    pub fn scene_and_accel(&mut self, progress: &Progress) -> Result<(&Scene, &dyn Accel), Error> {
+        self.build(progress)?;
+        Ok((&self.loaded()?.scene, self.built()?))
+    }
+
+    /// Loads, builds and decodes what the next render needs, with progress.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::scene_and_accel`]; when an image of the scene is broken and defects are not
+    /// tolerated; when it is stopped.
+    pub fn prepare(&mut self, progress: &Progress) -> Result<(), Error> {
+        self.build(progress)?;
+        self.decode(progress)
+    }
+
+    /// Checks that results can be written into `folder`, which is made, without any file of the scene being
+    /// overwritten. `also` are names of more files that the caller is to write there.
+    ///
+    /// # Errors
+    ///
+    /// When they cannot.
+    pub fn check_place(
+        &mut self,
+        folder: &Path,
+        also: &[&str],
+        progress: &Progress,
+    ) -> Result<Vec<PathBuf>, Error> {
+        places::folder(folder)?;
+        self.load(progress)?;
+        let (outputs, loaded) = (self.options.outputs, self.loaded()?);
+        let names = file_names(&loaded.scene, &loaded.plan, outputs);
+        let names = names.into_iter().chain(also.iter().map(|&name| name.to_owned()));
+        let results: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();
+        places::keep_apart(&loaded.scene.inputs, &results)?;
+        Ok(results)
+    }
+
+    /// Renders the scene as it is now. When it is stopped while it renders and every pixel has samples, the
+    /// picture of these is returned: see [`Rendering::partial`].
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::prepare`], and when it is stopped before.
+    pub fn render(&mut self, progress: &Progress) -> Result<Rendering, Error> {
+        let start = Instant::now();
+        let before = self.seconds;
+        self.prepare(progress)?;
+        let loaded = self.loaded()?;
+        let (scene, plan, accel) = (Arc::clone(&loaded.scene), &loaded.plan, self.built()?);
+        let tracing = Instant::now();
+        let header = header(&scene)?;
+        let rendered =
+            etendue_render::render(&scene, plan, accel, &self.images, header, progress)?;
+        let mut seconds = self.seconds;
+        seconds.render = tracing.elapsed().as_secs_f64();
+        // What was prepared before this call is a part of it, too.
+        seconds.total = start.elapsed().as_secs_f64() + before.load + before.build + before.decode;
+        let mut more = rendered.notes.clone();
+        more.extend(not_finite(&rendered));
+        more.extend(changed(&scene));
+        more.iter().for_each(|note| progress.note(note));
+        let mut notes = loaded.notes.clone();
+        notes.extend(self.images.faults.iter().cloned());
+        notes.extend(more);
+        let mut report = self.report(&scene, accel, &rendered, seconds)?;
+        (report.samples_wanted, report.notes) = (plan.samples, notes);
+        self.seconds = Seconds::default();
+        let Rendered { picture, band_film, .. } = rendered;
+        Ok(Rendering::new(scene, picture, band_film, report))
+    }
+
+    fn loaded(&self) -> Result<&Loaded, Error> {
+        self.loaded.as_ref().ok_or_else(|| Error::Refused("the scene is not loaded".to_owned()))
+    }
+
+    fn built(&self) -> Result<&dyn Accel, Error> {
+        let built = self.built.as_ref().map(|built| &*built.accel);
+        built.ok_or_else(|| Error::Refused("the structure is not built".to_owned()))
+    }
+
+    /// Loads the scene, if it is not.
+    fn load(&mut self, progress: &Progress) -> Result<(), Error> {
+        if self.loaded.is_some() {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let wanted = plan::wanted(&self.file.spec.all_layers());
+        let share = |done: usize, total: usize| done as f64 / total.max(1) as f64;
+        let goes_on = |step: etendue_scene::LoadProgress<'_>| {
+            progress.goes_on(Stage::Load, share(step.done, step.total))
+        };
+        let options = LoadOptions {
+            strictness: self.options.strictness,
+            reach: self.options.reach,
+            camera: self.options.camera.as_deref(),
+            memory_limit: self.options.memory_limit,
+            to_render: self.options.to_render,
+            cache: Some(&self.cache),
+            progress: Some(&goes_on),
+        };
+        let scene = self.file.load(wanted, &options)?;
+        let notes: Vec<String> = scene.notes.iter().map(in_words).collect();
+        notes.iter().for_each(|note| progress.note(note));
+        let plan = Plan::new(&scene, self.options.outputs);
+        self.loaded = Some(Loaded { scene: Arc::new(scene), plan, notes, is_decoded: false });
+        self.seconds.load += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Builds the structure, unless there is one over the same surfaces.
+    fn build(&mut self, progress: &Progress) -> Result<(), Error> {
+        self.load(progress)?;
+        let Loaded { scene, plan, .. } = self.loaded()?;
+        let name = scene.render.accel;
+        let is_same = |built: &Built| {
+            built.name == name
+                && (Arc::ptr_eq(&built.geometry, &scene.geometry)
+                    || built.geometry.has_surfaces_of(&scene.geometry))
+        };
+        if self.built.as_ref().is_some_and(is_same) {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let options = BuildOptions {
+            threads: rayon::current_num_threads(),
+            memory_limit: self.options.memory_limit,
+            robust: self.options.robust,
+            isa: self.options.isa.clone(),
+            progress: Some(progress.of(Stage::Build)),
+            ..BuildOptions::default()
+        };
+        let before = self.built.as_ref().filter(|built| built.name == name);
+        let accel =
+            etendue_render::rebuild(scene, plan, &options, before.map(|built| &*built.accel))?;
+        let geometry = Arc::clone(&scene.geometry);
+        self.built = Some(Built { accel, geometry, name });
+        self.seconds.build += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Decodes the images that the plan wants, unless they are.
+    fn decode(&mut self, progress: &Progress) -> Result<(), Error> {
+        let Loaded { scene, plan, is_decoded, .. } = self.loaded()?;
+        if *is_decoded {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let images = self.images.renewed(scene, plan, self.options.memory_limit)?;
+        if let (Strictness::Strict, Some(fault)) = (self.options.strictness, images.faults.first()) {
+            return Err(Error::Refused(fault.clone()));
+        }
+        images.faults.iter().for_each(|fault| progress.note(fault));
+        self.images = images;
+        if let Some(loaded) = &mut self.loaded {
+            loaded.is_decoded = true;
+        }
+        self.seconds.decode += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    fn report(
+        &self,
+        scene: &Scene,
+        accel: &dyn Accel,
+        rendered: &Rendered,
+        seconds: Seconds,
+    ) -> Result<Report, Error> {
+        let (built, counts) = (accel.report(), accel.counts());
+        let (peak, private) = memory();
+        let sizes = self.images.sizes(scene);
+        Ok(Report {
+            software: SOFTWARE,
+            scene: scene.path.clone(),
+            scene_hash: scene.hash()?.to_string(),
+            image_hash: ImageHash::of(&rendered.picture).to_string(),
+            resolution: scene.camera.resolution(),
+            layers: rendered.picture.layers().iter().map(Layer::title).collect(),
+            accel: built.backend,
+            build_quality: format!("{:?}", built.quality).to_lowercase(),
+            threads: rayon::current_num_threads(),
+            seed: scene.render.seed,
+            samples: rendered.samples,
+            samples_wanted: rendered.samples,
+            seconds,
+            rays: rendered.rays,
+            lens_rays: rendered.fates.total(),
+            lens_losses: rendered.fates.losses(),
+            mrays_per_second: rendered.rays as f64 / rendered.trace_time.as_secs_f64() / 1e6,
+            rechecked: counts.rechecked,
+            corrected: counts.corrected,
+            triangles: scene.geometry.triangles(),
+            triangles_unique: scene.geometry.triangles_unique(),
+            placements: scene.geometry.placements.len() as u64,
+            bvh_bytes: built.bytes,
+            geometry_bytes_mapped: scene.stats.bytes_mapped,
+            geometry_bytes_copied: scene.stats.bytes_copied + built.copied_bytes,
+            image_bytes: sizes.iter().map(|size| size.bytes).sum(),
+            images: sizes,
+            not_finite: rendered.light.not_finite,
+            peak_memory_bytes: peak,
+            peak_private_bytes: private,
+            notes: Vec::new(),
+            files: Vec::new(),
+        })
+    }
+}
+
+/// What stands in the header of every file.
+fn header(scene: &Scene) -> Result<Vec<(String, String)>, Error> {
+    let header: Vec<(String, String)> = [
+        ("scene_hash", scene.hash()?.to_string()),
+        ("seed", scene.render.seed.to_string()),
+        ("pixel_origin", "pixel centres lie at half-integers from the picture's corner".to_owned()),
+        ("camera", serde_json::to_string(&scene.camera.opencv()).unwrap_or_default()),
+    ]
+    .map(|(key, value)| (key.to_owned(), value))
+    .into();
+    Ok(header)
+}
+
+/// A note as one line.
+fn in_words(note: &Note) -> String {
+    let Note { subject, message, .. } = note;
+    one_line(&match note.count {
+        0 | 1 => format!("{subject}: {message}"),
+        count => format!("{subject} (x{count}): {message}"),
+    })
+    .into_owned()
+}
+
+/// Models that another program wrote to meanwhile.
+fn changed(scene: &Scene) -> impl Iterator<Item = String> {
+    scene.changed_files().into_iter().map(|path| {
+        let path = path.display();
+        format!(
+            "{path} changed while it was rendered: what is seen may be old or new; render again"
+        )
+    })
+}
+
+/// That some light was left out, if it was.
+fn not_finite(rendered: &Rendered) -> Option<String> {
+    let count = rendered.light.not_finite;
+    (count > 0).then(|| format!("{count} contributions of light were not finite and are left out"))
+}
