@@ -67,7 +67,8 @@ impl Embree {
         let bounds = geometry.loose_bounds();
         check_scale(bounds)?;
         let frame = Frame::of(bounds);
-        let scene = Scene::build(geometry, frame.origin, options, before.map(|before| &before.scene))?;
+        let scene =
+            Scene::build(geometry, frame.origin, options, before.map(|before| &before.scene))?;
         let mode = match (options.robust, options.refine) {
             (true, true) => "robust + f64",
             (true, false) => "robust",

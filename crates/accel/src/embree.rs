@@ -59,6 +59,12 @@ impl Quality {
 /// One reference to an Embree scene.
 struct SceneHandle(NonNull<sys::RTCSceneTy>);
 
+// SAFETY: references are counted atomically by Embree, so any thread may release one; a handle that is
+// not a `SceneBuilder`'s alone is of a committed scene, which is read only, and queries are re-entrant.
+unsafe impl Send for SceneHandle {}
+// SAFETY: as above.
+unsafe impl Sync for SceneHandle {}
+
 impl Drop for SceneHandle {
     fn drop(&mut self) {
         // SAFETY: releases the reference that `rtcNewScene` gave.
@@ -143,11 +149,6 @@ pub(crate) struct Scene {
     /// Bytes of vertices that had to be copied.
     pub(crate) copied_bytes: u64,
 }
-
-// SAFETY: after the commit the scene is read only; Embree's queries are re-entrant.
-unsafe impl Send for Scene {}
-// SAFETY: as above.
-unsafe impl Sync for Scene {}
 
 impl fmt::Debug for Scene {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

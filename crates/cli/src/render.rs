@@ -80,10 +80,9 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     print_text(&lines.join("\n"))?;
     match partial {
         None => Ok(()),
-        Some(partial) => Err(Fault::stopped(format!(
-            "{partial}; the picture so far is in {}",
-            folder.display()
-        ))),
+        Some(partial) => {
+            Err(Fault::stopped(format!("{partial}; the picture so far is in {}", folder.display())))
+        }
     }
 }
 

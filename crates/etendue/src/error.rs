@@ -42,7 +42,9 @@ impl Error {
             Self::Scene(SceneError::Stopped)
                 | Self::Render(RenderError::Stopped | RenderError::Build(BuildError::Stopped))
                 | Self::Output(OutputError::Stopped { .. })
-                | Self::Expose(ExposeError::Stopped | ExposeError::Output(OutputError::Stopped { .. }))
+                | Self::Expose(
+                    ExposeError::Stopped | ExposeError::Output(OutputError::Stopped { .. })
+                )
         )
     }
 

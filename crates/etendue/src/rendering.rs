@@ -101,7 +101,10 @@ impl Rendering {
     /// None that a caller can cause.
     pub fn raw(&self, exposure: Exposure) -> Result<Option<RawImage>, Error> {
         let light = self.light.as_ref();
-        Ok(light.map(|light| light.expose(exposure)).transpose().map_err(expose::ExposeError::from)?)
+        Ok(light
+            .map(|light| light.expose(exposure))
+            .transpose()
+            .map_err(expose::ExposeError::from)?)
     }
 
     /// What the render did and cost. Its files and the time to write them are not in it.

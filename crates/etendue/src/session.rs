@@ -329,8 +329,7 @@ impl Session {
         let (scene, plan, accel) = (Arc::clone(&loaded.scene), &loaded.plan, self.built()?);
         let tracing = Instant::now();
         let header = header(&scene)?;
-        let rendered =
-            etendue_render::render(&scene, plan, accel, &self.images, header, progress)?;
+        let rendered = etendue_render::render(&scene, plan, accel, &self.images, header, progress)?;
         let mut seconds = self.seconds;
         seconds.render = tracing.elapsed().as_secs_f64();
         // What was prepared before this call is a part of it, too.
@@ -426,7 +425,8 @@ impl Session {
         }
         let start = Instant::now();
         let images = self.images.renewed(scene, plan, self.options.memory_limit)?;
-        if let (Strictness::Strict, Some(fault)) = (self.options.strictness, images.faults.first()) {
+        if let (Strictness::Strict, Some(fault)) = (self.options.strictness, images.faults.first())
+        {
             return Err(Error::Refused(fault.clone()));
         }
         images.faults.iter().for_each(|fault| progress.note(fault));

@@ -146,7 +146,8 @@ fn files_have_the_numbers_of_the_arrays() {
     let picture = render(&mut session);
     let out = folder.path().join("out");
     let written = picture.write(&out, Outputs::ALL).unwrap();
-    for name in ["layers.exr", "picture.png", "depth.npy", "raw.npy", "camera.json", "sensor.json"] {
+    for name in ["layers.exr", "picture.png", "depth.npy", "raw.npy", "camera.json", "sensor.json"]
+    {
         assert!(written.files.contains(&out.join(name)), "{name} in {:?}", written.files);
     }
     let array = fs::read(out.join("raw.npy")).unwrap();
@@ -218,7 +219,10 @@ fn arrays_make_scenes_and_bad_ones_are_named() {
     let mut session = Session::from_json(".", scene.clone()).unwrap();
     let depth = |session: &mut Session| {
         let picture = render(session);
-        (picture.layer("Depth").unwrap().channels[0].values.at(5), picture.report().scene_hash.clone())
+        (
+            picture.layer("Depth").unwrap().channels[0].values.at(5),
+            picture.report().scene_hash.clone(),
+        )
     };
     // A third is not a number of single precision, and is kept.
     session.insert_mesh("tile", &corners(1.0 / 3.0), &[[0, 1, 2]]).unwrap();

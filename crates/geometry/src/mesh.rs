@@ -209,7 +209,9 @@ impl Mesh {
         let positions = match (&self.positions, &other.positions) {
             (Positions::F32(own), Positions::F32(other)) => own.is_same(other),
             (Positions::F64(own), Positions::F64(other)) => own.is_same(other),
-            (Positions::F32(_), Positions::F64(_)) | (Positions::F64(_), Positions::F32(_)) => false,
+            (Positions::F32(_), Positions::F64(_)) | (Positions::F64(_), Positions::F32(_)) => {
+                false
+            }
         };
         positions && self.triangles.is_same(&other.triangles)
     }
@@ -238,14 +240,15 @@ impl Mesh {
         let is_equal = self.positions.len() == other.positions.len()
             && self.triangles[..] == other.triangles[..]
             && match (&self.positions, &other.positions) {
-                (Positions::F32(own), Positions::F32(other)) => {
-                    (0..own.len()).all(|i| own.get(i).map(f32::to_bits) == other.get(i).map(f32::to_bits))
-                }
+                (Positions::F32(own), Positions::F32(other)) => (0..own.len())
+                    .all(|i| own.get(i).map(f32::to_bits) == other.get(i).map(f32::to_bits)),
                 (Positions::F64(own), Positions::F64(other)) => {
                     let bits = |p: &[f64; 3]| p.map(f64::to_bits);
                     own.iter().map(bits).eq(other.iter().map(bits))
                 }
-                (Positions::F32(_), Positions::F64(_)) | (Positions::F64(_), Positions::F32(_)) => false,
+                (Positions::F32(_), Positions::F64(_)) | (Positions::F64(_), Positions::F32(_)) => {
+                    false
+                }
             };
         if is_equal {
             self.positions = other.positions.clone();

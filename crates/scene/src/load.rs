@@ -84,7 +84,8 @@ impl SceneFile {
         let mut named = OwnParts { materials: &own.materials, files: Vec::new(), kept };
         let (origins, objects) = self.resolve_objects(&folder, &mut named)?;
         let instance_files = named.files;
-        let imports = self.import_all(&origins, &objects, &folder, wanted, options, &budget, kept)?;
+        let imports =
+            self.import_all(&origins, &objects, &folder, wanted, options, (&budget, kept))?;
         let mut parts = Parts::new(own.materials, own.textures, lights.clone().unwrap_or_default());
         let split_nodes = self.kind() == FileKind::Model;
         for (spec, object) in self.spec.objects.iter().zip(&objects) {
@@ -288,8 +289,7 @@ impl SceneFile {
         folder: &Folder,
         wanted: Wanted,
         options: &LoadOptions<'_>,
-        budget: &Arc<Budget>,
-        kept: &Cache,
+        (budget, kept): (&Arc<Budget>, &Cache),
     ) -> Result<Vec<Import>, SceneError> {
         let done = AtomicUsize::new(0);
         let settings = import::Options {

@@ -9,12 +9,12 @@ use etendue_geometry::Geometry;
 use etendue_sensor::Sensor;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 
+use crate::cache::Cache;
 use crate::file::{RenderSpec, TracerSpec};
 use crate::identity::Ingredients;
 use crate::ids::{Copies, SceneNode};
 use crate::import::{Note, Strictness};
 use crate::paths::Reach;
-use crate::cache::Cache;
 use crate::{CameraOrigin, SceneCamera, SceneError, SceneHash};
 
 /// A scene ready to be rendered.
