@@ -26,7 +26,7 @@ pub mod sensor;
 mod sobol;
 
 pub use camera::{Camera, CameraSpec, PixelBlock, PixelExtent, Projection};
-pub use camera_file::CameraFile;
+pub use camera_file::{CameraFile, ProjectionName};
 pub use distortion::{Distortion, DistortionSpec};
 pub use error::CameraError;
 pub use framing::{Subject, Support, Viewpoint};

@@ -70,6 +70,10 @@ Files in the folder:
   NAME.preview.png   each layer to look at; not data
   camera.json        K, distortion and pose in OpenCV's convention
   layers.json        what each layer means: definition, unit, frame, miss, and what ids name
+A scene with `frames` becomes a folder frames/000000, … each, and beside them
+  index.json         K, pose, time, seed and file names of every frame
+  transforms.json    the same for nerfstudio
+  colmap/            the same as COLMAP's text model
 and with a camera.sensor that is more than a grid of pixels, for each exposure:
   raw.png, .npy, .dng   digital numbers as the sensor's converter gave them
   raw.preview.png       the same to look at; not data
@@ -289,6 +293,12 @@ pub(crate) struct RenderArguments {
     /// Write times, rays, memory and fingerprints as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
+    /// Of a scene with `frames`, render these alone, e.g. 10..20 (without the last)
+    #[arg(long, value_name = "FROM..TO", value_parser = parse::frames)]
+    pub(crate) frames: Option<std::ops::Range<usize>>,
+    /// Of a scene with `frames`, leave those that are complete in the folder
+    #[arg(long)]
+    pub(crate) resume: bool,
     /// Write nothing of a picture that is stopped by Ctrl-C. Else what all pixels have by then is
     /// written, marked as partial
     #[arg(long)]

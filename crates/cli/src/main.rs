@@ -11,6 +11,7 @@ mod plan;
 mod progress;
 mod render;
 mod sensor;
+mod sequence;
 mod stop;
 mod version;
 

@@ -11,7 +11,7 @@ use etendue_render::{RenderError, Report, Seconds};
 use crate::arguments::{AccelMode, RenderArguments, SceneArguments};
 use crate::fault::{Fault, print_text};
 use crate::progress::{Stages, say};
-use crate::stop;
+use crate::{sequence, stop};
 
 pub(crate) fn run(arguments: &RenderArguments) -> Result<(), Fault> {
     stop::listen();
@@ -47,20 +47,26 @@ pub(crate) fn options(arguments: &SceneArguments) -> Options {
 
 fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let folder = &arguments.output;
-    let watching = Watching::new(arguments, outputs);
-    let progress = Stages::new(arguments.quiet)
-        .progress(!arguments.quiet)
-        .with_looks(move |so_far| watching.look(so_far));
     // Whether they can be written is better known now than after the render.
     places::folder(folder)?;
     if let Some(path) = &arguments.report {
         places::file(path)?;
     }
     let mut session = open(arguments, outputs)?;
+    let progress = Stages::new(arguments.quiet).progress(!arguments.quiet);
+    if let Some(frames) = session.frames(&progress)? {
+        return sequence::render(arguments, &mut session, &frames, outputs, &progress);
+    }
+    if arguments.resume || arguments.frames.is_some() {
+        let why = "--frames and --resume are for scenes with `frames`, and this is one picture";
+        return Err(Fault::refused(why));
+    }
+    let watching = Watching::new(arguments, outputs);
+    let progress = progress.with_looks(move |so_far| watching.look(so_far));
     let results = session.check_place(folder, &[SO_FAR], &progress)?;
     keep_report_apart(arguments, &mut session, &results)?;
     let rendering = session.render(&progress)?;
-    let partial = heed_stop(&rendering, arguments)?;
+    let partial = heed_stop(&rendering, arguments.discard_partial)?;
     if let Some(partial) = &partial
         && !arguments.quiet
     {
@@ -121,10 +127,10 @@ fn keep_report_apart(
 }
 
 /// What a stop left of the picture, in words; `None` when it is complete.
-fn heed_stop(rendering: &Rendering, arguments: &RenderArguments) -> Result<Option<String>, Fault> {
+pub(crate) fn heed_stop(rendering: &Rendering, discards: bool) -> Result<Option<String>, Fault> {
     stop::saves(false);
     let Some(partial) = rendering.partial() else { return Ok(None) };
-    if arguments.discard_partial {
+    if discards {
         return Err(RenderError::Stopped.into());
     }
     // From here on only a second signal stops.

@@ -49,6 +49,7 @@
 //! |---|---|
 //! | [`Session`] | a scene, opened once, changed and rendered often |
 //! | [`Rendering`] | layers as arrays, the sensor's images, files of them, the report |
+//! | [`Frame`], [`Dataset`] | the pictures of a scene that has `frames`, and what others read of them |
 //! | [`Progress`] | how far work is, and how it is stopped |
 //! | [`Error`] | why something could not be done, in a sentence |
 //! | [`places`] | where results go |
@@ -56,16 +57,18 @@
 //! The parts that it is made of can be used by themselves: `etendue-optics` is a library of lens design,
 //! `etendue-sensor` a sensor after EMVA 1288, `etendue-accel` an exact ray caster.
 
+mod dataset;
 mod error;
 pub mod places;
 mod progress;
 mod rendering;
 mod session;
 
+pub use dataset::Dataset;
 pub use error::Error;
 pub use etendue_render::output::{Channel, Layer, Outputs, Picture, Values};
 pub use etendue_render::{Plan, Report, SoFar};
-pub use etendue_scene::{Reach, Scene, Strictness};
+pub use etendue_scene::{Frame, Reach, Scene, Strictness};
 pub use progress::{Progress, Stage};
 pub use rendering::{Rendering, Written};
 pub use session::{Options, Session};

@@ -7,13 +7,13 @@ use std::time::Instant;
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_geometry::{Geometry, Mesh};
-use etendue_render::output::{ImageHash, Layer, Outputs, SOFTWARE};
+use etendue_render::output::{ImageHash, Layer, MANIFEST, Outputs, SOFTWARE};
 use etendue_render::report::memory;
 use etendue_render::{Images, Plan, Rendered, Report, Seconds, plan};
 use etendue_scene::escape::one_line;
-use etendue_scene::file::{AccelName, FileKind, SceneFile};
+use etendue_scene::file::{AccelName, FileKind, FramesSpec, SceneFile};
 use etendue_scene::import::Note;
-use etendue_scene::{Cache, LoadOptions, Reach, Scene, Strictness};
+use etendue_scene::{Cache, Frame, LoadOptions, Reach, Scene, SceneError, Start, Strictness};
 use serde_json::Value;
 
 use crate::progress::Stage;
@@ -69,7 +69,10 @@ impl Default for Options {
 ///
 /// A render runs on the threads of the rayon pool that it is called in.
 pub struct Session {
+    /// The scene as it was opened and set.
     file: SceneFile,
+    /// The frame of it that is shown.
+    shown: Option<SceneFile>,
     options: Options,
     cache: Cache,
     loaded: Option<Loaded>,
@@ -162,6 +165,7 @@ impl Session {
     fn of(file: SceneFile, options: Options) -> Self {
         Self {
             file,
+            shown: None,
             options,
             cache: Cache::default(),
             loaded: None,
@@ -217,7 +221,7 @@ impl Session {
         // What was set before at the same path is of no effect any more.
         self.settings.retain(|(path, _)| settings.iter().all(|(other, _)| other != path));
         self.settings.extend(settings);
-        self.loaded = None;
+        self.leave_frame();
         Ok(())
     }
 
@@ -235,20 +239,70 @@ impl Session {
             }
             self.file = again;
         }
-        self.loaded = None;
+        self.leave_frame();
         Ok(())
     }
 
     /// All values of the scene as they are now, in the words of the scene format.
     #[must_use]
     pub fn values(&self) -> &Value {
-        self.file.value()
+        self.file().value()
     }
 
-    /// The scene file as it is now.
+    /// The scene file as it is now: of the frame that is shown, when one is.
     #[must_use]
     pub fn file(&self) -> &SceneFile {
-        &self.file
+        self.shown.as_ref().unwrap_or(&self.file)
+    }
+
+    /// The frames of the scene, in order; `None` when its file has no `frames` and is one picture.
+    ///
+    /// # Errors
+    ///
+    /// When they make no sense, or a trajectory's file is missing or broken; and as [`Self::scene`], for a
+    /// path that begins where the scene's camera stands.
+    pub fn frames(&mut self, progress: &Progress) -> Result<Option<Vec<Frame>>, Error> {
+        self.leave_frame();
+        // Of a path the camera's own place is wanted, which may depend on the models.
+        if let Some(FramesSpec::Path(_)) = self.file.spec.frames {
+            self.load(progress)?;
+        }
+        let start = || {
+            let scene = self.loaded.as_ref().map(|loaded| &loaded.scene);
+            let scene = scene.ok_or(SceneError::Stopped)?;
+            let center = scene.geometry.loose_bounds().centre();
+            Ok(Start { pose: *scene.camera.pose(), center })
+        };
+        Ok(self.file.frames(self.options.reach, start)?)
+    }
+
+    /// Takes the scene to one of its [`frames`](Self::frames): what is rendered next is that picture, as if
+    /// it stood in a file of its own. What is [`set`](Self::set) afterwards is of the whole scene again.
+    ///
+    /// # Errors
+    ///
+    /// When the format does not know what the frame sets; the message names the frame.
+    pub fn show(&mut self, frame: &Frame) -> Result<(), Error> {
+        self.shown = Some(self.file.at(frame)?);
+        self.loaded = None;
+        Ok(())
+    }
+
+    fn leave_frame(&mut self) {
+        self.shown = None;
+        self.loaded = None;
+    }
+
+    /// Whether `folder` holds all files of a complete render of the scene as it is now.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::scene`].
+    pub fn is_complete(&mut self, folder: &Path, progress: &Progress) -> Result<bool, Error> {
+        self.load(progress)?;
+        let loaded = self.loaded()?;
+        let hash = loaded.scene.hash()?.to_string();
+        Ok(is_rendered(folder, &hash, loaded.scene.sensor.is_some()))
     }
 
     /// The loaded scene: read now when it is not, or has changed.
@@ -363,7 +417,7 @@ impl Session {
             return Ok(());
         }
         let start = Instant::now();
-        let wanted = plan::wanted(&self.file.spec.all_layers());
+        let wanted = plan::wanted(&self.file().spec.all_layers());
         let share = |done: usize, total: usize| done as f64 / total.max(1) as f64;
         let goes_on = |step: etendue_scene::LoadProgress<'_>| {
             progress.goes_on(Stage::Load, share(step.done, step.total))
@@ -377,7 +431,7 @@ impl Session {
             cache: Some(&self.cache),
             progress: Some(&goes_on),
         };
-        let scene = self.file.load(wanted, &options)?;
+        let scene = self.file().load(wanted, &options)?;
         let notes: Vec<String> = scene.notes.iter().map(in_words).collect();
         notes.iter().for_each(|note| progress.note(note));
         let plan = Plan::new(&scene, self.options.outputs);
@@ -483,6 +537,26 @@ impl Session {
             files: Vec::new(),
         })
     }
+}
+
+/// Whether `folder` has a complete picture of the scene with this hash, and all files of its manifest.
+fn is_rendered(folder: &Path, hash: &str, has_sensor: bool) -> bool {
+    let read = |name: &str| -> Option<Value> {
+        serde_json::from_slice(&std::fs::read(folder.join(name)).ok()?).ok()
+    };
+    let header = read("layers.json").and_then(|layers| layers.get("header").cloned());
+    let Some(header) = header else { return false };
+    let is_same = header.get("scene_hash").and_then(Value::as_str) == Some(hash);
+    let files = read(MANIFEST).and_then(|book| book.pointer("/files/render").cloned());
+    let Some(Value::Object(files)) = files else { return false };
+    let is_there = |(name, print): (&String, &Value)| {
+        let bytes = print.get("bytes").and_then(Value::as_u64);
+        folder.join(name).metadata().is_ok_and(|data| Some(data.len()) == bytes)
+    };
+    is_same
+        && header.get("partial").is_none()
+        && (!has_sensor || files.contains_key("sensor.json"))
+        && files.iter().all(is_there)
 }
 
 /// What stands in the header of every file.

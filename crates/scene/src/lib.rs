@@ -17,6 +17,7 @@
 //! | [`import`] | glTF, OBJ and PLY |
 //! | [`shape`] | shapes made on load |
 //! | [`scene`] | the loaded scene |
+//! | [`Frame`] | what is set for each of the pictures of a scene |
 //! | [`Cache`] | what is kept from one load to the next |
 //! | [`escape`] | text out of files on its way to a terminal |
 //! | [`memory`] | how much memory there may be, and an account of it |
@@ -30,6 +31,7 @@ pub mod error;
 pub mod escape;
 mod facing;
 pub mod file;
+mod frames;
 mod identity;
 mod ids;
 pub mod import;
@@ -51,6 +53,7 @@ pub use cameras::{CameraOrigin, SceneCamera};
 pub use doctor::{Diagnosis, MemoryForecast};
 pub use error::SceneError;
 pub use file::{FileKind, SceneFile, SceneSpec, scene_schema};
+pub use frames::{Frame, Start};
 pub use identity::SceneHash;
 pub use ids::{Copies, IdName, SceneNode};
 pub use import::{Import, ImportError, Note, NoteKind, Strictness, Wanted};

@@ -94,3 +94,14 @@ pub(super) fn bytes(text: &str) -> Result<u64, String> {
     )]
     Ok(bytes as u64)
 }
+
+pub(super) fn frames(text: &str) -> Result<std::ops::Range<usize>, String> {
+    let range = text.split_once("..").and_then(|(from, to)| {
+        let from = if from.is_empty() { 0 } else { from.parse().ok()? };
+        Some(from..to.parse().ok()?)
+    });
+    match range {
+        Some(range) if !range.is_empty() => Ok(range),
+        _ => Err("expected a range such as 10..20, without the last".to_owned()),
+    }
+}

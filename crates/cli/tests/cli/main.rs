@@ -8,6 +8,7 @@ mod emva; // the characterisation of what the command writes
 mod exposures; // what a scene's sensor makes of a render
 mod figures; // models with skins, in the pose of their file
 mod files; // what is no file, what costs without end, what real programs write
+mod frames; // many pictures of one scene, and trajectories of others
 mod gltf_looks; // materials, lights and textures of models, with closed-form answers
 mod hidden; // meshes of one point, nodes scaled to 0
 mod ids; // numbers of objects, copies, nodes and materials, and their names

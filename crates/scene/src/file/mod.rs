@@ -2,6 +2,7 @@
 
 mod check;
 mod document;
+mod frames;
 mod lenient;
 mod lens;
 mod object;
@@ -20,6 +21,7 @@ use etendue_sensor::Sensor;
 use serde_json::{Value, json};
 
 pub use document::Place;
+pub use frames::{CameraPath, FramesSpec, TrajectoryFormat};
 pub use lens::{ReadLens, lens_schema, rays_schema, read_lens, trace_rays};
 pub use object::{InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
 pub use overrides::OverrideError;
@@ -146,6 +148,15 @@ impl SceneFile {
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
         Ok(file)
+    }
+
+    /// The scene without its `frames`.
+    pub(crate) fn without_frames(&self) -> Result<Self, SceneError> {
+        let mut value = self.value.clone();
+        if let Value::Object(members) = &mut value {
+            members.remove("frames");
+        }
+        Self::of(self.written.clone(), self.kind, value, &[])
     }
 
     /// Whether the scene stands in no file.

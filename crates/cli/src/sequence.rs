@@ -1,0 +1,78 @@
+//! `etendue render` of a scene with `frames`: a folder a frame, and what data sets want beside them.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use etendue::{Dataset, Frame, Progress, Session, places};
+use etendue_render::output::{Ledger, MANIFEST, Outputs, sidecar};
+
+use crate::arguments::RenderArguments;
+use crate::fault::{Fault, print_text};
+use crate::progress::say;
+use crate::render::heed_stop;
+
+/// The names of what is written beside the folder of the frames.
+const BESIDE: [&str; 3] = ["index.json", "transforms.json", MANIFEST];
+
+pub(crate) fn render(
+    arguments: &RenderArguments,
+    session: &mut Session,
+    frames: &[Frame],
+    outputs: Outputs,
+    progress: &Progress,
+) -> Result<(), Fault> {
+    let out = &arguments.output;
+    let range = arguments.frames.clone().unwrap_or(0..frames.len());
+    let wanted = chosen(frames, &range)?;
+    let beside: Vec<PathBuf> = BESIDE.iter().map(|name| out.join(name)).collect();
+    places::keep_apart(&session.scene(progress)?.inputs, &beside)?;
+    let mut dataset = Dataset::default();
+    let mut files = Vec::new();
+    let mut reports = Vec::new();
+    let mut skipped = 0;
+    for (done, frame) in (1..).zip(wanted) {
+        let name = format!("frames/{:06}", frame.number);
+        let folder = out.join(&name);
+        session.show(frame)?;
+        if arguments.resume && session.is_complete(&folder, progress)? {
+            skipped += 1;
+            dataset.add(frame, session.scene(progress)?, &name, outputs)?;
+            continue;
+        }
+        session.check_place(&folder, &[], progress)?;
+        let rendering = session.render(progress)?;
+        if let Some(partial) = heed_stop(&rendering, true)? {
+            return Err(Fault::stopped(partial));
+        }
+        let written = rendering.write_with(&folder, outputs, progress)?;
+        dataset.add(frame, rendering.scene(), &name, outputs)?;
+        files.extend(written.files.iter().cloned());
+        let report = rendering.report_of(&written);
+        if !arguments.quiet {
+            let seconds = report.seconds.total;
+            say(&format!("frame {} ({done} of {}): {seconds:.2} s", frame.number, wanted.len()));
+        }
+        reports.push(report);
+    }
+    let beside = places::recorded(Ledger::open(out, "render"), || dataset.write(out))?;
+    files.extend(beside);
+    if let Some(path) = &arguments.report {
+        sidecar::write_json(path, &reports)?;
+    }
+    if !arguments.quiet && skipped > 0 {
+        say(&format!(
+            "{skipped} of {} frames were complete and are left as they are",
+            wanted.len()
+        ));
+    }
+    let lines: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    print_text(&lines.join("\n"))
+}
+
+fn chosen<'f>(frames: &'f [Frame], range: &Range<usize>) -> Result<&'f [Frame], Fault> {
+    frames.get(range.clone()).filter(|chosen| !chosen.is_empty()).ok_or_else(|| {
+        let last = frames.len();
+        let Range { start, end } = range;
+        Fault::refused(format!("--frames {start}..{end}: the scene has the frames 0..{last}"))
+    })
+}

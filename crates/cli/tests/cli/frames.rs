@@ -1,0 +1,213 @@
+//! Many pictures of one scene.
+
+use serde_json::{Value, json};
+
+use crate::run::{Bench, text};
+
+/// A ball on a floor and the frames of it.
+fn scene(frames: &Value) -> String {
+    json!({
+        "etendue": 1,
+        "tracer": {"type": "facing"},
+        "layers": ["depth", "position"],
+        "render": {"samples": 1},
+        "camera": {"type": "pinhole", "fov": 50,
+                   "pose": {"from": [0.3, 1.5, 4], "look_at": [0, 0, 0]},
+                   "sensor": {"resolution": [32, 24]}},
+        "objects": [{"shape": "sphere"},
+                    {"shape": "rectangle", "width": 40, "height": 40,
+                     "transform": {"translate": [0, -1, 0], "rotate": [1, 0, 0, -90]}}],
+        "frames": frames
+    })
+    .to_string()
+}
+
+fn refused(frames: &Value, files: &[(&str, &[u8])], more: &[&str]) -> String {
+    let bench = Bench::with_scene(&scene(frames));
+    files.iter().for_each(|(name, bytes)| bench.write(name, bytes));
+    let output = bench.run(&[&["render", "scene.json", "-o", "out", "-q"], more].concat());
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    assert!(!bench.path("out/frames/000000/layers.exr").exists());
+    text(&output.stderr)
+}
+
+#[test]
+fn each_frame_is_the_picture_of_its_settings() {
+    let frames = json!([{"camera.fov": 30}, {"camera.pose.from": [1, 2, 3], "render.samples": 2},
+                        {"objects[0].transform.translate": [0.5, 0, 0]}]);
+    let bench = Bench::with_scene(&scene(&frames));
+    bench.render(&["--report", "report.json"]);
+    let reports = bench.json("report.json");
+    assert_eq!(reports.as_array().map(Vec::len), Some(3));
+    let mut alone: Value = serde_json::from_str(&scene(&frames)).unwrap();
+    alone.as_object_mut().unwrap().remove("frames");
+    let alone = Bench::with_scene(&alone.to_string());
+    let all = frames.as_array().unwrap();
+    for (number, (frame, report)) in all.iter().zip(reports.as_array().unwrap()).enumerate() {
+        let mut more = vec!["--report".to_owned(), "report.json".to_owned()];
+        for (path, value) in frame.as_object().unwrap() {
+            more.extend(["--set".to_owned(), format!("{path}={value}")]);
+        }
+        alone.render(&more.iter().map(String::as_str).collect::<Vec<_>>());
+        let one = alone.json("report.json");
+        for key in ["image_hash", "scene_hash", "resolution"] {
+            assert_eq!(report[key], one[key], "frame {number}: {key}");
+        }
+    }
+    let index = bench.json("out/index.json");
+    assert_eq!(index["frames"][2]["folder"], "frames/000002");
+}
+
+#[test]
+fn points_of_one_frame_are_where_the_next_one_sees_them() {
+    let orbit = json!({"type": "orbit", "count": 12, "center": [0, 0, 0]});
+    let bench = Bench::with_scene(&scene(&orbit));
+    bench.render(&[]);
+    let index = bench.json("out/index.json");
+    let frames = index["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 12);
+    let positions = bench.array("frames/000000/position");
+    let depth = bench.array("frames/000001/depth");
+    let m = |i: usize, k: usize| frames[1]["camera_from_world"][i][k].as_f64().unwrap();
+    let k = |i: usize, j: usize| frames[1]["K"][i][j].as_f64().unwrap();
+    let (mut seen, mut worst) = (0, 0.0_f64);
+    for point in positions.chunks(3).filter(|point| point[0].is_finite()) {
+        let at = |i: usize| (0..3).map(|j| m(i, j) * point[j]).sum::<f64>() + m(i, 3);
+        let (x, y, z) = (at(0), at(1), at(2));
+        let (u, v) = (k(0, 0) * x / z + k(0, 2), k(1, 1) * y / z + k(1, 2));
+        // Near a pixel's centre the floor's depth there, carried over by its slope, is the point's.
+        if !(0.0..31.0).contains(&u) || !(0.0..23.0).contains(&v) || point[1] > -0.999 {
+            continue;
+        }
+        let (column, row) = (u.floor(), v.floor());
+        let here = |c: f64, r: f64| 1.0 / depth[(r * 32.0 + c) as usize];
+        // The inverse of depth is linear over a plane's picture.
+        let (p, q) = (u - column, v - row);
+        let corners = [here(column, row), here(column + 1.0, row), here(column, row + 1.0)];
+        let fourth = here(column + 1.0, row + 1.0);
+        let plane = corners[1] + corners[2] - corners[0];
+        // All four on the floor, and none past its edge.
+        if fourth == 0.0 || corners.contains(&0.0) || (plane / fourth - 1.0).abs() > 1e-9 {
+            continue;
+        }
+        let inverse = corners[0] + p * (corners[1] - corners[0]) + q * (corners[2] - corners[0]);
+        worst = worst.max((inverse * z - 1.0).abs());
+        seen += 1;
+    }
+    assert!(seen > 50, "{seen}");
+    // Roundings of f64 over a dozen steps.
+    assert!(worst < 1e-12, "{worst}");
+}
+
+#[test]
+fn written_data_sets_are_trajectories_again() {
+    let orbit = json!({"type": "orbit", "count": 4, "center": [0, 0, 0]});
+    let first = Bench::with_scene(&scene(&orbit));
+    first.render(&[]);
+    let read = |name: &str| std::fs::read(first.path("out").join(name)).unwrap();
+    let mut tum = "# timestamp tx ty tz qx qy qz qw\n".to_owned();
+    let images = text(&read("colmap/images.txt"));
+    for (i, line) in images.lines().filter(|l| l.contains("picture.png")).enumerate() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let [w, x, y, z, a, b, c] = [1, 2, 3, 4, 5, 6, 7].map(|k| words[k]);
+        tum.push_str(&format!("{i}.5 {a} {b} {c} {x} {y} {z} {w}\n"));
+    }
+    let files: [(&str, Vec<u8>, Value); 3] = [
+        ("transforms.json", read("transforms.json"), json!({})),
+        ("images.txt", read("colmap/images.txt"), json!({})),
+        ("poses.txt", tum.into_bytes(), json!({"maps": "camera_from_world"})),
+    ];
+    for (name, bytes, more) in files {
+        let mut frames = json!({"type": "trajectory", "file": name});
+        more.as_object().unwrap().iter().for_each(|(k, v)| frames[k] = v.clone());
+        let mut again: Value = serde_json::from_str(&scene(&frames)).unwrap();
+        if name != "poses.txt" {
+            // These bring a K.
+            again["camera"].as_object_mut().unwrap().remove("fov");
+        }
+        let bench = Bench::with_scene(&again.to_string());
+        bench.write(name, &bytes);
+        if name == "images.txt" {
+            bench.write("cameras.txt", &read("colmap/cameras.txt"));
+        }
+        bench.render(&[]);
+        for frame in 0..4 {
+            let layer = format!("frames/00000{frame}/depth");
+            let (old, new) = (first.array(&layer), bench.array(&layer));
+            for (old, new) in old.iter().zip(&new) {
+                // A turn there and back through a quaternion; silhouettes may move by a pixel.
+                let is_near = (new / old - 1.0).abs() < 1e-9 || old == new;
+                assert!(is_near, "{name} {frame}: {old} {new}");
+            }
+        }
+    }
+    let index =
+        Bench::with_scene(&scene(&json!({"type": "poses", "times": [0.25, "50 ms"], "poses": [
+        {"from": [0, 0, 4], "look_at": [0, 0, 0]}, {"from": [0, 1, 4], "look_at": [0, 0, 0]}]})));
+    index.render(&[]);
+    assert_eq!(index.json("out/index.json")["frames"][1]["time_s"], 0.05);
+}
+
+#[test]
+fn complete_frames_are_left_and_the_rest_is_rendered() {
+    let grid = json!({"type": "grid", "columns": 2, "rows": 2, "spacing": "65 mm"});
+    let bench = Bench::with_scene(&scene(&grid));
+    bench.render(&["--frames", "0..3"]);
+    assert!(!bench.path("out/frames/000003").exists());
+    let time = |n: u32| {
+        bench
+            .path(&format!("out/frames/00000{n}/layers.exr"))
+            .metadata()
+            .unwrap()
+            .modified()
+            .unwrap()
+    };
+    let before = [time(0), time(1), time(2)];
+    // A frame that lost a file, and one that was stopped.
+    std::fs::remove_file(bench.path("out/frames/000001/depth.npy")).unwrap();
+    bench.render(&["--resume"]);
+    assert_eq!([time(0), time(2)], [before[0], before[2]]);
+    assert_ne!(time(1), before[1]);
+    assert!(bench.path("out/frames/000003/layers.exr").exists());
+    assert_eq!(bench.json("out/index.json")["frames"].as_array().map(Vec::len), Some(4));
+    // Another scene is not what is there.
+    bench.render(&["--resume", "--set", "camera.fov=51"]);
+    assert_ne!(time(0), before[0]);
+    // The baseline, to the right and down, with the scene's own pose in the middle.
+    let at = |frame: usize| {
+        let matrix = &bench.json("out/transforms.json")["frames"][frame]["transform_matrix"];
+        [0, 1, 2].map(|row| matrix[row][3].as_f64().unwrap())
+    };
+    let (a, b) = (at(0), at(1));
+    let distance: f64 = (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
+    assert!((distance - 0.065).abs() < 1e-15, "{distance}");
+}
+
+#[test]
+fn bad_frames_are_refused_by_number() {
+    let error = refused(&json!([{"camera.fov": 30}, {"camera.fow": 30}]), &[], &[]);
+    assert!(error.contains("frames[1]") && error.contains("fow"), "{error}");
+    let error = refused(&json!([]), &[], &[]);
+    assert!(error.contains("no frame"), "{error}");
+    let error = refused(&json!([{}]), &[], &["--frames", "1..2"]);
+    assert!(error.contains("0..1"), "{error}");
+    let poses = |name: &str| json!({"type": "trajectory", "file": name});
+    let stretched = b"0 0 0 4 0 0 0 1\n1 0 0 4 0 0 0 0\n";
+    let error = refused(&poses("a.txt"), &[("a.txt", stretched)], &[]);
+    assert!(
+        error.contains("pose 1") && error.contains("a.txt") | error.contains("quaternion"),
+        "{error}"
+    );
+    let error = refused(&poses("a.txt"), &[("a.txt", b"0 0 nan 4 0 0 0 1\n")], &[]);
+    assert!(error.contains("line 1") && error.contains("nan"), "{error}");
+    let error = refused(&poses("a.txt"), &[("a.txt", b"0 0 0\n")], &[]);
+    assert!(error.contains("3 words") && error.contains("tx ty tz"), "{error}");
+    let error = refused(&poses("no.npy"), &[], &[]);
+    assert!(error.contains("no such file"), "{error}");
+    let error = refused(&json!({"type": "orbit", "count": 0}), &[], &[]);
+    assert!(error.contains("frames.count"), "{error}");
+    let error = refused(&json!({"type": "orbit", "count": 3, "axis": [0, 0, 0]}), &[], &[]);
+    assert!(error.contains("frames.axis"), "{error}");
+    let error = refused(&json!({"type": "poses", "poses": [], "times": [1]}), &[], &[]);
+    assert!(error.contains("1 times for 0 poses"), "{error}");
+}

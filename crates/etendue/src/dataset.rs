@@ -1,0 +1,230 @@
+//! The frames of a scene as data sets that others read: nerfstudio's `transforms.json`, COLMAP's text
+//! model, and a plain `index.json`.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use etendue_camera::{CameraFile, Convention, PixelOrigin, ProjectionName};
+use etendue_geometry::glam::{DMat3, DQuat};
+use etendue_render::output::{Outputs, SOFTWARE, sidecar, write_whole};
+use etendue_scene::{Frame, Scene};
+use serde_json::{Map, Value, json};
+
+use crate::Error;
+
+/// The frames of a scene, as they are added.
+#[derive(Debug, Clone, Default)]
+pub struct Dataset {
+    entries: Vec<Entry>,
+}
+
+/// One frame.
+#[derive(Debug, Clone)]
+struct Entry {
+    number: usize,
+    time: Option<f64>,
+    folder: String,
+    camera: CameraFile,
+    world_from_camera: [[f64; 4]; 4],
+    picture: Option<String>,
+    depth: Option<String>,
+    scene_hash: String,
+    seed: u64,
+    samples: u32,
+}
+
+impl Dataset {
+    /// Adds a frame, whose files are in `folder` as seen from the data set's own.
+    ///
+    /// # Errors
+    ///
+    /// When a file of the scene has gone.
+    pub fn add(
+        &mut self,
+        frame: &Frame,
+        scene: &Scene,
+        folder: &str,
+        outputs: Outputs,
+    ) -> Result<(), Error> {
+        let has_depth = scene.layers.contains(&etendue_tracer::LayerSpec::Depth);
+        let matrix = scene.camera.pose().world_from_camera(Convention::Opengl);
+        self.entries.push(Entry {
+            number: frame.number,
+            time: frame.time,
+            folder: folder.to_owned(),
+            camera: scene.camera.opencv(),
+            world_from_camera: matrix.transpose().to_cols_array_2d(),
+            picture: (scene.picture.is_some() && outputs.png)
+                .then(|| format!("{folder}/picture.png")),
+            depth: (has_depth && outputs.npy).then(|| format!("{folder}/depth.npy")),
+            scene_hash: scene.hash()?.to_string(),
+            seed: scene.render.seed,
+            samples: scene.render.samples,
+        });
+        Ok(())
+    }
+
+    /// Writes `index.json`, and where every camera has a K, `transforms.json` and the folder `colmap`.
+    /// Gives the files.
+    ///
+    /// # Errors
+    ///
+    /// When a file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+        let mut files = vec![folder.join("index.json")];
+        sidecar::write_json(&files[0], &self.index())?;
+        if self.entries.is_empty() || !self.entries.iter().all(Entry::has_k) {
+            return Ok(files);
+        }
+        let transforms = folder.join("transforms.json");
+        sidecar::write_json(&transforms, &self.transforms())?;
+        files.push(transforms);
+        crate::places::folder(&folder.join("colmap"))?;
+        for (name, text) in self.colmap() {
+            let path = folder.join("colmap").join(name);
+            write_whole(&path, |file| file.write_all(text.as_bytes()))?;
+            files.push(path);
+        }
+        Ok(files)
+    }
+
+    fn index(&self) -> Value {
+        let frame = |entry: &Entry| {
+            json!({
+                "frame": entry.number, "time_s": entry.time, "folder": entry.folder,
+                "picture": entry.picture, "depth": entry.depth,
+                "K": entry.camera.k, "pixel_origin": entry.camera.pixel_origin,
+                "distortion": entry.camera.distortion, "resolution": entry.camera.resolution,
+                "camera_from_world": entry.camera.camera_from_world, "convention": "opencv",
+                "seed": entry.seed, "samples": entry.samples, "scene_hash": entry.scene_hash,
+            })
+        };
+        json!({
+            "software": SOFTWARE,
+            "about": "frames of one scene; matrices by rows, metres, OpenCV's axes (x right, y down, z \
+                      forward)",
+            "frames": self.entries.iter().map(frame).collect::<Vec<_>>(),
+        })
+    }
+
+    fn transforms(&self) -> Value {
+        let frame = |entry: &Entry| {
+            let mut frame = Map::new();
+            let name = entry.picture.clone().unwrap_or_else(|| entry.folder.clone());
+            frame.insert("file_path".to_owned(), json!(name));
+            frame.insert("transform_matrix".to_owned(), json!(entry.world_from_camera));
+            if let Some(depth) = &entry.depth {
+                frame.insert("depth_file_path".to_owned(), json!(depth));
+            }
+            if let Some(time) = entry.time {
+                frame.insert("time".to_owned(), json!(time));
+            }
+            let Intrinsics { focal: [fx, fy], centre: [cx, cy], distortion, is_fisheye } =
+                entry.intrinsics();
+            let [w, h] = entry.camera.resolution;
+            let model = if is_fisheye { "OPENCV_FISHEYE" } else { "OPENCV" };
+            frame.insert("camera_model".to_owned(), json!(model));
+            for (key, value) in [("fl_x", fx), ("fl_y", fy), ("cx", cx), ("cy", cy)] {
+                frame.insert(key.to_owned(), json!(value));
+            }
+            frame.insert("w".to_owned(), json!(w));
+            frame.insert("h".to_owned(), json!(h));
+            // OpenCV's order.
+            let keys = if is_fisheye { ["k1", "k2", "k3", "k4"] } else { ["k1", "k2", "p1", "p2"] };
+            for (key, value) in keys.iter().zip(&distortion) {
+                frame.insert((*key).to_owned(), json!(value));
+            }
+            if !is_fisheye && let Some(k3) = distortion.get(4) {
+                frame.insert("k3".to_owned(), json!(k3));
+            }
+            Value::Object(frame)
+        };
+        json!({ "frames": self.entries.iter().map(frame).collect::<Vec<_>>() })
+    }
+
+    /// The files of COLMAP's text model: cameras, images, and no points.
+    fn colmap(&self) -> [(&'static str, String); 3] {
+        let mut cameras: Vec<String> = Vec::new();
+        let mut images = String::from("# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n");
+        for (number, entry) in (1..).zip(&self.entries) {
+            let camera = entry.colmap_camera();
+            let id = cameras.iter().position(|known| *known == camera).unwrap_or_else(|| {
+                cameras.push(camera);
+                cameras.len() - 1
+            });
+            let m = &entry.camera.camera_from_world;
+            let column = |k: usize| [m[0][k], m[1][k], m[2][k]].into();
+            let rotation = DMat3::from_cols(column(0), column(1), column(2));
+            let q = DQuat::from_mat3(&rotation);
+            let name = entry.picture.as_ref().unwrap_or(&entry.folder);
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                images,
+                "{number} {} {} {} {} {} {} {} {} {name}\n",
+                q.w,
+                q.x,
+                q.y,
+                q.z,
+                m[0][3],
+                m[1][3],
+                m[2][3],
+                id + 1
+            );
+        }
+        let mut lines = String::from("# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n");
+        for (id, camera) in (1..).zip(&cameras) {
+            let _ = writeln!(lines, "{id} {camera}");
+        }
+        let points = "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]\n".to_owned();
+        [("cameras.txt", lines), ("images.txt", images), ("points3D.txt", points)]
+    }
+}
+
+/// Pixels from the corner of the top left one.
+struct Intrinsics {
+    focal: [f64; 2],
+    centre: [f64; 2],
+    /// In OpenCV's order.
+    distortion: Vec<f64>,
+    is_fisheye: bool,
+}
+
+impl Entry {
+    fn has_k(&self) -> bool {
+        self.camera.k.is_some()
+    }
+
+    fn intrinsics(&self) -> Intrinsics {
+        let k = self.camera.k.unwrap_or_default();
+        let half = match self.camera.pixel_origin {
+            PixelOrigin::Center => 0.5,
+            PixelOrigin::Corner => 0.0,
+        };
+        let distortion = self.camera.distortion.as_ref();
+        Intrinsics {
+            focal: [k[0][0], k[1][1]],
+            centre: [k[0][2] + half, k[1][2] + half],
+            distortion: distortion.map(|d| d.coefficients.clone()).unwrap_or_default(),
+            is_fisheye: self.camera.projection == ProjectionName::Fisheye,
+        }
+    }
+
+    /// The camera without its number.
+    fn colmap_camera(&self) -> String {
+        let Intrinsics { focal, centre, distortion, is_fisheye } = self.intrinsics();
+        let (model, count) = match (is_fisheye, distortion.len()) {
+            (true, _) => ("OPENCV_FISHEYE", 4),
+            (false, 0) => ("PINHOLE", 0),
+            (false, 1..=4) => ("OPENCV", 4),
+            (false, _) => ("FULL_OPENCV", 8),
+        };
+        let [width, height] = self.camera.resolution;
+        let mut text = format!("{model} {width} {height}");
+        let coefficients = (0..count).map(|i| distortion.get(i).copied().unwrap_or(0.0));
+        for value in focal.into_iter().chain(centre).chain(coefficients) {
+            let _ = write!(text, " {value}");
+        }
+        text
+    }
+}

@@ -1,0 +1,109 @@
+//! `frames`: many pictures of one scene, as the file writes them.
+
+use std::collections::BTreeMap;
+
+use etendue_camera::{Convention, Maps, PoseSpec};
+use etendue_geometry::units::{Degrees, Metres, Seconds};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// The pictures of one scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum FramesSpec {
+    /// Settings of each frame: paths of the scene and their values, as `{"camera.f_number": 2.8}`.
+    List(Vec<BTreeMap<String, Value>>),
+    /// A path of the camera.
+    Path(CameraPath),
+}
+
+/// A path of the camera, which starts from the scene's own pose where it needs one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum CameraPath {
+    /// Around a point.
+    Orbit {
+        /// The number of frames.
+        count: u32,
+        /// The point (m); the middle of the scene's box when absent.
+        #[serde(default)]
+        center: Option<[f64; 3]>,
+        /// The axis, around which positive angles turn counter-clockwise as seen from its end.
+        #[serde(default = "up")]
+        axis: [f64; 3],
+        /// The angle of the whole path; a full turn ends one step before its start.
+        #[serde(default = "full_turn")]
+        angle: Degrees,
+    },
+    /// Along a straight line.
+    Dolly {
+        /// The number of frames, the first where the camera stands and the last at `to`.
+        count: u32,
+        /// The position of the last frame (m).
+        to: [f64; 3],
+        /// A point that stays in the middle of the picture (m); the camera does not turn when absent.
+        #[serde(default)]
+        look_at: Option<[f64; 3]>,
+    },
+    /// Side by side without turning, row by row from the top left as seen along the view: a pair for
+    /// stereo, or an array of cameras. The scene's own pose is in its middle.
+    Grid {
+        /// Cameras in a row.
+        columns: u32,
+        /// Rows.
+        #[serde(default = "one")]
+        rows: u32,
+        /// From one camera to the next: the baseline.
+        spacing: Metres,
+    },
+    /// Poses in the scene file.
+    Poses {
+        /// One a frame.
+        poses: Vec<PoseSpec>,
+        /// When each was taken; absent when nobody knows.
+        #[serde(default)]
+        times: Option<Vec<Seconds>>,
+    },
+    /// Poses of a file: `.npy` of n × 4 × 4 matrices; TUM's `timestamp tx ty tz qx qy qz qw`; COLMAP's
+    /// `images.txt`, with the intrinsics of the `cameras.txt` beside it; nerfstudio's `transforms.json`.
+    Trajectory {
+        /// The file, relative to the scene file.
+        file: String,
+        /// What it is; told by its name when absent.
+        #[serde(default)]
+        format: Option<TrajectoryFormat>,
+        /// Which way the poses map, of NPY and TUM files; camera to world when absent.
+        #[serde(default)]
+        maps: Option<Maps>,
+        /// The camera's axes, of NPY and TUM files; OpenCV's when absent.
+        #[serde(default)]
+        convention: Option<Convention>,
+    },
+}
+
+/// A format of trajectories.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TrajectoryFormat {
+    /// An array of numpy's.
+    Npy,
+    /// The TUM RGB-D benchmark's text.
+    Tum,
+    /// COLMAP's text model.
+    Colmap,
+    /// Nerfstudio's JSON.
+    Nerfstudio,
+}
+
+fn up() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+fn full_turn() -> Degrees {
+    Degrees(360.0)
+}
+
+fn one() -> u32 {
+    1
+}
