@@ -80,6 +80,11 @@ fn points_of_one_frame_are_where_the_next_one_sees_them() {
             continue;
         }
         let (column, row) = (u.floor(), v.floor());
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "in the picture"
+        )]
         let here = |c: f64, r: f64| 1.0 / depth[(r * 32.0 + c) as usize];
         // The inverse of depth is linear over a plane's picture.
         let (p, q) = (u - column, v - row);
