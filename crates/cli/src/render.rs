@@ -95,6 +95,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
 fn open(arguments: &RenderArguments, outputs: Outputs) -> Result<Session, Error> {
     let options = Options {
         memory_limit: arguments.memory_limit,
+        copy: arguments.copy,
         outputs,
         robust: arguments.accel_mode == AccelMode::Robust,
         isa: arguments.isa.clone(),

@@ -44,12 +44,12 @@ impl Rendering {
         picture: Picture,
         band_film: Option<BandFilm>,
         report: Report,
-    ) -> Self {
-        let (light, idle_notes) = match SensorLight::new(&scene, (&picture, band_film)) {
+    ) -> Result<Self, Error> {
+        let (light, idle_notes) = match SensorLight::new(&scene, (&picture, band_film))? {
             Ok(light) => (Some(light), Vec::new()),
             Err(notes) => (None, notes),
         };
-        Self { scene, picture, light, idle_notes, report }
+        Ok(Self { scene, picture, light, idle_notes, report })
     }
 
     /// The scene as it was rendered.

@@ -13,6 +13,7 @@ use etendue_render::{Images, Plan, Rendered, Report, Seconds, plan};
 use etendue_scene::escape::one_line;
 use etendue_scene::file::{AccelName, FileKind, FramesSpec, SceneFile};
 use etendue_scene::import::Note;
+use etendue_scene::memory::Budget;
 use etendue_scene::{Cache, Frame, LoadOptions, Reach, Scene, SceneError, Start, Strictness};
 use serde_json::Value;
 
@@ -33,6 +34,9 @@ pub struct Options {
     pub camera: Option<String>,
     /// The most memory that may be taken (bytes); `None` for what the system has free.
     pub memory_limit: Option<u64>,
+    /// Whether models are read into memory instead of being used where their files are mapped: for files that
+    /// other programs change meanwhile.
+    pub copy: bool,
     /// What is to be written of the pictures: without NPY data layers are kept in single precision.
     pub outputs: Outputs,
     /// Whether the structure is watertight (see [`BuildOptions::robust`]).
@@ -52,6 +56,7 @@ impl Default for Options {
             reach: Reach::default(),
             camera: None,
             memory_limit: None,
+            copy: false,
             outputs: Outputs::ALL,
             robust: true,
             isa: None,
@@ -399,7 +404,7 @@ impl Session {
         (report.samples_wanted, report.notes) = (plan.samples, notes);
         self.seconds = Seconds::default();
         let Rendered { picture, band_film, .. } = rendered;
-        Ok(Rendering::new(scene, picture, band_film, report))
+        Rendering::new(scene, picture, band_film, report)
     }
 
     fn loaded(&self) -> Result<&Loaded, Error> {
@@ -428,6 +433,7 @@ impl Session {
             camera: self.options.camera.as_deref(),
             memory_limit: self.options.memory_limit,
             to_render: self.options.to_render,
+            copy: self.options.copy,
             cache: Some(&self.cache),
             progress: Some(&goes_on),
         };
@@ -462,6 +468,7 @@ impl Session {
             progress: Some(progress.of(Stage::Build)),
             ..BuildOptions::default()
         };
+        fits(scene, plan, self.options.memory_limit)?;
         let before = self.built.as_ref().filter(|built| built.name == name);
         let accel =
             etendue_render::rebuild(scene, plan, &options, before.map(|built| &*built.accel))?;
@@ -557,6 +564,27 @@ fn is_rendered(folder: &Path, hash: &str, has_sensor: bool) -> bool {
         && header.get("partial").is_none()
         && (!has_sensor || files.contains_key("sensor.json"))
         && files.iter().all(is_there)
+}
+
+/// Refuses what will not fit into the memory that is allowed, or else free.
+fn fits(scene: &Scene, plan: &Plan, limit: Option<u64>) -> Result<(), Error> {
+    let memory = &plan.memory;
+    let bytes = match limit {
+        Some(_) => memory.total - memory.program,
+        // What was loaded is no longer free.
+        None => memory.to_come(),
+    };
+    let Err(error) = Budget::new(limit).take(bytes) else { return Ok(()) };
+    let [width, height] = scene.camera.resolution();
+    let images = scene.textures.iter().map(|texture| (texture.decoded_bytes(), &texture.name));
+    let largest = match images.max() {
+        Some((bytes, name)) if 2 * bytes > memory.total => {
+            format!(" (most of it for the image {})", one_line(name))
+        }
+        _ => String::new(),
+    };
+    let path = scene.path.display();
+    Err(Error::Refused(format!("{path}: a picture of {width} x {height} pixels{largest} {error}")))
 }
 
 /// What stands in the header of every file.

@@ -1,14 +1,15 @@
 //! What is kept from one load of a scene to the next, so that a change costs no more than it touches.
 
 use std::collections::{BTreeMap, HashMap};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use etendue_camera::Camera;
 use etendue_geometry::files::Stamp;
-use etendue_geometry::{Geometry, MappedFile, Mesh};
+use etendue_geometry::{Geometry, Mesh, files};
 use etendue_tracer::Material;
-use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
+use xxhash_rust::xxh3::Xxh3Default;
 
 use crate::import::{Import, ImportedPlacement, Stats, Strictness, Wanted};
 use crate::{CameraOrigin, SceneError};
@@ -191,8 +192,24 @@ impl Digests {
         if let Some((_, digest)) = locked(&self.0).get(path).filter(|(known, _)| *known == stamp) {
             return Ok(*digest);
         }
-        let digest = xxh3_128(MappedFile::open(path).map_err(unreadable)?.bytes());
+        let digest = read_through(path).map_err(unreadable)?;
         locked(&self.0).insert(path.to_owned(), (stamp, digest));
         Ok(digest)
+    }
+}
+
+/// XXH3-128 of a file, piece by piece: a file that another program cuts meanwhile is none that may be
+/// mapped for it.
+fn read_through(path: &Path) -> io::Result<u128> {
+    let mut file = files::open(path)?;
+    let mut hash = Xxh3Default::new();
+    let mut piece = vec![0; 1 << 20];
+    loop {
+        match file.read(&mut piece) {
+            Ok(0) => return Ok(hash.digest128()),
+            Ok(length) => hash.update(&piece[..length]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
     }
 }
