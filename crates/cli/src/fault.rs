@@ -6,9 +6,7 @@ use std::process::ExitCode;
 use etendue_accel::BuildError;
 use etendue_bench::BenchError;
 use etendue_render::RenderError;
-use etendue_render::expose::ExposeError;
-use etendue_render::light_field::LightFieldError;
-use etendue_render::output::{OutputError, PictureError};
+use etendue_render::output::OutputError;
 use etendue_scene::SceneError;
 use etendue_scene::escape::{printable, printable_json};
 use etendue_sensor::emva::EmvaError;
@@ -67,61 +65,18 @@ impl From<etendue::Error> for Fault {
     }
 }
 
-impl From<SceneError> for Fault {
-    fn from(error: SceneError) -> Self {
-        match error {
-            SceneError::Stopped => Self::stopped(STOPPED),
-            error => Self::Refused(error.into()),
-        }
-    }
-}
-
-impl From<RenderError> for Fault {
-    fn from(error: RenderError) -> Self {
-        match error {
-            RenderError::Stopped | RenderError::Build(BuildError::Stopped) => {
-                Self::stopped(STOPPED)
+/// What the library tells of its errors holds for those of its parts.
+macro_rules! as_the_library {
+    ($($error:ty),*) => {$(
+        impl From<$error> for Fault {
+            fn from(error: $error) -> Self {
+                etendue::Error::from(error).into()
             }
-            RenderError::Picture(PictureError::Memory(_)) => Self::Refused(error.into()),
-            RenderError::Picture(_) => Self::Failed(error.into()),
-            error => Self::Refused(error.into()),
         }
-    }
+    )*};
 }
 
-impl From<OutputError> for Fault {
-    fn from(error: OutputError) -> Self {
-        match error {
-            OutputError::Stopped { .. } => Self::stopped(STOPPED),
-            // Whether it can be written to was asked before: the disk is full, or the folder gone.
-            OutputError::Io { .. } => Self::Failed(error.into()),
-            error => Self::Refused(error.into()),
-        }
-    }
-}
-
-impl From<ExposeError> for Fault {
-    fn from(error: ExposeError) -> Self {
-        match error {
-            ExposeError::Output(error) => error.into(),
-            ExposeError::Stopped => Self::stopped(STOPPED),
-            ExposeError::Memory(_) | ExposeError::Picture(PictureError::Memory(_)) => {
-                Self::Refused(error.into())
-            }
-            error => Self::Failed(error.into()),
-        }
-    }
-}
-
-impl From<LightFieldError> for Fault {
-    fn from(error: LightFieldError) -> Self {
-        match error {
-            LightFieldError::Render(error) => error.into(),
-            LightFieldError::Output(error) => error.into(),
-            error => Self::Failed(error.into()),
-        }
-    }
-}
+as_the_library!(SceneError, RenderError, OutputError);
 
 impl From<BenchError> for Fault {
     fn from(error: BenchError) -> Self {

@@ -5,8 +5,19 @@ use std::io;
 use etendue_accel::BuildError;
 use etendue_render::RenderError;
 use etendue_render::expose::ExposeError;
-use etendue_render::output::OutputError;
+use etendue_render::light_field::LightFieldError;
+use etendue_render::output::{OutputError, PictureError};
 use etendue_scene::SceneError;
+
+impl From<LightFieldError> for Error {
+    fn from(error: LightFieldError) -> Self {
+        match error {
+            LightFieldError::Render(error) => Self::Render(error),
+            LightFieldError::Output(error) => Self::Output(error),
+            other => Self::LightField(other),
+        }
+    }
+}
 
 /// Why a scene could not be opened, changed, rendered or written. The message is a sentence that names
 /// the file, the place in it and the remedy, as on the command line.
@@ -25,6 +36,9 @@ pub enum Error {
     /// The sensor's images.
     #[error(transparent)]
     Expose(#[from] ExposeError),
+    /// What a light-field camera leaves.
+    #[error(transparent)]
+    LightField(LightFieldError),
     /// A place for results that cannot be written to, known before any work.
     #[error(transparent)]
     Place(OutputError),
@@ -49,24 +63,31 @@ impl Error {
     }
 
     /// Whether the caller can mend it by another scene, setting or place. What is left are stops, full
-    /// disks, want of memory and faults of this program.
+    /// disks and faults of this program.
     #[must_use]
     pub fn is_refused(&self) -> bool {
         match self {
             _ if self.is_stopped() => false,
             Self::Scene(_) | Self::Refused(_) => true,
-            Self::Render(error) => !matches!(
-                error,
-                RenderError::Picture(_) | RenderError::Build(BuildError::OutOfMemory { .. })
-            ),
+            Self::Render(error) => match error {
+                RenderError::Picture(error) => is_want_of_memory(error),
+                _ => true,
+            },
             // Whether it can be written to was asked before: the disk is full, or the folder gone.
             Self::Output(error) | Self::Expose(ExposeError::Output(error)) => {
                 !matches!(error, OutputError::Io { .. })
             }
-            Self::Expose(_) => false,
+            Self::Expose(ExposeError::Memory(_)) => true,
+            Self::Expose(ExposeError::Picture(error)) => is_want_of_memory(error),
+            Self::Expose(_) | Self::LightField(_) => false,
             Self::Place(error) => !has_no_room(error),
         }
     }
+}
+
+/// A smaller picture would do.
+fn is_want_of_memory(error: &PictureError) -> bool {
+    matches!(error, PictureError::Memory(_))
 }
 
 fn has_no_room(error: &OutputError) -> bool {

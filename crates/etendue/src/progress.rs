@@ -19,6 +19,8 @@ pub enum Stage {
     Write,
     /// The sensor's exposures are made and written.
     Expose,
+    /// A light-field camera's views are rendered, decoded and written.
+    LightField,
 }
 
 impl Stage {
@@ -31,6 +33,7 @@ impl Stage {
             Self::Render => "render",
             Self::Write => "write",
             Self::Expose => "expose",
+            Self::LightField => "views",
         }
     }
 }

@@ -4,12 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use etendue_accel::Accel;
 use etendue_render::expose::{self, BandFilm, SensorLight};
+use etendue_render::light_field::{self, LightFieldSet};
 use etendue_render::output::{
     Layer, Ledger, Look, MANIFEST, Outputs, Picture, exr, npy, png, sidecar,
 };
 use etendue_render::report::seconds;
-use etendue_render::{Plan, RenderError, Report};
+use etendue_render::{Images, Plan, RenderError, Report};
 use etendue_scene::Scene;
 use etendue_sensor::{Exposure, RawImage};
 
@@ -25,6 +27,8 @@ pub struct Rendering {
     /// Notes on a sensor that has nothing to expose.
     pub(crate) idle_notes: Vec<String>,
     pub(crate) report: Report,
+    /// The structure and the images of a light-field camera's scene.
+    traced: Option<(Arc<dyn Accel>, Arc<Images>)>,
 }
 
 /// What was written.
@@ -41,15 +45,15 @@ pub struct Written {
 impl Rendering {
     pub(crate) fn new(
         scene: Arc<Scene>,
-        picture: Picture,
-        band_film: Option<BandFilm>,
+        (picture, band_film): (Picture, Option<BandFilm>),
+        traced: Option<(Arc<dyn Accel>, Arc<Images>)>,
         report: Report,
     ) -> Result<Self, Error> {
         let (light, idle_notes) = match SensorLight::new(&scene, (&picture, band_film))? {
             Ok(light) => (Some(light), Vec::new()),
             Err(notes) => (None, notes),
         };
-        Ok(Self { scene, picture, light, idle_notes, report })
+        Ok(Self { scene, picture, light, idle_notes, report, traced })
     }
 
     /// The scene as it was rendered.
@@ -163,6 +167,9 @@ impl Rendering {
                 files.extend(exposed.files);
                 notes.extend(exposed.notes);
             }
+            let set = self.write_light_field(folder, outputs, progress)?;
+            files.extend(set.files);
+            notes.extend(set.notes);
             Ok::<_, Error>(Written { files, notes, time: Duration::ZERO })
         })?;
         written.notes.iter().for_each(|note| progress.note(note));
@@ -179,6 +186,19 @@ impl Rendering {
         report.notes.extend(written.notes.iter().cloned());
         report.files.clone_from(&written.files);
         report
+    }
+
+    /// What a light-field camera leaves beside its picture; nothing of others.
+    fn write_light_field(
+        &self,
+        folder: &Path,
+        outputs: Outputs,
+        progress: &Progress,
+    ) -> Result<LightFieldSet, Error> {
+        let Some((accel, images)) = &self.traced else { return Ok(LightFieldSet::default()) };
+        let rendering = light_field::Rendering { scene: &self.scene, accel: &**accel, images };
+        let goes_on = |share| progress.goes_on(Stage::LightField, share);
+        Ok(light_field::write(rendering, &self.picture, folder, outputs, &goes_on)?)
     }
 
     fn write_layers(
@@ -240,7 +260,8 @@ fn files_of(
 ) -> impl Iterator<Item = String> {
     let always = ["layers.exr", "camera.json", "layers.json", MANIFEST].map(str::to_owned);
     let layers = layers.into_iter().flat_map(move |layer| layer_files(&layer, outputs));
-    always.into_iter().chain(layers).chain(expose::file_names(scene))
+    let beside = expose::file_names(scene).into_iter().chain(light_field::file_names(scene));
+    always.into_iter().chain(layers).chain(beside)
 }
 
 /// The files of a layer: to look at, and for numpy.

@@ -82,7 +82,7 @@ pub struct Session {
     cache: Cache,
     loaded: Option<Loaded>,
     built: Option<Built>,
-    images: Images,
+    images: Arc<Images>,
     /// What was set since it was opened.
     settings: Vec<(String, String)>,
     /// What was done since the last render.
@@ -100,7 +100,7 @@ struct Loaded {
 
 /// A structure, and what it was built over.
 struct Built {
-    accel: Box<dyn Accel>,
+    accel: Arc<dyn Accel>,
     geometry: Arc<Geometry>,
     name: Option<AccelName>,
 }
@@ -175,7 +175,7 @@ impl Session {
             cache: Cache::default(),
             loaded: None,
             built: None,
-            images: Images::default(),
+            images: Arc::default(),
             settings: Vec::new(),
             seconds: Seconds::default(),
         }
@@ -404,7 +404,12 @@ impl Session {
         (report.samples_wanted, report.notes) = (plan.samples, notes);
         self.seconds = Seconds::default();
         let Rendered { picture, band_film, .. } = rendered;
-        Rendering::new(scene, picture, band_film, report)
+        let accel = self.built.as_ref().map(|built| Arc::clone(&built.accel));
+        // The views of a light field are rendered when they are written.
+        let traced = accel
+            .filter(|_| scene.camera.light_field().is_some())
+            .map(|accel| (accel, Arc::clone(&self.images)));
+        Rendering::new(scene, (picture, band_film), traced, report)
     }
 
     fn loaded(&self) -> Result<&Loaded, Error> {
@@ -473,7 +478,7 @@ impl Session {
         let accel =
             etendue_render::rebuild(scene, plan, &options, before.map(|built| &*built.accel))?;
         let geometry = Arc::clone(&scene.geometry);
-        self.built = Some(Built { accel, geometry, name });
+        self.built = Some(Built { accel: Arc::from(accel), geometry, name });
         self.seconds.build += start.elapsed().as_secs_f64();
         Ok(())
     }
@@ -491,7 +496,7 @@ impl Session {
             return Err(Error::Refused(fault.clone()));
         }
         images.faults.iter().for_each(|fault| progress.note(fault));
-        self.images = images;
+        self.images = Arc::new(images);
         if let Some(loaded) = &mut self.loaded {
             loaded.is_decoded = true;
         }
