@@ -6,13 +6,14 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render test test-embree4 bench bench-peers bench-light bench-lens bench-sensor docs-figures docs-charts \
+.PHONY: help setup render test test-embree4 python bench bench-peers bench-light bench-lens bench-sensor docs-figures docs-charts \
 	docs-stability fingerprints fuzz-smoke fuzz-seeds clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
 	@echo "make test          install what is missing, run everything that CI runs"
 	@echo "make test-embree4  run the tests that touch Embree against Embree 4, in a Debian 13 root"
+	@echo "make python        build the Python package's wheel and test it in a fresh venv"
 	@echo "make bench         measure everything, write docs/benchmarks.md"
 	@echo "make bench-peers   add other programs at the same job, from PyPI"
 	@echo "make bench-lens    time rays through a lens against optiland, from PyPI"
@@ -37,6 +38,10 @@ render: setup
 test:
 	@scripts/setup.sh test
 	@scripts/test.sh
+
+# The wheel, in out/python/wheels, tested in a fresh venv. PROFILE=dev is quick to build and slow to run.
+python: setup
+	@scripts/python.sh
 
 test-embree4: setup
 	@scripts/test-embree4.sh

@@ -48,5 +48,8 @@ EMBREE_DIR=/nonexistent run_tests -p etendue-accel -p etendue -p etendue-cli --n
 step "tests against Embree 4"
 scripts/test-embree4.sh
 
+step "Python package"
+PROFILE=dev scripts/python.sh
+
 step "tests"
 run_tests --workspace

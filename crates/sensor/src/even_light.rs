@@ -35,15 +35,7 @@ impl EvenLight {
         }
         let [width, height] = sensor.resolution();
         let mut corner = sensor.clone().with_resolution([width.min(size[0]), height.min(size[1])]);
-        corner.replace_response(Response {
-            bands: Bands::Grey,
-            channels: vec![Channel {
-                name: "Y".into(),
-                electrons: vec![1.0],
-                primaries: [1.0 / 3.0; 3],
-            }],
-            pattern: Some(vec![vec![0]]),
-        });
+        corner.replace_response(Response::of_electrons());
         Ok(Self { sensor: corner, efficiency })
     }
 
@@ -81,7 +73,40 @@ impl EvenLight {
     }
 }
 
+impl Response {
+    /// One channel, of which one band of light is worth one electron.
+    fn of_electrons() -> Self {
+        let channel = Channel { name: "Y".into(), electrons: vec![1.0], primaries: [1.0 / 3.0; 3] };
+        Self { bands: Bands::Grey, channels: vec![channel], pattern: Some(vec![vec![0]]) }
+    }
+}
+
 impl Sensor {
+    /// One exposure of a sensor of `size` (columns, rows), whose pixels get so many photo-electrons on average,
+    /// row by row: everything behind the light. The exposure time counts for the dark current alone.
+    ///
+    /// # Errors
+    ///
+    /// When the sensor counts no electrons, or they are not as many as pixels.
+    pub fn expose_electrons(
+        &self,
+        electrons: &[f64],
+        [width, height]: [usize; 2],
+        exposure: Exposure,
+        seed: u64,
+    ) -> Result<RawImage, SensorError> {
+        if !self.settings.counts {
+            let why = "electrons are counted";
+            return Err(SensorError::Missing { key: "system_gain", why });
+        }
+        let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
+        let mut sensor = self.clone().with_resolution([side(width), side(height)]);
+        sensor.replace_response(Response::of_electrons());
+        #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+        let film: Vec<f32> = electrons.iter().map(|&e| e.min(f64::from(f32::MAX)) as f32).collect();
+        sensor.expose(Film { values: &film }, exposure, seed)
+    }
+
     /// Electrons straight from the film: bands are worth what `response` says, whatever the exposure.
     fn replace_response(&mut self, response: Response) {
         self.response = response;

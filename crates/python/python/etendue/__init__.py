@@ -1,0 +1,421 @@
+"""A simulator of computational cameras.
+
+    import etendue
+    scene = etendue.load("scene.json")
+    scene["camera.f_number"] = 2.8
+    shot = scene.render(samples=64)
+    shot["depth"], shot.raw, shot.K, shot.pose
+
+Lengths are metres in scenes and millimetres in lenses; poses are OpenCV's (x right, y down, z forward).
+What is refused raises ValueError with a sentence that names the place and the remedy; Ctrl-C stops a render.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _core
+
+__version__ = _core.version()
+__all__ = ["load", "Scene", "Shot", "Lens", "Traced", "Sensor", "Accel", "Hits"]
+
+_Path = Union[str, "os.PathLike[str]"]
+
+
+def _rows(name: str, values: Any, dtype: Any) -> np.ndarray:
+    """An array of shape (n, 3), as the core takes it."""
+    try:
+        array = np.asarray(values)
+        if dtype is np.uint32 and array.size:
+            if not np.issubdtype(array.dtype, np.integer):
+                raise ValueError(f"{name} has the dtype {array.dtype}; whole numbers are needed")
+            if array.min() < 0 or array.max() >= 2**32:
+                raise ValueError(f"{name} has {array.min()} to {array.max()}; 0 to 4294967295 are needed")
+        array = np.ascontiguousarray(array, dtype=dtype)
+    except TypeError as error:
+        raise ValueError(f"{name}: {error}") from None
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"{name} has the shape {array.shape} instead of (n, 3)")
+    return array
+
+
+def _stem(layer: str) -> str:
+    """A layer's key: NormalCamera is normal_camera, Id.object id_object, the picture's picture."""
+    if not layer:
+        return "picture"
+    stem = ""
+    for c in layer.replace(".", "_"):
+        stem += ("_" if c.isupper() and stem else "") + c.lower()
+    return stem.replace("__", "_")
+
+
+def load(
+    path: _Path,
+    settings: Optional[Mapping[str, Any]] = None,
+    *,
+    strict: bool = False,
+    allow_outside: bool = False,
+    memory_limit: Optional[int] = None,
+) -> "Scene":
+    """Opens a scene (.json), or a model to frame by itself (.gltf, .glb, .obj, .ply).
+
+    settings: values by path of the scene, such as {"camera.fov": 30}.
+    strict: refuse defects of the data instead of noting them.
+    allow_outside: let the scene name files outside of its folder.
+    memory_limit: the most memory that may be taken, in bytes.
+    """
+    pairs = [(key, json.dumps(value)) for key, value in (settings or {}).items()]
+    core = _core.Session.open(os.fspath(path), pairs, strict, allow_outside, memory_limit)
+    return Scene._of(core)
+
+
+class Scene:
+    """A scene that is opened once, changed and rendered often.
+
+    Models, images and the acceleration structure are made when they are first needed and kept; after a
+    change only what it touches is made anew.
+    """
+
+    _core: Any
+
+    def __init__(
+        self,
+        vertices: Any = None,
+        faces: Any = None,
+        *,
+        folder: _Path = ".",
+        strict: bool = False,
+        allow_outside: bool = False,
+        memory_limit: Optional[int] = None,
+        **scene: Any,
+    ) -> None:
+        """A scene of arrays and of the keys of a scene file (camera, objects, lights, tracer, layers, …).
+
+        vertices: (n, 3) float, metres. faces: (m, 3) int, counter-clockwise from the front. They become the
+        mesh "mesh", and an object of it when `objects` says nothing.
+        folder: where files that the scene names lie.
+        """
+        if (vertices is None) != (faces is None):
+            raise ValueError("vertices and faces come together")
+        if vertices is not None:
+            scene.setdefault("objects", [{"file": "mesh"}])
+        self._core = _core.Session.from_json(
+            json.dumps(scene), os.fspath(folder), strict, allow_outside, memory_limit
+        )
+        if vertices is not None:
+            self.insert_mesh("mesh", vertices, faces)
+
+    @classmethod
+    def _of(cls, core: Any) -> "Scene":
+        scene = cls.__new__(cls)
+        scene._core = core
+        return scene
+
+    def insert_mesh(self, name: str, vertices: Any, faces: Any) -> None:
+        """Adds a mesh, or replaces it: objects whose `file` is `name` are made of it."""
+        self._core.insert_mesh(
+            name, _rows("vertices", vertices, np.float64), _rows("faces", faces, np.uint32)
+        )
+
+    def __setitem__(self, path: str, value: Any) -> None:
+        """Sets a value of the scene, at any path: scene["camera.f_number"] = 2.8."""
+        if isinstance(value, np.generic) or isinstance(value, np.ndarray):
+            value = value.tolist()
+        self._core.set(path, json.dumps(value))
+
+    def __getitem__(self, path: str) -> Any:
+        """The value at a path of the scene; KeyError where it says nothing."""
+        value = self.values
+        for step in path.replace("[", ".").replace("]", "").split("."):
+            try:
+                value = value[int(step)] if isinstance(value, list) else value[step]
+            except (KeyError, IndexError, ValueError, TypeError):
+                raise KeyError(path) from None
+        return value
+
+    @property
+    def values(self) -> Dict[str, Any]:
+        """All values of the scene as they are now."""
+        return json.loads(self._core.values())
+
+    def plan(self) -> str:
+        """What a render will do, and why."""
+        return self._core.plan()
+
+    def render(self, samples: Optional[int] = None, progress: Any = False) -> "Shot":
+        """Renders the scene as it is now, on all processors and without Python's lock.
+
+        samples: samples a pixel from now on.
+        progress: True prints, a function is called with the stage and the share of it that is done.
+        """
+        if samples is not None:
+            self["render.samples"] = int(samples)
+        told = _print_progress if progress is True else (progress or None)
+        shot = Shot(self._core.render(told))
+        if progress is True:
+            print(flush=True)
+        return shot
+
+    def frames(self, samples: Optional[int] = None) -> Iterator["Shot"]:
+        """Renders the frames that the scene's `frames` name, one after the other."""
+        if samples is not None:
+            self["render.samples"] = int(samples)
+        count = self._core.load_frames()
+        if count == 0:
+            yield self.render()
+        for number in range(count):
+            self._core.show(number)
+            yield Shot(self._core.render(None))
+
+
+def _print_progress(stage: str, share: float) -> None:
+    print(f"\r{stage:>8} {100 * share:3.0f} %", end="", flush=True)
+
+
+class Shot(Mapping[str, np.ndarray]):
+    """A rendered picture: layers by name as arrays, the sensor's raw image, K and pose.
+
+    shot["depth"] is (h, w), shot["normal"] (h, w, 3); rows from the top. Data layers are float64, and
+    +inf (float), 0 (int) or the zero vector (directions) where nothing is hit.
+    """
+
+    def __init__(self, core: Any) -> None:
+        self._core = core
+        self._names = {_stem(name): name for name in core.layers()}
+        self._arrays: Dict[str, np.ndarray] = {}
+        self._camera = json.loads(core.camera())
+
+    def __getitem__(self, key: str) -> np.ndarray:
+        name = key if key in self._names.values() else self._names.get(key)
+        if name is None:
+            raise KeyError(f"{key}: the shot has {', '.join(self._names)}")
+        if name not in self._arrays:
+            self._arrays[name] = self._core.layer(name)
+        return self._arrays[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    @property
+    def raw(self) -> Optional[np.ndarray]:
+        """Digital numbers of the first exposure, uint16 (h, w) or (h, w, channels); None without a sensor."""
+        return self._core.raw(0)
+
+    @property
+    def exposures(self) -> List[Tuple[float, int]]:
+        """Exposure times (s) and frames that the scene's sensor asks for."""
+        return self._core.exposures()
+
+    def raw_of(self, index: int) -> Optional[np.ndarray]:
+        """Digital numbers of exposure `index`."""
+        return self._core.raw(index)
+
+    @property
+    def K(self) -> Optional[np.ndarray]:
+        """OpenCV's camera matrix (3, 3) in pixels; None for parallel rays."""
+        k = self._camera["K"]
+        return None if k is None else np.array(k)
+
+    @property
+    def pose(self) -> np.ndarray:
+        """Camera to world, (4, 4), metres, OpenCV's axes."""
+        return np.array(self._camera["world_from_camera"])
+
+    @property
+    def camera(self) -> Dict[str, Any]:
+        """The camera as camera.json has it: K, distortion, extrinsics, lens."""
+        return self._camera
+
+    @property
+    def report(self) -> Dict[str, Any]:
+        """What the render did and cost: seconds, rays, memory, fingerprints, notes."""
+        return json.loads(self._core.report())
+
+    @property
+    def notes(self) -> List[str]:
+        """What a user should know."""
+        return self.report["notes"]
+
+    def meaning(self, key: str) -> Dict[str, str]:
+        """Definition, unit, frame and miss of a layer."""
+        return dict(self._core.meaning(self._names.get(key, key)))
+
+    def write(self, folder: _Path, outputs: str = "exr,png,npy,dng") -> List[str]:
+        """Writes the files that the command writes; gives their names."""
+        return self._core.write(os.fspath(folder), outputs)
+
+    def _repr_png_(self) -> Optional[bytes]:
+        """The picture, or else the first layer, for notebooks."""
+        name = self._names.get("picture") or next(iter(self._names.values()), None)
+        if name is None:
+            return None
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "shot.png")
+            self._core.write_png(path, name)
+            with open(path, "rb") as file:
+                return file.read()
+
+    def __repr__(self) -> str:
+        return f"<etendue.Shot of {', '.join(self._names)}>"
+
+
+class Traced(NamedTuple):
+    """Rays behind a lens."""
+
+    positions: np.ndarray
+    """(n, 3), mm: on the last element, or where the ray ended."""
+    directions: np.ndarray
+    """(n, 3): unit vectors."""
+    throughput: np.ndarray
+    """(n,): what apertures and filters pass."""
+    status: np.ndarray
+    """(n,) uint8: 0 exited, 1 missed, 2 totally reflected, 3 vignetted."""
+    element: np.ndarray
+    """(n,) int32: the element that ended the ray, from 0 on the object side; -1 for those that exited."""
+
+
+class Lens:
+    """A lens of a lens file (.json), a Zemax file (.zmx) or a scene. Lengths are millimetres, z = 0 is the
+    first element's vertex and +z runs from the object to the sensor."""
+
+    def __init__(
+        self, path: _Path, f_number: Optional[float] = None, allow_outside: bool = False
+    ) -> None:
+        self._core = _core.Lens(os.fspath(path), f_number, allow_outside)
+
+    @property
+    def name(self) -> str:
+        """What its file calls it."""
+        return self._core.name()
+
+    @property
+    def notes(self) -> List[str]:
+        """What a user should know."""
+        return self._core.notes()
+
+    @property
+    def wavelength(self) -> float:
+        """The main wavelength (nm)."""
+        return self._core.wavelength()
+
+    def paraxial(self, wavelength: Optional[float] = None) -> Dict[str, Optional[float]]:
+        """Focal lengths, principal planes, pupils (mm) and f-number at a wavelength (nm); None where the lens
+        has none."""
+        return self._core.paraxial(self.wavelength if wavelength is None else float(wavelength))
+
+    @property
+    def effective_focal_length(self) -> Optional[float]:
+        """mm, at the main wavelength."""
+        return self.paraxial()["effective_focal_length"]
+
+    @property
+    def back_focal_length(self) -> Optional[float]:
+        """mm, at the main wavelength."""
+        return self.paraxial()["back_focal_length"]
+
+    @property
+    def f_number(self) -> Optional[float]:
+        """Focal length over the entrance pupil's diameter."""
+        return self.paraxial()["f_number"]
+
+    def trace(
+        self,
+        origins: Any,
+        directions: Any,
+        wavelength: Optional[float] = None,
+        *,
+        from_sensor: bool = False,
+        clip: bool = True,
+    ) -> Traced:
+        """Takes rays through the lens: (n, 3) origins (mm) and directions, a wavelength (nm).
+
+        clip: end rays at rims and stops."""
+        wavelength = self.wavelength if wavelength is None else float(wavelength)
+        origins = _rows("origins", origins, np.float64)
+        directions = _rows("directions", directions, np.float64)
+        return Traced(*self._core.trace(origins, directions, wavelength, from_sensor, clip))
+
+
+class Sensor:
+    """A sensor: a preset ("imx183"), a sensor's JSON file, or that of a scene; settings by path, as on the
+    command line: Sensor("imx183", {"temperature": 313.15})."""
+
+    def __init__(self, name: _Path, settings: Optional[Mapping[str, Any]] = None) -> None:
+        pairs = [(key, json.dumps(value)) for key, value in (settings or {}).items()]
+        self._core = _core.Sensor(os.fspath(name), pairs)
+
+    @property
+    def facts(self) -> Dict[str, Any]:
+        """Resolution, levels (DN), gain (DN/e-), noise (e-), pixel pitch (um)."""
+        return self._core.facts()
+
+    def expose(
+        self, electrons: Any, seed: int = 0, exposure: float = 0.01, frame: int = 0
+    ) -> np.ndarray:
+        """Digital numbers (uint16) of one exposure, of (h, w) mean photo-electrons a pixel. The exposure time
+        (s) counts for the dark current; another frame has other temporal noise."""
+        array = np.ascontiguousarray(electrons, dtype=np.float64)
+        if array.ndim != 2 or array.size == 0:
+            raise ValueError(f"electrons has the shape {array.shape} instead of (h, w)")
+        return self._core.expose(array, float(exposure), int(frame), int(seed))
+
+
+class Hits(NamedTuple):
+    """The closest hits of rays, (n,) each and (n, 3) for the normal."""
+
+    t: np.ndarray
+    """In lengths of the ray's direction; +inf for a miss."""
+    triangle: np.ndarray
+    """int64; -1 for a miss."""
+    u: np.ndarray
+    """Barycentric coordinate of the second corner."""
+    v: np.ndarray
+    """Barycentric coordinate of the third corner."""
+    normal: np.ndarray
+    """Unit geometric normal on the triangle's front; zero for a miss."""
+
+
+class Accel:
+    """A ray caster over one mesh: Embree finds, double precision measures."""
+
+    def __init__(self, vertices: Any, faces: Any, backend: str = "embree") -> None:
+        """vertices: (n, 3) float. faces: (m, 3) int. backend: embree, bvh (pure Rust) or exact (slow)."""
+        self._core = _core.Accel(
+            _rows("vertices", vertices, np.float64), _rows("faces", faces, np.uint32), backend
+        )
+
+    def closest(
+        self, origins: Any, directions: Any, t_max: Any = None, *, coherent: bool = False
+    ) -> Hits:
+        """The closest hit of each ray: (n, 3) origins and directions, of any length but 0. t_max: (n,) or one
+        number, in lengths of the directions. coherent: neighbours run close together, as a camera's do.
+        A ray that is not finite misses."""
+        origins = _rows("origins", origins, np.float64)
+        directions = _rows("directions", directions, np.float64)
+        found = self._core.closest(origins, directions, _limits(t_max, len(origins)), coherent)
+        return Hits(found["t"], found["triangle"], found["u"], found["v"], found["normal"])
+
+    def occluded(
+        self, origins: Any, directions: Any, t_max: Any = None, *, coherent: bool = False
+    ) -> np.ndarray:
+        """Whether anything is in the way of each ray, up to t_max: (n,) bool."""
+        origins = _rows("origins", origins, np.float64)
+        directions = _rows("directions", directions, np.float64)
+        return self._core.occluded(origins, directions, _limits(t_max, len(origins)), coherent)
+
+    def __repr__(self) -> str:
+        return f"<etendue.Accel: {self._core.report()}>"
+
+
+def _limits(t_max: Any, count: int) -> Optional[np.ndarray]:
+    if t_max is None:
+        return None
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(t_max, dtype=np.float64), (count,)))

@@ -1,0 +1,95 @@
+//! Errors and arrays between Rust and Python.
+
+use etendue::Error;
+use etendue_render::output::{Layer, Values};
+use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+
+/// An error as Python has it: what the caller can mend is a `ValueError`.
+pub(crate) fn raised(error: Error) -> PyErr {
+    match error {
+        error if error.is_stopped() => PyKeyboardInterrupt::new_err("stopped"),
+        error if error.is_refused() => PyValueError::new_err(with_causes(&error)),
+        error => PyRuntimeError::new_err(with_causes(&error)),
+    }
+}
+
+/// A `ValueError` of what something says.
+pub(crate) fn refused(error: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+fn with_causes(error: &dyn std::error::Error) -> String {
+    let mut message = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        let inner_words = inner.to_string();
+        // Some errors already quote what caused them.
+        if !message.contains(&inner_words) {
+            message.push_str(": ");
+            message.push_str(&inner_words);
+        }
+        cause = inner.source();
+    }
+    message
+}
+
+/// Rows of three numbers.
+pub(crate) fn triples<T: numpy::Element + Copy>(
+    name: &str,
+    array: &PyReadonlyArray2<'_, T>,
+) -> PyResult<Vec<[T; 3]>> {
+    let array = array.as_array();
+    match array.shape() {
+        [_, 3] => Ok(array.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect()),
+        other => Err(refused(format!("{name} has the shape {other:?} instead of (n, 3)"))),
+    }
+}
+
+/// A layer as an array: `[h, w]` for one channel, else `[h, w, channels]`.
+pub(crate) fn of_layer<'py>(
+    py: Python<'py>,
+    layer: &Layer,
+    [width, height]: [usize; 2],
+) -> PyResult<Bound<'py, PyAny>> {
+    let planes: Vec<&Values> = layer.channels.iter().map(|channel| &channel.values).collect();
+    macro_rules! woven {
+        ($kind:path) => {{
+            let mut all = Vec::with_capacity(width * height * planes.len());
+            let slices: Vec<_> = planes
+                .iter()
+                .filter_map(|plane| if let $kind(values) = plane { Some(values) } else { None })
+                .collect();
+            for i in 0..width * height {
+                all.extend(slices.iter().map(|plane| plane[i]));
+            }
+            shaped(all.into_pyarray(py).into_any(), [height, width, slices.len()])
+        }};
+    }
+    match planes.first() {
+        Some(Values::F32(_)) => woven!(Values::F32),
+        Some(Values::F64(_)) => woven!(Values::F64),
+        Some(Values::U16(_)) => woven!(Values::U16),
+        Some(Values::U32(_)) => woven!(Values::U32),
+        None => Err(refused("a layer without channels")),
+    }
+}
+
+/// An array in rows, columns and channels; without the last when there is one.
+pub(crate) fn shaped(
+    flat: Bound<'_, PyAny>,
+    [height, width, channels]: [usize; 3],
+) -> PyResult<Bound<'_, PyAny>> {
+    match channels {
+        1 => flat.call_method1("reshape", ((height, width),)),
+        _ => flat.call_method1("reshape", ((height, width, channels),)),
+    }
+}
+
+/// An array of rows of three.
+pub(crate) fn of_triples(py: Python<'_>, rows: Vec<[f64; 3]>) -> PyResult<Bound<'_, PyAny>> {
+    let count = rows.len();
+    let flat: Vec<f64> = rows.into_iter().flatten().collect();
+    Ok(flat.into_pyarray(py).reshape([count, 3])?.into_any())
+}

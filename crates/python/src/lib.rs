@@ -1,0 +1,34 @@
+//! The core of the Python package `etendue`: what Python cannot do itself. The package's own Python, in
+//! `python/etendue`, checks and converts arrays and has the documentation.
+// PyO3's macros expand to code with casts and names of their own.
+#![allow(missing_docs, missing_debug_implementations, reason = "items are seen from Python alone")]
+#![allow(unreachable_pub, reason = "PyO3 exports what is public here")]
+
+mod accel;
+mod arrays;
+mod lens;
+mod scene;
+mod sensor;
+
+use pyo3::prelude::*;
+
+/// The Python module `etendue._core`.
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use super::accel::Accel;
+    #[pymodule_export]
+    use super::lens::Lens;
+    #[pymodule_export]
+    use super::scene::{Rendering, Session};
+    #[pymodule_export]
+    use super::sensor::Sensor;
+    #[pymodule_export]
+    use super::version;
+}
+
+/// The version of the package.
+#[pyfunction]
+fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}

@@ -1,0 +1,75 @@
+//! Sensors by themselves.
+
+use std::path::Path;
+
+use etendue_scene::file::SensorFile;
+use etendue_sensor::{Exposure, Model};
+use numpy::{IntoPyArray, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde_json::json;
+
+use crate::arrays::{refused, shaped};
+
+/// A sensor of the trade, or of a file.
+#[pyclass(frozen)]
+pub struct Sensor {
+    sensor: etendue_sensor::Sensor,
+}
+
+#[pymethods]
+impl Sensor {
+    #[new]
+    fn new(name: &str, settings: Vec<(String, String)>) -> PyResult<Self> {
+        let path = Path::new(name);
+        let file = if path.exists() || name.ends_with(".json") {
+            SensorFile::read(path, &settings)
+        } else {
+            let model = Model::from_name(name).ok_or_else(|| {
+                let known: Vec<&str> = Model::ALL.iter().map(|m| m.preset().name).collect();
+                let known = known.join(", ");
+                refused(format!("{name}: neither a file nor a preset; presets: {known}"))
+            })?;
+            SensorFile::of_value(path, json!({ "type": "raw", "model": model }), &settings)
+        };
+        Ok(Self { sensor: file.map_err(refused)?.sensor })
+    }
+
+    fn facts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (s, facts) = (&self.sensor, PyDict::new(py));
+        facts.set_item("resolution", s.resolution())?;
+        facts.set_item("bit_depth", s.bit_depth())?;
+        for (key, value) in [
+            ("pixel_pitch", s.pixel_pitch()),
+            ("system_gain", s.system_gain()),
+            ("read_noise", s.read_noise()),
+            ("dark_current", s.dark_current()),
+            ("full_well", s.full_well()),
+            ("saturation", s.saturation()),
+            ("black_level", s.black_level()),
+            ("white_level", s.white_level()),
+        ] {
+            facts.set_item(key, value)?;
+        }
+        Ok(facts)
+    }
+
+    /// Digital numbers of one exposure of so many photo-electrons a pixel on average.
+    fn expose<'py>(
+        &self,
+        py: Python<'py>,
+        electrons: PyReadonlyArray2<'_, f64>,
+        exposure: f64,
+        frame: u32,
+        seed: u64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let array = electrons.as_array();
+        let size = [array.ncols(), array.nrows()];
+        let electrons: Vec<f64> = array.iter().copied().collect();
+        let image = py.detach(|| {
+            self.sensor.expose_electrons(&electrons, size, Exposure { exposure, frame }, seed)
+        });
+        let image = image.map_err(refused)?;
+        shaped(image.values.into_pyarray(py).into_any(), [size[1], size[0], 1])
+    }
+}
