@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use etendue::{Options, Outputs, Progress, Reach, Strictness};
 use etendue_render::output::{png, sidecar};
@@ -13,8 +13,8 @@ use serde_json::Value;
 
 use crate::arrays::{of_layer, raised, refused, shaped, triples};
 
-/// How often Python is asked whether Ctrl-C was pressed, and shown progress.
-const LOOK: Duration = Duration::from_millis(50);
+/// How often Python is asked whether Ctrl-C was pressed, and shown progress (ms).
+const LOOK: u64 = 50;
 
 /// A scene that is opened once, changed and rendered often.
 #[pyclass]
@@ -122,7 +122,7 @@ fn watched(told: Option<Py<PyAny>>) -> Progress {
     Progress::new(move |stage, share| {
         let now = u64::try_from(start.elapsed().as_millis()).unwrap_or(u64::MAX);
         let due = next.load(Ordering::Relaxed);
-        let later = now + LOOK.as_millis() as u64;
+        let later = now + LOOK;
         let is_mine = now >= due
             && next.compare_exchange(due, later, Ordering::Relaxed, Ordering::Relaxed).is_ok();
         if !is_mine {

@@ -233,7 +233,8 @@ pub struct End {
     pub fate: RayStatus,
     /// The ray as it leaves, or where it ended (mm).
     pub ray: Ray,
-    pub(crate) throughput: f64,
+    /// What apertures and filters pass of it.
+    pub throughput: f64,
 }
 
 /// Vector registers to trace with.
