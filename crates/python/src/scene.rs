@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
 
 use etendue::{Options, Outputs, Progress, Reach, Strictness};
 use etendue_render::output::{png, sidecar};
 use numpy::{IntoPyArray, PyReadonlyArray2};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::Value;
@@ -90,12 +92,8 @@ impl Session {
     /// Renders without Python's lock; `told` is called with the stage and the share done now and then.
     fn render(&mut self, py: Python<'_>, told: Option<Py<PyAny>>) -> PyResult<Rendering> {
         let progress = watched(told);
-        let rendering = py.detach(|| self.session.render(&progress)).map_err(raised)?;
-        // A Ctrl-C that left a picture is one, too.
-        if progress.is_cancelled() {
-            py.check_signals()?;
-            return Err(pyo3::exceptions::PyKeyboardInterrupt::new_err("stopped"));
-        }
+        let session = &mut self.session;
+        let rendering = interruptible(py, &progress, || session.render(&progress))?;
         Ok(Rendering { rendering })
     }
 }
@@ -128,12 +126,44 @@ fn watched(told: Option<Py<PyAny>>) -> Progress {
         if !is_mine {
             return true;
         }
-        Python::attach(|py| {
-            let shown = told.as_ref().map(|told| told.call1(py, (stage.name(), share)));
-            // What a callback raises stops the render, and so does Ctrl-C.
-            py.check_signals().is_ok() && !matches!(shown, Some(Err(_)))
-        })
+        let Some(told) = &told else { return true };
+        // What a callback raises stops the work.
+        Python::attach(|py| told.call1(py, (stage.name(), share)).is_ok())
     })
+}
+
+/// Does `work` in a thread of its own, without Python's lock, while this one asks whether Ctrl-C was pressed:
+/// Python tells no other thread. Then the work is stopped, and what it left is dropped.
+fn interruptible<T: Send>(
+    py: Python<'_>,
+    progress: &Progress,
+    work: impl FnOnce() -> Result<T, etendue::Error> + Send,
+) -> PyResult<T> {
+    let mut interrupted = None;
+    let done = py.detach(|| {
+        std::thread::scope(|scope| {
+            let (sender, receiver) = mpsc::channel();
+            scope.spawn(move || sender.send(work()));
+            loop {
+                match receiver.recv_timeout(Duration::from_millis(LOOK)) {
+                    Ok(done) => return Some(done),
+                    // The work panicked, which was told.
+                    Err(mpsc::RecvTimeoutError::Disconnected) => return None,
+                    Err(mpsc::RecvTimeoutError::Timeout) => {
+                        if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                            interrupted = Some(raised);
+                            progress.cancel();
+                        }
+                    }
+                }
+            }
+        })
+    });
+    match (interrupted, done) {
+        (Some(raised), _) => Err(raised),
+        (None, Some(done)) => done.map_err(raised),
+        (None, None) => Err(PyRuntimeError::new_err("a fault of etendue; see the message above")),
+    }
 }
 
 /// A rendered picture with its layers.
@@ -185,11 +215,10 @@ impl Rendering {
     fn write(&self, py: Python<'_>, folder: &str, outputs: &str) -> PyResult<Vec<String>> {
         let outputs = Outputs::from_list(outputs).map_err(refused)?;
         let progress = watched(None);
-        let written = py.detach(|| {
+        let written = interruptible(py, &progress, || {
             etendue::places::folder(folder.as_ref())?;
             self.rendering.write_with(folder.as_ref(), outputs, &progress)
-        });
-        let written = written.map_err(raised)?;
+        })?;
         Ok(written.files.iter().map(|path| path.display().to_string()).collect())
     }
 

@@ -15,6 +15,8 @@ import etendue
 CHECKOUT = pathlib.Path(os.environ["ETENDUE_CHECKOUT"])
 LENSES = CHECKOUT / "scenes" / "lenses"
 
+# A few roundings of f64 of the direction and along it.
+EPSILON = 1e-15
 QUAD = np.array([[-9.0, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]])
 FACES = np.array([[0, 1, 2], [0, 2, 3]])
 
@@ -34,7 +36,7 @@ def test_layers_are_arrays():
     shot = scene.render()
     assert set(shot) >= {"depth", "normal", "id_object"}
     assert shot["depth"].shape == (6, 8) and shot["depth"].dtype == np.float64
-    np.testing.assert_array_equal(shot["depth"], 3.0)
+    np.testing.assert_allclose(shot["depth"], 3.0, rtol=EPSILON)
     np.testing.assert_array_equal(shot["normal"], np.broadcast_to([0, 0, 1], (6, 8, 3)))
     assert shot["id_object"].dtype == np.uint32 and (shot["id_object"] == 1).all()
     assert shot["Depth"] is shot["depth"]
@@ -49,7 +51,7 @@ def test_a_change_is_seen_and_projects():
     scene["camera.pose.from"] = np.array([0.0, 0.0, 5.0])
     assert scene["camera.pose.from"] == [0, 0, 5]
     shot = scene.render()
-    np.testing.assert_array_equal(shot["depth"], 5.0)
+    np.testing.assert_allclose(shot["depth"], 5.0, rtol=EPSILON)
     # The point in the middle of a pixel, projected with K and pose, is that pixel.
     rows, columns = np.mgrid[0:6, 0:8]
     rays = np.linalg.inv(shot.K) @ np.stack([columns.ravel(), rows.ravel(), np.ones(48)])
@@ -76,7 +78,7 @@ def test_what_is_refused_is_a_value_error_and_leaves_the_scene():
         etendue.Scene(QUAD)
     with pytest.raises(ValueError, match="nowhere.json"):
         etendue.load("nowhere.json")
-    np.testing.assert_array_equal(scene.render()["depth"], 3.0)
+    np.testing.assert_allclose(scene.render()["depth"], 3.0, rtol=EPSILON)
 
 
 def test_arrays_of_any_layout_are_taken():
@@ -87,7 +89,7 @@ def test_arrays_of_any_layout_are_taken():
     faces = np.asfortranarray(FACES.astype(np.int16))
     faces.setflags(write=False)
     scene = etendue.Scene(vertices, faces, layers=["depth"], camera=quad()["camera"])
-    np.testing.assert_array_equal(scene.render()["depth"], 3.0)
+    np.testing.assert_allclose(scene.render()["depth"], 3.0, rtol=EPSILON)
 
 
 def test_the_command_renders_the_same(tmp_path):
