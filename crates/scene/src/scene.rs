@@ -87,7 +87,7 @@ impl Scene {
     }
 
     /// The scene's identity. Reads every file of the scene once more, from the system's cache as a
-    /// rule; in later loads with the same [`Cache`](crate::Cache) only those that have changed.
+    /// rule; in later loads with the same [`Cache`] only those that have changed.
     ///
     /// # Errors
     ///
