@@ -188,8 +188,7 @@ impl Embree {
     }
 
     /// As [`Self::ask_beside`], for rays of which it was only asked whether they hit anything, and
-    /// that did not: by two rays beside each, because nothing else betrays a leak. One alone let 2 of
-    /// ten million rays pass that were aimed exactly at corners.
+    /// that did not: by two rays on different sides of each, because nothing else betrays a leak.
     fn ask_beside_for_any(
         &self,
         rays: &RayBatch,
