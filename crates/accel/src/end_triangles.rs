@@ -86,11 +86,7 @@ impl EndTriangles {
 }
 
 /// The formula of this module's head for the rays of `range`, whose triangles are in `lanes`.
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn measure(lanes: &Lanes, rays32: &Rays32, range: Range<usize>, out: &mut Clear) {
     let Lanes { a, e1, e2, d, .. } = lanes;
     let mut size = [0.0; LANES];

@@ -187,11 +187,7 @@ pub(crate) fn round(x: f64) -> f32 {
     x as f32
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
     let n = rays.len();
     let [ox, oy, oz] = rays.origins().map(|array| &array[..n]);

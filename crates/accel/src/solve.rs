@@ -227,11 +227,7 @@ impl Lanes {
     }
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn see(lanes: &mut Lanes, range: Range<usize>, place: &Place<'_>, origin: [&[f64]; 3]) {
     let Range { start, end } = range;
     let Lanes { narrow, corners, a, e1, e2, magnitude, handedness, .. } = lanes;
@@ -282,11 +278,7 @@ fn turn(linear: &DMat3, vectors: &mut [Lane; 3], start: usize, end: usize) {
 }
 
 /// Where each ray meets its triangle's plane, and whether that is inside of the triangle.
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn measure(lanes: &mut Lanes, want_normal: bool) {
     let Lanes { a, e1, e2, d, magnitude, handedness, t, u, v, excess, front, n, .. } = lanes;
     for i in 0..LANES {
@@ -323,11 +315,7 @@ struct Seen {
 }
 
 /// Copies one chunk's results to the hits.
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn scatter(
     rays: &RayBatch,
     hits: &mut HitBatch,

@@ -189,11 +189,7 @@ impl Pinhole {
 
 /// Directions through places on the sensor, which stand in the first two arrays, along the axes that
 /// point right, down and forward.
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn aim_straight(
     intrinsics: &Intrinsics,
     [right, down, forward]: [DVec3; 3],

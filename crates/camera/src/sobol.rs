@@ -52,11 +52,7 @@ fn both(first: u32) -> [&'static [u32; BITS]; 2] {
     [0, 1].map(|k| &directions[(first + k) as usize])
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn scrambled(keys: &[Key], first: u32, directions: [&[u32; BITS]; 2], out: &mut [[f64; 2]]) {
     for (keys, out) in keys.chunks(LANES).zip(out.chunks_mut(LANES)) {
         let mut lanes = [Key::default(); LANES];

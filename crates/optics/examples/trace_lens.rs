@@ -35,11 +35,7 @@ fn beam() -> LensRays {
 }
 
 /// Two square roots and a division for each surface, which is what a sphere takes, and nothing else.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl+avx512bw",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion(targets = "simd")]
 fn roots_and_divisions(values: &mut [[f64; 32]], surfaces: usize) {
     for block in values {
         for _ in 0..surfaces {

@@ -149,11 +149,7 @@ impl ToWorld {
     }
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn turn_block(
     to_world: &ToWorld,
     block: &Block,

@@ -250,11 +250,7 @@ pub enum Registers {
 }
 
 // Widest first: the first set that the processor has is taken, at run time.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl+avx512bw",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion(targets = "simd")]
 fn trace_blocks(blocks: &mut [Block], steps: &[Step], clip: Clip) {
     all_blocks(blocks, steps, clip);
 }

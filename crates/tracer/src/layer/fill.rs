@@ -9,19 +9,6 @@ use etendue_geometry::{HitBatch, MISS, Placement};
 use super::{Columns, NormalKind, Seen, Space};
 use crate::{Color, Paint, SceneView, Traced};
 
-/// Vector units that loops are compiled for beside the portable ones.
-macro_rules! vectorised {
-    ($(#[$doc:meta])* fn $name:ident($($argument:ident: $kind:ty),* $(,)?) $body:block) => {
-        $(#[$doc])*
-        #[multiversion::multiversion(targets(
-            "x86_64+avx512f+avx512dq+avx512vl",
-            "x86_64+avx2",
-            "aarch64+neon"
-        ))]
-        fn $name($($argument: $kind),*) $body
-    };
-}
-
 impl Seen<'_> {
     /// Refills the first columns with `value` of each ray.
     pub(super) fn each<const N: usize>(
@@ -205,47 +192,44 @@ impl SceneView<'_> {
     }
 }
 
-vectorised! {
-    /// Cosines between rays and the triangles' normals.
-    fn cosines(traced: Traced<'_>, run: Range<usize>, out: &mut [f64]) {
-        let [dx, dy, dz] = traced.rays.directions().map(|array| &array[run.clone()]);
-        let [nx, ny, nz] = traced.hits.normal.each_ref().map(|array| &array[run.clone()]);
-        for (i, out) in out[run].iter_mut().enumerate() {
-            *out = (nx[i] * dx[i] + ny[i] * dy[i] + nz[i] * dz[i]).abs();
-        }
+/// Cosines between rays and the triangles' normals.
+#[multiversion::multiversion(targets = "simd")]
+fn cosines(traced: Traced<'_>, run: Range<usize>, out: &mut [f64]) {
+    let [dx, dy, dz] = traced.rays.directions().map(|array| &array[run.clone()]);
+    let [nx, ny, nz] = traced.hits.normal.each_ref().map(|array| &array[run.clone()]);
+    for (i, out) in out[run].iter_mut().enumerate() {
+        *out = (nx[i] * dx[i] + ny[i] * dy[i] + nz[i] * dz[i]).abs();
     }
 }
 
-vectorised! {
-    fn depths(traced: Traced<'_>, from: DVec3, forward: DVec3, out: &mut [f64]) {
-        let [ox, oy, oz] = traced.rays.origins().map(|array| &array[..out.len()]);
-        let [dx, dy, dz] = traced.rays.directions().map(|array| &array[..out.len()]);
-        let t = &traced.hits.t[..out.len()];
-        for i in 0..out.len() {
-            let start = (ox[i] - from.x) * forward.x
-                + (oy[i] - from.y) * forward.y
-                + (oz[i] - from.z) * forward.z;
-            let along = dx[i] * forward.x + dy[i] * forward.y + dz[i] * forward.z;
-            // A miss is no product: a ray across the axis would make 0 × ∞ of it.
-            out[i] = if t[i] == f64::INFINITY { t[i] } else { start + t[i] * along };
-        }
+#[multiversion::multiversion(targets = "simd")]
+fn depths(traced: Traced<'_>, from: DVec3, forward: DVec3, out: &mut [f64]) {
+    let [ox, oy, oz] = traced.rays.origins().map(|array| &array[..out.len()]);
+    let [dx, dy, dz] = traced.rays.directions().map(|array| &array[..out.len()]);
+    let t = &traced.hits.t[..out.len()];
+    for i in 0..out.len() {
+        let start = (ox[i] - from.x) * forward.x
+            + (oy[i] - from.y) * forward.y
+            + (oz[i] - from.z) * forward.z;
+        let along = dx[i] * forward.x + dy[i] * forward.y + dz[i] * forward.z;
+        // A miss is no product: a ray across the axis would make 0 × ∞ of it.
+        out[i] = if t[i] == f64::INFINITY { t[i] } else { start + t[i] * along };
     }
 }
 
-vectorised! {
-    fn normals(traced: Traced<'_>, axes: [DVec3; 3], out: &mut Columns) {
-        let [a, b, c, _] = out;
-        let len = a.len();
-        let (b, c) = (&mut b[..len], &mut c[..len]);
-        let [dx, dy, dz] = traced.rays.directions().map(|array| &array[..len]);
-        let [nx, ny, nz] = traced.hits.normal.each_ref().map(|array| &array[..len]);
-        for i in 0..len {
-            let (x, y, z) = (nx[i], ny[i], nz[i]);
-            let side = if x * dx[i] + y * dy[i] + z * dz[i] > 0.0 { -1.0 } else { 1.0 };
-            let (x, y, z) = (x * side, y * side, z * side);
-            a[i] = x * axes[0].x + y * axes[0].y + z * axes[0].z;
-            b[i] = x * axes[1].x + y * axes[1].y + z * axes[1].z;
-            c[i] = x * axes[2].x + y * axes[2].y + z * axes[2].z;
-        }
+#[multiversion::multiversion(targets = "simd")]
+fn normals(traced: Traced<'_>, axes: [DVec3; 3], out: &mut Columns) {
+    let [a, b, c, _] = out;
+    let len = a.len();
+    let (b, c) = (&mut b[..len], &mut c[..len]);
+    let [dx, dy, dz] = traced.rays.directions().map(|array| &array[..len]);
+    let [nx, ny, nz] = traced.hits.normal.each_ref().map(|array| &array[..len]);
+    for i in 0..len {
+        let (x, y, z) = (nx[i], ny[i], nz[i]);
+        let side = if x * dx[i] + y * dy[i] + z * dz[i] > 0.0 { -1.0 } else { 1.0 };
+        let (x, y, z) = (x * side, y * side, z * side);
+        a[i] = x * axes[0].x + y * axes[0].y + z * axes[0].z;
+        b[i] = x * axes[1].x + y * axes[1].y + z * axes[1].z;
+        c[i] = x * axes[2].x + y * axes[2].y + z * axes[2].z;
     }
 }

@@ -331,11 +331,7 @@ impl Tracing<'_> {
 }
 
 /// Points, their errors, and normals on the viewer's side.
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn measure(patch: &mut Patch, own: DVec3) {
     let Patch { origin, direction, t, normal, point, error, .. } = patch;
     for i in 0..LANES {
@@ -361,11 +357,7 @@ fn measure(patch: &mut Patch, own: DVec3) {
 }
 
 /// Rays from the hits to the point `light`, with cos θ / (π r²): 0 where it is behind the surface.
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn aim_at(patch: &mut Patch, light: DVec3) {
     let Patch { normal, point, error, away, .. } = patch;
     for i in 0..LANES {
@@ -392,11 +384,7 @@ fn aim_at(patch: &mut Patch, light: DVec3) {
 
 /// Rays from the hits to places on lamps, with cos θ / π over the density, weighed by the power
 /// heuristic against the density of [`scatter`]: 0 where either side is turned away.
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn aim_at_lamps(patch: &mut Patch) {
     let Patch { normal, point, error, away, lamps, .. } = patch;
     let (mut offset, mut end) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
@@ -452,11 +440,7 @@ fn aim_at_lamps(patch: &mut Patch) {
 }
 
 /// Directions about the normals with density cos θ / π ([`crate::sampling`]).
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn scatter(patch: &mut Patch, squares: &[[f64; 2]; LANES]) {
     let Patch { normal, point, error, away, .. } = patch;
     for i in 0..LANES {

@@ -81,11 +81,7 @@ impl Disk {
     }
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn fill_blocks(disk: &Disk, bundle: &Bundle<'_>, blocks: &mut [Block]) {
     let Bundle { sensor, scale, film, squares } = *bundle;
     let Frame { vertex, rotation } = *sensor;
