@@ -85,11 +85,7 @@ impl Place {
 
 /// Exposes one block: mean photo-electrons in, digital numbers out. `offset` holds what rows and
 /// columns add (e⁻) and is used up.
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+bmi1+bmi2",
-    "x86_64+avx2+fma+bmi1+bmi2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 pub(crate) fn expose(
     chain: &Chain,
     place: Place,

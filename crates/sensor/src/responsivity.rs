@@ -40,11 +40,7 @@ impl Responsivity {
     }
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+bmi1+bmi2",
-    "x86_64+avx2+fma+bmi1+bmi2",
-    "aarch64+neon"
-))]
+#[multiversion::multiversion(targets = "simd")]
 fn one_band(values: &[f32], worth: f64, mean: &mut [f64]) -> bool {
     let mut clean = true;
     for (&value, mean) in values.iter().zip(mean) {

@@ -1,5 +1,6 @@
 //! A sensor ready to expose films.
 
+use etendue_geometry::units::Micrometres;
 use etendue_spectrum::{Bands, Curve};
 use rayon::prelude::*;
 
@@ -59,7 +60,7 @@ impl Sensor {
     ///
     /// When the size is none.
     pub fn with_pixel_pitch(&self, pitch: f64) -> Result<Self, SensorError> {
-        Self::new(&SensorSpec { pixel_pitch: Some(pitch), ..self.spec.clone() })
+        Self::new(&SensorSpec { pixel_pitch: Some(Micrometres(pitch)), ..self.spec.clone() })
     }
 
     /// The same sensor for a render in other bands than it asks for: in three, say, where nothing in

@@ -70,7 +70,11 @@ impl Settings {
             spec.noise.unwrap_or(if counts { NoiseModel::Poisson } else { NoiseModel::None });
         let mut settings = Self {
             resolution: spec.resolution.or(preset.map(|p| p.resolution.value)).unwrap_or([1024; 2]),
-            pixel_pitch: spec.pixel_pitch.or(preset.map(|p| p.pixel_pitch.value)).unwrap_or(5.0),
+            pixel_pitch: spec
+                .pixel_pitch
+                .map(|pitch| pitch.0)
+                .or(preset.map(|p| p.pixel_pitch.value))
+                .unwrap_or(5.0),
             efficiency: match &spec.quantum_efficiency {
                 Some(curve) => curve.clone(),
                 None => preset.map_or(Curve::ONE, crate::preset::Preset::efficiency),
@@ -90,7 +94,10 @@ impl Settings {
             dsnu: spec.dsnu.or(preset.map(|p| p.dsnu.value)).unwrap_or(0.0),
             row_noise: spec.row_noise.unwrap_or(0.0),
             column_noise: spec.column_noise.unwrap_or(0.0),
-            exposures: spec.exposures.clone().unwrap_or(vec![spec.exposure.unwrap_or(0.01)]),
+            exposures: match &spec.exposures {
+                Some(several) => several.iter().map(|time| time.0).collect(),
+                None => vec![spec.exposure.map_or(0.01, |time| time.0)],
+            },
             frames: spec.frames.unwrap_or(1),
             noise,
             serial: spec.serial.unwrap_or(0),
@@ -169,7 +176,7 @@ impl Settings {
     fn check_exposures(&self, spec: &SensorSpec) -> Result<(), SensorError> {
         let demand = "seconds, above 0 (1e-12 to 1e9)";
         if let Some(exposure) = spec.exposure {
-            within("exposure", exposure, [1e-12, 1e9], demand)?;
+            within("exposure", exposure.0, [1e-12, 1e9], demand)?;
         }
         for &exposure in &self.exposures {
             within("exposures", exposure, [1e-12, 1e9], demand)?;

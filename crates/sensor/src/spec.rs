@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use etendue_geometry::units::{Micrometres, Seconds};
 use etendue_spectrum::{Curve, Grid};
 use schemars::JsonSchema;
 use serde::de::{self, MapAccess, Visitor};
@@ -26,7 +27,7 @@ pub struct SensorSpec {
     pub resolution: Option<[u32; 2]>,
     /// From one pixel's centre to the next (µm, > 0; default 5).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub pixel_pitch: Option<f64>,
+    pub pixel_pitch: Option<Micrometres>,
     /// Electrons a photon frees, η (0..=1; default 1).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quantum_efficiency: Option<Curve>,
@@ -75,10 +76,10 @@ pub struct SensorSpec {
     pub hot_pixels: Option<HotPixels>,
     /// Exposure time T (s, > 0; default 0.01).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub exposure: Option<f64>,
+    pub exposure: Option<Seconds>,
     /// Several exposure times (s): the light is rendered once and exposed for each.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub exposures: Option<Vec<f64>>,
+    pub exposures: Option<Vec<Seconds>>,
     /// Frames of each exposure (≥ 1; default 1). They share the fixed pattern, not the noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frames: Option<u32>,

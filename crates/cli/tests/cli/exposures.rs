@@ -64,7 +64,7 @@ fn frames_share_the_light_and_the_pattern_but_not_the_noise() {
         [0.4; 3],
         &json!({
             "type": "raw", "resolution": [64, 64], "system_gain": 1, "bit_depth": 12, "dsnu": 20,
-            "read_noise": 1, "exposures": [0.01, 0.1], "frames": 2, "moments": true, "serial": 4
+            "read_noise": 1, "exposures": ["10 ms", 0.1], "frames": 2, "moments": true, "serial": 4
         }),
     );
     bench.render(&[]);
@@ -160,6 +160,7 @@ fn a_scenes_sensor_is_refused_by_its_path() {
         (json!({ "bit_depth": 0 }), ["camera.sensor.bit_depth", "1 to 16"]),
         (json!({ "system_gain": -1 }), ["camera.sensor.system_gain", "above 0"]),
         (json!({ "exposure": 0 }), ["camera.sensor.exposure", "above 0"]),
+        (json!({ "exposure": "3 parsec" }), ["camera.sensor.exposure", "ms"]),
         (json!({ "pixel_pitch": "3 parsec" }), ["camera.sensor.pixel_pitch", "parsec"]),
         (json!({ "resolution": [0, 1] }), ["camera.sensor.resolution", "1 to 65535"]),
         (json!({ "type": "bayer" }), ["camera.sensor.type", "`raw`"]),

@@ -2,10 +2,9 @@
 
 use std::sync::LazyLock;
 
-use etendue_geometry::units::Micrometres;
 use etendue_sensor::SensorSpec;
 use schemars::generate::SchemaSettings;
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 use super::{SceneSpec, lenient};
 
@@ -38,19 +37,10 @@ pub fn scene_schema() -> Value {
 /// The same, made once.
 pub(crate) static SCENE: LazyLock<Value> = LazyLock::new(scene_schema);
 
-/// The schema of a scene's `sensor`, made once. Its pixel pitch may have a unit, like all lengths.
+/// The schema of a scene's `sensor`, made once.
 pub(crate) static SENSOR: LazyLock<Value> = LazyLock::new(|| {
-    let mut generator = SchemaSettings::draft2020_12().into_generator();
-    let pitch = generator.subschema_for::<Option<Micrometres>>().to_value();
+    let generator = SchemaSettings::draft2020_12().into_generator();
     let mut schema = generator.into_root_schema_for::<SensorSpec>().to_value();
-    if let Some(member) = schema.pointer_mut("/properties/pixel_pitch")
-        && let Value::Object(members) = pitch
-    {
-        let about = member.get("description").cloned().unwrap_or_default();
-        let mut pitch = Map::from_iter([("description".to_owned(), about)]);
-        pitch.extend(members);
-        *member = Value::Object(pitch);
-    }
     if let Some(member) = schema.pointer_mut("/properties/resolution") {
         lenient::allow_resolution_words(member);
     }

@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use etendue_geometry::units::Micrometres;
 use etendue_sensor::{Sensor, SensorError, SensorSpec};
-use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::{Written, check, lenient, read_document, schema};
@@ -91,13 +89,7 @@ fn built(
     place: &str,
     written: &Written,
 ) -> Result<(SensorSpec, Sensor), SceneError> {
-    let mut object = object.clone();
-    if let Some(pitch) = object.get_mut("pixel_pitch").filter(|pitch| pitch.is_string()) {
-        let Micrometres(number) = Micrometres::deserialize(&*pitch)
-            .map_err(|error| written.fault(&inside(place, "pixel_pitch"), plain(&error)))?;
-        *pitch = number.into();
-    }
-    let spec: SensorSpec = serde_path_to_error::deserialize(&object).map_err(|error| {
+    let spec: SensorSpec = serde_path_to_error::deserialize(object).map_err(|error| {
         let path = inside(place, &error.path().to_string());
         written.fault(&path, plain(error.inner()))
     })?;
