@@ -18,6 +18,10 @@ use crate::{Accel, BuildError, BuildOptions, BuildReport, Counts};
 /// Bundles around a ray before it is believed to miss.
 const TURNS: usize = 4;
 
+/// The same for a ray with triangles on all sides, none of which it hits: that is no outline but a
+/// corner where many slivers meet, and the right one is looked for among them.
+const TURNS_AMONG_SLIVERS: usize = 64;
+
 /// The Embree backend.
 #[derive(Debug)]
 pub struct Embree {
@@ -250,14 +254,23 @@ impl Embree {
         again.push_unturned(rays, rays32, i);
         self.scene.search(again, &mut search, found);
         let is_neighbour = first.is_some_and(|t| (search.nearest.t - t).abs() <= slack);
+        if is_neighbour {
+            return search.nearest;
+        }
         let mut turn = 0;
-        while !is_neighbour && turn < TURNS {
+        let mut is_surrounded = true;
+        while turn < TURNS || is_surrounded && turn < TURNS_AMONG_SLIVERS {
             again.clear();
             for shift in recheck::bundle(rays.direction(i), rays32.blur(i, t), turn) {
                 again.push_shifted(rays32, i, shift);
             }
+            search.beside = 0;
             self.scene.search(again, &mut search, found);
-            turn = if search.nearest.placement == MISS { turn + 1 } else { TURNS };
+            if search.nearest.placement != MISS {
+                break;
+            }
+            is_surrounded &= search.beside == recheck::WHOLE_BUNDLE;
+            turn += 1;
         }
         search.nearest
     }

@@ -22,6 +22,9 @@ use etendue_geometry::{HitBatch, MISS};
 /// Rays in a bundle.
 pub(crate) const BUNDLE: usize = 16;
 
+/// A bit for each ray of a bundle.
+pub(crate) const WHOLE_BUNDLE: u32 = (1 << BUNDLE) - 1;
+
 /// Sideways offsets (m) of the rays of a bundle around `direction`, within `radius` (m): the ray
 /// itself first, then two rings. Bundles of another `turn` fill the gaps of the others, for slivers
 /// that lie between their rays.

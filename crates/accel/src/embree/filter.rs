@@ -197,6 +197,8 @@ pub(crate) struct Search<'a> {
     /// How far the bundle looks, from there: behind the nearest by what single precision may be off.
     limit: f32,
     slack: f64,
+    /// A bit for each ray of the bundle that met a triangle which the ray itself passes by.
+    pub(crate) beside: u32,
 }
 
 impl<'a> Search<'a> {
@@ -210,6 +212,7 @@ impl<'a> Search<'a> {
             advance,
             limit: f32::INFINITY,
             slack,
+            beside: 0,
         }
     }
 
@@ -219,8 +222,13 @@ impl<'a> Search<'a> {
 
     fn keeps(&mut self, hit: &Hit<'_>) -> bool {
         let triangle = hit.triangle(self.geometry);
-        let Verdict::Hit(exact) = verdict(self.geometry, &self.query, &triangle) else {
-            return false;
+        let exact = match verdict(self.geometry, &self.query, &triangle) {
+            Verdict::Hit(exact) => exact,
+            Verdict::OutOfRange => return false,
+            Verdict::Beside => {
+                self.beside |= 1 << hit.id();
+                return false;
+            }
         };
         self.nearest.offer(exact, &triangle);
         let end = self.nearest.t - self.advance + self.slack;
