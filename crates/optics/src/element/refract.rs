@@ -14,8 +14,10 @@
 //!
 //! Snell's law in vector form (G. H. Spencer and M. V. R. K. Murty, *J. Opt. Soc. Am.* 52, 672
 //! (1962)) with an unnormalised normal m: d' = μ d + σ (√(|m|² (1 − μ²) + μ² (d·m)²) − μ |d·m|) m/|m|²,
-//! where σ is the sign of d·m. |d·m| is √D, and |m|² is 1 − k c² r² on a conic, 1 on a sphere. Equal
-//! indices leave every direction as it is, to the last bit.
+//! where σ is the sign of d·m. |d·m| is √D, and |m|² is 1 − k c² r² on a conic, 1 on a sphere; where
+//! roundings of the place make that untrue, as on conics of −10⁶ or spheres of a nanometre, the
+//! direction is made a unit vector again. Equal indices leave every direction as it is, to the last
+//! bit.
 
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
 use super::surface::Surface;
@@ -126,6 +128,7 @@ impl Refraction {
         let (stretch, length2) = if SPHERE { (1.0, 1.0) } else { (1.0 + k, 1.0 - k * c * c * r2) };
         let m = [-c * x, -c * y, 1.0 - stretch * c * z];
         let (out, through) = self.media.refract(met.ray, m, length2, met.along2, met.along);
+        let out = out.unit();
         // A ray that misses has a NaN for a root, which is not greater than anything.
         let hit = (met.t > -TOUCH) & (met.t < f64::INFINITY) & (m[2] >= 0.0);
         Refracted { ray: out, t: met.t, hit, clear: r2 <= clip2, through }
