@@ -14,15 +14,21 @@ use etendue_geometry::glam::DVec3;
 
 use super::{fresnel, ggx};
 
-/// Steps in μ, and in √α, of the table.
-const STEPS: usize = 48;
+/// Knots in α, dense where sheets are smooth.
+const ROUGHNESSES: usize = 48;
+
+/// Knots in [`obliquity`].
+const OBLIQUITIES: usize = 96;
+
+/// The least roughness of the table; smoother sheets differ at μ < 10⁻⁴ alone.
+const SMOOTHEST: f64 = 1e-6;
 
 /// Facets that each entry is averaged over, a square number of them.
 const FACETS: u32 = 24;
 
 #[derive(Debug)]
 struct Table {
-    /// (A, B) by roughness, then μ.
+    /// (A, B) by roughness, then [`obliquity`].
     entries: Vec<[f64; 2]>,
     /// Their means over directions, by roughness.
     means: Vec<[f64; 2]>,
@@ -32,35 +38,59 @@ static TABLE: LazyLock<Table> = LazyLock::new(Table::new);
 
 impl Table {
     fn new() -> Self {
-        let knot = |k: usize| k as f64 / (STEPS - 1) as f64;
-        let mut entries = Vec::with_capacity(STEPS * STEPS);
-        let mut means = Vec::with_capacity(STEPS);
-        for i in 0..STEPS {
-            let alpha = knot(i) * knot(i);
-            let row: Vec<[f64; 2]> = (0..STEPS).map(|k| entry(knot(k), alpha)).collect();
-            // ∫ 2 μ E dμ of the piecewise linear interpolation, exactly.
-            let mean = |c: usize| -> f64 {
-                let h = 1.0 / (STEPS - 1) as f64;
-                let piece = |k: usize| {
-                    let (a, b, m) = (row[k][c], row[k + 1][c], knot(k));
-                    2.0 * h * (m * (a + b) / 2.0 + h * (a / 6.0 + b / 3.0))
-                };
-                (0..STEPS - 1).map(piece).sum()
-            };
-            means.push([mean(0), mean(1)]);
+        let mut entries = Vec::with_capacity(ROUGHNESSES * OBLIQUITIES);
+        let mut means = Vec::with_capacity(ROUGHNESSES);
+        for i in 0..ROUGHNESSES {
+            let alpha = knot::<ROUGHNESSES>(i).powi(4).max(SMOOTHEST);
+            let row: Vec<[f64; 2]> = (0..OBLIQUITIES)
+                .map(|k| entry(cosine(knot::<OBLIQUITIES>(k), alpha), alpha))
+                .collect();
+            means.push(mean(&row, alpha));
             entries.extend(row);
         }
         Self { entries, means }
     }
 }
 
+/// Where the table has the cosine `mu`, from 0 to 1. A sheet's albedo changes with μ/α at the horizon,
+/// by the masking of its facets, and with μ elsewhere, by Fresnel: half of the knots are for each.
+fn obliquity(mu: f64, alpha: f64) -> f64 {
+    let masking = mu / (mu + alpha).max(f64::MIN_POSITIVE) * (1.0 + alpha);
+    0.5 * (mu.sqrt() + masking)
+}
+
+/// The cosine at `place` of [`obliquity`], by bisection.
+fn cosine(place: f64, alpha: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..80 {
+        let middle = 0.5 * (low + high);
+        if obliquity(middle, alpha) < place { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// ∫ 2 μ E dμ = ∫ 4 x³ E dx, x = √μ, of the interpolation, by the midpoint rule.
+fn mean(row: &[[f64; 2]], alpha: f64) -> [f64; 2] {
+    const STEPS: u32 = 512;
+    let mut sum = [0.0; 2];
+    for step in 0..STEPS {
+        let x = (f64::from(step) + 0.5) / f64::from(STEPS);
+        let (k, share) = place::<OBLIQUITIES>(obliquity(x * x, alpha));
+        for (c, sum) in sum.iter_mut().enumerate() {
+            *sum += 4.0 * x.powi(3) * (row[k][c] * (1.0 - share) + row[k + 1][c] * share);
+        }
+    }
+    sum.map(|sum| sum / f64::from(STEPS))
+}
+
+/// The place in 0..=1 of knot `k` of `COUNT`.
+fn knot<const COUNT: usize>(k: usize) -> f64 {
+    k as f64 / (COUNT - 1) as f64
+}
+
 /// A and B by the visible facets: each returns G₂/G₁ times its reflectance.
 fn entry(mu: f64, alpha: f64) -> [f64; 2] {
-    let wo = DVec3::new((1.0 - mu * mu).sqrt(), 0.0, mu.max(1e-6));
-    if alpha == 0.0 {
-        let w = fresnel::schlick_weight(mu);
-        return [1.0 - w, w];
-    }
+    let wo = DVec3::new((1.0 - mu * mu).sqrt(), 0.0, mu.max(1e-12));
     let mut sum = [0.0; 2];
     for k in 0..FACETS * FACETS {
         let place = |i: u32| (f64::from(i) + 0.5) / f64::from(FACETS);
@@ -80,6 +110,7 @@ fn entry(mu: f64, alpha: f64) -> [f64; 2] {
 /// The albedo of one roughness: rows of the table, interpolated once.
 #[derive(Debug, Clone, Copy)]
 pub struct Albedo {
+    alpha: f64,
     row: usize,
     share: f64,
     f0: f64,
@@ -90,17 +121,17 @@ impl Albedo {
     /// Of a sheet with roughness `alpha` (0..=1) and reflectances `f0` face on and `f90` grazing.
     #[must_use]
     pub fn new(alpha: f64, f0: f64, f90: f64) -> Self {
-        let (row, share) = place(alpha.max(0.0).sqrt());
-        Self { row, share, f0, f90 }
+        let (row, share) = place::<ROUGHNESSES>(alpha.max(0.0).sqrt().sqrt());
+        Self { alpha, row, share, f0, f90 }
     }
 
     /// For the cosine `mu` of the direction.
     #[must_use]
     pub fn at(&self, mu: f64) -> f64 {
-        let (k, part) = place(mu);
+        let (k, part) = place::<OBLIQUITIES>(obliquity(mu.max(0.0), self.alpha));
         let table = &TABLE.entries;
         let at = |row: usize, k: usize| {
-            let [a, b] = table[row * STEPS + k];
+            let [a, b] = table[row * OBLIQUITIES + k];
             self.f0 * a + self.f90 * b
         };
         let along = |row: usize| at(row, k) * (1.0 - part) + at(row, k + 1) * part;
@@ -118,10 +149,10 @@ impl Albedo {
     }
 }
 
-/// The knot below `x` in 0..=1 and the share of the next.
-fn place(x: f64) -> (usize, f64) {
-    let scaled = x.clamp(0.0, 1.0) * (STEPS - 1) as f64;
+/// The knot of `COUNT` below `x` in 0..=1 and the share of the next.
+fn place<const COUNT: usize>(x: f64) -> (usize, f64) {
+    let scaled = x.clamp(0.0, 1.0) * (COUNT - 1) as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
-    let knot = (scaled as usize).min(STEPS - 2);
+    let knot = (scaled as usize).min(COUNT - 2);
     (knot, scaled - knot as f64)
 }
