@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
+use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
 
 use crate::embree::{ExactFilter, Found, Scene, Search, version};
@@ -16,11 +17,7 @@ use crate::solve::{self, Lanes, Solved};
 use crate::{Accel, BuildError, BuildOptions, BuildReport, Counts};
 
 /// Bundles around a ray before it is believed to miss.
-const TURNS: usize = 4;
-
-/// The same for a ray with triangles on all sides, none of which it hits: that is no outline but a
-/// corner where many slivers meet, and the right one is looked for among them.
-const TURNS_AMONG_SLIVERS: usize = 64;
+const TURNS: u32 = 4;
 
 /// The Embree backend.
 #[derive(Debug)]
@@ -234,6 +231,22 @@ impl Embree {
         nearest.write(self.scene.geometry(), hits, i);
     }
 
+    /// As [`Self::decide`], for rays of which it was only asked whether they hit anything.
+    fn decide_occlusion(
+        &self,
+        rays: &RayBatch,
+        rays32: &Rays32,
+        again: &mut Rays32,
+        found: &mut Found,
+        suspects: &[u32],
+        blocked: &mut [bool],
+    ) {
+        for &i in suspects {
+            let nearest = self.nearest(rays, i as usize, rays32, again, found, None);
+            blocked[i as usize] = nearest.placement != MISS;
+        }
+    }
+
     /// The nearest exact hit of ray `i`, of which single precision says that it is at `first`.
     fn nearest(
         &self,
@@ -257,22 +270,41 @@ impl Embree {
         if is_neighbour {
             return search.nearest;
         }
-        let mut turn = 0;
-        let mut is_surrounded = true;
-        while turn < TURNS || is_surrounded && turn < TURNS_AMONG_SLIVERS {
-            again.clear();
-            for shift in recheck::bundle(rays.direction(i), rays32.blur(i, t), turn) {
-                again.push_shifted(rays32, i, shift);
-            }
+        let mut beside = 0;
+        for turn in 0..TURNS {
+            let shifts = recheck::bundle(rays.direction(i), rays32.blur(i, t), turn);
             search.beside = 0;
-            self.scene.search(again, &mut search, found);
+            self.look_with(&shifts, rays32, i, again, &mut search, found);
             if search.nearest.placement != MISS {
-                break;
+                return search.nearest;
             }
-            is_surrounded &= search.beside == recheck::WHOLE_BUNDLE;
-            turn += 1;
+            beside += search.beside.count_ones();
+        }
+        // Triangles on nearly all sides, and none is hit: no outline, but a corner where slivers meet.
+        if beside >= recheck::MOSTLY_SURROUNDED * TURNS
+            && let Some(corner) = search.nearest_corner()
+        {
+            let shifts = recheck::away_from(corner, rays.direction(i), rays32.blur(i, t));
+            self.look_with(&shifts, rays32, i, again, &mut search, found);
         }
         search.nearest
+    }
+
+    /// Searches along ray `i`, moved sideways by each of `shifts` (m).
+    fn look_with(
+        &self,
+        shifts: &[DVec3],
+        rays32: &Rays32,
+        i: usize,
+        again: &mut Rays32,
+        search: &mut Search<'_>,
+        found: &mut Found,
+    ) {
+        again.clear();
+        for &shift in shifts {
+            again.push_shifted(rays32, i, shift);
+        }
+        self.scene.search(again, search, found);
     }
 }
 
@@ -338,19 +370,18 @@ impl Accel for Embree {
             let mut judged = ExactFilter::new(geometry, rays, rays32, doubtful);
             self.scene.occluded_exactly(rays32, rays.coherent, &mut judged, blocked);
             doubtful.retain(|&i| !blocked[i as usize]);
+            doubtful.sort_unstable();
+            doubtful.dedup();
+            self.decide_occlusion(rays, rays32, again, found, doubtful, blocked);
+            // Only now, as those that were decided tell which misses are lonely.
             let could_hit = |i| rays32.can_hit(i) && self.frame.may_meet(rays, i);
             suspects.clear();
             recheck::lonely_misses(|i| !blocked[i], blocked.len(), could_hit, suspects);
+            suspects.retain(|i| doubtful.binary_search(i).is_err());
             self.ask_beside_for_any(rays, rays32, again, suspects);
+            self.decide_occlusion(rays, rays32, again, found, suspects, blocked);
             doubtful.append(suspects);
-            doubtful.sort_unstable();
-            doubtful.dedup();
-            let mut corrected = 0;
-            for &i in doubtful.iter() {
-                let i = i as usize;
-                blocked[i] = self.nearest(rays, i, rays32, again, found, None).placement != MISS;
-                corrected += u64::from(blocked[i]);
-            }
+            let corrected = doubtful.iter().filter(|&&i| blocked[i as usize]).count() as u64;
             self.count(doubtful.len() as u64, corrected);
         });
     }

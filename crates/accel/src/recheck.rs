@@ -22,13 +22,14 @@ use etendue_geometry::{HitBatch, MISS};
 /// Rays in a bundle.
 pub(crate) const BUNDLE: usize = 16;
 
-/// A bit for each ray of a bundle.
-pub(crate) const WHOLE_BUNDLE: u32 = (1 << BUNDLE) - 1;
+/// Rays of a bundle that meet triangles where these are on all sides. Some slip between slivers near the
+/// corner where they meet; beside an outline half of the rays meet nothing.
+pub(crate) const MOSTLY_SURROUNDED: u32 = 12;
 
 /// Sideways offsets (m) of the rays of a bundle around `direction`, within `radius` (m): the ray
 /// itself first, then two rings. Bundles of another `turn` fill the gaps of the others, for slivers
 /// that lie between their rays.
-pub(crate) fn bundle(direction: DVec3, radius: f64, turn: usize) -> [DVec3; BUNDLE] {
+pub(crate) fn bundle(direction: DVec3, radius: f64, turn: u32) -> [DVec3; BUNDLE] {
     let (x, y) = direction.any_orthonormal_pair();
     std::array::from_fn(|k| {
         if k == 0 {
@@ -36,8 +37,20 @@ pub(crate) fn bundle(direction: DVec3, radius: f64, turn: usize) -> [DVec3; BUND
         }
         let (ring, step) = if k < 8 { (0.25, k as f64 / 7.0) } else { (1.0, k as f64 / 8.0) };
         // The golden ratio spreads any number of turns evenly.
-        let angle = TAU * (step + turn as f64 * 0.618_033_988_75 / 8.0);
+        let angle = TAU * (step + f64::from(turn) * 0.618_033_988_75 / 8.0);
         (x * angle.cos() + y * angle.sin()) * (radius * ring)
+    })
+}
+
+/// Sideways offsets (m) to the side of a `corner` (m, sideways from the ray along `direction`) on which
+/// the ray passes it, ever farther from it, in pairs that are 2 `radius` (m) apart. Near the corner single
+/// precision cannot tell apart the slivers that meet there, and farther out it can.
+pub(crate) fn away_from(corner: DVec3, direction: DVec3, radius: f64) -> [DVec3; BUNDLE] {
+    let side = -corner.normalize_or_zero();
+    let across = side.cross(direction) * radius;
+    std::array::from_fn(|k| {
+        let far = corner + side * (radius * f64::from(1_u32 << (2 * (k / 2))));
+        if k % 2 == 0 { far + across } else { far - across }
     })
 }
 

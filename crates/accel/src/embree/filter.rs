@@ -7,6 +7,7 @@
 use std::ffi::c_int;
 
 use embree4_sys as sys;
+use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, MISS, RayBatch};
 
 use crate::nearest::{Nearest, Query, Triangle, Verdict, View};
@@ -199,6 +200,8 @@ pub(crate) struct Search<'a> {
     slack: f64,
     /// A bit for each ray of the bundle that met a triangle which the ray itself passes by.
     pub(crate) beside: u32,
+    /// The corner of those that is nearest to the ray: its moment d × p.
+    nearest_moment: DVec3,
 }
 
 impl<'a> Search<'a> {
@@ -213,11 +216,31 @@ impl<'a> Search<'a> {
             limit: f32::INFINITY,
             slack,
             beside: 0,
+            nearest_moment: DVec3::INFINITY,
         }
     }
 
     pub(super) fn context(&mut self) -> *mut sys::RTCRayQueryContext {
         std::ptr::from_mut(self).cast()
+    }
+
+    fn note_corners(&mut self, triangle: &Triangle) {
+        let placement = &self.geometry.placements[triangle.placement as usize];
+        let view = View::new(&placement.world_from_mesh);
+        for corner in view.seen_from(self.query.origin, triangle.corners) {
+            let moment = moment(self.query.direction, corner);
+            if moment.length_squared() < self.nearest_moment.length_squared() {
+                self.nearest_moment = moment;
+            }
+        }
+    }
+
+    /// The way (m), sideways from the ray, to the nearest corner of the triangles that it passes by;
+    /// `None` without any, or where the ray goes through it.
+    pub(crate) fn nearest_corner(&self) -> Option<DVec3> {
+        let moment = self.nearest_moment;
+        let way = moment.cross(self.query.direction) / self.query.direction.length_squared();
+        (moment.is_finite() && way != DVec3::ZERO).then_some(way)
     }
 
     fn keeps(&mut self, hit: &Hit<'_>) -> bool {
@@ -227,6 +250,7 @@ impl<'a> Search<'a> {
             Verdict::OutOfRange => return false,
             Verdict::Beside => {
                 self.beside |= 1 << hit.id();
+                self.note_corners(&triangle);
                 return false;
             }
         };
@@ -236,6 +260,20 @@ impl<'a> Search<'a> {
         hit.look_to(self.limit);
         true
     }
+}
+
+/// `a` × `b`, each component to 1.5 units in its own last place, however much of it cancels (W. Kahan's
+/// difference of products: C.-P. Jeannerod, N. Louvet and J.-M. Muller, *Math. Comp.* 82, 2245 (2013)).
+fn moment(a: DVec3, b: DVec3) -> DVec3 {
+    let difference = |a: f64, b: f64, c: f64, d: f64| {
+        let subtracted = c * d;
+        a.mul_add(b, -subtracted) - c.mul_add(d, -subtracted)
+    };
+    DVec3::new(
+        difference(a.y, b.z, a.z, b.y),
+        difference(a.z, b.x, a.x, b.z),
+        difference(a.x, b.y, a.y, b.x),
+    )
 }
 
 /// Notes the nearest exact hit in a [`Search`].

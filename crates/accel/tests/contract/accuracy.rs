@@ -1,6 +1,8 @@
 //! Errors of distances and normals, counted against `exact`, of every backend in its default mode. (Leaks,
 //! instruction sets, and the regimes where single precision fails: the stability suite.)
 
+use std::f64::consts::TAU;
+
 use super::*;
 
 fn places() -> [Transform; 3] {
@@ -97,4 +99,37 @@ fn small_things_in_a_wide_scene_are_found_at_once() {
     let again = embree.counts().rechecked;
     println!("{again} of {} rays looked at again", rays.len());
     assert!(again * 50 < rays.len() as u64, "{again} of {} rays", rays.len());
+}
+
+/// A pole where more slivers meet than a few rays around one can try.
+#[test]
+fn a_ray_at_the_tip_of_a_cone_of_slivers_hits_one_of_them() {
+    const SLIVERS: u32 = 800;
+    let rim = |i: u32| {
+        let (sine, cosine) = (TAU * f64::from(i) / f64::from(SLIVERS)).sin_cos();
+        [cosine as f32, sine as f32, -1.0]
+    };
+    let corners: Vec<[f32; 3]> =
+        std::iter::once([0.1, 0.2, 0.3]).chain((0..SLIVERS).map(rim)).collect();
+    let triangles = (0..SLIVERS).map(|i| [0, 1 + i, 1 + (i + 1) % SLIVERS]).collect();
+    let geometry = scene(vec![mesh("cone", &corners, triangles)]);
+    let tip = DVec3::from(corners[0].map(f64::from));
+    let mut random = Random(79);
+    let mut rays = RayBatch::default();
+    for _ in 0..500 {
+        let origin = DVec3::new(0.1, 0.2, -2.0) + random.cube() * 0.3;
+        rays.push(origin, (tip - origin).normalize());
+    }
+    for (name, accel) in each(&geometry) {
+        for coherent in [false, true] {
+            let rays = rays.clone().with_coherence(coherent);
+            let mut blocked = Vec::new();
+            accel.occluded(&rays, &mut blocked);
+            let free = blocked.iter().filter(|&&blocked| !blocked).count();
+            assert_eq!(free, 0, "{name}, coherent {coherent}: rays that get past the tip");
+            let hits = closest(&*accel, &rays);
+            let missing = (0..rays.len()).filter(|&i| !hits.is_hit(i)).count();
+            assert_eq!(missing, 0, "{name}, coherent {coherent}: rays that miss the tip");
+        }
+    }
 }
