@@ -63,6 +63,22 @@ pub enum Scattering {
     Gltf(Box<GltfSurface>),
 }
 
+impl Scattering {
+    /// The glTF surface, of one.
+    #[must_use]
+    pub fn gltf(&self) -> Option<&GltfSurface> {
+        match self {
+            Self::Gltf(surface) => Some(surface),
+            Self::Black
+            | Self::Matte
+            | Self::Unlit
+            | Self::Mirror
+            | Self::Metal { .. }
+            | Self::Dielectric(_) => None,
+        }
+    }
+}
+
 /// A refractive index.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ior {
@@ -236,15 +252,8 @@ impl Material {
     /// (`KHR_materials_transmission` without roughness).
     #[must_use]
     pub fn is_pane(&self) -> bool {
-        match &self.scattering {
-            Scattering::Gltf(surface) => surface.transmission > 0.0 && surface.metallic < 1.0,
-            Scattering::Black
-            | Scattering::Matte
-            | Scattering::Unlit
-            | Scattering::Mirror
-            | Scattering::Metal { .. }
-            | Scattering::Dielectric(_) => false,
-        }
+        let passes = |surface: &GltfSurface| surface.transmission > 0.0 && surface.metallic < 1.0;
+        self.scattering.gltf().is_some_and(passes)
     }
 
     /// Whether rays may pass the surface as if it were not there.

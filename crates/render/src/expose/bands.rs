@@ -5,7 +5,7 @@ use etendue_scene::Scene;
 use etendue_sensor::bands::TOLERANCE;
 use etendue_sensor::{BandChoice, Illumination};
 use etendue_spectrum::{Bands, Curve, Illuminant, VISIBLE};
-use etendue_tracer::{Color, EnvironmentImage, LayerSpec, LightKind, Material, Paint, Scattering};
+use etendue_tracer::{Color, EnvironmentImage, LayerSpec, LightKind, Material, Paint};
 
 /// The bands that the picture of `scene` is rendered in: base colours have three parts and no more,
 /// light has as many as it takes to count the sensor's electrons right.
@@ -132,16 +132,8 @@ fn is_coloured(paint: &Paint) -> bool {
 }
 
 fn reflects_colour(material: &Material) -> bool {
-    let specular = match &material.scattering {
-        Scattering::Gltf(surface) => {
-            !is_grey(&surface.specular_color) || surface.specular_color_texture.is_some()
-        }
-        Scattering::Black
-        | Scattering::Matte
-        | Scattering::Unlit
-        | Scattering::Mirror
-        | Scattering::Metal { .. }
-        | Scattering::Dielectric(_) => false,
-    };
+    let specular = material.scattering.gltf().is_some_and(|surface| {
+        !is_grey(&surface.specular_color) || surface.specular_color_texture.is_some()
+    });
     specular || is_coloured(&material.base_color)
 }
