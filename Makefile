@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render test test-embree4 python bench bench-peers bench-light bench-lens bench-sensor docs-figures docs-charts \
+.PHONY: help setup render install dist test test-embree4 python bench bench-peers bench-python bench-light bench-lens bench-sensor docs-figures docs-charts \
 	docs-stability fingerprints fuzz-smoke fuzz-seeds clean
 
 help:
@@ -14,9 +14,12 @@ help:
 	@echo "make test          install what is missing, run everything that CI runs"
 	@echo "make test-embree4  run the tests that touch Embree against Embree 4, in a Debian 13 root"
 	@echo "make python        build the Python package's wheel and test it in a fresh venv"
+	@echo "make install       install the command below PREFIX, /usr/local when it is not given"
+	@echo "make dist          a tarball, a .deb and a wheel in out/dist, tried in bare Debian 12 and 13 roots"
 	@echo "make bench         measure everything, write docs/benchmarks.md"
 	@echo "make bench-peers   add other programs at the same job, from PyPI"
 	@echo "make bench-lens    time rays through a lens against optiland, from PyPI"
+	@echo "make bench-python  rays from Python against Rust, Open3D and embreex; frames against their rays"
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
@@ -43,6 +46,16 @@ test:
 python: setup
 	@scripts/python.sh
 
+PREFIX ?= /usr/local
+
+# DESTDIR goes before PREFIX, as packagers want it.
+install: setup
+	cargo build --release --locked -p etendue-cli
+	install -D -s -m 755 target/release/etendue "$(DESTDIR)$(PREFIX)/bin/etendue"
+
+dist: setup
+	@scripts/dist.sh
+
 test-embree4: setup
 	@scripts/test-embree4.sh
 
@@ -54,6 +67,11 @@ bench: setup
 bench-peers: setup
 	cargo build --release -p etendue-cli -p etendue-benches
 	scripts/bench-peers.sh peers.py $(ARGS)
+
+# Of the wheel that `make python` made last.
+bench-python: setup
+	cargo build --release -p etendue-benches
+	scripts/bench-peers.sh python_peers.py $(ARGS)
 
 bench-light: setup
 	cargo build --release -p etendue-cli -p etendue-benches

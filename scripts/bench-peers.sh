@@ -28,6 +28,7 @@ python3 -c "import ensurepip, venv" 2>/dev/null || need "for the programs' own f
 case $script in
 peers.py) need_open3d && need_mitsuba ;;
 light_peers.py) need_mitsuba ;;
+python_peers.py) need_open3d ;;
 esac
 # Without them the programs that want them are left out, by name.
 [ ${#missing[@]} -eq 0 ] || install_packages "${missing[@]}" || true

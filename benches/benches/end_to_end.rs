@@ -22,7 +22,7 @@ fn end_to_end(criterion: &mut Criterion) {
         let file = SceneFile::read(&path, &[]).expect("the scene is understood");
         let wanted = plan::wanted(&file.spec.all_layers());
         let scene = file.load(wanted, &LoadOptions::default()).expect("the scene loads");
-        let plan = Plan::new(&scene, Outputs { exr: true, png: false, npy: false, dng: false });
+        let plan = Plan::new(&scene, Outputs { exr: true, ..Outputs::NONE });
         let options = BuildOptions::default();
         let images = Images::decode(&scene, &plan, None).unwrap();
         group.throughput(Throughput::Elements(plan.rays));

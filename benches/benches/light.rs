@@ -38,7 +38,7 @@ fn light(criterion: &mut Criterion) {
             let file = SceneFile::read(&path, &[]).expect("the scene is understood");
             let wanted = plan::wanted(&file.spec.all_layers());
             let scene = file.load(wanted, &LoadOptions::default()).expect("the scene loads");
-            let plan = Plan::new(&scene, Outputs { exr: true, png: false, npy: false, dng: false });
+            let plan = Plan::new(&scene, Outputs { exr: true, ..Outputs::NONE });
             let options = BuildOptions::default();
             let accel = etendue_render::build(&scene, &plan, &options).expect("it builds");
             let images = Images::decode(&scene, &plan, None).unwrap();

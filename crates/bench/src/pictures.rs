@@ -125,7 +125,7 @@ pub fn opened(camera: &Camera) -> Result<Camera, BenchError> {
 }
 
 /// In double precision.
-const OUTPUTS: Outputs = Outputs { exr: false, png: false, npy: true, dng: false };
+const OUTPUTS: Outputs = Outputs { npy: true, ..Outputs::NONE };
 
 fn values(picture: &Picture) -> Vec<f64> {
     let layers = picture.layers().iter().filter(|layer| layer.name.is_empty());

@@ -165,6 +165,19 @@ impl Distortion {
         }
     }
 
+    /// As [`Self::distort`], of directions up to the farthest that the picture shows, or a fisheye's fold;
+    /// `None` of others.
+    #[must_use]
+    pub fn seen(&self, direction: [f64; 3]) -> Option<[f64; 2]> {
+        let [x, y, z] = direction;
+        let reaches = match &self.spec {
+            // Tangents know nothing of what is behind.
+            DistortionSpec::BrownConrady(_) => z > 0.0 && x.hypot(y) <= self.limit * z,
+            DistortionSpec::Fisheye(_) => x.hypot(y).atan2(z) <= self.limit,
+        };
+        reaches.then(|| self.distort(direction))
+    }
+
     /// The unit direction (x right, y down, z forward) that is seen at distorted tangents; `None`
     /// where nothing is.
     #[must_use]

@@ -19,6 +19,7 @@ pub mod lens;
 pub mod light_field;
 pub mod orthographic;
 pub mod pinhole;
+mod place;
 pub mod pose;
 pub mod sampler;
 pub mod samples;

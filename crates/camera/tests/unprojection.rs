@@ -123,6 +123,23 @@ fn a_known_vertex_is_found_at_its_pixel() {
 }
 
 #[test]
+fn a_point_is_placed_where_the_textbook_has_it() {
+    for camera in cameras() {
+        let file = camera.opencv();
+        for vertex in [[0.0, 0.0, 0.0], [0.4, -0.3, 0.2], [0.01, 0.6, 0.3]].map(DVec3::from) {
+            let from_camera = vertex - camera.pose().position;
+            let place = camera.place_of(from_camera).unwrap_or_else(|| panic!("{file:?}"));
+            let expected = project(&file, vertex);
+            let off = (place[0] - expected[0]).hypot(place[1] - expected[1]);
+            assert!(off < PIXELS, "{off} px in {file:?}");
+        }
+        let behind = -2.0 * camera.pose().forward();
+        let parallel = file.orthographic.is_some();
+        assert_eq!(camera.place_of(behind).is_some(), parallel, "{file:?}");
+    }
+}
+
+#[test]
 fn the_file_is_what_the_scene_said() {
     let file = cameras()[3].opencv();
     assert_eq!(file.pixel_origin, PixelOrigin::Corner);

@@ -270,7 +270,8 @@ pub(crate) struct RenderArguments {
     /// The folder to write into; made when it is not there
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
-    /// Kinds of file to write
+    /// Kinds of file to write; tum and kitti (16-bit PNG of depth, disparity, flow), flo and indexed
+    /// (masks with a palette) are there, too
     #[arg(long, value_name = "LIST", default_value = "exr,png,npy,dng")]
     pub(crate) outputs: String,
     /// Threads of build and render; 0 takes all that this process may use
@@ -296,6 +297,10 @@ pub(crate) struct RenderArguments {
     /// Of a scene with `frames`, render these alone, e.g. 10..20 (without the last)
     #[arg(long, value_name = "FROM..TO", value_parser = parse::frames)]
     pub(crate) frames: Option<std::ops::Range<usize>>,
+    /// Of a scene with `frames`, the names of their files below the folder: {frame} is the number,
+    /// {layer} the layer, as {layer}/{frame}
+    #[arg(long, value_name = "NAMES", value_parser = etendue::FramePattern::parse)]
+    pub(crate) pattern: Option<etendue::FramePattern>,
     /// Of a scene with `frames`, leave those that are complete in the folder
     #[arg(long)]
     pub(crate) resume: bool,

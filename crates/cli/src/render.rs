@@ -57,8 +57,8 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     if let Some(frames) = session.frames(&progress)? {
         return sequence::render(arguments, &mut session, &frames, outputs, &progress);
     }
-    if arguments.resume || arguments.frames.is_some() {
-        let why = "--frames and --resume are for scenes with `frames`, and this is one picture";
+    if arguments.resume || arguments.frames.is_some() || arguments.pattern.is_some() {
+        let why = "--frames, --pattern and --resume are for scenes with `frames`, and this is one picture";
         return Err(Fault::refused(why));
     }
     let watching = Watching::new(arguments, outputs);

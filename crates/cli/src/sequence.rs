@@ -26,26 +26,28 @@ pub(crate) fn render(
     let wanted = chosen(frames, &range)?;
     let beside: Vec<PathBuf> = BESIDE.iter().map(|name| out.join(name)).collect();
     places::keep_apart(&session.scene(progress)?.inputs, &beside)?;
+    let pattern = arguments.pattern.clone().unwrap_or_default();
     let mut dataset = Dataset::default();
     let mut files = Vec::new();
     let mut reports = Vec::new();
     let mut skipped = 0;
     for (done, frame) in (1..).zip(wanted) {
-        let name = format!("frames/{:06}", frame.number);
-        let folder = out.join(&name);
         session.show(frame)?;
-        if arguments.resume && session.is_complete(&folder, progress)? {
+        if arguments.resume && session.is_complete((out, &pattern), frame.number, progress)? {
             skipped += 1;
-            dataset.add(frame, session.scene(progress)?, &name, outputs)?;
+            dataset.add(frame, session.scene(progress)?, &pattern, outputs)?;
             continue;
         }
-        session.check_place(&folder, &[], progress)?;
+        let results =
+            session.check_place(&out.join(pattern.folder(frame.number)), &[], progress)?;
+        let inputs = &session.scene(progress)?.inputs;
+        pattern.keep_apart(out, frame.number, (inputs, &results))?;
         let rendering = session.render(progress)?;
         if let Some(partial) = heed_stop(&rendering, true)? {
             return Err(Fault::stopped(partial));
         }
-        let written = rendering.write_with(&folder, outputs, progress)?;
-        dataset.add(frame, rendering.scene(), &name, outputs)?;
+        let written = pattern.write(&rendering, out, frame.number, (outputs, progress))?;
+        dataset.add(frame, rendering.scene(), &pattern, outputs)?;
         files.extend(written.files.iter().cloned());
         let report = rendering.report_of(&written);
         if !arguments.quiet {

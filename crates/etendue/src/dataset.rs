@@ -1,17 +1,19 @@
 //! The frames of a scene as data sets that others read: nerfstudio's `transforms.json`, COLMAP's text
 //! model, and a plain `index.json`.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use etendue_camera::{CameraFile, Convention, PixelOrigin, ProjectionName};
 use etendue_geometry::glam::{DMat3, DQuat};
+use etendue_render::output::conventions::{KITTI_DEPTH, TUM_DEPTH};
 use etendue_render::output::{Outputs, SOFTWARE, sidecar, write_whole};
 use etendue_scene::{Frame, Scene};
 use serde_json::{Map, Value, json};
 
-use crate::Error;
+use crate::{Error, FramePattern, rendering};
 
 /// The frames of a scene, as they are added.
 #[derive(Debug, Clone, Default)]
@@ -24,18 +26,22 @@ pub struct Dataset {
 struct Entry {
     number: usize,
     time: Option<f64>,
-    folder: String,
+    folder: Option<String>,
+    /// What it is called where it has no picture.
+    name: String,
     camera: CameraFile,
     world_from_camera: [[f64; 4]; 4],
     picture: Option<String>,
     depth: Option<String>,
+    /// The files of each layer, by their ending.
+    files: BTreeMap<String, BTreeMap<String, String>>,
     scene_hash: String,
     seed: u64,
     samples: u32,
 }
 
 impl Dataset {
-    /// Adds a frame, whose files are in `folder` as seen from the data set's own.
+    /// Adds a frame, whose files are named by `pattern`.
     ///
     /// # Errors
     ///
@@ -44,20 +50,22 @@ impl Dataset {
         &mut self,
         frame: &Frame,
         scene: &Scene,
-        folder: &str,
+        pattern: &FramePattern,
         outputs: Outputs,
     ) -> Result<(), Error> {
-        let has_depth = scene.layers.contains(&etendue_tracer::LayerSpec::Depth);
+        let files = layer_files(scene, pattern, frame.number, outputs);
+        let of = |layer: &str, kind: &str| Some(files.get(layer)?.get(kind)?.clone());
         let matrix = scene.camera.pose().world_from_camera(Convention::Opengl);
         self.entries.push(Entry {
             number: frame.number,
             time: frame.time,
-            folder: folder.to_owned(),
+            folder: pattern.own_folder(frame.number),
+            name: pattern.place(frame.number, "picture"),
             camera: scene.camera.opencv(),
             world_from_camera: matrix.transpose().to_cols_array_2d(),
-            picture: (scene.picture.is_some() && outputs.png)
-                .then(|| format!("{folder}/picture.png")),
-            depth: (has_depth && outputs.npy).then(|| format!("{folder}/depth.npy")),
+            picture: of("picture", "png"),
+            depth: of("Depth", "npy"),
+            files,
             scene_hash: scene.hash()?.to_string(),
             seed: scene.render.seed,
             samples: scene.render.samples,
@@ -93,7 +101,7 @@ impl Dataset {
         let frame = |entry: &Entry| {
             json!({
                 "frame": entry.number, "time_s": entry.time, "folder": entry.folder,
-                "picture": entry.picture, "depth": entry.depth,
+                "files": entry.files,
                 "K": entry.camera.k, "pixel_origin": entry.camera.pixel_origin,
                 "distortion": entry.camera.distortion, "resolution": entry.camera.resolution,
                 "camera_from_world": entry.camera.camera_from_world, "convention": "opencv",
@@ -104,6 +112,7 @@ impl Dataset {
             "software": SOFTWARE,
             "about": "frames of one scene; matrices by rows, metres, OpenCV's axes (x right, y down, z \
                       forward)",
+            "depth_factors": { "tum.png": TUM_DEPTH, "kitti.png": KITTI_DEPTH },
             "frames": self.entries.iter().map(frame).collect::<Vec<_>>(),
         })
     }
@@ -111,7 +120,7 @@ impl Dataset {
     fn transforms(&self) -> Value {
         let frame = |entry: &Entry| {
             let mut frame = Map::new();
-            let name = entry.picture.clone().unwrap_or_else(|| entry.folder.clone());
+            let name = entry.picture.clone().unwrap_or_else(|| entry.name.clone());
             frame.insert("file_path".to_owned(), json!(name));
             frame.insert("transform_matrix".to_owned(), json!(entry.world_from_camera));
             if let Some(depth) = &entry.depth {
@@ -157,7 +166,7 @@ impl Dataset {
             let column = |k: usize| [m[0][k], m[1][k], m[2][k]].into();
             let rotation = DMat3::from_cols(column(0), column(1), column(2));
             let q = DQuat::from_mat3(&rotation);
-            let name = entry.picture.as_ref().unwrap_or(&entry.folder);
+            let name = entry.picture.as_ref().unwrap_or(&entry.name);
             // Writing to a string cannot fail.
             let _ = writeln!(
                 images,
@@ -179,6 +188,28 @@ impl Dataset {
         let points = "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]\n".to_owned();
         [("cameras.txt", lines), ("images.txt", images), ("points3D.txt", points)]
     }
+}
+
+/// The files of each layer by their ending, as seen from the data set's folder.
+fn layer_files(
+    scene: &Scene,
+    pattern: &FramePattern,
+    number: usize,
+    outputs: Outputs,
+) -> BTreeMap<String, BTreeMap<String, String>> {
+    let names = scene.layers.iter().flat_map(|layer| match Some(*layer) == scene.picture {
+        true => vec![String::new()],
+        false => layer.row().names_in_files(),
+    });
+    let endings = |name: String| {
+        let files = rendering::layer_files(&name, outputs).into_iter().filter_map(|file| {
+            let ending = file.split_once('.')?.1.to_owned();
+            Some((ending, pattern.place(number, &file)))
+        });
+        let title = if name.is_empty() { "picture".to_owned() } else { name };
+        (title, files.collect())
+    };
+    names.map(endings).collect()
 }
 
 /// Pixels from the corner of the top left one.

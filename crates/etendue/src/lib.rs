@@ -59,16 +59,20 @@
 
 mod dataset;
 mod error;
+mod frame_files;
+mod neighbours;
 pub mod places;
 mod progress;
 mod rendering;
 mod session;
+mod structures;
 
 pub use dataset::Dataset;
 pub use error::Error;
 pub use etendue_render::output::{Channel, Layer, Outputs, Picture, Values};
 pub use etendue_render::{Plan, Report, SoFar};
 pub use etendue_scene::{Frame, Reach, Scene, Strictness};
+pub use frame_files::FramePattern;
 pub use progress::{Progress, Stage};
 pub use rendering::{Rendering, Written};
 pub use session::{Options, Session};

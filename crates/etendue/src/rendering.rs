@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use etendue_accel::Accel;
 use etendue_render::expose::{self, BandFilm, SensorLight};
 use etendue_render::light_field::{self, LightFieldSet};
+use etendue_render::output::conventions::Manner;
 use etendue_render::output::{
     Layer, Ledger, Look, MANIFEST, Outputs, Picture, exr, npy, png, sidecar,
 };
@@ -29,6 +30,8 @@ pub struct Rendering {
     pub(crate) report: Report,
     /// The structure and the images of a light-field camera's scene.
     traced: Option<(Arc<dyn Accel>, Arc<Images>)>,
+    /// Entries of the header that tell what it shows.
+    fingerprints: Vec<(String, String)>,
 }
 
 /// What was written.
@@ -47,19 +50,25 @@ impl Rendering {
         scene: Arc<Scene>,
         (picture, band_film): (Picture, Option<BandFilm>),
         traced: Option<(Arc<dyn Accel>, Arc<Images>)>,
-        report: Report,
+        (report, fingerprints): (Report, Vec<(String, String)>),
     ) -> Result<Self, Error> {
         let (light, idle_notes) = match SensorLight::new(&scene, (&picture, band_film))? {
             Ok(light) => (Some(light), Vec::new()),
             Err(notes) => (None, notes),
         };
-        Ok(Self { scene, picture, light, idle_notes, report, traced })
+        Ok(Self { scene, picture, light, idle_notes, report, traced, fingerprints })
     }
 
     /// The scene as it was rendered.
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// What tells, in the headers of files, which scene is shown, and which other frames it is compared with.
+    #[must_use]
+    pub fn fingerprints(&self) -> &[(String, String)] {
+        &self.fingerprints
     }
 
     /// Columns and rows.
@@ -241,6 +250,12 @@ impl Rendering {
             if outputs.npy {
                 npy::write(&place(array), picture, &layer.name)?;
             }
+            for manner in Manner::of(&layer.name, outputs) {
+                let name = in_manner(&layer.name, manner);
+                if manner.write(&folder.join(&name), picture, &layer.name)? {
+                    place(name);
+                }
+            }
         }
         sidecar::write_json(&place("camera.json".to_owned()), &camera.opencv())?;
         sidecar::write(&place("layers.json".to_owned()), picture)?;
@@ -279,13 +294,19 @@ fn mask_of(layer: &str) -> String {
     format!("{}.png", stem(layer))
 }
 
+/// The file of a layer in the manner of a benchmark.
+fn in_manner(layer: &str, manner: Manner) -> String {
+    format!("{}.{}", stem(layer), manner.ending())
+}
+
 /// Those of them that are wanted.
-fn layer_files(layer: &str, outputs: Outputs) -> Vec<String> {
+pub(crate) fn layer_files(layer: &str, outputs: Outputs) -> Vec<String> {
     let [image, array] = image_and_array(layer);
     let has_mask = layer.starts_with("Id.") || layer == "MaterialId";
     let files =
         [(outputs.png, image), (outputs.npy, array), (outputs.png && has_mask, mask_of(layer))];
-    files.into_iter().filter_map(|(wanted, name)| wanted.then_some(name)).collect()
+    let files = files.into_iter().filter_map(|(wanted, name)| wanted.then_some(name));
+    files.chain(Manner::of(layer, outputs).map(|manner| in_manner(layer, manner))).collect()
 }
 
 /// A layer's file name: `NormalCamera` is `normal_camera`, `Id.object` `id_object`, the picture

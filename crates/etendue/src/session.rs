@@ -6,20 +6,22 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use etendue_accel::{Accel, BuildOptions};
-use etendue_geometry::{Geometry, Mesh};
-use etendue_render::output::{ImageHash, Layer, MANIFEST, Outputs, SOFTWARE};
+use etendue_geometry::Mesh;
+use etendue_render::output::{ImageHash, Layer, Outputs, SOFTWARE};
 use etendue_render::report::memory;
-use etendue_render::{Images, Plan, Rendered, Report, Seconds, plan};
+use etendue_render::{FollowedFrame, Images, Plan, Prepared, Rendered, Report, Seconds, plan};
 use etendue_scene::escape::one_line;
-use etendue_scene::file::{AccelName, FileKind, FramesSpec, SceneFile};
+use etendue_scene::file::{FileKind, FramesSpec, SceneFile};
 use etendue_scene::import::Note;
 use etendue_scene::memory::Budget;
 use etendue_scene::{Cache, Frame, LoadOptions, Reach, Scene, SceneError, Start, Strictness};
 use serde_json::Value;
 
+use crate::neighbours::{self, Neighbour};
 use crate::progress::Stage;
 use crate::rendering::file_names;
-use crate::{Error, Progress, Rendering, places};
+use crate::structures::Structures;
+use crate::{Error, FramePattern, Progress, Rendering, places};
 
 /// How a scene is opened and built.
 #[derive(Debug, Clone)]
@@ -76,12 +78,14 @@ impl Default for Options {
 pub struct Session {
     /// The scene as it was opened and set.
     file: SceneFile,
-    /// The frame of it that is shown.
-    shown: Option<SceneFile>,
+    /// The frame of it that is shown, and its number.
+    shown: Option<(usize, SceneFile)>,
+    /// All frames, where layers compare them.
+    frames: Option<Arc<[Frame]>>,
     options: Options,
     cache: Cache,
     loaded: Option<Loaded>,
-    built: Option<Built>,
+    structures: Structures,
     images: Arc<Images>,
     /// What was set since it was opened.
     settings: Vec<(String, String)>,
@@ -94,15 +98,12 @@ struct Loaded {
     scene: Arc<Scene>,
     plan: Plan,
     notes: Vec<String>,
+    /// The structure over it, once it is built.
+    accel: Option<Arc<dyn Accel>>,
+    /// Other frames that it is compared with.
+    neighbours: Vec<Neighbour>,
     /// Images are those of this scene.
     is_decoded: bool,
-}
-
-/// A structure, and what it was built over.
-struct Built {
-    accel: Arc<dyn Accel>,
-    geometry: Arc<Geometry>,
-    name: Option<AccelName>,
 }
 
 impl fmt::Debug for Session {
@@ -171,10 +172,11 @@ impl Session {
         Self {
             file,
             shown: None,
+            frames: None,
             options,
             cache: Cache::default(),
             loaded: None,
-            built: None,
+            structures: Structures::default(),
             images: Arc::default(),
             settings: Vec::new(),
             seconds: Seconds::default(),
@@ -257,7 +259,7 @@ impl Session {
     /// The scene file as it is now: of the frame that is shown, when one is.
     #[must_use]
     pub fn file(&self) -> &SceneFile {
-        self.shown.as_ref().unwrap_or(&self.file)
+        self.shown.as_ref().map_or(&self.file, |(_, shown)| shown)
     }
 
     /// The frames of the scene, in order; `None` when its file has no `frames` and is one picture.
@@ -276,9 +278,12 @@ impl Session {
             let scene = self.loaded.as_ref().map(|loaded| &loaded.scene);
             let scene = scene.ok_or(SceneError::Stopped)?;
             let center = scene.geometry.loose_bounds().centre();
-            Ok(Start { pose: *scene.camera.pose(), center })
+            let cameras = scene.cameras.iter().map(|camera| camera.spec.clone()).collect();
+            Ok(Start { pose: *scene.camera.pose(), center, cameras })
         };
-        Ok(self.file.frames(self.options.reach, start)?)
+        let frames = self.file.frames(self.options.reach, start)?;
+        self.frames = frames.as_deref().map(Arc::from);
+        Ok(frames)
     }
 
     /// Takes the scene to one of its [`frames`](Self::frames): what is rendered next is that picture, as if
@@ -288,26 +293,36 @@ impl Session {
     ///
     /// When the format does not know what the frame sets; the message names the frame.
     pub fn show(&mut self, frame: &Frame) -> Result<(), Error> {
-        self.shown = Some(self.file.at(frame)?);
+        let shown = self.file.at(frame)?;
+        if self.frames.is_none() && !neighbours::steps(&shown.spec.all_layers()).is_empty() {
+            self.frames(&Progress::none())?;
+        }
+        self.shown = Some((frame.number, shown));
         self.loaded = None;
         Ok(())
     }
 
     fn leave_frame(&mut self) {
         self.shown = None;
+        self.frames = None;
         self.loaded = None;
     }
 
-    /// Whether `folder` holds all files of a complete render of the scene as it is now.
+    /// Whether `out` holds all files of frame `number`, named by `pattern`, as the scene is now.
     ///
     /// # Errors
     ///
     /// As [`Self::scene`].
-    pub fn is_complete(&mut self, folder: &Path, progress: &Progress) -> Result<bool, Error> {
+    pub fn is_complete(
+        &mut self,
+        (out, pattern): (&Path, &FramePattern),
+        number: usize,
+        progress: &Progress,
+    ) -> Result<bool, Error> {
         self.load(progress)?;
-        let loaded = self.loaded()?;
-        let hash = loaded.scene.hash()?.to_string();
-        Ok(is_rendered(folder, &hash, loaded.scene.sensor.is_some()))
+        let Loaded { scene, neighbours, .. } = self.loaded()?;
+        let prints = fingerprints(scene, neighbours)?;
+        Ok(pattern.is_complete(out, number, &prints, scene.sensor.is_some()))
     }
 
     /// The loaded scene: read now when it is not, or has changed.
@@ -386,9 +401,14 @@ impl Session {
         self.prepare(progress)?;
         let loaded = self.loaded()?;
         let (scene, plan, accel) = (Arc::clone(&loaded.scene), &loaded.plan, self.built()?);
+        let structure = loaded.accel.clone();
         let tracing = Instant::now();
-        let header = header(&scene)?;
-        let rendered = etendue_render::render(&scene, plan, accel, &self.images, header, progress)?;
+        let fingerprints = fingerprints(&scene, &loaded.neighbours)?;
+        let header = header(&scene, &fingerprints);
+        let others: Vec<FollowedFrame<'_>> =
+            loaded.neighbours.iter().filter_map(|other| other.followed(&scene)).collect();
+        let prepared = Prepared { accel, images: &self.images, others: &others };
+        let rendered = etendue_render::render_frame(&scene, plan, prepared, header, progress)?;
         let mut seconds = self.seconds;
         seconds.render = tracing.elapsed().as_secs_f64();
         // What was prepared before this call is a part of it, too.
@@ -396,6 +416,9 @@ impl Session {
         let mut more = rendered.notes.clone();
         more.extend(not_finite(&rendered));
         more.extend(changed(&scene));
+        if others.iter().any(FollowedFrame::loses_some) {
+            more.push(NOT_FOLLOWED.to_owned());
+        }
         more.iter().for_each(|note| progress.note(note));
         let mut notes = loaded.notes.clone();
         notes.extend(self.images.faults.iter().cloned());
@@ -404,12 +427,11 @@ impl Session {
         (report.samples_wanted, report.notes) = (plan.samples, notes);
         self.seconds = Seconds::default();
         let Rendered { picture, band_film, .. } = rendered;
-        let accel = self.built.as_ref().map(|built| Arc::clone(&built.accel));
         // The views of a light field are rendered when they are written.
-        let traced = accel
+        let traced = structure
             .filter(|_| scene.camera.light_field().is_some())
             .map(|accel| (accel, Arc::clone(&self.images)));
-        Rendering::new(scene, (picture, band_film), traced, report)
+        Rendering::new(scene, (picture, band_film), traced, (report, fingerprints))
     }
 
     fn loaded(&self) -> Result<&Loaded, Error> {
@@ -417,17 +439,32 @@ impl Session {
     }
 
     fn built(&self) -> Result<&dyn Accel, Error> {
-        let built = self.built.as_ref().map(|built| &*built.accel);
+        let built = self.loaded()?.accel.as_deref();
         built.ok_or_else(|| Error::Refused("the structure is not built".to_owned()))
     }
 
-    /// Loads the scene, if it is not.
+    /// Loads the scene, if it is not, and the frames that it is compared with.
     fn load(&mut self, progress: &Progress) -> Result<(), Error> {
         if self.loaded.is_some() {
             return Ok(());
         }
         let start = Instant::now();
-        let wanted = plan::wanted(&self.file().spec.all_layers());
+        let neighbours = self.load_neighbours(progress)?;
+        let mut scene = self.load_file(self.file(), progress)?;
+        neighbours::refuse_views(&scene)?;
+        neighbours::leave_out(&mut scene, &neighbours);
+        let notes: Vec<String> = scene.notes.iter().map(in_words).collect();
+        notes.iter().for_each(|note| progress.note(note));
+        let plan = Plan::new(&scene, self.options.outputs);
+        let scene = Arc::new(scene);
+        self.loaded =
+            Some(Loaded { scene, plan, notes, accel: None, neighbours, is_decoded: false });
+        self.seconds.load += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    fn load_file(&self, file: &SceneFile, progress: &Progress) -> Result<Scene, Error> {
+        let wanted = plan::wanted(&file.spec.all_layers());
         let share = |done: usize, total: usize| done as f64 / total.max(1) as f64;
         let goes_on = |step: etendue_scene::LoadProgress<'_>| {
             progress.goes_on(Stage::Load, share(step.done, step.total))
@@ -442,28 +479,34 @@ impl Session {
             cache: Some(&self.cache),
             progress: Some(&goes_on),
         };
-        let scene = self.file().load(wanted, &options)?;
-        let notes: Vec<String> = scene.notes.iter().map(in_words).collect();
-        notes.iter().for_each(|note| progress.note(note));
-        let plan = Plan::new(&scene, self.options.outputs);
-        self.loaded = Some(Loaded { scene: Arc::new(scene), plan, notes, is_decoded: false });
-        self.seconds.load += start.elapsed().as_secs_f64();
-        Ok(())
+        Ok(file.load(wanted, &options)?)
     }
 
-    /// Builds the structure, unless there is one over the same surfaces.
+    fn load_neighbours(&self, progress: &Progress) -> Result<Vec<Neighbour>, Error> {
+        let steps = neighbours::steps(&self.file().spec.all_layers());
+        if steps.is_empty() {
+            return Ok(Vec::new());
+        }
+        if self.file.spec.frames.is_none() {
+            let path = self.file.path().display();
+            return Err(Error::Refused(format!(
+                "{path}: layers: flow, disparity and occlusion compare frames, and the scene has no `frames`"
+            )));
+        }
+        // The scene by itself, when no frame is shown, has no neighbours.
+        let (Some((number, _)), Some(frames)) = (&self.shown, &self.frames) else {
+            return Ok(Vec::new());
+        };
+        let load = |(step, frame): (_, &Frame)| {
+            let scene = Arc::new(self.load_file(&self.file.at(frame)?, progress)?);
+            Ok(Neighbour { step, scene, accel: None })
+        };
+        neighbours::around(frames, *number, &steps).into_iter().map(load).collect()
+    }
+
+    /// Builds the structures, unless there are such over the same surfaces.
     fn build(&mut self, progress: &Progress) -> Result<(), Error> {
         self.load(progress)?;
-        let Loaded { scene, plan, .. } = self.loaded()?;
-        let name = scene.render.accel;
-        let is_same = |built: &Built| {
-            built.name == name
-                && (Arc::ptr_eq(&built.geometry, &scene.geometry)
-                    || built.geometry.has_surfaces_of(&scene.geometry))
-        };
-        if self.built.as_ref().is_some_and(is_same) {
-            return Ok(());
-        }
         let start = Instant::now();
         let options = BuildOptions {
             threads: rayon::current_num_threads(),
@@ -473,13 +516,26 @@ impl Session {
             progress: Some(progress.of(Stage::Build)),
             ..BuildOptions::default()
         };
-        fits(scene, plan, self.options.memory_limit)?;
-        let before = self.built.as_ref().filter(|built| built.name == name);
-        let accel =
-            etendue_render::rebuild(scene, plan, &options, before.map(|built| &*built.accel))?;
-        let geometry = Arc::clone(&scene.geometry);
-        self.built = Some(Built { accel: Arc::from(accel), geometry, name });
-        self.seconds.build += start.elapsed().as_secs_f64();
+        let Some(loaded) = &mut self.loaded else { return Ok(()) };
+        let Loaded { scene, plan, accel, neighbours, .. } = loaded;
+        let structures = &mut self.structures;
+        let mut is_new = false;
+        let others = neighbours.iter_mut().map(|other| (&other.scene, &mut other.accel));
+        for (scene, accel) in std::iter::once((&*scene, accel)).chain(others) {
+            if accel.is_none() {
+                *accel = structures.over(scene);
+            }
+            if accel.is_none() {
+                fits(scene, plan, self.options.memory_limit)?;
+                *accel = Some(structures.build(scene, plan, &options)?);
+                is_new = true;
+            }
+        }
+        let others = neighbours.iter().map(|other| &*other.scene);
+        structures.keep(std::iter::once(&**scene).chain(others));
+        if is_new {
+            self.seconds.build += start.elapsed().as_secs_f64();
+        }
         Ok(())
     }
 
@@ -551,26 +607,6 @@ impl Session {
     }
 }
 
-/// Whether `folder` has a complete picture of the scene with this hash, and all files of its manifest.
-fn is_rendered(folder: &Path, hash: &str, has_sensor: bool) -> bool {
-    let read = |name: &str| -> Option<Value> {
-        serde_json::from_slice(&std::fs::read(folder.join(name)).ok()?).ok()
-    };
-    let header = read("layers.json").and_then(|layers| layers.get("header").cloned());
-    let Some(header) = header else { return false };
-    let is_same = header.get("scene_hash").and_then(Value::as_str) == Some(hash);
-    let files = read(MANIFEST).and_then(|book| book.pointer("/files/render").cloned());
-    let Some(Value::Object(files)) = files else { return false };
-    let is_there = |(name, print): (&String, &Value)| {
-        let bytes = print.get("bytes").and_then(Value::as_u64);
-        folder.join(name).metadata().is_ok_and(|data| Some(data.len()) == bytes)
-    };
-    is_same
-        && header.get("partial").is_none()
-        && (!has_sensor || files.contains_key("sensor.json"))
-        && files.iter().all(is_there)
-}
-
 /// Refuses what will not fit into the memory that is allowed, or else free.
 fn fits(scene: &Scene, plan: &Plan, limit: Option<u64>) -> Result<(), Error> {
     let memory = &plan.memory;
@@ -592,17 +628,25 @@ fn fits(scene: &Scene, plan: &Plan, limit: Option<u64>) -> Result<(), Error> {
     Err(Error::Refused(format!("{path}: a picture of {width} x {height} pixels{largest} {error}")))
 }
 
+/// That layers compare with a frame in which things were exchanged.
+const NOT_FOLLOWED: &str = "some meshes are others in the frame that layers compare this one with; their \
+                            points are not followed (+inf)";
+
 /// What stands in the header of every file.
-fn header(scene: &Scene) -> Result<Vec<(String, String)>, Error> {
-    let header: Vec<(String, String)> = [
-        ("scene_hash", scene.hash()?.to_string()),
+fn header(scene: &Scene, fingerprints: &[(String, String)]) -> Vec<(String, String)> {
+    let more = [
         ("seed", scene.render.seed.to_string()),
         ("pixel_origin", "pixel centres lie at half-integers from the picture's corner".to_owned()),
         ("camera", serde_json::to_string(&scene.camera.opencv()).unwrap_or_default()),
     ]
-    .map(|(key, value)| (key.to_owned(), value))
-    .into();
-    Ok(header)
+    .map(|(key, value)| (key.to_owned(), value));
+    fingerprints.iter().cloned().chain(more).collect()
+}
+
+/// What tells whether files show the same scene, compared with the same other frames.
+fn fingerprints(scene: &Scene, neighbours: &[Neighbour]) -> Result<Vec<(String, String)>, Error> {
+    let own = Ok(("scene_hash".to_owned(), scene.hash()?.to_string()));
+    std::iter::once(own).chain(neighbours.iter().map(Neighbour::header)).collect()
 }
 
 /// A note as one line.

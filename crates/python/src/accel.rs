@@ -1,5 +1,6 @@
 //! The exact ray caster by itself.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use etendue_accel::BuildOptions;
@@ -67,35 +68,13 @@ impl Accel {
         coherent: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let rays = Rays::new(&origins, &directions, t_max.as_ref())?;
-        let batches: Vec<HitBatch> = py.detach(|| {
-            let hits = |rays: RayBatch| {
-                let mut hits = HitBatch::new(Detail::Surface);
-                self.accel.closest(&rays, &mut hits);
-                hits
-            };
-            rays.batches(coherent).map(hits).collect()
-        });
+        let found = py.detach(|| self.found(&rays, coherent));
         let all = PyDict::new(py);
-        macro_rules! joined {
-            ($field:ident) => {{
-                let mut all = Vec::with_capacity(rays.origins.len());
-                batches.iter().for_each(|batch| all.extend_from_slice(&batch.$field));
-                all
-            }};
-        }
-        let mut t: Vec<f64> = joined!(t);
-        t.iter_mut().enumerate().for_each(|(i, t)| *t /= rays.length(i).max(f64::MIN_POSITIVE));
-        all.set_item("t", t.into_pyarray(py))?;
-        all.set_item("u", joined!(u).into_pyarray(py))?;
-        all.set_item("v", joined!(v).into_pyarray(py))?;
-        // A miss is -1.
-        let triangles: Vec<i64> = batches
-            .iter()
-            .flat_map(|b| (0..b.len()).map(|i| if b.is_hit(i) { b.triangle[i].into() } else { -1 }))
-            .collect();
-        all.set_item("triangle", triangles.into_pyarray(py))?;
-        let normals = batches.iter().flat_map(|b| (0..b.len()).map(|i| b.normal(i).to_array()));
-        all.set_item("normal", of_triples(py, normals.collect())?)?;
+        all.set_item("t", found.t.into_pyarray(py))?;
+        all.set_item("u", found.u.into_pyarray(py))?;
+        all.set_item("v", found.v.into_pyarray(py))?;
+        all.set_item("triangle", found.triangle.into_pyarray(py))?;
+        all.set_item("normal", of_triples(py, found.normal)?)?;
         Ok(all)
     }
 
@@ -109,15 +88,56 @@ impl Accel {
         coherent: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
         let rays = Rays::new(&origins, &directions, t_max.as_ref())?;
-        let blocked: Vec<Vec<bool>> = py.detach(|| {
-            let blocked = |rays: RayBatch| {
-                let mut blocked = Vec::new();
-                self.accel.occluded(&rays, &mut blocked);
-                blocked
-            };
-            rays.batches(coherent).map(blocked).collect()
+        let mut all = vec![false; rays.len()];
+        py.detach(|| {
+            all.par_chunks_mut(BATCH).enumerate().for_each_init(
+                || (RayBatch::with_capacity(BATCH), Vec::new()),
+                |(batch, blocked), (k, out)| {
+                    rays.fill(k, coherent, batch);
+                    self.accel.occluded(batch, blocked);
+                    out.copy_from_slice(blocked);
+                },
+            );
         });
-        Ok(blocked.concat().into_pyarray(py).into_any())
+        Ok(all.into_pyarray(py).into_any())
+    }
+}
+
+/// What the rays of a call met.
+struct Found {
+    /// In lengths of the directions as they came; `+inf` for a miss.
+    t: Vec<f64>,
+    u: Vec<f64>,
+    v: Vec<f64>,
+    /// −1 for a miss.
+    triangle: Vec<i64>,
+    normal: Vec<[f64; 3]>,
+}
+
+impl Accel {
+    fn found(&self, rays: &Rays<'_>, coherent: bool) -> Found {
+        let count = rays.len();
+        let numbers = || vec![0.0; count];
+        let (t, u, v) = (numbers(), numbers(), numbers());
+        let mut found = Found { t, u, v, triangle: vec![0; count], normal: vec![[0.0; 3]; count] };
+        let Found { t, u, v, triangle, normal } = &mut found;
+        let tuv = t.par_chunks_mut(BATCH).zip(u.par_chunks_mut(BATCH)).zip(v.par_chunks_mut(BATCH));
+        let rest = triangle.par_chunks_mut(BATCH).zip(normal.par_chunks_mut(BATCH));
+        tuv.zip(rest).enumerate().for_each_init(
+            || (RayBatch::with_capacity(BATCH), HitBatch::new(Detail::Surface)),
+            |(batch, hits), (k, (((t, u), v), (triangle, normal)))| {
+                rays.fill(k, coherent, batch);
+                self.accel.closest(batch, hits);
+                u.copy_from_slice(&hits.u);
+                v.copy_from_slice(&hits.v);
+                for i in 0..t.len() {
+                    t[i] = hits.t[i] / rays.length(k * BATCH + i).max(f64::MIN_POSITIVE);
+                    triangle[i] = if hits.is_hit(i) { hits.triangle[i].into() } else { -1 };
+                    normal[i] = hits.normal(i).to_array();
+                }
+            },
+        );
+        found
     }
 }
 
@@ -141,18 +161,18 @@ impl Unbuilt {
     }
 }
 
-/// Rays as they came, directions made unit vectors.
-struct Rays {
-    origins: Vec<[f64; 3]>,
-    directions: Vec<[f64; 3]>,
-    /// In lengths of the directions as they came.
+/// Rays as they came.
+struct Rays<'a> {
+    origins: Cow<'a, [[f64; 3]]>,
+    directions: Cow<'a, [[f64; 3]]>,
+    /// In lengths of the directions.
     t_max: Option<Vec<f64>>,
 }
 
-impl Rays {
+impl<'a> Rays<'a> {
     fn new(
-        origins: &PyReadonlyArray2<'_, f64>,
-        directions: &PyReadonlyArray2<'_, f64>,
+        origins: &'a PyReadonlyArray2<'_, f64>,
+        directions: &'a PyReadonlyArray2<'_, f64>,
         t_max: Option<&PyReadonlyArray1<'_, f64>>,
     ) -> PyResult<Self> {
         let (origins, directions) =
@@ -168,28 +188,29 @@ impl Rays {
         Ok(Self { origins, directions, t_max })
     }
 
+    fn len(&self) -> usize {
+        self.origins.len()
+    }
+
     fn length(&self, i: usize) -> f64 {
         DVec3::from(self.directions[i]).length()
     }
 
-    /// Batches of rays in order. A ray that is not finite, or without direction, misses.
-    fn batches(&self, coherent: bool) -> impl IndexedParallelIterator<Item = RayBatch> + '_ {
-        let starts = self.origins.len().div_ceil(BATCH);
-        (0..starts).into_par_iter().map(move |k| {
-            let range = k * BATCH..((k + 1) * BATCH).min(self.origins.len());
-            let mut rays = RayBatch::with_capacity(range.len()).with_coherence(coherent);
-            for i in range {
-                let origin = DVec3::from(self.origins[i]);
-                let far = self.t_max.as_ref().map_or(f64::INFINITY, |t| t[i]) * self.length(i);
-                match DVec3::from(self.directions[i]).try_normalize() {
-                    Some(direction) if origin.is_finite() && far >= 0.0 => {
-                        rays.push_between(origin, direction, 0.0, far);
-                    }
-                    // Ends before it starts.
-                    _ => rays.push_between(DVec3::ZERO, DVec3::Z, 0.0, -1.0),
+    /// Refills `batch` with the rays of batch `k`, of unit directions. A ray that is not finite, or without
+    /// direction, misses.
+    fn fill(&self, k: usize, coherent: bool, batch: &mut RayBatch) {
+        batch.clear();
+        batch.coherent = coherent;
+        for i in k * BATCH..((k + 1) * BATCH).min(self.len()) {
+            let (origin, length) = (DVec3::from(self.origins[i]), self.length(i));
+            let far = self.t_max.as_ref().map_or(f64::INFINITY, |t| t[i]) * length;
+            match DVec3::from(self.directions[i]).try_normalize() {
+                Some(direction) if origin.is_finite() && far >= 0.0 => {
+                    batch.push_between(origin, direction, 0.0, far);
                 }
+                // Ends before it starts.
+                _ => batch.push_between(DVec3::ZERO, DVec3::Z, 0.0, -1.0),
             }
-            rays
-        })
+        }
     }
 }

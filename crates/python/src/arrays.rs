@@ -1,5 +1,7 @@
 //! Errors and arrays between Rust and Python.
 
+use std::borrow::Cow;
+
 use etendue::Error;
 use etendue_render::output::{Layer, Values};
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2};
@@ -35,15 +37,19 @@ fn with_causes(error: &dyn std::error::Error) -> String {
     message
 }
 
-/// Rows of three numbers.
-pub(crate) fn triples<T: numpy::Element + Copy>(
+/// Rows of three numbers, where they are if they lie in rows.
+pub(crate) fn triples<'a, T: numpy::Element + Copy>(
     name: &str,
-    array: &PyReadonlyArray2<'_, T>,
-) -> PyResult<Vec<[T; 3]>> {
+    array: &'a PyReadonlyArray2<'_, T>,
+) -> PyResult<Cow<'a, [[T; 3]]>> {
+    let in_rows = array.as_slice();
     let array = array.as_array();
-    match array.shape() {
-        [_, 3] => Ok(array.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect()),
-        other => Err(refused(format!("{name} has the shape {other:?} instead of (n, 3)"))),
+    match (array.shape(), in_rows) {
+        ([_, 3], Ok(numbers)) => Ok(Cow::Borrowed(numbers.as_chunks().0)),
+        ([_, 3], Err(_)) => {
+            Ok(array.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
+        }
+        (other, _) => Err(refused(format!("{name} has the shape {other:?} instead of (n, 3)"))),
     }
 }
 
@@ -90,6 +96,5 @@ pub(crate) fn shaped(
 /// An array of rows of three.
 pub(crate) fn of_triples(py: Python<'_>, rows: Vec<[f64; 3]>) -> PyResult<Bound<'_, PyAny>> {
     let count = rows.len();
-    let flat: Vec<f64> = rows.into_iter().flatten().collect();
-    Ok(flat.into_pyarray(py).reshape([count, 3])?.into_any())
+    Ok(rows.into_flattened().into_pyarray(py).reshape([count, 3])?.into_any())
 }

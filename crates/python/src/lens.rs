@@ -96,7 +96,7 @@ impl Lens {
         }
         let rays: Vec<Ray> = origins
             .iter()
-            .zip(&directions)
+            .zip(directions.iter())
             .enumerate()
             .map(|(i, (o, d))| {
                 Ray::new((*o).into(), (*d).into())

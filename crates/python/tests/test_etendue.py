@@ -4,8 +4,10 @@ import json
 import os
 import pathlib
 import re
+import signal
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -117,6 +119,80 @@ def test_frames():
     assert len(shots) == 4
     np.testing.assert_allclose(shots[2]["depth"], 3.0, rtol=1e-14)
     np.testing.assert_allclose(shots[2].pose[:3, 3], [0, 0, -3], atol=1e-14)
+
+
+def test_frames_are_compared():
+    # Two cameras side by side: focal length times baseline over depth.
+    grid = {"type": "grid", "columns": 2, "spacing": 0.25}
+    left, right = quad(frames=grid, layers=["depth", "disparity"]).frames()
+    np.testing.assert_allclose(left["disparity"], left.K[0, 0] * 0.25 / left["depth"], rtol=1e-13)
+    assert "disparity" not in right
+
+
+def test_meshes_of_others_and_bytes(tmp_path):
+    class Mesh:
+        vertices, faces = QUAD, FACES
+
+    shot = etendue.Scene(Mesh(), layers=["depth"], camera=quad()["camera"]).render()
+    np.testing.assert_allclose(shot["depth"], 3.0, rtol=EPSILON)
+    binary = QUAD.astype("<f4").tobytes() + FACES.astype("<u4").tobytes()
+    document = {
+        "asset": {"version": "2.0"},
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": len(binary)}],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 24},
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 4},
+            {"bufferView": 1, "componentType": 5125, "type": "SCALAR", "count": 6},
+        ],
+    }
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunk = lambda kind, data: len(data).to_bytes(4, "little") + kind + data  # noqa: E731
+    body = chunk(b"JSON", text) + chunk(b"BIN\0", binary)
+    glb = b"glTF" + (2).to_bytes(4, "little") + (12 + len(body)).to_bytes(4, "little") + body
+    shot = etendue.load(glb, {"camera": quad()["camera"], "layers": ["depth"]}).render()
+    np.testing.assert_allclose(shot["depth"], 3.0, rtol=EPSILON)
+    with pytest.raises(ValueError, match="model.glb"):
+        etendue.load(b"glTF").render()
+
+
+def test_a_scene_is_one_threads_at_a_time():
+    scene = etendue.Scene(
+        objects=[{"shape": "sphere"}],
+        tracer={"type": "path"},
+        render={"samples": 1 << 20},
+        camera={"type": "pinhole", "sensor": {"resolution": [64, 64]}},
+    )
+    seen = []
+
+    def told(stage, share):
+        # Another thread, while the first is at work.
+        if not seen:
+            seen.append(True)
+            thread = threading.Thread(target=other)
+            thread.start()
+            thread.join()
+        return False
+
+    def other():
+        try:
+            scene.render()
+        except RuntimeError as error:
+            seen.append(str(error))
+        raise_in_main.set()
+
+    raise_in_main = threading.Event()
+    threading.Thread(
+        target=lambda: (raise_in_main.wait(60), os.kill(os.getpid(), signal.SIGINT)), daemon=True
+    ).start()
+    with pytest.raises(KeyboardInterrupt):
+        scene.render(progress=told)
+    assert len(seen) == 2 and "another thread" in seen[1]
 
 
 def test_progress_and_ctrl_c():

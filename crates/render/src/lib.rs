@@ -19,6 +19,7 @@ mod forecast;
 pub mod light_field;
 mod lighting;
 mod names;
+mod other_frame;
 pub mod output;
 pub mod plan;
 mod radiance;
@@ -29,7 +30,11 @@ mod tiles;
 mod watch;
 
 pub use film::{NoMemory, Precision};
+pub use other_frame::FollowedFrame;
 pub use plan::{Decision, Plan};
-pub use render::{Images, Progress, RenderError, Rendered, accelerators, build, rebuild, render};
+pub use render::{
+    Images, Prepared, Progress, RenderError, Rendered, accelerators, build, rebuild, render,
+    render_frame,
+};
 pub use report::{Report, Seconds};
 pub use watch::{SoFar, Watch};

@@ -110,6 +110,7 @@ fn lit_share(
     let pass: Vec<_> = std::iter::once(0..SAMPLES).collect();
     let job = Job {
         accel: stage.accel,
+        others: &[],
         camera: &camera,
         groups: groups.clone(),
         surroundings: stage.surroundings,

@@ -11,6 +11,7 @@ use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightRow};
 use etendue_spectrum::Bands;
+use etendue_tracer::layer::OtherFrame;
 use etendue_tracer::texture::{Encoding, Filter, ImageError, Wrap};
 use etendue_tracer::{
     Emitters, EnvironmentImage, EnvironmentMap, Image, ImageSource, LayerSpec, LightKind,
@@ -19,6 +20,7 @@ use etendue_tracer::{
 use rayon::prelude::*;
 
 use crate::film::{FilmLayer, NoMemory};
+use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::report::ImageSize;
@@ -413,6 +415,17 @@ pub(crate) fn environment(scene: &Scene) -> Option<&EnvironmentImage> {
     })
 }
 
+/// What was made ready for a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Prepared<'a> {
+    /// The structure over the scene's geometry.
+    pub accel: &'a dyn Accel,
+    /// The images that the plan wants.
+    pub images: &'a Images,
+    /// The frames that layers compare this one with; a layer whose frame is not here finds nothing there.
+    pub others: &'a [FollowedFrame<'a>],
+}
+
 /// Renders `scene` as planned. Runs on the threads of the current rayon pool; the picture does not
 /// depend on how many there are. The file header gets the number of samples a pixel.
 ///
@@ -428,6 +441,21 @@ pub fn render(
     plan: &Plan,
     accel: &dyn Accel,
     images: &Images,
+    header: Vec<(String, String)>,
+    watch: &dyn Watch,
+) -> Result<Rendered, RenderError> {
+    render_frame(scene, plan, Prepared { accel, images, others: &[] }, header, watch)
+}
+
+/// As [`render`], of a scene that is one of several frames.
+///
+/// # Errors
+///
+/// As [`render`].
+pub fn render_frame(
+    scene: &Scene,
+    plan: &Plan,
+    Prepared { accel, images, others }: Prepared<'_>,
     header: Vec<(String, String)>,
     watch: &dyn Watch,
 ) -> Result<Rendered, RenderError> {
@@ -473,8 +501,10 @@ pub fn render(
         groups: light_camera.band_groups(&plan.bands),
     });
     let so_far = |layers: &[&FilmLayer], samples| so_far(scene, plan, &header, layers, samples);
+    let others: Vec<&dyn OtherFrame> = others.iter().map(|other| other as _).collect();
     let job = Job {
         accel,
+        others: &others,
         camera: &camera,
         groups: camera.band_groups(&Bands::Rgb),
         surroundings,

@@ -7,7 +7,7 @@ use etendue_accel::Accel;
 use etendue_camera::{BandGroup, Camera, CameraRays};
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use etendue_optics::element::FateCounts;
-use etendue_tracer::layer::{Columns, Seen};
+use etendue_tracer::layer::{Columns, OtherFrame, Seen};
 use etendue_tracer::{LayerSpec, RayStats, SceneView, Traced};
 use rayon::prelude::*;
 
@@ -32,6 +32,8 @@ pub(crate) type ToPicture<'a> =
 pub(crate) struct Job<'a> {
     pub(crate) accel: &'a dyn Accel,
     pub(crate) camera: &'a Camera,
+    /// Frames that layers compare this one with.
+    pub(crate) others: &'a [&'a dyn OtherFrame],
     /// The colours of coloured layers that the camera traces apart.
     pub(crate) groups: Vec<BandGroup>,
     pub(crate) surroundings: SceneView<'a>,
@@ -186,8 +188,8 @@ impl Job<'_> {
             batch.aim_at_centres(self.camera, tile);
             self.accel.closest(&batch.rays, &mut batch.hits);
             batch.traced += batch.rays.len() as u64;
-            let Batch { rays, hits, places, values, .. } = &mut *batch;
-            let seen = self.seen(Traced { rays, hits });
+            let Batch { rays, hits, columns, rows, places, values, .. } = &mut *batch;
+            let seen = Seen { places: [columns, rows], ..self.seen(Traced { rays, hits }) };
             for layer in &mut strip.layers {
                 layer.spec.fill(&seen, values);
                 for (plane, values) in layer.planes.iter_mut().zip(&*values) {
@@ -201,7 +203,8 @@ impl Job<'_> {
 
     /// What layers are filled from.
     fn seen<'b>(&'b self, traced: Traced<'b>) -> Seen<'b> {
-        Seen { scene: self.surroundings, traced, light: self.light.as_ref().map(|pass| pass.stage) }
+        let light = self.light.as_ref().map(|pass| pass.stage);
+        Seen { scene: self.surroundings, traced, light, places: [&[]; 2], others: self.others }
     }
 }
 

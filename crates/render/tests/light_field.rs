@@ -11,7 +11,7 @@ use etendue_render::{Images, Plan, build, plan, render};
 use etendue_scene::LoadOptions;
 use etendue_scene::file::SceneFile;
 
-const OUTPUTS: Outputs = Outputs { exr: false, png: false, npy: true, dng: false };
+const OUTPUTS: Outputs = Outputs { npy: true, ..Outputs::NONE };
 
 /// Writes the set of a camera of 20 mm f/4 that looks at a wall of squares at `depth` (m), each of which
 /// is 3.5 columns of a view wide.

@@ -11,7 +11,7 @@ use etendue_geometry::{Geometry, Mesh, files};
 use etendue_tracer::Material;
 use xxhash_rust::xxh3::Xxh3Default;
 
-use crate::import::{Import, ImportedPlacement, Stats, Strictness, Wanted};
+use crate::import::{Import, ImportedPlacement, Play, Stats, Strictness, Wanted};
 use crate::{CameraOrigin, SceneError};
 
 /// Models, cameras and fingerprints of files that loads of one scene share, and the models that are in
@@ -47,6 +47,8 @@ pub(crate) struct Manner {
     pub(crate) wanted: Wanted,
     pub(crate) strictness: Strictness,
     pub(crate) root: Option<PathBuf>,
+    /// The moment of its animation.
+    pub(crate) play: Option<Play>,
 }
 
 #[derive(Debug)]
@@ -146,7 +148,9 @@ impl Cache {
         let mut kept = locked(&self.kept);
         let used: Vec<Origin> =
             kept.iter().filter(|k| k.is_used).map(|k| k.origin.clone()).collect();
-        kept.retain(|k| used.contains(&k.origin));
+        // Moments of an animation are as many as there are frames.
+        let stays = |k: &Kept| k.manner.play.is_none() && used.contains(&k.origin);
+        kept.retain(|k| k.is_used || stays(k));
         kept.iter_mut().for_each(|k| k.is_used = false);
     }
 

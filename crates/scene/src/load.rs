@@ -18,9 +18,11 @@ use crate::bounds::Vertices;
 use crate::cache::{KeptCamera, Manner};
 use crate::cameras::{self, CameraOrigin, SceneCamera};
 use crate::doctor::memory;
-use crate::file::{FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index, suggest};
+use crate::file::{
+    AnimationSpec, FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index, suggest,
+};
 use crate::identity::Ingredients;
-use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Strictness, Wanted};
+use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Play, Strictness, Wanted};
 use crate::instances::Instances;
 use crate::memory::Budget;
 use crate::parts::{Object, Parts};
@@ -38,7 +40,8 @@ struct Origin {
 
 #[derive(PartialEq)]
 enum OriginKind {
-    File(PathBuf),
+    /// A moment of it, where it is animated.
+    File(PathBuf, Option<Play>),
     Shape(ShapeSpec),
     /// In no file, by its name.
     Given(String),
@@ -48,12 +51,20 @@ impl OriginKind {
     /// As the cache knows it.
     fn kept(&self) -> Option<cache::Origin> {
         match self {
-            Self::File(path) => Some(cache::Origin::File(path.clone())),
+            Self::File(path, _) => Some(cache::Origin::File(path.clone())),
             // Shapes are made of numbers and words, which always serialise.
             Self::Shape(shape) => {
                 Some(cache::Origin::Shape(serde_json::to_string(shape).unwrap_or_default()))
             }
             Self::Given(_) => None,
+        }
+    }
+
+    /// The moment of an animation that is shown.
+    fn play(&self) -> Option<Play> {
+        match self {
+            Self::File(_, play) => play.clone(),
+            Self::Shape(_) | Self::Given(_) => None,
         }
     }
 }
@@ -152,7 +163,8 @@ impl SceneFile {
         own: &mut OwnParts<'_>,
     ) -> Result<(Vec<Origin>, Vec<Object>), SceneError> {
         let mut origins: Vec<Origin> = Vec::new();
-        let mut files: BTreeMap<PathBuf, usize> = BTreeMap::new();
+        // Links to one file are one file.
+        let mut files: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
         let mut objects = Vec::new();
         for (index, spec) in self.spec.objects.iter().enumerate() {
             let at = join_index("objects", index);
@@ -165,11 +177,17 @@ impl SceneFile {
                     })
                 }
                 Source::File(written) => {
-                    let found = self.find(folder, index, written)?;
-                    *files.entry(found.real).or_insert_with(|| {
-                        origins.push(Origin { kind: OriginKind::File(found.path), user: index });
+                    let Found { path, real } = self.find(folder, index, written)?;
+                    let path = files.entry(real).or_insert(path).clone();
+                    let kind = OriginKind::File(path, self.play(spec, &at)?);
+                    origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
+                        origins.push(Origin { kind, user: index });
                         origins.len() - 1
                     })
+                }
+                Source::Shape(_) if spec.animation.is_some() => {
+                    let why = "a shape has no animation; models of glTF files have";
+                    return Err(self.fault(&join(&at, "animation"), why));
                 }
                 Source::Shape(shape) => {
                     let kind = OriginKind::Shape(shape.clone());
@@ -182,6 +200,20 @@ impl SceneFile {
             objects.push(self.object(spec, &at, origin, folder, own)?);
         }
         Ok((origins, objects))
+    }
+
+    /// The moment of a model's animation that is shown.
+    fn play(&self, spec: &ObjectSpec, at: &str) -> Result<Option<Play>, SceneError> {
+        let Some(AnimationSpec { time, name }) = &spec.animation else { return Ok(None) };
+        if !time.0.is_finite() {
+            return Err(self.fault(&join(at, "animation.time"), "is not finite"));
+        }
+        match &spec.source {
+            Source::File(path) if !names_no_up(path) => {
+                Ok(Some(Play { which: name.clone(), time: time.0 }))
+            }
+            _ => Err(self.fault(&join(at, "animation"), "only glTF files have animations")),
+        }
     }
 
     /// The object at path `at`, its names resolved.
@@ -297,6 +329,7 @@ impl SceneFile {
             root: folder.limit().map(std::path::Path::to_owned),
             budget: Arc::clone(budget),
             copy: options.copy,
+            animation: None,
         };
         let goes_on = |origin: &Origin, done: usize| {
             let name = &objects[origin.user].title;
@@ -311,6 +344,7 @@ impl SceneFile {
             wanted,
             strictness: options.strictness,
             root: folder.limit().map(std::path::Path::to_owned),
+            play: None,
         };
         // All are waited for, so that the first fault in the file's order is the one reported.
         let imports: Vec<Result<Import, SceneError>> = origins
@@ -318,6 +352,7 @@ impl SceneFile {
             .map(|origin| {
                 let at = join_index("objects", origin.user);
                 let known = origin.kind.kept();
+                let manner = Manner { play: origin.kind.play(), ..manner.clone() };
                 if let Some(import) = known.as_ref().and_then(|known| kept.model(known, &manner)) {
                     return self.again(&import, budget, &objects[origin.user].title, structure);
                 }
@@ -326,7 +361,9 @@ impl SceneFile {
                         let import = kept.given(name).cloned().unwrap_or_default();
                         return self.again(&import, budget, name, structure);
                     }
-                    OriginKind::File(path) => {
+                    OriginKind::File(path, play) => {
+                        let settings =
+                            import::Options { animation: play.clone(), ..settings.clone() };
                         let import = import::import(path, wanted, &settings)
                             .map_err(|source| self.import_fault(at, source))?;
                         let triangles: usize =
@@ -351,7 +388,7 @@ impl SceneFile {
                     }
                 };
                 if let Some(known) = known {
-                    kept.keep(known, manner.clone(), &mut import);
+                    kept.keep(known, manner, &mut import);
                 }
                 let done = done.fetch_add(1, Ordering::Relaxed) + 1;
                 if goes_on(origin, done) { Ok(import) } else { Err(SceneError::Stopped) }

@@ -90,7 +90,7 @@ impl Prepared {
             overrides.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
         let file = SceneFile::read(&path, &overrides)?;
         let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default())?;
-        let plan = Plan::new(&scene, Outputs { exr: true, png: false, npy: false, dng: false });
+        let plan = Plan::new(&scene, Outputs { exr: true, ..Outputs::NONE });
         let accel = etendue_render::build(&scene, &plan, &BuildOptions::default())?;
         let images = Images::decode(&scene, &plan, None)?;
         Ok(Self { scene, plan, accel, images })

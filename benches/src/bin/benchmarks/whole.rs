@@ -165,7 +165,7 @@ pub(crate) fn print_memory(path: &Path) -> anyhow::Result<()> {
     let start = Memory::now();
     let file = SceneFile::read(path, &[])?;
     let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default())?;
-    let plan = Plan::new(&scene, Outputs { exr: true, png: false, npy: false, dng: false });
+    let plan = Plan::new(&scene, Outputs { exr: true, ..Outputs::NONE });
     let load = Memory::now();
     let accel = etendue_render::build(&scene, &plan, &BuildOptions::default())?;
     let build = Memory::now();

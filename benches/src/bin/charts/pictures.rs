@@ -94,7 +94,7 @@ fn only(findings: Findings, stem: &str) -> anyhow::Result<Chart> {
 fn load(path: &str) -> anyhow::Result<(Scene, Box<dyn Accel>)> {
     let file = SceneFile::read(Path::new(path), &[])?;
     let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default())?;
-    let plan = Plan::new(&scene, Outputs { exr: false, png: false, npy: true, dng: false });
+    let plan = Plan::new(&scene, Outputs { npy: true, ..Outputs::NONE });
     let accel = etendue_render::build(&scene, &plan, &BuildOptions::default())?;
     Ok((scene, accel))
 }

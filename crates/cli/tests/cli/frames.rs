@@ -189,6 +189,134 @@ fn complete_frames_are_left_and_the_rest_is_rendered() {
 }
 
 #[test]
+fn files_lie_where_a_pattern_says_and_a_kill_leaves_nothing_half() {
+    let grid = json!({"type": "grid", "columns": 3, "spacing": "65 mm"});
+    let bench = Bench::with_scene(&scene(&grid));
+    let by_layer = ["--pattern", "{layer}/{frame}", "--outputs", "png,npy,tum"];
+    bench.render(&[&by_layer[..], &["--frames", "0..2"]].concat());
+    let index = bench.json("out/index.json");
+    let files = &index["frames"][1]["files"];
+    assert_eq!(files["Depth"]["npy"], "depth/000001.npy");
+    assert_eq!(files["Depth"]["tum.png"], "depth/000001.tum.png");
+    assert_eq!(files["picture"]["png"], "picture/000001.png");
+    for (_, layer) in files.as_object().unwrap() {
+        for (_, path) in layer.as_object().unwrap() {
+            assert!(bench.path("out").join(path.as_str().unwrap()).is_file(), "{path}");
+        }
+    }
+    let left: Vec<_> = std::fs::read_dir(bench.path("out/frames")).unwrap().collect();
+    assert_eq!(left.len(), 2, "a record a frame, and no folder of files under way: {left:?}");
+    // What a kill leaves: a frame under way, and one whose record is not there yet.
+    std::fs::create_dir(bench.path("out/frames/000002.unfinished")).unwrap();
+    bench.write("out/frames/000002.unfinished/depth.npy", b"half");
+    std::fs::remove_file(bench.path("out/frames/000001.json")).unwrap();
+    let time = |n: u32| {
+        let path = bench.path(&format!("out/depth/00000{n}.npy"));
+        path.metadata().unwrap().modified().unwrap()
+    };
+    let before = [time(0), time(1)];
+    bench.render(&[&by_layer[..], &["--resume"]].concat());
+    assert_eq!(time(0), before[0]);
+    assert_ne!(time(1), before[1]);
+    assert_eq!(bench.array("depth/000002").len(), 32 * 24);
+    assert!(!bench.path("out/frames/000002.unfinished").exists());
+    // The same files as in folders of their own.
+    let folders = Bench::with_scene(&scene(&grid));
+    folders.render(&[]);
+    assert_eq!(folders.array("frames/000002/position"), bench.array("position/000002"));
+    let output = bench.run(&["render", "scene.json", "-o", "out", "--pattern", "{frame}"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("{layer}"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn a_killed_sequence_goes_on_where_it_was() {
+    let orbit = json!({"type": "orbit", "count": 400, "center": [0, 0, 0]});
+    let bench = Bench::with_scene(&scene(&orbit));
+    let arguments =
+        ["render", "scene.json", "-o", "out", "-q", "--set", "camera.sensor.resolution=[200,150]"];
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_etendue"))
+        .args(arguments)
+        .current_dir(bench.path(""))
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    while !bench.path("out/frames/000003/etendue-manifest.json").exists() {
+        assert!(child.try_wait().unwrap().is_none(), "400 frames were done in a moment");
+        std::thread::yield_now();
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let time = |n: u32| {
+        let path = bench.path(&format!("out/frames/00000{n}/layers.exr"));
+        path.metadata().unwrap().modified().unwrap()
+    };
+    let before = [time(0), time(1), time(2)];
+    let resumed = [&arguments[..], &["--resume", "--frames", "0..12"]].concat();
+    assert!(bench.run(&resumed).status.success());
+    assert_eq!([time(0), time(1), time(2)], before);
+    // As if nobody had killed it.
+    let whole = Bench::with_scene(&scene(&orbit));
+    let all = [&arguments[..], &["--frames", "0..12"]].concat();
+    assert!(whole.run(&all).status.success());
+    for frame in 0..12 {
+        let layer = format!("frames/{frame:06}/position");
+        assert!(whole.array(&layer) == bench.array(&layer), "{frame}");
+        let files = |bench: &Bench| {
+            let folder = bench.path(&format!("out/frames/{frame:06}"));
+            let mut names: Vec<_> =
+                std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name()).collect();
+            names.sort();
+            names
+        };
+        assert_eq!(files(&whole), files(&bench));
+    }
+}
+
+#[test]
+fn models_bring_their_animations_and_cameras() {
+    let Some(assets) = crate::run::assets("models_bring_their_animations_and_cameras") else {
+        return;
+    };
+    let moles = std::fs::read(assets.join("data/gltf/WhackAMole/WhackAMole.glb")).unwrap();
+    let bench = Bench::new();
+    bench.write("moles.glb", &moles);
+    let scene = |frames: &Value| {
+        json!({"etendue": 1, "layers": ["depth", "flow", "ids"], "render": {"samples": 1},
+               "camera": {"type": "pinhole", "sensor": {"resolution": [320, 240]}},
+               "objects": [{"file": "moles.glb"}], "frames": frames})
+    };
+    // The first mole comes up within 0.83 s; at first it is all in its hill.
+    let times = json!({"type": "animation", "name": "MoleAppear", "times": [0.0, "400 ms", 0.8]});
+    bench.write("scene.json", scene(&times).to_string().as_bytes());
+    bench.render(&["--camera", "Main Camera"]);
+    let index = bench.json("out/index.json");
+    assert_eq!(index["frames"][1]["time_s"], 0.4);
+    let flow = bench.array("frames/000001/flow");
+    let moves = |f: &&[f64]| f[0].is_finite() && f[0].hypot(f[1]) > 1e-9;
+    let moving = flow.chunks(2).filter(moves).count();
+    let still = flow.chunks(2).filter(|f| f[0] == 0.0 && f[1] == 0.0).count();
+    assert!(moving > 10 && still > 5000, "{moving} move, {still} do not");
+    assert!(bench.array("frames/000001/depth") != bench.array("frames/000002/depth"));
+    // A frame for each camera.
+    bench.write("scene.json", scene(&json!({"type": "cameras"})).to_string().as_bytes());
+    bench.render(&["--layers", "depth"]);
+    let cameras = bench.json("out/index.json");
+    assert_eq!(cameras["frames"].as_array().map(Vec::len), Some(1));
+    assert_eq!(cameras["frames"][0]["resolution"], json!([320, 240]));
+    let error = |frames: &Value, words: &str| {
+        bench.write("scene.json", scene(frames).to_string().as_bytes());
+        let output = bench.run(&["render", "scene.json", "-o", "out", "-q"]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(text(&output.stderr).contains(words), "{}", text(&output.stderr));
+    };
+    error(&json!({"type": "animation", "times": [0], "name": "walk"}), "MoleIdle");
+    error(&json!({"type": "animation"}), "either `times` or `end`");
+    error(&json!({"type": "animation", "end": 1, "rate": 0}), "frames.rate");
+    error(&json!({"type": "animation", "end": 1, "objects": [1]}), "objects[1]");
+}
+
+#[test]
 fn bad_frames_are_refused_by_number() {
     let error = refused(&json!([{"camera.fov": 30}, {"camera.fow": 30}]), &[], &[]);
     assert!(error.contains("frames[1]") && error.contains("fow"), "{error}");
@@ -213,6 +341,26 @@ fn bad_frames_are_refused_by_number() {
     assert!(error.contains("frames.count"), "{error}");
     let error = refused(&json!({"type": "orbit", "count": 3, "axis": [0, 0, 0]}), &[], &[]);
     assert!(error.contains("frames.axis"), "{error}");
+    // Poses that are no rotation: which, and by how much.
+    let bent = json!([[1, 0, 0, 0], [0, 1.01, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]);
+    let good = json!({"from": [0, 0, 4], "look_at": [0, 0, 0]});
+    let poses_of = json!({"type": "poses", "poses": [good, {"matrix": bent,
+        "maps": "world_from_camera", "convention": "opengl"}]});
+    let error = refused(&poses_of, &[], &[]);
+    assert!(error.contains("pose 1") && error.contains("rotation"), "{error}");
+    assert!(error.contains("2.01e-2"), "by how much: {error}");
+    let mut npy = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 4, 5), }";
+    npy.extend(format!("{header:<117}\n").bytes());
+    npy.extend([0; 160]);
+    let error = refused(&poses("a.npy"), &[("a.npy", &npy)], &[]);
+    assert!(error.contains("[1, 4, 5]") && error.contains("n × 4 × 4"), "{error}");
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 3, 4), }";
+    let mut npy = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    npy.extend(format!("{header:<117}\n").bytes());
+    npy.extend((0..12).flat_map(|_| f64::NAN.to_le_bytes()));
+    let error = refused(&poses("a.npy"), &[("a.npy", &npy)], &[]);
+    assert!(error.contains("a.npy") && error.contains("finite"), "{error}");
     let error = refused(&json!({"type": "poses", "poses": [], "times": [1]}), &[], &[]);
     assert!(error.contains("1 times for 0 poses"), "{error}");
 }

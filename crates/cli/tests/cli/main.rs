@@ -8,6 +8,7 @@ mod emva; // the characterisation of what the command writes
 mod exposures; // what a scene's sensor makes of a render
 mod figures; // models with skins, in the pose of their file
 mod files; // what is no file, what costs without end, what real programs write
+mod flow; // layers that compare two frames
 mod frames; // many pictures of one scene, and trajectories of others
 mod gltf_looks; // materials, lights and textures of models, with closed-form answers
 mod hidden; // meshes of one point, nodes scaled to 0
@@ -19,6 +20,7 @@ mod lens_pictures; // pictures through lenses, with closed-form answers
 mod memory; // refused before it is taken
 mod messages; // what is wrong, in plain words
 mod openings_and_glasses; // f-numbers that a lens lacks, glasses of earlier catalogues and of one's own
+mod orbit; // a data set of a real model
 mod overwriting; // inputs, results of an earlier run, and files of others
 mod panes; // light that passes panes
 mod photons; // electrons and noise of sensors, against sums by the nanometre

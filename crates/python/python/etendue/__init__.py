@@ -55,14 +55,14 @@ def _stem(layer: str) -> str:
 
 
 def load(
-    path: _Path,
+    path: Union[_Path, bytes],
     settings: Optional[Mapping[str, Any]] = None,
     *,
     strict: bool = False,
     allow_outside: bool = False,
     memory_limit: Optional[int] = None,
 ) -> "Scene":
-    """Opens a scene (.json), or a model to frame by itself (.gltf, .glb, .obj, .ply).
+    """Opens a scene (.json), or a model to frame by itself (.gltf, .glb, .obj, .ply); bytes are those of a GLB.
 
     settings: values by path of the scene, such as {"camera.fov": 30}.
     strict: refuse defects of the data instead of noting them.
@@ -70,8 +70,18 @@ def load(
     memory_limit: the most memory that may be taken, in bytes.
     """
     pairs = [(key, json.dumps(value)) for key, value in (settings or {}).items()]
+    folder = None
+    if isinstance(path, (bytes, bytearray, memoryview)):
+        # Kept as long as the scene, which uses the file where it lies.
+        folder = tempfile.TemporaryDirectory()
+        model = os.path.join(folder.name, "model.glb")
+        with open(model, "wb") as file:
+            file.write(path)
+        path = model
     core = _core.Session.open(os.fspath(path), pairs, strict, allow_outside, memory_limit)
-    return Scene._of(core)
+    scene = Scene._of(core)
+    scene._folder = folder
+    return scene
 
 
 class Scene:
@@ -82,6 +92,7 @@ class Scene:
     """
 
     _core: Any
+    _folder: Any = None
 
     def __init__(
         self,
@@ -97,9 +108,12 @@ class Scene:
         """A scene of arrays and of the keys of a scene file (camera, objects, lights, tracer, layers, …).
 
         vertices: (n, 3) float, metres. faces: (m, 3) int, counter-clockwise from the front. They become the
-        mesh "mesh", and an object of it when `objects` says nothing.
+        mesh "mesh", and an object of it when `objects` says nothing. A mesh of trimesh, or anything else with
+        `vertices` and `faces`, may stand for both.
         folder: where files that the scene names lie.
         """
+        if faces is None and hasattr(vertices, "vertices") and hasattr(vertices, "faces"):
+            vertices, faces = vertices.vertices, vertices.faces
         if (vertices is None) != (faces is None):
             raise ValueError("vertices and faces come together")
         if vertices is not None:
@@ -118,15 +132,26 @@ class Scene:
 
     def insert_mesh(self, name: str, vertices: Any, faces: Any) -> None:
         """Adds a mesh, or replaces it: objects whose `file` is `name` are made of it."""
-        self._core.insert_mesh(
-            name, _rows("vertices", vertices, np.float64), _rows("faces", faces, np.uint32)
+        self._do(
+            "insert_mesh", name, _rows("vertices", vertices, np.float64), _rows("faces", faces, np.uint32)
+        )
+
+    def _do(self, what: str, *arguments: Any) -> Any:
+        """Calls the core, which is one thread's at a time."""
+        try:
+            return getattr(self._core, what)(*arguments)
+        except RuntimeError as error:
+            if "borrowed" not in str(error):
+                raise
+        raise RuntimeError(
+            "the scene is at work in another thread; wait for it, or give each thread a scene of its own"
         )
 
     def __setitem__(self, path: str, value: Any) -> None:
         """Sets a value of the scene, at any path: scene["camera.f_number"] = 2.8."""
         if isinstance(value, np.generic) or isinstance(value, np.ndarray):
             value = value.tolist()
-        self._core.set(path, json.dumps(value))
+        self._do("set", path, json.dumps(value))
 
     def __getitem__(self, path: str) -> Any:
         """The value at a path of the scene; KeyError where it says nothing."""
@@ -141,11 +166,11 @@ class Scene:
     @property
     def values(self) -> Dict[str, Any]:
         """All values of the scene as they are now."""
-        return json.loads(self._core.values())
+        return json.loads(self._do("values"))
 
     def plan(self) -> str:
         """What a render will do, and why."""
-        return self._core.plan()
+        return self._do("plan")
 
     def render(self, samples: Optional[int] = None, progress: Any = False) -> "Shot":
         """Renders the scene as it is now, on all processors and without Python's lock.
@@ -156,7 +181,7 @@ class Scene:
         if samples is not None:
             self["render.samples"] = int(samples)
         told = _print_progress if progress is True else (progress or None)
-        shot = Shot(self._core.render(told))
+        shot = Shot(self._do("render", told))
         if progress is True:
             print(flush=True)
         return shot
@@ -165,12 +190,12 @@ class Scene:
         """Renders the frames that the scene's `frames` name, one after the other."""
         if samples is not None:
             self["render.samples"] = int(samples)
-        count = self._core.load_frames()
+        count = self._do("load_frames")
         if count == 0:
             yield self.render()
         for number in range(count):
-            self._core.show(number)
-            yield Shot(self._core.render(None))
+            self._do("show", number)
+            yield Shot(self._do("render", None))
 
 
 def _print_progress(stage: str, share: float) -> None:

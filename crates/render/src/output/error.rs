@@ -167,7 +167,8 @@ fn also_called(path: &Path, input: &Path) -> String {
 
 impl OutputError {
     /// The system's refusal of `path`, with what to do about it.
-    pub(super) fn io(path: &Path, source: io::Error) -> Self {
+    #[must_use]
+    pub fn io(path: &Path, source: io::Error) -> Self {
         let remedy = match source.kind() {
             io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
                 "make the folder writable or choose another one"

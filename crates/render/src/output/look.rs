@@ -58,6 +58,8 @@ pub(super) enum Channels {
     Grey,
     Rgb,
     Rgba,
+    /// Indices of [`palette`].
+    Indexed,
 }
 
 /// Shows `layer`, whose channels fit its look.
@@ -289,6 +291,28 @@ pub(super) fn mask(layer: &Layer) -> Option<Shown> {
     let bytes = fill(&[plane], |i| [number(i)]);
     let note = "data: the numbers themselves, not scaled; 0 is nothing".into();
     Some(Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes, note })
+}
+
+/// Numbers of a layer of ids as indices of [`palette`]; `None` when one has more than 8 bits.
+pub(super) fn indices(layer: &Layer) -> Option<Shown> {
+    let shown = mask(layer)?;
+    let is_small = |pair: &[u8; 2]| pair[0] == 0;
+    let (pairs, _) = shown.bytes.as_chunks::<2>();
+    pairs.iter().all(is_small).then(|| Shown {
+        channels: Channels::Indexed,
+        bits: Bits::Eight,
+        bytes: pairs.iter().map(|pair| pair[1]).collect(),
+        note: "data: the index of a pixel is the number itself; 0 is nothing".into(),
+    })
+}
+
+/// The colours of the numbers from 0 to 255, as previews have them; nothing is black.
+pub(super) fn palette() -> Vec<u8> {
+    let color = |id: u8| match id {
+        0 => [0; 3],
+        id => id_color(id.into()).map(|c| quantize(c, 255.0).to_be_bytes()[1]),
+    };
+    (0..=255).flat_map(color).collect()
 }
 
 fn counts(planes: &[&Values], bits: u8) -> Shown {

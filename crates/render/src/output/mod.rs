@@ -5,6 +5,7 @@
 //! | EXR | the data | all layers in one part, `Layer.Channel`, 32-bit, lossless |
 //! | NPY | the data, for numpy | one layer, `[h, w]` or `[h, w, c]`, little-endian, f64 too |
 //! | PNG | looking, and a sensor's digital numbers | one layer, 8 or 16 bits |
+//! | PNG, FLO | what TUM's and KITTI's tools read | depth, disparity, flow, masks: [`conventions`] |
 //! | PFM | disparities, for light-field benchmarks | one plane, f32 |
 //! | JSON | what the others mean | definition, unit, frame, miss … of each layer |
 //!
@@ -31,6 +32,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod conventions;
 pub mod exr;
 pub mod npy;
 pub mod pfm;

@@ -11,11 +11,31 @@ pub struct Outputs {
     pub npy: bool,
     /// Raw files of a sensor.
     pub dng: bool,
+    /// Depth as 16-bit PNG of the TUM RGB-D benchmark.
+    pub tum: bool,
+    /// Depth, disparity and flow as 16-bit PNG of KITTI.
+    pub kitti: bool,
+    /// Flow as `.flo` files.
+    pub flo: bool,
+    /// Numbers of things as PNG with a palette.
+    pub indexed: bool,
 }
 
 impl Outputs {
-    /// All of them.
-    pub const ALL: Self = Self { exr: true, png: true, npy: true, dng: true };
+    /// Nothing.
+    pub const NONE: Self = Self {
+        exr: false,
+        png: false,
+        npy: false,
+        dng: false,
+        tum: false,
+        kitti: false,
+        flo: false,
+        indexed: false,
+    };
+
+    /// All but what only single benchmarks read.
+    pub const ALL: Self = Self { exr: true, png: true, npy: true, dng: true, ..Self::NONE };
 
     /// From a comma-separated list such as `exr,png`.
     ///
@@ -23,17 +43,24 @@ impl Outputs {
     ///
     /// When a name is unknown or the list is empty; the message names the known ones.
     pub fn from_list(list: &str) -> Result<Self, String> {
-        let mut outputs = Self { exr: false, png: false, npy: false, dng: false };
+        let mut outputs = Self::NONE;
         for name in list.split(',').map(str::trim) {
-            match name {
-                "exr" => outputs.exr = true,
-                "png" => outputs.png = true,
-                "npy" => outputs.npy = true,
-                "dng" => outputs.dng = true,
+            let wanted = match name {
+                "exr" => &mut outputs.exr,
+                "png" => &mut outputs.png,
+                "npy" => &mut outputs.npy,
+                "dng" => &mut outputs.dng,
+                "tum" => &mut outputs.tum,
+                "kitti" => &mut outputs.kitti,
+                "flo" => &mut outputs.flo,
+                "indexed" => &mut outputs.indexed,
                 other => {
-                    return Err(format!("unknown kind \"{other}\"; known: exr, png, npy, dng"));
+                    return Err(format!(
+                        "unknown kind \"{other}\"; known: exr, png, npy, dng, tum, kitti, flo, indexed"
+                    ));
                 }
-            }
+            };
+            *wanted = true;
         }
         Ok(outputs)
     }

@@ -13,7 +13,7 @@ use ::png::text_metadata::ITXtChunk;
 use ::png::{BitDepth, ColorType, EncodingError, Info, SrgbRenderingIntent};
 
 pub use super::look::Bits;
-use super::look::{Channels, Shown, mask, show};
+use super::look::{Channels, Shown, mask, palette, show};
 use super::{Layer, Look, OutputError, PartFile, Picture, SOFTWARE};
 
 /// Writes the layer called `name` (empty for the picture itself) to `path`. `bits` is the depth of
@@ -52,7 +52,7 @@ pub fn write_mask(path: &Path, picture: &Picture, name: &str) -> Result<bool, Ou
     }
 }
 
-fn write_shown(
+pub(super) fn write_shown(
     path: &Path,
     picture: &Picture,
     layer: &Layer,
@@ -68,7 +68,9 @@ fn write_shown(
         Channels::Grey => ColorType::Grayscale,
         Channels::Rgb => ColorType::Rgb,
         Channels::Rgba => ColorType::Rgba,
+        Channels::Indexed => ColorType::Indexed,
     };
+    info.palette = (shown.channels == Channels::Indexed).then(|| palette().into());
     info.bit_depth = match shown.bits {
         Bits::Eight => BitDepth::Eight,
         Bits::Sixteen => BitDepth::Sixteen,
@@ -109,7 +111,9 @@ fn texts(picture: &Picture, layer: &Layer, shown: &Shown) -> Vec<ITXtChunk> {
     let entries = layer.meaning.iter().chain(picture.header());
     let entries = entries.map(|(key, text)| (Cow::from(format!("etendue:{key}")), text.as_str()));
     let fixed = fixed.into_iter().map(|(key, text)| (Cow::from(key), text));
-    fixed.chain(entries).map(|(key, text)| ITXtChunk::new(key, text)).collect()
+    let names = picture.names(&layer.name).filter(|_| shown.channels == Channels::Indexed);
+    let names = names.map(|names| ITXtChunk::new("Names", names.to_string()));
+    fixed.chain(entries).map(|(key, text)| ITXtChunk::new(key, text)).chain(names).collect()
 }
 
 #[cfg(test)]

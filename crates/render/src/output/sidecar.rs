@@ -9,13 +9,17 @@ use serde_json::Value;
 
 use super::{OutputError, Picture, SOFTWARE, write_whole};
 
-/// Names and texts as a JSON object, in their own order.
+/// Names and texts as a JSON object, in their own order; a text that is an object in JSON is that object.
 #[derive(Debug)]
 pub(super) struct Entries<'a>(pub(super) &'a [(String, String)]);
 
 impl Serialize for Entries<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(key, text)| (key, text)))
+        let value = |text: &String| match serde_json::from_str(text) {
+            Ok(object @ Value::Object(_)) => object,
+            _ => Value::from(text.as_str()),
+        };
+        serializer.collect_map(self.0.iter().map(|(key, text)| (key, value(text))))
     }
 }
 
@@ -95,7 +99,9 @@ mod tests {
             channels: vec![Channel { name: "Z".into(), values: Values::F32(vec![1.0, 2.0]) }],
             meaning: vec![("unit".into(), "m".into()), ("miss".into(), "+inf".into())],
         };
-        let header = vec![("seed".to_owned(), "3 \"quoted\"".to_owned())];
+        let header = [("seed", "3 \"quoted\""), ("camera", r#"{"K": [1.5]}"#)]
+            .map(|(key, text)| (key.to_owned(), text.to_owned()))
+            .to_vec();
         let picture = Picture::new(2, 1, vec![depth], header).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("layers.json");
@@ -104,6 +110,7 @@ mod tests {
         let json: serde_json::Value = serde_json::from_str(&read).unwrap();
         assert_eq!(json["width"], 2);
         assert_eq!(json["header"]["seed"], "3 \"quoted\"");
+        assert_eq!(json["header"]["camera"]["K"][0], 1.5);
         assert_eq!(json["layers"][0]["channels"][0], "Depth.Z");
         assert_eq!(json["layers"][0]["type"], "f4");
         let (unit, miss) = (read.find("\"unit\"").unwrap(), read.find("\"miss\"").unwrap());

@@ -18,7 +18,7 @@ pub enum FramesSpec {
     Path(CameraPath),
 }
 
-/// A path of the camera, which starts from the scene's own pose where it needs one.
+/// A path of the camera, which starts from the scene's own pose where it needs one; or of animated models.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum CameraPath {
@@ -65,6 +65,29 @@ pub enum CameraPath {
         #[serde(default)]
         times: Option<Vec<Seconds>>,
     },
+    /// Moments of the animations of glTF files: of nodes with all that hangs on them, cameras among it.
+    Animation {
+        /// The moments, one a frame.
+        #[serde(default)]
+        times: Option<Vec<Seconds>>,
+        /// Without `times`: the first moment.
+        #[serde(default)]
+        start: Option<Seconds>,
+        /// The last moment, as far as the rate meets it.
+        #[serde(default)]
+        end: Option<Seconds>,
+        /// Frames a second; 24 when absent.
+        #[serde(default)]
+        rate: Option<f64>,
+        /// Which of a file's animations, by name or by number from 0; the first when absent.
+        #[serde(default)]
+        name: Option<String>,
+        /// The objects that move, by number from 0; all of glTF files when absent.
+        #[serde(default)]
+        objects: Option<Vec<usize>>,
+    },
+    /// The cameras that models bring along, one a frame, in the order of their nodes.
+    Cameras {},
     /// Poses of a file: `.npy` of n × 4 × 4 matrices; TUM's `timestamp tx ty tz qx qy qz qw`; COLMAP's
     /// `images.txt`, with the intrinsics of the `cameras.txt` beside it; nerfstudio's `transforms.json`.
     Trajectory {

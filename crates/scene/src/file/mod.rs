@@ -23,7 +23,7 @@ use serde_json::{Value, json};
 pub use document::Place;
 pub use frames::{CameraPath, FramesSpec, TrajectoryFormat};
 pub use lens::{ReadLens, lens_schema, rays_schema, read_lens, trace_rays};
-pub use object::{InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
+pub use object::{AnimationSpec, InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
 pub use overrides::OverrideError;
 pub use schema::scene_schema;
 pub use sensor::SensorFile;

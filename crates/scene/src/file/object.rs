@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use etendue_geometry::Transform;
+use etendue_geometry::units::Seconds;
 use glam::{DMat3, DQuat, DVec3};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
@@ -26,10 +27,23 @@ pub struct ObjectSpec {
     pub materials: BTreeMap<String, String>,
     /// Which axis of the model's file points up; the scene's word when absent.
     pub up: Option<Up>,
+    /// The moment of a glTF file's animation that is shown; at rest when absent.
+    pub animation: Option<AnimationSpec>,
     /// Where it stands.
     pub transform: TransformSpec,
     /// Where copies of it stand before `transform` moves them all; one, unmoved, when absent.
     pub instances: Option<InstancesSpec>,
+}
+
+/// A moment of a glTF file's animation: nodes, skins, morph targets, cameras and lights are as they are then.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AnimationSpec {
+    /// When; before its first key and after its last an animation stands still.
+    pub time: Seconds,
+    /// Which of the file's animations, by name or by number from 0; the first when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
 }
 
 /// Which axis of a file's coordinates points up.
@@ -92,6 +106,9 @@ struct Common {
     /// PLY files when absent, and +Y for all else.
     #[serde(default)]
     up: Option<Up>,
+    /// The moment of a glTF file's animation that is shown; at rest when absent.
+    #[serde(default)]
+    animation: Option<AnimationSpec>,
     /// Where it stands.
     #[serde(default)]
     transform: TransformSpec,
@@ -126,12 +143,12 @@ impl<'de> Deserialize<'de> for ObjectSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let mut own = Map::<String, Value>::deserialize(deserializer)?;
         let mut common = Map::new();
-        for key in ["name", "material", "materials", "up", "transform", "instances"] {
+        for key in ["name", "material", "materials", "up", "animation", "transform", "instances"] {
             if let Some(value) = own.remove(key) {
                 common.insert(key.to_owned(), value);
             }
         }
-        let Common { name, material, materials, up, transform, instances } =
+        let Common { name, material, materials, up, animation, transform, instances } =
             serde_json::from_value(Value::Object(common)).map_err(D::Error::custom)?;
         let source = match own.remove("file") {
             Some(Value::String(path)) if own.is_empty() => Source::File(path),
@@ -144,7 +161,7 @@ impl<'de> Deserialize<'de> for ObjectSpec {
                 Source::Shape(shape.map_err(D::Error::custom)?)
             }
         };
-        Ok(Self { source, name, material, materials, up, transform, instances })
+        Ok(Self { source, name, material, materials, up, animation, transform, instances })
     }
 }
 

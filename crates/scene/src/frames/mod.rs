@@ -1,5 +1,6 @@
 //! The frames of a scene: what is set for each of its pictures.
 
+mod animation;
 mod colmap;
 mod intrinsics;
 mod nerfstudio;
@@ -9,7 +10,7 @@ mod tum;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use etendue_camera::{Convention, Maps, Pose, PoseSpec};
+use etendue_camera::{CameraSpec, Convention, Maps, Pose, PoseSpec};
 use etendue_geometry::files;
 use etendue_geometry::glam::DVec3;
 use serde_json::Value;
@@ -36,12 +37,14 @@ pub struct Frame {
 }
 
 /// What paths of the camera start from.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     /// The scene's own camera.
     pub pose: Pose,
     /// The middle of the scene's box (m).
     pub center: DVec3,
+    /// The cameras of the models.
+    pub cameras: Vec<CameraSpec>,
 }
 
 /// A pose of a trajectory, with what else its file says.
@@ -123,6 +126,10 @@ impl SceneFile {
     ) -> Result<Vec<Frame>, SceneError> {
         let fault = |(key, why): (&str, String)| self.fault(&join("frames", key), why);
         let stations = match path {
+            CameraPath::Animation { .. } => return animation::frames(self, path).map_err(fault),
+            CameraPath::Cameras {} => {
+                return animation::cameras(self, &start()?.cameras).map_err(fault);
+            }
             CameraPath::Poses { poses, times } => {
                 if let Some(times) = times
                     && times.len() != poses.len()
@@ -146,7 +153,7 @@ impl SceneFile {
                     .map_err(|why| fault(("file", format!("\"{file}\" {why}"))))?
             }
             CameraPath::Orbit { .. } | CameraPath::Dolly { .. } | CameraPath::Grid { .. } => {
-                path::made(path, start()?).map_err(fault)?
+                path::made(path, &start()?).map_err(fault)?
             }
         };
         let mut frames = Vec::with_capacity(stations.len());
@@ -154,10 +161,10 @@ impl SceneFile {
             // Told here, by its number, and not when it is that frame's turn.
             station.pose.build().map_err(|error| {
                 let why = format!("pose {number}: {}: {}", error.at, error.why);
-                fault((
-                    if matches!(path, CameraPath::Trajectory { .. }) { "file" } else { "poses" },
-                    why,
-                ))
+                fault(match path {
+                    CameraPath::Trajectory { file, .. } => ("file", format!("\"{file}\": {why}")),
+                    _ => ("poses", why),
+                })
             })?;
             let mut settings = station.settings;
             // A pose is made of numbers and words only, which always serialise.

@@ -11,7 +11,7 @@ use crate::file::CameraPath;
 /// The stations of a path; the error has the key that is wrong.
 pub(super) fn made(
     path: &CameraPath,
-    start: Start,
+    start: &Start,
 ) -> Result<Vec<Station>, (&'static str, String)> {
     let poses = match path {
         CameraPath::Orbit { count, center, axis, angle } => {
@@ -60,7 +60,10 @@ pub(super) fn made(
             })
             .collect()
         }
-        CameraPath::Poses { .. } | CameraPath::Trajectory { .. } => Vec::new(),
+        CameraPath::Poses { .. }
+        | CameraPath::Trajectory { .. }
+        | CameraPath::Animation { .. }
+        | CameraPath::Cameras {} => Vec::new(),
     };
     Ok(poses.into_iter().map(|pose| Station::new(spec_of(&pose))).collect())
 }

@@ -97,6 +97,17 @@ pub struct Options {
     pub budget: Arc<Budget>,
     /// Read files into memory instead of mapping them, so that they may change meanwhile.
     pub copy: bool,
+    /// The animation to show a moment of; glTF only. At rest when absent.
+    pub animation: Option<Play>,
+}
+
+/// A moment of an animation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Play {
+    /// The animation's name, or its number from 0; the first when absent.
+    pub which: Option<String>,
+    /// When (s): before the first key and after the last, things stand as there.
+    pub time: f64,
 }
 
 /// What a model file holds.

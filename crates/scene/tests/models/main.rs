@@ -1,5 +1,6 @@
 //! Small models made by hand: what the assets do not have, and what is broken.
 
+mod animations;
 mod broken;
 mod build;
 mod damaged;

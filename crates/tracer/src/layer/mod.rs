@@ -4,6 +4,7 @@
 mod fill;
 mod look;
 mod meaning;
+pub mod pair;
 pub mod table;
 
 use std::borrow::Cow;
@@ -13,6 +14,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
 pub use self::look::Look;
+pub use self::pair::{FrameStep, OtherFrame, Sight};
 pub use self::table::LayerSpec;
 use crate::{LightingContext, Needs, SceneView, Traced};
 
@@ -121,6 +123,11 @@ pub struct Seen<'a> {
     pub traced: Traced<'a>,
     /// The scene's light, where it is traced.
     pub light: Option<LightingContext<'a>>,
+    /// Columns and rows of the rays on the sensor (pixels from the corner of the top left one); empty where
+    /// layers are averaged over samples.
+    pub places: [&'a [f64]; 2],
+    /// Other frames of the scene, for layers that compare frames.
+    pub others: &'a [&'a dyn OtherFrame],
 }
 
 /// One number of each ray, as many times as a layer has channels.
@@ -132,6 +139,15 @@ impl LayerSpec {
     #[must_use]
     pub fn is_averaged(self) -> bool {
         self.row().taken != Taken::ChiefRay
+    }
+
+    /// The other frame that it compares this one with.
+    #[must_use]
+    pub fn step(self) -> Option<FrameStep> {
+        match self {
+            Self::Flow { to } | Self::Disparity { to } | Self::Occlusion { to } => Some(to),
+            _ => None,
+        }
     }
 
     /// What this layer needs.
@@ -205,6 +221,12 @@ mod tests {
         let plain = LayerSpec::NAMES.iter().filter_map(|name| LayerSpec::from_name(name));
         let mut layers: Vec<LayerSpec> = plain.chain(normals).chain(positions).collect();
         layers.extend([LayerSpec::Backdrop, LayerSpec::Radiance]);
+        for step in [-12, -1, 2] {
+            let to = FrameStep::try_from(step).unwrap();
+            let pair =
+                [LayerSpec::Flow { to }, LayerSpec::Disparity { to }, LayerSpec::Occlusion { to }];
+            layers.extend(pair);
+        }
         layers.dedup();
         let rows = layers.into_iter().collect::<std::collections::HashSet<_>>();
         let count: usize = rows.iter().map(|layer| layer.row().names_in_files().len()).sum();

@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::meaning::{CHIEF_RAY, LINEAR, definition_of_normals, frame, name_in, name_of_normals};
-use super::{Columns, Kept, Layer, Look, NormalKind, Seen, Space, Taken};
+use super::{Columns, FrameStep, Kept, Layer, Look, NormalKind, Seen, Space, Taken};
 use crate::Needs;
 
 /// Makes [`LayerSpec`], what files may write of it, and its [`Layer`]s out of the table.
@@ -292,6 +292,66 @@ layers! {
         }, |seen, out| {
             seen.each(out, |i| [f64::from(seen.scene.material_id(seen.traced.hits, i))]);
         };
+
+        /// `Flow.X Y`: from where a pixel's point is seen to where another frame sees it (pixels).
+        Flow {
+            /// Which frame.
+            to: FrameStep
+        } = "flow": Layer {
+            name: to.name("Flow"),
+            needs: SURFACE,
+            meaning: vec![
+                (
+                    "definition",
+                    "where another frame sees the point that was hit, less where this one does; the \
+                     point stays on its object when that moves; given also where it is hidden there or \
+                     outside of the picture: see Occlusion",
+                ),
+                ("unit", "px, x right and y down"),
+                to.meaning(),
+                CHIEF_RAY,
+                ("miss", "+inf +inf, also for what is behind the other camera"),
+            ],
+            ..measured("", &["X", "Y"], Look::Extent)
+        }, |seen, out| seen.flows(to, out);
+
+        /// `Disparity.X`: how far left of its place here another frame sees a pixel's point (pixels).
+        Disparity {
+            /// Which frame.
+            to: FrameStep
+        } = "disparity": Layer {
+            name: to.name("Disparity"),
+            needs: SURFACE,
+            meaning: vec![
+                (
+                    "definition",
+                    "column in which the point that was hit is seen, less the column in which another \
+                     frame sees it; of a pair side by side: focal length times baseline over depth",
+                ),
+                ("unit", "px"),
+                to.meaning(),
+                CHIEF_RAY,
+                ("miss", "+inf, also for what is behind the other camera"),
+            ],
+            ..measured("", &["X"], Look::Extent)
+        }, |seen, out| seen.disparities(to, out);
+
+        /// `Occlusion.hidden.X` and `Occlusion.outside.X`: 1 where another frame does not see a pixel's
+        /// point, because something is before it, or because its picture ends.
+        Occlusion {
+            /// Which frame.
+            to: FrameStep
+        } = "occlusion": Layer {
+            name: to.name("Occlusion"),
+            needs: SURFACE,
+            kept: Kept::Shown,
+            meaning: vec![to.meaning(), CHIEF_RAY, ("miss", "0")],
+            apart: Some(&[
+                "1 where something is before the point in another frame, else 0",
+                "1 where the point is beyond the edge of another frame or behind its camera, else 0",
+            ]),
+            ..measured("", &["hidden", "outside"], Look::Share)
+        }, |seen, out| seen.occlusions(to, out);
 
         /// `Alpha.A`: share of the pixel's samples that hit something.
         Alpha = "alpha": Layer {

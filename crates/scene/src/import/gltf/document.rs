@@ -16,7 +16,8 @@ pub(super) struct Document {
     pub scenes: Vec<Scene>,
     pub cameras: Vec<Camera>,
     pub skins: Vec<Skin>,
-    pub has_animations: bool,
+    /// Each as it is written; only one that is played is looked at.
+    pub animations: Vec<Value>,
 }
 
 /// What crate `gltf` reads of the document.
@@ -108,7 +109,10 @@ pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<Document, 
     let mut rest: Map<String, Value> =
         serde_json::from_slice(json).map_err(|error| broken(path, json, in_glb, &error))?;
     require_version_2(path, &rest)?;
-    let has_animations = rest.contains_key("animations");
+    let animations = match rest.remove("animations") {
+        Some(Value::Array(animations)) => animations,
+        _ => Vec::new(),
+    };
     let mut taken = Map::new();
     for key in ["nodes", "scenes", "cameras", "skins"] {
         if let Some((key, value)) = rest.remove_entry(key) {
@@ -124,7 +128,7 @@ pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<Document, 
     let whole = Value::Object(rest);
     refuse_arrays(&whole, "").map_err(|place| not_an_object(path, place))?;
     let root = typed(path, whole)?;
-    Ok(Document { root, nodes, scenes, cameras, skins, has_animations })
+    Ok(Document { root, nodes, scenes, cameras, skins, animations })
 }
 
 fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), ImportError> {

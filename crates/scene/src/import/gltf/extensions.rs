@@ -53,10 +53,10 @@ fn support(name: &str) -> Option<Support> {
         "KHR_materials_pbrSpecularGlossiness" => Support::As(
             "read as KHR_materials_specular with ior 0, as that extension's text converts it",
         ),
-        "KHR_animation_pointer"
-        | "KHR_interactivity"
-        | "KHR_node_selectability"
-        | "KHR_node_hoverability" => Support::Without("a still picture has no use for it"),
+        "KHR_animation_pointer" => Support::As("animations move nodes by it, and nothing else"),
+        "KHR_interactivity" | "KHR_node_selectability" | "KHR_node_hoverability" => {
+            Support::Without("a still picture has no use for it")
+        }
         "KHR_xmp_json_ld" | "KHR_xmp" => Support::Without("it holds descriptions only"),
         _ if name.starts_with("KHR_materials_") || name.starts_with("EXT_materials_") => {
             Support::Look

@@ -9,6 +9,7 @@
 //! The Khronos Group, *glTF 2.0 Specification*, version 2.0.1 (2021); its registry of extensions.
 
 mod accessor;
+mod animation;
 mod buffers;
 mod deform;
 mod document;
@@ -84,10 +85,17 @@ pub(super) fn import(
 ) -> Result<Import, ImportError> {
     let map = files.map_model(path)?;
     let container = glb::open(path, &map)?;
-    let document = document::parse(path, container.json, container.in_glb)?;
+    let mut document = document::parse(path, container.json, container.in_glb)?;
     let mut import = Import::default();
     extensions::check(path, &document, wanted, &mut import.notes)?;
 
+    if let Some(play) = &options.animation {
+        let buffers = Buffers::open(path, files, &document, container.binary.clone())?;
+        let reader =
+            Reader { file: path, files, document: &document, buffers: &buffers, wanted, options };
+        let moved = animation::moved(&reader, play, &mut import)?;
+        animation::apply(path, moved, &mut document.nodes)?;
+    }
     let scene = hierarchy::walk(path, &document, &mut import.notes)?;
     let buffers = Buffers::open(path, files, &document, container.binary)?;
     let reader =
@@ -99,13 +107,14 @@ pub(super) fn import(
     if wanted.light {
         import.lights = scene.lights;
     }
-    if document.has_animations {
+    if options.animation.is_none() && !document.animations.is_empty() {
         note::push(
             &mut import.notes,
             note::Note::new(
                 note::NoteKind::Unsupported,
                 "animations",
-                "animations are not played: nodes stand as the file has them at rest",
+                "nodes stand as the file has them at rest; the object's `animation`, or `frames` of the type \
+                 `animation`, play one",
             ),
         );
     }

@@ -1,0 +1,191 @@
+//! Layers that compare two frames: flow, disparity, occlusion.
+
+use serde_json::{Value, json};
+
+use crate::run::{Bench, text};
+
+/// 40 × 30 pixels, focal length 50 pixels, looking along −z.
+const FOCAL: f64 = 50.0;
+
+fn scene(objects: &Value, frames: &Value, layers: &Value) -> Value {
+    json!({
+        "etendue": 1,
+        "layers": layers,
+        "camera": {"type": "pinhole",
+                   "intrinsics": {"fx": 50, "fy": 50, "cx": 20, "cy": 15, "pixel_origin": "corner"},
+                   "pose": {"from": [0, 0, 0], "look_at": [0, 0, -1]},
+                   "sensor": {"resolution": [40, 30]}},
+        "objects": objects,
+        "frames": frames
+    })
+}
+
+/// A wall at 4 m and a square of 1 m before it, at 2 m.
+fn wall_and_square() -> Value {
+    json!([{"shape": "rectangle", "width": 1, "height": 1, "transform": {"translate": [0, 0, -2]}},
+           {"shape": "rectangle", "width": 40, "height": 40, "transform": {"translate": [0, 0, -4]}}])
+}
+
+fn rendered(objects: &Value, frames: &Value, layers: &Value) -> Bench {
+    let bench = Bench::with_scene(&scene(objects, frames, layers).to_string());
+    bench.render(&[]);
+    bench
+}
+
+#[test]
+fn disparity_is_focal_length_times_baseline_over_depth() {
+    let grid = json!({"type": "grid", "columns": 2, "spacing": "0.2 m"});
+    let layers = json!(["depth", "disparity", "flow", {"type": "disparity", "to": -1}]);
+    let bench = rendered(&wall_and_square(), &grid, &layers);
+    let (depth, disparity) =
+        (bench.array("frames/000000/depth"), bench.array("frames/000000/disparity"));
+    let flow = bench.array("frames/000000/flow");
+    for (i, (z, d)) in depth.iter().zip(&disparity).enumerate() {
+        // A dozen roundings of pixel coordinates up to 40.
+        assert!((d - FOCAL * 0.2 / z).abs() < 1e-12, "{d} at {z} m");
+        assert_eq!(flow[2 * i], -d);
+        assert!(flow[2 * i + 1].abs() < 1e-12, "{}", flow[2 * i + 1]);
+    }
+    // The other way it is the other sign, and at the ends there is no such frame.
+    let back = bench.array("frames/000001/disparity_back");
+    let depth = bench.array("frames/000001/depth");
+    assert!(back.iter().zip(&depth).all(|(d, z)| (d + FOCAL * 0.2 / z).abs() < 1e-12));
+    assert!(!bench.path("out/frames/000001/disparity.npy").exists());
+    assert!(!bench.path("out/frames/000000/disparity_back.npy").exists());
+}
+
+#[test]
+fn flow_follows_an_object_that_moves_and_says_what_it_hides() {
+    let frames = json!([{}, {"objects[0].transform.translate": [0.1, -0.05, -1.9]}]);
+    let bench =
+        rendered(&wall_and_square(), &frames, &json!(["depth", "position", "flow", "occlusion"]));
+    let at = |name: &str| bench.array(&format!("frames/000000/{name}"));
+    let (depth, position, flow) = (at("depth"), at("position"), at("flow"));
+    let (hidden, outside) = (at("occlusion_hidden"), at("occlusion_outside"));
+    let mut behind = 0;
+    for (i, z) in depth.iter().enumerate() {
+        let [x, y] = [position[3 * i], position[3 * i + 1]];
+        let place = |x: f64, y: f64, z: f64| [FOCAL * x / z, -FOCAL * y / z];
+        let here = place(x, y, *z);
+        let there = if *z < 3.0 { place(x + 0.1, y - 0.05, 1.9) } else { here };
+        for k in 0..2 {
+            let expected = there[k] - here[k];
+            assert!(
+                (flow[2 * i + k] - expected).abs() < 1e-12,
+                "{i}: {} {expected}",
+                flow[2 * i + k]
+            );
+        }
+        // The square's new edges at 1.9 m hide of the wall at 4 m what is twice as far from the axis.
+        let (left, right) = (-0.4 / 1.9 * 4.0, 0.6 / 1.9 * 4.0);
+        let (low, high) = (-0.55 / 1.9 * 4.0, 0.45 / 1.9 * 4.0);
+        let is_behind = *z > 3.0 && (left..right).contains(&x) && (low..high).contains(&y);
+        assert_eq!(hidden[i], f64::from(u8::from(is_behind)), "{x} {y} {z}");
+        assert_eq!(outside[i], 0.0);
+        behind += usize::from(is_behind);
+    }
+    assert!(behind > 30, "{behind}");
+}
+
+#[test]
+fn what_leaves_the_picture_is_outside_and_what_is_behind_has_no_flow() {
+    let frames =
+        json!([{}, {"camera.pose.look_at": [-1, 0, -1]}, {"camera.pose.look_at": [0, 0, 1]}]);
+    let layers =
+        json!(["flow", {"type": "flow", "to": 2}, "occlusion", {"type": "occlusion", "to": 2}]);
+    let bench = rendered(&wall_and_square(), &frames, &layers);
+    let at = |name: &str| bench.array(&format!("frames/000000/{name}"));
+    let (flow, outside) = (at("flow"), at("occlusion_outside"));
+    for i in 0..40 * 30 {
+        let column = f64::from(u32::try_from(i % 40).unwrap()) + 0.5;
+        // A turn by 45°: a direction of tangent t is seen at tan(45° + atan t).
+        let tangent = ((column - 20.0) / FOCAL).atan() + std::f64::consts::FRAC_PI_4;
+        let there = 20.0 + FOCAL * tangent.tan();
+        assert!((flow[2 * i] - (there - column)).abs() < 1e-10, "{} {there}", flow[2 * i]);
+        assert_eq!(outside[i], f64::from(u8::from(!(0.0..=40.0).contains(&there))), "{there}");
+    }
+    assert!(at("flow2").iter().all(|flow| *flow == f64::INFINITY));
+    assert!(at("occlusion2_outside").iter().all(|outside| *outside == 1.0));
+    assert!(at("occlusion2_hidden").iter().all(|hidden| *hidden == 0.0));
+}
+
+#[test]
+fn flow_lands_on_the_same_point_of_a_curved_surface_and_through_a_lens() {
+    // Forth and back again is where one was, wherever nothing is hidden: seen here by positions.
+    let objects = json!([{"shape": "sphere", "transform": {"translate": [0, 0, -4]}}]);
+    let frames = json!([{}, {"camera.pose.from": [0.2, 0.1, 0]}]);
+    let mut scene = scene(&objects, &frames, &json!(["position", "flow"]));
+    scene["camera"] = json!({"type": "lens", "lens": {"elements": [
+            {"type": "surface", "radius": 60, "thickness": 6, "glass": {"n": 1.6}, "semi_diameter": 12},
+            {"type": "surface", "radius": -60, "thickness": 4, "semi_diameter": 12},
+            {"type": "aperture", "shape": "circular", "radius": 4, "thickness": 30, "stop": true}]},
+        "focus_distance": 4, "pose": {"from": [0, 0, 0], "look_at": [0, 0, -1]},
+        "sensor": {"resolution": [40, 30], "pixel_pitch": "0.4 mm"}});
+    let bench = Bench::with_scene(&scene.to_string());
+    bench.render(&[]);
+    let (first, second) =
+        (bench.array("frames/000000/position"), bench.array("frames/000001/position"));
+    let flow = bench.array("frames/000000/flow");
+    let mut seen = 0;
+    for i in (0..40 * 30).filter(|i| flow[2 * i].is_finite()) {
+        let [column, row] = [i % 40, i / 40].map(|k| f64::from(u32::try_from(k).unwrap()));
+        let (u, v) = (column + flow[2 * i], row + flow[2 * i + 1]);
+        if !(0.0..38.0).contains(&u) || !(0.0..28.0).contains(&v) {
+            continue;
+        }
+        // The point itself, between the four that the second frame sees around its place.
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "in the picture"
+        )]
+        let around = |right: usize, down: usize, k: usize| {
+            second[3 * ((v as usize + down) * 40 + u as usize + right) + k]
+        };
+        let (p, q) = (u.fract(), v.fract());
+        let between = |k: usize| {
+            (1.0 - q) * ((1.0 - p) * around(0, 0, k) + p * around(1, 0, k))
+                + q * ((1.0 - p) * around(0, 1, k) + p * around(1, 1, k))
+        };
+        let off = (0..2).map(|k| (between(k) - first[3 * i + k]).powi(2)).sum::<f64>().sqrt();
+        if !off.is_finite() || (0..2).any(|k| (around(1, 1, k) - around(0, 0, k)).abs() > 0.1) {
+            continue;
+        }
+        // Between four points of a sphere of 1 m that lie some 50 mm apart a straight line is wrong by
+        // (50 mm)² / 8 m at most, twice, and more where it falls away; a pixel is 50 mm.
+        assert!(off < 2e-3, "{off} m at {column} {row}");
+        seen += 1;
+    }
+    assert!(seen > 100, "{seen}");
+}
+
+#[test]
+fn comparisons_without_another_frame_are_refused() {
+    let mut alone = scene(&wall_and_square(), &json!([{}]), &json!(["flow"]));
+    let refused = |scene: &Value, what: &str| {
+        let bench = Bench::with_scene(&scene.to_string());
+        let output = bench.run(&["render", "scene.json", "-o", "out", "-q"]);
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(what), "{error}");
+    };
+    alone["layers"] = json!([{"type": "flow", "to": 0}]);
+    refused(&alone, "`to` is 0");
+    alone["layers"] = json!(["flow"]);
+    alone.as_object_mut().unwrap().remove("frames");
+    refused(&alone, "no `frames`");
+}
+
+#[test]
+fn a_changed_neighbour_is_no_complete_frame() {
+    let frames = json!([{}, {"camera.pose.from": [0.2, 0, 0]}]);
+    let bench = rendered(&wall_and_square(), &frames, &json!(["flow"]));
+    let time =
+        || bench.path("out/frames/000000/layers.exr").metadata().unwrap().modified().unwrap();
+    let (before, flow) = (time(), bench.array("frames/000000/flow"));
+    bench.render(&["--resume"]);
+    assert_eq!(time(), before);
+    bench.render(&["--resume", "--set", "frames[1]={\"camera.pose.from\": [0.3, 0, 0]}"]);
+    assert_ne!(time(), before);
+    assert!(bench.array("frames/000000/flow") != flow);
+}

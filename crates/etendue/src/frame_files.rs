@@ -1,0 +1,238 @@
+//! Where the files of frames go, and which frames are complete.
+
+use std::path::{Component, Path, PathBuf};
+use std::{fs, io};
+
+use etendue_render::output::{MANIFEST, OutputError, Outputs, sidecar};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::{Error, Progress, Rendering, Written, places};
+
+/// Names of the files of frames: `{frame}` stands for the frame's number in six digits, `{layer}` for the
+/// layer's name, and the ending follows.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FramePattern {
+    text: String,
+    /// The part before `{layer}`, when each frame has a folder to itself.
+    folder: Option<String>,
+}
+
+/// What a complete frame is known by, where its files lie among those of others.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Record {
+    /// Entries of its files' headers.
+    fingerprints: Vec<(String, String)>,
+    /// Its files and their sizes (bytes).
+    files: Vec<(String, u64)>,
+}
+
+impl Default for FramePattern {
+    /// A folder a frame.
+    fn default() -> Self {
+        Self {
+            text: "frames/{frame}/{layer}".to_owned(),
+            folder: Some("frames/{frame}".to_owned()),
+        }
+    }
+}
+
+impl FramePattern {
+    /// From the words of a user.
+    ///
+    /// # Errors
+    ///
+    /// When frames or layers would have the same name, or files would lie elsewhere than in the folder.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        if !text.contains("{frame}") || !text.contains("{layer}") {
+            return Err("wants {frame} and {layer} in it, as {layer}/{frame}".to_owned());
+        }
+        let rest = text.replace("{frame}", "").replace("{layer}", "");
+        if rest.contains(['{', '}']) {
+            return Err("has braces around other words than {frame} and {layer}".to_owned());
+        }
+        let is_plain = |part| matches!(part, Component::Normal(_));
+        if !Path::new(text).components().all(is_plain) || text.ends_with('/') {
+            return Err(
+                "wants names below the folder, without . or .. or a / at its ends".to_owned()
+            );
+        }
+        let folder = text.strip_suffix("/{layer}").filter(|folder| !folder.contains("{layer}"));
+        Ok(Self { text: text.to_owned(), folder: folder.map(str::to_owned) })
+    }
+
+    /// Where frame `number` has `file`, which is a layer's name with its ending, as seen from the folder of
+    /// all frames.
+    #[must_use]
+    pub fn place(&self, number: usize, file: &str) -> String {
+        let (layer, ending) = file.split_once('.').unwrap_or((file, ""));
+        let dot = if ending.is_empty() { "" } else { "." };
+        numbered(&self.text, number).replace("{layer}", layer) + dot + ending
+    }
+
+    /// The folder in which frame `number` is written: its own, or one from which its files are taken to
+    /// their places.
+    #[must_use]
+    pub fn folder(&self, number: usize) -> String {
+        numbered(self.folder.as_deref().unwrap_or("frames/{frame}.unfinished"), number)
+    }
+
+    /// The folder that frame `number` has to itself, if each frame has one.
+    #[must_use]
+    pub fn own_folder(&self, number: usize) -> Option<String> {
+        self.folder.as_ref().map(|folder| numbered(folder, number))
+    }
+
+    /// Whether `out` holds all files of a frame whose headers have these fingerprints.
+    #[must_use]
+    pub fn is_complete(
+        &self,
+        out: &Path,
+        number: usize,
+        fingerprints: &[(String, String)],
+        has_sensor: bool,
+    ) -> bool {
+        match &self.folder {
+            Some(_) => is_rendered(&out.join(self.folder(number)), fingerprints, has_sensor),
+            None => read_record(&record_of(out, number)).is_some_and(|record| {
+                let has_size = |(name, size): &(String, u64)| {
+                    out.join(name).metadata().is_ok_and(|data| data.len() == *size)
+                };
+                record.fingerprints == fingerprints && record.files.iter().all(has_size)
+            }),
+        }
+    }
+
+    /// Refuses a place that is one of the scene's own files.
+    ///
+    /// # Errors
+    ///
+    /// When there is one; the message names it.
+    pub fn keep_apart(
+        &self,
+        out: &Path,
+        number: usize,
+        (inputs, results): (&[PathBuf], &[PathBuf]),
+    ) -> Result<(), Error> {
+        let names = results.iter().filter_map(|path| path.file_name()?.to_str());
+        let places: Vec<PathBuf> = names.map(|name| out.join(self.place(number, name))).collect();
+        places::keep_apart(inputs, &places)
+    }
+
+    /// Writes a frame. Its files lie in their places when all of them are complete, and what an earlier run
+    /// left of it goes.
+    ///
+    /// # Errors
+    ///
+    /// As [`Rendering::write`].
+    pub fn write(
+        &self,
+        rendering: &Rendering,
+        out: &Path,
+        number: usize,
+        (outputs, progress): (Outputs, &Progress),
+    ) -> Result<Written, Error> {
+        let folder = out.join(self.folder(number));
+        places::folder(&folder)?;
+        let mut written = rendering.write_with(&folder, outputs, progress)?;
+        if self.folder.is_none() {
+            let record = record_of(out, number);
+            let before = read_record(&record).unwrap_or_default();
+            // Until the new record is there, the frame is not complete.
+            let _ = fs::remove_file(&record);
+            let moved = self.take_to_places(out, number, &written.files);
+            let files = moved.map_err(|(path, error)| OutputError::io(&path, error))?;
+            for (old, _) in before.files.iter().filter(|old| files.iter().all(|new| new.0 != old.0))
+            {
+                let _ = fs::remove_file(out.join(old));
+            }
+            let _ = fs::remove_file(folder.join(MANIFEST)).and_then(|()| fs::remove_dir(&folder));
+            written.files = files.iter().map(|(name, _)| out.join(name)).collect();
+            let fingerprints = rendering.fingerprints().to_vec();
+            sidecar::write_json(&record, &Record { fingerprints, files })?;
+        }
+        Ok(written)
+    }
+
+    fn take_to_places(
+        &self,
+        out: &Path,
+        number: usize,
+        files: &[PathBuf],
+    ) -> Result<Vec<(String, u64)>, (PathBuf, io::Error)> {
+        let mut moved = Vec::new();
+        for path in files {
+            let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
+            let place = self.place(number, name);
+            let target = out.join(&place);
+            let size = target
+                .parent()
+                .map_or(Ok(()), fs::create_dir_all)
+                .and_then(|()| fs::rename(path, &target))
+                .and_then(|()| Ok(target.metadata()?.len()))
+                .map_err(|error| (target, error))?;
+            moved.push((place, size));
+        }
+        Ok(moved)
+    }
+}
+
+fn numbered(text: &str, number: usize) -> String {
+    text.replace("{frame}", &format!("{number:06}"))
+}
+
+fn record_of(out: &Path, number: usize) -> PathBuf {
+    out.join(numbered("frames/{frame}.json", number))
+}
+
+fn read_record(path: &Path) -> Option<Record> {
+    serde_json::from_slice(&fs::read(path).ok()?).ok()
+}
+
+/// Whether `folder` has a complete picture of the scene with these fingerprints, and all files of its
+/// manifest.
+fn is_rendered(folder: &Path, fingerprints: &[(String, String)], has_sensor: bool) -> bool {
+    let read = |name: &str| -> Option<Value> {
+        serde_json::from_slice(&fs::read(folder.join(name)).ok()?).ok()
+    };
+    let header = read("layers.json").and_then(|layers| layers.get("header").cloned());
+    let Some(header) = header else { return false };
+    let is_same = |(key, print): &(String, String)| {
+        header.get(key).and_then(Value::as_str) == Some(print.as_str())
+    };
+    let files = read(MANIFEST).and_then(|book| book.pointer("/files/render").cloned());
+    let Some(Value::Object(files)) = files else { return false };
+    let is_there = |(name, print): (&String, &Value)| {
+        let bytes = print.get("bytes").and_then(Value::as_u64);
+        folder.join(name).metadata().is_ok_and(|data| Some(data.len()) == bytes)
+    };
+    fingerprints.iter().all(is_same)
+        && header.get("partial").is_none()
+        && (!has_sensor || files.contains_key("sensor.json"))
+        && files.iter().all(is_there)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns_name_every_file_of_every_frame_apart() {
+        let own = FramePattern::default();
+        assert_eq!(own.place(7, "flow.kitti.png"), "frames/000007/flow.kitti.png");
+        assert_eq!(FramePattern::parse("frames/{frame}/{layer}"), Ok(own));
+        let layers = FramePattern::parse("{layer}/view_{frame}").unwrap();
+        assert_eq!(layers.place(12, "id_object.indexed.png"), "id_object/view_000012.indexed.png");
+        assert_eq!(layers.folder(12), "frames/000012.unfinished");
+        for bad in [
+            "{frame}",
+            "{layer}",
+            "/{frame}{layer}",
+            "../{frame}{layer}",
+            "{frame}{layer}/",
+            "{frame}{x}{layer}",
+        ] {
+            assert!(FramePattern::parse(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Another frame of a scene, as layers see it that compare two frames: its camera, its geometry, and the
+//! structure that says what hides what.
+
+use etendue_accel::Accel;
+use etendue_camera::Camera;
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Detail, Geometry, HitBatch, MISS, Placement, RayBatch};
+use etendue_scene::Scene;
+use etendue_tracer::layer::{FrameStep, OtherFrame, Seen, Sight};
+
+/// What is nearer than a point by less than this share of its distance does not hide it: the point was
+/// interpolated and its ray aimed with roundings of 10⁻¹⁵, which grazing surfaces stretch.
+const SAME_DEPTH: f64 = 1e-9;
+
+/// Another frame that layers are compared with.
+#[derive(Debug, Clone)]
+pub struct FollowedFrame<'a> {
+    step: FrameStep,
+    camera: &'a Camera,
+    geometry: &'a Geometry,
+    accel: &'a dyn Accel,
+    /// What became of each placement of this frame; `None` when all stand still.
+    fates: Option<Vec<Fate>>,
+}
+
+/// What became of a placement on the way to the other frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fate {
+    Still,
+    Moved,
+    /// Its mesh is another one, whose points have nothing to do with this one's.
+    Gone,
+}
+
+impl<'a> FollowedFrame<'a> {
+    /// The frame that is `step` on from `scene`: `other`, over whose geometry `accel` was built.
+    #[must_use]
+    pub fn new(step: FrameStep, scene: &Scene, other: &'a Scene, accel: &'a dyn Accel) -> Self {
+        let (from, geometry) = (&*scene.geometry, &*other.geometry);
+        let fates = (!from.has_surfaces_of(geometry)).then(|| {
+            let fate = |(i, placement)| fate(from, placement, geometry, i);
+            from.placements.iter().enumerate().map(fate).collect()
+        });
+        Self { step, camera: &other.camera, geometry, accel, fates }
+    }
+
+    /// Whether there is something that cannot be followed, because its mesh is another one there.
+    #[must_use]
+    pub fn loses_some(&self) -> bool {
+        self.fates.as_ref().is_some_and(|fates| fates.contains(&Fate::Gone))
+    }
+
+    /// From the other camera to the point of hit `i` (m).
+    fn offset(&self, seen: &Seen<'_>, i: usize) -> Option<DVec3> {
+        let (traced, origin) = (seen.traced, self.camera.pose().position);
+        let number = traced.hits.placement[i];
+        if number == MISS {
+            return None;
+        }
+        match self.fates.as_ref().map_or(Fate::Still, |fates| fates[number as usize]) {
+            Fate::Still => {
+                // Far from the world's origin the difference of the two cameras is what counts.
+                let along = traced.rays.direction(i) * traced.hits.t[i];
+                Some((traced.rays.origin(i) - origin) + along)
+            }
+            Fate::Moved => {
+                let placement = &self.geometry.placements[number as usize];
+                let corners =
+                    self.geometry.mesh_of(placement).corners(traced.hits.triangle[i] as usize);
+                let (u, v) = (traced.hits.u[i], traced.hits.v[i]);
+                let local =
+                    corners[0] + u * (corners[1] - corners[0]) + v * (corners[2] - corners[0]);
+                Some(placement.world_from_mesh.point_from(local, origin))
+            }
+            Fate::Gone => None,
+        }
+    }
+
+    fn is_in_picture(&self, [column, row]: [f64; 2]) -> bool {
+        let [width, height] = self.camera.resolution().map(f64::from);
+        (0.0..=width).contains(&column) && (0.0..=height).contains(&row)
+    }
+}
+
+fn fate(from: &Geometry, placement: &Placement, to: &Geometry, number: usize) -> Fate {
+    let Some(there) = to.placements.get(number) else { return Fate::Gone };
+    let (mesh, mesh_there) = (from.mesh_of(placement), to.mesh_of(there));
+    let name = |p: &Placement| (p.object, p.instance, p.node);
+    let is_same_mesh = mesh.has_surface_of(mesh_there);
+    if name(placement) != name(there) || mesh.triangles.len() != mesh_there.triangles.len() {
+        return Fate::Gone;
+    }
+    // A mesh of the same triangles with its corners elsewhere was bent.
+    if !is_same_mesh && mesh.triangles[..] != mesh_there.triangles[..] {
+        return Fate::Gone;
+    }
+    match is_same_mesh && placement.world_from_mesh == there.world_from_mesh {
+        true => Fate::Still,
+        false => Fate::Moved,
+    }
+}
+
+impl OtherFrame for FollowedFrame<'_> {
+    fn step(&self) -> FrameStep {
+        self.step
+    }
+
+    fn follow(&self, seen: &Seen<'_>, places: &mut Vec<Option<[f64; 2]>>) {
+        places.clear();
+        let rays = 0..seen.traced.rays.len();
+        places.extend(rays.map(|i| self.camera.place_of(self.offset(seen, i)?)));
+    }
+
+    fn look_for(&self, seen: &Seen<'_>, sights: &mut Vec<Sight>) {
+        let mut places = Vec::new();
+        self.follow(seen, &mut places);
+        sights.clear();
+        sights.extend((0..places.len()).map(|i| match places[i] {
+            _ if !seen.traced.hits.is_hit(i) => Sight::Miss,
+            Some(place) if self.is_in_picture(place) => Sight::Visible,
+            _ => Sight::Outside,
+        }));
+        let asked: Vec<usize> =
+            (0..sights.len()).filter(|&i| sights[i] == Sight::Visible).collect();
+        let at = |k: usize| asked.iter().filter_map(|&i| Some(places[i]?[k])).collect::<Vec<f64>>();
+        let (mut rays, mut hits) = (RayBatch::default(), HitBatch::new(Detail::Distance));
+        self.camera.rays_through(&at(0), &at(1), &mut rays);
+        self.accel.closest(&rays, &mut hits);
+        for (ray, &i) in asked.iter().enumerate() {
+            let Some(offset) = self.offset(seen, i) else { continue };
+            let start = rays.origin(ray) - self.camera.pose().position;
+            let distance = (offset - start).dot(rays.direction(ray));
+            let own = (seen.traced.hits.placement[i], seen.traced.hits.triangle[i]);
+            let is_itself = (hits.placement[ray], hits.triangle[ray]) == own;
+            if !is_itself && hits.t[ray] < distance * (1.0 - SAME_DEPTH) {
+                sights[i] = Sight::Hidden;
+            }
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! Layers as benchmarks and their tools keep them: 16-bit depth and disparity, flow, indexed masks.
+//!
+//! Sources: Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", 2012 (depth times 5000);
+//! Menze and Geiger, "Object Scene Flow for Autonomous Vehicles", 2015, and KITTI's development kits (depth
+//! and disparity times 256, flow times 64 above 2¹⁵); Baker et al., "A Database and Evaluation Methodology
+//! for Optical Flow", 2011 (`.flo`).
+
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use super::look::{Bits, Channels, Shown, indices};
+use super::{Layer, OutputError, Outputs, Picture, png, write_whole};
+
+/// Numbers a metre in TUM's depth images.
+pub const TUM_DEPTH: f64 = 5000.0;
+
+/// Numbers a metre in KITTI's depth images, and a pixel in its disparities.
+pub const KITTI_DEPTH: f64 = 256.0;
+
+/// Numbers a pixel in KITTI's flow, of which 0 stands at 2¹⁵.
+pub const KITTI_FLOW: f64 = 64.0;
+
+/// What `.flo` files have where nothing is known: anything above 10⁹.
+const UNKNOWN: f32 = 1e10;
+
+/// A file of one layer in the manner of a benchmark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Manner {
+    /// Depth of the TUM RGB-D benchmark.
+    TumDepth,
+    /// Depth of KITTI.
+    KittiDepth,
+    /// Disparity of KITTI.
+    KittiDisparity,
+    /// Flow of KITTI.
+    KittiFlow,
+    /// Flow of the Middlebury benchmark.
+    Flo,
+    /// Numbers of things as indices of a palette.
+    Indexed,
+}
+
+impl Manner {
+    /// Those of the layer called `layer` among `outputs`.
+    pub fn of(layer: &str, outputs: Outputs) -> impl Iterator<Item = Self> {
+        let is = |start: &str| layer.starts_with(start);
+        let named = layer == "MaterialId" || is("Id.") && layer != "Id.primitive";
+        let all = [
+            (outputs.tum && layer == "Depth", Self::TumDepth),
+            (outputs.kitti && layer == "Depth", Self::KittiDepth),
+            (outputs.kitti && is("Disparity"), Self::KittiDisparity),
+            (outputs.kitti && is("Flow"), Self::KittiFlow),
+            (outputs.flo && is("Flow"), Self::Flo),
+            (outputs.indexed && named, Self::Indexed),
+        ];
+        all.into_iter().filter_map(|(wanted, manner)| wanted.then_some(manner))
+    }
+
+    /// What follows the layer's name in the file's.
+    #[must_use]
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::TumDepth => "tum.png",
+            Self::KittiDepth | Self::KittiDisparity | Self::KittiFlow => "kitti.png",
+            Self::Flo => "flo",
+            Self::Indexed => "indexed.png",
+        }
+    }
+
+    /// Writes the layer called `name` to `path`. `false` when its numbers do not fit into the format, and
+    /// nothing is written.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such layer, or the file cannot be written.
+    pub fn write(self, path: &Path, picture: &Picture, name: &str) -> Result<bool, OutputError> {
+        let layer = picture.require(name)?;
+        let shown = match self {
+            Self::TumDepth => scaled(layer, TUM_DEPTH, "metres"),
+            Self::KittiDepth => scaled(layer, KITTI_DEPTH, "metres"),
+            Self::KittiDisparity => scaled(layer, KITTI_DEPTH, "pixels"),
+            Self::KittiFlow => flow(layer),
+            Self::Flo => return flo(path, picture, layer).map(|()| true),
+            Self::Indexed => match indices(layer) {
+                Some(shown) => shown,
+                None => return Ok(false),
+            },
+        };
+        png::write_shown(path, picture, layer, &shown).map(|()| true)
+    }
+}
+
+/// The nearest of `1..=65535`; 0 where it is another number.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 1 to 65535")]
+fn sixteen_bits(value: f64) -> u16 {
+    let rounded = value.round();
+    if (1.0..=65535.0).contains(&rounded) { rounded as u16 } else { 0 }
+}
+
+fn scaled(layer: &Layer, factor: f64, unit: &str) -> Shown {
+    let plane = &layer.channels[0].values;
+    let bytes = (0..plane.len()).flat_map(|i| sixteen_bits(plane.at(i) * factor).to_be_bytes());
+    let most = 65535.0 / factor;
+    let note = format!(
+        "data: {unit} times {factor}; 0 is nothing, and what is not above 0 or beyond {most:.3} {unit}"
+    );
+    Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes: bytes.collect(), note }
+}
+
+fn flow(layer: &Layer) -> Shown {
+    let [x, y] = [0, 1].map(|k| &layer.channels[k].values);
+    let pixel = |i: usize| {
+        let [u, v] = [x, y].map(|plane| sixteen_bits(plane.at(i) * KITTI_FLOW + 32768.0));
+        if u == 0 || v == 0 { [0; 3] } else { [u, v, 1] }
+    };
+    let bytes = (0..x.len()).flat_map(pixel).flat_map(u16::to_be_bytes).collect();
+    let note = format!(
+        "data: red and green are 32768 + {KITTI_FLOW} times the flow right and down (pixels), blue is 1 \
+         where it is known; flow of 512 pixels and more is not"
+    );
+    Shown { channels: Channels::Rgb, bits: Bits::Sixteen, bytes, note }
+}
+
+/// `PIEH`, columns and rows, and two little-endian floats a pixel.
+fn flo(path: &Path, picture: &Picture, layer: &Layer) -> Result<(), OutputError> {
+    let [x, y] = [0, 1].map(|k| &layer.channels[k].values);
+    let side = |side: usize| {
+        i32::try_from(side)
+            .map_err(|_| OutputError::format(path, "a side is longer than 2147483647"))
+    };
+    let (width, height) = (side(picture.width())?, side(picture.height())?);
+    write_whole(path, |part| {
+        let mut file = BufWriter::new(part);
+        file.write_all(b"PIEH")?;
+        file.write_all(&width.to_le_bytes())?;
+        file.write_all(&height.to_le_bytes())?;
+        for i in 0..x.len() {
+            for plane in [x, y] {
+                #[expect(clippy::cast_possible_truncation, reason = "the format's precision")]
+                let flow = plane.at(i) as f32;
+                let flow = if flow.is_finite() { flow } else { UNKNOWN };
+                file.write_all(&flow.to_le_bytes())?;
+            }
+        }
+        file.flush()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Channel, Look, Values};
+    use super::*;
+
+    fn picture(name: &str, look: Look, planes: Vec<Values>) -> Picture {
+        let channel = |(k, values)| Channel { name: ["X", "Y"][k].into(), values };
+        let channels = planes.into_iter().enumerate().map(channel).collect();
+        let layer = Layer { name: name.into(), look, channels, meaning: Vec::new() };
+        Picture::new(4, 1, vec![layer], Vec::new()).unwrap()
+    }
+
+    fn read(manner: Manner, picture: &Picture, name: &str) -> image::DynamicImage {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        assert!(manner.write(&path, picture, name).unwrap());
+        image::open(&path).unwrap()
+    }
+
+    #[test]
+    fn depth_is_sixteen_bits_of_a_stated_factor() {
+        let depth = Values::F64(vec![1.0, 2.5, f64::INFINITY, 14.0]);
+        let picture = picture("Depth", Look::Distance, vec![depth]);
+        let image::DynamicImage::ImageLuma16(tum) = read(Manner::TumDepth, &picture, "Depth")
+        else {
+            panic!("16 bits, grey")
+        };
+        // 14 m is beyond 13.107 m.
+        assert_eq!(tum.into_raw(), [5000, 12500, 0, 0]);
+        let kitti = read(Manner::KittiDepth, &picture, "Depth").into_luma16();
+        assert_eq!(kitti.into_raw(), [256, 640, 0, 3584]);
+    }
+
+    #[test]
+    fn flow_is_kittis_and_middleburys() {
+        let x = Values::F64(vec![0.0, -1.5, f64::INFINITY, 600.0]);
+        let y = Values::F64(vec![1.0, 0.25, f64::INFINITY, 0.0]);
+        let picture = picture("Flow", Look::Extent, vec![x, y]);
+        let image::DynamicImage::ImageRgb16(kitti) = read(Manner::KittiFlow, &picture, "Flow")
+        else {
+            panic!("16 bits, three channels")
+        };
+        let expected = [[32768, 32832, 1], [32672, 32784, 1], [0, 0, 0], [0, 0, 0]];
+        assert_eq!(kitti.into_raw(), expected.as_flattened());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.flo");
+        assert!(Manner::Flo.write(&path, &picture, "Flow").unwrap());
+        let bytes = std::fs::read(&path).unwrap();
+        let float = |i: usize| f32::from_le_bytes(bytes[4 * i..4 * i + 4].try_into().unwrap());
+        // The sanity check of the benchmark's own reader.
+        assert_eq!(float(0), 202_021.25);
+        assert_eq!((&bytes[4..12], bytes.len()), (&[4, 0, 0, 0, 1, 0, 0, 0][..], 12 + 32));
+        assert_eq!([3, 4, 5, 6, 7].map(float), [0.0, 1.0, -1.5, 0.25, 1e10]);
+    }
+
+    #[test]
+    fn masks_are_indices_of_a_palette_as_long_as_they_fit() {
+        let ids =
+            |largest| picture("Id.object", Look::Ids, vec![Values::U32(vec![0, 1, 2, largest])]);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        assert!(Manner::Indexed.write(&path, &ids(255), "Id.object").unwrap());
+        let decoder =
+            ::png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&path).unwrap()));
+        let mut reader = decoder.read_info().unwrap();
+        assert_eq!(reader.info().color_type, ::png::ColorType::Indexed);
+        assert_eq!(reader.info().palette.as_ref().unwrap().len(), 3 * 256);
+        let mut bytes = [0; 4];
+        reader.next_frame(&mut bytes).unwrap();
+        assert_eq!(bytes, [0, 1, 2, 255]);
+        assert!(!Manner::Indexed.write(&path, &ids(256), "Id.object").unwrap());
+    }
+}

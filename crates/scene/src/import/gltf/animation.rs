@@ -1,0 +1,309 @@
+//! Animations at one moment: what their channels make of the nodes' translations, rotations, scales and
+//! weights (glTF 2.0, section 3.11; interpolation by its appendix C).
+
+use std::path::Path;
+
+use etendue_geometry::glam::DQuat;
+use serde::Deserialize;
+use serde_json::{Map, Value};
+
+use super::document::Node;
+use super::{Reader, damaged};
+use crate::import::note::{Note, NoteKind};
+use crate::import::{Import, ImportError, Play};
+
+/// An animation.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Animation {
+    channels: Vec<Channel>,
+    samplers: Vec<Sampler>,
+}
+
+/// Which property of which node a sampler moves.
+#[derive(Debug, Deserialize)]
+struct Channel {
+    sampler: usize,
+    target: Target,
+}
+
+#[derive(Debug, Deserialize)]
+struct Target {
+    node: Option<usize>,
+    path: String,
+    #[serde(default)]
+    extensions: Map<String, Value>,
+}
+
+impl Target {
+    /// What is moved, in words: a path, or a pointer of `KHR_animation_pointer`.
+    fn words(&self) -> &str {
+        let extension = self.extensions.get("KHR_animation_pointer");
+        let pointer = extension.and_then(|e| e.get("pointer")).and_then(Value::as_str);
+        pointer.unwrap_or(&self.path)
+    }
+
+    /// The node and its property; `None` for what is no node's.
+    fn aim(&self) -> Option<(usize, Property)> {
+        let words = self.words();
+        let (node, path) = match words.strip_prefix("/nodes/").and_then(|rest| rest.split_once('/'))
+        {
+            Some((node, path)) => (node.parse().ok(), path),
+            None => (self.node, words),
+        };
+        let property = match path {
+            "translation" => Property::Translation,
+            "rotation" => Property::Rotation,
+            "scale" => Property::Scale,
+            "weights" => Property::Weights,
+            _ => return None,
+        };
+        Some((node?, property))
+    }
+}
+
+/// Times and values, as accessors.
+#[derive(Debug, Deserialize)]
+struct Sampler {
+    input: usize,
+    output: usize,
+    interpolation: Option<String>,
+}
+
+/// What a channel makes of a node.
+pub(super) struct Moved {
+    node: usize,
+    property: Property,
+    values: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Property {
+    Translation,
+    Rotation,
+    Scale,
+    Weights,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Interpolation {
+    Step,
+    Linear,
+    CubicSpline,
+}
+
+/// The nodes that the animation moves, as they are at its time.
+pub(super) fn moved(
+    reader: &Reader<'_>,
+    play: &Play,
+    import: &mut Import,
+) -> Result<Vec<Moved>, ImportError> {
+    let (number, animation) = chosen(reader, play)?;
+    let mut moved = Vec::new();
+    for (k, channel) in animation.channels.iter().enumerate() {
+        let place = format!("animations[{number}].channels[{k}]");
+        let Some((node, property)) = channel.target.aim() else {
+            let message =
+                format!("it moves \"{}\", which is left as it is", channel.target.words());
+            let note = Note::new(NoteKind::Unsupported, &place, &message);
+            crate::import::note::push(&mut import.notes, note);
+            continue;
+        };
+        super::pose::exists(reader.file, node, reader.document.nodes.len(), || {
+            format!("{place}.target.node")
+        })?;
+        let Some(sampler) = animation.samplers.get(channel.sampler) else {
+            let count = animation.samplers.len();
+            return Err(reader.absent(place, "sampler", channel.sampler, count));
+        };
+        let place = format!("animations[{number}].samplers[{}]", channel.sampler);
+        let values = Track::read(reader, sampler, property, &place)?.at(play.time);
+        moved.push(Moved { node, property, values });
+    }
+    Ok(moved)
+}
+
+/// Puts what moved in place of what the nodes have at rest.
+pub(super) fn apply(file: &Path, moved: Vec<Moved>, nodes: &mut [Node]) -> Result<(), ImportError> {
+    for Moved { node: index, property, values } in moved {
+        let node = &mut nodes[index];
+        if node.matrix.is_some() && property != Property::Weights {
+            let reason = "it has a matrix and is animated, which moves translation, rotation and scale; \
+                          export the file again";
+            return Err(damaged(file, format!("nodes[{index}]"), reason));
+        }
+        match (property, &values[..]) {
+            (Property::Translation, &[x, y, z]) => node.translation = Some([x, y, z]),
+            (Property::Scale, &[x, y, z]) => node.scale = Some([x, y, z]),
+            (Property::Rotation, &[x, y, z, w]) => node.rotation = Some([x, y, z, w]),
+            _ => node.weights = Some(values),
+        }
+    }
+    Ok(())
+}
+
+/// The animation by name or number, the first when none is named.
+fn chosen(reader: &Reader<'_>, play: &Play) -> Result<(usize, Animation), ImportError> {
+    let all = reader.document.animations.as_slice();
+    let name = |value: &Value| value.get("name").and_then(Value::as_str).map(str::to_owned);
+    let number = match &play.which {
+        None => 0,
+        Some(wanted) => {
+            let named = all.iter().position(|value| name(value).as_deref() == Some(wanted));
+            named.or_else(|| wanted.parse().ok()).unwrap_or(usize::MAX)
+        }
+    };
+    let Some(value) = all.get(number) else {
+        let known: Vec<String> = all
+            .iter()
+            .enumerate()
+            .map(|(k, value)| format!("{k} \"{}\"", name(value).unwrap_or_default()))
+            .collect();
+        let reason = match (&play.which, known.as_slice()) {
+            (_, []) => "there is none; take `animation` out of the scene".to_owned(),
+            (Some(wanted), known) => {
+                format!("there is no animation \"{wanted}\"; the file has {}", known.join(", "))
+            }
+            (None, _) => "there is none".to_owned(),
+        };
+        return Err(reader.damaged("animations", reason));
+    };
+    let animation = Animation::deserialize(value).map_err(|error| {
+        reader.damaged(format!("animations[{number}]"), crate::words::plain(&error))
+    })?;
+    Ok((number, animation))
+}
+
+/// The keys of one property.
+struct Track {
+    property: Property,
+    interpolation: Interpolation,
+    /// Times of the keys (s), growing.
+    times: Vec<f64>,
+    /// Numbers of a value.
+    width: usize,
+    /// A value a key; for cubic splines the tangent into it, it, and the tangent out of it.
+    values: Vec<f64>,
+}
+
+impl Track {
+    fn read(
+        reader: &Reader<'_>,
+        sampler: &Sampler,
+        property: Property,
+        place: &str,
+    ) -> Result<Self, ImportError> {
+        let interpolation = match sampler.interpolation.as_deref() {
+            None | Some("LINEAR") => Interpolation::Linear,
+            Some("STEP") => Interpolation::Step,
+            Some("CUBICSPLINE") => Interpolation::CubicSpline,
+            Some(other) => {
+                let reason = format!(
+                    "\"{other}\" is none of STEP, LINEAR and CUBICSPLINE; export the file again"
+                );
+                return Err(reader.damaged(format!("{place}.interpolation"), reason));
+            }
+        };
+        let times = numbers::<1>(reader, sampler.input, &format!("{place}.input"))?;
+        let grows = times.is_sorted_by(|a, b| a < b);
+        if times.is_empty() || !grows {
+            let reason = "its times do not grow from key to key, or there is none; export it again";
+            return Err(reader.damaged(format!("{place}.input"), reason));
+        }
+        let place = format!("{place}.output");
+        let values = match property {
+            Property::Translation | Property::Scale => {
+                numbers::<3>(reader, sampler.output, &place)?
+            }
+            Property::Rotation => numbers::<4>(reader, sampler.output, &place)?,
+            Property::Weights => numbers::<1>(reader, sampler.output, &place)?,
+        };
+        let parts = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
+        let width = match property {
+            Property::Translation | Property::Scale => 3,
+            Property::Rotation => 4,
+            Property::Weights => values.len() / (parts * times.len()),
+        };
+        if values.len() != width * parts * times.len() || width == 0 {
+            let reason =
+                format!("{} numbers for {} keys; export the file again", values.len(), times.len());
+            return Err(reader.damaged(place, reason));
+        }
+        Ok(Self { property, interpolation, times, width, values })
+    }
+
+    /// The value at a time (s); before the first key and after the last it stands still.
+    fn at(&self, time: f64) -> Vec<f64> {
+        let after = self.times.partition_point(|&key| key <= time);
+        let last = self.times.len() - 1;
+        if after == 0 {
+            return self.key(0).to_vec();
+        }
+        if after > last {
+            return self.key(last).to_vec();
+        }
+        let (from, to) = (after - 1, after);
+        let step = self.times[to] - self.times[from];
+        let t = (time - self.times[from]) / step;
+        match self.interpolation {
+            Interpolation::Step => self.key(from).to_vec(),
+            Interpolation::Linear if self.property == Property::Rotation => {
+                slerp(self.key(from), self.key(to), t)
+            }
+            Interpolation::Linear => {
+                let pairs = self.key(from).iter().zip(self.key(to));
+                pairs.map(|(a, b)| (1.0 - t) * a + t * b).collect()
+            }
+            Interpolation::CubicSpline => {
+                let (t2, t3) = (t * t, t * t * t);
+                let hermite = |i: usize| {
+                    (2.0 * t3 - 3.0 * t2 + 1.0) * self.key(from)[i]
+                        + step * (t3 - 2.0 * t2 + t) * self.part(from, 2)[i]
+                        + (3.0 * t2 - 2.0 * t3) * self.key(to)[i]
+                        + step * (t3 - t2) * self.part(to, 0)[i]
+                };
+                (0..self.width).map(hermite).collect()
+            }
+        }
+    }
+
+    fn key(&self, key: usize) -> &[f64] {
+        match self.interpolation {
+            Interpolation::CubicSpline => self.part(key, 1),
+            Interpolation::Step | Interpolation::Linear => {
+                &self.values[key * self.width..(key + 1) * self.width]
+            }
+        }
+    }
+
+    /// The tangent into a key of a cubic spline, its value, or the tangent out of it.
+    fn part(&self, key: usize, part: usize) -> &[f64] {
+        let start = (3 * key + part) * self.width;
+        &self.values[start..start + self.width]
+    }
+}
+
+/// Along the shorter way around.
+fn slerp(from: &[f64], to: &[f64], t: f64) -> Vec<f64> {
+    let quaternion = |q: &[f64]| DQuat::from_slice(q).normalize();
+    quaternion(from).slerp(quaternion(to), t).to_array().to_vec()
+}
+
+/// All numbers of an accessor of so many components, finite.
+fn numbers<const N: usize>(
+    reader: &Reader<'_>,
+    accessor: usize,
+    place: &str,
+) -> Result<Vec<f64>, ImportError> {
+    let accessor = reader.accessor(accessor, place)?;
+    let values = (accessor.components == N).then(|| accessor.floats::<N>(0.0)).flatten();
+    let Some(values) = values else {
+        let reason = format!("{} components where {N} are due", accessor.components);
+        return Err(reader.damaged(place, reason + "; export the file again"));
+    };
+    let numbers: Vec<f64> = (0..values.len()).flat_map(|i| values.get(i)).map(f64::from).collect();
+    match numbers.iter().all(|number| number.is_finite()) {
+        true => Ok(numbers),
+        false => Err(reader.damaged(place, "a number is not finite; export the file again")),
+    }
+}
