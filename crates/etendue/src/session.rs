@@ -7,65 +7,21 @@ use std::time::Instant;
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_geometry::Mesh;
-use etendue_render::output::{ImageHash, Layer, Outputs, SOFTWARE};
+use etendue_render::output::{ImageHash, Layer, SOFTWARE};
 use etendue_render::report::memory;
 use etendue_render::{FollowedFrame, Images, Plan, Prepared, Rendered, Report, Seconds, plan};
 use etendue_scene::escape::one_line;
 use etendue_scene::file::{FileKind, FramesSpec, SceneFile};
-use etendue_scene::import::Note;
 use etendue_scene::memory::Budget;
-use etendue_scene::{Cache, Frame, LoadOptions, Reach, Scene, SceneError, Start, Strictness};
+use etendue_scene::{Cache, Frame, LoadOptions, Scene, SceneError, Start, Strictness};
 use serde_json::Value;
 
 use crate::neighbours::{self, Neighbour};
 use crate::progress::Stage;
 use crate::rendering::file_names;
 use crate::structures::Structures;
-use crate::{Error, FramePattern, Progress, Rendering, places};
-
-/// How a scene is opened and built.
-#[derive(Debug, Clone)]
-pub struct Options {
-    /// Settings of the scene's values, as pairs of a path and JSON: (`camera.fov`, `30`).
-    pub settings: Vec<(String, String)>,
-    /// What becomes of defects in the data.
-    pub strictness: Strictness,
-    /// Whether files outside of the scene's folder may be read.
-    pub reach: Reach,
-    /// A camera of one of the models by name or number, in place of the scene's.
-    pub camera: Option<String>,
-    /// The most memory that may be taken (bytes); `None` for what the system has free.
-    pub memory_limit: Option<u64>,
-    /// Whether models are read into memory instead of being used where their files are mapped: for files that
-    /// other programs change meanwhile.
-    pub copy: bool,
-    /// What is to be written of the pictures: without NPY data layers are kept in single precision.
-    pub outputs: Outputs,
-    /// Whether the structure is watertight (see [`BuildOptions::robust`]).
-    pub robust: bool,
-    /// One of Embree's instruction sets (see [`BuildOptions::isa`]).
-    pub isa: Option<String>,
-    /// Whether memory for the picture and the structure is spoken for when the scene is loaded, so that a
-    /// render that would not fit is refused before any work is done.
-    pub to_render: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            settings: Vec::new(),
-            strictness: Strictness::default(),
-            reach: Reach::default(),
-            camera: None,
-            memory_limit: None,
-            copy: false,
-            outputs: Outputs::ALL,
-            robust: true,
-            isa: None,
-            to_render: true,
-        }
-    }
-}
+use crate::words::{NOT_FOLLOWED, changed, fingerprints, header, in_words, not_finite};
+use crate::{Error, FramePattern, Options, Progress, Rendering, places};
 
 /// A scene that is opened once, changed by [`set`](Self::set) and rendered as often as one likes.
 ///
@@ -626,51 +582,4 @@ fn fits(scene: &Scene, plan: &Plan, limit: Option<u64>) -> Result<(), Error> {
     };
     let path = scene.path.display();
     Err(Error::Refused(format!("{path}: a picture of {width} x {height} pixels{largest} {error}")))
-}
-
-/// That layers compare with a frame in which things were exchanged.
-const NOT_FOLLOWED: &str = "some meshes are others in the frame that layers compare this one with; their \
-                            points are not followed (+inf)";
-
-/// What stands in the header of every file.
-fn header(scene: &Scene, fingerprints: &[(String, String)]) -> Vec<(String, String)> {
-    let more = [
-        ("seed", scene.render.seed.to_string()),
-        ("pixel_origin", "pixel centres lie at half-integers from the picture's corner".to_owned()),
-        ("camera", serde_json::to_string(&scene.camera.opencv()).unwrap_or_default()),
-    ]
-    .map(|(key, value)| (key.to_owned(), value));
-    fingerprints.iter().cloned().chain(more).collect()
-}
-
-/// What tells whether files show the same scene, compared with the same other frames.
-fn fingerprints(scene: &Scene, neighbours: &[Neighbour]) -> Result<Vec<(String, String)>, Error> {
-    let own = Ok(("scene_hash".to_owned(), scene.hash()?.to_string()));
-    std::iter::once(own).chain(neighbours.iter().map(Neighbour::header)).collect()
-}
-
-/// A note as one line.
-fn in_words(note: &Note) -> String {
-    let Note { subject, message, .. } = note;
-    one_line(&match note.count {
-        0 | 1 => format!("{subject}: {message}"),
-        count => format!("{subject} (x{count}): {message}"),
-    })
-    .into_owned()
-}
-
-/// Models that another program wrote to meanwhile.
-fn changed(scene: &Scene) -> impl Iterator<Item = String> {
-    scene.changed_files().into_iter().map(|path| {
-        let path = path.display();
-        format!(
-            "{path} changed while it was rendered: what is seen may be old or new; render again"
-        )
-    })
-}
-
-/// That some light was left out, if it was.
-fn not_finite(rendered: &Rendered) -> Option<String> {
-    let count = rendered.light.not_finite;
-    (count > 0).then(|| format!("{count} contributions of light were not finite and are left out"))
 }

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     fn picture(name: &str, look: Look, planes: Vec<Values>) -> Picture {
-        let channel = |(k, values)| Channel { name: ["X", "Y"][k].into(), values };
+        let channel = |(k, values): (usize, Values)| Channel { name: ["X", "Y"][k].into(), values };
         let channels = planes.into_iter().enumerate().map(channel).collect();
         let layer = Layer { name: name.into(), look, channels, meaning: Vec::new() };
         Picture::new(4, 1, vec![layer], Vec::new()).unwrap()

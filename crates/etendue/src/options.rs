@@ -1,0 +1,48 @@
+//! How a scene is opened.
+
+use etendue_render::output::Outputs;
+use etendue_scene::{Reach, Strictness};
+
+/// How a scene is opened and built.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Settings of the scene's values, as pairs of a path and JSON: (`camera.fov`, `30`).
+    pub settings: Vec<(String, String)>,
+    /// What becomes of defects in the data.
+    pub strictness: Strictness,
+    /// Whether files outside of the scene's folder may be read.
+    pub reach: Reach,
+    /// A camera of one of the models by name or number, in place of the scene's.
+    pub camera: Option<String>,
+    /// The most memory that may be taken (bytes); `None` for what the system has free.
+    pub memory_limit: Option<u64>,
+    /// Whether models are read into memory instead of being used where their files are mapped: for files that
+    /// other programs change meanwhile.
+    pub copy: bool,
+    /// What is to be written of the pictures: without NPY data layers are kept in single precision.
+    pub outputs: Outputs,
+    /// Whether the structure is watertight (see [`etendue_accel::BuildOptions::robust`]).
+    pub robust: bool,
+    /// One of Embree's instruction sets (see [`etendue_accel::BuildOptions::isa`]).
+    pub isa: Option<String>,
+    /// Whether memory for the picture and the structure is spoken for when the scene is loaded, so that a
+    /// render that would not fit is refused before any work is done.
+    pub to_render: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            settings: Vec::new(),
+            strictness: Strictness::default(),
+            reach: Reach::default(),
+            camera: None,
+            memory_limit: None,
+            copy: false,
+            outputs: Outputs::ALL,
+            robust: true,
+            isa: None,
+            to_render: true,
+        }
+    }
+}

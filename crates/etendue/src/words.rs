@@ -1,0 +1,59 @@
+//! What is said of a picture: in the headers of its files, and in notes.
+
+use etendue_render::Rendered;
+use etendue_scene::Scene;
+use etendue_scene::escape::one_line;
+use etendue_scene::import::Note;
+
+use crate::Error;
+use crate::neighbours::Neighbour;
+
+/// That layers compare with a frame in which things were exchanged.
+pub(crate) const NOT_FOLLOWED: &str = "some meshes are others in the frame that layers compare this one with; their \
+                            points are not followed (+inf)";
+
+/// What stands in the header of every file.
+pub(crate) fn header(scene: &Scene, fingerprints: &[(String, String)]) -> Vec<(String, String)> {
+    let more = [
+        ("seed", scene.render.seed.to_string()),
+        ("pixel_origin", "pixel centres lie at half-integers from the picture's corner".to_owned()),
+        ("camera", serde_json::to_string(&scene.camera.opencv()).unwrap_or_default()),
+    ]
+    .map(|(key, value)| (key.to_owned(), value));
+    fingerprints.iter().cloned().chain(more).collect()
+}
+
+/// What tells whether files show the same scene, compared with the same other frames.
+pub(crate) fn fingerprints(
+    scene: &Scene,
+    neighbours: &[Neighbour],
+) -> Result<Vec<(String, String)>, Error> {
+    let own = Ok(("scene_hash".to_owned(), scene.hash()?.to_string()));
+    std::iter::once(own).chain(neighbours.iter().map(Neighbour::header)).collect()
+}
+
+/// A note as one line.
+pub(crate) fn in_words(note: &Note) -> String {
+    let Note { subject, message, .. } = note;
+    one_line(&match note.count {
+        0 | 1 => format!("{subject}: {message}"),
+        count => format!("{subject} (x{count}): {message}"),
+    })
+    .into_owned()
+}
+
+/// Models that another program wrote to meanwhile.
+pub(crate) fn changed(scene: &Scene) -> impl Iterator<Item = String> {
+    scene.changed_files().into_iter().map(|path| {
+        let path = path.display();
+        format!(
+            "{path} changed while it was rendered: what is seen may be old or new; render again"
+        )
+    })
+}
+
+/// That some light was left out, if it was.
+pub(crate) fn not_finite(rendered: &Rendered) -> Option<String> {
+    let count = rendered.light.not_finite;
+    (count > 0).then(|| format!("{count} contributions of light were not finite and are left out"))
+}
