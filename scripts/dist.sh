@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # What others install, in out/dist: a tarball, a Debian package and a Python wheel, each with the Embree and
 # TBB of this machine beside the program, and each tried in bare Debian 12 and 13 roots.
-# dist.sh build makes them, dist.sh try tries them; without a word it does both.
+# dist.sh build makes them, dist.sh try tries them; without a word it does both. PROFILE=dev builds as the
+# tests of Rust do: to try this script, not for users.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/packages.sh
@@ -9,20 +10,22 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 PATH=$PATH:/usr/sbin:/sbin:$PWD/out/tools/bin
 dist=out/dist
+profile="${PROFILE:-release}"
+program=target/$([ "$profile" = dev ] && echo debug || echo "$profile")/etendue
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -1)
 name="etendue-$version-linux-$(uname -m)"
 
 # The libraries that the program finds beside it, under the names that it asks for.
 bundle_libraries() {
     mkdir -p "$dist/lib"
-    ldd target/release/etendue | awk '$1 ~ /^lib(embree|tbb)/ { print $1, $3 }' | while read -r soname path; do
+    ldd "$program" | awk '$1 ~ /^lib(embree|tbb)/ { print $1, $3 }' | while read -r soname path; do
         install -m 644 "$path" "$dist/lib/$soname"
     done
 }
 
 build_tarball() {
     rm -rf "${dist:?}/$name"
-    install -D -s -m 755 target/release/etendue "$dist/$name/bin/etendue"
+    install -D -s -m 755 "$program" "$dist/$name/bin/etendue"
     install -D -m 644 -t "$dist/$name/lib/etendue" "$dist"/lib/*
     install -D -m 644 -t "$dist/$name" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE
     cp -R scenes "$dist/$name/scenes"
@@ -32,7 +35,7 @@ build_tarball() {
 
 build_package() {
     command -v cargo-deb >/dev/null || cargo install cargo-deb --version '^3' --locked --root out/tools
-    cargo-deb -p etendue-cli --no-build --output "$dist/"
+    cargo-deb -p etendue-cli --no-build --profile "$profile" --output "$dist/"
 }
 
 build_wheel() {
@@ -41,7 +44,7 @@ build_wheel() {
 }
 
 build() {
-    cargo build --release --locked -p etendue-cli
+    cargo build --profile "$profile" --locked -p etendue-cli
     rm -rf "$dist"
     bundle_libraries
     build_tarball
@@ -75,7 +78,10 @@ try_in() {
         for system in proc sys dev; do mount --rbind "/$system" "/mnt/$system"; done
         exec chroot /mnt env -i LANG=C.UTF-8 PATH=/usr/sbin:/usr/bin:/sbin:/bin sh -euc "$4"
     ' "$PWD/$root" "$1" "$PWD/$dist" '
-        ! command -v cc && ! ls /usr/lib/*/libembree* 2>/dev/null
+        if command -v cc || ls /usr/lib/*/libembree* 2>/dev/null; then
+            echo "this root is not bare"
+            exit 1
+        fi
         cd /tmp
         echo "- the tarball"
         tar -xzf /dist/etendue-*.tar.gz
