@@ -1,5 +1,5 @@
 //! Rays per second through the double Gauss (11 elements) on one thread: in batches, and ray by ray
-//! through the same arithmetic.
+//! through the same arithmetic; and through arrays of lenslets, against plain surfaces in their places.
 
 use std::hint::black_box;
 
@@ -69,6 +69,82 @@ fn transfer(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// Lenses with lenslets behind them, and the same with as many plain surfaces: the light of a disk of the
+/// sensor that all of them pass, as a camera traces it.
+fn lenslets(criterion: &mut Criterion) {
+    let before = r#"{"type": "aperture", "shape": "circular", "radius": 9, "stop": true},
+        {"type": "thin_lens", "focal_length": 50, "thickness": 50}"#;
+    let array = |keys: &str, glass: &str, gap: f64| {
+        format!(
+            r#"{{"type": "microlens_array", "size": [12, 12], "pitch": 0.1, "thickness": {gap},
+                {keys} {glass}}}"#
+        )
+    };
+    let thin = |keys: &str| array(keys, r#""focal_length": 0.4"#, 0.4);
+    let face = |keys: &str| {
+        let front = array(keys, r#""radius": 0.2, "glass": "N-BK7""#, 0.3);
+        format!(r#"{front}, {{"type": "surface", "thickness": 0.2}}"#)
+    };
+    let trains = [
+        ("thin/plain", r#"{"type": "thin_lens", "focal_length": 900, "thickness": 0.4}"#.to_owned()),
+        ("thin/square", thin("")),
+        ("thin/hexagonal", thin(r#""grid": "hexagonal", "rotation": 2,"#)),
+        ("thin/round", thin(r#""grid": "hexagonal", "aperture": "round", "gaps": "clear","#)),
+        (
+            "thin/three-types",
+            thin(r#""types": [{"focal_length": 0.4}, {"focal_length": 0.41}, {"focal_length": 0.42}],"#)
+                .replace(r#", "focal_length": 0.4}"#, "}"),
+        ),
+        (
+            "thick/plain",
+            r#"{"type": "surface", "radius": 200, "semi_diameter": 9, "glass": "N-BK7",
+                "thickness": 0.3}, {"type": "surface", "thickness": 0.2}"#
+                .to_owned(),
+        ),
+        ("thick/square", face("")),
+        ("thick/hexagonal", face(r#""grid": "hexagonal","#)),
+        (
+            "thick/three-types",
+            face(r#""types": [{"radius": 0.2}, {"radius": 0.21}, {"radius": 0.22}],"#)
+                .replace(r#""radius": 0.2, "glass""#, r#""glass""#),
+        ),
+        ("thick/conic", face(r#""conic": -0.5,"#)),
+    ];
+    let mut group = criterion.benchmark_group("microlenses");
+    group.throughput(Throughput::Elements(u64::from(RAYS)));
+    for (name, rear) in trains {
+        let train = lens(&format!(r#"{{"elements": [{before}, {rear}]}}"#));
+        let at = train.at(train.wavelength()).expect("glasses have indices");
+        let z = train.sensor_z(Focus::AsWritten).expect("as written");
+        let pupil = ExitPupil::new(&train, &[587.56], z, [2.0, 1.5]).expect("light passes");
+        let mut rays = LensRays::with_capacity(RAYS as usize);
+        let unit = |i: u32, step: f64| (0.5 + step * f64::from(i)).fract();
+        // Rays that pass, so that all trains have the same work.
+        for i in 0..40 * RAYS {
+            let r =
+                [0.856_674_883, 0.733_891_857, 0.628_706_721, 0.538_597_270].map(|a| unit(i, a));
+            let film = (2.0 * DVec2::new(r[0], r[1]) - 1.0) * DVec2::new(2.0, 1.5);
+            let Some(sample) = pupil.sample(film, [r[2], r[3]]) else { continue };
+            let mut one = LensRays::with_capacity(1);
+            one.push(pupil.film_point(film), sample.direction);
+            at.trace(Side::Sensor, Clip::On, &mut one);
+            if one.exited() == 1 && rays.len() < RAYS as usize {
+                rays.push(pupil.film_point(film), sample.direction);
+            }
+        }
+        assert_eq!(rays.len(), RAYS as usize, "{name}");
+        let mut work = rays.clone();
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                work.clone_from(black_box(&rays));
+                at.trace(Side::Sensor, Clip::On, &mut work);
+            });
+        });
+        assert_eq!(work.exited(), RAYS as usize, "{name}: every ray passes every check");
+    }
+    group.finish();
+}
+
 fn pupil(criterion: &mut Criterion) {
     let train = lens(include_str!("../../../scenes/lenses/double-gauss.json"));
     let z = train.sensor_z(Focus::Infinity).expect("it focuses");
@@ -91,5 +167,5 @@ fn pupil(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, transfer, pupil);
+criterion_group!(benches, transfer, lenslets, pupil);
 criterion_main!(benches);

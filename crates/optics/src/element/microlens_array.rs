@@ -385,6 +385,30 @@ impl MicrolensArray {
         if same { opening } else { clipped(&opening, &self.lattice.cell_corners()) }
     }
 
+    /// What of a cell is between its opening and its border, around its centre, along and across the rows
+    /// (mm): convex pieces, which beside openings that are no part of the border hold a little more.
+    #[must_use]
+    pub fn gap_pieces(&self) -> Vec<[[f64; 2]; 4]> {
+        // All corners of squares and hexagons lie at multiples of 15°.
+        let step = std::f64::consts::TAU / 24.0;
+        let at = |k: u32| {
+            let (sine, cosine) = (f64::from(k) * step).sin_cos();
+            let cell = match self.lattice.grid {
+                Grid::Square => LensletShape::Square,
+                Grid::Hexagonal => LensletShape::Hexagonal,
+            };
+            let inner = self.reach * cell_radius(self.shape, [cosine, sine]);
+            let outer = 0.5 * self.lattice.pitch * cell_radius(cell, [cosine, sine]);
+            [inner, outer.max(inner)].map(|radius| [radius * cosine, radius * sine])
+        };
+        (0..24)
+            .map(|k| {
+                let ([a, b], [d, c]) = (at(k), at(k + 1));
+                [a, b, c, d]
+            })
+            .collect()
+    }
+
     /// The same array with nothing dimmed.
     #[must_use]
     pub fn without_filters(self: &Arc<Self>) -> Arc<Self> {
@@ -392,6 +416,16 @@ impl MicrolensArray {
             return Arc::clone(self);
         }
         Arc::new(Self { curves: Vec::new(), ..(**self).clone() })
+    }
+}
+
+/// How far a shape of half a width of 1 reaches in a direction.
+fn cell_radius(shape: LensletShape, [x, y]: [f64; 2]) -> f64 {
+    let (a, b) = (0.5 * x, 0.75_f64.sqrt() * y);
+    match shape {
+        LensletShape::Round => 1.0,
+        LensletShape::Square => 1.0 / x.abs().max(y.abs()),
+        LensletShape::Hexagonal => 1.0 / x.abs().max((a + b).abs()).max((a - b).abs()),
     }
 }
 

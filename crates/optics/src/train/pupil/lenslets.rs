@@ -16,24 +16,14 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{ExitPupil, ExitPupilError, without_filters};
+use super::clear::{without_filters, without_masks};
+use super::outline_table::{NORMALS, OutlineTable, centre_of, normal, outline};
+use super::region::{Region, area_of};
+use super::{ExitPupil, ExitPupilError};
 use crate::element::{Clip, Gaps, Grid, LensRays, LensletShape, RayStatus, clipped};
 use crate::train::aim::towards_lens;
 use crate::train::lenslets::Sight;
 use crate::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
-
-/// Directions in which the outline's extent is kept.
-const NORMALS: usize = 16;
-
-/// Nodes over each side of the array.
-const NODES: u32 = 17;
-
-/// Directions from the middle of an outline in which it is found.
-const ANGLES: u32 = 64;
-
-/// How outlines are found: steps inwards, and halvings.
-const STEPS: u32 = 12;
-const HALVINGS: u32 = 6;
 
 /// Added to the outline on all sides, as a share of its width, to begin with.
 const MARGIN: f64 = 0.002;
@@ -49,83 +39,19 @@ const CHECKS: u32 = 1 << 14;
 #[derive(Debug, Clone)]
 pub struct LensletPupil {
     view: BehindLenslets,
-    table: Table,
+    table: OutlineTable,
     /// The opening of a lenslet around its centre, in the array's axes (mm).
     opening: Vec<DVec2>,
     /// The same of the other arrays, by kind and array.
     others: Vec<Vec<DVec2>>,
-    /// Its area (mm²), and the radius of the circle around it (mm).
+    /// What is between openings that let light by, in pieces around the centre of a cell.
+    gaps: Vec<Vec<DVec2>>,
+    /// The area of an opening (mm²), and the radius of the circle around it (mm).
     area: f64,
     around: f64,
     /// How the slopes towards the pupil change over the array (1/mm).
     drift: f64,
     margin: f64,
-}
-
-/// What is aimed at of one lenslet, or of what is between them.
-#[derive(Debug, Clone)]
-enum Region {
-    /// All of an opening that is a polygon.
-    Whole { centre: DVec2, area: f64, cell: Option<[f64; 2]>, checked: bool },
-    /// A polygon.
-    Polygon { cell: Option<[f64; 2]>, corners: Vec<DVec2>, area: f64, checked: bool },
-    /// All of a round opening.
-    Disk { centre: DVec2, radius: f64 },
-}
-
-impl Region {
-    fn polygon(cell: Option<[f64; 2]>, corners: Vec<DVec2>, checked: bool) -> Option<Self> {
-        let area = area_of(&corners);
-        (area > 0.0).then_some(Self::Polygon { cell, corners, area, checked })
-    }
-
-    fn area(&self) -> f64 {
-        match self {
-            Self::Polygon { area, .. } | Self::Whole { area, .. } => *area,
-            Self::Disk { radius, .. } => std::f64::consts::PI * radius * radius,
-        }
-    }
-
-    /// A point for a place in the unit square, even in area.
-    fn draw(&self, [u, v]: [f64; 2], opening: &[DVec2]) -> DVec2 {
-        match self {
-            Self::Whole { centre, area, .. } => *centre + in_polygon(opening, *area, [u, v]),
-            Self::Disk { centre, radius } => {
-                let [x, y] = etendue_geometry::disk::point([u, v]);
-                *centre + DVec2::new(x, y) * *radius
-            }
-            Self::Polygon { corners, area, .. } => in_polygon(corners, *area, [u, v]),
-        }
-    }
-}
-
-/// A point of a convex polygon for a place in the unit square, even in area.
-fn in_polygon(corners: &[DVec2], area: f64, [u, v]: [f64; 2]) -> DVec2 {
-    if let [a, b, c, d] = *corners
-        && (a + c - b - d).length_squared() < 1e-18 * area
-    {
-        return a + (b - a) * u + (d - a) * v;
-    }
-    // A fan of triangles around the first corner.
-    let mut left = u * 2.0 * area;
-    let last = corners.len() - 2;
-    for k in 1..=last {
-        let (b, c) = (corners[k] - corners[0], corners[k + 1] - corners[0]);
-        let twice = b.perp_dot(c);
-        if left <= twice || k == last {
-            let share = (left / twice).clamp(0.0, 1.0);
-            let root = v.sqrt();
-            return corners[0] + (b + (c - b) * share) * root;
-        }
-        left -= twice;
-    }
-    corners[0]
-}
-
-fn area_of(corners: &[DVec2]) -> f64 {
-    let Some(&first) = corners.first() else { return 0.0 };
-    let pairs = corners.windows(2).skip(1);
-    0.5 * pairs.map(|pair| (pair[0] - first).perp_dot(pair[1] - first)).sum::<f64>()
 }
 
 impl LensletPupil {
@@ -146,15 +72,23 @@ impl LensletPupil {
             .openings(0, pupil.sensor.vertex.z)
             .map(|(_, other)| turned(other.opening_corners()))
             .collect();
-        let main = super::without_masks(&without_filters(&view.main));
+        let open = |piece: &Vec<DVec2>| area_of(piece) > 1e-9 * array.lattice.pitch.powi(2);
+        let gaps = match array.gaps {
+            Gaps::Clear => {
+                array.gap_pieces().iter().map(|p| turned(p.to_vec())).filter(open).collect()
+            }
+            Gaps::Opaque => Vec::new(),
+        };
+        let main = without_masks(&without_filters(&view.main));
         let drift = match view.exit_pupil_z() {
             Some(z) if (view.front_z - z).abs() > 1e-9 => -1.0 / (view.front_z - z),
             _ => 0.0,
         };
-        let table = Table::new(&main, &view, wavelengths, pupil, drift)?;
+        let table = OutlineTable::new(&main, &view, wavelengths, pupil, drift)?;
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
         let area = area_of(&opening);
-        let mut own = Self { view, table, opening, others, area, around, drift, margin: MARGIN };
+        let mut own =
+            Self { view, table, opening, others, gaps, area, around, drift, margin: MARGIN };
         own.widen_until_tight(&lenses, pupil)?;
         Ok(own)
     }
@@ -198,6 +132,36 @@ impl LensletPupil {
         }
     }
 
+    /// The centroid of the light that a lenslet sends to the sensor's plane at z (mm) when the same radiance
+    /// comes from everywhere (mm across the axis): of its image of the main lens' outline, in which
+    /// irradiance falls with cos⁴ of the angle towards the lenslet. What lenslets blur spreads to all sides
+    /// alike. `None` in the dark.
+    #[must_use]
+    pub fn image_centroid(&self, cell: [f64; 2], z: f64) -> Option<DVec2> {
+        let centre = self.view.centre(cell);
+        let extent = self.table.at(centre)?;
+        let kind = self.view.array.type_at(cell);
+        let [slope, _] = self.view.sight(kind, z).central(self.view.principal_distance(kind));
+        let place = |m: DVec2| centre - m / slope;
+        let weight = |at: DVec2| {
+            let slopes = self.view.central_slopes(at.extend(z), cell);
+            (1.0 + slopes.length_squared()).powi(-2)
+        };
+        let corners = outline(|k| extent[k]).map(place);
+        let middle = place(centre_of(&extent));
+        let (mut sum, mut mean) = (0.0, DVec2::ZERO);
+        for k in 0..NORMALS {
+            let (a, b) = (corners[k], corners[(k + 1) % NORMALS]);
+            let area = (a - middle).perp_dot(b - middle).abs();
+            // The midpoints of a triangle's edges: exact for parabolas.
+            for at in [0.5 * (a + b), 0.5 * (a + middle), 0.5 * (b + middle)] {
+                let light = area * weight(at);
+                (sum, mean) = (sum + light, mean + (at - middle) * light);
+            }
+        }
+        (sum > 0.0).then(|| middle + mean / sum)
+    }
+
     /// Whether a point of the array is aimed at from a point of the sensor (mm).
     fn aims_at(&self, film: DVec3, at: DVec2) -> bool {
         let sight = self.view.sight(0, film.z);
@@ -224,11 +188,10 @@ impl LensletPupil {
         let [slope, _] = sight.central(self.view.principal_distance(0));
         let start = film.truncate();
         let mut at = start;
-        let mut extent = self.table.at(at)?;
         for _ in 0..4 {
-            at = start + centre_of(&extent) / slope;
-            extent = self.table.at(at)?;
+            at = start + self.table.centre_at(at)? / slope;
         }
+        let extent = self.table.at(at)?;
         let widest = self.widest(&extent) * (1.0 + 2.0 * self.margin);
         let kappa = (sight.slope[0] - self.drift * sight.height[0]).abs();
         let sigma = (sight.slope[1] - self.drift * sight.height[1] - self.drift).abs();
@@ -258,12 +221,8 @@ impl LensletPupil {
             };
             regions.extend(self.region(film, cell, kind, sight));
         }
-        if array.gaps == Gaps::Clear
-            && (array.shape == LensletShape::Round
-                || array.reach < 0.5 * array.lattice.pitch
-                || self.mixed())
-        {
-            regions.extend(self.gap(film, middle));
+        if !self.gaps.is_empty() {
+            self.add_gaps(film, middle, &mut regions);
         }
         regions
     }
@@ -324,14 +283,38 @@ impl LensletPupil {
         Region::polygon(Some(cell), corners, checked || array.gaps == Gaps::Clear)
     }
 
-    /// What is aimed at between lenslets.
-    fn gap(&self, film: DVec3, middle: DVec2) -> Option<Region> {
-        let extent = self.table.at(middle)?;
+    /// Adds what is aimed at between lenslets: of each piece what lies in the outline as seen past them.
+    fn add_gaps(&self, film: DVec3, middle: DVec2, regions: &mut Vec<Region>) {
+        let Some(extent) = self.table.at(middle) else { return };
         let sight = self.view.sight_past(film.z);
         let kappa = sight.slope[0] - self.drift * sight.height[0];
         let shift = (middle - film.truncate()) * (sight.slope[1] - self.drift * sight.height[1]);
-        let corners = self.outline(&extent).map(|m| middle + (m - shift) / kappa);
-        Region::polygon(None, corners.to_vec(), true)
+        let seen = self.outline(&extent).map(|m| middle + (m - shift) / kappa);
+        let centre = seen.iter().sum::<DVec2>() / NORMALS as f64;
+        let widest = seen.iter().map(|p| p.distance(centre)).fold(0.0, f64::max);
+        let inside = |p: &DVec2| {
+            (0..NORMALS).all(|k| (seen[(k + 1) % NORMALS] - seen[k]).perp_dot(*p - seen[k]) >= 0.0)
+        };
+        let clip = seen.map(|p| p.to_array());
+        let array = &self.view.array;
+        let around = array.lattice.pitch;
+        let local = (centre - self.view.decentre).to_array();
+        for cell in array.lattice.cells_near(local, widest + around) {
+            let at = self.view.centre(cell);
+            for piece in &self.gaps {
+                let corners: Vec<DVec2> = piece.iter().map(|p| at + *p).collect();
+                if corners[0].distance(centre) > widest + around {
+                    continue;
+                }
+                if corners.iter().all(inside) {
+                    regions.extend(Region::polygon(None, corners, true));
+                    continue;
+                }
+                let corners: Vec<[f64; 2]> = corners.iter().map(|p| p.to_array()).collect();
+                let corners = clipped(&corners, &clip).into_iter().map(DVec2::from).collect();
+                regions.extend(Region::polygon(None, corners, true));
+            }
+        }
     }
 
     /// The extent of the outline in a direction, with its margin.
@@ -341,13 +324,7 @@ impl LensletPupil {
 
     /// The corners of the outline with its margin, in slopes.
     fn outline(&self, extent: &[f64; NORMALS]) -> [DVec2; NORMALS] {
-        let sine = (std::f64::consts::TAU / NORMALS as f64).sin();
-        std::array::from_fn(|k| {
-            let next = (k + 1) % NORMALS;
-            let (a, b) = (normal(k), normal(next));
-            let (h, g) = (self.limit(extent, k), self.limit(extent, next));
-            DVec2::new(h * b.y - g * a.y, g * a.x - h * b.x) / sine
-        })
+        outline(|k| self.limit(extent, k))
     }
 
     /// Looks for rays that pass and are not aimed at, and widens the margin until there are none.
@@ -400,167 +377,4 @@ impl LensletPupil {
         }
         [passed, strays]
     }
-}
-
-/// The outward normal of a direction in which extents are kept.
-fn normal(k: usize) -> DVec2 {
-    NORMAL_TABLE[k]
-}
-
-/// cos and sin of multiples of 22.5°.
-const NORMAL_TABLE: [DVec2; NORMALS] = {
-    const C: f64 = 0.923_879_532_511_286_7;
-    const S: f64 = 0.382_683_432_365_089_8;
-    const R: f64 = std::f64::consts::FRAC_1_SQRT_2;
-    [
-        DVec2::new(1.0, 0.0),
-        DVec2::new(C, S),
-        DVec2::new(R, R),
-        DVec2::new(S, C),
-        DVec2::new(0.0, 1.0),
-        DVec2::new(-S, C),
-        DVec2::new(-R, R),
-        DVec2::new(-C, S),
-        DVec2::new(-1.0, 0.0),
-        DVec2::new(-C, -S),
-        DVec2::new(-R, -R),
-        DVec2::new(-S, -C),
-        DVec2::new(0.0, -1.0),
-        DVec2::new(S, -C),
-        DVec2::new(R, -R),
-        DVec2::new(C, -S),
-    ]
-};
-
-/// The middle of an outline, by its extents.
-fn centre_of(extent: &[f64; NORMALS]) -> DVec2 {
-    0.5 * DVec2::new(extent[0] - extent[8], extent[4] - extent[12])
-}
-
-/// The exit pupil of the lens before, over the plane of the array: extents of its outline in slopes.
-#[derive(Debug, Clone)]
-struct Table {
-    main: ExitPupil,
-    half: DVec2,
-    nodes: Vec<Option<[f64; NORMALS]>>,
-}
-
-impl Table {
-    fn new(
-        main: &OpticalTrain,
-        view: &BehindLenslets,
-        wavelengths: &[f64],
-        pupil: &ExitPupil,
-        drift: f64,
-    ) -> Result<Self, ExitPupilError> {
-        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-        let mut half = DVec2::ZERO;
-        for corner in corners {
-            let film = pupil.film_point(DVec2::from(corner) * pupil.half_size);
-            let sight = view.sight(0, film.z);
-            // Straight towards the pupil's middle: slopes are `drift` times the height.
-            let projected = film.truncate() / (1.0 - drift * sight.distance).max(0.1);
-            half = half.max(film.truncate().abs()).max(projected.abs());
-        }
-        let half = half * 1.05 + DVec2::splat(4.0 * view.array.lattice.pitch);
-        let lenses = wavelengths.iter().map(|&nm| main.at(nm)).collect::<Result<Vec<_>, _>>()?;
-        let main = ExitPupil::new(main, wavelengths, view.front_z, half.to_array())?;
-        let share = |i: u32| 2.0 * f64::from(i) / f64::from(NODES - 1) - 1.0;
-        let at = |i: u32| DVec2::new(share(i % NODES), share(i / NODES)) * half;
-        let exact = main.disk().is_some();
-        let node = |i: u32| match exact {
-            true => extent_of(&main.outline(at(i))),
-            false => extent_of(&tight_outline(&main, &lenses, at(i))),
-        };
-        let nodes = (0..NODES * NODES).map(node).collect();
-        Ok(Self { main, half, nodes })
-    }
-
-    /// The outline from a point of the array (mm); `None` in the dark.
-    fn at(&self, at: DVec2) -> Option<[f64; NORMALS]> {
-        let last = f64::from(NODES - 1);
-        let place = (0.5 * (at / self.half + 1.0) * last).clamp(DVec2::ZERO, DVec2::splat(last));
-        let low = place.floor().min(DVec2::splat(last - 1.0));
-        let share = place - low;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between 0 and the number of nodes"
-        )]
-        let first = low.y as usize * NODES as usize + low.x as usize;
-        let next = first + NODES as usize;
-        let corners = [first, first + 1, next, next + 1].map(|i| self.nodes[i].as_ref());
-        let [Some(a), Some(b), Some(c), Some(d)] = corners else {
-            return extent_of(&self.main.outline(at));
-        };
-        let weights = [
-            (1.0 - share.x) * (1.0 - share.y),
-            share.x * (1.0 - share.y),
-            (1.0 - share.x) * share.y,
-            share.x * share.y,
-        ];
-        Some(std::array::from_fn(|k| {
-            weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k] + weights[3] * d[k]
-        }))
-    }
-}
-
-fn extent_of(outline: &[DVec2]) -> Option<[f64; NORMALS]> {
-    if outline.is_empty() {
-        return None;
-    }
-    let extent = |k: usize| outline.iter().map(|m| normal(k).dot(*m)).fold(f64::MIN, f64::max);
-    Some(std::array::from_fn(extent))
-}
-
-/// The outline of what passes from a point of the array (mm), nearer than the bound of `main`, which is
-/// wider where it is joined from place to place.
-fn tight_outline(main: &ExitPupil, lenses: &[MonochromaticTrain], at: DVec2) -> Vec<DVec2> {
-    let bound = main.outline(at);
-    if bound.is_empty() {
-        return bound;
-    }
-    let centre = 0.5
-        * (bound.iter().copied().reduce(DVec2::min).unwrap_or_default()
-            + bound.iter().copied().reduce(DVec2::max).unwrap_or_default());
-    let every = bound.len() / ANGLES as usize;
-    let ends: Vec<DVec2> = bound.iter().step_by(every.max(1)).copied().collect();
-    let film = main.film_point(at);
-    let passes = |places: &[(usize, f64)]| -> Vec<bool> {
-        let mut passed = vec![false; places.len()];
-        for lens in lenses {
-            let mut rays = LensRays::with_capacity(places.len());
-            for &(i, share) in places {
-                rays.push(film, towards_lens(centre + (ends[i] - centre) * share));
-            }
-            lens.trace(Side::Sensor, Clip::On, &mut rays);
-            let exited = (0..rays.len()).map(|i| rays.fate(i) == RayStatus::Exited);
-            passed.iter_mut().zip(exited).for_each(|(any, one)| *any |= one);
-        }
-        passed
-    };
-    let step = 0.25 / f64::from(STEPS);
-    let scan: Vec<(usize, f64)> = (0..ends.len())
-        .flat_map(|i| (0..=STEPS).map(move |s| (i, 1.02 - step * f64::from(s))))
-        .collect();
-    // The outermost that passes, and what does not beyond it; the bound where none does.
-    let mut found = vec![None; ends.len()];
-    for (&(i, share), passed) in scan.iter().zip(passes(&scan)) {
-        if passed && found[i].is_none() {
-            found[i] = Some(share);
-        }
-    }
-    let mut width = step;
-    for _ in 0..HALVINGS {
-        width *= 0.5;
-        let middles: Vec<(usize, f64)> =
-            (0..ends.len()).filter_map(|i| Some((i, found[i]? + width))).collect();
-        for (&(i, share), passed) in middles.iter().zip(passes(&middles)) {
-            if passed {
-                found[i] = Some(share);
-            }
-        }
-    }
-    let reach = |i: usize| found[i].map_or(1.0, |share| share + width);
-    (0..ends.len()).map(|i| centre + (ends[i] - centre) * reach(i)).collect()
 }

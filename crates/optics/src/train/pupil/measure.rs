@@ -3,10 +3,9 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::place::between;
 use super::search::Window;
-use super::{
-    ANGLES, ExitPupil, Layout, Outline, PLANAR_INTERVALS, RADIAL_INTERVALS, between, turn_of,
-};
+use super::{ANGLES, ExitPupil, Layout, Outline, PLANAR_INTERVALS, RADIAL_INTERVALS, turn_of};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
 use crate::train::{MonochromaticTrain, OpticalTrain, Side};

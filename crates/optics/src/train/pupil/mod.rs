@@ -25,23 +25,31 @@
 //! The bounds that this replaces: C. Kolb, D. Mitchell, P. Hanrahan, "A realistic camera model for
 //! computer graphics", 1995; M. Pharr, W. Jakob, G. Humphreys, *Physically Based Rendering*, 6.4.5.
 
+mod bound;
+mod clear;
 mod coded;
 mod disk;
 mod histogram;
 mod lenslets;
+mod mask;
 mod measure;
+mod outline_table;
 mod place;
+mod region;
 mod search;
 
 use glam::{DVec2, DVec3};
 
+use self::bound::Bound;
+use self::clear::without_masks;
 use self::coded::Coded;
-use self::place::{Place, between, turn_of};
+use self::place::turn_of;
 use super::aim::towards_lens;
-use super::{MonochromaticTrain, OpticalTrain, Part, Side};
-use crate::element::{Clip, FateCounts, Frame, LensRays, LossesSpec, Opening, RayStatus};
+use super::{MonochromaticTrain, OpticalTrain, Side};
+use crate::element::{Clip, FateCounts, Frame, LensRays, RayStatus};
 use crate::glass::GlassError;
 
+pub use clear::{without_dimming, without_filters};
 pub use disk::{Bundle, Disk};
 pub use lenslets::LensletPupil;
 pub use measure::lit_radius;
@@ -369,103 +377,6 @@ impl ExitPupil {
     }
 }
 
-/// The outline from one point of the sensor.
-struct Bound<'a> {
-    nodes: &'a [Outline],
-    /// Between which nodes; `None` for a disk.
-    place: Option<Place>,
-    /// Centre and half axes in slopes, as the nodes are turned.
-    frame: [DVec2; 2],
-}
-
-impl Bound<'_> {
-    /// The radius in the frame at a share of a full turn.
-    fn reach(&self, turn: f64) -> f64 {
-        self.place.as_ref().map_or(1.0, |place| {
-            let reach =
-                |&(node, weight): &(usize, f64)| between(&self.nodes[node].reach, turn) * weight;
-            place.nodes.iter().map(reach).sum()
-        })
-    }
-
-    fn turned(&self, slopes: DVec2) -> DVec2 {
-        self.place.as_ref().map_or(slopes, |place| place.turned(slopes))
-    }
-
-    fn centre(&self) -> DVec2 {
-        self.turned(self.frame[0])
-    }
-
-    /// Slopes for a place in the unit square, uniform in area at each angle, and the area of slopes that
-    /// they stand for; `None` when the bound is empty there.
-    fn draw(&self, u: [f64; 2]) -> Option<(DVec2, f64)> {
-        let (disc_radius, turn) = concentric(u);
-        let reach = self.reach(turn);
-        let [centre, half] = self.frame;
-        let angle = DVec2::from_angle(turn * std::f64::consts::TAU);
-        let area = std::f64::consts::PI * half.x * half.y * reach * reach;
-        (reach > 0.0).then(|| (self.turned(centre + angle * half * (reach * disc_radius)), area))
-    }
-
-    /// The density of [`Self::draw`] per area of slopes; 0 outside.
-    fn density(&self, slopes: DVec2) -> f64 {
-        let [centre, half] = self.frame;
-        let unturned = self.place.as_ref().map_or(slopes, |place| place.unturned(slopes));
-        let inside = (unturned - centre) / half;
-        let turn = (inside.to_angle() / std::f64::consts::TAU).rem_euclid(1.0);
-        let reach = self.reach(turn);
-        if !(reach > 0.0 && inside.length() <= reach) {
-            return 0.0;
-        }
-        1.0 / (std::f64::consts::PI * half.x * half.y * reach * reach)
-    }
-}
-
-/// From the unit square to the disk: radius and share of a full turn, with equal areas staying
-/// equal (P. Shirley and K. Chiu, "A low distortion map between disk and square", 1997).
-fn concentric(u: [f64; 2]) -> (f64, f64) {
-    let [a, b] = u.map(|x| 2.0 * x - 1.0);
-    if a == 0.0 && b == 0.0 {
-        return (0.0, 0.0);
-    }
-    let (radius, eighths) = if a.abs() > b.abs() { (a, b / a) } else { (b, 2.0 - a / b) };
-    let turn = eighths / 8.0 + if radius < 0.0 { 0.5 } else { 0.0 };
-    (radius.abs(), turn.rem_euclid(1.0))
-}
-
-/// The same lens with masks clear: the bound goes around their whole rectangle.
-fn without_masks(train: &OpticalTrain) -> OpticalTrain {
-    let mut train = train.clone();
-    for element in &mut train.elements {
-        if let Part::Aperture(opening) = &element.part
-            && let Opening::Image(picture) = &**opening
-        {
-            element.part = Part::Aperture(Opening::Image(picture.blank()).into());
-        }
-    }
-    train
-}
-
-/// The same lens with filters clear: what is left does not depend on the wavelength but for glass.
-pub fn without_filters(train: &OpticalTrain) -> OpticalTrain {
-    let mut train = train.clone();
-    for element in &mut train.elements {
-        if let Part::MicrolensArray(array) = &element.part {
-            element.part = Part::MicrolensArray(array.without_filters());
-        }
-        if let Part::Filter(filter) = &element.part {
-            let opening = Opening::Circle { radius: filter.radius() };
-            element.part = Part::Aperture(opening.into());
-        }
-    }
-    train
-}
-
-/// The same lens with masks and filters clear, and nothing lost in glass.
-pub fn without_dimming(train: &OpticalTrain) -> OpticalTrain {
-    without_filters(&without_masks(train)).with_losses(LossesSpec::default())
-}
-
 /// The error that names what blocks the light.
 pub fn blocked(train: &OpticalTrain, lens: &MonochromaticTrain, film: DVec3) -> ExitPupilError {
     let mut counts = FateCounts::new(train.elements.len());
@@ -495,22 +406,6 @@ mod tests {
         let path = format!("{}/../../scenes/lenses/{name}.json", env!("CARGO_MANIFEST_DIR"));
         let file = LensFile::from_json(&std::fs::read_to_string(path).unwrap()).unwrap();
         file.build(&|name| Err(format!("{name}: presets have no files"))).unwrap()
-    }
-
-    #[test]
-    fn the_map_from_the_square_keeps_areas_and_neighbours() {
-        let mut inside = 0;
-        for i in 0..10_000 {
-            let u = [f64::from(i % 100) / 100.0 + 0.005, f64::from(i / 100) / 100.0 + 0.005];
-            let (radius, turn) = concentric(u);
-            assert!((0.0..=1.0).contains(&radius) && (0.0..1.0).contains(&turn));
-            inside += u32::from(radius <= 0.5);
-        }
-        assert_eq!(inside, 2500, "a quarter of the disk's area is a quarter of the square's");
-        assert_eq!(concentric([0.5, 0.5]), (0.0, 0.0));
-        assert_eq!(concentric([1.0, 0.5]), (1.0, 0.0));
-        assert_eq!(concentric([0.5, 1.0]), (1.0, 0.25));
-        assert_eq!(concentric([0.0, 0.5]), (1.0, 0.5));
     }
 
     /// The proof of the margin: the bound was closed with rays of the first rounds, and of the

@@ -1,0 +1,92 @@
+//! The bound around the passing directions from one point of the sensor, joined from those of the nodes
+//! around it: samples of it and their density.
+
+use glam::DVec2;
+
+use super::Outline;
+use super::place::{Place, between};
+
+/// The outline from one point of the sensor.
+pub(super) struct Bound<'a> {
+    pub(super) nodes: &'a [Outline],
+    /// Between which nodes; `None` for a disk.
+    pub(super) place: Option<Place>,
+    /// Centre and half axes in slopes, as the nodes are turned.
+    pub(super) frame: [DVec2; 2],
+}
+
+impl Bound<'_> {
+    /// The radius in the frame at a share of a full turn.
+    fn reach(&self, turn: f64) -> f64 {
+        self.place.as_ref().map_or(1.0, |place| {
+            let reach =
+                |&(node, weight): &(usize, f64)| between(&self.nodes[node].reach, turn) * weight;
+            place.nodes.iter().map(reach).sum()
+        })
+    }
+
+    fn turned(&self, slopes: DVec2) -> DVec2 {
+        self.place.as_ref().map_or(slopes, |place| place.turned(slopes))
+    }
+
+    pub(super) fn centre(&self) -> DVec2 {
+        self.turned(self.frame[0])
+    }
+
+    /// Slopes for a place in the unit square, uniform in area at each angle, and the area of slopes that
+    /// they stand for; `None` when the bound is empty there.
+    pub(super) fn draw(&self, u: [f64; 2]) -> Option<(DVec2, f64)> {
+        let (disc_radius, turn) = concentric(u);
+        let reach = self.reach(turn);
+        let [centre, half] = self.frame;
+        let angle = DVec2::from_angle(turn * std::f64::consts::TAU);
+        let area = std::f64::consts::PI * half.x * half.y * reach * reach;
+        (reach > 0.0).then(|| (self.turned(centre + angle * half * (reach * disc_radius)), area))
+    }
+
+    /// The density of [`Self::draw`] per area of slopes; 0 outside.
+    pub(super) fn density(&self, slopes: DVec2) -> f64 {
+        let [centre, half] = self.frame;
+        let unturned = self.place.as_ref().map_or(slopes, |place| place.unturned(slopes));
+        let inside = (unturned - centre) / half;
+        let turn = (inside.to_angle() / std::f64::consts::TAU).rem_euclid(1.0);
+        let reach = self.reach(turn);
+        if !(reach > 0.0 && inside.length() <= reach) {
+            return 0.0;
+        }
+        1.0 / (std::f64::consts::PI * half.x * half.y * reach * reach)
+    }
+}
+
+/// From the unit square to the disk: radius and share of a full turn, with equal areas staying
+/// equal (P. Shirley and K. Chiu, "A low distortion map between disk and square", 1997).
+fn concentric(u: [f64; 2]) -> (f64, f64) {
+    let [a, b] = u.map(|x| 2.0 * x - 1.0);
+    if a == 0.0 && b == 0.0 {
+        return (0.0, 0.0);
+    }
+    let (radius, eighths) = if a.abs() > b.abs() { (a, b / a) } else { (b, 2.0 - a / b) };
+    let turn = eighths / 8.0 + if radius < 0.0 { 0.5 } else { 0.0 };
+    (radius.abs(), turn.rem_euclid(1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::concentric;
+
+    #[test]
+    fn the_map_from_the_square_keeps_areas_and_neighbours() {
+        let mut inside = 0;
+        for i in 0..10_000 {
+            let u = [f64::from(i % 100) / 100.0 + 0.005, f64::from(i / 100) / 100.0 + 0.005];
+            let (radius, turn) = concentric(u);
+            assert!((0.0..=1.0).contains(&radius) && (0.0..1.0).contains(&turn));
+            inside += u32::from(radius <= 0.5);
+        }
+        assert_eq!(inside, 2500, "a quarter of the disk's area is a quarter of the square's");
+        assert_eq!(concentric([0.5, 0.5]), (0.0, 0.0));
+        assert_eq!(concentric([1.0, 0.5]), (1.0, 0.0));
+        assert_eq!(concentric([0.5, 1.0]), (1.0, 0.25));
+        assert_eq!(concentric([0.0, 0.5]), (1.0, 0.5));
+    }
+}

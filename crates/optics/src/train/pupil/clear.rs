@@ -1,0 +1,37 @@
+//! A lens with parts of it made clear: what its bounds do not depend on.
+
+use crate::element::{LossesSpec, Opening};
+use crate::train::{OpticalTrain, Part};
+
+/// The same lens with masks clear: the bound goes around their whole rectangle.
+pub(super) fn without_masks(train: &OpticalTrain) -> OpticalTrain {
+    let mut train = train.clone();
+    for element in &mut train.elements {
+        if let Part::Aperture(opening) = &element.part
+            && let Opening::Image(picture) = &**opening
+        {
+            element.part = Part::Aperture(Opening::Image(picture.blank()).into());
+        }
+    }
+    train
+}
+
+/// The same lens with filters clear: what is left does not depend on the wavelength but for glass.
+pub fn without_filters(train: &OpticalTrain) -> OpticalTrain {
+    let mut train = train.clone();
+    for element in &mut train.elements {
+        if let Part::MicrolensArray(array) = &element.part {
+            element.part = Part::MicrolensArray(array.without_filters());
+        }
+        if let Part::Filter(filter) = &element.part {
+            let opening = Opening::Circle { radius: filter.radius() };
+            element.part = Part::Aperture(opening.into());
+        }
+    }
+    train
+}
+
+/// The same lens with masks and filters clear, and nothing lost in glass.
+pub fn without_dimming(train: &OpticalTrain) -> OpticalTrain {
+    without_filters(&without_masks(train)).with_losses(LossesSpec::default())
+}
