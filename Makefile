@@ -7,7 +7,7 @@ export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
 .PHONY: help setup render install dist test test-embree4 python bench bench-peers bench-python bench-light bench-lens bench-sensor docs-figures docs-charts \
-	docs-stability fingerprints fuzz-smoke fuzz-seeds clean
+	docs-stability light-fields fingerprints fuzz-smoke fuzz-seeds clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -23,6 +23,7 @@ help:
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
+	@echo "make light-fields  the walk of docs/light-fields.md in a venv, its pictures, and another decoder's opinion"
 	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
 	@echo "make docs-stability  take every method to where it fails, at full scale, write docs/stability.md"
 	@echo "make fingerprints  fingerprints of pictures, sensor images and lens tables, to move code without changing them"
@@ -89,7 +90,7 @@ bench-sensor:
 docs-charts: setup
 	cargo run --release -p etendue-benches --bin charts -- $(ARGS)
 
-docs-figures: setup docs-charts docs-stability
+docs-figures: setup docs-charts docs-stability light-fields
 	cargo run --release -p etendue-cli -- render scenes/first-light.json -o out/docs-figures \
 		--set 'camera.sensor.resolution=[640,640]' --samples 16 --outputs png
 	install -D -m 644 out/docs-figures/picture.png docs/images/first-light.png
@@ -97,8 +98,12 @@ docs-figures: setup docs-charts docs-stability
 		--samples 256 --outputs png
 	install -D -m 644 out/docs-figures/fig3/picture.png docs/images/fig3.png
 	for kind in fig6a fig6b; do \
-		cargo run --release -p etendue -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind \
+		cargo run --release -p etendue-cli -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind \
 			--set 'camera.sensor.resolution=[480,360]' --outputs png && \
+		install -D -m 644 out/docs-figures/$$kind/picture.png docs/images/$$kind.png || exit 1; \
+	done
+	for kind in fig6c fig8a fig8b fig8c; do \
+		cargo run --release -p etendue-cli -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind --outputs png && \
 		install -D -m 644 out/docs-figures/$$kind/picture.png docs/images/$$kind.png || exit 1; \
 	done
 	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
@@ -107,6 +112,10 @@ docs-figures: setup docs-charts docs-stability
 			--outputs png && \
 		install -D -m 644 out/docs-figures/$$kind/raw.preview.png docs/images/$$kind.png || exit 1; \
 	done
+
+# The Python of docs/light-fields.md and its pictures, and plenopticam's views against ours. ARGS go to the render.
+light-fields: setup
+	@scripts/light-fields.sh $(ARGS)
 
 # Every reader of files under changed inputs, each for a minute: ARGS="--seconds 600 obj ply" for more
 # of fewer. What fails is kept in out/fuzz.

@@ -198,6 +198,8 @@ fn what_is_no_light_field_is_refused_in_words() {
         ))
         .contains("exit pupil")
     );
+    let tiny = r#""microlenses": {"pitch": 0.1, "focal_length": 0.4}, "focal_length": 20, "f_number": 400"#;
+    assert!(base(&format!("{tiny}, {sensor}")).contains("smaller than a pixel"));
     assert!(
         base(&format!(r#""microlenses": {{"pitch": 0.1}}, {sensor}"#)).contains("focal_length")
     );

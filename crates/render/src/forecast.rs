@@ -45,9 +45,29 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
         sums: each(if is_gone_over { BYTES_OF_SUM * averaged(plan) } else { 0 }),
         sensor: each(if sensor > 0 { sensor.max(woven) } else { 0 }),
         files: each(look.max(png).max(if sensor > 0 { 0 } else { woven })),
+        views: views(scene, plan, outputs),
         ..MemoryForecast::of(scene)
     }
     .summed()
+}
+
+/// Bytes of the views of a light field behind a raw picture: decoded from it, or rendered as an ideal lens
+/// has them and then taken apart and shown side by side, whichever is more.
+fn views(scene: &Scene, plan: &Plan, outputs: Outputs) -> u64 {
+    let (Some(light_field), true) = (scene.camera.light_field(), scene.camera.lens().is_some())
+    else {
+        return 0;
+    };
+    let picture = plan.layers.iter().find(|layer| Some(**layer) == scene.picture);
+    let Some(&picture) = picture else { return 0 };
+    let grid = &light_field.grid;
+    let side = |count: u32| u64::from(count) * u64::from(light_field.views);
+    let bands = if expose::has_spectrum(scene) { plan.bands.count() as u64 } else { 0 };
+    let arrays = F32 * (3 + bands);
+    let averaged = if picture == LayerSpec::Radiance { plan.bands.count() as u64 } else { 3 };
+    let shown = F32 * 3 + if outputs.png { PNG } else { 0 };
+    let reference = bytes_of_layer(picture, plan) + (BYTES_OF_SUM * averaged).max(arrays + shown);
+    side(grid.rows).saturating_mul(side(grid.cols)).saturating_mul(reference.max(2 * arrays))
 }
 
 /// Values of a pixel that are averaged over samples.

@@ -128,6 +128,15 @@ impl LensCamera {
         Self { focused: self.focused.coarser(factor), ..self.clone() }
     }
 
+    /// The centroid of a lenslet's light on the sensor (pixels from the corner) when the same radiance comes
+    /// from everywhere; `None` before the camera is opened for bands, and in the dark.
+    #[must_use]
+    pub fn image_centroid(&self, cell: [f64; 2]) -> Option<[f64; 2]> {
+        let lenslets = self.opened.as_ref()?.pupil.lenslets()?;
+        let at = lenslets.image_centroid(cell, self.focused.sensor_z())?;
+        Some(self.focused.pixel_of(at))
+    }
+
     /// The lenslets that the sensor looks through, if it does.
     #[must_use]
     pub fn lenslets(&self) -> Option<&LensletChiefs> {

@@ -165,6 +165,16 @@ impl LightField {
                 ),
             ));
         }
+        if image_diameter < 1.0 {
+            return Err(fault(
+                "f_number",
+                format!(
+                    "the images that lenslets make of the main lens' opening are {image_diameter:.2} pixels \
+                     wide, smaller than a pixel: no pixel sees a part of the opening; open the lens, or give \
+                     smaller pixels or lenslets of a longer focal length"
+                ),
+            ));
+        }
         let views = match views {
             None => most_views(image_diameter, step),
             Some(0) => return Err(fault("views", "is 0; it must be 1 or more".to_owned())),

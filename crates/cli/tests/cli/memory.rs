@@ -168,13 +168,14 @@ fn copies_of_models_may_change_while_they_are_rendered() {
 fn forecasts_are_within_half_as_much_again_of_the_peak() {
     let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let fewer = ["--set", "render.samples=8"];
-    let cases: [(&str, &[&str]); 6] = [
+    let cases: [(&str, &[&str]); 7] = [
         ("cube.json", &[]),
         ("first-light.json", &[]),
         ("instances.json", &[]),
         ("orthographic.json", &[]),
         ("opencv.json", &[]),
         ("double-gauss.json", &fewer),
+        ("light-field.json", &fewer),
     ];
     let bench = Bench::new();
     for (name, more) in cases {

@@ -35,9 +35,12 @@ pub(super) struct Geometry {
     array: Option<ArrayFacts>,
     /// The middles of the lenslets' images by chief ray, `[row][column]`: x, y in pixels.
     centres_px: Option<Vec<Vec<[f64; 2]>>>,
+    /// The centroids of the light of the same images before a uniform light, which cos⁴ and vignetting
+    /// move away from the chief rays.
+    centroids_px: Option<Vec<Vec<[f64; 2]>>>,
     /// The lenslets' own centres, seen square to the sensor, in pixels.
     lenslet_centres_px: Option<Vec<Vec<[f64; 2]>>>,
-    about: [&'static str; 4],
+    about: [&'static str; 5],
 }
 
 /// How disparity follows from depth.
@@ -68,13 +71,15 @@ struct ArrayFacts {
     first_lenslet_mm: [f64; 2],
 }
 
-const ABOUT: [&str; 4] = [
+const ABOUT: [&str; 5] = [
     "x runs right and y down; the picture is upright, so the sensor behind it is turned by 180 degrees",
     "view (u, v) takes the pixel at centre + step_px (u - (views - 1)/2, v - (views - 1)/2); u counts from \
      the left, v from the top, and its viewpoint is that far right and down in the opening",
     "row r, column c of a view is the lenslet at offset_px + pitch_px c (cos, sin) + row_pitch_px r (-sin, \
      cos) of rotation_rad; in a hex grid odd rows are half a pitch further along the row",
     "the chief ray of the main lens through a lenslet's middle ends in its image's middle: centres_px",
+    "the light of that image in the white picture has its centroid at centroids_px: cos^4 and vignetting move \
+     it",
 ];
 
 impl Geometry {
@@ -137,6 +142,11 @@ impl Geometry {
                     let at = view.centre(lenslets.cell(row, col));
                     Some(from_centre(lens.focused().pixel_of(at)))
                 }))
+            }),
+            centroids_px: lens.map(|lens| {
+                by_rows(light_field, |row, col| {
+                    lens.image_centroid(lenslets.cell(row, col)).map(from_centre)
+                })
             }),
             centres_px: centres,
             about: ABOUT,

@@ -22,6 +22,7 @@ use std::path::{Path, PathBuf};
 use etendue_accel::Accel;
 use etendue_camera::{Camera, Projection, ViewGrid};
 use etendue_scene::Scene;
+use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
 use crate::expose::SPECTRUM;
@@ -120,11 +121,13 @@ pub fn write(
     let Projection::Views(grid) = reference.projection() else { return Ok(set.written) };
     let raw = scene.camera.lens();
     let depth = central_depth(rendering, &reference, outputs, &|share| progress(0.1 * share))?;
-    let geometry = Geometry::new(&scene.camera, light_field, grid, &depth);
+    // Without a lens there is nothing to open.
+    let camera = scene.camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
+    let geometry = Geometry::new(&camera, light_field, grid, &depth);
     sidecar::write_json(&set.place("geometry.json"), &geometry)?;
     set.depth(grid, &depth)?;
     if raw.is_some() {
-        let white = white::picture(&scene.camera, &scene.render)?;
+        let white = white::picture(&camera, &scene.render)?;
         set.picture("white", &white)?;
     }
     if picture.layer("").is_none() {
@@ -135,8 +138,8 @@ pub fn write(
     let truth = match raw {
         None => None,
         Some(lens) => {
-            let decoded = Views::decoded(picture, lens, light_field, grid)?;
-            set.views("views", &decoded, picture)?;
+            // Gone before the reference is rendered, which takes as much again.
+            set.views("views", &Views::decoded(picture, lens, light_field, grid)?, picture)?;
             let truth = reference_picture(rendering, &reference, outputs, &|share| {
                 progress(0.1 + 0.9 * share)
             })?;

@@ -8,18 +8,17 @@ use etendue_spectrum::Bands;
 use rayon::prelude::*;
 
 use super::LightFieldError;
-use crate::RenderError;
 use crate::output::{Channel, Layer, Look, Picture, Values};
 
-/// Samples a pixel: few where all of them get through alike, many at the rims of images.
-const SAMPLES: [u32; 2] = [16, 256];
+/// Samples a pixel: few where all of them get through alike, more at the rims of images.
+const SAMPLES: [u32; 2] = [16, 64];
 
-/// How much the weights of a pixel may differ to be alike.
-const ALIKE: f64 = 0.02;
+/// How much the weights of a pixel may differ to be alike: cos⁴ takes half within a lenslet's light at f/1.
+/// Sixteen stratified samples of what changes so evenly have its mean to a percent.
+const ALIKE: f64 = 0.6;
 
-/// What a picture of radiance 1 everywhere is.
+/// What a picture of radiance 1 everywhere is to a camera that is opened for red, green and blue.
 pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, LightFieldError> {
-    let camera = camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
     let groups = camera.band_groups(&Bands::Rgb);
     let [width, height] = camera.resolution();
     let row = |row: u32| -> [Vec<f32>; 3] {

@@ -41,6 +41,8 @@ pub struct MemoryForecast {
     pub sensor: u64,
     /// What is made of the planes on the way to files and for a look at the picture so far.
     pub files: u64,
+    /// What the views of a light field take: they are made when all of the former is done.
+    pub views: u64,
     /// All but the mapped part. Sums are gone when the sensor's images and files are made.
     pub total: u64,
 }
@@ -63,7 +65,7 @@ impl MemoryForecast {
     #[must_use]
     pub fn summed(mut self) -> Self {
         let lasting = [self.program, self.geometry, self.structure, self.images, self.film];
-        let passing = self.sums.max(self.sensor).saturating_add(self.files);
+        let passing = self.sums.max(self.sensor).saturating_add(self.files).max(self.views);
         self.total = lasting.into_iter().fold(passing, u64::saturating_add);
         self
     }
@@ -98,6 +100,7 @@ impl fmt::Display for MemoryForecast {
             ("sums of passes", self.sums),
             ("sensor", self.sensor),
             ("files", self.files),
+            ("views", self.views),
         ];
         let parts = parts.iter().filter(|(_, bytes)| *bytes > 0);
         let parts: Vec<String> =

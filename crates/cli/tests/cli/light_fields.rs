@@ -1,0 +1,156 @@
+//! Light-field cameras and arrays of cameras, as a user meets them.
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::{Value, json};
+
+use crate::run::{Bench, text};
+
+/// A camera of 20 mm f/4 with lenslets of 0.1 mm before a ball.
+fn scene() -> Value {
+    json!({
+        "etendue": 1, "tracer": {"type": "facing"}, "render": {"samples": 4},
+        "objects": [{"shape": "sphere", "radius": 0.03}],
+        "camera": {
+            "type": "light_field", "focal_length": 20, "f_number": 4, "focus_distance": 0.5,
+            "microlenses": {"pitch": 0.1},
+            "pose": {"from": [0, 0, 0.5], "look_at": [0, 0, 0]},
+            "sensor": {"resolution": [120, 90], "pixel_pitch": 8}
+        }
+    })
+}
+
+/// What `etendue render` says of the scene with a value of its own, which it refuses.
+fn refused(path: &str, value: &str) -> String {
+    let bench = Bench::with_scene(&scene().to_string());
+    let setting = format!("{path}={value}");
+    let output = bench.run(&["render", "scene.json", "-o", "out", "-q", "--set", &setting]);
+    assert_eq!(output.status.code(), Some(2), "{setting}: {}", text(&output.stderr));
+    assert!(!bench.path("out/picture.png").exists(), "{setting}");
+    text(&output.stderr)
+}
+
+#[test]
+fn cameras_that_have_no_light_field_are_refused_with_a_way_out() {
+    let lenslets = "camera.microlenses";
+    for (path, value, words) in [
+        ("camera.microlenses.pitch", "0", "above zero"),
+        ("camera.microlenses.pitch", "3", "smaller pitch"),
+        (lenslets, r#"{"pitch": 0.5, "size": [0.3, 0.3], "focal_length": 2}"#, "not one lenslet"),
+        (lenslets, r#"{"pitch": 0.1, "size": [0.2, 0.2]}"#, "not one lenslet"),
+        ("camera.views", "40", "no samples of the opening"),
+        ("camera.sensor.pixel_pitch", "80", "pixels apart"),
+        ("camera.sensor.resolution", "[8, 8]", "whole on the sensor"),
+    ] {
+        let message = refused(path, value);
+        assert!(message.contains(words), "{path} {value}: {message}");
+    }
+}
+
+/// An array that stands beside the light of the lens before it: an error that says so.
+#[test]
+fn an_array_beside_the_light_is_refused() {
+    let mut scene = scene();
+    scene["camera"] = json!({
+        "type": "lens", "pose": {"from": [0, 0, 0.5], "look_at": [0, 0, 0]},
+        "sensor": {"resolution": [60, 40], "pixel_pitch": 20},
+        "lens": {"elements": [
+            {"type": "aperture", "shape": "circular", "radius": 5, "stop": true},
+            {"type": "thin_lens", "focal_length": 40, "thickness": 43.478},
+            {"type": "microlens_array", "size": [1, 1], "pitch": 0.25, "focal_length": 1,
+             "decentre": [30, 0], "thickness": 1}]}
+    });
+    let bench = Bench::with_scene(&scene.to_string());
+    let output = bench.run(&["render", "scene.json", "-o", "out", "-q"]);
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("microlens array"), "{}", text(&output.stderr));
+}
+
+/// Frames whose settings are whole cameras: one file, one run, and one structure for all of them.
+#[test]
+fn a_list_of_cameras_shares_one_structure() {
+    let mut scene = scene();
+    let pose = json!({"from": [0, 0, 0.5], "look_at": [0, 0, 0]});
+    let right = json!({"from": [0.05, 0, 0.5], "look_at": [0, 0, 0]});
+    let sensor = json!({"resolution": [24, 16]});
+    scene["layers"] = json!(["depth"]);
+    scene["frames"] = json!([
+        {"camera": {"type": "pinhole", "fov": 20, "pose": pose, "sensor": sensor}},
+        {"camera": {"type": "orthographic", "height": 0.1, "pose": right, "sensor": sensor}},
+        {"camera": {"type": "thin_lens", "focal_length": 20, "f_number": 4, "focus_distance": 0.5,
+                    "sensor_height": 4, "pose": right, "sensor": sensor}},
+        {"camera.microlenses.rotation": 3}
+    ]);
+    let bench = Bench::with_scene(&scene.to_string());
+    bench.render(&["--report", "report.json"]);
+    let reports = bench.json("report.json");
+    let reports = reports.as_array().unwrap();
+    assert_eq!(reports.len(), 4);
+    for (number, report) in reports.iter().enumerate() {
+        let build = report["seconds"]["build"].as_f64().unwrap();
+        assert_eq!(build == 0.0, number > 0, "frame {number} took {build} s to build");
+        assert!(bench.path(&format!("out/frames/{number:06}/picture.npy")).exists());
+    }
+    assert!(bench.path("out/frames/000003/geometry.json").exists(), "a light field of its own");
+    assert!(!bench.path("out/frames/000001/geometry.json").exists());
+}
+
+/// A grid of pinholes is the light field that a camera with as many views would have: the next camera sees
+/// a point of a wall where baseline, focal length and depth say.
+#[test]
+fn a_grid_of_cameras_has_the_disparity_of_its_spacing() {
+    let scene = json!({
+        "etendue": 1, "layers": ["position"], "objects": [{"shape": "rectangle", "width": 9, "height": 9}],
+        "camera": {"type": "pinhole", "fov": 40, "sensor": {"resolution": [32, 24]},
+                   "pose": {"from": [0, 0, 2], "look_at": [0, 0, 0]}},
+        "frames": {"type": "grid", "columns": 3, "rows": 2, "spacing": 0.1}
+    });
+    let bench = Bench::with_scene(&scene.to_string());
+    bench.render(&["--report", "report.json"]);
+    let reports = bench.json("report.json");
+    let builds = reports.as_array().unwrap().iter().filter(|r| r["seconds"]["build"] != 0.0);
+    assert_eq!(builds.count(), 1);
+    let x = |frame: u32| bench.array(&format!("frames/{frame:06}/position"))[3 * (12 * 32 + 16)];
+    let y =
+        |frame: u32| bench.array(&format!("frames/{frame:06}/position"))[3 * (12 * 32 + 16) + 1];
+    for (a, b, right, down) in [(0, 1, 0.1, 0.0), (1, 2, 0.1, 0.0), (0, 3, 0.0, 0.1)] {
+        assert!((x(b) - x(a) - right).abs() < 1e-6, "{a} {b}: row by row from the top left");
+        assert!((y(b) - y(a) + down).abs() < 1e-6, "{a} {b}");
+    }
+}
+
+/// The Python of docs/light-fields.md on what a camera of these pages leaves: it checks itself. Takes the
+/// interpreter that `ETENDUE_PYTHON` names, else `python3`, where it has numpy.
+#[test]
+fn the_page_of_light_fields_runs() {
+    let python = std::env::var("ETENDUE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let has_numpy = Command::new(&python).args(["-c", "import numpy"]).output();
+    if !has_numpy.is_ok_and(|output| output.status.success()) {
+        println!("passed over: {python} has no numpy");
+        return;
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let bench = Bench::new();
+    let scene = root.join("scenes/light-field.json");
+    let output = bench.run(&[
+        "render",
+        &scene.to_string_lossy(),
+        "-o",
+        "out",
+        "-q",
+        "--samples",
+        "8",
+        "--set",
+        "camera.sensor.resolution=[360,270]",
+    ]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let page = std::fs::read_to_string(root.join("docs/light-fields.md")).unwrap();
+    let blocks = page.split("```python\n").skip(1).filter_map(|rest| rest.split("```").next());
+    let program: String = blocks.collect();
+    assert!(program.contains("refocused"), "{program}");
+    bench.write("page.py", program.as_bytes());
+    let output = Command::new(&python).arg("page.py").current_dir(bench.path("")).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(bench.path("refocused.npy").exists());
+}
