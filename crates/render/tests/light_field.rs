@@ -273,8 +273,7 @@ fn spectra_of_views_are_those_of_what_they_see() {
         format!(
             r#"{{"etendue": 1, "tracer": {{"type": "direct"}}, "render": {{"samples": 16}},
             "camera": {camera},
-            "lights": [{{"type": "environment", "radiance": [0.6, 0.6, 0.6]}}],
-            "materials": {{"a": {{"type": "matte", "color": [0.7, 0.4, 0.1]}}}},
+            "materials": {{"a": {{"type": "emissive", "radiance": [0.7, 0.4, 0.1]}}}},
             "objects": [{{"shape": "rectangle", "width": 1, "height": 1, "material": "a"}}]}}"#
         )
     };

@@ -108,7 +108,11 @@ impl LensCamera {
             |film: DVec2| Window::find(train, &clear, frame.point(film.extend(0.0))).is_some();
         let places = [-1.0, 0.0, 1.0].map(|y| [-1.0, 0.0, 1.0].map(|x| DVec2::new(x, y) * half));
         if !lit_from(DVec2::ZERO) && !places.into_iter().flatten().any(lit_from) {
-            return Err(dark(blocked(train, &clear, frame.vertex)));
+            let closed = train.elements().iter().any(|e| e.clear_radius() == 0.0);
+            return Err(dark(match focused.train().first_array() {
+                Some(element) if !closed => ExitPupilError::Array { element },
+                _ => blocked(train, &clear, frame.vertex),
+            }));
         }
         let lit = ImageCircle::measure(train, &clear, frame, half);
         let solid_angle = unvignetted(focused.train(), &design, &focused);

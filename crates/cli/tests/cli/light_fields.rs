@@ -38,7 +38,11 @@ fn cameras_that_have_no_light_field_are_refused_with_a_way_out() {
         ("camera.microlenses.pitch", "0", "above zero"),
         ("camera.microlenses.pitch", "3", "smaller pitch"),
         (lenslets, r#"{"pitch": 0.5, "size": [0.3, 0.3], "focal_length": 2}"#, "not one lenslet"),
-        (lenslets, r#"{"pitch": 0.1, "size": [0.2, 0.2]}"#, "not one lenslet"),
+        (
+            lenslets,
+            r#"{"pitch": 0.1, "size": [0.12, 0.12], "offset": [0.05, 0.05]}"#,
+            "whole on the sensor",
+        ),
         ("camera.views", "40", "no samples of the opening"),
         ("camera.sensor.pixel_pitch", "80", "pixels apart"),
         ("camera.sensor.resolution", "[8, 8]", "whole on the sensor"),
