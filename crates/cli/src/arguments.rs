@@ -5,6 +5,7 @@ mod parse;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use etendue::Shard;
 use etendue_optics::train::Focus;
 use etendue_scene::import::Strictness;
 use etendue_scene::{LoadOptions, Reach};
@@ -34,6 +35,9 @@ pub(crate) enum Command {
     /// Render a scene file or a model into a folder
     #[command(after_help = RENDER_HELP)]
     Render(RenderArguments),
+    /// Put together the shares that `render --shard` wrote: the files of a render on one machine, to the bit
+    #[command(after_help = MERGE_HELP)]
+    Merge(MergeArguments),
     /// Examine a scene or model without rendering it
     #[command(after_help = "Example:\n  etendue check scenes/first-light.json\n  \
                             etendue check model.glb --json")]
@@ -85,6 +89,14 @@ Examples:
   etendue render model.glb -o out/lit --set tracer.type=path --set render.exposure=auto --samples 64
   etendue render scan.ply -o out/scan --up z
   etendue render scenes/cube.json -o out/cube --set camera.fov=30 --samples 16";
+
+const MERGE_HELP: &str = "\
+The scene is read again, from where the shares found it, for what is written beside the picture.
+
+Example:
+  etendue render scenes/first-light.json -o out/shares --shard 1/2
+  etendue render scenes/first-light.json -o out/shares --shard 2/2
+  etendue merge out/first-light out/shares/shard-*.film";
 
 const BENCH_HELP: &str = "\
 Prints a table, and writes into the folder:
@@ -304,10 +316,37 @@ pub(crate) struct RenderArguments {
     /// Of a scene with `frames`, leave those that are complete in the folder
     #[arg(long)]
     pub(crate) resume: bool,
+    /// Render only this share of the picture's rows, e.g. 3/8, into shard-3-of-8.film, for `etendue merge`
+    #[arg(long, value_name = "NUMBER/COUNT", value_parser = str::parse::<Shard>)]
+    pub(crate) shard: Option<Shard>,
+    /// Keep what there is on the way, in checkpoint.film, so often at most; the same command goes on from
+    /// there after an interruption, and its picture is the same to the bit
+    #[arg(long, value_name = "SECONDS", num_args = 0..=1, default_missing_value = "60",
+          value_parser = parse::seconds)]
+    pub(crate) checkpoint: Option<f64>,
     /// Write nothing of a picture that is stopped by Ctrl-C. Else what all pixels have by then is
     /// written, marked as partial
     #[arg(long)]
     pub(crate) discard_partial: bool,
+    /// Show no progress and no summary; the list of files and errors remain
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MergeArguments {
+    /// The folder to write into; made when it is not there
+    #[arg(value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// All shares of one render
+    #[arg(value_name = "SHARE", required = true)]
+    pub(crate) shares: Vec<PathBuf>,
+    /// Where the scene is now, if not where the shares found it
+    #[arg(long, value_name = "SCENE|MODEL")]
+    pub(crate) scene: Option<PathBuf>,
+    /// Write times, rays, memory and fingerprints as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) report: Option<PathBuf>,
     /// Show no progress and no summary; the list of files and errors remain
     #[arg(short, long)]
     pub(crate) quiet: bool,
@@ -428,7 +467,8 @@ impl Command {
             Self::Plan(arguments) => &arguments.scene.glass_catalogs,
             Self::Bench(arguments) => &arguments.scene.glass_catalogs,
             Self::Lens(arguments) => &arguments.glass_catalogs,
-            Self::Sensor(_) | Self::Schema { .. } => &[],
+            // A merge opens those of the shares.
+            Self::Merge(_) | Self::Sensor(_) | Self::Schema { .. } => &[],
         }
     }
 }

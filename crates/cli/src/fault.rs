@@ -28,8 +28,8 @@ impl Fault {
         Self::Refused(anyhow::Error::msg(message.into()))
     }
 
-    /// The user stopped it.
-    pub(crate) fn stopped(message: impl Into<String>) -> Self {
+    /// The user stopped it, or the system did not let it.
+    pub(crate) fn failed(message: impl Into<String>) -> Self {
         Self::Failed(anyhow::Error::msg(message.into()))
     }
 
@@ -58,7 +58,7 @@ impl Fault {
 impl From<etendue::Error> for Fault {
     fn from(error: etendue::Error) -> Self {
         match error {
-            error if error.is_stopped() => Self::stopped(STOPPED),
+            error if error.is_stopped() => Self::failed(STOPPED),
             error if error.is_refused() => Self::Refused(error.into()),
             error => Self::Failed(error.into()),
         }
@@ -81,7 +81,7 @@ as_the_library!(SceneError, RenderError, OutputError);
 impl From<BenchError> for Fault {
     fn from(error: BenchError) -> Self {
         match error {
-            BenchError::Stopped | BenchError::Build(BuildError::Stopped) => Self::stopped(STOPPED),
+            BenchError::Stopped | BenchError::Build(BuildError::Stopped) => Self::failed(STOPPED),
             BenchError::Drawing(_) => Self::Failed(error.into()),
             error => Self::Refused(error.into()),
         }
@@ -91,7 +91,7 @@ impl From<BenchError> for Fault {
 impl From<EmvaError> for Fault {
     fn from(error: EmvaError) -> Self {
         match error {
-            EmvaError::Stopped => Self::stopped(STOPPED),
+            EmvaError::Stopped => Self::failed(STOPPED),
             EmvaError::Write { .. } => Self::Failed(error.into()),
             error => Self::Refused(error.into()),
         }

@@ -7,6 +7,7 @@ mod check;
 mod fault;
 mod glasses;
 mod lens;
+mod merge;
 mod plan;
 mod progress;
 mod render;
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
     }
     let done = match cli.command {
         Some(Command::Render(arguments)) => render::run(&arguments),
+        Some(Command::Merge(arguments)) => merge::run(&arguments),
         Some(Command::Check(arguments)) => check::run(&arguments),
         Some(Command::Plan(arguments)) => plan::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),

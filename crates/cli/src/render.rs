@@ -1,19 +1,28 @@
 //! `etendue render`: from a file to a folder of images.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use etendue::{Error, Options, Progress, Rendering, Session, SoFar, places};
+use etendue::{Checkpoint, Error, Options, Progress, Rendering, Session, SoFar, places};
 use etendue_render::output::{Outputs, Temporary, png, sidecar};
 use etendue_render::{RenderError, Report, Seconds};
 
 use crate::arguments::{AccelMode, RenderArguments, SceneArguments};
 use crate::fault::{Fault, print_text};
 use crate::progress::{Stages, say};
-use crate::{sequence, stop};
+use crate::{merge, sequence, stop};
 
 pub(crate) fn run(arguments: &RenderArguments) -> Result<(), Fault> {
+    carry_out(arguments, |outputs| render(arguments, outputs))
+}
+
+/// Runs `render`, which writes into the output folder, on as many threads as are asked for.
+pub(crate) fn carry_out(
+    arguments: &RenderArguments,
+    render: impl FnOnce(Outputs) -> Result<(), Fault> + Send,
+) -> Result<(), Fault> {
     stop::listen();
     let outputs = Outputs::from_list(&arguments.outputs)
         .map_err(|message| Fault::refused(format!("--outputs: {message}")))?;
@@ -25,7 +34,7 @@ pub(crate) fn run(arguments: &RenderArguments) -> Result<(), Fault> {
     if folder_is_new {
         stop::made(&arguments.output);
     }
-    let done = pool.install(|| render(arguments, outputs));
+    let done = pool.install(|| render(outputs));
     if done.is_err() && folder_is_new {
         // Goes only when nothing was written into it.
         let _ = std::fs::remove_dir(&arguments.output);
@@ -61,12 +70,51 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
         let why = "--frames, --pattern and --resume are for scenes with `frames`, and this is one picture";
         return Err(Fault::refused(why));
     }
+    if let Some(shard) = arguments.shard {
+        return merge::render_shard(arguments, &mut session, shard, &progress);
+    }
     let watching = Watching::new(arguments, outputs);
     let progress = progress.with_looks(move |so_far| watching.look(so_far));
-    let results = session.check_place(folder, &[SO_FAR], &progress)?;
+    let checkpoint = keep(arguments, &mut session, folder, CHECKPOINT);
+    let results = session.check_place(folder, &[SO_FAR, CHECKPOINT], &progress)?;
     keep_report_apart(arguments, &mut session, &results)?;
     let rendering = session.render(&progress)?;
-    let partial = heed_stop(&rendering, arguments.discard_partial)?;
+    write(arguments, &rendering, outputs, progress)?;
+    Ok(checkpoint.map_or(Ok(()), remove)?)
+}
+
+/// Has the session keep what there is of the render in a file of `folder`, if that is asked for.
+pub(crate) fn keep(
+    arguments: &RenderArguments,
+    session: &mut Session,
+    folder: &Path,
+    name: &str,
+) -> Option<PathBuf> {
+    let every = Duration::try_from_secs_f64(arguments.checkpoint?).ok()?;
+    let path = folder.join(name);
+    session.keep_at(Some(Checkpoint { path: path.clone(), every }));
+    Some(path)
+}
+
+/// Removes a checkpoint that has served.
+pub(crate) fn remove(checkpoint: PathBuf) -> Result<(), Fault> {
+    match std::fs::remove_file(&checkpoint) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(Fault::failed(format!("cannot remove {}: {error}", checkpoint.display())))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes a rendering, its report and a summary; an error when it was stopped.
+pub(crate) fn write(
+    arguments: &RenderArguments,
+    rendering: &Rendering,
+    outputs: Outputs,
+    progress: Progress,
+) -> Result<(), Fault> {
+    let folder = &arguments.output;
+    let partial = heed_stop(rendering, arguments.discard_partial)?;
     if let Some(partial) = &partial
         && !arguments.quiet
     {
@@ -87,12 +135,12 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     match partial {
         None => Ok(()),
         Some(partial) => {
-            Err(Fault::stopped(format!("{partial}; the picture so far is in {}", folder.display())))
+            Err(Fault::failed(format!("{partial}; the picture so far is in {}", folder.display())))
         }
     }
 }
 
-fn open(arguments: &RenderArguments, outputs: Outputs) -> Result<Session, Error> {
+pub(crate) fn open(arguments: &RenderArguments, outputs: Outputs) -> Result<Session, Error> {
     let options = Options {
         memory_limit: arguments.memory_limit,
         copy: arguments.copy,
@@ -105,7 +153,7 @@ fn open(arguments: &RenderArguments, outputs: Outputs) -> Result<Session, Error>
 }
 
 /// Refuses to write the report over a result, or over what the scene is made of.
-fn keep_report_apart(
+pub(crate) fn keep_report_apart(
     arguments: &RenderArguments,
     session: &mut Session,
     results: &[PathBuf],
@@ -149,6 +197,9 @@ struct Watching {
     /// How long it took to write it last, and when that was done.
     shown: Mutex<Option<(Duration, Instant)>>,
 }
+
+/// What there is of a render, to go on from.
+const CHECKPOINT: &str = "checkpoint.film";
 
 /// The picture so far.
 const SO_FAR: &str = "picture.so-far.png";

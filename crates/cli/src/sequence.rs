@@ -9,7 +9,7 @@ use etendue_render::output::{Ledger, MANIFEST, Outputs, sidecar};
 use crate::arguments::RenderArguments;
 use crate::fault::{Fault, print_text};
 use crate::progress::say;
-use crate::render::heed_stop;
+use crate::render::{heed_stop, keep, remove};
 
 /// The names of what is written beside the folder of the frames.
 const BESIDE: [&str; 3] = ["index.json", "transforms.json", MANIFEST];
@@ -21,6 +21,11 @@ pub(crate) fn render(
     outputs: Outputs,
     progress: &Progress,
 ) -> Result<(), Fault> {
+    if arguments.shard.is_some() {
+        let why =
+            "--shard divides one picture; divide a scene with `frames` by --frames, e.g. 0..100";
+        return Err(Fault::refused(why));
+    }
     let out = &arguments.output;
     let range = arguments.frames.clone().unwrap_or(0..frames.len());
     let wanted = chosen(frames, &range)?;
@@ -35,6 +40,7 @@ pub(crate) fn render(
         session.show(frame)?;
         if arguments.resume && session.is_complete((out, &pattern), frame.number, progress)? {
             skipped += 1;
+            remove(out.join(checkpoint_of(frame)))?;
             dataset.add(frame, session.scene(progress)?, &pattern, outputs)?;
             continue;
         }
@@ -42,11 +48,13 @@ pub(crate) fn render(
             session.check_place(&out.join(pattern.folder(frame.number)), &[], progress)?;
         let inputs = &session.scene(progress)?.inputs;
         pattern.keep_apart(out, frame.number, (inputs, &results))?;
+        let checkpoint = keep(arguments, session, out, &checkpoint_of(frame));
         let rendering = session.render(progress)?;
         if let Some(partial) = heed_stop(&rendering, true)? {
-            return Err(Fault::stopped(partial));
+            return Err(Fault::failed(partial));
         }
         let written = pattern.write(&rendering, out, frame.number, (outputs, progress))?;
+        checkpoint.map_or(Ok(()), remove)?;
         dataset.add(frame, rendering.scene(), &pattern, outputs)?;
         files.extend(written.files.iter().cloned());
         let report = rendering.report_of(&written);
@@ -77,4 +85,9 @@ fn chosen<'f>(frames: &'f [Frame], range: &Range<usize>) -> Result<&'f [Frame], 
         let Range { start, end } = range;
         Fault::refused(format!("--frames {start}..{end}: the scene has the frames 0..{last}"))
     })
+}
+
+/// Where what there is of a frame is kept, beside the folders of the frames.
+fn checkpoint_of(frame: &Frame) -> String {
+    format!("frame-{:06}.checkpoint.film", frame.number)
 }

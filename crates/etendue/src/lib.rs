@@ -50,6 +50,7 @@
 //! | [`Session`] | a scene, opened once, changed and rendered often |
 //! | [`Rendering`] | layers as arrays, the sensor's images, files of them, the report |
 //! | [`Frame`], [`Dataset`] | the pictures of a scene that has `frames`, and what others read of them |
+//! | [`Shard`], [`Shares`], [`Checkpoint`] | renders that are divided over machines, or interrupted |
 //! | [`Progress`] | how far work is, and how it is stopped |
 //! | [`Error`] | why something could not be done, in a sentence |
 //! | [`places`] | where results go |
@@ -66,16 +67,18 @@ pub mod places;
 mod progress;
 mod rendering;
 mod session;
+mod shares;
 mod structures;
 mod words;
 
 pub use dataset::Dataset;
 pub use error::Error;
 pub use etendue_render::output::{Channel, Layer, Outputs, Picture, Values};
-pub use etendue_render::{Plan, Report, SoFar};
+pub use etendue_render::{Checkpoint, Plan, Report, Shard, SoFar};
 pub use etendue_scene::{Frame, Reach, Scene, Strictness};
 pub use frame_files::FramePattern;
 pub use options::Options;
 pub use progress::{Progress, Stage};
 pub use rendering::{Rendering, Written};
 pub use session::Session;
+pub use shares::Shares;

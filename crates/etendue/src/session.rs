@@ -9,7 +9,10 @@ use etendue_accel::{Accel, BuildOptions};
 use etendue_geometry::Mesh;
 use etendue_render::output::{ImageHash, Layer, SOFTWARE};
 use etendue_render::report::memory;
-use etendue_render::{FollowedFrame, Images, Plan, Prepared, Rendered, Report, Seconds, plan};
+use etendue_render::{
+    Checkpoint, Course, Film, FollowedFrame, Identity, Images, Plan, Prepared, RenderError,
+    Rendered, Report, Seconds, Shard, plan,
+};
 use etendue_scene::escape::one_line;
 use etendue_scene::file::{FileKind, FramesSpec, SceneFile};
 use etendue_scene::memory::Budget;
@@ -21,7 +24,7 @@ use crate::progress::Stage;
 use crate::rendering::file_names;
 use crate::structures::Structures;
 use crate::words::{NOT_FOLLOWED, changed, fingerprints, header, in_words, not_finite};
-use crate::{Error, FramePattern, Options, Progress, Rendering, places};
+use crate::{Error, FramePattern, Options, Progress, Rendering, Shares, places};
 
 /// A scene that is opened once, changed by [`set`](Self::set) and rendered as often as one likes.
 ///
@@ -47,6 +50,8 @@ pub struct Session {
     settings: Vec<(String, String)>,
     /// What was done since the last render.
     seconds: Seconds,
+    /// Where what there is of a render is kept.
+    checkpoint: Option<Checkpoint>,
 }
 
 /// The scene as it is now.
@@ -136,6 +141,7 @@ impl Session {
             images: Arc::default(),
             settings: Vec::new(),
             seconds: Seconds::default(),
+            checkpoint: None,
         }
     }
 
@@ -352,27 +358,115 @@ impl Session {
     ///
     /// As [`Self::prepare`], and when it is stopped before.
     pub fn render(&mut self, progress: &Progress) -> Result<Rendering, Error> {
-        let start = Instant::now();
-        let before = self.seconds;
+        let clock = self.clock();
+        let film = self.trace(None, progress)?;
+        self.conclude(film, clock, progress)
+    }
+
+    /// Renders a share of the picture's rows and writes it to `path`, for [`merge`](Self::merge). `origin` goes
+    /// with it, for whoever merges: [`Shares`](crate::Shares) reads it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::render`], and when it is stopped at all.
+    pub fn render_shard(
+        &mut self,
+        shard: Shard,
+        path: &Path,
+        origin: &Value,
+        progress: &Progress,
+    ) -> Result<(), Error> {
+        let film = self.trace(Some(shard), progress)?;
+        let Loaded { scene, plan, .. } = self.loaded()?;
+        if film.samples() < plan.samples {
+            return Err(RenderError::Stopped.into());
+        }
+        film.notes().iter().for_each(|note| progress.note(note));
+        Ok(film.write(path, &self.identity(scene, plan)?, origin)?)
+    }
+
+    /// Puts the shares of a render together: the rendering that one machine would have made, to the bit.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::scene_and_accel`]; when a share is missing, given twice, or of another render.
+    pub fn merge(&mut self, shares: &Shares, progress: &Progress) -> Result<Rendering, Error> {
+        let clock = self.clock();
         self.prepare(progress)?;
+        let Loaded { scene, plan, .. } = self.loaded()?;
+        let film = Film::merged(scene, plan, &shares.files, &self.identity(scene, plan)?)?;
+        self.conclude(film, clock, progress)
+    }
+
+    /// Keeps what there is of a render at `checkpoint` on the way, and goes on from there: after an
+    /// interruption the same render takes up what was kept. The file stays until it is removed.
+    pub fn keep_at(&mut self, checkpoint: Option<Checkpoint>) {
+        self.checkpoint = checkpoint;
+    }
+
+    /// When a render began, and what was prepared before it: a part of its time, too.
+    fn clock(&self) -> (Instant, f64) {
+        (Instant::now(), self.seconds.load + self.seconds.build + self.seconds.decode)
+    }
+
+    /// Traces the scene, or a share of it.
+    fn trace(&mut self, shard: Option<Shard>, progress: &Progress) -> Result<Film, Error> {
+        self.prepare(progress)?;
+        let Loaded { scene, plan, neighbours, .. } = self.loaded()?;
+        let identity = match (&shard, &self.checkpoint) {
+            (None, None) => Identity::new(),
+            _ => self.identity(scene, plan)?,
+        };
+        let course = Course { shard, checkpoint: self.checkpoint.clone(), identity };
+        let (accel, start) = (self.built()?, Instant::now());
+        let header = header(scene, &fingerprints(scene, neighbours)?);
+        let others: Vec<FollowedFrame<'_>> =
+            neighbours.iter().filter_map(|other| other.followed(scene)).collect();
+        let prepared = Prepared { accel, images: &self.images, others: &others };
+        let film = etendue_render::trace(scene, plan, prepared, &header, &course, progress)?;
+        self.seconds.render = start.elapsed().as_secs_f64();
+        Ok(film)
+    }
+
+    /// What films must agree in to be of one picture.
+    fn identity(&self, scene: &Scene, plan: &Plan) -> Result<Identity, Error> {
+        let [width, height] = scene.camera.resolution();
+        let layers: Vec<_> = plan.layers.iter().map(|layer| layer.row().name).collect();
+        let own = [
+            ("version", SOFTWARE.to_owned()),
+            ("accelerator", self.built()?.report().backend),
+            ("resolution", format!("{width} x {height}")),
+            ("number of samples", plan.samples.to_string()),
+            ("seed", scene.render.seed.to_string()),
+            ("list of layers", layers.join(", ")),
+            ("precision", format!("{:?}", plan.precision).to_lowercase()),
+        ];
+        let own = own.map(|(key, value)| (key.to_owned(), value));
+        let prints = fingerprints(scene, &self.loaded()?.neighbours)?;
+        let prints = prints.into_iter().map(|(key, value)| (key.replace('_', " "), value));
+        Ok(own.into_iter().chain(prints).collect())
+    }
+
+    /// The rendering of a film, with its report.
+    fn conclude(
+        &mut self,
+        film: Film,
+        (start, before): (Instant, f64),
+        progress: &Progress,
+    ) -> Result<Rendering, Error> {
         let loaded = self.loaded()?;
         let (scene, plan, accel) = (Arc::clone(&loaded.scene), &loaded.plan, self.built()?);
         let structure = loaded.accel.clone();
-        let tracing = Instant::now();
         let fingerprints = fingerprints(&scene, &loaded.neighbours)?;
         let header = header(&scene, &fingerprints);
-        let others: Vec<FollowedFrame<'_>> =
-            loaded.neighbours.iter().filter_map(|other| other.followed(&scene)).collect();
-        let prepared = Prepared { accel, images: &self.images, others: &others };
-        let rendered = etendue_render::render_frame(&scene, plan, prepared, header, progress)?;
+        let rendered = etendue_render::finish(&scene, plan, film, header, Some(accel))?;
         let mut seconds = self.seconds;
-        seconds.render = tracing.elapsed().as_secs_f64();
-        // What was prepared before this call is a part of it, too.
-        seconds.total = start.elapsed().as_secs_f64() + before.load + before.build + before.decode;
+        seconds.total = start.elapsed().as_secs_f64() + before;
         let mut more = rendered.notes.clone();
         more.extend(not_finite(&rendered));
         more.extend(changed(&scene));
-        if others.iter().any(FollowedFrame::loses_some) {
+        let mut others = loaded.neighbours.iter().filter_map(|other| other.followed(&scene));
+        if others.any(|other| other.loses_some()) {
             more.push(NOT_FOLLOWED.to_owned());
         }
         more.iter().for_each(|note| progress.note(note));

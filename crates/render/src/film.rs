@@ -179,6 +179,18 @@ impl FilmLayer {
         Ok(Some(film))
     }
 
+    /// Each plane with the name that it has in files of shards.
+    pub(crate) fn named_planes(&self) -> impl Iterator<Item = (String, &Values)> {
+        let title = self.row.name.clone();
+        self.planes.iter().enumerate().map(move |(k, plane)| (format!("{title} {k}"), plane))
+    }
+
+    /// The same, to be filled.
+    pub(crate) fn named_planes_mut(&mut self) -> impl Iterator<Item = (String, &mut Values)> {
+        let title = self.row.name.clone();
+        self.planes.iter_mut().enumerate().map(move |(k, plane)| (format!("{title} {k}"), plane))
+    }
+
     /// The planes alone.
     pub(crate) fn into_planes(self) -> Vec<Values> {
         self.planes

@@ -26,6 +26,7 @@ mod radiance;
 pub mod render;
 pub mod report;
 mod samples;
+mod shard;
 mod tiles;
 mod watch;
 
@@ -33,8 +34,9 @@ pub use film::{NoMemory, Precision};
 pub use other_frame::FollowedFrame;
 pub use plan::{Decision, Plan};
 pub use render::{
-    Images, Prepared, Progress, RenderError, Rendered, accelerators, build, rebuild, render,
-    render_frame,
+    Course, Film, Images, Prepared, Progress, RenderError, Rendered, accelerators, build, finish,
+    rebuild, render, trace,
 };
 pub use report::{Report, Seconds};
+pub use shard::{Checkpoint, FilmError, FilmFile, FilmHeader, Identity, Shard};
 pub use watch::{SoFar, Watch};

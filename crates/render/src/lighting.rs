@@ -17,6 +17,7 @@ use crate::output::{Picture, PictureError, Values, luminance};
 use crate::radiance::LightPass;
 use crate::render::RenderError;
 use crate::samples::Sampling;
+use crate::shard::Shard;
 use crate::tiles::Job;
 use crate::watch::Watcher;
 
@@ -119,7 +120,9 @@ fn lit_share(
             samples: SAMPLES,
             sampler: scene.render.sampler,
             seed: scene.render.seed,
+            shard: Shard::ALL,
         },
+        keeper: None,
         light: Some(LightPass { stage, tracer, camera: &camera, groups }),
         passes: &pass,
         picture: &|_, _| Err(PictureError::Empty { what: "the look".to_owned() }),

@@ -1,6 +1,7 @@
 //! From a loaded scene to a picture: build, decode, trace.
 
-use std::sync::Arc;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildError, BuildOptions};
@@ -21,10 +22,11 @@ use rayon::prelude::*;
 
 use crate::film::{FilmLayer, NoMemory};
 use crate::other_frame::FollowedFrame;
-use crate::output::{Development, Layer, Picture, PictureError};
+use crate::output::{Development, Layer, OutputError, Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::report::ImageSize;
-use crate::samples::Sampling;
+use crate::samples::{Sampling, short_passes};
+use crate::shard::{self, Checkpoint, FilmError, FilmFile, Identity, Keeper, Shard, Writing};
 use crate::tiles::{Done, Job, RayCounts};
 use crate::watch::{Stopped, Watch, Watcher};
 use crate::{Plan, expose, lighting, names};
@@ -78,6 +80,12 @@ pub enum RenderError {
     /// The environment is no image that can be read, or an image of the scene is too large.
     #[error(transparent)]
     Image(#[from] ImageError),
+    /// A file of what is filled of a film cannot be used.
+    #[error(transparent)]
+    Film(#[from] FilmError),
+    /// Shares of a render do not make a whole.
+    #[error("{0}")]
+    Shares(String),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
@@ -426,6 +434,31 @@ pub struct Prepared<'a> {
     pub others: &'a [FollowedFrame<'a>],
 }
 
+/// What of a render is wanted, and where it is kept on the way.
+#[derive(Debug, Clone, Default)]
+pub struct Course {
+    /// The share of the picture's rows; all of them when absent.
+    pub shard: Option<Shard>,
+    /// Where what there is so far is kept, and found again.
+    pub checkpoint: Option<Checkpoint>,
+    /// Which render it is: what other shares, and what was kept, must be of.
+    pub identity: Identity,
+}
+
+/// A film with what was traced onto it.
+#[derive(Debug)]
+pub struct Film {
+    layers: Vec<FilmLayer>,
+    resolution: [u32; 2],
+    shard: Shard,
+    counts: RayCounts,
+    samples: u32,
+    trace_time: Duration,
+    notes: Vec<String>,
+    /// The camera as it was opened for it.
+    camera: Option<Camera>,
+}
+
 /// Renders `scene` as planned. Runs on the threads of the current rayon pool; the picture does not
 /// depend on how many there are. The file header gets the number of samples a pixel.
 ///
@@ -444,27 +477,26 @@ pub fn render(
     header: Vec<(String, String)>,
     watch: &dyn Watch,
 ) -> Result<Rendered, RenderError> {
-    render_frame(scene, plan, Prepared { accel, images, others: &[] }, header, watch)
+    let prepared = Prepared { accel, images, others: &[] };
+    let film = trace(scene, plan, prepared, &header, &Course::default(), watch)?;
+    finish(scene, plan, film, header, Some(accel))
 }
 
-/// As [`render`], of a scene that is one of several frames.
+/// Traces what a `course` wants onto a film.
 ///
 /// # Errors
 ///
-/// As [`render`].
-pub fn render_frame(
+/// As [`render`]; when what was kept is of another render.
+pub fn trace(
     scene: &Scene,
     plan: &Plan,
     Prepared { accel, images, others }: Prepared<'_>,
-    header: Vec<(String, String)>,
+    header: &[(String, String)],
+    course: &Course,
     watch: &dyn Watch,
-) -> Result<Rendered, RenderError> {
-    let [width, height] = scene.camera.resolution().map(|side| side as usize);
-    let mut film: Vec<FilmLayer> = plan
-        .layers
-        .iter()
-        .map(|&layer| FilmLayer::new(layer, width * height, plan.precision, &plan.bands))
-        .collect::<Result<_, _>>()?;
+) -> Result<Film, RenderError> {
+    let resolution = scene.camera.resolution();
+    let mut layers = empty_film(scene, plan)?;
     let start = Instant::now();
     let open = |bands: &Bands| match plan.pupil {
         true => scene.camera.opened(bands).map_err(|e| RenderError::Camera(e.why)),
@@ -500,7 +532,13 @@ pub fn render_frame(
         camera: &light_camera,
         groups: light_camera.band_groups(&plan.bands),
     });
-    let so_far = |layers: &[&FilmLayer], samples| so_far(scene, plan, &header, layers, samples);
+    let so_far = |layers: &[&FilmLayer], samples| so_far(scene, plan, header, layers, samples);
+    let shard = course.shard.unwrap_or(Shard::ALL);
+    let checkpoint = course.checkpoint.as_ref();
+    let passes = match checkpoint {
+        Some(_) if plan.samples > 1 => short_passes(plan.samples),
+        _ => plan.passes.clone(),
+    };
     let others: Vec<&dyn OtherFrame> = others.iter().map(|other| other as _).collect();
     let job = Job {
         accel,
@@ -513,22 +551,126 @@ pub fn render_frame(
             samples: plan.samples,
             sampler: scene.render.sampler,
             seed: scene.render.seed,
+            shard,
         },
-        passes: &plan.passes,
+        passes: &passes,
         light,
         picture: &so_far,
+        keeper: checkpoint.map(|file| Keeper::new(file, &course.identity, shard, resolution)),
     };
-    let watcher = Watcher::new(watch, job.rays(&film));
-    let Done { traffic: RayCounts { chief_rays, light, fates }, samples } =
-        job.run(&mut film, &watcher)?;
+    let watcher = Watcher::new(watch, job.rays(&layers));
+    let Done { traffic: counts, samples } = job.run(&mut layers, &watcher)?;
+    notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
     let trace_time = start.elapsed();
+    drop(job);
+    let camera = Some(camera);
+    Ok(Film { layers, resolution, shard, counts, samples, trace_time, notes, camera })
+}
+
+fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, NoMemory> {
+    let [width, height] = scene.camera.resolution().map(|side| side as usize);
+    plan.layers
+        .iter()
+        .map(|&layer| FilmLayer::new(layer, width * height, plan.precision, &plan.bands))
+        .collect()
+}
+
+impl Film {
+    /// Samples that every pixel of it has.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// What a user should know of it.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Writes it to `path`: which render it is of, and how that was asked for, goes with it.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be written.
+    pub fn write(
+        &self,
+        path: &Path,
+        identity: &Identity,
+        origin: &serde_json::Value,
+    ) -> Result<(), OutputError> {
+        let writing = Writing {
+            identity,
+            origin,
+            shard: self.shard,
+            samples: self.samples,
+            counts: &self.counts,
+            trace_time: self.trace_time,
+            resolution: self.resolution,
+        };
+        writing.write(path, &self.layers.iter().collect::<Vec<_>>(), &[])
+    }
+
+    /// Puts the shares of a render together.
+    ///
+    /// # Errors
+    ///
+    /// When one is of another render, is there twice, or is missing.
+    pub fn merged(
+        scene: &Scene,
+        plan: &Plan,
+        shares: &[FilmFile],
+        identity: &Identity,
+    ) -> Result<Self, RenderError> {
+        let resolution = scene.camera.resolution();
+        let mut layers = empty_film(scene, plan)?;
+        shard::must_be_whole(shares, identity).map_err(RenderError::Shares)?;
+        let counts = Mutex::new(RayCounts::default());
+        for share in shares {
+            share.fill(&mut layers.iter_mut().collect::<Vec<_>>(), &mut [], resolution)?;
+            RayCounts::add(&counts, share.counts(), &FateCounts::default());
+        }
+        let counts = counts.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(Self {
+            layers,
+            resolution,
+            shard: Shard::ALL,
+            counts,
+            samples: plan.samples,
+            trace_time: shares.iter().map(FilmFile::trace_time).sum(),
+            notes: Vec::new(),
+            camera: None,
+        })
+    }
+}
+
+/// The picture on a film. With an accelerator it is judged, too, whether it is black.
+///
+/// # Errors
+///
+/// When no light got through the camera's lens, or the film holds no picture.
+pub fn finish(
+    scene: &Scene,
+    plan: &Plan,
+    film: Film,
+    header: Vec<(String, String)>,
+    accel: Option<&dyn Accel>,
+) -> Result<Rendered, RenderError> {
+    let Film { layers, counts, samples, trace_time, mut notes, camera, .. } = film;
+    let RayCounts { chief_rays, light, fates } = counts;
     if let (true, 0, Some(element)) =
         (fates.total() > 0, fates.exited, fates.farthest_from_sensor())
     {
         return Err(RenderError::Dark { element, losses: fates.losses() });
     }
-    let (picture, band_film) = finished(scene, plan, film, marked(header, samples, plan.samples))?;
-    notes.extend(judged(scene, (&camera, accel), &picture));
+    let header = marked(header, samples, plan.samples);
+    let (picture, band_film) = finished(scene, plan, layers, header)?;
+    if let (Some(camera), Some(accel)) = (&camera, accel)
+        && scene.picture == Some(LayerSpec::Radiance)
+    {
+        notes.extend(lighting::verdict((camera, accel), &picture));
+    }
+    notes.extend(names::notes(&picture));
     let rays = chief_rays + light.rays + light.shadow_rays;
     Ok(Rendered { picture, samples, band_film, rays, light, fates, trace_time, notes })
 }
@@ -556,13 +698,6 @@ fn finished(
     let picture = Picture::new(width, height, layers, header)?.with_names(names::tables(scene));
     let development = Development::new(&scene.render, &picture);
     Ok((picture.developed(development), band_film))
-}
-
-/// What a user should know of a finished picture.
-fn judged(scene: &Scene, seen: (&Camera, &dyn Accel), picture: &Picture) -> Vec<String> {
-    let is_light = scene.picture == Some(LayerSpec::Radiance);
-    let light = is_light.then(|| lighting::verdict(seen, picture)).flatten();
-    light.into_iter().chain(names::notes(picture)).collect()
 }
 
 /// `header` with the number of samples that every pixel has, of those asked for.

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 
 use crate::film::{FilmLayer, NoMemory, Rows, Strip, filled, strips, take};
 use crate::radiance::Numbers;
+use crate::shard::Shard;
 use crate::tiles::{RayCounts, TILE, Tile};
 use crate::watch::{Stopped, Watcher};
 
@@ -28,6 +29,9 @@ const FIRST_PASS: u32 = 4;
 
 /// The most samples of a pass.
 const LONGEST_PASS: u32 = 1024;
+
+/// The same where what a render has so far is kept on disk after passes.
+const LONGEST_KEPT_PASS: u32 = 16;
 
 /// A pass is no longer than this share of all: what a stopped render loses.
 const SHARE_OF_PASS: u32 = 8;
@@ -42,7 +46,15 @@ pub(crate) const BYTES_OF_SUM: u64 = size_of::<Sum>() as u64;
 /// The passes of `samples` a pixel: the first has few, so that there is soon something to see, and
 /// each takes as many as all before it until they are a small share of all.
 pub(crate) fn passes(samples: u32) -> Vec<Range<u32>> {
-    let longest = (samples / SHARE_OF_PASS).clamp(FIRST_PASS, LONGEST_PASS);
+    up_to(samples, (samples / SHARE_OF_PASS).clamp(FIRST_PASS, LONGEST_PASS))
+}
+
+/// Shorter passes, after each of which a render can be kept on disk.
+pub(crate) fn short_passes(samples: u32) -> Vec<Range<u32>> {
+    up_to(samples, LONGEST_KEPT_PASS)
+}
+
+fn up_to(samples: u32, longest: u32) -> Vec<Range<u32>> {
     let mut passes = Vec::new();
     let mut start = 0;
     while start < samples {
@@ -63,6 +75,8 @@ pub(crate) struct Sampling {
     pub(crate) samples: u32,
     pub(crate) sampler: Sampler,
     pub(crate) seed: u64,
+    /// The share of the pixels that is rendered.
+    pub(crate) shard: Shard,
 }
 
 /// What is averaged over the samples of a pixel: colours of surfaces, or light.
@@ -114,6 +128,16 @@ impl Sum {
         self.sum = sum;
     }
 
+    /// The sum, and what rounding took from it.
+    pub(crate) fn parts(self) -> [f64; 2] {
+        [self.sum, self.lost]
+    }
+
+    /// From its [`Self::parts`].
+    pub(crate) fn of_parts([sum, lost]: [f64; 2]) -> Self {
+        Self { sum, lost }
+    }
+
     fn total(self) -> f64 {
         self.sum + self.lost
     }
@@ -157,8 +181,10 @@ impl<'a> Averaging<'a> {
         let resolution = what.camera().resolution();
         let kept = split(sums, *what, resolution);
         let strips = strips(layers, resolution, TILE);
-        strips.par_iter().zip(&kept).try_for_each(|(strip, kept)| {
-            let Some(mut strip) = take(strip) else { return Ok(()) };
+        strips.par_iter().zip(&kept).enumerate().try_for_each(|(k, (strip, kept))| {
+            let Some(mut strip) = take(strip).filter(|_| sampling.shard.owns(k)) else {
+                return Ok(());
+            };
             let adding = Adding { what: *what, sampling: *sampling, pass, watcher };
             let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
             let mut memory = spare().pop().unwrap_or_default();
@@ -168,6 +194,16 @@ impl<'a> Averaging<'a> {
             spare().push(memory);
             done
         })
+    }
+
+    /// The sums between passes; none when there is one pass alone.
+    pub(crate) fn sums(&self) -> &[Sum] {
+        &self.sums
+    }
+
+    /// The same, to be filled.
+    pub(crate) fn sums_mut(&mut self) -> &mut [Sum] {
+        &mut self.sums
     }
 
     /// The layers.
@@ -289,7 +325,7 @@ impl Adding<'_> {
     /// Refills the batch with samples `range` of each of `pixels`, those of one pixel side by side.
     /// A camera without a lens looks at places alone.
     fn place(&self, tile: Tile, (pixels, range): (&[(u32, u32)], Range<u32>), memory: &mut Memory) {
-        let Sampling { samples, sampler, seed } = self.sampling;
+        let Sampling { samples, sampler, seed, .. } = self.sampling;
         let Memory { numbers, film, .. } = memory;
         let numbers: &mut Vec<(PixelSamples, u32)> = &mut numbers.samples;
         numbers.clear();

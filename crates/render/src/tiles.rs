@@ -16,6 +16,7 @@ use crate::output::{Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::render::RenderError;
 use crate::samples::{Averaged, Averaging, Memory, Sampling};
+use crate::shard::Keeper;
 use crate::watch::{SoFar, Stopped, Watcher};
 
 /// Side of a tile (pixels): its rays are one batch.
@@ -45,6 +46,8 @@ pub(crate) struct Job<'a> {
     pub(crate) light: Option<LightPass<'a>>,
     /// The picture as it is on the film.
     pub(crate) picture: &'a ToPicture<'a>,
+    /// Who keeps it on disk.
+    pub(crate) keeper: Option<Keeper<'a>>,
 }
 
 /// What was traced.
@@ -90,7 +93,6 @@ impl Job<'_> {
             film.iter_mut().partition(|layer| layer.spec == LayerSpec::Radiance);
         let (mut mean, mut centre): (Vec<_>, Vec<_>) =
             seen.into_iter().partition(|layer| self.is_averaged(layer.spec));
-        self.centres(&mut centre, watcher, &traffic)?;
         let colors = Colors { job: self, layers: mean.iter().map(|layer| layer.spec).collect() };
         let mut averaged = Vec::new();
         let passes = self.passes.len();
@@ -101,19 +103,35 @@ impl Job<'_> {
         if let (Some(light), false) = (&self.light, lit.is_empty()) {
             averaged.push(Averaging::new(light, self.sampling, lit, passes)?);
         }
-        let samples = self.passes(&mut averaged, watcher, &traffic)?;
+        let kept = self.keeper.as_ref().map(|keeper| keeper.restore(&mut centre, &mut averaged));
+        let mut done = 0;
+        match kept.transpose()?.flatten() {
+            Some((samples, counts)) => {
+                done = samples;
+                *traffic.lock().unwrap_or_else(PoisonError::into_inner) = counts;
+                watcher.did(self.camera_rays(done, averaged.len(), !centre.is_empty()))?;
+            }
+            None => self.centres(&mut centre, watcher, &traffic)?,
+        }
+        let samples = self.passes(done, &mut averaged, &centre, watcher, &traffic)?;
         let traffic = traffic.into_inner().unwrap_or_else(PoisonError::into_inner);
         Ok(Done { traffic, samples })
     }
 
     /// The rays of the camera that filling `film` takes.
     pub(crate) fn rays(&self, film: &[FilmLayer]) -> u64 {
-        let [width, height] = self.camera.resolution().map(u64::from);
         let is_lit = |layer: &FilmLayer| layer.spec == LayerSpec::Radiance;
         let is_mean = |layer: &FilmLayer| !is_lit(layer) && self.is_averaged(layer.spec);
-        let sampled = u64::from(film.iter().any(is_lit)) + u64::from(film.iter().any(is_mean));
+        let sampled = usize::from(film.iter().any(is_lit)) + usize::from(film.iter().any(is_mean));
         let chief = film.iter().any(|layer| !is_lit(layer) && !is_mean(layer));
-        width * height * (u64::from(chief) + sampled * u64::from(self.sampling.samples))
+        self.camera_rays(self.sampling.samples, sampled, chief)
+    }
+
+    /// The rays of the camera that `samples` of every pixel for `sampled` parts take, and the chief rays.
+    fn camera_rays(&self, samples: u32, sampled: usize, chief: bool) -> u64 {
+        let [width, height] = self.camera.resolution();
+        let pixels = u64::from(width) * u64::from(self.sampling.shard.rows(height));
+        pixels * (u64::from(chief) + sampled as u64 * u64::from(samples))
     }
 
     /// Whether a layer without light is a mean over samples.
@@ -123,11 +141,13 @@ impl Job<'_> {
         layer.is_averaged() && (many || lit)
     }
 
-    /// Takes the passes and returns the samples that every pixel has after the last that was
-    /// completed.
+    /// Takes the passes after the first `samples` samples and returns the samples that every pixel has
+    /// after the last that was completed.
     fn passes(
         &self,
+        mut samples: u32,
         averaged: &mut [Averaging<'_>],
+        centres: &[&mut FilmLayer],
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
     ) -> Result<u32, Stopped> {
@@ -135,9 +155,10 @@ impl Job<'_> {
         if averaged.is_empty() {
             return Ok(all);
         }
-        let mut samples = 0;
-        for pass in self.passes {
-            let done = averaged.iter_mut().try_for_each(|part| part.add(pass, watcher, traffic));
+        for pass in
+            self.passes.iter().filter(|pass| pass.end > samples).cloned().collect::<Vec<_>>()
+        {
+            let done = averaged.iter_mut().try_for_each(|part| part.add(&pass, watcher, traffic));
             if let Err(stopped) = done {
                 return if samples > 0 { Ok(samples) } else { Err(stopped) };
             }
@@ -151,6 +172,11 @@ impl Job<'_> {
                     share: watcher.share(),
                     picture: &picture,
                 });
+                if let Some(keeper) = &self.keeper {
+                    let centres: Vec<&FilmLayer> = centres.iter().map(|layer| &**layer).collect();
+                    let counts = traffic.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                    keeper.keep(samples, &centres, averaged, &counts);
+                }
             }
         }
         Ok(samples)
@@ -167,8 +193,11 @@ impl Job<'_> {
             return Ok(());
         }
         let [width, height] = self.camera.resolution();
-        strips(layers, [width, height], TILE).par_iter().try_for_each(|strip| {
-            let Some(mut strip) = take(strip) else { return Ok(()) };
+        let strips = strips(layers, [width, height], TILE);
+        strips.par_iter().enumerate().try_for_each(|(k, strip)| {
+            let Some(mut strip) = take(strip).filter(|_| self.sampling.shard.owns(k)) else {
+                return Ok(());
+            };
             let mut batch = Batch::new(self.detail);
             let done = self.fill(&mut strip, width, &mut batch, watcher);
             let own = RayCounts { chief_rays: batch.traced, ..RayCounts::default() };

@@ -30,6 +30,7 @@ mod printing; // what names in files do to a terminal
 mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
 mod sensor; // presets, curves, series of a characterisation
+mod shards; // renders that are divided or killed, and their pictures
 mod stopping; // Ctrl-C and what it leaves
 mod tools; // check, plan, schema, version
 mod views; // where a camera without a pose stands, and which way is up

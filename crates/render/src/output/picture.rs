@@ -85,12 +85,22 @@ impl Values {
     }
 
     /// Writes values `range` as little-endian bytes to `out`, `stride` bytes from one to the next.
-    pub(super) fn put_le(&self, range: Range<usize>, out: &mut [u8], stride: usize) {
+    pub(crate) fn put_le(&self, range: Range<usize>, out: &mut [u8], stride: usize) {
         match self {
             Self::F32(values) => put(&values[range], out, stride, f32::to_le_bytes),
             Self::F64(values) => put(&values[range], out, stride, f64::to_le_bytes),
             Self::U16(values) => put(&values[range], out, stride, u16::to_le_bytes),
             Self::U32(values) => put(&values[range], out, stride, u32::to_le_bytes),
+        }
+    }
+
+    /// Takes the values of `range` from `bytes`, little-endian and side by side.
+    pub(crate) fn read_le(&mut self, range: Range<usize>, bytes: &[u8]) {
+        match self {
+            Self::F32(values) => get(&mut values[range], bytes, f32::from_le_bytes),
+            Self::F64(values) => get(&mut values[range], bytes, f64::from_le_bytes),
+            Self::U16(values) => get(&mut values[range], bytes, u16::from_le_bytes),
+            Self::U32(values) => get(&mut values[range], bytes, u32::from_le_bytes),
         }
     }
 
@@ -106,6 +116,13 @@ impl Values {
 
 /// Values that are turned into bytes at a time: few enough to stay in a core's cache.
 pub(super) const LE_BAND: usize = 1 << 14;
+
+/// The values of `bytes`, side by side.
+fn get<T, const N: usize>(values: &mut [T], bytes: &[u8], value: impl Fn([u8; N]) -> T) {
+    for (slot, &bytes) in values.iter_mut().zip(bytes.as_chunks::<N>().0) {
+        *slot = value(bytes);
+    }
+}
 
 /// `bytes` of each value, `stride` bytes from one to the next in `out`.
 pub(super) fn put<T: Copy, const N: usize>(
