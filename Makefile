@@ -6,13 +6,14 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install dist test test-embree4 python bench bench-peers bench-python bench-light bench-lens bench-sensor docs-figures docs-charts \
+.PHONY: help setup render install dist test test-embree4 test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor docs-figures docs-charts \
 	docs-stability light-fields fingerprints fuzz-smoke fuzz-seeds clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
 	@echo "make test          install what is missing, run everything that CI runs"
 	@echo "make test-embree4  run the tests that touch Embree against Embree 4, in a Debian 13 root"
+	@echo "make test-slurm    run the jobs of scenes/cluster on a Slurm of one node, made for it"
 	@echo "make python        build the Python package's wheel and test it in a fresh venv"
 	@echo "make install       install the command below PREFIX, /usr/local when it is not given"
 	@echo "make dist          a tarball, a .deb and a wheel in out/dist, tried in bare Debian 12 and 13 roots"
@@ -59,6 +60,9 @@ dist: setup
 
 test-embree4: setup
 	@scripts/test-embree4.sh
+
+test-slurm: setup
+	@scripts/test-slurm.sh
 
 # ARGS=--quick takes lighter meshes; benches of single questions: cargo bench -p etendue-benches
 bench: setup

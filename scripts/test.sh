@@ -51,5 +51,8 @@ scripts/test-embree4.sh
 step "Python package"
 PROFILE=dev scripts/python.sh
 
+step "jobs on Slurm"
+scripts/test-slurm.sh
+
 step "tests"
 run_tests --workspace
