@@ -80,6 +80,7 @@ fn translations_step_go_straight_and_follow_splines() {
 #[test]
 fn rotations_turn_evenly_the_shorter_way_and_scales_scale() {
     let turn = |degrees: f32| DQuat::from_rotation_z(f64::from(degrees).to_radians());
+    #[expect(clippy::cast_possible_truncation, reason = "as files have them")]
     let floats = |q: DQuat| q.to_array().map(|x| x as f32);
     // The second key is the same turn with the other sign.
     let values = [floats(turn(0.0)), floats(-turn(90.0)), floats(turn(90.0))];
