@@ -288,8 +288,8 @@ fn spectra_of_views_are_those_of_what_they_see() {
         .replace(r#""resolution": [120, 60]"#, &sensor([120, 60]));
     let geometry = write_scene(folder.path(), &scene(&ours));
     let bands = 3;
-    let n = geometry["views"].as_u64().unwrap() as usize;
-    let [rows, cols] = ["rows", "cols"].map(|key| geometry[key].as_u64().unwrap() as usize);
+    let [n, rows, cols] = ["views", "rows", "cols"]
+        .map(|key| usize::try_from(geometry[key].as_u64().unwrap()).unwrap());
     let (shape, decoded) = array(&folder.path().join("views_spectrum.npy"));
     let (same, reference) = array(&folder.path().join("reference_spectrum.npy"));
     assert_eq!(shape, [n, n, rows, cols, bands]);
