@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
+use etendue_geometry::{Bounds, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch};
 
 use crate::embree::{ExactFilter, Found, Scene, Search, version};
 use crate::end_triangles::EndTriangles;
@@ -103,6 +103,23 @@ impl Embree {
     /// Whether answers are looked at a second time.
     fn checks(&self) -> bool {
         self.robust && self.refine
+    }
+
+    /// The closest hits as single precision has them.
+    fn closest_as_found(&self, rays: &RayBatch, hits: &mut HitBatch, scratch: &mut Scratch) {
+        let Scratch { rays: rays32, found, .. } = scratch;
+        rays32.convert(rays, &self.frame);
+        self.scene.closest_in_packets(rays32, rays.coherent, found);
+        std::mem::swap(&mut hits.placement, &mut found.placement);
+        std::mem::swap(&mut hits.triangle, &mut found.triangle);
+        widen(found, &rays32.advance, hits);
+        if let (Some(turns), Detail::Surface) = (self.scene.turns(), hits.detail) {
+            for i in (0..rays.len()).filter(|&i| hits.placement[i] != MISS) {
+                let turned = turns[hits.placement[i] as usize] * hits.normal(i);
+                let unit = turned.normalize_or_zero();
+                (hits.normal[0][i], hits.normal[1][i], hits.normal[2][i]) = unit.into();
+            }
+        }
     }
 
     /// Whether the rays are to be decided in f64 where they start: those of surfaces.
@@ -308,6 +325,36 @@ impl Embree {
     }
 }
 
+/// What single precision found, as hits: all but their placements and triangles.
+#[multiversion::multiversion(targets = "simd")]
+fn widen(found: &Found, advance: &[f64], hits: &mut HitBatch) {
+    let n = hits.t.len();
+    let HitBatch { detail, t, placement, u, v, normal, .. } = hits;
+    let placement = &placement[..n];
+    for (((t, &near), &ahead), &met) in t.iter_mut().zip(&found.t).zip(advance).zip(placement) {
+        *t = if met == MISS { f64::INFINITY } else { f64::from(near) + ahead };
+    }
+    if *detail == Detail::Distance {
+        return;
+    }
+    for (out, weights) in [u, v].into_iter().zip(&found.weights) {
+        for ((out, &weight), &met) in out.iter_mut().zip(weights).zip(placement) {
+            *out = if met == MISS { 0.0 } else { f64::from(weight.clamp(0.0, 1.0)) };
+        }
+    }
+    let [x, y, z] = normal.each_mut().map(|axis| &mut axis[..n]);
+    let [from_x, from_y, from_z] = found.normal.each_ref().map(|axis| &axis[..n]);
+    for i in 0..n {
+        let own = [from_x[i], from_y[i], from_z[i]].map(f64::from);
+        let length = (own[0] * own[0] + own[1] * own[1] + own[2] * own[2]).sqrt();
+        let scale = if placement[i] == MISS { 0.0 } else { 1.0 / length };
+        let keep = |axis: f64| if placement[i] == MISS { 0.0 } else { axis * scale };
+        x[i] = keep(own[0]);
+        y[i] = keep(own[1]);
+        z[i] = keep(own[2]);
+    }
+}
+
 /// Embree multiplies three lengths of a triangle, which have to stay in single precision.
 fn check_scale(bounds: Bounds) -> Result<(), BuildError> {
     const LEAST: f64 = 1e-12;
@@ -323,6 +370,9 @@ impl Accel for Embree {
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
         hits.resize(rays.len());
         SCRATCH.with_borrow_mut(|scratch| {
+            if rays.precision == HitPrecision::Single {
+                return self.closest_as_found(rays, hits, scratch);
+            }
             let geometry = self.scene.geometry();
             scratch.doubtful.clear();
             scratch.rays.convert(rays, &self.frame);
@@ -357,6 +407,10 @@ impl Accel for Embree {
             let Scratch { rays: rays32, again, found, suspects, doubtful, ends, lanes, .. } =
                 scratch;
             rays32.convert(rays, &self.frame);
+            if rays.precision == HitPrecision::Single {
+                self.scene.occluded_in_packets(rays32, rays.coherent, blocked);
+                return;
+            }
             if !self.checks() {
                 if Self::start_on_surfaces(rays) {
                     rays32.keep_clear(rays);

@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 use embree4_sys as sys;
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{Geometry, Mesh, Transform};
+use etendue_geometry::{Geometry, Mesh, Placement, Transform};
 
 use self::device::Device;
 use self::instanced::{Instanced, Kind};
@@ -146,6 +146,9 @@ pub(crate) struct Scene {
     geometry: Arc<Geometry>,
     /// Some meshes are scenes of their own.
     has_instances: bool,
+    /// What brings the normal that Embree gives of each placement into the world; `None` where that is
+    /// true of all as they are.
+    turns: Option<Vec<DMat3>>,
     /// Bytes of vertices that had to be copied.
     pub(crate) copied_bytes: u64,
 }
@@ -213,7 +216,8 @@ impl Scene {
         device.check("rtcAttachGeometry")?;
         let handle = builder.commit(options.progress.as_deref())?;
         let has_instances = instanced.meshes.contains(&true);
-        Ok(Self { handle, shared, device, geometry, has_instances, copied_bytes })
+        let turns = turns(&geometry, &instanced);
+        Ok(Self { handle, shared, device, geometry, has_instances, turns, copied_bytes })
     }
 
     /// The scene of mesh `index`, where that is `mesh`.
@@ -227,6 +231,11 @@ impl Scene {
         &self.geometry
     }
 
+    /// Turns the normal that Embree gives of a hit on a placement into the world.
+    pub(crate) fn turns(&self) -> Option<&[DMat3]> {
+        self.turns.as_deref()
+    }
+
     /// Bytes that Embree holds.
     pub(crate) fn bytes(&self) -> u64 {
         self.device.bytes()
@@ -236,6 +245,21 @@ impl Scene {
     pub(crate) fn packet_width(&self) -> usize {
         self.device.width
     }
+}
+
+/// [`Scene::turns`]: an instance's normal is its mesh's own; one that was baked into a mirror image is of
+/// the wrong side.
+fn turns(geometry: &Geometry, instanced: &Instanced) -> Option<Vec<DMat3>> {
+    let turn = |(placement, kind): (&Placement, &Kind)| {
+        let transform = &placement.world_from_mesh;
+        match kind {
+            Kind::Instance => transform.normal_matrix(),
+            Kind::Baked | Kind::LeftOut => DMat3::IDENTITY * transform.handedness(),
+        }
+    };
+    let turns: Vec<DMat3> =
+        geometry.placements.iter().zip(&instanced.placements).map(turn).collect();
+    turns.iter().any(|turn| *turn != DMat3::IDENTITY).then_some(turns)
 }
 
 /// The origin that an instanced mesh is traced relative to: its own, unless it lies far from it.

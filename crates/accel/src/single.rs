@@ -2,7 +2,7 @@
 //! started where they enter its box, so that f32's 24 bits are spent on the scene alone.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, RayBatch};
+use etendue_geometry::{Bounds, HitPrecision, RayBatch};
 
 /// The box of a scene and the origin that single-precision coordinates are relative to.
 #[derive(Debug, Clone, Copy)]
@@ -149,10 +149,15 @@ impl Rays32 {
         self.advance.resize(len, 0.0);
     }
 
-    /// Converts `rays` for a scene in `frame`.
+    /// Converts `rays` for a scene in `frame`, turned aside a little where their hits are to be decided
+    /// in f64.
     pub(crate) fn convert(&mut self, rays: &RayBatch, frame: &Frame) {
         self.resize(rays.len());
-        convert(self, rays, frame);
+        let nudge = match rays.precision {
+            HitPrecision::Double => NUDGE,
+            HitPrecision::Single => 0.0,
+        };
+        convert(self, rays, frame, nudge);
     }
 
     /// Appends ray `i` of `from`, moved sideways by `shift` (m).
@@ -188,7 +193,7 @@ pub(crate) fn round(x: f64) -> f32 {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
+fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame, nudge: f64) {
     let n = rays.len();
     let [ox, oy, oz] = rays.origins().map(|array| &array[..n]);
     let [dx, dy, dz] = rays.directions().map(|array| &array[..n]);
@@ -198,7 +203,9 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
     let (t_near, t_far) = (&mut out.t_near[..n], &mut out.t_far[..n]);
     let advance = &mut out.advance[..n];
     let far = FAR * frame.radius;
-    let pull = NUDGE / frame.radius;
+    let pull = nudge / frame.radius;
+    // As BLUR is to NUDGE.
+    let blur = 2.0 * nudge;
     let sphere = (1.0 + SPHERE_SLACK) * frame.radius;
     for i in 0..n {
         let x = ox[i] - frame.origin.x;
@@ -218,7 +225,7 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
         // Only a far ray is moved ahead, to `far` before the foot.
         let start = (foot - far).max(0.0);
         let (x, y, z) = (x + dx[i] * start, y + dy[i] * start, z + dz[i] * start);
-        let pad = SLOPE * BLUR * (x.abs() + y.abs() + z.abs());
+        let pad = SLOPE * blur * (x.abs() + y.abs() + z.abs());
         // The others are moved back.
         let back = if start > 0.0 { 0.0 } else { pad };
         let ahead = start - back;
@@ -226,13 +233,15 @@ fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame) {
         let [first, second] = ODD_AXES;
         let along = first[0] * dx[i] + first[1] * dy[i] + first[2] * dz[i];
         let odd = |axis: usize| if along.abs() < 0.8 { first[axis] } else { second[axis] };
-        let sx = pull * fx + NUDGE * (odd(1) * dz[i] - odd(2) * dy[i]);
-        let sy = pull * fy + NUDGE * (odd(2) * dx[i] - odd(0) * dz[i]);
-        let sz = pull * fz + NUDGE * (odd(0) * dy[i] - odd(1) * dx[i]);
+        let sx = pull * fx + nudge * (odd(1) * dz[i] - odd(2) * dy[i]);
+        let sy = pull * fy + nudge * (odd(2) * dx[i] - odd(0) * dz[i]);
+        let sz = pull * fz + nudge * (odd(0) * dy[i] - odd(1) * dx[i]);
         let near = t_min[i] - ahead;
-        let near = (near - (pad + SLOPE * BLUR * near)).max(0.0);
+        let near = (near - (pad + SLOPE * blur * near)).max(0.0);
         let end = t_max[i] - ahead;
-        let end = (end + (pad + SLOPE * BLUR * end.max(0.0))).max(near);
+        // Without blur there is nothing to add, and 0 times infinity is no number.
+        let more = if blur > 0.0 { pad + SLOPE * blur * end.max(0.0) } else { 0.0 };
+        let end = (end + more).max(near);
         // A ray that cannot hit is put beside the scene, pointing away.
         let traced = meets && sound;
         let choose = |value: f64, otherwise: f64| round(if traced { value } else { otherwise });

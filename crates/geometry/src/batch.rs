@@ -26,6 +26,19 @@ pub struct RayBatch {
     /// The rays start on surfaces, outside by no more than a hit's own error: near their ends only
     /// f64 can tell what counts. `false` for rays that start in the open.
     pub from_surface: bool,
+    /// How precisely its hits are wanted.
+    pub precision: HitPrecision,
+}
+
+/// How precisely hits are wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum HitPrecision {
+    /// To f64, decided by the exact test at edges and where rays start: for data.
+    #[default]
+    Double,
+    /// As single precision has them, where a backend works in it: for light, whose noise is far above
+    /// that. Rays that leave surfaces start clear of them by what f32 may misplace.
+    Single,
 }
 
 /// The arrays of a batch, to be filled in place: their length stays.
@@ -159,6 +172,7 @@ impl RayBatch {
         self.endpoint_triangles.clone_from(&other.endpoint_triangles);
         self.coherent = other.coherent;
         self.from_surface = other.from_surface;
+        self.precision = other.precision;
     }
 
     /// Takes those rays of `other` whose numbers `order` gives, in that order; memory is kept.
@@ -173,6 +187,7 @@ impl RayBatch {
         }
         self.coherent = other.coherent;
         self.from_surface = other.from_surface;
+        self.precision = other.precision;
     }
 
     /// Keeps the rays whose number `is_kept` says, in their order.
@@ -236,6 +251,37 @@ impl RayBatch {
         if !self.endpoint_triangles.is_empty() {
             self.endpoint_triangles.resize(len, [[MISS; 2]; 2]);
         }
+    }
+
+    /// Appends the `picked` rays of a block, one array an axis, which count hits from their origins as
+    /// far as `t_max` says (m); without triangles at their ends.
+    pub fn extend_picked<const N: usize>(
+        &mut self,
+        origins: &[[f64; N]; 3],
+        directions: &[[f64; N]; 3],
+        t_max: &[f64; N],
+        picked: &[usize],
+    ) {
+        let from = origins.iter().chain(directions);
+        for (own, from) in self.origins.iter_mut().chain(&mut self.directions).zip(from) {
+            own.extend(picked.iter().map(|&i| from[i]));
+        }
+        self.t_max.extend(picked.iter().map(|&i| t_max[i]));
+        let len = self.t_max.len();
+        self.t_min.resize(len, 0.0);
+        if !self.endpoint_triangles.is_empty() {
+            self.endpoint_triangles.resize(len, [[MISS; 2]; 2]);
+        }
+    }
+
+    /// Says of the last rays, as many as `triangles` there are, which triangles are at their ends.
+    pub fn end_on_triangles(
+        &mut self,
+        triangles: impl ExactSizeIterator<Item = [PlacedTriangle; 2]>,
+    ) {
+        let first = self.len() - triangles.len();
+        self.endpoint_triangles.resize(first, [[MISS; 2]; 2]);
+        self.endpoint_triangles.extend(triangles);
     }
 
     fn put(&mut self, origin: DVec3, direction: DVec3, [t_min, t_max]: [f64; 2]) {

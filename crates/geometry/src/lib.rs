@@ -39,7 +39,7 @@ pub mod units;
 pub mod world;
 
 pub use area::{AreaTest, is_degenerate};
-pub use batch::{Detail, HitBatch, MISS, PlacedTriangle, RayBatch, RaysMut};
+pub use batch::{Detail, HitBatch, HitPrecision, MISS, PlacedTriangle, RayBatch, RaysMut};
 pub use bounds::Bounds;
 pub use buffer::Buffer;
 pub use mapped::MappedFile;

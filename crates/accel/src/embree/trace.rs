@@ -16,6 +16,13 @@ pub(crate) struct Found {
     pub(crate) triangle: Vec<u32>,
     /// Single-precision distance from the moved origin.
     pub(crate) t: Vec<f32>,
+    /// Whether the rest is wanted, too.
+    pub(crate) has_surface: bool,
+    /// Barycentric weights of the second and the third corner.
+    pub(crate) weights: [Vec<f32>; 2],
+    /// Normals in the frame of what was hit, of any length, on the side from which its corners run
+    /// counter-clockwise.
+    pub(crate) normal: [Vec<f32>; 3],
 }
 
 impl Found {
@@ -23,6 +30,11 @@ impl Found {
         self.placement.resize(len, MISS);
         self.triangle.resize(len, MISS);
         self.t.resize(len, f32::INFINITY);
+        if self.has_surface {
+            for array in self.weights.iter_mut().chain(&mut self.normal) {
+                array.resize(len, 0.0);
+            }
+        }
     }
 }
 
@@ -57,15 +69,29 @@ impl Scene {
         self.intersect(rays, coherent, &mut arguments, found);
     }
 
+    /// As [`Self::closest`], in packets whether coherent or not: for hits that nobody judges.
+    pub(crate) fn closest_in_packets(&self, rays: &Rays32, coherent: bool, found: &mut Found) {
+        found.has_surface = true;
+        // As for occlusion: only packets that keep together are known to come back from instances.
+        let in_packets = coherent || !self.has_instances;
+        self.intersect(rays, in_packets, &mut intersect_arguments(coherent), found);
+        found.has_surface = false;
+    }
+
+    /// As [`Self::occluded`], in packets whether coherent or not.
+    pub(crate) fn occluded_in_packets(&self, rays: &Rays32, coherent: bool, blocked: &mut [bool]) {
+        self.occlude(rays, true, &mut occluded_arguments(coherent), blocked);
+    }
+
     fn intersect(
         &self,
         rays: &Rays32,
-        coherent: bool,
+        in_packets: bool,
         arguments: &mut sys::RTCIntersectArguments,
         found: &mut Found,
     ) {
         found.resize(rays.len());
-        match (coherent, self.device.width) {
+        match (in_packets, self.device.width) {
             (true, 16) => self.closest16(rays, arguments, found),
             (true, 8) => self.closest8(rays, arguments, found),
             (true, 4) => self.closest4(rays, arguments, found),
@@ -96,13 +122,13 @@ impl Scene {
     fn occlude(
         &self,
         rays: &Rays32,
-        coherent: bool,
+        in_packets: bool,
         arguments: &mut sys::RTCOccludedArguments,
         blocked: &mut [bool],
     ) {
         // Debian 12's Embree keeps the 16 rays of a packet that meets instances in 16 bits and reads
         // 64 of them: by what lies beside, it never comes back.
-        match (coherent && !self.has_instances, self.device.width) {
+        match (in_packets && !self.has_instances, self.device.width) {
             (true, 16) => self.occluded16(rays, arguments, blocked),
             (true, 8) => self.occluded8(rays, arguments, blocked),
             (true, 4) => self.occluded4(rays, arguments, blocked),
@@ -129,6 +155,12 @@ impl Scene {
             found.placement[i] = if hit.instID[0] == MISS { hit.geomID } else { hit.instID[0] };
             found.triangle[i] = hit.primID;
             found.t[i] = query.ray.tfar;
+            if found.has_surface {
+                (found.weights[0][i], found.weights[1][i]) = (hit.u, hit.v);
+                for (axis, n) in found.normal.iter_mut().zip([hit.Ng_x, hit.Ng_y, hit.Ng_z]) {
+                    axis[i] = n;
+                }
+            }
             ahead.fetch(found.placement[i], found.triangle[i]);
         }
         ahead.fetch(MISS, MISS);
@@ -203,6 +235,11 @@ fn prefetch<T>(place: &T) {
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = place;
+}
+
+/// Whether Embree is told to keep packets together.
+fn is_coherent(flags: sys::RTCRayQueryFlags) -> bool {
+    flags.0 & sys::RTC_RAY_QUERY_FLAG_COHERENT.0 != 0
 }
 
 /// Whether rays spread by more than a few degrees, as those to lamps on all sides do. Embree follows a
@@ -302,6 +339,14 @@ macro_rules! packets {
                     put(&mut found.placement, start, count, &placement);
                     put(&mut found.triangle, start, count, &hit.primID);
                     put(&mut found.t, start, count, &query.0.ray.tfar);
+                    if found.has_surface {
+                        let Found { weights: [u, v], normal: [x, y, z], .. } = found;
+                        put(u, start, count, &hit.u);
+                        put(v, start, count, &hit.v);
+                        put(x, start, count, &hit.Ng_x);
+                        put(y, start, count, &hit.Ng_y);
+                        put(z, start, count, &hit.Ng_z);
+                    }
                 }
             }
 
@@ -315,7 +360,7 @@ macro_rules! packets {
                 query.0.mask = [u32::MAX; $width];
                 for start in (0..rays.len()).step_by($width) {
                     let count = $width.min(rays.len() - start);
-                    if run_apart(rays, start, count) {
+                    if is_coherent(arguments.flags) && run_apart(rays, start, count) {
                         for i in start..start + count {
                             blocked[i] = self.is_occluded(rays, i, arguments);
                         }
