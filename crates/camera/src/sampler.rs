@@ -8,9 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::sobol::{self, Key};
 
-/// Dimensions of the Sobol set.
-const DIMENSIONS: u32 = sobol_burley::NUM_DIMENSIONS;
-
 /// The point sets that samples come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -53,7 +50,10 @@ impl PixelSamples {
         let key = mix(self.seed.wrapping_add(u64::from(pair)));
         let random = |salt: u64| unit(mix(key ^ mix(u64::from(index) << 8 | salt)));
         match self.sampler {
-            Sampler::Sobol => sobol::pair(self.sobol_key(index, pair), 2 * pair % DIMENSIONS),
+            Sampler::Sobol => {
+                let (key, first) = self.sobol_key(index, pair);
+                sobol::point(key, first)
+            }
             Sampler::Independent => [random(0), random(1)],
             Sampler::Stratified => {
                 let [columns, rows] = self.grid();
@@ -75,12 +75,22 @@ impl PixelSamples {
         }
     }
 
-    /// The set has 2¹⁶ points in [`DIMENSIONS`]; beyond both it starts over, scrambled anew.
-    fn sobol_key(&self, index: u32, pair: u32) -> Key {
-        let again = u64::from(2 * pair / DIMENSIONS) << 32 | u64::from(index >> 16);
+    /// Which point of which dimensions a pair is. The place in the pixel and in the pupil and the first
+    /// surface's light and direction (the pairs 0, 1, 4 and 5) make the picture together and are dimensions
+    /// of one set; each other pair is a set for itself. Sets have 2¹⁶ points, and start over, scrambled
+    /// anew.
+    fn sobol_key(&self, index: u32, pair: u32) -> (Key, usize) {
+        let (first, apart) = match pair {
+            0 => (0, 0),
+            1 => (2, 0),
+            4 => (4, 0),
+            5 => (6, 0),
+            _ => (0, pair),
+        };
+        let again = (index >> 16).wrapping_mul(0x85eb_ca6b);
         #[expect(clippy::cast_possible_truncation, reason = "the low half is the seed")]
-        let seed = mix(self.seed ^ again) as u32;
-        Key { index: index & 0xffff, seed }
+        let seed = (self.seed as u32).wrapping_add(apart.wrapping_mul(0x9e37_79b9));
+        (Key { index: index & 0xffff, seed: seed.wrapping_add(again) }, first)
     }
 
     /// Columns and rows whose product is at most the number of samples and is nearest to a square.
@@ -105,9 +115,15 @@ pub fn squares_of_pair(
         out.extend(samples.map(|(pixel, index)| pixel.square(index, pair)));
         return;
     }
-    let keys: Vec<Key> = samples.map(|(pixel, index)| pixel.sobol_key(index, pair)).collect();
+    let mut dimensions = 0;
+    let key = |(pixel, index): (PixelSamples, u32)| {
+        let (key, first) = pixel.sobol_key(index, pair);
+        dimensions = first;
+        key
+    };
+    let keys: Vec<Key> = samples.map(key).collect();
     out.resize(keys.len(), [0.0; 2]);
-    sobol::pairs(&keys, 2 * pair % DIMENSIONS, out);
+    sobol::points(&keys, dimensions, out);
 }
 
 /// [`PixelSamples::square`] for each of `wanted`, which are a pixel's samples, an index and a pair of
@@ -118,31 +134,13 @@ pub fn squares(wanted: &[(PixelSamples, u32, u32)], out: &mut Vec<[f64; 2]>) {
         out.extend(wanted.iter().map(|(pixel, index, pair)| pixel.square(*index, *pair)));
         return;
     }
-    out.resize(wanted.len(), [0.0; 2]);
-    // Rays of a batch are about equally far on their way: few pairs in all.
-    let mut pairs: Vec<u32> = Vec::new();
-    for &(.., pair) in wanted {
-        if !pairs.contains(&pair) {
-            pairs.push(pair);
-        }
+    let key = |&(pixel, index, pair): &(PixelSamples, u32, u32)| pixel.sobol_key(index, pair);
+    if wanted.iter().all(|wanted| key(wanted).1 == 0) {
+        let keys: Vec<Key> = wanted.iter().map(|wanted| key(wanted).0).collect();
+        out.resize(keys.len(), [0.0; 2]);
+        return sobol::points(&keys, 0, out);
     }
-    let mut keys = Vec::with_capacity(wanted.len());
-    let mut places = Vec::with_capacity(wanted.len());
-    let mut numbers = vec![[0.0; 2]; wanted.len()];
-    for pair in pairs {
-        keys.clear();
-        places.clear();
-        for (place, &(pixel, index, _)) in
-            wanted.iter().enumerate().filter(|(_, (.., own))| *own == pair)
-        {
-            keys.push(pixel.sobol_key(index, pair));
-            places.push(place);
-        }
-        sobol::pairs(&keys, 2 * pair % DIMENSIONS, &mut numbers[..keys.len()]);
-        for (&place, &number) in places.iter().zip(&numbers) {
-            out[place] = number;
-        }
-    }
+    out.extend(wanted.iter().map(|&(pixel, index, pair)| pixel.square(index, pair)));
 }
 
 /// Steele, Lea & Flood, "Fast splittable pseudorandom number generators", 2014: the finaliser of

@@ -1,17 +1,22 @@
-//! Owen-scrambled Sobol numbers of many samples side by side, to the last bit of an f64 below 1.
+//! Owen-scrambled Sobol points of many samples side by side, to the last bit of an f64 below 1.
 //!
-//! The first 23 bits are those of the crate `sobol_burley` (Burley, "Practical hash-based Owen
-//! scrambling", 2020), which gives f32. A table of 2¹⁹ entries leaves four of them for what comes
-//! after the choice, so the scrambled number's other 9 bits are kept, and 21 random ones go behind:
-//! of at most 2¹⁶ points, Owen's scrambling makes all bits behind the 16th random (Owen,
-//! "Randomly permuted (t, m, s)-nets and (t, s)-sequences", 1995). That crate makes one sample's at a
-//! time, in a loop over the set bits of its index, which a vector unit cannot share among samples;
-//! here every bit is looked at.
+//! Most pairs of numbers are points of the first two dimensions of Sobol's sequence, which are the best
+//! stratified that there are (of any 2ᵐ points from a multiple of 2ᵐ on, one lies in each elementary
+//! interval of area 2⁻ᵐ), scrambled and shuffled for itself (Burley, "Practical hash-based Owen
+//! scrambling", 2020, section 3: shuffling pads such pairs to any number of dimensions). The few pairs on
+//! which a picture depends together are pairs of further dimensions with one shuffling, by a table.
+//!
+//! The first dimension is the reversed index. The second multiplies it by Pascal's triangle modulo 2,
+//! which is 1 where the bits of a row's number are among those of the column's (Lucas 1878): a sum over
+//! supersets, five shifts (Ahmed, "An Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and
+//! Compact", 2024).
+//!
+//! 32 bits are scrambled, and 21 random ones go behind them: a table of 2²⁴ entries leaves as many even
+//! ones for what comes after the choice.
 
 use std::array;
 use std::sync::LazyLock;
 
-use sobol_burley::NUM_DIMENSIONS;
 use sobol_burley::parts::{hash, owen_scramble_rev, sobol_rev};
 
 /// Samples worked on side by side.
@@ -20,10 +25,14 @@ const LANES: usize = 16;
 /// Bits of an index.
 const BITS: usize = 16;
 
-/// For each dimension, what each bit of the reversed index adds (exclusive or) to the reversed number.
-static DIRECTIONS: LazyLock<Vec<[u32; BITS]>> = LazyLock::new(|| {
-    let direction = |dimension, bit: usize| sobol_rev(1_u32 << (31 - bit), dimension);
-    (0..NUM_DIMENSIONS).map(|d| array::from_fn(|bit| direction(d, bit))).collect()
+/// Dimensions that share a shuffling.
+const DIMENSIONS: usize = 8;
+
+/// For each dimension, what each bit of the index adds (exclusive or) to the reversed number.
+static DIRECTIONS: LazyLock<[[u32; BITS]; DIMENSIONS]> = LazyLock::new(|| {
+    // In range: there are eight.
+    #[expect(clippy::cast_possible_truncation, reason = "below eight")]
+    array::from_fn(|d| array::from_fn(|bit| sobol_rev(1_u32 << (31 - bit), d as u32)))
 });
 
 /// A sample of a scrambled set.
@@ -35,58 +44,75 @@ pub(crate) struct Key {
     pub(crate) seed: u32,
 }
 
-/// The numbers of each of `keys` in dimensions `first` and `first + 1`; `first` is even. `out` is as
-/// long as `keys`.
-pub(crate) fn pairs(keys: &[Key], first: u32, out: &mut [[f64; 2]]) {
-    scrambled(keys, first, both(first), out);
+/// The point of each of `keys` in dimensions `first` and `first + 1`; `first` is even and below eight.
+/// `out` is as long as `keys`.
+pub(crate) fn points(keys: &[Key], first: usize, out: &mut [[f64; 2]]) {
+    scrambled(keys, first, &DIRECTIONS, out);
 }
 
-/// The numbers of one key in dimensions `first` and `first + 1`; `first` is even.
-pub(crate) fn pair(key: Key, first: u32) -> [f64; 2] {
-    let [numbers] = side_by_side([key], first, both(first));
-    numbers
-}
-
-fn both(first: u32) -> [&'static [u32; BITS]; 2] {
-    let directions = &*DIRECTIONS;
-    [0, 1].map(|k| &directions[(first + k) as usize])
+/// The point of one key in dimensions `first` and `first + 1`.
+pub(crate) fn point(key: Key, first: usize) -> [f64; 2] {
+    let [point] = side_by_side([key], first, &DIRECTIONS);
+    point
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn scrambled(keys: &[Key], first: u32, directions: [&[u32; BITS]; 2], out: &mut [[f64; 2]]) {
-    for (keys, out) in keys.chunks(LANES).zip(out.chunks_mut(LANES)) {
-        let mut lanes = [Key::default(); LANES];
-        lanes[..keys.len()].copy_from_slice(keys);
-        let numbers = side_by_side(lanes, first, directions);
-        out.copy_from_slice(&numbers[..keys.len()]);
+fn scrambled(
+    keys: &[Key],
+    first: usize,
+    directions: &[[u32; BITS]; DIMENSIONS],
+    out: &mut [[f64; 2]],
+) {
+    let (whole, rest) = keys.as_chunks::<LANES>();
+    let (to, to_rest) = out.as_chunks_mut::<LANES>();
+    for (keys, out) in whole.iter().zip(to) {
+        *out = side_by_side(*keys, first, directions);
     }
+    let mut lanes = [Key::default(); LANES];
+    lanes[..rest.len()].copy_from_slice(rest);
+    to_rest.copy_from_slice(&side_by_side(lanes, first, directions)[..rest.len()]);
+}
+
+/// The second dimension of point `index`, its bits reversed.
+#[inline(always)]
+fn second_reversed(index: u32) -> u32 {
+    let mut bits = index;
+    bits ^= (bits >> 1) & 0x5555_5555;
+    bits ^= (bits >> 2) & 0x3333_3333;
+    bits ^= (bits >> 4) & 0x0f0f_0f0f;
+    bits ^= (bits >> 8) & 0x00ff_00ff;
+    bits ^ ((bits >> 16) & 0x0000_ffff)
 }
 
 #[inline(always)]
 fn side_by_side<const N: usize>(
     keys: [Key; N],
-    first: u32,
-    directions: [&[u32; BITS]; 2],
+    first: usize,
+    directions: &[[u32; BITS]; DIMENSIONS],
 ) -> [[f64; 2]; N] {
-    const SHUFFLE: u32 = 0x79c6_8e4a;
-    const SEED: u32 = 0x9c8f_2d3b;
-    const DIMENSION: [u32; 4] = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8];
-    let mut out = [[0.0; 2]; N];
-    let mut index = [0; N];
-    for (index, key) in index.iter_mut().zip(&keys) {
-        *index = owen_scramble_rev(key.index.reverse_bits(), hash(key.seed ^ SHUFFLE));
+    const DIMENSION: [u32; 2] = [0x912f_69ba, 0x174f_18ab];
+    let (mut index, mut seed) = ([0; N], [0; N]);
+    for i in 0..N {
+        seed[i] = hash(keys[i].seed);
+        index[i] = owen_scramble_rev(keys[i].index.reverse_bits(), seed[i]).reverse_bits();
     }
-    for (k, directions) in directions.into_iter().enumerate() {
+    let mut out = [[0.0; 2]; N];
+    for k in 0..2 {
         let mut number = [0; N];
-        for (bit, &direction) in directions.iter().enumerate() {
-            for (number, &index) in number.iter_mut().zip(&index) {
-                let is_set = index >> (31 - bit) & 1;
-                *number ^= direction & is_set.wrapping_neg();
+        match first + k {
+            0 => number = index,
+            1 => number = index.map(second_reversed),
+            dimension => {
+                for (bit, &direction) in directions[dimension].iter().enumerate() {
+                    for (number, &index) in number.iter_mut().zip(&index) {
+                        *number ^= direction & (index >> bit & 1).wrapping_neg();
+                    }
+                }
             }
         }
-        let salt = first >> 2 ^ DIMENSION[(first as usize + k) % 4];
+        let salt = hash(DIMENSION[k].wrapping_add(u32::try_from(first).unwrap_or(0)));
         for i in 0..N {
-            let scramble = hash(salt ^ keys[i].seed.wrapping_mul(SEED));
+            let scramble = hash(seed[i] ^ salt);
             let high = owen_scramble_rev(number[i], scramble).reverse_bits();
             let low = hash(high ^ scramble) >> 11;
             out[i][k] = (f64::from(high) + f64::from(low) / TWO_TO_21) / TWO_TO_32;
@@ -100,26 +126,87 @@ const TWO_TO_32: f64 = 4_294_967_296.0;
 
 #[cfg(test)]
 mod tests {
+    use sobol_burley::parts::sobol_rev;
+
     use super::*;
 
     #[test]
-    fn numbers_begin_as_those_of_the_crate() {
-        let keys: Vec<Key> = (0..1000)
-            .map(|i: u32| Key { index: i * 7919 % (1 << 16), seed: i.wrapping_mul(0x9e37_79b9) })
-            .collect();
-        let mut out = vec![[0.0; 2]; keys.len()];
-        for first in [0, 2, 4, 18, 254] {
-            pairs(&keys, first, &mut out);
-            for (key, pair) in keys.iter().zip(&out) {
-                let expected = [first, first + 1]
-                    .map(|d| f64::from(sobol_burley::sample(key.index, d, key.seed)));
-                // The crate's have 23 bits.
-                let cut = pair.map(|x| (x * 8_388_608.0).floor() / 8_388_608.0);
-                assert_eq!(cut, expected, "{key:?}, dimension {first}");
-                assert_eq!(*pair, super::pair(*key, first));
+    fn the_second_dimension_is_that_of_the_crate() {
+        // Its table has 16 bits of indices.
+        for index in (0..1 << 16).step_by(37) {
+            let reversed: u32 = index;
+            assert_eq!(second_reversed(index), sobol_rev(reversed.reverse_bits(), 1), "{index}");
+            assert_eq!(index, sobol_rev(reversed.reverse_bits(), 0), "{index}");
+        }
+    }
+
+    /// Of 2ᵐ points from a multiple of 2ᵐ on, one lies in each box of 2⁻ᵃ by 2ᵃ⁻ᵐ, for all a.
+    #[test]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 2⁸")]
+    fn points_are_a_net_in_every_elementary_interval() {
+        for (m, first, seed) in [(4, 0, 1), (6, 64, 2), (8, 1 << 15, 3)] {
+            let count = 1_u32 << m;
+            let keys: Vec<Key> = (first..first + count).map(|index| Key { index, seed }).collect();
+            let mut out = vec![[0.0; 2]; keys.len()];
+            points(&keys, 0, &mut out);
+            for a in 0..=m {
+                let mut boxes = vec![0; count as usize];
+                for [x, y] in &out {
+                    let column = (x * f64::from(1 << a)) as usize;
+                    let row = (y * f64::from(1 << (m - a))) as usize;
+                    boxes[row << a | column] += 1;
+                }
+                assert!(boxes.iter().all(|&points| points == 1), "2^{m} points, 2^-{a}: {boxes:?}");
             }
         }
     }
+
+    #[test]
+    fn many_points_are_those_one_by_one() {
+        let keys: Vec<Key> = (0..77).map(|i: u32| Key { index: i * 7919, seed: i / 5 }).collect();
+        let mut out = vec![[0.0; 2]; keys.len()];
+        for first in [0, 2, 4, 6] {
+            points(&keys, first, &mut out);
+            assert_eq!(out, keys.iter().map(|&key| point(key, first)).collect::<Vec<_>>());
+        }
+    }
+
+    /// Dimensions of one shuffling belong to each other: of 2ᵐ points from a multiple of 2ᵐ on, one lies in
+    /// each interval of 2⁻ᵐ of every dimension, and the unscrambled numbers are those of the crate.
+    #[test]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 2⁶")]
+    fn further_dimensions_are_those_of_the_crate() {
+        for (d, directions) in DIRECTIONS.iter().enumerate() {
+            let own = (0..BITS).filter(|bit| 0x5a3c >> bit & 1 == 1);
+            let sum = own.fold(0, |sum, bit| sum ^ directions[bit]);
+            assert_eq!(sum, sobol_rev(0x5a3c_u32.reverse_bits(), d as u32), "{d}");
+        }
+        let keys: Vec<Key> = (192..256).map(|index| Key { index, seed: 11 }).collect();
+        let mut out = vec![[0.0; 2]; keys.len()];
+        for first in [0, 2, 4, 6] {
+            points(&keys, first, &mut out);
+            for k in 0..2 {
+                let mut met =
+                    out.iter().map(|point| (point[k] * 64.0) as usize).collect::<Vec<_>>();
+                met.sort_unstable();
+                assert_eq!(met, (0..64).collect::<Vec<_>>(), "{first} {k}");
+            }
+        }
+    }
+
+    /// Pairs of one sample do not know of each other: the mean of the product of two uniform numbers is
+    /// 1/4, with a standard deviation of √(7/144).
+    #[test]
+    fn pairs_are_independent() {
+        let count = 1 << 14;
+        let keys =
+            |pair: u32| (0..count).map(move |i| Key { index: i % 64, seed: i / 64 * 8 + pair });
+        let product = |(a, b): (Key, Key)| point(a, 0)[0] * point(b, 0)[0];
+        let mean = keys(0).zip(keys(1)).map(product).sum::<f64>() / f64::from(count);
+        // Four standard errors.
+        assert!((mean - 0.25).abs() < 4.0 * 0.2205 / 128.0, "{mean}");
+    }
+
     /// What a table of 2²⁴ entries leaves of a number is as even as the number: all 29 bits behind the
     /// 24th are set as often as not.
     #[test]
@@ -128,7 +215,7 @@ mod tests {
         let keys: Vec<Key> =
             (0..count).map(|i| Key { index: i % 256, seed: hash(i / 256) }).collect();
         let mut out = vec![[0.0; 2]; keys.len()];
-        pairs(&keys, 2, &mut out);
+        points(&keys, 2, &mut out);
         for bit in 25..=53 {
             let set = |x: &f64| (x * f64::from(bit).exp2()).rem_euclid(2.0) >= 1.0;
             for k in 0..2 {
