@@ -22,6 +22,7 @@ mod names;
 mod other_frame;
 pub mod output;
 pub mod plan;
+mod precision;
 mod radiance;
 pub mod render;
 pub mod report;

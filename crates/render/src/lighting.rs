@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use etendue_accel::Accel;
 use etendue_camera::Camera;
-use etendue_geometry::{Detail, HitBatch, RayBatch};
+use etendue_geometry::{Detail, HitBatch, HitPrecision, RayBatch};
 use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use etendue_tracer::{
-    EnvironmentMap, LayerSpec, Light, LightingContext, Lights, Rules, SceneView, Spectral, Traits,
+    EnvironmentMap, LayerSpec, Light, LightingContext, Lights, PlacedSurfaces, Rules, SceneView,
+    Spectral, Traits,
 };
 
 use crate::film::{FilmLayer, Precision};
@@ -67,6 +68,7 @@ pub(crate) fn settle(
     let spectral = Spectral::new(&Bands::Rgb);
     let lights = Lights::new(&lighting.lights, lighting.map.clone(), &surroundings, &spectral)
         .map_err(|error| RenderError::Lights(error.to_string()))?;
+    let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials);
     let stage = LightingContext {
         accel,
         surroundings,
@@ -74,6 +76,8 @@ pub(crate) fn settle(
         spectral: &spectral,
         traits: Traits::of(&scene.geometry, &scene.materials),
         emitters: None,
+        placed: &placed,
+        precision: HitPrecision::Single,
     };
     let lit = lit_share(scene, tracer, stage, progress)?;
     if lit.is_none_or(|share| share >= LIT) {

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use etendue_accel::Quality;
 use etendue_camera::{LensCamera, Projection};
-use etendue_geometry::{Detail, Placement};
+use etendue_geometry::{Detail, HitPrecision, Placement};
 use etendue_scene::file::{TracerRow, TracerSpec};
 use etendue_scene::import::Wanted;
 use etendue_scene::{MemoryForecast, Scene};
@@ -19,6 +19,7 @@ use crate::expose;
 use crate::film::Precision;
 use crate::forecast::forecast;
 use crate::output::Outputs;
+use crate::precision::light_precision;
 use crate::samples::{self, BYTES_OF_SUM};
 
 /// What of the models has to be read for `layers`: decided before they are opened.
@@ -74,6 +75,8 @@ pub struct Plan {
     pub quality: Quality,
     /// How finely data layers are kept.
     pub precision: Precision,
+    /// How precisely paths of light hit.
+    pub light_precision: HitPrecision,
     /// What the numbers are that the picture's light is kept in.
     pub bands: Bands,
     /// What it will take, by counts and headers alone: within 1.5 of the peak of the example scenes.
@@ -135,6 +138,7 @@ impl Plan {
             if rays / RAYS_PER_TRIANGLE < triangles { Quality::Low } else { Quality::Medium };
         let detail = if needs.surface { Detail::Surface } else { Detail::Distance };
         let precision = if outputs.npy { Precision::Double } else { Precision::Single };
+        let (light_precision, why_precision) = light_precision(scene, samples);
         let images = (needs.materials && !scene.textures.is_empty())
             .then_some(TextureScope { light: needs.light, ambient: needs.ambient });
         let mut plan = Self {
@@ -148,12 +152,23 @@ impl Plan {
             rays,
             quality,
             precision,
+            light_precision,
             bands: chosen.bands.clone(),
             memory: MemoryForecast::default(),
             decisions: Vec::new(),
         };
         plan.memory = forecast(scene, &plan, outputs);
         plan.decisions = plan.explain(scene, &chosen, (needs, passes), triangles);
+        if needs.light {
+            let choice = match light_precision {
+                HitPrecision::Single => "32 bits",
+                HitPrecision::Double => "64 bits",
+            };
+            let because = why_precision;
+            let decision = Decision { what: "light paths", choice: choice.to_owned(), because };
+            let last = plan.decisions.len() - 1;
+            plan.decisions.insert(last, decision);
+        }
         plan
     }
 

@@ -16,7 +16,8 @@ use etendue_tracer::layer::OtherFrame;
 use etendue_tracer::texture::{Encoding, Filter, ImageError, Wrap};
 use etendue_tracer::{
     Emitters, EnvironmentImage, EnvironmentMap, Image, ImageSource, LayerSpec, LightKind,
-    LightingContext, Lights, Material, Pixel, RayStats, SceneView, Spectral, Texture, Traits, View,
+    LightingContext, Lights, Material, Pixel, PlacedSurfaces, RayStats, SceneView, Spectral,
+    Texture, Traits, View,
 };
 use rayon::prelude::*;
 
@@ -519,6 +520,7 @@ pub fn trace(
         _ => None,
     };
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
+    let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials);
     let light = lit.as_ref().map(|(rules, lights)| LightPass {
         stage: LightingContext {
             accel,
@@ -527,6 +529,8 @@ pub fn trace(
             spectral: &spectral,
             traits: Traits::of(&scene.geometry, &scene.materials),
             emitters: emitters.as_ref(),
+            placed: &placed,
+            precision: plan.light_precision,
         },
         tracer: *rules,
         camera: &light_camera,

@@ -476,6 +476,7 @@ impl SceneFile {
             picture: self.spec.picture(),
             layers: self.spec.all_layers(),
             render: self.spec.render.clone(),
+            plan: self.spec.plan,
             notes,
             stats: parts.stats,
             inputs,

@@ -10,7 +10,7 @@ use etendue_sensor::Sensor;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 
 use crate::cache::Cache;
-use crate::file::{RenderSpec, TracerSpec};
+use crate::file::{PlanSpec, RenderSpec, TracerSpec};
 use crate::identity::Ingredients;
 use crate::ids::{Copies, SceneNode};
 use crate::import::{Note, Strictness};
@@ -56,6 +56,8 @@ pub struct Scene {
     pub layers: Vec<LayerSpec>,
     /// How to render.
     pub render: RenderSpec,
+    /// What the plan is told instead of deciding it.
+    pub plan: PlanSpec,
     /// What was dropped, ignored or missing on the way.
     pub notes: Vec<Note>,
     /// What loading cost.

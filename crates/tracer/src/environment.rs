@@ -95,10 +95,14 @@ impl EnvironmentMap {
     /// Radiance from the unit direction `d`, interpolated.
     #[must_use]
     pub fn radiance(&self, d: DVec3) -> Color {
+        self.radiance_at(place(d))
+    }
+
+    /// Radiance at a [`place`].
+    pub(crate) fn radiance_at(&self, [u, v]: [f64; 2]) -> Color {
         if self.texels.is_empty() {
             return [0.0; 3];
         }
-        let [u, v] = place(d);
         let (x, y) = (u * self.width as f64 - 0.5, v * self.height as f64 - 0.5);
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
@@ -111,16 +115,20 @@ impl EnvironmentMap {
         })
     }
 
+    /// The texel of a column from −1 to the width, around, and of a row, of which there are no more above
+    /// the first and below the last.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "wrapped, clamped")]
     fn texel(&self, x: f64, y: f64) -> [f32; 3] {
-        let column = x.rem_euclid(self.width as f64) as usize;
+        let width = self.width as f64;
+        let around = if x < 0.0 { x + width } else { x };
+        let column = if around >= width { around - width } else { around } as usize;
         let row = y.clamp(0.0, (self.height - 1) as f64) as usize;
         self.texels[row * self.width + column.min(self.width - 1)]
     }
 }
 
 /// Places (u, v) in 0..1 of a map for a unit direction.
-fn place(d: DVec3) -> [f64; 2] {
+pub(crate) fn place(d: DVec3) -> [f64; 2] {
     [0.5 + d.x.atan2(-d.z) / TAU, d.y.clamp(-1.0, 1.0).acos() / PI]
 }
 
@@ -177,21 +185,26 @@ impl MapSampler {
         Self { cells: GridDistribution::new(columns, &weights), mean }
     }
 
-    /// A direction and its density (1/sr).
-    #[must_use]
-    pub fn sample(&self, square: [f64; 2]) -> (DVec3, f64) {
-        let d = direction(self.cells.place(square));
-        (d, self.pdf(d))
+    /// A direction, its density (1/sr) and its [`place`].
+    pub(crate) fn sample(&self, square: [f64; 2]) -> (DVec3, f64, [f64; 2]) {
+        let at = self.cells.place(square);
+        let d = direction(at);
+        (d, self.pdf_at(d, at), at)
     }
 
     /// The density (1/sr) of a unit direction.
     #[must_use]
     pub fn pdf(&self, d: DVec3) -> f64 {
+        self.pdf_at(d, place(d))
+    }
+
+    /// [`Self::pdf`] of a direction whose [`place`] is known.
+    pub(crate) fn pdf_at(&self, d: DVec3, at: [f64; 2]) -> f64 {
         let sin_theta = (d.x * d.x + d.z * d.z).sqrt();
         if sin_theta <= 0.0 {
             return 0.0;
         }
-        self.cells.pdf(place(d)) / (2.0 * PI * PI * sin_theta)
+        self.cells.pdf(at) / (2.0 * PI * PI * sin_theta)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Emissive triangles: as one point sees them, and those of one radiance ready to be asked many times.
+//! Emissive triangles, ready to be asked many times.
 
 use std::f64::consts::PI;
 
@@ -11,7 +11,7 @@ use crate::spawn::magnitudes;
 use crate::{Material, Paint};
 
 /// More emissive triangles than this are not kept ready.
-pub(crate) const MOST: usize = 4096;
+pub(crate) const MOST: usize = 1 << 16;
 
 /// A triangle in the world.
 #[derive(Debug, Clone, Copy)]
@@ -37,62 +37,53 @@ impl Shape {
     }
 }
 
-/// A triangle that shines, as seen from a point.
-pub(crate) struct EmissiveTriangle<'a> {
-    pub(crate) id: [u32; 2],
-    pub(crate) spot: SurfacePoint<'a>,
-    /// The first corner from the point (m).
-    pub(crate) corner: DVec3,
-    pub(crate) shape: Shape,
-}
-
-impl<'a> EmissiveTriangle<'a> {
-    pub(crate) fn new(
-        around: &SceneView<'a>,
-        number: u32,
-        triangle: u32,
-        from: DVec3,
-    ) -> Option<Self> {
-        let placement = around.geometry.placements.get(number as usize)?;
-        let spot = SurfacePoint::corner(around.geometry, placement, triangle as usize);
-        let [corner, ..] = spot.mesh.corners(spot.triangle);
-        let corner = placement.world_from_mesh.point_from(corner, from);
-        Some(Self { id: [number, triangle], corner, shape: Shape::of(&spot)?, spot })
-    }
-}
-
-/// A triangle that shines alike all over.
+/// A triangle that shines, ready to be asked.
 #[derive(Debug, Clone)]
 pub(crate) struct AreaLight {
     /// Placement and triangle.
     pub(crate) id: [u32; 2],
-    /// The first corner, turned into the world, and the placement's translation (m): its high part
-    /// and its low one.
-    pub(crate) corner: DVec3,
-    pub(crate) translation: [DVec3; 2],
+    /// The first corner in the world (m): what f64 holds of it, and what is left.
+    pub(crate) corner: [DVec3; 2],
     pub(crate) shape: Shape,
     pub(crate) two_sided: bool,
+    /// It shines alike all over.
+    pub(crate) is_plain: bool,
     /// What the placement's own numbers add to the rounding of a point on it (m).
     pub(crate) magnitudes: DVec3,
 }
 
 impl AreaLight {
-    /// Triangle `id`; `None` when its radiance is not alike all over, or it has no area.
+    /// Triangle `id`; `None` when it does not shine or has no area.
     pub(crate) fn new(around: &SceneView<'_>, id: [u32; 2]) -> Option<Self> {
         let placement = around.geometry.placements.get(id[0] as usize)?;
         let spot = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
         let emission = around.material(&spot)?.emission.as_ref()?;
-        let Paint::Plain(_) = emission.radiance else { return None };
         let place = &placement.world_from_mesh;
         let [corner, ..] = spot.mesh.corners(spot.triangle);
+        let (turned, far) = (place.linear * corner, place.translation);
+        // Knuth's sum of two numbers without loss.
+        let sum = turned + far;
+        let of_turned = sum - far;
+        let lost = (turned - of_turned) + (far - (sum - of_turned));
         Some(Self {
             id,
-            corner: place.linear * corner,
-            translation: [place.translation, place.translation_low],
+            corner: [sum, lost + place.translation_low],
             shape: Shape::of(&spot)?,
             two_sided: emission.two_sided,
+            is_plain: matches!(emission.radiance, Paint::Plain(_)),
             magnitudes: magnitudes(placement, spot.mesh),
         })
+    }
+
+    /// From a point of the world to the place with these weights of the second and third corner (m).
+    pub(crate) fn offset(&self, from: DVec3, [u, v]: [f64; 2]) -> DVec3 {
+        let [corner, rest] = self.corner;
+        ((corner - from) + rest) + self.across([u, v])
+    }
+
+    /// From the first corner to that place (m).
+    pub(crate) fn across(&self, [u, v]: [f64; 2]) -> DVec3 {
+        self.shape.edges[0] * u + self.shape.edges[1] * v
     }
 }
 

@@ -4,17 +4,18 @@
 //! mesh by its own: `π A L` for one side. Lights far away are counted by what falls onto the scene's
 //! sphere of radius R: `π R² E` for parallel light, `4 π² R² L` for an environment.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{Illuminant, NoOverlap};
 
-use crate::environment::{EnvironmentMap, MapSampler};
-use crate::lamps::{self, AreaLight, EmissiveTriangle, triangle_power};
+use crate::environment::{EnvironmentMap, MapSampler, place};
+use crate::lamps::{self, AreaLight, triangle_power};
 use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::{DiscreteDistribution, sphere_direction, triangle_point};
-use crate::spawn::Anchor;
 use crate::spectral::Spectral;
 use crate::{Color, Material};
 
@@ -94,28 +95,48 @@ fn spot_falloff(cosine: f64, cos_outer: f64, cos_inner: f64) -> f64 {
     share * share
 }
 
-/// A point's view of one light.
+/// A place on a light, or a direction to it, that was chosen.
 #[derive(Debug, Clone, Copy)]
-pub struct LightSample {
-    /// From the point to the light (unit).
-    pub direction: DVec3,
-    /// Density (1/sr) times the light's chance; of a light that is a point, its chance alone.
-    pub pdf: f64,
-    /// The light can be met by a direction in no other way.
-    pub is_delta: bool,
-    /// Where the light is (m); a surface knows how exactly. `None` far away.
-    pub end: End,
+pub(crate) struct Target {
+    /// What it is a place of.
+    pub(crate) kind: TargetKind,
+    /// Where it is (m), the sum of the three: where a triangle begins, what f64 lost of that, and from
+    /// there to the place. Of a direction, the first alone.
+    pub(crate) place: [DVec3; 3],
+    /// Unit normal of a triangle; else zero.
+    pub(crate) normal: DVec3,
+    /// What a triangle's own numbers add to the rounding of the place (m).
+    pub(crate) magnitudes: DVec3,
+    /// Density over the area (1/m²) or, of a direction, over the solid angle (1/sr), the light's chance
+    /// included; of a point the chance alone.
+    pub(crate) density: f64,
+    /// Placement and triangle, or [`MISS`].
+    pub(crate) id: [u32; 2],
 }
 
-/// Where a ray to a light ends.
-#[derive(Debug, Clone, Copy)]
-pub enum End {
-    /// Nowhere.
+/// Kinds of places that light comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TargetKind {
+    /// A point, which no direction meets by chance.
+    Point,
+    /// A direction, which no other is alike.
+    Parallel,
+    /// A direction of the environment.
     Far,
-    /// At a point (m).
-    Point(DVec3),
-    /// On a triangle of a placement.
-    Surface(Anchor, [u32; 2]),
+    /// A place on a triangle.
+    Triangle {
+        /// It shines to both sides.
+        two_sided: bool,
+    },
+}
+
+impl Target {
+    /// A direction (unit) or a point (m).
+    fn bare(kind: TargetKind, place: DVec3, density: f64) -> Self {
+        let place = [place, DVec3::ZERO, DVec3::ZERO];
+        let (normal, magnitudes) = (DVec3::ZERO, DVec3::ZERO);
+        Self { kind, place, normal, magnitudes, density, id: [MISS; 2] }
+    }
 }
 
 /// All lights of a scene, ready to be chosen from.
@@ -132,9 +153,9 @@ pub struct Lights {
     /// Placement and triangle of each emissive triangle, behind the lights.
     triangles: Vec<[u32; 2]>,
     picker: DiscreteDistribution,
-    /// The emissive triangles, where there are no other lights and each shines alike all over, and
-    /// what they give off in all bands.
-    lamps: Vec<AreaLight>,
+    /// The emissive triangles where they are at most [`lamps::MOST`] (`None` without area), and what those
+    /// that shine alike all over give off in all bands.
+    lamps: Vec<Option<AreaLight>>,
     lamp_bands: Vec<f64>,
 }
 
@@ -142,12 +163,13 @@ pub struct Lights {
 struct Environment {
     index: usize,
     map: Option<(Arc<EnvironmentMap>, MapSampler)>,
-    rotation: f64,
+    /// Sine and cosine of its turn.
+    turn: (f64, f64),
 }
 
 impl Environment {
     fn turned(&self, d: DVec3, sign: f64) -> DVec3 {
-        let (sin, cos) = (sign * self.rotation).sin_cos();
+        let (sin, cos) = (sign * self.turn.0, self.turn.1);
         DVec3::new(cos * d.x + sin * d.z, d.y, -sin * d.x + cos * d.z)
     }
 
@@ -189,7 +211,7 @@ impl Lights {
                     let sampler = MapSampler::new(&map);
                     (map, sampler)
                 });
-                Some(Environment { index, map: sampled, rotation })
+                Some(Environment { index, map: sampled, turn: rotation.sin_cos() })
             }
             _ => None,
         });
@@ -228,42 +250,28 @@ impl Lights {
         Ok(all)
     }
 
-    /// Keeps emissive triangles ready, if all that there is to choose from is of that kind.
+    /// Keeps emissive triangles ready.
     fn light_lamps(&mut self, around: &SceneView<'_>, spectral: &Spectral) {
-        if !self.lights.is_empty() || self.is_dark() || self.triangles.len() > lamps::MOST {
+        if self.is_dark() || self.triangles.len() > lamps::MOST {
             return;
         }
-        let lamps: Option<Vec<AreaLight>> =
-            self.triangles.iter().map(|&id| AreaLight::new(around, id)).collect();
-        let Some(lamps) = lamps else { return };
         let count = spectral.count();
-        let mut bands = vec![0.0; lamps.len() * count];
-        for (lamp, bands) in lamps.iter().zip(bands.chunks_mut(count)) {
-            let placement = &around.geometry.placements[lamp.id[0] as usize];
-            let spot = SurfacePoint::corner(around.geometry, placement, lamp.id[1] as usize);
+        let mut bands = vec![0.0; self.triangles.len() * count];
+        for (id, bands) in self.triangles.iter().zip(bands.chunks_mut(count)) {
+            let placement = &around.geometry.placements[id[0] as usize];
+            let spot = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
             self.emitted(around, spectral, &spot, true, bands);
         }
-        (self.lamps, self.lamp_bands) = (lamps, bands);
+        self.lamps = self.triangles.iter().map(|&id| AreaLight::new(around, id)).collect();
+        self.lamp_bands = bands;
     }
 
-    /// The lamp for `choice`: its number, itself and its chance; `None` where lights have to be asked
-    /// one by one.
-    pub(crate) fn lamp(&self, choice: f64) -> Option<(usize, &AreaLight, f64)> {
-        if self.lamps.is_empty() {
-            return None;
+    /// The emissive triangle of a number; `None` without area.
+    fn lamp(&self, around: &SceneView<'_>, number: usize) -> Option<Cow<'_, AreaLight>> {
+        match self.lamps.get(number) {
+            Some(lamp) => lamp.as_ref().map(Cow::Borrowed),
+            None => AreaLight::new(around, self.triangles[number]).map(Cow::Owned),
         }
-        let (index, _) = self.picker.pick(choice);
-        Some((index, &self.lamps[index], self.picker.probability(index)))
-    }
-
-    /// What a lamp gives off in `count` bands.
-    pub(crate) fn bands_of_lamp(&self, lamp: usize, count: usize) -> &[f64] {
-        &self.lamp_bands[lamp * count..(lamp + 1) * count]
-    }
-
-    /// Whether [`Self::lamp`] has one.
-    pub(crate) fn has_lamps(&self) -> bool {
-        !self.lamps.is_empty()
     }
 
     /// Whether there is nothing to choose from.
@@ -290,16 +298,6 @@ impl Lights {
         self.environment.is_some()
     }
 
-    /// The only light there is, when that is a point (m), with its intensity in `count` bands.
-    pub(crate) fn lone_point(&self, count: usize) -> Option<(DVec3, &[f64])> {
-        match self.lights[..] {
-            [Light { kind: LightKind::Point(at), .. }] if self.picker.len() == 1 => {
-                Some((at, self.bands_of(0, count)))
-            }
-            _ => None,
-        }
-    }
-
     /// How many emissive triangles there are.
     #[must_use]
     pub fn emissive_triangles(&self) -> usize {
@@ -310,51 +308,48 @@ impl Lights {
         &self.bands[light * count..(light + 1) * count]
     }
 
-    /// Chooses a light for `from` by `choice` and a direction to it by `square` (in 0..1); its
-    /// radiance (of a point: intensity over squared distance) goes to `radiance`. `None` when it does
-    /// not shine there.
-    pub fn sample(
+    /// Chooses a light for the point `from` (m) and a place on it by `square` (in 0..1); its radiance (of
+    /// a point its intensity) goes to `radiance`. `None` when it does not shine there.
+    pub(crate) fn choose(
         &self,
         around: &SceneView<'_>,
         spectral: &Spectral,
-        from: &Anchor,
-        choice: f64,
-        square: [f64; 2],
+        from: DVec3,
+        [choice, v]: [f64; 2],
         radiance: &mut [f64],
-    ) -> Option<LightSample> {
-        if self.picker.is_empty() {
-            return None;
-        }
-        let (index, _) = self.picker.pick(choice);
-        let chance = self.picker.probability(index);
+    ) -> Option<Target> {
+        // What is left of the number that chose the light chooses the place: both stay even.
+        let (index, rest, chance) = match self.picker.len() {
+            0 => return None,
+            1 => (0, choice, 1.0),
+            _ => {
+                let (index, rest) = self.picker.pick(choice);
+                (index, rest, self.picker.probability(index))
+            }
+        };
+        let square = [rest, v];
         let Some(light) = self.lights.get(index) else {
-            let [placement, triangle] = self.triangles[index - self.lights.len()];
-            let place = EmissiveTriangle::new(around, placement, triangle, from.point)?;
-            return self.toward_triangle(around, spectral, from, &place, square, chance, radiance);
+            let number = index - self.lights.len();
+            return self.place_on_lamp(around, spectral, number, square, chance, radiance);
         };
         radiance.copy_from_slice(self.bands_of(index, radiance.len()));
-        let point = |at: DVec3, factor: f64, radiance: &mut [f64]| {
-            let offset = at - from.point;
-            let squared = offset.length_squared();
-            let direction = offset.try_normalize()?;
-            radiance.iter_mut().for_each(|band| *band *= factor / squared);
-            Some(LightSample { direction, pdf: chance, is_delta: true, end: End::Point(at) })
-        };
         match light.kind {
-            LightKind::Point(at) => point(at, 1.0, radiance),
+            LightKind::Point(at) => Some(Target::bare(TargetKind::Point, at, chance)),
             LightKind::Spot { at, axis, cos_outer, cos_inner } => {
-                let cosine = (from.point - at).try_normalize()?.dot(axis);
+                let cosine = (from - at).try_normalize()?.dot(axis);
                 let factor = spot_falloff(cosine, cos_outer, cos_inner);
-                if factor > 0.0 { point(at, factor, radiance) } else { None }
+                radiance.iter_mut().for_each(|band| *band *= factor);
+                (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance))
             }
             LightKind::Directional(along) => {
-                Some(LightSample { direction: -along, pdf: chance, is_delta: true, end: End::Far })
+                Some(Target::bare(TargetKind::Parallel, -along, chance))
             }
             LightKind::Environment { .. } => {
                 let environment = self.environment.as_ref()?;
                 let (direction, pdf) = match &environment.map {
-                    Some((_, sampler)) => {
-                        let (local, pdf) = sampler.sample(square);
+                    Some((map, sampler)) => {
+                        let (local, pdf, at) = sampler.sample(square);
+                        self.spread_sky(spectral, &map.radiance_at(at), radiance);
                         (environment.world(local), pdf)
                     }
                     None => (sphere_direction(square), 0.25 / PI),
@@ -362,45 +357,42 @@ impl Lights {
                 if pdf <= 0.0 {
                     return None;
                 }
-                self.environment(spectral, direction, radiance);
-                let pdf = pdf * chance;
-                Some(LightSample { direction, pdf, is_delta: false, end: End::Far })
+                Some(Target::bare(TargetKind::Far, direction, pdf * chance))
             }
         }
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one step of `sample`, taken out to be read")]
-    fn toward_triangle(
+    /// A place on an emissive triangle.
+    fn place_on_lamp(
         &self,
         around: &SceneView<'_>,
         spectral: &Spectral,
-        from: &Anchor,
-        place: &EmissiveTriangle<'_>,
+        number: usize,
         square: [f64; 2],
         chance: f64,
         radiance: &mut [f64],
-    ) -> Option<LightSample> {
+    ) -> Option<Target> {
+        let lamp = self.lamp(around, number)?;
         let [u, v] = triangle_point(square);
-        let offset = place.corner + place.shape.edges[0] * u + place.shape.edges[1] * v;
-        let direction = offset.try_normalize()?;
-        let spot = SurfacePoint { weights: [1.0 - u - v, u, v], ..place.spot };
-        let facing = -direction.dot(place.shape.normal);
-        if !self.emitted(around, spectral, &spot, facing > 0.0, radiance) {
-            return None;
+        let count = radiance.len();
+        match self.lamp_bands.get(number * count..(number + 1) * count) {
+            Some(bands) if lamp.is_plain => radiance.copy_from_slice(bands),
+            _ => {
+                let placement = &around.geometry.placements[lamp.id[0] as usize];
+                let spot = SurfacePoint::corner(around.geometry, placement, lamp.id[1] as usize);
+                let spot = SurfacePoint { weights: [1.0 - u - v, u, v], ..spot };
+                if !self.emitted(around, spectral, &spot, true, radiance) {
+                    return None;
+                }
+            }
         }
-        let pdf = chance * offset.length_squared() / (facing.abs() * place.shape.area);
-        let end = Anchor::new(
-            from.point + offset,
-            place.shape.normal,
-            from.point,
-            spot.placement,
-            spot.mesh,
-        );
-        pdf.is_finite().then_some(LightSample {
-            direction,
-            pdf,
-            is_delta: false,
-            end: End::Surface(end, place.id),
+        Some(Target {
+            kind: TargetKind::Triangle { two_sided: lamp.two_sided },
+            place: [lamp.corner[0], lamp.corner[1], lamp.across([u, v])],
+            normal: lamp.shape.normal,
+            magnitudes: lamp.magnitudes,
+            density: chance / lamp.shape.area,
+            id: lamp.id,
         })
     }
 
@@ -424,10 +416,9 @@ impl Lights {
         true
     }
 
-    /// The density (1/sr), chance included, with which [`Self::sample`] gives the direction from
+    /// The density (1/sr), chance included, with which [`Self::choose`] gives the direction from
     /// `from` to `spot`, where it was met by a ray along `direction`.
-    #[must_use]
-    pub fn pdf_of_surface(
+    pub(crate) fn pdf_of_surface(
         &self,
         around: &SceneView<'_>,
         placement: u32,
@@ -439,48 +430,50 @@ impl Lights {
         if self.picker.is_empty() {
             return 0.0;
         }
-        let triangle = u32::try_from(spot.triangle).unwrap_or(u32::MAX);
-        let Some(place) = EmissiveTriangle::new(around, placement, triangle, from) else {
-            return 0.0;
-        };
-        let chance = self.picker.probability(*first as usize + spot.triangle);
+        let index = *first as usize + spot.triangle;
+        let Some(lamp) = self.lamp(around, index - self.lights.len()) else { return 0.0 };
         let [_, u, v] = spot.weights;
-        let offset = place.corner + place.shape.edges[0] * u + place.shape.edges[1] * v;
-        let pdf = chance * offset.length_squared()
-            / (direction.dot(place.shape.normal).abs() * place.shape.area);
+        let squared = lamp.offset(from, [u, v]).length_squared();
+        let cosine = direction.dot(lamp.shape.normal).abs();
+        let pdf = self.picker.probability(index) * squared / (cosine * lamp.shape.area);
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 
-    /// Radiance that comes from the unit `direction` without meeting anything; `false` when it is
-    /// dark there.
-    pub fn environment(&self, spectral: &Spectral, direction: DVec3, radiance: &mut [f64]) -> bool {
-        let Some(environment) = &self.environment else { return false };
-        let own = self.bands_of(environment.index, radiance.len());
-        match &environment.map {
-            None => radiance.copy_from_slice(own),
-            Some((map, _)) => {
-                let color = map.radiance(environment.local(direction));
-                for (i, band) in radiance.iter_mut().enumerate() {
-                    *band = own[i] * spectral.band(&color, i);
-                }
+    /// Radiance that comes from the unit `direction` without meeting anything, and the density (1/sr),
+    /// chance included, with which [`Self::choose`] gives that direction; `None` when it is dark there.
+    pub(crate) fn environment(
+        &self,
+        spectral: &Spectral,
+        direction: DVec3,
+        radiance: &mut [f64],
+    ) -> Option<f64> {
+        let environment = self.environment.as_ref()?;
+        let pdf = match &environment.map {
+            None => {
+                radiance.copy_from_slice(self.bands_of(environment.index, radiance.len()));
+                0.25 / PI
             }
-        }
-        true
+            Some((map, sampler)) => {
+                let local = environment.local(direction);
+                let at = place(local);
+                self.spread_sky(spectral, &map.radiance_at(at), radiance);
+                sampler.pdf_at(local, at)
+            }
+        };
+        let chance = match self.picker.len() {
+            0 => 0.0,
+            _ => self.picker.probability(environment.index),
+        };
+        Some(pdf * chance)
     }
 
-    /// The density (1/sr), chance included, with which [`Self::sample`] gives a direction of the
-    /// environment.
-    #[must_use]
-    pub fn pdf_of_environment(&self, direction: DVec3) -> f64 {
-        let Some(environment) = self.environment.as_ref().filter(|_| !self.picker.is_empty())
-        else {
-            return 0.0;
-        };
-        let pdf = match &environment.map {
-            Some((_, sampler)) => sampler.pdf(environment.local(direction)),
-            None => 0.25 / PI,
-        };
-        pdf * self.picker.probability(environment.index)
+    /// A colour of the environment's image in all bands.
+    fn spread_sky(&self, spectral: &Spectral, color: &Color, radiance: &mut [f64]) {
+        let index = self.environment.as_ref().map_or(0, |environment| environment.index);
+        let own = self.bands_of(index, radiance.len());
+        for (i, (band, own)) in radiance.iter_mut().zip(own).enumerate() {
+            *band = own * spectral.band(color, i);
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Where a ray that leaves a surface starts, by the hit's own error bound.
 //!
-//! A hit is solved in f64, so the point `p = o + t d` misses its triangle's plane by a few roundings
+//! A hit is solved in f64 (or found in f32, with f32's ε), so the point `p = o + t d` misses its triangle's plane by a few roundings
 //! of the numbers that it was made from. Along the normal `n` these are at most
 //!
 //! ```text
@@ -16,11 +16,24 @@
 //! the scene's scale, and far from the origin the bound grows as f64's spacing does.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Mesh, Placement};
+use etendue_geometry::{HitPrecision, Mesh, Placement};
 
 /// Roundings that a point, a later ray's origin and that ray's own test of this triangle go through:
 /// about five each, and as many again for safety.
-pub(crate) const ROUNDINGS: f64 = 32.0 * f64::EPSILON;
+const ROUNDINGS: f64 = 32.0 * f64::EPSILON;
+
+/// The same where hits are those of single precision: of the corners, of the ray and of the distance,
+/// about two each, of which each number of the sum has its share, and as many again for safety.
+const SINGLE_ROUNDINGS: f64 = 8.0 * f32::EPSILON as f64;
+
+/// `k ε` of the bound for hits of some precision.
+#[must_use]
+pub fn roundings(precision: HitPrecision) -> f64 {
+    match precision {
+        HitPrecision::Double => ROUNDINGS,
+        HitPrecision::Single => SINGLE_ROUNDINGS,
+    }
+}
 
 /// A point of a surface, with how well it is known.
 #[derive(Debug, Clone, Copy)]
@@ -34,17 +47,17 @@ pub struct Anchor {
 }
 
 impl Anchor {
-    /// The point on a triangle of `placement`, found by a ray from `origin`, or for one.
-    #[must_use]
-    pub fn new(
+    /// The point on a triangle, found by a ray from `origin`, or for one; `magnitudes` are those of its
+    /// placement, and `roundings` those of the hits' precision.
+    pub(crate) fn new(
         point: DVec3,
         normal: DVec3,
         origin: DVec3,
-        placement: &Placement,
-        mesh: &Mesh,
+        magnitudes: DVec3,
+        roundings: f64,
     ) -> Self {
-        let magnitudes = point.abs() + origin.abs() + magnitudes(placement, mesh);
-        Self { point, normal, error: ROUNDINGS * normal.abs().dot(magnitudes) }
+        let magnitudes = point.abs() + origin.abs() + magnitudes;
+        Self { point, normal, error: roundings * normal.abs().dot(magnitudes) }
     }
 
     /// The point moved off the surface to the side that `towards` is on.

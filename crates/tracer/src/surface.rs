@@ -1,18 +1,20 @@
 //! From a hit to a surface that light can be scattered by.
 
-use etendue_geometry::glam::DVec3;
+use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{HitBatch, RayBatch};
 
 use crate::bsdf::{Bsdf, Layered, Model, fresnel};
 use crate::material::{Alpha, GltfSurface, NormalMap};
+use crate::placed::PlacedSurface;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::Anchor;
-use crate::{Color, Footprint, Material, Scattering};
+use crate::{Color, Footprint, LightingContext, Material, Scattering};
 
 /// A hit seen from its ray.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SurfaceInteraction<'a> {
     pub(crate) spot: SurfacePoint<'a>,
+    placed: &'a PlacedSurface,
     pub(crate) material: &'a Material,
     pub(crate) anchor: Anchor,
     /// The ray came from the triangle's front.
@@ -25,21 +27,22 @@ pub(crate) struct SurfaceInteraction<'a> {
 impl<'a> SurfaceInteraction<'a> {
     /// Hit `i`; `None` for a miss.
     pub(crate) fn new(
-        around: &'a SceneView<'a>,
+        stage: &'a LightingContext<'a>,
         rays: &RayBatch,
         hits: &HitBatch,
         i: usize,
         footprint: Option<Footprint>,
     ) -> Option<Self> {
+        let around = &stage.surroundings;
+        let placed = stage.placed.get(hits.placement[i])?;
         let spot = SurfacePoint { footprint, ..around.spot(hits, i)? };
         let material = around.material(&spot)?;
         let (origin, direction) = (rays.origin(i), rays.direction(i));
         let normal = hits.normal(i);
-        let anchor =
-            Anchor::new(origin + direction * hits.t[i], normal, origin, spot.placement, spot.mesh);
+        let anchor = stage.anchor(origin + direction * hits.t[i], normal, origin, placed);
         let front = normal.dot(direction) <= 0.0;
         let base = around.base_color(material, &spot);
-        Some(Self { spot, material, anchor, front, base, wo: -direction })
+        Some(Self { spot, placed, material, anchor, front, base, wo: -direction })
     }
 
     /// Share of the surface that is there.
@@ -109,24 +112,39 @@ impl<'a> SurfaceInteraction<'a> {
     /// The shading normal on the viewer's side; the geometric one where the viewer would see its
     /// back.
     fn shading(&self, around: &SceneView<'_>, geometric: DVec3) -> DVec3 {
-        let front = self.anchor.normal;
-        let mut normal = self.spot.shading_normal(front).unwrap_or(front);
-        if let Some(map) = &self.material.normal_map {
-            normal = self.tilted(around, map, normal);
+        if !self.placed.is_tilted {
+            return geometric;
         }
-        if !self.front {
-            normal = -normal;
+        let (turn, front) = (self.placed.turn.as_ref(), self.anchor.normal);
+        let normal = self.spot.tilted_normal(around, self.material, turn, front);
+        facing(if self.front { normal } else { -normal }, geometric, self.wo)
+    }
+}
+
+impl SurfacePoint<'_> {
+    /// The shading normal on the front, of which `front` is the geometric one; `turn` brings the mesh's
+    /// normals into the world.
+    pub(crate) fn tilted_normal(
+        &self,
+        around: &SceneView<'_>,
+        material: &Material,
+        turn: Option<&DMat3>,
+        front: DVec3,
+    ) -> DVec3 {
+        let normal = self.turned_normal(turn, front).unwrap_or(front);
+        match &material.normal_map {
+            Some(map) => self.mapped_normal(around, map, normal),
+            None => normal,
         }
-        if normal.dot(self.wo) > 0.0 { outward(normal, geometric, self.wo) } else { geometric }
     }
 
     /// The normal tilted by a normal map: +x along u, +y up the image, against v (glTF 2.0, section
     /// 3.9.3).
-    fn tilted(&self, around: &SceneView<'_>, map: &NormalMap, normal: DVec3) -> DVec3 {
-        let Some([along_u, along_v]) = self.spot.texture_axes(map.image.uv_set as usize) else {
+    fn mapped_normal(&self, around: &SceneView<'_>, map: &NormalMap, normal: DVec3) -> DVec3 {
+        let Some([along_u, along_v]) = self.texture_axes(map.image.uv_set as usize) else {
             return normal;
         };
-        let Some(texel) = around.lookup(&map.image, &self.spot) else { return normal };
+        let Some(texel) = around.lookup(&map.image, self) else { return normal };
         let [x, y, z, _] = texel.map(|c| 2.0 * c - 1.0);
         let Some(tangent) = (along_u - normal * normal.dot(along_u)).try_normalize() else {
             return normal;
@@ -138,21 +156,29 @@ impl<'a> SurfaceInteraction<'a> {
     }
 }
 
-/// A shading normal that mirrors the viewer into the surface, bent until it mirrors them along it: a
+/// A shading normal as light is scattered by: the geometric one where the viewer would see its back,
+/// and bent until it mirrors the viewer along the surface where it would mirror them into it, as a
 /// tilted mirror would be black there (Keller et al., "The Iray Light Transport Simulation and
-/// Rendering System", 2017, appendix A.3). All unit; `normal` and `geometric` face the viewer.
-fn outward(normal: DVec3, geometric: DVec3, wo: DVec3) -> DVec3 {
-    /// How far above the surface the mirrored direction is raised before it is contribution back to unit
+/// Rendering System", 2017, appendix A.3). All unit; `geometric` faces the viewer.
+#[inline(always)]
+pub(crate) fn facing(normal: DVec3, geometric: DVec3, wo: DVec3) -> DVec3 {
+    /// How far above the surface the mirrored direction is raised before it is brought back to unit
     /// length, as a share of the viewer's elevation: enough to stay above it in rounding.
     const LEAST: f64 = 0.05;
-    let mirrored = 2.0 * normal.dot(wo) * normal - wo;
+    let cosine = normal.dot(wo);
+    let mirrored = 2.0 * cosine * normal - wo;
     let lacking = LEAST * geometric.dot(wo) - geometric.dot(mirrored);
     let slope = normal.dot(geometric);
-    if lacking <= 0.0 || slope <= 0.0 {
-        return normal;
-    }
-    let raised = (mirrored + normal * (lacking / slope)).try_normalize();
-    raised.and_then(|raised| (wo + raised).try_normalize()).unwrap_or(normal)
+    let raised = mirrored + normal * (lacking / slope);
+    let half = wo + raised * (1.0 / raised.length());
+    let bent = half * (1.0 / half.length());
+    let is_sound = bent.x.abs() + bent.y.abs() + bent.z.abs() <= 2.0;
+    let bends = (lacking > 0.0) & (slope > 0.0) & is_sound;
+    let pick = |yes: bool, a: DVec3, b: DVec3| {
+        let pick = |a, b| if yes { a } else { b };
+        DVec3::new(pick(a.x, b.x), pick(a.y, b.y), pick(a.z, b.z))
+    };
+    pick(cosine > 0.0, pick(bends, bent, normal), geometric)
 }
 
 #[cfg(test)]
@@ -173,7 +199,7 @@ mod tests {
             if normal.dot(wo) <= 0.0 {
                 continue;
             }
-            let outward = outward(normal, DVec3::Z, wo);
+            let outward = facing(normal, DVec3::Z, wo);
             let mirrored = |n: DVec3| (2.0 * n.dot(wo) * n - wo).z;
             assert!((outward.length() - 1.0).abs() < 1e-12);
             assert!(mirrored(outward) > 0.0, "{normal} {wo}: {outward}");

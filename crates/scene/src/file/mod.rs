@@ -28,7 +28,8 @@ pub use overrides::OverrideError;
 pub use schema::scene_schema;
 pub use sensor::SensorFile;
 pub use settings::{
-    AccelName, Auto, Exposure, LightRow, RenderSpec, ToneMap, TracerRow, TracerSpec,
+    AccelName, Auto, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec, ToneMap, TracerRow,
+    TracerSpec,
 };
 pub use spec::{SceneSpec, Version};
 

@@ -134,6 +134,28 @@ pub struct RenderSpec {
     pub alpha: bool,
 }
 
+/// What the plan is told instead of deciding it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanSpec {
+    /// How precisely paths of light hit surfaces. Data layers are always in f64.
+    #[serde(default)]
+    pub light_precision: LightPrecision,
+}
+
+/// How precisely paths of light hit surfaces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LightPrecision {
+    /// In f32 where its error is lost in the noise, in f64 where it is not.
+    #[default]
+    Auto,
+    /// In f64.
+    Double,
+    /// In f32.
+    Single,
+}
+
 /// The exposure of a PNG.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]

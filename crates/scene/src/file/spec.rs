@@ -9,7 +9,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::{FramesSpec, ObjectSpec, RenderSpec, TracerSpec, Up};
+use super::{FramesSpec, ObjectSpec, PlanSpec, RenderSpec, TracerSpec, Up};
 
 /// A scene as the file writes it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
@@ -43,6 +43,9 @@ pub struct SceneSpec {
     /// How it is rendered.
     #[serde(default)]
     pub render: RenderSpec,
+    /// What the plan is told instead of deciding it.
+    #[serde(default)]
+    pub plan: PlanSpec,
     /// The pictures to be made of it; one when absent.
     #[serde(default)]
     pub frames: Option<FramesSpec>,

@@ -12,34 +12,35 @@
 //! * Many wavelengths on one path, all but one ending where a glass splits them: Wilkie et al., "Hero
 //!   Wavelength Spectral Sampling", 2014.
 
-mod matte;
+mod kernels;
 mod meet;
 mod numbers;
+mod patch;
 mod paths;
 mod rules;
 mod shadows;
+mod step;
 
 use std::fmt::Debug;
 use std::ops::{AddAssign, Range};
 
 use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, Geometry, HitBatch, MISS, RayBatch};
+use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, RayBatch};
 
-use self::matte::Patch;
-use self::numbers::{DRAWS, Draw, Numbers};
+use self::numbers::{Draw, Numbers};
+use self::patch::Patch;
 use self::paths::{Paths, State};
 pub use self::rules::{Follow, Rules};
-use self::shadows::{Shadows, push_to};
+use self::shadows::Shadows;
 use crate::bsdf::{Bsdf, Weights};
 use crate::emitters::Emitters;
-use crate::light::{End, Lights};
+use crate::light::Lights;
+use crate::placed::{PlacedSurface, PlacedSurfaces};
 use crate::reference::SceneView;
-use crate::sampling::power_heuristic;
-use crate::spawn::Anchor;
+use crate::spawn::{self, Anchor};
 use crate::spectral::Spectral;
-use crate::surface::SurfaceInteraction;
-use crate::{Ior, Material, Scattering};
+use crate::{Material, Scattering};
 
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
@@ -56,6 +57,28 @@ pub struct LightingContext<'a> {
     pub traits: Traits,
     /// The surfaces that shine, where they are few.
     pub emitters: Option<&'a Emitters>,
+    /// What is known of each placement beforehand.
+    pub placed: &'a PlacedSurfaces,
+    /// How precisely its paths hit.
+    pub precision: HitPrecision,
+}
+
+impl LightingContext<'_> {
+    /// A hit on a placement, found by a ray from `origin` (m).
+    pub(crate) fn anchor(
+        &self,
+        point: DVec3,
+        normal: DVec3,
+        origin: DVec3,
+        placed: &PlacedSurface,
+    ) -> Anchor {
+        Anchor::new(point, normal, origin, placed.magnitudes, self.roundings())
+    }
+
+    /// How often numbers of a hit are rounded, times the spacing of its precision.
+    pub(crate) fn roundings(&self) -> f64 {
+        spawn::roundings(self.precision)
+    }
 }
 
 /// What no surface of a scene asks for is not done.
@@ -152,6 +175,7 @@ fn trace(
     scratch.hits.detail = Detail::Surface;
     scratch.shadows.hits.detail = Detail::Surface;
     scratch.radiance.resize(count, 0.0);
+    let precision = stage.precision;
     tracing.start(beam, &mut scratch.now);
     while !scratch.now.states.is_empty() {
         stage.accel.closest(&scratch.now.rays, &mut scratch.hits);
@@ -160,13 +184,14 @@ fn trace(
         let needs = tracing.needs(&scratch.now.states);
         let paths = (&scratch.now.states[..], &scratch.alive[..]);
         scratch.numbers.draw(beam.samples, needs, paths);
-        scratch.next.clear();
-        scratch.last.clear();
+        scratch.next.restart(precision);
+        scratch.last.restart(precision);
         scratch.shadows.clear();
+        scratch.shadows.rays.precision = precision;
         // From neighbouring places to lights: as coherent as what they start from.
         scratch.shadows.rays.coherent = scratch.now.rays.coherent;
         tracing.step_all(scratch);
-        if stage.lights.is_hittable() {
+        if stage.lights.is_hittable() && precision == HitPrecision::Double {
             scratch.shadows.sort(count);
         }
         tracing.light(&mut scratch.shadows, out);
@@ -188,6 +213,7 @@ impl Tracing<'_> {
         paths.clear();
         paths.rays.copy_from(beam.rays);
         paths.rays.from_surface = false;
+        paths.rays.precision = self.stage.precision;
         for i in 0..beam.rays.len() {
             paths.states.push(State {
                 ray: u32::try_from(i).unwrap_or(u32::MAX),
@@ -214,183 +240,11 @@ impl Tracing<'_> {
         let roulette = self.rules.roulette.is_some_and(|after| most >= after);
         let [several, extended] = [lights.are_several(), lights.is_hittable()];
         move |draw| match draw {
-            Draw::Choice => several || traits.has_choice,
-            Draw::Light => extended || traits.has_choice,
+            Draw::Choice => traits.has_choice,
+            Draw::Light => several || extended || traits.has_choice,
             Draw::Direction => follows,
             Draw::Chance => roulette || traits.has_alpha,
         }
-    }
-
-    /// The step of all paths that go on.
-    fn step_all(&mut self, scratch: &mut Scratch) {
-        let mut start = 0;
-        while let Some(&first) = scratch.alive.get(start) {
-            let placement = scratch.hits.placement[first as usize];
-            let met = |i: &u32| scratch.hits.placement[*i as usize] == placement;
-            let run = scratch.alive[start..].iter().take_while(|i| met(i)).count();
-            let which = start..start + run;
-            start = which.end;
-            match self.matte(placement) {
-                Some(matte) => self.step_matte(scratch, &matte, which),
-                None => which.for_each(|k| self.step(scratch, k)),
-            }
-        }
-    }
-
-    /// One path's step at the surface that it met: a light is asked, a direction is chosen.
-    fn step(&mut self, scratch: &mut Scratch, k: usize) {
-        let Scratch { now, next, last, hits, alive, numbers, shadows, radiance, .. } = scratch;
-        let i = alive[k] as usize;
-        let around = &self.stage.surroundings;
-        let footprint = now.footprint(hits, i);
-        let Some(met) = SurfaceInteraction::new(around, &now.rays, hits, i, footprint) else {
-            return;
-        };
-        let numbers = numbers.of(k);
-        let left = [hits.placement[i], hits.triangle[i]];
-        let mut state = now.states[i];
-        state.steps += 1;
-        state.cone = state.cone.map(|cone| cone.after(hits.t[i]));
-        let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
-        if met.material.has_alpha() && numbers[Draw::Chance as usize][0] >= met.opacity() {
-            let direction = now.rays.direction(i);
-            next.push((met.anchor.leave(direction), direction), left, state);
-            next.throughput.extend_from_slice(throughput);
-            return;
-        }
-        if state.is_last || state.bounces >= self.rules.bounces {
-            return;
-        }
-        if let Scattering::Dielectric(Ior::Dispersive(_)) = met.material.scattering
-            && self.count > 1
-        {
-            // A boundary asks no light: its numbers are free.
-            split(throughput, &mut state, numbers[Draw::Light as usize][0]);
-        }
-        let wavelength = self.stage.spectral.wavelength(state.band.unwrap_or(0) as usize);
-        let bsdf = met.bsdf(around, wavelength);
-        state.bounces += 1;
-        if !bsdf.is_delta() {
-            let path = (&*throughput, state.ray);
-            self.sample_light(&bsdf, (&met.anchor, left), path, &numbers, shadows, radiance);
-        }
-        self.scatter(&bsdf, (&met.anchor, left), throughput, state, &numbers, [next, last]);
-    }
-
-    /// Chooses a light and notes the ray to it.
-    fn sample_light(
-        &mut self,
-        bsdf: &Bsdf,
-        (anchor, left): (&Anchor, [u32; 2]),
-        (throughput, ray): (&[f64], u32),
-        numbers: &[[f64; 2]; DRAWS as usize],
-        shadows: &mut Shadows,
-        radiance: &mut [f64],
-    ) {
-        let LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
-        let toward = lights.sample(
-            around,
-            spectral,
-            anchor,
-            numbers[Draw::Choice as usize][0],
-            numbers[Draw::Light as usize],
-            radiance,
-        );
-        let Some(toward) = toward else { return };
-        let (value, pdf) = bsdf.evaluate(toward.direction);
-        if value.is_zero() {
-            return;
-        }
-        let balance = if toward.is_delta { 1.0 } else { power_heuristic(toward.pdf, pdf) };
-        let factor = balance / toward.pdf;
-        let origin = anchor.leave(toward.direction);
-        let rays = &mut shadows.rays;
-        match toward.end {
-            End::Far => {
-                let limits = [0.0, f64::INFINITY];
-                let triangles = [left, [MISS; 2]];
-                rays.push_between_triangles(origin, toward.direction, limits, triangles);
-            }
-            End::Point(at) => push_to(rays, origin, at, [left, [MISS; 2]]),
-            End::Surface(end, triangle) => {
-                push_to(rays, origin, end.leave(-toward.direction), [left, triangle]);
-            }
-        }
-        shadows.ray.push(ray);
-        shadows.is_delta.push(toward.is_delta);
-        let bands = radiance.iter().zip(throughput).enumerate();
-        let contribution =
-            bands.map(|(k, (l, t))| l * t * factor * in_band(spectral, bsdf, value, k));
-        shadows.contribution.extend(contribution);
-    }
-
-    /// Chooses a direction and notes the path along it.
-    fn scatter(
-        &self,
-        bsdf: &Bsdf,
-        (anchor, left): (&Anchor, [u32; 2]),
-        throughput: &mut [f64],
-        mut state: State,
-        numbers: &[[f64; 2]; DRAWS as usize],
-        [next, last]: [&mut Paths; 2],
-    ) {
-        let ends = state.bounces >= self.rules.bounces;
-        if (ends || self.rules.follow == Follow::Single)
-            && !self.stage.lights.is_hittable()
-            && !bsdf.has_single()
-        {
-            return;
-        }
-        let choice = numbers[Draw::Choice as usize][1];
-        let Some(scattered) = bsdf.sample(choice, numbers[Draw::Direction as usize]) else {
-            return;
-        };
-        let single = scattered.pdf == f64::INFINITY;
-        let follows = single || self.rules.follow == Follow::All;
-        state.is_last = ends || !follows;
-        if state.is_last && !single && !self.stage.lights.is_hittable() {
-            return;
-        }
-        for (k, band) in throughput.iter_mut().enumerate() {
-            *band *= in_band(self.stage.spectral, bsdf, scattered.weights, k);
-        }
-        if !single {
-            // Seen by chance from one point, a surface is a point.
-            state.cone = None;
-        }
-        state.pdf = scattered.pdf;
-        state.vertex = anchor.point;
-        let ray = (anchor.leave(scattered.direction), scattered.direction);
-        let chance = numbers[Draw::Chance as usize][1];
-        self.follow(ray, left, throughput, (state, chance), [next, last]);
-    }
-
-    /// Notes a path along a ray that leaves a placement's triangle, unless it carries nothing or ends
-    /// by `chance`.
-    fn follow(
-        &self,
-        ray: (DVec3, DVec3),
-        left: [u32; 2],
-        throughput: &mut [f64],
-        (state, chance): (State, f64),
-        [next, last]: [&mut Paths; 2],
-    ) {
-        let single = state.pdf == f64::INFINITY;
-        let traces_emitters = state.is_last && !single && self.traces_emitters();
-        let most = throughput.iter().copied().fold(0.0, f64::max);
-        if most <= 0.0 || (traces_emitters && !self.may_shine(ray)) {
-            return;
-        }
-        if self.rules.roulette.is_some_and(|after| state.bounces >= after) && !state.is_last {
-            let survival = most.min(0.95);
-            if chance >= survival {
-                return;
-            }
-            throughput.iter_mut().for_each(|band| *band /= survival);
-        }
-        let next = if traces_emitters { last } else { next };
-        next.push(ray, left, state);
-        next.throughput.extend_from_slice(throughput);
     }
 
     fn add(&mut self, light: &[f64], ray: u32, out: &mut [f64]) {

@@ -6,9 +6,9 @@ use super::paths::State;
 /// What a path uses random numbers for at each step.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Draw {
-    /// Choosing a light, and among the ways in which a surface scatters.
+    /// Choosing among the ways in which a surface scatters.
     Choice,
-    /// A place on the light; or the band that stays where glass splits them.
+    /// Choosing a light and a place on it; or the band that stays where glass splits them.
     Light,
     /// The direction to follow.
     Direction,
@@ -17,7 +17,7 @@ pub(super) enum Draw {
 }
 
 /// How many uses there are.
-pub(super) const DRAWS: u32 = 4;
+const DRAWS: u32 = 4;
 
 impl Draw {
     const ALL: [Self; DRAWS as usize] = [Self::Choice, Self::Light, Self::Direction, Self::Chance];
@@ -28,7 +28,7 @@ impl Draw {
 pub(super) struct Numbers {
     wanted: Vec<(u32, u32)>,
     /// By [`Draw`], one a path that goes on; empty where not needed.
-    pub(super) drawn: [Vec<[f64; 2]>; DRAWS as usize],
+    drawn: [Vec<[f64; 2]>; DRAWS as usize],
 }
 
 impl Numbers {
@@ -52,8 +52,9 @@ impl Numbers {
         }
     }
 
-    /// Those of the `k`-th path that goes on.
-    pub(super) fn of(&self, k: usize) -> [[f64; 2]; DRAWS as usize] {
-        self.drawn.each_ref().map(|drawn| drawn.get(k).copied().unwrap_or([0.5; 2]))
+    /// Those of the `k`-th path that goes on, for one use.
+    #[inline]
+    pub(super) fn of(&self, draw: Draw, k: usize) -> [f64; 2] {
+        self.drawn[draw as usize].get(k).copied().unwrap_or([0.5; 2])
     }
 }

@@ -1,7 +1,7 @@
 //! Paths under way, in arrays, and what each remembers.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, MISS, RayBatch};
+use etendue_geometry::{HitBatch, HitPrecision, MISS, RayBatch};
 
 use crate::footprint::{Cone, Footprint};
 
@@ -12,6 +12,8 @@ pub(super) struct Paths {
     pub(super) states: Vec<State>,
     /// `[path][band]`.
     pub(super) throughput: Vec<f64>,
+    /// Lanes of a patch whose paths are added.
+    pub(super) kept: Vec<usize>,
 }
 
 /// What a path remembers.
@@ -43,6 +45,14 @@ impl Paths {
         self.throughput.clear();
     }
 
+    /// Empties it for paths that leave surfaces.
+    pub(super) fn restart(&mut self, precision: HitPrecision) {
+        self.clear();
+        self.rays.from_surface = true;
+        self.rays.coherent = false;
+        self.rays.precision = precision;
+    }
+
     /// What path `i` covers of what it hit.
     pub(super) fn footprint(&self, hits: &HitBatch, i: usize) -> Option<Footprint> {
         let width = self.states[i].cone?.after(hits.t[i]).width;
@@ -51,8 +61,6 @@ impl Paths {
 
     /// Adds a path that leaves a placement's triangle: where it starts, and its direction.
     pub(super) fn push(&mut self, ray: (DVec3, DVec3), left: [u32; 2], state: State) {
-        self.rays.from_surface = true;
-        self.rays.coherent = false;
         let limits = [0.0, f64::INFINITY];
         self.rays.push_between_triangles(ray.0, ray.1, limits, [left, [MISS; 2]]);
         self.states.push(state);

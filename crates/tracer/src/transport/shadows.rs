@@ -5,7 +5,6 @@ use etendue_geometry::{HitBatch, MISS, PlacedTriangle, RayBatch};
 
 use super::{LightingContext, Scratch, Tracing, Traits, in_band};
 use crate::emitters::Emitters;
-use crate::spawn::Anchor;
 use crate::surface::SurfaceInteraction;
 
 /// Rays to lights and what each brings if nothing is in between.
@@ -102,9 +101,10 @@ impl Tracing<'_> {
                     let limits = [0.0, f64::INFINITY];
                     shadows.rays.push_between_triangles(origin, direction, limits, triangles);
                 }
-                Some(spot) => {
+                Some(_) => {
                     let point = origin + direction * hits.t[i];
-                    let end = Anchor::new(point, hits.normal(i), origin, spot.placement, spot.mesh);
+                    let Some(placed) = self.stage.placed.get(hits.placement[i]) else { continue };
+                    let end = self.stage.anchor(point, hits.normal(i), origin, placed);
                     push_to(&mut shadows.rays, origin, end.leave(-direction), triangles);
                 }
             }
@@ -154,11 +154,10 @@ impl Tracing<'_> {
                 self.tally.shadow_rays += again.len() as u64;
             }
             let mut onward = RayBatch::default().from_surfaces();
+            onward.precision = again.precision;
             let mut still = Vec::new();
             for (k, &i) in open.iter().enumerate() {
-                let Some(met) =
-                    SurfaceInteraction::new(&self.stage.surroundings, again, hits, k, None)
-                else {
+                let Some(met) = SurfaceInteraction::new(self.stage, again, hits, k, None) else {
                     blocked[i as usize] = false;
                     continue;
                 };
@@ -194,12 +193,7 @@ impl Tracing<'_> {
 }
 
 /// A ray from one point to another (m), on the triangles at its ends.
-pub(super) fn push_to(
-    rays: &mut RayBatch,
-    origin: DVec3,
-    end: DVec3,
-    triangles: [PlacedTriangle; 2],
-) {
+fn push_to(rays: &mut RayBatch, origin: DVec3, end: DVec3, triangles: [PlacedTriangle; 2]) {
     let offset = end - origin;
     let distance = offset.length();
     // Points that fall together see each other: a ray of no length meets nothing.

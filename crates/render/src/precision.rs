@@ -1,0 +1,122 @@
+//! How precisely paths of light hit: in f32 where what that misplaces is lost in the picture's noise and
+//! under its smallest things, in f64 where it is not.
+
+use etendue_geometry::HitPrecision;
+use etendue_geometry::glam::DVec3;
+use etendue_scene::Scene;
+use etendue_scene::file::{AccelName, LightPrecision};
+use etendue_tracer::spawn::roundings;
+
+use crate::render::accelerators;
+
+/// The largest share of a mesh's mean edge that rays may start off a surface.
+const MOST_OF_AN_EDGE: f64 = 0.125;
+
+/// The noise of a pixel of one sample that f32's error is held against: pictures of good samplers have
+/// less than their mean.
+const NOISE_OF_A_SAMPLE: f64 = 0.25;
+
+/// The precision of a scene's light paths for so many samples a pixel, and why.
+pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, String) {
+    match scene.plan.light_precision {
+        LightPrecision::Double => {
+            return (HitPrecision::Double, "the scene asks for it".to_owned());
+        }
+        LightPrecision::Single => {
+            return (HitPrecision::Single, "the scene asks for it".to_owned());
+        }
+        LightPrecision::Auto => {}
+    }
+    if scene.render.accel.unwrap_or(accelerators()[0]) != AccelName::Embree {
+        return (HitPrecision::Double, "the accelerator works in f64".to_owned());
+    }
+    let offset = offset(scene);
+    let noise = NOISE_OF_A_SAMPLE / f64::from(samples).sqrt();
+    let Some((least, edge)) = smallest(scene) else {
+        return (HitPrecision::Single, "there is nothing to hit".to_owned());
+    };
+    let words = |than: &str| format!("f32 misplaces rays by up to {offset:.1e} m, {than}");
+    if offset > MOST_OF_AN_EDGE * edge {
+        let why = words(&format!("too much for triangles with edges of {edge:.1e} m"));
+        return (HitPrecision::Double, why);
+    }
+    if offset > noise * least {
+        let than =
+            format!("more of a thing of {least:.1e} m than noise hides at {samples} samples");
+        return (HitPrecision::Double, words(&than));
+    }
+    let than = format!("less of the smallest thing, {least:.1e} m, than noise hides");
+    (HitPrecision::Single, words(&than))
+}
+
+/// How far (m) rays start off surfaces in f32, at most: what tracing reckons for a hit at the edge of the
+/// scene, seen from the camera.
+fn offset(scene: &Scene) -> f64 {
+    let bounds = scene.geometry.loose_bounds();
+    if bounds.is_empty() {
+        return 0.0;
+    }
+    let farthest = bounds.min.abs().max(bounds.max.abs()).length();
+    let camera = scene.camera.pose().position.length();
+    // The hit, the placement's own numbers, and where the ray came from.
+    roundings(HitPrecision::Single) * (2.0 * farthest + farthest.max(camera))
+}
+
+/// The extent of the smallest thing and the shortest mean edge of a mesh (m); `None` without any.
+fn smallest(scene: &Scene) -> Option<(f64, f64)> {
+    let sizes = scene.geometry.placements.iter().filter_map(|placement| {
+        let mesh = scene.geometry.mesh_of(placement);
+        let (linear, size) = (&placement.world_from_mesh.linear, mesh.bounds.max - mesh.bounds.min);
+        let extent: DVec3 = linear.x_axis.abs() * size.x
+            + linear.y_axis.abs() * size.y
+            + linear.z_axis.abs() * size.z;
+        let extent = extent.max_element();
+        // A surface of n triangles is about √(n/2) edges wide.
+        let edges = (mesh.triangles.len() as f64 / 2.0).sqrt().max(1.0);
+        (extent > 0.0).then_some((extent, extent / edges))
+    });
+    sizes.reduce(|a, b| (a.0.min(b.0), a.1.min(b.1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use etendue_scene::LoadOptions;
+    use etendue_scene::file::SceneFile;
+    use serde_json::json;
+
+    use super::*;
+    use crate::plan::wanted;
+
+    /// A sphere of 2000 triangles, and a cube of some size (m) at some place (m).
+    fn decided(size: f64, place: f64, samples: u32, plan: &serde_json::Value) -> HitPrecision {
+        let shift = |x: f64| json!({ "translate": [place + x, place, place] });
+        let scene = json!({
+            "tracer": { "type": "path" }, "plan": plan, "render": { "accel": "embree" },
+            "camera": { "type": "pinhole",
+                "pose": { "from": [place, place, place + 4.0], "look_at": [place, place, place] } },
+            "objects": [
+                { "shape": "sphere", "triangles": 2000, "transform": shift(0.0) },
+                { "shape": "box", "size": [size, size, size], "transform": shift(2.0) },
+            ],
+        });
+        let file = SceneFile::from_json(std::path::Path::new("."), scene).unwrap();
+        let layers = file.spec.all_layers();
+        let scene = file.load(wanted(&layers), &LoadOptions::default()).unwrap();
+        light_precision(&scene, samples).0
+    }
+
+    #[test]
+    #[cfg(feature = "embree")]
+    fn single_precision_is_chosen_where_its_error_is_lost() {
+        use HitPrecision::{Double, Single};
+        let auto = json!({});
+        assert_eq!(decided(0.5, 0.0, 64, &auto), Single);
+        // 10⁵ times smaller than the scene, far from the origin, or of next to no noise.
+        assert_eq!(decided(1e-5, 0.0, 64, &auto), Double);
+        assert_eq!(decided(0.5, 1e6, 64, &auto), Double);
+        assert_eq!(decided(0.01, 0.0, 1 << 20, &auto), Double);
+        // The file's word goes before.
+        assert_eq!(decided(0.5, 0.0, 64, &json!({ "light_precision": "double" })), Double);
+        assert_eq!(decided(1e-5, 0.0, 64, &json!({ "light_precision": "single" })), Single);
+    }
+}

@@ -1,0 +1,65 @@
+//! What there is to know of each placement before any ray meets it: worked out once, looked up at each
+//! hit.
+
+use etendue_geometry::Geometry;
+use etendue_geometry::glam::{DMat3, DVec3};
+
+use crate::spawn::magnitudes;
+use crate::{Color, Material, Paint, Scattering};
+
+/// What light has to know of the placements of a scene, by their numbers.
+#[derive(Debug, Clone, Default)]
+pub struct PlacedSurfaces {
+    /// `None` for a placement whose material there is none of.
+    all: Vec<Option<PlacedSurface>>,
+}
+
+/// A placement as light meets it.
+#[derive(Debug, Clone)]
+pub(crate) struct PlacedSurface {
+    /// What its own numbers add to the rounding of a hit (m).
+    pub(crate) magnitudes: DVec3,
+    /// What brings its mesh's normals into the world; `None` where nothing has to.
+    pub(crate) turn: Option<DMat3>,
+    /// It shines, or shows itself without light.
+    pub(crate) is_seen: bool,
+    /// It is partly not there.
+    pub(crate) has_alpha: bool,
+    /// It is Lambert's, and wholly there.
+    pub(crate) is_matte: bool,
+    /// Its shading normal is not that of its triangles.
+    pub(crate) is_tilted: bool,
+    /// Its colour, where that is alike all over.
+    pub(crate) color: Option<Color>,
+}
+
+impl PlacedSurfaces {
+    /// Those of a scene.
+    #[must_use]
+    pub fn of(geometry: &Geometry, materials: &[Material]) -> Self {
+        let surface = |placement: &etendue_geometry::Placement| {
+            let material = materials.get(placement.material as usize)?;
+            let mesh = geometry.mesh_of(placement);
+            let place = &placement.world_from_mesh;
+            let colored = material.vertex_colors && mesh.colors.is_some();
+            Some(PlacedSurface {
+                magnitudes: magnitudes(placement, mesh),
+                turn: (place.linear != DMat3::IDENTITY).then(|| place.normal_matrix()),
+                is_seen: material.emission.is_some() || material.scattering == Scattering::Unlit,
+                has_alpha: material.has_alpha(),
+                is_matte: material.scattering == Scattering::Matte && !material.has_alpha(),
+                is_tilted: material.normal_map.is_some() || mesh.normals.is_some(),
+                color: match material.base_color {
+                    Paint::Plain(color) if !colored => Some(color.map(|c| c.clamp(0.0, 1.0))),
+                    _ => None,
+                },
+            })
+        };
+        Self { all: geometry.placements.iter().map(surface).collect() }
+    }
+
+    /// That of a placement; `None` for [`MISS`](etendue_geometry::MISS), too.
+    pub(crate) fn get(&self, placement: u32) -> Option<&PlacedSurface> {
+        self.all.get(placement as usize)?.as_ref()
+    }
+}

@@ -1,0 +1,164 @@
+//! Loops over the hits of a patch that vectorise: where they are, how light reaches them, and where a
+//! matte surface sends it. The same light and the same directions as [`crate::bsdf`] has.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
+
+use std::f64::consts::PI;
+
+use etendue_geometry::disk;
+use etendue_geometry::glam::DVec3;
+
+use super::patch::{LANES, Patch};
+use crate::surface::facing;
+
+/// Points, their errors of so many `roundings`, and normals on the viewer's side.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn measure(patch: &mut Patch, roundings: f64) {
+    let seen = &mut patch.seen;
+    let (direction, normal, shading) = (&seen.direction, &mut seen.normal, &mut seen.shading);
+    for i in 0..LANES {
+        let (x, y, z) = (normal[0][i], normal[1][i], normal[2][i]);
+        let along = x * direction[0][i] + y * direction[1][i] + z * direction[2][i];
+        let side = if along <= 0.0 { 1.0 } else { -1.0 };
+        for axis in 0..3 {
+            normal[axis][i] *= side;
+            shading[axis][i] *= side;
+        }
+    }
+    seen.error.fill(0.0);
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let start = seen.origin[axis][i];
+            let here = start + direction[axis][i] * seen.t[i];
+            seen.point[axis][i] = here;
+            let magnitudes = here.abs() + start.abs() + seen.magnitudes[axis][i];
+            seen.error[i] += normal[axis][i].abs() * magnitudes;
+        }
+    }
+    for error in &mut seen.error {
+        *error *= roundings;
+    }
+}
+
+/// Shading normals as light is scattered by.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn bend(patch: &mut Patch) {
+    let seen = &mut patch.seen;
+    for i in 0..LANES {
+        let vector = |axes: &[[f64; LANES]; 3]| DVec3::new(axes[0][i], axes[1][i], axes[2][i]);
+        let (normal, wo) = (vector(&seen.normal), -vector(&seen.direction));
+        let shading = facing(vector(&seen.shading), normal, wo);
+        seen.shading[0][i] = shading.x;
+        seen.shading[1][i] = shading.y;
+        seen.shading[2][i] = shading.z;
+    }
+}
+
+/// Rays from the hits to what they aim at, and the densities of their directions.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn aim(patch: &mut Patch, roundings: f64) {
+    let Patch { seen, away, targets, .. } = patch;
+    let (mut offset, mut squared) = ([[0.0; LANES]; 3], [0.0; LANES]);
+    let (mut facing, mut blur, mut above) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for axis in 0..3 {
+        let [corner, rest, across] = targets.place.each_ref().map(|part| &part[axis]);
+        for i in 0..LANES {
+            let here = seen.point[axis][i];
+            let way = ((corner[i] - here) + rest[i]) + across[i];
+            let way = if targets.is_far[i] > 0.0 { corner[i] } else { way };
+            let there = here + way;
+            offset[axis][i] = way;
+            squared[i] += way * way;
+            facing[i] -= way * targets.normal[axis][i];
+            above[i] += way * seen.normal[axis][i];
+            let magnitudes = there.abs() + here.abs() + targets.magnitudes[axis][i];
+            blur[i] += targets.normal[axis][i].abs() * magnitudes;
+        }
+    }
+    let mut side = [0.0; LANES];
+    for i in 0..LANES {
+        let inverse = 1.0 / squared[i].sqrt();
+        let shown = facing[i] * inverse;
+        let shines = (shown > 0.0) | ((shown < 0.0) & (targets.two_sided[i] > 0.0));
+        let of_triangle = squared[i] / shown.abs();
+        let solid = if targets.is_triangle[i] > 0.0 { of_triangle } else { squared[i] };
+        let solid = if targets.is_far[i] > 0.0 { 1.0 } else { solid };
+        let sends = shines | (targets.is_triangle[i] == 0.0);
+        away.pdf[i] = if sends { targets.density[i] * solid } else { f64::INFINITY };
+        blur[i] *= if shown < 0.0 { -roundings } else { roundings };
+        side[i] = if above[i] < 0.0 { -seen.error[i] } else { seen.error[i] };
+        for axis in 0..3 {
+            away.toward[axis][i] = offset[axis][i] * inverse;
+        }
+    }
+    let mut length = [0.0; LANES];
+    for axis in 0..3 {
+        for i in 0..LANES {
+            let lifted = seen.normal[axis][i] * side[i];
+            let way = (offset[axis][i] + targets.normal[axis][i] * blur[i]) - lifted;
+            let way = if targets.is_far[i] > 0.0 { offset[axis][i] } else { way };
+            away.start[axis][i] = seen.point[axis][i] + lifted;
+            away.along[axis][i] = way;
+            length[i] += way * way;
+        }
+    }
+    for i in 0..LANES {
+        let reach = length[i].sqrt();
+        // Points that fall together see each other: a ray of no length meets nothing.
+        let inverse = if reach > 0.0 { 1.0 / reach } else { 0.0 };
+        for axis in 0..3 {
+            away.along[axis][i] *= inverse;
+        }
+        away.reach[i] = if targets.is_far[i] > 0.0 { f64::INFINITY } else { reach };
+    }
+}
+
+/// What matte surfaces turn to the viewer of the light that is aimed at: cos θ / π over the density,
+/// weighed by the power heuristic against the density of [`scatter`]; 0 where there is none.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn reflect(patch: &mut Patch) {
+    let Patch { seen, away, targets, .. } = patch;
+    for i in 0..LANES {
+        let [mut cosine, mut above] = [0.0; 2];
+        for axis in 0..3 {
+            cosine += away.toward[axis][i] * seen.shading[axis][i];
+            above += away.toward[axis][i] * seen.normal[axis][i];
+        }
+        let pdf = away.pdf[i];
+        let ratio = cosine / PI / pdf;
+        let balance = if targets.is_delta[i] > 0.0 { 1.0 } else { 1.0 + ratio * ratio };
+        let counts = (cosine > 0.0) & (above > 0.0) & (pdf < f64::INFINITY);
+        away.value[i] = if counts { cosine / PI / (balance * pdf) } else { 0.0 };
+    }
+}
+
+/// Directions about the shading normals with density cos θ / π ([`crate::sampling`]), which is 0 where
+/// they run into the surface.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn scatter(patch: &mut Patch, squares: &[[f64; 2]; LANES]) {
+    let Patch { seen, away, .. } = patch;
+    let (normal, shading) = (&seen.normal, &seen.shading);
+    for i in 0..LANES {
+        let (x, y, z) = (shading[0][i], shading[1][i], shading[2][i]);
+        let [a, b] = disk::point(squares[i]);
+        let c = (1.0 - a * a - b * b).max(0.0).sqrt();
+        // Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
+        let sign = if z < 0.0 { -1.0 } else { 1.0 };
+        let f = -1.0 / (sign + z);
+        let g = x * y * f;
+        let (ux, uy, uz) = (1.0 + sign * x * x * f, sign * g, -sign * x);
+        let (vx, vy, vz) = (g, sign + y * y * f, -y);
+        let (dx, dy, dz) =
+            (ux * a + vx * b + x * c, uy * a + vy * b + y * c, uz * a + vz * b + z * c);
+        let inverse = 1.0 / (dx * dx + dy * dy + dz * dz).sqrt();
+        away.along[0][i] = dx * inverse;
+        away.along[1][i] = dy * inverse;
+        away.along[2][i] = dz * inverse;
+        let above = dx * normal[0][i] + dy * normal[1][i] + dz * normal[2][i];
+        away.value[i] = if above > 0.0 { c / PI } else { 0.0 };
+    }
+    for axis in 0..3 {
+        for i in 0..LANES {
+            away.start[axis][i] = seen.point[axis][i] + normal[axis][i] * seen.error[i];
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! Hits worked on side by side: one array a number, of so many lanes.
+
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{HitBatch, MISS};
+
+use super::paths::Paths;
+use crate::Color;
+use crate::bsdf::Bsdf;
+use crate::light::{Target, TargetKind};
+use crate::placed::PlacedSurface;
+use crate::spawn::Anchor;
+
+/// Hits worked on side by side.
+pub(super) const LANES: usize = 64;
+
+pub(super) type Row = [f64; LANES];
+
+/// Hits and what leaves them.
+#[derive(Debug, Default)]
+pub(super) struct Patch {
+    pub(super) count: usize,
+    /// Of each path: its number, and which of those that go on it is.
+    pub(super) path: Vec<(usize, usize)>,
+    pub(super) seen: Seen,
+    pub(super) away: Away,
+    pub(super) targets: Targets,
+    /// The colours of matte surfaces.
+    pub(super) colors: Vec<Color>,
+    /// The surfaces that are not matte.
+    pub(super) bsdfs: Vec<Bsdf>,
+    /// What each light that was chosen gives off: `[lane][band]`.
+    pub(super) radiance: Vec<f64>,
+    /// Lanes of which something goes on.
+    pub(super) picked: Vec<usize>,
+}
+
+/// The hits.
+#[derive(Debug)]
+pub(super) struct Seen {
+    pub(super) origin: [Row; 3],
+    pub(super) direction: [Row; 3],
+    pub(super) t: Row,
+    /// The triangle's normal, on the viewer's side once measured.
+    pub(super) normal: [Row; 3],
+    /// The one that light is scattered by, likewise.
+    pub(super) shading: [Row; 3],
+    pub(super) point: [Row; 3],
+    /// What the placement's own numbers add to the rounding of the hit (m), and what that comes to.
+    pub(super) magnitudes: [Row; 3],
+    pub(super) error: Row,
+}
+
+/// The places on lights that the hits ask, as [`Target`] has them.
+#[derive(Debug)]
+pub(super) struct Targets {
+    pub(super) id: [[u32; 2]; LANES],
+    pub(super) place: [[Row; 3]; 3],
+    pub(super) normal: [Row; 3],
+    pub(super) magnitudes: [Row; 3],
+    pub(super) density: Row,
+    /// 1 where it is a direction; where it is a triangle; where that shines on both sides.
+    pub(super) is_far: Row,
+    pub(super) is_triangle: Row,
+    pub(super) two_sided: Row,
+    /// 1 where no direction meets it by chance.
+    pub(super) is_delta: Row,
+}
+
+/// Rays that leave the hits.
+#[derive(Debug)]
+pub(super) struct Away {
+    pub(super) start: [Row; 3],
+    pub(super) along: [Row; 3],
+    /// How far (m).
+    pub(super) reach: Row,
+    /// From the hit itself to its light (unit), and the density of that (1/sr); `+inf` where it sends
+    /// nothing.
+    pub(super) toward: [Row; 3],
+    pub(super) pdf: Row,
+    /// The share of light that a matte surface turns to the viewer per colour, over the density of the
+    /// direction; or the density itself where the direction was drawn.
+    pub(super) value: Row,
+}
+
+const ZERO: Row = [0.0; LANES];
+
+impl Default for Seen {
+    fn default() -> Self {
+        Self {
+            origin: [ZERO; 3],
+            direction: [ZERO; 3],
+            t: ZERO,
+            normal: [ZERO; 3],
+            shading: [ZERO; 3],
+            point: [ZERO; 3],
+            magnitudes: [ZERO; 3],
+            error: ZERO,
+        }
+    }
+}
+
+impl Default for Targets {
+    fn default() -> Self {
+        Self {
+            id: [[MISS; 2]; LANES],
+            place: [[ZERO; 3]; 3],
+            normal: [ZERO; 3],
+            magnitudes: [ZERO; 3],
+            density: ZERO,
+            is_far: ZERO,
+            is_triangle: ZERO,
+            two_sided: ZERO,
+            is_delta: ZERO,
+        }
+    }
+}
+
+impl Default for Away {
+    fn default() -> Self {
+        Self {
+            start: [ZERO; 3],
+            along: [ZERO; 3],
+            reach: ZERO,
+            toward: [ZERO; 3],
+            pdf: ZERO,
+            value: ZERO,
+        }
+    }
+}
+
+impl Patch {
+    /// Empties it.
+    pub(super) fn clear(&mut self) {
+        self.count = 0;
+        self.path.clear();
+        self.colors.clear();
+        self.bsdfs.clear();
+    }
+
+    /// Adds hit `i` of the `k`-th path that goes on, on a placement, and returns its lane.
+    #[inline]
+    pub(super) fn push(
+        &mut self,
+        (now, hits): (&Paths, &HitBatch),
+        (i, k): (usize, usize),
+        placed: &PlacedSurface,
+    ) -> usize {
+        let lane = self.count;
+        let Seen { origin, direction, t, normal, shading, magnitudes, .. } = &mut self.seen;
+        self.path.push((i, k));
+        t[lane] = hits.t[i];
+        let (origins, directions) = (now.rays.origins(), now.rays.directions());
+        for axis in 0..3 {
+            origin[axis][lane] = origins[axis][i];
+            direction[axis][lane] = directions[axis][i];
+            normal[axis][lane] = hits.normal[axis][i];
+            shading[axis][lane] = hits.normal[axis][i];
+            magnitudes[axis][lane] = placed.magnitudes[axis];
+        }
+        self.count += 1;
+        lane
+    }
+
+    pub(super) fn point(&self, lane: usize) -> DVec3 {
+        at(&self.seen.point, lane)
+    }
+
+    pub(super) fn anchor(&self, lane: usize) -> Anchor {
+        let normal = at(&self.seen.normal, lane);
+        Anchor { point: self.point(lane), normal, error: self.seen.error[lane] }
+    }
+
+    /// Sets the ray that leaves the hit of a lane.
+    pub(super) fn send(&mut self, lane: usize, (start, along): (DVec3, DVec3)) {
+        put(&mut self.away.start, lane, start);
+        put(&mut self.away.along, lane, along);
+        self.away.reach[lane] = f64::INFINITY;
+    }
+}
+
+impl Targets {
+    /// Sets what a lane aims at; at nothing when there is no light.
+    #[inline]
+    pub(super) fn set(&mut self, lane: usize, target: Option<&Target>) {
+        let Some(target) = target else {
+            self.density[lane] = f64::INFINITY;
+            return;
+        };
+        self.id[lane] = target.id;
+        for (rows, part) in self.place.iter_mut().zip(target.place) {
+            put(rows, lane, part);
+        }
+        put(&mut self.normal, lane, target.normal);
+        put(&mut self.magnitudes, lane, target.magnitudes);
+        self.density[lane] = target.density;
+        let flag = |yes: bool| f64::from(u8::from(yes));
+        self.is_far[lane] = flag(matches!(target.kind, TargetKind::Far | TargetKind::Parallel));
+        self.is_delta[lane] = flag(matches!(target.kind, TargetKind::Point | TargetKind::Parallel));
+        self.is_triangle[lane] = flag(matches!(target.kind, TargetKind::Triangle { .. }));
+        self.two_sided[lane] = flag(target.kind == TargetKind::Triangle { two_sided: true });
+    }
+}
+
+#[inline]
+pub(super) fn at(axes: &[Row; 3], lane: usize) -> DVec3 {
+    DVec3::new(axes[0][lane], axes[1][lane], axes[2][lane])
+}
+
+#[inline]
+pub(super) fn put(axes: &mut [Row; 3], lane: usize, vector: DVec3) {
+    (axes[0][lane], axes[1][lane], axes[2][lane]) = vector.into();
+}

@@ -1,0 +1,347 @@
+//! The step of all paths that go on, side by side: at each surface that was met a light is asked and a
+//! direction is followed. Matte surfaces are worked out in loops that vectorise, whatever they are of;
+//! what scatters in other ways shares with them all but its own formula.
+
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{HitPrecision, MISS};
+
+use super::numbers::Draw;
+use super::patch::{LANES, Patch, at, put};
+use super::paths::State;
+use super::{Follow, Scratch, Tracing, in_band, kernels, split};
+use crate::bsdf::Weights;
+use crate::placed::PlacedSurface;
+use crate::reference::SurfacePoint;
+use crate::sampling::power_heuristic;
+use crate::surface::SurfaceInteraction;
+use crate::{Ior, Scattering};
+
+impl Tracing<'_> {
+    /// The step of all paths that go on.
+    pub(super) fn step_all(&mut self, scratch: &mut Scratch) {
+        let mut patch = std::mem::take(&mut scratch.patch);
+        for is_matte in [true, false] {
+            patch.clear();
+            for k in 0..scratch.alive.len() {
+                let i = scratch.alive[k] as usize;
+                let Some(placed) = self.stage.placed.get(scratch.hits.placement[i]) else {
+                    continue;
+                };
+                if placed.is_matte != is_matte {
+                    continue;
+                }
+                if is_matte {
+                    self.gather_matte(scratch, &mut patch, (i, k), placed);
+                } else {
+                    self.gather_other(scratch, &mut patch, (i, k), placed);
+                }
+                if patch.count == LANES {
+                    self.step_patch(scratch, &mut patch);
+                }
+            }
+            if patch.count > 0 {
+                self.step_patch(scratch, &mut patch);
+            }
+        }
+        scratch.patch = patch;
+    }
+
+    /// The step of the paths of a patch, which is emptied.
+    fn step_patch(&mut self, scratch: &mut Scratch, patch: &mut Patch) {
+        let roundings = self.stage.roundings();
+        kernels::measure(patch, roundings);
+        if patch.bsdfs.is_empty() {
+            kernels::bend(patch);
+        }
+        if !self.stage.lights.is_dark() {
+            self.choose(scratch, patch);
+            kernels::aim(patch, roundings);
+            self.ask(scratch, patch);
+        }
+        self.scatter(scratch, patch);
+        patch.clear();
+    }
+
+    /// Adds a hit on a matte surface.
+    #[inline]
+    fn gather_matte(
+        &self,
+        scratch: &Scratch,
+        patch: &mut Patch,
+        (i, k): (usize, usize),
+        placed: &PlacedSurface,
+    ) {
+        let Scratch { now, hits, .. } = scratch;
+        let state = &now.states[i];
+        if state.is_last || state.bounces >= self.rules.bounces {
+            return;
+        }
+        let lane = patch.push((now, hits), (i, k), placed);
+        if let (Some(color), false) = (placed.color, placed.is_tilted) {
+            patch.colors.push(color);
+            return;
+        }
+        let around = &self.stage.surroundings;
+        let footprint = now.footprint(hits, i);
+        let surface = around.spot(hits, i).map(|spot| SurfacePoint { footprint, ..spot });
+        let surface = surface.and_then(|spot| Some((spot, around.material(&spot)?)));
+        let Some((spot, material)) = surface else { return patch.colors.push([0.0; 3]) };
+        if placed.is_tilted {
+            let front = hits.normal(i);
+            let tilted = spot.tilted_normal(around, material, placed.turn.as_ref(), front);
+            put(&mut patch.seen.shading, lane, tilted);
+        }
+        patch.colors.push(placed.color.unwrap_or_else(|| {
+            let [r, g, b, _] = around.base_color(material, &spot);
+            [r, g, b].map(|c| c.clamp(0.0, 1.0))
+        }));
+    }
+
+    /// Adds a hit on a surface that may scatter light in any way, or not be there.
+    fn gather_other(
+        &self,
+        scratch: &mut Scratch,
+        patch: &mut Patch,
+        (i, k): (usize, usize),
+        placed: &PlacedSurface,
+    ) {
+        let Scratch { now, next, hits, numbers, .. } = scratch;
+        let footprint = now.footprint(hits, i);
+        let Some(met) = SurfaceInteraction::new(self.stage, &now.rays, hits, i, footprint) else {
+            return;
+        };
+        let bands = i * self.count..(i + 1) * self.count;
+        if met.material.has_alpha() && numbers.of(Draw::Chance, k)[0] >= met.opacity() {
+            let direction = now.rays.direction(i);
+            let mut state = now.states[i];
+            state.steps += 1;
+            state.cone = state.cone.map(|cone| cone.after(hits.t[i]));
+            let left = [hits.placement[i], hits.triangle[i]];
+            next.push((met.anchor.leave(direction), direction), left, state);
+            next.throughput.extend_from_slice(&now.throughput[bands]);
+            return;
+        }
+        let state = &mut now.states[i];
+        if state.is_last || state.bounces >= self.rules.bounces {
+            return;
+        }
+        if let Scattering::Dielectric(Ior::Dispersive(_)) = met.material.scattering
+            && self.count > 1
+        {
+            // A boundary asks no light: its numbers are free.
+            split(&mut now.throughput[bands], state, numbers.of(Draw::Light, k)[0]);
+        }
+        let wavelength = self.stage.spectral.wavelength(state.band.unwrap_or(0) as usize);
+        let bsdf = met.bsdf(&self.stage.surroundings, wavelength);
+        patch.push((now, hits), (i, k), placed);
+        patch.bsdfs.push(bsdf);
+    }
+
+    /// Chooses a light for each hit, and a place on it.
+    fn choose(&self, scratch: &Scratch, patch: &mut Patch) {
+        let super::LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
+        patch.radiance.resize(LANES * self.count, 0.0);
+        for lane in 0..patch.count {
+            let (_, k) = patch.path[lane];
+            let square = scratch.numbers.of(Draw::Light, k);
+            let asks = patch.bsdfs.get(lane).is_none_or(|bsdf| !bsdf.is_delta());
+            let from = patch.point(lane);
+            let radiance = &mut patch.radiance[lane * self.count..(lane + 1) * self.count];
+            let target = match asks {
+                true => lights.choose(around, spectral, from, square, radiance),
+                false => None,
+            };
+            patch.targets.set(lane, target.as_ref());
+        }
+    }
+
+    /// Notes the rays to the lights that were chosen, and what each brings.
+    fn ask(&self, scratch: &mut Scratch, patch: &mut Patch) {
+        let Scratch { now, hits, shadows, .. } = scratch;
+        if patch.bsdfs.is_empty() {
+            kernels::reflect(patch);
+        } else {
+            weigh(patch);
+        }
+        let Patch { count, path, away, targets, colors, bsdfs, radiance, picked, .. } = patch;
+        picked.clear();
+        picked.extend((0..*count).filter(|&lane| away.value[lane] > 0.0));
+        shadows.rays.extend_picked(&away.start, &away.along, &away.reach, picked);
+        if self.stage.precision == HitPrecision::Double {
+            shadows.rays.end_on_triangles(picked.iter().map(|&lane| {
+                let (i, _) = path[lane];
+                [[hits.placement[i], hits.triangle[i]], targets.id[lane]]
+            }));
+        }
+        shadows.ray.extend(picked.iter().map(|&lane| now.states[path[lane].0].ray));
+        shadows.is_delta.extend(picked.iter().map(|&lane| targets.is_delta[lane] > 0.0));
+        for &lane in picked.iter() {
+            let start = path[lane].0 * self.count;
+            let throughput = &now.throughput[start..start + self.count];
+            let light = radiance[lane * self.count..(lane + 1) * self.count].iter().zip(throughput);
+            let (light, value) = (light.enumerate(), away.value[lane]);
+            let spectral = self.stage.spectral;
+            match bsdfs.get(lane) {
+                None => {
+                    let color = &colors[lane];
+                    shadows
+                        .contribution
+                        .extend(light.map(|(k, (l, t))| l * t * value * spectral.band(color, k)));
+                }
+                Some(bsdf) => {
+                    let (weights, _) = bsdf.evaluate(at(&away.toward, lane));
+                    shadows
+                        .contribution
+                        .extend(light.map(|(k, (l, t))| {
+                            l * t * value * in_band(spectral, bsdf, weights, k)
+                        }));
+                }
+            }
+        }
+    }
+
+    /// Chooses a direction for each hit, and notes the path along it.
+    fn scatter(&self, scratch: &mut Scratch, patch: &mut Patch) {
+        if patch.bsdfs.is_empty() {
+            self.scatter_matte(scratch, patch);
+        } else {
+            self.scatter_others(scratch, patch);
+        }
+    }
+
+    fn scatter_matte(&self, scratch: &mut Scratch, patch: &mut Patch) {
+        let Scratch { now, numbers, .. } = scratch;
+        let hittable = self.stage.lights.is_hittable();
+        let follows_any = self.rules.follow == Follow::All;
+        let ends = |state: &State| state.bounces + 1 >= self.rules.bounces || !follows_any;
+        if !hittable && patch.path.iter().all(|&(i, _)| ends(&now.states[i])) {
+            return;
+        }
+        let mut squares = [[0.5; 2]; LANES];
+        for (square, &(_, k)) in squares.iter_mut().zip(&patch.path) {
+            *square = numbers.of(Draw::Direction, k);
+        }
+        kernels::scatter(patch, &squares);
+        patch.picked.clear();
+        for lane in 0..patch.count {
+            let (i, _) = patch.path[lane];
+            let state = &mut now.states[i];
+            let is_last = ends(state);
+            let pdf = patch.away.value[lane];
+            if pdf <= 0.0 || (is_last && !hittable) {
+                continue;
+            }
+            let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
+            for (k, band) in throughput.iter_mut().enumerate() {
+                *band *= self.stage.spectral.band(&patch.colors[lane], k);
+            }
+            state.cone = None;
+            state.pdf = pdf;
+            state.is_last = is_last;
+            patch.picked.push(lane);
+        }
+        self.follow(scratch, patch);
+    }
+
+    fn scatter_others(&self, scratch: &mut Scratch, patch: &mut Patch) {
+        let Scratch { now, hits, numbers, .. } = scratch;
+        let hittable = self.stage.lights.is_hittable();
+        patch.picked.clear();
+        for lane in 0..patch.count {
+            let (i, k) = patch.path[lane];
+            let bsdf = patch.bsdfs[lane];
+            let state = &mut now.states[i];
+            let ends = state.bounces + 1 >= self.rules.bounces;
+            if (ends || self.rules.follow == Follow::Single) && !hittable && !bsdf.has_single() {
+                continue;
+            }
+            let choice = numbers.of(Draw::Choice, k)[1];
+            let Some(scattered) = bsdf.sample(choice, numbers.of(Draw::Direction, k)) else {
+                continue;
+            };
+            let single = scattered.pdf == f64::INFINITY;
+            state.is_last = ends || !(single || self.rules.follow == Follow::All);
+            if state.is_last && !single && !hittable {
+                continue;
+            }
+            let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
+            for (k, band) in throughput.iter_mut().enumerate() {
+                *band *= in_band(self.stage.spectral, &bsdf, scattered.weights, k);
+            }
+            // Seen by chance from one point, a surface is a point.
+            state.cone = state.cone.filter(|_| single).map(|cone| cone.after(hits.t[i]));
+            state.pdf = scattered.pdf;
+            let start = patch.anchor(lane).leave(scattered.direction);
+            patch.send(lane, (start, scattered.direction));
+            patch.picked.push(lane);
+        }
+        self.follow(scratch, patch);
+    }
+
+    /// Notes the paths along the rays that leave the picked lanes, but for those that carry nothing or
+    /// end by chance.
+    fn follow(&self, scratch: &mut Scratch, patch: &mut Patch) {
+        let Scratch { now, next, last, hits, numbers, .. } = scratch;
+        let traces_emitters = self.traces_emitters();
+        for is_last in [false, true] {
+            let paths = if is_last { &mut *last } else { &mut *next };
+            let first = paths.states.len();
+            let mut kept: Vec<usize> = std::mem::take(&mut paths.kept);
+            kept.clear();
+            for &lane in &patch.picked {
+                let (i, k) = patch.path[lane];
+                let state = &now.states[i];
+                let asks = state.is_last && state.pdf != f64::INFINITY && traces_emitters;
+                if asks != is_last {
+                    continue;
+                }
+                let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
+                let most = throughput.iter().copied().fold(0.0, f64::max);
+                let ray = || (at(&patch.away.start, lane), at(&patch.away.along, lane));
+                if most <= 0.0 || (asks && !self.may_shine(ray())) {
+                    continue;
+                }
+                let bounces = state.bounces + 1;
+                if self.rules.roulette.is_some_and(|after| bounces >= after) && !state.is_last {
+                    let survival = most.min(0.95);
+                    if numbers.of(Draw::Chance, k)[1] >= survival {
+                        continue;
+                    }
+                    throughput.iter_mut().for_each(|band| *band /= survival);
+                }
+                kept.push(lane);
+                let (steps, vertex) = (state.steps + 1, patch.point(lane));
+                paths.states.push(State { steps, bounces, vertex, ..*state });
+                paths.throughput.extend_from_slice(throughput);
+            }
+            let away = &patch.away;
+            paths.rays.extend_picked(&away.start, &away.along, &UNLIMITED, &kept);
+            if self.stage.precision == HitPrecision::Double {
+                paths.rays.end_on_triangles(kept.iter().map(|&lane| {
+                    let (i, _) = patch.path[lane];
+                    [[hits.placement[i], hits.triangle[i]], [MISS; 2]]
+                }));
+            }
+            debug_assert_eq!(paths.states.len() - first, kept.len());
+            paths.kept = kept;
+        }
+    }
+}
+
+const UNLIMITED: [f64; LANES] = [f64::INFINITY; LANES];
+
+/// For surfaces that are not matte: the weight of what was aimed at over its density, which is 0 where
+/// the surface turns nothing of it to the viewer.
+fn weigh(patch: &mut Patch) {
+    for lane in 0..patch.count {
+        let toward: DVec3 = at(&patch.away.toward, lane);
+        let pdf = patch.away.pdf[lane];
+        let (value, own) = match pdf < f64::INFINITY {
+            true => patch.bsdfs[lane].evaluate(toward),
+            false => (Weights::default(), 0.0),
+        };
+        let is_delta = patch.targets.is_delta[lane] > 0.0;
+        let balance = if is_delta { 1.0 } else { power_heuristic(pdf, own) };
+        patch.away.value[lane] = if value.is_zero() { 0.0 } else { balance / pdf };
+    }
+}
