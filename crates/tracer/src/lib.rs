@@ -17,6 +17,7 @@
 //! | [`footprint`] | how much of a surface a sample stands for |
 //! | [`bsdf`] | how surfaces scatter light |
 //! | [`light`], [`emitters`], [`environment`] | where light comes from |
+//! | [`placed`] | what there is to know of each placement before any ray meets it |
 //! | [`spawn`] | where a ray that leaves a surface starts |
 //! | [`transport`] | batches of paths, and the rules of each tracer of light |
 //! //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
