@@ -80,7 +80,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     keep_report_apart(arguments, &mut session, &results)?;
     let rendering = session.render(&progress)?;
     write(arguments, &rendering, outputs, progress)?;
-    Ok(checkpoint.map_or(Ok(()), remove)?)
+    checkpoint.map_or(Ok(()), remove)
 }
 
 /// Has the session keep what there is of the render in a file of `folder`, if that is asked for.

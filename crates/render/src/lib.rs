@@ -13,8 +13,10 @@
 //! | [`report`] | what a render did and what it cost |
 //! | [`Watch`] | who is told how far a render is, and may stop it |
 
+mod checkpoint;
 pub mod expose;
 mod film;
+mod film_file;
 mod forecast;
 pub mod light_field;
 mod lighting;
@@ -31,7 +33,9 @@ mod shard;
 mod tiles;
 mod watch;
 
+pub use checkpoint::Checkpoint;
 pub use film::{NoMemory, Precision};
+pub use film_file::{FilmError, FilmFile, FilmHeader, Identity};
 pub use other_frame::FollowedFrame;
 pub use plan::{Decision, Plan};
 pub use render::{
@@ -39,5 +43,5 @@ pub use render::{
     rebuild, render, trace,
 };
 pub use report::{Report, Seconds};
-pub use shard::{Checkpoint, FilmError, FilmFile, FilmHeader, Identity, Shard};
+pub use shard::Shard;
 pub use watch::{SoFar, Watch};

@@ -21,13 +21,15 @@ use etendue_tracer::{
 };
 use rayon::prelude::*;
 
+use crate::checkpoint::{Checkpoint, Keeper};
 use crate::film::{FilmLayer, NoMemory};
+use crate::film_file::{FilmError, FilmFile, Identity, Writing};
 use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, OutputError, Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::report::ImageSize;
 use crate::samples::{Sampling, short_passes};
-use crate::shard::{self, Checkpoint, FilmError, FilmFile, Identity, Keeper, Shard, Writing};
+use crate::shard::{self, Shard};
 use crate::tiles::{Done, Job, RayCounts};
 use crate::watch::{Stopped, Watch, Watcher};
 use crate::{Plan, expose, lighting, names};

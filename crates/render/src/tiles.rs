@@ -11,12 +11,12 @@ use etendue_tracer::layer::{Columns, OtherFrame, Seen};
 use etendue_tracer::{LayerSpec, RayStats, SceneView, Traced};
 use rayon::prelude::*;
 
+use crate::checkpoint::Keeper;
 use crate::film::{FilmLayer, Strip, strips, take};
 use crate::output::{Picture, PictureError};
 use crate::radiance::LightPass;
 use crate::render::RenderError;
 use crate::samples::{Averaged, Averaging, Memory, Sampling};
-use crate::shard::Keeper;
 use crate::watch::{SoFar, Stopped, Watcher};
 
 /// Side of a tile (pixels): its rays are one batch.
