@@ -96,20 +96,32 @@ impl Lenslets {
     ) -> bool {
         match &self.kinds {
             Kinds::Thin(powers) => match powers[..] {
-                [power] => {
-                    each_lane(block, element, z, |ray| self.at_thin(form, ray, clip, |_| power))
-                }
-                _ => each_lane(block, element, z, |ray| {
-                    self.at_thin(form, ray, clip, |index| powers[self.array.type_at(index)])
-                }),
+                [power] => each_lane(
+                    block,
+                    element,
+                    z,
+                    #[inline(always)]
+                    |ray| self.at_thin(form, ray, clip, |_| power),
+                ),
+                _ => each_lane(
+                    block,
+                    element,
+                    z,
+                    #[inline(always)]
+                    |ray| self.at_thin(form, ray, clip, |index| powers[self.array.type_at(index)]),
+                ),
             },
             Kinds::Faces { faces, flat } => match &faces[..] {
-                [one] if one.surface.curvature != 0.0 && one.surface.conic == 0.0 => {
-                    each_lane(block, element, z, |ray| {
+                [one] if one.surface.curvature != 0.0 && one.surface.conic == 0.0 => each_lane(
+                    block,
+                    element,
+                    z,
+                    #[inline(always)]
+                    |ray| {
                         let near = |ray| one.at_near_root::<true>(ray, f64::INFINITY);
                         self.at_face(form, ray, clip, (near, flat))
-                    })
-                }
+                    },
+                ),
                 _ => each_lane(block, element, z, |ray| Refracted {
                     hit: false,
                     ..flat.at_plane(ray, f64::INFINITY)
