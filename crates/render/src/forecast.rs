@@ -6,8 +6,8 @@ use etendue_spectrum::Bands;
 use etendue_tracer::{EnvironmentImage, LayerSpec, texture};
 
 use crate::film::bytes_of_plane;
+use crate::images::{environment, wanted_images};
 use crate::output::Outputs;
-use crate::render::{environment, wanted_images};
 use crate::samples::BYTES_OF_SUM;
 use crate::{Plan, expose};
 

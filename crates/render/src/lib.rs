@@ -18,6 +18,7 @@ pub mod expose;
 mod film;
 mod film_file;
 mod forecast;
+mod images;
 pub mod light_field;
 mod lighting;
 mod names;
@@ -36,11 +37,12 @@ mod watch;
 pub use checkpoint::Checkpoint;
 pub use film::{NoMemory, Precision};
 pub use film_file::{FilmError, FilmFile, FilmHeader, Identity};
+pub use images::Images;
 pub use other_frame::FollowedFrame;
 pub use plan::{Decision, Plan};
 pub use render::{
-    Course, Film, Images, Prepared, Progress, RenderError, Rendered, accelerators, build, finish,
-    rebuild, render, trace,
+    Course, Film, Prepared, Progress, RenderError, Rendered, accelerators, build, finish, rebuild,
+    render, trace,
 };
 pub use report::{Report, Seconds};
 pub use shard::Shard;

@@ -1,35 +1,30 @@
 //! From a loaded scene to a picture: build, decode, trace.
 
-use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildError, BuildOptions};
 use etendue_camera::{Camera, PixelExtent};
-use etendue_geometry::files::Stamp;
-use etendue_image::Limits;
 use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightRow};
 use etendue_spectrum::Bands;
 use etendue_tracer::layer::OtherFrame;
-use etendue_tracer::texture::{Encoding, Filter, ImageError, Wrap};
+use etendue_tracer::texture::ImageError;
 use etendue_tracer::{
-    Emitters, EnvironmentImage, EnvironmentMap, Image, ImageSource, LayerSpec, LightKind,
-    LightingContext, Lights, Material, Pixel, PlacedSurfaces, RayStats, SceneView, Spectral,
-    Texture, Traits, View,
+    Emitters, LayerSpec, LightingContext, Lights, Material, Pixel, PlacedSurfaces, RayStats,
+    SceneView, Spectral, Traits, View,
 };
-use rayon::prelude::*;
 
 use crate::checkpoint::{Checkpoint, Keeper};
 use crate::film::{FilmLayer, NoMemory};
-use crate::film_file::{FilmError, FilmFile, Identity, Writing};
+use crate::film_file::{FilmError, Identity};
+use crate::images::Images;
 use crate::other_frame::FollowedFrame;
-use crate::output::{Development, Layer, OutputError, Picture, PictureError};
+use crate::output::{Development, Layer, Picture, PictureError};
 use crate::radiance::LightPass;
-use crate::report::ImageSize;
 use crate::samples::{Sampling, short_passes};
-use crate::shard::{self, Shard};
+use crate::shard::Shard;
 use crate::tiles::{Done, Job, RayCounts};
 use crate::watch::{Stopped, Watch, Watcher};
 use crate::{Plan, expose, lighting, names};
@@ -179,253 +174,6 @@ pub fn rebuild(
     }
 }
 
-/// Images of a scene's materials and its environment, decoded; what could not be is told.
-#[derive(Debug, Default)]
-pub struct Images {
-    /// One a texture; `None` where no layer looks at it.
-    pub decoded: Vec<Option<Arc<Image>>>,
-    /// The image of the environment.
-    pub environment: Option<Arc<EnvironmentMap>>,
-    /// What each texture was decoded from, and what is wrong with it.
-    origins: Vec<Option<Origin>>,
-    /// What the environment was read from, and its file as it was.
-    sky: Option<(EnvironmentImage, Option<Stamp>)>,
-    /// What could not be decoded, in words.
-    pub faults: Vec<String>,
-}
-
-impl Images {
-    /// Decodes side by side the textures that the plan's materials look at, and the environment, each
-    /// within [`Limits::within`] of `memory` (bytes). A broken texture becomes a magenta checker and a
-    /// fault.
-    ///
-    /// # Errors
-    ///
-    /// When the environment cannot be read or decoded, or an image that the scene itself names is too
-    /// large.
-    pub fn decode(scene: &Scene, plan: &Plan, memory: Option<u64>) -> Result<Self, RenderError> {
-        Self::default().renewed(scene, plan, memory)
-    }
-
-    /// As [`Self::decode`], with what these images have already.
-    ///
-    /// # Errors
-    ///
-    /// As [`Self::decode`].
-    pub fn renewed(
-        &self,
-        scene: &Scene,
-        plan: &Plan,
-        memory: Option<u64>,
-    ) -> Result<Self, RenderError> {
-        let limits = Limits::within(memory);
-        let wanted = wanted_images(scene, plan);
-        let results: Vec<_> = scene
-            .textures
-            .par_iter()
-            .zip(&wanted)
-            .enumerate()
-            .map(|(i, (texture, encodings))| {
-                let encodings = (*encodings)?;
-                let origin = Origin::of(texture, encodings);
-                Some(match self.known(i, &origin) {
-                    Some(known) => Ok(known),
-                    None => decoded(texture, origin, limits),
-                })
-            })
-            .collect();
-        let mut images = Self::default();
-        for result in results {
-            let (image, origin) = result.transpose()?.unzip();
-            images.faults.extend(origin.iter().filter_map(|origin| origin.fault.clone()));
-            images.decoded.push(image);
-            images.origins.push(origin);
-        }
-        if plan.layers.contains(&LayerSpec::Radiance) {
-            images.read_environment(scene, limits, self)?;
-        }
-        Ok(images)
-    }
-
-    /// The image of texture `i`, where it was decoded from the same.
-    fn known(&self, i: usize, origin: &Origin) -> Option<(Arc<Image>, Origin)> {
-        let known = self.origins.get(i)?.as_ref().filter(|known| known.is_same(origin))?;
-        Some((Arc::clone(self.decoded.get(i)?.as_ref()?), known.clone()))
-    }
-
-    /// What is wrong with the first image of `scene` that cannot be decoded, whether a layer looks at
-    /// it or not.
-    #[must_use]
-    pub fn first_fault(scene: &Scene) -> Option<String> {
-        let limits = Limits::default();
-        let faults: Vec<Option<String>> = scene
-            .textures
-            .par_iter()
-            .map(|texture| texture.decode(limits).err().map(|error| error.to_string()))
-            .collect();
-        let environment = || match environment(scene)? {
-            EnvironmentImage::File(path) => {
-                EnvironmentMap::read(path, limits).err().map(|e| e.to_string())
-            }
-            EnvironmentImage::Studio | EnvironmentImage::Constant => None,
-        };
-        faults.into_iter().flatten().next().or_else(environment)
-    }
-
-    fn read_environment(
-        &mut self,
-        scene: &Scene,
-        limits: Limits,
-        before: &Self,
-    ) -> Result<(), ImageError> {
-        let Some(image) = environment(scene) else { return Ok(()) };
-        let stamp = match image {
-            EnvironmentImage::File(path) => Stamp::of(path),
-            EnvironmentImage::Studio | EnvironmentImage::Constant => None,
-        };
-        self.sky = Some((image.clone(), stamp));
-        let known = before.environment.as_ref().filter(|_| before.sky == self.sky);
-        let map = match (known, image) {
-            (Some(known), _) => Arc::clone(known),
-            (None, EnvironmentImage::Studio) => Arc::new(EnvironmentMap::studio()),
-            (None, EnvironmentImage::File(path)) => Arc::new(EnvironmentMap::read(path, limits)?),
-            (None, EnvironmentImage::Constant) => return Ok(()),
-        };
-        if map.dropped > 0 {
-            self.faults.push(format!(
-                "the environment has {} pixels that are not finite or below zero; they are black",
-                map.dropped
-            ));
-        }
-        self.environment = Some(map);
-        Ok(())
-    }
-
-    /// Each decoded image: what it is called, columns, rows and bytes.
-    #[must_use]
-    pub fn sizes(&self, scene: &Scene) -> Vec<ImageSize> {
-        let textures = scene.textures.iter().zip(&self.decoded);
-        let textures = textures.filter_map(|(texture, image)| {
-            let image = image.as_ref()?;
-            let (name, resolution) = (texture.name.clone(), image.size());
-            Some(ImageSize { name, resolution, bytes: image.bytes() as u64 })
-        });
-        let environment = self.environment.iter().map(|map| ImageSize {
-            name: "environment".to_owned(),
-            resolution: map.size(),
-            bytes: map.bytes() as u64,
-        });
-        textures.chain(environment).collect()
-    }
-}
-
-/// The encodings in which an image is averaged over footprints.
-type Encodings = [Option<Encoding>; 2];
-
-/// Which of the scene's images the plan's materials look at.
-pub(crate) fn wanted_images(scene: &Scene, plan: &Plan) -> Vec<Option<Encodings>> {
-    let mut wanted = vec![None; scene.textures.len()];
-    let Some(scope) = plan.images else { return wanted };
-    let mut seen = vec![false; scene.materials.len()];
-    for placement in &scene.geometry.placements {
-        if let Some(seen) = seen.get_mut(placement.material as usize) {
-            *seen = true;
-        }
-    }
-    for (material, _) in scene.materials.iter().zip(&seen).filter(|(_, seen)| **seen) {
-        for (texture, encoding) in material.textures(scope) {
-            if let Some(wanted) = wanted.get_mut(texture as usize) {
-                let encodings = wanted.get_or_insert([None; 2]);
-                encodings[encoding as usize] = plan.footprint.then_some(encoding);
-            }
-        }
-    }
-    wanted
-}
-
-/// What an image was decoded from, and what is wrong with it.
-#[derive(Debug, Clone)]
-struct Origin {
-    source: ImageSource,
-    /// The file as it was.
-    stamp: Option<Stamp>,
-    wrap: [Wrap; 2],
-    filter: Filter,
-    /// How it is filtered by footprint.
-    encodings: Encodings,
-    fault: Option<String>,
-}
-
-impl Origin {
-    fn of(texture: &Texture, encodings: Encodings) -> Self {
-        Self {
-            source: texture.source.clone(),
-            stamp: texture.file().and_then(|path| Stamp::of(path)),
-            wrap: texture.wrap,
-            filter: texture.filter,
-            encodings,
-            fault: None,
-        }
-    }
-
-    fn is_same(&self, other: &Self) -> bool {
-        let source = match (&self.source, &other.source) {
-            (ImageSource::File(own), ImageSource::File(other)) => own == other,
-            (ImageSource::Bytes(own), ImageSource::Bytes(other)) => own.is_same(other),
-            (ImageSource::Missing, ImageSource::Missing) => true,
-            (ImageSource::File(_) | ImageSource::Bytes(_) | ImageSource::Missing, _) => false,
-        };
-        source
-            && self.stamp == other.stamp
-            && (self.wrap, self.filter) == (other.wrap, other.filter)
-            && self.encodings == other.encodings
-    }
-}
-
-/// Decodes a texture; a broken one becomes a magenta checker and a fault.
-///
-/// # Errors
-///
-/// When it is too large and the scene itself names it: who writes a scene can choose a smaller image, who
-/// renders a model often cannot.
-fn decoded(
-    texture: &Texture,
-    mut origin: Origin,
-    limits: Limits,
-) -> Result<(Arc<Image>, Origin), ImageError> {
-    let decode = || -> Result<Image, ImageError> {
-        let mut image = texture.decode(limits)?;
-        for encoding in origin.encodings.into_iter().flatten() {
-            image.filter_by_footprint(encoding, &texture.name)?;
-        }
-        Ok(image)
-    };
-    let image = match decode() {
-        Err(error) if texture.named_by_scene && error.is_too_large() => return Err(error),
-        Err(error) => {
-            let shown = "where it is a colour, magenta squares show it; data are left out";
-            origin.fault = Some(format!("{error}; {shown}"));
-            Image::missing()
-        }
-        Ok(image) => image,
-    };
-    if image.dropped > 0 {
-        origin.fault = Some(format!(
-            "{} has {} texels that are not finite or below zero; they are black",
-            texture.name, image.dropped
-        ));
-    }
-    Ok((Arc::new(image), origin))
-}
-
-/// The image of the environment of `scene`, when it has one.
-pub(crate) fn environment(scene: &Scene) -> Option<&EnvironmentImage> {
-    scene.lights.iter().find_map(|light| match &light.kind {
-        LightKind::Environment { image, .. } => Some(image),
-        _ => None,
-    })
-}
-
 /// What was made ready for a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Prepared<'a> {
@@ -451,15 +199,15 @@ pub struct Course {
 /// A film with what was traced onto it.
 #[derive(Debug)]
 pub struct Film {
-    layers: Vec<FilmLayer>,
-    resolution: [u32; 2],
-    shard: Shard,
-    counts: RayCounts,
-    samples: u32,
-    trace_time: Duration,
-    notes: Vec<String>,
+    pub(crate) layers: Vec<FilmLayer>,
+    pub(crate) resolution: [u32; 2],
+    pub(crate) shard: Shard,
+    pub(crate) counts: RayCounts,
+    pub(crate) samples: u32,
+    pub(crate) trace_time: Duration,
+    pub(crate) notes: Vec<String>,
     /// The camera as it was opened for it.
-    camera: Option<Camera>,
+    pub(crate) camera: Option<Camera>,
 }
 
 /// Renders `scene` as planned. Runs on the threads of the current rayon pool; the picture does not
@@ -573,7 +321,7 @@ pub fn trace(
     Ok(Film { layers, resolution, shard, counts, samples, trace_time, notes, camera })
 }
 
-fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, NoMemory> {
+pub(crate) fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, NoMemory> {
     let [width, height] = scene.camera.resolution().map(|side| side as usize);
     plan.layers
         .iter()
@@ -592,61 +340,6 @@ impl Film {
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
-    }
-
-    /// Writes it to `path`: which render it is of, and how that was asked for, goes with it.
-    ///
-    /// # Errors
-    ///
-    /// When the file cannot be written.
-    pub fn write(
-        &self,
-        path: &Path,
-        identity: &Identity,
-        origin: &serde_json::Value,
-    ) -> Result<(), OutputError> {
-        let writing = Writing {
-            identity,
-            origin,
-            shard: self.shard,
-            samples: self.samples,
-            counts: &self.counts,
-            trace_time: self.trace_time,
-            resolution: self.resolution,
-        };
-        writing.write(path, &self.layers.iter().collect::<Vec<_>>(), &[])
-    }
-
-    /// Puts the shares of a render together.
-    ///
-    /// # Errors
-    ///
-    /// When one is of another render, is there twice, or is missing.
-    pub fn merged(
-        scene: &Scene,
-        plan: &Plan,
-        shares: &[FilmFile],
-        identity: &Identity,
-    ) -> Result<Self, RenderError> {
-        let resolution = scene.camera.resolution();
-        let mut layers = empty_film(scene, plan)?;
-        shard::must_be_whole(shares, identity).map_err(RenderError::Shares)?;
-        let counts = Mutex::new(RayCounts::default());
-        for share in shares {
-            share.fill(&mut layers.iter_mut().collect::<Vec<_>>(), &mut [], resolution)?;
-            RayCounts::add(&counts, share.counts(), &FateCounts::default());
-        }
-        let counts = counts.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Ok(Self {
-            layers,
-            resolution,
-            shard: Shard::ALL,
-            counts,
-            samples: plan.samples,
-            trace_time: shares.iter().map(FilmFile::trace_time).sum(),
-            notes: Vec::new(),
-            camera: None,
-        })
     }
 }
 

@@ -5,10 +5,18 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use etendue_optics::element::FateCounts;
+use etendue_scene::Scene;
 use serde::{Deserialize, Serialize};
 
-use crate::film_file::{FilmFile, Identity};
-use crate::tiles::TILE;
+use crate::Plan;
+use crate::film_file::{FilmFile, Identity, Writing};
+use crate::output::OutputError;
+use crate::render::{Film, RenderError, empty_film};
+use crate::tiles::{RayCounts, TILE};
 
 /// A share of a render. Its rows are dealt out in strips, in turn, so that every share has some of each
 /// part of the picture.
@@ -80,8 +88,65 @@ impl FromStr for Shard {
     }
 }
 
+impl Film {
+    /// Writes it to `path`: which render it is of, and how that was asked for, goes with it.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be written.
+    pub fn write(
+        &self,
+        path: &Path,
+        identity: &Identity,
+        origin: &serde_json::Value,
+    ) -> Result<(), OutputError> {
+        let writing = Writing {
+            identity,
+            origin,
+            shard: self.shard,
+            samples: self.samples,
+            counts: &self.counts,
+            trace_time: self.trace_time,
+            resolution: self.resolution,
+        };
+        writing.write(path, &self.layers.iter().collect::<Vec<_>>(), &[])
+    }
+
+    /// Puts the shares of a render together.
+    ///
+    /// # Errors
+    ///
+    /// When one is of another render, is there twice, or is missing.
+    pub fn merged(
+        scene: &Scene,
+        plan: &Plan,
+        shares: &[FilmFile],
+        identity: &Identity,
+    ) -> Result<Self, RenderError> {
+        let resolution = scene.camera.resolution();
+        let mut layers = empty_film(scene, plan)?;
+        must_be_whole(shares, identity).map_err(RenderError::Shares)?;
+        let counts = Mutex::new(RayCounts::default());
+        for share in shares {
+            share.fill(&mut layers.iter_mut().collect::<Vec<_>>(), &mut [], resolution)?;
+            RayCounts::add(&counts, share.counts(), &FateCounts::default());
+        }
+        let counts = counts.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(Self {
+            layers,
+            resolution,
+            shard: Shard::ALL,
+            counts,
+            samples: plan.samples,
+            trace_time: shares.iter().map(FilmFile::trace_time).sum(),
+            notes: Vec::new(),
+            camera: None,
+        })
+    }
+}
+
 /// Refuses shares that are not one of each of one render, by name.
-pub(crate) fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<(), String> {
+fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<(), String> {
     let Some(first) = shares.first() else {
         return Err("there is no share to put together".to_owned());
     };
