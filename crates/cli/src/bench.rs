@@ -21,7 +21,7 @@ use etendue_scene::file::SceneFile;
 
 use crate::arguments::{BenchArguments, PartArgument, SceneArguments};
 use crate::fault::{Fault, print_text};
-use crate::progress::{Stages, say};
+use crate::progress::{Phases, say};
 use crate::{render, stop};
 
 /// All of a run, and of a quick one.
@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &BenchArguments) -> Result<(), Fault> {
 }
 
 fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
-    let stages = Stages::new(arguments.quiet);
+    let phases = Phases::new(arguments.quiet);
     places::folder(&arguments.output)?;
     let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     let has_pictures = has(PartArgument::Samplers) || has(PartArgument::Cameras);
@@ -58,7 +58,7 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     let options =
         Options { memory_limit: arguments.memory_limit, ..render::options(&scene_arguments) };
     let mut session = Session::open_with(&scene_arguments.scene, options)?;
-    let progress = stages.progress(false);
+    let progress = phases.progress(false);
     let scene = session.scene(&progress)?;
     let results = file_names().map(|name| arguments.output.join(name)).collect::<Vec<_>>();
     places::keep_apart(&scene.inputs, &results)?;
@@ -72,11 +72,11 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
         notes,
     };
     if has(PartArgument::Accelerators) {
-        accelerators(arguments, scene, stages, &mut findings)?;
+        accelerators(arguments, scene, phases, &mut findings)?;
     }
     if has_pictures {
         let (scene, accel) = session.scene_and_accel(&progress)?;
-        pictures(arguments, (scene, accel), stages, &mut findings)?;
+        pictures(arguments, (scene, accel), phases, &mut findings)?;
     }
     let ledger = Ledger::open(&arguments.output, "bench");
     let files = places::recorded(ledger, || write(arguments, &findings))?;
@@ -105,7 +105,7 @@ fn about(scene: &Scene) -> Vec<String> {
 fn accelerators(
     arguments: &BenchArguments,
     scene: &Scene,
-    stages: Stages,
+    phases: Phases,
     findings: &mut Findings,
 ) -> Result<(), Fault> {
     let quick = usize::from(arguments.quick);
@@ -133,7 +133,7 @@ fn accelerators(
         quality: quality(scene),
         memory_limit: arguments.memory_limit,
     };
-    let progress = stages.begin("trace");
+    let progress = phases.begin("trace");
     findings.accelerators =
         accelerators::measure(&scene.geometry, &rays, &effort, &|share| progress(share))?;
     Ok(())
@@ -157,7 +157,7 @@ fn with_picture(
 fn pictures(
     arguments: &BenchArguments,
     (scene, accel): (&Scene, &dyn Accel),
-    stages: Stages,
+    phases: Phases,
     findings: &mut Findings,
 ) -> Result<(), Fault> {
     let quick = usize::from(arguments.quick);
@@ -173,13 +173,13 @@ fn pictures(
     };
     let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     if has(PartArgument::Samplers) && scene.picture.is_some_and(is_sampled) {
-        let progress = stages.begin("sample");
+        let progress = phases.begin("sample");
         let mut studio = Studio::new(scene, accel)?;
         findings.samplers =
             Some(samplers::measure(&mut studio, &effort, &|share| progress(share))?);
     }
     if has(PartArgument::Cameras) {
-        let progress = stages.begin("camera");
+        let progress = phases.begin("camera");
         let mut studio = Studio::new(scene, accel)?;
         match cameras::measure(&mut studio, &effort, &|share| progress(share)) {
             Ok(cameras) => {

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::arguments::{Cli, Command, MergeArguments, RenderArguments};
 use crate::fault::{Fault, print_text};
-use crate::progress::Stages;
+use crate::progress::Phases;
 use crate::{glasses, render};
 
 /// Renders a share of the picture into its file in the folder.
@@ -49,7 +49,7 @@ pub(crate) fn run(arguments: &MergeArguments) -> Result<(), Fault> {
             places::file(path)?;
         }
         let mut session = render::open(&asked, outputs)?;
-        let progress = Stages::new(asked.quiet).progress(!asked.quiet);
+        let progress = Phases::new(asked.quiet).progress(!asked.quiet);
         let results = session.check_place(&asked.output, &[], &progress)?;
         places::keep_apart(&arguments.shares, &results)?;
         render::keep_report_apart(&asked, &mut session, &results)?;

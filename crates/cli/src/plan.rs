@@ -4,11 +4,11 @@ use etendue::{Options, Session};
 
 use crate::arguments::PlanArguments;
 use crate::fault::{Fault, print_json, print_text};
-use crate::progress::Stages;
+use crate::progress::Phases;
 use crate::render::options;
 
 pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
-    let progress = Stages::new(arguments.json).progress(false);
+    let progress = Phases::new(arguments.json).progress(false);
     let options = Options { to_render: false, ..options(&arguments.scene) };
     let mut session = Session::open_with(&arguments.scene.scene, options)?;
     let plan = session.plan(&progress)?;

@@ -3,7 +3,7 @@
 use std::io::{IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use etendue::Stage;
+use etendue::Phase;
 use etendue_render::Progress;
 use etendue_scene::escape::printable;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -32,27 +32,27 @@ pub(crate) fn say(line: &str) {
     }
 }
 
-/// Shows how far each stage is, one bar a stage.
+/// Shows how far each phase is, one bar a phase.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Stages {
+pub(crate) struct Phases {
     shown: bool,
 }
 
-impl Stages {
+impl Phases {
     pub(crate) fn new(quiet: bool) -> Self {
         Self { shown: !quiet && std::io::stderr().is_terminal() }
     }
 
-    /// The bars of all stages of a render, one after the other, and notes above them where they are
+    /// The bars of all phases of a render, one after the other, and notes above them where they are
     /// `said`.
     pub(crate) fn progress(self, says_notes: bool) -> etendue::Progress {
-        let shown: Mutex<Option<(Stage, Progress)>> = Mutex::default();
-        let told = move |stage: Stage, share: f64| {
+        let shown: Mutex<Option<(Phase, Progress)>> = Mutex::default();
+        let told = move |phase: Phase, share: f64| {
             let mut shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
-            if shown.as_ref().is_none_or(|(of, _)| *of != stage) {
+            if shown.as_ref().is_none_or(|(of, _)| *of != phase) {
                 // The old bar goes before the new one comes.
                 *shown = None;
-                *shown = Some((stage, self.begin(stage.name())));
+                *shown = Some((phase, self.begin(phase.name())));
             }
             shown.as_ref().is_none_or(|(_, bar)| bar(share))
         };
@@ -64,7 +64,7 @@ impl Stages {
         etendue::Progress::new(told).with_notes(note)
     }
 
-    /// Begins a stage. The function is told the share done and answers whether to go on; the bar
+    /// Begins a phase. The function is told the share done and answers whether to go on; the bar
     /// goes away with the last of its owners.
     pub(crate) fn begin(self, name: &'static str) -> Progress {
         let bar = Bar(if self.shown {

@@ -11,7 +11,7 @@ use etendue_render::{RenderError, Report, Seconds};
 
 use crate::arguments::{AccelMode, RenderArguments, SceneArguments};
 use crate::fault::{Fault, print_text};
-use crate::progress::{Stages, say};
+use crate::progress::{Phases, say};
 use crate::{merge, sequence, stop};
 
 pub(crate) fn run(arguments: &RenderArguments) -> Result<(), Fault> {
@@ -62,7 +62,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
         places::file(path)?;
     }
     let mut session = open(arguments, outputs)?;
-    let progress = Stages::new(arguments.quiet).progress(!arguments.quiet);
+    let progress = Phases::new(arguments.quiet).progress(!arguments.quiet);
     if let Some(frames) = session.frames(&progress)? {
         return sequence::render(arguments, &mut session, &frames, outputs, &progress);
     }

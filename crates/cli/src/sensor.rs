@@ -17,7 +17,7 @@ use serde_json::json;
 
 use crate::arguments::SensorArguments;
 use crate::fault::{Fault, print_json, print_text};
-use crate::progress::{Stages, say};
+use crate::progress::{Phases, say};
 use crate::stop;
 
 pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
@@ -217,7 +217,7 @@ fn series(arguments: &SensorArguments, file: &SensorFile, folder: &Path) -> Resu
     places::keep_apart([], &files)?;
     places::folder(folder)?;
     let total = series.len();
-    let progress = Stages::new(arguments.quiet).begin("expose");
+    let progress = Phases::new(arguments.quiet).begin("expose");
     let start = SystemTime::now();
     places::recorded(Ledger::open(folder, "sensor --emva"), || {
         let written = series

@@ -78,7 +78,7 @@ pub use etendue_render::{Checkpoint, Plan, Report, Shard, SoFar};
 pub use etendue_scene::{Frame, Reach, Scene, Strictness};
 pub use frame_files::FramePattern;
 pub use options::Options;
-pub use progress::{Progress, Stage};
+pub use progress::{Phase, Progress};
 pub use rendering::{Rendering, Written};
 pub use session::Session;
 pub use shares::Shares;

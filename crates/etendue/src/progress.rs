@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use etendue_render::{SoFar, Watch};
 
-/// A stage of the work on a picture.
+/// A phase of the work on a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Stage {
+pub enum Phase {
     /// The scene and its models are read.
     Load,
     /// The acceleration structure is built.
@@ -23,7 +23,7 @@ pub enum Stage {
     LightField,
 }
 
-impl Stage {
+impl Phase {
     /// A word for it.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -38,7 +38,7 @@ impl Stage {
     }
 }
 
-type OnStage = dyn Fn(Stage, f64) -> bool + Send + Sync;
+type OnPhase = dyn Fn(Phase, f64) -> bool + Send + Sync;
 type OnLook = dyn Fn(&SoFar<'_>) + Send + Sync;
 type OnNote = dyn Fn(&str) + Send + Sync;
 
@@ -53,7 +53,7 @@ type OnNote = dyn Fn(&str) + Send + Sync;
 /// ```
 #[derive(Clone, Default)]
 pub struct Progress {
-    on_stage: Option<Arc<OnStage>>,
+    on_phase: Option<Arc<OnPhase>>,
     on_look: Option<Arc<OnLook>>,
     on_note: Option<Arc<OnNote>>,
     cancelled: Arc<AtomicBool>,
@@ -72,11 +72,11 @@ impl Progress {
         Self::default()
     }
 
-    /// `told` is called with the stage and the share of it that is done (0..=1), now and then and from
+    /// `told` is called with the phase and the share of it that is done (0..=1), now and then and from
     /// many threads; answering `false` stops.
     #[must_use]
-    pub fn new(told: impl Fn(Stage, f64) -> bool + Send + Sync + 'static) -> Self {
-        Self { on_stage: Some(Arc::new(told)), ..Self::default() }
+    pub fn new(told: impl Fn(Phase, f64) -> bool + Send + Sync + 'static) -> Self {
+        Self { on_phase: Some(Arc::new(told)), ..Self::default() }
     }
 
     /// Shows the picture so far to `look` after each pass over its pixels but the last.
@@ -106,8 +106,8 @@ impl Progress {
     }
 
     /// Reports, and answers whether to go on.
-    pub(crate) fn goes_on(&self, stage: Stage, share: f64) -> bool {
-        let told = self.on_stage.as_ref().is_none_or(|told| told(stage, share));
+    pub(crate) fn goes_on(&self, phase: Phase, share: f64) -> bool {
+        let told = self.on_phase.as_ref().is_none_or(|told| told(phase, share));
         told && !self.is_cancelled()
     }
 
@@ -117,16 +117,16 @@ impl Progress {
         }
     }
 
-    /// The progress of one stage, for a build.
-    pub(crate) fn of(&self, stage: Stage) -> Arc<dyn Fn(f64) -> bool + Send + Sync> {
+    /// The progress of one phase, for a build.
+    pub(crate) fn of(&self, phase: Phase) -> Arc<dyn Fn(f64) -> bool + Send + Sync> {
         let progress = self.clone();
-        Arc::new(move |share| progress.goes_on(stage, share))
+        Arc::new(move |share| progress.goes_on(phase, share))
     }
 }
 
 impl Watch for Progress {
     fn goes_on(&self, share: f64) -> bool {
-        Self::goes_on(self, Stage::Render, share)
+        Self::goes_on(self, Phase::Render, share)
     }
 
     fn look(&self, so_far: &SoFar<'_>) {

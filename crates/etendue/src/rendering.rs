@@ -16,7 +16,7 @@ use etendue_render::{Images, Plan, RenderError, Report};
 use etendue_scene::Scene;
 use etendue_sensor::{Exposure, RawImage};
 
-use crate::progress::Stage;
+use crate::progress::Phase;
 use crate::{Error, Progress, places};
 
 /// A rendered picture with all its layers, and what the camera's sensor makes of its light.
@@ -171,7 +171,7 @@ impl Rendering {
             let mut files = self.write_layers(folder, outputs, progress)?;
             let mut notes = self.idle_notes.clone();
             if let Some(light) = &self.light {
-                let goes_on = |share| progress.goes_on(Stage::Expose, share);
+                let goes_on = |share| progress.goes_on(Phase::Expose, share);
                 let exposed = expose::write(light, folder, outputs, &goes_on)?;
                 files.extend(exposed.files);
                 notes.extend(exposed.notes);
@@ -206,7 +206,7 @@ impl Rendering {
     ) -> Result<LightFieldSet, Error> {
         let Some((accel, images)) = &self.traced else { return Ok(LightFieldSet::default()) };
         let rendering = light_field::Rendering { scene: &self.scene, accel: &**accel, images };
-        let goes_on = |share| progress.goes_on(Stage::LightField, share);
+        let goes_on = |share| progress.goes_on(Phase::LightField, share);
         Ok(light_field::write(rendering, &self.picture, folder, outputs, &goes_on)?)
     }
 
@@ -224,13 +224,13 @@ impl Rendering {
             path
         };
         if outputs.exr {
-            let goes_on = |share: f64| progress.goes_on(Stage::Write, share * 0.5);
+            let goes_on = |share: f64| progress.goes_on(Phase::Write, share * 0.5);
             let options = exr::Options { progress: Some(&goes_on), ..Default::default() };
             exr::write(&place("layers.exr".to_owned()), picture, &options)?;
         }
         let total = picture.layers().len() as f64;
         for (done, layer) in picture.layers().iter().enumerate() {
-            if !progress.goes_on(Stage::Write, 0.5 + 0.5 * done as f64 / total) {
+            if !progress.goes_on(Phase::Write, 0.5 + 0.5 * done as f64 / total) {
                 return Err(RenderError::Stopped.into());
             }
             let [image, array] = image_and_array(&layer.name);

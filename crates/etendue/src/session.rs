@@ -20,7 +20,7 @@ use etendue_scene::{Cache, Frame, LoadOptions, Scene, SceneError, Start, Strictn
 use serde_json::Value;
 
 use crate::neighbours::{self, Neighbour};
-use crate::progress::Stage;
+use crate::progress::Phase;
 use crate::rendering::file_names;
 use crate::structures::Structures;
 use crate::words::{NOT_FOLLOWED, changed, fingerprints, header, in_words, not_finite};
@@ -517,7 +517,7 @@ impl Session {
         let wanted = plan::wanted(&file.spec.all_layers());
         let share = |done: usize, total: usize| done as f64 / total.max(1) as f64;
         let goes_on = |step: etendue_scene::LoadProgress<'_>| {
-            progress.goes_on(Stage::Load, share(step.done, step.total))
+            progress.goes_on(Phase::Load, share(step.done, step.total))
         };
         let options = LoadOptions {
             strictness: self.options.strictness,
@@ -563,7 +563,7 @@ impl Session {
             memory_limit: self.options.memory_limit,
             robust: self.options.robust,
             isa: self.options.isa.clone(),
-            progress: Some(progress.of(Stage::Build)),
+            progress: Some(progress.of(Phase::Build)),
             ..BuildOptions::default()
         };
         let Some(loaded) = &mut self.loaded else { return Ok(()) };

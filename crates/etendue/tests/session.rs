@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use etendue::{Options, Outputs, Progress, Rendering, Session, Stage};
+use etendue::{Options, Outputs, Phase, Progress, Rendering, Session};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -205,7 +205,7 @@ fn stages_are_told_in_order() {
     let picture = session.render(&progress).unwrap();
     picture.write_with(folder.path(), Outputs::ALL, &progress).unwrap();
     let told = told.lock().unwrap();
-    assert_eq!(*told, [Stage::Load, Stage::Build, Stage::Render, Stage::Write, Stage::Expose]);
+    assert_eq!(*told, [Phase::Load, Phase::Build, Phase::Render, Phase::Write, Phase::Expose]);
 }
 
 #[test]

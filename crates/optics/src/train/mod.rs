@@ -379,27 +379,39 @@ impl OpticalTrain {
 
     /// Neighbouring surfaces that cut through each other inside their clear apertures.
     fn crossings(&self) -> Vec<String> {
-        let mut notes = Vec::new();
-        for (i, pair) in self.elements.windows(2).enumerate() {
-            let [a, b] = [&pair[0].part, &pair[1].part];
-            let reach = a.clear_radius().min(b.clear_radius());
-            let of_glass = [a, b].iter().all(|part| part.symbol() == Symbol::Surface);
-            if !of_glass || !reach.is_finite() || !pair.iter().all(|e| e.frame.is_axial()) {
-                continue;
-            }
-            let thickness = pair[1].frame.vertex.z - pair[0].frame.vertex.z;
-            let gap = |place| Some(thickness + b.sag(place)? - a.sag(place)?);
-            let is_cut = |place| gap(place).is_some_and(|gap| gap < 0.0);
-            let mut heights = (0..=64).map(|step| reach * f64::from(step) / 64.0);
-            if let Some(r) = heights.find(|&r| is_cut([0.0, r]) || is_cut([r, 0.0])) {
-                notes.push(format!(
-                    "elements[{i}] and elements[{}] cut through each other {r:.3} mm from the \
-                     axis: rays beyond miss the second",
-                    i + 1
-                ));
-            }
+        /// As many are named one by one.
+        const NAMED: usize = 3;
+        let all: Vec<(usize, f64)> =
+            (1..self.elements.len()).filter_map(|i| Some((i - 1, self.crossing(i - 1)?))).collect();
+        let named = all.iter().take(NAMED).map(|&(i, r)| {
+            format!(
+                "elements[{i}] and elements[{}] cut through each other {r:.3} mm from the axis: rays \
+                 beyond miss the second",
+                i + 1
+            )
+        });
+        let others = all.len().saturating_sub(NAMED);
+        let others = (others > 0).then(|| match others {
+            1 => "another pair of neighbours does so, too".to_owned(),
+            _ => format!("{others} more pairs of neighbours do so, too"),
+        });
+        named.chain(others).collect()
+    }
+
+    /// Where (mm from the axis) element `i` and the next cut through each other, if they do.
+    fn crossing(&self, i: usize) -> Option<f64> {
+        let pair = self.elements.get(i..i + 2)?;
+        let [a, b] = [&pair[0].part, &pair[1].part];
+        let reach = a.clear_radius().min(b.clear_radius());
+        let of_glass = [a, b].iter().all(|part| part.symbol() == Symbol::Surface);
+        if !of_glass || !reach.is_finite() || !pair.iter().all(|e| e.frame.is_axial()) {
+            return None;
         }
-        notes
+        let thickness = pair[1].frame.vertex.z - pair[0].frame.vertex.z;
+        let gap = |place| Some(thickness + b.sag(place)? - a.sag(place)?);
+        let is_cut = |place| gap(place).is_some_and(|gap| gap < 0.0);
+        let mut heights = (0..=64).map(|step| reach * f64::from(step) / 64.0);
+        heights.find(|&r| is_cut([0.0, r]) || is_cut([r, 0.0]))
     }
 }
 
