@@ -1,73 +1,31 @@
 //! From a scene file to a scene: each model once, in parallel, then put together.
 
-use std::cell::RefCell;
-use std::collections::BTreeMap;
+mod camera;
+mod objects;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::SystemTime;
 
-use etendue_camera::{Camera, CameraError, CameraSpec};
+use etendue_camera::Camera;
 use etendue_geometry::{Bounds, Geometry};
-use etendue_sensor::Sensor;
-use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
 
-use crate::bounds::Vertices;
 use crate::cache::{KeptCamera, Manner};
-use crate::cameras::{self, CameraOrigin, SceneCamera};
 use crate::doctor::memory;
-use crate::file::{
-    AnimationSpec, FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index, suggest,
-};
+use crate::file::{FileKind, ObjectSpec, SceneFile, join, join_index};
 use crate::identity::Ingredients;
-use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Play, Strictness, Wanted};
-use crate::instances::Instances;
+use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Wanted};
 use crate::memory::Budget;
 use crate::parts::{Object, Parts};
-use crate::paths::{Folder, Found};
+use crate::paths::Folder;
 use crate::scene::{LoadOptions, LoadProgress, Scene};
 use crate::shape::{GoOn, ShapeError, ShapeSpec};
-use crate::{Cache, SceneError, cache, facing, light_notes};
-
-/// Where triangles come from, once for all objects that share them.
-struct Origin {
-    kind: OriginKind,
-    /// The first object that uses it, for messages.
-    user: usize,
-}
-
-#[derive(PartialEq)]
-enum OriginKind {
-    /// A moment of it, where it is animated.
-    File(PathBuf, Option<Play>),
-    Shape(ShapeSpec),
-    /// In no file, by its name.
-    Given(String),
-}
-
-impl OriginKind {
-    /// As the cache knows it.
-    fn kept(&self) -> Option<cache::Origin> {
-        match self {
-            Self::File(path, _) => Some(cache::Origin::File(path.clone())),
-            // Shapes are made of numbers and words, which always serialise.
-            Self::Shape(shape) => {
-                Some(cache::Origin::Shape(serde_json::to_string(shape).unwrap_or_default()))
-            }
-            Self::Given(_) => None,
-        }
-    }
-
-    /// The moment of an animation that is shown.
-    fn play(&self) -> Option<Play> {
-        match self {
-            Self::File(_, play) => play.clone(),
-            Self::Shape(_) | Self::Given(_) => None,
-        }
-    }
-}
+use crate::{Cache, SceneError, light_notes};
+use camera::CameraFiles;
+use objects::{Origin, OriginKind, OwnParts};
 
 impl SceneFile {
     /// Opens all that the scene names and puts it together. Of the models only what is `wanted` is
@@ -146,172 +104,6 @@ impl SceneFile {
 
     fn too_many(&self, what: &'static str) -> SceneError {
         SceneError::TooMany { file: self.path().to_owned(), what, limit: u32::MAX.into() }
-    }
-
-    fn camera_spec(&self) -> CameraSpec {
-        self.spec.camera.clone().unwrap_or_default()
-    }
-
-    fn camera_fault(&self, error: &CameraError) -> SceneError {
-        let dot = if error.at.is_empty() { "" } else { "." };
-        self.fault(&format!("camera{dot}{}", error.at), error.why.as_str())
-    }
-
-    fn resolve_objects(
-        &self,
-        folder: &Folder,
-        own: &mut OwnParts<'_>,
-    ) -> Result<(Vec<Origin>, Vec<Object>), SceneError> {
-        let mut origins: Vec<Origin> = Vec::new();
-        // Links to one file are one file.
-        let mut files: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
-        let mut objects = Vec::new();
-        for (index, spec) in self.spec.objects.iter().enumerate() {
-            let at = join_index("objects", index);
-            let origin = match &spec.source {
-                Source::File(written) if own.kept.given(written).is_some() => {
-                    let kind = OriginKind::Given(written.clone());
-                    origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
-                        origins.push(Origin { kind, user: index });
-                        origins.len() - 1
-                    })
-                }
-                Source::File(written) => {
-                    let Found { path, real } = self.find(folder, index, written)?;
-                    let path = files.entry(real).or_insert(path).clone();
-                    let kind = OriginKind::File(path, self.play(spec, &at)?);
-                    origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
-                        origins.push(Origin { kind, user: index });
-                        origins.len() - 1
-                    })
-                }
-                Source::Shape(_) if spec.animation.is_some() => {
-                    let why = "a shape has no animation; models of glTF files have";
-                    return Err(self.fault(&join(&at, "animation"), why));
-                }
-                Source::Shape(shape) => {
-                    let kind = OriginKind::Shape(shape.clone());
-                    origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
-                        origins.push(Origin { kind, user: index });
-                        origins.len() - 1
-                    })
-                }
-            };
-            objects.push(self.object(spec, &at, origin, folder, own)?);
-        }
-        Ok((origins, objects))
-    }
-
-    /// The moment of a model's animation that is shown.
-    fn play(&self, spec: &ObjectSpec, at: &str) -> Result<Option<Play>, SceneError> {
-        let Some(AnimationSpec { time, name }) = &spec.animation else { return Ok(None) };
-        if !time.0.is_finite() {
-            return Err(self.fault(&join(at, "animation.time"), "is not finite"));
-        }
-        match &spec.source {
-            Source::File(path) if !names_no_up(path) => {
-                Ok(Some(Play { which: name.clone(), time: time.0 }))
-            }
-            _ => Err(self.fault(&join(at, "animation"), "only glTF files have animations")),
-        }
-    }
-
-    /// The object at path `at`, its names resolved.
-    fn object(
-        &self,
-        spec: &ObjectSpec,
-        at: &str,
-        origin: usize,
-        folder: &Folder,
-        own: &mut OwnParts<'_>,
-    ) -> Result<Object, SceneError> {
-        let world_from_object = spec.transform.build().map_err(|(key, why)| {
-            let at = join(at, "transform");
-            self.fault(&if key.is_empty() { at } else { join(&at, key) }, why)
-        })?;
-        let named = |name: &str, at: &str| {
-            let position = own.materials.iter().position(|material| material.name == name);
-            let position = position.and_then(|position| u32::try_from(position).ok());
-            position.ok_or_else(|| self.fault(at, unknown_material(name, own.materials)))
-        };
-        let material = match &spec.material {
-            Some(name) => Some(named(name, &join(at, "material"))?),
-            None => None,
-        };
-        let mut overrides = BTreeMap::new();
-        for (theirs, ours) in &spec.materials {
-            let at = join(&join(at, "materials"), theirs);
-            overrides.insert(theirs.clone(), named(ours, &at)?);
-        }
-        let instances = Instances::resolve(spec.instances.as_ref(), &join(at, "instances"), folder)
-            .map_err(|(at, why)| self.fault(&at, why))?;
-        own.files.extend(instances.file);
-        let turn = self.up_of(spec).turn();
-        let copies = instances.transforms.iter();
-        let copies = copies.map(|copy| world_from_object.then_inner(&copy.then_inner(&turn)));
-        Ok(Object {
-            title: spec.title(),
-            origin,
-            world_from_object: copies.collect(),
-            material,
-            overrides,
-        })
-    }
-
-    /// Which axis of an object's file points up.
-    fn up_of(&self, spec: &ObjectSpec) -> Up {
-        let silent = matches!(&spec.source, Source::File(path) if names_no_up(path));
-        spec.up.unwrap_or(if silent { self.spec.up } else { Up::Y })
-    }
-
-    /// That a model seems to lie on its back: a file that does not say which way is up, and whose box
-    /// stands on z = 0 with as much on one side of y = 0 as on the other.
-    fn note_up(&self, spec: &ObjectSpec, import: &Import) -> Option<Note> {
-        let Source::File(path) = &spec.source else { return None };
-        let said = spec.up.is_some() || self.value().get("up").is_some();
-        if said || !names_no_up(path) || !stands_on_z(import) {
-            return None;
-        }
-        let message = "its box stands on z = 0: if it lies on its back, +Z is up in this file; give \
-                       `--up z`, or its object `\"up\": \"z\"` (`\"y\"` for silence)";
-        Some(Note {
-            kind: NoteKind::Assumed,
-            subject: path.clone(),
-            message: message.to_owned(),
-            count: 1,
-        })
-    }
-
-    /// Materials that an object replaces and its model does not have are refused.
-    fn check_overrides(
-        &self,
-        parts: &Parts,
-        object: &Object,
-        index: usize,
-    ) -> Result<(), SceneError> {
-        let known: Vec<&str> = parts.names_of_materials(object).collect();
-        match object.overrides.keys().find(|name| !known.contains(&name.as_str())) {
-            None => Ok(()),
-            Some(name) => {
-                let at = join(&join(&join_index("objects", index), "materials"), name);
-                let known = known.into_iter().filter(|name| !name.is_empty());
-                let why = format!("the model has no material \"{name}\"{}", suggest(name, known));
-                Err(self.fault(&at, why))
-            }
-        }
-    }
-
-    /// The file of an object. A model that stands for the scene is where the user said it is.
-    fn find(&self, folder: &Folder, index: usize, written: &str) -> Result<Found, SceneError> {
-        let own_name = self.path().file_name().unwrap_or_default().to_string_lossy();
-        if self.kind() == FileKind::Model && written == own_name {
-            let path = self.path().to_owned();
-            let real =
-                path.canonicalize().map_err(|source| SceneError::unreadable(&path, source))?;
-            return Ok(Found { path, real });
-        }
-        let at = join(&join_index("objects", index), "file");
-        folder.find(written).map_err(|why| self.fault(&at, why))
     }
 
     fn import_all(
@@ -491,119 +283,6 @@ impl SceneFile {
         })
     }
 
-    /// The picture's columns and rows, known without the models.
-    fn resolution(
-        &self,
-        folder: &Folder,
-        options: &LoadOptions<'_>,
-        kept: &Cache,
-    ) -> Result<[u32; 2], SceneError> {
-        match kept.camera(&self.camera_words(options)) {
-            Some(known) => Ok(known.camera.resolution()),
-            None => Ok(self.camera_alone(folder)?.resolution()),
-        }
-    }
-
-    /// All that makes the camera but the geometry.
-    fn camera_words(&self, options: &LoadOptions<'_>) -> String {
-        format!("{:?} {}", options.camera, self.value().get("camera").unwrap_or_default())
-    }
-
-    /// The camera over `geometry`; the one before when nothing has changed that it depends on.
-    fn kept_camera(
-        &self,
-        geometry: Geometry,
-        cameras: &[SceneCamera],
-        (folder, options): (&Folder, &LoadOptions<'_>),
-        kept: &Cache,
-    ) -> Result<KeptCamera, SceneError> {
-        let words = self.camera_words(options);
-        let known = kept.camera(&words);
-        let geometry = match &known {
-            Some(known) if known.geometry.is_same(&geometry) => Arc::clone(&known.geometry),
-            _ => Arc::new(geometry),
-        };
-        if let Some(known) = known
-            && (Arc::ptr_eq(&known.geometry, &geometry) && options.camera.is_none()
-                || known.origin == CameraOrigin::Scene)
-        {
-            let same = KeptCamera { geometry, ..known };
-            kept.keep_camera(same.clone());
-            return Ok(same);
-        }
-        let files = CameraFiles::new(folder);
-        let (camera, origin) = self.camera(&geometry, cameras, &files, options)?;
-        let files = cache::stamps(&files.found.into_inner());
-        let built = KeptCamera { words, geometry, camera, origin, files };
-        kept.keep_camera(built.clone());
-        Ok(built)
-    }
-
-    fn camera(
-        &self,
-        geometry: &Geometry,
-        cameras: &[SceneCamera],
-        files: &CameraFiles<'_>,
-        options: &LoadOptions<'_>,
-    ) -> Result<(Camera, CameraOrigin), SceneError> {
-        let own = self.camera_spec();
-        let (spec, origin) = match options.camera {
-            Some(wanted) => {
-                let (index, camera) = cameras::pick(cameras, wanted).map_err(|reason| {
-                    SceneError::NoSuchCamera { wanted: wanted.to_owned(), reason }
-                })?;
-                let mut spec = camera.spec.clone();
-                let given = |key| self.value().pointer("/camera/sensor")?.get(key);
-                if given("resolution").or_else(|| given("model")).is_some() {
-                    *spec.sensor_mut() = own.sensor().clone();
-                }
-                let name = match &camera.name {
-                    name if name.is_empty() => index.to_string(),
-                    name => name.clone(),
-                };
-                (spec, CameraOrigin::Model(name))
-            }
-            None if own.has_pose() => (own, CameraOrigin::Scene),
-            None => (own, CameraOrigin::Framed),
-        };
-        let vertices = Vertices(geometry);
-        let camera = spec
-            .build(|| facing::subject(&vertices), &|name| files.find(name))
-            .map_err(|error| self.camera_fault(&error))?;
-        Ok((camera, origin))
-    }
-
-    /// What is odd about the camera's lens. Glasses and filters that are not known at a wavelength
-    /// that is traced are an error when strict.
-    fn lens_notes(&self, camera: &Camera, strictness: Strictness) -> Result<Vec<Note>, SceneError> {
-        let Some(lens) = camera.lens() else { return Ok(Vec::new()) };
-        let guesses = lens.out_of_range(&Bands::Rgb);
-        if let (Strictness::Strict, Some(guess)) = (strictness, guesses.first()) {
-            return Err(self.fault("camera", guess.as_str()));
-        }
-        let train = lens.focused().train();
-        let subject = if train.name().is_empty() { "the camera's lens" } else { train.name() };
-        let note = |message: &String| Note {
-            kind: NoteKind::Irregular,
-            subject: subject.to_owned(),
-            message: message.clone(),
-            count: 1,
-        };
-        let implausible = lens.implausible();
-        Ok(train.notes().iter().chain(&implausible).chain(&guesses).map(note).collect())
-    }
-
-    /// The sensor with the pixels that the camera gives it.
-    fn sensor_behind(&self, camera: &Camera) -> Result<Option<Sensor>, SceneError> {
-        let Some(sensor) = &self.sensor else { return Ok(None) };
-        let sized = match camera.pixel_pitch() {
-            Some(pitch) if pitch != sensor.pixel_pitch() => sensor.with_pixel_pitch(pitch),
-            _ => Ok(sensor.clone()),
-        };
-        let sized = sized.map_err(|error| self.fault("camera.sensor", error.why()))?;
-        Ok(Some(sized.with_resolution(camera.resolution())))
-    }
-
     fn unused_materials(&self) -> impl Iterator<Item = Note> + '_ {
         let is_used = |name: &String| {
             let names = |o: &ObjectSpec| {
@@ -617,68 +296,6 @@ impl SceneFile {
             message: "no object uses this material".to_owned(),
             count: 1,
         })
-    }
-}
-
-/// Whether a model's format leaves open which way is up.
-fn names_no_up(path: &str) -> bool {
-    let ending = path.rsplit_once('.').map_or("", |(_, ending)| ending);
-    ["obj", "ply"].iter().any(|known| ending.eq_ignore_ascii_case(known))
-}
-
-/// Whether the box of a model stands on the plane z = 0, and not on y = 0.
-fn stands_on_z(import: &Import) -> bool {
-    /// Shares of the box's own sides.
-    const ON_THE_GROUND: f64 = 0.01;
-    const OFF_CENTRE: f64 = 0.2;
-    let boxes = import.meshes.iter().map(|mesh| mesh.bounds);
-    let bounds = boxes.fold(Bounds::EMPTY, Bounds::union);
-    if bounds.is_empty() {
-        return false;
-    }
-    let size = bounds.max - bounds.min;
-    // A sheet says nothing.
-    size.min_element() > 0.05 * size.max_element()
-        && bounds.min.z.abs() <= ON_THE_GROUND * size.z
-        && bounds.centre().y.abs() <= OFF_CENTRE * size.y
-}
-
-/// What the scene file itself brings, while its objects are resolved.
-struct OwnParts<'a> {
-    materials: &'a [Material],
-    /// Files that objects name beside their models.
-    files: Vec<PathBuf>,
-    kept: &'a Cache,
-}
-
-/// That the scene has no material of this name, and which it has.
-fn unknown_material(name: &str, materials: &[Material]) -> String {
-    let known = materials.iter().map(|material| material.name.as_str());
-    match materials {
-        [] => format!("unknown material \"{name}\"; the scene has no `materials`"),
-        _ => format!("unknown material \"{name}\"{}", suggest(name, known)),
-    }
-}
-
-/// The files that a camera names: lenses and masks.
-struct CameraFiles<'a> {
-    folder: &'a Folder,
-    /// Those that were asked for and are there.
-    found: RefCell<Vec<PathBuf>>,
-}
-
-impl<'a> CameraFiles<'a> {
-    fn new(folder: &'a Folder) -> Self {
-        Self { folder, found: RefCell::default() }
-    }
-
-    fn find(&self, written: &str) -> Result<PathBuf, String> {
-        let path = self.folder.find(written)?.path;
-        let mut found = self.found.borrow_mut();
-        if !found.contains(&path) {
-            found.push(path.clone());
-        }
-        Ok(path)
     }
 }
 

@@ -1,0 +1,260 @@
+//! The objects of a scene, their names resolved: where their triangles come from, once for all that share
+//! them, and what each makes of them.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use etendue_geometry::Bounds;
+use etendue_tracer::Material;
+
+use crate::file::{
+    AnimationSpec, FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index, suggest,
+};
+use crate::import::{Import, Note, NoteKind, Play};
+use crate::instances::Instances;
+use crate::parts::{Object, Parts};
+use crate::paths::{Folder, Found};
+use crate::shape::ShapeSpec;
+use crate::{Cache, SceneError, cache};
+
+/// Where triangles come from, once for all objects that share them.
+pub(super) struct Origin {
+    pub(super) kind: OriginKind,
+    /// The first object that uses it, for messages.
+    pub(super) user: usize,
+}
+
+#[derive(PartialEq)]
+pub(super) enum OriginKind {
+    /// A moment of it, where it is animated.
+    File(PathBuf, Option<Play>),
+    Shape(ShapeSpec),
+    /// In no file, by its name.
+    Given(String),
+}
+
+impl OriginKind {
+    /// As the cache knows it.
+    pub(super) fn kept(&self) -> Option<cache::Origin> {
+        match self {
+            Self::File(path, _) => Some(cache::Origin::File(path.clone())),
+            // Shapes are made of numbers and words, which always serialise.
+            Self::Shape(shape) => {
+                Some(cache::Origin::Shape(serde_json::to_string(shape).unwrap_or_default()))
+            }
+            Self::Given(_) => None,
+        }
+    }
+
+    /// The moment of an animation that is shown.
+    pub(super) fn play(&self) -> Option<Play> {
+        match self {
+            Self::File(_, play) => play.clone(),
+            Self::Shape(_) | Self::Given(_) => None,
+        }
+    }
+}
+
+impl SceneFile {
+    pub(super) fn resolve_objects(
+        &self,
+        folder: &Folder,
+        own: &mut OwnParts<'_>,
+    ) -> Result<(Vec<Origin>, Vec<Object>), SceneError> {
+        let mut origins: Vec<Origin> = Vec::new();
+        // Links to one file are one file.
+        let mut files: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+        let mut objects = Vec::new();
+        for (index, spec) in self.spec.objects.iter().enumerate() {
+            let at = join_index("objects", index);
+            let origin = match &spec.source {
+                Source::File(written) if own.kept.given(written).is_some() => {
+                    let kind = OriginKind::Given(written.clone());
+                    origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
+                        origins.push(Origin { kind, user: index });
+                        origins.len() - 1
+                    })
+                }
+                Source::File(written) => {
+                    let Found { path, real } = self.find(folder, index, written)?;
+                    let path = files.entry(real).or_insert(path).clone();
+                    let kind = OriginKind::File(path, self.play(spec, &at)?);
+                    origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
+                        origins.push(Origin { kind, user: index });
+                        origins.len() - 1
+                    })
+                }
+                Source::Shape(_) if spec.animation.is_some() => {
+                    let why = "a shape has no animation; models of glTF files have";
+                    return Err(self.fault(&join(&at, "animation"), why));
+                }
+                Source::Shape(shape) => {
+                    let kind = OriginKind::Shape(shape.clone());
+                    origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
+                        origins.push(Origin { kind, user: index });
+                        origins.len() - 1
+                    })
+                }
+            };
+            objects.push(self.object(spec, &at, origin, folder, own)?);
+        }
+        Ok((origins, objects))
+    }
+
+    /// The moment of a model's animation that is shown.
+    pub(super) fn play(&self, spec: &ObjectSpec, at: &str) -> Result<Option<Play>, SceneError> {
+        let Some(AnimationSpec { time, name }) = &spec.animation else { return Ok(None) };
+        if !time.0.is_finite() {
+            return Err(self.fault(&join(at, "animation.time"), "is not finite"));
+        }
+        match &spec.source {
+            Source::File(path) if !names_no_up(path) => {
+                Ok(Some(Play { which: name.clone(), time: time.0 }))
+            }
+            _ => Err(self.fault(&join(at, "animation"), "only glTF files have animations")),
+        }
+    }
+
+    /// The object at path `at`, its names resolved.
+    pub(super) fn object(
+        &self,
+        spec: &ObjectSpec,
+        at: &str,
+        origin: usize,
+        folder: &Folder,
+        own: &mut OwnParts<'_>,
+    ) -> Result<Object, SceneError> {
+        let world_from_object = spec.transform.build().map_err(|(key, why)| {
+            let at = join(at, "transform");
+            self.fault(&if key.is_empty() { at } else { join(&at, key) }, why)
+        })?;
+        let named = |name: &str, at: &str| {
+            let position = own.materials.iter().position(|material| material.name == name);
+            let position = position.and_then(|position| u32::try_from(position).ok());
+            position.ok_or_else(|| self.fault(at, unknown_material(name, own.materials)))
+        };
+        let material = match &spec.material {
+            Some(name) => Some(named(name, &join(at, "material"))?),
+            None => None,
+        };
+        let mut overrides = BTreeMap::new();
+        for (theirs, ours) in &spec.materials {
+            let at = join(&join(at, "materials"), theirs);
+            overrides.insert(theirs.clone(), named(ours, &at)?);
+        }
+        let instances = Instances::resolve(spec.instances.as_ref(), &join(at, "instances"), folder)
+            .map_err(|(at, why)| self.fault(&at, why))?;
+        own.files.extend(instances.file);
+        let turn = self.up_of(spec).turn();
+        let copies = instances.transforms.iter();
+        let copies = copies.map(|copy| world_from_object.then_inner(&copy.then_inner(&turn)));
+        Ok(Object {
+            title: spec.title(),
+            origin,
+            world_from_object: copies.collect(),
+            material,
+            overrides,
+        })
+    }
+
+    /// Which axis of an object's file points up.
+    pub(super) fn up_of(&self, spec: &ObjectSpec) -> Up {
+        let silent = matches!(&spec.source, Source::File(path) if names_no_up(path));
+        spec.up.unwrap_or(if silent { self.spec.up } else { Up::Y })
+    }
+
+    /// That a model seems to lie on its back: a file that does not say which way is up, and whose box
+    /// stands on z = 0 with as much on one side of y = 0 as on the other.
+    pub(super) fn note_up(&self, spec: &ObjectSpec, import: &Import) -> Option<Note> {
+        let Source::File(path) = &spec.source else { return None };
+        let said = spec.up.is_some() || self.value().get("up").is_some();
+        if said || !names_no_up(path) || !stands_on_z(import) {
+            return None;
+        }
+        let message = "its box stands on z = 0: if it lies on its back, +Z is up in this file; give \
+                       `--up z`, or its object `\"up\": \"z\"` (`\"y\"` for silence)";
+        Some(Note {
+            kind: NoteKind::Assumed,
+            subject: path.clone(),
+            message: message.to_owned(),
+            count: 1,
+        })
+    }
+
+    /// Materials that an object replaces and its model does not have are refused.
+    pub(super) fn check_overrides(
+        &self,
+        parts: &Parts,
+        object: &Object,
+        index: usize,
+    ) -> Result<(), SceneError> {
+        let known: Vec<&str> = parts.names_of_materials(object).collect();
+        match object.overrides.keys().find(|name| !known.contains(&name.as_str())) {
+            None => Ok(()),
+            Some(name) => {
+                let at = join(&join(&join_index("objects", index), "materials"), name);
+                let known = known.into_iter().filter(|name| !name.is_empty());
+                let why = format!("the model has no material \"{name}\"{}", suggest(name, known));
+                Err(self.fault(&at, why))
+            }
+        }
+    }
+
+    /// The file of an object. A model that stands for the scene is where the user said it is.
+    pub(super) fn find(
+        &self,
+        folder: &Folder,
+        index: usize,
+        written: &str,
+    ) -> Result<Found, SceneError> {
+        let own_name = self.path().file_name().unwrap_or_default().to_string_lossy();
+        if self.kind() == FileKind::Model && written == own_name {
+            let path = self.path().to_owned();
+            let real =
+                path.canonicalize().map_err(|source| SceneError::unreadable(&path, source))?;
+            return Ok(Found { path, real });
+        }
+        let at = join(&join_index("objects", index), "file");
+        folder.find(written).map_err(|why| self.fault(&at, why))
+    }
+}
+
+/// Whether a model's format leaves open which way is up.
+fn names_no_up(path: &str) -> bool {
+    let ending = path.rsplit_once('.').map_or("", |(_, ending)| ending);
+    ["obj", "ply"].iter().any(|known| ending.eq_ignore_ascii_case(known))
+}
+
+/// Whether the box of a model stands on the plane z = 0, and not on y = 0.
+fn stands_on_z(import: &Import) -> bool {
+    /// Shares of the box's own sides.
+    const ON_THE_GROUND: f64 = 0.01;
+    const OFF_CENTRE: f64 = 0.2;
+    let boxes = import.meshes.iter().map(|mesh| mesh.bounds);
+    let bounds = boxes.fold(Bounds::EMPTY, Bounds::union);
+    if bounds.is_empty() {
+        return false;
+    }
+    let size = bounds.max - bounds.min;
+    // A sheet says nothing.
+    size.min_element() > 0.05 * size.max_element()
+        && bounds.min.z.abs() <= ON_THE_GROUND * size.z
+        && bounds.centre().y.abs() <= OFF_CENTRE * size.y
+}
+
+/// What the scene file itself brings, while its objects are resolved.
+pub(super) struct OwnParts<'a> {
+    pub(super) materials: &'a [Material],
+    /// Files that objects name beside their models.
+    pub(super) files: Vec<PathBuf>,
+    pub(super) kept: &'a Cache,
+}
+
+/// That the scene has no material of this name, and which it has.
+fn unknown_material(name: &str, materials: &[Material]) -> String {
+    let known = materials.iter().map(|material| material.name.as_str());
+    match materials {
+        [] => format!("unknown material \"{name}\"; the scene has no `materials`"),
+        _ => format!("unknown material \"{name}\"{}", suggest(name, known)),
+    }
+}
