@@ -573,7 +573,7 @@ impl Session {
         let others = neighbours.iter_mut().map(|other| (&other.scene, &mut other.accel));
         for (scene, accel) in std::iter::once((&*scene, accel)).chain(others) {
             if accel.is_none() {
-                *accel = structures.over(scene);
+                *accel = structures.over(scene, plan);
             }
             if accel.is_none() {
                 fits(scene, plan, self.options.memory_limit)?;

@@ -1,12 +1,17 @@
 //! Acceleration structures of a session, kept while they are of use.
+//!
+//! In f64 every structure over the same surfaces gives the same hits. Those of f32 depend in their last
+//! bits on how it was built, so a picture whose light hits in f32 wants one that was built for it alone:
+//! it is then the picture of a new session.
 
 use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildOptions};
-use etendue_geometry::Geometry;
+use etendue_geometry::{Geometry, HitPrecision};
 use etendue_render::{Plan, RenderError};
 use etendue_scene::Scene;
 use etendue_scene::file::AccelName;
+use etendue_tracer::LayerSpec;
 
 /// The structures that were built last.
 #[derive(Debug, Default)]
@@ -21,15 +26,24 @@ struct Built {
     accel: Arc<dyn Accel>,
     geometry: Arc<Geometry>,
     name: Option<AccelName>,
+    /// Nothing of it is of one before.
+    is_new: bool,
+}
+
+/// Whether a picture depends on how the structure was built.
+fn wants_new(plan: &Plan) -> bool {
+    plan.light_precision == HitPrecision::Single && plan.layers.contains(&LayerSpec::Radiance)
 }
 
 impl Structures {
-    /// The structure over the surfaces of `scene`, if there is one.
-    pub(crate) fn over(&self, scene: &Scene) -> Option<Arc<dyn Accel>> {
-        self.built.iter().find(|built| built.is_over(scene)).map(|built| Arc::clone(&built.accel))
+    /// The structure over the surfaces of `scene`, if there is one that will do.
+    pub(crate) fn over(&self, scene: &Scene, plan: &Plan) -> Option<Arc<dyn Accel>> {
+        let is_own = |built: &Built| built.is_new && built.accel.report().quality == plan.quality;
+        let serves = |built: &&Built| built.is_over(scene) && (!wants_new(plan) || is_own(built));
+        self.built.iter().find(serves).map(|built| Arc::clone(&built.accel))
     }
 
-    /// Builds the structure over `scene`, with what the last one has of it.
+    /// Builds the structure over `scene`, with what the last one has of it where that will do.
     pub(crate) fn build(
         &mut self,
         scene: &Scene,
@@ -37,11 +51,12 @@ impl Structures {
         options: &BuildOptions,
     ) -> Result<Arc<dyn Accel>, RenderError> {
         let name = scene.render.accel;
-        let before = self.built.iter().find(|built| built.name == name);
+        let before = self.built.iter().find(|built| built.name == name && !wants_new(plan));
+        let is_new = before.is_none();
         let accel = etendue_render::rebuild(scene, plan, options, before.map(|b| &*b.accel))?;
         let accel: Arc<dyn Accel> = Arc::from(accel);
         let geometry = Arc::clone(&scene.geometry);
-        self.built.insert(0, Built { accel: Arc::clone(&accel), geometry, name });
+        self.built.insert(0, Built { accel: Arc::clone(&accel), geometry, name, is_new });
         Ok(accel)
     }
 
