@@ -2,8 +2,8 @@
 # A Slurm of one node on this machine, and on it the jobs of scenes/cluster: eight shares of a picture, one
 # of whose tasks is killed and requeued, and a sweep. The merged picture must be that of one process.
 #
-# All that Slurm needs lives in a folder below target/, on ports and sockets of its own, and ends with
-# this script.
+# All that Slurm needs lives in a temporary folder, on ports and sockets of its own, and ends with this
+# script.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/packages.sh
@@ -11,7 +11,6 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 PATH=$PATH:/usr/sbin:/sbin
 binaries=$PWD/target/debug
-home=$PWD/target/slurm
 
 # Without CI, not being able to is no failure, but is said.
 skip() {
@@ -35,15 +34,15 @@ finish() {
     # shellcheck disable=SC2317
     for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done
     wait "${pids[@]}" 2>/dev/null || true
-    rm -rf "${sockets:-}"
+    rm -rf "${home:-}"
 }
 trap finish EXIT
 
-rm -rf "$home"
-mkdir -p "$home"/{state,spool,jobs}
-# Munge wants a socket in a folder that nobody else may write to, and a path without blanks.
-sockets=$(mktemp -d)
-chmod 755 "$sockets"
+# Slurm wants paths without blanks, and munge a folder that nobody else may write to.
+home=$(mktemp -d)
+chmod 755 "$home"
+mkdir -p "$home"/{state,spool,jobs,munge}
+sockets=$home/munge
 head -c 128 /dev/urandom >"$sockets/key"
 chmod 600 "$sockets/key"
 munged --foreground --force --num-threads 2 --socket "$sockets/socket" --key-file "$sockets/key" \

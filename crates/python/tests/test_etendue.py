@@ -33,6 +33,14 @@ def quad(**more):
     return etendue.Scene(QUAD, FACES, **{"camera": camera, "layers": ["depth", "normal", "ids"], **more})
 
 
+@pytest.fixture(autouse=True)
+def heeds_ctrl_c():
+    """A process that was started in the background ignores SIGINT until it says otherwise."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def test_layers_are_arrays():
     scene = quad()
     shot = scene.render()
