@@ -22,8 +22,10 @@ const LARGE: &str = r#"{"etendue": 1, "layers": ["depth"],
 struct Running(Child);
 
 impl Running {
+    /// Heeding Ctrl-C, which tests that run in the background are started to ignore.
     fn start(bench: &Bench, arguments: &[&str]) -> Self {
-        Self::spawn(Command::new(env!("CARGO_BIN_EXE_etendue")).args(arguments), bench)
+        let command = ["--default-signal=INT", env!("CARGO_BIN_EXE_etendue")];
+        Self::spawn(Command::new("env").args(command).args(arguments), bench)
     }
 
     fn spawn(command: &mut Command, bench: &Bench) -> Self {
