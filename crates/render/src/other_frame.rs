@@ -20,12 +20,12 @@ pub struct FollowedFrame<'a> {
     geometry: &'a Geometry,
     accel: &'a dyn Accel,
     /// What became of each placement of this frame; `None` when all stand still.
-    fates: Option<Vec<Fate>>,
+    motions: Option<Vec<Motion>>,
 }
 
 /// What became of a placement on the way to the other frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Fate {
+enum Motion {
     Still,
     Moved,
     /// Its mesh is another one, whose points have nothing to do with this one's.
@@ -37,17 +37,17 @@ impl<'a> FollowedFrame<'a> {
     #[must_use]
     pub fn new(step: FrameStep, scene: &Scene, other: &'a Scene, accel: &'a dyn Accel) -> Self {
         let (from, geometry) = (&*scene.geometry, &*other.geometry);
-        let fates = (!from.has_surfaces_of(geometry)).then(|| {
-            let fate = |(i, placement)| fate(from, placement, geometry, i);
-            from.placements.iter().enumerate().map(fate).collect()
+        let motions = (!from.has_surfaces_of(geometry)).then(|| {
+            let of = |(i, placement)| motion(from, placement, geometry, i);
+            from.placements.iter().enumerate().map(of).collect()
         });
-        Self { step, camera: &other.camera, geometry, accel, fates }
+        Self { step, camera: &other.camera, geometry, accel, motions }
     }
 
     /// Whether there is something that cannot be followed, because its mesh is another one there.
     #[must_use]
     pub fn loses_some(&self) -> bool {
-        self.fates.as_ref().is_some_and(|fates| fates.contains(&Fate::Gone))
+        self.motions.as_ref().is_some_and(|motions| motions.contains(&Motion::Gone))
     }
 
     /// From the other camera to the point of hit `i` (m).
@@ -57,13 +57,13 @@ impl<'a> FollowedFrame<'a> {
         if number == MISS {
             return None;
         }
-        match self.fates.as_ref().map_or(Fate::Still, |fates| fates[number as usize]) {
-            Fate::Still => {
+        match self.motions.as_ref().map_or(Motion::Still, |motions| motions[number as usize]) {
+            Motion::Still => {
                 // Far from the world's origin the difference of the two cameras is what counts.
                 let along = traced.rays.direction(i) * traced.hits.t[i];
                 Some((traced.rays.origin(i) - origin) + along)
             }
-            Fate::Moved => {
+            Motion::Moved => {
                 let placement = &self.geometry.placements[number as usize];
                 let corners =
                     self.geometry.mesh_of(placement).corners(traced.hits.triangle[i] as usize);
@@ -72,7 +72,7 @@ impl<'a> FollowedFrame<'a> {
                     corners[0] + u * (corners[1] - corners[0]) + v * (corners[2] - corners[0]);
                 Some(placement.world_from_mesh.point_from(local, origin))
             }
-            Fate::Gone => None,
+            Motion::Gone => None,
         }
     }
 
@@ -82,21 +82,21 @@ impl<'a> FollowedFrame<'a> {
     }
 }
 
-fn fate(from: &Geometry, placement: &Placement, to: &Geometry, number: usize) -> Fate {
-    let Some(there) = to.placements.get(number) else { return Fate::Gone };
+fn motion(from: &Geometry, placement: &Placement, to: &Geometry, number: usize) -> Motion {
+    let Some(there) = to.placements.get(number) else { return Motion::Gone };
     let (mesh, mesh_there) = (from.mesh_of(placement), to.mesh_of(there));
     let name = |p: &Placement| (p.object, p.instance, p.node);
     let is_same_mesh = mesh.has_surface_of(mesh_there);
     if name(placement) != name(there) || mesh.triangles.len() != mesh_there.triangles.len() {
-        return Fate::Gone;
+        return Motion::Gone;
     }
     // A mesh of the same triangles with its corners elsewhere was bent.
     if !is_same_mesh && mesh.triangles[..] != mesh_there.triangles[..] {
-        return Fate::Gone;
+        return Motion::Gone;
     }
     match is_same_mesh && placement.world_from_mesh == there.world_from_mesh {
-        true => Fate::Still,
-        false => Fate::Moved,
+        true => Motion::Still,
+        false => Motion::Moved,
     }
 }
 
