@@ -325,7 +325,7 @@ pub(crate) struct RenderArguments {
           value_parser = parse::seconds)]
     pub(crate) checkpoint: Option<f64>,
     /// Write nothing of a picture that is stopped by Ctrl-C. Else what all pixels have by then is
-    /// written, marked as partial
+    /// written, marked as partial, in the folder `partial` where a complete picture stands
     #[arg(long)]
     pub(crate) discard_partial: bool,
     /// Show no progress and no summary; the list of files and errors remain

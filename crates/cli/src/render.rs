@@ -113,13 +113,14 @@ pub(crate) fn write(
     outputs: Outputs,
     progress: Progress,
 ) -> Result<(), Fault> {
-    let folder = &arguments.output;
     let partial = heed_stop(rendering, arguments.discard_partial)?;
     if let Some(partial) = &partial
         && !arguments.quiet
     {
         say(&format!("note: {partial}"));
     }
+    let folder = &rendering.place_in(&arguments.output);
+    places::folder(folder)?;
     let written = rendering.write_with(folder, outputs, &progress)?;
     drop(progress);
     let mut report = rendering.report_of(&written);

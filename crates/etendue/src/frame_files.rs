@@ -5,7 +5,7 @@ use std::{fs, io};
 
 use etendue_render::output::{MANIFEST, OutputError, Outputs, sidecar};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::{Error, Progress, Rendering, Written, places};
 
@@ -192,24 +192,29 @@ fn read_record(path: &Path) -> Option<Record> {
 /// Whether `folder` has a complete picture of the scene with these fingerprints, and all files of its
 /// manifest.
 fn is_rendered(folder: &Path, fingerprints: &[(String, String)], has_sensor: bool) -> bool {
-    let read = |name: &str| -> Option<Value> {
-        serde_json::from_slice(&fs::read(folder.join(name)).ok()?).ok()
-    };
-    let header = read("layers.json").and_then(|layers| layers.get("header").cloned());
-    let Some(header) = header else { return false };
+    let Some((header, files)) = complete_picture(folder) else { return false };
     let is_same = |(key, print): &(String, String)| {
         header.get(key).and_then(Value::as_str) == Some(print.as_str())
     };
-    let files = read(MANIFEST).and_then(|book| book.pointer("/files/render").cloned());
-    let Some(Value::Object(files)) = files else { return false };
+    fingerprints.iter().all(is_same) && (!has_sensor || files.contains_key("sensor.json"))
+}
+
+/// The header and the files of the picture in `folder`; `None` when there is none, when a file of it is
+/// missing, or when it was stopped before all samples were taken.
+pub(crate) fn complete_picture(folder: &Path) -> Option<(Value, Map<String, Value>)> {
+    let read = |name: &str| -> Option<Value> {
+        serde_json::from_slice(&fs::read(folder.join(name)).ok()?).ok()
+    };
+    let header = read("layers.json")?.get("header")?.clone();
+    let Value::Object(files) = read(MANIFEST)?.pointer("/files/render")?.clone() else {
+        return None;
+    };
     let is_there = |(name, print): (&String, &Value)| {
         let bytes = print.get("bytes").and_then(Value::as_u64);
         folder.join(name).metadata().is_ok_and(|data| Some(data.len()) == bytes)
     };
-    fingerprints.iter().all(is_same)
-        && header.get("partial").is_none()
-        && (!has_sensor || files.contains_key("sensor.json"))
-        && files.iter().all(is_there)
+    let is_complete = header.get("partial").is_none() && files.iter().all(is_there);
+    is_complete.then_some((header, files))
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! Where results go: made, and checked against the inputs, before any work is done.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use etendue_render::output::{
-    Ledger, OutputError, PartFile, prepare_folder, protect_inputs, refuse_inputs,
+    Ledger, MANIFEST, OutputError, PartFile, prepare_folder, protect_inputs, refuse_inputs,
 };
 
 use crate::Error;
@@ -56,4 +57,17 @@ pub fn recorded<T, E: From<OutputError>>(
     recorded?;
     ledger.clear()?;
     Ok(written)
+}
+
+/// Removes what an earlier render wrote into `folder`, as far as it is as it was, and the folder when
+/// nothing else is in it.
+pub(crate) fn clear(folder: &Path) {
+    let manifest = folder.join(MANIFEST);
+    // What cannot be removed is nobody's loss: it is marked as what it is.
+    if manifest.is_file() && Ledger::open(folder, "render").clear().is_ok() {
+        let is_left_alone = fs::read_dir(folder).is_ok_and(|entries| entries.count() == 1);
+        if is_left_alone && fs::remove_file(manifest).is_ok() {
+            let _ = fs::remove_dir(folder);
+        }
+    }
 }

@@ -16,8 +16,12 @@ use etendue_render::{Images, Plan, RenderError, Report};
 use etendue_scene::Scene;
 use etendue_sensor::{Exposure, RawImage};
 
+use crate::frame_files::complete_picture;
 use crate::progress::Phase;
 use crate::{Error, Progress, places};
+
+/// The folder of a stopped picture, in that of a complete one.
+const PARTIAL: &str = "partial";
 
 /// A rendered picture with all its layers, and what the camera's sensor makes of its light.
 #[derive(Debug)]
@@ -139,9 +143,19 @@ impl Rendering {
         (has < of).then(|| format!("stopped after {has} of {of} samples a pixel"))
     }
 
+    /// The folder that takes its files: `folder`, or `partial` in it when this picture was stopped and a
+    /// complete one stands there.
+    #[must_use]
+    pub fn place_in(&self, folder: &Path) -> PathBuf {
+        match self.partial().and_then(|_| complete_picture(folder)) {
+            Some(_) => folder.join(PARTIAL),
+            None => folder.to_owned(),
+        }
+    }
+
     /// Writes all files into `folder`, which is made when it is missing; each appears when it is complete.
     /// Files that an earlier render left there and this one does not write again are removed, when they are
-    /// as they were.
+    /// as they were; so is a stopped picture beside them, when this one is complete.
     ///
     /// # Errors
     ///
@@ -181,6 +195,9 @@ impl Rendering {
             notes.extend(set.notes);
             Ok::<_, Error>(Written { files, notes, time: Duration::ZERO })
         })?;
+        if self.partial().is_none() {
+            places::clear(&folder.join(PARTIAL));
+        }
         written.notes.iter().for_each(|note| progress.note(note));
         written.time = start.elapsed();
         Ok(written)

@@ -110,6 +110,23 @@ fn a_stopped_picture_is_kept_and_says_what_it_is() {
 }
 
 #[test]
+fn a_stopped_picture_does_not_replace_a_complete_one() {
+    let bench = Bench::with_scene(ENDLESS);
+    bench.render(&["--samples", "4"]);
+    let complete = std::fs::read(bench.path("out/layers.exr")).expect("an EXR");
+    let mut running = Running::start(&bench, &RENDER);
+    running.wait_for(&bench.path("out/picture.so-far.png"));
+    running.signal("INT");
+    let (status, _, err) = running.end();
+    assert!(status.code() == Some(1) && err.contains("the picture so far is in out/partial"), "{err}");
+    assert_eq!(complete, std::fs::read(bench.path("out/layers.exr")).expect("an EXR"));
+    assert!(bench.json("out/partial/layers.json")["header"]["partial"].is_string());
+    // The next complete one ends its stay.
+    bench.render(&["--samples", "4"]);
+    assert!(!bench.path("out/partial").exists());
+}
+
+#[test]
 fn nothing_is_left_where_nothing_is_to_be_kept() {
     let bench = Bench::with_scene(ENDLESS);
     let arguments = [&RENDER[..], &["--discard-partial"]].concat();
