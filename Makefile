@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install dist test test-embree4 test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor docs-figures docs-charts \
+.PHONY: help setup render install dist test test-embree4 test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits docs-figures docs-charts \
 	docs-stability light-fields fingerprints fuzz-smoke fuzz-seeds clean
 
 help:
@@ -23,6 +23,7 @@ help:
 	@echo "make bench-python  rays from Python against Rust, Open3D and embreex; frames against their rays"
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
+	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/limits.md"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make light-fields  the walk of docs/light-fields.md in a venv, its pictures, and another decoder's opinion"
 	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
@@ -89,6 +90,10 @@ bench-lens:
 bench-sensor:
 	cargo build --release -p etendue-sensor --example expose_frame
 	scripts/bench-peers.sh sensor_peers.py $(ARGS)
+
+bench-limits: setup
+	cargo build --release -p etendue-cli -p etendue-benches
+	python3 benches/limits.py $(ARGS)
 
 # ARGS=--quick takes lighter meshes
 docs-charts: setup

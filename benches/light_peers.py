@@ -21,7 +21,6 @@ import os
 import resource
 import statistics
 import subprocess
-import sys
 import tempfile
 import textwrap
 import time
@@ -384,7 +383,4 @@ def main():
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--serve"]:
-        serve(*sys.argv[2:4])
-    else:
-        main()
+    program.begin(main, serve)

@@ -18,7 +18,6 @@ virtual environment below target/; what cannot be had is named in the table.
 import json
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -311,7 +310,4 @@ def main():
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--serve"]:
-        serve(*sys.argv[2:4])
-    else:
-        main()
+    program.begin(main, serve)

@@ -94,6 +94,14 @@ class Peer:
             self.process.kill()
 
 
+def begin(main, serve):
+    """Runs `main`, or `serve` with the words of the command line in a process of a [`Peer`]."""
+    if sys.argv[1:2] == ["--serve"]:
+        serve(*sys.argv[2:4])
+    else:
+        main()
+
+
 def serve(answer):
     """Answers each line of words from standard input."""
     for line in sys.stdin:

@@ -17,7 +17,6 @@ The wheel is that of `make python`; other programs come from PyPI.
 import json
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -261,7 +260,4 @@ def main():
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--serve"]:
-        serve(*sys.argv[2:4])
-    else:
-        main()
+    program.begin(main, serve)

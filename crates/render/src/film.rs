@@ -43,15 +43,21 @@ pub(crate) fn bytes_of_plane(spec: LayerSpec, precision: Precision) -> u64 {
     }
 }
 
-/// The system has less memory than the film takes.
+/// The system has less memory than the pixels of a picture take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the system has too little memory for {} more of the film; ask for fewer pixels, layers or bands",
+    "the system has too little memory for {} more of the picture; ask for fewer pixels, layers or bands",
     Size(*bytes)
 )]
 pub struct NoMemory {
     /// What could not be had (bytes).
     pub bytes: u64,
+}
+
+/// Whether there is memory for so many bytes now: for a library that would abort without.
+pub(crate) fn check_room(bytes: usize) -> Result<(), NoMemory> {
+    let reserved = Vec::<u8>::new().try_reserve_exact(bytes);
+    reserved.map_err(|_| NoMemory { bytes: bytes as u64 })
 }
 
 /// `count` times `value`, where there is memory for it.

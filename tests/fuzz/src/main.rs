@@ -27,7 +27,7 @@ fn main() -> Result<ExitCode> {
                 let folder = PathBuf::from(arguments.next().unwrap_or_default());
                 effort.time = Duration::from_secs(number(arguments.next())?);
                 effort.seed = number(arguments.next())?;
-                run::child(target, &folder, effort)?;
+                println!("{}", run::child(target, &folder, effort)?);
                 return Ok(ExitCode::SUCCESS);
             }
             "--one" => {
@@ -69,8 +69,8 @@ fn all(targets: &[Target], effort: Effort) -> Result<ExitCode> {
     let mut failed = 0;
     for target in targets {
         match run::supervise(*target, effort, &program)? {
-            None => println!("{}: fine", target.name),
-            Some(failure) => {
+            Ok(count) => println!("{}: {count} inputs, fine", target.name),
+            Err(failure) => {
                 failed += 1;
                 let kept = run::keep(&failure, *target, Path::new(KEPT))?;
                 println!("{}: FAILED on {}: {}", target.name, kept.display(), failure.how);

@@ -35,12 +35,12 @@ pub struct Effort {
     pub seed: u64,
 }
 
-/// Runs `target` in a process of its own; the input that failed and how, when one does.
+/// Runs `target` in a process of its own: how many inputs it read, or the one that failed and how.
 ///
 /// # Errors
 ///
 /// When the process cannot be started, or files cannot be written.
-pub fn supervise(target: Target, effort: Effort, program: &Path) -> Result<Option<Failure>> {
+pub fn supervise(target: Target, effort: Effort, program: &Path) -> Result<Result<u64, Failure>> {
     let folder = tempfile::tempdir()?;
     // The shell's own limit, in KiB: it is the simplest that needs nobody's trust.
     let script = "ulimit -d \"$1\" && shift && exec \"$0\" \"$@\"";
@@ -57,13 +57,14 @@ pub fn supervise(target: Target, effort: Effort, program: &Path) -> Result<Optio
         .output()
         .context("sh cannot be started")?;
     if child.status.success() {
-        return Ok(None);
+        let count = String::from_utf8_lossy(&child.stdout);
+        return Ok(Ok(count.trim().parse().context("the child did not count its inputs")?));
     }
     let input = fs::read(folder.path().join(CURRENT)).context("the child left no input")?;
     let words = String::from_utf8_lossy(&child.stderr);
     let last = words.lines().rev().take(6).collect::<Vec<_>>();
     let last: Vec<&str> = last.into_iter().rev().collect();
-    Ok(Some(Failure { input, how: format!("{}\n{}", child.status, last.join("\n")) }))
+    Ok(Err(Failure { input, how: format!("{}\n{}", child.status, last.join("\n")) }))
 }
 
 /// An input that was not read within the limits.

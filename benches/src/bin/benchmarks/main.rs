@@ -53,6 +53,9 @@ enum Command {
         /// How heavy
         #[arg(long, default_value_t = 1_000_000)]
         triangles: u64,
+        /// Write these formats alone: glb, ply, obj
+        #[arg(long, value_delimiter = ',')]
+        formats: Vec<String>,
     },
     /// Print as JSON what Embree's bare loop takes for a camera's rays over the blob, and for one
     /// ray from each hit to a light
@@ -85,7 +88,9 @@ fn blob_name(triangles: u64) -> String {
 fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     match &arguments.command {
-        Some(Command::Models { folder, triangles }) => return write_models(folder, *triangles),
+        Some(Command::Models { folder, triangles, formats }) => {
+            return write_models(folder, *triangles, formats);
+        }
         Some(Command::LightRays { scene, triangles, light }) => {
             let light = etendue_geometry::glam::DVec3::from_slice(light);
             return light::print_bound(scene, *triangles, light);
@@ -122,11 +127,13 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn write_models(folder: &Path, triangles: u64) -> anyhow::Result<()> {
+fn write_models(folder: &Path, triangles: u64, formats: &[String]) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
     let geometry = meshes::blob(triangles)?;
     let view = View::framing(geometry.bounds());
-    for format in Format::ALL {
+    let is_wanted =
+        |format: &Format| formats.is_empty() || formats.iter().any(|f| f == format.extension());
+    for format in Format::ALL.into_iter().filter(is_wanted) {
         let name = format!("blob.{}", format.extension());
         let path = folder.join(&name);
         format.write(&path, &geometry).with_context(|| format!("{}", path.display()))?;

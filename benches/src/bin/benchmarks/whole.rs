@@ -44,7 +44,7 @@ pub(crate) fn measure(effort: Effort, findings: &mut Findings) -> anyhow::Result
         let mesh = crate::blob_name(triangles);
         eprintln!("{mesh}, from file to pixels");
         let folder = tempfile::tempdir().context("a temporary folder")?;
-        crate::write_models(folder.path(), triangles)?;
+        crate::write_models(folder.path(), triangles, &[])?;
         let job = Job { program: program.clone(), folder: folder.path().to_owned() };
         findings.contests.push(contest(effort, &mesh, triangles, &job)?);
         let (file, report) = job.report()?;

@@ -18,6 +18,7 @@ mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // lenses against other software, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers
 mod light_fields; // lenslets, arrays of cameras, and the page about them
+mod limits; // what the page on limits lists
 mod memory; // refused before it is taken
 mod messages; // what is wrong, in plain words
 mod openings_and_glasses; // f-numbers that a lens lacks, glasses of earlier catalogues and of one's own

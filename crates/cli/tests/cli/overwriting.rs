@@ -169,6 +169,24 @@ fn a_full_disk_is_no_fault_of_the_input() {
     assert!(err.contains("free some space"), "{err}");
 }
 
+/// A file system that takes no writes: refused before anything is rendered, and nothing is left.
+#[test]
+fn a_folder_that_cannot_be_written_to_is_named_at_once() {
+    let bench = Bench::with_scene(BOX);
+    fs::create_dir(bench.path("out")).expect("a folder");
+    let script = "mount -t tmpfs -o ro none out || exit 77
+        etendue render scene.json -o out/new --quiet --set render.samples=1048576";
+    let Some(output) = in_namespace(&bench, script) else {
+        return println!("skipped: no namespaces");
+    };
+    let err = text(&output.stderr);
+    if output.status.code() == Some(77) {
+        return println!("skipped: {err}");
+    }
+    assert_eq!(output.status.code(), Some(2), "{err}");
+    assert!(err.contains("out/new") && err.contains("Read-only"), "{err}");
+}
+
 #[test]
 fn strict_checks_decode_images() {
     let bench = Bench::new();

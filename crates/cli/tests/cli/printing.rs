@@ -80,3 +80,24 @@ fn notes_come_before_the_render_that_they_are_about() {
     let err = text(&bench.run(&refused).stderr);
     assert!(err.starts_with("note: ") && err.contains("error: "), "{err}");
 }
+
+/// Text that is longer than what a pipe holds (64 KiB), for a reader that is slow, and for one that has
+/// had enough.
+#[test]
+fn a_slow_reader_gets_all_and_one_that_leaves_is_no_fault() {
+    let bench = Bench::new();
+    let program = env!("CARGO_BIN_EXE_etendue");
+    let run = |script: &str| {
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", script, program]).current_dir(bench.path(""));
+        command.output().expect("a shell")
+    };
+    let all = bench.run(&["schema"]).stdout;
+    assert!(all.len() > 1 << 16, "{} bytes", all.len());
+    let slow = run("\"$0\" schema 2>err | { sleep 0.5; cat; }");
+    assert_eq!((slow.status.code(), slow.stdout), (Some(0), all));
+    let left = run("{ \"$0\" schema; echo $? >code; } 2>err | head -c 1");
+    assert_eq!(left.stdout, b"{");
+    let read = |name: &str| std::fs::read_to_string(bench.path(name)).expect("a file");
+    assert_eq!((read("code").as_str(), read("err").as_str()), ("0\n", ""));
+}

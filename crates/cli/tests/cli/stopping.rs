@@ -118,7 +118,10 @@ fn a_stopped_picture_does_not_replace_a_complete_one() {
     running.wait_for(&bench.path("out/picture.so-far.png"));
     running.signal("INT");
     let (status, _, err) = running.end();
-    assert!(status.code() == Some(1) && err.contains("the picture so far is in out/partial"), "{err}");
+    assert!(
+        status.code() == Some(1) && err.contains("the picture so far is in out/partial"),
+        "{err}"
+    );
     assert_eq!(complete, std::fs::read(bench.path("out/layers.exr")).expect("an EXR"));
     assert!(bench.json("out/partial/layers.json")["header"]["partial"].is_string());
     // The next complete one ends its stay.

@@ -88,6 +88,20 @@ impl Lattice {
         Cell { index, local, away }
     }
 
+    /// Whether a point (mm from a cell's centre, in the array's own axes) is of this cell, whatever
+    /// rounding does: some that are, 10⁻⁹ of the pitch within its border, are not told.
+    #[inline(always)]
+    pub(crate) fn is_well_inside(&self, grid: Grid, x: f64, y: f64) -> bool {
+        let [c, s] = self.turn;
+        let (u, v) = (c * x + s * y, c * y - s * x);
+        let half = self.pitch * (0.5 - 1e-9);
+        match grid {
+            Grid::Square => (u.abs() <= half) & (v.abs() <= half),
+            // Two edges across the rows, and four at 60° to them.
+            Grid::Hexagonal => (u.abs() <= half) & (0.5 * u.abs() + 0.5 * ROOT3 * v.abs() <= half),
+        }
+    }
+
     /// The centre of a cell (mm).
     #[must_use]
     pub fn centre(&self, index: [f64; 2]) -> [f64; 2] {
@@ -184,6 +198,11 @@ mod tests {
                     assert!((distance(found.index) - least).abs() < 1e-12, "{grid:?} {x} {y}");
                     assert!((found.away[0] - (x - cx)).abs() < 1e-12, "{found:?}");
                     assert!((found.away[1] - (y - cy)).abs() < 1e-12, "{found:?}");
+                    let is_inside =
+                        |[cx, cy]: [f64; 2]| lattice.is_well_inside(grid, x - cx, y - cy);
+                    assert!(is_inside([cx, cy]), "no point of these is on a border");
+                    let others = lattice.cells_near([x, y], 0.35).filter(|one| *one != found.index);
+                    assert!(!others.map(|one| lattice.centre(one)).any(is_inside), "{found:?}");
                 }
             }
         }

@@ -111,15 +111,23 @@ impl Lenslets {
                     |ray| self.at_thin(form, ray, clip, |index| powers[self.array.type_at(index)]),
                 ),
             },
-            Kinds::Faces { faces, flat } => match &faces[..] {
-                [one] if one.surface.curvature != 0.0 && one.surface.conic == 0.0 => each_lane(
+            Kinds::Faces { faces, flat } => match (&faces[..], self.array.gaps) {
+                // Where nothing passes, a ray ends in the plane.
+                ([one], Gaps::Opaque) if is_sphere(one) => each_lane(
+                    block,
+                    element,
+                    z,
+                    #[inline(always)]
+                    |ray| self.at_face(form, ray, clip, (one, at_end)),
+                ),
+                ([one], Gaps::Clear) if is_sphere(one) => each_lane(
                     block,
                     element,
                     z,
                     #[inline(always)]
                     |ray| {
-                        let near = |ray| one.at_near_root::<true>(ray, f64::INFINITY);
-                        self.at_face(form, ray, clip, (near, flat))
+                        let gap = |_, _| flat.at_plane(ray, f64::INFINITY);
+                        self.at_face(form, ray, clip, (one, gap))
                     },
                 ),
                 _ => each_lane(block, element, z, |ray| Refracted {
@@ -166,28 +174,27 @@ impl Lenslets {
         Refracted { ray: Ray { direction, ..there }, t, hit, clear: place.clear, through: true }
     }
 
-    /// A ray at the face of the cell in which it crosses the plane; no hit where the face is met in
-    /// another cell.
+    /// A ray at the face of the cell in which it crosses the plane; no hit where the face may be met in
+    /// another cell. What is between faces gets the ray in the plane, and how far it went.
     #[inline(always)]
     fn at_face(
         &self,
         form: (Grid, LensletShape),
         ray: Ray,
         clip: Clip,
-        (face, flat): (impl Fn(Ray) -> Refracted, &Refraction),
+        (face, gap): (&Refraction, impl Fn(Ray, f64) -> Refracted),
     ) -> Refracted {
-        let (there, _) = to_plane(ray);
+        let (there, t) = to_plane(ray);
         let [x, y, _] = there.position;
         let place = self.place(form, [x, y], clip);
         let centre = [x - place.away[0], y - place.away[1]];
-        let met = moved(face(moved(ray, [-centre[0], -centre[1]])), centre);
-        let cell = self.array.lattice.cell_of(form.0, met.ray.position[0], met.ray.position[1]);
-        let same = (cell.index[0] == place.index[0]) & (cell.index[1] == place.index[1]);
-        let gap = flat.at_plane(ray, f64::INFINITY);
-        let met = Refracted { hit: met.hit & same, ..met };
-        // Where nothing passes, a ray ends in the plane.
+        let local = moved(ray, [-centre[0], -centre[1]]);
+        let met = face.at_near_root::<true>(local, f64::INFINITY);
+        let same =
+            self.array.lattice.is_well_inside(form.0, met.ray.position[0], met.ray.position[1]);
+        let met = Refracted { hit: met.hit & same, ..moved(met, centre) };
         let on_face = place.open & place.clear;
-        Refracted { clear: place.clear, ..if on_face { met } else { gap } }
+        Refracted { clear: place.clear, ..if on_face { met } else { gap(there, t) } }
     }
 
     /// A ray in the array's frame, exactly by the rule, and the type of lenslet that it meets.
@@ -245,6 +252,16 @@ impl Lenslets {
 #[inline(always)]
 fn goes_there(t: f64) -> bool {
     (t > -super::refract::TOUCH) & (t < f64::INFINITY)
+}
+
+fn is_sphere(face: &Refraction) -> bool {
+    face.surface.curvature != 0.0 && face.surface.conic == 0.0
+}
+
+/// A ray that ends in the array's plane.
+#[inline(always)]
+fn at_end(there: Ray, t: f64) -> Refracted {
+    Refracted { ray: there, t, hit: goes_there(t), clear: false, through: true }
 }
 
 #[inline(always)]

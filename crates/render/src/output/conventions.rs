@@ -8,8 +8,9 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use super::look::{Bits, Channels, Shown, indices};
+use super::look::{Bits, Channels, Shown, fill, indices};
 use super::{Layer, OutputError, Outputs, Picture, png, write_whole};
+use crate::film::NoMemory;
 
 /// Numbers a metre in TUM's depth images.
 pub const TUM_DEPTH: f64 = 5000.0;
@@ -76,12 +77,12 @@ impl Manner {
     pub fn write(self, path: &Path, picture: &Picture, name: &str) -> Result<bool, OutputError> {
         let layer = picture.require(name)?;
         let shown = match self {
-            Self::TumDepth => scaled(layer, TUM_DEPTH, "metres"),
-            Self::KittiDepth => scaled(layer, KITTI_DEPTH, "metres"),
-            Self::KittiDisparity => scaled(layer, KITTI_DEPTH, "pixels"),
-            Self::KittiFlow => flow(layer),
+            Self::TumDepth => scaled(layer, TUM_DEPTH, "metres")?,
+            Self::KittiDepth => scaled(layer, KITTI_DEPTH, "metres")?,
+            Self::KittiDisparity => scaled(layer, KITTI_DEPTH, "pixels")?,
+            Self::KittiFlow => flow(layer)?,
             Self::Flo => return flo(path, picture, layer).map(|()| true),
-            Self::Indexed => match indices(layer) {
+            Self::Indexed => match indices(layer)? {
                 Some(shown) => shown,
                 None => return Ok(false),
             },
@@ -97,28 +98,28 @@ fn sixteen_bits(value: f64) -> u16 {
     if (1.0..=65535.0).contains(&rounded) { rounded as u16 } else { 0 }
 }
 
-fn scaled(layer: &Layer, factor: f64, unit: &str) -> Shown {
+fn scaled(layer: &Layer, factor: f64, unit: &str) -> Result<Shown, NoMemory> {
     let plane = &layer.channels[0].values;
-    let bytes = (0..plane.len()).flat_map(|i| sixteen_bits(plane.at(i) * factor).to_be_bytes());
+    let bytes = fill(&[plane], |i| [sixteen_bits(plane.at(i) * factor).to_be_bytes()])?;
     let most = 65535.0 / factor;
     let note = format!(
         "data: {unit} times {factor}; 0 is nothing, and what is not above 0 or beyond {most:.3} {unit}"
     );
-    Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes: bytes.collect(), note }
+    Ok(Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes, note })
 }
 
-fn flow(layer: &Layer) -> Shown {
+fn flow(layer: &Layer) -> Result<Shown, NoMemory> {
     let [x, y] = [0, 1].map(|k| &layer.channels[k].values);
     let pixel = |i: usize| {
         let [u, v] = [x, y].map(|plane| sixteen_bits(plane.at(i) * KITTI_FLOW + 32768.0));
         if u == 0 || v == 0 { [0; 3] } else { [u, v, 1] }
     };
-    let bytes = (0..x.len()).flat_map(pixel).flat_map(u16::to_be_bytes).collect();
+    let bytes = fill(&[x], |i| pixel(i).map(u16::to_be_bytes))?;
     let note = format!(
         "data: red and green are 32768 + {KITTI_FLOW} times the flow right and down (pixels), blue is 1 \
          where it is known; flow of 512 pixels and more is not"
     );
-    Shown { channels: Channels::Rgb, bits: Bits::Sixteen, bytes, note }
+    Ok(Shown { channels: Channels::Rgb, bits: Bits::Sixteen, bytes, note })
 }
 
 /// `PIEH`, columns and rows, and two little-endian floats a pixel.

@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 
 use super::look::{Channels, Shown, srgb, unit};
 use super::{Layer, Picture, Values, png::Bits};
+use crate::film::NoMemory;
 
 /// How a PNG shows the picture's light.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -88,7 +89,12 @@ impl Development {
     }
 
     /// The picture's own layer, of one channel or three, as a PNG shows it.
-    pub(super) fn show(&self, picture: &Picture, layer: &Layer, bits: Bits) -> Shown {
+    pub(super) fn show(
+        &self,
+        picture: &Picture,
+        layer: &Layer,
+        bits: Bits,
+    ) -> Result<Shown, NoMemory> {
         let planes: Vec<_> = layer.channels.iter().map(|channel| &channel.values).collect();
         let light = |i: usize| match *planes.as_slice() {
             [r, g, b] => [r, g, b].map(|plane| plane.at(i)),
@@ -304,7 +310,7 @@ mod tests {
         let all =
             picture(vec![0.4, 0.6, 0.8], vec![layer("Alpha", ["A"], vec![0.0, 0.5, 1.0]), behind]);
         let develop = Development { alpha: true, ..Development::default() };
-        let shown = develop.show(&all, all.layer("").unwrap(), Bits::Eight);
+        let shown = develop.show(&all, all.layer("").unwrap(), Bits::Eight).unwrap();
         assert_eq!(shown.channels, Channels::Rgba);
         let edge = &shown.bytes[4..8];
         // 0.8 is 0.9063 in sRGB, 231 of 255.

@@ -121,6 +121,9 @@ pub enum OutputError {
         /// The name under which it is read.
         input: PathBuf,
     },
+    /// The system has less memory than a file takes while it is made.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
     /// The format cannot hold the picture.
     #[error("{} cannot hold this picture: {message}", path.display())]
     Format {

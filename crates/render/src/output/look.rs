@@ -4,6 +4,7 @@ pub use etendue_tracer::layer::Look;
 use rayon::prelude::*;
 
 use super::{Layer, Values};
+use crate::film::{NoMemory, filled};
 
 /// What `layer` lacks to be shown as it looks, if anything.
 pub(super) fn lacks(layer: &Layer) -> Option<&'static str> {
@@ -63,7 +64,7 @@ pub(super) enum Channels {
 }
 
 /// Shows `layer`, whose channels fit its look.
-pub(super) fn show(layer: &Layer, bits: Bits) -> Shown {
+pub(super) fn show(layer: &Layer, bits: Bits) -> Result<Shown, NoMemory> {
     let planes: Vec<_> = layer.channels.iter().map(|channel| &channel.values).collect();
     let planes = planes.as_slice();
     match layer.look {
@@ -95,31 +96,31 @@ impl Shown {
         planes: &[&Values],
         shade: impl Fn(usize) -> [f32; N] + Sync,
         note: String,
-    ) -> Self {
+    ) -> Result<Self, NoMemory> {
         let bytes = match bits {
             Bits::Eight => {
                 fill(planes, |i| shade(i).map(|v| [quantize(v, 255.0).to_be_bytes()[1]]))
             }
             Bits::Sixteen => fill(planes, |i| shade(i).map(|v| quantize(v, 65535.0).to_be_bytes())),
         };
-        Self { channels, bits, bytes, note }
+        Ok(Self { channels, bits, bytes: bytes?, note })
     }
 }
 
 /// `N` samples of `B` bytes a pixel.
-fn fill<const N: usize, const B: usize>(
+pub(super) fn fill<const N: usize, const B: usize>(
     planes: &[&Values],
     pixel: impl Fn(usize) -> [[u8; B]; N] + Sync,
-) -> Vec<u8> {
+) -> Result<Vec<u8>, NoMemory> {
     const BAND: usize = 1 << 12;
     let pixels = planes.first().map_or(0, |plane| plane.len());
-    let mut bytes = vec![0; pixels * N * B];
+    let mut bytes = filled(0, pixels * N * B)?;
     bytes.par_chunks_mut(BAND * N * B).enumerate().for_each(|(band, out)| {
         for (k, slot) in out.chunks_exact_mut(N * B).enumerate() {
             slot.copy_from_slice(pixel(band * BAND + k).as_flattened());
         }
     });
-    bytes
+    Ok(bytes)
 }
 
 #[expect(
@@ -143,7 +144,7 @@ pub(super) fn srgb(linear: f64) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-fn color(planes: &[&Values], bits: Bits) -> Shown {
+fn color(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
     let note = "sRGB; light above full scale is clipped".into();
     match *planes {
         [r, g, b] => {
@@ -157,7 +158,7 @@ fn color(planes: &[&Values], bits: Bits) -> Shown {
 /// Brightness of the farthest distance shown: darker is only a miss.
 const FAR_GREY: f64 = 0.125;
 
-fn distance(planes: &[&Values], bits: Bits) -> Shown {
+fn distance(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
     let plane = planes[0];
     let Some((near, far)) = spread(plane) else {
         let note = "every pixel is a miss (black)".into();
@@ -203,7 +204,7 @@ fn spread(plane: &Values) -> Option<(f64, f64)> {
     Some((sample[last / 100], sample[last - last / 100]))
 }
 
-fn direction(planes: &[&Values], bits: Bits) -> Shown {
+fn direction(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
     let rgba = |i| {
         let n = [0, 1, 2].map(|axis| planes[axis].at(i));
         if n == [0.0; 3] {
@@ -216,7 +217,7 @@ fn direction(planes: &[&Values], bits: Bits) -> Shown {
     Shown::new(Channels::Rgba, bits, planes, rgba, note)
 }
 
-fn extent(planes: &[&Values], bits: Bits) -> Shown {
+fn extent(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
     let ranges: Vec<_> = planes.iter().map(|plane| finite_range(plane)).collect();
     let rgba = |i| {
         let mut shade = [0.0, 0.0, 0.0, 1.0];
@@ -251,7 +252,7 @@ fn finite_range(plane: &Values) -> (f64, f64) {
         .reduce(|| (f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-fn ids(planes: &[&Values], bits: Bits) -> Shown {
+fn ids(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
     let rgba = |i| match planes[0].at(i) {
         0.0 => [0.0; 4],
         id => {
@@ -279,31 +280,36 @@ fn id_color(id: f64) -> [f32; 3] {
 }
 
 /// Numbers of a layer of ids as they are; `None` when one has more than 16 bits.
-pub(super) fn mask(layer: &Layer) -> Option<Shown> {
-    let plane = &layer.channels.first()?.values;
-    u16::try_from(plane.largest_integer()).ok()?;
+pub(super) fn mask(layer: &Layer) -> Result<Option<Shown>, NoMemory> {
+    let plane = layer.channels.first().map(|channel| &channel.values);
+    let Some(plane) = plane.filter(|plane| plane.largest_integer() <= u16::MAX.into()) else {
+        return Ok(None);
+    };
     let number = |i: usize| match plane {
         Values::U16(values) => values[i].to_be_bytes(),
         // The last two bytes are all of it.
         Values::U32(values) => values[i].to_be_bytes()[2..].try_into().unwrap_or_default(),
         Values::F32(_) | Values::F64(_) => [0; 2],
     };
-    let bytes = fill(&[plane], |i| [number(i)]);
+    let bytes = fill(&[plane], |i| [number(i)])?;
     let note = "data: the numbers themselves, not scaled; 0 is nothing".into();
-    Some(Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes, note })
+    Ok(Some(Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes, note }))
 }
 
 /// Numbers of a layer of ids as indices of [`palette`]; `None` when one has more than 8 bits.
-pub(super) fn indices(layer: &Layer) -> Option<Shown> {
-    let shown = mask(layer)?;
-    let is_small = |pair: &[u8; 2]| pair[0] == 0;
-    let (pairs, _) = shown.bytes.as_chunks::<2>();
-    pairs.iter().all(is_small).then(|| Shown {
-        channels: Channels::Indexed,
-        bits: Bits::Eight,
-        bytes: pairs.iter().map(|pair| pair[1]).collect(),
-        note: "data: the index of a pixel is the number itself; 0 is nothing".into(),
-    })
+pub(super) fn indices(layer: &Layer) -> Result<Option<Shown>, NoMemory> {
+    let plane = layer.channels.first().map(|channel| &channel.values);
+    if plane.is_none_or(|plane| plane.largest_integer() > u8::MAX.into()) {
+        return Ok(None);
+    }
+    let Some(Shown { mut bytes, .. }) = mask(layer)? else { return Ok(None) };
+    // Of two bytes the second is all of it.
+    for i in 0..bytes.len() / 2 {
+        bytes[i] = bytes[2 * i + 1];
+    }
+    bytes.truncate(bytes.len() / 2);
+    let note = "data: the index of a pixel is the number itself; 0 is nothing".into();
+    Ok(Some(Shown { channels: Channels::Indexed, bits: Bits::Eight, bytes, note }))
 }
 
 /// The colours of the numbers from 0 to 255, as previews have them; nothing is black.
@@ -315,18 +321,18 @@ pub(super) fn palette() -> Vec<u8> {
     (0..=255).flat_map(color).collect()
 }
 
-fn counts(planes: &[&Values], bits: u8) -> Shown {
+fn counts(planes: &[&Values], bits: u8) -> Result<Shown, NoMemory> {
     // `lacks` has seen to the type.
     fn number(plane: &Values, i: usize) -> [u8; 2] {
         let Values::U16(values) = plane else { return [0; 2] };
         values[i].to_be_bytes()
     }
     let (channels, bytes) = match *planes {
-        [r, g, b] => (Channels::Rgb, fill(planes, |i| [r, g, b].map(|p| number(p, i)))),
-        _ => (Channels::Grey, fill(planes, |i| [number(planes[0], i)])),
+        [r, g, b] => (Channels::Rgb, fill(planes, |i| [r, g, b].map(|p| number(p, i)))?),
+        _ => (Channels::Grey, fill(planes, |i| [number(planes[0], i)])?),
     };
     let note = format!("digital numbers (DN), 0 to {}, not scaled", (1_u32 << bits) - 1);
-    Shown { channels, bits: Bits::Sixteen, bytes, note }
+    Ok(Shown { channels, bits: Bits::Sixteen, bytes, note })
 }
 
 #[cfg(test)]
@@ -344,7 +350,7 @@ mod tests {
     }
 
     fn eight(look: Look, planes: Vec<Values>) -> (Channels, Vec<u8>) {
-        let shown = show(&layer(look, planes), Bits::Eight);
+        let shown = show(&layer(look, planes), Bits::Eight).unwrap();
         (shown.channels, shown.bytes)
     }
 
@@ -359,7 +365,8 @@ mod tests {
 
     #[test]
     fn sixteen_bits_are_big_endian_and_finer() {
-        let shown = show(&layer(Look::Share, vec![Values::F32(vec![0.5, 1.0])]), Bits::Sixteen);
+        let shown =
+            show(&layer(Look::Share, vec![Values::F32(vec![0.5, 1.0])]), Bits::Sixteen).unwrap();
         assert_eq!(shown.bytes, [0x80, 0x00, 0xff, 0xff]);
     }
 
@@ -434,11 +441,12 @@ mod tests {
         let shown = show(
             &layer(Look::Counts { bits: 12 }, vec![Values::U16(vec![0, 1, 4095])]),
             Bits::Eight,
-        );
+        )
+        .unwrap();
         assert_eq!((shown.channels, shown.bits), (Channels::Grey, Bits::Sixteen));
         assert_eq!(shown.bytes, [0, 0, 0, 1, 0x0f, 0xff]);
         let planes = vec![Values::U16(vec![1]), Values::U16(vec![2]), Values::U16(vec![255])];
-        let shown = show(&layer(Look::Counts { bits: 8 }, planes), Bits::Sixteen);
+        let shown = show(&layer(Look::Counts { bits: 8 }, planes), Bits::Sixteen).unwrap();
         assert_eq!((shown.channels, shown.bits), (Channels::Rgb, Bits::Sixteen));
         assert_eq!(shown.bytes, [0, 1, 0, 2, 0, 255]);
     }

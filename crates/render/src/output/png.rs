@@ -15,6 +15,7 @@ use ::png::{BitDepth, ColorType, EncodingError, Info, SrgbRenderingIntent};
 pub use super::look::Bits;
 use super::look::{Channels, Shown, mask, palette, show};
 use super::{Layer, Look, OutputError, PartFile, Picture, SOFTWARE};
+use crate::film::check_room;
 
 /// Writes the layer called `name` (empty for the picture itself) to `path`. `bits` is the depth of
 /// a preview; a sensor's digital numbers take the depth they need.
@@ -26,8 +27,8 @@ use super::{Layer, Look, OutputError, PartFile, Picture, SOFTWARE};
 pub fn write(path: &Path, picture: &Picture, name: &str, bits: Bits) -> Result<(), OutputError> {
     let layer = picture.require(name)?;
     let shown = match (layer.look, name) {
-        (Look::Color, "") => picture.development().show(picture, layer, bits),
-        _ => show(layer, bits),
+        (Look::Color, "") => picture.development().show(picture, layer, bits)?,
+        _ => show(layer, bits)?,
     };
     write_shown(path, picture, layer, &shown)
 }
@@ -46,7 +47,7 @@ pub fn has_mask(layer: &Layer) -> bool {
 /// As [`write()`].
 pub fn write_mask(path: &Path, picture: &Picture, name: &str) -> Result<bool, OutputError> {
     let layer = picture.require(name)?;
-    match mask(layer) {
+    match mask(layer)? {
         Some(shown) => write_shown(path, picture, layer, &shown).map(|()| true),
         None => Ok(false),
     }
@@ -78,6 +79,8 @@ pub(super) fn write_shown(
     // Only light is meant for a colour transform.
     info.srgb = (layer.look == Look::Color).then_some(SrgbRenderingIntent::Perceptual);
 
+    // The encoder holds the filtered rows and what it makes of them, which may be no smaller.
+    check_room(shown.bytes.len().saturating_mul(2))?;
     let mut part = PartFile::create(path)?;
     encode(&mut part, info, &shown.bytes).map_err(|error| match error {
         EncodingError::IoError(source) => OutputError::io(path, source),
