@@ -81,7 +81,7 @@ impl Dataset {
     /// When a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, Error> {
         let mut files = vec![folder.join("index.json")];
-        sidecar::write_json(&files[0], &self.index())?;
+        sidecar::write_json(&files[0], &self.index(folder))?;
         if self.entries.is_empty() || !self.entries.iter().all(Entry::has_k) {
             return Ok(files);
         }
@@ -97,11 +97,16 @@ impl Dataset {
         Ok(files)
     }
 
-    fn index(&self) -> Value {
+    /// Of the files of `folder`. A mask whose numbers are too large for its format was not written.
+    fn index(&self, folder: &Path) -> Value {
         let frame = |entry: &Entry| {
+            let mut layers = entry.files.clone();
+            layers
+                .values_mut()
+                .for_each(|files| files.retain(|_, file| folder.join(file).exists()));
             json!({
                 "frame": entry.number, "time_s": entry.time, "folder": entry.folder,
-                "files": entry.files,
+                "files": layers,
                 "K": entry.camera.k, "pixel_origin": entry.camera.pixel_origin,
                 "distortion": entry.camera.distortion, "resolution": entry.camera.resolution,
                 "camera_from_world": entry.camera.camera_from_world, "convention": "opencv",

@@ -58,6 +58,30 @@ fn each_frame_is_the_picture_of_its_settings() {
     assert_eq!(index["frames"][2]["folder"], "frames/000002");
 }
 
+/// 300 copies, whose numbers a mask of 8 bits cannot have.
+#[test]
+fn the_index_lists_no_file_that_was_not_written() {
+    let place =
+        |k: i32| json!({"translate": [f64::from(k % 20) - 9.5, f64::from(k / 20) - 7.0, -15]});
+    let places: Vec<Value> = (0..300).map(place).collect();
+    let mut scene: Value = serde_json::from_str(&scene(&json!([{}]))).unwrap();
+    scene["layers"] = json!(["ids"]);
+    scene["camera"]["pose"] = json!({"from": [0, 0, 0], "look_at": [0, 0, -1]});
+    scene["camera"]["sensor"]["resolution"] = json!([160, 120]);
+    scene["objects"] = json!([{"shape": "rectangle", "instances": places}]);
+    let bench = Bench::with_scene(&scene.to_string());
+    bench.render(&["--outputs", "png,npy,indexed"]);
+    let index = bench.json("out/index.json");
+    let layers = index["frames"][0]["files"].as_object().unwrap();
+    let files = layers.values().flat_map(|files| files.as_object().unwrap());
+    for (ending, file) in files {
+        assert!(bench.path("out").join(file.as_str().unwrap()).exists(), "{ending}: {file}");
+    }
+    assert!(layers["Id.object"].get("indexed.png").is_some(), "{layers:?}");
+    assert!(layers["Id.instance"].get("indexed.png").is_none(), "{layers:?}");
+    assert!(layers["Id.instance"].get("png").is_some(), "{layers:?}");
+}
+
 #[test]
 fn points_of_one_frame_are_where_the_next_one_sees_them() {
     let orbit = json!({"type": "orbit", "count": 12, "center": [0, 0, 0]});
