@@ -5,6 +5,7 @@ use etendue_camera::{Camera, Sampler};
 use etendue_render::output::{Outputs, Picture};
 use etendue_render::{Images, Plan, RenderError};
 use etendue_scene::Scene;
+use etendue_scene::file::SamplesSpec;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
@@ -98,7 +99,7 @@ impl<'a> Studio<'a> {
     pub fn take(&mut self, camera: &Camera, sampling: Sampling) -> Result<Taken, BenchError> {
         let render = &mut self.scene.render;
         (render.samples, render.sampler, render.seed) =
-            (sampling.samples, sampling.sampler, sampling.seed);
+            (SamplesSpec::Count(sampling.samples), sampling.sampler, sampling.seed);
         self.scene.camera = camera.clone();
         let plan = Plan::new(&self.scene, OUTPUTS);
         let rendered = etendue_render::render(

@@ -36,7 +36,21 @@ impl Sampler {
     /// The samples of the pixel in `column` and `row`, of which there will be `count`.
     #[must_use]
     pub fn pixel(self, seed: u64, column: u32, row: u32, count: u32) -> PixelSamples {
-        let pixel = u64::from(row) << 32 | u64::from(column);
+        self.pixel_in_set(seed, [column, row], 0, count)
+    }
+
+    /// As [`Self::pixel`], in one of up to 2¹⁶ sets that know nothing of each other: means over the
+    /// samples of different sets are independent random numbers.
+    #[must_use]
+    pub fn pixel_in_set(
+        self,
+        seed: u64,
+        [column, row]: [u32; 2],
+        set: u16,
+        count: u32,
+    ) -> PixelSamples {
+        // A picture's sides have 16 bits.
+        let pixel = u64::from(row) << 32 | u64::from(set) << 16 | u64::from(column);
         PixelSamples { sampler: self, seed: mix(seed ^ mix(pixel)), count: count.max(1) }
     }
 }
@@ -239,6 +253,28 @@ mod tests {
             assert_eq!(at(1, 1), at(1, 1), "{sampler:?}");
             assert_ne!(at(1, 1), at(1, 2), "{sampler:?}");
             assert_ne!(at(1, 1), at(2, 1), "{sampler:?}");
+        }
+    }
+
+    /// The means of two sets of samples of a pixel do not know of each other. Of Sobol points of one set
+    /// they do: the halves of a net fill each other's gaps, with a correlation near −1.
+    #[test]
+    fn sets_are_independent() {
+        let repeats = 4000;
+        for sampler in [Sampler::Sobol, Sampler::Independent] {
+            let (mut products, mut squares) = (0.0, 0.0);
+            for k in 0..repeats {
+                let mean = |set: u16| -> f64 {
+                    let samples = sampler.pixel_in_set(k, [3, 5], set, 16);
+                    (0..16).map(|i| samples.square(i, 0)[0] - 0.5).sum::<f64>() / 16.0
+                };
+                let means = [mean(0), mean(1)];
+                products += means[0] * means[1];
+                squares += means[0] * means[0];
+            }
+            let correlation = products / squares;
+            // Four standard errors.
+            assert!(correlation.abs() < 4.0 / 4000_f64.sqrt(), "{sampler:?}: {correlation}");
         }
     }
 }

@@ -10,6 +10,7 @@ use etendue_camera::{CameraFile, Convention, PixelOrigin, ProjectionName};
 use etendue_geometry::glam::{DMat3, DQuat};
 use etendue_render::output::conventions::{KITTI_DEPTH, TUM_DEPTH};
 use etendue_render::output::{Outputs, SOFTWARE, sidecar, write_whole};
+use etendue_scene::file::SamplesSpec;
 use etendue_scene::{Frame, Scene};
 use serde_json::{Map, Value, json};
 
@@ -37,7 +38,7 @@ struct Entry {
     files: BTreeMap<String, BTreeMap<String, String>>,
     scene_hash: String,
     seed: u64,
-    samples: u32,
+    samples: SamplesSpec,
 }
 
 impl Dataset {

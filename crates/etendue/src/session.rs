@@ -378,7 +378,7 @@ impl Session {
     ) -> Result<(), Error> {
         let film = self.trace(Some(shard), progress)?;
         let Loaded { scene, plan, .. } = self.loaded()?;
-        if film.samples() < plan.samples {
+        if !film.is_complete() {
             return Err(RenderError::Stopped.into());
         }
         film.notes().iter().for_each(|note| progress.note(note));
@@ -474,7 +474,7 @@ impl Session {
         notes.extend(self.images.faults.iter().cloned());
         notes.extend(more);
         let mut report = self.report(&scene, accel, &rendered, seconds)?;
-        (report.samples_wanted, report.notes) = (plan.samples, notes);
+        report.notes = notes;
         self.seconds = Seconds::default();
         let Rendered { picture, band_film, .. } = rendered;
         // The views of a light field are rendered when they are written.
@@ -632,7 +632,8 @@ impl Session {
             threads: rayon::current_num_threads(),
             seed: scene.render.seed,
             samples: rendered.samples,
-            samples_wanted: rendered.samples,
+            samples_wanted: rendered.samples_wanted,
+            sample_counts: rendered.sample_counts,
             seconds,
             rays: rendered.rays,
             lens_rays: rendered.fates.total(),

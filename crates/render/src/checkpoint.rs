@@ -90,6 +90,7 @@ impl<'a> Keeper<'a> {
             origin: &serde_json::Value::Null,
             shard: self.shard,
             samples,
+            sample_counts: None,
             counts,
             trace_time: self.start.elapsed(),
             resolution: self.resolution,

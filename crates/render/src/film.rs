@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use etendue_scene::memory::Size;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
-use etendue_tracer::layer::{self, Kept, Taken};
+use etendue_tracer::layer::{self, Kept, Look, Taken};
 
 use crate::expose::BandFilm;
 use crate::output::{Channel, Layer, Values};
@@ -161,6 +161,10 @@ impl FilmLayer {
         };
         let names: Vec<String> = match spec {
             LayerSpec::Radiance => bands.names(),
+            // Dots part the names of layers and channels in files.
+            LayerSpec::Variance => {
+                bands.names().iter().map(|name| name.replace('.', "_")).collect()
+            }
             _ => row.channels.iter().map(|name| (*name).to_owned()).collect(),
         };
         let planes = names.iter().map(|_| plane()).collect::<Result<_, _>>()?;
@@ -218,6 +222,7 @@ impl FilmLayer {
             };
             return files.into_iter().zip(self.planes).zip(definitions).map(layer).collect();
         }
+        let look = if self.planes.len() > 4 { Look::Cube } else { look };
         let planes = self.names.into_iter().zip(self.planes);
         let channels = planes.map(|(name, values)| Channel { name, values }).collect();
         let name = if root { String::new() } else { name.into_owned() };

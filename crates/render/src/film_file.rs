@@ -16,6 +16,7 @@ use etendue_tracer::RayStats;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
+use crate::adaptive::SampleCounts;
 use crate::film::FilmLayer;
 use crate::output::{OutputError, Values, write_whole};
 use crate::samples::Sum;
@@ -86,6 +87,9 @@ pub struct FilmHeader {
     pub shard: Shard,
     /// Samples that every pixel of them has.
     pub samples: u32,
+    /// How many samples the pixels have, where that differs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample_counts: Option<SampleCounts>,
     counts: Counts,
     /// The names of what is kept, and the type of its numbers.
     sections: Vec<(String, String)>,
@@ -115,6 +119,7 @@ pub(crate) struct Writing<'a> {
     pub(crate) origin: &'a serde_json::Value,
     pub(crate) shard: Shard,
     pub(crate) samples: u32,
+    pub(crate) sample_counts: Option<SampleCounts>,
     pub(crate) counts: &'a RayCounts,
     /// Wall time of the tracing.
     pub(crate) trace_time: Duration,
@@ -142,6 +147,7 @@ impl Writing<'_> {
             origin: self.origin.clone(),
             shard: self.shard,
             samples: self.samples,
+            sample_counts: self.sample_counts,
             counts: Counts::of(self.counts, self.trace_time),
             sections: sections.iter().map(|(name, s)| (name.clone(), kind(s))).collect(),
         };

@@ -1,5 +1,6 @@
 //! How much memory a render will take, from counts and headers alone.
 
+use etendue_scene::file::SETS;
 use etendue_scene::{MemoryForecast, Scene};
 use etendue_sensor::{Sensor, SensorKind};
 use etendue_spectrum::Bands;
@@ -42,7 +43,7 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
     MemoryForecast {
         images: images(scene, plan),
         film: each(film),
-        sums: each(if is_gone_over { BYTES_OF_SUM * averaged(plan) } else { 0 }),
+        sums: each(bytes_of_sums(plan)),
         sensor: each(if sensor > 0 { sensor.max(woven) } else { 0 }),
         files: each(look.max(png).max(if sensor > 0 { 0 } else { woven })),
         views: views(scene, plan, outputs),
@@ -70,6 +71,15 @@ fn views(scene: &Scene, plan: &Plan, outputs: Outputs) -> u64 {
     side(grid.rows).saturating_mul(side(grid.cols)).saturating_mul(reference.max(2 * arrays))
 }
 
+/// Bytes a pixel of what is kept between passes.
+fn bytes_of_sums(plan: &Plan) -> u64 {
+    let slots = match plan.stopping.is_adaptive() {
+        true => u64::from(SETS) + 1,
+        false => u64::from(plan.passes.len() > 1),
+    };
+    BYTES_OF_SUM * slots * averaged(plan)
+}
+
 /// Values of a pixel that are averaged over samples.
 fn averaged(plan: &Plan) -> u64 {
     let values = |layer: &LayerSpec| match layer {
@@ -82,7 +92,7 @@ fn averaged(plan: &Plan) -> u64 {
 /// Bytes a pixel of the planes of a layer.
 fn bytes_of_layer(layer: LayerSpec, plan: &Plan) -> u64 {
     let planes = match layer {
-        LayerSpec::Radiance => plan.bands.count(),
+        LayerSpec::Radiance | LayerSpec::Variance => plan.bands.count(),
         _ => layer.row().channels.len(),
     };
     planes as u64 * bytes_of_plane(layer, plan.precision)

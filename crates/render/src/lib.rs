@@ -13,6 +13,7 @@
 //! | [`report`] | what a render did and what it cost |
 //! | [`Watch`] | who is told how far a render is, and may stop it |
 
+mod adaptive;
 mod checkpoint;
 pub mod expose;
 mod film;
@@ -24,6 +25,7 @@ mod lighting;
 mod names;
 mod other_frame;
 pub mod output;
+mod passes;
 pub mod plan;
 mod precision;
 mod radiance;
@@ -31,9 +33,11 @@ pub mod render;
 pub mod report;
 mod samples;
 mod shard;
+mod stopping;
 mod tiles;
 mod watch;
 
+pub use adaptive::SampleCounts;
 pub use checkpoint::Checkpoint;
 pub use film::{NoMemory, Precision};
 pub use film_file::{FilmError, FilmFile, FilmHeader, Identity};
@@ -46,4 +50,5 @@ pub use render::{
 };
 pub use report::{Report, Seconds};
 pub use shard::Shard;
+pub use stopping::Stopping;
 pub use watch::{SoFar, Watch};

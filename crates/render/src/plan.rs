@@ -21,6 +21,7 @@ use crate::forecast::forecast;
 use crate::output::Outputs;
 use crate::precision::light_precision;
 use crate::samples::{self, BYTES_OF_SUM};
+use crate::stopping::{Stopping, judged_passes};
 
 /// What of the models has to be read for `layers`: decided before they are opened.
 #[must_use]
@@ -62,8 +63,12 @@ pub struct Plan {
     pub images: Option<TextureScope>,
     /// Whether images are averaged over the footprint of a sample.
     pub footprint: bool,
-    /// Rays a pixel for coloured layers.
+    /// Samples a pixel for coloured layers, at most.
     pub samples: u32,
+    /// When they are enough.
+    pub stopping: Stopping,
+    /// Why that is not what the scene asks for, where it is not.
+    pub stopping_note: Option<String>,
     /// Which of these are taken of every pixel before the next are taken of any. The picture does
     /// not depend on it.
     pub passes: Vec<Range<u32>>,
@@ -97,8 +102,16 @@ const RAYS_A_SAMPLE_OF_LIGHT: u64 = 4;
 const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
 
 /// The passes in which the film is filled.
-fn sample_passes(scene: &Scene, passes: Passes, bands: usize) -> Vec<Range<u32>> {
-    let samples = scene.render.samples;
+fn sample_passes(
+    scene: &Scene,
+    passes: Passes,
+    bands: usize,
+    stopping: Stopping,
+) -> Vec<Range<u32>> {
+    let samples = scene.render.samples.most();
+    if stopping.is_adaptive() {
+        return judged_passes(scene.render.samples.least(), samples);
+    }
     let [width, height] = scene.camera.resolution().map(u64::from);
     let colours = if passes.mean {
         3 * scene.layers.iter().filter(|layer| layer.is_averaged()).count()
@@ -122,13 +135,15 @@ impl Plan {
         let layers = scene.layers.clone();
         let needs = needs(&layers);
         let lens = scene.camera.has_pupil();
-        let passes = Passes::of(&layers, scene.render.samples, lens);
+        let spec = scene.render.samples;
+        let (stopping, stopping_note) = Stopping::of(scene);
+        let passes = Passes::of(&layers, spec.most(), lens);
         let [width, height] = scene.camera.resolution();
         let pixels = u64::from(width) * u64::from(height);
-        let samples = scene.render.samples;
+        let samples = spec.most();
         let chosen = expose::bands(scene);
         let apart = scene.camera.band_groups(&chosen.bands).len() as u64;
-        let sampled = |yes| if yes { u64::from(samples) * apart } else { 0 };
+        let sampled = |yes| if yes { u64::from(spec.typical()) * apart } else { 0 };
         let rays = pixels
             * (u64::from(passes.centre)
                 + sampled(passes.mean)
@@ -147,7 +162,9 @@ impl Plan {
             images,
             footprint: images.is_some() && scene.camera.pixel_extent().is_some(),
             samples,
-            passes: sample_passes(scene, passes, chosen.bands.count()),
+            stopping,
+            stopping_note,
+            passes: sample_passes(scene, passes, chosen.bands.count(), stopping),
             pupil: lens && (passes.mean || passes.light),
             rays,
             quality,
@@ -222,6 +239,11 @@ impl Plan {
         };
         let on = |yes| if yes { "on" } else { "off" };
         decide("rays", &self.rays.to_string(), self.ray_words(passes));
+        if passes.mean || passes.light {
+            let note = self.stopping_note.as_ref();
+            let (choice, because) = self.stopping.words(scene.render.samples, note);
+            decide("samples", &choice, because);
+        }
         if let Some((choice, because)) = self.explain_passes(passes) {
             decide("passes", &choice, because);
         }
@@ -283,6 +305,10 @@ impl Plan {
             return None;
         }
         let because = match &self.passes[..] {
+            [first, ..] if self.stopping.is_adaptive() => format!(
+                "at most: the picture can be seen after {} samples a pixel, and is judged after each",
+                first.end
+            ),
             [first, .., last] => format!(
                 "the picture can be seen after {} samples a pixel, and a stop loses {} at most",
                 first.end,
@@ -374,7 +400,9 @@ impl Passes {
     fn of(layers: &[LayerSpec], samples: u32, lens: bool) -> Self {
         let averaged = samples > 1 || lens;
         let light = layers.contains(&LayerSpec::Radiance);
-        let mut seen = layers.iter().filter(|layer| **layer != LayerSpec::Radiance);
+        let is_traced = |layer: &LayerSpec| !layer.is_of_sampling();
+        let seen = layers.iter().filter(|layer| **layer != LayerSpec::Radiance);
+        let mut seen = seen.filter(|layer| is_traced(layer));
         let mean = averaged && seen.clone().any(|layer| layer.is_averaged());
         let centre = seen.any(|layer| !averaged || !layer.is_averaged());
         Self { centre, mean, light }

@@ -7,7 +7,7 @@ use etendue_accel::{Accel, BuildError, BuildOptions};
 use etendue_camera::{Camera, PixelExtent};
 use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
-use etendue_scene::file::{AccelName, LightRow};
+use etendue_scene::file::{AccelName, LightRow, SETS};
 use etendue_spectrum::Bands;
 use etendue_tracer::layer::OtherFrame;
 use etendue_tracer::texture::ImageError;
@@ -16,15 +16,18 @@ use etendue_tracer::{
     SceneView, Spectral, Traits, View,
 };
 
+use crate::adaptive::{Rule, SampleCounts};
 use crate::checkpoint::{Checkpoint, Keeper};
 use crate::film::{FilmLayer, NoMemory};
 use crate::film_file::{FilmError, Identity};
 use crate::images::Images;
 use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, Picture, PictureError};
+use crate::passes::Passed;
 use crate::radiance::LightPass;
 use crate::samples::{Sampling, short_passes};
 use crate::shard::Shard;
+use crate::stopping::Stopping;
 use crate::tiles::{Done, Job, RayCounts};
 use crate::watch::{Stopped, Watch, Watcher};
 use crate::{Plan, expose, lighting, names};
@@ -78,6 +81,18 @@ pub enum RenderError {
     /// The environment is no image that can be read, or an image of the scene is too large.
     #[error(transparent)]
     Image(#[from] ImageError),
+    /// What there is of samples that go on until an error is reached is not kept on the way.
+    #[error(
+        "--checkpoint: samples that go on until an error is reached are not kept on the way; give \
+         `render.samples` a number, or divide the render by --shard"
+    )]
+    Checkpoint,
+    /// A time ends differently on each machine, so that parts of a picture do not fit together.
+    #[error(
+        "--shard, --checkpoint: a time (`render.samples.time`) ends at another number of samples in each \
+         part; give `render.samples` a number"
+    )]
+    Timed,
     /// A file of what is filled of a film cannot be used.
     #[error(transparent)]
     Film(#[from] FilmError),
@@ -100,9 +115,13 @@ impl From<Stopped> for RenderError {
 pub struct Rendered {
     /// The layers.
     pub picture: Picture,
-    /// Samples that every pixel of the picture has. Fewer than were asked for when it was stopped:
-    /// then the picture's header says so, by the entry `partial`.
+    /// Samples that every pixel of the picture has.
     pub samples: u32,
+    /// Samples that every pixel was to have: more than it has when the render was stopped. Then the
+    /// picture's header says so, by the entry `partial`.
+    pub samples_wanted: u32,
+    /// How many samples the pixels have, where they got them until an error was reached.
+    pub sample_counts: Option<SampleCounts>,
     /// The light of the picture in bands other than red, green and blue, where it was traced so.
     pub band_film: Option<expose::BandFilm>,
     /// Rays traced, to lights included.
@@ -203,7 +222,7 @@ pub struct Film {
     pub(crate) resolution: [u32; 2],
     pub(crate) shard: Shard,
     pub(crate) counts: RayCounts,
-    pub(crate) samples: u32,
+    pub(crate) passed: Passed,
     pub(crate) trace_time: Duration,
     pub(crate) notes: Vec<String>,
     /// The camera as it was opened for it.
@@ -246,6 +265,13 @@ pub fn trace(
     course: &Course,
     watch: &dyn Watch,
 ) -> Result<Film, RenderError> {
+    match (plan.stopping, course.checkpoint.is_some(), course.shard.is_some()) {
+        (Stopping::Time(_), true, _) | (Stopping::Time(_), _, true) => {
+            return Err(RenderError::Timed);
+        }
+        (stopping, true, _) if stopping.is_adaptive() => return Err(RenderError::Checkpoint),
+        _ => {}
+    }
     let resolution = scene.camera.resolution();
     let mut layers = empty_film(scene, plan)?;
     let start = Instant::now();
@@ -255,7 +281,7 @@ pub fn trace(
     };
     let camera = open(&Bands::Rgb)?;
     let light_camera = if plan.bands == Bands::Rgb { camera.clone() } else { open(&plan.bands)? };
-    let surroundings = surroundings(scene, images, plan.samples);
+    let surroundings = surroundings(scene, images, scene.render.samples.typical());
     let spectral = Spectral::new(&plan.bands);
     let mut notes = Vec::new();
     let lit = match scene.tracer.and_then(|tracer| tracer.row().light) {
@@ -294,6 +320,7 @@ pub fn trace(
         _ => plan.passes.clone(),
     };
     let others: Vec<&dyn OtherFrame> = others.iter().map(|other| other as _).collect();
+    let rule = Rule::of(scene, plan);
     let job = Job {
         accel,
         others: &others,
@@ -306,19 +333,23 @@ pub fn trace(
             sampler: scene.render.sampler,
             seed: scene.render.seed,
             shard,
+            sets: if rule.is_some() { SETS } else { 1 },
         },
+        rule,
+        time: plan.stopping.time(),
+        judged: scene.picture,
         passes: &passes,
         light,
         picture: &so_far,
         keeper: checkpoint.map(|file| Keeper::new(file, &course.identity, shard, resolution)),
     };
     let watcher = Watcher::new(watch, job.rays(&layers));
-    let Done { traffic: counts, samples } = job.run(&mut layers, &watcher)?;
+    let Done { traffic: counts, passed } = job.run(&mut layers, &watcher)?;
     notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
     let trace_time = start.elapsed();
     drop(job);
     let camera = Some(camera);
-    Ok(Film { layers, resolution, shard, counts, samples, trace_time, notes, camera })
+    Ok(Film { layers, resolution, shard, counts, passed, trace_time, notes, camera })
 }
 
 pub(crate) fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, NoMemory> {
@@ -330,10 +361,10 @@ pub(crate) fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, N
 }
 
 impl Film {
-    /// Samples that every pixel of it has.
+    /// Whether it has all samples that were wanted: a film of a render that was stopped has not.
     #[must_use]
-    pub fn samples(&self) -> u32 {
-        self.samples
+    pub fn is_complete(&self) -> bool {
+        self.passed.is_complete
     }
 
     /// What a user should know of it.
@@ -355,14 +386,19 @@ pub fn finish(
     header: Vec<(String, String)>,
     accel: Option<&dyn Accel>,
 ) -> Result<Rendered, RenderError> {
-    let Film { layers, counts, samples, trace_time, mut notes, camera, .. } = film;
+    let Film { layers, counts, passed, trace_time, mut notes, camera, .. } = film;
+    let Passed { samples, is_complete, counts: sample_counts } = passed;
+    let samples_wanted = if is_complete { samples } else { plan.samples };
     let RayCounts { chief_rays, light, fates } = counts;
     if let (true, 0, Some(element)) =
         (fates.total() > 0, fates.exited, fates.farthest_from_sensor())
     {
         return Err(RenderError::Dark { element, losses: fates.losses() });
     }
-    let header = marked(header, samples, plan.samples);
+    notes.extend(plan.stopping_note.clone());
+    notes.extend(sample_counts.filter(|_| is_complete).and_then(|counts| counts.note()));
+    let words = sample_counts.map_or_else(|| samples.to_string(), |counts| counts.words());
+    let header = marked(header, words, [samples, samples_wanted]);
     let (picture, band_film) = finished(scene, plan, layers, header)?;
     if let (Some(camera), Some(accel)) = (&camera, accel)
         && scene.picture == Some(LayerSpec::Radiance)
@@ -371,7 +407,18 @@ pub fn finish(
     }
     notes.extend(names::notes(&picture));
     let rays = chief_rays + light.rays + light.shadow_rays;
-    Ok(Rendered { picture, samples, band_film, rays, light, fates, trace_time, notes })
+    Ok(Rendered {
+        picture,
+        samples,
+        samples_wanted,
+        sample_counts,
+        band_film,
+        rays,
+        light,
+        fates,
+        trace_time,
+        notes,
+    })
 }
 
 /// What the film holds as a picture, and its light in bands of its own.
@@ -399,9 +446,13 @@ fn finished(
     Ok((picture.developed(development), band_film))
 }
 
-/// `header` with the number of samples that every pixel has, of those asked for.
-fn marked(mut header: Vec<(String, String)>, samples: u32, of: u32) -> Vec<(String, String)> {
-    header.push(("samples".to_owned(), samples.to_string()));
+/// `header` with the `words` for how many samples the pixels have; all have `samples`, of those asked for.
+fn marked(
+    mut header: Vec<(String, String)>,
+    words: String,
+    [samples, of]: [u32; 2],
+) -> Vec<(String, String)> {
+    header.push(("samples".to_owned(), words));
     if samples < of {
         let words = format!("stopped after {samples} of {of} samples a pixel");
         header.push(("partial".to_owned(), words));
@@ -427,7 +478,7 @@ fn so_far(
         }
         None => Vec::new(),
     };
-    let header = marked(header.to_vec(), samples, plan.samples);
+    let header = marked(header.to_vec(), samples.to_string(), [samples, plan.samples]);
     let picture = Picture::new(width, height, layers, header)?;
     let development = Development::new(&scene.render, &picture);
     Ok(picture.developed(development))

@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::SampleCounts;
+
 /// Wall time of each stage (s).
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Seconds {
@@ -60,6 +62,9 @@ pub struct Report {
     pub samples: u32,
     /// Samples a pixel that were asked for: more than it has when the render was stopped.
     pub samples_wanted: u32,
+    /// How many samples the pixels have, where they got them until an error was reached.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample_counts: Option<SampleCounts>,
     /// Wall time of each stage (s).
     pub seconds: Seconds,
     /// Rays traced.

@@ -18,6 +18,7 @@ use etendue_tracer::Scratch;
 use etendue_tracer::layer::{Columns, Taken};
 use rayon::prelude::*;
 
+use crate::adaptive::Blocks;
 use crate::film::{FilmLayer, NoMemory, Rows, Strip, filled, strips, take};
 use crate::radiance::Numbers;
 use crate::shard::Shard;
@@ -77,6 +78,24 @@ pub(crate) struct Sampling {
     pub(crate) seed: u64,
     /// The share of the pixels that is rendered.
     pub(crate) shard: Shard,
+    /// Independent sets that the samples of a pixel are of, in turn.
+    pub(crate) sets: u32,
+}
+
+impl Sampling {
+    /// What sample `index` of a pixel is sampled by, and its index there.
+    fn of(&self, column: u32, row: u32, index: u32) -> (PixelSamples, u32) {
+        let Self { samples, sampler, seed, sets, .. } = *self;
+        #[expect(clippy::cast_possible_truncation, reason = "below the few sets that there are")]
+        let set = (index % sets) as u16;
+        let pixel = sampler.pixel_in_set(seed, [column, row], set, samples.div_ceil(sets));
+        (pixel, index / sets)
+    }
+
+    /// Sums that are kept of a value between passes: those of all sets, and what is settled.
+    pub(crate) fn slots(&self) -> usize {
+        if self.sets > 1 { self.sets as usize + 1 } else { 1 }
+    }
 }
 
 /// What is averaged over the samples of a pixel: colours of surfaces, or light.
@@ -105,7 +124,7 @@ pub(crate) struct Memory {
     pub(crate) scratch: Scratch,
     pub(crate) traffic: RayCounts,
     film: FilmSamples,
-    /// `[pixel of the tile][layer][band]`.
+    /// `[pixel of the tile][slot][layer][band]`.
     sums: Vec<Sum>,
     order: Vec<u32>,
 }
@@ -138,18 +157,18 @@ impl Sum {
         Self { sum, lost }
     }
 
-    fn total(self) -> f64 {
+    pub(crate) fn total(self) -> f64 {
         self.sum + self.lost
     }
 }
 
 /// Layers on their way: what is averaged, and the sums between passes.
 pub(crate) struct Averaging<'a> {
-    what: &'a dyn Averaged,
-    sampling: Sampling,
-    layers: Vec<&'a mut FilmLayer>,
-    /// `[pixel][layer][band]`; empty when there is one pass alone.
-    sums: Vec<Sum>,
+    pub(crate) what: &'a dyn Averaged,
+    pub(crate) sampling: Sampling,
+    pub(crate) layers: Vec<&'a mut FilmLayer>,
+    /// `[pixel][slot][layer][band]`; empty when there is one pass alone.
+    pub(crate) sums: Vec<Sum>,
     /// Threads' memory between strips and passes: made anew each time, its pages are, too.
     spare: Mutex<Vec<Memory>>,
 }
@@ -163,29 +182,32 @@ impl<'a> Averaging<'a> {
     ) -> Result<Self, NoMemory> {
         let [width, height] = what.camera().resolution().map(|side| side as usize);
         let [count, bands] = what.shape();
-        let kept = if passes > 1 { width * height * count * bands } else { 0 };
+        let values = width * height * count * bands * sampling.slots();
+        let kept = if passes > 1 || sampling.sets > 1 { values } else { 0 };
         let sums = filled(Sum::default(), kept)?;
         Ok(Self { what, sampling, layers, sums, spare: Mutex::default() })
     }
 
-    /// Adds the samples `pass` of every pixel. Of several passes the layers see nothing until
-    /// [`Self::show`]; a single one fills them.
+    /// Adds the samples `pass` of every pixel, or of those of `blocks` that want more. Of several passes
+    /// the layers see nothing until [`Self::show`]; a single one fills them.
     pub(crate) fn add(
         &mut self,
         pass: &Range<u32>,
+        blocks: Option<&Blocks>,
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
+        let slots = self.sampling.slots();
         let Self { what, sampling, layers, sums, spare } = self;
         let spare = &*spare;
         let resolution = what.camera().resolution();
-        let kept = split(sums, *what, resolution);
+        let kept = split(sums, *what, slots, resolution);
         let strips = strips(layers, resolution, TILE);
         strips.par_iter().zip(&kept).enumerate().try_for_each(|(k, (strip, kept))| {
             let Some(mut strip) = take(strip).filter(|_| sampling.shard.owns(k)) else {
                 return Ok(());
             };
-            let adding = Adding { what: *what, sampling: *sampling, pass, watcher };
+            let adding = Adding { what: *what, sampling: *sampling, pass, blocks, watcher };
             let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
             let mut memory = spare().pop().unwrap_or_default();
             let done = adding.fill(&mut strip, take(kept), &mut memory);
@@ -219,7 +241,7 @@ impl<'a> Averaging<'a> {
         }
         let resolution = what.camera().resolution();
         let [count, bands] = what.shape();
-        let kept = split(sums, *what, resolution);
+        let kept = split(sums, *what, 1, resolution);
         strips(layers, resolution, TILE).par_iter().zip(&kept).for_each(|(strip, kept)| {
             let (Some(mut strip), Some(sums)) = (take(strip), take(kept)) else { return };
             for (index, sums) in sums.chunks(count * bands).enumerate() {
@@ -232,21 +254,22 @@ impl<'a> Averaging<'a> {
 type Shared<T> = Mutex<Option<T>>;
 
 /// The sums of each strip; of nothing when none are kept.
-fn split<'s>(
+pub(crate) fn split<'s>(
     sums: &'s mut [Sum],
     what: &dyn Averaged,
+    slots: usize,
     [width, height]: [u32; 2],
 ) -> Vec<Shared<&'s mut [Sum]>> {
     let [count, bands] = what.shape();
     if sums.is_empty() {
         return (0..height.div_ceil(TILE)).map(|_| Mutex::new(None)).collect();
     }
-    let a_band = width as usize * TILE as usize * count * bands;
-    sums.chunks_mut(a_band.max(1)).map(|sums| Mutex::new(Some(sums))).collect()
+    let a_strip = width as usize * TILE as usize * count * bands * slots;
+    sums.chunks_mut(a_strip.max(1)).map(|sums| Mutex::new(Some(sums))).collect()
 }
 
 /// Writes the means of a pixel of a strip.
-fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usize, samples: u32) {
+pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usize, samples: u32) {
     for (layer, sums) in strip.layers.iter_mut().zip(sums.chunks(bands)) {
         if let (Taken::PictureShare, &[part, all, _]) = (layer.taken, sums) {
             let (part, all) = (part.total(), all.total());
@@ -265,6 +288,7 @@ struct Adding<'a> {
     what: &'a dyn Averaged,
     sampling: Sampling,
     pass: &'a Range<u32>,
+    blocks: Option<&'a Blocks>,
     watcher: &'a Watcher<'a>,
 }
 
@@ -278,9 +302,12 @@ impl Adding<'_> {
     ) -> Result<(), Stopped> {
         let [width, _] = self.what.camera().resolution();
         let [layers, bands] = self.what.shape();
-        let count = layers * bands;
+        let count = layers * bands * self.sampling.slots();
         for tile in Tile::across(width, strip) {
-            let pixels: Vec<(u32, u32)> = tile.pixels().collect();
+            let wants = |&(x, y): &(u32, u32)| {
+                self.blocks.is_none_or(|blocks| blocks.wants([tile.left + x, tile.top + y]))
+            };
+            let pixels: Vec<(u32, u32)> = tile.pixels().filter(wants).collect();
             let places = pixels.iter().map(|&(x, y)| tile.index(x, y, width));
             memory.sums.clear();
             match &kept {
@@ -301,20 +328,26 @@ impl Adding<'_> {
     }
 
     fn tile(&self, tile: Tile, pixels: &[(u32, u32)], memory: &mut Memory) -> Result<(), Stopped> {
-        let [layers, bands] = self.what.shape();
+        let shape @ [layers, bands] = self.what.shape();
+        let (sets, slots) = (self.sampling.sets, self.sampling.slots());
         let at_once = (self.pass.end - self.pass.start).clamp(1, self.what.batch());
         let pixels_at_once = (self.what.batch() / at_once) as usize;
         for (k, pixels) in pixels.chunks(pixels_at_once).enumerate() {
-            let start = k * pixels_at_once * layers * bands;
+            let start = k * pixels_at_once * layers * bands * slots;
             for first in self.pass.clone().step_by(at_once as usize) {
                 let range = first..self.pass.end.min(first + at_once);
                 let a_pixel = range.len();
+                // The slot of each sample of the batch: the pixel's sum, or that of its set.
+                let slot = |sample: u32| {
+                    let (pixel, index) = (sample as usize / a_pixel, sample % a_pixel as u32);
+                    pixel * slots + ((first + index) % sets) as usize
+                };
                 self.place(tile, (pixels, range), memory);
                 for (number, group) in self.what.groups().iter().enumerate() {
                     memory.film.group = number;
                     self.what.camera().sample_rays(&memory.film, &mut memory.rays);
                     self.what.trace(&group.bands, memory);
-                    memory.add(start, a_pixel, [layers, bands], &group.bands);
+                    memory.add(start, slot, shape, &group.bands);
                 }
                 self.watcher.did(pixels.len() as u64 * a_pixel as u64)?;
             }
@@ -325,13 +358,12 @@ impl Adding<'_> {
     /// Refills the batch with samples `range` of each of `pixels`, those of one pixel side by side.
     /// A camera without a lens looks at places alone.
     fn place(&self, tile: Tile, (pixels, range): (&[(u32, u32)], Range<u32>), memory: &mut Memory) {
-        let Sampling { samples, sampler, seed, .. } = self.sampling;
         let Memory { numbers, film, .. } = memory;
         let numbers: &mut Vec<(PixelSamples, u32)> = &mut numbers.samples;
         numbers.clear();
         for &(x, y) in pixels {
-            let pixel = sampler.pixel(seed, tile.left + x, tile.top + y, samples);
-            numbers.extend(range.clone().map(|index| (pixel, index)));
+            let of = |index| self.sampling.of(tile.left + x, tile.top + y, index);
+            numbers.extend(range.clone().map(of));
         }
         let count = numbers.len();
         let draw = |pair, out: &mut Vec<_>| squares_of_pair(numbers.iter().copied(), pair, out);
@@ -362,14 +394,14 @@ impl Memory {
     fn add(
         &mut self,
         start: usize,
-        a_pixel: usize,
+        slot: impl Fn(u32) -> usize,
         [layers, bands]: [usize; 2],
         group: &Range<usize>,
     ) {
         let Self { rays: CameraRays { sample, weight, .. }, values, sums, order, .. } = self;
         let count = layers * bands;
         let mut add = |ray: usize| {
-            let at = start + sample[ray] as usize / a_pixel * count;
+            let at = start + slot(sample[ray]) * count;
             let sums = &mut sums[at..at + count];
             let values = &values[ray * count..(ray + 1) * count];
             for first in (0..count).step_by(bands.max(1)) {

@@ -13,8 +13,10 @@ use etendue_scene::Scene;
 use serde::{Deserialize, Serialize};
 
 use crate::Plan;
+use crate::adaptive::SampleCounts;
 use crate::film_file::{FilmFile, Identity, Writing};
 use crate::output::OutputError;
+use crate::passes::Passed;
 use crate::render::{Film, RenderError, empty_film};
 use crate::tiles::{RayCounts, TILE};
 
@@ -104,7 +106,8 @@ impl Film {
             identity,
             origin,
             shard: self.shard,
-            samples: self.samples,
+            samples: self.passed.samples,
+            sample_counts: self.passed.counts,
             counts: &self.counts,
             trace_time: self.trace_time,
             resolution: self.resolution,
@@ -132,12 +135,16 @@ impl Film {
             RayCounts::add(&counts, share.counts(), &FateCounts::default());
         }
         let counts = counts.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let of_pixels = shares.iter().filter_map(|share| share.header.sample_counts);
+        let of_pixels = of_pixels.reduce(SampleCounts::and);
+        let samples = of_pixels.map_or(plan.samples, |counts| counts.least);
+        let passed = Passed { samples, is_complete: true, counts: of_pixels };
         Ok(Self {
             layers,
             resolution,
             shard: Shard::ALL,
             counts,
-            samples: plan.samples,
+            passed,
             trace_time: shares.iter().map(FilmFile::trace_time).sum(),
             notes: Vec::new(),
             camera: None,

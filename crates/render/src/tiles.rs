@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use etendue_accel::Accel;
 use etendue_camera::{BandGroup, Camera, CameraRays};
@@ -11,13 +12,15 @@ use etendue_tracer::layer::{Columns, OtherFrame, Seen};
 use etendue_tracer::{LayerSpec, RayStats, SceneView, Traced};
 use rayon::prelude::*;
 
+use crate::adaptive::Rule;
 use crate::checkpoint::Keeper;
 use crate::film::{FilmLayer, Strip, strips, take};
 use crate::output::{Picture, PictureError};
+use crate::passes::{Beside, Passed};
 use crate::radiance::LightPass;
 use crate::render::RenderError;
 use crate::samples::{Averaged, Averaging, Memory, Sampling};
-use crate::watch::{SoFar, Stopped, Watcher};
+use crate::watch::{Stopped, Watcher};
 
 /// Side of a tile (pixels): its rays are one batch.
 pub(crate) const TILE: u32 = 16;
@@ -46,6 +49,12 @@ pub(crate) struct Job<'a> {
     pub(crate) light: Option<LightPass<'a>>,
     /// The picture as it is on the film.
     pub(crate) picture: &'a ToPicture<'a>,
+    /// What samples are to reach, where pixels get different numbers of them.
+    pub(crate) rule: Option<Rule>,
+    /// How long samples are taken.
+    pub(crate) time: Option<Duration>,
+    /// Which layer is the picture, by whose error samples are judged.
+    pub(crate) judged: Option<LayerSpec>,
     /// Who keeps it on disk.
     pub(crate) keeper: Option<Keeper<'a>>,
 }
@@ -76,8 +85,7 @@ impl RayCounts {
 #[derive(Debug)]
 pub(crate) struct Done {
     pub(crate) traffic: RayCounts,
-    /// Samples that every pixel has.
-    pub(crate) samples: u32,
+    pub(crate) passed: Passed,
 }
 
 impl Job<'_> {
@@ -89,8 +97,10 @@ impl Job<'_> {
         watcher: &Watcher<'_>,
     ) -> Result<Done, RenderError> {
         let traffic = Mutex::new(RayCounts::default());
+        let (mut told, film): (Vec<_>, Vec<_>) =
+            film.iter_mut().partition(|layer| layer.spec.is_of_sampling());
         let (lit, seen): (Vec<_>, Vec<_>) =
-            film.iter_mut().partition(|layer| layer.spec == LayerSpec::Radiance);
+            film.into_iter().partition(|layer| layer.spec == LayerSpec::Radiance);
         let (mut mean, mut centre): (Vec<_>, Vec<_>) =
             seen.into_iter().partition(|layer| self.is_averaged(layer.spec));
         let colors = Colors { job: self, layers: mean.iter().map(|layer| layer.spec).collect() };
@@ -113,17 +123,20 @@ impl Job<'_> {
             }
             None => self.centres(&mut centre, watcher, &traffic)?,
         }
-        let samples = self.passes(done, &mut averaged, &centre, watcher, &traffic)?;
+        let beside = Beside { centres: &centre, told: &mut told };
+        let passed = self.passes(done, &mut averaged, beside, watcher, &traffic)?;
         let traffic = traffic.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Ok(Done { traffic, samples })
+        Ok(Done { traffic, passed })
     }
 
     /// The rays of the camera that filling `film` takes.
     pub(crate) fn rays(&self, film: &[FilmLayer]) -> u64 {
+        let film = film.iter().filter(|layer| !layer.spec.is_of_sampling());
         let is_lit = |layer: &FilmLayer| layer.spec == LayerSpec::Radiance;
         let is_mean = |layer: &FilmLayer| !is_lit(layer) && self.is_averaged(layer.spec);
-        let sampled = usize::from(film.iter().any(is_lit)) + usize::from(film.iter().any(is_mean));
-        let chief = film.iter().any(|layer| !is_lit(layer) && !is_mean(layer));
+        let any = |what: &dyn Fn(&FilmLayer) -> bool| film.clone().any(what);
+        let sampled = usize::from(any(&is_lit)) + usize::from(any(&is_mean));
+        let chief = any(&|layer| !is_lit(layer) && !is_mean(layer));
         self.camera_rays(self.sampling.samples, sampled, chief)
     }
 
@@ -139,47 +152,6 @@ impl Job<'_> {
         let many = self.sampling.samples > 1 || self.camera.has_pupil();
         let lit = self.light.is_some() && layer.row().taken.with_picture();
         layer.is_averaged() && (many || lit)
-    }
-
-    /// Takes the passes after the first `samples` samples and returns the samples that every pixel has
-    /// after the last that was completed.
-    fn passes(
-        &self,
-        mut samples: u32,
-        averaged: &mut [Averaging<'_>],
-        centres: &[&mut FilmLayer],
-        watcher: &Watcher<'_>,
-        traffic: &Mutex<RayCounts>,
-    ) -> Result<u32, Stopped> {
-        let all = self.sampling.samples;
-        if averaged.is_empty() {
-            return Ok(all);
-        }
-        for pass in
-            self.passes.iter().filter(|pass| pass.end > samples).cloned().collect::<Vec<_>>()
-        {
-            let done = averaged.iter_mut().try_for_each(|part| part.add(&pass, watcher, traffic));
-            if let Err(stopped) = done {
-                return if samples > 0 { Ok(samples) } else { Err(stopped) };
-            }
-            samples = pass.end;
-            averaged.iter_mut().for_each(|part| part.show(samples));
-            if samples < all {
-                let layers: Vec<&FilmLayer> = averaged.iter().flat_map(Averaging::layers).collect();
-                let picture = || (self.picture)(&layers, samples);
-                watcher.watch().look(&SoFar {
-                    samples: [samples, all],
-                    share: watcher.share(),
-                    picture: &picture,
-                });
-                if let Some(keeper) = &self.keeper {
-                    let centres: Vec<&FilmLayer> = centres.iter().map(|layer| &**layer).collect();
-                    let counts = traffic.lock().unwrap_or_else(PoisonError::into_inner).clone();
-                    keeper.keep(samples, &centres, averaged, &counts);
-                }
-            }
-        }
-        Ok(samples)
     }
 
     /// Fills layers along the chief ray of each pixel.

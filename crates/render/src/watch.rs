@@ -50,14 +50,19 @@ pub(crate) struct Stopped;
 pub(crate) struct Watcher<'a> {
     watch: &'a dyn Watch,
     done: AtomicU64,
-    total: u64,
+    total: AtomicU64,
     stopped: AtomicBool,
 }
 
 impl<'a> Watcher<'a> {
     /// Of work that has `total` rays of the camera.
     pub(crate) fn new(watch: &'a dyn Watch, total: u64) -> Self {
-        Self { watch, done: AtomicU64::new(0), total, stopped: AtomicBool::new(false) }
+        Self {
+            watch,
+            done: AtomicU64::new(0),
+            total: AtomicU64::new(total),
+            stopped: AtomicBool::new(false),
+        }
     }
 
     /// Counts `rays` more.
@@ -74,7 +79,20 @@ impl<'a> Watcher<'a> {
     }
 
     pub(crate) fn share(&self) -> f64 {
-        self.done.load(Ordering::Relaxed) as f64 / self.total.max(1) as f64
+        let (done, total) = (&self.done, &self.total);
+        done.load(Ordering::Relaxed) as f64 / total.load(Ordering::Relaxed).max(1) as f64
+    }
+
+    /// Corrects the work by what is still to come of it, as a multiple of what is done.
+    pub(crate) fn expect_more(&self, multiple: f64) {
+        let done = self.done.load(Ordering::Relaxed) as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a forecast")]
+        self.expect((done * multiple.clamp(0.0, 1e9)) as u64);
+    }
+
+    /// Corrects the work by what is still `to_come` of it, in rays of the camera.
+    pub(crate) fn expect(&self, to_come: u64) {
+        self.total.store(self.done.load(Ordering::Relaxed) + to_come, Ordering::Relaxed);
     }
 
     pub(crate) fn watch(&self) -> &'a dyn Watch {

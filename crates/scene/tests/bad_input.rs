@@ -185,6 +185,42 @@ fn wrong_types_say_what_is_expected() {
 }
 
 #[test]
+fn samples_that_would_never_stop_or_are_none_are_refused_by_path() {
+    let noise = |more: &str| format!(r#"{{"samples": {{"until": "sensor-noise"{more}}}}}"#);
+    let cases = [
+        (noise(r#", "fraction": 0"#), "render.samples.fraction: sampling would never stop"),
+        (noise(r#", "fraction": -0.5"#), "render.samples.fraction: -0.5 is below the least, 0"),
+        (noise(r#", "fraction": 1.5"#), "render.samples.fraction: 1.5 is above the most, 1"),
+        (
+            noise(r#", "min": 64, "max": 16"#),
+            "render.samples.min: at least 64 samples and at most 16",
+        ),
+        (noise(r#", "max": 8"#), "render.samples.max: at least 16 samples and at most 8"),
+        (noise(r#", "min": 0"#), "render.samples.min: 0 is below the least, 1"),
+        (noise(r#", "frac": 1"#), "render.samples.frac: unknown key; known: `fraction`"),
+        (noise(r#"}, "sampler": {"a": 1"#), "render.sampler"),
+        (r#"{"samples": {"until": "noise"}}"#.to_owned(), "render.samples.until: \"noise\" is not"),
+        (r#"{"samples": {"relative_error": 0}}"#.to_owned(), "would never stop"),
+        (r#"{"samples": {"time": "0 s"}}"#.to_owned(), "no samples are taken in no time"),
+        (r#"{"samples": {"time": "10 m"}}"#.to_owned(), "unknown unit `m`"),
+        (
+            r#"{"samples": {"relative_error": 0.1}, "sampler": "stratified"}"#.to_owned(),
+            "render.sampler: has to be told the number of samples beforehand",
+        ),
+    ];
+    for (render, part) in cases {
+        assert_says(&format!(r#"{{"etendue": 1, "render": {render}}}"#), &[part]);
+    }
+    for samples in ["64", r#"{"time": 1}"#] {
+        let render =
+            format!(r#""layers": ["depth", "variance"], "render": {{"samples": {samples}}}"#);
+        let part =
+            "layers: the layer `variance` is of samples that go on until an error is reached";
+        assert_says(&format!(r#"{{"etendue": 1, {render}}}"#), &[part]);
+    }
+}
+
+#[test]
 fn impossible_cameras_are_refused_by_path() {
     let cases = [
         (

@@ -41,6 +41,7 @@
 //! | [`bands`] | the fewest spectral bands that count electrons right |
 //! | [`film`] | what a sensor is given and gives back |
 //! | [`sensor`] | a sensor ready to expose, and pictures of what it saw |
+//! | [`noise_floor`] | what a sensor's own noise hides |
 //! | [`demosaic`] | missing colours |
 //! | [`dng`] | raw files |
 //! | [`emva`] | the image series of a characterisation |
@@ -58,6 +59,7 @@ pub mod emva;
 mod error;
 mod even_light;
 pub mod film;
+pub mod noise_floor;
 mod normal;
 mod philox;
 pub mod photon_transfer;
@@ -75,6 +77,7 @@ pub use bands::{BandChoice, Illumination};
 pub use cfa::CfaSpec;
 pub use error::SensorError;
 pub use film::{Exposure, Film, InvalidValues, Moments, RawImage};
+pub use noise_floor::NoiseFloor;
 pub use philox::mixed_seed;
 pub use preset::{Model, Preset};
 pub use sensor::Sensor;

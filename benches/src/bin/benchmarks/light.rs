@@ -29,7 +29,7 @@ pub(crate) fn print_bound(path: &Path, triangles: u64, light: DVec3) -> anyhow::
     let file = SceneFile::read(path, &[])?;
     let scene = file.load(Wanted::NOTHING, &LoadOptions::default())?;
     let camera = scene.camera.opened(&Bands::Rgb).context("the camera")?;
-    let primary = camera_rays(&camera, scene.render.samples, &scene.render);
+    let primary = camera_rays(&camera, scene.render.samples.most(), &scene.render);
     let geometry = meshes::blob(triangles)?;
     let accel = Embree::build(geometry.clone(), &BuildOptions::default())?;
     let shadow = rays_to(light, &accel, &primary);

@@ -76,12 +76,11 @@ impl BandFilm {
     /// (W·m⁻²·nm⁻¹) of it. Cameras without an aperture give irradiance as it is.
     #[must_use]
     pub(super) fn on_sensor(mut self, scene: &Scene, sensor: &Sensor) -> Self {
-        if let (Radiometry::Physical, Some(angle)) =
-            (sensor.radiometry(), scene.camera.pupil_solid_angle())
-        {
+        let factor = light_factor(scene, sensor);
+        if factor != 1.0 {
             #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
-            let angle = angle as f32;
-            self.values.par_iter_mut().for_each(|value| *value *= angle);
+            let factor = factor as f32;
+            self.values.par_iter_mut().for_each(|value| *value *= factor);
         }
         self
     }
@@ -107,6 +106,14 @@ impl BandFilm {
             }
         });
         Ok(Self { bands, values })
+    }
+}
+
+/// What falls on the sensor, of a unit of the picture's light.
+pub(super) fn light_factor(scene: &Scene, sensor: &Sensor) -> f64 {
+    match sensor.radiometry() {
+        Radiometry::Physical => scene.camera.pupil_solid_angle().unwrap_or(1.0),
+        Radiometry::Digital => 1.0,
     }
 }
 

@@ -15,6 +15,7 @@
 mod bands;
 mod files;
 mod film;
+mod noise;
 mod remarks;
 
 use std::path::{Path, PathBuf};
@@ -28,6 +29,7 @@ use etendue_spectrum::Bands;
 pub(crate) use bands::{bands, explain_bands};
 pub use film::BandFilm;
 pub(crate) use film::{SPECTRUM, has_spectrum, spectrum};
+pub(crate) use noise::NoiseOfPixels;
 
 use crate::film::NoMemory;
 use crate::output::{OutputError, Outputs, Picture, PictureError, sidecar};

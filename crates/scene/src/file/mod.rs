@@ -7,6 +7,7 @@ mod lenient;
 mod lens;
 mod object;
 mod overrides;
+mod samples;
 mod schema;
 mod sensor;
 mod settings;
@@ -25,6 +26,7 @@ pub use frames::{CameraPath, FramesSpec, TrajectoryFormat};
 pub use lens::{ReadLens, lens_schema, rays_schema, read_lens, trace_rays};
 pub use object::{AnimationSpec, InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
 pub use overrides::OverrideError;
+pub use samples::{RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until};
 pub use schema::scene_schema;
 pub use sensor::SensorFile;
 pub use settings::{
@@ -148,7 +150,10 @@ impl SceneFile {
             .map_err(|why| written.fault("camera.sensor.resolution", why))?;
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
-        Ok(file)
+        match samples::fault(&file.spec.render, &file.spec.sampling_layers(), &file.value) {
+            Some((path, why)) => Err(file.fault(&path, why)),
+            None => Ok(file),
+        }
     }
 
     /// The scene without its `frames`.

@@ -5,6 +5,8 @@ use etendue_tracer::{LayerSpec, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::SamplesSpec;
+
 /// What the picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
@@ -108,10 +110,10 @@ impl TracerSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RenderSpec {
-    /// Rays a pixel of the picture (at least 1). Layers take the pixel's chief ray alone.
+    /// Samples a pixel of the picture: a number, or what they are to reach. Layers take the pixel's chief
+    /// ray alone.
     #[serde(default = "one")]
-    #[schemars(range(min = 1, max = 1_048_576))]
-    pub samples: u32,
+    pub samples: SamplesSpec,
     /// Where in its pixel a sample lies.
     #[serde(default)]
     pub sampler: Sampler,
@@ -198,15 +200,15 @@ pub enum ToneMap {
     Aces,
 }
 
-fn one() -> u32 {
-    1
+fn one() -> SamplesSpec {
+    SamplesSpec::Count(1)
 }
 
 impl Default for RenderSpec {
     fn default() -> Self {
         let sampler = Sampler::default();
         let (exposure, tone_map) = Default::default();
-        Self { samples: 1, sampler, seed: 0, accel: None, exposure, tone_map, alpha: false }
+        Self { samples: one(), sampler, seed: 0, accel: None, exposure, tone_map, alpha: false }
     }
 }
 

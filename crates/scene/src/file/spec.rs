@@ -80,6 +80,15 @@ impl SceneSpec {
         }
         all
     }
+
+    /// The layers that tell of samples which go on until an error is reached, by name.
+    pub(super) fn sampling_layers(&self) -> Vec<&'static str> {
+        let told = [(LayerSpec::SampleCount, "sample_count"), (LayerSpec::Variance, "variance")];
+        told.iter()
+            .filter(|(layer, _)| self.layers.contains(layer))
+            .map(|(_, name)| *name)
+            .collect()
+    }
 }
 
 /// The number 1: the version of the format that this program reads.

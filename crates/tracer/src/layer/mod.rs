@@ -101,6 +101,8 @@ pub enum Taken {
     /// The sum of the first number over the samples of the picture, as a share of the sum of the
     /// second.
     PictureShare,
+    /// What sampling the picture found out about itself.
+    Sampling,
 }
 
 impl Taken {
@@ -108,7 +110,7 @@ impl Taken {
     #[must_use]
     pub fn with_picture(self) -> bool {
         match self {
-            Self::ChiefRay | Self::Samples => false,
+            Self::ChiefRay | Self::Samples | Self::Sampling => false,
             Self::PictureSamples | Self::PictureShare => true,
         }
     }
@@ -138,7 +140,13 @@ impl LayerSpec {
     /// ray of its centre.
     #[must_use]
     pub fn is_averaged(self) -> bool {
-        self.row().taken != Taken::ChiefRay
+        !matches!(self.row().taken, Taken::ChiefRay | Taken::Sampling)
+    }
+
+    /// Whether the layer tells of the samples of the picture.
+    #[must_use]
+    pub fn is_of_sampling(self) -> bool {
+        self.row().taken == Taken::Sampling
     }
 
     /// The other frame that it compares this one with.

@@ -364,6 +364,33 @@ layers! {
             )],
             ..measured("Alpha", &["A"], Look::Share)
         }, |seen, out| seen.shares(out);
+
+        /// `SampleCount.X`: samples that the pixel got.
+        SampleCount = "sample_count": Layer {
+            kept: Kept::Counted,
+            taken: Taken::Sampling,
+            meaning: vec![
+                ("definition", "samples that the pixel's mean was taken over"),
+                ("unit", "1"),
+            ],
+            ..measured("SampleCount", &["X"], Look::Extent)
+        }, |_seen, _out| {};
+
+        /// `Variance.R G B`: variance of the picture's pixels, by their samples.
+        Variance = "variance": Layer {
+            kept: Kept::Shown,
+            taken: Taken::Sampling,
+            meaning: vec![
+                (
+                    "definition",
+                    "variance of the mean that is the picture's pixel, one channel a spectral band, \
+                     estimated with two degrees of freedom from four independent sets of samples: \
+                     take means over some pixels",
+                ),
+                ("unit", "that of the picture, squared"),
+            ],
+            ..measured("Variance", &["R", "G", "B"], Look::Extent)
+        }, |_seen, _out| {};
     }
     no file names {
         /// `Backdrop.R G B`: the part of the picture's radiance that came past everything. No file

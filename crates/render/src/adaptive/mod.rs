@@ -1,0 +1,302 @@
+//! Samples until an error is reached: which parts of the picture want more.
+//!
+//! The samples of a pixel are of four independent sets, in turn. The first two make one half of the
+//! pixel's mean, the others the other half. After each pass a block of 8 by 8 pixels is judged twice: by
+//! the differences between the two sets of one half, over all of its pixels, and by those of the other.
+//! What is judged by one half decides how many samples the *other* half's mean is taken over. Both are
+//! sampled until both are decided, and the mean of a half is taken over its decided number.
+//!
+//! So a half's samples have no part in deciding their own number, and its mean is without bias whatever
+//! the rule is: the expected value of a mean of N independent samples is theirs if N does not depend on
+//! them. Where the same samples decide and are counted, pixels that happen to be dark and even stop
+//! early, and the picture is too dark (Kirk & Arvo, "Unbiased sampling techniques for image synthesis",
+//! 1991, who propose to throw the deciding samples away; Pharr, Jakob & Humphreys, "Physically Based
+//! Rendering", 4th edition, 2023, section 8.1 on the bias of adaptive sampling). Here each half decides
+//! for the other, and what is thrown away is the difference between two decisions.
+//!
+//! A block goes on as long as it or one of the blocks beside, above and below it has not passed: so
+//! what is hard is found from the blocks around it, too, and numbers of samples change by no seam through
+//! the middle of a thing. Blocks belong to strips of rows, as the shares of a render do, and look no further.
+
+mod halves;
+mod rule;
+
+use rayon::prelude::*;
+
+pub(crate) use rule::{Rule, variance_of_mean};
+
+use crate::film::FilmLayer;
+use crate::samples::Averaging;
+use crate::shard::Shard;
+use crate::tiles::TILE;
+use halves::HALVES;
+
+/// Side of a block (pixels).
+const BLOCK: u32 = 8;
+
+/// Rows of blocks in a strip of rows.
+const ROWS_OF_STRIP: usize = (TILE / BLOCK) as usize;
+
+/// What is known of a block.
+#[derive(Debug, Clone, Copy, Default)]
+struct Block {
+    /// Samples after which a half's number was decided by the block's own other half; 0 before.
+    passed: [u32; HALVES],
+    /// Samples a pixel of which a half's mean is settled; 0 before.
+    settled: [u32; HALVES],
+    /// The error that the two halves last found, as a share of what is allowed.
+    error: [f64; HALVES],
+}
+
+impl Block {
+    fn wants_more(&self) -> bool {
+        self.settled.contains(&0)
+    }
+}
+
+/// The blocks of a picture, in rows from the top.
+#[derive(Debug, Clone)]
+pub(crate) struct Blocks {
+    resolution: [u32; 2],
+    across: usize,
+    blocks: Vec<Block>,
+}
+
+impl Blocks {
+    fn new(resolution: [u32; 2]) -> Self {
+        let [across, down] = resolution.map(|side| side.div_ceil(BLOCK) as usize);
+        Self { resolution, across, blocks: vec![Block::default(); across * down] }
+    }
+
+    /// The block of a pixel.
+    fn of(&self, pixel: [u32; 2]) -> &Block {
+        &self.blocks[self.index(pixel)]
+    }
+
+    /// The number of the block of a pixel.
+    fn index(&self, [x, y]: [u32; 2]) -> usize {
+        (y / BLOCK) as usize * self.across + (x / BLOCK) as usize
+    }
+
+    /// Whether a pixel is to have more samples.
+    pub(crate) fn wants(&self, pixel: [u32; 2]) -> bool {
+        self.of(pixel).wants_more()
+    }
+
+    /// The pixels of a block.
+    fn pixels(&self, index: usize) -> impl Iterator<Item = [u32; 2]> + use<> {
+        let [width, height] = self.resolution;
+        #[expect(clippy::cast_possible_truncation, reason = "a picture's sides have 16 bits")]
+        let (left, top) =
+            ((index % self.across) as u32 * BLOCK, (index / self.across) as u32 * BLOCK);
+        let rows = top..height.min(top + BLOCK);
+        rows.flat_map(move |y| (left..width.min(left + BLOCK)).map(move |x| [x, y]))
+    }
+}
+
+/// How many samples the pixels of a picture got.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct SampleCounts {
+    /// The fewest.
+    pub least: u32,
+    /// The most.
+    pub most: u32,
+    /// Pixels.
+    pub pixels: u64,
+    /// Samples of all of them together.
+    pub total: u64,
+    /// Pixels that were given up at the most samples.
+    pub given_up: u64,
+    /// The middle of the worst block of these (column and row, from 0), and its error as a share of what
+    /// was allowed (of variances).
+    pub worst: Option<([u32; 2], f64)>,
+}
+
+impl SampleCounts {
+    /// Of two parts of a picture.
+    pub(crate) fn and(self, other: Self) -> Self {
+        let worst = [self.worst, other.worst].into_iter().flatten();
+        // The first of equals in the order of rows, so that shares give what the whole does.
+        let worst = worst.reduce(|a, b| {
+            let place = |worst: ([u32; 2], f64)| (worst.0[1], worst.0[0]);
+            let first = if place(a) <= place(b) { [a, b] } else { [b, a] };
+            if first[1].1 > first[0].1 { first[1] } else { first[0] }
+        });
+        Self {
+            least: self.least.min(other.least),
+            most: self.most.max(other.most),
+            pixels: self.pixels + other.pixels,
+            total: self.total + other.total,
+            given_up: self.given_up + other.given_up,
+            worst,
+        }
+    }
+
+    /// Samples of a pixel in the mean.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.total as f64 / self.pixels.max(1) as f64
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        format!("{} to {}, {:.1} in the mean", self.least, self.most, self.mean())
+    }
+
+    /// What a user should know of pixels that were given up.
+    #[must_use]
+    pub fn note(&self) -> Option<String> {
+        let ([column, row], error) = self.worst?;
+        let share = 100.0 * self.given_up as f64 / self.pixels.max(1) as f64;
+        Some(format!(
+            "samples: {share:.2} % of the pixels still have more error than `render.samples` allows after \
+             {} samples; the worst are around column {column}, row {row}, with {error:.1} times the \
+             variance; give `max` a larger number, or see what shines so unevenly there",
+            self.most
+        ))
+    }
+}
+
+/// Judges the samples of a picture.
+pub(crate) struct Adaptive<'a> {
+    rule: &'a Rule,
+    /// Samples after which a pixel is given up.
+    most: u32,
+    shard: Shard,
+    pub(crate) blocks: Blocks,
+    /// Which part of what is averaged is judged, and its first value of a pixel.
+    judged: (usize, usize),
+}
+
+impl<'a> Adaptive<'a> {
+    pub(crate) fn new(
+        (rule, most): (&'a Rule, u32),
+        resolution: [u32; 2],
+        shard: Shard,
+        judged: (usize, usize),
+    ) -> Self {
+        Self { rule, most, shard, blocks: Blocks::new(resolution), judged }
+    }
+
+    /// Judges what there is after `samples` samples of each pixel that wanted them, and settles what is
+    /// done.
+    pub(crate) fn judge(&mut self, samples: u32, parts: &mut [Averaging<'_>]) {
+        let before: Vec<[u32; HALVES]> = self.blocks.blocks.iter().map(|b| b.settled).collect();
+        self.measure(samples, &parts[self.judged.0]);
+        self.decide(samples);
+        for part in parts {
+            part.settle(&self.blocks, &before, samples);
+        }
+    }
+
+    /// Writes to the layers `told` what sampling found of itself.
+    pub(crate) fn tell(&self, samples: u32, parts: &[Averaging<'_>], told: &mut [&mut FilmLayer]) {
+        parts[self.judged.0].tell(told, &self.blocks, (samples, self.judged.1));
+    }
+
+    /// Whether any pixel wants more.
+    pub(crate) fn goes_on(&self) -> bool {
+        self.owned().any(|index| self.blocks.blocks[index].wants_more())
+    }
+
+    /// The blocks of this share.
+    fn owned(&self) -> impl Iterator<Item = usize> + '_ {
+        let strip = ROWS_OF_STRIP * self.blocks.across;
+        (0..self.blocks.blocks.len()).filter(move |index| self.shard.owns(index / strip))
+    }
+
+    /// Measures the errors of the blocks that go on, and marks halves whose number they decide.
+    fn measure(&mut self, samples: u32, part: &Averaging<'_>) {
+        let pixels = self.blocks.clone();
+        let (shard, rule, first) = (self.shard, self.rule, self.judged.1);
+        let strip = ROWS_OF_STRIP * pixels.across;
+        self.blocks.blocks.par_iter_mut().enumerate().for_each(|(index, block)| {
+            if !block.wants_more() || !shard.owns(index / strip) {
+                return;
+            }
+            for half in 0..HALVES {
+                let halves = pixels.pixels(index).map(|pixel| part.half(pixel, half, first));
+                block.error[half] = rule.error(halves, samples);
+                let other = HALVES - 1 - half;
+                if block.passed[other] == 0 && block.error[half] <= 1.0 {
+                    block.passed[other] = samples;
+                }
+            }
+        });
+    }
+
+    /// Settles the halves of blocks that have passed with those beside them, and of those that have had
+    /// the most.
+    fn decide(&mut self, samples: u32) {
+        let Self { blocks: Blocks { across, blocks, .. }, most, shard, .. } = self;
+        let (across, strip) = (*across, ROWS_OF_STRIP * *across);
+        let passed: Vec<[bool; HALVES]> =
+            blocks.iter().map(|block| block.passed.map(|samples| samples > 0)).collect();
+        for (index, block) in blocks.iter_mut().enumerate() {
+            if !shard.owns(index / strip) {
+                continue;
+            }
+            let column = index % across;
+            let around = [
+                (column > 0).then(|| index - 1),
+                (column + 1 < across).then_some(index + 1),
+                index.checked_sub(across),
+                Some(index + across),
+            ];
+            let around = around.into_iter().flatten();
+            let around: Vec<usize> = around
+                .filter(|other| *other < passed.len() && other / strip == index / strip)
+                .chain(std::iter::once(index))
+                .collect();
+            for half in 0..HALVES {
+                let is_done = samples >= *most || around.iter().all(|&other| passed[other][half]);
+                if block.settled[half] == 0 && is_done {
+                    block.settled[half] = samples;
+                }
+            }
+        }
+    }
+
+    /// The rays that are still to come after `samples` samples, by what blocks lack, for each part that
+    /// is averaged.
+    pub(crate) fn to_come(&self, samples: u32) -> u64 {
+        let more = |index: usize| {
+            let block = &self.blocks.blocks[index];
+            if !block.wants_more() {
+                return 0;
+            }
+            let error = block.error[0].max(block.error[1]);
+            // A variance falls at least as one over the number of samples.
+            let wanted = (f64::from(samples) * error.clamp(1.0, 1e6)).min(f64::from(self.most));
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a forecast"
+            )]
+            let wanted = (wanted as u32).max(samples) - samples;
+            u64::from(wanted.max(samples / 4)) * u64::from(BLOCK * BLOCK)
+        };
+        self.owned().map(more).sum()
+    }
+
+    /// How many samples the pixels got.
+    pub(crate) fn counts(&self, samples: u32) -> Option<SampleCounts> {
+        let of_block = |index: usize| {
+            let block = &self.blocks.blocks[index];
+            let pixels: Vec<[u32; 2]> = self.blocks.pixels(index).collect();
+            let (count, number) = (pixels.len() as u64, block.samples(samples));
+            let gave_up = block.passed.contains(&0) && !block.wants_more();
+            let error = block.error[0].max(block.error[1]);
+            SampleCounts {
+                least: number,
+                most: number,
+                pixels: count,
+                total: count * u64::from(number),
+                given_up: if gave_up { count } else { 0 },
+                worst: gave_up.then(|| (pixels[pixels.len() / 2], error)),
+            }
+        };
+        self.owned().map(of_block).reduce(SampleCounts::and)
+    }
+}

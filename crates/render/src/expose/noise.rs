@@ -1,0 +1,93 @@
+//! The noise that the sensor puts over each pixel, as a measure of the errors of its light.
+
+use etendue_scene::Scene;
+use etendue_sensor::{NoiseFloor, Sensor};
+use etendue_spectrum::Bands;
+use etendue_tracer::LayerSpec;
+
+use super::film::light_factor;
+use crate::adaptive::variance_of_mean;
+
+/// The sensor's noise at each pixel of a picture.
+pub(crate) struct NoiseOfPixels {
+    sensor: Sensor,
+    shots: Vec<Shot>,
+}
+
+/// One of the sensor's exposure times.
+struct Shot {
+    /// Seconds.
+    exposure: f64,
+    /// Mean photo-electrons that a unit of each number of the picture makes, by channel (e⁻).
+    electrons: Vec<Vec<f64>>,
+}
+
+impl NoiseOfPixels {
+    /// The noise of `scene`'s sensor over its picture, which is kept in `bands`; `None` where there is no
+    /// sensor or no noise.
+    pub(crate) fn of(scene: &Scene, bands: &Bands) -> Option<Self> {
+        let sensor = scene.sensor.as_ref()?;
+        let lit = scene.picture == Some(LayerSpec::Radiance);
+        let own = if lit { bands.clone() } else { Bands::Rgb };
+        // Base colours are brought into the sensor's bands where it has no use for three.
+        let (sensor, from_rgb) = match sensor.clone().in_bands(own) {
+            Ok(sensor) => (sensor, None),
+            Err(_) => (sensor.clone(), Some(sensor.bands().from_rgb())),
+        };
+        let factor = light_factor(scene, &sensor);
+        let mut exposures: Vec<f64> = sensor.shots().map(|shot| shot.exposure).collect();
+        exposures.dedup();
+        let shot = |exposure: f64| {
+            let floor = sensor.noise_floor(exposure)?;
+            let electrons = (0..sensor.channels().len()).map(|channel| {
+                let units: Vec<f64> =
+                    floor.electrons_per_unit(channel).map(|e| e * factor).collect();
+                match &from_rgb {
+                    None => units,
+                    Some(rows) => (0..3)
+                        .map(|k| units.iter().zip(rows).map(|(unit, row)| unit * row[k]).sum())
+                        .collect(),
+                }
+            });
+            Some(Shot { exposure, electrons: electrons.collect() })
+        };
+        let shots: Vec<Shot> = exposures.into_iter().map(shot).collect::<Option<_>>()?;
+        Some(Self { sensor, shots })
+    }
+
+    /// The variance of the mean of a pixel's samples, carried through exposure, quantum efficiency and
+    /// gain, as a share of the sensor's own at that signal: the largest over exposures, the mean over
+    /// channels. `light` is what each of two of the four independent sets of samples has of each band.
+    pub(crate) fn share(&self, pixel: [u32; 2], light: impl Fn(usize, usize) -> f64) -> f64 {
+        let shares = self.shots.iter().filter_map(|shot| {
+            let floor = self.sensor.noise_floor(shot.exposure)?;
+            Some(match self.sensor.depth() {
+                1 => {
+                    let [column, row] = pixel.map(|place| place as usize);
+                    shot.share(floor, self.sensor.channel_at(row, column), &light)
+                }
+                channels => {
+                    let each = (0..channels).map(|channel| shot.share(floor, channel, &light));
+                    each.sum::<f64>() / channels as f64
+                }
+            })
+        });
+        shares.fold(0.0, f64::max)
+    }
+}
+
+impl Shot {
+    /// The share at one channel.
+    fn share(
+        &self,
+        floor: NoiseFloor<'_>,
+        channel: usize,
+        light: impl Fn(usize, usize) -> f64,
+    ) -> f64 {
+        let units = self.electrons[channel].iter().enumerate();
+        let [a, b] = [0, 1]
+            .map(|set| units.clone().map(|(band, unit)| unit * light(set, band)).sum::<f64>());
+        let (signal, slope) = (0.5 * (a + b), floor.slope(0.5 * (a + b)));
+        slope * slope * variance_of_mean(a - b) / floor.variance(signal)
+    }
+}

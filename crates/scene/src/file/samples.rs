@@ -1,0 +1,197 @@
+//! How many samples a pixel gets: a number, or what they are to reach.
+
+use etendue_camera::sampler::Sampler;
+use etendue_geometry::units::Seconds;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::RenderSpec;
+
+/// Samples in each of the four sets that pixels are sampled in until an error is reached: one at least,
+/// so four a pixel.
+pub const SETS: u32 = 4;
+
+/// How many samples a pixel gets.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum SamplesSpec {
+    /// So many.
+    Count(#[schemars(range(min = 1, max = 1_048_576))] u32),
+    /// As many as it takes for their error to be lost in the sensor's noise.
+    SensorNoise(SensorNoiseSpec),
+    /// As many as it takes for an error relative to the light.
+    RelativeError(RelativeErrorSpec),
+    /// As many as a time is enough for, the same number for each pixel.
+    Time(TimeSpec),
+}
+
+/// Samples until their error is lost in the sensor's noise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorNoiseSpec {
+    /// What they are to reach.
+    pub until: Until,
+    /// The variance of the samples' mean, as a share of the sensor's own at that signal (above 0, at
+    /// most 1).
+    #[serde(default = "tenth")]
+    #[schemars(range(min = 0, max = 1))]
+    pub fraction: f64,
+    /// Samples that each pixel gets in any case; rounded up to a multiple of four.
+    #[serde(default = "sixteen")]
+    #[schemars(range(min = 1, max = 1_048_576))]
+    pub min: u32,
+    /// Samples that no pixel gets more of; rounded up to a multiple of four.
+    #[serde(default = "four_thousand")]
+    #[schemars(range(min = 1, max = 1_048_576))]
+    pub max: u32,
+}
+
+/// What samples are to reach.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum Until {
+    /// The noise of the camera's sensor.
+    #[serde(rename = "sensor-noise")]
+    SensorNoise,
+}
+
+/// Samples until an error relative to the light.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RelativeErrorSpec {
+    /// The standard deviation of the samples' mean, as a share of it (above 0, at most 1).
+    #[schemars(range(min = 0, max = 1))]
+    pub relative_error: f64,
+    /// Samples that each pixel gets in any case; rounded up to a multiple of four.
+    #[serde(default = "sixteen")]
+    #[schemars(range(min = 1, max = 1_048_576))]
+    pub min: u32,
+    /// Samples that no pixel gets more of; rounded up to a multiple of four.
+    #[serde(default = "four_thousand")]
+    #[schemars(range(min = 1, max = 1_048_576))]
+    pub max: u32,
+}
+
+/// Samples for a time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TimeSpec {
+    /// How long samples are taken (s, above 0). Loading, building and writing are not counted.
+    pub time: Seconds,
+    /// Samples that no pixel gets more of.
+    #[serde(default = "sixty_thousand")]
+    #[schemars(range(min = 1, max = 1_048_576))]
+    pub max: u32,
+}
+
+fn tenth() -> f64 {
+    0.1
+}
+
+fn sixteen() -> u32 {
+    16
+}
+
+fn four_thousand() -> u32 {
+    4096
+}
+
+fn sixty_thousand() -> u32 {
+    65_536
+}
+
+impl SamplesSpec {
+    /// Samples that no pixel gets more of.
+    #[must_use]
+    pub fn most(self) -> u32 {
+        match self {
+            Self::Count(count) => count,
+            Self::SensorNoise(SensorNoiseSpec { max, .. })
+            | Self::RelativeError(RelativeErrorSpec { max, .. }) => whole_sets(max),
+            Self::Time(TimeSpec { max, .. }) => max,
+        }
+    }
+
+    /// Samples that each pixel gets.
+    #[must_use]
+    pub fn least(self) -> u32 {
+        match self {
+            Self::Count(count) => count,
+            Self::SensorNoise(SensorNoiseSpec { min, .. })
+            | Self::RelativeError(RelativeErrorSpec { min, .. }) => whole_sets(min),
+            Self::Time(_) => 1,
+        }
+    }
+
+    /// A number to reckon with before anything is known of the picture: the least and the most in the
+    /// geometric mean.
+    #[must_use]
+    pub fn typical(self) -> u32 {
+        let product = u64::from(self.least()) * u64::from(self.most());
+        u32::try_from(product.isqrt()).unwrap_or(u32::MAX).max(1)
+    }
+
+    /// Whether pixels get samples until their error is small enough, and so different numbers of them.
+    #[must_use]
+    pub fn is_adaptive(self) -> bool {
+        matches!(self, Self::SensorNoise(_) | Self::RelativeError(_))
+    }
+}
+
+/// `count`, or the next number that is as many samples in each set.
+fn whole_sets(count: u32) -> u32 {
+    count.next_multiple_of(SETS)
+}
+
+/// What makes no sense of `render.samples` in the scene `value`, and its path.
+pub(super) fn fault(
+    render: &RenderSpec,
+    layers: &[&str],
+    value: &Value,
+) -> Option<(String, String)> {
+    let at = |key: &str, why: &str| Some((format!("render.samples{key}"), why.to_owned()));
+    let [min, max] = match render.samples {
+        SamplesSpec::Count(_) | SamplesSpec::Time(_) if !layers.is_empty() => {
+            let why = format!(
+                "the layer `{}` is of samples that go on until an error is reached; give \
+                 `render.samples` {{\"until\": \"sensor-noise\"}} or {{\"relative_error\": 0.02}}, or \
+                 leave the layer out",
+                layers[0]
+            );
+            return Some(("layers".to_owned(), why));
+        }
+        SamplesSpec::Count(_) => return None,
+        SamplesSpec::Time(TimeSpec { time, .. }) if time.0 <= 0.0 => {
+            return at(".time", "no samples are taken in no time; give it more than 0 s");
+        }
+        SamplesSpec::Time(_) => [0, 0],
+        SamplesSpec::SensorNoise(SensorNoiseSpec { fraction, .. }) if fraction <= 0.0 => {
+            let why = "sampling would never stop; give it more than 0, such as 0.1";
+            return at(".fraction", why);
+        }
+        SamplesSpec::RelativeError(RelativeErrorSpec { relative_error, .. })
+            if relative_error <= 0.0 =>
+        {
+            let why = "sampling would never stop; give it more than 0, such as 0.02";
+            return at(".relative_error", why);
+        }
+        SamplesSpec::SensorNoise(SensorNoiseSpec { min, max, .. })
+        | SamplesSpec::RelativeError(RelativeErrorSpec { min, max, .. }) => [min, max],
+    };
+    if min > max {
+        let key = match value.pointer("/render/samples/min") {
+            Some(_) => ".min",
+            None => ".max",
+        };
+        let why = format!(
+            "at least {min} samples and at most {max} is none at all; give a `min` up to `max`"
+        );
+        return at(key, &why);
+    }
+    if matches!(render.sampler, Sampler::Stratified | Sampler::Hammersley) {
+        let why = "has to be told the number of samples beforehand, and `render.samples` is none; \
+                   take `sobol` or `independent`";
+        return Some(("render.sampler".to_owned(), why.to_owned()));
+    }
+    None
+}
