@@ -215,6 +215,18 @@ pub struct Course {
     pub identity: Identity,
 }
 
+impl Course {
+    /// Refuses what cannot be kept, or put together.
+    fn allows(&self, stopping: Stopping) -> Result<(), RenderError> {
+        let is_kept = self.checkpoint.is_some();
+        match stopping {
+            Stopping::Time(_) if is_kept || self.shard.is_some() => Err(RenderError::Timed),
+            _ if stopping.is_adaptive() && is_kept => Err(RenderError::Checkpoint),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// A film with what was traced onto it.
 #[derive(Debug)]
 pub struct Film {
@@ -265,13 +277,7 @@ pub fn trace(
     course: &Course,
     watch: &dyn Watch,
 ) -> Result<Film, RenderError> {
-    match (plan.stopping, course.checkpoint.is_some(), course.shard.is_some()) {
-        (Stopping::Time(_), true, _) | (Stopping::Time(_), _, true) => {
-            return Err(RenderError::Timed);
-        }
-        (stopping, true, _) if stopping.is_adaptive() => return Err(RenderError::Checkpoint),
-        _ => {}
-    }
+    course.allows(plan.stopping)?;
     let resolution = scene.camera.resolution();
     let mut layers = empty_film(scene, plan)?;
     let start = Instant::now();

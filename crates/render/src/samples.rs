@@ -339,8 +339,8 @@ impl Adding<'_> {
                 let a_pixel = range.len();
                 // The slot of each sample of the batch: the pixel's sum, or that of its set.
                 let slot = |sample: u32| {
-                    let (pixel, index) = (sample as usize / a_pixel, sample % a_pixel as u32);
-                    pixel * slots + ((first + index) % sets) as usize
+                    let (pixel, index) = (sample as usize / a_pixel, sample as usize % a_pixel);
+                    pixel * slots + (first as usize + index) % sets as usize
                 };
                 self.place(tile, (pixels, range), memory);
                 for (number, group) in self.what.groups().iter().enumerate() {

@@ -114,7 +114,7 @@ mod tests {
             assert_eq!(passes.last().unwrap().end, most);
             assert!(passes.windows(2).all(|pair| pair[0].end == pair[1].start));
             assert!(passes.iter().all(|pass| pass.len() % 4 == 0), "{passes:?}");
-            assert!(passes[1..].iter().all(|pass| pass.len() as u32 <= pass.start / 4 + 4));
+            assert!(passes[1..].iter().all(|pass| pass.end <= pass.start + pass.start / 4 + 4));
             assert!(passes.len() < 60, "{}", passes.len());
         }
     }

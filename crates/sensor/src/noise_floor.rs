@@ -32,7 +32,7 @@ impl NoiseFloor<'_> {
     }
 
     /// Variance over frames of the number of a pixel of `electrons` mean photo-electrons (DN²), before
-    /// anything is clipped: K²·(μ + μ_I·T + σ_read² + row² + column²) + 1/12, by the linear model of EMVA
+    /// anything is clipped: `K²·(μ + μ_I·T + σ_read² + row² + column²) + 1/12`, by the linear model of EMVA
     /// 1288 (Release 4.0, equations 9 and 11) with quantisation.
     #[must_use]
     pub fn variance(&self, electrons: f64) -> f64 {

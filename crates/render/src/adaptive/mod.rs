@@ -14,9 +14,10 @@
 //! Rendering", 4th edition, 2023, section 8.1 on the bias of adaptive sampling). Here each half decides
 //! for the other, and what is thrown away is the difference between two decisions.
 //!
-//! A block goes on as long as it or one of the blocks beside, above and below it has not passed: so
-//! what is hard is found from the blocks around it, too, and numbers of samples change by no seam through
-//! the middle of a thing. Blocks belong to strips of rows, as the shares of a render do, and look no further.
+//! A block goes on as long as it has not passed, or one of the blocks beside, above and below it has more
+//! than twice the error that is allowed: so what is hard is found from the blocks around it, too, and
+//! numbers of samples change gradually, without a seam. Blocks belong to strips of rows, as the shares of a
+//! render do, and look no further.
 
 mod halves;
 mod rule;
@@ -33,6 +34,10 @@ use halves::HALVES;
 
 /// Side of a block (pixels).
 const BLOCK: u32 = 8;
+
+/// The error of blocks around that a block does not wait for, as a share of what is allowed: they will
+/// get about so many times its samples.
+const NEAR: f64 = 2.0;
 
 /// Rows of blocks in a strip of rows.
 const ROWS_OF_STRIP: usize = (TILE / BLOCK) as usize;
@@ -51,6 +56,13 @@ struct Block {
 impl Block {
     fn wants_more(&self) -> bool {
         self.settled.contains(&0)
+    }
+
+    /// Whether the number of each half is decided, or soon will be.
+    fn is_near(&self) -> [bool; HALVES] {
+        let [a, b] = self.error;
+        // The first half is judged by the second, and the second by the first.
+        [self.passed[0] > 0 || b <= NEAR, self.passed[1] > 0 || a <= NEAR]
     }
 }
 
@@ -231,8 +243,7 @@ impl<'a> Adaptive<'a> {
     fn decide(&mut self, samples: u32) {
         let Self { blocks: Blocks { across, blocks, .. }, most, shard, .. } = self;
         let (across, strip) = (*across, ROWS_OF_STRIP * *across);
-        let passed: Vec<[bool; HALVES]> =
-            blocks.iter().map(|block| block.passed.map(|samples| samples > 0)).collect();
+        let near: Vec<[bool; HALVES]> = blocks.iter().map(Block::is_near).collect();
         for (index, block) in blocks.iter_mut().enumerate() {
             if !shard.owns(index / strip) {
                 continue;
@@ -246,13 +257,13 @@ impl<'a> Adaptive<'a> {
             ];
             let around = around.into_iter().flatten();
             let around: Vec<usize> = around
-                .filter(|other| *other < passed.len() && other / strip == index / strip)
-                .chain(std::iter::once(index))
+                .filter(|other| *other < near.len() && other / strip == index / strip)
                 .collect();
-            for half in 0..HALVES {
-                let is_done = samples >= *most || around.iter().all(|&other| passed[other][half]);
-                if block.settled[half] == 0 && is_done {
-                    block.settled[half] = samples;
+            let Block { passed, settled, .. } = block;
+            for (half, (settled, passed)) in settled.iter_mut().zip(passed).enumerate() {
+                let has_passed = *passed > 0 && around.iter().all(|&other| near[other][half]);
+                if *settled == 0 && (has_passed || samples >= *most) {
+                    *settled = samples;
                 }
             }
         }
