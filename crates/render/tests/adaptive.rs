@@ -85,7 +85,7 @@ fn room(samples: &Value, more: &Value) -> Value {
 /// numbers of samples differ from picture to picture and the pixels that stop early are the even ones.
 #[test]
 fn stopping_does_not_bend_the_picture() {
-    for share in [0.9, 0.25] {
+    for share in [0.5, 0.25] {
         let samples = json!({ "relative_error": 0.25, "min": 4, "max": 4096 });
         let render = json!({ "samples": samples, "sampler": "independent" });
         let mut scene = loaded(strips([16, 16], share, &render));
@@ -108,7 +108,7 @@ fn stopping_does_not_bend_the_picture() {
             mean(&numbers)
         );
         numbers.sort_by(f64::total_cmp);
-        assert!(share > 0.5 || numbers[0] < 0.95 * numbers[999], "numbers depend on chance");
+        assert!(numbers[0] < 0.95 * numbers[999], "numbers depend on chance");
         assert!(bias.abs() < 1e-3, "{share}: {bias}");
     }
 }
