@@ -26,6 +26,8 @@ struct Built {
     accel: Arc<dyn Accel>,
     geometry: Arc<Geometry>,
     name: Option<AccelName>,
+    /// Whether its hits are solved again in f64.
+    refine: bool,
     /// Nothing of it is of one before.
     is_new: bool,
 }
@@ -39,7 +41,11 @@ impl Structures {
     /// The structure over the surfaces of `scene`, if there is one that will do.
     pub(crate) fn over(&self, scene: &Scene, plan: &Plan) -> Option<Arc<dyn Accel>> {
         let is_own = |built: &Built| built.is_new && built.accel.report().quality == plan.quality;
-        let serves = |built: &&Built| built.is_over(scene) && (!wants_new(plan) || is_own(built));
+        let serves = |built: &&Built| {
+            built.is_over(scene)
+                && built.refine == plan.refine
+                && (!wants_new(plan) || is_own(built))
+        };
         self.built.iter().find(serves).map(|built| Arc::clone(&built.accel))
     }
 
@@ -51,12 +57,16 @@ impl Structures {
         options: &BuildOptions,
     ) -> Result<Arc<dyn Accel>, RenderError> {
         let name = scene.render.accel;
-        let before = self.built.iter().find(|built| built.name == name && !wants_new(plan));
+        let is_alike = |built: &&Built| built.name == name && built.refine == plan.refine;
+        let before = self.built.iter().find(|built| is_alike(built) && !wants_new(plan));
         let is_new = before.is_none();
         let accel = etendue_render::rebuild(scene, plan, options, before.map(|b| &*b.accel))?;
         let accel: Arc<dyn Accel> = Arc::from(accel);
         let geometry = Arc::clone(&scene.geometry);
-        self.built.insert(0, Built { accel: Arc::clone(&accel), geometry, name, is_new });
+        self.built.insert(
+            0,
+            Built { accel: Arc::clone(&accel), geometry, name, refine: plan.refine, is_new },
+        );
         Ok(accel)
     }
 

@@ -158,7 +158,7 @@ pub fn build(
     options: &BuildOptions,
 ) -> Result<Box<dyn Accel>, RenderError> {
     let geometry = Arc::clone(&scene.geometry);
-    let options = BuildOptions { quality: plan.quality, ..options.clone() };
+    let options = BuildOptions { quality: plan.quality, refine: plan.refine, ..options.clone() };
     let name = scene.render.accel.unwrap_or(accelerators()[0]);
     if options.isa.is_some() && name != AccelName::Embree {
         return Err(RenderError::NotEmbree);
@@ -185,7 +185,8 @@ pub fn rebuild(
     options: &BuildOptions,
     before: Option<&dyn Accel>,
 ) -> Result<Box<dyn Accel>, RenderError> {
-    let with_quality = BuildOptions { quality: plan.quality, ..options.clone() };
+    let with_quality =
+        BuildOptions { quality: plan.quality, refine: plan.refine, ..options.clone() };
     let again = |before: &dyn Accel| before.rebuilt(Arc::clone(&scene.geometry), &with_quality);
     match before.and_then(again) {
         Some(rebuilt) => Ok(rebuilt?),

@@ -221,6 +221,33 @@ fn samples_that_would_never_stop_or_are_none_are_refused_by_path() {
 }
 
 #[test]
+fn overrides_of_the_plan_that_contradict_each_other_are_refused_by_path() {
+    let cases = [
+        (
+            r#""render": {"accel": "bvh"}, "plan": {"refine": false}"#,
+            "plan.refine: `bvh` works in f64",
+        ),
+        (
+            r#""render": {"accel": "exact"}, "plan": {"refine": false}"#,
+            "plan.refine: `exact` works",
+        ),
+        (
+            r#""plan": {"refine": false, "light_precision": "double"}"#,
+            "plan.refine: contradicts `light_precision` \"double\"",
+        ),
+        (
+            r#""plan": {"textures": false, "texture_filter": true}"#,
+            "plan.texture_filter: contradicts `textures` false",
+        ),
+        (r#""plan": {"build_quality": "best"}"#, "plan.build_quality: \"best\" is not known here"),
+        (r#""plan": {"textur": true}"#, "plan.textur: unknown key; did you mean `textures`?"),
+    ];
+    for (text, part) in cases {
+        assert_says(&format!(r#"{{"etendue": 1, {text}}}"#), &[part]);
+    }
+}
+
+#[test]
 fn impossible_cameras_are_refused_by_path() {
     let cases = [
         (

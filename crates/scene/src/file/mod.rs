@@ -30,8 +30,8 @@ pub use samples::{RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpe
 pub use schema::scene_schema;
 pub use sensor::SensorFile;
 pub use settings::{
-    AccelName, Auto, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec, ToneMap, TracerRow,
-    TracerSpec,
+    AccelName, Auto, BuildQuality, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec,
+    ToneMap, TracerRow, TracerSpec,
 };
 pub use spec::{SceneSpec, Version};
 
@@ -150,7 +150,13 @@ impl SceneFile {
             .map_err(|why| written.fault("camera.sensor.resolution", why))?;
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
-        match samples::fault(&file.spec.render, &file.spec.sampling_layers(), &file.value) {
+        let spec = &file.spec;
+        let fault =
+            samples::fault(&spec.render, &spec.sampling_layers(), &file.value).or_else(|| {
+                let (key, why) = spec.plan.contradiction(spec.render.accel)?;
+                Some((format!("plan.{key}"), why))
+            });
+        match fault {
             Some((path, why)) => Err(file.fault(&path, why)),
             None => Ok(file),
         }

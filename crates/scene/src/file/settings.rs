@@ -143,6 +143,61 @@ pub struct PlanSpec {
     /// How precisely paths of light hit surfaces. Data layers are always in f64.
     #[serde(default)]
     pub light_precision: LightPrecision,
+    /// How much time the build of the structure may take; by the number of rays when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build_quality: Option<BuildQuality>,
+    /// Whether hits that data layers and light in f64 are made of are solved again in f64 (true), or taken
+    /// as Embree finds them in f32.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refine: Option<bool>,
+    /// Whether images of materials are read where a layer shows colour (true), or materials have their
+    /// factors alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub textures: Option<bool>,
+    /// Whether images are averaged over what a sample covers; where the camera tells that when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub texture_filter: Option<bool>,
+}
+
+/// How much time the build of the structure may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BuildQuality {
+    /// The least.
+    Low,
+    /// What pays for most pictures.
+    Medium,
+    /// The most, for the quickest rays.
+    High,
+}
+
+impl PlanSpec {
+    /// What contradicts something else of these, or the accelerator that the scene names: the key, and
+    /// why.
+    pub(super) fn contradiction(&self, accel: Option<AccelName>) -> Option<(&'static str, String)> {
+        let of_f64 = match accel {
+            Some(AccelName::Bvh) => Some("`bvh`"),
+            Some(AccelName::Exact) => Some("`exact`"),
+            Some(AccelName::Embree) | None => None,
+        };
+        match (self.refine, of_f64) {
+            (Some(false), Some(name)) => {
+                let why = format!("{name} works in f64 alone; leave this out, or take `embree`");
+                return Some(("refine", why));
+            }
+            (Some(false), None) if self.light_precision == LightPrecision::Double => {
+                let why = "contradicts `light_precision` \"double\": without it there are hits in f32 \
+                           alone; leave one of them out";
+                return Some(("refine", why.to_owned()));
+            }
+            _ => {}
+        }
+        (self.textures == Some(false) && self.texture_filter == Some(true)).then(|| {
+            let why = "contradicts `textures` false: no image is read that could be averaged; leave one \
+                       of them out";
+            ("texture_filter", why.to_owned())
+        })
+    }
 }
 
 /// How precisely paths of light hit surfaces.

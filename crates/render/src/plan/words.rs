@@ -1,47 +1,25 @@
-//! The plan: the one place where it is decided what a scene needs, and why. What is off costs
-//! nothing: it is not read, not traced, not written.
+//! The plan's decisions in words: what, how, why, what it saves, and by which key it is made otherwise.
 
 use std::fmt;
-use std::ops::Range;
 
 use etendue_accel::Quality;
 use etendue_camera::{LensCamera, Projection};
-use etendue_geometry::{Detail, HitPrecision, Placement};
-use etendue_scene::file::{TracerRow, TracerSpec};
-use etendue_scene::import::Wanted;
-use etendue_scene::{MemoryForecast, Scene};
+use etendue_geometry::{HitPrecision, Placement};
+use etendue_scene::Scene;
+use etendue_scene::file::{LightPrecision, TracerRow, TracerSpec};
+use etendue_scene::memory::Size;
 use etendue_sensor::BandChoice;
-use etendue_spectrum::Bands;
-use etendue_tracer::{LayerSpec, Needs, TextureScope};
+use etendue_tracer::Needs;
+use etendue_tracer::layer::Kept;
 use serde::Serialize;
 
-use crate::expose;
+use super::{
+    MOST_BYTES_OF_SUMS, Passes, Plan, RAYS_A_SAMPLE_OF_LIGHT, RAYS_PER_TRIANGLE, quality_for,
+};
 use crate::film::Precision;
-use crate::forecast::forecast;
-use crate::output::Outputs;
-use crate::precision::light_precision;
-use crate::samples::{self, BYTES_OF_SUM};
-use crate::stopping::{Stopping, judged_passes};
+use crate::{expose, samples};
 
-/// What of the models has to be read for `layers`: decided before they are opened.
-#[must_use]
-pub fn wanted(layers: &[LayerSpec]) -> Wanted {
-    let needs = needs(layers);
-    Wanted {
-        normals: needs.normals,
-        uvs: needs.uvs,
-        colors: needs.materials,
-        textures: needs.materials,
-        light: needs.light,
-        occlusion: needs.ambient,
-    }
-}
-
-fn needs(layers: &[LayerSpec]) -> Needs {
-    layers.iter().fold(Needs::default(), |needs, layer| needs.union(layer.needs()))
-}
-
-/// A decision and its reason.
+/// A decision: one value, its reason, and how to overrule it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Decision {
     /// What is decided.
@@ -50,156 +28,22 @@ pub struct Decision {
     pub choice: String,
     /// Why.
     pub because: String,
+    /// What it saves beside the fullest choice, counted; `None` where that has no number before the render.
+    pub saves: Option<String>,
+    /// The path in the scene file that decides it otherwise.
+    pub key: Option<&'static str>,
+    /// Whether the scene has decided it.
+    pub forced: bool,
 }
 
-/// What is done for a scene, and why.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
-    /// The layers to fill, the picture first.
-    pub layers: Vec<LayerSpec>,
-    /// How much of each hit is worked out.
-    pub detail: Detail,
-    /// Which images of materials are decoded; none for `None`.
-    pub images: Option<TextureScope>,
-    /// Whether images are averaged over the footprint of a sample.
-    pub footprint: bool,
-    /// Samples a pixel for coloured layers, at most.
-    pub samples: u32,
-    /// When they are enough.
-    pub stopping: Stopping,
-    /// Why that is not what the scene asks for, where it is not.
-    pub stopping_note: Option<String>,
-    /// Which of these are taken of every pixel before the next are taken of any. The picture does
-    /// not depend on it.
-    pub passes: Vec<Range<u32>>,
-    /// Whether rays are spread over a pupil.
-    pub pupil: bool,
-    /// Rays in all.
-    pub rays: u64,
-    /// Build time against traversal speed.
-    pub quality: Quality,
-    /// How finely data layers are kept.
-    pub precision: Precision,
-    /// How precisely paths of light hit.
-    pub light_precision: HitPrecision,
-    /// What the numbers are that the picture's light is kept in.
-    pub bands: Bands,
-    /// What it will take, by counts and headers alone: within 1.5 of the peak of the example scenes.
-    pub memory: MemoryForecast,
-    /// The decisions, in words.
-    pub decisions: Vec<Decision>,
-}
-
-/// Rays per triangle from which a better structure pays for its longer build: a rule of thumb, which
-/// `make bench` measures both sides of (build time a triangle, traversal time a ray).
-const RAYS_PER_TRIANGLE: u64 = 50;
-
-/// Rays that a sample of light is counted as when the build quality is chosen: the camera's, one to a
-/// light, and one more bounce with its own.
-const RAYS_A_SAMPLE_OF_LIGHT: u64 = 4;
-
-/// The most memory that the sums of a film may take between passes. A larger film is gone over once.
-const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
-
-/// The passes in which the film is filled.
-fn sample_passes(
-    scene: &Scene,
-    passes: Passes,
-    bands: usize,
-    stopping: Stopping,
-) -> Vec<Range<u32>> {
-    let samples = scene.render.samples.most();
-    if stopping.is_adaptive() {
-        return judged_passes(scene.render.samples.least(), samples);
-    }
-    let [width, height] = scene.camera.resolution().map(u64::from);
-    let colours = if passes.mean {
-        3 * scene.layers.iter().filter(|layer| layer.is_averaged()).count()
-    } else {
-        0
-    };
-    let bands = if passes.light { bands } else { 0 };
-    let bytes = (width * height).saturating_mul(BYTES_OF_SUM * (colours + bands) as u64);
-    match samples::passes(samples) {
-        several if several.len() > 1 && bytes > MOST_BYTES_OF_SUMS => {
-            std::iter::once(0..samples).collect()
-        }
-        passes => passes,
-    }
+/// The key of a decision, whether the scene gives it, and what the decision saves.
+struct Overruling {
+    key: &'static str,
+    forced: bool,
+    saves: Option<String>,
 }
 
 impl Plan {
-    /// The plan for `scene`, written as `outputs`.
-    #[must_use]
-    pub fn new(scene: &Scene, outputs: Outputs) -> Self {
-        let layers = scene.layers.clone();
-        let needs = needs(&layers);
-        let lens = scene.camera.has_pupil();
-        let spec = scene.render.samples;
-        let (stopping, stopping_note) = Stopping::of(scene);
-        let passes = Passes::of(&layers, spec.most(), lens);
-        let [width, height] = scene.camera.resolution();
-        let pixels = u64::from(width) * u64::from(height);
-        let samples = spec.most();
-        let chosen = expose::bands(scene);
-        let apart = scene.camera.band_groups(&chosen.bands).len() as u64;
-        let sampled = |yes| if yes { u64::from(spec.typical()) * apart } else { 0 };
-        let rays = pixels
-            * (u64::from(passes.centre)
-                + sampled(passes.mean)
-                + sampled(passes.light) * RAYS_A_SAMPLE_OF_LIGHT);
-        let triangles = scene.geometry.triangles_unique();
-        let quality =
-            if rays / RAYS_PER_TRIANGLE < triangles { Quality::Low } else { Quality::Medium };
-        let detail = if needs.surface { Detail::Surface } else { Detail::Distance };
-        let precision = if outputs.npy { Precision::Double } else { Precision::Single };
-        let (light_precision, why_precision) = light_precision(scene, samples);
-        let images = (needs.materials && !scene.textures.is_empty())
-            .then_some(TextureScope { light: needs.light, ambient: needs.ambient });
-        let mut plan = Self {
-            layers,
-            detail,
-            images,
-            footprint: images.is_some() && scene.camera.pixel_extent().is_some(),
-            samples,
-            stopping,
-            stopping_note,
-            passes: sample_passes(scene, passes, chosen.bands.count(), stopping),
-            pupil: lens && (passes.mean || passes.light),
-            rays,
-            quality,
-            precision,
-            light_precision,
-            bands: chosen.bands.clone(),
-            memory: MemoryForecast::default(),
-            decisions: Vec::new(),
-        };
-        plan.memory = forecast(scene, &plan, outputs);
-        plan.decisions = plan.explain(scene, &chosen, (needs, passes), triangles);
-        if needs.light {
-            let choice = match light_precision {
-                HitPrecision::Single => "32 bits",
-                HitPrecision::Double => "64 bits",
-            };
-            let because = why_precision;
-            let decision = Decision { what: "light paths", choice: choice.to_owned(), because };
-            let last = plan.decisions.len() - 1;
-            plan.decisions.insert(last, decision);
-        }
-        plan
-    }
-
-    /// The layers of the picture by the names that they will have in files; the picture's is empty.
-    #[must_use]
-    pub fn names(&self, scene: &Scene) -> Vec<String> {
-        let names = |layer: &LayerSpec| match Some(*layer) == scene.picture {
-            true => vec![String::new()],
-            false => layer.row().names_in_files(),
-        };
-        let spectrum = expose::has_spectrum(scene).then(|| expose::SPECTRUM.to_owned());
-        self.layers.iter().flat_map(names).chain(spectrum).collect()
-    }
-
     /// What the rays are for.
     fn ray_words(&self, passes: Passes) -> String {
         let seen = match (passes.centre, passes.mean) {
@@ -226,16 +70,24 @@ impl Plan {
         parts.join("; ")
     }
 
-    fn explain(
+    pub(super) fn explain(
         &self,
         scene: &Scene,
         chosen: &BandChoice,
         (needs, passes): (Needs, Passes),
-        triangles: u64,
+        (triangles, why_precision): (u64, String),
     ) -> Vec<Decision> {
         let mut decisions = Vec::new();
         let mut decide = |what, choice: &str, because: String| {
-            decisions.push(Decision { what, choice: choice.to_owned(), because });
+            let choice = choice.to_owned();
+            decisions.push(Decision {
+                what,
+                choice,
+                because,
+                saves: None,
+                key: None,
+                forced: false,
+            });
         };
         let on = |yes| if yes { "on" } else { "off" };
         decide("rays", &self.rays.to_string(), self.ray_words(passes));
@@ -257,33 +109,27 @@ impl Plan {
         }
         let (choice, because) = light_words(scene, needs);
         decide("shadows and bounces", &choice, because);
-        decide(
-            "surface",
-            on(needs.surface),
-            either(
-                needs.surface,
-                "a layer needs normals or barycentric coordinates",
-                "no layer needs more than distance and ids",
-            ),
-        );
+        for (what, choice, because) in surface_words(needs) {
+            decide(what, on(choice), because);
+        }
         if needs.light {
             let (choice, because) = source_words(scene);
             decide("lights", &choice, because);
         }
-        decide(
-            "vertex normals",
-            on(needs.normals),
-            either(
-                needs.normals,
-                "a layer needs shading normals",
-                "no layer needs shading normals; they are not read",
-            ),
-        );
         for (what, choice, because) in self.explain_textures(scene, needs) {
             decide(what, choice, because);
         }
-        let (choice, because) = self.explain_quality(triangles);
+        let (choice, because) = self.explain_quality(scene, triangles);
         decide("build quality", choice, because);
+        decide(
+            "refinement",
+            on(self.refine),
+            either(
+                self.refine,
+                "hits found in f32 are solved again in f64: data are as exact as the file's numbers",
+                "the scene takes f32's hits as they are",
+            ),
+        );
         decide(
             "data layers",
             if self.precision == Precision::Single { "32 bits" } else { "64 bits" },
@@ -293,10 +139,53 @@ impl Plan {
                 "NPY files hold what was computed",
             ),
         );
+        if needs.light {
+            let choice = match self.light_precision {
+                HitPrecision::Single => "32 bits",
+                HitPrecision::Double => "64 bits",
+            };
+            decide("light paths", choice, why_precision);
+        }
         let memory = self.memory.to_string();
         let (total, parts) = memory.split_once(" (").unwrap_or((&memory, ""));
         decide("memory", total, parts.replacen(')', "", 1));
+        for decision in &mut decisions {
+            if let Some(Overruling { key, forced, saves }) = self.overruling(scene, decision.what) {
+                (decision.key, decision.forced, decision.saves) = (Some(key), forced, saves);
+            }
+        }
         decisions
+    }
+
+    /// How a decision is overruled, and what it saves.
+    fn overruling(&self, scene: &Scene, what: &str) -> Option<Overruling> {
+        let spec = &scene.plan;
+        let by = |key, forced, saves| Some(Overruling { key, forced, saves });
+        match what {
+            "samples" => by("render.samples", false, None),
+            "materials and textures" => {
+                let bytes = scene.textures.iter().map(|texture| texture.decoded_bytes()).sum();
+                let saved = (self.images.is_none() && bytes > 0)
+                    .then(|| format!("{} of {} images", Size(bytes), scene.textures.len()));
+                by("plan.textures", spec.textures.is_some(), saved)
+            }
+            "texture filter" => by("plan.texture_filter", spec.texture_filter.is_some(), None),
+            "build quality" => by("plan.build_quality", spec.build_quality.is_some(), None),
+            "refinement" => by("plan.refine", spec.refine.is_some(), None),
+            "light paths" => {
+                let forced = spec.light_precision != LightPrecision::Auto;
+                by("plan.light_precision", forced, None)
+            }
+            "data layers" => {
+                let [width, height] = scene.camera.resolution().map(u64::from);
+                let planes = self.layers.iter().filter(|layer| layer.row().kept == Kept::Measured);
+                let planes: u64 = planes.map(|layer| layer.row().channels.len() as u64).sum();
+                let is_single = self.precision == Precision::Single && planes > 0;
+                let saved = is_single.then(|| Size(4 * planes * width * height).to_string());
+                by("--outputs", false, saved)
+            }
+            _ => None,
+        }
     }
 
     /// How often the film is gone over, where samples are averaged.
@@ -322,16 +211,23 @@ impl Plan {
         Some((self.passes.len().to_string(), because))
     }
 
-    fn explain_quality(&self, triangles: u64) -> (&'static str, String) {
+    fn explain_quality(&self, scene: &Scene, triangles: u64) -> (&'static str, String) {
         let what = format!("{} rays over {triangles} triangles:", self.rays);
         let pays = format!("{RAYS_PER_TRIANGLE} a triangle or more pay for a better structure");
-        match self.quality {
+        let own = quality_for(self.rays, triangles);
+        let because = match own {
             Quality::Low => {
                 let less = format!("under {RAYS_PER_TRIANGLE} a triangle, a better structure");
-                ("low", format!("{what} {less} would not pay for its build"))
+                format!("{what} {less} would not pay for its build")
             }
-            Quality::Medium => ("medium", format!("{what} {pays}")),
-            Quality::High => ("high", format!("{what} {pays}")),
+            Quality::Medium | Quality::High => format!("{what} {pays}"),
+        };
+        match scene.plan.build_quality {
+            Some(_) => {
+                let own = quality_name(own);
+                (quality_name(self.quality), format!("it would be {own} by itself: {because}"))
+            }
+            None => (quality_name(self.quality), because),
         }
     }
 
@@ -346,14 +242,21 @@ impl Plan {
             (true, n) => format!("a layer shows base colour; {n} images named"),
             (false, _) => "no layer shows colour; no image is decoded".to_owned(),
         };
-        let on = if needs.materials { "on" } else { "off" };
+        let (on, because) = match (needs.materials, scene.plan.textures) {
+            (true, Some(false)) => {
+                let n = scene.textures.len();
+                ("without images", format!("surfaces have their factors alone; {n} images named"))
+            }
+            (needed, _) => (if needed { "on" } else { "off" }, because),
+        };
         let mut decisions = vec![("materials and textures", on, because)];
         if self.images.is_some() {
-            let reason = either(
-                self.footprint,
-                "the camera tells what a sample covers",
-                "the camera does not tell what a pixel covers",
-            );
+            let reason = match (self.footprint, scene.plan.texture_filter) {
+                (true, _) => "the camera tells what a sample covers",
+                (false, Some(false)) => "the scene takes images at the very points that were hit",
+                (false, _) => "the camera does not tell what a pixel covers",
+            };
+            let reason = reason.to_owned();
             let choice = if self.footprint { "footprint" } else { "none" };
             decisions.push(("texture filter", choice, reason));
         }
@@ -385,27 +288,26 @@ fn either(yes: bool, reason: &str, other: &str) -> String {
     if yes { reason } else { other }.to_owned()
 }
 
-/// Which rays have to be traced.
-#[derive(Debug, Clone, Copy)]
-struct Passes {
-    /// Chief rays.
-    centre: bool,
-    /// Samples of layers that are averaged.
-    mean: bool,
-    /// Samples of light.
-    light: bool,
+/// What is worked out of surfaces, and why.
+fn surface_words(needs: Needs) -> [(&'static str, bool, String); 2] {
+    let surface = either(
+        needs.surface,
+        "a layer needs normals or barycentric coordinates",
+        "no layer needs more than distance and ids",
+    );
+    let normals = either(
+        needs.normals,
+        "a layer needs shading normals",
+        "no layer needs shading normals; they are not read",
+    );
+    [("surface", needs.surface, surface), ("vertex normals", needs.normals, normals)]
 }
 
-impl Passes {
-    fn of(layers: &[LayerSpec], samples: u32, lens: bool) -> Self {
-        let averaged = samples > 1 || lens;
-        let light = layers.contains(&LayerSpec::Radiance);
-        let is_traced = |layer: &LayerSpec| !layer.is_of_sampling();
-        let seen = layers.iter().filter(|layer| **layer != LayerSpec::Radiance);
-        let mut seen = seen.filter(|layer| is_traced(layer));
-        let mean = averaged && seen.clone().any(|layer| layer.is_averaged());
-        let centre = seen.any(|layer| !averaged || !layer.is_averaged());
-        Self { centre, mean, light }
+fn quality_name(quality: Quality) -> &'static str {
+    match quality {
+        Quality::Low => "low",
+        Quality::Medium => "medium",
+        Quality::High => "high",
     }
 }
 
@@ -487,8 +389,16 @@ impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let width = self.decisions.iter().map(|d| d.what.len()).max().unwrap_or(0);
         let choice = self.decisions.iter().map(|d| d.choice.len()).max().unwrap_or(0);
-        for Decision { what, choice: chosen, because } in &self.decisions {
-            writeln!(f, "{what:width$}  {chosen:choice$}  {because}")?;
+        for Decision { what, choice: chosen, because, saves, key, forced } in &self.decisions {
+            write!(f, "{what:width$}  {chosen:choice$}  {because}")?;
+            if let Some(saves) = saves {
+                write!(f, "; saves {saves}")?;
+            }
+            match (key, forced) {
+                (Some(key), true) => writeln!(f, " [forced by {key}]")?,
+                (Some(key), false) => writeln!(f, " [{key}]")?,
+                (None, _) => writeln!(f)?,
+            }
         }
         Ok(())
     }

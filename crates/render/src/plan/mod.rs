@@ -1,0 +1,223 @@
+//! The plan: the one place where it is decided what a scene needs, and why. What is off costs
+//! nothing: it is not read, not traced, not written.
+
+mod words;
+
+use std::ops::Range;
+
+use etendue_accel::Quality;
+use etendue_geometry::{Detail, HitPrecision};
+use etendue_scene::file::BuildQuality;
+use etendue_scene::import::Wanted;
+use etendue_scene::{MemoryForecast, Scene};
+use etendue_spectrum::Bands;
+use etendue_tracer::{LayerSpec, Needs, TextureScope};
+
+pub use self::words::Decision;
+use crate::expose;
+use crate::film::Precision;
+use crate::forecast::forecast;
+use crate::output::Outputs;
+use crate::precision::light_precision;
+use crate::samples::{self, BYTES_OF_SUM};
+use crate::stopping::{Stopping, judged_passes};
+
+/// What of the models has to be read for `layers`: decided before they are opened.
+#[must_use]
+pub fn wanted(layers: &[LayerSpec]) -> Wanted {
+    let needs = needs(layers);
+    Wanted {
+        normals: needs.normals,
+        uvs: needs.uvs,
+        colors: needs.materials,
+        textures: needs.materials,
+        light: needs.light,
+        occlusion: needs.ambient,
+    }
+}
+
+fn needs(layers: &[LayerSpec]) -> Needs {
+    layers.iter().fold(Needs::default(), |needs, layer| needs.union(layer.needs()))
+}
+
+/// What is done for a scene, and why.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// The layers to fill, the picture first.
+    pub layers: Vec<LayerSpec>,
+    /// How much of each hit is worked out.
+    pub detail: Detail,
+    /// Which images of materials are decoded; none for `None`.
+    pub images: Option<TextureScope>,
+    /// Whether images are averaged over the footprint of a sample.
+    pub footprint: bool,
+    /// Samples a pixel for coloured layers, at most.
+    pub samples: u32,
+    /// When they are enough.
+    pub stopping: Stopping,
+    /// Why that is not what the scene asks for, where it is not.
+    pub stopping_note: Option<String>,
+    /// Which of these are taken of every pixel before the next are taken of any. The picture does
+    /// not depend on it.
+    pub passes: Vec<Range<u32>>,
+    /// Whether rays are spread over a pupil.
+    pub pupil: bool,
+    /// Rays in all.
+    pub rays: u64,
+    /// Build time against traversal speed.
+    pub quality: Quality,
+    /// Whether hits are solved again in f64.
+    pub refine: bool,
+    /// How finely data layers are kept.
+    pub precision: Precision,
+    /// How precisely paths of light hit.
+    pub light_precision: HitPrecision,
+    /// What the numbers are that the picture's light is kept in.
+    pub bands: Bands,
+    /// What it will take, by counts and headers alone: within 1.5 of the peak of the example scenes.
+    pub memory: MemoryForecast,
+    /// The decisions, in words.
+    pub decisions: Vec<Decision>,
+}
+
+/// Rays per triangle from which a better structure pays for its longer build: a rule of thumb, which
+/// `make bench` measures both sides of (build time a triangle, traversal time a ray).
+const RAYS_PER_TRIANGLE: u64 = 50;
+
+/// Rays that a sample of light is counted as when the build quality is chosen: the camera's, one to a
+/// light, and one more bounce with its own.
+const RAYS_A_SAMPLE_OF_LIGHT: u64 = 4;
+
+/// The most memory that the sums of a film may take between passes. A larger film is gone over once.
+const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
+
+/// The passes in which the film is filled.
+fn sample_passes(
+    scene: &Scene,
+    passes: Passes,
+    bands: usize,
+    stopping: Stopping,
+) -> Vec<Range<u32>> {
+    let samples = scene.render.samples.most();
+    if stopping.is_adaptive() {
+        return judged_passes(scene.render.samples.least(), samples);
+    }
+    let [width, height] = scene.camera.resolution().map(u64::from);
+    let colours = if passes.mean {
+        3 * scene.layers.iter().filter(|layer| layer.is_averaged()).count()
+    } else {
+        0
+    };
+    let bands = if passes.light { bands } else { 0 };
+    let bytes = (width * height).saturating_mul(BYTES_OF_SUM * (colours + bands) as u64);
+    match samples::passes(samples) {
+        several if several.len() > 1 && bytes > MOST_BYTES_OF_SUMS => {
+            std::iter::once(0..samples).collect()
+        }
+        passes => passes,
+    }
+}
+
+impl Plan {
+    /// The plan for `scene`, written as `outputs`.
+    #[must_use]
+    pub fn new(scene: &Scene, outputs: Outputs) -> Self {
+        let layers = scene.layers.clone();
+        let needs = needs(&layers);
+        let lens = scene.camera.has_pupil();
+        let spec = scene.render.samples;
+        let (stopping, stopping_note) = Stopping::of(scene);
+        let passes = Passes::of(&layers, spec.most(), lens);
+        let [width, height] = scene.camera.resolution();
+        let pixels = u64::from(width) * u64::from(height);
+        let samples = spec.most();
+        let chosen = expose::bands(scene);
+        let apart = scene.camera.band_groups(&chosen.bands).len() as u64;
+        let sampled = |yes| if yes { u64::from(spec.typical()) * apart } else { 0 };
+        let rays = pixels
+            * (u64::from(passes.centre)
+                + sampled(passes.mean)
+                + sampled(passes.light) * RAYS_A_SAMPLE_OF_LIGHT);
+        let triangles = scene.geometry.triangles_unique();
+        let quality = forced_quality(scene).unwrap_or_else(|| quality_for(rays, triangles));
+        let detail = if needs.surface { Detail::Surface } else { Detail::Distance };
+        let precision = if outputs.npy { Precision::Double } else { Precision::Single };
+        let (light_precision, why_precision) = light_precision(scene, samples);
+        let wants_images = needs.materials && scene.plan.textures != Some(false);
+        let images = (wants_images && !scene.textures.is_empty())
+            .then_some(TextureScope { light: needs.light, ambient: needs.ambient });
+        let mut plan = Self {
+            layers,
+            detail,
+            images,
+            footprint: images.is_some()
+                && scene.camera.pixel_extent().is_some()
+                && scene.plan.texture_filter != Some(false),
+            samples,
+            stopping,
+            stopping_note,
+            passes: sample_passes(scene, passes, chosen.bands.count(), stopping),
+            pupil: lens && (passes.mean || passes.light),
+            rays,
+            quality,
+            refine: scene.plan.refine != Some(false),
+            precision,
+            light_precision,
+            bands: chosen.bands.clone(),
+            memory: MemoryForecast::default(),
+            decisions: Vec::new(),
+        };
+        plan.memory = forecast(scene, &plan, outputs);
+        plan.decisions = plan.explain(scene, &chosen, (needs, passes), (triangles, why_precision));
+        plan
+    }
+
+    /// The layers of the picture by the names that they will have in files; the picture's is empty.
+    #[must_use]
+    pub fn names(&self, scene: &Scene) -> Vec<String> {
+        let names = |layer: &LayerSpec| match Some(*layer) == scene.picture {
+            true => vec![String::new()],
+            false => layer.row().names_in_files(),
+        };
+        let spectrum = expose::has_spectrum(scene).then(|| expose::SPECTRUM.to_owned());
+        self.layers.iter().flat_map(names).chain(spectrum).collect()
+    }
+}
+
+/// The quality that pays for so many rays.
+fn quality_for(rays: u64, triangles: u64) -> Quality {
+    if rays / RAYS_PER_TRIANGLE < triangles { Quality::Low } else { Quality::Medium }
+}
+
+/// The quality that the scene asks for.
+fn forced_quality(scene: &Scene) -> Option<Quality> {
+    scene.plan.build_quality.map(|quality| match quality {
+        BuildQuality::Low => Quality::Low,
+        BuildQuality::Medium => Quality::Medium,
+        BuildQuality::High => Quality::High,
+    })
+}
+
+/// Which rays have to be traced.
+#[derive(Debug, Clone, Copy)]
+struct Passes {
+    /// Chief rays.
+    centre: bool,
+    /// Samples of layers that are averaged.
+    mean: bool,
+    /// Samples of light.
+    light: bool,
+}
+
+impl Passes {
+    fn of(layers: &[LayerSpec], samples: u32, lens: bool) -> Self {
+        let averaged = samples > 1 || lens;
+        let light = layers.contains(&LayerSpec::Radiance);
+        let is_traced = |layer: &LayerSpec| !layer.is_of_sampling();
+        let seen = layers.iter().filter(|layer| **layer != LayerSpec::Radiance);
+        let mut seen = seen.filter(|layer| is_traced(layer));
+        let mean = averaged && seen.clone().any(|layer| layer.is_averaged());
+        let centre = seen.any(|layer| !averaged || !layer.is_averaged());
+        Self { centre, mean, light }
+    }
+}
