@@ -5,6 +5,8 @@
 //! their mean: it has to be within four of the known value, or within `bias` where a scene is only
 //! nearly the one that the formula speaks of.
 
+use std::path::Path;
+
 use etendue_accel::BuildOptions;
 use etendue_render::output::Outputs;
 use etendue_render::output::Values;
@@ -26,8 +28,11 @@ fn ways() -> Vec<Way> {
 }
 
 fn load(text: &str) -> Scene {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("scene.json");
+    load_in(tempfile::tempdir().unwrap().path(), text)
+}
+
+fn load_in(folder: &Path, text: &str) -> Scene {
+    let path = folder.join("scene.json");
     std::fs::write(&path, text).unwrap();
     let file = SceneFile::read(&path, &[]).unwrap();
     file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).unwrap()
@@ -275,6 +280,81 @@ fn a_slab_of_glass() {
             },
         );
     }
+}
+
+/// White metal, rough as can be, under a white sky looks as white as the sky.
+#[test]
+fn white_metal_in_a_furnace() {
+    for roughness in [0.5, 1.0] {
+        let rest = format!(
+            r#""lights": [{{"type": "environment"}}],
+            "objects": [{{"shape": "rectangle", "width": 9, "height": 9, "material": "m"}}],
+            "materials": {{"m": {{"type": "metal", "color": [1, 1, 1], "roughness": {roughness}}}}}"#
+        );
+        // The table of albedos is exact to 1e-3, which both directions are short of.
+        check("metal", 64, [[1.0, 0.5, 3.0], [0.0; 3]], &rest, |_| (), 6e-3, |_| 1.0);
+    }
+}
+
+/// The slab again, which leaves half of the light after 0.2 m: with a way of 0.2 / cos θ' in the glass,
+/// what passes is (1 − R)² T / (1 − R² T²) with T = 0.5 to the power 1 / cos θ'.
+#[test]
+fn a_slab_of_absorbing_glass() {
+    let rest = r#""lights": [],
+        "objects": [{"shape": "box", "size": [4, 4, 0.2], "material": "glass"},
+            {"shape": "rectangle", "width": 40, "height": 40, "material": "lamp",
+             "transform": {"translate": [0, 0, -2]}}],
+        "materials": {"glass": {"type": "dielectric", "ior": 1.5,
+                "absorption": {"color": [0.5, 0.25, 1], "distance": 0.2}},
+            "lamp": {"type": "emissive", "radiance": [1, 1, 1]}}"#;
+    for from in [[0.0, 0.0, 3.0], [2.0, 1.0, 3.0]] {
+        let cosine = 3.0 / f64::hypot(f64::hypot(from[0], from[1]), 3.0);
+        let (reflectance, within) = etendue_tracer::bsdf::fresnel::dielectric(cosine, 1.5);
+        let left = 0.5_f64.powf(1.0 / within.unwrap());
+        let passed = (1.0 - reflectance).powi(2) * left / (1.0 - (reflectance * left).powi(2));
+        let known = |tracer: &str| if tracer == "direct" { 0.0 } else { passed };
+        check("absorbing slab", 256, [from, [0.0; 3]], rest, |_| (), 0.0, known);
+    }
+}
+
+/// A pane that is hardly rough passes what a smooth one does.
+#[test]
+fn a_slab_of_hardly_rough_glass() {
+    let rest = r#""lights": [{"type": "environment"}],
+        "objects": [{"shape": "box", "size": [40, 40, 0.2], "material": "glass"}],
+        "materials": {"glass": {"type": "dielectric", "ior": 1.5, "roughness": 0.2}}"#;
+    // White all around: what its facets lose to one another at α = 0.04 is below 1e-3 a hit.
+    for way in ways() {
+        let text = patch("path", 256, [0.5, 0.3, 3.0], [0.0; 3], rest);
+        assert_shows(&format!("{way:?}"), &picture(load(&text), way), 1.0, 5e-3);
+    }
+}
+
+/// A sky of which the upper half is red, tilted to +X: who looks there sees red, and black where it is
+/// hidden.
+#[test]
+fn a_tilted_and_hidden_sky() {
+    let folder = tempfile::tempdir().unwrap();
+    let half = |_: u32, y: u32| {
+        if y < 16 { image::Rgb([1.0_f32, 0.0, 0.0]) } else { image::Rgb([0.0, 0.0, 0.0]) }
+    };
+    let sky = image::Rgb32FImage::from_fn(64, 32, half);
+    image::DynamicImage::from(sky).save(folder.path().join("sky.hdr")).unwrap();
+    let scene = |at: [f64; 3], visible: bool| {
+        let sky = format!(
+            r#""lights": [{{"type": "environment", "image": "sky.hdr", "up": [1, 0, 0],
+                "visible": {visible}}}], "objects": [{{"shape": "sphere", "radius": 0.1,
+                "transform": {{"translate": [0, 9, 0]}}}}]"#
+        );
+        let text = patch("path", 64, at, [0.0; 3], &sky);
+        picture(load_in(folder.path(), &text), ways()[0])
+    };
+    let facing = scene([3.0, 0.1, 0.2], true);
+    assert!(facing.iter().all(|&p| p < 1e-6), "looking to −X, away from the top: black");
+    let facing = scene([-3.0, 0.1, 0.2], true);
+    assert!(facing.iter().all(|&p| (p - 1.0).abs() < 0.01), "looking to +X: red");
+    let hidden = scene([-3.0, 0.1, 0.2], false);
+    assert!(hidden.iter().all(|&p| p == 0.0));
 }
 
 /// A closed box in a blinding sky is dark inside: exactly.

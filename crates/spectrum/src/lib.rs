@@ -33,6 +33,7 @@
 //! | [`grid`] | consecutive bands of wavelengths |
 //! | [`illuminant`] | lights by name, and Planck's law |
 //! | [`colour`] | the CIE 1931 observer and sRGB |
+//! | [`metal`] | metals by name
 //! | [`rgb`] | from a colour to a spectrum and back |
 //! | [`bands`] | the numbers that a ray of a render carries |
 //! | [`spread`] | wavelengths that stand for a wide band |
@@ -45,6 +46,7 @@ pub mod curve;
 pub mod grid;
 pub mod illuminant;
 mod mallett_yuksel;
+pub mod metal;
 pub mod rgb;
 pub mod spread;
 pub mod weighted;
@@ -53,6 +55,7 @@ pub use bands::{Bands, NoOverlap, Outside, VISIBLE};
 pub use curve::{Curve, CurveError, integral};
 pub use grid::{Band, Grid, GridError};
 pub use illuminant::{Illuminant, IlluminantError};
+pub use metal::Metal;
 pub use spread::Spread;
 pub use weighted::WeightedBands;
 

@@ -31,11 +31,7 @@ impl Bands {
     /// weights; that of red, green and blue as the CIE 1931 observer's x̄ + ȳ + z̄ sees it.
     #[must_use]
     pub fn spread(&self, i: usize, filters: &[&Curve]) -> Spread {
-        let [from, to] = match self {
-            Self::Grey | Self::Rgb => VISIBLE,
-            Self::Spectral(grid) => [grid.edges()[i], grid.edges()[i + 1]],
-            Self::Weighted(bands) => [bands.grid().edges()[i], bands.grid().edges()[i + 1]],
-        };
+        let [from, to] = self.ends(i);
         let cell = (to - from) / f64::from(CELLS);
         let middle = |c: u32| from + (f64::from(c) + 0.5) * cell;
         let (mut total, mut passed, mut moment) = (0.0, 0.0, 0.0);
@@ -72,6 +68,46 @@ impl Bands {
         let mut before = 0.0;
         let mean = |end: f64| (end - std::mem::replace(&mut before, end)) / each;
         Spread { wavelengths: ends.map(mean).collect(), overlap }
+    }
+
+    /// Wavelengths (nm, ascending) between which lie equal shares of the light of band `i`, counted as
+    /// [`Self::spread`] counts it: `shares` + 1 of them, of which the outer ones are the band's ends.
+    ///
+    /// # Panics
+    ///
+    /// When `shares` is 0.
+    #[must_use]
+    pub fn quantiles(&self, i: usize, shares: usize) -> Vec<f64> {
+        assert!(shares > 0, "no shares");
+        let [from, to] = self.ends(i);
+        let cell = (to - from) / f64::from(CELLS);
+        let even = || (0..=shares).map(|k| from + (to - from) * k as f64 / shares as f64).collect();
+        let mut sum = 0.0;
+        let sums: Vec<f64> = (0..CELLS)
+            .map(|c| {
+                sum += self.light(i, from + (f64::from(c) + 0.5) * cell);
+                sum
+            })
+            .collect();
+        if sum <= 0.0 {
+            return even();
+        }
+        let inner = (1..shares).map(|k| {
+            let light = sum * k as f64 / shares as f64;
+            let c = sums.partition_point(|&passed| passed < light);
+            let before = if c > 0 { sums[c - 1] } else { 0.0 };
+            from + (c as f64 + (light - before) / (sums[c] - before)) * cell
+        });
+        std::iter::once(from).chain(inner).chain([to]).collect()
+    }
+
+    /// The wavelengths between which band `i` lies (nm).
+    fn ends(&self, i: usize) -> [f64; 2] {
+        match self {
+            Self::Grey | Self::Rgb => VISIBLE,
+            Self::Spectral(grid) => [grid.edges()[i], grid.edges()[i + 1]],
+            Self::Weighted(bands) => [bands.grid().edges()[i], bands.grid().edges()[i + 1]],
+        }
     }
 
     /// The light of band `i` at a wavelength (nm), to a factor.
@@ -112,6 +148,30 @@ mod tests {
         }
         let grey = Bands::Grey.spread(0, &[]).wavelengths;
         assert!(grey.len() == 16 && grey[0] < 400.0 && grey[15] > 765.0, "{grey:?}");
+    }
+
+    #[test]
+    fn quantiles_share_the_light_evenly() {
+        let bands = Bands::Spectral(Grid::from_edges(vec![400.0, 425.0, 525.0]).unwrap());
+        // Photons: densities of λ, whose integral is λ²/2.
+        let edge = |share: f64| (425f64.powi(2) + share * (525f64.powi(2) - 425f64.powi(2))).sqrt();
+        for (k, nm) in bands.quantiles(1, 4).into_iter().enumerate() {
+            // Cells are 0.025 nm wide.
+            assert!((nm - edge(k as f64 / 4.0)).abs() < 1e-4, "{k}: {nm}");
+        }
+        let seen = |i: usize, from, to| -> f64 {
+            let primary = &rgb::PRIMARIES[i];
+            OBSERVER.iter().map(|c| integral(&[primary, c], from, to)).sum()
+        };
+        for i in 0..3 {
+            let edges = Bands::Rgb.quantiles(i, 16);
+            let all = seen(i, VISIBLE[0], VISIBLE[1]);
+            for pair in edges.windows(2) {
+                // Cells are 0.1 nm wide: what they misplace is 2e-3 of a share at most.
+                let share = 16.0 * seen(i, pair[0], pair[1]) / all;
+                assert!((share - 1.0).abs() < 2e-3, "{i} {pair:?}: {share}");
+            }
+        }
     }
 
     #[test]

@@ -3,11 +3,11 @@
 
 use std::path::PathBuf;
 
-use etendue_geometry::glam::DVec3;
-use etendue_spectrum::Illuminant;
+use etendue_geometry::glam::{DMat3, DQuat, DVec3};
+use etendue_spectrum::{Illuminant, Metal, rgb};
 
-use crate::material::{Alpha, GltfSurface};
-use crate::spec::{BRIGHTEST, ImageSpec, IorSpec, PaintSpec};
+use crate::material::{Absorption, Alpha, Glass, GltfSurface};
+use crate::spec::{AbsorptionSpec, BRIGHTEST, ImageSpec, IorSpec, PaintSpec};
 use crate::{
     Color, Emission, EnvironmentImage, Ior, Light, LightKind, LightSpec, Material, MaterialSpec,
     Paint, Scattering,
@@ -76,13 +76,29 @@ impl MaterialSpec {
             Self::Mirror { color } => {
                 Material::new(name, paint("color", color, Bound::One, supply)?, Scattering::Mirror)
             }
-            Self::Metal { color, roughness } => {
-                let scattering = Scattering::Metal { roughness: *roughness };
-                Material::new(name, paint("color", color, Bound::One, supply)?, scattering)
+            Self::Metal { color, metal, roughness } => {
+                let scattering = Scattering::Metal { roughness: *roughness, named: *metal };
+                let paint = match (color, metal) {
+                    (Some(color), None) => paint("color", color, Bound::One, supply)?,
+                    (None, Some(metal)) => Paint::Plain(look(*metal)),
+                    (None, None) => {
+                        let why = "is missing: give it, or a `metal` (\"gold\", \"silver\", …)";
+                        return Err(Fault::new("color", why));
+                    }
+                    (Some(_), Some(_)) => {
+                        let why = "is given with `metal`, which has its own: leave one of them out";
+                        return Err(Fault::new("color", why));
+                    }
+                };
+                Material::new(name, paint, scattering)
             }
-            Self::Dielectric { ior, color } => {
-                let index = supply.index(ior).map_err(|why| Fault::new("ior", why))?;
-                let scattering = Scattering::Dielectric(index);
+            Self::Dielectric { ior, color, roughness, absorption } => {
+                let glass = Glass {
+                    ior: supply.index(ior).map_err(|why| Fault::new("ior", why))?,
+                    roughness: *roughness,
+                    absorption: absorption.as_ref().map(absorbing).transpose()?,
+                };
+                let scattering = Scattering::Dielectric(glass);
                 Material::new(name, paint("color", color, Bound::One, supply)?, scattering)
             }
             Self::Gltf { color, metallic, roughness, ior, transmission, opacity } => {
@@ -161,7 +177,7 @@ impl LightSpec {
             Self::Directional { direction, .. } => {
                 LightKind::Directional(unit("direction", DVec3::from(*direction))?)
             }
-            Self::Environment { image, rotate, .. } => {
+            Self::Environment { image, rotate, up, visible, .. } => {
                 let image = match image {
                     None => EnvironmentImage::Constant,
                     Some(written) => {
@@ -169,11 +185,29 @@ impl LightSpec {
                         EnvironmentImage::File(found)
                     }
                 };
-                LightKind::Environment { image, rotation: rotate.to_radians() }
+                let top = unit("up", DVec3::from(*up))?;
+                let tilt = DMat3::from_quat(DQuat::from_rotation_arc(DVec3::Y, top));
+                let turn = tilt * DMat3::from_rotation_y(rotate.to_radians());
+                LightKind::Environment { image, turn, visible: *visible }
             }
         };
         Ok(Light { kind, color: *color, illuminant: checked(*illuminant)? })
     }
+}
+
+/// What a metal looks like face on: linear RGB in 0..=1.
+fn look(metal: Metal) -> Color {
+    rgb::colour(&metal.reflectance(1.0)).map(|part| part.clamp(0.0, 1.0))
+}
+
+fn absorbing(spec: &AbsorptionSpec) -> Result<Absorption, Fault> {
+    let AbsorptionSpec { color, distance } = *spec;
+    in_bounds("absorption.color", &color, Bound::One)?;
+    if distance.is_nan() || distance <= 0.0 {
+        let why = format!("{distance} is not above zero");
+        return Err(Fault::new("absorption.distance", why));
+    }
+    Ok(Absorption { color, distance })
 }
 
 fn paint(

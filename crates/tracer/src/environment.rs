@@ -10,7 +10,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_image::Limits;
 
 use crate::Color;
-use crate::sampling::GridDistribution;
+use crate::sampling::{GridDistribution, PlacesOnGrid};
 use crate::texture::{ImageError, read_file, read_image};
 
 /// The most cells of the grid that directions are chosen on, across and down.
@@ -185,11 +185,19 @@ impl MapSampler {
         Self { cells: GridDistribution::new(columns, &weights), mean }
     }
 
-    /// A direction, its density (1/sr) and its [`place`].
-    pub(crate) fn sample(&self, square: [f64; 2]) -> (DVec3, f64, [f64; 2]) {
-        let at = self.cells.place(square);
-        let d = direction(at);
-        (d, self.pdf_at(d, at), at)
+    /// A direction and its density (1/sr) for each of `squares`; their [`place`]s stay in `places`.
+    pub(crate) fn sample(
+        &self,
+        squares: impl Iterator<Item = [f64; 2]>,
+        places: &mut PlacesOnGrid,
+        mut each: impl FnMut(usize, DVec3, f64),
+    ) {
+        self.cells.places(squares, places);
+        for (k, &(at, density)) in places.chosen.iter().enumerate() {
+            let d = direction(at);
+            let sin_theta = (d.x * d.x + d.z * d.z).sqrt();
+            each(k, d, over_the_sphere(density, sin_theta));
+        }
     }
 
     /// The density (1/sr) of a unit direction.
@@ -200,12 +208,16 @@ impl MapSampler {
 
     /// [`Self::pdf`] of a direction whose [`place`] is known.
     pub(crate) fn pdf_at(&self, d: DVec3, at: [f64; 2]) -> f64 {
-        let sin_theta = (d.x * d.x + d.z * d.z).sqrt();
-        if sin_theta <= 0.0 {
-            return 0.0;
-        }
-        self.cells.pdf(at) / (2.0 * PI * PI * sin_theta)
+        over_the_sphere(self.cells.pdf(at), (d.x * d.x + d.z * d.z).sqrt())
     }
+}
+
+/// A density over the map's places as one over solid angles (1/sr), by the sine of the polar angle.
+fn over_the_sphere(density: f64, sin_theta: f64) -> f64 {
+    if sin_theta <= 0.0 {
+        return 0.0;
+    }
+    density / (2.0 * PI * PI * sin_theta)
 }
 
 #[cfg(test)]

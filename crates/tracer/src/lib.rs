@@ -20,7 +20,7 @@
 //! | [`placed`] | what there is to know of each placement before any ray meets it |
 //! | [`spawn`] | where a ray that leaves a surface starts |
 //! | [`transport`] | batches of paths, and the rules of each tracer of light |
-//! //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
+//! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
 pub mod bsdf;
 pub mod build;
@@ -35,6 +35,7 @@ pub mod placed;
 mod pyramid;
 pub mod reference;
 pub mod sampling;
+mod sky;
 pub mod spawn;
 pub mod spec;
 pub mod spectral;
@@ -47,7 +48,9 @@ pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};
 pub use layer::{Layer, LayerSpec, NormalKind, Space};
 pub use light::{EnvironmentImage, Light, LightKind, Lights};
-pub use material::{Color, Emission, Ior, Material, Paint, Scattering, TextureScope};
+pub use material::{
+    Absorption, Color, Emission, Glass, Ior, Material, Paint, Scattering, TextureScope,
+};
 pub use placed::PlacedSurfaces;
 pub use reference::{Needs, SceneView, SurfacePoint, Traced, View};
 pub use spec::{LightSpec, MaterialSpec};

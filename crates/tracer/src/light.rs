@@ -9,13 +9,14 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use etendue_geometry::MISS;
-use etendue_geometry::glam::DVec3;
+use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_spectrum::{Illuminant, NoOverlap};
 
-use crate::environment::{EnvironmentMap, MapSampler, place};
+use crate::environment::EnvironmentMap;
 use crate::lamps::{self, AreaLight, triangle_power};
 use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::{DiscreteDistribution, sphere_direction, triangle_point};
+use crate::sky::Sky;
 use crate::spectral::Spectral;
 use crate::{Color, Material};
 
@@ -33,7 +34,11 @@ pub struct Light {
 impl Light {
     /// What lights a model that brings no light of its own.
     pub const STUDIO: Self = Self {
-        kind: LightKind::Environment { image: EnvironmentImage::Studio, rotation: 0.0 },
+        kind: LightKind::Environment {
+            image: EnvironmentImage::Studio,
+            turn: DMat3::IDENTITY,
+            visible: true,
+        },
         color: [1.0; 3],
         illuminant: None,
     };
@@ -70,8 +75,10 @@ pub enum LightKind {
     Environment {
         /// Its image.
         image: EnvironmentImage,
-        /// Turn about +Y (radians).
-        rotation: f64,
+        /// What brings the image's directions into the world: its middle from −Z, its top from +Y.
+        turn: DMat3,
+        /// The camera sees it where nothing is in the way.
+        visible: bool,
     },
 }
 
@@ -130,9 +137,37 @@ pub(crate) enum TargetKind {
     },
 }
 
+/// What a light was chosen with.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Chosen {
+    /// Nothing that shines here.
+    Dark,
+    /// A place on it.
+    Place(Target),
+    /// The image of the sky, whose directions are chosen together ([`Sky::choose`]).
+    Sky {
+        /// Chooses the direction.
+        square: [f64; 2],
+        /// With which the sky was chosen.
+        chance: f64,
+    },
+}
+
+impl From<Target> for Chosen {
+    fn from(target: Target) -> Self {
+        Self::Place(target)
+    }
+}
+
+impl From<Option<Target>> for Chosen {
+    fn from(target: Option<Target>) -> Self {
+        target.map_or(Self::Dark, Self::Place)
+    }
+}
+
 impl Target {
     /// A direction (unit) or a point (m).
-    fn bare(kind: TargetKind, place: DVec3, density: f64) -> Self {
+    pub(crate) fn bare(kind: TargetKind, place: DVec3, density: f64) -> Self {
         let place = [place, DVec3::ZERO, DVec3::ZERO];
         let (normal, magnitudes) = (DVec3::ZERO, DVec3::ZERO);
         Self { kind, place, normal, magnitudes, density, id: [MISS; 2] }
@@ -145,7 +180,7 @@ pub struct Lights {
     lights: Vec<Light>,
     /// The bands of each light, one light after the other.
     bands: Vec<f64>,
-    environment: Option<Environment>,
+    pub(crate) sky: Option<Sky>,
     /// The bands by which each material's emission is multiplied, where it has an illuminant.
     tints: Vec<Option<Vec<f64>>>,
     /// For each placement, where its triangles start among the choices.
@@ -157,30 +192,6 @@ pub struct Lights {
     /// that shine alike all over give off in all bands.
     lamps: Vec<Option<AreaLight>>,
     lamp_bands: Vec<f64>,
-}
-
-#[derive(Debug)]
-struct Environment {
-    index: usize,
-    map: Option<(Arc<EnvironmentMap>, MapSampler)>,
-    /// Sine and cosine of its turn.
-    turn: (f64, f64),
-}
-
-impl Environment {
-    fn turned(&self, d: DVec3, sign: f64) -> DVec3 {
-        let (sin, cos) = (sign * self.turn.0, self.turn.1);
-        DVec3::new(cos * d.x + sin * d.z, d.y, -sin * d.x + cos * d.z)
-    }
-
-    /// In the map's frame.
-    fn local(&self, d: DVec3) -> DVec3 {
-        self.turned(d, -1.0)
-    }
-
-    fn world(&self, d: DVec3) -> DVec3 {
-        self.turned(d, 1.0)
-    }
 }
 
 impl Lights {
@@ -205,20 +216,11 @@ impl Lights {
                 bands.iter_mut().zip(&tint).for_each(|(band, tint)| *band *= tint);
             }
         }
-        let environment = lights.iter().enumerate().find_map(|(index, light)| match light.kind {
-            LightKind::Environment { rotation, .. } => {
-                let sampled = map.clone().map(|map| {
-                    let sampler = MapSampler::new(&map);
-                    (map, sampler)
-                });
-                Some(Environment { index, map: sampled, turn: rotation.sin_cos() })
-            }
-            _ => None,
-        });
+        let sky = Sky::of(lights, map);
         let radius = 0.5 * around.geometry.loose_bounds().diagonal();
         let far = if radius > 0.0 { PI * radius * radius } else { PI };
         let mut powers: Vec<f64> =
-            lights.iter().map(|light| power(light, far, environment.as_ref())).collect();
+            lights.iter().map(|light| power(light, far, sky.as_ref())).collect();
         let mut first = Vec::with_capacity(around.geometry.placements.len());
         let mut triangles = Vec::new();
         for (number, placement) in (0_u32..).zip(&around.geometry.placements) {
@@ -245,7 +247,7 @@ impl Lights {
         let lights = lights.to_vec();
         let (lamps, lamp_bands) = Default::default();
         let mut all =
-            Self { lights, bands, environment, tints, first, triangles, picker, lamps, lamp_bands };
+            Self { lights, bands, sky, tints, first, triangles, picker, lamps, lamp_bands };
         all.light_lamps(around, spectral);
         Ok(all)
     }
@@ -283,7 +285,7 @@ impl Lights {
     /// Whether a ray that nobody aimed may come upon a light: not upon points and parallel light.
     #[must_use]
     pub fn is_hittable(&self) -> bool {
-        self.environment.is_some() || !self.triangles.is_empty()
+        self.sky.is_some() || !self.triangles.is_empty()
     }
 
     /// Whether there is more than one to choose from.
@@ -295,7 +297,7 @@ impl Lights {
     /// Whether light comes from where nothing is.
     #[must_use]
     pub fn has_environment(&self) -> bool {
-        self.environment.is_some()
+        self.sky.is_some()
     }
 
     /// How many emissive triangles there are.
@@ -304,12 +306,12 @@ impl Lights {
         self.triangles.len()
     }
 
-    fn bands_of(&self, light: usize, count: usize) -> &[f64] {
+    pub(crate) fn bands_of(&self, light: usize, count: usize) -> &[f64] {
         &self.bands[light * count..(light + 1) * count]
     }
 
     /// Chooses a light for the point `from` (m) and a place on it by `square` (in 0..1); its radiance (of
-    /// a point its intensity) goes to `radiance`. `None` when it does not shine there.
+    /// a point its intensity) goes to `radiance`.
     pub(crate) fn choose(
         &self,
         around: &SceneView<'_>,
@@ -317,10 +319,10 @@ impl Lights {
         from: DVec3,
         [choice, v]: [f64; 2],
         radiance: &mut [f64],
-    ) -> Option<Target> {
+    ) -> Chosen {
         // What is left of the number that chose the light chooses the place: both stay even.
         let (index, rest, chance) = match self.picker.len() {
-            0 => return None,
+            0 => return Chosen::Dark,
             1 => (0, choice, 1.0),
             _ => {
                 let (index, rest) = self.picker.pick(choice);
@@ -330,35 +332,25 @@ impl Lights {
         let square = [rest, v];
         let Some(light) = self.lights.get(index) else {
             let number = index - self.lights.len();
-            return self.place_on_lamp(around, spectral, number, square, chance, radiance);
+            return self.place_on_lamp(around, spectral, number, square, chance, radiance).into();
         };
         radiance.copy_from_slice(self.bands_of(index, radiance.len()));
         match light.kind {
-            LightKind::Point(at) => Some(Target::bare(TargetKind::Point, at, chance)),
+            LightKind::Point(at) => Target::bare(TargetKind::Point, at, chance).into(),
             LightKind::Spot { at, axis, cos_outer, cos_inner } => {
-                let cosine = (from - at).try_normalize()?.dot(axis);
+                let cosine = (from - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
                 let factor = spot_falloff(cosine, cos_outer, cos_inner);
                 radiance.iter_mut().for_each(|band| *band *= factor);
-                (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance))
+                (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance)).into()
             }
             LightKind::Directional(along) => {
-                Some(Target::bare(TargetKind::Parallel, -along, chance))
+                Target::bare(TargetKind::Parallel, -along, chance).into()
             }
-            LightKind::Environment { .. } => {
-                let environment = self.environment.as_ref()?;
-                let (direction, pdf) = match &environment.map {
-                    Some((map, sampler)) => {
-                        let (local, pdf, at) = sampler.sample(square);
-                        self.spread_sky(spectral, &map.radiance_at(at), radiance);
-                        (environment.world(local), pdf)
-                    }
-                    None => (sphere_direction(square), 0.25 / PI),
-                };
-                if pdf <= 0.0 {
-                    return None;
-                }
-                Some(Target::bare(TargetKind::Far, direction, pdf * chance))
+            LightKind::Environment { image: EnvironmentImage::Constant, .. } => {
+                let density = 0.25 / PI * chance;
+                Target::bare(TargetKind::Far, sphere_direction(square), density).into()
             }
+            LightKind::Environment { .. } => Chosen::Sky { square, chance },
         }
     }
 
@@ -439,40 +431,11 @@ impl Lights {
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 
-    /// Radiance that comes from the unit `direction` without meeting anything, and the density (1/sr),
-    /// chance included, with which [`Self::choose`] gives that direction; `None` when it is dark there.
-    pub(crate) fn environment(
-        &self,
-        spectral: &Spectral,
-        direction: DVec3,
-        radiance: &mut [f64],
-    ) -> Option<f64> {
-        let environment = self.environment.as_ref()?;
-        let pdf = match &environment.map {
-            None => {
-                radiance.copy_from_slice(self.bands_of(environment.index, radiance.len()));
-                0.25 / PI
-            }
-            Some((map, sampler)) => {
-                let local = environment.local(direction);
-                let at = place(local);
-                self.spread_sky(spectral, &map.radiance_at(at), radiance);
-                sampler.pdf_at(local, at)
-            }
-        };
-        let chance = match self.picker.len() {
+    /// The chance with which [`Self::choose`] chooses light `index`.
+    pub(crate) fn chance(&self, index: usize) -> f64 {
+        match self.picker.len() {
             0 => 0.0,
-            _ => self.picker.probability(environment.index),
-        };
-        Some(pdf * chance)
-    }
-
-    /// A colour of the environment's image in all bands.
-    fn spread_sky(&self, spectral: &Spectral, color: &Color, radiance: &mut [f64]) {
-        let index = self.environment.as_ref().map_or(0, |environment| environment.index);
-        let own = self.bands_of(index, radiance.len());
-        for (i, (band, own)) in radiance.iter_mut().zip(own).enumerate() {
-            *band = own * spectral.band(color, i);
+            _ => self.picker.probability(index),
         }
     }
 }
@@ -482,7 +445,7 @@ pub(crate) fn mean(color: &Color) -> f64 {
 }
 
 /// Power of a light (W), `far` being the area (m²) that the scene shows to far lights.
-fn power(light: &Light, far: f64, environment: Option<&Environment>) -> f64 {
+fn power(light: &Light, far: f64, sky: Option<&Sky>) -> f64 {
     let own = mean(&light.color);
     match light.kind {
         LightKind::Point(_) => 4.0 * PI * own,
@@ -491,9 +454,6 @@ fn power(light: &Light, far: f64, environment: Option<&Environment>) -> f64 {
             2.0 * PI * (1.0 - 0.5 * (cos_outer + cos_inner)) * own
         }
         LightKind::Directional(_) => far * own,
-        LightKind::Environment { .. } => {
-            let map = environment.and_then(|e| e.map.as_ref());
-            4.0 * PI * far * own * map.map_or(1.0, |(_, sampler)| sampler.mean)
-        }
+        LightKind::Environment { .. } => 4.0 * PI * far * own * sky.map_or(1.0, Sky::mean),
     }
 }

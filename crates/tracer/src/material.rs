@@ -1,7 +1,7 @@
 //! Materials, ready to be looked up at a hit: what colour a surface has, how it scatters light, and
 //! what it gives off itself.
 
-use etendue_spectrum::{Curve, Illuminant};
+use etendue_spectrum::{Curve, Illuminant, Metal};
 
 use crate::TextureUse;
 use crate::texture::Encoding;
@@ -56,14 +56,26 @@ pub enum Scattering {
     Metal {
         /// Roughness, 0..=1; its square is GGX's α.
         roughness: f64,
+        /// The metal whose measured index it has, in place of the base colour.
+        named: Option<Metal>,
     },
-    /// As a smooth boundary of glass; the front is outside.
-    Dielectric(Ior),
+    /// As a boundary of glass; the front is outside.
+    Dielectric(Glass),
     /// As glTF's metallic-roughness surfaces.
     Gltf(Box<GltfSurface>),
 }
 
 impl Scattering {
+    /// Whether it scatters light in several ways, among which is chosen.
+    #[must_use]
+    pub fn has_parts(&self) -> bool {
+        match self {
+            Self::Dielectric(_) | Self::Gltf(_) => true,
+            Self::Metal { roughness, .. } => *roughness > 0.0,
+            Self::Black | Self::Matte | Self::Unlit | Self::Mirror => false,
+        }
+    }
+
     /// The glTF surface, of one.
     #[must_use]
     pub fn gltf(&self) -> Option<&GltfSurface> {
@@ -77,6 +89,35 @@ impl Scattering {
             | Self::Dielectric(_) => None,
         }
     }
+}
+
+/// A body of glass, water or the like.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Glass {
+    /// Its refractive index.
+    pub ior: Ior,
+    /// Roughness of its surface, 0..=1; its square is GGX's α.
+    pub roughness: f64,
+    /// What is left of light on its way through.
+    pub absorption: Option<Absorption>,
+}
+
+impl Glass {
+    /// Smooth and clear.
+    #[must_use]
+    pub fn clear(ior: Ior) -> Self {
+        Self { ior, roughness: 0.0, absorption: None }
+    }
+}
+
+/// Light that a body takes away on the way through it, by Beer and Lambert: after a way `s` there is
+/// `color` to the power `s` / `distance` left (`KHR_materials_volume`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Absorption {
+    /// What is left after `distance`.
+    pub color: Color,
+    /// m, above 0.
+    pub distance: f64,
 }
 
 /// A refractive index.
@@ -254,6 +295,15 @@ impl Material {
     pub fn is_pane(&self) -> bool {
         let passes = |surface: &GltfSurface| surface.transmission > 0.0 && surface.metallic < 1.0;
         self.scattering.gltf().is_some_and(passes)
+    }
+
+    /// What the body behind its front takes from light.
+    #[must_use]
+    pub fn absorption(&self) -> Option<Absorption> {
+        match &self.scattering {
+            Scattering::Dielectric(glass) => glass.absorption,
+            _ => None,
+        }
     }
 
     /// Whether rays may pass the surface as if it were not there.

@@ -4,6 +4,7 @@
 use etendue_geometry::Geometry;
 use etendue_geometry::glam::{DMat3, DVec3};
 
+use crate::material::Absorption;
 use crate::spawn::magnitudes;
 use crate::{Color, Material, Paint, Scattering};
 
@@ -29,6 +30,8 @@ pub(crate) struct PlacedSurface {
     pub(crate) is_matte: bool,
     /// Its shading normal is not that of its triangles.
     pub(crate) is_tilted: bool,
+    /// What the body behind its front takes from light.
+    pub(crate) absorption: Option<Absorption>,
     /// Its colour, where that is alike all over.
     pub(crate) color: Option<Color>,
 }
@@ -48,6 +51,7 @@ impl PlacedSurfaces {
                 is_seen: material.emission.is_some() || material.scattering == Scattering::Unlit,
                 has_alpha: material.has_alpha(),
                 is_matte: material.scattering == Scattering::Matte && !material.has_alpha(),
+                absorption: material.absorption(),
                 is_tilted: material.normal_map.is_some() || mesh.normals.is_some(),
                 color: match material.base_color {
                     Paint::Plain(color) if !colored => Some(color.map(|c| c.clamp(0.0, 1.0))),

@@ -151,6 +151,12 @@ impl DiscreteDistribution {
     /// without weight is never chosen.
     #[must_use]
     pub fn pick(&self, u: f64) -> (usize, f64) {
+        self.pick_between(u, self.guided(u))
+    }
+
+    /// The first and the last index that `u` may pick.
+    #[inline]
+    fn guided(&self, u: f64) -> [usize; 2] {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -158,7 +164,12 @@ impl DiscreteDistribution {
         )]
         let interval = ((u * self.len() as f64) as usize).min(self.len() - 1);
         let first = self.guide[interval] as usize;
-        let last = self.guide.get(interval + 1).map_or(self.len() - 1, |&index| index as usize);
+        [first, self.guide.get(interval + 1).map_or(self.len() - 1, |&index| index as usize)]
+    }
+
+    /// [`Self::pick`] from these on.
+    #[inline]
+    fn pick_between(&self, u: f64, [first, last]: [usize; 2]) -> (usize, f64) {
         // The first whose end is beyond u.
         let index = first + self.below[first + 1..=last].partition_point(|&end| end <= u);
         let (start, end) = (self.below[index], self.below[index + 1]);
@@ -179,6 +190,23 @@ pub struct GridDistribution {
     columns: Vec<DiscreteDistribution>,
 }
 
+/// A row that was chosen, and where the column is looked for.
+#[derive(Debug, Clone, Copy, Default)]
+struct Found {
+    row: usize,
+    down: f64,
+    across: f64,
+    between: [usize; 2],
+}
+
+/// Places that are chosen together; kept for the next.
+#[derive(Debug, Clone, Default)]
+pub struct PlacesOnGrid {
+    found: Vec<Found>,
+    /// Places (u, v) and their density over the unit square.
+    pub chosen: Vec<([f64; 2], f64)>,
+}
+
 impl GridDistribution {
     /// By `weights`, row by row of `columns` each.
     #[must_use]
@@ -190,17 +218,31 @@ impl GridDistribution {
         }
     }
 
-    /// The place for `square`, its first number along columns. Neighbours in the square are
-    /// neighbours on the grid.
-    #[must_use]
-    pub fn place(&self, [u, v]: [f64; 2]) -> [f64; 2] {
-        let (row, down) = self.rows.pick(v);
-        let columns = &self.columns[row];
-        let (column, across) = columns.pick(u);
-        let at = |cell: usize, rest: f64, cells: usize| {
-            ((cell as f64 + rest) / cells as f64).min(ONE_BELOW)
-        };
-        [at(column, across, columns.len()), at(row, down, self.columns.len())]
+    /// The place for each of `squares`, the first number along columns, and its density; `places` is
+    /// refilled. Neighbours in the square are neighbours on the grid.
+    ///
+    /// Tables of large grids are in no cache near by: what is read of them is read in loops of little
+    /// else, so that many reads are under way at once.
+    pub fn places(&self, squares: impl Iterator<Item = [f64; 2]>, places: &mut PlacesOnGrid) {
+        let PlacesOnGrid { found, chosen } = places;
+        found.clear();
+        found.extend(squares.map(|[u, v]| {
+            let (row, down) = self.rows.pick(v);
+            Found { row, down, across: u, between: [0; 2] }
+        }));
+        for found in found.iter_mut() {
+            found.between = self.columns[found.row].guided(found.across);
+        }
+        chosen.clear();
+        chosen.extend(found.iter().map(|&Found { row, down, across, between }| {
+            let columns = &self.columns[row];
+            let (column, rest) = columns.pick_between(across, between);
+            let at = |cell: usize, rest: f64, cells: usize| {
+                ((cell as f64 + rest) / cells as f64).min(ONE_BELOW)
+            };
+            let place = [at(column, rest, columns.len()), at(row, down, self.columns.len())];
+            (place, self.density_of(row, column))
+        }));
     }
 
     /// The density of places at one, over the unit square.
@@ -213,9 +255,13 @@ impl GridDistribution {
         )]
         let cell = |x: f64, cells: usize| ((x * cells as f64) as usize).min(cells - 1);
         let row = cell(v, self.columns.len());
+        self.density_of(row, cell(u, self.columns[row].len()))
+    }
+
+    fn density_of(&self, row: usize, column: usize) -> f64 {
         let columns = &self.columns[row];
         let cells = (self.columns.len() * columns.len()) as f64;
-        self.rows.probability(row) * columns.probability(cell(u, columns.len())) * cells
+        self.rows.probability(row) * columns.probability(column) * cells
     }
 }
 
@@ -271,14 +317,17 @@ mod tests {
     fn places_on_grids_have_their_density() {
         let weights = [1.0, 0.0, 3.0, 0.0, 0.0, 0.0, 5.0, 0.0, 7.0];
         let grid = GridDistribution::new(3, &weights);
+        let mut places = PlacesOnGrid::default();
         let n = 400;
         let mut counts = [0.0; 9];
         for k in 0..n * n {
             let square = [k % n, k / n].map(|i| (f64::from(i) + 0.5) / f64::from(n));
-            let place = grid.place(square);
+            grid.places(std::iter::once(square), &mut places);
+            let (place, density) = places.chosen[0];
             let [x, y] = place.map(|c| (c * 3.0) as usize);
             counts[y * 3 + x] += 1.0 / f64::from(n * n);
             assert!((grid.pdf(place) - weights[y * 3 + x] * 9.0 / 16.0).abs() < 1e-12);
+            assert_eq!(grid.pdf(place), density);
         }
         for (count, weight) in counts.iter().zip(weights) {
             // A regular grid: within a step along each side of the cell's share of the square.

@@ -1,6 +1,6 @@
 //! Materials and lights as the scene file writes them.
 
-use etendue_spectrum::Illuminant;
+use etendue_spectrum::{Illuminant, Metal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,16 +26,20 @@ pub enum MaterialSpec {
         #[serde(default)]
         color: PaintSpec,
     },
-    /// A metal with GGX facets.
+    /// A metal with GGX facets: of a colour, or of a measured metal.
     Metal {
-        /// Reflectance face on: linear RGB, each 0..=1, or an image.
-        color: PaintSpec,
+        /// Reflectance face on: linear RGB, each 0..=1, or an image. Either this or `metal`.
+        #[serde(default)]
+        color: Option<PaintSpec>,
+        /// The metal whose measured index decides what is reflected at which wavelength.
+        #[serde(default)]
+        metal: Option<Metal>,
         /// Roughness, 0 (a mirror) to 1.
         #[serde(default = "default_roughness")]
         #[schemars(range(min = 0.0, max = 1.0))]
         roughness: f64,
     },
-    /// A smooth boundary of glass, water or the like. The front of its triangles is outside.
+    /// A boundary of glass, water or the like. The front of its triangles is outside.
     Dielectric {
         /// Refractive index: a number (at least 1), a glass of the catalogue, or `{"nd", "vd"}`.
         #[serde(default)]
@@ -43,6 +47,13 @@ pub enum MaterialSpec {
         /// Tint of what passes: linear RGB, each 0..=1.
         #[serde(default)]
         color: PaintSpec,
+        /// Roughness, 0 (smooth) to 1: facets reflect and refract.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        roughness: f64,
+        /// What the body takes from light on its way through; nothing when absent.
+        #[serde(default)]
+        absorption: Option<AbsorptionSpec>,
     },
     /// glTF's metallic-roughness surface.
     Gltf {
@@ -191,6 +202,16 @@ impl Default for IorSpec {
     }
 }
 
+/// Absorption of a body, by Beer and Lambert.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AbsorptionSpec {
+    /// What is left of light after `distance`: linear RGB, each 0..=1.
+    pub color: Color,
+    /// m (> 0).
+    pub distance: f64,
+}
+
 /// A light as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
@@ -244,13 +265,28 @@ pub enum LightSpec {
         /// is at −Z, its top at +Y.
         #[serde(default)]
         image: Option<String>,
-        /// Turns the image about +Y (degrees, counter-clockwise from above).
+        /// Turns the image about its top (degrees, counter-clockwise from above).
         #[serde(default)]
         rotate: f64,
+        /// Where the image's top is: the image is tilted the shortest way from +Y.
+        #[serde(default = "upwards")]
+        up: [f64; 3],
+        /// The camera sees it where nothing is in the way; if not, it lights, and is seen in mirrors and
+        /// through glass.
+        #[serde(default = "yes")]
+        visible: bool,
         /// The spectrum that the radiance multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
     },
+}
+
+fn upwards() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn default_cone() -> f64 {

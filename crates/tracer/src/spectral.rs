@@ -1,8 +1,12 @@
 //! From colours to the bands that a ray carries.
 
-use etendue_spectrum::{Bands, Curve, Illuminant, NoOverlap, Outside};
+use etendue_spectrum::{Bands, Curve, Illuminant, Metal, NoOverlap, Outside};
 
 use crate::Color;
+use crate::bsdf::metal;
+
+/// Shares of a band's light between which a wavelength is interpolated.
+const SHARES: usize = 32;
 
 /// The bands of a render, and the way from linear RGB to them.
 #[derive(Debug, Clone)]
@@ -10,6 +14,10 @@ pub struct Spectral {
     bands: Bands,
     from_rgb: Vec<[f64; 3]>,
     is_rgb: bool,
+    /// The [`Bands::quantiles`] of each band (nm).
+    quantiles: Vec<Vec<f64>>,
+    /// Of each metal by its number, and band: the reflectance face on, and the dip beside it.
+    metals: Vec<[f64; 2]>,
 }
 
 impl Spectral {
@@ -17,7 +25,15 @@ impl Spectral {
     #[must_use]
     pub fn new(bands: &Bands) -> Self {
         let from_rgb = bands.from_rgb();
-        Self { is_rgb: *bands == Bands::Rgb, from_rgb, bands: bands.clone() }
+        let quantiles = (0..from_rgb.len()).map(|i| bands.quantiles(i, SHARES)).collect();
+        let metals = Metal::ALL.iter().flat_map(|&metal| reflectances(metal, bands)).collect();
+        Self { is_rgb: *bands == Bands::Rgb, from_rgb, quantiles, metals, bands: bands.clone() }
+    }
+
+    /// What a metal reflects face on in band `i`, and the dip of its reflectance
+    /// ([`crate::bsdf::Weights::dip`]).
+    pub(crate) fn metal(&self, metal: Metal, i: usize) -> [f64; 2] {
+        self.metals[metal as usize * self.count() + i]
     }
 
     /// The bands.
@@ -36,6 +52,16 @@ impl Spectral {
     #[must_use]
     pub fn wavelength(&self, i: usize) -> f64 {
         self.bands.wavelength(i)
+    }
+
+    /// The wavelength (nm) of band `i` below which lies the share `u` (0..1) of its light.
+    #[must_use]
+    pub fn wavelength_at(&self, i: usize, u: f64) -> f64 {
+        let scaled = u.clamp(0.0, 1.0) * SHARES as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
+        let k = (scaled as usize).min(SHARES - 1);
+        let [from, to] = [self.quantiles[i][k], self.quantiles[i][k + 1]];
+        from + (to - from) * (scaled - k as f64)
     }
 
     /// Row `i` of a linear sRGB colour.
@@ -67,4 +93,17 @@ impl Spectral {
         let curve = illuminant.curve().unwrap_or(Curve::ONE);
         self.bands.from_curve(&curve, Outside::Zero)
     }
+}
+
+/// What a metal reflects face on in each band, and the dip of its reflectance.
+fn reflectances(named: Metal, bands: &Bands) -> Vec<[f64; 2]> {
+    let at = |cosine| {
+        let curve = named.reflectance(cosine);
+        // Far from where it is measured a metal reflects as at the end of its table.
+        bands.from_curve(&curve, Outside::Held).unwrap_or_else(|_| {
+            (0..bands.count()).map(|i| curve.held(bands.wavelength(i))).collect()
+        })
+    };
+    let (face_on, second) = (at(1.0), at(metal::SECOND_COSINE));
+    face_on.iter().zip(&second).map(|(&f, &s)| [f, metal::dip(f, s)]).collect()
 }

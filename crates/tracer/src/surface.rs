@@ -8,7 +8,7 @@ use crate::material::{Alpha, GltfSurface, NormalMap};
 use crate::placed::PlacedSurface;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::Anchor;
-use crate::{Color, Footprint, LightingContext, Material, Scattering};
+use crate::{Color, Footprint, Ior, LightingContext, Material, Scattering};
 
 /// A hit seen from its ray.
 #[derive(Debug, Clone, Copy)]
@@ -68,15 +68,23 @@ impl<'a> SurfaceInteraction<'a> {
             Scattering::Black | Scattering::Unlit => Model::Black,
             Scattering::Matte => Model::Matte,
             Scattering::Mirror => Model::Mirror,
-            Scattering::Metal { roughness } => Model::Metal { alpha: roughness * roughness },
-            Scattering::Dielectric(ior) => {
-                let n = ior.at(wavelength);
-                Model::Dielectric { eta: if self.front { n } else { 1.0 / n } }
+            Scattering::Metal { roughness, named } => {
+                Model::Metal { alpha: roughness * roughness, named: *named }
             }
+            Scattering::Dielectric(glass) => Model::Dielectric {
+                alpha: glass.roughness * glass.roughness,
+                eta: self.eta(&glass.ior, wavelength),
+            },
             Scattering::Gltf(surface) => return self.layered(around, surface, geometric),
         };
         let shading = self.shading(around, geometric);
         Bsdf::new(model, [geometric, shading], self.wo, [self.color(), [1.0; 3]])
+    }
+
+    /// Index behind the surface over the index in front, as seen from its ray, at a wavelength (nm).
+    pub(crate) fn eta(&self, ior: &Ior, wavelength: f64) -> f64 {
+        let n = ior.at(wavelength);
+        if self.front { n } else { 1.0 / n }
     }
 
     fn layered(&self, around: &SceneView<'_>, own: &GltfSurface, geometric: DVec3) -> Bsdf {

@@ -3,7 +3,7 @@
 use etendue_geometry::glam::DVec3;
 use etendue_scene::import::NoteKind;
 use etendue_tracer::material::Alpha;
-use etendue_tracer::{Ior, Material, Paint, Scattering};
+use etendue_tracer::{Glass, Ior, Material, Paint, Scattering};
 
 use crate::{error, folder, import_strict, load, points, write};
 
@@ -114,13 +114,13 @@ fn mtl_materials_become_the_nearest_of_ours() {
     };
     assert_eq!(of("matte").scattering, Scattering::Matte);
     assert_eq!(of("matte").base_color, Paint::Plain([0.5, 0.25, 1.0]));
-    assert_eq!(of("glass").scattering, Scattering::Dielectric(Ior::Constant(1.7)));
+    assert_eq!(of("glass").scattering, Scattering::Dielectric(Glass::clear(Ior::Constant(1.7))));
     assert_eq!(of("glass").base_color, Paint::Plain([1.0; 3]), "glass lets all through");
-    assert_eq!(of("thin").scattering, Scattering::Dielectric(Ior::Constant(1.0)));
+    assert_eq!(of("thin").scattering, Scattering::Dielectric(Glass::clear(Ior::Constant(1.0))));
     assert_eq!(of("thin").alpha, Alpha::Opaque, "glass is there as a whole");
     // α² = 2 / (Ns + 2) and α is the square of the roughness.
     let roughness = |material: &Material| match &material.scattering {
-        Scattering::Metal { roughness } => *roughness,
+        Scattering::Metal { roughness, .. } => *roughness,
         Scattering::Gltf(surface) => surface.roughness,
         other => panic!("{other:?}"),
     };

@@ -23,8 +23,9 @@ const OBLIQUITIES: usize = 96;
 /// The least roughness of the table; smoother sheets differ at μ < 10⁻⁴ alone.
 const SMOOTHEST: f64 = 1e-6;
 
-/// Facets that each entry is averaged over, a square number of them.
-const FACETS: u32 = 24;
+/// Facets that each entry is averaged over: a lattice by the golden ratio, all of whose points differ along
+/// both axes, as the viewer's azimuth changes nothing face on.
+const FACETS: u32 = 1024;
 
 #[derive(Debug)]
 struct Table {
@@ -88,13 +89,17 @@ fn knot<const COUNT: usize>(k: usize) -> f64 {
     k as f64 / (COUNT - 1) as f64
 }
 
+/// The fractional part of the golden ratio.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
 /// A and B by the visible facets: each returns G₂/G₁ times its reflectance.
 fn entry(mu: f64, alpha: f64) -> [f64; 2] {
     let wo = DVec3::new((1.0 - mu * mu).sqrt(), 0.0, mu.max(1e-12));
     let mut sum = [0.0; 2];
-    for k in 0..FACETS * FACETS {
-        let place = |i: u32| (f64::from(i) + 0.5) / f64::from(FACETS);
-        let h = ggx::sample_visible(wo, [place(k % FACETS), place(k / FACETS)], alpha);
+    for k in 0..FACETS {
+        let u = (f64::from(k) + 0.5) * (GOLDEN);
+        let v = (f64::from(k) + 0.5) / f64::from(FACETS);
+        let h = ggx::sample_visible(wo, [u.fract(), v], alpha);
         let wi = 2.0 * wo.dot(h) * h - wo;
         if wi.z <= 0.0 {
             continue;
@@ -104,7 +109,7 @@ fn entry(mu: f64, alpha: f64) -> [f64; 2] {
         sum[0] += returned * (1.0 - w);
         sum[1] += returned * w;
     }
-    sum.map(|s| s / f64::from(FACETS * FACETS))
+    sum.map(|s| s / f64::from(FACETS))
 }
 
 /// The albedo of one roughness: rows of the table, interpolated once.
@@ -128,24 +133,36 @@ impl Albedo {
     /// For the cosine `mu` of the direction.
     #[must_use]
     pub fn at(&self, mu: f64) -> f64 {
-        let (k, part) = place::<OBLIQUITIES>(obliquity(mu.max(0.0), self.alpha));
-        let table = &TABLE.entries;
-        let at = |row: usize, k: usize| {
-            let [a, b] = table[row * OBLIQUITIES + k];
-            self.f0 * a + self.f90 * b
-        };
-        let along = |row: usize| at(row, k) * (1.0 - part) + at(row, k + 1) * part;
-        along(self.row) * (1.0 - self.share) + along(self.row + 1) * self.share
+        self.of(self.terms(mu))
     }
 
     /// The mean over directions.
     #[must_use]
     pub fn mean(&self) -> f64 {
-        let of = |row: usize| {
-            let [a, b] = TABLE.means[row];
-            self.f0 * a + self.f90 * b
+        self.of(self.mean_terms())
+    }
+
+    /// From A and B of some direction, or their means.
+    pub(super) fn of(&self, [a, b]: [f64; 2]) -> f64 {
+        self.f0 * a + self.f90 * b
+    }
+
+    /// A and B for the cosine `mu` of the direction. Their sum is what facets of reflectance 1 return.
+    pub(super) fn terms(&self, mu: f64) -> [f64; 2] {
+        let (k, part) = place::<OBLIQUITIES>(obliquity(mu.max(0.0), self.alpha));
+        let at = |row: usize, term: usize| {
+            let entry = row * OBLIQUITIES + k;
+            TABLE.entries[entry][term] * (1.0 - part) + TABLE.entries[entry + 1][term] * part
         };
-        of(self.row) * (1.0 - self.share) + of(self.row + 1) * self.share
+        [0, 1].map(|term| {
+            at(self.row, term) * (1.0 - self.share) + at(self.row + 1, term) * self.share
+        })
+    }
+
+    /// Their means over directions.
+    pub(super) fn mean_terms(&self) -> [f64; 2] {
+        let [own, next] = [self.row, self.row + 1].map(|row| TABLE.means[row]);
+        [0, 1].map(|term| own[term] * (1.0 - self.share) + next[term] * self.share)
     }
 }
 

@@ -5,13 +5,15 @@
 //! `metallic`; the dielectric is a GGX sheet over a matte base. The specification weighs the base by
 //! `1 − F(h)`, which returns more than falls in at grazing angles; here the base gets what the sheet
 //! leaves on both ways ([`super::albedo`]). `KHR_materials_specular` and `_ior` set the sheet's
-//! reflectances, `KHR_materials_transmission` lets a share of the base through a thin wall.
+//! reflectances, `KHR_materials_transmission` lets a share of the base through a thin wall. The metal
+//! keeps its energy as [`super::metal`] does.
 
 use std::f64::consts::PI;
 
 use etendue_geometry::glam::DVec3;
 
 use super::albedo::Albedo;
+use super::metal::{deep, mean_reflectance, multiple};
 use super::{Weights, fresnel, ggx, mirrored};
 use crate::sampling::cosine_direction;
 
@@ -53,23 +55,54 @@ struct Chances {
     through: f64,
 }
 
+/// The model as seen from one direction.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Viewed {
+    peaks: Peaks,
+    /// Of the dielectric.
+    albedo: Albedo,
+    /// What the dielectric, and facets of reflectance 1, return of light from the viewer.
+    dielectric: f64,
+    facets: f64,
+    /// Their means over directions.
+    dielectric_mean: f64,
+    pub(super) mean: f64,
+    chances: Chances,
+}
+
 impl Layered {
     pub(super) fn is_delta(&self) -> bool {
         let matte = (1.0 - self.metallic) * (1.0 - self.transmission);
         self.alpha == 0.0 && matte == 0.0
     }
 
-    fn albedo(&self, peaks: &Peaks) -> Albedo {
-        Albedo::new(self.alpha, (self.f0 * peaks.highlight).min(1.0), self.f90)
+    /// As seen from `wo`.
+    pub(super) fn viewed(&self, wo: DVec3, peaks: &Peaks) -> Viewed {
+        let albedo = Albedo::new(self.alpha, (self.f0 * peaks.highlight).min(1.0), self.f90);
+        let ([a, b], means) = (albedo.terms(wo.z), albedo.mean_terms());
+        let mut viewed = Viewed {
+            peaks: *peaks,
+            albedo,
+            dielectric: albedo.of([a, b]),
+            facets: (a + b).min(1.0),
+            dielectric_mean: albedo.of(means),
+            mean: (means[0] + means[1]).min(1.0),
+            chances: Chances { sheet: 0.0, base: 0.0, through: 0.0 },
+        };
+        viewed.chances = self.chances(&viewed, peaks.base * a + b);
+        viewed
     }
 
-    fn chances(&self, wo: DVec3, peaks: &Peaks) -> Chances {
+    /// By what each part returns of a white light, the metal's facets `metal` of it.
+    fn chances(&self, viewed: &Viewed, metal: f64) -> Chances {
         let m = self.metallic;
-        let dielectric = self.albedo(peaks).at(wo.z).min(1.0);
-        let metal = Albedo::new(self.alpha, peaks.base, 1.0).at(wo.z);
-        let below = (1.0 - m) * (1.0 - dielectric) * peaks.base;
+        let dielectric = viewed.dielectric.min(1.0);
+        let below = (1.0 - m) * (1.0 - dielectric) * viewed.peaks.base;
         let sheet = m * metal + (1.0 - m) * dielectric;
-        let (base, through) = (below * (1.0 - self.transmission), below * self.transmission);
+        let lacking = multiple(mean_reflectance(viewed.peaks.base, 0.0), viewed.mean);
+        let deep = if self.alpha > 0.0 { m * lacking * (1.0 - viewed.facets) } else { 0.0 };
+        let base = below * (1.0 - self.transmission) + deep;
+        let through = below * self.transmission;
         let sum = sheet + base + through;
         if sum > 0.0 {
             Chances { sheet: sheet / sum, base: base / sum, through: through / sum }
@@ -85,6 +118,7 @@ impl Layered {
             white: m * w + (1.0 - m) * self.f90 * w,
             base: m * (1.0 - w),
             highlight: (1.0 - m) * self.f0 * (1.0 - w),
+            ..Weights::default()
         }
     }
 
@@ -95,23 +129,26 @@ impl Layered {
         (1.0 - (f0 * (1.0 - w) + self.f90 * w)).max(0.0)
     }
 
-    /// Value times cosine of the base that is seen through the sheet, per its colour.
-    fn matte(&self, wo: DVec3, wi: DVec3, peaks: &Peaks) -> f64 {
+    /// Value times cosine of what is alike from all sides: the base that is seen through the sheet, per
+    /// its colour, and light that met several facets of the metal.
+    fn matte(&self, wi: DVec3, viewed: &Viewed) -> Weights {
         let share = (1.0 - self.metallic) * (1.0 - self.transmission);
-        if share == 0.0 {
-            return 0.0;
+        let rough = self.metallic > 0.0 && self.alpha > 0.0;
+        if share == 0.0 && !rough {
+            return Weights::default();
         }
-        let albedo = self.albedo(peaks);
-        let below = 1.0 - albedo.mean();
-        if below <= 0.0 {
-            return 0.0;
-        }
-        let seen = (1.0 - albedo.at(wo.z)).max(0.0) * (1.0 - albedo.at(wi.z)).max(0.0);
-        share * seen / below * wi.z / PI
+        let [a, b] = viewed.albedo.terms(wi.z);
+        let dielectric = viewed.albedo.of([a, b]);
+        let below = 1.0 - viewed.dielectric_mean;
+        let passed = (1.0 - viewed.dielectric).max(0.0) * (1.0 - dielectric).max(0.0);
+        let base = if below > 0.0 { share * passed / below * wi.z / PI } else { 0.0 };
+        let metal = deep(viewed.facets, (a + b).min(1.0), viewed.mean) * wi.z / PI;
+        let deep = if rough { self.metallic * metal } else { 0.0 };
+        Weights { base, deep, ..Weights::default() }
     }
 
-    pub(super) fn evaluate(&self, wo: DVec3, wi: DVec3, peaks: &Peaks) -> (Weights, f64) {
-        let chances = self.chances(wo, peaks);
+    pub(super) fn evaluate(&self, wo: DVec3, wi: DVec3, viewed: &Viewed) -> (Weights, f64) {
+        let Viewed { chances, peaks, .. } = viewed;
         if wi.z < 0.0 {
             if self.transmission == 0.0 || self.alpha == 0.0 {
                 return (Weights::default(), 0.0);
@@ -119,7 +156,7 @@ impl Layered {
             let (value, pdf) = self.through(wo, wi, peaks);
             return (Weights::base(value), pdf * chances.through);
         }
-        let mut weights = Weights::base(self.matte(wo, wi, peaks));
+        let mut weights = self.matte(wi, viewed);
         let mut pdf = chances.base * wi.z / PI;
         if self.alpha > 0.0 {
             let (value, facets) = ggx::reflection(wo, wi, self.alpha);
@@ -152,9 +189,9 @@ impl Layered {
         wo: DVec3,
         choice: f64,
         square: [f64; 2],
-        peaks: &Peaks,
+        viewed: &Viewed,
     ) -> Option<Found> {
-        let chances = self.chances(wo, peaks);
+        let Viewed { chances, peaks, .. } = viewed;
         let wi = if choice < chances.sheet {
             if self.alpha == 0.0 {
                 let weights = self.sheet(wo.z).times(1.0 / chances.sheet);
@@ -177,7 +214,7 @@ impl Layered {
         if (wi.z < 0.0) != below || wi.z == 0.0 {
             return None;
         }
-        let (weights, pdf) = self.evaluate(wo, wi, peaks);
+        let (weights, pdf) = self.evaluate(wo, wi, viewed);
         (pdf > 0.0).then(|| Found { wi, weights: weights.times(1.0 / pdf), pdf })
     }
 

@@ -1,8 +1,8 @@
 //! How a surface scatters light: each model as a function to evaluate, to sample, and the density of
 //! the sampling.
 //!
-//! Every model's value is a sum of three colours, white, the surface's own and that of its highlights,
-//! times plain numbers ([`Weights`]). So directions, Fresnel terms and facets are worked out once a
+//! Every model's value is a sum of a few colours, white, the surface's own, that of its highlights and
+//! that of light that met several facets, times plain numbers ([`Weights`]). So directions, Fresnel terms and facets are worked out once a
 //! hit, whatever the number of bands, and a band costs two multiplications.
 //!
 //! Directions point away from the surface; `wo` is where the light goes (to the viewer), `wi` where it
@@ -10,19 +10,22 @@
 //! measured with the shading normal (Veach 1997, section 5.3).
 
 pub mod albedo;
+mod boundary;
 pub mod fresnel;
 pub mod ggx;
 mod layered;
+pub(crate) mod metal;
 
 use std::f64::consts::PI;
 
 use etendue_geometry::glam::DVec3;
+use etendue_spectrum::Metal;
 
 use crate::Color;
 use crate::sampling::{Frame, cosine_direction};
 pub use layered::Layered;
 
-/// A value as multiples of white, the surface's colour and its highlights' colour.
+/// A value as multiples of white, the surface's colour and others that follow from it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Weights {
     /// Of white.
@@ -31,6 +34,10 @@ pub struct Weights {
     pub base: f64,
     /// Of the highlights' colour.
     pub highlight: f64,
+    /// Of what a measured metal's reflectance lacks of Schlick's ([`metal`]).
+    pub dip: f64,
+    /// Of the colour of light that met several facets ([`metal`]).
+    pub deep: f64,
 }
 
 impl Weights {
@@ -57,6 +64,8 @@ impl Weights {
             white: self.white + other.white,
             base: self.base + other.base,
             highlight: self.highlight + other.highlight,
+            dip: self.dip + other.dip,
+            deep: self.deep + other.deep,
         }
     }
 
@@ -65,6 +74,8 @@ impl Weights {
             white: self.white * factor,
             base: self.base * factor,
             highlight: self.highlight * factor,
+            dip: self.dip * factor,
+            deep: self.deep * factor,
         }
     }
 }
@@ -82,9 +93,13 @@ pub enum Model {
     Metal {
         /// The square of the roughness, 0..=1; at 0 a mirror.
         alpha: f64,
+        /// Its reflectance by its measured index, in place of the colour.
+        named: Option<Metal>,
     },
-    /// A smooth boundary of glass.
+    /// A boundary of glass.
     Dielectric {
+        /// The square of the roughness, 0..=1; at 0 smooth.
+        alpha: f64,
         /// Index behind the surface over the index in front, as seen from `wo`.
         eta: f64,
     },
@@ -103,6 +118,18 @@ pub struct Bsdf {
     pub base: Color,
     /// The colour of its highlights.
     pub highlight: Color,
+    /// The colour of light that met several facets.
+    pub(crate) deep: Color,
+    /// What of the model follows from the viewer's direction alone.
+    seen: Seen,
+}
+
+/// What of a model follows from the viewer's direction alone.
+#[derive(Debug, Clone, Copy)]
+enum Seen {
+    Plain,
+    Metal(metal::Rough),
+    Layered(layered::Viewed),
 }
 
 /// A direction that light comes from, chosen in proportion to what it contributes.
@@ -126,15 +153,47 @@ impl Bsdf {
         [base, highlight]: [Color; 2],
     ) -> Self {
         let frame = Frame::around(shading);
-        Self { model, frame, geometric, wo: frame.local(wo), base, highlight }
+        let local = frame.local(wo);
+        let (seen, mean) = match model {
+            Model::Metal { alpha, .. } if alpha > 0.0 => {
+                let rough = metal::Rough::new(alpha, local);
+                (Seen::Metal(rough), Some(rough.mean))
+            }
+            Model::Layered(layered) => {
+                let viewed = layered.viewed(local, &peaks([&base, &highlight]));
+                (Seen::Layered(viewed), (layered.metallic > 0.0).then_some(viewed.mean))
+            }
+            _ => (Seen::Plain, None),
+        };
+        let deep = mean.map_or([0.0; 3], |mean| {
+            base.map(|c| metal::multiple(metal::mean_reflectance(c, 0.0), mean))
+        });
+        Self { model, frame, geometric, wo: local, base, highlight, deep, seen }
+    }
+
+    /// The metal by whose measured index it reflects.
+    pub(crate) fn named(&self) -> Option<Metal> {
+        match self.model {
+            Model::Metal { named, .. } => named,
+            _ => None,
+        }
+    }
+
+    /// The share of light that facets of reflectance 1 return at once, over all directions.
+    pub(crate) fn mean_albedo(&self) -> f64 {
+        match self.seen {
+            Seen::Plain => 1.0,
+            Seen::Metal(rough) => rough.mean,
+            Seen::Layered(viewed) => viewed.mean,
+        }
     }
 
     /// Whether light of one direction only can be scattered to `wo` (no light can be aimed at).
     #[must_use]
     pub fn is_delta(&self) -> bool {
         match self.model {
-            Model::Black | Model::Mirror | Model::Dielectric { .. } => true,
-            Model::Metal { alpha } => alpha == 0.0,
+            Model::Black | Model::Mirror => true,
+            Model::Metal { alpha, .. } | Model::Dielectric { alpha, .. } => alpha == 0.0,
             Model::Layered(layered) => layered.is_delta(),
             Model::Matte => false,
         }
@@ -156,19 +215,17 @@ impl Bsdf {
             return (Weights::default(), 0.0);
         }
         let black = (Weights::default(), 0.0);
-        match self.model {
-            Model::Layered(layered) => layered.evaluate(self.wo, local, &self.peaks()),
-            Model::Matte | Model::Metal { .. } if transmits => black,
-            Model::Matte => (Weights::base(local.z / PI), local.z / PI),
-            // All of their directions are single rays.
-            Model::Black
-            | Model::Mirror
-            | Model::Metal { alpha: 0.0 }
-            | Model::Dielectric { .. } => black,
-            Model::Metal { alpha } => {
-                let (value, pdf) = ggx::reflection(self.wo, local, alpha);
-                (metal(self.wo, local).times(value), pdf)
+        match (self.model, self.seen) {
+            (Model::Layered(layered), Seen::Layered(viewed)) => {
+                layered.evaluate(self.wo, local, &viewed)
             }
+            (Model::Dielectric { alpha, eta }, _) if alpha > 0.0 => {
+                boundary::Rough { alpha, eta }.evaluate(self.wo, local)
+            }
+            (Model::Matte, _) if !transmits => (Weights::base(local.z / PI), local.z / PI),
+            (_, Seen::Metal(rough)) if !transmits => rough.evaluate(self.wo, local),
+            // All of their directions are single rays, or on the other side.
+            _ => black,
         }
     }
 
@@ -186,22 +243,19 @@ impl Bsdf {
                 self.given(local, Weights::base(1.0), local.z / PI)
             }
             Model::Mirror => self.single(mirrored(self.wo), Weights::base(1.0)),
-            Model::Metal { alpha: 0.0 } => {
-                let wi = mirrored(self.wo);
-                self.single(wi, metal(self.wo, wi))
+            Model::Metal { .. } => {
+                let Seen::Metal(rough) = self.seen else {
+                    return self.single(mirrored(self.wo), metal::facets(self.wo.z));
+                };
+                self.sampled(rough.sample(self.wo, choice, square))
             }
-            Model::Metal { alpha } => {
-                let h = ggx::sample_visible(self.wo, square, alpha);
-                let wi = 2.0 * self.wo.dot(h) * h - self.wo;
-                let (value, pdf) = ggx::reflection(self.wo, wi, alpha);
-                if pdf <= 0.0 {
-                    return None;
-                }
-                self.given(wi, metal(self.wo, wi).times(value / pdf), pdf)
+            Model::Dielectric { alpha: 0.0, eta } => self.boundary(eta, choice),
+            Model::Dielectric { alpha, eta } => {
+                self.sampled(boundary::Rough { alpha, eta }.sample(self.wo, choice, square)?)
             }
-            Model::Dielectric { eta } => self.boundary(eta, choice),
             Model::Layered(layered) => {
-                let found = layered.sample(self.wo, choice, square, &self.peaks())?;
+                let Seen::Layered(viewed) = self.seen else { return None };
+                let found = layered.sample(self.wo, choice, square, &viewed)?;
                 if found.pdf == f64::INFINITY {
                     self.single(found.wi, found.weights)
                 } else {
@@ -211,31 +265,50 @@ impl Bsdf {
         }
     }
 
+    /// A sampled direction with what [`Self::evaluate`] says of it.
+    fn sampled(&self, local: DVec3) -> Option<BsdfSample> {
+        let (value, pdf) = match (self.model, self.seen) {
+            (_, Seen::Metal(rough)) if local.z > 0.0 => rough.evaluate(self.wo, local),
+            (Model::Dielectric { alpha, eta }, _) => {
+                boundary::Rough { alpha, eta }.evaluate(self.wo, local)
+            }
+            _ => return None,
+        };
+        if pdf <= 0.0 {
+            return None;
+        }
+        self.given(local, value.times(1.0 / pdf), pdf)
+    }
+
     /// What passes a smooth pane without thickness straight on, over what arrives; `None` for all other
     /// surfaces.
     #[must_use]
     pub fn straight_through(&self) -> Option<Weights> {
         let Model::Layered(layered) = &self.model else { return None };
-        layered.straight_through(self.wo, &self.peaks())
+        layered.straight_through(self.wo, &peaks([&self.base, &self.highlight]))
     }
 
-    /// Reflects or refracts by Snell and Fresnel. Radiance is compressed by the square of the index
-    /// (Veach 1997, section 5.2.2).
+    /// Reflects or refracts by Snell and Fresnel.
     fn boundary(&self, eta: f64, choice: f64) -> Option<BsdfSample> {
-        let (reflectance, cos_out) = fresnel::dielectric(self.wo.z, eta);
-        match cos_out {
-            Some(cos_out) if choice >= reflectance => {
-                let wi = DVec3::new(-self.wo.x / eta, -self.wo.y / eta, -cos_out);
-                self.single(wi, Weights::base(1.0 / (eta * eta)))
-            }
-            _ => self.single(mirrored(self.wo), Weights::white(1.0)),
-        }
+        if choice < self.reflectance(eta) { self.mirrored() } else { self.refracted(eta) }
     }
 
-    /// The largest bands of the two colours, for choosing among parts.
-    fn peaks(&self) -> layered::Peaks {
-        let peak = |c: &Color| c[0].max(c[1]).max(c[2]);
-        layered::Peaks { base: peak(&self.base), highlight: peak(&self.highlight) }
+    /// What a smooth boundary of relative index `eta` reflects of light to `wo`.
+    pub(crate) fn reflectance(&self, eta: f64) -> f64 {
+        fresnel::dielectric(self.wo.z, eta).0
+    }
+
+    /// The mirrored direction, at weight 1.
+    pub(crate) fn mirrored(&self) -> Option<BsdfSample> {
+        self.single(mirrored(self.wo), Weights::white(1.0))
+    }
+
+    /// The refracted direction behind a smooth boundary of relative index `eta`; `None` under total
+    /// reflection. Radiance is compressed by the square of the index (Veach 1997, section 5.2.2).
+    pub(crate) fn refracted(&self, eta: f64) -> Option<BsdfSample> {
+        let cos_out = fresnel::dielectric(self.wo.z, eta).1?;
+        let wi = DVec3::new(-self.wo.x / eta, -self.wo.y / eta, -cos_out);
+        self.single(wi, Weights::base(1.0 / (eta * eta)))
     }
 
     fn given(&self, local: DVec3, weights: Weights, pdf: f64) -> Option<BsdfSample> {
@@ -257,11 +330,10 @@ fn mirrored(w: DVec3) -> DVec3 {
     DVec3::new(-w.x, -w.y, w.z)
 }
 
-/// Schlick's reflectance of a metal of the surface's colour.
-fn metal(wo: DVec3, wi: DVec3) -> Weights {
-    let cosine = (wo + wi).try_normalize().map_or(0.0, |h| wo.dot(h));
-    let w = fresnel::schlick_weight(cosine);
-    Weights { white: w, base: 1.0 - w, highlight: 0.0 }
+/// The largest bands of the two colours, for choosing among parts.
+fn peaks(colors: [&Color; 2]) -> layered::Peaks {
+    let [base, highlight] = colors.map(|c| c[0].max(c[1]).max(c[2]));
+    layered::Peaks { base, highlight }
 }
 
 #[cfg(test)]

@@ -123,7 +123,7 @@ impl Seen<'_> {
             let mut color = [0.0; 3];
             if let (Some(light), MISS) = (light, self.traced.hits.placement[i]) {
                 let direction = self.traced.rays.direction(i);
-                light.lights.environment(light.spectral, direction, &mut color);
+                light.lights.backdrop(light.spectral, direction, &mut color);
             }
             color
         });

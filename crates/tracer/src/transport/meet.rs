@@ -6,7 +6,6 @@ use super::paths::Paths;
 use super::{LightingContext, Scratch, Tracing};
 use crate::Scattering;
 use crate::reference::SurfacePoint;
-use crate::sampling::power_heuristic;
 use crate::surface::SurfaceInteraction;
 
 /// The most steps of a path: surfaces that let it pass count, and may be many.
@@ -15,14 +14,19 @@ const MOST_STEPS: u32 = 4096;
 impl Tracing<'_> {
     /// Adds the light that paths met by themselves, and lists those that go on.
     pub(super) fn meet(&mut self, scratch: &mut Scratch, out: &mut [f64]) {
-        let Scratch { now, hits, alive, radiance, .. } = scratch;
+        let Scratch { now, hits, alive, radiance, missed, asked, .. } = scratch;
         alive.clear();
-        let lit = self.stage.lights.has_environment();
+        missed.clear();
+        let lit = self.stage.lights.sky.as_ref();
         for (i, state) in now.states.iter().enumerate() {
             let placed = self.stage.placed.get(hits.placement[i]);
-            let is_seen = placed.map_or(lit, |placed| placed.is_seen);
-            if is_seen && let Some(weight) = self.met(now, hits, i, radiance) {
-                let throughput = &now.throughput[i * self.count..(i + 1) * self.count];
+            if placed.is_none() && lit.is_some_and(|sky| sky.visible || state.bounces > 0) {
+                missed.push(u32::try_from(i).unwrap_or(u32::MAX));
+            }
+            if placed.is_some_and(|placed| placed.is_seen)
+                && let Some(weight) = self.met(now, hits, i, radiance)
+            {
+                let throughput = now.throughput_of(i, self.count);
                 radiance.iter_mut().zip(throughput).for_each(|(r, t)| *r *= t * weight);
                 self.add(radiance, state.ray, out);
             }
@@ -33,9 +37,19 @@ impl Tracing<'_> {
                 alive.push(u32::try_from(i).unwrap_or(u32::MAX));
             }
         }
+        let (lights, spectral) = (self.stage.lights, self.stage.spectral);
+        let directions = missed.iter().map(|&i| now.rays.direction(i as usize));
+        lights.environment(spectral, directions, asked, radiance, |number, pdf, light| {
+            let i = missed[number] as usize;
+            let weight = now.states[i].weight_against(pdf);
+            let throughput = now.throughput_of(i, self.count);
+            light.iter_mut().zip(throughput).for_each(|(r, t)| *r *= t * weight);
+            self.add(light, now.states[i].ray, out);
+        });
     }
 
-    /// The light that ray `i` met, and its weight against having asked for it; `None` if none.
+    /// The light of the surface that ray `i` met, and its weight against having asked for it; `None` if
+    /// there is none.
     pub(super) fn met(
         &self,
         now: &Paths,
@@ -45,13 +59,7 @@ impl Tracing<'_> {
     ) -> Option<f64> {
         let LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
         let (state, direction) = (&now.states[i], now.rays.direction(i));
-        let asked = |pdf: f64| match state.pdf {
-            f64::INFINITY => 1.0,
-            own => power_heuristic(own, pdf),
-        };
-        let Some(spot) = around.spot(hits, i) else {
-            return lights.environment(spectral, direction, radiance).map(asked);
-        };
+        let spot = around.spot(hits, i)?;
         let front = hits.normal(i).dot(direction) <= 0.0;
         let material = around.material(&spot)?;
         let spot = SurfacePoint { footprint: now.footprint(hits, i), ..spot };
@@ -73,6 +81,6 @@ impl Tracing<'_> {
             return None;
         }
         let pdf = lights.pdf_of_surface(around, hits.placement[i], &spot, state.vertex, direction);
-        Some(asked(pdf) * there())
+        Some(state.weight_against(pdf) * there())
     }
 }

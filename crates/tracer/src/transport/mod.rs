@@ -9,9 +9,11 @@
 //! * Estimators of light and of directions, weighed against each other: Veach, *Robust Monte Carlo
 //!   Methods for Light Transport Simulation*, 1997, sections 8.3 and 9.2 (power heuristic).
 //! * Russian roulette: Arvo and Kirk, "Particle Transport and Image Synthesis", 1990.
-//! * Many wavelengths on one path, all but one ending where a glass splits them: Wilkie et al., "Hero
-//!   Wavelength Spectral Sampling", 2014.
+//! * Many wavelengths on one path: Wilkie et al., "Hero Wavelength Spectral Sampling", 2014. Theirs keeps
+//!   one of them where a smooth boundary parts them; here all go on, each its way ([`dispersion`]).
 
+mod body;
+mod dispersion;
 mod kernels;
 mod meet;
 mod numbers;
@@ -26,21 +28,22 @@ use std::ops::{AddAssign, Range};
 
 use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, RayBatch};
+use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch};
 
 use self::numbers::{Draw, Numbers};
 use self::patch::Patch;
 use self::paths::{Paths, State};
 pub use self::rules::{Follow, Rules};
 use self::shadows::Shadows;
-use crate::bsdf::{Bsdf, Weights};
+use crate::Material;
+use crate::bsdf::{Bsdf, Weights, metal};
 use crate::emitters::Emitters;
 use crate::light::Lights;
 use crate::placed::{PlacedSurface, PlacedSurfaces};
 use crate::reference::SceneView;
+use crate::sky::Asked;
 use crate::spawn::{self, Anchor};
 use crate::spectral::Spectral;
-use crate::{Material, Scattering};
 
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
@@ -90,6 +93,8 @@ pub struct Traits {
     pub has_panes: bool,
     /// Some surface scatters light in several ways, among which is chosen.
     pub has_choice: bool,
+    /// Some body absorbs light on its way through.
+    pub has_bodies: bool,
 }
 
 impl Traits {
@@ -101,8 +106,8 @@ impl Traits {
         for material in placed {
             traits.has_alpha |= material.has_alpha();
             traits.has_panes |= material.is_pane();
-            traits.has_choice |=
-                matches!(material.scattering, Scattering::Dielectric(_) | Scattering::Gltf(_));
+            traits.has_choice |= material.scattering.has_parts();
+            traits.has_bodies |= material.absorption().is_some();
         }
         traits
     }
@@ -157,6 +162,9 @@ pub struct Scratch {
     numbers: Numbers,
     shadows: Shadows,
     radiance: Vec<f64>,
+    /// Paths that met nothing, and what is asked of the sky together.
+    missed: Vec<u32>,
+    asked: Asked,
     patch: Box<Patch>,
 }
 
@@ -180,6 +188,9 @@ fn trace(
     while !scratch.now.states.is_empty() {
         stage.accel.closest(&scratch.now.rays, &mut scratch.hits);
         tracing.tally.rays += scratch.now.states.len() as u64;
+        if stage.traits.has_bodies {
+            tracing.absorb(scratch);
+        }
         tracing.meet(scratch, out);
         let needs = tracing.needs(&scratch.now.states);
         let paths = (&scratch.now.states[..], &scratch.alive[..]);
@@ -221,7 +232,8 @@ impl Tracing<'_> {
                 bounces: 0,
                 pdf: f64::INFINITY,
                 vertex: beam.rays.origin(i),
-                band: None,
+                wavelength: None,
+                inside: MISS,
                 is_last: false,
                 cone: self.stage.surroundings.view.cone(beam.rays.direction(i)),
             });
@@ -260,25 +272,20 @@ impl Tracing<'_> {
 /// The value in band `k`.
 fn in_band(spectral: &Spectral, bsdf: &Bsdf, value: Weights, k: usize) -> f64 {
     let mut sum = value.white;
+    if let Some(named) = bsdf.named() {
+        let [face_on, dip] = spectral.metal(named, k);
+        let mean = metal::mean_reflectance(face_on, dip);
+        let deep = metal::multiple(mean, bsdf.mean_albedo());
+        return (sum + value.base * face_on + value.dip * dip + value.deep * deep).max(0.0);
+    }
     if value.base != 0.0 {
         sum += value.base * spectral.band(&bsdf.base, k);
     }
     if value.highlight != 0.0 {
         sum += value.highlight * spectral.band(&bsdf.highlight, k);
     }
+    if value.deep != 0.0 {
+        sum += value.deep * spectral.band(&bsdf.deep, k);
+    }
     sum
-}
-
-/// Keeps one band, chosen by `u` among those that carry anything, at as many times its throughput.
-fn split(throughput: &mut [f64], state: &mut State, u: f64) {
-    if state.band.is_some() {
-        return;
-    }
-    let live: Vec<usize> = (0..throughput.len()).filter(|&k| throughput[k] > 0.0).collect();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "u is in 0..1")]
-    let Some(&kept) = live.get((u * live.len() as f64) as usize) else { return };
-    for (k, band) in throughput.iter_mut().enumerate() {
-        *band = if k == kept { *band * live.len() as f64 } else { 0.0 };
-    }
-    state.band = u32::try_from(kept).ok();
 }

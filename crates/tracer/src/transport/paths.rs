@@ -4,6 +4,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, HitPrecision, MISS, RayBatch};
 
 use crate::footprint::{Cone, Footprint};
+use crate::sampling::power_heuristic;
 
 /// Paths under way.
 #[derive(Debug, Default)]
@@ -29,13 +30,26 @@ pub(super) struct State {
     pub(super) pdf: f64,
     /// The surface that it left (m).
     pub(super) vertex: DVec3,
-    /// The one band left, after a glass has split them.
-    pub(super) band: Option<u32>,
+    /// The wavelength (nm) of the one band left, after a glass has parted them.
+    pub(super) wavelength: Option<f64>,
+    /// The placement within whose body it is, of those that absorb; else [`MISS`].
+    pub(super) inside: u32,
     /// Looks for light and goes no farther.
     pub(super) is_last: bool,
     /// What the path stands for, as long as it only met mirrors and clear boundaries; as wide as at
     /// its vertex.
     pub(super) cone: Option<Cone>,
+}
+
+impl State {
+    /// The weight of light that the path met by itself against having asked for it with density `pdf`
+    /// (1/sr).
+    pub(super) fn weight_against(&self, pdf: f64) -> f64 {
+        match self.pdf {
+            f64::INFINITY => 1.0,
+            own => power_heuristic(own, pdf),
+        }
+    }
 }
 
 impl Paths {
@@ -51,6 +65,11 @@ impl Paths {
         self.rays.from_surface = true;
         self.rays.coherent = false;
         self.rays.precision = precision;
+    }
+
+    /// What path `i` carries in its `count` bands.
+    pub(super) fn throughput_of(&self, i: usize, count: usize) -> &[f64] {
+        &self.throughput[i * count..(i + 1) * count]
     }
 
     /// What path `i` covers of what it hit.

@@ -3,6 +3,7 @@
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, MISS, PlacedTriangle, RayBatch};
 
+use super::paths::Paths;
 use super::{LightingContext, Scratch, Tracing, Traits, in_band};
 use crate::emitters::Emitters;
 use crate::surface::SurfaceInteraction;
@@ -39,6 +40,13 @@ impl Shadows {
         self.ray.clear();
         self.contribution.clear();
         self.is_delta.clear();
+    }
+
+    /// Notes what a ray brings: `light` times what its path carries and its weight.
+    fn note(&mut self, ray: u32, light: &[f64], throughput: &[f64], weight: f64) {
+        self.ray.push(ray);
+        self.is_delta.push(false);
+        self.contribution.extend(light.iter().zip(throughput).map(|(l, t)| l * t * weight));
     }
 
     /// Puts rays side by side that run in about the same direction, `count` bands each, so that they
@@ -84,37 +92,38 @@ impl Tracing<'_> {
 
     /// Adds the light that the last directions of paths meet.
     pub(super) fn trace_emitters(&mut self, scratch: &mut Scratch, out: &mut [f64]) {
-        let Scratch { last, hits, shadows, radiance, .. } = scratch;
+        let Scratch { last, hits, shadows, radiance, missed, asked, .. } = scratch;
         let Some(emitters) = self.stage.emitters.filter(|_| !last.states.is_empty()) else {
             return;
         };
         emitters.closest(&last.rays, hits);
         shadows.clear();
         shadows.rays.coherent = false;
+        missed.clear();
         for (i, state) in last.states.iter().enumerate() {
-            let Some(weight) = self.met(last, hits, i, radiance) else { continue };
             let (origin, direction) = (last.rays.origin(i), last.rays.direction(i));
-            let left = last.rays.endpoint_triangles().map_or([MISS; 2], |ends| ends[i][0]);
-            let triangles = [left, [hits.placement[i], hits.triangle[i]]];
-            match self.stage.surroundings.spot(hits, i) {
-                None => {
-                    let limits = [0.0, f64::INFINITY];
-                    shadows.rays.push_between_triangles(origin, direction, limits, triangles);
-                }
-                Some(_) => {
-                    let point = origin + direction * hits.t[i];
-                    let Some(placed) = self.stage.placed.get(hits.placement[i]) else { continue };
-                    let end = self.stage.anchor(point, hits.normal(i), origin, placed);
-                    push_to(&mut shadows.rays, origin, end.leave(-direction), triangles);
-                }
-            }
-            let throughput = &last.throughput[i * self.count..(i + 1) * self.count];
-            shadows.ray.push(state.ray);
-            shadows.is_delta.push(false);
-            shadows
-                .contribution
-                .extend(radiance.iter().zip(throughput).map(|(r, t)| r * t * weight));
+            let Some(placed) = self.stage.placed.get(hits.placement[i]) else {
+                missed.push(u32::try_from(i).unwrap_or(u32::MAX));
+                continue;
+            };
+            let Some(weight) = self.met(last, hits, i, radiance) else { continue };
+            let point = origin + direction * hits.t[i];
+            let end = self.stage.anchor(point, hits.normal(i), origin, placed);
+            let triangles = [left(last, i), [hits.placement[i], hits.triangle[i]]];
+            push_to(&mut shadows.rays, origin, end.leave(-direction), triangles);
+            shadows.note(state.ray, radiance, last.throughput_of(i, self.count), weight);
         }
+        let (lights, spectral) = (self.stage.lights, self.stage.spectral);
+        let directions = missed.iter().map(|&i| last.rays.direction(i as usize));
+        lights.environment(spectral, directions, asked, radiance, |number, pdf, light| {
+            let i = missed[number] as usize;
+            let (origin, direction) = (last.rays.origin(i), last.rays.direction(i));
+            let limits = [0.0, f64::INFINITY];
+            let triangles = [left(last, i), [MISS; 2]];
+            shadows.rays.push_between_triangles(origin, direction, limits, triangles);
+            let weight = last.states[i].weight_against(pdf);
+            shadows.note(last.states[i].ray, light, last.throughput_of(i, self.count), weight);
+        });
         self.light(shadows, out);
     }
 
@@ -190,6 +199,11 @@ impl Tracing<'_> {
         }
         light.iter().any(|band| *band > 0.0)
     }
+}
+
+/// The triangle that a path left.
+fn left(paths: &Paths, i: usize) -> PlacedTriangle {
+    paths.rays.endpoint_triangles().map_or([MISS; 2], |ends| ends[i][0])
 }
 
 /// A ray from one point to another (m), on the triangles at its ends.

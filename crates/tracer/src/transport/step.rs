@@ -5,11 +5,13 @@
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitPrecision, MISS};
 
+use super::dispersion::{Boundary, keep_one};
 use super::numbers::Draw;
 use super::patch::{LANES, Patch, at, put};
 use super::paths::State;
-use super::{Follow, Scratch, Tracing, in_band, kernels, split};
+use super::{Follow, Scratch, Tracing, in_band, kernels};
 use crate::bsdf::Weights;
+use crate::light::Chosen;
 use crate::placed::PlacedSurface;
 use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
@@ -125,34 +127,53 @@ impl Tracing<'_> {
         if state.is_last || state.bounces >= self.rules.bounces {
             return;
         }
-        if let Scattering::Dielectric(Ior::Dispersive(_)) = met.material.scattering
-            && self.count > 1
+        let middle = || self.stage.spectral.wavelength(0);
+        let mut bsdf = met.bsdf(&self.stage.surroundings, state.wavelength.unwrap_or_else(middle));
+        if let Scattering::Dielectric(glass) = &met.material.scattering
+            && let Ior::Dispersive(_) = glass.ior
+            && state.wavelength.is_none()
         {
-            // A boundary asks no light: its numbers are free.
-            split(&mut now.throughput[bands], state, numbers.of(Draw::Light, k)[0]);
+            if glass.roughness == 0.0 {
+                let boundary = Boundary { path: (i, k), met: &met, ior: &glass.ior, bsdf };
+                return self.disperse(&boundary, scratch);
+            }
+            let throughput = &mut now.throughput[bands];
+            keep_one(throughput, state, self.stage.spectral, numbers.of(Draw::Choice, k)[0]);
+            let wavelength = state.wavelength.unwrap_or_else(middle);
+            bsdf = met.bsdf(&self.stage.surroundings, wavelength);
         }
-        let wavelength = self.stage.spectral.wavelength(state.band.unwrap_or(0) as usize);
-        let bsdf = met.bsdf(&self.stage.surroundings, wavelength);
         patch.push((now, hits), (i, k), placed);
         patch.bsdfs.push(bsdf);
     }
 
     /// Chooses a light for each hit, and a place on it.
-    fn choose(&self, scratch: &Scratch, patch: &mut Patch) {
+    fn choose(&self, scratch: &mut Scratch, patch: &mut Patch) {
         let super::LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
-        patch.radiance.resize(LANES * self.count, 0.0);
+        let (numbers, asked, count) = (&scratch.numbers, &mut scratch.asked, self.count);
+        patch.radiance.resize(LANES * count, 0.0);
+        asked.clear();
         for lane in 0..patch.count {
             let (_, k) = patch.path[lane];
-            let square = scratch.numbers.of(Draw::Light, k);
+            let square = numbers.of(Draw::Light, k);
             let asks = patch.bsdfs.get(lane).is_none_or(|bsdf| !bsdf.is_delta());
             let from = patch.point(lane);
-            let radiance = &mut patch.radiance[lane * self.count..(lane + 1) * self.count];
-            let target = match asks {
+            let radiance = &mut patch.radiance[lane * count..(lane + 1) * count];
+            let chosen = match asks {
                 true => lights.choose(around, spectral, from, square, radiance),
-                false => None,
+                false => Chosen::Dark,
             };
-            patch.targets.set(lane, target.as_ref());
+            match chosen {
+                Chosen::Dark => patch.targets.set(lane, None),
+                Chosen::Place(target) => patch.targets.set(lane, Some(&target)),
+                Chosen::Sky { square, chance } => asked.push(lane, square, chance),
+            }
         }
+        let Some(sky) = &lights.sky else { return };
+        sky.choose(asked, |lane, target, color| {
+            patch.targets.set(lane, target.as_ref());
+            let radiance = &mut patch.radiance[lane * count..(lane + 1) * count];
+            lights.spread_sky(spectral, color, radiance);
+        });
     }
 
     /// Notes the rays to the lights that were chosen, and what each brings.
@@ -271,6 +292,15 @@ impl Tracing<'_> {
             // Seen by chance from one point, a surface is a point.
             state.cone = state.cone.filter(|_| single).map(|cone| cone.after(hits.t[i]));
             state.pdf = scattered.pdf;
+            if self.stage.traits.has_bodies {
+                let front = hits.normal(i);
+                let body = self.body_behind(hits.placement[i], scattered.direction, front);
+                // What leaves another surface within a body is still in it.
+                let placed = self.stage.placed.get(hits.placement[i]);
+                if placed.is_some_and(|placed| placed.absorption.is_some()) {
+                    state.inside = body;
+                }
+            }
             let start = patch.anchor(lane).leave(scattered.direction);
             patch.send(lane, (start, scattered.direction));
             patch.picked.push(lane);

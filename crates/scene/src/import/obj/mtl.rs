@@ -13,7 +13,7 @@ use etendue_tracer::material::{Alpha, GltfSurface};
 use etendue_tracer::spec::BRIGHTEST;
 use etendue_tracer::texture::{Encoding, Filter, Wrap};
 use etendue_tracer::{
-    Emission, ImageSource, Ior, Material, Paint, Scattering, Texture, TextureUse,
+    Emission, Glass, ImageSource, Ior, Material, Paint, Scattering, Texture, TextureUse,
 };
 
 use super::oddities;
@@ -253,11 +253,12 @@ fn nearest(material: &tobj::Material, plain: Material) -> Material {
     match material.illumination_model {
         Some(4 | 6 | 7 | 9) => {
             read.base_color = Paint::Plain([1.0; 3]);
-            read.scattering = Scattering::Dielectric(Ior::Constant(ior.unwrap_or(1.5)));
+            read.scattering =
+                Scattering::Dielectric(Glass::clear(Ior::Constant(ior.unwrap_or(1.5))));
         }
         Some(3 | 5 | 8) if dark(diffuse) && !dark(specular) => {
             read.base_color = Paint::Plain(specular);
-            read.scattering = Scattering::Metal { roughness };
+            read.scattering = Scattering::Metal { roughness, named: None };
         }
         _ if !dark(specular) => {
             let surface = GltfSurface {

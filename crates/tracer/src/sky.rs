@@ -1,0 +1,150 @@
+//! The environment of a scene: what comes from where nothing is, and directions by how bright it is
+//! there, many at a time.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use etendue_geometry::glam::{DMat3, DVec3};
+
+use crate::Color;
+use crate::environment::{EnvironmentMap, MapSampler, place};
+use crate::light::{Light, LightKind, Lights, Target, TargetKind};
+use crate::sampling::PlacesOnGrid;
+use crate::spectral::Spectral;
+
+/// The environment, ready to be asked.
+#[derive(Debug)]
+pub(crate) struct Sky {
+    /// Which of the lights it is.
+    index: usize,
+    map: Option<(Arc<EnvironmentMap>, MapSampler)>,
+    world_from_map: DMat3,
+    /// The camera sees it.
+    pub(crate) visible: bool,
+}
+
+/// Directions that are asked together; kept for the next.
+#[derive(Debug, Default)]
+pub(crate) struct Asked {
+    /// Lanes and the chance of each.
+    lanes: Vec<(usize, f64)>,
+    squares: Vec<[f64; 2]>,
+    places: PlacesOnGrid,
+    directions: Vec<(DVec3, f64)>,
+    colors: Vec<Color>,
+}
+
+impl Asked {
+    pub(crate) fn clear(&mut self) {
+        self.lanes.clear();
+        self.squares.clear();
+    }
+
+    /// Adds a lane that chose the sky.
+    pub(crate) fn push(&mut self, lane: usize, square: [f64; 2], chance: f64) {
+        self.lanes.push((lane, chance));
+        self.squares.push(square);
+    }
+}
+
+impl Sky {
+    /// That of `lights`; `map` is its decoded image, if it has one.
+    pub(crate) fn of(lights: &[Light], map: Option<Arc<EnvironmentMap>>) -> Option<Self> {
+        let sampled = |map: Arc<EnvironmentMap>| {
+            let sampler = MapSampler::new(&map);
+            (map, sampler)
+        };
+        lights.iter().enumerate().find_map(|(index, light)| match light.kind {
+            LightKind::Environment { turn, visible, .. } => {
+                Some(Self { index, map: map.clone().map(sampled), world_from_map: turn, visible })
+            }
+            _ => None,
+        })
+    }
+
+    /// The mean over all directions of what its image has, or 1.
+    pub(crate) fn mean(&self) -> f64 {
+        self.map.as_ref().map_or(1.0, |(_, sampler)| sampler.mean)
+    }
+
+    /// Chooses the directions of the lanes that were pushed, by brightness: `each` gets a lane, its
+    /// direction as a target, and the colour there.
+    pub(crate) fn choose(
+        &self,
+        asked: &mut Asked,
+        mut each: impl FnMut(usize, Option<Target>, &Color),
+    ) {
+        let Some((map, sampler)) = &self.map else { return };
+        let Asked { lanes, squares, places, directions, colors } = asked;
+        directions.clear();
+        let take = |_, local: DVec3, pdf| directions.push((self.world_from_map * local, pdf));
+        sampler.sample(squares.iter().copied(), places, take);
+        colors.clear();
+        colors.extend(places.chosen.iter().map(|&(at, _)| map.radiance_at(at)));
+        for ((&(lane, chance), &(direction, pdf)), color) in
+            lanes.iter().zip(&*directions).zip(&*colors)
+        {
+            let target = Target::bare(TargetKind::Far, direction, pdf * chance);
+            each(lane, (pdf > 0.0).then_some(target), color);
+        }
+    }
+}
+
+impl Lights {
+    /// Radiance that comes from each unit direction without meeting anything, and the density (1/sr),
+    /// chance included, with which [`Self::choose`] gives that direction. Both go to `each`, with the
+    /// number of the direction.
+    pub(crate) fn environment(
+        &self,
+        spectral: &Spectral,
+        wanted: impl Iterator<Item = DVec3>,
+        asked: &mut Asked,
+        radiance: &mut [f64],
+        mut each: impl FnMut(usize, f64, &mut [f64]),
+    ) {
+        let Some(sky) = &self.sky else { return };
+        let (own, chance) = (self.bands_of(sky.index, radiance.len()), self.chance(sky.index));
+        let Some((map, sampler)) = &sky.map else {
+            for (number, _) in wanted.enumerate() {
+                radiance.copy_from_slice(own);
+                each(number, 0.25 / PI * chance, radiance);
+            }
+            return;
+        };
+        let Asked { places, directions, colors, .. } = asked;
+        directions.clear();
+        directions.extend(wanted.map(|world| (sky.world_from_map.transpose() * world, 0.0)));
+        places.chosen.clear();
+        places.chosen.extend(directions.iter().map(|&(local, _)| (place(local), 0.0)));
+        colors.clear();
+        colors.extend(places.chosen.iter().map(|&(at, _)| map.radiance_at(at)));
+        for ((local, pdf), &(at, _)) in directions.iter_mut().zip(&places.chosen) {
+            *pdf = sampler.pdf_at(*local, at);
+        }
+        for (number, (color, &(_, pdf))) in colors.iter().zip(&*directions).enumerate() {
+            self.spread_sky(spectral, color, radiance);
+            each(number, pdf * chance, radiance);
+        }
+    }
+
+    /// Radiance that the camera sees along the unit `direction` where nothing is.
+    pub(crate) fn backdrop(&self, spectral: &Spectral, direction: DVec3, radiance: &mut [f64]) {
+        let Some(sky) = self.sky.as_ref().filter(|sky| sky.visible) else { return };
+        match &sky.map {
+            None => radiance.copy_from_slice(self.bands_of(sky.index, radiance.len())),
+            Some((map, _)) => {
+                let color = map.radiance(sky.world_from_map.transpose() * direction);
+                self.spread_sky(spectral, &color, radiance);
+            }
+        }
+    }
+
+    /// A colour of the environment's image in all bands.
+    pub(crate) fn spread_sky(&self, spectral: &Spectral, color: &Color, radiance: &mut [f64]) {
+        let index = self.sky.as_ref().map_or(0, |sky| sky.index);
+        let own = self.bands_of(index, radiance.len());
+        for (i, (band, own)) in radiance.iter_mut().zip(own).enumerate() {
+            *band = own * spectral.band(color, i);
+        }
+    }
+}
