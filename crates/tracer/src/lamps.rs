@@ -1,11 +1,12 @@
 //! Emissive triangles, ready to be asked many times.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
-use etendue_geometry::Placement;
 use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Bounds, Placement};
 
 use crate::light::mean;
+use crate::light_tree::Cluster;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::magnitudes;
 use crate::{Material, Paint};
@@ -85,6 +86,18 @@ impl AreaLight {
     pub(crate) fn across(&self, [u, v]: [f64; 2]) -> DVec3 {
         self.shape.edges[0] * u + self.shape.edges[1] * v
     }
+}
+
+/// Where an emissive triangle of some power (W) is and shines; `None` without area.
+pub(crate) fn cluster(around: &SceneView<'_>, id: [u32; 2], power: f64) -> Option<Cluster> {
+    let AreaLight { corner, shape, two_sided, .. } = AreaLight::new(around, id)?;
+    let mut bounds = Bounds::default();
+    for offset in [DVec3::ZERO, shape.edges[0], shape.edges[1]] {
+        bounds.include(corner[0] + offset);
+    }
+    let (cone, sides) = if two_sided { (PI, 2.0) } else { (0.0, 1.0) };
+    let intensity = power / (sides * PI);
+    Some(Cluster { bounds, axis: shape.normal, cone, reach: FRAC_PI_2, intensity })
 }
 
 /// Power of an emissive triangle (W), by the paint at its middle and corners.

@@ -30,6 +30,7 @@ pub mod footprint;
 mod lamps;
 pub mod layer;
 pub mod light;
+mod light_tree;
 pub mod material;
 pub mod placed;
 mod pyramid;
@@ -40,6 +41,7 @@ pub mod spawn;
 pub mod spec;
 pub mod spectral;
 mod surface;
+mod target;
 pub mod texture;
 pub mod transport;
 

@@ -2,22 +2,25 @@
 //!
 //! A light is chosen by its power (W, of the mean of the three colours), a triangle of an emissive
 //! mesh by its own: `π A L` for one side. Lights far away are counted by what falls onto the scene's
-//! sphere of radius R: `π R² E` for parallel light, `4 π² R² L` for an environment.
+//! sphere of radius R: `π R² E` for parallel light, `4 π² R² L` for an environment. Among several lights
+//! that are somewhere, one is chosen by what it may send to the point ([`light_tree`]).
 
 use std::borrow::Cow;
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-use etendue_geometry::MISS;
+use etendue_geometry::Bounds;
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_spectrum::{Illuminant, NoOverlap};
 
 use crate::environment::EnvironmentMap;
 use crate::lamps::{self, AreaLight, triangle_power};
+use crate::light_tree::{self, Cluster, LightTree};
 use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::{DiscreteDistribution, sphere_direction, triangle_point};
 use crate::sky::Sky;
 use crate::spectral::Spectral;
+use crate::target::{Chosen, Target, TargetKind};
 use crate::{Color, Material};
 
 /// A light of the scene, beside its emissive surfaces.
@@ -82,6 +85,22 @@ pub enum LightKind {
     },
 }
 
+impl LightKind {
+    /// Where it is and shines, with an intensity (W/sr); `None` of what is far away.
+    fn cluster(&self, intensity: f64) -> Option<Cluster> {
+        let (at, axis, cone, reach) = match *self {
+            Self::Point(at) => (at, DVec3::Y, PI, FRAC_PI_2),
+            Self::Spot { at, axis, cos_outer, cos_inner } => {
+                let [outer, inner] = [cos_outer.acos(), cos_inner.acos()];
+                (at, axis, inner, outer - inner)
+            }
+            Self::Directional(_) | Self::Environment { .. } => return None,
+        };
+        let bounds = Bounds { min: at, max: at };
+        Some(Cluster { bounds, axis, cone, reach, intensity })
+    }
+}
+
 /// Where an environment's image comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum EnvironmentImage {
@@ -102,78 +121,6 @@ fn spot_falloff(cosine: f64, cos_outer: f64, cos_inner: f64) -> f64 {
     share * share
 }
 
-/// A place on a light, or a direction to it, that was chosen.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Target {
-    /// What it is a place of.
-    pub(crate) kind: TargetKind,
-    /// Where it is (m), the sum of the three: where a triangle begins, what f64 lost of that, and from
-    /// there to the place. Of a direction, the first alone.
-    pub(crate) place: [DVec3; 3],
-    /// Unit normal of a triangle; else zero.
-    pub(crate) normal: DVec3,
-    /// What a triangle's own numbers add to the rounding of the place (m).
-    pub(crate) magnitudes: DVec3,
-    /// Density over the area (1/m²) or, of a direction, over the solid angle (1/sr), the light's chance
-    /// included; of a point the chance alone.
-    pub(crate) density: f64,
-    /// Placement and triangle, or [`MISS`].
-    pub(crate) id: [u32; 2],
-}
-
-/// Kinds of places that light comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum TargetKind {
-    /// A point, which no direction meets by chance.
-    Point,
-    /// A direction, which no other is alike.
-    Parallel,
-    /// A direction of the environment.
-    Far,
-    /// A place on a triangle.
-    Triangle {
-        /// It shines to both sides.
-        two_sided: bool,
-    },
-}
-
-/// What a light was chosen with.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Chosen {
-    /// Nothing that shines here.
-    Dark,
-    /// A place on it.
-    Place(Target),
-    /// The image of the sky, whose directions are chosen together ([`Sky::choose`]).
-    Sky {
-        /// Chooses the direction.
-        square: [f64; 2],
-        /// With which the sky was chosen.
-        chance: f64,
-    },
-}
-
-impl From<Target> for Chosen {
-    fn from(target: Target) -> Self {
-        Self::Place(target)
-    }
-}
-
-impl From<Option<Target>> for Chosen {
-    fn from(target: Option<Target>) -> Self {
-        target.map_or(Self::Dark, Self::Place)
-    }
-}
-
-impl Target {
-    /// A direction (unit) or a point (m).
-    pub(crate) fn bare(kind: TargetKind, place: DVec3, density: f64) -> Self {
-        let place = [place, DVec3::ZERO, DVec3::ZERO];
-        let (normal, magnitudes) = (DVec3::ZERO, DVec3::ZERO);
-        Self { kind, place, normal, magnitudes, density, id: [MISS; 2] }
-    }
-}
-
 /// All lights of a scene, ready to be chosen from.
 #[derive(Debug)]
 pub struct Lights {
@@ -187,7 +134,9 @@ pub struct Lights {
     first: Vec<Option<u32>>,
     /// Placement and triangle of each emissive triangle, behind the lights.
     triangles: Vec<[u32; 2]>,
+    /// With a tree, what is in it has one choice together, the last.
     picker: DiscreteDistribution,
+    tree: Option<LightTree>,
     /// The emissive triangles where they are at most [`lamps::MOST`] (`None` without area), and what those
     /// that shine alike all over give off in all bands.
     lamps: Vec<Option<AreaLight>>,
@@ -242,14 +191,66 @@ impl Lights {
         };
         let tints = around.materials.iter().map(tint).collect::<Result<_, _>>()?;
         let lit = powers.iter().any(|&p| p > 0.0);
+        let tree = Self::plant(lights, &triangles, around, &mut powers);
         let picker =
             if lit { DiscreteDistribution::new(&powers) } else { DiscreteDistribution::default() };
         let lights = lights.to_vec();
         let (lamps, lamp_bands) = Default::default();
         let mut all =
-            Self { lights, bands, sky, tints, first, triangles, picker, lamps, lamp_bands };
+            Self { lights, bands, sky, tints, first, triangles, picker, tree, lamps, lamp_bands };
         all.light_lamps(around, spectral);
         Ok(all)
+    }
+
+    /// The tree over what has a place, when that is worth one: their `powers` become 0, and their sum is
+    /// added behind all.
+    fn plant(
+        lights: &[Light],
+        triangles: &[[u32; 2]],
+        around: &SceneView<'_>,
+        powers: &mut Vec<f64>,
+    ) -> Option<LightTree> {
+        let near = lights.iter().map(|light| light.kind.cluster(mean(&light.color)));
+        let shining = triangles.iter().zip(&powers[lights.len()..]);
+        let all = near.chain(shining.map(|(&id, &power)| lamps::cluster(around, id, power)));
+        let all: Vec<_> = (0_u32..).zip(all).filter_map(|(k, c)| Some((k, c?))).collect();
+        if !(light_tree::LEAST..=light_tree::MOST).contains(&all.len()) {
+            return None;
+        }
+        let take = |&(number, _): &(u32, Cluster)| std::mem::take(&mut powers[number as usize]);
+        let sum = all.iter().map(take).sum();
+        powers.push(sum);
+        Some(LightTree::new(all, powers.len()))
+    }
+
+    /// A light for the point `from` (m) by `u` in 0..1: its number, what is left of `u`, and its chance.
+    fn pick(&self, from: DVec3, u: f64) -> Option<(usize, f64, f64)> {
+        let (index, rest, chance) = match self.picker.len() {
+            0 => return None,
+            1 => (0, u, 1.0),
+            _ => {
+                let (index, rest) = self.picker.pick(u);
+                (index, rest, self.picker.probability(index))
+            }
+        };
+        match &self.tree {
+            Some(tree) if index + 1 == self.picker.len() => {
+                let (number, rest, own) = tree.pick(from, rest)?;
+                Some((number, rest, chance * own))
+            }
+            _ => Some((index, rest, chance)),
+        }
+    }
+
+    /// The chance with which [`Self::pick`] picks light `index` for the point `from` (m).
+    pub(crate) fn chance(&self, from: DVec3, index: usize) -> f64 {
+        match (&self.tree, self.picker.len()) {
+            (_, 0) => 0.0,
+            (Some(tree), count) if tree.holds(index) => {
+                self.picker.probability(count - 1) * tree.chance(from, index)
+            }
+            _ => self.picker.probability(index),
+        }
     }
 
     /// Keeps emissive triangles ready.
@@ -321,14 +322,7 @@ impl Lights {
         radiance: &mut [f64],
     ) -> Chosen {
         // What is left of the number that chose the light chooses the place: both stay even.
-        let (index, rest, chance) = match self.picker.len() {
-            0 => return Chosen::Dark,
-            1 => (0, choice, 1.0),
-            _ => {
-                let (index, rest) = self.picker.pick(choice);
-                (index, rest, self.picker.probability(index))
-            }
-        };
+        let Some((index, rest, chance)) = self.pick(from, choice) else { return Chosen::Dark };
         let square = [rest, v];
         let Some(light) = self.lights.get(index) else {
             let number = index - self.lights.len();
@@ -427,16 +421,8 @@ impl Lights {
         let [_, u, v] = spot.weights;
         let squared = lamp.offset(from, [u, v]).length_squared();
         let cosine = direction.dot(lamp.shape.normal).abs();
-        let pdf = self.picker.probability(index) * squared / (cosine * lamp.shape.area);
+        let pdf = self.chance(from, index) * squared / (cosine * lamp.shape.area);
         if pdf.is_finite() { pdf } else { 0.0 }
-    }
-
-    /// The chance with which [`Self::choose`] chooses light `index`.
-    pub(crate) fn chance(&self, index: usize) -> f64 {
-        match self.picker.len() {
-            0 => 0.0,
-            _ => self.picker.probability(index),
-        }
     }
 }
 

@@ -8,9 +8,10 @@ use etendue_geometry::glam::{DMat3, DVec3};
 
 use crate::Color;
 use crate::environment::{EnvironmentMap, MapSampler, place};
-use crate::light::{Light, LightKind, Lights, Target, TargetKind};
+use crate::light::{Light, LightKind, Lights};
 use crate::sampling::PlacesOnGrid;
 use crate::spectral::Spectral;
+use crate::target::{Target, TargetKind};
 
 /// The environment, ready to be asked.
 #[derive(Debug)]
@@ -103,7 +104,8 @@ impl Lights {
         mut each: impl FnMut(usize, f64, &mut [f64]),
     ) {
         let Some(sky) = &self.sky else { return };
-        let (own, chance) = (self.bands_of(sky.index, radiance.len()), self.chance(sky.index));
+        let (own, chance) =
+            (self.bands_of(sky.index, radiance.len()), self.chance(DVec3::ZERO, sky.index));
         let Some((map, sampler)) = &sky.map else {
             for (number, _) in wanted.enumerate() {
                 radiance.copy_from_slice(own);

@@ -6,9 +6,9 @@ use etendue_geometry::{HitBatch, MISS};
 use super::paths::Paths;
 use crate::Color;
 use crate::bsdf::Bsdf;
-use crate::light::{Target, TargetKind};
 use crate::placed::PlacedSurface;
 use crate::spawn::Anchor;
+use crate::target::{Target, TargetKind};
 
 /// Hits worked on side by side.
 pub(super) const LANES: usize = 64;

@@ -11,11 +11,11 @@ use super::patch::{LANES, Patch, at, put};
 use super::paths::State;
 use super::{Follow, Scratch, Tracing, in_band, kernels};
 use crate::bsdf::Weights;
-use crate::light::Chosen;
 use crate::placed::PlacedSurface;
 use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
 use crate::surface::SurfaceInteraction;
+use crate::target::Chosen;
 use crate::{Ior, Scattering};
 
 impl Tracing<'_> {

@@ -1,0 +1,76 @@
+//! What is aimed at when a light is asked.
+
+use etendue_geometry::MISS;
+use etendue_geometry::glam::DVec3;
+
+/// A place on a light, or a direction to it, that was chosen.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Target {
+    /// What it is a place of.
+    pub(crate) kind: TargetKind,
+    /// Where it is (m), the sum of the three: where a triangle begins, what f64 lost of that, and from
+    /// there to the place. Of a direction, the first alone.
+    pub(crate) place: [DVec3; 3],
+    /// Unit normal of a triangle; else zero.
+    pub(crate) normal: DVec3,
+    /// What a triangle's own numbers add to the rounding of the place (m).
+    pub(crate) magnitudes: DVec3,
+    /// Density over the area (1/m²) or, of a direction, over the solid angle (1/sr), the light's chance
+    /// included; of a point the chance alone.
+    pub(crate) density: f64,
+    /// Placement and triangle, or [`MISS`].
+    pub(crate) id: [u32; 2],
+}
+
+/// Kinds of places that light comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TargetKind {
+    /// A point, which no direction meets by chance.
+    Point,
+    /// A direction, which no other is alike.
+    Parallel,
+    /// A direction of the environment.
+    Far,
+    /// A place on a triangle.
+    Triangle {
+        /// It shines to both sides.
+        two_sided: bool,
+    },
+}
+
+/// What a light was chosen with.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Chosen {
+    /// Nothing that shines here.
+    Dark,
+    /// A place on it.
+    Place(Target),
+    /// The image of the sky, whose directions are chosen together ([`crate::sky::Sky::choose`]).
+    Sky {
+        /// Chooses the direction.
+        square: [f64; 2],
+        /// With which the sky was chosen.
+        chance: f64,
+    },
+}
+
+impl From<Target> for Chosen {
+    fn from(target: Target) -> Self {
+        Self::Place(target)
+    }
+}
+
+impl From<Option<Target>> for Chosen {
+    fn from(target: Option<Target>) -> Self {
+        target.map_or(Self::Dark, Self::Place)
+    }
+}
+
+impl Target {
+    /// A direction (unit) or a point (m).
+    pub(crate) fn bare(kind: TargetKind, place: DVec3, density: f64) -> Self {
+        let place = [place, DVec3::ZERO, DVec3::ZERO];
+        let (normal, magnitudes) = (DVec3::ZERO, DVec3::ZERO);
+        Self { kind, place, normal, magnitudes, density, id: [MISS; 2] }
+    }
+}
