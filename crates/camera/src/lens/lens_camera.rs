@@ -127,6 +127,11 @@ impl LensCamera {
         &self.focused
     }
 
+    /// The lens at its design wavelength.
+    pub(super) fn design(&self) -> &MonochromaticTrain {
+        &self.design
+    }
+
     /// The same on pixels `factor` times as large: what was measured of the pupil holds for them too.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         Self { focused: self.focused.coarser(factor), ..self.clone() }

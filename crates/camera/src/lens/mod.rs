@@ -12,6 +12,7 @@
 //! | `image_circle` | the part of the sensor that light reaches |
 //! | [`lenslets`] | which lenslet a place on the sensor belongs to |
 //! | [`lens_camera`] | chief rays for data, and what is measured for pictures |
+//! | `paths` | rays of a pixel on their way through the lens |
 //! | `rays` | weighted rays of the pupil for pictures |
 
 pub mod chief;
@@ -19,6 +20,7 @@ pub mod focused;
 mod image_circle;
 pub mod lens_camera;
 pub mod lenslets;
+mod paths;
 mod rays;
 pub mod source;
 pub mod spec;

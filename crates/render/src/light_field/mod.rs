@@ -7,6 +7,7 @@
 //! | `geometry` | `geometry.json`: grid, centres, views, and the formula of disparities |
 //! | `white` | the same camera before a uniform light |
 //! | `views` | views as an array of five dimensions, from the raw picture and from a picture of views |
+//! | `looking` | views one by one, and refocused together |
 //! | `hci` | the folder of the benchmark's layout |
 //!
 //! The layout: K. Honauer, O. Johannsen, D. Kondermann, B. Goldluecke, "A dataset and evaluation
@@ -14,6 +15,7 @@
 
 mod geometry;
 mod hci;
+mod looking;
 mod views;
 mod white;
 
@@ -33,6 +35,7 @@ use crate::output::{
 use crate::{Images, Plan, RenderError, render};
 
 use geometry::Geometry;
+pub use looking::LightFieldViews;
 use views::Views;
 
 /// Why the set is not complete.

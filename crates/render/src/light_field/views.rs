@@ -106,6 +106,30 @@ impl Views {
         picture([cols, rows], value)
     }
 
+    /// The mean of all views, each moved by its number from the middle one times `disparity` (pixels of a
+    /// view).
+    pub(super) fn averaged(&self, disparity: f64) -> Result<Picture, PictureError> {
+        let [cols, rows] = self.size.map(|side| side as usize);
+        let (n, middle) = (self.views, 0.5 * (f64::from(self.views) - 1.0));
+        let view = |k: u32| {
+            let [right, below] = [k % n, k / n].map(|at| -disparity * (f64::from(at) - middle));
+            let plane = |channel| (0..rows * cols).map(|i| self.color(k, i, channel)).collect();
+            let planes: [Vec<f32>; 3] = std::array::from_fn(plane);
+            let moved = |plane: &Vec<f32>, i: usize| {
+                let (x, y) = ((i % cols) as f64 + 0.5 + right, (i / cols) as f64 + 0.5 + below);
+                sampled(plane, [cols, rows], [x, y])
+            };
+            planes.map(|plane| (0..rows * cols).map(|i| moved(&plane, i)).collect::<Vec<f32>>())
+        };
+        let moved: Vec<[Vec<f32>; 3]> = (0..n * n).into_par_iter().map(view).collect();
+        #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+        let mean = |i: usize, channel: usize| {
+            let sum: f64 = moved.iter().map(|planes| f64::from(planes[channel][i])).sum();
+            (sum / moved.len() as f64) as f32
+        };
+        picture([cols, rows], mean)
+    }
+
     /// All views as one picture.
     pub(super) fn side_by_side(&self) -> Result<Picture, PictureError> {
         let [cols, rows] = self.size.map(|side| side as usize);
@@ -171,6 +195,29 @@ fn sampled(plane: &[f32], [width, height]: [usize; 2], [x, y]: [f64; 2]) -> f32 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A ramp that every view shows moved by its disparity is that ramp again when they are averaged so.
+    #[test]
+    fn averaging_moves_views_by_their_disparity() {
+        let (n, cols, rows, disparity) = (3_u32, 12_u32, 10_u32, 0.75);
+        let mut values = Vec::new();
+        for k in 0..n * n {
+            let [u, v] = [k % n, k / n].map(|at| f64::from(at) - 1.0);
+            for i in 0..rows * cols {
+                let (x, y) = (f64::from(i % cols), f64::from(i / cols));
+                // What stands at x in the middle stands at x − u d here.
+                #[expect(clippy::cast_possible_truncation, reason = "a test's numbers")]
+                let value = ((x + u * disparity) + 2.0 * (y + v * disparity)) as f32;
+                values.extend([value; 3]);
+            }
+        }
+        let colors = Array { values, channels: 3 };
+        let views = Views { views: n, size: [cols, rows], colors, spectrum: None };
+        let sharp = views.averaged(disparity).unwrap();
+        let value = sharp.layer("").unwrap().channels[1].values.at((5 * cols + 6) as usize);
+        // f32 has 7 digits of numbers up to 30.
+        assert!((value - 16.0).abs() < 1e-5, "{value}");
+    }
 
     /// Cubic convolution gives second-degree polynomials back exactly.
     #[test]

@@ -113,8 +113,26 @@ pub fn write_whole(
     target: &Path,
     write: impl FnOnce(&mut PartFile) -> io::Result<()>,
 ) -> Result<(), OutputError> {
-    let mut part = PartFile::create(target)?;
-    write(&mut part).map_err(|source| OutputError::io(target, source))?;
+    filled(PartFile::create(target)?, write)
+}
+
+/// As [`write_whole`], where `target` may be an input: what its user has changed takes its place.
+///
+/// # Errors
+///
+/// As [`write_whole`].
+pub fn write_over(
+    target: &Path,
+    write: impl FnOnce(&mut PartFile) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    filled(PartFile::over(target)?, write)
+}
+
+fn filled(
+    mut part: PartFile,
+    write: impl FnOnce(&mut PartFile) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    write(&mut part).map_err(|source| OutputError::io(&part.target, source))?;
     part.finish()
 }
 
@@ -156,11 +174,16 @@ impl PartFile {
     /// [`OutputError::Io`] when the folder does not exist or cannot be written to, or when a
     /// folder already has that name.
     pub fn create(target: &Path) -> Result<Self, OutputError> {
+        refuse_inputs([target])?;
+        Self::over(target)
+    }
+
+    /// As [`Self::create`], of an input, too.
+    fn over(target: &Path) -> Result<Self, OutputError> {
         let refuse = |source| OutputError::io(target, source);
         if target.is_dir() || target.file_name().is_none() {
             return Err(refuse(io::ErrorKind::IsADirectory.into()));
         }
-        refuse_inputs([target])?;
         let target = target.to_owned();
         if let Some(to) = Special::of(&target) {
             let file = tempfile::tempfile().map_err(refuse)?;

@@ -187,7 +187,7 @@ fn distance(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
 
 /// The 1st and the 99th percentile of finite values, from an even sample of all: single outliers
 /// must not darken the rest.
-fn spread(plane: &Values) -> Option<(f64, f64)> {
+pub(super) fn spread(plane: &Values) -> Option<(f64, f64)> {
     const SAMPLE: usize = 1 << 16;
     // An odd step visits all columns, also of a width that is a power of two.
     let step = (plane.len() / SAMPLE) | 1;

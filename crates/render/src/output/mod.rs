@@ -48,9 +48,11 @@ mod ledger;
 mod look;
 mod outputs;
 mod picture;
+mod screen;
 
 pub use atomic::{
-    PartFile, Temporary, note_finished, open_parts, prepare_folder, remove_open_parts, write_whole,
+    PartFile, Temporary, note_finished, open_parts, prepare_folder, remove_open_parts, write_over,
+    write_whole,
 };
 pub use develop::Development;
 pub(crate) use develop::luminance;
@@ -61,6 +63,7 @@ pub use ledger::{Ledger, MANIFEST};
 pub use look::Look;
 pub use outputs::Outputs;
 pub use picture::{Channel, Layer, Picture, Values};
+pub use screen::{DistanceScale, Screen};
 
 /// What wrote a file, for its header.
 pub const SOFTWARE: &str = concat!("etendue ", env!("CARGO_PKG_VERSION"));

@@ -32,14 +32,13 @@ pub fn layout(
     report: &LensReport,
 ) -> Result<String, crate::glass::GlassError> {
     let at = train.at(train.wavelength())?;
-    let end =
-        report.sensor_z.unwrap_or_else(|| train.last_vertex() + 0.3 * train.last_vertex().max(1.0));
+    let end = end_of(train, report);
     let fields = drawn_fields(report);
     let fans: Vec<Fan> = fields.iter().map(|&field| fan(train, &at, report, field, end)).collect();
     let heights = heights(train, &fans);
     let view = View::around(train, &heights, &fans, report, end);
     let mut canvas = Canvas::new(WIDTH, view.height, &title(report));
-    glasses(&mut canvas, &view, train, &at, &heights);
+    glasses(&mut canvas, &view, &bodies(train, &at, &heights));
     canvas.dashed(view.pixel([view.left, 0.0]), view.pixel([view.right, 0.0]), "10 3 2 3");
     for (i, fan) in fans.iter().enumerate() {
         for ray in &fan.rays {
@@ -62,8 +61,13 @@ pub fn layout(
     Ok(canvas.finish())
 }
 
+/// Where rays end (mm): at the sensor, or a little behind the lens.
+pub(super) fn end_of(train: &OpticalTrain, report: &LensReport) -> f64 {
+    report.sensor_z.unwrap_or_else(|| train.last_vertex() + 0.3 * train.last_vertex().max(1.0))
+}
+
 /// The axis, a middle field and the widest one.
-fn drawn_fields(report: &LensReport) -> Vec<f64> {
+pub(super) fn drawn_fields(report: &LensReport) -> Vec<f64> {
     let mut fields = report.fields.clone();
     fields.sort_by(f64::total_cmp);
     fields.dedup();
@@ -74,11 +78,11 @@ fn drawn_fields(report: &LensReport) -> Vec<f64> {
 }
 
 /// The rays of a field that leave the lens, as points (z, y).
-struct Fan {
-    rays: Vec<Vec<[f64; 2]>>,
+pub(super) struct Fan {
+    pub(super) rays: Vec<Vec<[f64; 2]>>,
 }
 
-fn fan(
+pub(super) fn fan(
     train: &OpticalTrain,
     at: &MonochromaticTrain,
     report: &LensReport,
@@ -146,7 +150,7 @@ fn trace(
 }
 
 /// How far from its axis each element is drawn (mm): its rim, or where the rays are.
-fn heights(train: &OpticalTrain, fans: &[Fan]) -> Vec<f64> {
+pub(super) fn heights(train: &OpticalTrain, fans: &[Fan]) -> Vec<f64> {
     let rays = || fans.iter().flat_map(|fan| &fan.rays);
     let reach = |i: usize| {
         let heights = rays().filter_map(|ray| ray.get(i + 1)).map(|point| point[1].abs());
@@ -255,47 +259,55 @@ fn section(element: &Element, height: f64) -> Vec<[f64; 2]> {
     points.collect()
 }
 
+/// A body of glass between two surfaces.
+pub(super) struct Body {
+    /// All around, from the lower end of its front.
+    pub(super) outline: Vec<[f64; 2]>,
+    /// Points of its front; 0 where its rim is not drawn.
+    front: usize,
+}
+
 /// The bodies of glass between surfaces.
-fn glasses(
-    canvas: &mut Canvas,
-    view: &View,
-    train: &OpticalTrain,
-    at: &MonochromaticTrain,
-    heights: &[f64],
-) {
+pub(super) fn bodies(train: &OpticalTrain, at: &MonochromaticTrain, heights: &[f64]) -> Vec<Body> {
     let surfaces: Vec<usize> = (0..heights.len())
         .filter(|&i| train.elements()[i].part.symbol() == Symbol::Surface)
         .collect();
-    for pair in surfaces.windows(2) {
-        let [front, back] = [pair[0], pair[1]];
-        if at.index_behind(front) <= 1.0 {
-            continue;
-        }
-        let side = |i: usize| section(&train.elements()[i], heights[i]);
-        let (first, second) = (side(front), side(back));
-        // The thicker of the two rims is the glass'.
-        let rim = heights[front].max(heights[back]);
-        let edge = |points: &[[f64; 2]], upper: bool| {
-            let point = if upper { points.last() } else { points.first() };
-            point.map(|&[z, y]| {
-                [z, if y.abs() < rim { rim * if upper { 1.0 } else { -1.0 } } else { y }]
-            })
-        };
-        let tilted = [front, back].iter().any(|&i| !train.elements()[i].frame.is_axial());
-        let mut outline = first.clone();
-        if !tilted {
-            outline.extend(edge(&first, true));
-            outline.extend(edge(&second, true));
-        }
-        outline.extend(second.iter().rev());
-        if !tilted {
-            outline.extend(edge(&second, false));
-            outline.extend(edge(&first, false));
-        }
+    let pairs = surfaces.windows(2).map(|pair| [pair[0], pair[1]]);
+    let of_glass = pairs.filter(|&[front, _]| at.index_behind(front) > 1.0);
+    of_glass.map(|pair| body(train, heights, pair)).collect()
+}
+
+fn body(train: &OpticalTrain, heights: &[f64], [front, back]: [usize; 2]) -> Body {
+    let side = |i: usize| section(&train.elements()[i], heights[i]);
+    let (first, second) = (side(front), side(back));
+    // The thicker of the two rims is the glass'.
+    let rim = heights[front].max(heights[back]);
+    let edge = |points: &[[f64; 2]], upper: bool| {
+        let point = if upper { points.last() } else { points.first() };
+        point.map(|&[z, y]| {
+            [z, if y.abs() < rim { rim * if upper { 1.0 } else { -1.0 } } else { y }]
+        })
+    };
+    let tilted = [front, back].iter().any(|&i| !train.elements()[i].frame.is_axial());
+    let mut outline = first.clone();
+    if !tilted {
+        outline.extend(edge(&first, true));
+        outline.extend(edge(&second, true));
+    }
+    outline.extend(second.iter().rev());
+    if !tilted {
+        outline.extend(edge(&second, false));
+        outline.extend(edge(&first, false));
+    }
+    Body { outline, front: if tilted { 0 } else { first.len() } }
+}
+
+fn glasses(canvas: &mut Canvas, view: &View, bodies: &[Body]) {
+    for Body { outline, front } in bodies {
         let outline: Vec<[f64; 2]> = outline.iter().map(|&point| view.pixel(point)).collect();
         canvas.path(&outline, "glass", 0.0);
-        let count = first.len();
-        if !tilted && outline.len() > count + 2 {
+        let count = *front;
+        if count > 0 && outline.len() > count + 2 {
             let rims = [&outline[count - 1..count + 3], &outline[outline.len() - 3..]];
             canvas.path(rims[0], "ink", 1.0);
             let closing: Vec<[f64; 2]> = rims[1].iter().copied().chain([outline[0]]).collect();
@@ -304,49 +316,43 @@ fn glasses(
     }
 }
 
-fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: bool) {
-    let line = |canvas: &mut Canvas, points: &[DVec3], width: f64| {
-        let points: Vec<[f64; 2]> = points
-            .iter()
-            .map(|&local| element.frame.point(local))
-            .map(|point| view.pixel([point.z, point.y]))
-            .collect();
-        canvas.path(&points, "ink", width);
+/// The lines of an element with their widths (pixels), where a pixel is `pixel` mm.
+pub(super) fn strokes(element: &Element, height: f64, pixel: f64) -> Vec<(Vec<[f64; 2]>, f64)> {
+    let line = |points: &[DVec3], width: f64| {
+        let points = points.iter().map(|&local| element.frame.point(local));
+        (points.map(|point| [point.z, point.y]).collect(), width)
     };
     let at = |y: f64, z: f64| DVec3::new(0.0, y, z);
     match element.part.symbol() {
-        Symbol::Surface => {
-            let points: Vec<[f64; 2]> =
-                section(element, height).iter().map(|&point| view.pixel(point)).collect();
-            canvas.path(&points, "ink", 1.2);
-        }
+        Symbol::Surface => vec![(section(element, height), 1.2)],
         Symbol::ThinLens { converging } => {
             let tip = 0.05 * height * converging;
-            line(canvas, &[at(-height, 0.0), at(height, 0.0)], 1.2);
-            for side in [-1.0, 1.0] {
+            let arrow = |side: f64| {
                 let inner = side * (height - tip);
-                line(
-                    canvas,
-                    &[at(inner, -tip.abs()), at(side * height, 0.0), at(inner, tip.abs())],
-                    1.2,
-                );
-            }
+                let tips = [at(inner, -tip.abs()), at(side * height, 0.0), at(inner, tip.abs())];
+                line(&tips, 1.2)
+            };
+            vec![line(&[at(-height, 0.0), at(height, 0.0)], 1.2), arrow(-1.0), arrow(1.0)]
         }
         Symbol::Opening => {
-            let outer = height + (0.2 * height).max(8.0 / view.scale);
-            for side in [-1.0, 1.0] {
-                line(canvas, &[at(side * height, 0.0), at(side * outer, 0.0)], 3.0);
-            }
+            let outer = height + (0.2 * height).max(8.0 * pixel);
+            let blade = |side: f64| line(&[at(side * height, 0.0), at(side * outer, 0.0)], 3.0);
+            vec![blade(-1.0), blade(1.0)]
         }
         Symbol::Sheet => {
-            let half = 1.5 / view.scale;
-            for z in [-half, half] {
-                line(canvas, &[at(-height, z), at(height, z)], 0.8);
-            }
+            let half = 1.5 * pixel;
+            [-half, half].map(|z| line(&[at(-height, z), at(height, z)], 0.8)).into()
         }
     }
+}
+
+fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: bool) {
+    for (line, width) in strokes(element, height, 1.0 / view.scale) {
+        let points: Vec<[f64; 2]> = line.iter().map(|&point| view.pixel(point)).collect();
+        canvas.path(&points, "ink", width);
+    }
     if stop {
-        let top = element.frame.point(at(-height, 0.0));
+        let top = element.frame.point(DVec3::new(0.0, -height, 0.0));
         let [x, y] = view.pixel([top.z, top.y]);
         let below = if element.part.symbol() == Symbol::Opening { 26.0 } else { 14.0 };
         canvas.text([x, y + below], Anchor::Middle, "small", "stop");

@@ -3,11 +3,13 @@
 //! | module | idea |
 //! |---|---|
 //! | [`layout`] | the lens cut along y and z, with fans of rays |
+//! | [`Section`] | the same cut as lines in millimetres, for those who draw themselves |
 //! | [`spots`] | spot diagrams by field and wavelength |
 //! | [`relative_illumination`] | relative illumination over the sensor |
 
 mod layout;
 mod relative_illumination;
+mod section;
 mod spots;
 
 use super::LensReport;
@@ -17,6 +19,7 @@ use svg::{Document, Node};
 
 pub use layout::layout;
 pub use relative_illumination::relative_illumination;
+pub use section::{DrawnElement, Section};
 pub use spots::spots;
 
 /// Colours by theme. A program that knows no themes shows the light one.
