@@ -49,6 +49,7 @@
 //! |---|---|
 //! | [`Session`] | a scene, opened once, changed and rendered often |
 //! | [`Rendering`] | layers as arrays, the sensor's images, files of them, the report |
+//! | [`Preview`], [`Screen`], [`Viewpoint`], [`Inspector`] | what a window needs: pictures soon, shown, moved about and asked |
 //! | [`Frame`], [`Dataset`] | the pictures of a scene that has `frames`, and what others read of them |
 //! | [`Shard`], [`Shares`], [`Checkpoint`] | renders that are divided over machines, or interrupted |
 //! | [`Progress`] | how far work is, and how it is stopped |
@@ -58,27 +59,47 @@
 //! The parts that it is made of can be used by themselves: `etendue-optics` is a library of lens design,
 //! `etendue-sensor` a sensor after EMVA 1288, `etendue-accel` an exact ray caster.
 
+mod changes;
 mod dataset;
 mod error;
 mod frame_files;
+mod inspector;
+mod lens_view;
 mod neighbours;
 mod options;
 pub mod places;
+mod preview;
 mod progress;
 mod rendering;
+mod saving;
 mod session;
 mod shares;
 mod structures;
+mod viewpoint;
 mod words;
 
 pub use dataset::Dataset;
 pub use error::Error;
-pub use etendue_render::output::{Channel, Layer, Outputs, Picture, Values};
+pub use etendue_render::light_field::LightFieldViews;
+pub use etendue_render::output::{
+    Channel, DistanceScale, Layer, Look, Outputs, Picture, Screen, Values,
+};
 pub use etendue_render::{Checkpoint, Plan, Report, Shard, SoFar};
+pub use etendue_scene::file::scene_schema;
 pub use etendue_scene::{Frame, Reach, Scene, Strictness};
 pub use frame_files::FramePattern;
+pub use inspector::{Inspector, Probe};
+pub use lens_view::{LensView, lens_values};
 pub use options::Options;
+pub use preview::{Preview, Roughness};
 pub use progress::{Phase, Progress};
 pub use rendering::{Rendering, Written};
 pub use session::Session;
 pub use shares::Shares;
+pub use viewpoint::Viewpoint;
+
+/// The layers by the names that scenes give them.
+#[must_use]
+pub fn layer_names() -> &'static [&'static str] {
+    &etendue_tracer::LayerSpec::NAMES
+}

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_geometry::Mesh;
-use etendue_render::output::{ImageHash, Layer, SOFTWARE};
+use etendue_render::output::{ImageHash, Layer, Outputs, SOFTWARE};
 use etendue_render::report::memory;
 use etendue_render::{
     Checkpoint, Course, Film, FollowedFrame, Identity, Images, Plan, Prepared, RenderError,
@@ -19,6 +19,7 @@ use etendue_scene::memory::Budget;
 use etendue_scene::{Cache, Frame, LoadOptions, Scene, SceneError, Start, Strictness};
 use serde_json::Value;
 
+use crate::changes;
 use crate::neighbours::{self, Neighbour};
 use crate::progress::Phase;
 use crate::rendering::file_names;
@@ -53,6 +54,9 @@ pub struct Session {
     /// Where what there is of a render is kept.
     checkpoint: Option<Checkpoint>,
 }
+
+/// A scene, the structure over it, and its images.
+pub(crate) type Ready = (Arc<Scene>, Arc<dyn Accel>, Arc<Images>);
 
 /// The scene as it is now.
 struct Loaded {
@@ -192,6 +196,30 @@ impl Session {
         self.settings.extend(settings);
         self.leave_frame();
         Ok(())
+    }
+
+    /// Makes the scene that which `values` say, in the words of the scene format: sets what differs from
+    /// [`values`](Self::values), and nothing else. When it is refused, the session is as it was.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::set`].
+    pub fn replace(&mut self, values: &Value) -> Result<(), Error> {
+        self.set_changes(&self.file.value().clone(), values)
+    }
+
+    /// Sets what turns the scene `before` into `after`, both in the words of the scene format: edits of one
+    /// version of a scene, made to this one.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::set`].
+    pub fn set_changes(&mut self, before: &Value, after: &Value) -> Result<(), Error> {
+        let changes = changes::between(before, after);
+        match changes.is_empty() {
+            true => Ok(()),
+            false => self.set_all(changes.iter().map(|(path, value)| (&**path, value.clone()))),
+        }
     }
 
     /// Reads the scene's file again, with all that was set since, and at the next render the models and
@@ -484,13 +512,24 @@ impl Session {
         Rendering::new(scene, (picture, band_film), traced, (report, fingerprints))
     }
 
+    /// The scene, the structure over it and its images, once they are [prepared](Self::prepare).
+    pub(crate) fn prepared(&self) -> Result<Ready, Error> {
+        let Loaded { scene, accel, .. } = self.loaded()?;
+        let accel = accel.clone().ok_or_else(not_built)?;
+        Ok((Arc::clone(scene), accel, Arc::clone(&self.images)))
+    }
+
+    /// What is to be written of the pictures.
+    pub(crate) fn outputs(&self) -> Outputs {
+        self.options.outputs
+    }
+
     fn loaded(&self) -> Result<&Loaded, Error> {
         self.loaded.as_ref().ok_or_else(|| Error::Refused("the scene is not loaded".to_owned()))
     }
 
     fn built(&self) -> Result<&dyn Accel, Error> {
-        let built = self.loaded()?.accel.as_deref();
-        built.ok_or_else(|| Error::Refused("the structure is not built".to_owned()))
+        self.loaded()?.accel.as_deref().ok_or_else(not_built)
     }
 
     /// Loads the scene, if it is not, and the frames that it is compared with.
@@ -656,6 +695,10 @@ impl Session {
             files: Vec::new(),
         })
     }
+}
+
+fn not_built() -> Error {
+    Error::Refused("the structure is not built".to_owned())
 }
 
 /// Refuses what will not fit into the memory that is allowed, or else free.

@@ -1,0 +1,52 @@
+//! A changed scene as a file.
+
+use std::io::Write;
+use std::path::Path;
+
+use etendue_render::output::{write_over, write_whole};
+use etendue_scene::file::FileKind;
+
+use crate::{Error, Progress, Session, places};
+
+impl Session {
+    /// Writes the scene as it is now to `path` as JSON; it may take the place of the file that it was
+    /// opened from. Rendered from there, it is the same picture to the bit.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be written or is another file of the scene, and when the scene names files,
+    /// which are found from its own folder, and `path` is in another one.
+    pub fn save(&mut self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let path = path.as_ref();
+        let (own, folder) = (self.file().path().to_owned(), self.file().folder().to_owned());
+        let is_model = self.file().kind() == FileKind::Model;
+        let inputs = self.scene(&Progress::none())?.inputs.clone();
+        let is_scene = |input: &Path| !is_model && input == own;
+        let named = inputs.iter().find(|input| !is_scene(input));
+        if let Some(named) = named
+            && !is_same_folder(path.parent(), &folder)
+        {
+            return Err(Error::Refused(format!(
+                "{}: the scene names files, such as {}, and finds them from its own folder: save it in {}",
+                path.display(),
+                named.display(),
+                folder.display()
+            )));
+        }
+        let text = format!("{:#}", self.values());
+        if path == own && !is_model {
+            return Ok(write_over(path, |part| writeln!(part, "{text}"))?);
+        }
+        places::keep_apart(&inputs, &[path.to_owned()])?;
+        Ok(write_whole(path, |part| writeln!(part, "{text}"))?)
+    }
+}
+
+fn is_same_folder(folder: Option<&Path>, own: &Path) -> bool {
+    let here = Path::new(".");
+    let folder = folder.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(here);
+    match (folder.canonicalize(), own.canonicalize()) {
+        (Ok(folder), Ok(own)) => folder == own,
+        _ => false,
+    }
+}
