@@ -6,13 +6,15 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install dist test test-embree4 test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits docs-figures docs-charts \
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits docs-figures docs-charts \
 	docs-stability light-fields fingerprints fuzz-smoke fuzz-seeds clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
 	@echo "make test          install what is missing, run everything that CI runs"
 	@echo "make test-embree4  run the tests that touch Embree against Embree 4, in a Debian 13 root"
+	@echo "make view          a window onto scenes/first-light.json; SCENE=… for another scene or model"
+	@echo "make test-window   drive a real window on a screen in memory (Xvfb)"
 	@echo "make test-slurm    run the jobs of scenes/cluster on a Slurm of one node, made for it"
 	@echo "make python        build the Python package's wheel and test it in a fresh venv"
 	@echo "make install       install the command below PREFIX, /usr/local when it is not given"
@@ -40,6 +42,15 @@ render: setup
 	cargo run --release -p etendue-cli -- render scenes/first-light.json -o out/first-light
 	@echo "The files are in $(CURDIR)/out/first-light:"
 	@ls -lh out/first-light
+
+SCENE := scenes/first-light.json
+
+view: setup
+	cargo run --release -p etendue-cli --features window -- view $(SCENE)
+
+test-window:
+	@scripts/setup.sh test
+	@scripts/test-window.sh
 
 test:
 	@scripts/setup.sh test

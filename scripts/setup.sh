@@ -30,6 +30,11 @@ if [ "${1:-}" = test ]; then
     command -v exrheader >/dev/null || need "to read images back with OpenEXR's own tool" openexr
     python3 -c "import ensurepip, venv" 2>/dev/null ||
         need "to read images back with Python's OpenEXR and numpy" python3-venv
+    { command -v Xvfb && command -v xdotool && command -v import && command -v jq; } >/dev/null ||
+        need "to drive a window on a screen in memory" xvfb xdotool imagemagick jq
+    ldconfig -p | grep -q libxkbcommon-x11 && any_file "/usr/lib/*/dri/*_dri.so" ||
+        need "to draw a window without a graphics card: Mesa and X's libraries" \
+            libgl1-mesa-dri libgl1 libegl1 libxkbcommon-x11-0 libxcursor1 libxi6 libx11-xcb1
 fi
 
 if [ ${#missing[@]} -gt 0 ]; then

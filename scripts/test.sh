@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Everything that CI runs, cheapest first; the tests of the whole workspace close.
+# Everything that CI runs, cheapest first; the tests of the whole workspace and a real window close.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -20,7 +20,7 @@ step "format"
 cargo fmt --all --check
 
 step "lints"
-cargo clippy --workspace --all-targets -- -D warnings
+cargo clippy --workspace --features etendue-cli/window --all-targets -- -D warnings
 
 # An empty EMBREE_DIR would stop the bindings' build, so this also shows that nothing asks for them.
 step "lints without Embree"
@@ -55,4 +55,7 @@ step "jobs on Slurm"
 scripts/test-slurm.sh
 
 step "tests"
-run_tests --workspace
+run_tests --workspace --features etendue-cli/window
+
+step "window"
+scripts/test-window.sh

@@ -48,6 +48,9 @@ pub(crate) enum Command {
     /// Show what a sensor makes of light, or make the images that EMVA 1288 characterises it by
     #[command(after_help = SENSOR_HELP)]
     Sensor(SensorArguments),
+    /// Open a window onto a scene: look, change the camera, ask pixels, save
+    #[command(after_help = VIEW_HELP)]
+    View(ViewArguments),
     /// Analyse a lens, or trace given rays through it
     #[command(after_help = LENS_HELP)]
     Lens(LensArguments),
@@ -89,6 +92,15 @@ Examples:
   etendue render model.glb -o out/lit --set tracer.type=path --set render.exposure=auto --samples 64
   etendue render scan.ply -o out/scan --up z
   etendue render scenes/cube.json -o out/cube --set camera.fov=30 --samples 16";
+
+const VIEW_HELP: &str = "\
+Drag turns the scene, Shift+drag or the middle button moves it, the right button looks around, the wheel
+goes nearer, W A S D Q E fly; Ctrl+wheel enlarges the picture, a double click fits it. docs/window.md
+tells the rest.
+
+Examples:
+  etendue view scenes/first-light.json
+  etendue view model.glb";
 
 const MERGE_HELP: &str = "\
 The scene is read again, from where the shares found it, for what is written beside the picture.
@@ -334,6 +346,25 @@ pub(crate) struct RenderArguments {
 }
 
 #[derive(Debug, Args)]
+#[cfg_attr(not(feature = "window"), expect(dead_code, reason = "read by the window alone"))]
+pub(crate) struct ViewArguments {
+    /// A scene (.json), or a model (.gltf, .glb, .obj, .ply); a file can be dropped on the window, too
+    #[arg(value_name = "SCENE|MODEL")]
+    pub(crate) scene: Option<PathBuf>,
+    // Not a comment of documentation, whose brackets would be a link.
+    #[arg(
+        long = "set",
+        value_name = "PATH=VALUE",
+        value_parser = parse::setting,
+        help = "Set any value of the scene, e.g. camera.fov=30 or objects[0].transform.scale=2"
+    )]
+    pub(crate) settings: Vec<(String, String)>,
+    /// Let the scene name files outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct MergeArguments {
     /// The folder to write into; made when it is not there
     #[arg(value_name = "DIR")]
@@ -468,7 +499,7 @@ impl Command {
             Self::Bench(arguments) => &arguments.scene.glass_catalogs,
             Self::Lens(arguments) => &arguments.glass_catalogs,
             // A merge opens those of the shares.
-            Self::Merge(_) | Self::Sensor(_) | Self::Schema { .. } => &[],
+            Self::Merge(_) | Self::View(_) | Self::Sensor(_) | Self::Schema { .. } => &[],
         }
     }
 }

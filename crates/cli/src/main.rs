@@ -15,6 +15,7 @@ mod sensor;
 mod sequence;
 mod stop;
 mod version;
+mod view;
 
 use std::process::ExitCode;
 
@@ -40,6 +41,7 @@ fn main() -> ExitCode {
         Some(Command::Plan(arguments)) => plan::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Sensor(arguments)) => sensor::run(&arguments),
+        Some(Command::View(arguments)) => view::run(&arguments),
         Some(Command::Lens(arguments)) => lens::run(&arguments),
         Some(Command::Schema { of }) => print_schema(of),
         None => {

@@ -34,4 +34,5 @@ mod sensor; // presets, curves, series of a characterisation
 mod shards; // renders that are divided or killed, and their pictures
 mod stopping; // Ctrl-C and what it leaves
 mod tools; // check, plan, schema, version
+mod view; // the window, as far as there is none
 mod views; // where a camera without a pose stands, and which way is up

@@ -1,0 +1,457 @@
+//! The window's state, and how news and input change it.
+
+mod input;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use eframe::egui::{self, Context};
+use etendue::{Inspector, LensView, Options, Preview, Probe, Screen, Viewpoint};
+use serde_json::Value;
+
+use crate::canvas::Canvas;
+use crate::document::{Document, Edit};
+use crate::form::Form;
+use crate::panels::{
+    self,
+    light_field::{LightField, Shows},
+};
+use crate::view::View;
+use crate::worker::{News, Shown, Task, Wake, Wish, Worker};
+
+/// What a click on the picture does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Tool {
+    /// Asks the pixel.
+    #[default]
+    Inspect,
+    /// Focuses the lens there.
+    Focus,
+}
+
+/// The picture that is shown.
+pub(crate) struct Picture {
+    pub(crate) screen: Screen,
+    pub(crate) factor: u32,
+    pub(crate) samples: Option<[u32; 2]>,
+    /// The wish that it answers, and whether there is none finer to come.
+    pub(crate) number: u64,
+    pub(crate) layer: String,
+    pub(crate) layers: Vec<String>,
+    pub(crate) is_final: bool,
+    /// What it was made of.
+    pub(crate) preview: Option<Arc<Preview>>,
+    pub(crate) texture: egui::TextureHandle,
+}
+
+/// What was asked of a pixel.
+#[derive(Debug, Clone)]
+pub(crate) struct Asked {
+    /// Column and row coordinates (pixels from the picture's corner).
+    pub(crate) place: [f64; 2],
+    pub(crate) probe: Option<Probe>,
+}
+
+/// A window in the window that asks for a path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Asking {
+    Open,
+    SaveAs,
+    Render,
+}
+
+/// All of the window.
+pub(crate) struct App {
+    worker: Worker,
+    pub(crate) form: Form,
+    pub(crate) document: Option<Document>,
+    pub(crate) view: View,
+    pub(crate) part: Option<String>,
+    pub(crate) tool: Tool,
+    pub(crate) canvas: Canvas,
+    pub(crate) picture: Option<Picture>,
+    pub(crate) inspector: Option<Inspector>,
+    pub(crate) asked: Option<Asked>,
+    /// The camera's lens, while its panel is open.
+    pub(crate) lens: Option<Result<LensView, String>>,
+    pub(crate) shows_lens: bool,
+    /// The lens as the scene or its file has it, and whether that is a file's.
+    pub(crate) written_lens: Option<(Value, bool)>,
+    pub(crate) light_field: LightField,
+    /// Frames of the scene, and the one that is shown.
+    pub(crate) frames: Option<usize>,
+    pub(crate) frame: Option<usize>,
+    pub(crate) error: Option<String>,
+    pub(crate) said: Option<String>,
+    pub(crate) busy: Option<(&'static str, f64)>,
+    pub(crate) asking: Option<(Asking, String)>,
+    /// The number of the last wish, and of the last one that was accepted.
+    number: u64,
+    accepted: Option<(u64, Arc<Value>)>,
+}
+
+/// Pixels are seen as squares when they are enlarged.
+const PIXELS: egui::TextureOptions = egui::TextureOptions {
+    magnification: egui::TextureFilter::Nearest,
+    minification: egui::TextureFilter::Linear,
+    ..egui::TextureOptions::NEAREST
+};
+
+fn image_of(screen: &Screen) -> egui::ColorImage {
+    egui::ColorImage::from_rgba_unmultiplied(screen.size, &screen.rgba)
+}
+
+impl App {
+    pub(crate) fn new(
+        path: Option<PathBuf>,
+        options: Options,
+        wake: Wake,
+    ) -> std::io::Result<Self> {
+        let worker = Worker::start(options, wake)?;
+        if let Some(path) = path {
+            worker.ask(Task::Open(path));
+        }
+        Ok(Self {
+            worker,
+            form: Form::new(etendue::scene_schema()),
+            document: None,
+            view: View::default(),
+            part: None,
+            tool: Tool::default(),
+            canvas: Canvas::default(),
+            picture: None,
+            inspector: None,
+            asked: None,
+            lens: None,
+            shows_lens: false,
+            written_lens: None,
+            light_field: LightField::default(),
+            frames: None,
+            frame: None,
+            error: None,
+            said: None,
+            busy: None,
+            asking: None,
+            number: 0,
+            accepted: None,
+        })
+    }
+
+    /// One pass of the user interface.
+    pub(crate) fn show(&mut self, ctx: &Context) {
+        self.take_news(ctx);
+        self.take_drops(ctx);
+        self.take_shortcuts(ctx);
+        panels::bar::show(self, ctx);
+        panels::status::show(self, ctx);
+        panels::lens::show(self, ctx);
+        panels::scene::show(self, ctx);
+        panels::inspect::show(self, ctx);
+        egui::CentralPanel::default().frame(egui::Frame::NONE).show(ctx, |ui| {
+            crate::canvas::show(self, ui);
+        });
+        panels::asking::show(self, ctx);
+    }
+
+    fn take_news(&mut self, ctx: &Context) {
+        let news: Vec<News> = self.worker.news().collect();
+        for news in news {
+            match news {
+                News::Opened(path, scene) => self.opened(path, scene),
+                News::TakenUp(saved, scene) => {
+                    if let Some(document) = &mut self.document {
+                        document.take_up(saved, scene);
+                        self.said = Some("the file has changed, and was read again".to_owned());
+                    }
+                }
+                News::Accepted(number, scene, inspector, frames) => {
+                    self.accepted = Some((number, scene));
+                    self.inspector = Some(inspector);
+                    self.frames = frames;
+                    if number == self.number {
+                        self.error = None;
+                    }
+                    self.ask_again();
+                    self.look_at_lens();
+                }
+                News::Refused(number, why) => self.refused(number, why),
+                News::Shown(shown) => self.shown(ctx, *shown),
+                News::Busy(phase, share) => self.busy = Some((phase, share)),
+                News::Idle => self.busy = None,
+                News::Saved(path, scene) => {
+                    self.said = Some(format!("saved {}", path.display()));
+                    if let Some(document) = &mut self.document {
+                        document.saved_to(path, &scene);
+                    }
+                }
+                News::Written(folder, count) => {
+                    self.said = Some(format!("wrote {count} files into {}", folder.display()));
+                    // The session rendered the whole scene; back to what is looked at.
+                    self.wish();
+                }
+                News::Fault(why) => self.error = Some(why),
+            }
+        }
+    }
+
+    fn opened(&mut self, path: PathBuf, scene: Arc<Value>) {
+        let is_same = self.document.as_ref().is_some_and(|document| **document.value() == *scene);
+        if is_same {
+            // It was saved under this name.
+            if let Some(document) = &mut self.document {
+                document.path = path;
+            }
+        } else {
+            self.document = Some(Document::new(path, scene));
+            (self.asked, self.frame, self.part, self.error) = (None, None, None, None);
+            (self.view, self.accepted) = (View::default(), None);
+            self.light_field = LightField::default();
+            self.canvas = Canvas::default();
+        }
+        self.wish();
+    }
+
+    fn refused(&mut self, number: u64, why: String) {
+        if number < self.number {
+            return;
+        }
+        self.error = Some(why);
+        if let (Some(document), Some((last, accepted))) = (&mut self.document, &self.accepted)
+            && *last != number
+        {
+            document.refuse(accepted);
+        }
+    }
+
+    fn shown(&mut self, ctx: &Context, shown: Shown) {
+        if self.document.is_none() {
+            return;
+        }
+        let Shown { number, screen, factor, samples, layer, is_final, preview, .. } = shown;
+        let before = self.picture.take();
+        let layers = match (preview.is_some(), &before) {
+            (false, Some(before)) => before.layers.clone(),
+            _ => shown.layers,
+        };
+        let image = image_of(&screen);
+        let texture = match before {
+            Some(before) => {
+                let mut texture = before.texture;
+                texture.set(image, PIXELS);
+                texture
+            }
+            None => ctx.load_texture("picture", image, PIXELS),
+        };
+        self.picture = Some(Picture {
+            screen,
+            factor,
+            samples,
+            number,
+            layer,
+            layers,
+            is_final,
+            preview,
+            texture,
+        });
+        self.light_field.renew();
+        if self.light_field.shows != Shows::Raw {
+            self.show_light_field(ctx);
+        }
+    }
+
+    /// Shows what is wanted of a light field in place of its raw picture.
+    pub(crate) fn show_light_field(&mut self, ctx: &Context) {
+        let Some(picture) = &mut self.picture else { return };
+        let preview = picture.preview.as_deref();
+        let screen = self.light_field.screen(preview).and_then(|screen| match (screen, preview) {
+            (Some(screen), _) => Ok(Some(screen)),
+            (None, Some(preview)) => preview.screen(&picture.layer).map(Some),
+            (None, None) => Ok(None),
+        });
+        match screen {
+            Ok(Some(screen)) => {
+                picture.texture.set(image_of(&screen), PIXELS);
+                picture.screen = screen;
+            }
+            Ok(None) => {}
+            Err(error) => self.error = Some(error.to_string()),
+        }
+        ctx.request_repaint();
+    }
+
+    pub(crate) fn open(&mut self, path: &Path) {
+        self.worker.ask(Task::Open(path.to_owned()));
+    }
+
+    pub(crate) fn save(&mut self) {
+        let Some(document) = &self.document else { return };
+        match document.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json")) {
+            true => self.save_as(&document.path.clone()),
+            // A model is no scene: a new file is made beside it.
+            false => {
+                let path = document.path.with_extension("json").display().to_string();
+                self.asking = Some((Asking::SaveAs, path));
+            }
+        }
+    }
+
+    pub(crate) fn save_as(&mut self, path: &Path) {
+        if let Some(document) = &self.document {
+            self.worker.ask(Task::Save(path.to_owned(), Arc::clone(document.value())));
+        }
+    }
+
+    pub(crate) fn render(&mut self, folder: &Path) {
+        if let Some(document) = &self.document {
+            let scene = Arc::clone(document.value());
+            self.worker.ask(Task::Render(folder.to_owned(), scene, self.frame));
+        }
+    }
+
+    pub(crate) fn cancel(&mut self) {
+        self.worker.cancel();
+    }
+
+    pub(crate) fn undo(&mut self) {
+        if let Some(document) = &mut self.document {
+            document.undo();
+            self.canvas.release();
+            self.wish();
+        }
+    }
+
+    pub(crate) fn redo(&mut self) {
+        if let Some(document) = &mut self.document {
+            document.redo();
+            self.canvas.release();
+            self.wish();
+        }
+    }
+
+    /// Changes the scene, and asks for its picture.
+    pub(crate) fn edit(&mut self, ctx: &Context, edits: &[Edit]) {
+        let now = ctx.input(|input| input.time);
+        if let Some(document) = &mut self.document
+            && document.apply(edits, now)
+        {
+            self.wish();
+        }
+    }
+
+    /// Asks for the picture of the scene as it is now.
+    pub(crate) fn wish(&mut self) {
+        let Some(document) = &self.document else { return };
+        self.number += 1;
+        self.worker.wish(Wish {
+            number: self.number,
+            scene: Arc::clone(document.value()),
+            view: self.view.clone(),
+            part: self.part.clone(),
+            frame: self.frame,
+        });
+    }
+
+    pub(crate) fn look_at(&mut self, view: View) {
+        if self.view != view {
+            (self.view, self.part) = (view, None);
+            self.wish();
+        }
+    }
+
+    /// Asks what is seen at a place of the picture.
+    pub(crate) fn ask(&mut self, place: [f64; 2]) {
+        let probe = self.inspector.as_ref().and_then(|inspector| inspector.probe(place));
+        self.asked = Some(Asked { place, probe });
+    }
+
+    /// Opens or closes the panel of the lens.
+    pub(crate) fn show_lens(&mut self, shows: bool) {
+        self.shows_lens = shows;
+        self.look_at_lens();
+    }
+
+    fn look_at_lens(&mut self) {
+        let inspector = self.inspector.as_ref().filter(|_| self.shows_lens);
+        let lens = inspector.and_then(|inspector| inspector.lens().transpose());
+        self.lens = lens.map(|lens| lens.map_err(|error| error.to_string()));
+        let document = self.document.as_ref().filter(|_| self.lens.is_some());
+        self.written_lens = document.and_then(|document| {
+            panels::lens::written(document.at("/camera/lens"), &document.path)
+        });
+    }
+
+    /// The same place, after the scene has changed.
+    fn ask_again(&mut self) {
+        if let Some(asked) = &self.asked {
+            self.ask(asked.place);
+        }
+    }
+
+    /// Focuses the lens on what is seen at a place of the picture.
+    pub(crate) fn focus(&mut self, ctx: &Context, place: [f64; 2]) {
+        let Some(inspector) = &self.inspector else { return };
+        if inspector.scene().camera.lens().is_none() {
+            let why = "this camera has no lens to focus: choose a type that has, such as thin_lens";
+            self.error = Some(why.to_owned());
+            return;
+        }
+        let Some(probe) = inspector.probe(place) else {
+            self.said = Some("nothing is there to focus on".to_owned());
+            return;
+        };
+        let edits = [
+            Edit::Remove("/camera/sensor_distance".to_owned()),
+            Edit::set("/camera/focus_distance", probe.depth),
+        ];
+        self.edit(ctx, &edits);
+        self.ask(place);
+    }
+
+    /// Whether the picture is that of the scene as it is now, as fine as it gets.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.picture.as_ref().is_some_and(|p| p.is_final && p.number == self.number)
+    }
+
+    /// What it is at, for those who wait.
+    #[cfg(test)]
+    pub(crate) fn state(&self) -> String {
+        let picture = self.picture.as_ref().map(|p| (p.number, p.factor, p.is_final));
+        let accepted = self.accepted.as_ref().map(|(number, _)| number);
+        let (number, busy, error) = (self.number, self.busy, &self.error);
+        format!("wish {number}, accepted {accepted:?}, picture {picture:?}, {busy:?}, {error:?}")
+    }
+
+    /// Whether the renderer has not reached the last wish.
+    pub(crate) fn is_behind(&self) -> bool {
+        self.accepted.as_ref().is_none_or(|(number, _)| *number < self.number)
+    }
+
+    /// Where the camera stands, as the picture shows it or as it was asked for since.
+    pub(crate) fn viewpoint(&self) -> Option<Viewpoint> {
+        let inspector = self.inspector.as_ref()?;
+        Some(inspector.viewpoint(self.asked.as_ref().and_then(|asked| asked.probe.as_ref())))
+    }
+
+    /// Moves the camera.
+    pub(crate) fn stand(&mut self, ctx: &Context, viewpoint: &Viewpoint) {
+        let Some(document) = &self.document else { return };
+        let mut edits = vec![Edit::set("/camera/pose", viewpoint.pose())];
+        // A camera that frames the scene by itself focuses by itself: it stays focused where it is.
+        let camera = document.at("/camera");
+        let is_free = camera["focus_distance"].is_null() && camera["sensor_distance"].is_null();
+        let lens = self.inspector.as_ref().and_then(|inspector| inspector.scene().camera.lens());
+        if let (true, true, Some(lens)) = (camera["pose"].is_null(), is_free, lens) {
+            let distance = lens.focused().object_distance();
+            if distance.is_finite() && distance > 0.0 {
+                edits.push(Edit::set("/camera/focus_distance", distance));
+            }
+        }
+        self.edit(ctx, &edits);
+    }
+}
+
+impl eframe::App for App {
+    fn update(&mut self, ctx: &Context, _frame: &mut eframe::Frame) {
+        self.show(ctx);
+    }
+}

@@ -1,0 +1,266 @@
+//! The scene that is edited: its values, and the way back to earlier ones.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use serde_json::{Map, Value};
+
+/// Earlier values that are kept.
+const MOST_STEPS: usize = 200;
+
+/// Edits of one value that follow each other this soon (s) are one step back.
+const ONE_GESTURE: f64 = 0.7;
+
+/// A change of one value, at its JSON pointer.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Edit {
+    /// The value is this now; objects on the way are made.
+    Set(String, Value),
+    /// The key is gone: the format's own default holds.
+    Remove(String),
+}
+
+impl Edit {
+    pub(crate) fn set(pointer: impl Into<String>, value: impl Into<Value>) -> Self {
+        Self::Set(pointer.into(), value.into())
+    }
+
+    fn pointer(&self) -> &str {
+        match self {
+            Self::Set(pointer, _) | Self::Remove(pointer) => pointer,
+        }
+    }
+}
+
+/// A scene with its past and its future.
+#[derive(Debug)]
+pub(crate) struct Document {
+    /// The file that it was opened from.
+    pub(crate) path: PathBuf,
+    value: Arc<Value>,
+    /// What the file says.
+    saved: Arc<Value>,
+    past: Vec<Arc<Value>>,
+    future: Vec<Arc<Value>>,
+    /// The last edit's place and time (s).
+    last: Option<(String, f64)>,
+}
+
+impl Document {
+    pub(crate) fn new(path: PathBuf, value: Arc<Value>) -> Self {
+        let saved = Arc::clone(&value);
+        Self { path, value, saved, past: Vec::new(), future: Vec::new(), last: None }
+    }
+
+    pub(crate) fn value(&self) -> &Arc<Value> {
+        &self.value
+    }
+
+    /// The value at a JSON pointer; null where there is none.
+    pub(crate) fn at(&self, pointer: &str) -> &Value {
+        self.value.pointer(pointer).unwrap_or(&Value::Null)
+    }
+
+    pub(crate) fn is_changed(&self) -> bool {
+        self.value != self.saved
+    }
+
+    /// Applies edits at the time `now` (s); `true` when anything is another.
+    pub(crate) fn apply(&mut self, edits: &[Edit], now: f64) -> bool {
+        let mut value = (*self.value).clone();
+        edits.iter().for_each(|edit| apply(&mut value, edit));
+        let Some(first) = edits.first().filter(|_| value != *self.value) else { return false };
+        let goes_on = self.last.as_ref().is_some_and(|(place, at)| {
+            place == first.pointer() && (0.0..ONE_GESTURE).contains(&(now - at))
+        });
+        if !goes_on {
+            self.remember();
+        }
+        self.last = Some((first.pointer().to_owned(), now));
+        self.value = Arc::new(value);
+        self.future.clear();
+        true
+    }
+
+    fn remember(&mut self) {
+        self.past.push(Arc::clone(&self.value));
+        if self.past.len() > MOST_STEPS {
+            self.past.remove(0);
+        }
+    }
+
+    pub(crate) fn can_undo(&self) -> bool {
+        !self.past.is_empty()
+    }
+
+    pub(crate) fn can_redo(&self) -> bool {
+        !self.future.is_empty()
+    }
+
+    pub(crate) fn undo(&mut self) {
+        if let Some(earlier) = self.past.pop() {
+            self.future.push(std::mem::replace(&mut self.value, earlier));
+            self.last = None;
+        }
+    }
+
+    pub(crate) fn redo(&mut self) {
+        if let Some(later) = self.future.pop() {
+            self.past.push(std::mem::replace(&mut self.value, later));
+            self.last = None;
+        }
+    }
+
+    /// Goes back to what was accepted last, as if what was refused had not been tried.
+    pub(crate) fn refuse(&mut self, accepted: &Arc<Value>) {
+        self.value = Arc::clone(accepted);
+        while self.past.last().is_some_and(|past| past == accepted) {
+            self.past.pop();
+        }
+        self.last = None;
+    }
+
+    /// What the file says now; `value` is that with the edits that were not saved.
+    pub(crate) fn take_up(&mut self, saved: Arc<Value>, value: Arc<Value>) {
+        if self.value != value {
+            self.remember();
+            self.value = value;
+        }
+        self.saved = saved;
+        self.last = None;
+    }
+
+    /// The values stand in the file `path` now.
+    pub(crate) fn saved_to(&mut self, path: PathBuf, value: &Arc<Value>) {
+        self.path = path;
+        self.saved = Arc::clone(value);
+    }
+}
+
+fn apply(value: &mut Value, edit: &Edit) {
+    let pointer = edit.pointer();
+    let Some((parents, key)) = pointer.rsplit_once('/') else { return };
+    let mut here = value;
+    for step in parents.split('/').skip(1).map(unescaped) {
+        here = match here {
+            Value::Array(elements) => {
+                let Some(element) = step.parse::<usize>().ok().and_then(|i| elements.get_mut(i))
+                else {
+                    return;
+                };
+                element
+            }
+            Value::Object(members) => match edit {
+                Edit::Set(..) => members.entry(step).or_insert(Value::Null),
+                Edit::Remove(_) => match members.get_mut(&step) {
+                    Some(member) => member,
+                    None => return,
+                },
+            },
+            Value::Null if matches!(edit, Edit::Set(..)) => {
+                *here = Value::Object(Map::new());
+                here.as_object_mut().expect("just made").entry(step).or_insert(Value::Null)
+            }
+            _ => return,
+        };
+    }
+    if here.is_null() && matches!(edit, Edit::Set(..)) {
+        *here = Value::Object(Map::new());
+    }
+    let key = unescaped(key);
+    match (here, edit) {
+        (Value::Object(members), Edit::Set(_, new)) => {
+            members.insert(key, new.clone());
+        }
+        (Value::Object(members), Edit::Remove(_)) => {
+            members.remove(&key);
+        }
+        (Value::Array(elements), edit) => {
+            let Ok(index) = key.parse::<usize>() else { return };
+            match edit {
+                Edit::Set(_, new) if index < elements.len() => elements[index] = new.clone(),
+                Edit::Set(_, new) if index == elements.len() => elements.push(new.clone()),
+                Edit::Remove(_) if index < elements.len() => {
+                    elements.remove(index);
+                }
+                _ => {}
+            }
+        }
+        _ => {}
+    }
+}
+
+/// A key as a step of a JSON pointer (RFC 6901).
+pub(crate) fn escaped(key: &str) -> String {
+    key.replace('~', "~0").replace('/', "~1")
+}
+
+fn unescaped(step: &str) -> String {
+    step.replace("~1", "/").replace("~0", "~")
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn document() -> Document {
+        let scene = json!({"camera": {"type": "thin_lens", "f_number": 2.0}, "lights": [{"a": 1}]});
+        Document::new("scene.json".into(), Arc::new(scene))
+    }
+
+    #[test]
+    fn a_drag_is_one_step_back() {
+        let mut document = document();
+        for (i, f_number) in [2.1, 2.2, 2.3].into_iter().enumerate() {
+            assert!(document.apply(&[Edit::set("/camera/f_number", f_number)], 0.1 * i as f64));
+        }
+        document.apply(&[Edit::set("/camera/f_number", 8.0)], 5.0);
+        document.undo();
+        assert_eq!(document.at("/camera/f_number"), &json!(2.3));
+        document.undo();
+        assert_eq!(document.at("/camera/f_number"), &json!(2.0));
+        assert!(!document.can_undo() && !document.is_changed());
+        document.redo();
+        document.redo();
+        assert_eq!(document.at("/camera/f_number"), &json!(8.0));
+        assert!(!document.can_redo() && document.is_changed());
+    }
+
+    #[test]
+    fn edits_make_and_remove_what_they_name() {
+        let mut document = document();
+        let edits = [
+            Edit::set("/camera/pose/from", json!([1, 2, 3])),
+            Edit::Remove("/camera/f_number".into()),
+            Edit::set("/lights/1", json!({"b": 2})),
+            Edit::Remove("/lights/0".into()),
+            Edit::set("/materials/a~1b/color", 1),
+        ];
+        assert!(document.apply(&edits, 0.0));
+        let expected = json!({"camera": {"type": "thin_lens", "pose": {"from": [1, 2, 3]}},
+                              "lights": [{"b": 2}], "materials": {"a/b": {"color": 1}}});
+        assert_eq!(**document.value(), expected);
+        assert!(!document.apply(&[Edit::Remove("/nothing/here".into())], 0.0));
+    }
+
+    #[test]
+    fn what_is_refused_leaves_no_step() {
+        let mut document = document();
+        let accepted = Arc::clone(document.value());
+        document.apply(&[Edit::set("/camera/f_number", -1)], 0.0);
+        document.refuse(&accepted);
+        assert_eq!(document.value(), &accepted);
+        assert!(!document.can_undo());
+    }
+
+    #[test]
+    fn the_past_has_an_end() {
+        let mut document = document();
+        for i in 0..10_000 {
+            document.apply(&[Edit::set("/camera/f_number", i)], 10.0 * f64::from(i));
+        }
+        assert_eq!(document.past.len(), MOST_STEPS);
+    }
+}

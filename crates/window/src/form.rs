@@ -1,0 +1,326 @@
+//! Widgets for any value that a JSON Schema describes: the panels follow the scene format by themselves.
+
+mod leaf;
+
+use eframe::egui::{self, Ui};
+use serde_json::{Map, Value, json};
+
+use crate::document::{Edit, escaped};
+
+/// Keys that no panel shows: what the format allows for editors and remarks.
+const HIDDEN: [&str; 2] = ["$schema", "comment"];
+
+/// Keys that tell variants of an object apart.
+const TAGS: [&str; 2] = ["type", "shape"];
+
+/// A schema with its definitions.
+#[derive(Debug)]
+pub(crate) struct Form {
+    schema: Value,
+}
+
+/// A value in a form: where it is, and what it is there (null where it is absent).
+#[derive(Debug, Clone, Copy)]
+struct Field<'a> {
+    schema: &'a Value,
+    pointer: &'a str,
+    value: &'a Value,
+    is_required: bool,
+}
+
+impl Form {
+    pub(crate) fn new(schema: Value) -> Self {
+        Self { schema }
+    }
+
+    /// Widgets for the key `key` of the top, whose value is `value`. What the user changes is added to
+    /// `edits`.
+    pub(crate) fn show(&self, ui: &mut Ui, key: &str, value: &Value, edits: &mut Vec<Edit>) {
+        let pointer = format!("/{}", escaped(key));
+        let schema = &self.schema["properties"][key];
+        let field = Field { schema, pointer: &pointer, value, is_required: true };
+        self.inner(ui, field, edits);
+    }
+
+    /// The schema itself, past references, and without null.
+    fn resolved<'a>(&'a self, schema: &'a Value) -> &'a Value {
+        let mut schema = schema;
+        // References of references; a schema that names itself alone describes nothing.
+        for _ in 0..16 {
+            if let Some(name) = schema["$ref"].as_str() {
+                schema = self.schema.pointer(name.trim_start_matches('#')).unwrap_or(&Value::Null);
+                continue;
+            }
+            let choices = ["anyOf", "oneOf"].iter().find_map(|key| schema[*key].as_array());
+            let real: Vec<&Value> =
+                choices.into_iter().flatten().filter(|one| one["type"] != "null").collect();
+            match real.as_slice() {
+                [one] => schema = one,
+                _ => return schema,
+            }
+        }
+        schema
+    }
+
+    /// A labelled value: a line, or a heading with what is below it.
+    fn field(&self, ui: &mut Ui, key: &str, field: Field<'_>, edits: &mut Vec<Edit>) {
+        let schema = self.resolved(field.schema);
+        let about = field.schema["description"].as_str().or(schema["description"].as_str());
+        let label = key.replace('_', " ");
+        let is_nested = field.value.is_object()
+            || field.value.as_array().is_some_and(|list| list.iter().any(|v| !v.is_number()));
+        if is_nested {
+            let heading = egui::CollapsingHeader::new(label).id_salt(field.pointer);
+            let shown = heading.default_open(key == "sensor").show(ui, |ui| {
+                self.inner(ui, field, edits);
+                if !field.is_required && ui.small_button("remove").clicked() {
+                    edits.push(Edit::Remove(field.pointer.to_owned()));
+                }
+            });
+            hint(shown.header_response, about);
+            return;
+        }
+        ui.horizontal(|ui| {
+            hint(ui.label(label), about);
+            self.inner(ui, field, edits);
+            if !field.is_required && !field.value.is_null() {
+                let default = ui.small_button("\u{d7}").on_hover_text("back to the default");
+                if default.clicked() {
+                    edits.push(Edit::Remove(field.pointer.to_owned()));
+                }
+            }
+        });
+    }
+
+    fn inner(&self, ui: &mut Ui, field: Field<'_>, edits: &mut Vec<Edit>) {
+        let schema = self.resolved(field.schema);
+        let field = Field { schema, ..field };
+        if let Some(variants) = variants(schema) {
+            return self.tagged(ui, field, &variants, edits);
+        }
+        match field.value {
+            Value::Object(members) => self.members(ui, field, members, edits),
+            Value::Array(list) if list.iter().any(|v| !v.is_number()) => {
+                self.list(ui, field, list, edits);
+            }
+            Value::Null => self.absent(ui, field, edits),
+            _ => leaf::show(ui, schema, field.pointer, field.value, edits),
+        }
+    }
+
+    /// A choice among kinds of objects, and the keys of the chosen one.
+    fn tagged(
+        &self,
+        ui: &mut Ui,
+        field: Field<'_>,
+        (tag, variants): &(&str, Vec<(&str, &Value)>),
+        edits: &mut Vec<Edit>,
+    ) {
+        let now = field.value.get(*tag).and_then(Value::as_str);
+        let id = egui::Id::new((field.pointer, *tag));
+        let place = format!("{}/{tag}", field.pointer);
+        let combo = egui::ComboBox::from_id_salt(id).selected_text(now.unwrap_or("none"));
+        let shown = combo.show_ui(ui, |ui| {
+            for (name, variant) in variants {
+                let choice = ui.selectable_label(now == Some(*name), *name);
+                mark(ui.ctx(), &format!("{place}={name}"), choice.rect);
+                if hint(choice, variant["description"].as_str()).clicked() {
+                    let object = self.changed_to(field.value, (tag, name), variant);
+                    edits.push(Edit::set(field.pointer, object));
+                }
+            }
+        });
+        mark(ui.ctx(), &place, shown.response.rect);
+        let chosen = variants.iter().find(|(name, _)| Some(*name) == now);
+        if let (Some((_, variant)), Value::Object(members)) = (chosen, field.value) {
+            self.members(ui, Field { schema: variant, ..field }, members, edits);
+        }
+    }
+
+    /// An object of another kind, with what the two have in common, and what the new one has to have.
+    fn changed_to(&self, before: &Value, (tag, name): (&str, &str), variant: &Value) -> Value {
+        let mut object = Map::new();
+        object.insert(tag.to_owned(), json!(name));
+        let known = variant["properties"].as_object();
+        for (key, value) in before.as_object().into_iter().flatten() {
+            if key != tag && known.is_some_and(|known| known.contains_key(key)) {
+                object.insert(key.clone(), value.clone());
+            }
+        }
+        for key in required(variant).filter(|key| *key != tag) {
+            let schema = &variant["properties"][key];
+            object.entry(key).or_insert_with(|| self.something(schema));
+        }
+        Value::Object(object)
+    }
+
+    /// A value that fits a schema, to begin with.
+    fn something(&self, schema: &Value) -> Value {
+        if let Some(default) = schema.get("default").filter(|default| !default.is_null()) {
+            return default.clone();
+        }
+        let schema = self.resolved(schema);
+        if let Some((tag, variants)) = variants(schema) {
+            let first = variants.first();
+            return first.map_or(Value::Null, |(name, variant)| {
+                self.changed_to(&Value::Null, (tag, name), variant)
+            });
+        }
+        if let Some(default) = schema.get("default").filter(|default| !default.is_null()) {
+            return default.clone();
+        }
+        if let Some(first) = leaf::words(schema).first() {
+            return json!(first);
+        }
+        let kind = schema["type"].as_str().or_else(|| schema["type"].get(0)?.as_str());
+        match kind {
+            Some("object") => {
+                let keys = required(schema);
+                let member =
+                    |key: &str| (key.to_owned(), self.something(&schema["properties"][key]));
+                Value::Object(keys.map(member).collect())
+            }
+            Some("array") => {
+                let count = schema["minItems"].as_u64().unwrap_or(0);
+                Value::Array((0..count).map(|_| self.something(&schema["items"])).collect())
+            }
+            Some("boolean") => json!(false),
+            Some("string") => json!(""),
+            Some("integer") => schema.get("minimum").cloned().unwrap_or(json!(1)),
+            Some("number") => json!(1.0),
+            _ => match ["anyOf", "oneOf"].iter().find_map(|key| schema[*key].get(0)) {
+                Some(first) => self.something(first),
+                None => json!(1.0),
+            },
+        }
+    }
+
+    fn members(
+        &self,
+        ui: &mut Ui,
+        field: Field<'_>,
+        members: &Map<String, Value>,
+        edits: &mut Vec<Edit>,
+    ) {
+        let schema = self.shape_of(field.schema, members);
+        let needed: Vec<&str> = required(schema).collect();
+        let named = schema["properties"].as_object();
+        let is_tag = |key: &str| schema["properties"][key].get("const").is_some();
+        let known = named.into_iter().flatten();
+        let known = known.filter(|(key, _)| !HIDDEN.contains(&&***key) && !is_tag(key));
+        let (there, absent): (Vec<_>, Vec<_>) =
+            known.partition(|(key, _)| members.get(*key).is_some_and(|value| !value.is_null()));
+        for (key, schema) in there {
+            let pointer = format!("{}/{}", field.pointer, escaped(key));
+            let is_required = needed.contains(&&**key);
+            let below = Field { schema, pointer: &pointer, value: &members[key], is_required };
+            self.field(ui, key, below, edits);
+        }
+        // Names that the user gives: materials.
+        let others = &schema["additionalProperties"];
+        if others.is_object() {
+            for (key, value) in members {
+                let pointer = format!("{}/{}", field.pointer, escaped(key));
+                let below = Field { schema: others, pointer: &pointer, value, is_required: false };
+                self.field(ui, key, below, edits);
+            }
+        }
+        if !absent.is_empty() {
+            self.additions(ui, field.pointer, &absent, edits);
+        }
+    }
+
+    /// The one of several descriptions of objects that these members fit.
+    fn shape_of<'a>(&'a self, schema: &'a Value, members: &Map<String, Value>) -> &'a Value {
+        let choices = ["anyOf", "oneOf"].iter().find_map(|key| schema[*key].as_array());
+        let fits = |shape: &&Value| {
+            let known = shape["properties"].as_object();
+            known.is_some_and(|known| members.keys().all(|key| known.contains_key(key)))
+        };
+        let shapes = choices.into_iter().flatten().map(|choice| self.resolved(choice));
+        shapes.into_iter().find(fits).unwrap_or(schema)
+    }
+
+    /// A menu of what is not there.
+    fn additions(
+        &self,
+        ui: &mut Ui,
+        pointer: &str,
+        absent: &[(&String, &Value)],
+        edits: &mut Vec<Edit>,
+    ) {
+        let menu = ui.menu_button("add", |ui| {
+            egui::ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
+                for (key, schema) in absent {
+                    let about = schema["description"].as_str();
+                    let button = ui.button(key.replace('_', " "));
+                    mark(ui.ctx(), &format!("{pointer}/{key}+"), button.rect);
+                    if hint(button, about).clicked() {
+                        let place = format!("{pointer}/{}", escaped(key));
+                        edits.push(Edit::set(place, self.something(schema)));
+                        ui.close();
+                    }
+                }
+            });
+        });
+        mark(ui.ctx(), &format!("{pointer}+"), menu.response.rect);
+    }
+
+    fn list(&self, ui: &mut Ui, field: Field<'_>, list: &[Value], edits: &mut Vec<Edit>) {
+        let items = &field.schema["items"];
+        for (i, value) in list.iter().enumerate() {
+            let pointer = format!("{}/{i}", field.pointer);
+            let name =
+                ["name", "file", "shape", "type"].iter().find_map(|key| value[*key].as_str());
+            let title = format!("{} {}", i + 1, name.unwrap_or_default());
+            let below = Field { schema: items, pointer: &pointer, value, is_required: false };
+            self.field(ui, &title, below, edits);
+        }
+        if items.is_object() && ui.small_button("add one").clicked() {
+            let place = format!("{}/{}", field.pointer, list.len());
+            edits.push(Edit::set(place, self.something(items)));
+        }
+    }
+
+    fn absent(&self, ui: &mut Ui, field: Field<'_>, edits: &mut Vec<Edit>) {
+        ui.weak("default");
+        if ui.small_button("set").clicked() {
+            edits.push(Edit::set(field.pointer, self.something(field.schema)));
+        }
+    }
+}
+
+/// The tag and the named variants of a choice among objects.
+fn variants(schema: &Value) -> Option<(&'static str, Vec<(&str, &Value)>)> {
+    let choices = ["oneOf", "anyOf"].iter().find_map(|key| schema[*key].as_array())?;
+    TAGS.into_iter().find_map(|tag| {
+        let named: Option<Vec<_>> = choices
+            .iter()
+            .map(|variant| Some((variant["properties"][tag]["const"].as_str()?, variant)))
+            .collect();
+        Some((tag, named?))
+    })
+}
+
+fn required(schema: &Value) -> impl Iterator<Item = &str> {
+    schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str)
+}
+
+/// A response that explains itself.
+fn hint(response: egui::Response, about: Option<&str>) -> egui::Response {
+    match about {
+        Some(about) => response.on_hover_text(about.replace('\n', " ")),
+        None => response,
+    }
+}
+
+/// Notes where a widget is, by a name: for those who drive the window.
+pub(crate) fn mark(ctx: &egui::Context, name: &str, place: egui::Rect) {
+    ctx.data_mut(|data| data.insert_temp(egui::Id::new(("mark", name)), place));
+}
+
+/// Where a widget is.
+#[cfg(test)]
+pub(crate) fn marked(ctx: &egui::Context, name: &str) -> Option<egui::Rect> {
+    ctx.data(|data| data.get_temp(egui::Id::new(("mark", name))))
+}

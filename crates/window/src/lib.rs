@@ -1,0 +1,79 @@
+#![forbid(unsafe_code)]
+//! A window onto a scene: look at it, move about, change its camera, ask its pixels, save it.
+//!
+//! Everything that is shown is worked out by the library `etendue`; here are widgets, and a thread that
+//! renders.
+//!
+//! | module | idea |
+//! |---|---|
+//! | `app` | the window's state, and how news and input change it |
+//! | `worker` | the thread that renders, always at the latest wish |
+//! | `document` | the scene that is edited, with undo and redo |
+//! | `form` | widgets for any value that a JSON Schema describes |
+//! | `canvas` | the picture: shown, moved about in, clicked |
+//! | `panels` | what stands around it |
+
+mod app;
+mod canvas;
+mod document;
+#[cfg(test)]
+mod driven;
+mod form;
+mod panels;
+mod view;
+mod worker;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use eframe::egui;
+use etendue::Options;
+
+/// The window's first size (points).
+const SIZE: [f32; 2] = [1360.0, 860.0];
+
+/// Why there is no window.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WindowError {
+    /// There is no screen to show it on.
+    #[error(
+        "there is no display to show a window on (neither DISPLAY nor WAYLAND_DISPLAY is set): over SSH, \
+         connect with X forwarding (ssh -X), or render to files with `etendue render`"
+    )]
+    NoDisplay,
+    /// The screen, or OpenGL on it, cannot be used.
+    #[error(
+        "the window cannot be opened: {0}; over SSH, connect with X forwarding (ssh -X), or render to \
+         files with `etendue render`"
+    )]
+    Display(String),
+}
+
+/// Opens a window, on `path` when it is given, and returns when it is closed.
+///
+/// # Errors
+///
+/// When there is no display, or it cannot show a window.
+pub fn run(path: Option<PathBuf>, options: Options) -> Result<(), WindowError> {
+    let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    if cfg!(target_os = "linux") && !is_set("DISPLAY") {
+        // Without an X server there may be a Wayland compositor's, but it names that in DISPLAY, too.
+        return Err(WindowError::NoDisplay);
+    }
+    let viewport = egui::ViewportBuilder::default()
+        .with_title("etendue")
+        .with_app_id("etendue")
+        .with_inner_size(SIZE)
+        .with_min_inner_size([640.0, 400.0])
+        .with_drag_and_drop(true);
+    let native = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
+    let make = move |context: &eframe::CreationContext<'_>| {
+        let painter = context.egui_ctx.clone();
+        let wake = Arc::new(move || painter.request_repaint());
+        let app = app::App::new(path, options, wake)?;
+        Ok(Box::new(app) as Box<dyn eframe::App>)
+    };
+    eframe::run_native("etendue", native, Box::new(make))
+        .map_err(|error| WindowError::Display(error.to_string()))
+}

@@ -1,0 +1,45 @@
+//! A small window that asks for a path.
+
+use std::path::PathBuf;
+
+use eframe::egui::{self, Context, Key};
+
+use super::bar::button;
+use crate::app::{App, Asking};
+use crate::form::mark;
+
+pub(crate) fn show(app: &mut App, ctx: &Context) {
+    let Some((asking, mut path)) = app.asking.take() else { return };
+    let (title, action) = match asking {
+        Asking::Open => ("Open a scene or a model", "Open"),
+        Asking::SaveAs => ("Save the scene as", "Save"),
+        Asking::Render => ("Render into the folder", "Render"),
+    };
+    let mut is_done = false;
+    let mut is_cancelled = ctx.input(|input| input.key_pressed(Key::Escape));
+    let modal = egui::Modal::new(egui::Id::new("asking")).show(ctx, |ui| {
+        ui.set_width(460.0);
+        ui.heading(title);
+        let field = ui.add(egui::TextEdit::singleline(&mut path).desired_width(f32::INFINITY));
+        mark(ctx, "path", field.rect);
+        if !field.has_focus() && !field.lost_focus() {
+            field.request_focus();
+        }
+        let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+        ui.horizontal(|ui| {
+            is_done = button(ui, "do it", action, "Enter") || entered;
+            is_cancelled |= button(ui, "let it be", "Cancel", "Escape");
+        });
+    });
+    is_cancelled |= modal.should_close();
+    if is_done && !path.trim().is_empty() {
+        let path = PathBuf::from(path.trim());
+        match asking {
+            Asking::Open => app.open(&path),
+            Asking::SaveAs => app.save_as(&path),
+            Asking::Render => app.render(&path),
+        }
+    } else if !is_cancelled && !is_done {
+        app.asking = Some((asking, path));
+    }
+}

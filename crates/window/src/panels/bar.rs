@@ -1,0 +1,134 @@
+//! The bar at the top: files, steps, and what of the scene is looked at.
+
+use eframe::egui::{self, Context, Ui};
+
+use crate::app::{App, Asking, Tool};
+use crate::form::mark;
+use crate::view::View;
+
+pub(crate) fn show(app: &mut App, ctx: &Context) {
+    egui::TopBottomPanel::top("bar").show(ctx, |ui| {
+        ui.horizontal_wrapped(|ui| {
+            files(app, ui);
+            ui.separator();
+            steps(app, ui);
+            ui.separator();
+            views(app, ui);
+            ui.separator();
+            tools(app, ui);
+            ui.separator();
+            compare(app, ui);
+            egui::widgets::global_theme_preference_switch(ui);
+        });
+    });
+}
+
+fn files(app: &mut App, ui: &mut Ui) {
+    let folder = app.document.as_ref().and_then(|document| document.path.parent());
+    let folder = folder.map(|folder| folder.display().to_string()).unwrap_or_default();
+    let is_open = app.document.is_some();
+    if button(ui, "open", "Open", "Open a scene or a model (Ctrl+O); or drop one on the window") {
+        app.asking = Some((Asking::Open, folder));
+    }
+    ui.add_enabled_ui(is_open, |ui| {
+        if button(ui, "save", "Save", "Write the scene to its file (Ctrl+S)") {
+            app.save();
+        }
+        if button(ui, "save as", "Save as", "Write the scene to another file") {
+            let path = app.document.as_ref().map(|document| document.path.with_extension("json"));
+            let path = path.map(|path| path.display().to_string()).unwrap_or_default();
+            app.asking = Some((Asking::SaveAs, path));
+        }
+        let about = "Render the whole scene as the command line does, and write PNG, EXR and all other files";
+        if button(ui, "render", "Render", about) {
+            app.asking = Some((Asking::Render, "out".to_owned()));
+        }
+    });
+}
+
+fn steps(app: &mut App, ui: &mut Ui) {
+    let can =
+        |test: fn(&crate::document::Document) -> bool| app.document.as_ref().is_some_and(test);
+    let (back, on) = (can(|document| document.can_undo()), can(|document| document.can_redo()));
+    ui.add_enabled_ui(back, |ui| {
+        if button(ui, "undo", "Undo", "Ctrl+Z") {
+            app.undo();
+        }
+    });
+    ui.add_enabled_ui(on, |ui| {
+        if button(ui, "redo", "Redo", "Ctrl+Shift+Z") {
+            app.redo();
+        }
+    });
+}
+
+fn views(app: &mut App, ui: &mut Ui) {
+    let mut view = app.view.clone();
+    let combo = egui::ComboBox::from_id_salt("view").selected_text(view.title());
+    let shown = combo.height(420.0).show_ui(ui, |ui| {
+        let layers = etendue::layer_names().iter().map(|name| View::Layer((*name).to_owned()));
+        for choice in [View::Picture, View::Sensor, View::Numbers].into_iter().chain(layers) {
+            let title = choice.title();
+            let one = ui.selectable_value(&mut view, choice, &title);
+            mark(ui.ctx(), &format!("view={title}"), one.rect);
+        }
+    });
+    mark(ui.ctx(), "view", shown.response.rect);
+    app.look_at(view);
+    parts(app, ui);
+}
+
+/// The parts of a layer that has several: ids of objects, of triangles ….
+fn parts(app: &mut App, ui: &mut Ui) {
+    let Some(picture) = &app.picture else { return };
+    if picture.layers.len() < 2 || !matches!(app.view, View::Layer(_)) {
+        return;
+    }
+    let mut part = picture.layer.clone();
+    egui::ComboBox::from_id_salt("part").selected_text(&part).show_ui(ui, |ui| {
+        for layer in &picture.layers {
+            ui.selectable_value(&mut part, layer.clone(), layer);
+        }
+    });
+    if part != picture.layer {
+        app.part = Some(part);
+        app.wish();
+    }
+}
+
+fn tools(app: &mut App, ui: &mut Ui) {
+    let about = "A click asks the pixel";
+    let one = ui.selectable_value(&mut app.tool, Tool::Inspect, "Inspect").on_hover_text(about);
+    mark(ui.ctx(), "tool=inspect", one.rect);
+    let about = "A click focuses the lens on what is there";
+    let one = ui.selectable_value(&mut app.tool, Tool::Focus, "Focus").on_hover_text(about);
+    mark(ui.ctx(), "tool=focus", one.rect);
+    let mut shows = app.shows_lens;
+    let about = "The lens in section with the rays of the pixel that was clicked, and its spots";
+    let switch = ui.toggle_value(&mut shows, "Lens").on_hover_text(about);
+    mark(ui.ctx(), "lens", switch.rect);
+    if switch.changed() {
+        app.show_lens(shows);
+    }
+}
+
+fn compare(app: &mut App, ui: &mut Ui) {
+    let Some(picture) = &app.picture else { return };
+    let mut compares = app.canvas.before.is_some();
+    let about = "Keep the picture as it is now on the left of a line, to compare";
+    if ui.toggle_value(&mut compares, "Before | after").on_hover_text(about).changed() {
+        app.canvas.before = compares.then(|| {
+            let image =
+                egui::ColorImage::from_rgba_unmultiplied(picture.screen.size, &picture.screen.rgba);
+            ui.ctx().load_texture("before", image, egui::TextureOptions::LINEAR)
+        });
+        app.canvas.split = 0.5;
+    }
+}
+
+/// A button that explains itself; whether it was clicked.
+pub(crate) fn button(ui: &mut Ui, name: &str, title: &str, about: &str) -> bool {
+    let response = ui.button(title).on_hover_text(about);
+    mark(ui.ctx(), name, response.rect);
+    response.clicked()
+}

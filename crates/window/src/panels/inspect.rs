@@ -1,0 +1,113 @@
+//! What the window tells on the left: the pixel that was asked, and the histogram.
+
+use eframe::egui::{self, Color32, Context, Pos2, Rect, Sense, Ui, Vec2};
+
+use crate::app::App;
+use crate::canvas::short;
+
+pub(crate) fn show(app: &mut App, ctx: &Context) {
+    if app.document.is_none() {
+        return;
+    }
+    egui::SidePanel::left("inspect").default_width(250.0).show(ctx, |ui| {
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            section(ui, "Pixel", |ui| pixel(app, ui));
+            if super::light_field::is_there(app) {
+                section(ui, "Light field", |ui| super::light_field::show(app, ui));
+            }
+            section(ui, "Histogram", |ui| histogram(app, ui));
+            section(ui, "Notes", |ui| notes(app, ui));
+        });
+    });
+}
+
+fn section(ui: &mut Ui, title: &str, show: impl FnOnce(&mut Ui)) {
+    egui::CollapsingHeader::new(title).default_open(true).show(ui, show);
+}
+
+fn pixel(app: &App, ui: &mut Ui) {
+    let Some(asked) = &app.asked else {
+        ui.weak("Click on the picture.");
+        return;
+    };
+    let [column, row] = asked.place.map(f64::floor);
+    let mut rows = vec![("pixel".to_owned(), format!("{column}, {row}"))];
+    let mut add = |name: &str, value: String| rows.push((name.to_owned(), value));
+    if let Some(reading) =
+        app.picture.as_ref().and_then(|picture| picture.preview.as_ref()?.reading(asked.place).ok())
+    {
+        reading.into_iter().for_each(|(name, value)| add(&name, value));
+    }
+    match &asked.probe {
+        None => add("hit", "nothing".to_owned()),
+        Some(probe) => {
+            add("depth", format!("{} m", short(probe.depth)));
+            add("distance", format!("{} m", short(probe.distance)));
+            add("position", vector(probe.position.to_array(), " m"));
+            add("normal", vector(probe.normal.to_array(), ""));
+            add("object", probe.object.clone());
+            if !probe.node.is_empty() && probe.node != probe.object {
+                add("node", probe.node.clone());
+            }
+            add("material", probe.material.clone());
+            add("triangle", probe.triangle.to_string());
+        }
+    }
+    egui::Grid::new("pixel").num_columns(2).striped(true).show(ui, |ui| {
+        for (name, value) in rows {
+            ui.weak(name);
+            ui.label(value);
+            ui.end_row();
+        }
+    });
+}
+
+fn vector(values: [f64; 3], unit: &str) -> String {
+    let values = values.map(short);
+    format!("{}{unit}", values.join(", "))
+}
+
+fn histogram(app: &App, ui: &mut Ui) {
+    let Some(picture) = &app.picture else { return };
+    let counts = picture.screen.histogram();
+    let (response, painter) =
+        ui.allocate_painter(Vec2::new(ui.available_width(), 90.0), Sense::hover());
+    let place = response.rect;
+    painter.rect_filled(place, 2.0, ui.visuals().extreme_bg_color);
+    let is_grey = counts[0] == counts[1] && counts[1] == counts[2];
+    let colors = match is_grey {
+        true => vec![(0, ui.visuals().text_color())],
+        false => vec![
+            (0, Color32::from_rgba_unmultiplied(230, 60, 60, 150)),
+            (1, Color32::from_rgba_unmultiplied(40, 190, 70, 150)),
+            (2, Color32::from_rgba_unmultiplied(70, 110, 250, 150)),
+        ],
+    };
+    // Black and white often are all of a background: they are cut off rather than flatten the rest.
+    let inner = counts.iter().flat_map(|channel| &channel[1..255]);
+    let top = f64::from(inner.copied().max().unwrap_or(0).max(1));
+    let width = place.width() / 256.0;
+    for (channel, color) in colors {
+        for (value, &count) in (0_u8..=255).zip(&counts[channel]) {
+            #[expect(clippy::cast_possible_truncation, reason = "points on the screen")]
+            let height = place.height() * (f64::from(count) / top).sqrt().min(1.0) as f32;
+            let left = place.left() + width * f32::from(value);
+            let bar = Rect::from_min_max(
+                Pos2::new(left, place.bottom() - height),
+                Pos2::new(left + width, place.bottom()),
+            );
+            painter.rect_filled(bar, 0.0, color);
+        }
+    }
+    response.on_hover_text("Pixels by their value from black to white (root of the counts)");
+}
+
+fn notes(app: &App, ui: &mut Ui) {
+    if let Some(picture) = &app.picture {
+        ui.weak(&picture.screen.note);
+        let preview = picture.preview.as_ref();
+        for note in preview.map(|preview| preview.notes()).unwrap_or_default() {
+            ui.label(note);
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! The thread that renders: always at the latest wish, and stopped when there is a newer one.
+//!
+//! The first, rough picture of a wish is finished even when there is a newer one, so that a hand that
+//! keeps moving sees something; what refines it is not.
+
+mod studio;
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use etendue::{Error, Inspector, Options, Preview, Progress, Screen};
+use serde_json::Value;
+
+use crate::view::View;
+use studio::Studio;
+
+/// How often files are looked at for changes when there is nothing else to do.
+const WATCH: Duration = Duration::from_secs(1);
+
+/// What is to be seen.
+#[derive(Debug, Clone)]
+pub(crate) struct Wish {
+    /// Numbers rise; answers carry them.
+    pub(crate) number: u64,
+    pub(crate) scene: Arc<Value>,
+    pub(crate) view: View,
+    /// Of a layer with several parts, the one to show, by the name that files give it.
+    pub(crate) part: Option<String>,
+    /// One of the scene's frames.
+    pub(crate) frame: Option<usize>,
+}
+
+/// Something to be done once.
+#[derive(Debug)]
+pub(crate) enum Task {
+    /// Open a scene or a model.
+    Open(PathBuf),
+    /// Write the scene to a file.
+    Save(PathBuf, Arc<Value>),
+    /// Render the scene as the command line does, and write its files into a folder.
+    Render(PathBuf, Arc<Value>, Option<usize>),
+}
+
+/// What the thread tells.
+#[derive(Debug)]
+pub(crate) enum News {
+    /// A file was opened: its values.
+    Opened(PathBuf, Arc<Value>),
+    /// The file has changed: what it says now, and that with the edits that were not saved.
+    TakenUp(Arc<Value>, Arc<Value>),
+    /// A wish makes sense: what it shows can be asked. With the number of the scene's frames.
+    Accepted(u64, Arc<Value>, Inspector, Option<usize>),
+    /// A wish makes no sense.
+    Refused(u64, String),
+    /// A picture, rough or fine.
+    Shown(Box<Shown>),
+    /// What is being done, and the share of it that is done.
+    Busy(&'static str, f64),
+    /// Nothing is being done.
+    Idle,
+    /// The scene stands in this file now.
+    Saved(PathBuf, Arc<Value>),
+    /// Files were written into a folder.
+    Written(PathBuf, usize),
+    /// Something else went wrong.
+    Fault(String),
+}
+
+/// A picture to be shown.
+#[derive(Debug)]
+pub(crate) struct Shown {
+    /// The wish that it answers.
+    pub(crate) number: u64,
+    pub(crate) screen: Screen,
+    /// Pixels of the picture along the side of one of these.
+    pub(crate) factor: u32,
+    /// The layer that it shows, as files call it; empty for the picture.
+    pub(crate) layer: String,
+    /// All layers that there are.
+    pub(crate) layers: Vec<String>,
+    /// What it was made of; none for a picture between two passes.
+    pub(crate) preview: Option<Arc<Preview>>,
+    /// Samples that its pixels have, and are to have, where that is known.
+    pub(crate) samples: Option<[u32; 2]>,
+    /// There is none finer to come.
+    pub(crate) is_final: bool,
+}
+
+/// What the two threads share.
+#[derive(Debug, Default)]
+struct Desk {
+    tasks: VecDeque<Task>,
+    wish: Option<Wish>,
+    /// Stops what may be stopped for something newer.
+    refining: Option<Progress>,
+    /// Stops what only the user stops.
+    working: Option<Progress>,
+    closes: bool,
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct Shared {
+    desk: Mutex<Desk>,
+    bell: Condvar,
+}
+
+impl Shared {
+    fn desk(&self) -> MutexGuard<'_, Desk> {
+        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The thread, seen from the window.
+#[derive(Debug)]
+pub(crate) struct Worker {
+    shared: Arc<Shared>,
+    news: Receiver<News>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Tells the window that there is news.
+pub(crate) type Wake = Arc<dyn Fn() + Send + Sync>;
+
+impl Worker {
+    pub(crate) fn start(options: Options, wake: Wake) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared::default());
+        let (to, news) = channel();
+        let teller = Teller { to, wake };
+        let mut studio = Studio::new(options, teller, Arc::clone(&shared));
+        let thread = std::thread::Builder::new()
+            .name("render".to_owned())
+            // Scenes are read by recursion.
+            .stack_size(8 << 20)
+            .spawn(move || studio.work())?;
+        Ok(Self { shared, news, thread: Some(thread) })
+    }
+
+    /// Replaces the wish before.
+    pub(crate) fn wish(&self, wish: Wish) {
+        let mut desk = self.shared.desk();
+        desk.wish = Some(wish);
+        desk.refining.iter().for_each(Progress::cancel);
+        drop(desk);
+        self.shared.bell.notify_one();
+    }
+
+    pub(crate) fn ask(&self, task: Task) {
+        let mut desk = self.shared.desk();
+        desk.tasks.push_back(task);
+        desk.refining.iter().for_each(Progress::cancel);
+        drop(desk);
+        self.shared.bell.notify_one();
+    }
+
+    /// Stops what is being done.
+    pub(crate) fn cancel(&self) {
+        let desk = self.shared.desk();
+        desk.refining.iter().chain(&desk.working).for_each(Progress::cancel);
+    }
+
+    pub(crate) fn news(&self) -> impl Iterator<Item = News> + '_ {
+        self.news.try_iter()
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        let mut desk = self.shared.desk();
+        desk.closes = true;
+        desk.refining.iter().chain(&desk.working).for_each(Progress::cancel);
+        drop(desk);
+        self.shared.bell.notify_one();
+        if let Some(thread) = self.thread.take() {
+            // A panic there was told already.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Sends news to the window.
+#[derive(Clone)]
+pub(crate) struct Teller {
+    to: Sender<News>,
+    wake: Wake,
+}
+
+impl Teller {
+    fn tell(&self, news: News) {
+        // Nobody listens any more when the window is closing.
+        let _ = self.to.send(news);
+        (self.wake)();
+    }
+
+    fn fault(&self, error: &Error) {
+        if !error.is_stopped() {
+            self.tell(News::Fault(error.to_string()));
+        }
+    }
+}

@@ -1,0 +1,360 @@
+//! The rendering thread's own side: a session, and what is done with it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
+
+use etendue::{Error, Options, Outputs, Preview, Progress, Roughness, Screen, Session, places};
+use serde_json::Value;
+
+use super::{News, Shared, Shown, Task, Teller, WATCH, Wish};
+use crate::view::View;
+
+/// How long a first picture may take, so that twenty follow each other in a second.
+const SOON: Duration = Duration::from_millis(40);
+
+/// Pixels of a first picture when it is not known how long they take.
+const FIRST_PIXELS: f64 = 40_000.0;
+
+/// Progress is told this often.
+const TELL: Duration = Duration::from_millis(60);
+
+/// What a file was when it was looked at last.
+type Stamp = Option<(u64, SystemTime)>;
+
+pub(super) struct Studio {
+    options: Options,
+    teller: Teller,
+    shared: Arc<Shared>,
+    open: Option<Open>,
+}
+
+/// What is open.
+struct Open {
+    path: PathBuf,
+    session: Session,
+    /// What the file says.
+    base: Arc<Value>,
+    /// The user's scene of the last wish.
+    scene: Arc<Value>,
+    /// The last wish that was followed.
+    wish: Option<Wish>,
+    /// Files of the scene as they were.
+    files: Vec<(PathBuf, Stamp)>,
+    /// Seconds that a pixel of the view took last.
+    cost: Option<(View, f64)>,
+}
+
+/// What there is to do next.
+enum Job {
+    Task(Task),
+    Wish(Wish),
+    Watch,
+    Close,
+}
+
+impl Studio {
+    pub(super) fn new(options: Options, teller: Teller, shared: Arc<Shared>) -> Self {
+        Self { options, teller, shared, open: None }
+    }
+
+    pub(super) fn work(&mut self) {
+        loop {
+            match self.next() {
+                Job::Close => return,
+                Job::Watch => self.look_for_changes(),
+                Job::Task(task) => self.carry_out(task),
+                Job::Wish(wish) => self.follow(wish),
+            }
+        }
+    }
+
+    fn next(&self) -> Job {
+        let mut desk = self.shared.desk();
+        (desk.refining, desk.working) = (None, None);
+        let mut is_idle = false;
+        loop {
+            if desk.closes {
+                return Job::Close;
+            }
+            if let Some(task) = desk.tasks.pop_front() {
+                return Job::Task(task);
+            }
+            if let Some(wish) = desk.wish.take() {
+                return Job::Wish(wish);
+            }
+            if !is_idle {
+                self.teller.tell(News::Idle);
+                is_idle = true;
+            }
+            let waited = self.shared.bell.wait_timeout(desk, WATCH);
+            let (back, timeout) = waited.unwrap_or_else(std::sync::PoisonError::into_inner);
+            desk = back;
+            if timeout.timed_out() && self.has_changes() {
+                return Job::Watch;
+            }
+        }
+    }
+
+    /// A progress that tells the window; stopped by the user alone, or also for something newer.
+    fn progress(&self, may_be_replaced: bool) -> Progress {
+        let teller = self.teller.clone();
+        let last = std::sync::Mutex::new(None::<Instant>);
+        let progress = Progress::new(move |phase, share| {
+            if let Ok(mut last) = last.try_lock()
+                && last.is_none_or(|at| at.elapsed() > TELL)
+            {
+                *last = Some(Instant::now());
+                teller.tell(News::Busy(phase.name(), share));
+            }
+            true
+        });
+        let mut desk = self.shared.desk();
+        if desk.closes || (may_be_replaced && (desk.wish.is_some() || !desk.tasks.is_empty())) {
+            progress.cancel();
+        }
+        let place = if may_be_replaced { &mut desk.refining } else { &mut desk.working };
+        *place = Some(progress.clone());
+        progress
+    }
+
+    fn carry_out(&mut self, task: Task) {
+        let done = match task {
+            Task::Open(path) => self.open(path),
+            Task::Save(path, scene) => self.save(path, &scene),
+            Task::Render(folder, scene, frame) => self.render(folder, &scene, frame),
+        };
+        if let Err(error) = done {
+            self.teller.fault(&error);
+        }
+    }
+
+    fn open(&mut self, path: PathBuf) -> Result<(), Error> {
+        let session = Session::open_with(&path, self.options.clone())?;
+        let base = Arc::new(session.values().clone());
+        let files = vec![(path.clone(), stamp(&path))];
+        let scene = Arc::clone(&base);
+        self.teller.tell(News::Opened(path.clone(), Arc::clone(&base)));
+        self.open = Some(Open { path, session, base, scene, wish: None, files, cost: None });
+        Ok(())
+    }
+
+    fn save(&mut self, path: PathBuf, scene: &Arc<Value>) -> Result<(), Error> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        open.session.replace(scene)?;
+        open.session.save(&path)?;
+        if open.path != path {
+            // From now on it is that file's scene.
+            self.open(path.clone())?;
+        } else {
+            open.base = Arc::clone(scene);
+        }
+        if let Some(open) = &mut self.open {
+            open.files.iter_mut().for_each(|(path, was)| *was = stamp(path));
+        }
+        self.teller.tell(News::Saved(path, Arc::clone(scene)));
+        Ok(())
+    }
+
+    fn render(
+        &mut self,
+        folder: PathBuf,
+        scene: &Value,
+        frame: Option<usize>,
+    ) -> Result<(), Error> {
+        let progress = self.progress(false);
+        let Some(open) = &mut self.open else { return Ok(()) };
+        open.session.replace(scene)?;
+        show_frame(&mut open.session, frame, &progress)?;
+        places::folder(&folder)?;
+        open.session.check_place(&folder, &[], &progress)?;
+        let rendering = open.session.render(&progress)?;
+        let written = rendering.write_with(&folder, Outputs::ALL, &progress)?;
+        self.teller.tell(News::Written(folder, written.files.len()));
+        Ok(())
+    }
+
+    fn has_changes(&self) -> bool {
+        let open = self.open.as_ref();
+        open.is_some_and(|open| open.files.iter().any(|(path, was)| stamp(path) != *was))
+    }
+
+    fn look_for_changes(&mut self) {
+        let Some(open) = &mut self.open else { return };
+        open.files.iter_mut().for_each(|(path, was)| *was = stamp(path));
+        match open.take_up(&self.options) {
+            Ok(()) => {
+                let (base, scene) = (Arc::clone(&open.base), Arc::clone(&open.scene));
+                self.teller.tell(News::TakenUp(base, Arc::clone(&scene)));
+                if let Some(wish) = open.wish.clone() {
+                    self.follow(Wish { scene, ..wish });
+                }
+            }
+            // Often it is being written, and complete in a moment.
+            Err(error) => self.teller.fault(&error),
+        }
+    }
+
+    fn follow(&mut self, wish: Wish) {
+        let number = wish.number;
+        match self.follow_to_the_end(wish) {
+            Ok(()) => {}
+            Err(error) if error.is_stopped() => {}
+            Err(error) => self.teller.tell(News::Refused(number, error.to_string())),
+        }
+    }
+
+    fn follow_to_the_end(&mut self, wish: Wish) -> Result<(), Error> {
+        let patient = self.progress(false);
+        let Some(open) = &mut self.open else { return Ok(()) };
+        open.session.replace(&wish.view.of(&wish.scene))?;
+        let frames = show_frame(&mut open.session, wish.frame, &patient)?;
+        let inspector = open.session.inspector(&patient)?;
+        let inputs = inspector.scene().inputs.iter();
+        open.files = inputs.map(|path| (path.clone(), stamp(path))).collect();
+        let samples = inspector.scene().render.samples.most();
+        let pixels: f64 = inspector.scene().camera.resolution().map(f64::from).iter().product();
+        open.scene = Arc::clone(&wish.scene);
+        open.wish = Some(wish.clone());
+        let scene = Arc::clone(&wish.scene);
+        self.teller.tell(News::Accepted(wish.number, scene, inspector, frames));
+        let mut factor = self.first_factor(&wish.view, pixels);
+        let mut progress = patient;
+        // A single sample of the fine picture is of use where many are to follow.
+        let finest = if samples > 4 { 1 } else { 2 };
+        while factor >= finest {
+            let rough = Roughness { factor, samples: Some(1) };
+            let preview = self.preview(rough, &progress)?;
+            let cost = preview.time().as_secs_f64() * f64::from(factor * factor) / pixels;
+            if let Some(open) = &mut self.open {
+                open.cost = Some((wish.view.clone(), cost));
+            }
+            self.show(&wish, preview, false)?;
+            progress = self.progress(true);
+            factor = if factor > 3 { factor / 3 } else { factor - 1 };
+        }
+        let progress = self.progress(true).with_looks(self.looks(&wish));
+        let preview = self.preview(Roughness::NONE, &progress)?;
+        let is_whole = !progress.is_cancelled();
+        self.show(&wish, preview, is_whole)
+    }
+
+    fn preview(&mut self, rough: Roughness, progress: &Progress) -> Result<Preview, Error> {
+        let open =
+            self.open.as_mut().ok_or_else(|| Error::Refused("nothing is open".to_owned()))?;
+        open.session.preview(rough, progress)
+    }
+
+    /// Pixels so large that a first picture is there soon.
+    fn first_factor(&self, view: &View, pixels: f64) -> u32 {
+        let known = self.open.as_ref().and_then(|open| open.cost.as_ref());
+        let most = match known {
+            Some((of, cost)) if of == view && *cost > 0.0 => SOON.as_secs_f64() / cost,
+            _ => FIRST_PIXELS,
+        };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let factor = (pixels / most.max(64.0)).sqrt().ceil().clamp(1.0, 64.0) as u32;
+        factor
+    }
+
+    /// Shows the picture after each pass of samples.
+    fn looks(&self, wish: &Wish) -> impl Fn(&etendue::SoFar<'_>) + Send + Sync + 'static {
+        let (teller, number) = (self.teller.clone(), wish.number);
+        let is_picture = wish.view == View::Picture;
+        move |so_far| {
+            if !is_picture {
+                return;
+            }
+            let screen = so_far.picture().ok().and_then(|p| Screen::of_layer(&p, "").ok());
+            if let Some(screen) = screen {
+                teller.tell(News::Shown(Box::new(Shown {
+                    number,
+                    screen,
+                    factor: 1,
+                    layer: String::new(),
+                    layers: Vec::new(),
+                    preview: None,
+                    samples: Some(so_far.samples),
+                    is_final: false,
+                })));
+            }
+        }
+    }
+
+    fn show(&self, wish: &Wish, preview: Preview, is_final: bool) -> Result<(), Error> {
+        let layers: Vec<String> = preview.layers().iter().map(|layer| layer.name.clone()).collect();
+        let wanted = wish.part.clone();
+        let layer = match &wish.view {
+            View::Layer(_) => {
+                wanted.filter(|name| layers.contains(name)).or(layers.first().cloned())
+            }
+            _ => Some(String::new()),
+        };
+        let layer = layer.unwrap_or_default();
+        let screen = screen_of(&preview, &wish.view, &layer)?;
+        let samples = match wish.view {
+            View::Layer(_) => None,
+            _ => Some(preview.samples()),
+        };
+        let factor = preview.factor();
+        let preview = Some(Arc::new(preview));
+        let number = wish.number;
+        let shown = Shown { number, screen, factor, layer, layers, preview, samples, is_final };
+        self.teller.tell(News::Shown(Box::new(shown)));
+        Ok(())
+    }
+}
+
+/// What a view shows of a preview.
+pub(crate) fn screen_of(preview: &Preview, view: &View, layer: &str) -> Result<Screen, Error> {
+    let none = || {
+        let why = "the camera's sensor is ideal: give it a `type` or a `model` to see its numbers";
+        Error::Refused(why.to_owned())
+    };
+    match view {
+        View::Picture | View::Layer(_) => preview.screen(layer),
+        View::Sensor | View::Numbers => {
+            let light = preview.sensor_light().ok_or_else(none)?;
+            let raw = preview.raw()?.ok_or_else(none)?;
+            Ok(match view {
+                View::Sensor => Screen::of_sensor(light.sensor(), raw),
+                _ => Screen::of_numbers(light.sensor(), raw),
+            })
+        }
+    }
+}
+
+impl Open {
+    /// Reads the file again, and sets anew what was edited and not saved.
+    fn take_up(&mut self, options: &Options) -> Result<(), Error> {
+        let mut file = Session::open_with(&self.path, options.clone())?;
+        let base = Arc::new(file.values().clone());
+        file.set_changes(&self.base, &self.scene)?;
+        let scene = Arc::new(file.values().clone());
+        // Models and images that have changed are read again.
+        self.session.reload()?;
+        (self.base, self.scene) = (base, scene);
+        Ok(())
+    }
+}
+
+/// Takes the session to a frame, and tells how many there are.
+fn show_frame(
+    session: &mut Session,
+    frame: Option<usize>,
+    progress: &Progress,
+) -> Result<Option<usize>, Error> {
+    if session.values().get("frames").is_none_or(Value::is_null) {
+        return Ok(None);
+    }
+    let Some(frames) = session.frames(progress)? else { return Ok(None) };
+    if let Some(frame) = frame.and_then(|frame| frames.get(frame)) {
+        session.show(frame)?;
+    }
+    Ok(Some(frames.len()))
+}
+
+fn stamp(path: &Path) -> Stamp {
+    let data = path.metadata().ok()?;
+    Some((data.len(), data.modified().ok()?))
+}

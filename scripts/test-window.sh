@@ -1,0 +1,163 @@
+#!/usr/bin/env bash
+# A real window on a screen in memory, driven by keys and the mouse: opened, moved about in, saved, given a
+# broken file, closed during a render. What is saved must render to the same bits. Screenshots are left in
+# out/window, at once and twice the size, dark and light.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+# The same packages and features as the tests of the workspace: nothing is built twice.
+cargo build --workspace --features etendue-cli/window --bin etendue
+etendue=$PWD/target/debug/etendue
+shots=$PWD/out/window
+home=$(mktemp -d)
+mkdir -p "$shots"
+
+pids=()
+finish() {
+    for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done
+    wait "${pids[@]}" 2>/dev/null || true
+    rm -rf "$home"
+}
+trap finish EXIT
+
+fail() {
+    echo "test-window: $1" >&2
+    import -window root "$shots/failed.png" 2>/dev/null || true
+    cat "$home/said" >&2 2>/dev/null || true
+    rm -rf "$shots/failed" && cp -r "$home" "$shots/failed"
+    exit 1
+}
+
+# until_so SECONDS COMMAND...: waits until the command succeeds.
+until_so() {
+    local end=$((SECONDS + $1))
+    while ! "${@:2}" >/dev/null 2>&1; do
+        [ "$SECONDS" -lt "$end" ] || return 1
+        sleep 0.2
+    done
+}
+
+# Without a display it is said what to do, and the exit code is 2.
+code=0
+(unset DISPLAY WAYLAND_DISPLAY && "$etendue" view scenes/first-light.json 2>"$home/said") || code=$?
+[ "$code" -eq 2 ] || fail "without a display the exit code is $code instead of 2"
+grep -q "ssh -X" "$home/said" || fail "without a display it does not say what to do"
+
+# A screen of its own; its number is told when it is there.
+Xvfb -displayfd 3 -screen 0 2800x1800x24 +extension GLX -nolisten tcp 3>"$home/display" 2>/dev/null &
+pids+=($!)
+until_so 30 test -s "$home/display" || fail "Xvfb does not start"
+DISPLAY=:$(cat "$home/display")
+export DISPLAY LIBGL_ALWAYS_SOFTWARE=1
+
+# open SCALE FILE: a window on a file; sets `window` and `pid`.
+open() {
+    WINIT_X11_SCALE_FACTOR=$1 "$etendue" view "$2" 2>"$home/said" &
+    pid=$!
+    pids+=("$pid")
+    until_so 60 xdotool search --onlyvisible --name '^etendue$' || fail "there is no window on $2"
+    window=$(xdotool search --onlyvisible --name '^etendue$' | tail -n 1)
+    xdotool windowmove "$window" 0 0 windowfocus "$window"
+    until_so 60 is_idle || fail "the window on $2 never comes to rest"
+}
+
+# ticks: processor time of the window so far, in hundredths of a second.
+ticks() {
+    awk '{print $14 + $15}' "/proc/$pid/stat"
+}
+
+# Whether next to nothing was done for a while. A loop that spins takes sixty.
+is_idle() {
+    local before
+    before=$(ticks)
+    sleep 0.6
+    [ $(($(ticks) - before)) -le 6 ]
+}
+
+# shoot NAME: a screenshot with more colours than an empty window has.
+shoot() {
+    import -window "$window" "$shots/$1.png"
+    [ "$(identify -format %k "$shots/$1.png")" -gt 500 ] || fail "there is no picture in $shots/$1.png"
+}
+
+press() {
+    xdotool key --clearmodifiers "$1"
+    sleep 0.3
+}
+
+# close_window: by its own shortcut, to the exit code 0.
+close_window() {
+    press ctrl+q
+    until_so 60 bash -c "! kill -0 $pid" || fail "the window does not close"
+    wait "$pid" || fail "the window ends with $?"
+}
+
+cp -r scenes/double-gauss.json scenes/lenses "$home/"
+scene=$home/double-gauss.json
+jq '.camera.sensor.resolution = [240, 160] | .render.samples = 4' <"$scene" >"$home/small.json"
+scene=$home/small.json
+cp "$scene" "$home/before.json"
+
+open 1 "$scene"
+shoot dark-1x
+press ctrl+t
+until_so 30 is_idle
+shoot light-1x
+press ctrl+t
+
+# A drag in the picture turns the camera; saved, it is another scene.
+xdotool mousemove 640 430 sleep 0.2 mousedown 1 sleep 0.2 mousemove_relative 30 5 sleep 0.2 \
+    mousemove_relative 40 10 sleep 0.2 mousemove_relative 30 5 sleep 0.2 mouseup 1 sleep 0.5
+until_so 60 is_idle || fail "no rest after a drag"
+shoot turned-1x
+cmp -s "$shots/dark-1x.png" "$shots/turned-1x.png" && fail "the drag changed nothing"
+press ctrl+s
+until_so 30 bash -c "! cmp -s '$scene' '$home/before.json'" || fail "Ctrl+S wrote nothing"
+jq -e '.camera.pose.from != [0, 0.5, 1.9]' "$scene" >/dev/null || fail "the camera did not move"
+"$etendue" render "$scene" -o "$home/saved" --quiet >/dev/null
+
+# The window writes what the command line does.
+press ctrl+r
+xdotool key ctrl+a
+xdotool type "$home/shown"
+press Return
+until_so 60 test -s "$home/shown/picture.png" || fail "nothing was rendered into a folder"
+until_so 60 is_idle
+for file in picture.png depth.npy normal.npy layers.exr; do
+    cmp "$home/saved/$file" "$home/shown/$file" || fail "$file of the window and of the command line differ"
+done
+
+# A broken file is told, and changes nothing.
+echo '{ "etendue": 1, "camera": ' >"$home/broken.json"
+press ctrl+o
+xdotool key ctrl+a
+xdotool type "$home/broken.json"
+press Return
+until_so 60 is_idle
+shoot broken-1x
+kill -0 "$pid" || fail "a broken file ends the window"
+spent=$(ticks)
+sleep 5
+idle=$(($(ticks) - spent))
+echo "processor time of a window at rest over 5 s: ${idle}0 ms"
+[ "$idle" -le 50 ] || fail "a window at rest works"
+close_window
+
+# Closed in the middle of a render that would take hours.
+jq '.tracer = {"type": "path"} | .render.samples = 1000000' <"$scene" >"$home/slow.json"
+WINIT_X11_SCALE_FACTOR=1 "$etendue" view "$home/slow.json" 2>"$home/said" &
+pid=$!
+pids+=("$pid")
+until_so 60 xdotool search --onlyvisible --name '^etendue$' || fail "there is no window on the slow scene"
+window=$(xdotool search --onlyvisible --name '^etendue$' | tail -n 1)
+xdotool windowfocus "$window"
+sleep 2
+close_window
+
+open 2 "$scene"
+shoot dark-2x
+press ctrl+t
+until_so 30 is_idle
+shoot light-2x
+close_window
+echo "the window works; screenshots are in $shots"
