@@ -26,6 +26,7 @@ help:
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/limits.md"
+	@echo "make bench-sampling  what samples that stop save; writes the measured part of docs/sampling.md"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make light-fields  the walk of docs/light-fields.md in a venv, its pictures, and another decoder's opinion"
 	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
@@ -105,6 +106,9 @@ bench-sensor:
 bench-limits: setup
 	cargo build --release -p etendue-cli -p etendue-benches
 	python3 benches/limits.py $(ARGS)
+
+bench-sampling: setup
+	cargo run --release -p etendue-benches --bin sampling -- $(ARGS)
 
 # ARGS=--quick takes lighter meshes
 docs-charts: setup

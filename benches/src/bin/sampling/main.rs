@@ -1,0 +1,284 @@
+//! What samples that stop where they are enough save, against the same number for every pixel: writes the
+//! measured part of `docs/sampling.md` with its chart and its map.
+//!
+//! The light of the scenes is scaled down to that of a lit room, so that a sensor in physical units sees
+//! some to some thousand electrons in 0.1 to 30 ms. The variance of a picture is measured from two of other
+//! seeds, never from a picture's own samples: per pixel and channel, the half of their squared difference,
+//! carried to digital numbers and divided by the sensor's own variance.
+
+mod study;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Context;
+use clap::Parser;
+use etendue_bench::machine;
+use etendue_chart::{Axis, Chart, Series, Theme};
+use etendue_render::Plan;
+use etendue_render::output::{Outputs, png};
+use serde_json::json;
+
+use study::{Spread, Study, Wanted};
+
+/// Behind this line the page is measured.
+const MARK: &str = "<!-- Behind this line `make bench-sampling` writes. -->\n";
+
+/// Exposure times (s) of the table, dim and bright, and of the chart.
+const SHOWN: [f64; 2] = [0.001, 0.01];
+const CHARTED: [f64; 5] = [0.0001, 0.0003, 0.001, 0.003, 0.01];
+
+/// Samples of pictures with the same number for each pixel.
+const COUNTS: [u32; 7] = [8, 16, 32, 64, 128, 256, 512];
+
+/// The variance that samples may have, as a share of the sensor's.
+const FRACTION: f64 = 0.1;
+
+/// The relative error of the other table.
+const ERROR: f64 = 0.1;
+
+/// The most samples.
+const MOST: u32 = 2048;
+
+#[derive(Parser)]
+struct Arguments {
+    /// The folder of the scenes.
+    #[arg(long, default_value = "scenes")]
+    scenes: PathBuf,
+    /// The folder of the page.
+    #[arg(long, default_value = "docs")]
+    docs: PathBuf,
+    /// Columns of the pictures.
+    #[arg(long, default_value_t = 96)]
+    width: u32,
+    /// Measure fewer numbers of samples and exposure times.
+    #[arg(long)]
+    quick: bool,
+}
+
+/// How much is measured.
+struct Effort {
+    counts: &'static [u32],
+    charted: &'static [f64],
+    most: u32,
+}
+
+impl Effort {
+    fn of(quick: bool) -> Self {
+        match quick {
+            false => Self { counts: &COUNTS, charted: &CHARTED, most: MOST },
+            true => Self { counts: &COUNTS[..5], charted: &[0.0003, 0.001, 0.01], most: MOST / 4 },
+        }
+    }
+}
+
+fn main() -> anyhow::Result<()> {
+    let arguments = Arguments::parse();
+    let effort = Effort::of(arguments.quick);
+    let mut text = String::new();
+    let _ = write!(
+        text,
+        "\n## Measured\n\n`make bench-sampling` measures this and writes it. Pictures of {} columns{}.\n\n",
+        arguments.width,
+        if arguments.quick { ", at the quick scale" } else { "" }
+    );
+    for line in machine::describe().into_iter().chain([machine::checkout()]) {
+        let _ = writeln!(text, "- {line}");
+    }
+    let names = ["paper/fig3.json", "double-gauss.json", "sensor-noise.json"];
+    let open = |name: &&str| Study::open(&arguments.scenes.join(name), arguments.width);
+    let studies: Vec<Study> = names.iter().map(open).collect::<Result<_, _>>()?;
+    let uniform: Vec<Vec<Shot>> = studies
+        .iter()
+        .map(|study| effort.counts.iter().map(|n| Shot::of(study, json!(n))).collect())
+        .collect();
+    let noise = noise_table(&effort, &names, &studies, &uniform);
+    text += &noise.text;
+    draw(&arguments.docs, &names, &noise.saved)?;
+    text += "\n![Rays saved against exposure time](images/sampling/saved.svg)\n";
+    text += &relative_table(&effort, &names, &studies, &uniform);
+    text += &map(&arguments.docs, &studies[0])?;
+    text += &planner(&studies[0]);
+    let path = arguments.docs.join("sampling.md");
+    let page = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    let written = page.split(MARK).next().unwrap_or_default().trim_end().to_owned();
+    std::fs::write(&path, format!("{written}\n\n{MARK}{text}"))?;
+    println!("{}", path.display());
+    Ok(())
+}
+
+/// Two pictures of other seeds, and the rays of one.
+struct Shot {
+    pair: [study::Picture; 2],
+    rays: f64,
+    mean_samples: f64,
+}
+
+impl Shot {
+    fn of(study: &Study, samples: serde_json::Value) -> Self {
+        let wanted = Wanted { samples, exposure: SHOWN[0] };
+        Self::with(study, &wanted)
+    }
+
+    fn with(study: &Study, wanted: &Wanted) -> Self {
+        let pair = [1, 2].map(|seed| study.picture(wanted, seed));
+        let mean = |of: &dyn Fn(&study::Picture) -> f64| 0.5 * (of(&pair[0]) + of(&pair[1]));
+        let (rays, mean_samples) = (mean(&|p| p.rays), mean(&|p| p.samples));
+        Self { rays, mean_samples, pair }
+    }
+}
+
+struct NoiseTable {
+    text: String,
+    /// Of each scene: exposure time, and rays of the same number for each pixel over those taken.
+    saved: Vec<Vec<[f64; 2]>>,
+}
+
+fn noise_table(
+    effort: &Effort,
+    names: &[&str],
+    studies: &[Study],
+    uniform: &[Vec<Shot>],
+) -> NoiseTable {
+    let mut text = format!(
+        "\nUntil the variance of the samples is {FRACTION} of the sensor's. `as even`: rays of a number for every pixel \
+         with the same variance in the mean over the picture (so the same root mean square error of the sensor's \
+         image), over those taken. `as good`: of a number with which as many as nine tenths of all blocks of 8 × 8 \
+         pixels have what nine tenths have here. What lies beyond the numbers of samples measured ({} to {}) is extrapolated along \
+         the nearest two, and marked.\n\n| scene | exposure | samples a pixel | variance, of the sensor's | as even | as good |\n\
+         |---|---|---|---|---|---|\n",
+        effort.counts[0],
+        effort.counts[effort.counts.len() - 1]
+    );
+    let mut saved = Vec::new();
+    let mut factors = Vec::new();
+    for ((name, study), uniform) in names.iter().zip(studies).zip(uniform) {
+        let mut line = Vec::new();
+        for &exposure in effort.charted {
+            let samples =
+                json!({ "until": "sensor-noise", "fraction": FRACTION, "max": effort.most });
+            let taken = Shot::with(study, &Wanted { samples, exposure });
+            let spread = |shot: &Shot| study.noise_share(&shot.pair, exposure);
+            let own = spread(&taken);
+            let curve = |of: &dyn Fn(Spread) -> f64| -> Vec<[f64; 2]> {
+                uniform.iter().map(|shot| [shot.rays, of(spread(shot))]).collect()
+            };
+            let (even, even_mark) = rays_for(&curve(&|s| s.mean), own.mean);
+            let (good, good_mark) = rays_for(&curve(&|s| s.ninth), own.ninth);
+            line.push([exposure, good / taken.rays]);
+            if SHOWN.contains(&exposure) {
+                factors.push([even / taken.rays, good / taken.rays]);
+                let _ = writeln!(
+                    text,
+                    "| `{name}` | {} ms | {:.0} | {:.3} | {:.1}{even_mark} | {:.1}{good_mark} |",
+                    exposure * 1e3,
+                    taken.mean_samples,
+                    own.mean,
+                    even / taken.rays,
+                    good / taken.rays
+                );
+            }
+        }
+        saved.push(line);
+    }
+    for (k, words) in ["as even", "as good"].into_iter().enumerate() {
+        let mut all: Vec<f64> = factors.iter().map(|pair| pair[k]).collect();
+        all.sort_by(f64::total_cmp);
+        let middle = 0.5 * (all[(all.len() - 1) / 2] + all[all.len() / 2]);
+        let _ = write!(text, "\nMedian, {words}: **{middle:.1} times fewer rays** (goal: 4).\n");
+    }
+    NoiseTable { text, saved }
+}
+
+fn relative_table(
+    effort: &Effort,
+    names: &[&str],
+    studies: &[Study],
+    uniform: &[Vec<Shot>],
+) -> String {
+    let mut text = format!(
+        "\nUntil a relative error of {ERROR}, against a number for every pixel with the same error in the worst tenth of \
+         all blocks (goal: 2 times fewer rays):\n\n| scene | samples a pixel | error of the worst tenth | fewer rays |\n\
+         |---|---|---|---|\n"
+    );
+    for ((name, study), uniform) in names.iter().zip(studies).zip(uniform) {
+        let samples = json!({ "relative_error": ERROR, "max": effort.most });
+        let taken = Shot::of(study, samples);
+        let spread = |shot: &Shot| study.relative_variance(&shot.pair).ninth;
+        let curve: Vec<[f64; 2]> = uniform.iter().map(|shot| [shot.rays, spread(shot)]).collect();
+        let (rays, mark) = rays_for(&curve, spread(&taken));
+        let _ = writeln!(
+            text,
+            "| `{name}` | {:.0} | {:.3} | {:.1}{mark} |",
+            taken.mean_samples,
+            spread(&taken).sqrt(),
+            rays / taken.rays
+        );
+    }
+    text
+}
+
+/// The rays at which a curve of rays and variances, which falls, is `variance`; and a mark when that is
+/// beyond it.
+fn rays_for(curve: &[[f64; 2]], variance: f64) -> (f64, &'static str) {
+    let logs: Vec<[f64; 2]> = curve.iter().map(|point| point.map(f64::ln)).collect();
+    let wanted = variance.max(1e-300).ln();
+    let within = logs.windows(2).find(|pair| pair[1][1] <= wanted);
+    let mark = if within.is_none() || logs[0][1] < wanted { " *" } else { "" };
+    let pair = within.unwrap_or(&logs[logs.len() - 2..]);
+    let slope = ((pair[1][0] - pair[0][0]) / (pair[1][1] - pair[0][1])).clamp(-2.0, -0.3);
+    ((pair[0][0] + slope * (wanted - pair[0][1])).exp(), mark)
+}
+
+fn draw(docs: &Path, names: &[&str], saved: &[Vec<[f64; 2]>]) -> anyhow::Result<()> {
+    let folder = docs.join("images/sampling");
+    std::fs::create_dir_all(&folder)?;
+    let series = names.iter().zip(saved).enumerate();
+    let chart = Chart {
+        title: "Rays saved against exposure time".to_owned(),
+        axes: [
+            Axis::new("exposure time (s)"),
+            Axis::new("rays of one number for all over rays taken"),
+        ],
+        series: series
+            .map(|(k, (name, line))| Series { colour: k, ..Series::line(*name, line.clone()) })
+            .collect(),
+        ..Chart::default()
+    };
+    std::fs::write(folder.join("saved.svg"), chart.svg(Theme::Reader))?;
+    Ok(())
+}
+
+/// The map of samples as a picture.
+fn map(docs: &Path, study: &Study) -> anyhow::Result<String> {
+    let samples = json!({ "until": "sensor-noise", "fraction": FRACTION, "max": 512 });
+    let rendered = study.rendered(&Wanted { samples, exposure: SHOWN[1] }, 1);
+    let path = docs.join("images/sampling/map.png");
+    png::write(&path, &rendered.picture, "SampleCount", png::Bits::Eight)?;
+    let counts = rendered.sample_counts.context("samples are counted")?;
+    let [fewest, most] = [counts.least, counts.most];
+    Ok(format!(
+        "\nWhere the samples of `paper/fig3.json` go at {} ms: {fewest} (black) to {most} (white) a pixel.\n\n\
+         ![Samples of each pixel](images/sampling/map.png)\n",
+        SHOWN[1] * 1e3
+    ))
+}
+
+/// What planning costs beyond loading.
+fn planner(study: &Study) -> String {
+    let wanted = Wanted { samples: json!(64), exposure: SHOWN[0] };
+    let scene = study.scene(&wanted, 0);
+    let mut times: Vec<f64> = (0..50)
+        .map(|_| {
+            let start = Instant::now();
+            std::hint::black_box(Plan::new(&scene, Outputs::ALL));
+            1e3 * start.elapsed().as_secs_f64()
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    format!(
+        "\nPlanning `paper/fig3.json` takes {:.3} ms beyond loading (median of 50; goal: 1).\n",
+        times[25]
+    )
+}

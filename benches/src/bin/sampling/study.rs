@@ -1,0 +1,224 @@
+//! A scene that is rendered with samples of all kinds, and how far its pictures are from each other.
+
+use std::path::Path;
+
+use etendue_accel::{Accel, BuildOptions};
+use etendue_render::output::{Outputs, Values};
+use etendue_render::{Images, Plan, Rendered, build, plan, render};
+use etendue_scene::file::SceneFile;
+use etendue_scene::{LoadOptions, Scene};
+use etendue_spectrum::Bands;
+use serde_json::{Value, json};
+
+/// What the scenes' light is multiplied by: 1 becomes the irradiance of a lit room on a sensor
+/// (W·m⁻²·nm⁻¹).
+const LIGHT: f64 = 2e-5;
+
+/// The pixels' pitch (µm).
+const PITCH: f64 = 3.45;
+
+/// Side of the blocks that errors are averaged over (pixels).
+const BLOCK: usize = 8;
+
+/// A picture that is wanted.
+pub(crate) struct Wanted {
+    /// `render.samples`.
+    pub(crate) samples: Value,
+    /// Exposure time (s).
+    pub(crate) exposure: f64,
+}
+
+/// A picture's light, and what it cost.
+pub(crate) struct Picture {
+    /// `[channel][pixel]`, in the film's bands as red, green and blue.
+    light: Vec<Vec<f64>>,
+    pub(crate) rays: f64,
+    pub(crate) samples: f64,
+}
+
+/// The mean of an error over the picture, and what nine tenths of all blocks stay below.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spread {
+    pub(crate) mean: f64,
+    pub(crate) ninth: f64,
+}
+
+/// A scene.
+pub(crate) struct Study {
+    file: SceneFile,
+    accel: Box<dyn Accel>,
+    images: Images,
+    width: usize,
+}
+
+impl Study {
+    pub(crate) fn open(path: &Path, width: u32) -> anyhow::Result<Self> {
+        eprintln!("{}", path.display());
+        let mut value: Value = serde_json::from_str(&std::fs::read_to_string(path)?)?;
+        let [columns, rows] = [0, 1].map(|k| {
+            value.pointer(&format!("/camera/sensor/resolution/{k}")).and_then(Value::as_f64)
+        });
+        let height = (f64::from(width) * rows.unwrap_or(1.0) / columns.unwrap_or(1.0)).round();
+        let mut light = LIGHT;
+        value["camera"]["sensor"] = json!({
+            "type": "rgb", "radiometry": "physical", "resolution": [width, height as u32],
+            "quantum_efficiency": 0.6, "read_noise": 2.5, "dark_current": 1,
+            "system_gain": 0.4, "bit_depth": 12, "black_level": 64, "full_well": 10_000,
+        });
+        match length_mm(&value["camera"]["sensor_height"]) {
+            None => value["camera"]["sensor"]["pixel_pitch"] = json!(PITCH),
+            // Few pixels of a large sensor are wide: they get as much light as small ones behind a
+            // pupil of a tenth of a steradian.
+            Some(mm) => light *= 10.0 * (PITCH * height / (1e3 * mm)).powi(2),
+        }
+        if value["tracer"]["type"] == "facing" {
+            value["tracer"] = json!({ "type": "direct" });
+            value["lights"] = json!([{ "type": "environment", "radiance": [1, 1, 1] }]);
+        }
+        dim(&mut value, light);
+        value["layers"] = json!([]);
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let file = SceneFile::from_json(folder, value)?;
+        let scene = loaded(&file);
+        let plan = Plan::new(&scene, Outputs::ALL);
+        let accel = build(&scene, &plan, &BuildOptions::default())?;
+        let images = Images::decode(&scene, &plan, None)?;
+        Ok(Self { file, accel, images, width: width as usize })
+    }
+
+    /// The scene with the samples and exposure wanted.
+    pub(crate) fn scene(&self, wanted: &Wanted, seed: u64) -> Scene {
+        let mut settings = vec![
+            ("render.samples".to_owned(), wanted.samples.to_string()),
+            ("render.seed".to_owned(), seed.to_string()),
+            ("camera.sensor.exposure".to_owned(), wanted.exposure.to_string()),
+        ];
+        if wanted.samples.is_object() {
+            settings.push(("layers".to_owned(), r#"["sample_count"]"#.to_owned()));
+        }
+        loaded(&self.file.with(&settings).expect("settings that the format knows"))
+    }
+
+    pub(crate) fn rendered(&self, wanted: &Wanted, seed: u64) -> Rendered {
+        let scene = self.scene(wanted, seed);
+        let plan = Plan::new(&scene, Outputs::ALL);
+        render(&scene, &plan, &*self.accel, &self.images, Vec::new(), &|_: f64| true)
+            .expect("a picture")
+    }
+
+    pub(crate) fn picture(&self, wanted: &Wanted, seed: u64) -> Picture {
+        let done = self.rendered(wanted, seed);
+        let samples = done.sample_counts.map_or(f64::from(done.samples), |counts| counts.mean());
+        eprintln!("  {} at {} s: {samples:.0} samples", wanted.samples, wanted.exposure);
+        let layer = done.picture.layer("").expect("the picture");
+        let light = layer.channels.iter().map(|channel| numbers(&channel.values)).collect();
+        Picture { light, rays: done.rays as f64, samples }
+    }
+
+    /// The variance of a pair of pictures in digital numbers, as a share of the sensor's own.
+    pub(crate) fn noise_share(&self, pair: &[Picture; 2], exposure: f64) -> Spread {
+        let scene = self.scene(&Wanted { samples: json!(1), exposure }, 0);
+        let sensor = scene.sensor.as_ref().expect("a sensor").clone();
+        let sensor = sensor.in_bands(Bands::Rgb).expect("a sensor of three colours");
+        let floor = sensor.noise_floor(exposure).expect("a sensor with noise");
+        let angle = scene.camera.pupil_solid_angle().unwrap_or(1.0);
+        let units: Vec<Vec<f64>> = (0..3)
+            .map(|channel| floor.electrons_per_unit(channel).map(|e| e * angle).collect())
+            .collect();
+        let share = |pixel: usize| {
+            let electrons = |picture: &Picture, channel: usize| -> f64 {
+                units[channel].iter().zip(&picture.light).map(|(e, light)| e * light[pixel]).sum()
+            };
+            let of = |channel: usize| {
+                let [a, b] = [0, 1].map(|k| electrons(&pair[k], channel));
+                let slope = floor.slope(0.5 * (a + b));
+                0.5 * slope * slope * (a - b).powi(2) / floor.variance(0.5 * (a + b))
+            };
+            (0..3).map(of).sum::<f64>() / 3.0
+        };
+        self.spread(&share)
+    }
+
+    /// The variance of a pair of pictures, as a share of the square of a block's mean.
+    pub(crate) fn relative_variance(&self, pair: &[Picture; 2]) -> Spread {
+        let grey = |picture: &Picture, pixel: usize| {
+            picture.light.iter().map(|plane| plane[pixel]).sum::<f64>() / 3.0
+        };
+        let variance = |pixel: usize| {
+            let squares =
+                (0..3).map(|k| 0.5 * (pair[0].light[k][pixel] - pair[1].light[k][pixel]).powi(2));
+            squares.sum::<f64>() / 3.0
+        };
+        let mut blocks: Vec<f64> = self
+            .blocks(pair[0].light[0].len())
+            .map(|pixels| {
+                let count = pixels.len() as f64;
+                let mean = |of: &dyn Fn(usize) -> f64| {
+                    pixels.iter().map(|&pixel| of(pixel)).sum::<f64>() / count
+                };
+                let light = mean(&|pixel| 0.5 * (grey(&pair[0], pixel) + grey(&pair[1], pixel)));
+                mean(&variance) / (light * light).max(1e-300)
+            })
+            .collect();
+        spread_of(&mut blocks)
+    }
+
+    fn spread(&self, of: &dyn Fn(usize) -> f64) -> Spread {
+        let height = self.file.value()["camera"]["sensor"]["resolution"][1].as_u64().unwrap_or(1);
+        let mut blocks: Vec<f64> = self
+            .blocks(self.width * usize::try_from(height).unwrap_or(1))
+            .map(|pixels| pixels.iter().map(|&p| of(p)).sum::<f64>() / pixels.len() as f64)
+            .collect();
+        spread_of(&mut blocks)
+    }
+
+    /// The pixels of each block.
+    fn blocks(&self, pixels: usize) -> impl Iterator<Item = Vec<usize>> + '_ {
+        let (width, height) = (self.width, pixels / self.width);
+        let rows = (0..height).step_by(BLOCK);
+        rows.flat_map(move |y| (0..width).step_by(BLOCK).map(move |x| (x, y))).map(move |(x, y)| {
+            let inside = |y: usize| (x..width.min(x + BLOCK)).map(move |x| y * width + x);
+            (y..height.min(y + BLOCK)).flat_map(inside).collect()
+        })
+    }
+}
+
+fn spread_of(blocks: &mut [f64]) -> Spread {
+    blocks.sort_by(f64::total_cmp);
+    let mean = blocks.iter().sum::<f64>() / blocks.len() as f64;
+    Spread { mean, ninth: blocks[blocks.len() * 9 / 10] }
+}
+
+fn loaded(file: &SceneFile) -> Scene {
+    file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).expect("a scene")
+}
+
+fn numbers(values: &Values) -> Vec<f64> {
+    (0..values.len()).map(|i| values.at(i)).collect()
+}
+
+/// A length of a scene file (mm), where there is one.
+fn length_mm(value: &Value) -> Option<f64> {
+    let text = value.as_str()?;
+    etendue_geometry::units::Dimension::Length.parse(text, "mm").ok()
+}
+
+/// Scales all light of a scene.
+fn dim(value: &mut Value, light: f64) {
+    match value {
+        Value::Object(members) => {
+            for (key, member) in members {
+                match (key.as_str(), member.as_array_mut()) {
+                    ("radiance" | "intensity" | "irradiance", Some(numbers)) => {
+                        for number in numbers {
+                            *number = json!(number.as_f64().unwrap_or(0.0) * light);
+                        }
+                    }
+                    _ => dim(member, light),
+                }
+            }
+        }
+        Value::Array(elements) => elements.iter_mut().for_each(|e| dim(e, light)),
+        _ => {}
+    }
+}
