@@ -56,12 +56,13 @@ impl Study {
         eprintln!("{}", path.display());
         let mut value: Value = serde_json::from_str(&std::fs::read_to_string(path)?)?;
         let [columns, rows] = [0, 1].map(|k| {
-            value.pointer(&format!("/camera/sensor/resolution/{k}")).and_then(Value::as_f64)
+            let side = value.pointer(&format!("/camera/sensor/resolution/{k}"));
+            side.and_then(Value::as_u64).unwrap_or(1)
         });
-        let height = (f64::from(width) * rows.unwrap_or(1.0) / columns.unwrap_or(1.0)).round();
+        let height = (u64::from(width) * rows / columns).max(1);
         let mut light = LIGHT;
         value["camera"]["sensor"] = json!({
-            "type": "rgb", "radiometry": "physical", "resolution": [width, height as u32],
+            "type": "rgb", "radiometry": "physical", "resolution": [width, height],
             "quantum_efficiency": 0.6, "read_noise": 2.5, "dark_current": 1,
             "system_gain": 0.4, "bit_depth": 12, "black_level": 64, "full_well": 10_000,
         });
@@ -69,7 +70,7 @@ impl Study {
             None => value["camera"]["sensor"]["pixel_pitch"] = json!(PITCH),
             // Few pixels of a large sensor are wide: they get as much light as small ones behind a
             // pupil of a tenth of a steradian.
-            Some(mm) => light *= 10.0 * (PITCH * height / (1e3 * mm)).powi(2),
+            Some(mm) => light *= 10.0 * (PITCH * height as f64 / (1e3 * mm)).powi(2),
         }
         if value["tracer"]["type"] == "facing" {
             value["tracer"] = json!({ "type": "direct" });
