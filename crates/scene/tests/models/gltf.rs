@@ -6,7 +6,7 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Positions, Transform};
 use etendue_scene::import::{NoteKind, Projection, Wanted};
 use etendue_tracer::texture::{Filter, Wrap};
-use etendue_tracer::{ImageSource, Paint};
+use etendue_tracer::{Absorption, Glass, ImageSource, Ior, Paint, Scattering};
 use serde_json::{Value, json};
 
 use crate::build::{Builder, SQUARE, square_glb};
@@ -307,6 +307,33 @@ fn materials_have_colour_texture_and_transform() {
     let plain = import_with(&folder, "material.glb", Wanted::NOTHING);
     assert_eq!(plain.materials[0].base_color, Paint::Plain([0.25, 0.5, 0.75]));
     assert!(plain.textures.is_empty());
+}
+
+/// What is clear all over and has a thickness is a body of glass; what is partly clear is a thin wall.
+#[test]
+fn volumes_are_bodies_of_glass() {
+    let folder = folder();
+    let material = |transmission: f64, volume: Value| {
+        json!({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.25},
+            "extensions": {"KHR_materials_transmission": {"transmissionFactor": transmission},
+                "KHR_materials_ior": {"ior": 1.4}, "KHR_materials_volume": volume}})
+    };
+    let blue = json!({"thicknessFactor": 0.1, "attenuationDistance": 0.02,
+        "attenuationColor": [0.1, 0.2, 0.9]});
+    let rest = json!({
+        "extensionsUsed": ["KHR_materials_transmission", "KHR_materials_ior", "KHR_materials_volume"],
+        "materials": [material(1.0, blue.clone()), material(1.0, json!({"thicknessFactor": 1})),
+            material(1.0, json!({"attenuationDistance": 1})), material(0.5, blue)]
+    });
+    let path = write(&folder, "volume.glb", square_glb(json!({"material": 0}), rest, |_| ()));
+    let materials = load(&path).materials;
+    let glass = |absorption| Glass { ior: Ior::Constant(1.4), roughness: 0.25, absorption };
+    let absorption = Absorption { color: [0.1, 0.2, 0.9], distance: 0.02 };
+    assert_eq!(materials[0].scattering, Scattering::Dielectric(glass(Some(absorption))));
+    assert_eq!(materials[1].scattering, Scattering::Dielectric(glass(None)));
+    for thin in &materials[2..4] {
+        assert!(matches!(thin.scattering, Scattering::Gltf(_)), "{thin:?}");
+    }
 }
 
 #[test]

@@ -53,6 +53,10 @@ fn support(name: &str) -> Option<Support> {
         "KHR_materials_pbrSpecularGlossiness" => Support::As(
             "read as KHR_materials_specular with ior 0, as that extension's text converts it",
         ),
+        "KHR_materials_volume" => Support::As(
+            "surfaces that are clear all over and have a thickness are bodies of glass; light passes \
+             others as thin walls",
+        ),
         "KHR_animation_pointer" => Support::As("animations move nodes by it, and nothing else"),
         "KHR_interactivity" | "KHR_node_selectability" | "KHR_node_hoverability" => {
             Support::Without("a still picture has no use for it")

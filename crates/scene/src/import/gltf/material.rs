@@ -17,7 +17,7 @@ use serde_json::Value;
 
 use super::buffers::{Bytes, data_uri, percent_decoded};
 use super::glossiness::Glossiness;
-use super::{Reader, extensions};
+use super::{Reader, extensions, volume};
 use crate::import::note::{self, Note, NoteKind};
 use crate::import::{Import, ImportError, Strictness};
 
@@ -96,7 +96,7 @@ impl Judge<'_> {
     }
 
     /// The number that an extension of the material gives; `None` without one.
-    fn number(
+    pub(super) fn number(
         &self,
         material: &json::Material,
         name: &str,
@@ -279,7 +279,7 @@ fn scattering(
     read.specular_color_texture = placed("specularColorTexture", info.as_ref(), Encoding::Srgb)?;
     let info = texture(TRANSMISSION, "transmissionTexture");
     read.transmission_texture = placed("transmissionTexture", info.as_ref(), Encoding::Linear)?;
-    Ok(Scattering::Gltf(Box::new(read)))
+    volume::body(judge, material, read, import)
 }
 
 /// The tint of the reflection face on: anything from 0.

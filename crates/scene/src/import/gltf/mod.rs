@@ -24,6 +24,7 @@ mod meshopt;
 mod pose;
 mod primitive;
 mod skin;
+mod volume;
 
 use std::path::Path;
 
