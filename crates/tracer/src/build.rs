@@ -101,12 +101,23 @@ impl MaterialSpec {
                 let scattering = Scattering::Dielectric(glass);
                 Material::new(name, paint("color", color, Bound::One, supply)?, scattering)
             }
-            Self::Gltf { color, metallic, roughness, ior, transmission, opacity } => {
+            Self::Gltf {
+                color,
+                metallic,
+                roughness,
+                ior,
+                transmission,
+                clearcoat,
+                clearcoat_roughness,
+                opacity,
+            } => {
                 let surface = GltfSurface {
                     metallic: *metallic,
                     roughness: *roughness,
                     ior: *ior,
                     transmission: *transmission,
+                    clearcoat: *clearcoat,
+                    clearcoat_roughness: *clearcoat_roughness,
                     ..GltfSurface::default()
                 };
                 let paint = paint("color", color, Bound::One, supply)?;

@@ -167,6 +167,14 @@ pub struct GltfSurface {
     pub transmission: f64,
     /// Share in red (linear).
     pub transmission_texture: Option<TextureUse>,
+    /// Share of a clear coat over all of it (`KHR_materials_clearcoat`), 0..=1.
+    pub clearcoat: f64,
+    /// Share in red (linear).
+    pub clearcoat_texture: Option<TextureUse>,
+    /// The coat's roughness, 0..=1.
+    pub clearcoat_roughness: f64,
+    /// Roughness in green (linear).
+    pub clearcoat_roughness_texture: Option<TextureUse>,
 }
 
 impl Default for GltfSurface {
@@ -183,6 +191,10 @@ impl Default for GltfSurface {
             specular_color_texture: None,
             transmission: 0.0,
             transmission_texture: None,
+            clearcoat: 0.0,
+            clearcoat_texture: None,
+            clearcoat_roughness: 0.0,
+            clearcoat_roughness_texture: None,
         }
     }
 }
@@ -276,6 +288,8 @@ impl Material {
             uses.extend(surface.specular_texture.as_mut());
             uses.extend(surface.specular_color_texture.as_mut());
             uses.extend(surface.transmission_texture.as_mut());
+            uses.extend(surface.clearcoat_texture.as_mut());
+            uses.extend(surface.clearcoat_roughness_texture.as_mut());
         }
         uses.extend(self.emission.as_mut().and_then(|emission| emission.radiance.image_mut()));
         uses.extend(self.normal_map.as_mut().map(|map| &mut map.image));

@@ -76,6 +76,14 @@ pub enum MaterialSpec {
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 1.0))]
         transmission: f64,
+        /// Share of the surface under a clear coat, 0 to 1.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        clearcoat: f64,
+        /// Roughness of the clear coat, 0 to 1.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        clearcoat_roughness: f64,
         /// Share of the surface that is there, 0 to 1.
         #[serde(default = "one")]
         #[schemars(range(min = 0.0, max = 1.0))]

@@ -3,7 +3,7 @@
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{HitBatch, RayBatch};
 
-use crate::bsdf::{Bsdf, Layered, Model, fresnel};
+use crate::bsdf::{Bsdf, Coat, Layered, Model, fresnel};
 use crate::material::{Alpha, GltfSurface, NormalMap};
 use crate::placed::PlacedSurface;
 use crate::reference::{SceneView, SurfacePoint};
@@ -111,6 +111,15 @@ impl<'a> SurfaceInteraction<'a> {
             f0: face_on * specular,
             f90: specular,
             transmission: (own.transmission * texel(&own.transmission_texture)[0]).clamp(0.0, 1.0),
+            coat: match own.clearcoat {
+                0.0 => Coat::default(),
+                share => Coat {
+                    share: (share * texel(&own.clearcoat_texture)[0]).clamp(0.0, 1.0),
+                    alpha: (own.clearcoat_roughness * texel(&own.clearcoat_roughness_texture)[1])
+                        .clamp(0.0, 1.0)
+                        .powi(2),
+                },
+            },
         });
         let base = self.color();
         let shading = self.shading(around, geometric);

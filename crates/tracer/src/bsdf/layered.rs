@@ -13,6 +13,7 @@ use std::f64::consts::PI;
 use etendue_geometry::glam::DVec3;
 
 use super::albedo::Albedo;
+use super::coat::{self, Coat};
 use super::metal::{deep, mean_reflectance, multiple};
 use super::{Weights, fresnel, ggx, mirrored};
 use crate::sampling::cosine_direction;
@@ -30,6 +31,8 @@ pub struct Layered {
     pub f90: f64,
     /// Share of the base that is a hole in a thin wall, 0..=1.
     pub transmission: f64,
+    /// A clear coat over all of it.
+    pub coat: Coat,
 }
 
 /// The largest bands of a surface's colours.
@@ -68,12 +71,13 @@ pub(super) struct Viewed {
     dielectric_mean: f64,
     pub(super) mean: f64,
     chances: Chances,
+    coat: Option<coat::Seen>,
 }
 
 impl Layered {
     pub(super) fn is_delta(&self) -> bool {
         let matte = (1.0 - self.metallic) * (1.0 - self.transmission);
-        self.alpha == 0.0 && matte == 0.0
+        self.alpha == 0.0 && matte == 0.0 && self.coat.share == 0.0
     }
 
     /// As seen from `wo`.
@@ -88,6 +92,7 @@ impl Layered {
             dielectric_mean: albedo.of(means),
             mean: (means[0] + means[1]).min(1.0),
             chances: Chances { sheet: 0.0, base: 0.0, through: 0.0 },
+            coat: self.coat.seen(wo),
         };
         viewed.chances = self.chances(&viewed, peaks.base * a + b);
         viewed
@@ -147,7 +152,13 @@ impl Layered {
         Weights { base, deep, ..Weights::default() }
     }
 
+    /// Value times cosine, and the density of [`Self::sample`].
     pub(super) fn evaluate(&self, wo: DVec3, wi: DVec3, viewed: &Viewed) -> (Weights, f64) {
+        let below = self.evaluate_uncoated(wo, wi, viewed);
+        viewed.coat.map_or(below, |coat| coat.over(wo, wi, below))
+    }
+
+    fn evaluate_uncoated(&self, wo: DVec3, wi: DVec3, viewed: &Viewed) -> (Weights, f64) {
         let Viewed { chances, peaks, .. } = viewed;
         if wi.z < 0.0 {
             if self.transmission == 0.0 || self.alpha == 0.0 {
@@ -177,14 +188,47 @@ impl Layered {
         (share * self.passed(cosine, peaks) * value, pdf)
     }
 
-    /// What a smooth wall lets pass straight.
+    /// What a smooth wall with its coat lets pass straight.
     pub(super) fn straight_through(&self, wo: DVec3, peaks: &Peaks) -> Option<Weights> {
+        let coat = self.coat.seen(wo).map_or(1.0, |coat| coat.passes(wo));
+        Some(self.straight(wo, peaks)?.times(coat))
+    }
+
+    fn straight(&self, wo: DVec3, peaks: &Peaks) -> Option<Weights> {
         let share = (1.0 - self.metallic) * self.transmission;
         let passes = self.alpha == 0.0 && share > 0.0 && wo.z > 0.0;
         passes.then(|| Weights::base(share * self.passed(wo.z, peaks)))
     }
 
     pub(super) fn sample(
+        &self,
+        wo: DVec3,
+        choice: f64,
+        square: [f64; 2],
+        viewed: &Viewed,
+    ) -> Option<Found> {
+        let Some(coat) = &viewed.coat else {
+            return self.sample_uncoated(wo, choice, square, viewed);
+        };
+        let wi = if choice < coat.returned {
+            coat.sample(wo, square)
+        } else {
+            let choice = (choice - coat.returned) / (1.0 - coat.returned);
+            let below = self.sample_uncoated(wo, choice, square, viewed)?;
+            if below.pdf == f64::INFINITY {
+                let passes = coat.passes(below.wi) / (1.0 - coat.returned);
+                return Some(Found { weights: below.weights.times(passes), ..below });
+            }
+            below.wi
+        };
+        if wi.z == 0.0 || (choice < coat.returned && wi.z < 0.0) {
+            return None;
+        }
+        let (weights, pdf) = self.evaluate(wo, wi, viewed);
+        (pdf > 0.0).then(|| Found { wi, weights: weights.times(1.0 / pdf), pdf })
+    }
+
+    fn sample_uncoated(
         &self,
         wo: DVec3,
         choice: f64,
@@ -202,7 +246,7 @@ impl Layered {
             cosine_direction(square)
         } else if chances.through > 0.0 {
             if self.alpha == 0.0 {
-                let weights = self.straight_through(wo, peaks)?.times(1.0 / chances.through);
+                let weights = self.straight(wo, peaks)?.times(1.0 / chances.through);
                 return Some(Found { wi: -wo, weights, pdf: f64::INFINITY });
             }
             let up = self.reflected(wo, square);
@@ -214,7 +258,7 @@ impl Layered {
         if (wi.z < 0.0) != below || wi.z == 0.0 {
             return None;
         }
-        let (weights, pdf) = self.evaluate(wo, wi, viewed);
+        let (weights, pdf) = self.evaluate_uncoated(wo, wi, viewed);
         (pdf > 0.0).then(|| Found { wi, weights: weights.times(1.0 / pdf), pdf })
     }
 

@@ -11,6 +11,7 @@
 
 pub mod albedo;
 mod boundary;
+mod coat;
 pub mod fresnel;
 pub mod ggx;
 mod layered;
@@ -23,6 +24,7 @@ use etendue_spectrum::Metal;
 
 use crate::Color;
 use crate::sampling::{Frame, cosine_direction};
+pub use coat::Coat;
 pub use layered::Layered;
 
 /// A value as multiples of white, the surface's colour and others that follow from it.

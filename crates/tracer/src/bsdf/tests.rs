@@ -11,7 +11,8 @@ fn bsdf(model: Model, cos_theta: f64) -> Bsdf {
 
 fn layered(metallic: f64, roughness: f64, transmission: f64) -> Model {
     let alpha = roughness * roughness;
-    Model::Layered(Layered { metallic, alpha, f0: 0.04, f90: 1.0, transmission })
+    let coat = Coat::default();
+    Model::Layered(Layered { metallic, alpha, f0: 0.04, f90: 1.0, transmission, coat })
 }
 
 fn all() -> Vec<(&'static str, Model)> {
@@ -32,8 +33,16 @@ fn all() -> Vec<(&'static str, Model)> {
         }
         models.push(("wall", layered(0.0, roughness, 0.7)));
     }
-    let shiny = Layered { metallic: 0.0, alpha: 0.09, f0: 0.8, f90: 1.0, transmission: 0.3 };
+    let coat = Coat::default();
+    let shiny = Layered { metallic: 0.0, alpha: 0.09, f0: 0.8, f90: 1.0, transmission: 0.3, coat };
     models.push(("shiny", Model::Layered(shiny)));
+    for (share, roughness) in [(1.0, 0.4), (0.5, 0.8)] {
+        for (metallic, transmission) in [(1.0, 0.0), (0.0, 0.0), (0.3, 0.6)] {
+            let Model::Layered(below) = layered(metallic, 0.7, transmission) else { continue };
+            let coat = Coat { share, alpha: roughness * roughness };
+            models.push(("coated", Model::Layered(Layered { coat, ..below })));
+        }
+    }
     models
 }
 

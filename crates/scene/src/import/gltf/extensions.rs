@@ -53,6 +53,9 @@ fn support(name: &str) -> Option<Support> {
         "KHR_materials_pbrSpecularGlossiness" => Support::As(
             "read as KHR_materials_specular with ior 0, as that extension's text converts it",
         ),
+        "KHR_materials_clearcoat" => {
+            Support::As("coats follow the normals of what is beneath them")
+        }
         "KHR_materials_volume" => Support::As(
             "surfaces that are clear all over and have a thickness are bodies of glass; light passes \
              others as thin walls",

@@ -203,6 +203,7 @@ fn reflectance(
 
 const TRANSFORM: &str = "KHR_texture_transform";
 const SPECULAR: &str = "KHR_materials_specular";
+const CLEARCOAT: &str = "KHR_materials_clearcoat";
 const TRANSMISSION: &str = "KHR_materials_transmission";
 
 /// A texture's use in the words of the base colour's, whose type the document has no second time.
@@ -250,7 +251,16 @@ fn scattering(
     let ior = judge.number(material, "KHR_materials_ior", "ior", import)?.unwrap_or(1.5);
     let strength = judge.number(material, SPECULAR, "specularFactor", import)?.unwrap_or(1.0);
     let passes = judge.number(material, TRANSMISSION, "transmissionFactor", import)?.unwrap_or(0.0);
+    let coat = judge.number(material, CLEARCOAT, "clearcoatFactor", import)?.unwrap_or(0.0);
+    let of_coat = judge.number(material, CLEARCOAT, "clearcoatRoughnessFactor", import)?;
     let mut read = GltfSurface {
+        clearcoat: judge.factor("clearcoatFactor", coat, SHARE, import)?,
+        clearcoat_roughness: judge.factor(
+            "clearcoatRoughnessFactor",
+            of_coat.unwrap_or(0.0),
+            SHARE,
+            import,
+        )?,
         metallic: judge.factor("metallicFactor", metallic, SHARE, import)?,
         roughness: judge.factor("roughnessFactor", roughness, SHARE, import)?,
         ior: match ior {
@@ -279,6 +289,12 @@ fn scattering(
     read.specular_color_texture = placed("specularColorTexture", info.as_ref(), Encoding::Srgb)?;
     let info = texture(TRANSMISSION, "transmissionTexture");
     read.transmission_texture = placed("transmissionTexture", info.as_ref(), Encoding::Linear)?;
+    for (key, use_of) in [
+        ("clearcoatTexture", &mut read.clearcoat_texture),
+        ("clearcoatRoughnessTexture", &mut read.clearcoat_roughness_texture),
+    ] {
+        *use_of = placed(key, texture(CLEARCOAT, key).as_ref(), Encoding::Linear)?;
+    }
     volume::body(judge, material, read, import)
 }
 
