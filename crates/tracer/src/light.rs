@@ -3,7 +3,7 @@
 //! A light is chosen by its power (W, of the mean of the three colours), a triangle of an emissive
 //! mesh by its own: `π A L` for one side. Lights far away are counted by what falls onto the scene's
 //! sphere of radius R: `π R² E` for parallel light, `4 π² R² L` for an environment. Among several lights
-//! that are somewhere, one is chosen by what it may send to the point ([`light_tree`]).
+//! that are somewhere, one is chosen by what it may send to the point.
 
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};

@@ -36,9 +36,9 @@ pub struct Weights {
     pub base: f64,
     /// Of the highlights' colour.
     pub highlight: f64,
-    /// Of what a measured metal's reflectance lacks of Schlick's ([`metal`]).
+    /// Of what a measured metal's reflectance lacks of Schlick's.
     pub dip: f64,
-    /// Of the colour of light that met several facets ([`metal`]).
+    /// Of the colour of light that met several facets.
     pub deep: f64,
 }
 

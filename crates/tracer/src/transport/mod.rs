@@ -10,7 +10,7 @@
 //!   Methods for Light Transport Simulation*, 1997, sections 8.3 and 9.2 (power heuristic).
 //! * Russian roulette: Arvo and Kirk, "Particle Transport and Image Synthesis", 1990.
 //! * Many wavelengths on one path: Wilkie et al., "Hero Wavelength Spectral Sampling", 2014. Theirs keeps
-//!   one of them where a smooth boundary parts them; here all go on, each its way ([`dispersion`]).
+//!   one of them where a smooth boundary parts them; here all go on, each its way.
 
 mod body;
 mod dispersion;
