@@ -57,5 +57,6 @@ scripts/test-slurm.sh
 step "tests"
 run_tests --workspace --features etendue-cli/window
 
+# The command that the tests of the workspace have built.
 step "window"
-scripts/test-window.sh
+ETENDUE=target/debug/etendue scripts/test-window.sh

@@ -85,6 +85,8 @@ pub(crate) struct App {
     pub(crate) said: Option<String>,
     pub(crate) busy: Option<(&'static str, f64)>,
     pub(crate) asking: Option<(Asking, String)>,
+    /// The window's title.
+    titled: String,
     /// The number of the last wish, and of the last one that was accepted.
     number: u64,
     accepted: Option<(u64, Arc<Value>)>,
@@ -132,9 +134,19 @@ impl App {
             said: None,
             busy: None,
             asking: None,
+            titled: String::new(),
             number: 0,
             accepted: None,
         })
+    }
+
+    /// The file, whether all of it is saved, and whether its picture is whole.
+    pub(crate) fn title(&self) -> String {
+        let Some(document) = &self.document else { return "etendue".to_owned() };
+        let name = document.path.file_name().unwrap_or_default().display().to_string();
+        let changed = if document.is_changed() { "*" } else { "" };
+        let working = if self.is_settled() { "" } else { " (rendering)" };
+        format!("{name}{changed}{working} - etendue")
     }
 
     /// One pass of the user interface.
@@ -151,6 +163,11 @@ impl App {
             crate::canvas::show(self, ui);
         });
         panels::asking::show(self, ctx);
+        let title = self.title();
+        if title != self.titled {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.titled = title;
+        }
     }
 
     fn take_news(&mut self, ctx: &Context) {

@@ -255,7 +255,9 @@ fn what_is_saved_renders_to_the_same_bits() {
     window.enter("/camera/f_number", "5.6");
     window.drag(window.at(0.5, 0.5), Vec2::new(40.0, 16.0));
     assert_ne!(window.value("/camera/pose/from"), json!([0, 0, 2]), "the drag turned the camera");
+    assert_eq!(window.app.title(), "scene.json* (rendering) - etendue");
     window.settle();
+    assert_eq!(window.app.title(), "scene.json* - etendue");
     window.press(Key::S, Modifiers::COMMAND);
     window.until("saved", |app| app.document.as_ref().is_some_and(|d| !d.is_changed()));
     let saved = folder.path().join("scene.json");
