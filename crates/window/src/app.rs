@@ -82,6 +82,8 @@ pub(crate) struct App {
     pub(crate) frames: Option<usize>,
     pub(crate) frame: Option<usize>,
     pub(crate) error: Option<String>,
+    /// The error is of a wish, and goes with the next one that makes sense.
+    is_refusal: bool,
     pub(crate) said: Option<String>,
     pub(crate) busy: Option<(&'static str, f64)>,
     pub(crate) asking: Option<(Asking, String)>,
@@ -131,6 +133,7 @@ impl App {
             frames: None,
             frame: None,
             error: None,
+            is_refusal: false,
             said: None,
             busy: None,
             asking: None,
@@ -185,7 +188,7 @@ impl App {
                     self.accepted = Some((number, scene));
                     self.inspector = Some(inspector);
                     self.frames = frames;
-                    if number == self.number {
+                    if number == self.number && self.is_refusal {
                         self.error = None;
                     }
                     self.ask_again();
@@ -200,13 +203,17 @@ impl App {
                     if let Some(document) = &mut self.document {
                         document.saved_to(path, &scene);
                     }
+                    self.refine();
                 }
                 News::Written(folder, count) => {
                     self.said = Some(format!("wrote {count} files into {}", folder.display()));
                     // The session rendered the whole scene; back to what is looked at.
                     self.wish();
                 }
-                News::Fault(why) => self.error = Some(why),
+                News::Fault(why) => {
+                    (self.error, self.is_refusal) = (Some(why), false);
+                    self.refine();
+                }
             }
         }
     }
@@ -232,7 +239,7 @@ impl App {
         if number < self.number {
             return;
         }
-        self.error = Some(why);
+        (self.error, self.is_refusal) = (Some(why), true);
         if let (Some(document), Some((last, accepted))) = (&mut self.document, &self.accepted)
             && *last != number
         {
@@ -366,6 +373,13 @@ impl App {
             part: self.part.clone(),
             frame: self.frame,
         });
+    }
+
+    /// Goes on with a picture that a task has interrupted.
+    fn refine(&mut self) {
+        if !self.is_settled() {
+            self.wish();
+        }
     }
 
     pub(crate) fn look_at(&mut self, view: View) {
