@@ -307,8 +307,8 @@ pub(crate) struct RenderArguments {
     /// Make Embree use this instruction set: sse2, sse4.2, avx, avx2 or avx512
     #[arg(long, value_name = "NAME")]
     pub(crate) isa: Option<String>,
-    /// Refuse what would need more memory than this, e.g. 800M or 4G (bytes, 1024-based), before work
-    /// starts; without it, more than the system has free
+    /// Refuse pictures that would need more memory than this beside the program itself, e.g. 800M or 4G
+    /// (bytes, 1024-based), before work on them starts; without it, more than the system has free
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(crate) memory_limit: Option<u64>,
     /// Read models into memory instead of using them where their files are mapped: other programs may

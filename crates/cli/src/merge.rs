@@ -61,7 +61,11 @@ pub(crate) fn run(arguments: &MergeArguments) -> Result<(), Fault> {
 /// The arguments that the shares were rendered with, as far as they tell of the picture.
 fn as_asked(arguments: &MergeArguments, shares: &Shares) -> Result<RenderArguments, Fault> {
     let first = arguments.shares.first().map(|path| path.display().to_string()).unwrap_or_default();
-    let unknown = || Fault::refused(format!("{first}: does not say how it was rendered"));
+    let unknown = || {
+        Fault::refused(format!(
+            "{first}: does not say how it was rendered: it is a checkpoint, and no share"
+        ))
+    };
     let origin = shares.origin().ok_or_else(unknown)?;
     let folder = origin.get("folder").and_then(Value::as_str).map(Path::new).ok_or_else(unknown)?;
     let words = origin.get("arguments").and_then(Value::as_array).ok_or_else(unknown)?;
@@ -79,9 +83,11 @@ fn as_asked(arguments: &MergeArguments, shares: &Shares) -> Result<RenderArgumen
     (asked.shard, asked.checkpoint) = (None, None);
     if !asked.scene.scene.exists() {
         let scene = asked.scene.scene.display();
-        return Err(Fault::refused(format!(
-            "{scene}: the shares are of this scene, which is not here; say by --scene where it is"
-        )));
+        let why = match arguments.scene {
+            Some(_) => "--scene names no file",
+            None => "the shares are of this scene, which is not here; say by --scene where it is",
+        };
+        return Err(Fault::refused(format!("{scene}: {why}")));
     }
     let command = Command::Render(asked);
     glasses::open(&command)?;

@@ -44,8 +44,8 @@ pub(crate) fn render(
             dataset.add(frame, session.scene(progress)?, &pattern, outputs)?;
             continue;
         }
-        let results =
-            session.check_place(&out.join(pattern.folder(frame.number)), &[], progress)?;
+        let folder = EmptyFolder(out.join(pattern.folder(frame.number)));
+        let results = session.check_place(&folder.0, &[], progress)?;
         let inputs = &session.scene(progress)?.inputs;
         pattern.keep_apart(out, frame.number, (inputs, &results))?;
         let checkpoint = keep(arguments, session, out, &checkpoint_of(frame));
@@ -64,6 +64,15 @@ pub(crate) fn render(
         }
         reports.push(report);
     }
+    // What other runs have of the scene is of the same data set.
+    for frame in frames.iter().filter(|frame| !range.contains(&frame.number)) {
+        if pattern.is_begun(out, frame.number) {
+            session.show(frame)?;
+            if session.is_complete((out, &pattern), frame.number, progress)? {
+                dataset.add(frame, session.scene(progress)?, &pattern, outputs)?;
+            }
+        }
+    }
     let beside = places::recorded(Ledger::open(out, "render"), || dataset.write(out))?;
     files.extend(beside);
     if let Some(path) = &arguments.report {
@@ -77,6 +86,16 @@ pub(crate) fn render(
     }
     let lines: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     print_text(&lines.join("\n"))
+}
+
+/// A folder that goes when this is dropped and nothing is in it.
+struct EmptyFolder(PathBuf);
+
+impl Drop for EmptyFolder {
+    fn drop(&mut self) {
+        // One that has something in it stays.
+        let _ = std::fs::remove_dir(&self.0);
+    }
 }
 
 fn chosen<'f>(frames: &'f [Frame], range: &Range<usize>) -> Result<&'f [Frame], Fault> {

@@ -57,20 +57,24 @@ impl Dataset {
         let files = layer_files(scene, pattern, frame.number, outputs);
         let of = |layer: &str, kind: &str| Some(files.get(layer)?.get(kind)?.clone());
         let matrix = scene.camera.pose().world_from_camera(Convention::Opengl);
-        self.entries.push(Entry {
-            number: frame.number,
-            time: frame.time,
-            folder: pattern.own_folder(frame.number),
-            name: pattern.place(frame.number, "picture"),
-            camera: scene.camera.opencv(),
-            world_from_camera: matrix.transpose().to_cols_array_2d(),
-            picture: of("picture", "png"),
-            depth: of("Depth", "npy"),
-            files,
-            scene_hash: scene.hash()?.to_string(),
-            seed: scene.render.seed,
-            samples: scene.render.samples,
-        });
+        let at = self.entries.partition_point(|entry| entry.number < frame.number);
+        self.entries.insert(
+            at,
+            Entry {
+                number: frame.number,
+                time: frame.time,
+                folder: pattern.own_folder(frame.number),
+                name: pattern.place(frame.number, "picture"),
+                camera: scene.camera.opencv(),
+                world_from_camera: matrix.transpose().to_cols_array_2d(),
+                picture: of("picture", "png"),
+                depth: of("Depth", "npy"),
+                files,
+                scene_hash: scene.hash()?.to_string(),
+                seed: scene.render.seed,
+                samples: scene.render.samples,
+            },
+        );
         Ok(())
     }
 
@@ -155,7 +159,15 @@ impl Dataset {
             }
             Value::Object(frame)
         };
-        json!({ "frames": self.entries.iter().map(frame).collect::<Vec<_>>() })
+        let frames: Vec<Value> = self.entries.iter().map(frame).collect();
+        let mut all = Map::new();
+        // Readers of this format look for one model of all cameras here, and take others for perspective.
+        let models = || frames.iter().filter_map(|frame| frame.get("camera_model"));
+        if let Some(model) = models().next().filter(|model| models().all(|other| other == *model)) {
+            all.insert("camera_model".to_owned(), model.clone());
+        }
+        all.insert("frames".to_owned(), Value::Array(frames));
+        Value::Object(all)
     }
 
     /// The files of COLMAP's text model: cameras, images, and no points.

@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
-use etendue_render::output::{MANIFEST, OutputError, Outputs, sidecar};
+use etendue_render::output::{Ledger, MANIFEST, OutputError, Outputs, sidecar};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -83,22 +83,38 @@ impl FramePattern {
         self.folder.as_ref().map(|folder| numbered(folder, number))
     }
 
-    /// Whether `out` holds all files of a frame whose headers have these fingerprints.
+    /// Whether something of frame `number` may be in `out`.
+    #[must_use]
+    pub fn is_begun(&self, out: &Path, number: usize) -> bool {
+        match &self.folder {
+            Some(_) => out.join(self.folder(number)).join("layers.json").exists(),
+            None => record_of(out, number).exists(),
+        }
+    }
+
+    /// Whether `out` holds a frame whose headers have these fingerprints, as it was written, with `files`
+    /// among its own.
     #[must_use]
     pub fn is_complete(
         &self,
         out: &Path,
         number: usize,
         fingerprints: &[(String, String)],
-        has_sensor: bool,
+        files: &[String],
     ) -> bool {
         match &self.folder {
-            Some(_) => is_rendered(&out.join(self.folder(number)), fingerprints, has_sensor),
+            Some(_) => is_rendered(&out.join(self.folder(number)), fingerprints, files),
             None => read_record(&record_of(out, number)).is_some_and(|record| {
                 let has_size = |(name, size): &(String, u64)| {
                     out.join(name).metadata().is_ok_and(|data| data.len() == *size)
                 };
-                record.fingerprints == fingerprints && record.files.iter().all(has_size)
+                let is_listed = |file: &String| {
+                    let place = self.place(number, file);
+                    record.files.iter().any(|(name, _)| *name == place)
+                };
+                record.fingerprints == fingerprints
+                    && files.iter().all(is_listed)
+                    && record.files.iter().all(has_size)
             }),
         }
     }
@@ -189,14 +205,16 @@ fn read_record(path: &Path) -> Option<Record> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }
 
-/// Whether `folder` has a complete picture of the scene with these fingerprints, and all files of its
-/// manifest.
-fn is_rendered(folder: &Path, fingerprints: &[(String, String)], has_sensor: bool) -> bool {
-    let Some((header, files)) = complete_picture(folder) else { return false };
+/// Whether `folder` has a complete picture of the scene with these fingerprints, `files` among its files,
+/// and all as they were written.
+fn is_rendered(folder: &Path, fingerprints: &[(String, String)], files: &[String]) -> bool {
+    let Some((header, found)) = complete_picture(folder) else { return false };
     let is_same = |(key, print): &(String, String)| {
         header.get(key).and_then(Value::as_str) == Some(print.as_str())
     };
-    fingerprints.iter().all(is_same) && (!has_sensor || files.contains_key("sensor.json"))
+    fingerprints.iter().all(is_same)
+        && files.iter().all(|file| found.contains_key(file))
+        && Ledger::open(folder, "render").is_whole()
 }
 
 /// The header and the files of the picture in `folder`; `None` when there is none, when a file of it is

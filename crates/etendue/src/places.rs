@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use etendue_render::output::{
-    Ledger, MANIFEST, OutputError, PartFile, prepare_folder, protect_inputs, refuse_inputs,
+    Ledger, MANIFEST, OutputError, PartFile, Together, prepare_folder, protect_inputs,
+    refuse_inputs,
 };
 
 use crate::Error;
@@ -40,9 +41,9 @@ pub fn keep_apart<'p>(
     Ok(refuse_inputs(outputs.iter().map(PathBuf::as_path))?)
 }
 
-/// Runs `write`, and sees to it that the files which it wrote into the ledger's folder stand in the
-/// manifest, also when it failed half-way. Those that the command wrote there before and not again
-/// are removed when it did not.
+/// Runs `write`, and gives the files that it wrote into the ledger's folder their names when all of them
+/// are complete: when it fails, what was there before stays as it was. Those that stand in the manifest
+/// from before and were not written again are removed.
 ///
 /// # Errors
 ///
@@ -51,7 +52,11 @@ pub fn recorded<T, E: From<OutputError>>(
     mut ledger: Ledger,
     write: impl FnOnce() -> Result<T, E>,
 ) -> Result<T, E> {
-    let written = write();
+    let set = Together::in_folder(ledger.folder());
+    let written = write().and_then(|written| {
+        set.finish()?;
+        Ok(written)
+    });
     let recorded = ledger.record();
     let written = written?;
     recorded?;

@@ -181,6 +181,7 @@ impl Rendering {
         let results = files_of(&self.scene, names, outputs);
         let results: Vec<PathBuf> = results.map(|name| folder.join(name)).collect();
         places::keep_apart(&self.scene.inputs, &results)?;
+        let mut folders = Vec::new();
         let mut written = places::recorded(Ledger::open(folder, "render"), || {
             let mut files = self.write_layers(folder, outputs, progress)?;
             let mut notes = self.idle_notes.clone();
@@ -193,8 +194,12 @@ impl Rendering {
             let set = self.write_light_field(folder, outputs, progress)?;
             files.extend(set.files);
             notes.extend(set.notes);
+            folders = set.folders;
             Ok::<_, Error>(Written { files, notes, time: Duration::ZERO })
         })?;
+        for below in folders {
+            places::recorded(Ledger::open(&below, "render"), || Ok::<_, Error>(()))?;
+        }
         if self.partial().is_none() {
             places::clear(&folder.join(PARTIAL));
         }
@@ -314,6 +319,24 @@ fn mask_of(layer: &str) -> String {
 /// The file of a layer in the manner of a benchmark.
 fn in_manner(layer: &str, manner: Manner) -> String {
     format!("{}.{}", stem(layer), manner.ending())
+}
+
+/// The files that a render leaves of these layers whatever they hold. A mask is not among them: its numbers
+/// may be too large for it.
+pub(crate) fn certain_files(
+    layers: impl IntoIterator<Item = String>,
+    outputs: Outputs,
+) -> Vec<String> {
+    let of = |layer: String| {
+        let indexed = in_manner(&layer, Manner::Indexed);
+        let mask = mask_of(&layer);
+        let has_mask = layer.starts_with("Id.") || layer == "MaterialId";
+        layer_files(&layer, outputs)
+            .into_iter()
+            .filter(move |file| *file != indexed && !(has_mask && *file == mask))
+    };
+    let files = layers.into_iter().flat_map(of);
+    files.chain(outputs.exr.then(|| "layers.exr".to_owned())).collect()
 }
 
 /// Those of them that are wanted.

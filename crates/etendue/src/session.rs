@@ -22,7 +22,7 @@ use serde_json::Value;
 use crate::changes;
 use crate::neighbours::{self, Neighbour};
 use crate::progress::Phase;
-use crate::rendering::file_names;
+use crate::rendering::{certain_files, file_names};
 use crate::structures::Structures;
 use crate::words::{NOT_FOLLOWED, changed, fingerprints, header, in_words, not_finite};
 use crate::{Error, FramePattern, Options, Progress, Rendering, Shares, places};
@@ -310,9 +310,12 @@ impl Session {
         progress: &Progress,
     ) -> Result<bool, Error> {
         self.load(progress)?;
-        let Loaded { scene, neighbours, .. } = self.loaded()?;
+        let outputs = self.options.outputs;
+        let Loaded { scene, plan, neighbours, .. } = self.loaded()?;
         let prints = fingerprints(scene, neighbours)?;
-        Ok(pattern.is_complete(out, number, &prints, scene.sensor.is_some()))
+        let mut files = certain_files(plan.names(scene), outputs);
+        files.extend(scene.sensor.as_ref().map(|_| "sensor.json".to_owned()));
+        Ok(pattern.is_complete(out, number, &prints, &files))
     }
 
     /// The loaded scene: read now when it is not, or has changed.
@@ -609,6 +612,10 @@ impl Session {
         let Loaded { scene, plan, accel, neighbours, .. } = loaded;
         let structures = &mut self.structures;
         let mut is_new = false;
+        // What is free now was judged when the structure was built; a limit holds for every picture.
+        if self.options.memory_limit.is_some() {
+            fits(scene, plan, self.options.memory_limit)?;
+        }
         let others = neighbours.iter_mut().map(|other| (&other.scene, &mut other.accel));
         for (scene, accel) in std::iter::once((&*scene, accel)).chain(others) {
             if accel.is_none() {

@@ -1,6 +1,8 @@
 //! Another frame of a scene, as layers see it that compare two frames: its camera, its geometry, and the
 //! structure that says what hides what.
 
+use std::collections::HashMap;
+
 use etendue_accel::Accel;
 use etendue_camera::Camera;
 use etendue_geometry::glam::DVec3;
@@ -19,8 +21,8 @@ pub struct FollowedFrame<'a> {
     camera: &'a Camera,
     geometry: &'a Geometry,
     accel: &'a dyn Accel,
-    /// What became of each placement of this frame; `None` when all stand still.
-    motions: Option<Vec<Motion>>,
+    /// What became of each placement of this frame, and its number there; `None` when all stand still.
+    motions: Option<Vec<(Motion, u32)>>,
 }
 
 /// What became of a placement on the way to the other frame.
@@ -38,8 +40,13 @@ impl<'a> FollowedFrame<'a> {
     pub fn new(step: FrameStep, scene: &Scene, other: &'a Scene, accel: &'a dyn Accel) -> Self {
         let (from, geometry) = (&*scene.geometry, &*other.geometry);
         let motions = (!from.has_surfaces_of(geometry)).then(|| {
-            let of = |(i, placement)| motion(from, placement, geometry, i);
-            from.placements.iter().enumerate().map(of).collect()
+            let there: HashMap<Name, u32> =
+                (0..).zip(names(geometry)).map(|(i, n)| (n, i)).collect();
+            let of = |(name, placement)| match there.get(&name) {
+                Some(&number) => (motion(from, placement, geometry, number), number),
+                None => (Motion::Gone, MISS),
+            };
+            names(from).into_iter().zip(&from.placements).map(of).collect()
         });
         Self { step, camera: &other.camera, geometry, accel, motions }
     }
@@ -47,7 +54,12 @@ impl<'a> FollowedFrame<'a> {
     /// Whether there is something that cannot be followed, because its mesh is another one there.
     #[must_use]
     pub fn loses_some(&self) -> bool {
-        self.motions.as_ref().is_some_and(|motions| motions.contains(&Motion::Gone))
+        self.motions.as_ref().is_some_and(|motions| motions.iter().any(|one| one.0 == Motion::Gone))
+    }
+
+    /// What becomes of a placement of this frame, and its number in the other one.
+    fn motion(&self, number: u32) -> (Motion, u32) {
+        self.motions.as_ref().map_or((Motion::Still, number), |motions| motions[number as usize])
     }
 
     /// From the other camera to the point of hit `i` (m).
@@ -57,7 +69,8 @@ impl<'a> FollowedFrame<'a> {
         if number == MISS {
             return None;
         }
-        match self.motions.as_ref().map_or(Motion::Still, |motions| motions[number as usize]) {
+        let (motion, number) = self.motion(number);
+        match motion {
             Motion::Still => {
                 // Far from the world's origin the difference of the two cameras is what counts.
                 let along = traced.rays.direction(i) * traced.hits.t[i];
@@ -82,12 +95,40 @@ impl<'a> FollowedFrame<'a> {
     }
 }
 
-fn motion(from: &Geometry, placement: &Placement, to: &Geometry, number: usize) -> Motion {
-    let Some(there) = to.placements.get(number) else { return Motion::Gone };
+/// What a placement is called whatever else is in the scene: its object, and which copy of it, which node
+/// of that and which mesh of that it is.
+type Name = [u32; 4];
+
+/// The names of all placements. Copies and nodes are counted through all objects, so their numbers depend
+/// on those before.
+fn names(geometry: &Geometry) -> Vec<Name> {
+    let mut names: Vec<Name> = Vec::with_capacity(geometry.placements.len());
+    let before = std::iter::once(None).chain(geometry.placements.iter().map(Some));
+    for (placement, before) in geometry.placements.iter().zip(before) {
+        let name = match (before, names.last()) {
+            (Some(before), Some(&[object, copy, node, mesh]))
+                if before.object == placement.object =>
+            {
+                if before.instance != placement.instance {
+                    [object, copy + 1, 0, 0]
+                } else if before.node != placement.node {
+                    [object, copy, node + 1, 0]
+                } else {
+                    [object, copy, node, mesh + 1]
+                }
+            }
+            _ => [placement.object, 0, 0, 0],
+        };
+        names.push(name);
+    }
+    names
+}
+
+fn motion(from: &Geometry, placement: &Placement, to: &Geometry, number: u32) -> Motion {
+    let there = &to.placements[number as usize];
     let (mesh, mesh_there) = (from.mesh_of(placement), to.mesh_of(there));
-    let name = |p: &Placement| (p.object, p.instance, p.node);
     let is_same_mesh = mesh.has_surface_of(mesh_there);
-    if name(placement) != name(there) || mesh.triangles.len() != mesh_there.triangles.len() {
+    if mesh.triangles.len() != mesh_there.triangles.len() {
         return Motion::Gone;
     }
     // A mesh of the same triangles with its corners elsewhere was bent.
@@ -130,7 +171,8 @@ impl OtherFrame for FollowedFrame<'_> {
             let Some(offset) = self.offset(seen, i) else { continue };
             let start = rays.origin(ray) - self.camera.pose().position;
             let distance = (offset - start).dot(rays.direction(ray));
-            let own = (seen.traced.hits.placement[i], seen.traced.hits.triangle[i]);
+            let (_, number) = self.motion(seen.traced.hits.placement[i]);
+            let own = (number, seen.traced.hits.triangle[i]);
             let is_itself = (hits.placement[ray], hits.triangle[ray]) == own;
             if !is_itself && hits.t[ray] < distance * (1.0 - SAME_DEPTH) {
                 sights[i] = Sight::Hidden;

@@ -180,7 +180,10 @@ fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<(), String>
     match missing.as_slice() {
         [] => Ok(()),
         missing => {
-            let (lack, have) = (missing.join(", "), found.len());
+            let have = found.len();
+            let left = count as usize - have - missing.len();
+            let more = if left > 0 { format!(" and {left} more") } else { String::new() };
+            let lack = missing.join(", ") + &more;
             Err(format!("{have} of {count} shares are here; missing: {lack}; render them first"))
         }
     }

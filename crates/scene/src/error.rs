@@ -172,7 +172,7 @@ fn invalid(file: &Path, path: &str, place: &Origin, reason: &str) -> String {
         Origin::Text(place) => {
             format!("{}, line {}, column {}", file.display(), place.line, place.column)
         }
-        Origin::Setting(setting) => format!("--set {setting}"),
+        Origin::Setting(setting) => setting.clone(),
         Origin::Nowhere => file.display().to_string(),
     };
     if path.is_empty() { format!("{file}: {reason}") } else { format!("{file}: {path}: {reason}") }

@@ -54,6 +54,34 @@ fn disparity_is_focal_length_times_baseline_over_depth() {
     assert!(!bench.path("out/frames/000000/disparity_back.npy").exists());
 }
 
+/// Numbers of copies run through all objects: what stands still is followed whatever became of others.
+#[test]
+fn a_copy_that_goes_takes_nothing_else_along() {
+    let copies = |xs: &[f64]| -> Vec<Value> {
+        xs.iter().map(|x| json!({"translate": [x, 0, -2]})).collect()
+    };
+    let mut objects = wall_and_square();
+    objects[0] = json!({"shape": "rectangle", "width": 0.2, "height": 0.2,
+                        "instances": copies(&[-0.5, 0.5])});
+    let frames = json!([{}, {"objects[0].instances": copies(&[-0.5])}]);
+    let bench = rendered(&objects, &frames, &json!(["ids", "flow"]));
+    let object = bench.array("frames/000000/id_object");
+    let instance = bench.array("frames/000000/id_instance");
+    let flow = bench.array("frames/000000/flow");
+    let first =
+        instance.iter().copied().filter(|number| *number > 0.0).fold(f64::INFINITY, f64::min);
+    for (i, flow) in flow.chunks(2).enumerate() {
+        let is_gone = object[i] == 1.0 && instance[i] != first;
+        let expected = if is_gone { f64::INFINITY } else { 0.0 };
+        // The roundings of pixel coordinates up to 40.
+        assert!(
+            flow.iter().all(|v| *v == expected || (v - expected).abs() < 1e-12),
+            "{i}: {flow:?}"
+        );
+    }
+    assert!((0..object.len()).any(|i| object[i] == 1.0 && instance[i] != first), "one copy goes");
+}
+
 #[test]
 fn flow_follows_an_object_that_moves_and_says_what_it_hides() {
     let frames = json!([{}, {"objects[0].transform.translate": [0.1, -0.05, -1.9]}]);

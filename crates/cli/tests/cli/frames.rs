@@ -82,6 +82,58 @@ fn the_index_lists_no_file_that_was_not_written() {
     assert!(layers["Id.instance"].get("png").is_some(), "{layers:?}");
 }
 
+/// Frames are told to be too many before any is made.
+#[test]
+fn too_many_frames_are_refused_at_once() {
+    for frames in [
+        json!({"type": "grid", "columns": 100_000, "rows": 100_000, "spacing": 0.1}),
+        json!({"type": "orbit", "count": 4_000_000_000_u32}),
+    ] {
+        let err = refused(&frames, &[], &[]);
+        assert!(err.contains("frames; 100000 are the most"), "{err}");
+    }
+}
+
+#[test]
+fn a_value_that_is_wrong_in_one_frame_is_told_with_its_place() {
+    let bench = Bench::with_scene(&scene(&json!([{}, {"camera.fov": 300}])));
+    let output = bench.run(&["render", "scene.json", "-o", "out", "-q"]);
+    let err = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{err}");
+    assert!(err.contains("frames[1]: camera.fov=300") && !err.contains("--set"), "{err}");
+    assert!(!bench.path("out/frames/000001").exists(), "no empty folder is left");
+}
+
+#[test]
+fn a_limit_of_memory_holds_for_every_frame() {
+    let large = json!([{}, {"camera.sensor.resolution": [4000, 4000]}]);
+    let bench = Bench::with_scene(&scene(&large));
+    let output = bench.run(&["render", "scene.json", "-o", "out", "-q", "--memory-limit", "64M"]);
+    let err = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{err}");
+    assert!(err.contains("4000 x 4000") && err.contains("--memory-limit allows 64"), "{err}");
+    assert!(bench.path("out/frames/000000/depth.npy").exists());
+}
+
+#[test]
+fn resumed_frames_have_what_is_asked_for_and_parts_of_a_set_are_one() {
+    let bench = Bench::with_scene(&scene(&json!({"type": "orbit", "count": 4})));
+    bench.render(&["--outputs", "npy", "--frames", "2..4"]);
+    bench.render(&["--outputs", "npy", "--frames", "0..2"]);
+    let count = |bench: &Bench| bench.json("out/index.json")["frames"].as_array().map(Vec::len);
+    assert_eq!(count(&bench), Some(4), "those of the other run, too");
+    assert_eq!(bench.json("out/index.json")["frames"][3]["frame"], 3);
+    assert!(!bench.path("out/frames/000001/layers.exr").exists());
+    bench.render(&["--outputs", "npy,exr", "--resume"]);
+    assert!(bench.path("out/frames/000001/layers.exr").exists());
+    // As large as it was, and not what it was.
+    let damaged = bench.path("out/frames/000002/depth.npy");
+    let whole = std::fs::read(&damaged).unwrap();
+    std::fs::write(&damaged, vec![0; whole.len()]).unwrap();
+    bench.render(&["--outputs", "npy,exr", "--resume"]);
+    assert_eq!(std::fs::read(&damaged).unwrap(), whole);
+}
+
 #[test]
 fn points_of_one_frame_are_where_the_next_one_sees_them() {
     let orbit = json!({"type": "orbit", "count": 12, "center": [0, 0, 0]});

@@ -150,7 +150,7 @@ fn is_nerfstudios(bench: &Bench, frames: &[Value]) {
         "p2",
     ]
     .into();
-    assert_eq!(file.as_object().unwrap().keys().collect::<Vec<_>>(), ["frames"]);
+    assert_eq!(file.as_object().unwrap().keys().collect::<Vec<_>>(), ["camera_model", "frames"]);
     let listed = file["frames"].as_array().unwrap();
     assert_eq!(listed.len(), frames.len());
     for (frame, ours) in listed.iter().zip(frames) {

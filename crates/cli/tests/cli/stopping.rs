@@ -43,10 +43,15 @@ impl Running {
 
     /// Waits for a file. The limit is there for a test that would hang.
     fn wait_for(&mut self, file: &Path) {
+        self.wait_until(&file.display().to_string(), || file.exists());
+    }
+
+    /// Waits for something else.
+    fn wait_until(&mut self, what: &str, is_so: impl Fn() -> bool) {
         let start = Instant::now();
-        while !file.exists() {
-            assert!(self.0.try_wait().expect("a child").is_none(), "ended before {file:?}");
-            assert!(start.elapsed() < Duration::from_secs(300), "no {file:?}");
+        while !is_so() {
+            assert!(self.0.try_wait().expect("a child").is_none(), "ended before {what}");
+            assert!(start.elapsed() < Duration::from_secs(300), "no {what}");
             std::thread::sleep(Duration::from_millis(5));
         }
     }
@@ -127,6 +132,49 @@ fn a_stopped_picture_does_not_replace_a_complete_one() {
     // The next complete one ends its stay.
     bench.render(&["--samples", "4"]);
     assert!(!bench.path("out/partial").exists());
+}
+
+#[test]
+fn what_a_stopped_render_goes_on_from_is_left_alone_by_others() {
+    let bench = Bench::with_scene(ENDLESS);
+    let arguments = [&RENDER[..], &["--checkpoint", "0.001"]].concat();
+    let mut running = Running::start(&bench, &arguments);
+    running.wait_for(&bench.path("out/checkpoint.film"));
+    running.signal("INT");
+    let (status, _, err) = running.end();
+    assert_eq!(status.code(), Some(1), "{err}");
+    bench.render(&["--samples", "4"]);
+    assert!(bench.path("out/checkpoint.film").exists());
+}
+
+/// Views by an ideal lens are rendered while files are written.
+const VIEWS: &str = r#"{"etendue": 1, "tracer": {"type": "facing"}, "render": {"samples": 256},
+    "objects": [{"shape": "sphere", "radius": 0.03}],
+    "camera": {"type": "light_field", "focal_length": 20, "f_number": 4, "focus_distance": 0.5,
+        "microlenses": {"pitch": 0.1}, "pose": {"from": [0, 0, 0.5], "look_at": [0, 0, 0]},
+        "sensor": {"resolution": [240, 180], "pixel_pitch": 8}}}"#;
+
+#[test]
+fn a_set_that_is_stopped_while_it_is_written_leaves_the_one_before_whole() {
+    let bench = Bench::with_scene(VIEWS);
+    bench.render(&["--samples", "1"]);
+    let names = ["picture.npy", "white.npy", "views.npy", "reference.npy", "layers.json"];
+    let contents = || names.map(|name| std::fs::read(bench.path("out").join(name)).expect(name));
+    let before = contents();
+    let mut running = Running::start(&bench, &[&RENDER[..], &["--seed", "5"]].concat());
+    let is_begun = || {
+        let files = std::fs::read_dir(bench.path("out")).expect("a folder");
+        let names = files.map(|entry| entry.expect("an entry").file_name());
+        names.into_iter().any(|name| name.to_string_lossy().starts_with(".picture.npy."))
+    };
+    running.wait_until("the picture's part file", is_begun);
+    running.signal("INT");
+    let (status, out, err) = running.end();
+    assert_eq!((status.code(), out.as_str()), (Some(1), ""), "{err}");
+    assert!(contents() == before, "of one render");
+    let left = std::fs::read_dir(bench.path("out")).expect("a folder").map(|e| e.expect("one"));
+    let left = left.filter(|entry| entry.file_name().to_string_lossy().ends_with(".part")).count();
+    assert_eq!(left, 0);
 }
 
 #[test]

@@ -96,7 +96,7 @@ impl Lattice {
         let (u, v) = (c * x + s * y, c * y - s * x);
         let half = self.pitch * (0.5 - 1e-9);
         match grid {
-            Grid::Square => (u.abs() <= half) & (v.abs() <= half),
+            Grid::Square => u.abs().max(v.abs()) <= half,
             // Two edges across the rows, and four at 60° to them.
             Grid::Hexagonal => (u.abs() <= half) & (0.5 * u.abs() + 0.5 * ROOT3 * v.abs() <= half),
         }

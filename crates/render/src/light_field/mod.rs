@@ -29,8 +29,8 @@ use etendue_tracer::LayerSpec;
 
 use crate::expose::SPECTRUM;
 use crate::output::{
-    Channel, Layer, Ledger, Look, OutputError, Outputs, Picture, PictureError, Values, exr, npy,
-    pfm, png, prepare_folder, sidecar,
+    Channel, Layer, Look, OutputError, Outputs, Picture, PictureError, Values, exr, npy, pfm, png,
+    prepare_folder, sidecar,
 };
 use crate::{Images, Plan, RenderError, render};
 
@@ -61,6 +61,8 @@ impl From<PictureError> for LightFieldError {
 pub struct LightFieldSet {
     /// The files, in the order they were written.
     pub files: Vec<PathBuf>,
+    /// The folders that hold some of them, each with a manifest of its own.
+    pub folders: Vec<PathBuf>,
     /// What a user should know.
     pub notes: Vec<String>,
 }
@@ -293,7 +295,7 @@ impl Writer<'_> {
         })
     }
 
-    /// Fills a folder in the folder; files of an earlier run that are not written again go.
+    /// Fills a folder in the folder.
     fn below(
         &mut self,
         name: &str,
@@ -301,12 +303,8 @@ impl Writer<'_> {
     ) -> Result<(), LightFieldError> {
         let folder = self.folder.join(name);
         prepare_folder(&folder)?;
-        let mut ledger = Ledger::open(&folder, "render");
-        let filled = fill(self, &folder);
-        let recorded = ledger.record();
-        filled?;
-        recorded?;
-        ledger.clear()?;
+        fill(self, &folder)?;
+        self.written.folders.push(folder);
         Ok(())
     }
 }

@@ -77,6 +77,26 @@ impl Ledger {
         Self { folder: folder.to_owned(), command, others, old, new: BTreeMap::new() }
     }
 
+    /// Where the files are.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Whether all files that the command wrote are as it wrote them.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        let is_there = |(name, print): (&String, &Print)| {
+            Print::of(&self.folder.join(name)).is_ok_and(|found| found == *print)
+        };
+        self.old.iter().all(is_there)
+    }
+
+    /// The names of the files that the command wrote.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.old.keys().map(String::as_str)
+    }
+
     /// Notes the files that this process finished in the folder since it was last asked.
     ///
     /// # Errors
@@ -85,7 +105,8 @@ impl Ledger {
     pub fn record(&mut self) -> Result<(), OutputError> {
         for path in take_finished(&self.folder) {
             let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
-            if name == MANIFEST {
+            // What a render goes on from is no result of it.
+            if name == MANIFEST || name.ends_with(".film") {
                 continue;
             }
             // Gone again already, or no regular file: nothing to remove later.

@@ -51,8 +51,8 @@ mod picture;
 mod screen;
 
 pub use atomic::{
-    PartFile, Temporary, note_finished, open_parts, prepare_folder, remove_open_parts, write_over,
-    write_whole,
+    PartFile, Temporary, Together, note_finished, open_parts, prepare_folder, remove_open_parts,
+    write_over, write_whole,
 };
 pub use develop::Development;
 pub(crate) use develop::luminance;

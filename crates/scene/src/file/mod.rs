@@ -74,6 +74,8 @@ struct Written {
     document: Option<Document>,
     /// Which paths the command line set, and how it was written there.
     settings: BTreeMap<String, String>,
+    /// Of which frame they are; none for the command line's.
+    frame: Option<usize>,
 }
 
 /// What kind of file stands for the scene.
@@ -171,6 +173,12 @@ impl SceneFile {
         Self::of(self.written.clone(), self.kind, value, &[])
     }
 
+    /// The same, whose further settings are those of a frame.
+    pub(crate) fn of_frame(mut self, number: usize) -> Self {
+        self.written.frame = Some(number);
+        self
+    }
+
     /// Whether the scene stands in no file.
     #[must_use]
     pub fn is_in_memory(&self) -> bool {
@@ -225,7 +233,7 @@ impl SceneFile {
 
 impl Written {
     fn new(path: &Path, document: Option<Document>) -> Self {
-        Self { path: path.to_owned(), document, settings: BTreeMap::new() }
+        Self { path: path.to_owned(), document, settings: BTreeMap::new(), frame: None }
     }
 
     /// Applies settings of the command line to the file's values, the later the stronger.
@@ -258,7 +266,10 @@ impl Written {
         let setting = holders().find_map(|path| self.settings.get(path));
         let place = holders().find_map(|path| self.document.as_ref()?.place(path));
         match (setting, place) {
-            (Some(setting), _) => Origin::Setting(setting.clone()),
+            (Some(setting), _) => Origin::Setting(match self.frame {
+                Some(number) => format!("frames[{number}]: {setting}"),
+                None => format!("--set {setting}"),
+            }),
             (None, Some(place)) => Origin::Text(place),
             (None, None) => Origin::Nowhere,
         }
@@ -270,7 +281,7 @@ impl Written {
 pub enum Origin {
     /// In the file's text.
     Text(Place),
-    /// On the command line, as it was written there.
+    /// On the command line, or in one of the frames: where, and as it was written there.
     Setting(String),
     /// Nowhere: it is missing, or the file is a model.
     Nowhere,

@@ -22,8 +22,8 @@ use crate::{Reach, SceneError, npy};
 /// The longest trajectory that is read (bytes).
 const LONGEST: u64 = 1 << 30;
 
-/// The most frames of a scene.
-const MOST_FRAMES: usize = 10_000_000;
+/// The most frames of a scene. All are made before the first is shown, of a few kilobytes each.
+const MOST_FRAMES: usize = 100_000;
 
 /// One picture of a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,8 +88,7 @@ impl SceneFile {
             FramesSpec::Path(path) => self.along(path, reach, start)?,
         };
         if frames.len() > MOST_FRAMES {
-            let why = format!("{} frames; {MOST_FRAMES} are the most", frames.len());
-            return Err(self.fault("frames", why));
+            return Err(self.fault("frames", too_many(frames.len())));
         }
         if frames.is_empty() {
             return Err(
@@ -115,7 +114,7 @@ impl SceneFile {
             let why = error.to_string();
             self.fault(&join_index("frames", frame.number), why)
         };
-        self.without_frames()?.with(&settings).map_err(in_frame)
+        self.without_frames()?.of_frame(frame.number).with(&settings).map_err(in_frame)
     }
 
     fn along(
@@ -156,6 +155,9 @@ impl SceneFile {
                 path::made(path, &start()?).map_err(fault)?
             }
         };
+        if stations.len() > MOST_FRAMES {
+            return Err(self.fault("frames", too_many(stations.len())));
+        }
         let mut frames = Vec::with_capacity(stations.len());
         for (number, station) in stations.into_iter().enumerate() {
             // Told here, by its number, and not when it is that frame's turn.
@@ -174,6 +176,10 @@ impl SceneFile {
         }
         Ok(frames)
     }
+}
+
+fn too_many(count: usize) -> String {
+    format!("{count} frames; {MOST_FRAMES} are the most")
 }
 
 /// Reads a trajectory; the error goes on after the file's name.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use etendue_camera::{Convention, Maps, Pose, PoseSpec};
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 
-use super::{Start, Station};
+use super::{MOST_FRAMES, Start, Station, too_many};
 use crate::file::CameraPath;
 
 /// The stations of a path; the error has the key that is wrong.
@@ -50,6 +50,10 @@ pub(super) fn made(
         }
         CameraPath::Grid { columns, rows, spacing } => {
             let (columns, rows) = (some("columns", *columns)?, some("rows", *rows)?);
+            let count = columns as usize * rows as usize;
+            if count > MOST_FRAMES {
+                return Err(("columns", too_many(count)));
+            }
             let offset = |i: u32, of: u32| (f64::from(i) - 0.5 * f64::from(of - 1)) * spacing.0;
             let right = |column: u32| start.pose.right() * offset(column, columns);
             let down = |row: u32| -start.pose.up() * offset(row, rows);
@@ -71,6 +75,7 @@ pub(super) fn made(
 fn some(key: &'static str, count: u32) -> Result<u32, (&'static str, String)> {
     match count {
         0 => Err((key, "at least one frame is needed".to_owned())),
+        count if count as usize > MOST_FRAMES => Err((key, too_many(count as usize))),
         count => Ok(count),
     }
 }
