@@ -29,7 +29,8 @@ EMBREE_DIR=/nonexistent cargo clippy -p etendue-accel -p etendue -p etendue-cli 
 
 step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
-cargo test --workspace --doc
+# With the features of the tests below, so that dependencies are built once.
+cargo test --workspace --features etendue-cli/window --doc
 
 if cargo deny --version >/dev/null 2>&1; then
     step "licences, sources and advisories of dependencies"

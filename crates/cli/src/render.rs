@@ -120,7 +120,9 @@ pub(crate) fn write(
         say(&format!("note: {partial}"));
     }
     let folder = &rendering.place_in(&arguments.output);
-    places::folder(folder)?;
+    if *folder != arguments.output {
+        places::folder(folder)?;
+    }
     let written = rendering.write_with(folder, outputs, &progress)?;
     drop(progress);
     let mut report = rendering.report_of(&written);
