@@ -11,6 +11,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 PATH=$PATH:/usr/sbin:/sbin
 binaries=$PWD/target/debug
+[ -z "${ETENDUE:-}" ] || binaries=$(dirname "$(realpath "$ETENDUE")")
 
 # Without CI, not being able to is no failure, but is said.
 skip() {
@@ -27,7 +28,8 @@ if [ ${#missing[@]} -gt 0 ]; then
     echo "missing: ${missing[*]} (to run a Slurm of one node)"
     install_packages "${missing[@]}" || skip "it could not be installed."
 fi
-cargo build -p etendue-cli
+# ETENDUE names a command that is built already, as the workspace's tests leave one.
+[ -n "${ETENDUE:-}" ] || cargo build -p etendue-cli
 
 pids=()
 finish() {

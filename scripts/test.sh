@@ -52,12 +52,16 @@ scripts/test-embree4.sh
 step "Python package"
 PROFILE=dev scripts/python.sh
 
+# The command that the tests of the workspace leave serves all that follows.
+step "building the tests"
+run_tests --workspace --features etendue-cli/window --no-run
+export ETENDUE=target/debug/etendue
+
 step "jobs on Slurm"
 scripts/test-slurm.sh
 
+step "window"
+scripts/test-window.sh
+
 step "tests"
 run_tests --workspace --features etendue-cli/window
-
-# The command that the tests of the workspace have built.
-step "window"
-ETENDUE=target/debug/etendue scripts/test-window.sh
