@@ -346,7 +346,7 @@ pub(crate) struct RenderArguments {
 }
 
 #[derive(Debug, Args)]
-#[cfg_attr(not(feature = "window"), expect(dead_code, reason = "read by the window alone"))]
+#[cfg_attr(not(feature = "window"), allow(dead_code, reason = "read by the window alone"))]
 pub(crate) struct ViewArguments {
     /// A scene (.json), or a model (.gltf, .glb, .obj, .ply); a file can be dropped on the window, too
     #[arg(value_name = "SCENE|MODEL")]

@@ -311,6 +311,11 @@ fn image_and_array(layer: &str) -> [String; 2] {
     [image, format!("{stem}.npy")]
 }
 
+/// Whether a layer's numbers are identities, which a mask may hold.
+fn has_mask(layer: &str) -> bool {
+    layer.starts_with("Id.") || layer == "MaterialId"
+}
+
 /// The file of a layer's numbers, where they are identities.
 fn mask_of(layer: &str) -> String {
     format!("{}.png", stem(layer))
@@ -330,7 +335,7 @@ pub(crate) fn certain_files(
     let of = |layer: String| {
         let indexed = in_manner(&layer, Manner::Indexed);
         let mask = mask_of(&layer);
-        let has_mask = layer.starts_with("Id.") || layer == "MaterialId";
+        let has_mask = has_mask(&layer);
         layer_files(&layer, outputs)
             .into_iter()
             .filter(move |file| *file != indexed && !(has_mask && *file == mask))
@@ -342,9 +347,8 @@ pub(crate) fn certain_files(
 /// Those of them that are wanted.
 pub(crate) fn layer_files(layer: &str, outputs: Outputs) -> Vec<String> {
     let [image, array] = image_and_array(layer);
-    let has_mask = layer.starts_with("Id.") || layer == "MaterialId";
-    let files =
-        [(outputs.png, image), (outputs.npy, array), (outputs.png && has_mask, mask_of(layer))];
+    let mask = (outputs.png && has_mask(layer), mask_of(layer));
+    let files = [(outputs.png, image), (outputs.npy, array), mask];
     let files = files.into_iter().filter_map(|(wanted, name)| wanted.then_some(name));
     files.chain(Manner::of(layer, outputs).map(|manner| in_manner(layer, manner))).collect()
 }

@@ -11,11 +11,11 @@ use crate::adaptive::variance_of_mean;
 /// The sensor's noise at each pixel of a picture.
 pub(crate) struct NoiseOfPixels {
     sensor: Sensor,
-    shots: Vec<Shot>,
+    exposures: Vec<ExposureResponse>,
 }
 
-/// One of the sensor's exposure times.
-struct Shot {
+/// What the sensor makes of light in one of its exposure times.
+struct ExposureResponse {
     /// Seconds.
     exposure: f64,
     /// Mean photo-electrons that a unit of each number of the picture makes, by channel (e⁻).
@@ -37,7 +37,7 @@ impl NoiseOfPixels {
         let factor = light_factor(scene, &sensor);
         let mut exposures: Vec<f64> = sensor.shots().map(|shot| shot.exposure).collect();
         exposures.dedup();
-        let shot = |exposure: f64| {
+        let response = |exposure: f64| {
             let floor = sensor.noise_floor(exposure)?;
             let electrons = (0..sensor.channels().len()).map(|channel| {
                 let units: Vec<f64> =
@@ -49,25 +49,25 @@ impl NoiseOfPixels {
                         .collect(),
                 }
             });
-            Some(Shot { exposure, electrons: electrons.collect() })
+            Some(ExposureResponse { exposure, electrons: electrons.collect() })
         };
-        let shots: Vec<Shot> = exposures.into_iter().map(shot).collect::<Option<_>>()?;
-        Some(Self { sensor, shots })
+        let exposures = exposures.into_iter().map(response).collect::<Option<_>>()?;
+        Some(Self { sensor, exposures })
     }
 
     /// The variance of the mean of a pixel's samples, carried through exposure, quantum efficiency and
     /// gain, as a share of the sensor's own at that signal: the largest over exposures, the mean over
     /// channels. `light` is what each of two of the four independent sets of samples has of each band.
     pub(crate) fn share(&self, pixel: [u32; 2], light: impl Fn(usize, usize) -> f64) -> f64 {
-        let shares = self.shots.iter().filter_map(|shot| {
-            let floor = self.sensor.noise_floor(shot.exposure)?;
+        let shares = self.exposures.iter().filter_map(|response| {
+            let floor = self.sensor.noise_floor(response.exposure)?;
             Some(match self.sensor.depth() {
                 1 => {
                     let [column, row] = pixel.map(|place| place as usize);
-                    shot.share(floor, self.sensor.channel_at(row, column), &light)
+                    response.share(floor, self.sensor.channel_at(row, column), &light)
                 }
                 channels => {
-                    let each = (0..channels).map(|channel| shot.share(floor, channel, &light));
+                    let each = (0..channels).map(|channel| response.share(floor, channel, &light));
                     each.sum::<f64>() / channels as f64
                 }
             })
@@ -76,7 +76,7 @@ impl NoiseOfPixels {
     }
 }
 
-impl Shot {
+impl ExposureResponse {
     /// The share at one channel.
     fn share(
         &self,

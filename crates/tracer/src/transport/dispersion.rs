@@ -20,7 +20,7 @@ const MOST_PARTS: usize = 32;
 
 /// A boundary as one band meets it.
 #[derive(Debug, Clone, Copy)]
-struct Passage {
+struct TransmittedBand {
     band: usize,
     wavelength: f64,
     /// Index behind the surface over the index in front.
@@ -76,13 +76,13 @@ impl Tracing<'_> {
         boundary: &Boundary<'_>,
         scratch: &Scratch,
         [_, place]: [f64; 2],
-    ) -> Vec<Passage> {
+    ) -> Vec<TransmittedBand> {
         let start = boundary.path.0 * self.count;
         let live = |&band: &usize| scratch.now.throughput[start + band] > 0.0;
         let passage = |band| {
             let wavelength = self.stage.spectral.wavelength_at(band, place);
             let eta = boundary.met.eta(boundary.ior, wavelength);
-            Passage { band, wavelength, eta, reflectance: boundary.bsdf.reflectance(eta) }
+            TransmittedBand { band, wavelength, eta, reflectance: boundary.bsdf.reflectance(eta) }
         };
         (0..self.count).filter(live).map(passage).collect()
     }
