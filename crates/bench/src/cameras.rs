@@ -135,6 +135,15 @@ pub fn models(full: &Camera) -> Result<(Vec<Model>, Vec<String>), BenchError> {
     Ok((models, notes))
 }
 
+/// Pixels of a picture for a slope of 1 near the axis; `None` of a camera without a lens, or with a
+/// telecentric one.
+pub(crate) fn scale(camera: &Camera) -> Option<f64> {
+    match camera.lens()?.focused().view() {
+        View::Perspective(k) => Some(k.focal[0]),
+        View::Parallel { .. } => None,
+    }
+}
+
 /// What is known of a lens near its axis.
 struct Gauss {
     pose: PoseSpec,

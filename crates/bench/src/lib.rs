@@ -16,6 +16,7 @@
 //! | [`pictures`] | a scene's picture at any number of samples |
 //! | [`samplers`] | each sampler × number of samples |
 //! | [`cameras`] | each model of the same lens × number of samples |
+//! | [`tolerance`] | the cheapest model of a lens within a tolerance, by what pixels see |
 //! | [`findings`] | all that was measured on a scene: as text, CSV and charts |
 //! | [`drawing`] | charts as files, SVG and PNG |
 
@@ -29,6 +30,7 @@ pub mod pictures;
 pub mod rays;
 pub mod rounds;
 pub mod samplers;
+pub mod tolerance;
 
 use etendue_accel::BuildError;
 use etendue_render::RenderError;

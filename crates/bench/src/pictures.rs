@@ -14,7 +14,8 @@ use crate::BenchError;
 /// The fewest pixels along a side.
 const LEAST_SIDE: u32 = 16;
 
-/// A scene whose picture is rendered again and again, as red, green and blue before any sensor.
+/// A scene whose picture is rendered again and again, before any sensor: as red, green and blue, or in a
+/// sensor's bands.
 #[derive(Debug)]
 pub struct Studio<'a> {
     scene: Scene,
@@ -50,9 +51,20 @@ impl<'a> Studio<'a> {
     ///
     /// [`BenchError::NoPicture`] when the scene has layers alone.
     pub fn new(scene: &Scene, accel: &'a dyn Accel) -> Result<Self, BenchError> {
+        let mut scene = scene.clone();
+        scene.sensor = None;
+        Self::with_sensor(&scene, accel)
+    }
+
+    /// As [`Self::new`], in the bands that the scene's sensor asks for.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::new`].
+    pub fn with_sensor(scene: &Scene, accel: &'a dyn Accel) -> Result<Self, BenchError> {
         let picture = scene.picture.ok_or(BenchError::NoPicture)?;
         let mut scene = scene.clone();
-        (scene.layers, scene.sensor) = (vec![picture], None);
+        scene.layers = vec![picture];
         let images = Images::decode(&scene, &Plan::new(&scene, OUTPUTS), None)?;
         let camera = opened(&scene.camera)?;
         Ok(Self { scene, camera, accel, images })

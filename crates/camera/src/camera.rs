@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::framing::Subject;
-use crate::lens::focused::View;
+use crate::lens::{self, focused::View};
 use crate::{
     BandGroup, CameraError, CameraRays, ChromaticRealLensCameraSpec, Distortion, DistortionSpec,
     FilmSamples, Intrinsics, LensCamera, LensCameraSpec, LightField, LightFieldSpec, Orthographic,
@@ -17,6 +17,7 @@ use crate::{
 };
 use etendue_geometry::units::{Degrees, Metres, Micrometres};
 use etendue_optics::element::Resolve;
+use etendue_optics::train::{Focus, OpticalTrain};
 
 /// Rows of the picture of a camera that comes without a resolution.
 const DEFAULT_ROWS: u32 = 1024;
@@ -247,6 +248,22 @@ fn resolution_of(aspect: f64) -> [u32; 2] {
 }
 
 impl Camera {
+    /// A lens by itself as a camera at the world's origin: focused, with a sensor whose pixels have a
+    /// [pitch](SensorSpec::pixel_pitch).
+    ///
+    /// # Errors
+    ///
+    /// When the two make no camera: the error names the key that a scene would have.
+    pub fn of_lens(
+        train: &OpticalTrain,
+        focus: Focus,
+        sensor: SensorSpec,
+    ) -> Result<Self, CameraError> {
+        sensor.check()?;
+        let (pose, lens) = lens::alone(train, focus, &sensor)?;
+        Ok(Self { pose, sensor, projection: Projection::Lens(Arc::new(lens)), light_field: None })
+    }
+
     /// Columns and rows of the picture.
     #[must_use]
     pub fn resolution(&self) -> [u32; 2] {

@@ -17,6 +17,7 @@ pub mod framing;
 pub mod intrinsics;
 pub mod lens;
 pub mod light_field;
+pub mod opencv_fit;
 pub mod orthographic;
 pub mod pinhole;
 mod place;
@@ -37,6 +38,7 @@ pub use lens::{
     ThinLensCameraSpec,
 };
 pub use light_field::{LightField, LightFieldSpec, ViewGrid};
+pub use opencv_fit::OpencvFit;
 pub use orthographic::{Orthographic, OrthographicSpec};
 pub use pinhole::{Pinhole, PinholeSpec};
 pub use pose::{Convention, Maps, Pose, PoseSpec};

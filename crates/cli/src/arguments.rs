@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use etendue::Shard;
+use etendue_bench::tolerance::Tolerance;
 use etendue_optics::train::Focus;
 use etendue_scene::import::Strictness;
 use etendue_scene::{LoadOptions, Reach};
@@ -43,7 +44,8 @@ pub(crate) enum Command {
                             etendue check model.glb --json")]
     Check(CheckArguments),
     /// Say what a render would do, and why
-    #[command(after_help = "Example:\n  etendue plan scenes/first-light.json")]
+    #[command(after_help = "Example:\n  etendue plan scenes/first-light.json\n  \
+                            etendue plan scenes/double-gauss.json --models --tolerance \"0.5 px,5 %\"")]
     Plan(PlanArguments),
     /// Show what a sensor makes of light, or make the images that EMVA 1288 characterises it by
     #[command(after_help = SENSOR_HELP)]
@@ -157,7 +159,8 @@ Examples:
   etendue lens scenes/lenses/achromat.json --json --fields 0,5,10
   etendue lens scenes/lenses/double-gauss.json --rays rays.json --json
   etendue lens scenes/lenses/double-gauss.json -o out/double-gauss
-  etendue lens bought.zmx --save bought.json";
+  etendue lens bought.zmx --save bought.json
+  etendue lens scenes/double-gauss.json --fit-opencv";
 
 #[derive(Debug, Args)]
 pub(crate) struct LensArguments {
@@ -176,6 +179,19 @@ pub(crate) struct LensArguments {
     /// Write the lens as a lens file, such as an imported one
     #[arg(long, value_name = "FILE")]
     pub(crate) save: Option<PathBuf>,
+    /// Fit OpenCV's camera (K, k1, k2, p1, p2, k3, or its fisheye) to the lens' chief rays, and print it
+    /// with its residuals, where it holds, and as the camera of a scene; with -o, into opencv.json there
+    #[arg(long, conflicts_with = "rays")]
+    pub(crate) fit_opencv: bool,
+    /// What the fit may be off by: "0.5 px", which is the default
+    #[arg(long, value_name = "PIXELS", value_parser = parse::pixels, requires = "fit_opencv")]
+    pub(crate) tolerance: Option<f64>,
+    /// Columns and rows of the picture that is fitted, 1536x1024 when absent
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = parse::resolution, requires = "fit_opencv")]
+    pub(crate) resolution: Option<[u32; 2]>,
+    /// From one pixel to the next, such as "4 um"; as wide as fills the image circle when absent
+    #[arg(long, value_name = "PITCH", value_parser = parse::pitch, requires = "fit_opencv")]
+    pub(crate) pixel_pitch: Option<f64>,
     /// Field angles in degrees; the file's own or shares of the field of view when absent
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) fields: Option<Vec<f64>>,
@@ -449,6 +465,13 @@ pub(crate) struct CheckArguments {
 pub(crate) struct PlanArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
+    /// Compare simpler models of the camera's lens with all of it, by what pixels see of the scene, and
+    /// name the cheapest within the tolerance; times the picture through each
+    #[arg(long)]
+    pub(crate) models: bool,
+    /// What a model may be off by: pixels, and a share of the light when that is to be judged as well
+    #[arg(long, value_name = "PIXELS[,SHARE]", default_value = "0.5 px", value_parser = parse::tolerance)]
+    pub(crate) tolerance: Tolerance,
     /// Print JSON for machines
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,16 +1,21 @@
 //! `etendue check`: the scene doctor.
 
+use std::time::Instant;
+
+use etendue::{Calibration, Prospect, TimeForecast};
 use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan};
 use etendue_scene::Wanted;
 use etendue_scene::doctor::Diagnosis;
 use etendue_scene::file::SceneFile;
+use serde::Serialize;
 
 use crate::arguments::CheckArguments;
 use crate::fault::{Fault, print_json, print_text};
 
 pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
     let options = &arguments.scene;
+    let start = Instant::now();
     let file = SceneFile::read(&options.scene, &options.overrides())?;
     let scene = file.load(Wanted::EVERYTHING, &options.load_options())?;
     if options.strict
@@ -18,7 +23,21 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
     {
         return Err(Fault::refused(fault));
     }
-    let memory = Plan::new(&scene, Outputs::ALL).memory;
-    let diagnosis = Diagnosis { memory, ..Diagnosis::of(&scene, file.kind()) };
-    if arguments.json { print_json(&diagnosis) } else { print_text(&diagnosis.to_string()) }
+    let load = start.elapsed().as_secs_f64();
+    let plan = Plan::new(&scene, Outputs::ALL);
+    let prospect = Prospect { scene: &scene, plan: &plan, outputs: Outputs::ALL, load };
+    let time = TimeForecast::new(&prospect, &Calibration::of_this_machine()?);
+    let diagnosis = Diagnosis { memory: plan.memory, ..Diagnosis::of(&scene, file.kind()) };
+    match arguments.json {
+        true => print_json(&Checked { diagnosis, time }),
+        false => print_text(&format!("{diagnosis}{:<13} {time}", "time")),
+    }
+}
+
+/// A diagnosis, and how long a render will take.
+#[derive(Serialize)]
+struct Checked {
+    #[serde(flatten)]
+    diagnosis: Diagnosis,
+    time: TimeForecast,
 }

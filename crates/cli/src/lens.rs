@@ -13,12 +13,14 @@ use etendue_scene::file::{ReadLens, read_lens, trace_rays};
 
 use crate::arguments::LensArguments;
 use crate::fault::{Fault, print_json, print_json_line, print_text};
+use crate::opencv;
 use crate::progress::say;
 
 pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
     let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
     let mut lens = read_lens(&arguments.lens, reach)?;
-    let drawn = arguments.output.iter().flat_map(|folder| DRAWINGS.map(|name| folder.join(name)));
+    let files: &[&str] = if arguments.fit_opencv { &[opencv::FILE] } else { &DRAWINGS };
+    let drawn = arguments.output.iter().flat_map(|dir| files.iter().map(|name| dir.join(name)));
     let results: Vec<_> = drawn.chain(arguments.save.clone()).collect();
     places::keep_apart(lens.inputs.iter().chain(&arguments.rays), &results)?;
     if let Some(path) = &arguments.save {
@@ -32,6 +34,7 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
     }
     lens.train = adjusted(lens.train, arguments)?;
     match &arguments.rays {
+        _ if arguments.fit_opencv => opencv::fit(&lens, arguments),
         Some(rays) => {
             let traced = trace_rays(&lens.train, rays)?;
             warn(&traced.out_of_range, arguments)?;

@@ -8,6 +8,7 @@ mod fault;
 mod glasses;
 mod lens;
 mod merge;
+mod opencv;
 mod plan;
 mod progress;
 mod render;

@@ -1,16 +1,44 @@
 //! `etendue plan`: what a render would do, and why.
 
-use etendue::{Options, Session};
+use etendue::{Calibration, Options, Session, TimeForecast};
+use etendue_bench::tolerance;
 
 use crate::arguments::PlanArguments;
 use crate::fault::{Fault, print_json, print_text};
 use crate::progress::Phases;
 use crate::render::options;
+use crate::stop;
 
 pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
+    if arguments.models {
+        return compare_models(arguments);
+    }
     let progress = Phases::new(arguments.json).progress(false);
     let options = Options { to_render: false, ..options(&arguments.scene) };
     let mut session = Session::open_with(&arguments.scene.scene, options)?;
-    let plan = session.plan(&progress)?;
+    let mut plan = session.plan(&progress)?.clone();
+    let machine = Calibration::of_this_machine()?;
+    let time = TimeForecast::new(&session.prospect(&progress)?, &machine);
+    plan.decisions.push(time.decision());
     if arguments.json { print_json(&plan.decisions) } else { print_text(&plan.to_string()) }
+}
+
+/// `--models`: what simpler models of the lens miss, and what they cost.
+fn compare_models(arguments: &PlanArguments) -> Result<(), Fault> {
+    stop::listen();
+    let phases = Phases::new(arguments.json);
+    let mut session = Session::open_with(&arguments.scene.scene, options(&arguments.scene))?;
+    let (scene, accel) = session.scene_and_accel(&phases.progress(false))?;
+    let progress = phases.begin("models");
+    let told = |share| progress(share);
+    let compared =
+        tolerance::compare(scene, accel, arguments.tolerance, &told).map_err(|error| {
+            match Fault::from(error) {
+                Fault::Refused(why) => {
+                    Fault::refused(format!("{}: {why}", arguments.scene.scene.display()))
+                }
+                fault => fault,
+            }
+        })?;
+    if arguments.json { print_json(&compared) } else { print_text(&compared.to_string()) }
 }

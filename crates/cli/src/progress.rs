@@ -2,11 +2,12 @@
 
 use std::io::{IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use etendue::Phase;
 use etendue_render::Progress;
 use etendue_scene::escape::printable;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::stop;
 
@@ -18,6 +19,27 @@ static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
 fn shown() -> Option<ProgressBar> {
     SHOWN.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
+/// How long the tracing will take (s), as far as somebody has said.
+static EXPECTED: Mutex<Option<f64>> = Mutex::new(None);
+
+/// The share that is done from which on the work itself tells how long it takes.
+const TELLING: f64 = 0.03;
+
+/// Says how long the tracing that comes will take (s).
+pub(crate) fn expect(seconds: f64) {
+    *EXPECTED.lock().unwrap_or_else(PoisonError::into_inner) = Some(seconds);
+}
+
+/// What remains (s) of work that is done to a `share`, for which `elapsed` (s) were taken and `expected`
+/// foreseen; `None` while nothing is known.
+fn remaining(share: f64, elapsed: f64, expected: Option<f64>) -> Option<f64> {
+    match expected {
+        Some(expected) if share < TELLING => Some((expected - elapsed).max(0.0)),
+        _ if share > 0.0 => Some(elapsed * (1.0 / share - 1.0)),
+        _ => None,
+    }
 }
 
 /// Writes a line to standard error, above the bar when there is one. When nobody reads it, nobody is
@@ -70,7 +92,7 @@ impl Phases {
         let bar = Bar(if self.shown {
             let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
             let style =
-                ProgressStyle::with_template("{prefix:>7} {wide_bar} {percent:>3} %  {eta}");
+                ProgressStyle::with_template("{prefix:>7} {wide_bar} {percent:>3} %  {msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar.set_prefix(name);
             *SHOWN.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.clone());
@@ -78,7 +100,16 @@ impl Phases {
         } else {
             ProgressBar::hidden()
         });
+        let expected = match name == Phase::Render.name() {
+            true => EXPECTED.lock().unwrap_or_else(PoisonError::into_inner).take(),
+            false => None,
+        };
+        let start = Instant::now();
         Arc::new(move |share| {
+            let left = remaining(share, start.elapsed().as_secs_f64(), expected);
+            if let Some(left) = left.and_then(|left| Duration::try_from_secs_f64(left).ok()) {
+                bar.0.set_message(format!("{:#}", HumanDuration(left)));
+            }
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -98,5 +129,19 @@ impl Drop for Bar {
         if !self.0.is_hidden() {
             SHOWN.lock().unwrap_or_else(PoisonError::into_inner).take();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_forecast_holds_until_the_work_tells_for_itself() {
+        assert_eq!(remaining(0.0, 0.0, None), None);
+        assert_eq!(remaining(0.0, 1.0, Some(40.0)), Some(39.0));
+        assert_eq!(remaining(0.01, 60.0, Some(40.0)), Some(0.0));
+        assert_eq!(remaining(0.25, 10.0, Some(400.0)), Some(30.0));
+        assert_eq!(remaining(0.5, 10.0, None), Some(10.0));
     }
 }

@@ -5,13 +5,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use etendue::{Checkpoint, Error, Options, Progress, Rendering, Session, SoFar, places};
+use etendue::{
+    Calibration, Checkpoint, Error, Options, Progress, Rendering, Session, SoFar, TimeForecast,
+    places,
+};
 use etendue_render::output::{Outputs, Temporary, png, sidecar};
 use etendue_render::{RenderError, Report, Seconds};
 
 use crate::arguments::{AccelMode, RenderArguments, SceneArguments};
 use crate::fault::{Fault, print_text};
-use crate::progress::{Phases, say};
+use crate::progress::{Phases, expect, say};
 use crate::{merge, sequence, stop};
 
 pub(crate) fn run(arguments: &RenderArguments) -> Result<(), Fault> {
@@ -78,6 +81,10 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let checkpoint = keep(arguments, &mut session, folder, CHECKPOINT);
     let results = session.check_place(folder, &[SO_FAR, CHECKPOINT], &progress)?;
     keep_report_apart(arguments, &mut session, &results)?;
+    // By what is kept of this machine; a render does not begin with measuring it.
+    if let Some(machine) = Calibration::kept() {
+        expect(TimeForecast::counted(&session.prospect(&progress)?, &machine).trace);
+    }
     let rendering = session.render(&progress)?;
     write(arguments, &rendering, outputs, progress)?;
     checkpoint.map_or(Ok(()), remove)

@@ -52,6 +52,7 @@
 //! | [`Preview`], [`Screen`], [`Viewpoint`], [`Inspector`] | what a window needs: pictures soon, shown, moved about and asked |
 //! | [`Frame`], [`Dataset`] | the pictures of a scene that has `frames`, and what others read of them |
 //! | [`Shard`], [`Shares`], [`Checkpoint`] | renders that are divided over machines, or interrupted |
+//! | [`TimeForecast`], [`Calibration`] | how long a render will take, by what this machine takes for a ray |
 //! | [`Progress`] | how far work is, and how it is stopped |
 //! | [`Error`] | why something could not be done, in a sentence |
 //! | [`places`] | where results go |
@@ -62,6 +63,7 @@
 mod changes;
 mod dataset;
 mod error;
+mod forecast;
 mod frame_files;
 mod inspector;
 mod lens_view;
@@ -87,6 +89,7 @@ pub use etendue_render::output::{
 pub use etendue_render::{Checkpoint, Plan, Report, Shard, SoFar};
 pub use etendue_scene::file::scene_schema;
 pub use etendue_scene::{Frame, Reach, Scene, Strictness};
+pub use forecast::{Calibration, Prospect, TimeForecast};
 pub use frame_files::FramePattern;
 pub use inspector::{Inspector, Probe};
 pub use lens_view::{LensView, lens_values};

@@ -25,7 +25,7 @@ use crate::progress::Phase;
 use crate::rendering::{certain_files, file_names};
 use crate::structures::Structures;
 use crate::words::{NOT_FOLLOWED, changed, fingerprints, header, in_words, not_finite};
-use crate::{Error, FramePattern, Options, Progress, Rendering, Shares, places};
+use crate::{Error, FramePattern, Options, Progress, Prospect, Rendering, Shares, places};
 
 /// A scene that is opened once, changed by [`set`](Self::set) and rendered as often as one likes.
 ///
@@ -316,6 +316,18 @@ impl Session {
         let mut files = certain_files(plan.names(scene), outputs);
         files.extend(scene.sensor.as_ref().map(|_| "sensor.json".to_owned()));
         Ok(pattern.is_complete(out, number, &prints, &files))
+    }
+
+    /// What is known of the next render before it is begun; the scene is read when it is not.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::scene`].
+    pub fn prospect(&mut self, progress: &Progress) -> Result<Prospect<'_>, Error> {
+        self.load(progress)?;
+        let Loaded { scene, plan, .. } = self.loaded()?;
+        let (outputs, load) = (self.options.outputs, self.seconds.load);
+        Ok(Prospect { scene, plan, outputs, load })
     }
 
     /// The loaded scene: read now when it is not, or has changed.

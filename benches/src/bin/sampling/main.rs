@@ -6,6 +6,8 @@
 //! seeds, never from a picture's own samples: per pixel and channel, the half of their squared difference,
 //! carried to digital numbers and divided by the sensor's own variance.
 
+mod models;
+mod plans;
 mod study;
 
 use std::fmt::Write as _;
@@ -99,6 +101,8 @@ fn main() -> anyhow::Result<()> {
     text += "\n![Rays saved against exposure time](images/sampling/saved.svg)\n";
     text += &relative_table(&effort, &names, &studies, &uniform);
     text += &map(&arguments.docs, &studies[0])?;
+    text += &models::table(&arguments.scenes.join("double-gauss.json"))?;
+    text += &plans::table(&arguments.scenes.join("first-light.json"))?;
     text += &planner(&studies[0]);
     let path = arguments.docs.join("sampling.md");
     let page = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;

@@ -13,8 +13,10 @@
 //! | [`lenslets`] | which lenslet a place on the sensor belongs to |
 //! | [`lens_camera`] | chief rays for data, and what is measured for pictures |
 //! | `paths` | rays of a pixel on their way through the lens |
+//! | `alone` | a lens by itself as a camera |
 //! | `rays` | weighted rays of the pupil for pictures |
 
+mod alone;
 pub mod chief;
 pub mod focused;
 mod image_circle;
@@ -25,6 +27,7 @@ mod rays;
 pub mod source;
 pub mod spec;
 
+pub(crate) use alone::alone;
 pub use focused::Focused;
 pub use lens_camera::{BandGroup, LensCamera};
 pub use lenslets::LensletChiefs;

@@ -1,5 +1,7 @@
 //! Values of arguments from their words, or what would have been one.
 
+use etendue_bench::tolerance::Tolerance;
+use etendue_geometry::units::Dimension;
 use etendue_tracer::LayerSpec;
 
 /// More threads than any machine has cores only make a machine unusable.
@@ -104,4 +106,47 @@ pub(super) fn frames(text: &str) -> Result<std::ops::Range<usize>, String> {
         Some(range) if !range.is_empty() => Ok(range),
         _ => Err("expected a range such as 10..20, without the last".to_owned()),
     }
+}
+
+/// `0.5 px`, or a plain number of pixels.
+pub(super) fn pixels(text: &str) -> Result<f64, String> {
+    let number = text.trim().strip_suffix("px").unwrap_or(text).trim();
+    positive(number).ok_or_else(|| "expected pixels above 0, such as \"0.5 px\"".to_owned())
+}
+
+/// `1536x1024`.
+pub(super) fn resolution(text: &str) -> Result<[u32; 2], String> {
+    let sides: Option<Vec<u32>> =
+        text.split(['x', 'X', '×', ',']).map(|side| side.trim().parse().ok()).collect();
+    match sides.as_deref() {
+        Some(&[columns, rows]) => Ok([columns, rows]),
+        _ => Err("expected columns and rows, such as 1536x1024".to_owned()),
+    }
+}
+
+/// `4 um`, or a plain number of micrometres.
+pub(super) fn pitch(text: &str) -> Result<f64, String> {
+    let micrometres = match text.trim().parse() {
+        Ok(number) => number,
+        Err(_) => Dimension::Length.parse(text, "um").map_err(|error| error.to_string())?,
+    };
+    match micrometres > 0.0 && f64::is_finite(micrometres) {
+        true => Ok(micrometres),
+        false => Err("expected a length above 0, such as \"4 um\"".to_owned()),
+    }
+}
+
+fn positive(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|number| *number > 0.0 && f64::is_finite(*number))
+}
+
+/// `0.5 px`, or with a share of the light `0.5 px,5 %`.
+pub(super) fn tolerance(text: &str) -> Result<Tolerance, String> {
+    let Some((places, light)) = text.split_once(',') else {
+        return Ok(Tolerance { pixels: pixels(text)?, light: None });
+    };
+    let wrong = || "expected pixels and a share of the light, such as \"0.5 px,5 %\"".to_owned();
+    let light = light.trim().strip_suffix('%').ok_or_else(wrong)?;
+    let percent = positive(light.trim()).ok_or_else(wrong)?;
+    Ok(Tolerance { pixels: pixels(places)?, light: Some(percent / 100.0) })
 }

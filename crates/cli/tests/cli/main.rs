@@ -21,6 +21,7 @@ mod light_fields; // lenslets, arrays of cameras, and the page about them
 mod limits; // what the page on limits lists
 mod memory; // refused before it is taken
 mod messages; // what is wrong, in plain words
+mod models; // simpler models of a lens, and OpenCV's fitted to it
 mod openings_and_glasses; // f-numbers that a lens lacks, glasses of earlier catalogues and of one's own
 mod orbit; // a data set of a real model
 mod overwriting; // inputs, results of an earlier run, and files of others

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+use etendue_camera::Camera;
 use etendue_optics::train::{
     Focus, LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays, ZemaxError, ZemaxLens,
 };
@@ -52,6 +53,8 @@ pub struct ReadLens {
     pub file: Option<LensFile>,
     /// Where a scene has its sensor; as written in other files.
     pub focus: Focus,
+    /// The camera that it is the lens of, of a scene.
+    pub camera: Option<Camera>,
     /// Field angles (degrees) that its file names.
     pub fields: Vec<f64>,
     /// Wavelengths (nm) that its file names, the main one first.
@@ -90,6 +93,7 @@ pub fn read_lens(path: &Path, reach: Reach) -> Result<ReadLens, SceneError> {
         train: focused.train().clone(),
         file: None,
         focus: if distance > 0.0 { Focus::Sensor(distance) } else { Focus::AsWritten },
+        camera: Some(camera.clone()),
         fields: Vec::new(),
         wavelengths: Vec::new(),
         notes: Vec::new(),
@@ -149,6 +153,7 @@ fn build(written: &Written, value: &Value, reach: Reach) -> Result<ReadLens, Sce
         train,
         file: Some(file),
         focus: Focus::AsWritten,
+        camera: None,
         fields: Vec::new(),
         wavelengths: Vec::new(),
         notes: Vec::new(),
@@ -166,7 +171,16 @@ fn read_zemax(path: &Path) -> Result<ReadLens, SceneError> {
         .map_err(|error| zemax(ZemaxError { line: 1, why: error.to_string() }))?;
     let focus = Focus::AsWritten;
     let inputs = vec![path.to_owned()];
-    Ok(ReadLens { train, file: Some(file), focus, fields, wavelengths, notes, inputs })
+    Ok(ReadLens {
+        train,
+        file: Some(file),
+        focus,
+        camera: None,
+        fields,
+        wavelengths,
+        notes,
+        inputs,
+    })
 }
 
 fn not_a_lens(error: SceneError) -> SceneError {

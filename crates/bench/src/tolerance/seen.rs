@@ -1,0 +1,140 @@
+//! What a camera sees from places of its picture: where their rays run, in pixels, at any depth.
+//!
+//! A ray is a straight line, so where it meets the plane at the depth z is, in tangents from the entrance
+//! pupil, a + b/z: its slope, and its offset in the pupil's plane over the depth. The mean and the variance
+//! of a pixel's rays at every depth follow from their moments, and nothing is traced twice.
+
+use etendue_camera::{Camera, CameraRays, FilmSamples, Pose, Sampler};
+use etendue_geometry::RayBatch;
+use etendue_geometry::glam::{DVec2, DVec3};
+use etendue_spectrum::Bands;
+
+use super::Place;
+
+/// What is seen from one place.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Seen {
+    /// The chief ray; `None` where the camera sees nothing.
+    pub(super) chief: Option<Line>,
+    /// The light of each band.
+    pub(super) bands: Vec<Beam>,
+}
+
+/// A straight line: its slope, and its offset (m) in the entrance pupil's plane. x right, y down.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Line {
+    slope: DVec2,
+    offset: DVec2,
+}
+
+/// The rays of a band that arrive.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Beam {
+    /// What the picture has for a radiance of 1.
+    pub(super) light: f64,
+    /// Their mean.
+    middle: Line,
+    /// The variances of slope and offset, and their covariance, over both axes together.
+    spread: [f64; 3],
+}
+
+impl Line {
+    /// Where it runs at a depth whose inverse (1/m) is given, in tangents.
+    pub(super) fn at(&self, nearness: f64) -> DVec2 {
+        self.slope + self.offset * nearness
+    }
+
+    /// A ray of the world in the camera's frame; `None` for one that does not run forwards.
+    fn of(pose: &Pose, origin: DVec3, direction: DVec3) -> Option<Self> {
+        let turn = pose.rotation.transpose();
+        let (o, d) = (turn * (origin - pose.position), turn * direction);
+        if d.z >= 0.0 {
+            return None;
+        }
+        let slope = DVec2::new(d.x, -d.y) / -d.z;
+        let offset = DVec2::new(o.x, -o.y) + slope * o.z;
+        Some(Self { slope, offset })
+    }
+}
+
+impl Beam {
+    /// Of weighted lines, `count` rays having been sent.
+    fn of(lines: &[(Line, f64)], count: usize) -> Self {
+        let sum: f64 = lines.iter().map(|(_, weight)| weight).sum();
+        if sum <= 0.0 {
+            return Self::default();
+        }
+        let mean = |of: &dyn Fn(&Line) -> DVec2| {
+            lines.iter().map(|(line, weight)| of(line) * *weight).sum::<DVec2>() / sum
+        };
+        let middle = Line { slope: mean(&|line| line.slope), offset: mean(&|line| line.offset) };
+        let spread = lines.iter().fold([0.0; 3], |[a, b, c], (line, weight)| {
+            let (slope, offset) = (line.slope - middle.slope, line.offset - middle.offset);
+            [
+                a + weight * slope.length_squared() / sum,
+                b + weight * offset.length_squared() / sum,
+                c + weight * slope.dot(offset) / sum,
+            ]
+        });
+        Self { light: sum / count as f64, middle, spread }
+    }
+
+    /// The middle of its light at a nearness (1/m), in tangents; `None` in the dark.
+    pub(super) fn centroid(&self, nearness: f64) -> Option<DVec2> {
+        (self.light > 0.0).then(|| self.middle.at(nearness))
+    }
+
+    /// The root of the mean squared distance from there, in tangents.
+    pub(super) fn blur(&self, nearness: f64) -> f64 {
+        let [slope, offset, both] = self.spread;
+        (slope + nearness * (2.0 * both + nearness * offset)).max(0.0).sqrt()
+    }
+}
+
+impl Seen {
+    /// The middle of the light of all bands together, each counted alike.
+    pub(super) fn centroid(&self, nearness: f64) -> Option<DVec2> {
+        let lit: Vec<DVec2> =
+            self.bands.iter().filter_map(|beam| beam.centroid(nearness)).collect();
+        (!lit.is_empty()).then(|| lit.iter().sum::<DVec2>() / lit.len() as f64)
+    }
+}
+
+/// What `camera`, opened for `bands`, sees from each of `places`, by `rays` of each band or group of
+/// bands.
+pub(super) fn seen(camera: &Camera, bands: &Bands, places: &[Place], rays: u32) -> Vec<Seen> {
+    let (columns, rows): (Vec<f64>, Vec<f64>) =
+        places.iter().map(|place| (place.column, place.row)).unzip();
+    let mut chief = RayBatch::default();
+    camera.rays_through(&columns, &rows, &mut chief);
+    let groups = camera.band_groups(bands);
+    let mut samples = FilmSamples::default();
+    let mut out = CameraRays::default();
+    let mut all = Vec::with_capacity(places.len());
+    for (i, place) in places.iter().enumerate() {
+        let sees = chief.t_max()[i] >= 0.0;
+        let line = Line::of(camera.pose(), chief.origin(i), chief.direction(i));
+        let mut seen = Seen { chief: line.filter(|_| sees), bands: Vec::new() };
+        // The same places of the pupil for every camera, and everywhere.
+        let points = Sampler::Sobol.pixel(0, 0, 0, rays);
+        for (number, group) in groups.iter().enumerate() {
+            samples.clear();
+            samples.group = number;
+            for k in 0..rays {
+                let [spectrum, _] = points.square(k, 2);
+                samples.push([place.column, place.row], points.square(k, 1), spectrum);
+            }
+            camera.sample_rays(&samples, &mut out);
+            let lines: Vec<(Line, f64)> = (0..out.rays.len())
+                .filter_map(|k| {
+                    let line = Line::of(camera.pose(), out.rays.origin(k), out.rays.direction(k));
+                    Some((line?, out.weight[k]))
+                })
+                .collect();
+            let beam = Beam::of(&lines, rays as usize);
+            seen.bands.extend(group.bands.clone().map(|_| beam));
+        }
+        all.push(seen);
+    }
+    all
+}

@@ -1,0 +1,117 @@
+//! What models of a lens miss, where a closed form tells it.
+
+use std::path::Path;
+
+use etendue_accel::BuildOptions;
+use etendue_bench::BenchError;
+use etendue_bench::tolerance::{Comparison, Finding, Tolerance, compare};
+use etendue_render::output::Outputs;
+use etendue_render::{Plan, build, plan};
+use etendue_scene::LoadOptions;
+use etendue_scene::file::SceneFile;
+use serde_json::{Value, json};
+
+/// A wall 3 m before a camera.
+fn compared(camera: &Value, tolerance: Tolerance) -> Result<Comparison, BenchError> {
+    let mut camera = camera.clone();
+    camera["pose"] = json!({ "from": [1, 2, 3], "look_at": [1, 2, 0] });
+    let scene = json!({
+        "camera": camera, "tracer": { "type": "facing" },
+        "objects": [{ "shape": "rectangle", "width": 40, "height": 40 }],
+    });
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let file = SceneFile::from_json(&scenes, scene).unwrap();
+    let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).unwrap();
+    let own = Plan::new(&scene, Outputs::ALL);
+    let accel = build(&scene, &own, &BuildOptions::default()).unwrap();
+    compare(&scene, &*accel, tolerance, &|_| true)
+}
+
+fn model<'a>(all: &'a Comparison, name: &str) -> &'a Finding {
+    all.models.iter().find(|finding| finding.model == name).unwrap()
+}
+
+fn thin_lens() -> Value {
+    json!({ "type": "thin_lens", "focal_length": 50, "f_number": 2, "focus_distance": 2,
+            "sensor_height": 24, "sensor": { "resolution": [150, 100] } })
+}
+
+/// A thin lens of 25 mm, focused at 2 m, sees a point at 3 m in a disk of 25 mm · (1/2 − 1/3) per metre,
+/// whose root mean square radius is its radius over the root of 2. Its corners get the light of a disk of
+/// finite size, which is a little more than cos⁴ (P. Foote, "Illumination from a radiating disk", 1915).
+#[test]
+fn a_pinhole_lacks_the_blur_and_falloff_of_a_thin_lens_and_nothing_else() {
+    let all = compared(&thin_lens(), Tolerance { pixels: 0.2, light: None }).unwrap();
+    let image = 1.0 / (1.0 / 50.0 - 1.0 / 2000.0);
+    let focal = image / 0.24;
+    let blur = focal * 0.0125 / 2.0_f64.sqrt() * (1.0 / 2.0 - 1.0 / 3.0);
+    let corner = (75.0_f64 / focal).powi(2) + (50.0 / focal).powi(2);
+    let pupil = (12.5_f64 / image).powi(2);
+    let root = (corner * corner + 2.0 * corner * (1.0 - pupil) + (1.0 + pupil).powi(2)).sqrt();
+    let light = 0.5 * (1.0 - (1.0 + corner - pupil) / root);
+    let falloff = 1.0 - light / (pupil / (1.0 + pupil));
+    for name in ["pinhole", "opencv"] {
+        let pinhole = model(&all, name);
+        // Of 1024 places of the pupil, weighed by the angle at which each is seen.
+        assert!(
+            (pinhole.blur.value / blur - 1.0).abs() < 0.02,
+            "{} for {blur}",
+            pinhole.blur.value
+        );
+        assert!((pinhole.light.value - falloff).abs() < 0.002, "{:?} {falloff}", pinhole.light);
+        assert!(pinhole.chief_ray.value < 1e-6 && pinhole.colour.value < 1e-9, "{pinhole:?}");
+        assert!((pinhole.blur.depth.unwrap() - 3.0).abs() < 1e-9, "{:?}", pinhole.blur);
+        assert!(!pinhole.is_within);
+    }
+    for name in ["thin", "thick", "full"] {
+        let own = model(&all, name);
+        assert!(own.blur.value < 1e-9 && own.light.value < 1e-9 && own.is_within, "{own:?}");
+    }
+    assert_eq!((all.cheapest, all.depths.len()), ("thin", 2));
+    assert!(all.models.iter().all(|m| m.seconds_a_sample.is_some()));
+}
+
+#[test]
+fn the_tolerance_decides_which_model_is_the_cheapest() {
+    let cheapest =
+        |pixels, light| compared(&thin_lens(), Tolerance { pixels, light }).unwrap().cheapest;
+    // The blur is 0.31 pixels and the corners lack 26 % of the light.
+    assert_eq!(cheapest(0.3, None), "thin");
+    assert_eq!(cheapest(0.35, None), "pinhole");
+    assert_eq!(cheapest(0.35, Some(0.2)), "thin");
+    assert_eq!(cheapest(0.35, Some(0.4)), "pinhole");
+}
+
+/// The double Gauss at f/11: distortion is what a thin lens lacks, and OpenCV's model has.
+#[test]
+fn opencv_has_the_distortion_that_other_models_lack() {
+    let camera = json!({ "type": "lens", "lens": "lenses/double-gauss.json", "f_number": 11,
+        "focus_distance": 3, "sensor_height": 24, "sensor": { "resolution": [720, 480] } });
+    let all = compared(&camera, Tolerance { pixels: 1.0, light: None }).unwrap();
+    let chief = |name| model(&all, name).chief_ray.value;
+    assert!(chief("opencv") < 0.2, "{}", chief("opencv"));
+    for name in ["pinhole", "thin", "thick"] {
+        assert!((chief(name) / chief("pinhole") - 1.0).abs() < 1e-3, "{name}: {}", chief(name));
+        assert!(chief(name) > 5.0 * chief("opencv"), "{name}: {}", chief(name));
+    }
+    let full = model(&all, "full");
+    let all_zero = [full.chief_ray, full.centroid, full.blur, full.colour, full.light];
+    assert!(all_zero.iter().all(|worst| worst.value == 0.0), "{full:?}");
+    // A lens of glass has colours where ideal lenses have none.
+    assert!(model(&all, "thick").colour.value > 0.01);
+}
+
+#[test]
+fn cameras_without_a_lens_to_simplify_are_refused() {
+    for camera in [
+        json!({ "type": "pinhole", "fov": 40, "sensor": { "resolution": [30, 20] } }),
+        json!({ "type": "light_field", "focal_length": 35, "f_number": 2, "focus_distance": 0.8,
+            "microlenses": { "pitch": 0.09 },
+            "sensor": { "resolution": [60, 45], "pixel_pitch": 6 } }),
+    ] {
+        match compared(&camera, Tolerance { pixels: 0.5, light: None }) {
+            Err(BenchError::NoLens(_)) => {}
+            other => panic!("{other:?}"),
+        }
+    }
+}

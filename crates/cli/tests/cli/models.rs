@@ -1,0 +1,91 @@
+//! Simpler models of a lens: `plan --models`, and `lens --fit-opencv`.
+
+use serde_json::{Value, json};
+
+use crate::run::{Bench, text};
+
+/// A scene with the double Gauss of the examples.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    let lens = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/lenses/double-gauss.json");
+    bench.write("lens.json", &std::fs::read(lens).unwrap());
+    bench.write("scene.json", scene(&camera()).to_string().as_bytes());
+    bench
+}
+
+fn camera() -> Value {
+    json!({ "type": "lens", "lens": "lens.json", "f_number": 8, "focus_distance": "1.6 m",
+        "sensor_height": "24 mm", "pose": { "from": [0, 0.5, 1.9], "look_at": [0, 0.3, 0] },
+        "sensor": { "resolution": [90, 60] } })
+}
+
+fn scene(camera: &Value) -> Value {
+    json!({ "etendue": 1, "camera": camera, "tracer": { "type": "facing" }, "layers": ["depth"],
+        "objects": [{ "shape": "rectangle", "width": 9, "height": 9 },
+                    { "shape": "sphere", "radius": 0.2, "transform": { "translate": [0, 0.3, 0.4] } }] })
+}
+
+fn printed(bench: &Bench, arguments: &[&str]) -> Value {
+    let output = bench.run(arguments);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+#[test]
+fn a_fit_is_written_and_is_a_camera_of_a_scene() {
+    let bench = bench();
+    let fit = printed(&bench, &["lens", "scene.json", "--fit-opencv", "--json", "-o", "out"]);
+    let written = std::fs::read(bench.path("out/opencv.json")).unwrap();
+    assert_eq!(serde_json::from_slice::<Value>(&written).unwrap(), fit);
+    assert_eq!(
+        (&fit["model"], fit["coefficients"].as_array().unwrap().len()),
+        (&json!("brown_conrady"), 5)
+    );
+    let largest = fit["residuals"]["largest"].as_f64().unwrap();
+    assert!(largest < 0.5 && fit["holds"]["share"] == 1.0, "{fit}");
+    bench.write("fitted.json", scene(&fit["camera"]).to_string().as_bytes());
+    let output = bench.run(&["render", "fitted.json", "-o", "fitted", "--outputs", "npy"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let words = text(&bench.run(&["lens", "lens.json", "--fit-opencv"]).stdout);
+    for word in ["distortion", "residuals", "holds", "\"intrinsics\""] {
+        assert!(words.contains(word), "{words}");
+    }
+}
+
+#[test]
+fn what_cannot_be_fitted_is_refused() {
+    let bench = bench();
+    for (arguments, word) in [
+        (&["lens", "scene.json", "--fit-opencv", "--f-number", "4"][..], "--f-number"),
+        (&["lens", "lens.json", "--fit-opencv", "--tolerance", "0 px"], "above 0"),
+        (&["lens", "lens.json", "--fit-opencv", "--resolution", "40"], "1536x1024"),
+        (&["lens", "lens.json", "--tolerance", "1 px"], "--fit-opencv"),
+        (&["plan", "scene.json", "--models", "--tolerance", "1 m"], "0.5 px"),
+        (&["plan", "scene.json", "--models", "--tolerance", "1 px,5"], "0.5 px,5 %"),
+        (&["plan", "scene.json", "--models", "--set", "camera={\"type\": \"pinhole\"}"], "lens"),
+    ] {
+        let output = bench.run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", text(&output.stdout));
+        assert!(text(&output.stderr).contains(word), "{arguments:?}: {}", text(&output.stderr));
+    }
+}
+
+#[test]
+fn plan_names_the_cheapest_model_within_a_tolerance() {
+    let bench = bench();
+    let models = |tolerance| {
+        printed(&bench, &["plan", "scene.json", "--models", "--json", "--tolerance", tolerance])
+    };
+    let all = models("0.5 px");
+    let names: Vec<&str> =
+        all["models"].as_array().unwrap().iter().map(|m| m["model"].as_str().unwrap()).collect();
+    assert_eq!(names, ["pinhole", "opencv", "thin", "thick", "full"]);
+    // A pixel is an eighth of that of the example: nothing that the train does shows but distortion and blur.
+    assert_eq!(all["cheapest"], "opencv", "{all}");
+    assert!(all["saving"].as_f64().is_some_and(f64::is_finite), "{all}");
+    assert_eq!(models("1e-6 px")["cheapest"], "full");
+    assert_eq!(models("50 px")["cheapest"], "pinhole");
+    let words = bench.run(&["plan", "scene.json", "--models", "--tolerance", "0.5 px,2 %"]);
+    let words = text(&words.stdout);
+    assert!(words.contains("cheapest within 0.5 px and 2 % of light: full"), "{words}");
+}

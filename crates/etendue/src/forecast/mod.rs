@@ -1,0 +1,164 @@
+//! How long a render will take, by stage, before it is begun.
+//!
+//! Counts of the plan times what this machine takes for each of them, which a short [`Calibration`] has
+//! measured and the machine keeps. What rays cost in this very scene no count tells: where its structure is
+//! built in a moment, a few small pictures of it are traced and what they took is carried to the picture's own
+//! size and samples.
+
+mod calibration;
+mod kept;
+mod pilot;
+mod words;
+
+use std::time::Instant;
+
+use etendue_accel::BuildOptions;
+use etendue_render::output::Outputs;
+use etendue_render::{Images, Plan, Stopping, build};
+use etendue_scene::Scene;
+use etendue_sensor::SensorKind;
+use etendue_tracer::LayerSpec;
+use serde::Serialize;
+
+pub use self::calibration::Calibration;
+use self::pilot::Pilot;
+use crate::Error;
+
+/// The longest build (s), by the machine's rates, that is done for a forecast.
+const LONGEST_BUILD: f64 = 1.0;
+
+/// The most bytes of images that are decoded for one.
+const MOST_IMAGES: u64 = 256 << 20;
+
+/// The time that a render will take (s), by stage.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TimeForecast {
+    /// Reading the scene, its models and its images.
+    pub load: f64,
+    /// Building the acceleration structure.
+    pub build: f64,
+    /// Tracing rays and filling layers.
+    pub trace: f64,
+    /// What the sensor makes of the light, with its files.
+    pub sensor: f64,
+    /// The views of a light field.
+    pub views: f64,
+    /// Writing the layers.
+    pub output: f64,
+    /// All of it.
+    pub total: f64,
+    /// Whether small pictures of the scene itself were traced, or rays were only counted.
+    pub is_piloted: bool,
+}
+
+/// What is known of a scene before it is rendered.
+#[derive(Debug, Clone, Copy)]
+pub struct Prospect<'a> {
+    /// The loaded scene.
+    pub scene: &'a Scene,
+    /// Its plan.
+    pub plan: &'a Plan,
+    /// The files that are wanted.
+    pub outputs: Outputs,
+    /// What loading took (s).
+    pub load: f64,
+}
+
+impl TimeForecast {
+    /// By counts and the machine's rates alone; nothing is traced.
+    #[must_use]
+    pub fn counted(prospect: &Prospect<'_>, machine: &Calibration) -> Self {
+        let Prospect { scene, plan, load, .. } = *prospect;
+        let trace = match plan.stopping {
+            Stopping::Time(time) => time.as_secs_f64(),
+            _ => plan.rays as f64 * machine.ray,
+        };
+        let views = 0.0;
+        let build = build_time(scene, plan, machine);
+        let (sensor, output) = (sensor(scene, plan, machine), output(prospect, machine));
+        Self { load, build, trace, sensor, views, output, total: 0.0, is_piloted: false }.summed()
+    }
+
+    /// As [`Self::counted`], with small pictures of the scene itself where its structure is built and its
+    /// images are decoded in a moment, and where it can be rendered at all.
+    #[must_use]
+    pub fn new(prospect: &Prospect<'_>, machine: &Calibration) -> Self {
+        let counted = Self::counted(prospect, machine);
+        let textures = prospect.scene.textures.iter();
+        let images: u64 = textures.map(|texture| texture.decoded_bytes()).sum();
+        if counted.build > LONGEST_BUILD || images > MOST_IMAGES {
+            return counted;
+        }
+        // What is wrong with the scene, its render will say.
+        Self::piloted(prospect, counted).unwrap_or(counted)
+    }
+
+    fn piloted(prospect: &Prospect<'_>, counted: Self) -> Result<Self, Error> {
+        let Prospect { scene, plan, .. } = *prospect;
+        let start = Instant::now();
+        let threads = rayon::current_num_threads();
+        let accel = build(scene, plan, &BuildOptions { threads, ..BuildOptions::default() })?;
+        let build = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let images = Images::decode(scene, plan, None)?;
+        let load = counted.load + start.elapsed().as_secs_f64();
+        let pilot = Pilot { scene, accel: &*accel, images: &images };
+        let trace = match plan.stopping {
+            Stopping::Time(time) => time.as_secs_f64(),
+            _ => pilot.picture(&scene.camera)?,
+        };
+        let views = match (scene.camera.lens(), scene.camera.reference_views()) {
+            (Some(_), Ok(views)) if scene.picture.is_some() => pilot.picture(&views)?,
+            _ => 0.0,
+        };
+        Ok(Self { load, build, trace, views, is_piloted: true, ..counted }.summed())
+    }
+
+    fn summed(self) -> Self {
+        let Self { load, build, trace, sensor, views, output, .. } = self;
+        Self { total: load + build + trace + sensor + views + output, ..self }
+    }
+}
+
+/// The time of the build (s).
+fn build_time(scene: &Scene, plan: &Plan, machine: &Calibration) -> f64 {
+    scene.geometry.triangles_unique() as f64 * machine.build_of(plan.quality)
+}
+
+fn pixels(scene: &Scene) -> f64 {
+    let [width, height] = scene.camera.resolution().map(f64::from);
+    width * height
+}
+
+/// The time of the exposures and their files (s).
+fn sensor(scene: &Scene, plan: &Plan, machine: &Calibration) -> f64 {
+    let Some(sensor) = scene.sensor.as_ref().filter(|_| scene.picture.is_some()) else {
+        return 0.0;
+    };
+    let shots = sensor.shots().count() as f64;
+    let noise = machine.noise(sensor.noise());
+    let channels = match sensor.spec().kind {
+        SensorKind::Raw => machine.raw + noise,
+        SensorKind::Rgb => machine.rgb + noise * 3.0,
+        SensorKind::Multispectral => sensor.depth() as f64 * (machine.rgb / 3.0 + noise),
+    };
+    // Light comes to the sensor band by band.
+    let bands = plan.bands.count() as f64 / 3.0;
+    pixels(scene) * shots * channels * bands.max(1.0).sqrt()
+}
+
+/// The time of writing the layers (s).
+fn output(prospect: &Prospect<'_>, machine: &Calibration) -> f64 {
+    let Prospect { scene, plan, outputs, .. } = *prospect;
+    let planes = |layer: &LayerSpec| match layer {
+        LayerSpec::Radiance | LayerSpec::Variance => plan.bands.count().max(3),
+        _ => layer.row().channels.len(),
+    };
+    let values: usize = plan.layers.iter().map(planes).sum();
+    let each =
+        |wanted: bool, rate: f64, count: usize| if wanted { rate * count as f64 } else { 0.0 };
+    pixels(scene)
+        * (each(outputs.exr, machine.exr, values)
+            + each(outputs.npy, machine.npy, values)
+            + each(outputs.png, machine.png, plan.layers.len()))
+}
