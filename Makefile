@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits docs-figures docs-charts \
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast docs-figures docs-charts \
 	docs-stability light-fields fingerprints fuzz-smoke fuzz-seeds clean
 
 help:
@@ -27,6 +27,7 @@ help:
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/limits.md"
 	@echo "make bench-sampling  what samples that stop save; writes the measured part of docs/sampling.md"
+	@echo "make bench-forecast  render the example scenes, and hold the forecast of time against it"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make light-fields  the walk of docs/light-fields.md in a venv, its pictures, and another decoder's opinion"
 	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
@@ -109,6 +110,10 @@ bench-limits: setup
 
 bench-sampling: setup
 	cargo run --release -p etendue-benches --bin sampling -- $(ARGS)
+
+bench-forecast: setup
+	cargo build --release -p etendue-cli
+	python3 benches/forecast.py $(ARGS)
 
 # ARGS=--quick takes lighter meshes
 docs-charts: setup
