@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # A real window on a screen in memory, driven by keys and the mouse: opened, moved about in, saved, given a
 # broken file, closed during a render. What is saved must render to the same bits. Screenshots are left in
-# out/window, at once and twice the size, dark and light.
+# out/window, at once and twice the size, dark and light. docs/images/window.png is lens-1x.png of
+# RESOLUTION=[720,480] SAMPLES=64.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -103,7 +104,8 @@ close_window() {
 
 cp -r scenes/double-gauss.json scenes/lenses "$home/"
 scene=$home/double-gauss.json
-jq '.camera.sensor.resolution = [240, 160] | .render.samples = 4' <"$scene" >"$home/small.json"
+jq ".camera.sensor.resolution = ${RESOLUTION:-[240,160]} | .render.samples = ${SAMPLES:-4}" <"$scene" \
+    >"$home/small.json"
 scene=$home/small.json
 
 open 1 "$scene"
@@ -112,6 +114,13 @@ press ctrl+t
 sleep 1
 shoot light-1x
 press ctrl+t
+
+# A pixel, its values and its rays through the lens.
+xdotool mousemove 640 330 sleep 0.2 click 1 sleep 0.3 mousemove 578 12 sleep 0.2 click 1 sleep 0.5 mousemove 640 700
+shows small.json || fail "the panel of the lens never settles"
+shoot lens-1x
+cmp -s "$shots/dark-1x.png" "$shots/lens-1x.png" && fail "the panel of the lens does not open"
+xdotool mousemove 578 12 sleep 0.2 click 1 sleep 0.5
 
 # A drag in the picture turns the camera; saved, it is another scene.
 xdotool mousemove 640 430 sleep 0.2 mousedown 1 sleep 0.2 mousemove_relative 30 5 sleep 0.2 \

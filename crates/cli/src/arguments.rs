@@ -50,7 +50,7 @@ pub(crate) enum Command {
     /// Show what a sensor makes of light, or make the images that EMVA 1288 characterises it by
     #[command(after_help = SENSOR_HELP)]
     Sensor(SensorArguments),
-    /// Open a window onto a scene: look, change the camera, ask pixels, save
+    /// Open a window onto a scene, a lens or an image: look, change the camera, ask pixels, save
     #[command(after_help = VIEW_HELP)]
     View(ViewArguments),
     /// Analyse a lens, or trace given rays through it
@@ -102,7 +102,9 @@ tells the rest.
 
 Examples:
   etendue view scenes/first-light.json
-  etendue view model.glb";
+  etendue view model.glb
+  etendue view scenes/lenses/double-gauss.json
+  etendue view out/layers.exr";
 
 const MERGE_HELP: &str = "\
 The scene is read again, from where the shares found it, for what is written beside the picture.
@@ -364,8 +366,9 @@ pub(crate) struct RenderArguments {
 #[derive(Debug, Args)]
 #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "read by the window alone"))]
 pub(crate) struct ViewArguments {
-    /// A scene (.json), or a model (.gltf, .glb, .obj, .ply); a file can be dropped on the window, too
-    #[arg(value_name = "SCENE|MODEL")]
+    /// A scene (.json), a model (.gltf, .glb, .obj, .ply), a lens to look through (.json, .zmx) or an image
+    /// (.exr, .hdr, .png, .jpg); a file can be dropped on the window, too
+    #[arg(value_name = "SCENE|MODEL|LENS|IMAGE")]
     pub(crate) scene: Option<PathBuf>,
     // Not a comment of documentation, whose brackets would be a link.
     #[arg(

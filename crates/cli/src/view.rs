@@ -1,4 +1,4 @@
-//! `etendue view`: a window onto a scene.
+//! `etendue view`: a window onto a scene, a model, a lens or an image.
 
 use crate::arguments::ViewArguments;
 use crate::fault::Fault;
@@ -17,7 +17,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), Fault> {
     };
     if let Some(path) = &arguments.scene {
         // What cannot be opened at all is told where the command was given.
-        etendue::Session::open_with(path, options.clone())?;
+        etendue::Viewed::open(path, options.clone())?;
     }
     etendue_window::run(arguments.scene.clone(), options)
         .map_err(|error: WindowError| Fault::refused(error.to_string()))

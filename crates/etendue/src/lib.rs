@@ -49,6 +49,7 @@
 //! |---|---|
 //! | [`Session`] | a scene, opened once, changed and rendered often |
 //! | [`Rendering`] | layers as arrays, the sensor's images, files of them, the report |
+//! | [`Viewed`], [`Still`] | a file to look at, by what it is: a scene, a model, a lens, an image |
 //! | [`Preview`], [`Screen`], [`Viewpoint`], [`Inspector`] | what a window needs: pictures soon, shown, moved about and asked |
 //! | [`Frame`], [`Dataset`] | the pictures of a scene that has `frames`, and what others read of them |
 //! | [`Shard`], [`Shares`], [`Checkpoint`] | renders that are divided over machines, or interrupted |
@@ -76,7 +77,9 @@ mod rendering;
 mod saving;
 mod session;
 mod shares;
+mod still;
 mod structures;
+mod viewed;
 mod viewpoint;
 mod words;
 
@@ -99,6 +102,8 @@ pub use progress::{Phase, Progress};
 pub use rendering::{Rendering, Written};
 pub use session::Session;
 pub use shares::Shares;
+pub use still::Still;
+pub use viewed::Viewed;
 pub use viewpoint::Viewpoint;
 
 /// The layers by the names that scenes give them.

@@ -140,15 +140,7 @@ impl Preview {
                 }
             }
         }
-        for layer in self.layers() {
-            let values =
-                layer.channels.iter().map(|channel| format!("{:.4}", channel.values.at(i)));
-            let unit = layer.meaning.iter().find(|(key, _)| key == "unit");
-            let unit =
-                unit.map(|(_, unit)| format!(" {unit}")).filter(|unit| !unit.starts_with(" 1"));
-            let values = values.collect::<Vec<_>>().join(", ");
-            reading.push((layer.title(), format!("{values}{}", unit.unwrap_or_default())));
-        }
+        reading.extend(self.layers().iter().map(|layer| layer_reading(layer, i)));
         Ok(reading)
     }
 
@@ -207,6 +199,15 @@ impl Session {
         let (factor, raw) = (rough.factor, OnceLock::new());
         Ok(Preview { scene, picture, light, raw, factor, samples, time, notes })
     }
+}
+
+/// What a layer has at pixel `i`: its name, and its values with their unit.
+pub(crate) fn layer_reading(layer: &Layer, i: usize) -> (String, String) {
+    let values = layer.channels.iter().map(|channel| format!("{:.4}", channel.values.at(i)));
+    let unit = layer.meaning.iter().find(|(key, _)| key == "unit");
+    let unit = unit.map(|(_, unit)| format!(" {unit}")).filter(|unit| !unit.starts_with(" 1"));
+    let values = values.collect::<Vec<_>>().join(", ");
+    (layer.title(), format!("{values}{}", unit.unwrap_or_default()))
 }
 
 impl Preview {

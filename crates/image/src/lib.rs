@@ -9,6 +9,7 @@ mod openexr;
 mod radiance;
 mod raster;
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, Cursor, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -148,6 +149,43 @@ pub fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {
     // all that one has seen is dropped with it.
     let decoded = catch_unwind(AssertUnwindSafe(|| decode_unguarded(bytes, limits)));
     decoded.unwrap_or(Err(DecodeError::Panic))
+}
+
+/// The values of one channel of an EXR file, by rows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Plane {
+    /// Half or single precision.
+    F32(Vec<f32>),
+    /// Integers.
+    U32(Vec<u32>),
+}
+
+/// All channels of an EXR file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExrChannels {
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// The channels by their full names (`R`, `Depth.Z`), in the file's order: that of their names.
+    pub planes: Vec<(String, Plane)>,
+    /// Attributes of the header that are text.
+    pub texts: BTreeMap<String, String>,
+}
+
+/// Whether `bytes` begin as an EXR file does.
+#[must_use]
+pub fn is_exr(bytes: &[u8]) -> bool {
+    bytes.starts_with(openexr::SIGNATURE)
+}
+
+/// Reads all channels of an EXR file's first layer that is not deep, but for those with fewer values than
+/// pixels.
+///
+/// # Errors
+///
+/// When it is over `limits`, no EXR file, or broken.
+pub fn exr_channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, DecodeError> {
+    let read = catch_unwind(AssertUnwindSafe(|| openexr::channels(bytes, limits)));
+    read.unwrap_or(Err(DecodeError::Panic))
 }
 
 /// Bytes that an image takes when it is decoded, by its header alone; `None` where that is none that

@@ -8,7 +8,7 @@ use exr::meta::MetaData;
 use exr::meta::header::Header;
 use exr::prelude::*;
 
-use crate::{DecodeError, Limits, Raster, Samples, zeroed};
+use crate::{DecodeError, ExrChannels, Limits, Plane, Raster, Samples, zeroed};
 
 /// What every EXR file begins with.
 pub(crate) const SIGNATURE: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
@@ -128,4 +128,37 @@ fn grey(bytes: &[u8], header: &Header, name: &Text, limits: Limits) -> Result<Ra
         .from_buffered(Cursor::new(bytes))?;
     let values = image.layer_data.channel_data.pixels;
     Ok(Raster::new(window.size, window.channels, Samples::F32(values)))
+}
+
+/// Reads all channels of the first layer as they are.
+pub(crate) fn channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, DecodeError> {
+    let about = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
+    let header = about.headers.iter().find(|header| !header.deep).ok_or(DecodeError::Channels)?;
+    let side = [header.layer_size.x(), header.layer_size.y()].map(|side| side as u64);
+    limits.judge(side, 4 * header.channels.list.len() as u64)?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))?;
+    let layer = image.layer_data;
+    let size = [layer.size.x(), layer.size.y()];
+    let texts = image.attributes.other.iter().chain(&layer.attributes.other);
+    let texts = texts.filter_map(|(name, value)| match value {
+        AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+        _ => None,
+    });
+    let whole = layer.channel_data.list.into_iter();
+    let whole = whole.filter(|channel| channel.sample_data.len() == size[0] * size[1]);
+    let planes = whole.map(|channel| {
+        let plane = match channel.sample_data {
+            FlatSamples::F16(values) => Plane::F32(values.into_iter().map(f16::to_f32).collect()),
+            FlatSamples::F32(values) => Plane::F32(values),
+            FlatSamples::U32(values) => Plane::U32(values),
+        };
+        (channel.name.to_string(), plane)
+    });
+    Ok(ExrChannels { size, planes: planes.collect(), texts: texts.collect() })
 }

@@ -474,3 +474,19 @@ fn loading_tells_how_far_it_is_and_can_be_stopped() {
     let error = file.load(Wanted::NOTHING, &options).unwrap_err();
     assert!(matches!(error, etendue_scene::SceneError::Stopped), "{error}");
 }
+
+#[test]
+fn a_key_that_is_set_to_null_is_as_if_it_were_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.json");
+    let scene = r#"{"etendue": 1, "layers": ["depth"], "render": {"samples": 4}, "objects": []}"#;
+    std::fs::write(&path, scene).unwrap();
+    let null = |key: &str| (key.to_owned(), "null".to_owned());
+    let file = SceneFile::read(&path, &[null("layers"), null("render")]).unwrap();
+    assert!(file.spec.layers.is_empty());
+    let is_written = |key: &str| file.value().get(key).is_some();
+    assert!(is_written("objects") && !is_written("layers") && !is_written("render"));
+    // In the file itself it stays an error.
+    std::fs::write(&path, r#"{"etendue": 1, "layers": null}"#).unwrap();
+    assert!(SceneFile::read(&path, &[]).is_err());
+}

@@ -1,12 +1,14 @@
 //! The window's state, and how news and input change it.
 
 mod input;
+mod looking;
+mod still;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use eframe::egui::{self, Context};
-use etendue::{Inspector, LensView, Options, Preview, Probe, Screen, Viewpoint};
+use etendue::{Inspector, LensView, Options, Preview, Probe, Screen, Still, Viewpoint};
 use serde_json::Value;
 
 use crate::canvas::Canvas;
@@ -17,7 +19,7 @@ use crate::panels::{
     light_field::{LightField, Shows},
 };
 use crate::view::View;
-use crate::worker::{News, Shown, Task, Wake, Wish, Worker};
+use crate::worker::{Kind, News, Shown, Task, Wake, Wish, Worker};
 
 /// What a click on the picture does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -65,6 +67,8 @@ pub(crate) struct App {
     worker: Worker,
     pub(crate) form: Form,
     pub(crate) document: Option<Document>,
+    /// The image that is looked at instead of a scene, and its file.
+    pub(crate) still: Option<(PathBuf, Arc<Still>)>,
     pub(crate) view: View,
     pub(crate) part: Option<String>,
     pub(crate) tool: Tool,
@@ -119,6 +123,7 @@ impl App {
             worker,
             form: Form::new(etendue::scene_schema()),
             document: None,
+            still: None,
             view: View::default(),
             part: None,
             tool: Tool::default(),
@@ -145,8 +150,13 @@ impl App {
 
     /// The file, whether all of it is saved, and whether its picture is whole.
     pub(crate) fn title(&self) -> String {
-        let Some(document) = &self.document else { return "etendue".to_owned() };
-        let name = document.path.file_name().unwrap_or_default().display().to_string();
+        let name_of = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
+        let document = match (&self.document, &self.still) {
+            (Some(document), _) => document,
+            (None, Some((path, _))) => return format!("{} - etendue", name_of(path)),
+            (None, None) => return "etendue".to_owned(),
+        };
+        let name = name_of(&document.path);
         let changed = if document.is_changed() { "*" } else { "" };
         let working = if self.is_settled() { "" } else { " (rendering)" };
         format!("{name}{changed}{working} - etendue")
@@ -177,7 +187,8 @@ impl App {
         let news: Vec<News> = self.worker.news().collect();
         for news in news {
             match news {
-                News::Opened(path, scene) => self.opened(path, scene),
+                News::Opened(path, kind, scene) => self.opened(path, kind, scene),
+                News::Looked(path, still) => self.looked(ctx, path, still),
                 News::TakenUp(saved, scene) => {
                     if let Some(document) = &mut self.document {
                         document.take_up(saved, scene);
@@ -218,15 +229,18 @@ impl App {
         }
     }
 
-    fn opened(&mut self, path: PathBuf, scene: Arc<Value>) {
+    fn opened(&mut self, path: PathBuf, kind: Kind, scene: Arc<Value>) {
         let is_same = self.document.as_ref().is_some_and(|document| **document.value() == *scene);
         if is_same {
             // It was saved under this name.
             if let Some(document) = &mut self.document {
-                document.path = path;
+                (document.path, document.is_scene) = (path, kind == Kind::Scene);
             }
         } else {
-            self.document = Some(Document::new(path, scene));
+            self.document = Some(Document::new(path, kind == Kind::Scene, scene));
+            self.still = None;
+            // Who opens a lens wants to see it.
+            self.shows_lens |= kind == Kind::Lens;
             (self.asked, self.frame, self.part, self.error) = (None, None, None, None);
             (self.view, self.accepted) = (View::default(), None);
             self.light_field = LightField::default();
@@ -251,10 +265,19 @@ impl App {
         if self.document.is_none() {
             return;
         }
+        self.show_picture(ctx, shown);
+        self.light_field.renew();
+        if self.light_field.shows != Shows::Raw {
+            self.show_light_field(ctx);
+        }
+    }
+
+    fn show_picture(&mut self, ctx: &Context, shown: Shown) {
         let Shown { number, screen, factor, samples, layer, is_final, preview, .. } = shown;
         let before = self.picture.take();
         let layers = match (preview.is_some(), &before) {
-            (false, Some(before)) => before.layers.clone(),
+            // Between two passes the layers are those of the picture before.
+            (false, Some(before)) if shown.layers.is_empty() => before.layers.clone(),
             _ => shown.layers,
         };
         let image = image_of(&screen);
@@ -277,10 +300,6 @@ impl App {
             preview,
             texture,
         });
-        self.light_field.renew();
-        if self.light_field.shows != Shows::Raw {
-            self.show_light_field(ctx);
-        }
     }
 
     /// Shows what is wanted of a light field in place of its raw picture.
@@ -309,13 +328,11 @@ impl App {
 
     pub(crate) fn save(&mut self) {
         let Some(document) = &self.document else { return };
-        match document.path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json")) {
-            true => self.save_as(&document.path.clone()),
-            // A model is no scene: a new file is made beside it.
-            false => {
-                let path = document.path.with_extension("json").display().to_string();
-                self.asking = Some((Asking::SaveAs, path));
-            }
+        let own = document.own_file();
+        match document.is_scene {
+            true => self.save_as(&own),
+            // A model or a lens is no scene: a new file is made beside it.
+            false => self.asking = Some((Asking::SaveAs, own.display().to_string())),
         }
     }
 
@@ -387,55 +404,6 @@ impl App {
             (self.view, self.part) = (view, None);
             self.wish();
         }
-    }
-
-    /// Asks what is seen at a place of the picture.
-    pub(crate) fn ask(&mut self, place: [f64; 2]) {
-        let probe = self.inspector.as_ref().and_then(|inspector| inspector.probe(place));
-        self.asked = Some(Asked { place, probe });
-    }
-
-    /// Opens or closes the panel of the lens.
-    pub(crate) fn show_lens(&mut self, shows: bool) {
-        self.shows_lens = shows;
-        self.look_at_lens();
-    }
-
-    fn look_at_lens(&mut self) {
-        let inspector = self.inspector.as_ref().filter(|_| self.shows_lens);
-        let lens = inspector.and_then(|inspector| inspector.lens().transpose());
-        self.lens = lens.map(|lens| lens.map_err(|error| error.to_string()));
-        let document = self.document.as_ref().filter(|_| self.lens.is_some());
-        self.written_lens = document.and_then(|document| {
-            panels::lens::written(document.at("/camera/lens"), &document.path)
-        });
-    }
-
-    /// The same place, after the scene has changed.
-    fn ask_again(&mut self) {
-        if let Some(asked) = &self.asked {
-            self.ask(asked.place);
-        }
-    }
-
-    /// Focuses the lens on what is seen at a place of the picture.
-    pub(crate) fn focus(&mut self, ctx: &Context, place: [f64; 2]) {
-        let Some(inspector) = &self.inspector else { return };
-        if inspector.scene().camera.lens().is_none() {
-            let why = "this camera has no lens to focus: choose a type that has, such as thin_lens";
-            self.error = Some(why.to_owned());
-            return;
-        }
-        let Some(probe) = inspector.probe(place) else {
-            self.said = Some("nothing is there to focus on".to_owned());
-            return;
-        };
-        let edits = [
-            Edit::Remove("/camera/sensor_distance".to_owned()),
-            Edit::set("/camera/focus_distance", probe.depth),
-        ];
-        self.edit(ctx, &edits);
-        self.ask(place);
     }
 
     /// Whether the picture is that of the scene as it is now, as fine as it gets.

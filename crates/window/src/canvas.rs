@@ -56,7 +56,7 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
     let Some(picture) = &app.picture else {
         let words = match app.document {
             Some(_) => "",
-            None => "Drop a scene or a model here, or open one (Ctrl+O)",
+            None => "Drop a scene, a model, a lens or an image here, or open one (Ctrl+O)",
         };
         let font = egui::FontId::proportional(17.0);
         let color = ui.visuals().weak_text_color();
@@ -156,6 +156,7 @@ fn compare(app: &mut App, ui: &Ui, painter: &egui::Painter, place: Rect, canvas:
     painter.vline(x, place.y_range(), (2.0, ui.visuals().selection.bg_fill));
     let handle = Rect::from_center_size(Pos2::new(x, place.center().y), Vec2::new(14.0, 44.0));
     painter.rect_filled(handle, 4.0, ui.visuals().selection.bg_fill);
+    mark(ui.ctx(), "split", handle);
     let grip = ui.interact(handle.expand(4.0), ui.id().with("split"), Sense::drag());
     if let Some(at) = grip.interact_pointer_pos() {
         app.canvas.split = ((at.x - place.left()) / place.width()).clamp(0.0, 1.0);
@@ -204,6 +205,11 @@ fn point(app: &mut App, response: &Response, place: Rect, size: [f32; 2]) {
     if drag == Vec2::ZERO {
         return;
     }
+    if app.still.is_some() {
+        // There is no camera to move: the picture is.
+        app.canvas.shift += drag;
+        return;
+    }
     let shifted = ctx.input(|input| input.modifiers.shift);
     let angles = [drag.x, drag.y].map(|points| f64::from(points / POINTS_PER_RADIAN));
     let heights = [drag.x, drag.y].map(|points| f64::from(points / place.height()));
@@ -234,7 +240,11 @@ fn zoom(app: &mut App, ui: &Ui, response: &Response, canvas: Rect) {
         (app.canvas.zoom, app.canvas.shift) = (None, Vec2::ZERO);
     }
     let Some(pointer) = response.hover_pos() else { return };
-    let (wheel, larger) = ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
+    let (mut wheel, mut larger) =
+        ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
+    if app.still.is_some() && wheel != 0.0 {
+        (larger, wheel) = (larger * (wheel * 0.0025).exp(), 0.0);
+    }
     if (larger - 1.0).abs() > 1e-4 {
         let before = app.canvas.zoom.unwrap_or(1.0);
         let after = (before * larger).clamp(0.25, 64.0);

@@ -37,6 +37,8 @@ impl Edit {
 pub(crate) struct Document {
     /// The file that it was opened from.
     pub(crate) path: PathBuf,
+    /// That file is a scene, and no model or lens that a scene was made for.
+    pub(crate) is_scene: bool,
     value: Arc<Value>,
     /// What the file says.
     saved: Arc<Value>,
@@ -47,9 +49,20 @@ pub(crate) struct Document {
 }
 
 impl Document {
-    pub(crate) fn new(path: PathBuf, value: Arc<Value>) -> Self {
+    pub(crate) fn new(path: PathBuf, is_scene: bool, value: Arc<Value>) -> Self {
         let saved = Arc::clone(&value);
-        Self { path, value, saved, past: Vec::new(), future: Vec::new(), last: None }
+        Self { path, is_scene, value, saved, past: Vec::new(), future: Vec::new(), last: None }
+    }
+
+    /// Where it is saved when nobody says where: in its own file, or in a new one beside that.
+    pub(crate) fn own_file(&self) -> PathBuf {
+        match self.is_scene {
+            true => self.path.clone(),
+            false => {
+                let stem = self.path.file_stem().unwrap_or_default().display();
+                self.path.with_file_name(format!("{stem}-scene.json"))
+            }
+        }
     }
 
     pub(crate) fn value(&self) -> &Arc<Value> {
@@ -132,7 +145,7 @@ impl Document {
 
     /// The values stand in the file `path` now.
     pub(crate) fn saved_to(&mut self, path: PathBuf, value: &Arc<Value>) {
-        self.path = path;
+        (self.path, self.is_scene) = (path, true);
         self.saved = Arc::clone(value);
     }
 }
@@ -207,7 +220,7 @@ mod tests {
 
     fn document() -> Document {
         let scene = json!({"camera": {"type": "thin_lens", "f_number": 2.0}, "lights": [{"a": 1}]});
-        Document::new("scene.json".into(), Arc::new(scene))
+        Document::new("scene.json".into(), true, Arc::new(scene))
     }
 
     #[test]

@@ -1,7 +1,11 @@
 //! The window, driven as by a user: events go in, and what it shows and says is looked at. Nothing is
 //! drawn; that is for a real window (`scripts/test-window.sh`).
 
+mod images;
+mod lenses;
+mod light_fields;
 mod measured;
+mod tasks;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,6 @@
 #![forbid(unsafe_code)]
-//! A window onto a scene: look at it, move about, change its camera, ask its pixels, save it.
+//! A window onto a scene: look at it, move about, change its camera, ask its pixels, save it. Or onto a lens,
+//! by a scene that looks through it, or onto an image.
 //!
 //! Everything that is shown is worked out by the library `etendue`; here are widgets, and a thread that
 //! renders.

@@ -12,7 +12,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use etendue::{Error, Inspector, Options, Preview, Progress, Screen};
+use etendue::{Error, Inspector, Options, Preview, Progress, Screen, Still};
 use serde_json::Value;
 
 use crate::view::View;
@@ -37,7 +37,7 @@ pub(crate) struct Wish {
 /// Something to be done once.
 #[derive(Debug)]
 pub(crate) enum Task {
-    /// Open a scene or a model.
+    /// Open a scene, a model, a lens or an image.
     Open(PathBuf),
     /// Write the scene to a file.
     Save(PathBuf, Arc<Value>),
@@ -45,11 +45,21 @@ pub(crate) enum Task {
     Render(PathBuf, Arc<Value>, Option<usize>),
 }
 
+/// What a scene was made for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Scene,
+    Model,
+    Lens,
+}
+
 /// What the thread tells.
 #[derive(Debug)]
 pub(crate) enum News {
-    /// A file was opened: its values.
-    Opened(PathBuf, Arc<Value>),
+    /// A file was opened: what it is, and the values of its scene.
+    Opened(PathBuf, Kind, Arc<Value>),
+    /// An image was opened, or has changed.
+    Looked(PathBuf, Arc<Still>),
     /// The file has changed: what it says now, and that with the edits that were not saved.
     TakenUp(Arc<Value>, Arc<Value>),
     /// A wish makes sense: what it shows can be asked. With the number of the scene's frames.

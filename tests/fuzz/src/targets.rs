@@ -188,6 +188,7 @@ fn environment_hdr(bytes: &[u8], folder: &Path) {
 
 fn environment_exr(bytes: &[u8], folder: &Path) {
     let _ = EnvironmentMap::read(&write(folder, "sky.exr", bytes), Limits::default());
+    let _ = etendue_image::exr_channels(bytes, Limits::default());
 }
 
 /// The files beside a model, which are looked through for names.

@@ -101,6 +101,18 @@ pub fn read_lens(path: &Path, reach: Reach) -> Result<ReadLens, SceneError> {
     })
 }
 
+/// Whether the file at `path` is a lens by itself: a Zemax file by its name, or JSON that has elements and
+/// nothing of a scene.
+#[must_use]
+pub fn is_lens(path: &Path) -> bool {
+    let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    let has_elements = || {
+        let Ok((_, value)) = read(path) else { return false };
+        value.get("elements").is_some() && !SCENE_KEYS.iter().any(|key| value.get(key).is_some())
+    };
+    ZemaxLens::is_named(path) || (is_json && has_elements())
+}
+
 /// Reads rays and traces them through a lens.
 ///
 /// # Errors

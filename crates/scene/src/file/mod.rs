@@ -23,7 +23,7 @@ use serde_json::{Value, json};
 
 pub use document::Place;
 pub use frames::{CameraPath, FramesSpec, TrajectoryFormat};
-pub use lens::{ReadLens, lens_schema, rays_schema, read_lens, trace_rays};
+pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, trace_rays};
 pub use object::{AnimationSpec, InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
 pub use overrides::OverrideError;
 pub use samples::{RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until};
@@ -147,6 +147,11 @@ impl SceneFile {
         overrides: &[(String, String)],
     ) -> Result<Self, SceneError> {
         written.set(&mut value, overrides)?;
+        if let Value::Object(members) = &mut value {
+            // A key of the scene that was set to null is as if it were not written.
+            let is_unset = |key: &str| overrides.iter().any(|(path, _)| path == key);
+            members.retain(|key, value| !(value.is_null() && is_unset(key)));
+        }
         lenient::tidy(&mut value);
         lenient::read_resolution(&mut value, "camera.sensor.resolution")
             .map_err(|why| written.fault("camera.sensor.resolution", why))?;

@@ -50,6 +50,10 @@ fn measured_speed() {
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     measure(&scenes.join("first-light.json"));
     measure(&scenes.join("double-gauss.json"));
+    // A model with textures, of the reference data.
+    if let Some(assets) = std::env::var_os("ETENDUE_ASSETS") {
+        measure(&Path::new(&assets).join("data/gltf/Avocado/Avocado.gltf"));
+    }
 }
 
 /// Pages of this process that are in memory.

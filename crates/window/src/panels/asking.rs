@@ -11,7 +11,7 @@ use crate::form::mark;
 pub(crate) fn show(app: &mut App, ctx: &Context) {
     let Some((asking, mut path)) = app.asking.take() else { return };
     let (title, action) = match asking {
-        Asking::Open => ("Open a scene or a model", "Open"),
+        Asking::Open => ("Open a scene, a model, a lens or an image", "Open"),
         Asking::SaveAs => ("Save the scene as", "Save"),
         Asking::Render => ("Render into the folder", "Render"),
     };

@@ -24,10 +24,17 @@ pub(crate) fn show(app: &mut App, ctx: &Context) {
 }
 
 fn files(app: &mut App, ui: &mut Ui) {
-    let folder = app.document.as_ref().and_then(|document| document.path.parent());
+    let file = app.document.as_ref().map(|document| &document.path);
+    let file = file.or(app.still.as_ref().map(|(path, _)| path));
+    let folder = file.and_then(|path| path.parent());
     let folder = folder.map(|folder| folder.display().to_string()).unwrap_or_default();
     let is_open = app.document.is_some();
-    if button(ui, "open", "Open", "Open a scene or a model (Ctrl+O); or drop one on the window") {
+    if button(
+        ui,
+        "open",
+        "Open",
+        "Open a scene, a model, a lens or an image (Ctrl+O); or drop one on the window",
+    ) {
         app.asking = Some((Asking::Open, folder));
     }
     ui.add_enabled_ui(is_open, |ui| {
@@ -35,7 +42,7 @@ fn files(app: &mut App, ui: &mut Ui) {
             app.save();
         }
         if button(ui, "save as", "Save as", "Write the scene to another file") {
-            let path = app.document.as_ref().map(|document| document.path.with_extension("json"));
+            let path = app.document.as_ref().map(crate::document::Document::own_file);
             let path = path.map(|path| path.display().to_string()).unwrap_or_default();
             app.asking = Some((Asking::SaveAs, path));
         }
@@ -63,6 +70,10 @@ fn steps(app: &mut App, ui: &mut Ui) {
 }
 
 fn views(app: &mut App, ui: &mut Ui) {
+    if app.still.is_some() {
+        parts(app, ui);
+        return;
+    }
     let mut view = app.view.clone();
     let combo = egui::ComboBox::from_id_salt("view").selected_text(view.title());
     let shown = combo.height(420.0).show_ui(ui, |ui| {
@@ -81,18 +92,27 @@ fn views(app: &mut App, ui: &mut Ui) {
 /// The parts of a layer that has several: ids of objects, of triangles ….
 fn parts(app: &mut App, ui: &mut Ui) {
     let Some(picture) = &app.picture else { return };
-    if picture.layers.len() < 2 || !matches!(app.view, View::Layer(_)) {
+    let has_parts = app.still.is_some() || matches!(app.view, View::Layer(_));
+    if picture.layers.len() < 2 || !has_parts {
         return;
     }
+    let title =
+        |layer: &str| if layer.is_empty() { "Picture".to_owned() } else { layer.to_owned() };
     let mut part = picture.layer.clone();
-    egui::ComboBox::from_id_salt("part").selected_text(&part).show_ui(ui, |ui| {
+    let combo = egui::ComboBox::from_id_salt("part").selected_text(title(&part)).height(420.0);
+    let shown = combo.show_ui(ui, |ui| {
         for layer in &picture.layers {
-            ui.selectable_value(&mut part, layer.clone(), layer);
+            let one = ui.selectable_value(&mut part, layer.clone(), title(layer));
+            mark(ui.ctx(), &format!("part={}", title(layer)), one.rect);
         }
     });
+    mark(ui.ctx(), "part", shown.response.rect);
     if part != picture.layer {
         app.part = Some(part);
-        app.wish();
+        match app.still.is_some() {
+            true => app.show_still(ui.ctx()),
+            false => app.wish(),
+        }
     }
 }
 
@@ -116,7 +136,9 @@ fn compare(app: &mut App, ui: &mut Ui) {
     let Some(picture) = &app.picture else { return };
     let mut compares = app.canvas.before.is_some();
     let about = "Keep the picture as it is now on the left of a line, to compare";
-    if ui.toggle_value(&mut compares, "Before | after").on_hover_text(about).changed() {
+    let switch = ui.toggle_value(&mut compares, "Before | after").on_hover_text(about);
+    mark(ui.ctx(), "compare", switch.rect);
+    if switch.changed() {
         app.canvas.before = compares.then(|| {
             let image =
                 egui::ColorImage::from_rgba_unmultiplied(picture.screen.size, &picture.screen.rgba);

@@ -6,7 +6,7 @@ use crate::app::App;
 use crate::canvas::short;
 
 pub(crate) fn show(app: &mut App, ctx: &Context) {
-    if app.document.is_none() {
+    if app.document.is_none() && app.still.is_none() {
         return;
     }
     egui::SidePanel::left("inspect").default_width(250.0).show(ctx, |ui| {
@@ -38,7 +38,11 @@ fn pixel(app: &App, ui: &mut Ui) {
     {
         reading.into_iter().for_each(|(name, value)| add(&name, value));
     }
+    if let Some((_, still)) = &app.still {
+        still.reading(asked.place).into_iter().for_each(|(name, value)| add(&name, value));
+    }
     match &asked.probe {
+        None if app.still.is_some() => {}
         None => add("hit", "nothing".to_owned()),
         Some(probe) => {
             add("depth", format!("{} m", short(probe.depth)));
@@ -105,8 +109,9 @@ fn histogram(app: &App, ui: &mut Ui) {
 fn notes(app: &App, ui: &mut Ui) {
     if let Some(picture) = &app.picture {
         ui.weak(&picture.screen.note);
-        let preview = picture.preview.as_ref();
-        for note in preview.map(|preview| preview.notes()).unwrap_or_default() {
+        let preview = picture.preview.as_ref().map(|preview| preview.notes());
+        let still = app.still.as_ref().map(|(_, still)| still.notes());
+        for note in preview.or(still).unwrap_or_default() {
             ui.label(note);
         }
     }

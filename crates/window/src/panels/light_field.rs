@@ -32,18 +32,21 @@ impl LightField {
         self.views = None;
     }
 
+    /// Takes the views out of a picture, once.
+    fn find(&mut self, preview: Option<&etendue::Preview>) -> Result<(), Error> {
+        // Lenslets are told apart at the picture's own size alone.
+        if let (None, Some(preview)) = (&self.views, preview.filter(|of| of.factor() == 1)) {
+            self.views = preview.light_field()?;
+        }
+        Ok(())
+    }
+
     /// What is to be shown instead of the picture itself.
     pub(crate) fn screen(
         &mut self,
         preview: Option<&etendue::Preview>,
     ) -> Result<Option<Screen>, Error> {
-        if self.views.is_none() {
-            // Lenslets are told apart at the picture's own size alone.
-            let Some(preview) = preview.filter(|preview| preview.factor() == 1) else {
-                return Ok(None);
-            };
-            self.views = preview.light_field()?;
-        }
+        self.find(preview)?;
         let Some(views) = &self.views else { return Ok(None) };
         let picture: Picture = match self.shows {
             Shows::Raw => return Ok(None),
@@ -55,6 +58,10 @@ impl LightField {
 }
 
 pub(crate) fn show(app: &mut App, ui: &mut Ui) {
+    let preview = app.picture.as_ref().filter(|picture| picture.is_final);
+    if let Err(error) = app.light_field.find(preview.and_then(|of| of.preview.as_deref())) {
+        app.error = Some(error.to_string());
+    }
     let before = app.light_field.shows;
     let mut shows = before;
     let focus = app.light_field.views.as_ref().map_or(f64::INFINITY, LightFieldViews::focus);
@@ -78,7 +85,8 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
         Shows::Focused(depth) => {
             let range = focus * 0.2..=focus * 5.0;
             let slider = egui::Slider::new(depth, range).logarithmic(true).suffix(" m");
-            ui.add(slider.custom_formatter(|depth, _| short(depth)));
+            let slider = ui.add(slider.custom_formatter(|depth, _| short(depth)));
+            mark(ui.ctx(), "refocus", slider.rect);
         }
     }
     if shows != before {

@@ -14,6 +14,9 @@ pub(crate) fn show(app: &mut App, ctx: &Context) {
                 let mark = if document.is_changed() { " (not saved)" } else { "" };
                 ui.label(format!("{}{mark}", document.path.display()));
             }
+            if let Some((path, _)) = &app.still {
+                ui.label(path.display().to_string());
+            }
             if let Some(said) = &app.said {
                 ui.separator();
                 ui.label(said);

@@ -4,10 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-use etendue::{Error, Options, Outputs, Preview, Progress, Roughness, Screen, Session, places};
+use etendue::{
+    Error, Options, Outputs, Preview, Progress, Roughness, Screen, Session, Viewed, places,
+};
 use serde_json::Value;
 
-use super::{News, Shared, Shown, Task, Teller, WATCH, Wish};
+use super::{Kind, News, Shared, Shown, Task, Teller, WATCH, Wish};
 use crate::view::View;
 
 /// How long a first picture may take, so that twenty follow each other in a second.
@@ -27,6 +29,8 @@ pub(super) struct Studio {
     teller: Teller,
     shared: Arc<Shared>,
     open: Option<Open>,
+    /// The image that is looked at instead, as it was.
+    image: Option<(PathBuf, Stamp)>,
 }
 
 /// What is open.
@@ -55,7 +59,7 @@ enum Job {
 
 impl Studio {
     pub(super) fn new(options: Options, teller: Teller, shared: Arc<Shared>) -> Self {
-        Self { options, teller, shared, open: None }
+        Self { options, teller, shared, open: None, image: None }
     }
 
     pub(super) fn work(&mut self) {
@@ -130,11 +134,19 @@ impl Studio {
     }
 
     fn open(&mut self, path: PathBuf) -> Result<(), Error> {
-        let session = Session::open_with(&path, self.options.clone())?;
-        let base = Arc::new(session.values().clone());
         let files = vec![(path.clone(), stamp(&path))];
+        let (kind, session) = match open_scene(&path, &self.options)? {
+            Ok(scene) => scene,
+            Err(image) => {
+                (self.open, self.image) = (None, Some((path.clone(), stamp(&path))));
+                self.teller.tell(News::Looked(path, image));
+                return Ok(());
+            }
+        };
+        let base = Arc::new(session.values().clone());
         let scene = Arc::clone(&base);
-        self.teller.tell(News::Opened(path.clone(), Arc::clone(&base)));
+        self.teller.tell(News::Opened(path.clone(), kind, Arc::clone(&base)));
+        self.image = None;
         self.open = Some(Open { path, session, base, scene, wish: None, files, cost: None });
         Ok(())
     }
@@ -175,11 +187,16 @@ impl Studio {
     }
 
     fn has_changes(&self) -> bool {
-        let open = self.open.as_ref();
-        open.is_some_and(|open| open.files.iter().any(|(path, was)| stamp(path) != *was))
+        let files = self.open.iter().flat_map(|open| &open.files).chain(&self.image);
+        files.into_iter().any(|(path, was)| stamp(path) != *was)
     }
 
     fn look_for_changes(&mut self) {
+        if let Some((path, was)) = &mut self.image {
+            *was = stamp(path);
+            let path = path.clone();
+            return self.carry_out(Task::Open(path));
+        }
         let Some(open) = &mut self.open else { return };
         open.files.iter_mut().for_each(|(path, was)| *was = stamp(path));
         match open.take_up(&self.options) {
@@ -327,7 +344,10 @@ pub(crate) fn screen_of(preview: &Preview, view: &View, layer: &str) -> Result<S
 impl Open {
     /// Reads the file again, and sets anew what was edited and not saved.
     fn take_up(&mut self, options: &Options) -> Result<(), Error> {
-        let mut file = Session::open_with(&self.path, options.clone())?;
+        let (_, mut file) = open_scene(&self.path, options)?.map_err(|_| {
+            let why = "is an image now, which has no scene";
+            Error::Refused(format!("{}: {why}", self.path.display()))
+        })?;
         let base = Arc::new(file.values().clone());
         file.set_changes(&self.base, &self.scene)?;
         let scene = Arc::new(file.values().clone());
@@ -336,6 +356,19 @@ impl Open {
         (self.base, self.scene) = (base, scene);
         Ok(())
     }
+}
+
+/// The scene of a file, or the image that it is.
+fn open_scene(
+    path: &Path,
+    options: &Options,
+) -> Result<Result<(Kind, Session), Arc<etendue::Still>>, Error> {
+    Ok(match Viewed::open(path, options.clone())? {
+        Viewed::Scene(session) => Ok((Kind::Scene, *session)),
+        Viewed::Model(session) => Ok((Kind::Model, *session)),
+        Viewed::Lens(session) => Ok((Kind::Lens, *session)),
+        Viewed::Image(still) => Err(Arc::from(still)),
+    })
 }
 
 /// Takes the session to a frame, and tells how many there are.

@@ -1,0 +1,238 @@
+//! An image file by itself, to be looked at: its layers, how each is shown, and the values of its pixels.
+
+use std::path::Path;
+
+use etendue_geometry::files;
+use etendue_image::{ExrChannels, Limits, MOST_BYTES, Plane, Raster, Samples};
+use etendue_render::output::{Channel, Layer, Look, Picture, Screen, Values};
+use serde_json::Value;
+
+use crate::Error;
+use crate::preview::layer_reading;
+
+/// Layers by the names that this program's EXR files give them, and how they are shown; others are told by
+/// their channels.
+const LOOKS: [(&str, Look); 8] = [
+    ("Depth", Look::Distance),
+    ("Distance", Look::Distance),
+    ("Normal", Look::Direction),
+    ("Id.", Look::Ids),
+    ("MaterialId", Look::Ids),
+    ("Spectrum", Look::Cube),
+    ("Coverage", Look::Share),
+    ("Alpha", Look::Share),
+];
+
+/// An image file (EXR, Radiance, PNG, JPEG) with its layers.
+#[derive(Debug)]
+pub struct Still {
+    picture: Picture,
+    /// The texels as the file has them, where those are integers.
+    codes: Option<Raster>,
+    notes: Vec<String>,
+}
+
+impl Still {
+    /// Whether a file's name says that it is an image.
+    #[must_use]
+    pub fn is_named(path: &Path) -> bool {
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        ["exr", "hdr", "png", "jpg", "jpeg"].iter().any(|known| ending.eq_ignore_ascii_case(known))
+    }
+
+    /// Reads the image at `path`: of an EXR file all channels, in layers by what stands before their last
+    /// dot.
+    ///
+    /// # Errors
+    ///
+    /// When it cannot be read, is no image, or takes more than 2 GiB.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let refused = |why: String| Error::Refused(format!("{}: {why}", path.display()));
+        let bytes = files::read(path, MOST_BYTES).map_err(|error| refused(error.to_string()))?;
+        let limits = Limits::default();
+        if etendue_image::is_exr(&bytes) {
+            let channels = etendue_image::exr_channels(&bytes, limits);
+            return Self::of_channels(channels.map_err(|error| refused(error.to_string()))?)
+                .map_err(|error| refused(error.to_string()));
+        }
+        let raster = etendue_image::decode(&bytes, limits);
+        Self::of_raster(raster.map_err(|error| refused(error.to_string()))?)
+            .map_err(|error| refused(error.to_string()))
+    }
+
+    fn of_channels(channels: ExrChannels) -> Result<Self, Error> {
+        let [width, height] = channels.size;
+        let (mut layers, mut missing) = (Vec::<Layer>::new(), 0);
+        for (full_name, mut plane) in channels.planes {
+            let (name, channel) = place_of(&full_name);
+            let (title, channel) = (fit(name), fit(channel));
+            missing += without_nan(&mut plane);
+            let values = match plane {
+                Plane::F32(values) => Values::F32(values),
+                Plane::U32(values) => Values::U32(values),
+            };
+            let meaning = meaning(channels.texts.get(&format!("etendue:{name}")));
+            let channel = Channel { name: channel, values };
+            match layers.iter_mut().find(|layer| layer.name == title) {
+                Some(layer) => layer.channels.push(channel),
+                None => layers.push(Layer {
+                    name: title,
+                    look: Look::Cube,
+                    channels: vec![channel],
+                    meaning,
+                }),
+            }
+        }
+        layers.iter_mut().for_each(arrange);
+        // The picture comes first.
+        layers.sort_by_key(|layer| !layer.name.is_empty());
+        let picture = Picture::new(width, height, layers, Vec::new()).map_err(in_words)?;
+        let notes = match missing {
+            0 => Vec::new(),
+            _ => vec![format!("{missing} values are no numbers (NaN); they count as infinite")],
+        };
+        Ok(Self { picture, codes: None, notes })
+    }
+
+    fn of_raster(raster: Raster) -> Result<Self, Error> {
+        let [width, height] = raster.size();
+        let names: &[&str] = if raster.channels() < 3 { &["Y"] } else { &["R", "G", "B"] };
+        let channel = |(k, name): (usize, &&str)| {
+            #[expect(clippy::cast_possible_truncation, reason = "light of a file of f32 or less")]
+            let light = (0..raster.len()).map(|i| raster.linear(i)[k] as f32);
+            Channel { name: (*name).to_owned(), values: Values::F32(light.collect()) }
+        };
+        let channels = names.iter().enumerate().map(channel).collect();
+        let light = Layer { name: String::new(), look: Look::Color, channels, meaning: Vec::new() };
+        let picture = Picture::new(width, height, vec![light], Vec::new()).map_err(in_words)?;
+        let codes = (!raster.is_float()).then_some(raster);
+        Ok(Self { picture, codes, notes: Vec::new() })
+    }
+
+    /// The layers, the picture first where there is one; its name is empty.
+    #[must_use]
+    pub fn layers(&self) -> &[Layer] {
+        self.picture.layers()
+    }
+
+    /// What a user should know.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// A layer for a screen; the picture's name is empty.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such layer.
+    pub fn screen(&self, layer: &str) -> Result<Screen, Error> {
+        Ok(Screen::of_layer(&self.picture, layer)?)
+    }
+
+    /// What the file has at column and row coordinates `place` (pixels): names and values with their units;
+    /// of integers the numbers themselves beside their linear light. Empty outside of the picture.
+    #[must_use]
+    pub fn reading(&self, place: [f64; 2]) -> Vec<(String, String)> {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 0 is 0")]
+        let [x, y] = place.map(|at| at.floor() as usize);
+        let (width, height) = (self.picture.width(), self.picture.height());
+        if x >= width || y >= height {
+            return Vec::new();
+        }
+        let i = y * width + x;
+        let codes = self.codes.as_ref().map(|raster| ("file".to_owned(), codes_at(raster, i)));
+        let layers = self.layers().iter().map(|layer| layer_reading(layer, i));
+        codes.into_iter().chain(layers).collect()
+    }
+}
+
+/// The layer and the channel of a full name: `Depth` and `Z`; R, G and B by themselves are the picture's,
+/// and any other channel without a layer is one of its own.
+fn place_of(full_name: &str) -> (&str, &str) {
+    match full_name.rsplit_once('.') {
+        Some(place) => place,
+        None if ["R", "G", "B"].contains(&full_name) => ("", full_name),
+        None => (full_name, full_name),
+    }
+}
+
+/// A name as layers may have it: letters, digits and `.`, `_`, `-`, at most 60.
+fn fit(name: &str) -> String {
+    let is_fit = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+    let kept = name.chars().take(60).map(|c| if is_fit(c) { c } else { '_' });
+    kept.collect()
+}
+
+/// Makes NaN infinite; how many there were.
+fn without_nan(plane: &mut Plane) -> usize {
+    let Plane::F32(values) = plane else { return 0 };
+    let missing = values.iter_mut().filter(|value| value.is_nan());
+    missing.map(|value| *value = f32::INFINITY).count()
+}
+
+/// The unit that this program's files state of a layer, as JSON.
+fn meaning(text: Option<&String>) -> Vec<(String, String)> {
+    let value = text.and_then(|text| serde_json::from_str::<Value>(text).ok());
+    let unit = value.as_ref().and_then(|value| value.get("unit")?.as_str());
+    unit.map(|unit| ("unit".to_owned(), unit.to_owned())).into_iter().collect()
+}
+
+/// Puts a layer's channels in order, and chooses how it is shown.
+fn arrange(layer: &mut Layer) {
+    let is_colour = layer.channels.iter().all(|channel| "RGBAY".contains(&*channel.name));
+    if is_colour {
+        layer.channels.sort_by_key(|channel| "RGBA".find(&*channel.name));
+        // How much a pixel covers is no colour.
+        layer.channels.truncate(3);
+    }
+    let named = LOOKS.iter().find(|(name, _)| layer.name.starts_with(name)).map(|(_, look)| *look);
+    let count = layer.channels.len();
+    let own = match count {
+        3 if is_colour => Look::Color,
+        1 if layer.name == "Y" => Look::Color,
+        1..=3 => Look::Extent,
+        _ => Look::Cube,
+    };
+    let look = named.filter(|look| match look {
+        Look::Distance | Look::Share => count == 1,
+        Look::Direction => count == 3,
+        _ => true,
+    });
+    layer.look = look.unwrap_or(own);
+    let is_float = layer.channels.iter().any(|channel| matches!(channel.values, Values::F32(_)));
+    if layer.look == Look::Ids || (is_float && layer.type_name() != "f4") || count > 1 {
+        unite(layer, is_float);
+    }
+}
+
+/// Makes the channels of a layer of one type: integers for ids, else floats where one of them is.
+fn unite(layer: &mut Layer, is_float: bool) {
+    let ids = layer.look == Look::Ids;
+    for channel in &mut layer.channels {
+        let values = &channel.values;
+        let all = (0..values.len()).map(|i| values.at(i));
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+        let united = match (values, ids, is_float) {
+            (Values::F32(_), true, _) => Values::U32(all.map(|value| value as u32).collect()),
+            (Values::U32(_), false, true) => Values::F32(all.map(|value| value as f32).collect()),
+            _ => continue,
+        };
+        channel.values = united;
+    }
+}
+
+fn codes_at(raster: &Raster, i: usize) -> String {
+    let first = i * raster.channels();
+    let range = first..first + raster.channels();
+    let (codes, full): (Vec<String>, u32) = match raster.samples() {
+        Samples::U8(values) => (values[range].iter().map(u8::to_string).collect(), 255),
+        Samples::U16(values) => (values[range].iter().map(u16::to_string).collect(), 65_535),
+        Samples::F16(_) | Samples::F32(_) => (Vec::new(), 1),
+    };
+    format!("{} of {full}", codes.join(", "))
+}
+
+fn in_words(error: impl std::fmt::Display) -> Error {
+    Error::Refused(error.to_string())
+}

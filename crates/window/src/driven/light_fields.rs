@@ -1,0 +1,56 @@
+//! The panel of light fields.
+
+use super::*;
+use crate::panels::light_field::Shows;
+
+fn camera(folder: &Path) -> Driver {
+    let mut scene = scene();
+    scene["camera"] = json!({
+        "type": "light_field", "focal_length": "35 mm", "f_number": 2, "focus_distance": "2 m",
+        "microlenses": {"pitch": "90 um"},
+        "pose": {"from": [0, 0, 2], "look_at": [0, 0, 0]},
+        "sensor": {"resolution": [240, 180], "pixel_pitch": "6 um"}
+    });
+    scene["render"]["samples"] = json!(2);
+    let path = folder.join("plenoptic.json");
+    fs::write(&path, scene.to_string()).unwrap();
+    let mut window = Driver::open(&path);
+    window.settle();
+    window
+}
+
+#[test]
+fn views_are_moved_through_by_the_pupil() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut window = camera(folder.path());
+    let raw = window.pixels();
+    window.click("light field=view");
+    let corner = window.pixels();
+    assert_ne!(corner, raw, "a view in place of the raw picture");
+    window.step(Vec::new());
+    let pupil = marked(&window.ctx, "pupil").unwrap();
+    window.drag(pupil.min + Vec2::splat(3.0), pupil.size() - Vec2::splat(6.0));
+    let Shows::View([u, v]) = window.app.light_field.shows else { panic!("no view is shown") };
+    assert!(u == v && u > 2, "the drag ended in the pupil's other corner: {u}, {v}");
+    assert_ne!(window.pixels(), corner, "seen from elsewhere");
+    window.click("light field=raw");
+    assert_eq!(window.pixels(), raw);
+}
+
+#[test]
+fn all_views_are_focused_anew_by_the_slider() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut window = camera(folder.path());
+    window.click("light field=refocus");
+    let Shows::Focused(at) = window.app.light_field.shows else { panic!("no focus is shown") };
+    assert!((at - 2.0).abs() < 1e-6, "where the camera is focused: {at}");
+    let sharp = window.pixels();
+    window.step(Vec::new());
+    let slider = marked(&window.ctx, "refocus").unwrap();
+    let knob = slider.left_center() + Vec2::new(0.3 * slider.width(), 0.0);
+    window.drag(knob, Vec2::new(-0.2 * slider.width(), 0.0));
+    let Shows::Focused(near) = window.app.light_field.shows else { panic!("no focus is shown") };
+    assert!(near < 1.5, "{near}");
+    assert_ne!(window.pixels(), sharp);
+    assert_eq!(window.app.error, None);
+}
