@@ -7,7 +7,7 @@ export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
 .PHONY: help setup render install view dist test test-embree4 test-window test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast docs-figures docs-charts \
-	docs-stability light-fields fingerprints fuzz-smoke fuzz-seeds clean
+	docs-stability gallery light-fields fingerprints fuzz-smoke fuzz-seeds clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -28,6 +28,7 @@ help:
 	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/limits.md"
 	@echo "make bench-sampling  what samples that stop save; writes the measured part of docs/sampling.md"
 	@echo "make bench-forecast  render the example scenes, and hold the forecast of time against it"
+	@echo "make gallery       render the pictures of docs/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make light-fields  the walk of docs/light-fields.md in a venv, its pictures, and another decoder's opinion"
 	@echo "make docs-charts   measure docs/speed-and-accuracy.md anew, with its charts"
@@ -119,28 +120,16 @@ bench-forecast: setup
 docs-charts: setup
 	cargo run --release -p etendue-benches --bin charts -- $(ARGS)
 
-docs-figures: setup docs-charts docs-stability light-fields
+docs-figures: setup docs-charts docs-stability light-fields gallery
 	cargo run --release -p etendue-cli -- render scenes/first-light.json -o out/docs-figures \
 		--set 'camera.sensor.resolution=[640,640]' --samples 16 --outputs png
 	install -D -m 644 out/docs-figures/picture.png docs/images/first-light.png
-	cargo run --release -p etendue-cli -- render scenes/paper/fig3.json -o out/docs-figures/fig3 \
-		--samples 256 --outputs png
-	install -D -m 644 out/docs-figures/fig3/picture.png docs/images/fig3.png
-	for kind in fig6a fig6b; do \
-		cargo run --release -p etendue-cli -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind \
-			--set 'camera.sensor.resolution=[480,360]' --outputs png && \
-		install -D -m 644 out/docs-figures/$$kind/picture.png docs/images/$$kind.png || exit 1; \
-	done
-	for kind in fig6c fig8a fig8b fig8c; do \
-		cargo run --release -p etendue-cli -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind --outputs png && \
-		install -D -m 644 out/docs-figures/$$kind/picture.png docs/images/$$kind.png || exit 1; \
-	done
 	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
-	for kind in fig5a fig5b fig5c fig7a-raw fig7b-rgb fig7c-multispectral; do \
-		cargo run --release -p etendue-cli -- render scenes/paper/$$kind.json -o out/docs-figures/$$kind \
-			--outputs png && \
-		install -D -m 644 out/docs-figures/$$kind/raw.preview.png docs/images/$$kind.png || exit 1; \
-	done
+
+# The commands of docs/gallery.md, their pictures and their times. ARGS="prism burst" takes some sections.
+gallery: setup
+	cargo build --release -p etendue-cli
+	python3 benches/gallery.py $(ARGS)
 
 # The Python of docs/light-fields.md and its pictures, and plenopticam's views against ours. ARGS go to the render.
 light-fields: setup

@@ -10,6 +10,7 @@ mod figures; // models with skins, in the pose of their file
 mod files; // what is no file, what costs without end, what real programs write
 mod flow; // layers that compare two frames
 mod frames; // many pictures of one scene, and trajectories of others
+mod gallery; // the page of pictures, its commands and its scenes
 mod gltf_looks; // materials, lights and textures of models, with closed-form answers
 mod hidden; // meshes of one point, nodes scaled to 0
 mod ids; // numbers of objects, copies, nodes and materials, and their names

@@ -1,0 +1,160 @@
+"""Renders the pictures of docs/gallery.md by the commands of that page, and writes there what each took.
+
+A section of the page is a heading, a block of commands, comments that say which of the files are shown, and
+a line between two comments for the times:
+
+    <!-- picture: images/fig3.png = fig3/picture.png -->
+    <!-- bands: images/gallery/bands.png = spectrum/views_spectrum.npy 1 4 8 11 -->
+    <!-- took: begin -->...<!-- took: end -->
+
+Words choose among the sections: those whose heading or commands have one of them.
+"""
+
+import argparse
+import math
+import os
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import time
+import zlib
+from array import array
+from ast import literal_eval
+from pathlib import Path
+
+import program
+import section
+
+PAGE = program.ROOT / "docs" / "gallery.md"
+OUT = "out/gallery"
+
+# Views of a light field have few pixels: each is shown as a square of so many.
+MAGNIFIED = 8
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("words", nargs="*", help="of the sections to render; all when there are none")
+    words = parser.parse_args().words
+    etendue = program.built("etendue")
+    parts = re.split(r"(?m)^(?=## )", PAGE.read_text())
+    for number, part in enumerate(parts):
+        commands = commands_of(part)
+        if not commands or words and not any(word in part_key(part, commands) for word in words):
+            continue
+        print(part.splitlines()[0], file=sys.stderr)
+        times = [took(etendue, command) for command in commands]
+        for target, source in comments(part, "picture"):
+            show(source, target)
+        for target, source in comments(part, "bands"):
+            bands(*source.split(), target=target)
+        parts[number] = with_times(part, times)
+        # What is done stays when a later command fails.
+        PAGE.write_text("".join(parts))
+    section.put(PAGE, "machine", f"Machine: {section.machine()}; {len(os.sched_getaffinity(0))} processors.")
+
+
+def commands_of(part):
+    """The commands of a section, each as one line."""
+    blocks = re.findall(r"(?ms)^```sh\n(.*?)^```", part)
+    lines = "".join(blocks).replace("\\\n", " ").splitlines()
+    return [line for line in lines if line.startswith("etendue ")]
+
+
+def part_key(part, commands):
+    return "\n".join([part.splitlines()[0].lower(), *commands])
+
+
+def took(etendue, command):
+    """Seconds on the clock and of the processors that a command takes."""
+    words = re.findall(r"'([^']*)'|(\S+)", command)
+    words = [quoted or plain for quoted, plain in words][1:]
+    before, start = os.times(), time.monotonic()
+    done = subprocess.run([etendue, *words], cwd=program.ROOT, stdout=subprocess.DEVNULL)
+    if done.returncode:
+        raise SystemExit(f"{command}: failed")
+    after = os.times()
+    processor = sum(after[2:4]) - sum(before[2:4])
+    return time.monotonic() - start, processor
+
+
+def comments(part, kind):
+    """The pairs of target and source of a section's comments of a kind."""
+    return re.findall(rf"<!-- {kind}: (\S+) = (.*?) -->", part)
+
+
+def with_times(part, times):
+    clock = ", ".join(f"{seconds:.1f} s" for seconds, _ in times)
+    processor = sum(processor for _, processor in times)
+    text = f"Time: {clock}; {processor:.0f} s of processor time."
+    return re.sub(r"(?s)(<!-- took: begin -->).*?(<!-- took: end -->)", rf"\1{text}\2", part)
+
+
+def show(source, target):
+    """Puts a file that was rendered where the page shows it; pictures as small as they get."""
+    source, target = program.ROOT / OUT / source, PAGE.parent / target
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if source.suffix != ".png":
+        shutil.copyfile(source, target)
+        return
+    header, rows = read_png(source)
+    write_png(target, header, rows)
+
+
+def read_png(path):
+    """The header of a PNG and its filtered rows; what else stands in the file is left out."""
+    data = path.read_bytes()
+    header, packed, at = b"", b"", len(SIGNATURE)
+    while at < len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        kind, content = data[at + 4 : at + 8], data[at + 8 : at + 8 + length]
+        header = content if kind == b"IHDR" else header
+        packed += content if kind == b"IDAT" else b""
+        at += length + 12
+    return header, zlib.decompress(packed)
+
+
+def write_png(path, header, rows):
+    def chunk(kind, content):
+        check = zlib.crc32(kind + content)
+        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", check)
+
+    chunks = [chunk(b"IHDR", header), chunk(b"IDAT", zlib.compress(rows, 9)), chunk(b"IEND", b"")]
+    path.write_bytes(SIGNATURE + b"".join(chunks))
+
+
+def bands(source, *numbers, target):
+    """The middle view of a light field in some of its bands, side by side: each in grey, as sRGB."""
+    data = (program.ROOT / OUT / source).read_bytes()
+    (length,) = struct.unpack("<H", data[8:10])
+    about = literal_eval(data[10 : 10 + length].decode())
+    down, across, height, width, count = about["shape"]
+    values = array({"<f4": "f", "<f8": "d"}[about["descr"]], data[10 + length :])
+    start = (down // 2 * across + across // 2) * height * width * count
+    view = values[start : start + height * width * count]
+    most = max(view)
+    codes = [round(255 * encoded(value / most)) for value in view]
+    rows = bytearray()
+    for row in range(height):
+        line = bytearray(1)
+        for band in map(int, numbers):
+            first = row * width * count + band
+            for code in codes[first : first + width * count : count]:
+                line += bytes([code]) * MAGNIFIED
+        rows += line * MAGNIFIED
+    size = [width * len(numbers) * MAGNIFIED, height * MAGNIFIED]
+    header = struct.pack(">IIBBBBB", *size, 8, 0, 0, 0, 0)
+    write_png(PAGE.parent / target, header, bytes(rows))
+
+
+def encoded(light):
+    """sRGB's code of a linear value (IEC 61966-2-1)."""
+    light = min(max(light, 0.0), 1.0)
+    return 12.92 * light if light <= 0.0031308 else 1.055 * math.pow(light, 1 / 2.4) - 0.055
+
+
+if __name__ == "__main__":
+    main()

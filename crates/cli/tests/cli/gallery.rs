@@ -1,0 +1,110 @@
+//! The page of pictures: its commands run, on small pictures, and leave the files that it shows.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::run::{Bench, text};
+
+/// The page, and the folder that its commands are given in; `None` where the tests stand without them.
+fn page() -> Option<(String, PathBuf)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let Ok(page) = fs::read_to_string(root.join("docs/gallery.md")) else {
+        println!("skipped: there is no docs/gallery.md beside the sources");
+        return None;
+    };
+    Some((page, root))
+}
+
+/// The page's commands, without the word `etendue`.
+fn commands(page: &str) -> Vec<&str> {
+    let blocks = page.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next());
+    blocks.flat_map(str::lines).filter_map(|line| line.strip_prefix("etendue ")).collect()
+}
+
+/// Comments of a kind, `TARGET = SOURCE`, by their two sides.
+fn comments<'a>(page: &'a str, kind: &str) -> Vec<(&'a str, &'a str)> {
+    let opening = format!("<!-- {kind}: ");
+    let found = page.split(&*opening).skip(1).filter_map(|rest| rest.split(" -->").next());
+    found.map(|comment| comment.split_once(" = ").expect("TARGET = SOURCE")).collect()
+}
+
+/// Copies a folder, its scenes with few pixels and few triangles.
+fn copy_small(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let (path, copy) = {
+            let entry = entry.unwrap();
+            (entry.path(), to.join(entry.file_name()))
+        };
+        if path.is_dir() {
+            copy_small(&path, &copy);
+            continue;
+        }
+        fs::copy(&path, &copy).unwrap();
+        let written =
+            fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
+        if let Some(mut scene @ Value::Object(_)) = written
+            && scene["etendue"] == 1
+        {
+            shrink(&mut scene);
+            fs::write(&copy, scene.to_string()).unwrap();
+        }
+    }
+}
+
+fn shrink(scene: &mut Value) {
+    // Behind exaggerated lenslets a few have to be whole.
+    let size = if scene["camera"]["microlenses"].is_null() { [24, 18] } else { [72, 54] };
+    scene["camera"]["sensor"]["resolution"] = json!(size);
+    scene["render"]["samples"] = json!(1);
+    for object in scene["objects"].as_array_mut().into_iter().flatten() {
+        if object["triangles"].as_u64().is_some_and(|count| count > 2000) {
+            object["triangles"] = json!(2000);
+        }
+    }
+}
+
+#[test]
+fn scenes_of_the_gallery_check_and_render_small() {
+    let Some((page, root)) = page() else { return };
+    let bench = Bench::new();
+    copy_small(&root.join("scenes"), &bench.path("scenes"));
+    let mut rendered = 0;
+    for command in commands(&page) {
+        let arguments: Vec<&str> = command.split_whitespace().collect();
+        if arguments[0] != "render" {
+            continue;
+        }
+        let check = bench.run(&["check", arguments[1]]);
+        assert!(check.status.success(), "{command}: {}", text(&check.stderr));
+        let render = bench.run(&[&*arguments, &["--quiet"]].concat());
+        assert!(render.status.success(), "{command}: {}", text(&render.stderr));
+        rendered += 1;
+    }
+    assert!(rendered > 20, "only {rendered} were found");
+    let pictures = comments(&page, "picture").into_iter().chain(comments(&page, "bands"));
+    for (shown, source) in pictures {
+        let file = source.split_whitespace().next().unwrap();
+        // Benchmarks are not run here.
+        let is_there = file.starts_with("bench/") || bench.path("out/gallery").join(file).exists();
+        assert!(is_there, "no command leaves {file}");
+        assert!(page.contains(&format!("]({shown})")), "{shown} is not shown");
+        assert!(root.join("docs").join(shown).exists(), "docs/{shown} is missing: make gallery");
+    }
+}
+
+#[test]
+fn every_figure_and_every_scene_of_the_gallery_is_on_its_page() {
+    let Some((page, root)) = page() else { return };
+    let commands = commands(&page).join("\n");
+    for folder in ["paper", "gallery"] {
+        for entry in fs::read_dir(root.join("scenes").join(folder)).unwrap() {
+            let name = entry.unwrap().file_name().to_string_lossy().into_owned();
+            let is_scene = name.ends_with(".json");
+            let scene = format!("scenes/{folder}/{name} ");
+            assert!(!is_scene || commands.contains(&scene), "no command renders {scene}");
+        }
+    }
+}
