@@ -2,7 +2,7 @@
 # A real window on a screen in memory, driven by keys and the mouse: opened, moved about in, saved, given a
 # broken file, closed during a render. What is saved must render to the same bits. Screenshots are left in
 # out/window, at once and twice the size, dark and light. docs/images/window.png is lens-1x.png of
-# RESOLUTION=[720,480] SAMPLES=64.
+# RESOLUTION=[480,320] SAMPLES=32.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -116,11 +116,12 @@ shoot light-1x
 press ctrl+t
 
 # A pixel, its values and its rays through the lens.
-xdotool mousemove 640 330 sleep 0.2 click 1 sleep 0.3 mousemove 578 12 sleep 0.2 click 1 sleep 0.5 mousemove 640 700
-shows small.json || fail "the panel of the lens never settles"
+xdotool mousemove 640 330 sleep 0.2 click 1 sleep 1 mousemove 578 12 sleep 0.2 click 1 sleep 1 mousemove 640 700
+until_so 60 is_idle || fail "the panel of the lens never settles"
 shoot lens-1x
 cmp -s "$shots/dark-1x.png" "$shots/lens-1x.png" && fail "the panel of the lens does not open"
-xdotool mousemove 578 12 sleep 0.2 click 1 sleep 0.5
+xdotool mousemove 578 12 sleep 0.2 click 1 sleep 1
+until_so 60 is_idle
 
 # A drag in the picture turns the camera; saved, it is another scene.
 xdotool mousemove 640 430 sleep 0.2 mousedown 1 sleep 0.2 mousemove_relative 30 5 sleep 0.2 \
