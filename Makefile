@@ -124,6 +124,9 @@ docs-figures: setup docs-charts docs-stability light-fields gallery
 	cargo run --release -p etendue-cli -- render scenes/first-light.json -o out/docs-figures \
 		--set 'camera.sensor.resolution=[640,640]' --samples 16 --outputs png
 	install -D -m 644 out/docs-figures/picture.png docs/images/first-light.png
+	cargo run --release -p etendue-cli -- render scenes/sensor-noise.json -o out/docs-figures/sampling --outputs png
+	install -D -m 644 out/docs-figures/sampling/raw.preview.png docs/images/sampling/sensor-noise.png
+	install -D -m 644 out/docs-figures/sampling/sample_count.preview.png docs/images/sampling/sensor-noise-map.png
 	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
 
 # The commands of docs/gallery.md, their pictures and their times. ARGS="prism burst" takes some sections.
