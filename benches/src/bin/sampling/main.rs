@@ -6,8 +6,6 @@
 //! seeds, never from a picture's own samples: per pixel and channel, the half of their squared difference,
 //! carried to digital numbers and divided by the sensor's own variance.
 
-mod models;
-mod plans;
 mod study;
 
 use std::fmt::Write as _;
@@ -101,8 +99,6 @@ fn main() -> anyhow::Result<()> {
     text += "\n![Rays saved against exposure time](images/sampling/saved.svg)\n";
     text += &relative_table(&effort, &names, &studies, &uniform);
     text += &map(&arguments.docs, &studies[0])?;
-    text += &models::table(&arguments.scenes.join("double-gauss.json"))?;
-    text += &plans::table(&arguments.scenes.join("first-light.json"))?;
     text += &planner(&studies[0]);
     let path = arguments.docs.join("sampling.md");
     let page = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
@@ -190,7 +186,10 @@ fn noise_table(
         let mut all: Vec<f64> = factors.iter().map(|pair| pair[k]).collect();
         all.sort_by(f64::total_cmp);
         let middle = 0.5 * (all[(all.len() - 1) / 2] + all[all.len() / 2]);
-        let _ = write!(text, "\nMedian, {words}: **{middle:.1} times fewer rays** (goal: 4).\n");
+        let _ = write!(
+            text,
+            "\nMedian, {words}: one number for all takes **{middle:.1} times the rays** (goal: 4).\n"
+        );
     }
     NoiseTable { text, saved }
 }
@@ -203,7 +202,7 @@ fn relative_table(
 ) -> String {
     let mut text = format!(
         "\nUntil a relative error of {ERROR}, against a number for every pixel with the same error in the worst tenth of \
-         all blocks (goal: 2 times fewer rays):\n\n| scene | samples a pixel | error of the worst tenth | fewer rays |\n\
+         all blocks (goal: 2):\n\n| scene | samples a pixel | error of the worst tenth | rays of one number for all over those taken |\n\
          |---|---|---|---|\n"
     );
     for ((name, study), uniform) in names.iter().zip(studies).zip(uniform) {
@@ -263,7 +262,7 @@ fn map(docs: &Path, study: &Study) -> anyhow::Result<String> {
     let counts = rendered.sample_counts.context("samples are counted")?;
     let [fewest, most] = [counts.least, counts.most];
     Ok(format!(
-        "\nWhere the samples of `paper/fig3.json` go at {} ms: {fewest} (black) to {most} (white) a pixel.\n\n\
+        "\nWhere the samples of `paper/fig3.json` go at {} ms: {fewest} (dark) to {most} (bright) a pixel.\n\n\
          ![Samples of each pixel](images/sampling/map.png)\n",
         SHOWN[1] * 1e3
     ))
