@@ -5,7 +5,7 @@ mod parse;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use etendue::Shard;
+use etendue::{Shard, ShardBy};
 use etendue_bench::tolerance::Tolerance;
 use etendue_optics::train::Focus;
 use etendue_scene::import::Strictness;
@@ -297,6 +297,24 @@ pub(crate) enum AccelArgument {
     Exact,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum ShardByArgument {
+    /// Strips of rows, in turn
+    #[default]
+    Rows,
+    /// Samples of every pixel: each share is a whole picture, with more noise
+    Samples,
+}
+
+impl From<ShardByArgument> for ShardBy {
+    fn from(by: ShardByArgument) -> Self {
+        match by {
+            ShardByArgument::Rows => Self::Rows,
+            ShardByArgument::Samples => Self::Samples,
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum AccelMode {
     /// Closed meshes have no leaks: suspicious rays are looked at again in f64
@@ -346,9 +364,12 @@ pub(crate) struct RenderArguments {
     /// Of a scene with `frames`, leave those that are complete in the folder
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Render only this share of the picture's rows, e.g. 3/8, into shard-3-of-8.film, for `etendue merge`
+    /// Render only this share of the picture, e.g. 3/8, into shard-3-of-8.film, for `etendue merge`
     #[arg(long, value_name = "NUMBER/COUNT", value_parser = str::parse::<Shard>)]
     pub(crate) shard: Option<Shard>,
+    /// What is dealt out to shares
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t, requires = "shard")]
+    pub(crate) shard_by: ShardByArgument,
     /// Keep what there is on the way, in checkpoint.film, so often at most; the same command goes on from
     /// there after an interruption, and its picture is the same to the bit
     #[arg(long, value_name = "SECONDS", num_args = 0..=1, default_missing_value = "60",

@@ -22,7 +22,8 @@ pub(crate) fn render_shard(
         return Err(Fault::refused("--report is of a whole picture; give it to `etendue merge`"));
     }
     let folder = &arguments.output;
-    let stem = format!("shard-{}", shard.to_string().replace('/', "-of-"));
+    let what = if shard.is_of_samples() { "samples" } else { "shard" };
+    let stem = format!("{what}-{}", shard.to_string().replace('/', "-of-"));
     let path = folder.join(format!("{stem}.film"));
     let name = format!("{stem}.checkpoint.film");
     let checkpoint = render::keep(arguments, session, folder, &name);

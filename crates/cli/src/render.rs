@@ -73,7 +73,7 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
         let why = "--frames, --pattern and --resume are for scenes with `frames`, and this is one picture";
         return Err(Fault::refused(why));
     }
-    if let Some(shard) = arguments.shard {
+    if let Some(shard) = arguments.shard.map(|shard| shard.by(arguments.shard_by.into())) {
         return merge::render_shard(arguments, &mut session, shard, &progress);
     }
     let watching = Watching::new(arguments, outputs);

@@ -89,7 +89,7 @@ pub use etendue_render::light_field::LightFieldViews;
 pub use etendue_render::output::{
     Channel, DistanceScale, Layer, Look, Outputs, Picture, Screen, Values,
 };
-pub use etendue_render::{Checkpoint, Plan, Report, Shard, SoFar};
+pub use etendue_render::{Checkpoint, Plan, Report, Shard, ShardBy, SoFar};
 pub use etendue_scene::file::scene_schema;
 pub use etendue_scene::{Frame, Reach, Scene, Strictness};
 pub use forecast::{Calibration, Prospect, TimeForecast};

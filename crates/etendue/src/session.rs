@@ -10,8 +10,8 @@ use etendue_geometry::Mesh;
 use etendue_render::output::{ImageHash, Layer, Outputs, SOFTWARE};
 use etendue_render::report::memory;
 use etendue_render::{
-    Checkpoint, Course, Film, FollowedFrame, Identity, Images, Plan, Prepared, RenderError,
-    Rendered, Report, Seconds, Shard, plan,
+    Checkpoint, Course, Film, FilmFile, FollowedFrame, Identity, Images, Plan, Prepared,
+    RenderError, Rendered, Report, Seconds, Shard, plan,
 };
 use etendue_scene::escape::one_line;
 use etendue_scene::file::{FileKind, FramesSpec, SceneFile};
@@ -402,11 +402,11 @@ impl Session {
     /// As [`Self::prepare`], and when it is stopped before.
     pub fn render(&mut self, progress: &Progress) -> Result<Rendering, Error> {
         let clock = self.clock();
-        let film = self.trace(None, progress)?;
+        let film = self.trace(None, &[], progress)?;
         self.conclude(film, clock, progress)
     }
 
-    /// Renders a share of the picture's rows and writes it to `path`, for [`merge`](Self::merge). `origin` goes
+    /// Renders a share of the picture's rows, or of its samples, and writes it to `path`, for [`merge`](Self::merge). `origin` goes
     /// with it, for whoever merges: [`Shares`](crate::Shares) reads it.
     ///
     /// # Errors
@@ -419,7 +419,7 @@ impl Session {
         origin: &Value,
         progress: &Progress,
     ) -> Result<(), Error> {
-        let film = self.trace(Some(shard), progress)?;
+        let film = self.trace(Some(shard), &[], progress)?;
         let Loaded { scene, plan, .. } = self.loaded()?;
         if !film.is_complete() {
             return Err(RenderError::Stopped.into());
@@ -428,7 +428,8 @@ impl Session {
         Ok(film.write(path, &self.identity(scene, plan)?, origin)?)
     }
 
-    /// Puts the shares of a render together: the rendering that one machine would have made, to the bit.
+    /// Puts the shares of a render together: the rendering that one machine would have made, to the bit when
+    /// they are of its rows. Those of its samples are added as exactly as two f64 hold them.
     ///
     /// # Errors
     ///
@@ -436,8 +437,12 @@ impl Session {
     pub fn merge(&mut self, shares: &Shares, progress: &Progress) -> Result<Rendering, Error> {
         let clock = self.clock();
         self.prepare(progress)?;
-        let Loaded { scene, plan, .. } = self.loaded()?;
-        let film = Film::merged(scene, plan, &shares.files, &self.identity(scene, plan)?)?;
+        let film = if shares.are_of_samples() {
+            self.trace(None, &shares.files, progress)?
+        } else {
+            let Loaded { scene, plan, .. } = self.loaded()?;
+            Film::merged(scene, plan, &shares.files, &self.identity(scene, plan)?)?
+        };
         self.conclude(film, clock, progress)
     }
 
@@ -452,15 +457,20 @@ impl Session {
         (Instant::now(), self.seconds.load + self.seconds.build + self.seconds.decode)
     }
 
-    /// Traces the scene, or a share of it.
-    fn trace(&mut self, shard: Option<Shard>, progress: &Progress) -> Result<Film, Error> {
+    /// Traces the scene, or a share of it, or puts shares of its samples together.
+    fn trace(
+        &mut self,
+        shard: Option<Shard>,
+        shares: &[FilmFile],
+        progress: &Progress,
+    ) -> Result<Film, Error> {
         self.prepare(progress)?;
         let Loaded { scene, plan, neighbours, .. } = self.loaded()?;
         let identity = match (&shard, &self.checkpoint) {
-            (None, None) => Identity::new(),
+            (None, None) if shares.is_empty() => Identity::new(),
             _ => self.identity(scene, plan)?,
         };
-        let course = Course { shard, checkpoint: self.checkpoint.clone(), identity };
+        let course = Course { shard, shares, checkpoint: self.checkpoint.clone(), identity };
         let (accel, start) = (self.built()?, Instant::now());
         let header = header(scene, &fingerprints(scene, neighbours)?);
         let others: Vec<FollowedFrame<'_>> =

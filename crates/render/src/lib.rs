@@ -49,6 +49,6 @@ pub use render::{
     render, trace,
 };
 pub use report::{Report, Seconds};
-pub use shard::Shard;
+pub use shard::{Shard, ShardBy};
 pub use stopping::Stopping;
 pub use watch::{SoFar, Watch};

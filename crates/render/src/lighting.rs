@@ -130,6 +130,7 @@ fn lit_share(
         rule: None,
         time: None,
         judged: None,
+        shares: &[],
         keeper: None,
         light: Some(LightPass { stage, tracer, camera: &camera, groups }),
         passes: &pass,

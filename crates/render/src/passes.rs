@@ -1,5 +1,6 @@
 //! The passes over the film, until all samples are taken, an error is reached, or a time is over.
 
+use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -42,9 +43,12 @@ impl Job<'_> {
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
     ) -> Result<Passed, Stopped> {
-        let all = self.sampling.samples;
+        let Range { start: first, end: all } = self.sampling.range();
         if parts.is_empty() {
             return Ok(Passed { samples: all, is_complete: true, counts: None });
+        }
+        if !self.shares.is_empty() {
+            parts.iter_mut().for_each(|part| part.show(samples));
         }
         let mut adaptive = self.adaptive(parts);
         let mut passed = Passed { samples, is_complete: samples >= all, counts: None };
@@ -54,7 +58,7 @@ impl Job<'_> {
             let pass = samples..end;
             let mut add = |part: &mut Averaging<'_>| part.add(&pass, blocks, watcher, traffic);
             if let Err(stopped) = parts.iter_mut().try_for_each(&mut add) {
-                return if samples > 0 { Ok(passed) } else { Err(stopped) };
+                return if samples > first { Ok(passed) } else { Err(stopped) };
             }
             samples = end;
             passed = match &mut adaptive {
@@ -94,6 +98,7 @@ impl Job<'_> {
     /// The samples after the next pass; `None` when there is no time for one.
     fn end_of_pass(&self, samples: u32, start: Instant) -> Option<u32> {
         let end = self.passes.iter().map(|pass| pass.end).find(|end| *end > samples)?;
+        let end = end.min(self.sampling.range().end);
         let Some(time) = self.time.filter(|_| samples > 0) else { return Some(end) };
         let a_sample = start.elapsed().as_secs_f64() / f64::from(samples);
         let left = SHARE_OF_TIME * time.saturating_sub(start.elapsed()).as_secs_f64();

@@ -19,14 +19,14 @@ use etendue_tracer::{
 use crate::adaptive::{Rule, SampleCounts};
 use crate::checkpoint::{Checkpoint, Keeper};
 use crate::film::{FilmLayer, NoMemory};
-use crate::film_file::{FilmError, Identity};
+use crate::film_file::{FilmError, FilmFile, Identity};
 use crate::images::Images;
 use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, Picture, PictureError};
 use crate::passes::Passed;
 use crate::radiance::LightPass;
-use crate::samples::{Sampling, short_passes};
-use crate::shard::Shard;
+use crate::samples::{Sampling, Sum, short_passes};
+use crate::shard::{Shard, must_be_whole};
 use crate::stopping::Stopping;
 use crate::tiles::{Done, Job, RayCounts};
 use crate::watch::{Stopped, Watch, Watcher};
@@ -87,6 +87,12 @@ pub enum RenderError {
          `render.samples` a number, or divide the render by --shard"
     )]
     Checkpoint,
+    /// Which samples are taken is judged from all before them.
+    #[error(
+        "--shard-by samples: samples that go on until an error is reached are not known beforehand; give \
+         `render.samples` a number, or divide the rows, by --shard alone"
+    )]
+    SampleShares,
     /// A time ends differently on each machine, so that parts of a picture do not fit together.
     #[error(
         "--shard, --checkpoint: a time (`render.samples.time`) ends at another number of samples in each \
@@ -207,22 +213,27 @@ pub struct Prepared<'a> {
 
 /// What of a render is wanted, and where it is kept on the way.
 #[derive(Debug, Clone, Default)]
-pub struct Course {
-    /// The share of the picture's rows; all of them when absent.
+pub struct Course<'a> {
+    /// The share of the picture's rows, or of its samples; all of it when absent.
     pub shard: Option<Shard>,
+    /// Shares of the samples, which are put together instead of being traced.
+    pub shares: &'a [FilmFile],
     /// Where what there is so far is kept, and found again.
     pub checkpoint: Option<Checkpoint>,
     /// Which render it is: what other shares, and what was kept, must be of.
     pub identity: Identity,
 }
 
-impl Course {
+impl Course<'_> {
     /// Refuses what cannot be kept, or put together.
     fn allows(&self, stopping: Stopping) -> Result<(), RenderError> {
         let is_kept = self.checkpoint.is_some();
         match stopping {
             Stopping::Time(_) if is_kept || self.shard.is_some() => Err(RenderError::Timed),
             _ if stopping.is_adaptive() && is_kept => Err(RenderError::Checkpoint),
+            _ if stopping.is_adaptive() && self.shard.is_some_and(Shard::is_of_samples) => {
+                Err(RenderError::SampleShares)
+            }
             _ => Ok(()),
         }
     }
@@ -237,6 +248,10 @@ pub struct Film {
     pub(crate) counts: RayCounts,
     pub(crate) passed: Passed,
     pub(crate) trace_time: Duration,
+    /// Of a share of the samples, the sums of what is averaged.
+    pub(crate) sums: Vec<Vec<Sum>>,
+    /// The layers that are not averaged.
+    pub(crate) centres: Vec<LayerSpec>,
     pub(crate) notes: Vec<String>,
     /// The camera as it was opened for it.
     pub(crate) camera: Option<Camera>,
@@ -275,10 +290,13 @@ pub fn trace(
     plan: &Plan,
     Prepared { accel, images, others }: Prepared<'_>,
     header: &[(String, String)],
-    course: &Course,
+    course: &Course<'_>,
     watch: &dyn Watch,
 ) -> Result<Film, RenderError> {
     course.allows(plan.stopping)?;
+    if !course.shares.is_empty() {
+        must_be_whole(course.shares, &course.identity).map_err(RenderError::Shares)?;
+    }
     let resolution = scene.camera.resolution();
     let mut layers = empty_film(scene, plan)?;
     let start = Instant::now();
@@ -348,15 +366,17 @@ pub fn trace(
         passes: &passes,
         light,
         picture: &so_far,
+        shares: course.shares,
         keeper: checkpoint.map(|file| Keeper::new(file, &course.identity, shard, resolution)),
     };
     let watcher = Watcher::new(watch, job.rays(&layers));
-    let Done { traffic: counts, passed } = job.run(&mut layers, &watcher)?;
+    let Done { traffic: counts, passed, sums, centres } = job.run(&mut layers, &watcher)?;
     notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
-    let trace_time = start.elapsed();
+    let of_shares: Duration = course.shares.iter().map(FilmFile::trace_time).sum();
+    let trace_time = start.elapsed() + of_shares;
     drop(job);
     let camera = Some(camera);
-    Ok(Film { layers, resolution, shard, counts, passed, trace_time, notes, camera })
+    Ok(Film { layers, resolution, shard, counts, passed, trace_time, sums, centres, notes, camera })
 }
 
 pub(crate) fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, NoMemory> {

@@ -76,7 +76,7 @@ pub(crate) struct Sampling {
     pub(crate) samples: u32,
     pub(crate) sampler: Sampler,
     pub(crate) seed: u64,
-    /// The share of the pixels that is rendered.
+    /// The share of the pixels, or of the samples, that is rendered.
     pub(crate) shard: Shard,
     /// Independent sets that the samples of a pixel are of, in turn.
     pub(crate) sets: u32,
@@ -90,6 +90,11 @@ impl Sampling {
         let set = (index % sets) as u16;
         let pixel = sampler.pixel_in_set(seed, [column, row], set, samples.div_ceil(sets));
         (pixel, index / sets)
+    }
+
+    /// The samples that the share has.
+    pub(crate) fn range(&self) -> Range<u32> {
+        self.shard.samples(self.samples)
     }
 
     /// Sums that are kept of a value between passes: those of all sets, and what is settled.
@@ -155,6 +160,12 @@ impl Sum {
     /// From its [`Self::parts`].
     pub(crate) fn of_parts([sum, lost]: [f64; 2]) -> Self {
         Self { sum, lost }
+    }
+
+    /// Adds what another has, as exactly as both are.
+    pub(crate) fn add_sum(&mut self, other: Self) {
+        self.add(other.sum);
+        self.lost += other.lost;
     }
 
     pub(crate) fn total(self) -> f64 {
@@ -233,9 +244,10 @@ impl<'a> Averaging<'a> {
         self.layers.iter().map(|layer| &**layer)
     }
 
-    /// Writes to the layers the means of the first `samples` samples.
+    /// Writes to the layers the means of the share's samples before `samples`.
     pub(crate) fn show(&mut self, samples: u32) {
-        let Self { what, layers, sums, .. } = self;
+        let Self { what, layers, sums, sampling, .. } = self;
+        let samples = samples - sampling.range().start;
         if sums.is_empty() {
             return;
         }

@@ -14,28 +14,72 @@ use serde::{Deserialize, Serialize};
 
 use crate::Plan;
 use crate::adaptive::SampleCounts;
-use crate::film_file::{FilmFile, Identity, Writing};
+use crate::film::{FilmLayer, filled};
+use crate::film_file::{FilmError, FilmFile, Identity, Writing};
 use crate::output::OutputError;
 use crate::passes::Passed;
 use crate::render::{Film, RenderError, empty_film};
+use crate::samples::{Averaging, Sum};
 use crate::tiles::{RayCounts, TILE};
 
-/// A share of a render. Its rows are dealt out in strips, in turn, so that every share has some of each
-/// part of the picture.
+/// What of a render is dealt out to its shares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ShardBy {
+    /// Strips of rows, in turn, so that every share has some of each part of the picture.
+    #[default]
+    Rows,
+    /// A range of the samples of every pixel; the first share has the layers that are not sampled.
+    Samples,
+}
+
+/// A share of a render.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Shard {
     index: u32,
     count: u32,
+    #[serde(default)]
+    by: ShardBy,
 }
 
 impl Shard {
     /// The whole.
-    pub const ALL: Self = Self { index: 0, count: 1 };
+    pub const ALL: Self = Self { index: 0, count: 1, by: ShardBy::Rows };
 
-    /// Share `number` of `count`, counted from 1; `None` when there is no such share.
+    /// Share `number` of `count` of the rows, counted from 1; `None` when there is no such share.
     #[must_use]
     pub fn new(number: u32, count: u32) -> Option<Self> {
-        (1..=count).contains(&number).then(|| Self { index: number - 1, count })
+        let by = ShardBy::Rows;
+        (1..=count).contains(&number).then(|| Self { index: number - 1, count, by })
+    }
+
+    /// The same share of what `by` says.
+    #[must_use]
+    pub fn by(self, by: ShardBy) -> Self {
+        Self { by, ..self }
+    }
+
+    /// Whether samples are dealt out, and not rows.
+    #[must_use]
+    pub fn is_of_samples(self) -> bool {
+        self.by == ShardBy::Samples
+    }
+
+    /// Whether it has the layers that are not sampled.
+    pub(crate) fn has_data(self) -> bool {
+        !self.is_of_samples() || self.index == 0
+    }
+
+    /// Its part of the `samples` of each pixel.
+    pub(crate) fn samples(self, samples: u32) -> Range<u32> {
+        if !self.is_of_samples() {
+            return 0..samples;
+        }
+        let [all, count] = [samples, self.count].map(u64::from);
+        let [start, end] = [self.index, self.index + 1].map(|k| all * u64::from(k) / count);
+        #[expect(clippy::cast_possible_truncation, reason = "at most as many as there are")]
+        let range = start as u32..end as u32;
+        range
     }
 
     /// Whether there is such a share: one that was read from a file may be none.
@@ -51,7 +95,7 @@ impl Shard {
 
     /// Whether a strip of rows is of this share.
     pub(crate) fn owns(self, strip: usize) -> bool {
-        strip % self.count as usize == self.index as usize
+        self.is_of_samples() || strip % self.count as usize == self.index as usize
     }
 
     /// How many of `height` rows are.
@@ -102,20 +146,26 @@ impl Film {
         identity: &Identity,
         origin: &serde_json::Value,
     ) -> Result<(), OutputError> {
+        let (shard, sums) = (self.shard, &self.sums);
+        let is_written = |layer: &&FilmLayer| match shard.is_of_samples() {
+            true => shard.has_data() && self.centres.contains(&layer.spec),
+            false => true,
+        };
+        let layers: Vec<&FilmLayer> = self.layers.iter().filter(is_written).collect();
         let writing = Writing {
             identity,
             origin,
-            shard: self.shard,
+            shard,
             samples: self.passed.samples,
             sample_counts: self.passed.counts,
             counts: &self.counts,
             trace_time: self.trace_time,
             resolution: self.resolution,
         };
-        writing.write(path, &self.layers.iter().collect::<Vec<_>>(), &[])
+        writing.write(path, &layers, &sums.iter().map(Vec::as_slice).collect::<Vec<_>>())
     }
 
-    /// Puts the shares of a render together.
+    /// Puts the shares of a render's rows together.
     ///
     /// # Errors
     ///
@@ -145,6 +195,8 @@ impl Film {
             shard: Shard::ALL,
             counts,
             passed,
+            sums: Vec::new(),
+            centres: Vec::new(),
             trace_time: shares.iter().map(FilmFile::trace_time).sum(),
             notes: Vec::new(),
             camera: None,
@@ -152,26 +204,61 @@ impl Film {
     }
 }
 
+/// Puts the shares of a render's samples together, in the order of the samples, whatever that of the files
+/// is: sums with what rounding took from them, and layers that are not sampled from the first share.
+pub(crate) fn put_together(
+    shares: &[FilmFile],
+    resolution: [u32; 2],
+    centres: &mut [&mut FilmLayer],
+    averaged: &mut [Averaging<'_>],
+) -> Result<RayCounts, FilmError> {
+    let counts = Mutex::new(RayCounts::default());
+    let mut shares: Vec<&FilmFile> = shares.iter().collect();
+    shares.sort_by_key(|share| share.header.shard);
+    for share in shares {
+        let lengths = averaged.iter().map(|part| part.sums().len());
+        let mut own = lengths
+            .map(|length| filled(Sum::default(), length))
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|error| share.error(error.to_string()))?;
+        let mut sums: Vec<&mut [Sum]> = own.iter_mut().map(Vec::as_mut_slice).collect();
+        let has_data = share.header.shard.has_data();
+        share.fill(if has_data { &mut *centres } else { &mut [] }, &mut sums, resolution)?;
+        for (part, own) in averaged.iter_mut().zip(&own) {
+            part.sums_mut().iter_mut().zip(own).for_each(|(sum, own)| sum.add_sum(*own));
+        }
+        RayCounts::add(&counts, share.counts(), &FateCounts::default());
+    }
+    Ok(counts.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
 /// Refuses shares that are not one of each of one render, by name.
-fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<(), String> {
+pub(crate) fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<(), String> {
     let Some(first) = shares.first() else {
         return Err("there is no share to put together".to_owned());
     };
-    let count = first.header.shard.count;
+    let Shard { count, by, .. } = first.header.shard;
     let mut found: BTreeMap<Shard, &FilmFile> = BTreeMap::new();
     for share in shares {
         share.must_be_of(identity).map_err(|error| error.to_string())?;
         let shard = share.header.shard;
+        let (path, other) = (share.path.display(), first.path.display());
         if shard.count != count {
-            let (path, other) = (share.path.display(), first.path.display());
             return Err(format!("{path}: is share {shard}, and {other} is one of {count}"));
         }
+        if shard.by != by {
+            let of = |by| if by == ShardBy::Rows { "rows" } else { "samples" };
+            let (this, that) = (of(shard.by), of(by));
+            return Err(format!(
+                "{path}: is a share of the {this}, and {other} is one of the {that}"
+            ));
+        }
         if let Some(twice) = found.insert(shard, share) {
-            let (path, other) = (share.path.display(), twice.path.display());
+            let other = twice.path.display();
             return Err(format!("{path}: is share {shard}, as {other} is; give each once"));
         }
     }
-    let missing = (0..count).map(|index| Shard { index, count });
+    let missing = (0..count).map(|index| Shard { index, count, by });
     let missing: Vec<String> = missing
         .filter(|shard| !found.contains_key(shard))
         .map(|shard| shard.to_string())
@@ -199,6 +286,22 @@ mod tests {
         assert_eq!((shard.to_string(), shard.count()), ("3/8".to_owned(), 8));
         for wrong in ["0/8", "9/8", "1/0", "8", "-1/8", "a/b", ""] {
             assert!(wrong.parse::<Shard>().unwrap_err().contains("from 1/8 to 8/8"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn shares_have_all_samples_once() {
+        for (samples, count) in [(1, 3), (7, 3), (64, 8), (5, 5), (u32::MAX, 7)] {
+            let mut next = 0;
+            for number in 1..=count {
+                let shard = Shard::new(number, count).unwrap().by(ShardBy::Samples);
+                let range = shard.samples(samples);
+                assert_eq!(range.start, next, "{number}/{count} of {samples}");
+                assert!((range.end - range.start).abs_diff(samples / count) <= 1);
+                assert_eq!((shard.rows(100), shard.owns(7)), (100, true));
+                next = range.end;
+            }
+            assert_eq!(next, samples);
         }
     }
 

@@ -15,11 +15,13 @@ use rayon::prelude::*;
 use crate::adaptive::Rule;
 use crate::checkpoint::Keeper;
 use crate::film::{FilmLayer, Strip, strips, take};
+use crate::film_file::{FilmError, FilmFile};
 use crate::output::{Picture, PictureError};
 use crate::passes::{Beside, Passed};
 use crate::radiance::LightPass;
 use crate::render::RenderError;
-use crate::samples::{Averaged, Averaging, Memory, Sampling};
+use crate::samples::{Averaged, Averaging, Memory, Sampling, Sum};
+use crate::shard::put_together;
 use crate::watch::{Stopped, Watcher};
 
 /// Side of a tile (pixels): its rays are one batch.
@@ -55,6 +57,8 @@ pub(crate) struct Job<'a> {
     pub(crate) time: Option<Duration>,
     /// Which layer is the picture, by whose error samples are judged.
     pub(crate) judged: Option<LayerSpec>,
+    /// Shares of the samples, which are put together instead of being traced.
+    pub(crate) shares: &'a [FilmFile],
     /// Who keeps it on disk.
     pub(crate) keeper: Option<Keeper<'a>>,
 }
@@ -86,6 +90,10 @@ impl RayCounts {
 pub(crate) struct Done {
     pub(crate) traffic: RayCounts,
     pub(crate) passed: Passed,
+    /// Of a share of the samples, the sums of what is averaged.
+    pub(crate) sums: Vec<Vec<Sum>>,
+    /// The layers that are not averaged.
+    pub(crate) centres: Vec<LayerSpec>,
 }
 
 impl Job<'_> {
@@ -105,7 +113,9 @@ impl Job<'_> {
             seen.into_iter().partition(|layer| self.is_averaged(layer.spec));
         let colors = Colors { job: self, layers: mean.iter().map(|layer| layer.spec).collect() };
         let mut averaged = Vec::new();
-        let passes = self.passes.len();
+        // Shares of the samples keep sums, whatever the passes are.
+        let is_shared = self.sampling.shard.is_of_samples() || !self.shares.is_empty();
+        let passes = if is_shared { usize::MAX } else { self.passes.len() };
         if !mean.is_empty() {
             let layers = std::mem::take(&mut mean);
             averaged.push(Averaging::new(&colors, self.sampling, layers, passes)?);
@@ -113,20 +123,42 @@ impl Job<'_> {
         if let (Some(light), false) = (&self.light, lit.is_empty()) {
             averaged.push(Averaging::new(light, self.sampling, lit, passes)?);
         }
-        let kept = self.keeper.as_ref().map(|keeper| keeper.restore(&mut centre, &mut averaged));
-        let mut done = 0;
-        match kept.transpose()?.flatten() {
+        let shard = self.sampling.shard;
+        let range = self.sampling.range();
+        let mut done = range.start;
+        match self.found(&mut centre, &mut averaged)? {
             Some((samples, counts)) => {
                 done = samples;
                 *traffic.lock().unwrap_or_else(PoisonError::into_inner) = counts;
-                watcher.did(self.camera_rays(done, averaged.len(), !centre.is_empty()))?;
+                let taken = done.saturating_sub(range.start);
+                watcher.did(self.camera_rays(taken, averaged.len(), !centre.is_empty()))?;
             }
-            None => self.centres(&mut centre, watcher, &traffic)?,
+            None if shard.has_data() => self.centres(&mut centre, watcher, &traffic)?,
+            None => {}
         }
         let beside = Beside { centres: &centre, told: &mut told };
         let passed = self.passes(done, &mut averaged, beside, watcher, &traffic)?;
         let traffic = traffic.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Ok(Done { traffic, passed })
+        let sums = averaged.into_iter().map(|part| part.sums).filter(|_| shard.is_of_samples());
+        let (sums, centres) = (sums.collect(), centre.iter().map(|layer| layer.spec).collect());
+        Ok(Done { traffic, passed, sums, centres })
+    }
+
+    /// What there is already, in shares or on disk, put onto the film: how many samples every pixel has, and
+    /// what was traced for them.
+    fn found(
+        &self,
+        centres: &mut [&mut FilmLayer],
+        averaged: &mut [Averaging<'_>],
+    ) -> Result<Option<(u32, RayCounts)>, FilmError> {
+        if !self.shares.is_empty() {
+            let counts = put_together(self.shares, self.camera.resolution(), centres, averaged)?;
+            return Ok(Some((self.sampling.samples, counts)));
+        }
+        match &self.keeper {
+            Some(keeper) => keeper.restore(centres, averaged),
+            None => Ok(None),
+        }
     }
 
     /// The rays of the camera that filling `film` takes.
@@ -137,7 +169,8 @@ impl Job<'_> {
         let any = |what: &dyn Fn(&FilmLayer) -> bool| film.clone().any(what);
         let sampled = usize::from(any(&is_lit)) + usize::from(any(&is_mean));
         let chief = any(&|layer| !is_lit(layer) && !is_mean(layer));
-        self.camera_rays(self.sampling.samples, sampled, chief)
+        let Range { start, end } = self.sampling.range();
+        self.camera_rays(end - start, sampled, chief && self.sampling.shard.has_data())
     }
 
     /// The rays of the camera that `samples` of every pixel for `sampled` parts take, and the chief rays.

@@ -263,7 +263,7 @@ fn a_time_gives_the_picture_of_some_number_of_samples() {
 /// What cannot be kept or divided is refused by name.
 #[test]
 fn checkpoints_of_such_samples_and_shares_of_a_time_are_refused() {
-    let refused = |samples: &Value, course: Course| {
+    let refused = |samples: &Value, course: Course<'_>| {
         let scene = loaded(room(samples, &json!({ "/layers": [] })));
         let plan = Plan::new(&scene, Outputs::ALL);
         let accel = build(&scene, &plan, &BuildOptions::default()).unwrap();

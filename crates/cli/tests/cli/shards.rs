@@ -103,6 +103,34 @@ fn shares_make_the_files_of_one_machine() {
     }
 }
 
+/// Sums are merged as exactly as two f64 hold them, so that what is left of the order in which they were added
+/// is far below the f32 of the picture: here all files are the same, in whatever order the shares are given.
+#[test]
+fn shares_of_the_samples_make_the_picture_of_one_machine() {
+    let bench = scene();
+    bench.render(&[]);
+    let by_samples = ["--shard-by", "samples"];
+    for number in [3, 1, 2] {
+        share(&bench, number, 3, &by_samples);
+    }
+    let [first, second, third] =
+        [1, 2, 3].map(|number| format!("shares/samples-{number}-of-3.film"));
+    let size = |path: &str| std::fs::metadata(bench.path(path)).expect("a share").len();
+    assert!(size(&first) > size(&second), "data layers are in the first share alone");
+    done(&bench, &["merge", "merged", "--report", "report.json", &third, &first, &second]);
+    assert_same(&bench, "out", "merged");
+    done(&bench, &["render", "scene.json", "-o", "out", "--report", "whole.json"]);
+    let (merged, whole) = (bench.json("report.json"), bench.json("whole.json"));
+    for key in ["image_hash", "samples", "rays", "lens_rays", "lens_losses"] {
+        assert_eq!(merged[key], whole[key], "{key}");
+    }
+    let said = refused(&bench, &[&first, &third]);
+    assert!(said.contains("missing: 2/3"), "{said}");
+    let of_rows = share(&bench, 2, 3, &[]);
+    let said = refused(&bench, &[&first, &of_rows, &third]);
+    assert!(said.contains("a share of the rows") && said.contains("samples"), "{said}");
+}
+
 /// Settings are those of the shares; the scene may have been moved.
 #[test]
 fn a_merge_asks_for_what_its_shares_were_asked_for() {
@@ -179,6 +207,10 @@ fn shares_of_what_cannot_be_divided_are_refused() {
     assert!(run(&["--shard", "0/4"]).contains("from 1/8 to 8/8"));
     assert!(run(&["--shard", "5/4"]).contains("from 1/8 to 8/8"));
     assert!(run(&["--shard", "1/2", "--report", "r.json"]).contains("etendue merge"));
+    assert!(run(&["--shard-by", "samples"]).contains("--shard"));
+    let adaptive = "render.samples={\"relative_error\": 0.5}";
+    let adaptive = run(&["--shard", "1/2", "--shard-by", "samples", "--set", adaptive]);
+    assert!(adaptive.contains("divide the rows"), "{adaptive}");
     let frames = run(&["--shard", "1/2", "--set", "frames=[{\"render.seed\": 1}]"]);
     assert!(frames.contains("--frames"), "{frames}");
 }
@@ -192,6 +224,12 @@ fn empty_shares_are_shares() {
     let shares: Vec<String> = (1..=5).map(|number| share(&bench, number, 5, &more)).collect();
     let shares: Vec<&str> = shares.iter().map(String::as_str).collect();
     done(&bench, &[&["merge", "merged"], shares.as_slice()].concat());
+    assert_same(&bench, "out", "merged");
+    // And more than samples.
+    let more = [more.as_slice(), &["--shard-by", "samples"]].concat();
+    (1..=3).for_each(|number| drop(share(&bench, number, 3, &more)));
+    let shares = [1, 2, 3].map(|number| format!("shares/samples-{number}-of-3.film"));
+    done(&bench, &["merge", "merged", &shares[0], &shares[1], &shares[2]]);
     assert_same(&bench, "out", "merged");
 }
 
