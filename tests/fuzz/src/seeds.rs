@@ -26,9 +26,9 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
             [&b"camera="[..], &b"[".repeat(60_000)].concat(),
         ],
         "sensor" => vec![SENSOR.into()],
-        "lens" => files("scenes/lenses", "json"),
+        "lens" | "lens_report" => files("scenes/lenses", "json"),
         "rays" => vec![RAYS.into()],
-        "zmx" => zmxs(),
+        "zmx" | "zmx_report" => zmxs(),
         "mask_png" => vec![picture(ImageFormat::Png, [7, 7, 7])],
         "texture" => {
             let color = [200, 90, 10];
