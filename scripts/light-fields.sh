@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Renders scenes/light-field.json, runs the Python of docs/light-fields.md on it in a venv, makes the page's
-# pictures, and asks plenopticam for its opinion where it installs (Python 3.11, numpy 1.26).
+# pictures, and asks plenopticam for its opinion where it installs (Python 3.11, numpy 1.26). ETENDUE names a
+# command that is built already, IMAGES another folder for the pictures than docs/images.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -8,8 +9,14 @@ out="$PWD/out/light-fields"
 venv="$out/venv"
 python=$(command -v python3.11 || command -v python3)
 
-mkdir -p "$out"
-cargo run --release -p etendue-cli -- render scenes/light-field.json -o "$out/out" "$@"
+images=${IMAGES:-docs/images}
+
+mkdir -p "$out" "$images"
+if [ -z "${ETENDUE:-}" ]; then
+    cargo build --release -p etendue-cli
+    ETENDUE=target/release/etendue
+fi
+"$ETENDUE" render scenes/light-field.json -o "$out/out" "$@"
 
 [ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
 pip=("$venv/bin/pip" install --quiet --disable-pip-version-check)
@@ -24,7 +31,7 @@ fi
 
 sed -n '/^```python$/,/^```$/{/^```/d;p}' docs/light-fields.md >"$out/page.py"
 (cd "$out" && "$venv/bin/python" page.py)
-"$venv/bin/python" scripts/light_field_pictures.py "$out" docs/images
+"$venv/bin/python" scripts/light_field_pictures.py "$out" "$images"
 if "$venv/bin/python" -c "import plenopticam" 2>/dev/null || [ -d "$venv"/lib/python3*/site-packages/plenopticam ]; then
     "$venv/bin/python" scripts/light_field_opinion.py "$out/out"
 else

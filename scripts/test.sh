@@ -60,6 +60,9 @@ export ETENDUE=target/debug/etendue
 step "jobs on Slurm"
 scripts/test-slurm.sh
 
+step "light fields: the page, and another decoder's opinion"
+IMAGES=target/light-field-images scripts/light-fields.sh --samples 32 --quiet
+
 step "window"
 scripts/test-window.sh
 

@@ -60,8 +60,13 @@ pub struct Finding {
 }
 
 /// The samplers, the plainest first.
-const ALL: [Sampler; 4] =
-    [Sampler::Independent, Sampler::Stratified, Sampler::Hammersley, Sampler::Sobol];
+const ALL: [Sampler; 5] = [
+    Sampler::Independent,
+    Sampler::Stratified,
+    Sampler::Hammersley,
+    Sampler::Sobol,
+    Sampler::BlueNoise,
+];
 
 fn name(sampler: Sampler) -> &'static str {
     match sampler {
@@ -69,6 +74,7 @@ fn name(sampler: Sampler) -> &'static str {
         Sampler::Stratified => "stratified",
         Sampler::Hammersley => "hammersley",
         Sampler::Sobol => "sobol",
+        Sampler::BlueNoise => "blue_noise",
     }
 }
 

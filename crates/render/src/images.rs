@@ -7,7 +7,7 @@ use etendue_image::Limits;
 use etendue_scene::Scene;
 use etendue_tracer::texture::{Encoding, Filter, ImageError, Wrap};
 use etendue_tracer::{
-    EnvironmentImage, EnvironmentMap, Image, ImageSource, LayerSpec, LightKind, Texture,
+    EnvironmentImage, EnvironmentMap, Image, ImageSource, LayerSpec, Light, LightKind, Texture,
 };
 use rayon::prelude::*;
 
@@ -174,6 +174,12 @@ pub(crate) fn wanted_images(scene: &Scene, plan: &Plan) -> Vec<Option<Encodings>
                 let encodings = wanted.get_or_insert([None; 2]);
                 encodings[encoding as usize] = plan.footprint.then_some(encoding);
             }
+        }
+    }
+    // What lights throw is looked up at points.
+    for thrown in scene.lights.iter().filter(|_| scope.light).filter_map(Light::texture) {
+        if let Some(wanted) = wanted.get_mut(thrown.texture as usize) {
+            wanted.get_or_insert([None; 2]);
         }
     }
     wanted

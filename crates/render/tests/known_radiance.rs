@@ -166,6 +166,64 @@ fn a_spot_light_by_its_cones() {
     }
 }
 
+/// A sun of radius r high over a plane: the mean cosine over its disk is (1 + cos r) / 2 of that of its
+/// middle, and where the edge of a wall hides one half of the disk, half of it is left.
+#[test]
+fn a_sun_with_a_disk() {
+    let scene = |more: &str| {
+        format!(
+            r#""lights": [{{"type": "directional", "direction": [0, 0, -1], "irradiance": [2, 2, 2], "angle": 60}}],
+            "objects": [{{"shape": "rectangle", "width": 10, "height": 10, "material": "m"}}{more}],
+            "materials": {{"m": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}}"#
+        )
+    };
+    let eye = [[1.0, 0.5, 0.4], [0.0, 0.0, 0.0]];
+    let open = 0.5 * 2.0 / std::f64::consts::PI * 0.5 * (1.0 + 30_f64.to_radians().cos());
+    check("disk", 64, eye, &scene(""), |_| (), 0.0, |_| open);
+    let wall = r#", {"shape": "rectangle", "width": 100, "height": 100, "transform": {"translate": [-50, 0, 1]}}"#;
+    let black = |scene: &mut Scene| {
+        scene.materials.iter_mut().filter(|m| m.name.is_empty()).for_each(|material| {
+            material.base_color = Paint::Plain([0.0; 3]);
+        });
+    };
+    // The patch is 1 mm wide, and the wall 1 m away: a mean over it differs by less than 10⁻³.
+    check("half of it", 256, eye, &scene(wall), black, 1e-3 * open, |_| 0.5 * open);
+}
+
+/// A projector over a plane that faces it: ρ I / (π z²) all over its image, without noise, by the four
+/// texels of an image that lie where they lie as seen from the projector, and nothing beside it.
+#[test]
+fn a_projector_and_its_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let texels = image::RgbImage::from_fn(2, 2, |x, y| {
+        image::Rgb([[[255, 204], [102, 51]][y as usize][x as usize]; 3])
+    });
+    texels.save(folder.path().join("four.png")).unwrap();
+    let rest = r#""lights": [{"type": "projector", "at": [0, 0, 4], "look_at": [0, 0, 0], "fov": 60,
+            "intensity": [8, 8, 8],
+            "image": {"image": "four.png", "encoding": "linear", "filter": "nearest"}}],
+        "objects": [{"shape": "rectangle", "width": 20, "height": 20, "material": "m"}],
+        "materials": {"m": {"type": "matte", "color": [0.5, 0.5, 0.5]}}"#;
+    let full = 0.5 * 8.0 / (std::f64::consts::PI * 16.0);
+    // Half of the image is tan 30° · 4 m = 2.309 m across.
+    for (at, share) in [
+        ([-2.2, 1.9, 0.0], 1.0),
+        ([2.2, 0.1, 0.0], 0.8),
+        ([-0.1, -2.2, 0.0], 0.4),
+        ([2.2, -2.2, 0.0], 0.2),
+        ([2.4, 1.0, 0.0], 0.0),
+        ([1.0, -2.4, 0.0], 0.0),
+    ] {
+        for tracer in TRACERS {
+            for way in ways() {
+                let text = patch(tracer, 4, [0.3, 0.2, 3.0], at, rest);
+                let pixels = picture(load_in(folder.path(), &text), way);
+                assert_shows(&format!("{at:?}, {tracer}, {way:?}"), &pixels, full * share, 0.0);
+            }
+        }
+    }
+}
+
 /// Radiance that is no number is left out and counted, and the picture has numbers only.
 #[test]
 fn what_is_not_finite_is_counted_and_left_out() {

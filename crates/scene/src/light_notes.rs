@@ -36,7 +36,7 @@ pub(crate) fn of(geometry: &Geometry, materials: &[Material], lights: &[Light]) 
     let points = lights.iter().filter(is_point).count() as u64;
     if points > 0 && !bends.is_empty() {
         let message = format!(
-            "the light of suns, spots and points does not find its way through surfaces that bend it \
+            "the light of suns, spots, points and projectors does not find its way through surfaces that bend it \
              ({}): what it shines on through them, or from within, is black; give the light a size \
              (`emissive`, `environment`) and take the tracer `path`",
             bends.join(", ")

@@ -40,8 +40,8 @@ impl SceneFile {
         let fresh = Cache::default();
         let kept = options.cache.unwrap_or(&fresh);
         let folder = Folder::open(self.folder(), options.reach)?;
-        let own = self.named_materials(&folder, wanted)?;
-        let lights = self.named_lights(&folder)?;
+        let mut own = self.named_materials(&folder, wanted)?;
+        let lights = self.named_lights(&folder, wanted, &mut own.textures)?;
         // What can be checked without the models is; a bad camera need not wait for them.
         let size = self.resolution(&folder, options, kept)?;
         let budget = Arc::new(Budget::new(options.memory_limit));

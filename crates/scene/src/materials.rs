@@ -38,13 +38,19 @@ impl SceneFile {
         Ok(own)
     }
 
-    /// The scene's own lights; `None` when it does not speak of any.
-    pub(crate) fn named_lights(&self, folder: &Folder) -> Result<Option<Vec<Light>>, SceneError> {
+    /// The scene's own lights; `None` when it does not speak of any. Images that they throw are added to
+    /// `textures`.
+    pub(crate) fn named_lights(
+        &self,
+        folder: &Folder,
+        wanted: Wanted,
+        textures: &mut Vec<Texture>,
+    ) -> Result<Option<Vec<Light>>, SceneError> {
         let Some(specs) = &self.spec.lights else { return Ok(None) };
         let mut lights: Vec<Light> = Vec::new();
         for (index, spec) in specs.iter().enumerate() {
             let at = join_index("lights", index);
-            let mut supply = Named { folder, wanted: Wanted::default(), textures: &mut Vec::new() };
+            let mut supply = Named { folder, wanted, textures };
             let fault = |Fault { key, why }| self.fault(&below(&at, &key), why);
             let light = spec.build(&mut supply).map_err(fault)?;
             let is_sky = |l: &Light| matches!(l.kind, LightKind::Environment { .. });

@@ -160,7 +160,8 @@ impl LightSpec {
     pub fn build(&self, supply: &mut dyn Supply) -> Result<Light, Fault> {
         let (key, color, illuminant) = match self {
             Self::Point { intensity, illuminant, .. }
-            | Self::Spot { intensity, illuminant, .. } => ("intensity", intensity, illuminant),
+            | Self::Spot { intensity, illuminant, .. }
+            | Self::Projector { intensity, illuminant, .. } => ("intensity", intensity, illuminant),
             Self::Directional { irradiance, illuminant, .. } => {
                 ("irradiance", irradiance, illuminant)
             }
@@ -185,8 +186,28 @@ impl LightSpec {
                     cos_inner: inner_cone.to_radians().cos(),
                 }
             }
-            Self::Directional { direction, .. } => {
-                LightKind::Directional(unit("direction", DVec3::from(*direction))?)
+            Self::Directional { direction, angle, .. } => LightKind::Directional {
+                along: unit("direction", DVec3::from(*direction))?,
+                cos_radius: (0.5 * angle).to_radians().cos(),
+            },
+            Self::Projector { at, look_at, up, fov, aspect, image, .. } => {
+                let at = DVec3::from(*at);
+                let back = unit("look_at", at - DVec3::from(*look_at))?;
+                let right = unit("up", DVec3::from(*up).cross(back))?;
+                if !(*fov > 0.0 && *fov < 180.0) {
+                    return Err(Fault::new("fov", format!("{fov} is not between 0 and 180")));
+                }
+                if let Some(aspect) = aspect.filter(|aspect| !(*aspect > 0.0 && aspect.is_finite()))
+                {
+                    return Err(Fault::new("aspect", format!("{aspect} is not above zero")));
+                }
+                LightKind::Projector(Box::new(crate::Projector {
+                    at,
+                    axes: DMat3::from_cols(right, back.cross(right), back),
+                    tangent: (0.5 * fov).to_radians().tan(),
+                    aspect: *aspect,
+                    image: paint("image", image, Bound::None, supply)?,
+                }))
             }
             Self::Environment { image, rotate, up, visible, .. } => {
                 let image = match image {

@@ -33,6 +33,7 @@ pub mod light;
 mod light_tree;
 pub mod material;
 pub mod placed;
+pub mod projector;
 mod pyramid;
 pub mod reference;
 pub mod sampling;
@@ -54,6 +55,7 @@ pub use material::{
     Absorption, Color, Emission, Glass, Ior, Material, Paint, Scattering, TextureScope,
 };
 pub use placed::PlacedSurfaces;
+pub use projector::Projector;
 pub use reference::{Needs, SceneView, SurfacePoint, Traced, View};
 pub use spec::{LightSpec, MaterialSpec};
 pub use spectral::Spectral;

@@ -16,12 +16,15 @@ use etendue_spectrum::{Illuminant, NoOverlap};
 use crate::environment::EnvironmentMap;
 use crate::lamps::{self, AreaLight, triangle_power};
 use crate::light_tree::{self, Cluster, LightTree};
+use crate::projector::Projector;
 use crate::reference::{SceneView, SurfacePoint};
-use crate::sampling::{DiscreteDistribution, sphere_direction, triangle_point};
+use crate::sampling::{
+    DiscreteDistribution, Frame, cone_direction, sphere_direction, triangle_point,
+};
 use crate::sky::Sky;
 use crate::spectral::Spectral;
 use crate::target::{Chosen, Target, TargetKind};
-use crate::{Color, Material};
+use crate::{Color, Material, TextureUse};
 
 /// A light of the scene, beside its emissive surfaces.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +48,15 @@ impl Light {
         color: [1.0; 3],
         illuminant: None,
     };
+
+    /// The texture that it throws.
+    #[must_use]
+    pub fn texture(&self) -> Option<&TextureUse> {
+        match &self.kind {
+            LightKind::Projector(projector) => projector.image.image(),
+            _ => None,
+        }
+    }
 
     /// The file of an environment's image.
     #[must_use]
@@ -72,8 +84,15 @@ pub enum LightKind {
         /// Cosine of the half-angle inside of which it is at its full.
         cos_inner: f64,
     },
-    /// Parallel light that goes along this unit vector, with an irradiance.
-    Directional(DVec3),
+    /// Light from afar, with an irradiance.
+    Directional {
+        /// Where it goes (unit).
+        along: DVec3,
+        /// Cosine of the half-angle of the disk that it comes from; 1 of parallel light.
+        cos_radius: f64,
+    },
+    /// A point that throws an image, with an axial intensity.
+    Projector(Box<Projector>),
     /// Radiance from all around.
     Environment {
         /// Its image.
@@ -87,14 +106,17 @@ pub enum LightKind {
 
 impl LightKind {
     /// Where it is and shines, with an intensity (W/sr); `None` of what is far away.
-    fn cluster(&self, intensity: f64) -> Option<Cluster> {
-        let (at, axis, cone, reach) = match *self {
-            Self::Point(at) => (at, DVec3::Y, PI, FRAC_PI_2),
+    fn cluster(&self, intensity: f64, around: &SceneView<'_>) -> Option<Cluster> {
+        let (at, axis, cone, reach) = match self {
+            Self::Point(at) => (*at, DVec3::Y, PI, FRAC_PI_2),
             Self::Spot { at, axis, cos_outer, cos_inner } => {
                 let [outer, inner] = [cos_outer.acos(), cos_inner.acos()];
-                (at, axis, inner, outer - inner)
+                (*at, *axis, inner, outer - inner)
             }
-            Self::Directional(_) | Self::Environment { .. } => return None,
+            Self::Projector(projector) => {
+                (projector.at, projector.axis(), projector.cone(around), 0.0)
+            }
+            Self::Directional { .. } | Self::Environment { .. } => return None,
         };
         let bounds = Bounds { min: at, max: at };
         Some(Cluster { bounds, axis, cone, reach, intensity })
@@ -169,7 +191,7 @@ impl Lights {
         let radius = 0.5 * around.geometry.loose_bounds().diagonal();
         let far = if radius > 0.0 { PI * radius * radius } else { PI };
         let mut powers: Vec<f64> =
-            lights.iter().map(|light| power(light, far, sky.as_ref())).collect();
+            lights.iter().map(|light| power(light, around, far, sky.as_ref())).collect();
         let mut first = Vec::with_capacity(around.geometry.placements.len());
         let mut triangles = Vec::new();
         for (number, placement) in (0_u32..).zip(&around.geometry.placements) {
@@ -210,7 +232,7 @@ impl Lights {
         around: &SceneView<'_>,
         powers: &mut Vec<f64>,
     ) -> Option<LightTree> {
-        let near = lights.iter().map(|light| light.kind.cluster(mean(&light.color)));
+        let near = lights.iter().map(|light| light.kind.cluster(mean(&light.color), around));
         let shining = triangles.iter().zip(&powers[lights.len()..]);
         let all = near.chain(shining.map(|(&id, &power)| lamps::cluster(around, id, power)));
         let all: Vec<_> = (0_u32..).zip(all).filter_map(|(k, c)| Some((k, c?))).collect();
@@ -289,6 +311,13 @@ impl Lights {
         self.sky.is_some() || !self.triangles.is_empty()
     }
 
+    /// Whether a place on one of them is chosen: not on points and parallel light.
+    #[must_use]
+    pub fn are_extended(&self) -> bool {
+        let is_soft = |light: &Light| matches!(light.kind, LightKind::Directional { cos_radius, .. } if cos_radius < 1.0);
+        self.is_hittable() || self.lights.iter().any(is_soft)
+    }
+
     /// Whether there is more than one to choose from.
     #[must_use]
     pub fn are_several(&self) -> bool {
@@ -329,16 +358,24 @@ impl Lights {
             return self.place_on_lamp(around, spectral, number, square, chance, radiance).into();
         };
         radiance.copy_from_slice(self.bands_of(index, radiance.len()));
-        match light.kind {
-            LightKind::Point(at) => Target::bare(TargetKind::Point, at, chance).into(),
-            LightKind::Spot { at, axis, cos_outer, cos_inner } => {
+        match &light.kind {
+            LightKind::Point(at) => Target::bare(TargetKind::Point, *at, chance).into(),
+            &LightKind::Spot { at, axis, cos_outer, cos_inner } => {
                 let cosine = (from - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
                 let factor = spot_falloff(cosine, cos_outer, cos_inner);
                 radiance.iter_mut().for_each(|band| *band *= factor);
                 (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance)).into()
             }
-            LightKind::Directional(along) => {
-                Target::bare(TargetKind::Parallel, -along, chance).into()
+            LightKind::Projector(projector) => {
+                let Some(color) = projector.toward(around, from) else { return Chosen::Dark };
+                for (k, band) in radiance.iter_mut().enumerate() {
+                    *band *= spectral.band(&color, k);
+                }
+                Target::bare(TargetKind::Point, projector.at, chance).into()
+            }
+            &LightKind::Directional { along, cos_radius } => {
+                let toward = Frame::around(-along).world(cone_direction(square, cos_radius));
+                Target::bare(TargetKind::Parallel, toward, chance).into()
             }
             LightKind::Environment { image: EnvironmentImage::Constant, .. } => {
                 let density = 0.25 / PI * chance;
@@ -431,15 +468,16 @@ pub(crate) fn mean(color: &Color) -> f64 {
 }
 
 /// Power of a light (W), `far` being the area (m²) that the scene shows to far lights.
-fn power(light: &Light, far: f64, sky: Option<&Sky>) -> f64 {
+fn power(light: &Light, around: &SceneView<'_>, far: f64, sky: Option<&Sky>) -> f64 {
     let own = mean(&light.color);
-    match light.kind {
+    match &light.kind {
         LightKind::Point(_) => 4.0 * PI * own,
         LightKind::Spot { cos_outer, cos_inner, .. } => {
             // As bright as inside over the mean of both cones.
             2.0 * PI * (1.0 - 0.5 * (cos_outer + cos_inner)) * own
         }
-        LightKind::Directional(_) => far * own,
+        LightKind::Directional { .. } => far * own,
+        LightKind::Projector(projector) => projector.solid_angle(around) * own,
         LightKind::Environment { .. } => 4.0 * PI * far * own * sky.map_or(1.0, Sky::mean),
     }
 }

@@ -67,10 +67,11 @@ pub fn sphere_direction([u, v]: [f64; 2]) -> DVec3 {
 /// angle.
 #[must_use]
 pub fn cone_direction([u, v]: [f64; 2], cos_max: f64) -> DVec3 {
-    let z = 1.0 - u * (1.0 - cos_max);
+    // What is lacking of 1, which narrow cones need whole.
+    let short = u * (1.0 - cos_max);
     let (sin, cos) = (TAU * v).sin_cos();
-    let r = (1.0 - z * z).max(0.0).sqrt();
-    DVec3::new(r * cos, r * sin, z)
+    let r = (short * (2.0 - short)).max(0.0).sqrt();
+    DVec3::new(r * cos, r * sin, 1.0 - short)
 }
 
 /// Solid angle of that cone (sr).

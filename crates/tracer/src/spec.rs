@@ -260,7 +260,38 @@ pub enum LightSpec {
         direction: [f64; 3],
         /// Irradiance on a surface that faces it, linear RGB.
         irradiance: Color,
+        /// Diameter of the disk that it comes from, as seen from the scene (degrees; the sun's is 0.53).
+        /// Shadows have soft edges by it; no ray of the camera meets the disk.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 90.0))]
+        angle: f64,
         /// The spectrum that the irradiance multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+    },
+    /// A point that throws an image, as for structured light.
+    Projector {
+        /// Where it is (m).
+        at: [f64; 3],
+        /// A point that it is aimed at (m).
+        look_at: [f64; 3],
+        /// What is up in the image.
+        #[serde(default = "upwards")]
+        up: [f64; 3],
+        /// Angle across the image (degrees).
+        #[serde(default = "default_throw")]
+        #[schemars(range(min = 0.0, max = 179.0))]
+        fov: f64,
+        /// Width over height; that of the image when absent, of a plain colour 1.
+        #[serde(default)]
+        aspect: Option<f64>,
+        /// What is thrown: an image, or a colour. It is seen as from the projector.
+        #[serde(default)]
+        image: PaintSpec,
+        /// Radiant intensity along the axis where the image is white, linear RGB: on a screen that faces it at
+        /// 1 m the image has this irradiance all over.
+        intensity: Color,
+        /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
     },
@@ -295,6 +326,10 @@ fn upwards() -> [f64; 3] {
 
 fn yes() -> bool {
     true
+}
+
+fn default_throw() -> f64 {
+    40.0
 }
 
 fn default_cone() -> f64 {

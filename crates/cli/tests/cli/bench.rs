@@ -44,7 +44,7 @@ fn a_quick_run_leaves_tables_and_charts() {
         let of = samplers.iter().find(|f| f["sampler"] == sampler && f["samples"] == samples);
         of.unwrap()["relative_rmse"].as_f64().unwrap()
     };
-    for sampler in ["independent", "stratified", "hammersley", "sobol"] {
+    for sampler in ["independent", "stratified", "hammersley", "sobol", "blue_noise"] {
         // Random numbers promise 1/√16, from 4 samples to 64; the others more.
         assert!(rmse(sampler, 64) < 0.5 * rmse(sampler, 4), "{sampler}: {samplers:?}");
     }

@@ -117,6 +117,11 @@ fn shares_of_the_samples_make_the_picture_of_one_machine() {
         [1, 2, 3].map(|number| format!("shares/samples-{number}-of-3.film"));
     let size = |path: &str| std::fs::metadata(bench.path(path)).expect("a share").len();
     assert!(size(&first) > size(&second), "data layers are in the first share alone");
+    let said = refused(&bench, &[&first, &third]);
+    assert!(said.contains("missing: 2/3"), "{said}");
+    let of_rows = share(&bench, 2, 3, &[]);
+    let said = refused(&bench, &[&first, &of_rows, &third]);
+    assert!(said.contains("a share of the rows") && said.contains("samples"), "{said}");
     done(&bench, &["merge", "merged", "--report", "report.json", &third, &first, &second]);
     assert_same(&bench, "out", "merged");
     done(&bench, &["render", "scene.json", "-o", "out", "--report", "whole.json"]);
@@ -124,11 +129,6 @@ fn shares_of_the_samples_make_the_picture_of_one_machine() {
     for key in ["image_hash", "samples", "rays", "lens_rays", "lens_losses"] {
         assert_eq!(merged[key], whole[key], "{key}");
     }
-    let said = refused(&bench, &[&first, &third]);
-    assert!(said.contains("missing: 2/3"), "{said}");
-    let of_rows = share(&bench, 2, 3, &[]);
-    let said = refused(&bench, &[&first, &of_rows, &third]);
-    assert!(said.contains("a share of the rows") && said.contains("samples"), "{said}");
 }
 
 /// Settings are those of the shares; the scene may have been moved.

@@ -93,7 +93,11 @@ fn illumination(scene: &Scene) -> Illumination {
         add(light.illuminant);
         let image = match &light.kind {
             LightKind::Environment { image, .. } => *image != EnvironmentImage::Constant,
-            LightKind::Point(_) | LightKind::Spot { .. } | LightKind::Directional(_) => false,
+            LightKind::Projector(projector) => match &projector.image {
+                Paint::Plain(color) => !is_grey(color),
+                Paint::Checker { .. } | Paint::Image { .. } => true,
+            },
+            LightKind::Point(_) | LightKind::Spot { .. } | LightKind::Directional { .. } => false,
         };
         coloured_light |= image || !is_grey(&light.color);
     }

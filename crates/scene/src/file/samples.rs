@@ -188,7 +188,7 @@ pub(super) fn fault(
         );
         return at(key, &why);
     }
-    if matches!(render.sampler, Sampler::Stratified | Sampler::Hammersley) {
+    if matches!(render.sampler, Sampler::Stratified | Sampler::Hammersley | Sampler::BlueNoise) {
         let why = "has to be told the number of samples beforehand, and `render.samples` is none; \
                    take `sobol` or `independent`";
         return Some(("render.sampler".to_owned(), why.to_owned()));

@@ -183,7 +183,9 @@ impl ImportedLight {
             LightKind::Spot { cos_outer, cos_inner, .. } => {
                 LightKind::Spot { at, axis: along()?, cos_outer, cos_inner }
             }
-            LightKind::Directional(_) => LightKind::Directional(along()?),
+            LightKind::Directional { cos_radius, .. } => {
+                LightKind::Directional { along: along()?, cos_radius }
+            }
             other => other,
         };
         Some(Light { kind, ..self.light.clone() })

@@ -250,7 +250,7 @@ impl Tracing<'_> {
         let goes_on = self.rules.follow == Follow::All && least < self.rules.bounces;
         let follows = goes_on || lights.is_hittable() || traits.has_choice;
         let roulette = self.rules.roulette.is_some_and(|after| most >= after);
-        let [several, extended] = [lights.are_several(), lights.is_hittable()];
+        let [several, extended] = [lights.are_several(), lights.are_extended()];
         move |draw| match draw {
             Draw::Choice => traits.has_choice,
             Draw::Light => several || extended || traits.has_choice,

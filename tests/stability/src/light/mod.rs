@@ -2,6 +2,7 @@
 
 mod lights;
 mod paths;
+mod precision;
 mod surfaces;
 
 use crate::Method;
@@ -19,5 +20,7 @@ pub const METHOD: Method = Method {
         lights::SMALL_SUN,
         paths::FIREFLIES,
         paths::ROULETTE,
+        precision::DARK_BOX,
+        precision::CORNER,
     ],
 };

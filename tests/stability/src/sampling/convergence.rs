@@ -67,7 +67,7 @@ fn fitted(scale: Scale, f: Integrand, [sobol_last, sobol, grid]: [f64; 3]) -> Ou
         let holds = match sampler {
             Sampler::Sobol => rate <= sobol,
             Sampler::Independent => (rate + 0.5).abs() <= 0.05,
-            Sampler::Stratified | Sampler::Hammersley => rate <= grid,
+            Sampler::Stratified | Sampler::Hammersley | Sampler::BlueNoise => rate <= grid,
         };
         outcome.must(holds, || format!("{name}: the error falls as n^{rate:.2}"));
         let end = curve.last().map_or(f64::NAN, |p| p[1].exp2());

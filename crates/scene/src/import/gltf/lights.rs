@@ -108,7 +108,7 @@ pub(super) fn placed(
     }
     let kind = match (written.kind.as_str(), written.spot) {
         ("point", _) => LightKind::Point(DVec3::ZERO),
-        ("directional", _) => LightKind::Directional(DVec3::NEG_Z),
+        ("directional", _) => LightKind::Directional { along: DVec3::NEG_Z, cos_radius: 1.0 },
         ("spot", Some(cone)) => LightKind::Spot {
             at: DVec3::ZERO,
             axis: DVec3::NEG_Z,
