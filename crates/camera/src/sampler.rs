@@ -251,9 +251,8 @@ mod tests {
         let disk = |[x, y]: [f64; 2]| f64::from(u8::from(x * x + y * y < 1.0));
         let smooth = |[x, y]: [f64; 2]| (x + y).exp();
         let e = std::f64::consts::E - 1.0;
-        let integrands: [(&dyn Fn([f64; 2]) -> f64, f64); 2] =
-            [(&disk, std::f64::consts::FRAC_PI_4), (&smooth, e * e)];
-        for (integrand, mean) in integrands {
+        let integrands: [&dyn Fn([f64; 2]) -> f64; 2] = [&disk, &smooth];
+        for (integrand, mean) in integrands.into_iter().zip([std::f64::consts::FRAC_PI_4, e * e]) {
             for (count, pair) in [(1, 0), (4, 1), (4, 9), (8, 4)] {
                 let error = |sampler: Sampler| -> f64 {
                     let pixel = |column, row| -> f64 {

@@ -227,6 +227,9 @@ pub struct Course<'a> {
 impl Course<'_> {
     /// Refuses what cannot be kept, or put together.
     fn allows(&self, stopping: Stopping) -> Result<(), RenderError> {
+        if !self.shares.is_empty() {
+            must_be_whole(self.shares, &self.identity).map_err(RenderError::Shares)?;
+        }
         let is_kept = self.checkpoint.is_some();
         match stopping {
             Stopping::Time(_) if is_kept || self.shard.is_some() => Err(RenderError::Timed),
@@ -294,9 +297,6 @@ pub fn trace(
     watch: &dyn Watch,
 ) -> Result<Film, RenderError> {
     course.allows(plan.stopping)?;
-    if !course.shares.is_empty() {
-        must_be_whole(course.shares, &course.identity).map_err(RenderError::Shares)?;
-    }
     let resolution = scene.camera.resolution();
     let mut layers = empty_film(scene, plan)?;
     let start = Instant::now();
@@ -340,10 +340,8 @@ pub fn trace(
     let so_far = |layers: &[&FilmLayer], samples| so_far(scene, plan, header, layers, samples);
     let shard = course.shard.unwrap_or(Shard::ALL);
     let checkpoint = course.checkpoint.as_ref();
-    let passes = match checkpoint {
-        Some(_) if plan.samples > 1 => short_passes(plan.samples),
-        _ => plan.passes.clone(),
-    };
+    let is_kept = checkpoint.is_some() && plan.samples > 1;
+    let passes = if is_kept { short_passes(plan.samples) } else { plan.passes.clone() };
     let others: Vec<&dyn OtherFrame> = others.iter().map(|other| other as _).collect();
     let rule = Rule::of(scene, plan);
     let job = Job {
@@ -372,8 +370,7 @@ pub fn trace(
     let watcher = Watcher::new(watch, job.rays(&layers));
     let Done { traffic: counts, passed, sums, centres } = job.run(&mut layers, &watcher)?;
     notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
-    let of_shares: Duration = course.shares.iter().map(FilmFile::trace_time).sum();
-    let trace_time = start.elapsed() + of_shares;
+    let trace_time = start.elapsed() + course.shares.iter().map(FilmFile::trace_time).sum();
     drop(job);
     let camera = Some(camera);
     Ok(Film { layers, resolution, shard, counts, passed, trace_time, sums, centres, notes, camera })

@@ -79,7 +79,9 @@ fn dark_box(scale: Scale) -> Result<Outcome> {
         outcome.must(double == 0, || format!("{place}: {double} pixels are lit in f64"));
         outcome.must(!single || forced == 0, || format!("{place}: {forced} pixels are lit in f32"));
         let choice = if single { "f32" } else { "f64" };
-        outcome.measured(format!("{place}: {double} pixels lit in f64, {forced} in f32 (plan: {choice})"));
+        outcome.measured(format!(
+            "{place}: {double} pixels lit in f64, {forced} in f32 (plan: {choice})"
+        ));
     }
     Ok(outcome)
 }
@@ -113,10 +115,15 @@ fn corner(scale: Scale) -> Result<Outcome> {
             outcome.must(double.are_sound() && forced.are_sound(), || "not finite".to_owned());
             let off = forced.mean() / double.mean() - 1.0;
             outcome.must(!single || off.abs() <= 1e-3, || {
-                format!("{place}, {beside} m: f32 shows {} and f64 {}", forced.mean(), double.mean())
+                format!(
+                    "{place}, {beside} m: f32 shows {} and f64 {}",
+                    forced.mean(),
+                    double.mean()
+                )
             });
             let choice = if single { "f32" } else { "f64" };
-            outcome.measured(format!("{place}, {beside} m: f32 is {off:+.0e} off (plan: {choice})"));
+            outcome
+                .measured(format!("{place}, {beside} m: f32 is {off:+.0e} off (plan: {choice})"));
         }
     }
     Ok(outcome)
