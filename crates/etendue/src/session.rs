@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_geometry::Mesh;
+use etendue_render::output::conventions::Manner;
 use etendue_render::output::{ImageHash, Layer, Outputs, SOFTWARE};
 use etendue_render::report::memory;
 use etendue_render::{
@@ -387,6 +388,14 @@ impl Session {
         places::folder(folder)?;
         self.load(progress)?;
         let (outputs, loaded) = (self.options.outputs, self.loaded()?);
+        let layers = loaded.plan.names(&loaded.scene);
+        if let Some([output, wanted]) = Manner::without_layer(outputs, &layers) {
+            let why = format!(
+                "outputs: `{output}` is a file of {wanted}, and the scene has no such layer; add it to \
+                 `layers`, or leave `{output}` out"
+            );
+            return Err(Error::Refused(why));
+        }
         let names = file_names(&loaded.scene, &loaded.plan, outputs);
         let names = names.into_iter().chain(also.iter().map(|&name| name.to_owned()));
         let results: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();

@@ -190,6 +190,40 @@ fn a_sun_with_a_disk() {
     check("half of it", 256, eye, &scene(wall), black, 1e-3 * open, |_| 0.5 * open);
 }
 
+/// A luminaire of I₀ cos θ in the plane of its horizontal angle 0 and half of that across, over a plane: what a
+/// point light of that intensity gives, ρ I cos θ / (π r²), without noise.
+#[test]
+fn a_luminaire_by_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = |step: f64, count: u32| (0..count).map(move |k| f64::from(k) * step);
+    let words = |all: &mut dyn Iterator<Item = f64>| {
+        all.map(|x| x.to_string()).collect::<Vec<_>>().join("\n")
+    };
+    let values =
+        |share: f64| words(&mut list(5.0, 19).map(|v| share * 10.0 * v.to_radians().cos()));
+    let (vertical, all, half) = (words(&mut list(5.0, 19)), values(1.0), values(0.5));
+    let text = format!(
+        "IESNA:LM-63-1995\nTILT=NONE\n1 1000 1 19 2 1 2 0 0 0\n1 1 40\n{vertical}\n0 90\n{all}\n{half}\n"
+    );
+    std::fs::write(folder.path().join("lamp.ies"), text).unwrap();
+    // Down along −Z, its angle 0 along +X, or turned by a quarter.
+    for (rotate, shares) in [(0, [1.0, 0.5]), (90, [0.5, 1.0])] {
+        let rest = format!(
+            r#""lights": [{{"type": "goniometric", "at": [0, 0, 3], "direction": [0, 0, -1], "file": "lamp.ies",
+                "rotate": {rotate}}}],
+            "objects": [{{"shape": "rectangle", "width": 20, "height": 20, "material": "m"}}],
+            "materials": {{"m": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}}"#
+        );
+        for (at, share) in [([3.0, 0.0, 0.0], shares[0]), ([0.0, -3.0, 0.0], shares[1])] {
+            let text = patch("direct", 4, [0.3, 0.2, 3.0], at, &rest);
+            let pixels = picture(load_in(folder.path(), &text), ways()[0]);
+            let known = 0.5 * share * 10.0 * 0.5 / (std::f64::consts::PI * 18.0);
+            // The patch is 1 mm wide: linear over it but for (1e-3 / 3)², and over the file's five degrees.
+            assert_shows(&format!("{rotate} {at:?}"), &pixels, known, 1e-4 * known);
+        }
+    }
+}
+
 /// A projector over a plane that faces it: ρ I / (π z²) all over its image, without noise, by the four
 /// texels of an image that lie where they lie as seen from the projector, and nothing beside it.
 #[test]

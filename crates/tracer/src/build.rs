@@ -6,11 +6,12 @@ use std::path::PathBuf;
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 use etendue_spectrum::{Illuminant, Metal, rgb};
 
+use crate::goniometric::{Goniometric, Photometry};
 use crate::material::{Absorption, Alpha, Glass, GltfSurface};
 use crate::spec::{AbsorptionSpec, BRIGHTEST, ImageSpec, IorSpec, PaintSpec};
 use crate::{
     Color, Emission, EnvironmentImage, Ior, Light, LightKind, LightSpec, Material, MaterialSpec,
-    Paint, Scattering,
+    Paint, Projector, Scattering,
 };
 
 /// What is wrong with a value.
@@ -161,6 +162,7 @@ impl LightSpec {
         let (key, color, illuminant) = match self {
             Self::Point { intensity, illuminant, .. }
             | Self::Spot { intensity, illuminant, .. }
+            | Self::Goniometric { intensity, illuminant, .. }
             | Self::Projector { intensity, illuminant, .. } => ("intensity", intensity, illuminant),
             Self::Directional { irradiance, illuminant, .. } => {
                 ("irradiance", irradiance, illuminant)
@@ -190,6 +192,21 @@ impl LightSpec {
                 along: unit("direction", DVec3::from(*direction))?,
                 cos_radius: (0.5 * angle).to_radians().cos(),
             },
+            Self::Goniometric { at, file, direction, rotate, .. } => {
+                let below = unit("direction", DVec3::from(*direction))?;
+                let tilt = DMat3::from_quat(DQuat::from_rotation_arc(DVec3::NEG_Y, below));
+                let turn = tilt * DMat3::from_rotation_y(rotate.to_radians());
+                let path = supply.file(file).map_err(|why| Fault::new("file", why))?;
+                let photometry = Photometry::read(&path)
+                    .map_err(|why| Fault::new("file", format!("\"{file}\" {why}")))?;
+                LightKind::Goniometric(Box::new(Goniometric {
+                    at: DVec3::from(*at),
+                    // A quarter turn from +X, counter-clockwise from above, is −Z.
+                    axes: DMat3::from_cols(turn.x_axis, -turn.z_axis, turn.y_axis),
+                    file: path,
+                    photometry,
+                }))
+            }
             Self::Projector { at, look_at, up, fov, aspect, image, .. } => {
                 let at = DVec3::from(*at);
                 let back = unit("look_at", at - DVec3::from(*look_at))?;
@@ -201,7 +218,7 @@ impl LightSpec {
                 {
                     return Err(Fault::new("aspect", format!("{aspect} is not above zero")));
                 }
-                LightKind::Projector(Box::new(crate::Projector {
+                LightKind::Projector(Box::new(Projector {
                     at,
                     axes: DMat3::from_cols(right, back.cross(right), back),
                     tangent: (0.5 * fov).to_radians().tan(),

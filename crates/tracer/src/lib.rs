@@ -27,6 +27,7 @@ pub mod build;
 pub mod emitters;
 pub mod environment;
 pub mod footprint;
+pub mod goniometric;
 mod lamps;
 pub mod layer;
 pub mod light;
@@ -49,6 +50,7 @@ pub mod transport;
 pub use emitters::Emitters;
 pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};
+pub use goniometric::Goniometric;
 pub use layer::{Layer, LayerSpec, NormalKind, Space};
 pub use light::{EnvironmentImage, Light, LightKind, Lights};
 pub use material::{

@@ -14,6 +14,7 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_spectrum::{Illuminant, NoOverlap};
 
 use crate::environment::EnvironmentMap;
+use crate::goniometric::Goniometric;
 use crate::lamps::{self, AreaLight, triangle_power};
 use crate::light_tree::{self, Cluster, LightTree};
 use crate::projector::Projector;
@@ -49,6 +50,15 @@ impl Light {
         illuminant: None,
     };
 
+    /// Its intensity in the middle, or of what is measured the mean, over the three colours (W/sr).
+    fn intensity(&self) -> f64 {
+        let measured = match &self.kind {
+            LightKind::Goniometric(measured) => measured.photometry.mean(),
+            _ => 1.0,
+        };
+        measured * mean(&self.color)
+    }
+
     /// The texture that it throws.
     #[must_use]
     pub fn texture(&self) -> Option<&TextureUse> {
@@ -58,11 +68,12 @@ impl Light {
         }
     }
 
-    /// The file of an environment's image.
+    /// The file of an environment's image, or of a measured distribution.
     #[must_use]
     pub fn file(&self) -> Option<&std::path::PathBuf> {
         match &self.kind {
             LightKind::Environment { image: EnvironmentImage::File(path), .. } => Some(path),
+            LightKind::Goniometric(measured) => Some(&measured.file),
             _ => None,
         }
     }
@@ -93,6 +104,8 @@ pub enum LightKind {
     },
     /// A point that throws an image, with an axial intensity.
     Projector(Box<Projector>),
+    /// A point that shines by a measured distribution, which the colour multiplies.
+    Goniometric(Box<Goniometric>),
     /// Radiance from all around.
     Environment {
         /// Its image.
@@ -115,6 +128,9 @@ impl LightKind {
             }
             Self::Projector(projector) => {
                 (projector.at, projector.axis(), projector.cone(around), 0.0)
+            }
+            Self::Goniometric(measured) => {
+                (measured.at, measured.axis(), measured.photometry.reach(), 0.0)
             }
             Self::Directional { .. } | Self::Environment { .. } => return None,
         };
@@ -232,7 +248,7 @@ impl Lights {
         around: &SceneView<'_>,
         powers: &mut Vec<f64>,
     ) -> Option<LightTree> {
-        let near = lights.iter().map(|light| light.kind.cluster(mean(&light.color), around));
+        let near = lights.iter().map(|light| light.kind.cluster(light.intensity(), around));
         let shining = triangles.iter().zip(&powers[lights.len()..]);
         let all = near.chain(shining.map(|(&id, &power)| lamps::cluster(around, id, power)));
         let all: Vec<_> = (0_u32..).zip(all).filter_map(|(k, c)| Some((k, c?))).collect();
@@ -373,6 +389,12 @@ impl Lights {
                 }
                 Target::bare(TargetKind::Point, projector.at, chance).into()
             }
+            LightKind::Goniometric(measured) => {
+                let intensity = measured.toward(from);
+                radiance.iter_mut().for_each(|band| *band *= intensity);
+                let place = Target::bare(TargetKind::Point, measured.at, chance);
+                (intensity > 0.0).then_some(place).into()
+            }
             &LightKind::Directional { along, cos_radius } => {
                 let toward = Frame::around(-along).world(cone_direction(square, cos_radius));
                 Target::bare(TargetKind::Parallel, toward, chance).into()
@@ -478,6 +500,7 @@ fn power(light: &Light, around: &SceneView<'_>, far: f64, sky: Option<&Sky>) -> 
         }
         LightKind::Directional { .. } => far * own,
         LightKind::Projector(projector) => projector.solid_angle(around) * own,
+        LightKind::Goniometric(_) => 4.0 * PI * light.intensity(),
         LightKind::Environment { .. } => 4.0 * PI * far * own * sky.map_or(1.0, Sky::mean),
     }
 }

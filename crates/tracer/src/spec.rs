@@ -269,6 +269,26 @@ pub enum LightSpec {
         #[serde(default)]
         illuminant: Option<Illuminant>,
     },
+    /// A point that shines by a measured distribution.
+    Goniometric {
+        /// Where it is (m).
+        at: [f64; 3],
+        /// An IES file (LM-63, type C), relative to the scene file.
+        file: String,
+        /// Where the luminaire's downward direction points: the plane of the horizontal angle 0 is turned from
+        /// +X the shortest way.
+        #[serde(default = "downwards")]
+        direction: [f64; 3],
+        /// Turns it about that direction (degrees, counter-clockwise from above).
+        #[serde(default)]
+        rotate: f64,
+        /// Multiplies the file's candela: linear RGB.
+        #[serde(default = "white")]
+        intensity: Color,
+        /// The spectrum that the intensity multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+    },
     /// A point that throws an image, as for structured light.
     Projector {
         /// Where it is (m).
@@ -322,6 +342,10 @@ pub enum LightSpec {
 
 fn upwards() -> [f64; 3] {
     [0.0, 1.0, 0.0]
+}
+
+fn downwards() -> [f64; 3] {
+    [0.0, -1.0, 0.0]
 }
 
 fn yes() -> bool {

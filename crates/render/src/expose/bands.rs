@@ -97,7 +97,10 @@ fn illumination(scene: &Scene) -> Illumination {
                 Paint::Plain(color) => !is_grey(color),
                 Paint::Checker { .. } | Paint::Image { .. } => true,
             },
-            LightKind::Point(_) | LightKind::Spot { .. } | LightKind::Directional { .. } => false,
+            LightKind::Point(_)
+            | LightKind::Spot { .. }
+            | LightKind::Goniometric(_)
+            | LightKind::Directional { .. } => false,
         };
         coloured_light |= image || !is_grey(&light.color);
     }

@@ -57,6 +57,28 @@ impl Manner {
         all.into_iter().filter_map(|(wanted, manner)| wanted.then_some(manner))
     }
 
+    /// What of `outputs` none of `layers` is written as: the word for it, and the layers that are.
+    #[must_use]
+    pub fn without_layer(outputs: Outputs, layers: &[String]) -> Option<[&'static str; 2]> {
+        let all = [
+            (Outputs { tum: outputs.tum, ..Outputs::NONE }, ["tum", "depth"]),
+            (
+                Outputs { kitti: outputs.kitti, ..Outputs::NONE },
+                ["kitti", "depth, disparity or flow"],
+            ),
+            (Outputs { flo: outputs.flo, ..Outputs::NONE }, ["flo", "flow"]),
+            (
+                Outputs { indexed: outputs.indexed, ..Outputs::NONE },
+                ["indexed", "ids or material_id"],
+            ),
+        ];
+        let lacks = |alone: Outputs| {
+            alone != Outputs::NONE
+                && layers.iter().all(|name| Self::of(name, alone).next().is_none())
+        };
+        all.into_iter().find_map(|(alone, words)| lacks(alone).then_some(words))
+    }
+
     /// What follows the layer's name in the file's.
     #[must_use]
     pub fn ending(self) -> &'static str {
@@ -151,6 +173,20 @@ fn flo(path: &Path, picture: &Picture, layer: &Layer) -> Result<(), OutputError>
 mod tests {
     use super::super::{Channel, Look, Values};
     use super::*;
+
+    #[test]
+    fn outputs_that_no_layer_serves_are_named() {
+        let lacks = |list: &str, layers: &[&str]| {
+            let layers: Vec<String> = layers.iter().map(|&name| name.to_owned()).collect();
+            Manner::without_layer(Outputs::from_list(list).unwrap(), &layers).map(|words| words[0])
+        };
+        // A depth that is the picture has no name.
+        assert_eq!(lacks("png,tum", &["", "Normal"]), Some("tum"));
+        assert_eq!(lacks("kitti,tum", &["Depth"]), None);
+        assert_eq!(lacks("kitti,flo", &["Depth"]), Some("flo"));
+        assert_eq!(lacks("indexed", &["Id.primitive"]), Some("indexed"));
+        assert_eq!(lacks("exr,png,npy,dng", &[]), None);
+    }
 
     fn picture(name: &str, look: Look, planes: Vec<Values>) -> Picture {
         let channel = |(k, values): (usize, Values)| Channel { name: ["X", "Y"][k].into(), values };
