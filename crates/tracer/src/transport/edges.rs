@@ -3,8 +3,8 @@
 //!
 //! In f32 a hit is misplaced, and the ray that leaves it is rounded, by some 10⁻⁷ of the coordinates. Where two
 //! walls meet at a corner, what starts nearer to the other wall than that may start behind it, and sees
-//! what is outside of a closed room. So a point that is nearer to an edge of its triangle than the bound of
-//! [`spawn`](crate::spawn) is moved along the triangle until it is as far.
+//! what is outside of a closed room. So a point that is nearer to an edge of its triangle than an eighth of
+//! the bound of [`spawn`](crate::spawn) is moved along the triangle until it is as far.
 
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, Placement};
@@ -16,6 +16,10 @@ use crate::reference::SurfacePoint;
 /// Hits whose least barycentric weight is above this are not looked at: only triangles that are less than
 /// some hundred bounds high have others, and a mesh of those has no sharp corners that it can resolve.
 const BESIDE: f64 = 1.0 / 256.0;
+
+/// What is kept clear of the edge, over the bound, which counts more roundings for safety than these two: of
+/// the hit, and of the origin of the ray that leaves it.
+const SHARE: f64 = 0.125;
 
 /// The largest of the least weights: a triangle's middle is inside.
 const MOST: f64 = 1.0 / 3.0;
@@ -34,7 +38,7 @@ impl Tracing<'_> {
             let origin = paths.rays.origin(i);
             let point = origin + paths.rays.direction(i) * hits.t[i];
             let magnitudes = point.abs() + origin.abs() + placed.magnitudes;
-            let bound = self.stage.roundings() * magnitudes.max_element();
+            let bound = SHARE * self.stage.roundings() * magnitudes.max_element();
             if let Some(by) = inwards(spot.placement, &spot, weights, bound) {
                 let rays = paths.rays.arrays_mut();
                 for axis in 0..3 {
