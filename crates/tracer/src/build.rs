@@ -194,18 +194,8 @@ impl LightSpec {
             },
             Self::Goniometric { at, file, direction, rotate, .. } => {
                 let below = unit("direction", DVec3::from(*direction))?;
-                let tilt = DMat3::from_quat(DQuat::from_rotation_arc(DVec3::NEG_Y, below));
-                let turn = tilt * DMat3::from_rotation_y(rotate.to_radians());
-                let path = supply.file(file).map_err(|why| Fault::new("file", why))?;
-                let photometry = Photometry::read(&path)
-                    .map_err(|why| Fault::new("file", format!("\"{file}\" {why}")))?;
-                LightKind::Goniometric(Box::new(Goniometric {
-                    at: DVec3::from(*at),
-                    // A quarter turn from +X, counter-clockwise from above, is −Z.
-                    axes: DMat3::from_cols(turn.x_axis, -turn.z_axis, turn.y_axis),
-                    file: path,
-                    photometry,
-                }))
+                let measured = goniometric(DVec3::from(*at), below, *rotate, (file, supply))?;
+                LightKind::Goniometric(Box::new(measured))
             }
             Self::Projector { at, look_at, up, fov, aspect, image, .. } => {
                 let at = DVec3::from(*at);
@@ -242,6 +232,24 @@ impl LightSpec {
         };
         Ok(Light { kind, color: *color, illuminant: checked(*illuminant)? })
     }
+}
+
+/// A luminaire at a point (m) whose downward direction is `below` (unit), turned by `rotate` (degrees), by its
+/// file.
+fn goniometric(
+    at: DVec3,
+    below: DVec3,
+    rotate: f64,
+    (file, supply): (&str, &mut dyn Supply),
+) -> Result<Goniometric, Fault> {
+    let tilt = DMat3::from_quat(DQuat::from_rotation_arc(DVec3::NEG_Y, below));
+    let turn = tilt * DMat3::from_rotation_y(rotate.to_radians());
+    let path = supply.file(file).map_err(|why| Fault::new("file", why))?;
+    let photometry =
+        Photometry::read(&path).map_err(|why| Fault::new("file", format!("\"{file}\" {why}")))?;
+    // A quarter turn from +X, counter-clockwise from above, is −Z.
+    let axes = DMat3::from_cols(turn.x_axis, -turn.z_axis, turn.y_axis);
+    Ok(Goniometric { at, axes, file: path, photometry })
 }
 
 /// What a metal looks like face on: linear RGB in 0..=1.

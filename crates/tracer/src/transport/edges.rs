@@ -65,7 +65,7 @@ fn inwards(
     let lengths = [(to_c - to_b).length(), to_c.length(), to_b.length()];
     let least = lengths.map(|length| (bound * length / doubled_area).min(MOST));
     let is_off = weights.iter().zip(&least).all(|(weight, least)| weight >= least);
-    if is_off || !(doubled_area > 0.0) {
+    if is_off || doubled_area == 0.0 {
         return None;
     }
     let raised: [f64; 3] = std::array::from_fn(|k| (weights[k] - least[k]).max(0.0));
