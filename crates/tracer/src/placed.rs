@@ -28,6 +28,8 @@ pub(crate) struct PlacedSurface {
     pub(crate) has_alpha: bool,
     /// It is Lambert's, and wholly there.
     pub(crate) is_matte: bool,
+    /// No light passes it.
+    pub(crate) is_opaque: bool,
     /// Its shading normal is not that of its triangles.
     pub(crate) is_tilted: bool,
     /// What the body behind its front takes from light.
@@ -51,6 +53,9 @@ impl PlacedSurfaces {
                 is_seen: material.emission.is_some() || material.scattering == Scattering::Unlit,
                 has_alpha: material.has_alpha(),
                 is_matte: material.scattering == Scattering::Matte && !material.has_alpha(),
+                is_opaque: !material.has_alpha()
+                    && !material.is_pane()
+                    && !matches!(material.scattering, Scattering::Dielectric(_)),
                 absorption: material.absorption(),
                 is_tilted: material.normal_map.is_some() || mesh.normals.is_some(),
                 color: match material.base_color {

@@ -39,7 +39,7 @@ fn a_quick_run_leaves_tables_and_charts() {
     let columns = lines[0].split(',').count();
     assert!(lines.iter().all(|line| line.split(',').count() == columns), "{csv}");
     let samplers = found["samplers"]["findings"].as_array().unwrap();
-    assert_eq!(samplers.len(), 4 * 4, "four samplers at four numbers of samples");
+    assert_eq!(samplers.len(), 5 * 4, "five samplers at four numbers of samples");
     let rmse = |sampler: &str, samples: u64| {
         let of = samplers.iter().find(|f| f["sampler"] == sampler && f["samples"] == samples);
         of.unwrap()["relative_rmse"].as_f64().unwrap()

@@ -193,7 +193,7 @@ fn trace(
             tracing.absorb(scratch);
         }
         if precision == HitPrecision::Single {
-            tracing.keep_off_edges(&mut scratch.now, &scratch.hits);
+            tracing.keep_off_edges(&scratch.now, &mut scratch.hits);
         }
         tracing.meet(scratch, out);
         let needs = tracing.needs(&scratch.now.states);
