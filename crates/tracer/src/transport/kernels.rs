@@ -37,6 +37,32 @@ pub(super) fn measure(patch: &mut Patch, roundings: f64) {
     for error in &mut seen.error {
         *error *= roundings;
     }
+    bring_back(patch, roundings);
+}
+
+/// How far rays that leave hits of f32 beside an edge start back, over the bound of [`crate::spawn`], which
+/// counts more roundings for safety than these two: of the hit, and of the origin of the ray that leaves it.
+const BACK: f64 = 0.25;
+
+/// What rays that leave hits of f32 beside edges start back by, along the ray that hit. In f32 a hit is
+/// misplaced, and what leaves it is rounded, by some 10⁻⁷ of the coordinates: where two walls meet, what starts
+/// nearer to the other wall than that may start behind it, and sees what is outside of a closed room. The ray
+/// that hit came from inside.
+#[inline(always)]
+fn bring_back(patch: &mut Patch, roundings: f64) {
+    let seen = &mut patch.seen;
+    for i in 0..LANES {
+        let mut most: f64 = 0.0;
+        for axis in 0..3 {
+            let magnitudes =
+                seen.point[axis][i].abs() + seen.origin[axis][i].abs() + seen.magnitudes[axis][i];
+            most = most.max(magnitudes);
+        }
+        let back = seen.is_beside[i] * BACK * roundings * most;
+        for axis in 0..3 {
+            seen.back[axis][i] = -seen.direction[axis][i] * back;
+        }
+    }
 }
 
 /// Shading normals as light is scattered by.
@@ -93,7 +119,7 @@ pub(super) fn aim(patch: &mut Patch, roundings: f64) {
     let mut length = [0.0; LANES];
     for axis in 0..3 {
         for i in 0..LANES {
-            let lifted = seen.normal[axis][i] * side[i];
+            let lifted = seen.normal[axis][i] * side[i] + seen.back[axis][i];
             let way = (offset[axis][i] + targets.normal[axis][i] * blur[i]) - lifted;
             let way = if targets.is_far[i] > 0.0 { offset[axis][i] } else { way };
             away.start[axis][i] = seen.point[axis][i] + lifted;
@@ -158,7 +184,8 @@ pub(super) fn scatter(patch: &mut Patch, squares: &[[f64; 2]; LANES]) {
     }
     for axis in 0..3 {
         for i in 0..LANES {
-            away.start[axis][i] = seen.point[axis][i] + normal[axis][i] * seen.error[i];
+            let lifted = normal[axis][i] * seen.error[i] + seen.back[axis][i];
+            away.start[axis][i] = seen.point[axis][i] + lifted;
         }
     }
 }

@@ -14,7 +14,6 @@
 
 mod body;
 mod dispersion;
-mod edges;
 mod kernels;
 mod meet;
 mod numbers;
@@ -191,9 +190,6 @@ fn trace(
         tracing.tally.rays += scratch.now.states.len() as u64;
         if stage.traits.has_bodies {
             tracing.absorb(scratch);
-        }
-        if precision == HitPrecision::Single {
-            tracing.keep_off_edges(&scratch.now, &mut scratch.hits);
         }
         tracing.meet(scratch, out);
         let needs = tracing.needs(&scratch.now.states);

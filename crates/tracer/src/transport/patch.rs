@@ -1,7 +1,7 @@
 //! Hits worked on side by side: one array a number, of so many lanes.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, MISS};
+use etendue_geometry::{HitBatch, HitPrecision, MISS};
 
 use super::paths::Paths;
 use crate::Color;
@@ -12,6 +12,11 @@ use crate::target::{Target, TargetKind};
 
 /// Hits worked on side by side.
 pub(super) const LANES: usize = 64;
+
+/// Hits of f32 are beside an edge of their triangle where their least barycentric weight is below this: only
+/// triangles that are less than some hundred of the bounds of [`spawn`](crate::spawn) high have others as near
+/// to one, and a mesh of those has no sharp corners that it can resolve.
+const BESIDE: f64 = 1.0 / 256.0;
 
 pub(super) type Row = [f64; LANES];
 
@@ -48,6 +53,9 @@ pub(super) struct Seen {
     /// What the placement's own numbers add to the rounding of the hit (m), and what that comes to.
     pub(super) magnitudes: [Row; 3],
     pub(super) error: Row,
+    /// 1 where it is beside an edge, and what rays that leave start behind by (m).
+    pub(super) is_beside: Row,
+    pub(super) back: [Row; 3],
 }
 
 /// The places on lights that the hits ask, as [`Target`] has them.
@@ -95,6 +103,8 @@ impl Default for Seen {
             point: [ZERO; 3],
             magnitudes: [ZERO; 3],
             error: ZERO,
+            is_beside: ZERO,
+            back: [ZERO; 3],
         }
     }
 }
@@ -146,7 +156,12 @@ impl Patch {
         placed: &PlacedSurface,
     ) -> usize {
         let lane = self.count;
-        let Seen { origin, direction, t, normal, shading, magnitudes, .. } = &mut self.seen;
+        let Seen { origin, direction, t, normal, shading, magnitudes, is_beside, .. } =
+            &mut self.seen;
+        // Rays that pass a surface leave it on the other side.
+        let is_single = now.rays.precision == HitPrecision::Single && placed.is_opaque;
+        let least = hits.u[i].min(hits.v[i]).min(1.0 - hits.u[i] - hits.v[i]);
+        is_beside[lane] = f64::from(u8::from(is_single && least < BESIDE));
         self.path.push((i, k));
         t[lane] = hits.t[i];
         let (origins, directions) = (now.rays.origins(), now.rays.directions());
@@ -165,9 +180,11 @@ impl Patch {
         at(&self.seen.point, lane)
     }
 
-    pub(super) fn anchor(&self, lane: usize) -> Anchor {
+    /// Where a ray starts that leaves the hit of a lane along `towards`.
+    pub(super) fn leave(&self, lane: usize, towards: DVec3) -> DVec3 {
         let normal = at(&self.seen.normal, lane);
-        Anchor { point: self.point(lane), normal, error: self.seen.error[lane] }
+        let anchor = Anchor { point: self.point(lane), normal, error: self.seen.error[lane] };
+        anchor.leave(towards) + at(&self.seen.back, lane)
     }
 
     /// Sets the ray that leaves the hit of a lane.

@@ -301,7 +301,7 @@ impl Tracing<'_> {
                     state.inside = body;
                 }
             }
-            let start = patch.anchor(lane).leave(scattered.direction);
+            let start = patch.leave(lane, scattered.direction);
             patch.send(lane, (start, scattered.direction));
             patch.picked.push(lane);
         }
