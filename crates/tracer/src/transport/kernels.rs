@@ -44,23 +44,24 @@ pub(super) fn measure(patch: &mut Patch, roundings: f64) {
 /// counts more roundings for safety than these two: of the hit, and of the origin of the ray that leaves it.
 const BACK: f64 = 0.25;
 
-/// What rays that leave hits of f32 beside edges start back by, along the ray that hit. In f32 a hit is
-/// misplaced, and what leaves it is rounded, by some 10⁻⁷ of the coordinates: where two walls meet, what starts
-/// nearer to the other wall than that may start behind it, and sees what is outside of a closed room. The ray
-/// that hit came from inside.
+/// What rays that leave hits of f32 beside edges start back by, along the surface, against the ray that hit.
+/// In f32 a hit is misplaced, and what leaves it is rounded, by some 10⁻⁷ of the coordinates: where two walls
+/// meet, what starts nearer to the other wall than that may start behind it, and sees what is outside of a
+/// closed room. The ray that hit came from inside.
 #[inline(always)]
 fn bring_back(patch: &mut Patch, roundings: f64) {
     let seen = &mut patch.seen;
     for i in 0..LANES {
-        let mut most: f64 = 0.0;
+        let (mut most, mut across) = (0.0_f64, 0.0);
         for axis in 0..3 {
+            across += seen.normal[axis][i] * seen.direction[axis][i];
             let magnitudes =
                 seen.point[axis][i].abs() + seen.origin[axis][i].abs() + seen.magnitudes[axis][i];
             most = most.max(magnitudes);
         }
         let back = seen.is_beside[i] * BACK * roundings * most;
         for axis in 0..3 {
-            seen.back[axis][i] = -seen.direction[axis][i] * back;
+            seen.back[axis][i] = (seen.normal[axis][i] * across - seen.direction[axis][i]) * back;
         }
     }
 }
