@@ -10,7 +10,7 @@ mod kept;
 mod pilot;
 mod words;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use etendue_accel::BuildOptions;
 use etendue_render::output::Outputs;
@@ -26,6 +26,10 @@ use crate::Error;
 
 /// The longest build (s), by the machine's rates, that is done for a forecast.
 const LONGEST_BUILD: f64 = 1.0;
+
+/// The longest that small pictures are traced for one: where rays take as long as in a pile of triangles in one
+/// place, they are counted instead.
+const LONGEST_PILOT: Duration = Duration::from_secs(3);
 
 /// The most bytes of images that are decoded for one.
 const MOST_IMAGES: u64 = 256 << 20;
@@ -102,7 +106,8 @@ impl TimeForecast {
         let start = Instant::now();
         let images = Images::decode(scene, plan, None)?;
         let load = counted.load + start.elapsed().as_secs_f64();
-        let pilot = Pilot { scene, accel: &*accel, images: &images };
+        let until = Instant::now() + LONGEST_PILOT;
+        let pilot = Pilot { scene, accel: &*accel, images: &images, until };
         let trace = match plan.stopping {
             Stopping::Time(time) => time.as_secs_f64(),
             _ => pilot.picture(&scene.camera)?,

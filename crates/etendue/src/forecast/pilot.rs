@@ -28,6 +28,8 @@ pub(super) struct Pilot<'a> {
     pub(super) scene: &'a Scene,
     pub(super) accel: &'a dyn Accel,
     pub(super) images: &'a Images,
+    /// When they have taken too long: a forecast is worth no wait.
+    pub(super) until: Instant,
 }
 
 impl Pilot<'_> {
@@ -85,7 +87,11 @@ impl Pilot<'_> {
         }
         let plan = Plan::new(&scene, Outputs::ALL);
         let start = Instant::now();
-        let done = render(&scene, &plan, self.accel, self.images, Vec::new(), &|_: f64| true)?;
+        let goes_on = |_: f64| Instant::now() < self.until;
+        let done = render(&scene, &plan, self.accel, self.images, Vec::new(), &goes_on)?;
+        if !goes_on(1.0) {
+            return Err(RenderError::Stopped.into());
+        }
         let time = done.trace_time.min(start.elapsed()).as_secs_f64();
         Ok((time, done.sample_counts.map(|counts| counts.mean())))
     }
