@@ -1,5 +1,7 @@
 //! What can be asked for on the command line.
 
+mod bench;
+mod lens;
 mod parse;
 
 use std::path::PathBuf;
@@ -7,12 +9,12 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use etendue::{Shard, ShardBy};
 use etendue_bench::tolerance::Tolerance;
-use etendue_optics::train::Focus;
 use etendue_scene::import::Strictness;
 use etendue_scene::{LoadOptions, Reach};
 use etendue_tracer::LayerSpec;
 
-use crate::lens::parse_focus;
+pub(crate) use bench::{BenchArguments, PartArgument};
+pub(crate) use lens::LensArguments;
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
 /// it.
@@ -54,10 +56,10 @@ pub(crate) enum Command {
     #[command(after_help = VIEW_HELP)]
     View(ViewArguments),
     /// Analyse a lens, or trace given rays through it
-    #[command(after_help = LENS_HELP)]
+    #[command(after_help = lens::HELP)]
     Lens(LensArguments),
     /// Measure speed against accuracy on a scene: every accelerator, on this machine
-    #[command(after_help = BENCH_HELP)]
+    #[command(after_help = bench::HELP)]
     Bench(BenchArguments),
     /// Print the JSON Schema of scene files, lens files, or files of rays
     #[command(after_help = "Example:\n  etendue schema > scene.schema.json\n  \
@@ -114,26 +116,6 @@ Example:
   etendue render scenes/first-light.json -o out/shares --shard 2/2
   etendue merge out/first-light out/shares/shard-*.film";
 
-const BENCH_HELP: &str = "\
-Prints a table, and writes into the folder:
-  bench.json                 all that was measured, with the machine
-  accelerators.csv           each accelerator x batch width x threads: build, memory, speed, errors
-  accelerators-hits.svg      rays with a wrong answer against time (.png too)
-  accelerators-depth.svg     error of the distance against time
-  accelerators-batch.svg     time against batch width
-  samplers.csv               each sampler x number of samples: time, and error of the picture
-  samplers-time.svg, samplers-samples.svg
-  cameras.csv, cameras-time.svg
-                             each model of the camera's lens, from a pinhole to the full train
-
-Errors of hits are against `exact`, the f64 reference, which is built and traced too; errors of
-pictures against one of sixteen times the samples. Run it on a machine that does nothing else.
-
-Examples:
-  etendue bench scenes/first-light.json -o out/bench --quick
-  etendue bench model.glb -o out/bench --batches 64,256 --threads 1,8 --rays 1000000
-  etendue bench scenes/first-light.json -o out/bench --only accelerators --scattered";
-
 const SENSOR_HELP: &str = "\
 Without a sensor, lists the presets. With one, exposes frames of even light from a tenth of an
 electron to past saturation and prints the photon-transfer and signal-to-noise curves: simulated,
@@ -148,77 +130,6 @@ Examples:
   etendue sensor imx183 -o out/imx183
   etendue sensor imx183 --set temperature=313.15 --set exposure=10 --json
   etendue sensor kaf8300 --emva out/kaf8300 --wavelength 525 --steps 25";
-
-const LENS_HELP: &str = "\
-All lengths are millimetres; z = 0 is the first element's vertex, +z runs from the object to the
-sensor, and elements count from 0 on the object side.
-
-RAYS.json: {\"from\": \"object\" or \"sensor\", \"clip\": true or false, \"rays\": [
-  {\"origin\": [x, y, z], \"direction\": [x, y, z], \"wavelength\": 587.56}]}
-
-Examples:
-  etendue lens scenes/lenses/double-gauss.json
-  etendue lens scenes/lenses/achromat.json --json --fields 0,5,10
-  etendue lens scenes/lenses/double-gauss.json --rays rays.json --json
-  etendue lens scenes/lenses/double-gauss.json -o out/double-gauss
-  etendue lens bought.zmx --save bought.json
-  etendue lens scenes/double-gauss.json --fit-opencv";
-
-#[derive(Debug, Args)]
-pub(crate) struct LensArguments {
-    /// A lens file (.json), a Zemax file (.zmx), or a scene whose camera is a lens
-    #[arg(value_name = "LENS|ZMX|SCENE")]
-    pub(crate) lens: PathBuf,
-    /// Print JSON for machines, with all digits
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// Trace the rays of a file instead, and print every intersection and how each ray ends
-    #[arg(long, value_name = "FILE")]
-    pub(crate) rays: Option<PathBuf>,
-    /// Draw layout.svg, spots.svg and illumination.svg into this folder, made when it is not there
-    #[arg(short, long, value_name = "DIR")]
-    pub(crate) output: Option<PathBuf>,
-    /// Write the lens as a lens file, such as an imported one
-    #[arg(long, value_name = "FILE")]
-    pub(crate) save: Option<PathBuf>,
-    /// Fit OpenCV's camera (K, k1, k2, p1, p2, k3, or its fisheye) to the lens' chief rays, and print it
-    /// with its residuals, where it holds, and as the camera of a scene; with -o, into opencv.json there
-    #[arg(long, conflicts_with = "rays")]
-    pub(crate) fit_opencv: bool,
-    /// What the fit may be off by: "0.5 px", which is the default
-    #[arg(long, value_name = "PIXELS", value_parser = parse::pixels, requires = "fit_opencv")]
-    pub(crate) tolerance: Option<f64>,
-    /// Columns and rows of the picture that is fitted, 1536x1024 when absent
-    #[arg(long, value_name = "COLUMNSxROWS", value_parser = parse::resolution, requires = "fit_opencv")]
-    pub(crate) resolution: Option<[u32; 2]>,
-    /// From one pixel to the next, such as "4 um"; as wide as fills the image circle when absent
-    #[arg(long, value_name = "PITCH", value_parser = parse::pitch, requires = "fit_opencv")]
-    pub(crate) pixel_pitch: Option<f64>,
-    /// Field angles in degrees; the file's own or shares of the field of view when absent
-    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
-    pub(crate) fields: Option<Vec<f64>>,
-    /// Wavelengths in nm, the main one first; the lens' own and the F, d and C lines when absent
-    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
-    pub(crate) wavelengths: Option<Vec<f64>>,
-    /// Put the sensor where a plane at this distance is sharp: "1.2 m", or infinity
-    #[arg(long, value_name = "DISTANCE", value_parser = parse_focus, allow_hyphen_values = true)]
-    pub(crate) focus: Option<Focus>,
-    /// Open or close the stop to this f-number
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
-    pub(crate) f_number: Option<f64>,
-    /// Look glasses up in this catalogue (Zemax' AGF format) first; the last one given is asked first
-    #[arg(long = "glass-catalog", value_name = "FILE")]
-    pub(crate) glass_catalogs: Vec<PathBuf>,
-    /// Refuse wavelengths outside of what the glasses are stated for instead of warning
-    #[arg(long)]
-    pub(crate) strict: bool,
-    /// Let the file name files outside its own folder
-    #[arg(long)]
-    pub(crate) allow_outside: bool,
-    /// Say nothing on standard error but errors
-    #[arg(short, long)]
-    pub(crate) quiet: bool,
-}
 
 /// A scene, and what of it is overridden.
 #[derive(Debug, Clone, Args)]
@@ -419,59 +330,6 @@ pub(crate) struct MergeArguments {
     #[arg(long, value_name = "FILE")]
     pub(crate) report: Option<PathBuf>,
     /// Show no progress and no summary; the list of files and errors remain
-    #[arg(short, long)]
-    pub(crate) quiet: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum PartArgument {
-    /// Each accelerator x batch width x threads
-    Accelerators,
-    /// Each sampler x number of samples
-    Samplers,
-    /// Each model of the camera's lens x number of samples
-    Cameras,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct BenchArguments {
-    #[command(flatten)]
-    pub(crate) scene: SceneArguments,
-    /// The folder to write into; made when it is not there
-    #[arg(short, long, value_name = "DIR")]
-    pub(crate) output: PathBuf,
-    /// Fewer rays, rounds and batch widths: under a minute for a million triangles
-    #[arg(long)]
-    pub(crate) quick: bool,
-    /// Measure these alone
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
-    pub(crate) only: Vec<PartArgument>,
-    /// Times that everything is built and timed [default: 5, quick 3]
-    #[arg(long, value_name = "N", value_parser = parse::rounds)]
-    pub(crate) rounds: Option<usize>,
-    /// The most rays to trace, in whole tiles of the picture [default: 524288, quick 65536]
-    #[arg(long, value_name = "N", value_parser = parse::rays)]
-    pub(crate) rays: Option<usize>,
-    /// Trace rays that scatter from what the camera sees, as paths go on, instead of the camera's own
-    #[arg(long)]
-    pub(crate) scattered: bool,
-    /// Batch widths in rays [default: 16,64,256,1024, quick 64,256]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::batch)]
-    pub(crate) batches: Option<Vec<usize>>,
-    /// Numbers of threads [default: 1, 2, 4 … all, quick 1 and all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::some_threads)]
-    pub(crate) threads: Option<Vec<usize>>,
-    /// Samples a pixel to compare [default: 1,4,16,64,256, quick 1,4,16,64]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::samples)]
-    pub(crate) sample_counts: Option<Vec<u32>>,
-    /// About how long samplers and cameras may take, each; pixels are made larger until they do
-    /// [default: 60, quick 10]
-    #[arg(long, value_name = "S", value_parser = parse::seconds)]
-    pub(crate) seconds: Option<f64>,
-    /// Stop when a structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
-    #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
-    pub(crate) memory_limit: Option<u64>,
-    /// Show no progress and no list of files; the table and errors remain
     #[arg(short, long)]
     pub(crate) quiet: bool,
 }

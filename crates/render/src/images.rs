@@ -12,7 +12,7 @@ use etendue_tracer::{
 use rayon::prelude::*;
 
 use crate::Plan;
-use crate::render::RenderError;
+use crate::error::RenderError;
 use crate::report::ImageSize;
 
 /// Images of a scene's materials and its environment, decoded; what could not be is told.

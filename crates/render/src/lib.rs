@@ -15,6 +15,7 @@
 
 mod adaptive;
 mod checkpoint;
+mod error;
 pub mod expose;
 mod film;
 mod film_file;
@@ -39,14 +40,14 @@ mod watch;
 
 pub use adaptive::SampleCounts;
 pub use checkpoint::Checkpoint;
+pub use error::RenderError;
 pub use film::{NoMemory, Precision};
 pub use film_file::{FilmError, FilmFile, FilmHeader, Identity};
 pub use images::Images;
 pub use other_frame::FollowedFrame;
 pub use plan::{Decision, Plan};
 pub use render::{
-    Course, Film, Prepared, Progress, RenderError, Rendered, accelerators, build, finish, rebuild,
-    render, trace,
+    Course, Film, Prepared, Progress, Rendered, accelerators, build, finish, rebuild, render, trace,
 };
 pub use report::{Report, Seconds};
 pub use shard::{Shard, ShardBy};

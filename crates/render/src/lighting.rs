@@ -13,10 +13,10 @@ use etendue_tracer::{
     Spectral, Traits,
 };
 
+use crate::error::RenderError;
 use crate::film::{FilmLayer, Precision};
 use crate::output::{Picture, PictureError, Values, luminance};
 use crate::radiance::LightPass;
-use crate::render::RenderError;
 use crate::samples::Sampling;
 use crate::shard::Shard;
 use crate::tiles::Job;

@@ -3,14 +3,13 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use etendue_accel::{Accel, BuildError, BuildOptions};
+use etendue_accel::{Accel, BuildOptions};
 use etendue_camera::{Camera, PixelExtent};
 use etendue_optics::element::FateCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightRow, SETS};
 use etendue_spectrum::Bands;
 use etendue_tracer::layer::OtherFrame;
-use etendue_tracer::texture::ImageError;
 use etendue_tracer::{
     Emitters, LayerSpec, LightingContext, Lights, Material, Pixel, PlacedSurfaces, RayStats,
     SceneView, Spectral, Traits, View,
@@ -18,8 +17,9 @@ use etendue_tracer::{
 
 use crate::adaptive::{Rule, SampleCounts};
 use crate::checkpoint::{Checkpoint, Keeper};
+use crate::error::RenderError;
 use crate::film::{FilmLayer, NoMemory};
-use crate::film_file::{FilmError, FilmFile, Identity};
+use crate::film_file::{FilmFile, Identity};
 use crate::images::Images;
 use crate::other_frame::FollowedFrame;
 use crate::output::{Development, Layer, Picture, PictureError};
@@ -29,92 +29,11 @@ use crate::samples::{Sampling, Sum, short_passes};
 use crate::shard::{Shard, must_be_whole};
 use crate::stopping::Stopping;
 use crate::tiles::{Done, Job, RayCounts};
-use crate::watch::{Stopped, Watch, Watcher};
+use crate::watch::{Watch, Watcher};
 use crate::{Plan, expose, lighting, names};
 
 /// Told the share done (0..=1) now and then; answering `false` stops.
 pub type Progress = Arc<dyn Fn(f64) -> bool + Send + Sync>;
-
-/// Why a render came to nothing.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RenderError {
-    /// The acceleration structure could not be built.
-    #[error(transparent)]
-    Build(#[from] BuildError),
-    /// The backend was left out when this program was built.
-    #[error("this program was built without {0}; use `--accel bvh`, or build it with the feature")]
-    Absent(&'static str),
-    /// An instruction set was asked for that the backend cannot be told.
-    #[error(
-        "only Embree can be told an instruction set; leave `--isa` out, or use `--accel embree`"
-    )]
-    NotEmbree,
-    /// The result is no picture; a fault of this program.
-    #[error(transparent)]
-    Picture(#[from] PictureError),
-    /// The camera's pupil cannot be sampled: nothing gets through the lens at the wavelengths that
-    /// are wanted.
-    #[error("camera: {0}")]
-    Camera(String),
-    /// Rays were sent, and not one left the lens.
-    #[error(
-        "the picture would be black: no ray gets from the sensor past element {element} of the \
-         camera's lens, counted from 0 on the object side ({})",
-        losses.join(", ")
-    )]
-    Dark {
-        /// The element nearest to the object at which rays ended.
-        element: usize,
-        /// Which share of the rays ended where.
-        losses: Vec<String>,
-    },
-    /// The system has less memory than the film takes.
-    #[error(transparent)]
-    Memory(#[from] NoMemory),
-    /// A light's spectrum is of no use to the sensor.
-    #[error(
-        "a light's illuminant: {0}; give the light `equal_energy`, `a` or {{\"black_body\": kelvin}}, \
-         which reach further, or the sensor a quantum_efficiency or bands that see it"
-    )]
-    Lights(String),
-    /// The environment is no image that can be read, or an image of the scene is too large.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// What there is of samples that go on until an error is reached is not kept on the way.
-    #[error(
-        "--checkpoint: samples that go on until an error is reached are not kept on the way; give \
-         `render.samples` a number, or divide the render by --shard"
-    )]
-    Checkpoint,
-    /// Which samples are taken is judged from all before them.
-    #[error(
-        "--shard-by samples: samples that go on until an error is reached are not known beforehand; give \
-         `render.samples` a number, or divide the rows, by --shard alone"
-    )]
-    SampleShares,
-    /// A time ends differently on each machine, so that parts of a picture do not fit together.
-    #[error(
-        "--shard, --checkpoint: a time (`render.samples.time`) ends at another number of samples in each \
-         part; give `render.samples` a number"
-    )]
-    Timed,
-    /// A file of what is filled of a film cannot be used.
-    #[error(transparent)]
-    Film(#[from] FilmError),
-    /// Shares of a render do not make a whole.
-    #[error("{0}")]
-    Shares(String),
-    /// The caller asked to stop.
-    #[error("stopped")]
-    Stopped,
-}
-
-impl From<Stopped> for RenderError {
-    fn from(_: Stopped) -> Self {
-        Self::Stopped
-    }
-}
 
 /// A render's result.
 #[derive(Debug)]

@@ -14,11 +14,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::Plan;
 use crate::adaptive::SampleCounts;
+use crate::error::RenderError;
 use crate::film::{FilmLayer, filled};
 use crate::film_file::{FilmError, FilmFile, Identity, Writing};
 use crate::output::OutputError;
 use crate::passes::Passed;
-use crate::render::{Film, RenderError, empty_film};
+use crate::render::{Film, empty_film};
 use crate::samples::{Averaging, Sum};
 use crate::tiles::{RayCounts, TILE};
 

@@ -14,12 +14,12 @@ use rayon::prelude::*;
 
 use crate::adaptive::Rule;
 use crate::checkpoint::Keeper;
+use crate::error::RenderError;
 use crate::film::{FilmLayer, Strip, strips, take};
 use crate::film_file::{FilmError, FilmFile};
 use crate::output::{Picture, PictureError};
 use crate::passes::{Beside, Passed};
 use crate::radiance::LightPass;
-use crate::render::RenderError;
 use crate::samples::{Averaged, Averaging, Memory, Sampling, Sum};
 use crate::shard::put_together;
 use crate::watch::{Stopped, Watcher};

@@ -32,6 +32,7 @@ mod lamps;
 pub mod layer;
 pub mod light;
 mod light_tree;
+pub mod lights;
 pub mod material;
 pub mod placed;
 pub mod projector;
@@ -52,7 +53,8 @@ pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};
 pub use goniometric::Goniometric;
 pub use layer::{Layer, LayerSpec, NormalKind, Space};
-pub use light::{EnvironmentImage, Light, LightKind, Lights};
+pub use light::{EnvironmentImage, Light, LightKind};
+pub use lights::Lights;
 pub use material::{
     Absorption, Color, Emission, Glass, Ior, Material, Paint, Scattering, TextureScope,
 };

@@ -8,7 +8,8 @@ use etendue_geometry::glam::{DMat3, DVec3};
 
 use crate::Color;
 use crate::environment::{EnvironmentMap, MapSampler, place};
-use crate::light::{Light, LightKind, Lights};
+use crate::light::{Light, LightKind};
+use crate::lights::Lights;
 use crate::sampling::PlacesOnGrid;
 use crate::spectral::Spectral;
 use crate::target::{Target, TargetKind};

@@ -89,9 +89,9 @@ fn main() -> anyhow::Result<()> {
     let names = ["paper/fig3.json", "double-gauss.json", "sensor-noise.json"];
     let open = |name: &&str| Study::open(&arguments.scenes.join(name), arguments.width);
     let studies: Vec<Study> = names.iter().map(open).collect::<Result<_, _>>()?;
-    let uniform: Vec<Vec<Shot>> = studies
+    let uniform: Vec<Vec<PicturePair>> = studies
         .iter()
-        .map(|study| effort.counts.iter().map(|n| Shot::of(study, json!(n))).collect())
+        .map(|study| effort.counts.iter().map(|n| PicturePair::of(study, json!(n))).collect())
         .collect();
     let noise = noise_table(&effort, &names, &studies, &uniform);
     text += &noise.text;
@@ -109,13 +109,13 @@ fn main() -> anyhow::Result<()> {
 }
 
 /// Two pictures of other seeds, and the rays of one.
-struct Shot {
+struct PicturePair {
     pair: [study::Picture; 2],
     rays: f64,
     mean_samples: f64,
 }
 
-impl Shot {
+impl PicturePair {
     fn of(study: &Study, samples: serde_json::Value) -> Self {
         let wanted = Wanted { samples, exposure: SHOWN[0] };
         Self::with(study, &wanted)
@@ -139,7 +139,7 @@ fn noise_table(
     effort: &Effort,
     names: &[&str],
     studies: &[Study],
-    uniform: &[Vec<Shot>],
+    uniform: &[Vec<PicturePair>],
 ) -> NoiseTable {
     let mut text = format!(
         "\nUntil the variance of the samples is {FRACTION} of the sensor's. `as even`: rays of a number for every pixel \
@@ -158,8 +158,8 @@ fn noise_table(
         for &exposure in effort.charted {
             let samples =
                 json!({ "until": "sensor-noise", "fraction": FRACTION, "max": effort.most });
-            let taken = Shot::with(study, &Wanted { samples, exposure });
-            let spread = |shot: &Shot| study.noise_share(&shot.pair, exposure);
+            let taken = PicturePair::with(study, &Wanted { samples, exposure });
+            let spread = |shot: &PicturePair| study.noise_share(&shot.pair, exposure);
             let own = spread(&taken);
             let curve = |of: &dyn Fn(Spread) -> f64| -> Vec<[f64; 2]> {
                 uniform.iter().map(|shot| [shot.rays, of(spread(shot))]).collect()
@@ -198,7 +198,7 @@ fn relative_table(
     effort: &Effort,
     names: &[&str],
     studies: &[Study],
-    uniform: &[Vec<Shot>],
+    uniform: &[Vec<PicturePair>],
 ) -> String {
     let mut text = format!(
         "\nUntil a relative error of {ERROR}, against a number for every pixel with the same error in the worst tenth of \
@@ -207,8 +207,8 @@ fn relative_table(
     );
     for ((name, study), uniform) in names.iter().zip(studies).zip(uniform) {
         let samples = json!({ "relative_error": ERROR, "max": effort.most });
-        let taken = Shot::of(study, samples);
-        let spread = |shot: &Shot| study.relative_variance(&shot.pair).ninth;
+        let taken = PicturePair::of(study, samples);
+        let spread = |shot: &PicturePair| study.relative_variance(&shot.pair).ninth;
         let curve: Vec<[f64; 2]> = uniform.iter().map(|shot| [shot.rays, spread(shot)]).collect();
         let (rays, mark) = rays_for(&curve, spread(&taken));
         let _ = writeln!(

@@ -17,7 +17,7 @@ pub(super) struct Seen {
     /// The chief ray; `None` where the camera sees nothing.
     pub(super) chief: Option<Line>,
     /// The light of each band.
-    pub(super) bands: Vec<Beam>,
+    pub(super) bands: Vec<BandRays>,
 }
 
 /// A straight line: its slope, and its offset (m) in the entrance pupil's plane. x right, y down.
@@ -29,7 +29,7 @@ pub(super) struct Line {
 
 /// The rays of a band that arrive.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Beam {
+pub(super) struct BandRays {
     /// What the picture has for a radiance of 1.
     pub(super) light: f64,
     /// Their mean.
@@ -57,7 +57,7 @@ impl Line {
     }
 }
 
-impl Beam {
+impl BandRays {
     /// Of weighted lines, `count` rays having been sent.
     fn of(lines: &[(Line, f64)], count: usize) -> Self {
         let sum: f64 = lines.iter().map(|(_, weight)| weight).sum();
@@ -95,7 +95,7 @@ impl Seen {
     /// The middle of the light of all bands together, each counted alike.
     pub(super) fn centroid(&self, nearness: f64) -> Option<DVec2> {
         let lit: Vec<DVec2> =
-            self.bands.iter().filter_map(|beam| beam.centroid(nearness)).collect();
+            self.bands.iter().filter_map(|band| band.centroid(nearness)).collect();
         (!lit.is_empty()).then(|| lit.iter().sum::<DVec2>() / lit.len() as f64)
     }
 }
@@ -131,8 +131,8 @@ pub(super) fn seen(camera: &Camera, bands: &Bands, places: &[Place], rays: u32) 
                     Some((line?, out.weight[k]))
                 })
                 .collect();
-            let beam = Beam::of(&lines, rays as usize);
-            seen.bands.extend(group.bands.clone().map(|_| beam));
+            let band = BandRays::of(&lines, rays as usize);
+            seen.bands.extend(group.bands.clone().map(|_| band));
         }
         all.push(seen);
     }

@@ -38,7 +38,7 @@ use self::shadows::Shadows;
 use crate::Material;
 use crate::bsdf::{Bsdf, Weights, metal};
 use crate::emitters::Emitters;
-use crate::light::Lights;
+use crate::lights::Lights;
 use crate::placed::{PlacedSurface, PlacedSurfaces};
 use crate::reference::SceneView;
 use crate::sky::Asked;

@@ -1,0 +1,80 @@
+//! What `etendue lens` can be asked for.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use etendue_optics::train::Focus;
+
+use super::parse;
+use crate::lens::parse_focus;
+
+pub(super) const HELP: &str = "\
+All lengths are millimetres; z = 0 is the first element's vertex, +z runs from the object to the
+sensor, and elements count from 0 on the object side.
+
+RAYS.json: {\"from\": \"object\" or \"sensor\", \"clip\": true or false, \"rays\": [
+  {\"origin\": [x, y, z], \"direction\": [x, y, z], \"wavelength\": 587.56}]}
+
+Examples:
+  etendue lens scenes/lenses/double-gauss.json
+  etendue lens scenes/lenses/achromat.json --json --fields 0,5,10
+  etendue lens scenes/lenses/double-gauss.json --rays rays.json --json
+  etendue lens scenes/lenses/double-gauss.json -o out/double-gauss
+  etendue lens bought.zmx --save bought.json
+  etendue lens scenes/double-gauss.json --fit-opencv";
+
+#[derive(Debug, Args)]
+pub(crate) struct LensArguments {
+    /// A lens file (.json), a Zemax file (.zmx), or a scene whose camera is a lens
+    #[arg(value_name = "LENS|ZMX|SCENE")]
+    pub(crate) lens: PathBuf,
+    /// Print JSON for machines, with all digits
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Trace the rays of a file instead, and print every intersection and how each ray ends
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rays: Option<PathBuf>,
+    /// Draw layout.svg, spots.svg and illumination.svg into this folder, made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write the lens as a lens file, such as an imported one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) save: Option<PathBuf>,
+    /// Fit OpenCV's camera (K, k1, k2, p1, p2, k3, or its fisheye) to the lens' chief rays, and print it
+    /// with its residuals, where it holds, and as the camera of a scene; with -o, into opencv.json there
+    #[arg(long, conflicts_with = "rays")]
+    pub(crate) fit_opencv: bool,
+    /// What the fit may be off by: "0.5 px", which is the default
+    #[arg(long, value_name = "PIXELS", value_parser = parse::pixels, requires = "fit_opencv")]
+    pub(crate) tolerance: Option<f64>,
+    /// Columns and rows of the picture that is fitted, 1536x1024 when absent
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = parse::resolution, requires = "fit_opencv")]
+    pub(crate) resolution: Option<[u32; 2]>,
+    /// From one pixel to the next, such as "4 um"; as wide as fills the image circle when absent
+    #[arg(long, value_name = "PITCH", value_parser = parse::pitch, requires = "fit_opencv")]
+    pub(crate) pixel_pitch: Option<f64>,
+    /// Field angles in degrees; the file's own or shares of the field of view when absent
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) fields: Option<Vec<f64>>,
+    /// Wavelengths in nm, the main one first; the lens' own and the F, d and C lines when absent
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) wavelengths: Option<Vec<f64>>,
+    /// Put the sensor where a plane at this distance is sharp: "1.2 m", or infinity
+    #[arg(long, value_name = "DISTANCE", value_parser = parse_focus, allow_hyphen_values = true)]
+    pub(crate) focus: Option<Focus>,
+    /// Open or close the stop to this f-number
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) f_number: Option<f64>,
+    /// Look glasses up in this catalogue (Zemax' AGF format) first; the last one given is asked first
+    #[arg(long = "glass-catalog", value_name = "FILE")]
+    pub(crate) glass_catalogs: Vec<PathBuf>,
+    /// Refuse wavelengths outside of what the glasses are stated for instead of warning
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// Let the file name files outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+    /// Say nothing on standard error but errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}

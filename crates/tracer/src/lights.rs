@@ -1,0 +1,352 @@
+//! The lights of a scene, and how one of them is chosen for a point.
+//!
+//! A light is chosen by its power (W, of the mean of the three colours), a triangle of an emissive
+//! mesh by its own: `π A L` for one side. Lights far away are counted by what falls onto the scene's
+//! sphere of radius R: `π R² E` for parallel light, `4 π² R² L` for an environment. Among several lights
+//! that are somewhere, one is chosen by what it may send to the point.
+
+use std::borrow::Cow;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use etendue_geometry::glam::DVec3;
+use etendue_spectrum::NoOverlap;
+
+use crate::Material;
+use crate::environment::EnvironmentMap;
+use crate::lamps::{self, AreaLight, triangle_power};
+use crate::light::{EnvironmentImage, Light, LightKind, power, spot_falloff};
+use crate::light_tree::{self, Cluster, LightTree};
+use crate::reference::{SceneView, SurfacePoint};
+use crate::sampling::{
+    DiscreteDistribution, Frame, cone_direction, sphere_direction, triangle_point,
+};
+use crate::sky::Sky;
+use crate::spectral::Spectral;
+use crate::target::{Chosen, Target, TargetKind};
+
+/// All lights of a scene, ready to be chosen from.
+#[derive(Debug)]
+pub struct Lights {
+    lights: Vec<Light>,
+    /// The bands of each light, one light after the other.
+    bands: Vec<f64>,
+    pub(crate) sky: Option<Sky>,
+    /// The bands by which each material's emission is multiplied, where it has an illuminant.
+    tints: Vec<Option<Vec<f64>>>,
+    /// For each placement, where its triangles start among the choices.
+    first: Vec<Option<u32>>,
+    /// Placement and triangle of each emissive triangle, behind the lights.
+    triangles: Vec<[u32; 2]>,
+    /// With a tree, what is in it has one choice together, the last.
+    picker: DiscreteDistribution,
+    tree: Option<LightTree>,
+    /// The emissive triangles where they are at most [`lamps::MOST`] (`None` without area), and what those
+    /// that shine alike all over give off in all bands.
+    lamps: Vec<Option<AreaLight>>,
+    lamp_bands: Vec<f64>,
+}
+
+impl Lights {
+    /// The lights of a scene whose emissive surfaces are those of `around`; `map` is the decoded
+    /// image of the environment, if it has one.
+    ///
+    /// # Errors
+    ///
+    /// When an illuminant is known at no wavelength of the bands.
+    pub fn new(
+        lights: &[Light],
+        map: Option<Arc<EnvironmentMap>>,
+        around: &SceneView<'_>,
+        spectral: &Spectral,
+    ) -> Result<Self, NoOverlap> {
+        let count = spectral.count();
+        let mut bands = vec![0.0; lights.len() * count];
+        for (light, bands) in lights.iter().zip(bands.chunks_mut(count)) {
+            spectral.spread(&light.color, bands);
+            if let Some(illuminant) = light.illuminant {
+                let tint = spectral.illuminant(illuminant)?;
+                bands.iter_mut().zip(&tint).for_each(|(band, tint)| *band *= tint);
+            }
+        }
+        let sky = Sky::of(lights, map);
+        let radius = 0.5 * around.geometry.loose_bounds().diagonal();
+        let far = if radius > 0.0 { PI * radius * radius } else { PI };
+        let mut powers: Vec<f64> =
+            lights.iter().map(|light| power(light, around, far, sky.as_ref())).collect();
+        let mut first = Vec::with_capacity(around.geometry.placements.len());
+        let mut triangles = Vec::new();
+        for (number, placement) in (0_u32..).zip(&around.geometry.placements) {
+            let material = around.materials.get(placement.material as usize);
+            let emits = material.is_some_and(|m| m.emission.is_some());
+            first.push(if emits { u32::try_from(powers.len()).ok() } else { None });
+            let Some(material) = material.filter(|_| emits) else { continue };
+            let mesh = around.geometry.mesh_of(placement);
+            for triangle in 0..mesh.triangles.len() {
+                powers.push(triangle_power(around, placement, triangle, material));
+                triangles.push([number, u32::try_from(triangle).unwrap_or(u32::MAX)]);
+            }
+        }
+        let tint = |material: &Material| -> Result<Option<Vec<f64>>, NoOverlap> {
+            match material.emission.as_ref().and_then(|e| e.illuminant) {
+                Some(illuminant) => spectral.illuminant(illuminant).map(Some),
+                None => Ok(None),
+            }
+        };
+        let tints = around.materials.iter().map(tint).collect::<Result<_, _>>()?;
+        let lit = powers.iter().any(|&p| p > 0.0);
+        let tree = Self::plant(lights, &triangles, around, &mut powers);
+        let picker =
+            if lit { DiscreteDistribution::new(&powers) } else { DiscreteDistribution::default() };
+        let lights = lights.to_vec();
+        let (lamps, lamp_bands) = Default::default();
+        let mut all =
+            Self { lights, bands, sky, tints, first, triangles, picker, tree, lamps, lamp_bands };
+        all.light_lamps(around, spectral);
+        Ok(all)
+    }
+
+    /// The tree over what has a place, when that is worth one: their `powers` become 0, and their sum is
+    /// added behind all.
+    fn plant(
+        lights: &[Light],
+        triangles: &[[u32; 2]],
+        around: &SceneView<'_>,
+        powers: &mut Vec<f64>,
+    ) -> Option<LightTree> {
+        let near = lights.iter().map(|light| light.kind.cluster(light.intensity(), around));
+        let shining = triangles.iter().zip(&powers[lights.len()..]);
+        let all = near.chain(shining.map(|(&id, &power)| lamps::cluster(around, id, power)));
+        let all: Vec<_> = (0_u32..).zip(all).filter_map(|(k, c)| Some((k, c?))).collect();
+        if !(light_tree::LEAST..=light_tree::MOST).contains(&all.len()) {
+            return None;
+        }
+        let take = |&(number, _): &(u32, Cluster)| std::mem::take(&mut powers[number as usize]);
+        let sum = all.iter().map(take).sum();
+        powers.push(sum);
+        Some(LightTree::new(all, powers.len()))
+    }
+
+    /// A light for the point `from` (m) by `u` in 0..1: its number, what is left of `u`, and its chance.
+    fn pick(&self, from: DVec3, u: f64) -> Option<(usize, f64, f64)> {
+        let (index, rest, chance) = match self.picker.len() {
+            0 => return None,
+            1 => (0, u, 1.0),
+            _ => {
+                let (index, rest) = self.picker.pick(u);
+                (index, rest, self.picker.probability(index))
+            }
+        };
+        match &self.tree {
+            Some(tree) if index + 1 == self.picker.len() => {
+                let (number, rest, own) = tree.pick(from, rest)?;
+                Some((number, rest, chance * own))
+            }
+            _ => Some((index, rest, chance)),
+        }
+    }
+
+    /// The chance with which [`Self::pick`] picks light `index` for the point `from` (m).
+    pub(crate) fn chance(&self, from: DVec3, index: usize) -> f64 {
+        match (&self.tree, self.picker.len()) {
+            (_, 0) => 0.0,
+            (Some(tree), count) if tree.holds(index) => {
+                self.picker.probability(count - 1) * tree.chance(from, index)
+            }
+            _ => self.picker.probability(index),
+        }
+    }
+
+    /// Keeps emissive triangles ready.
+    fn light_lamps(&mut self, around: &SceneView<'_>, spectral: &Spectral) {
+        if self.is_dark() || self.triangles.len() > lamps::MOST {
+            return;
+        }
+        let count = spectral.count();
+        let mut bands = vec![0.0; self.triangles.len() * count];
+        for (id, bands) in self.triangles.iter().zip(bands.chunks_mut(count)) {
+            let placement = &around.geometry.placements[id[0] as usize];
+            let spot = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
+            self.emitted(around, spectral, &spot, true, bands);
+        }
+        self.lamps = self.triangles.iter().map(|&id| AreaLight::new(around, id)).collect();
+        self.lamp_bands = bands;
+    }
+
+    /// The emissive triangle of a number; `None` without area.
+    fn lamp(&self, around: &SceneView<'_>, number: usize) -> Option<Cow<'_, AreaLight>> {
+        match self.lamps.get(number) {
+            Some(lamp) => lamp.as_ref().map(Cow::Borrowed),
+            None => AreaLight::new(around, self.triangles[number]).map(Cow::Owned),
+        }
+    }
+
+    /// Whether there is nothing to choose from.
+    #[must_use]
+    pub fn is_dark(&self) -> bool {
+        self.picker.is_empty()
+    }
+
+    /// Whether a ray that nobody aimed may come upon a light: not upon points and parallel light.
+    #[must_use]
+    pub fn is_hittable(&self) -> bool {
+        self.sky.is_some() || !self.triangles.is_empty()
+    }
+
+    /// Whether a place on one of them is chosen: not on points and parallel light.
+    #[must_use]
+    pub fn are_extended(&self) -> bool {
+        let is_soft = |light: &Light| matches!(light.kind, LightKind::Directional { cos_radius, .. } if cos_radius < 1.0);
+        self.is_hittable() || self.lights.iter().any(is_soft)
+    }
+
+    /// Whether there is more than one to choose from.
+    #[must_use]
+    pub fn are_several(&self) -> bool {
+        self.picker.len() > 1
+    }
+
+    /// Whether light comes from where nothing is.
+    #[must_use]
+    pub fn has_environment(&self) -> bool {
+        self.sky.is_some()
+    }
+
+    /// How many emissive triangles there are.
+    #[must_use]
+    pub fn emissive_triangles(&self) -> usize {
+        self.triangles.len()
+    }
+
+    pub(crate) fn bands_of(&self, light: usize, count: usize) -> &[f64] {
+        &self.bands[light * count..(light + 1) * count]
+    }
+
+    /// Chooses a light for the point `from` (m) and a place on it by `square` (in 0..1); its radiance (of
+    /// a point its intensity) goes to `radiance`.
+    pub(crate) fn choose(
+        &self,
+        around: &SceneView<'_>,
+        spectral: &Spectral,
+        from: DVec3,
+        [choice, v]: [f64; 2],
+        radiance: &mut [f64],
+    ) -> Chosen {
+        // What is left of the number that chose the light chooses the place: both stay even.
+        let Some((index, rest, chance)) = self.pick(from, choice) else { return Chosen::Dark };
+        let square = [rest, v];
+        let Some(light) = self.lights.get(index) else {
+            let number = index - self.lights.len();
+            return self.place_on_lamp(around, spectral, number, square, chance, radiance).into();
+        };
+        radiance.copy_from_slice(self.bands_of(index, radiance.len()));
+        match &light.kind {
+            LightKind::Point(at) => Target::bare(TargetKind::Point, *at, chance).into(),
+            &LightKind::Spot { at, axis, cos_outer, cos_inner } => {
+                let cosine = (from - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
+                let factor = spot_falloff(cosine, cos_outer, cos_inner);
+                radiance.iter_mut().for_each(|band| *band *= factor);
+                (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance)).into()
+            }
+            LightKind::Projector(projector) => {
+                let Some(color) = projector.toward(around, from) else { return Chosen::Dark };
+                for (k, band) in radiance.iter_mut().enumerate() {
+                    *band *= spectral.band(&color, k);
+                }
+                Target::bare(TargetKind::Point, projector.at, chance).into()
+            }
+            LightKind::Goniometric(measured) => {
+                let intensity = measured.toward(from);
+                radiance.iter_mut().for_each(|band| *band *= intensity);
+                let place = Target::bare(TargetKind::Point, measured.at, chance);
+                (intensity > 0.0).then_some(place).into()
+            }
+            &LightKind::Directional { along, cos_radius } => {
+                let toward = Frame::around(-along).world(cone_direction(square, cos_radius));
+                Target::bare(TargetKind::Parallel, toward, chance).into()
+            }
+            LightKind::Environment { image: EnvironmentImage::Constant, .. } => {
+                let density = 0.25 / PI * chance;
+                Target::bare(TargetKind::Far, sphere_direction(square), density).into()
+            }
+            LightKind::Environment { .. } => Chosen::Sky { square, chance },
+        }
+    }
+
+    /// A place on an emissive triangle.
+    fn place_on_lamp(
+        &self,
+        around: &SceneView<'_>,
+        spectral: &Spectral,
+        number: usize,
+        square: [f64; 2],
+        chance: f64,
+        radiance: &mut [f64],
+    ) -> Option<Target> {
+        let lamp = self.lamp(around, number)?;
+        let [u, v] = triangle_point(square);
+        let count = radiance.len();
+        match self.lamp_bands.get(number * count..(number + 1) * count) {
+            Some(bands) if lamp.is_plain => radiance.copy_from_slice(bands),
+            _ => {
+                let placement = &around.geometry.placements[lamp.id[0] as usize];
+                let spot = SurfacePoint::corner(around.geometry, placement, lamp.id[1] as usize);
+                let spot = SurfacePoint { weights: [1.0 - u - v, u, v], ..spot };
+                if !self.emitted(around, spectral, &spot, true, radiance) {
+                    return None;
+                }
+            }
+        }
+        Some(Target {
+            kind: TargetKind::Triangle { two_sided: lamp.two_sided },
+            place: [lamp.corner[0], lamp.corner[1], lamp.across([u, v])],
+            normal: lamp.shape.normal,
+            magnitudes: lamp.magnitudes,
+            density: chance / lamp.shape.area,
+            id: lamp.id,
+        })
+    }
+
+    /// Radiance that a surface gives off to its front or back; `false` when it is dark.
+    pub fn emitted(
+        &self,
+        around: &SceneView<'_>,
+        spectral: &Spectral,
+        spot: &SurfacePoint<'_>,
+        front: bool,
+        radiance: &mut [f64],
+    ) -> bool {
+        let number = spot.placement.material as usize;
+        let emission = around.materials.get(number).and_then(|m| m.emission.as_ref());
+        let Some(emission) = emission.filter(|e| front || e.two_sided) else { return false };
+        let [r, g, b, _] = around.paint(&emission.radiance, spot);
+        spectral.spread(&[r, g, b].map(|c| c * emission.strength), radiance);
+        if let Some(tint) = &self.tints[number] {
+            radiance.iter_mut().zip(tint).for_each(|(band, tint)| *band *= tint);
+        }
+        true
+    }
+
+    /// The density (1/sr), chance included, with which [`Self::choose`] gives the direction from
+    /// `from` to `spot`, where it was met by a ray along `direction`.
+    pub(crate) fn pdf_of_surface(
+        &self,
+        around: &SceneView<'_>,
+        placement: u32,
+        spot: &SurfacePoint<'_>,
+        from: DVec3,
+        direction: DVec3,
+    ) -> f64 {
+        let Some(Some(first)) = self.first.get(placement as usize) else { return 0.0 };
+        if self.picker.is_empty() {
+            return 0.0;
+        }
+        let index = *first as usize + spot.triangle;
+        let Some(lamp) = self.lamp(around, index - self.lights.len()) else { return 0.0 };
+        let [_, u, v] = spot.weights;
+        let squared = lamp.offset(from, [u, v]).length_squared();
+        let cosine = direction.dot(lamp.shape.normal).abs();
+        let pdf = self.chance(from, index) * squared / (cosine * lamp.shape.area);
+        if pdf.is_finite() { pdf } else { 0.0 }
+    }
+}
