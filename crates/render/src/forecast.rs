@@ -73,11 +73,11 @@ fn views(scene: &Scene, plan: &Plan, outputs: Outputs) -> u64 {
 
 /// Bytes a pixel of what is kept between passes.
 fn bytes_of_sums(plan: &Plan) -> u64 {
-    let slots = match plan.stopping.is_adaptive() {
-        true => u64::from(SETS) + 1,
+    let sets = match plan.stopping.is_adaptive() {
+        true => u64::from(SETS),
         false => u64::from(plan.passes.len() > 1),
     };
-    BYTES_OF_SUM * slots * averaged(plan)
+    BYTES_OF_SUM * sets * averaged(plan)
 }
 
 /// Values of a pixel that are averaged over samples.

@@ -96,11 +96,6 @@ impl Sampling {
     pub(crate) fn range(&self) -> Range<u32> {
         self.shard.samples(self.samples)
     }
-
-    /// Sums that are kept of a value between passes: those of all sets, and what is settled.
-    pub(crate) fn slots(&self) -> usize {
-        if self.sets > 1 { self.sets as usize + 1 } else { 1 }
-    }
 }
 
 /// What is averaged over the samples of a pixel: colours of surfaces, or light.
@@ -129,7 +124,7 @@ pub(crate) struct Memory {
     pub(crate) scratch: Scratch,
     pub(crate) traffic: RayCounts,
     film: FilmSamples,
-    /// `[pixel of the tile][slot][layer][band]`.
+    /// `[pixel of the tile][set][layer][band]`.
     sums: Vec<Sum>,
     order: Vec<u32>,
 }
@@ -178,7 +173,7 @@ pub(crate) struct Averaging<'a> {
     pub(crate) what: &'a dyn Averaged,
     pub(crate) sampling: Sampling,
     pub(crate) layers: Vec<&'a mut FilmLayer>,
-    /// `[pixel][slot][layer][band]`; empty when there is one pass alone.
+    /// `[pixel][set][layer][band]`; empty when there is one pass alone.
     pub(crate) sums: Vec<Sum>,
     /// Threads' memory between strips and passes: made anew each time, its pages are, too.
     spare: Mutex<Vec<Memory>>,
@@ -193,7 +188,7 @@ impl<'a> Averaging<'a> {
     ) -> Result<Self, NoMemory> {
         let [width, height] = what.camera().resolution().map(|side| side as usize);
         let [count, bands] = what.shape();
-        let values = width * height * count * bands * sampling.slots();
+        let values = width * height * count * bands * sampling.sets as usize;
         let kept = if passes > 1 || sampling.sets > 1 { values } else { 0 };
         let sums = filled(Sum::default(), kept)?;
         Ok(Self { what, sampling, layers, sums, spare: Mutex::default() })
@@ -208,11 +203,11 @@ impl<'a> Averaging<'a> {
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
-        let slots = self.sampling.slots();
+        let sets = self.sampling.sets as usize;
         let Self { what, sampling, layers, sums, spare } = self;
         let spare = &*spare;
         let resolution = what.camera().resolution();
-        let kept = split(sums, *what, slots, resolution);
+        let kept = split(sums, *what, sets, resolution);
         let strips = strips(layers, resolution, TILE);
         strips.par_iter().zip(&kept).enumerate().try_for_each(|(k, (strip, kept))| {
             let Some(mut strip) = take(strip).filter(|_| sampling.shard.owns(k)) else {
@@ -269,14 +264,14 @@ type Shared<T> = Mutex<Option<T>>;
 pub(crate) fn split<'s>(
     sums: &'s mut [Sum],
     what: &dyn Averaged,
-    slots: usize,
+    sets: usize,
     [width, height]: [u32; 2],
 ) -> Vec<Shared<&'s mut [Sum]>> {
     let [count, bands] = what.shape();
     if sums.is_empty() {
         return (0..height.div_ceil(TILE)).map(|_| Mutex::new(None)).collect();
     }
-    let a_strip = width as usize * TILE as usize * count * bands * slots;
+    let a_strip = width as usize * TILE as usize * count * bands * sets;
     sums.chunks_mut(a_strip.max(1)).map(|sums| Mutex::new(Some(sums))).collect()
 }
 
@@ -314,7 +309,7 @@ impl Adding<'_> {
     ) -> Result<(), Stopped> {
         let [width, _] = self.what.camera().resolution();
         let [layers, bands] = self.what.shape();
-        let count = layers * bands * self.sampling.slots();
+        let count = layers * bands * self.sampling.sets as usize;
         for tile in Tile::across(width, strip) {
             let wants = |&(x, y): &(u32, u32)| {
                 self.blocks.is_none_or(|blocks| blocks.wants([tile.left + x, tile.top + y]))
@@ -341,18 +336,18 @@ impl Adding<'_> {
 
     fn tile(&self, tile: Tile, pixels: &[(u32, u32)], memory: &mut Memory) -> Result<(), Stopped> {
         let shape @ [layers, bands] = self.what.shape();
-        let (sets, slots) = (self.sampling.sets, self.sampling.slots());
+        let sets = self.sampling.sets as usize;
         let at_once = (self.pass.end - self.pass.start).clamp(1, self.what.batch());
         let pixels_at_once = (self.what.batch() / at_once) as usize;
         for (k, pixels) in pixels.chunks(pixels_at_once).enumerate() {
-            let start = k * pixels_at_once * layers * bands * slots;
+            let start = k * pixels_at_once * layers * bands * sets;
             for first in self.pass.clone().step_by(at_once as usize) {
                 let range = first..self.pass.end.min(first + at_once);
                 let a_pixel = range.len();
-                // The slot of each sample of the batch: the pixel's sum, or that of its set.
+                // The sum of each sample of the batch: the pixel's, or that of its set.
                 let slot = |sample: u32| {
                     let (pixel, index) = (sample as usize / a_pixel, sample as usize % a_pixel);
-                    pixel * slots + (first as usize + index) % sets as usize
+                    pixel * sets + (first as usize + index) % sets
                 };
                 self.place(tile, (pixels, range), memory);
                 for (number, group) in self.what.groups().iter().enumerate() {

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use etendue_scene::Scene;
-use etendue_scene::file::{SETS, SamplesSpec};
+use etendue_scene::file::{SAMPLES_AT_ONCE, SamplesSpec};
 use etendue_sensor::NoiseModel;
 
 /// The relative error that stands in for a sensor's noise where there is none.
@@ -96,7 +96,7 @@ impl Stopping {
 pub(crate) fn judged_passes(least: u32, most: u32) -> Vec<Range<u32>> {
     let mut passes: Vec<Range<u32>> = std::iter::once(0..least.min(most)).collect();
     while let Some(end) = passes.last().map(|pass| pass.end).filter(|end| *end < most) {
-        let more = (end / 4).next_multiple_of(SETS).max(SETS);
+        let more = (end / 4).next_multiple_of(SAMPLES_AT_ONCE).max(SAMPLES_AT_ONCE);
         passes.push(end..most.min(end.saturating_add(more)));
     }
     passes

@@ -1,18 +1,18 @@
 //! Samples until an error is reached: which parts of the picture want more.
 //!
-//! The samples of a pixel are of four independent sets, in turn. The first two make one half of the
-//! pixel's mean, the others the other half. After each pass a block of 8 by 8 pixels is judged twice: by
-//! the differences between the two sets of one half, over all of its pixels, and by those of the other.
-//! What is judged by one half decides how many samples the *other* half's mean is taken over. Both are
-//! sampled until both are decided, and the mean of a half is taken over its decided number.
+//! The samples of a pixel are of two independent sets, in turn; the difference of their means tells the
+//! variance of the pixel's. After each pass a block of 8 by 8 pixels is judged twice: by the pixels of one
+//! colour of a chessboard, and by those of the other. What is judged by one half of the pixels decides
+//! how many samples the *other* half gets.
 //!
-//! So a half's samples have no part in deciding their own number, and its mean is without bias whatever
+//! So a pixel's samples have no part in deciding their own number, and its mean is without bias whatever
 //! the rule is: the expected value of a mean of N independent samples is theirs if N does not depend on
-//! them. Where the same samples decide and are counted, pixels that happen to be dark and even stop
-//! early, and the picture is too dark (Kirk & Arvo, "Unbiased sampling techniques for image synthesis",
-//! 1991, who propose to throw the deciding samples away; Pharr, Jakob & Humphreys, "Physically Based
-//! Rendering", 4th edition, 2023, section 8.1 on the bias of adaptive sampling). Here each half decides
-//! for the other, and what is thrown away is the difference between two decisions.
+//! them, and pixels' samples know nothing of each other. Where the same samples decide and are counted,
+//! pixels that happen to be dark and even stop early, and the picture is too dark (Kirk & Arvo, "Unbiased
+//! sampling techniques for image synthesis", 1991, who propose to throw the deciding samples away; Pharr,
+//! Jakob & Humphreys, "Physically Based Rendering", 4th edition, 2023, section 8.1 on the bias of adaptive
+//! sampling). Here nothing is thrown away. What it costs: two sets of Sobol points fill a pixel less
+//! evenly than one, and what is uneven in a single pixel alone is found by its neighbours or not at all.
 //!
 //! A block goes on as long as it has not passed, or one of the blocks beside, above and below it has more
 //! than twice the error that is allowed: so what is hard is found from the blocks around it, too, and
@@ -30,7 +30,7 @@ use crate::film::FilmLayer;
 use crate::samples::Averaging;
 use crate::shard::Shard;
 use crate::tiles::TILE;
-use halves::HALVES;
+use halves::{HALVES, half_of};
 
 /// Side of a block (pixels).
 const BLOCK: u32 = 8;
@@ -45,17 +45,25 @@ const ROWS_OF_STRIP: usize = (TILE / BLOCK) as usize;
 /// What is known of a block.
 #[derive(Debug, Clone, Copy, Default)]
 struct Block {
-    /// Samples after which a half's number was decided by the block's own other half; 0 before.
+    /// Samples after which the number of a half was decided by the block's other half; 0 before.
     passed: [u32; HALVES],
-    /// Samples a pixel of which a half's mean is settled; 0 before.
+    /// Samples of each pixel of a half, when they are settled; 0 before.
     settled: [u32; HALVES],
-    /// The error that the two halves last found, as a share of what is allowed.
+    /// The error that is found in each half, as a share of what is allowed.
     error: [f64; HALVES],
 }
 
 impl Block {
     fn wants_more(&self) -> bool {
         self.settled.contains(&0)
+    }
+
+    /// Samples of each pixel of a half, `samples` being what it has while it goes on.
+    fn samples(&self, half: usize, samples: u32) -> u32 {
+        match self.settled[half] {
+            0 => samples,
+            settled => settled,
+        }
     }
 
     /// Whether the number of each half is decided, or soon will be.
@@ -92,7 +100,12 @@ impl Blocks {
 
     /// Whether a pixel is to have more samples.
     pub(crate) fn wants(&self, pixel: [u32; 2]) -> bool {
-        self.of(pixel).wants_more()
+        self.of(pixel).settled[half_of(pixel)] == 0
+    }
+
+    /// Samples of a pixel, `samples` being what it has while it goes on.
+    fn samples(&self, pixel: [u32; 2], samples: u32) -> u32 {
+        self.of(pixel).samples(half_of(pixel), samples)
     }
 
     /// The pixels of a block.
@@ -193,13 +206,9 @@ impl<'a> Adaptive<'a> {
 
     /// Judges what there is after `samples` samples of each pixel that wanted them, and settles what is
     /// done.
-    pub(crate) fn judge(&mut self, samples: u32, parts: &mut [Averaging<'_>]) {
-        let before: Vec<[u32; HALVES]> = self.blocks.blocks.iter().map(|b| b.settled).collect();
+    pub(crate) fn judge(&mut self, samples: u32, parts: &[Averaging<'_>]) {
         self.measure(samples, &parts[self.judged.0]);
         self.decide(samples);
-        for part in parts {
-            part.settle(&self.blocks, &before, samples);
-        }
     }
 
     /// Writes to the layers `told` what sampling found of itself.
@@ -227,19 +236,26 @@ impl<'a> Adaptive<'a> {
             if !block.wants_more() || !shard.owns(index / strip) {
                 return;
             }
+            let found = [0, 1].map(|half| {
+                let pixels = pixels.pixels(index).filter(|pixel| half_of(*pixel) == half);
+                let has = block.samples(half, samples);
+                let sampled = pixels.map(|pixel| part.sampled(pixel, first));
+                // What is settled stands for what it would be with as many samples as the others have.
+                rule.error(sampled, has).map(|error| error * f64::from(has) / f64::from(samples))
+            });
+            // A single pixel has no other half.
+            let either = found[0].or(found[1]).unwrap_or(0.0);
+            block.error = found.map(|error| error.unwrap_or(either));
             for half in 0..HALVES {
-                let halves = pixels.pixels(index).map(|pixel| part.half(pixel, half, first));
-                block.error[half] = rule.error(halves, samples);
-                let other = HALVES - 1 - half;
-                if block.passed[other] == 0 && block.error[half] <= 1.0 {
-                    block.passed[other] = samples;
+                if block.passed[half] == 0 && block.error[HALVES - 1 - half] <= 1.0 {
+                    block.passed[half] = samples;
                 }
             }
         });
     }
 
-    /// Settles the halves of blocks that have passed with those beside them, and of those that have had
-    /// the most.
+    /// Settles the halves of blocks that have passed with those beside them, and those that have had the
+    /// most.
     fn decide(&mut self, samples: u32) {
         let Self { blocks: Blocks { across, blocks, .. }, most, shard, .. } = self;
         let (across, strip) = (*across, ROWS_OF_STRIP * *across);
@@ -274,9 +290,7 @@ impl<'a> Adaptive<'a> {
     pub(crate) fn to_come(&self, samples: u32) -> u64 {
         let more = |index: usize| {
             let block = &self.blocks.blocks[index];
-            if !block.wants_more() {
-                return 0;
-            }
+            let going_on = block.settled.iter().filter(|settled| **settled == 0).count();
             let error = block.error[0].max(block.error[1]);
             // A variance falls at least as one over the number of samples.
             let wanted = (f64::from(samples) * error.clamp(1.0, 1e6)).min(f64::from(self.most));
@@ -286,28 +300,33 @@ impl<'a> Adaptive<'a> {
                 reason = "a forecast"
             )]
             let wanted = (wanted as u32).max(samples) - samples;
-            u64::from(wanted.max(samples / 4)) * u64::from(BLOCK * BLOCK)
+            let pixels = going_on as u64 * u64::from(BLOCK * BLOCK) / HALVES as u64;
+            u64::from(wanted.max(samples / 4)) * pixels
         };
         self.owned().map(more).sum()
     }
 
     /// How many samples the pixels got.
     pub(crate) fn counts(&self, samples: u32) -> Option<SampleCounts> {
-        let of_block = |index: usize| {
+        let of_half = |(index, half): (usize, usize)| {
             let block = &self.blocks.blocks[index];
-            let pixels: Vec<[u32; 2]> = self.blocks.pixels(index).collect();
-            let (count, number) = (pixels.len() as u64, block.samples(samples));
-            let gave_up = block.passed.contains(&0) && !block.wants_more();
-            let error = block.error[0].max(block.error[1]);
-            SampleCounts {
+            let pixels = self.blocks.pixels(index).filter(|pixel| half_of(*pixel) == half);
+            let pixels: Vec<[u32; 2]> = pixels.collect();
+            let middle = *pixels.get(pixels.len() / 2)?;
+            let (count, number) = (pixels.len() as u64, block.samples(half, samples));
+            let gave_up = block.passed[half] == 0 && block.settled[half] > 0;
+            Some(SampleCounts {
                 least: number,
                 most: number,
                 pixels: count,
                 total: count * u64::from(number),
                 given_up: if gave_up { count } else { 0 },
-                worst: gave_up.then(|| (pixels[pixels.len() / 2], error)),
-            }
+                worst: gave_up.then(|| (middle, block.error[0].max(block.error[1]))),
+            })
         };
-        self.owned().map(of_block).reduce(SampleCounts::and)
+        self.owned()
+            .flat_map(|index| [(index, 0), (index, 1)])
+            .filter_map(of_half)
+            .reduce(SampleCounts::and)
     }
 }

@@ -3,7 +3,7 @@
 use etendue_scene::Scene;
 use etendue_scene::file::SETS;
 
-use super::halves::Half;
+use super::halves::Sampled;
 use crate::Plan;
 use crate::expose::NoiseOfPixels;
 use crate::stopping::Stopping;
@@ -29,23 +29,28 @@ impl Rule {
         }
     }
 
-    /// The variance of the mean of some pixels' samples, by those of one half of them, as a share of what
-    /// is allowed: in the mean over the pixels. `samples` is what each pixel has.
-    pub(super) fn error<'a>(&self, halves: impl Iterator<Item = Half<'a>>, samples: u32) -> f64 {
+    /// The variance of the mean of some pixels' samples as a share of what is allowed: in the mean over the
+    /// pixels. `samples` is what each pixel has. `None` of no pixels.
+    pub(super) fn error<'a>(
+        &self,
+        pixels: impl Iterator<Item = Sampled<'a>>,
+        samples: u32,
+    ) -> Option<f64> {
         let of_set = f64::from(samples / SETS);
+        let mut count = 0.0;
         match self {
             Self::SensorNoise(noise, share) => {
-                let (mut sum, mut count) = (0.0, 0.0);
-                for Half { pixel, sets: [a, b] } in halves {
+                let mut sum = 0.0;
+                for Sampled { pixel, sets: [a, b] } in pixels {
                     let light = |set: usize, band: usize| [a, b][set][band].total() / of_set;
                     sum += noise.share(pixel, light);
                     count += 1.0;
                 }
-                sum / f64::max(count, 1.0) / share
+                (count > 0.0).then(|| sum / count / share)
             }
             Self::RelativeError(share) => {
-                let (mut variance, mut mean, mut count) = (0.0, 0.0, 0.0);
-                for Half { sets: [a, b], .. } in halves {
+                let (mut variance, mut mean) = (0.0, 0.0);
+                for Sampled { sets: [a, b], .. } in pixels {
                     for (a, b) in a.iter().zip(b) {
                         let [a, b] = [a.total() / of_set, b.total() / of_set];
                         variance += variance_of_mean(a - b);
@@ -53,17 +58,17 @@ impl Rule {
                         count += 1.0;
                     }
                 }
-                if variance <= 0.0 {
-                    return 0.0;
-                }
-                variance * count / (mean * mean) / (share * share)
+                let error = || match variance > 0.0 {
+                    true => variance * count / (mean * mean) / (share * share),
+                    false => 0.0,
+                };
+                (count > 0.0).then(error)
             }
         }
     }
 }
 
-/// The variance of the mean of four sets, by the difference of the means of two: that of one set is
-/// half of its square.
+/// The variance of the mean of two sets, by the difference of their means: a quarter of its square.
 pub(crate) fn variance_of_mean(difference: f64) -> f64 {
-    difference * difference / f64::from(2 * SETS)
+    0.25 * difference * difference
 }

@@ -8,9 +8,11 @@ use serde_json::Value;
 
 use super::RenderSpec;
 
-/// Samples in each of the four sets that pixels are sampled in until an error is reached: one at least,
-/// so four a pixel.
-pub const SETS: u32 = 4;
+/// The independent sets that the samples of a pixel are of where they go on until an error is reached.
+pub const SETS: u32 = 2;
+
+/// Samples come in multiples of this, two in each set: odd numbers of Sobol points are uneven.
+pub const SAMPLES_AT_ONCE: u32 = 2 * SETS;
 
 /// How many samples a pixel gets.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -140,7 +142,7 @@ impl SamplesSpec {
 
 /// `count`, or the next number that is as many samples in each set.
 fn whole_sets(count: u32) -> u32 {
-    count.next_multiple_of(SETS)
+    count.next_multiple_of(SAMPLES_AT_ONCE)
 }
 
 /// What makes no sense of `render.samples` in the scene `value`, and its path.
