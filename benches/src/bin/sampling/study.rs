@@ -7,12 +7,16 @@ use etendue_render::output::{Outputs, Values};
 use etendue_render::{Images, Plan, Rendered, build, plan, render};
 use etendue_scene::file::SceneFile;
 use etendue_scene::{LoadOptions, Scene};
+use etendue_sensor::Sensor;
 use etendue_spectrum::Bands;
 use serde_json::{Value, json};
 
-/// What the scenes' light is multiplied by: 1 becomes the irradiance of a lit room on a sensor
-/// (W·m⁻²·nm⁻¹).
-const LIGHT: f64 = 2e-5;
+/// The exposure (s) at which the light of a scene is scaled to fill a part of the full well, in the mean
+/// over the picture; and that part.
+const METERED: [f64; 2] = [0.01, 0.25];
+
+/// The sensor's full well (electrons).
+const FULL_WELL: f64 = 10_000.0;
 
 /// The pixels' pitch (µm).
 const PITCH: f64 = 3.45;
@@ -36,11 +40,19 @@ pub(crate) struct Picture {
     pub(crate) samples: f64,
 }
 
-/// The mean of an error over the picture, and what nine tenths of all blocks stay below.
+impl Picture {
+    /// The photo-electrons of a channel at a pixel, `units` being those of a unit of light of each band.
+    fn electrons(&self, units: &[f64], pixel: usize) -> f64 {
+        units.iter().zip(&self.light).map(|(e, light)| e * light[pixel]).sum()
+    }
+}
+
+/// The mean of an error over the picture, and what nine tenths and 99 in 100 of all blocks stay below.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Spread {
     pub(crate) mean: f64,
     pub(crate) ninth: f64,
+    pub(crate) most: f64,
 }
 
 /// A scene.
@@ -60,31 +72,35 @@ impl Study {
             side.and_then(Value::as_u64).unwrap_or(1)
         });
         let height = (u64::from(width) * rows / columns).max(1);
-        let mut light = LIGHT;
         value["camera"]["sensor"] = json!({
             "type": "rgb", "radiometry": "physical", "resolution": [width, height],
             "quantum_efficiency": 0.6, "read_noise": 2.5, "dark_current": 1,
-            "system_gain": 0.4, "bit_depth": 12, "black_level": 64, "full_well": 10_000,
+            "system_gain": 0.4, "bit_depth": 12, "black_level": 64, "full_well": FULL_WELL,
         });
-        match length_mm(&value["camera"]["sensor_height"]) {
-            None => value["camera"]["sensor"]["pixel_pitch"] = json!(PITCH),
-            // Few pixels of a large sensor are wide: they get as much light as small ones behind a
-            // pupil of a tenth of a steradian.
-            Some(mm) => light *= 10.0 * (PITCH * height as f64 / (1e3 * mm)).powi(2),
+        if value["camera"]["sensor_height"].is_null() {
+            value["camera"]["sensor"]["pixel_pitch"] = json!(PITCH);
         }
         if value["tracer"]["type"] == "facing" {
             value["tracer"] = json!({ "type": "direct" });
             value["lights"] = json!([{ "type": "environment", "radiance": [1, 1, 1] }]);
         }
-        dim(&mut value, light);
         value["layers"] = json!([]);
         let folder = path.parent().unwrap_or(Path::new("."));
+        let of = |value: Value| Self::prepared(folder, value, width as usize);
+        let wanted = Wanted { samples: json!(16), exposure: METERED[0] };
+        let unmetered = of(value.clone())?;
+        let filled = unmetered.electrons(&unmetered.picture(&wanted, 1), wanted.exposure);
+        dim(&mut value, METERED[1] * FULL_WELL / filled);
+        of(value)
+    }
+
+    fn prepared(folder: &Path, value: Value, width: usize) -> anyhow::Result<Self> {
         let file = SceneFile::from_json(folder, value)?;
         let scene = loaded(&file);
         let plan = Plan::new(&scene, Outputs::ALL);
         let accel = build(&scene, &plan, &BuildOptions::default())?;
         let images = Images::decode(&scene, &plan, None)?;
-        Ok(Self { file, accel, images, width: width as usize })
+        Ok(Self { file, accel, images, width })
     }
 
     /// The scene with the samples and exposure wanted.
@@ -116,22 +132,34 @@ impl Study {
         Picture { light, rays: done.rays as f64, samples }
     }
 
-    /// The variance of a pair of pictures in digital numbers, as a share of the sensor's own.
-    pub(crate) fn noise_share(&self, pair: &[Picture; 2], exposure: f64) -> Spread {
+    /// The photo-electrons of a picture in the mean over its pixels and channels.
+    fn electrons(&self, picture: &Picture, exposure: f64) -> f64 {
+        let (_, units) = self.sensor(exposure);
+        let pixels = picture.light[0].len();
+        let of_pixel = |pixel| (0..3).map(|k| picture.electrons(&units[k], pixel)).sum::<f64>();
+        (0..pixels).map(of_pixel).sum::<f64>() / (3 * pixels) as f64
+    }
+
+    /// The sensor, and the electrons of each channel by a unit of light of each band.
+    fn sensor(&self, exposure: f64) -> (Sensor, Vec<Vec<f64>>) {
         let scene = self.scene(&Wanted { samples: json!(1), exposure }, 0);
         let sensor = scene.sensor.as_ref().expect("a sensor").clone();
         let sensor = sensor.in_bands(Bands::Rgb).expect("a sensor of three colours");
         let floor = sensor.noise_floor(exposure).expect("a sensor with noise");
         let angle = scene.camera.pupil_solid_angle().unwrap_or(1.0);
-        let units: Vec<Vec<f64>> = (0..3)
+        let units = (0..3)
             .map(|channel| floor.electrons_per_unit(channel).map(|e| e * angle).collect())
             .collect();
+        (sensor, units)
+    }
+
+    /// The variance of a pair of pictures in digital numbers, as a share of the sensor's own.
+    pub(crate) fn noise_share(&self, pair: &[Picture; 2], exposure: f64) -> Spread {
+        let (sensor, units) = self.sensor(exposure);
+        let floor = sensor.noise_floor(exposure).expect("a sensor with noise");
         let share = |pixel: usize| {
-            let electrons = |picture: &Picture, channel: usize| -> f64 {
-                units[channel].iter().zip(&picture.light).map(|(e, light)| e * light[pixel]).sum()
-            };
             let of = |channel: usize| {
-                let [a, b] = [0, 1].map(|k| electrons(&pair[k], channel));
+                let [a, b] = [0, 1].map(|k| pair[k].electrons(&units[channel], pixel));
                 let slope = floor.slope(0.5 * (a + b));
                 0.5 * slope * slope * (a - b).powi(2) / floor.variance(0.5 * (a + b))
             };
@@ -187,7 +215,8 @@ impl Study {
 fn spread_of(blocks: &mut [f64]) -> Spread {
     blocks.sort_by(f64::total_cmp);
     let mean = blocks.iter().sum::<f64>() / blocks.len() as f64;
-    Spread { mean, ninth: blocks[blocks.len() * 9 / 10] }
+    let share = |share: f64| blocks[(share * blocks.len() as f64) as usize];
+    Spread { mean, ninth: share(0.9), most: share(0.99) }
 }
 
 fn loaded(file: &SceneFile) -> Scene {
@@ -198,16 +227,13 @@ fn numbers(values: &Values) -> Vec<f64> {
     (0..values.len()).map(|i| values.at(i)).collect()
 }
 
-/// A length of a scene file (mm), where there is one.
-fn length_mm(value: &Value) -> Option<f64> {
-    let text = value.as_str()?;
-    etendue_geometry::units::Dimension::Length.parse(text, "mm").ok()
-}
-
 /// Scales all light of a scene.
 fn dim(value: &mut Value, light: f64) {
     match value {
         Value::Object(members) => {
+            if members.get("type") == Some(&json!("environment")) {
+                members.entry("radiance").or_insert(json!([1, 1, 1]));
+            }
             for (key, member) in members {
                 match (key.as_str(), member.as_array_mut()) {
                     ("radiance" | "intensity" | "irradiance", Some(numbers)) => {
