@@ -57,7 +57,7 @@ impl NoiseOfPixels {
 
     /// The variance of the mean of a pixel's samples, carried through exposure, quantum efficiency and
     /// gain, as a share of the sensor's own at that signal: the largest over exposures, the mean over
-    /// channels. `light` is what each of two of the four independent sets of samples has of each band.
+    /// channels. `light` is what each of the two sets of samples has of each band.
     pub(crate) fn share(&self, pixel: [u32; 2], light: impl Fn(usize, usize) -> f64) -> f64 {
         let shares = self.exposures.iter().filter_map(|response| {
             let floor = self.sensor.noise_floor(response.exposure)?;

@@ -384,7 +384,7 @@ layers! {
                 (
                     "definition",
                     "variance of the mean that is the picture's pixel, one channel a spectral band, \
-                     estimated with two degrees of freedom from four independent sets of samples: \
+                     estimated with one degree of freedom from two independent sets of samples: \
                      take means over some pixels",
                 ),
                 ("unit", "that of the picture, squared"),
