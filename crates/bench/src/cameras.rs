@@ -21,6 +21,7 @@ use etendue_camera::{
 use etendue_geometry::Bounds;
 use etendue_geometry::units::{Micrometres, Millimetres};
 use etendue_optics::element::{ElementSpec, PartSpec};
+use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 
 use crate::pictures::{Studio, opened};
@@ -84,7 +85,8 @@ pub fn measure(
             }
             let entry = &mut entries[who];
             let camera = &models[entry.of].1;
-            entry.take(studio, camera, Sampler::Sobol, round, &converged)?;
+            let how = (Sampler::Sobol, LightPrecision::Auto);
+            entry.take(studio, camera, how, round, &converged)?;
             done += f64::from(entry.samples);
         }
     }

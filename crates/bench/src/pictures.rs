@@ -2,10 +2,11 @@
 
 use etendue_accel::Accel;
 use etendue_camera::{Camera, Sampler};
+use etendue_geometry::HitPrecision;
 use etendue_render::output::{Outputs, Picture};
 use etendue_render::{Images, Plan, RenderError};
 use etendue_scene::Scene;
-use etendue_scene::file::SamplesSpec;
+use etendue_scene::file::{LightPrecision, SamplesSpec};
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
@@ -33,6 +34,8 @@ pub struct Sampling {
     pub sampler: Sampler,
     /// Other seeds give other samples.
     pub seed: u64,
+    /// The precision of the hits that light is worked out from.
+    pub precision: LightPrecision,
 }
 
 /// A picture's values, one after the other, and the time it took.
@@ -76,6 +79,14 @@ impl<'a> Studio<'a> {
         &self.camera
     }
 
+    /// The precision of the hits that light is worked out from where nothing else is asked for; `None` where
+    /// the picture is not of light.
+    #[must_use]
+    pub fn precision(&self) -> Option<HitPrecision> {
+        let plan = Plan::new(&self.scene, OUTPUTS);
+        plan.layers.contains(&LayerSpec::Radiance).then_some(plan.light_precision)
+    }
+
     /// Makes the camera's pixels as large as it takes for `per_pixel` samples of each to be done in
     /// `seconds`, by what a few samples take.
     ///
@@ -86,7 +97,12 @@ impl<'a> Studio<'a> {
         let [width, height] = self.camera().resolution();
         let limit = (width.min(height) / LEAST_SIDE).max(1);
         let pilot = self.camera().coarser((width.max(height) / 64).clamp(1, limit));
-        let sampling = Sampling { samples: 4, sampler: Sampler::default(), seed: 0 };
+        let sampling = Sampling {
+            samples: 4,
+            sampler: Sampler::default(),
+            seed: 0,
+            precision: LightPrecision::Auto,
+        };
         // The first wakes threads and caches.
         self.take(&pilot, sampling)?;
         let taken = self.take(&pilot, sampling)?;
@@ -112,6 +128,7 @@ impl<'a> Studio<'a> {
         let render = &mut self.scene.render;
         (render.samples, render.sampler, render.seed) =
             (SamplesSpec::Count(sampling.samples), sampling.sampler, sampling.seed);
+        self.scene.plan.light_precision = sampling.precision;
         self.scene.camera = camera.clone();
         let plan = Plan::new(&self.scene, OUTPUTS);
         let rendered = etendue_render::render(

@@ -1,6 +1,9 @@
-//! Each sampler × number of samples: how far the picture is from the converged one, and the time.
+//! Each sampler × number of samples: how far the picture is from the converged one, and the time. Of light,
+//! Sobol's points are taken with hits in both precisions.
 
 use etendue_camera::{Camera, Sampler};
+use etendue_geometry::HitPrecision;
+use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 
 use crate::pictures::{Sampling, Studio, mean, mean_square};
@@ -47,7 +50,7 @@ pub struct Converged {
 /// What was measured of one sampler at one number of samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// The point set, as a scene file writes it.
+    /// The point set, as a scene file writes it, and the precision of hits where it is not the plan's.
     pub sampler: &'static str,
     /// Samples a pixel.
     pub samples: u32,
@@ -59,23 +62,34 @@ pub struct Finding {
     pub relative_rmse: f64,
 }
 
-/// The samplers, the plainest first.
-const ALL: [Sampler; 5] = [
-    Sampler::Independent,
-    Sampler::Stratified,
-    Sampler::Hammersley,
-    Sampler::Sobol,
-    Sampler::BlueNoise,
-];
+/// A point set, and the precision of hits.
+#[derive(Debug, Clone, Copy)]
+struct Contestant {
+    name: &'static str,
+    sampler: Sampler,
+    precision: LightPrecision,
+}
 
-fn name(sampler: Sampler) -> &'static str {
-    match sampler {
-        Sampler::Independent => "independent",
-        Sampler::Stratified => "stratified",
-        Sampler::Hammersley => "hammersley",
-        Sampler::Sobol => "sobol",
-        Sampler::BlueNoise => "blue_noise",
-    }
+/// The samplers, the plainest first, and then the precision that the plan does not choose.
+fn contestants(studio: &Studio<'_>) -> Vec<Contestant> {
+    let of = |name, sampler| Contestant { name, sampler, precision: LightPrecision::Auto };
+    let mut all = vec![
+        of("independent", Sampler::Independent),
+        of("stratified", Sampler::Stratified),
+        of("hammersley", Sampler::Hammersley),
+        of("sobol", Sampler::Sobol),
+        of("blue_noise", Sampler::BlueNoise),
+    ];
+    let other = studio.precision().map(|precision| match precision {
+        HitPrecision::Single => ("sobol, hits in f64", LightPrecision::Double),
+        HitPrecision::Double => ("sobol, hits in f32", LightPrecision::Single),
+    });
+    all.extend(other.map(|(name, precision)| Contestant {
+        name,
+        sampler: Sampler::Sobol,
+        precision,
+    }));
+    all
 }
 
 /// Renders with every sampler in turn.
@@ -90,28 +104,29 @@ pub fn measure(
 ) -> Result<Samplers, BenchError> {
     let rounds = effort.rounds.max(1);
     let own: f64 = effort.counts.iter().map(|&n| f64::from(n)).sum();
-    let all = f64::from(effort.converged) + own * (rounds * ALL.len()) as f64;
+    let contestants = contestants(studio);
+    let all = f64::from(effort.converged) + own * (rounds * contestants.len()) as f64;
     studio.fit(all, effort.seconds)?;
     let camera = studio.camera().clone();
     let converged = Converged::render(studio, &camera, effort.converged)?;
     let mut done = f64::from(effort.converged);
-    let mut entries: Vec<Entry<Sampler>> =
-        ALL.iter().flat_map(|&sampler| Entry::each(sampler, &effort.counts)).collect();
+    let mut entries: Vec<Entry<Contestant>> =
+        contestants.iter().flat_map(|&who| Entry::each(who, &effort.counts)).collect();
     for round in 0..rounds {
         for who in order(round, entries.len()) {
             if !progress(done / all) {
                 return Err(BenchError::Stopped);
             }
             let entry = &mut entries[who];
-            let sampler = entry.of;
-            entry.take(studio, &camera, sampler, round, &converged)?;
+            let Contestant { sampler, precision, .. } = entry.of;
+            entry.take(studio, &camera, (sampler, precision), round, &converged)?;
             done += f64::from(entry.samples);
         }
     }
-    let finding = |entry: &Entry<Sampler>| {
+    let finding = |entry: &Entry<Contestant>| {
         let rmse = entry.rmse();
         Some(Finding {
-            sampler: name(entry.of),
+            sampler: entry.of.name,
             samples: entry.samples,
             seconds: entry.seconds.spread()?,
             rmse,
@@ -129,8 +144,11 @@ impl Converged {
         samples: u32,
     ) -> Result<Self, BenchError> {
         let half = (samples / 2).max(1);
-        let mut take =
-            |seed| studio.take(camera, Sampling { samples: half, sampler: Sampler::Sobol, seed });
+        let mut take = |seed| {
+            let precision = LightPrecision::Auto;
+            studio
+                .take(camera, Sampling { samples: half, sampler: Sampler::Sobol, seed, precision })
+        };
         // Far from the seeds of the rounds.
         let [a, b] = [take(u64::MAX)?.values, take(u64::MAX - 1)?.values];
         let rmse = 0.5 * mean_square(&a, &b).sqrt();
@@ -162,11 +180,11 @@ impl<T: Clone> Entry<T> {
         &mut self,
         studio: &mut Studio<'_>,
         camera: &Camera,
-        sampler: Sampler,
+        (sampler, precision): (Sampler, LightPrecision),
         round: usize,
         converged: &Converged,
     ) -> Result<(), BenchError> {
-        let sampling = Sampling { samples: self.samples, sampler, seed: round as u64 };
+        let sampling = Sampling { samples: self.samples, sampler, seed: round as u64, precision };
         let taken = studio.take(camera, sampling)?;
         self.seconds.0.push(taken.seconds);
         self.squares.push(mean_square(&taken.values, &converged.values));

@@ -5,9 +5,10 @@ use std::time::Instant;
 use etendue::{Calibration, Prospect, TimeForecast};
 use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan};
-use etendue_scene::Wanted;
 use etendue_scene::doctor::Diagnosis;
 use etendue_scene::file::SceneFile;
+use etendue_scene::{Start, Wanted};
+
 use serde::Serialize;
 
 use crate::arguments::CheckArguments;
@@ -24,10 +25,15 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
         return Err(Fault::refused(fault));
     }
     let load = start.elapsed().as_secs_f64();
+    let frames = file.frames(options.load_options().reach, || Ok(Start::of(&scene)))?;
     let plan = Plan::new(&scene, Outputs::ALL);
     let prospect = Prospect { scene: &scene, plan: &plan, outputs: Outputs::ALL, load };
     let time = TimeForecast::new(&prospect, &Calibration::of_this_machine()?);
-    let diagnosis = Diagnosis { memory: plan.memory, ..Diagnosis::of(&scene, file.kind()) };
+    let diagnosis = Diagnosis {
+        memory: plan.memory,
+        frames: frames.map(|frames| frames.len()),
+        ..Diagnosis::of(&scene, file.kind())
+    };
     match arguments.json {
         true => print_json(&Checked { diagnosis, time }),
         false => print_text(&format!("{diagnosis}{:<13} {time}", "time")),

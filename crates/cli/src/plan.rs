@@ -2,6 +2,7 @@
 
 use etendue::{Calibration, Options, Session, TimeForecast};
 use etendue_bench::tolerance;
+use etendue_render::Decision;
 
 use crate::arguments::PlanArguments;
 use crate::fault::{Fault, print_json, print_text};
@@ -16,10 +17,22 @@ pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
     let progress = Phases::new(arguments.json).progress(false);
     let options = Options { to_render: false, ..options(&arguments.scene) };
     let mut session = Session::open_with(&arguments.scene.scene, options)?;
+    let frames = session.frames(&progress)?;
     let mut plan = session.plan(&progress)?.clone();
     let machine = Calibration::of_this_machine()?;
     let time = TimeForecast::new(&session.prospect(&progress)?, &machine);
     plan.decisions.push(time.decision());
+    plan.decisions.extend(frames.map(|frames| {
+        Decision {
+            what: "frames",
+            choice: frames.len().to_string(),
+            because: "each is a picture of its own; all above is of one, of the scene as it stands"
+                .to_owned(),
+            saves: None,
+            key: None,
+            forced: false,
+        }
+    }));
     if arguments.json { print_json(&plan.decisions) } else { print_text(&plan.to_string()) }
 }
 

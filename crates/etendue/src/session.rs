@@ -267,10 +267,7 @@ impl Session {
         }
         let start = || {
             let scene = self.loaded.as_ref().map(|loaded| &loaded.scene);
-            let scene = scene.ok_or(SceneError::Stopped)?;
-            let center = scene.geometry.loose_bounds().centre();
-            let cameras = scene.cameras.iter().map(|camera| camera.spec.clone()).collect();
-            Ok(Start { pose: *scene.camera.pose(), center, cameras })
+            scene.map(|scene| Start::of(scene)).ok_or(SceneError::Stopped)
         };
         let frames = self.file.frames(self.options.reach, start)?;
         self.frames = frames.as_deref().map(Arc::from);

@@ -1,6 +1,7 @@
 //! What each model costs: the scene's own picture through it, on this machine.
 
 use etendue_camera::Sampler;
+use etendue_scene::file::LightPrecision;
 
 use super::super::cameras::Model;
 use crate::pictures::{Sampling, Studio};
@@ -36,7 +37,12 @@ pub(super) fn seconds_a_sample(
             let camera = models[who].1.coarser(factor);
             let [width, height] = camera.resolution().map(f64::from);
             let mut take = |samples| {
-                let sampling = Sampling { samples, sampler: Sampler::Sobol, seed: round as u64 };
+                let sampling = Sampling {
+                    samples,
+                    sampler: Sampler::Sobol,
+                    seed: round as u64,
+                    precision: LightPrecision::Auto,
+                };
                 studio.take(&camera, sampling).map(|taken| taken.seconds)
             };
             if round == 0 {

@@ -6,6 +6,31 @@ const SCENE: &str = r#"{"etendue": 1,
     "camera": {"type": "pinhole", "sensor": {"resolution": [48, 32]}},
     "objects": [{"shape": "sphere", "radius": 1}, {"shape": "box", "transform": {"translate": [3, 0, 0]}}]}"#;
 
+/// Of light, Sobol's points are taken with hits in both precisions, which come to one error.
+#[test]
+fn light_is_charted_in_both_precisions() {
+    let bench = Bench::with_scene(
+        r#"{"etendue": 1, "tracer": {"type": "direct"},
+            "camera": {"type": "pinhole", "sensor": {"resolution": [32, 32]}},
+            "objects": [{"shape": "sphere", "radius": 1}],
+            "lights": [{"type": "environment", "radiance": [1, 1, 1]}]}"#,
+    );
+    let run = ["bench", "scene.json", "-o", "out", "--quick", "--only", "samplers"];
+    let output = bench.run(&[&run[..], &["--rounds", "1", "--seconds", "0.1"]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = bench.json("out/bench.json");
+    let rows = found["samplers"]["findings"].as_array().unwrap();
+    let rmse = |sampler: &str| {
+        let row = rows.iter().find(|row| row["sampler"] == sampler && row["samples"] == 16);
+        row.unwrap_or_else(|| panic!("{sampler}: {rows:?}"))["rmse"].as_f64().unwrap()
+    };
+    // The same samples: what f32 adds is lost in their noise.
+    let [single, double] = ["sobol", "sobol, hits in f64"].map(rmse);
+    assert!((single / double - 1.0).abs() < 0.05 && double > 0.0, "{single} {double}");
+    let chart = text(&std::fs::read(bench.path("out/samplers-time.svg")).unwrap());
+    assert!(chart.contains("hits in f64"), "{chart}");
+}
+
 #[test]
 fn a_quick_run_leaves_tables_and_charts() {
     let bench = Bench::with_scene(SCENE);

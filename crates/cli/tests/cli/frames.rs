@@ -58,6 +58,26 @@ fn each_frame_is_the_picture_of_its_settings() {
     assert_eq!(index["frames"][2]["folder"], "frames/000002");
 }
 
+/// What examines a scene examines its frames: it counts them, and refuses what a render would.
+#[test]
+fn check_and_plan_know_of_frames() {
+    let bench = Bench::with_scene(&scene(&json!([{"camera.fov": 30}, {"camera.fov": 40}])));
+    for (command, counted) in [("check", "frames        2;"), ("plan", "frames")] {
+        let output = bench.run(&[command, "scene.json"]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let told = text(&output.stdout);
+        assert!(told.lines().any(|line| line.starts_with(counted)), "{told}");
+    }
+    let bench = Bench::with_scene(&scene(&json!([{}, {"camera.fob": 40}])));
+    for command in ["check", "plan", "render"] {
+        let more: &[&str] = if command == "render" { &["-o", "out"] } else { &[] };
+        let output = bench.run(&[&[command, "scene.json"], more].concat());
+        assert_eq!(output.status.code(), Some(2), "{command}");
+        let why = text(&output.stderr);
+        assert!(why.contains("frames[1]") && why.contains("fob"), "{command}: {why}");
+    }
+}
+
 /// 300 copies, whose numbers a mask of 8 bits cannot have.
 #[test]
 fn the_index_lists_no_file_that_was_not_written() {

@@ -230,9 +230,14 @@ fn extent(planes: &[&Values], bits: Bits) -> Result<Shown, NoMemory> {
             let span = high / 2.0 - low / 2.0;
             shade[k] = if span > 0.0 { unit((value / 2.0 - low / 2.0) / span) } else { 1.0 };
         }
+        if planes.len() == 1 {
+            let [grey, ..] = shade;
+            return [grey, grey, grey, 1.0];
+        }
         shade
     };
-    let axes: Vec<_> = ["red", "green", "blue"]
+    let colours: &[&str] = if planes.len() == 1 { &["grey"] } else { &["red", "green", "blue"] };
+    let axes: Vec<_> = colours
         .iter()
         .zip(&ranges)
         .filter(|(_, (low, high))| low <= high)
@@ -419,6 +424,8 @@ mod tests {
         ];
         let (_, bytes) = eight(Look::Extent, planes);
         assert_eq!(bytes, [0, 255, 0, 255, 255, 0, 0, 255, 0, 0, 0, 0]);
+        let (_, bytes) = eight(Look::Extent, vec![Values::F64(vec![2.0, 3.0, f64::NAN])]);
+        assert_eq!(bytes, [0, 0, 0, 255, 255, 255, 255, 255, 0, 0, 0, 0], "one channel is grey");
     }
 
     #[test]

@@ -57,6 +57,8 @@ pub struct Diagnosis {
     pub cameras: Vec<CameraReport>,
     /// Lights that the glTF models bring along (`KHR_lights_punctual`).
     pub lights: u64,
+    /// Frames of the scene; null when it is one picture.
+    pub frames: Option<usize>,
     /// What a render will need.
     pub memory: MemoryForecast,
     /// glTF extensions that are not, or not wholly, supported, and what to do.
@@ -163,7 +165,7 @@ pub fn check(
 
 impl Diagnosis {
     /// What there is to tell of a scene that was loaded with [`Wanted::EVERYTHING`] from a file of this
-    /// kind. Its forecast of memory is [`MemoryForecast::of`].
+    /// kind. Its forecast of memory is [`MemoryForecast::of`], and its frames are not counted.
     #[must_use]
     pub fn of(scene: &Scene, kind: FileKind) -> Self {
         let geometry = &*scene.geometry;
@@ -198,6 +200,7 @@ impl Diagnosis {
             },
             cameras: cameras(scene),
             lights: models.iter().map(|path| lights::count(path)).sum(),
+            frames: None,
             memory: MemoryForecast::of(scene),
             extensions: scene.notes.iter().filter(is_extension).map(Finding::from).collect(),
             unused_files: leftovers::find(&models, &scene.path),

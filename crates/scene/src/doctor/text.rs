@@ -36,6 +36,9 @@ impl fmt::Display for Diagnosis {
         }
         let [width, height] = self.camera.resolution;
         row(f, "camera", &format!("{width} × {height}, {}", self.camera_origin))?;
+        if let Some(frames) = self.frames {
+            row(f, "frames", &format!("{frames}; all below is of one"))?;
+        }
         if let Some(k) = self.camera.k {
             let [fx, fy, cx, cy] = [k[0][0], k[1][1], k[0][2], k[1][2]];
             let text =

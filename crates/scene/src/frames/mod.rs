@@ -17,7 +17,7 @@ use serde_json::Value;
 
 use crate::file::{CameraPath, FramesSpec, SceneFile, TrajectoryFormat, join, join_index};
 use crate::paths::Folder;
-use crate::{Reach, SceneError, npy};
+use crate::{Reach, Scene, SceneError, npy};
 
 /// The longest trajectory that is read (bytes).
 const LONGEST: u64 = 1 << 30;
@@ -45,6 +45,18 @@ pub struct Start {
     pub center: DVec3,
     /// The cameras of the models.
     pub cameras: Vec<CameraSpec>,
+}
+
+impl Start {
+    /// Of a scene that is loaded.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Self {
+        Self {
+            pose: *scene.camera.pose(),
+            center: scene.geometry.loose_bounds().centre(),
+            cameras: scene.cameras.iter().map(|camera| camera.spec.clone()).collect(),
+        }
+    }
 }
 
 /// A pose of a trajectory, with what else its file says.

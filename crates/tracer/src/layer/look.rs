@@ -12,8 +12,8 @@ pub enum Look {
     /// Three channels of a unit vector n, shown as (n + 1)/2; a miss (the zero vector)
     /// transparent.
     Direction,
-    /// One to three channels, each stretched from its least to its greatest finite value: positions,
-    /// texture coordinates. A pixel that is not finite is transparent.
+    /// One to three channels, each stretched from its least to its greatest finite value (one alone is grey):
+    /// positions, texture coordinates, numbers of samples. A pixel that is not finite is transparent.
     Extent,
     /// Integers that name things, each in a colour of its own; 0 (a miss) transparent. Only the
     /// first channel is shown.
