@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast docs-figures docs-charts \
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-decisions docs-figures docs-charts \
 	docs-stability gallery light-fields fingerprints fuzz-smoke fuzz-seeds clean
 
 help:
@@ -28,6 +28,7 @@ help:
 	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/limits.md"
 	@echo "make bench-sampling  what samples that stop save; writes the measured part of docs/sampling.md"
 	@echo "make bench-forecast  render the example scenes, and hold the forecast of time against it"
+	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model"
 	@echo "make gallery       render the pictures of docs/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make light-fields  the walk of docs/light-fields.md in a venv, its pictures, and another decoder's opinion"
@@ -115,6 +116,10 @@ bench-sampling: setup
 bench-forecast: setup
 	cargo build --release -p etendue-cli
 	python3 benches/forecast.py $(ARGS)
+
+bench-decisions: setup
+	cargo build --release -p etendue-cli
+	python3 benches/decisions.py $(ARGS)
 
 # ARGS=--quick takes lighter meshes
 docs-charts: setup

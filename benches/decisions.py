@@ -1,0 +1,94 @@
+"""What each decision of the plan saves that a scene can overrule: as planned, against the fuller model.
+
+Both are rendered by the built command in turn, and the median of what the whole process takes is compared; so
+are the pictures. Writes a table into docs/sampling.md.
+"""
+
+import json
+import os
+import statistics
+import subprocess
+import tempfile
+from pathlib import Path
+
+import program
+import section
+
+SCENES = program.ROOT / "scenes"
+# A model with images, made here so that the table needs nothing else.
+TEXTURED = {
+    "etendue": 1,
+    "camera": {"type": "pinhole", "sensor": {"resolution": [640, 480]},
+               "pose": {"from": [0, 1, 3], "look_at": [0, 0, 0]}},
+    "tracer": {"type": "flat"},
+    "objects": [{"shape": "rectangle", "width": 40, "height": 40, "material": "stripes",
+                 "transform": {"translate": [0, -1, 0], "rotate": [1, 0, 0, -90]}},
+                {"shape": "sphere", "material": "stripes"}],
+    "materials": {"stripes": {"type": "matte", "color": {"image": "stripes.png"}}},
+}
+
+
+def jobs(folder):
+    """What is decided, the scene, what is set of it for both, and what overrules the decision."""
+    textured = folder / "textured.json"
+    textured.write_text(json.dumps(TEXTURED))
+    (folder / "stripes.png").write_bytes((SCENES / "stripes.png").read_bytes())
+    small = ["camera.sensor.resolution=[240,180]", "render.samples=64"]
+    yield "hits of light in f32", SCENES / "paper" / "fig3.json", small, "plan.light_precision=double"
+    yield "a quick build", SCENES / "first-light.json", [], "plan.build_quality=high"
+    yield "hits of data in f64", SCENES / "first-light.json", [], "plan.refine=false"
+    data = ["tracer=null", 'layers=["depth"]']
+    yield "no images for depth alone", textured, data, "plan.textures=true"
+    yield "images averaged over samples", textured, ["render.samples=64"], "plan.texture_filter=true"
+
+
+def rendered(scene, settings, folder):
+    """Seconds of a render in all, and its first array."""
+    report, out = folder / "report.json", folder / "out"
+    command = [program.built("etendue"), "render", scene, "-o", out, "--outputs", "npy", "--report", report, "--quiet"]
+    for setting in settings:
+        command += ["--set", setting]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    if done.returncode != 0:
+        raise SystemExit(f"{scene}: {done.stderr.strip()}")
+    arrays = sorted(out.glob("*.npy"), key=lambda path: (path.name != "picture.npy", path.name))
+    import numpy as np
+    return json.loads(report.read_text())["seconds"]["total"], np.load(arrays[0])
+
+
+def difference(a, b):
+    """The root mean square difference of two arrays, over the mean of one, where both are finite."""
+    import numpy as np
+    both = np.isfinite(a) & np.isfinite(b)
+    mean = np.abs(a[both]).mean()
+    return float(np.sqrt(np.mean((a[both] - b[both]) ** 2)) / mean) if mean > 0 else 0.0
+
+
+def main():
+    arguments = program.arguments(__doc__, "sampling.md", rounds=5).parse_args()
+    program.enter("decision-peers", ["numpy"])
+    lines = ["| decided | scene | overruled by | as planned (s) | overruled (s) | overruled takes | pictures differ by |",
+             "|---|---|---|---|---|---|---|"]
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        for what, scene, both, overruled in jobs(folder):
+            times, pictures = ([], []), {}
+            for turn in range(arguments.rounds):
+                for way in (0, 1) if turn % 2 == 0 else (1, 0):
+                    settings = both + [overruled] * way
+                    seconds, pictures[way] = rendered(scene, settings, folder)
+                    times[way].append(seconds)
+            ratio = statistics.median(times[1]) / statistics.median(times[0])
+            name = scene.relative_to(SCENES) if scene.is_relative_to(SCENES) else "a floor and a ball with an image"
+            name = f"`{name}`" if scene.is_relative_to(SCENES) else name
+            lines.append(f"| {what} | {name} | `{overruled}` | {section.spread(times[0], 2)} | "
+                         f"{section.spread(times[1], 2)} | {ratio:.2f} times as long | "
+                         f"{difference(pictures[0], pictures[1]):.1e} |")
+            print(lines[-1], flush=True)
+    text = (f"{section.machine()}; {os.cpu_count()} processors; medians of {arguments.rounds} turns, with the least and "
+            "the greatest; of everything from the scene's text to the files.")
+    section.put(arguments.output, "decisions", text + "\n\n" + "\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()
