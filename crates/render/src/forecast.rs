@@ -4,7 +4,7 @@ use etendue_scene::file::SETS;
 use etendue_scene::{MemoryForecast, Scene};
 use etendue_sensor::{Sensor, SensorKind};
 use etendue_spectrum::Bands;
-use etendue_tracer::{EnvironmentImage, LayerSpec, texture};
+use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec, texture};
 
 use crate::film::bytes_of_plane;
 use crate::images::{environment, wanted_images};
@@ -137,6 +137,9 @@ fn images(scene: &Scene, plan: &Plan) -> u64 {
             )]
             let bytes = (texture::decoded_bytes(path) as f64 * ENVIRONMENT) as u64;
             textures.saturating_add(bytes)
+        }
+        Some(EnvironmentImage::ClearSky(_)) if plan.layers.contains(&LayerSpec::Radiance) => {
+            textures.saturating_add(ClearSky::MAP_BYTES)
         }
         _ => textures,
     }

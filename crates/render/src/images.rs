@@ -103,7 +103,9 @@ impl Images {
             EnvironmentImage::File(path) => {
                 EnvironmentMap::read(path, limits).err().map(|e| e.to_string())
             }
-            EnvironmentImage::Studio | EnvironmentImage::Constant => None,
+            EnvironmentImage::Studio
+            | EnvironmentImage::ClearSky(_)
+            | EnvironmentImage::Constant => None,
         };
         faults.into_iter().flatten().next().or_else(environment)
     }
@@ -117,13 +119,16 @@ impl Images {
         let Some(image) = environment(scene) else { return Ok(()) };
         let stamp = match image {
             EnvironmentImage::File(path) => Stamp::of(path),
-            EnvironmentImage::Studio | EnvironmentImage::Constant => None,
+            EnvironmentImage::Studio
+            | EnvironmentImage::ClearSky(_)
+            | EnvironmentImage::Constant => None,
         };
         self.sky = Some((image.clone(), stamp));
         let known = before.environment.as_ref().filter(|_| before.sky == self.sky);
         let map = match (known, image) {
             (Some(known), _) => Arc::clone(known),
             (None, EnvironmentImage::Studio) => Arc::new(EnvironmentMap::studio()),
+            (None, EnvironmentImage::ClearSky(sky)) => Arc::new(sky.map()),
             (None, EnvironmentImage::File(path)) => Arc::new(EnvironmentMap::read(path, limits)?),
             (None, EnvironmentImage::Constant) => return Ok(()),
         };

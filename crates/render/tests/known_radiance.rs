@@ -8,12 +8,13 @@
 use std::path::Path;
 
 use etendue_accel::BuildOptions;
+use etendue_geometry::glam::DVec3;
 use etendue_render::output::Outputs;
 use etendue_render::output::Values;
 use etendue_render::{Images, Plan, accelerators, build, plan, render};
 use etendue_scene::file::{AccelName, LightPrecision, SceneFile};
 use etendue_scene::{LoadOptions, Scene};
-use etendue_tracer::{Emission, Paint};
+use etendue_tracer::{ClearSky, Emission, Paint};
 
 const TRACERS: [&str; 3] = ["direct", "whitted", "path"];
 
@@ -317,6 +318,59 @@ fn a_plane_under_a_sky() {
         "materials": {"m": {"type": "matte", "color": [0.5, 0.5, 0.5]}}"#;
     let eye = [[1.0, 0.5, 3.0], [0.0, 0.0, 0.0]];
     check("sky", 64, eye, rest, |_| (), 0.0, |_| 1.0);
+}
+
+/// Lambert planes under a clear sky and its sun, by integration of the model over the hemispheres that they see: one
+/// that lies on the ground, and a wall that the sun does not reach.
+#[test]
+fn planes_under_a_clear_sky() {
+    let sky = ClearSky::new(3.0, 40.0, 0.3, true).unwrap();
+    let (albedo, pi) = (0.5, std::f64::consts::PI);
+    let steps = 400;
+    // Red that falls on a plane with the normal from the dome and from ground of this radiance.
+    let falling = |normal: DVec3, ground: f64| {
+        let mut sum = 0.0;
+        for k in 0..steps * steps {
+            let at = |i: usize| (i as f64 + 0.5) / steps as f64;
+            // Squares of the height resolve the horizon.
+            let (u, phi) = (at(k % steps), 2.0 * pi * at(k / steps));
+            let (y, weight) = (u * u, 2.0 * u * 2.0 * pi / (steps * steps) as f64);
+            let r = (1.0 - y * y).sqrt();
+            let up = DVec3::new(r * phi.sin(), y, -r * phi.cos());
+            let down = DVec3::new(up.x, -up.y, up.z);
+            sum += sky.dome(up)[0] * up.dot(normal).max(0.0) * weight;
+            sum += ground * down.dot(normal).max(0.0) * weight;
+        }
+        sum
+    };
+    let sun = sky.sun()[0];
+    let floor = falling(DVec3::Y, 0.0) + sun * sky.toward_sun().y;
+    let ground = 0.3 * floor / pi;
+    // Rectangles face +Z, and the sun stands over −Z, or over −X where it is turned.
+    let away = falling(DVec3::Z, ground);
+    let rest = |turn: &str| {
+        format!(
+            r#""lights": [{{"type": "sky", "turbidity": 3, "ground_albedo": 0.3, "scale": 2,
+                "sun": {{"elevation": 40, "azimuth": -90}}}}],
+            "objects": [{{"shape": "rectangle", "width": 10, "height": 10, "material": "m",
+                "transform": {{"rotate": {turn}}}}}],
+            "materials": {{"m": {{"type": "matte", "color": [{albedo}, {albedo}, {albedo}]}}}}"#
+        )
+    };
+    // The map blurs the horizon by 0.35°, and the midpoint rules are exact to less than that.
+    let shown = |falling: f64| 2.0 * albedo * falling / pi;
+    let eye = [[1.0, 3.0, 0.5], [0.0; 3]];
+    check(
+        "floor",
+        256,
+        eye,
+        &rest("[1, 0, 0, -90]"),
+        |_| (),
+        1e-3 * shown(floor),
+        |_| shown(floor),
+    );
+    let eye = [[3.0, 1.0, 0.5], [0.0; 3]];
+    check("wall", 256, eye, &rest("[0, 1, 0, 90]"), |_| (), 2e-3 * shown(away), |_| shown(away));
 }
 
 /// A sphere of radiance L over a plane: its form factor is (r/d)² cos θ (Howell, *A Catalog of

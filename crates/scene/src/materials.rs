@@ -52,12 +52,12 @@ impl SceneFile {
             let at = join_index("lights", index);
             let mut supply = Named { folder, wanted, textures };
             let fault = |Fault { key, why }| self.fault(&below(&at, &key), why);
-            let light = spec.build(&mut supply).map_err(fault)?;
+            let built = spec.build(&mut supply).map_err(fault)?;
             let is_sky = |l: &Light| matches!(l.kind, LightKind::Environment { .. });
-            if is_sky(&light) && lights.iter().any(is_sky) {
+            if built.iter().any(is_sky) && lights.iter().any(is_sky) {
                 return Err(self.fault(&at, "a second environment; a scene has one at most"));
             }
-            lights.push(light);
+            lights.extend(built);
         }
         Ok(Some(lights))
     }

@@ -6,12 +6,13 @@ use std::path::PathBuf;
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 use etendue_spectrum::{Illuminant, Metal, rgb};
 
+use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
 use crate::material::{Absorption, Alpha, Glass, GltfSurface};
 use crate::spec::{AbsorptionSpec, BRIGHTEST, ImageSpec, IorSpec, PaintSpec};
 use crate::{
-    Color, Emission, EnvironmentImage, Ior, Light, LightKind, LightSpec, Material, MaterialSpec,
-    Paint, Projector, Scattering,
+    ClearSky, Color, Emission, EnvironmentImage, Ior, Light, LightKind, LightSpec, Material,
+    MaterialSpec, Paint, Projector, Scattering,
 };
 
 /// What is wrong with a value.
@@ -153,13 +154,18 @@ impl MaterialSpec {
 }
 
 impl LightSpec {
-    /// The light.
+    /// The light; of a sky the sun, too.
     ///
     /// # Errors
     ///
     /// On the first value that describes no light.
-    pub fn build(&self, supply: &mut dyn Supply) -> Result<Light, Fault> {
+    pub fn build(&self, supply: &mut dyn Supply) -> Result<Vec<Light>, Fault> {
         let (key, color, illuminant) = match self {
+            Self::Sky { turbidity, sun, ground_albedo, scale, up, visible } => {
+                let sky = ClearSky::new(*turbidity, sun.elevation, *ground_albedo, sun.shines);
+                let sky = sky.ok_or_else(|| Fault::new("", "is no sky that the model knows"))?;
+                return shining(sky, sun.azimuth, *scale, (*up, *visible));
+            }
             Self::Point { intensity, illuminant, .. }
             | Self::Spot { intensity, illuminant, .. }
             | Self::Goniometric { intensity, illuminant, .. }
@@ -170,10 +176,8 @@ impl LightSpec {
             Self::Environment { radiance, illuminant, .. } => ("radiance", radiance, illuminant),
         };
         in_bounds(key, color, Bound::None)?;
-        let unit = |key: &str, v: DVec3| {
-            v.try_normalize().ok_or_else(|| Fault::new(key, "gives no direction"))
-        };
         let kind = match self {
+            Self::Sky { .. } => return Ok(Vec::new()),
             Self::Point { at, .. } => LightKind::Point(DVec3::from(*at)),
             Self::Spot { at, look_at, cone, inner_cone, .. } => {
                 let at = DVec3::from(*at);
@@ -224,14 +228,51 @@ impl LightSpec {
                         EnvironmentImage::File(found)
                     }
                 };
-                let top = unit("up", DVec3::from(*up))?;
-                let tilt = DMat3::from_quat(DQuat::from_rotation_arc(DVec3::Y, top));
-                let turn = tilt * DMat3::from_rotation_y(rotate.to_radians());
+                let turn = tilted(*up, *rotate)?;
                 LightKind::Environment { image, turn, visible: *visible }
             }
         };
-        Ok(Light { kind, color: *color, illuminant: checked(*illuminant)? })
+        Ok(vec![Light { kind, color: *color, illuminant: checked(*illuminant)? }])
     }
+}
+
+fn unit(key: &str, v: DVec3) -> Result<DVec3, Fault> {
+    v.try_normalize().ok_or_else(|| Fault::new(key, "gives no direction"))
+}
+
+/// What brings an environment's directions into the world: its top from +Y to `up` the shortest way, after a
+/// turn by `rotate` (degrees, counter-clockwise from above).
+fn tilted(up: [f64; 3], rotate: f64) -> Result<DMat3, Fault> {
+    let tilt = DQuat::from_rotation_arc(DVec3::Y, unit("up", DVec3::from(up))?);
+    Ok(DMat3::from_quat(tilt) * DMat3::from_rotation_y(rotate.to_radians()))
+}
+
+/// A sky as an environment, and its sun as parallel light from a disk.
+fn shining(
+    sky: ClearSky,
+    azimuth: f64,
+    scale: f64,
+    (up, visible): ([f64; 3], bool),
+) -> Result<Vec<Light>, Fault> {
+    in_bounds("scale", &[scale; 3], Bound::None)?;
+    if !azimuth.is_finite() {
+        return Err(Fault::new("sun.azimuth", format!("{azimuth} is no angle")));
+    }
+    // Clockwise from above.
+    let turn = tilted(up, -azimuth)?;
+    let sun = Light {
+        kind: LightKind::Directional {
+            along: -(turn * sky.toward_sun()),
+            cos_radius: (0.5 * SUN_DIAMETER).to_radians().cos(),
+        },
+        color: sky.sun().map(|part| part * scale),
+        illuminant: None,
+    };
+    let shines = sky.is_sunlit();
+    let image = EnvironmentImage::ClearSky(Box::new(sky));
+    let kind = LightKind::Environment { image, turn, visible };
+    let dome = Light { kind, color: [scale; 3], illuminant: None };
+    Ok(if shines { vec![dome, sun] } else { vec![dome] })
 }
 
 /// A luminaire at a point (m) whose downward direction is `below` (unit), turned by `rotate` (degrees), by its

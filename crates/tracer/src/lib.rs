@@ -16,7 +16,7 @@
 //! | [`material`], [`texture`] | surfaces, ready to be looked up |
 //! | [`footprint`] | how much of a surface a sample stands for |
 //! | [`bsdf`] | how surfaces scatter light |
-//! | [`light`], [`emitters`], [`environment`] | where light comes from |
+//! | [`light`], [`emitters`], [`environment`], [`clear_sky`] | where light comes from |
 //! | [`placed`] | what there is to know of each placement before any ray meets it |
 //! | [`spawn`] | where a ray that leaves a surface starts |
 //! | [`transport`] | batches of paths, and the rules of each tracer of light |
@@ -24,6 +24,7 @@
 
 pub mod bsdf;
 pub mod build;
+pub mod clear_sky;
 pub mod emitters;
 pub mod environment;
 pub mod footprint;
@@ -48,6 +49,7 @@ mod target;
 pub mod texture;
 pub mod transport;
 
+pub use clear_sky::ClearSky;
 pub use emitters::Emitters;
 pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};

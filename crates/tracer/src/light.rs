@@ -11,7 +11,7 @@ use crate::light_tree::Cluster;
 use crate::projector::Projector;
 use crate::reference::SceneView;
 use crate::sky::Sky;
-use crate::{Color, TextureUse};
+use crate::{ClearSky, Color, TextureUse};
 
 /// A light of the scene, beside its emissive surfaces.
 #[derive(Debug, Clone, PartialEq)]
@@ -126,12 +126,14 @@ impl LightKind {
 }
 
 /// Where an environment's image comes from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum EnvironmentImage {
     /// There is none: alike from all sides.
     Constant,
     /// The one that lights models without a light ([`EnvironmentMap::studio`]).
     Studio,
+    /// A clear sky.
+    ClearSky(Box<ClearSky>),
     /// A file.
     File(std::path::PathBuf),
 }

@@ -338,6 +338,57 @@ pub enum LightSpec {
         #[serde(default)]
         illuminant: Option<Illuminant>,
     },
+    /// A clear sky with its sun, and the ground below the horizon. It is the scene's environment.
+    Sky {
+        /// How hazy the air is: 1 (none but air) to 10.
+        #[serde(default = "default_turbidity")]
+        #[schemars(range(min = 1.0, max = 10.0))]
+        turbidity: f64,
+        /// The sun.
+        #[serde(default)]
+        sun: SunSpec,
+        /// Reflectance of the ground, 0 to 1.
+        #[serde(default = "default_ground")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        ground_albedo: f64,
+        /// Multiplies all of it: at 1, radiance 1 is 1 W/(m² sr nm).
+        #[serde(default = "one")]
+        #[schemars(range(min = 0.0))]
+        scale: f64,
+        /// Where the zenith is: the sky is tilted the shortest way from +Y.
+        #[serde(default = "upwards")]
+        up: [f64; 3],
+        /// The camera sees it where nothing is in the way.
+        #[serde(default = "yes")]
+        visible: bool,
+    },
+}
+
+/// Where the sun of a sky stands.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SunSpec {
+    /// Degrees above the horizon, 0 to 90.
+    #[schemars(range(min = 0.0, max = 90.0))]
+    pub elevation: f64,
+    /// Degrees from −Z, clockwise from above: at 90 it stands over +X.
+    pub azimuth: f64,
+    /// The sun itself shines; if not, its sky alone does, as when a cloud hides it.
+    pub shines: bool,
+}
+
+impl Default for SunSpec {
+    fn default() -> Self {
+        Self { elevation: 45.0, azimuth: 0.0, shines: true }
+    }
+}
+
+fn default_turbidity() -> f64 {
+    3.0
+}
+
+fn default_ground() -> f64 {
+    0.2
 }
 
 fn upwards() -> [f64; 3] {

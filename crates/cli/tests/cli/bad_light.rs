@@ -119,6 +119,17 @@ fn values_that_no_material_or_light_can_have_are_refused_by_path() {
         (material(r#"{"type": "gltf", "roughness": 1.1}"#), "materials.m.roughness"),
         (light(r#"{"type": "point", "at": [0, 0, 0], "intensity": [1, -1, 1]}"#), "lights[0]"),
         (light(r#"{"type": "environment", "radiance": [-1, 1, 1]}"#), "lights[0].radiance"),
+        (
+            light(r#"{"type": "sky", "turbidity": 0.5}"#),
+            "lights[0].turbidity: 0.5 is below the least, 1",
+        ),
+        (
+            light(r#"{"type": "sky", "sun": {"elevation": -1}}"#),
+            "lights[0].sun.elevation: -1 is below the least, 0",
+        ),
+        (light(r#"{"type": "sky", "ground_albedo": 1.5}"#), "lights[0].ground_albedo"),
+        (light(r#"{"type": "sky", "scale": -1}"#), "lights[0].scale"),
+        (light(r#"{"type": "sky", "up": [0, 0, 0]}"#), "lights[0].up: gives no direction"),
         (light(r#"{"type": "environment", "image": "sky.exr"}"#), "lights[0].image: no such file"),
         (
             light(r#"{"type": "directional", "direction": [0, 0, 0], "irradiance": [1, 1, 1]}"#),
