@@ -1,0 +1,186 @@
+//! What a render needs: the scene, the frames that it is compared with, the structures over them, and images.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use etendue_accel::{Accel, BuildOptions};
+use etendue_render::output::Outputs;
+use etendue_render::{Plan, plan};
+use etendue_scene::escape::one_line;
+use etendue_scene::file::SceneFile;
+use etendue_scene::memory::Budget;
+use etendue_scene::{Frame, LoadOptions, Scene, Strictness};
+
+use super::{Loaded, Ready, Session};
+use crate::neighbours::{self, Neighbour};
+use crate::progress::Phase;
+use crate::words::in_words;
+use crate::{Error, Progress};
+
+impl Session {
+    /// The scene, the structure over it and its images, once they are [prepared](Self::prepare).
+    pub(crate) fn prepared(&self) -> Result<Ready, Error> {
+        let Loaded { scene, accel, .. } = self.loaded()?;
+        let accel = accel.clone().ok_or_else(not_built)?;
+        Ok((Arc::clone(scene), accel, Arc::clone(&self.images)))
+    }
+
+    /// What is to be written of the pictures.
+    pub(crate) fn outputs(&self) -> Outputs {
+        self.options.outputs
+    }
+
+    pub(super) fn loaded(&self) -> Result<&Loaded, Error> {
+        self.loaded.as_ref().ok_or_else(|| Error::Refused("the scene is not loaded".to_owned()))
+    }
+
+    pub(super) fn built(&self) -> Result<&dyn Accel, Error> {
+        self.loaded()?.accel.as_deref().ok_or_else(not_built)
+    }
+
+    /// Loads the scene, if it is not, and the frames that it is compared with.
+    pub(super) fn load(&mut self, progress: &Progress) -> Result<(), Error> {
+        if self.loaded.is_some() {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let neighbours = self.load_neighbours(progress)?;
+        let mut scene = self.load_file(self.file(), progress)?;
+        neighbours::refuse_views(&scene)?;
+        neighbours::leave_out(&mut scene, &neighbours);
+        let notes: Vec<String> = scene.notes.iter().map(in_words).collect();
+        notes.iter().for_each(|note| progress.note(note));
+        let plan = Plan::new(&scene, self.options.outputs);
+        let scene = Arc::new(scene);
+        self.loaded =
+            Some(Loaded { scene, plan, notes, accel: None, neighbours, is_decoded: false });
+        self.seconds.load += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    pub(super) fn load_file(&self, file: &SceneFile, progress: &Progress) -> Result<Scene, Error> {
+        let wanted = plan::wanted(&file.spec.all_layers());
+        let share = |done: usize, total: usize| done as f64 / total.max(1) as f64;
+        let goes_on = |step: etendue_scene::LoadProgress<'_>| {
+            progress.goes_on(Phase::Load, share(step.done, step.total))
+        };
+        let options = LoadOptions {
+            strictness: self.options.strictness,
+            reach: self.options.reach,
+            camera: self.options.camera.as_deref(),
+            memory_limit: self.options.memory_limit,
+            to_render: self.options.to_render,
+            copy: self.options.copy,
+            cache: Some(&self.cache),
+            progress: Some(&goes_on),
+        };
+        Ok(file.load(wanted, &options)?)
+    }
+
+    pub(super) fn load_neighbours(&self, progress: &Progress) -> Result<Vec<Neighbour>, Error> {
+        let steps = neighbours::steps(&self.file().spec.all_layers());
+        if steps.is_empty() {
+            return Ok(Vec::new());
+        }
+        if self.file.spec.frames.is_none() {
+            let path = self.file.path().display();
+            return Err(Error::Refused(format!(
+                "{path}: layers: flow, disparity and occlusion compare frames, and the scene has no `frames`"
+            )));
+        }
+        // The scene by itself, when no frame is shown, has no neighbours.
+        let (Some((number, _)), Some(frames)) = (&self.shown, &self.frames) else {
+            return Ok(Vec::new());
+        };
+        let load = |(step, frame): (_, &Frame)| {
+            let scene = Arc::new(self.load_file(&self.file.at(frame)?, progress)?);
+            Ok(Neighbour { step, scene, accel: None })
+        };
+        neighbours::around(frames, *number, &steps).into_iter().map(load).collect()
+    }
+
+    /// Builds the structures, unless there are such over the same surfaces.
+    pub(super) fn build(&mut self, progress: &Progress) -> Result<(), Error> {
+        self.load(progress)?;
+        let start = Instant::now();
+        let options = BuildOptions {
+            threads: rayon::current_num_threads(),
+            memory_limit: self.options.memory_limit,
+            robust: self.options.robust,
+            isa: self.options.isa.clone(),
+            progress: Some(progress.of(Phase::Build)),
+            ..BuildOptions::default()
+        };
+        let Some(loaded) = &mut self.loaded else { return Ok(()) };
+        let Loaded { scene, plan, accel, neighbours, .. } = loaded;
+        let structures = &mut self.structures;
+        let mut is_new = false;
+        // What is free now was judged when the structure was built; a limit holds for every picture.
+        if self.options.memory_limit.is_some() {
+            fits(scene, plan, self.options.memory_limit)?;
+        }
+        let others = neighbours.iter_mut().map(|other| (&other.scene, &mut other.accel));
+        for (scene, accel) in std::iter::once((&*scene, accel)).chain(others) {
+            if accel.is_none() {
+                *accel = structures.over(scene, plan);
+            }
+            if accel.is_none() {
+                fits(scene, plan, self.options.memory_limit)?;
+                *accel = Some(structures.build(scene, plan, &options)?);
+                is_new = true;
+            }
+        }
+        let others = neighbours.iter().map(|other| &*other.scene);
+        structures.keep(std::iter::once(&**scene).chain(others));
+        if is_new {
+            self.seconds.build += start.elapsed().as_secs_f64();
+        }
+        Ok(())
+    }
+
+    /// Decodes the images that the plan wants, unless they are.
+    pub(super) fn decode(&mut self, progress: &Progress) -> Result<(), Error> {
+        let Loaded { scene, plan, is_decoded, .. } = self.loaded()?;
+        if *is_decoded {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let images = self.images.renewed(scene, plan, self.options.memory_limit)?;
+        if let (Strictness::Strict, Some(fault)) = (self.options.strictness, images.faults.first())
+        {
+            return Err(Error::Refused(fault.clone()));
+        }
+        images.faults.iter().for_each(|fault| progress.note(fault));
+        self.images = Arc::new(images);
+        if let Some(loaded) = &mut self.loaded {
+            loaded.is_decoded = true;
+        }
+        self.seconds.decode += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+}
+
+fn not_built() -> Error {
+    Error::Refused("the structure is not built".to_owned())
+}
+
+/// Refuses what will not fit into the memory that is allowed, or else free.
+fn fits(scene: &Scene, plan: &Plan, limit: Option<u64>) -> Result<(), Error> {
+    let memory = &plan.memory;
+    let bytes = match limit {
+        Some(_) => memory.total - memory.program,
+        // What was loaded is no longer free.
+        None => memory.to_come(),
+    };
+    let Err(error) = Budget::new(limit).take(bytes) else { return Ok(()) };
+    let [width, height] = scene.camera.resolution();
+    let images = scene.textures.iter().map(|texture| (texture.decoded_bytes(), &texture.name));
+    let largest = match images.max() {
+        Some((bytes, name)) if 2 * bytes > memory.total => {
+            format!(" (most of it for the image {})", one_line(name))
+        }
+        _ => String::new(),
+    };
+    let path = scene.path.display();
+    Err(Error::Refused(format!("{path}: a picture of {width} x {height} pixels{largest} {error}")))
+}

@@ -1,0 +1,211 @@
+//! Renders of a session: whole pictures, shares of them, and what is reported of them.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use etendue_accel::Accel;
+use etendue_render::output::{ImageHash, Layer, SOFTWARE};
+use etendue_render::report::memory;
+use etendue_render::{
+    Checkpoint, Course, Film, FilmFile, FollowedFrame, Identity, Plan, Prepared, RenderError,
+    Rendered, Report, Seconds, Shard,
+};
+use etendue_scene::Scene;
+use serde_json::Value;
+
+use super::{Loaded, Session};
+use crate::words::{NOT_FOLLOWED, changed, fingerprints, header, not_finite};
+use crate::{Error, Progress, Rendering, Shares};
+
+impl Session {
+    /// Renders the scene as it is now. When it is stopped while it renders and every pixel has samples, the
+    /// picture of these is returned: see [`Rendering::partial`].
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::prepare`], and when it is stopped before.
+    pub fn render(&mut self, progress: &Progress) -> Result<Rendering, Error> {
+        let clock = self.clock();
+        let film = self.trace(None, &[], progress)?;
+        self.conclude(film, clock, progress)
+    }
+
+    /// Renders a share of the picture's rows, or of its samples, and writes it to `path`, for [`merge`](Self::merge). `origin` goes
+    /// with it, for whoever merges: [`Shares`](crate::Shares) reads it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::render`], and when it is stopped at all.
+    pub fn render_shard(
+        &mut self,
+        shard: Shard,
+        path: &Path,
+        origin: &Value,
+        progress: &Progress,
+    ) -> Result<(), Error> {
+        let film = self.trace(Some(shard), &[], progress)?;
+        let Loaded { scene, plan, .. } = self.loaded()?;
+        if !film.is_complete() {
+            return Err(RenderError::Stopped.into());
+        }
+        film.notes().iter().for_each(|note| progress.note(note));
+        Ok(film.write(path, &self.identity(scene, plan)?, origin)?)
+    }
+
+    /// Puts the shares of a render together: the rendering that one machine would have made, to the bit when
+    /// they are of its rows. Those of its samples are added as exactly as two f64 hold them.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::scene_and_accel`]; when a share is missing, given twice, or of another render.
+    pub fn merge(&mut self, shares: &Shares, progress: &Progress) -> Result<Rendering, Error> {
+        let clock = self.clock();
+        self.prepare(progress)?;
+        let film = if shares.are_of_samples() {
+            self.trace(None, &shares.files, progress)?
+        } else {
+            let Loaded { scene, plan, .. } = self.loaded()?;
+            Film::merged(scene, plan, &shares.files, &self.identity(scene, plan)?)?
+        };
+        self.conclude(film, clock, progress)
+    }
+
+    /// Keeps what there is of a render at `checkpoint` on the way, and goes on from there: after an
+    /// interruption the same render takes up what was kept. The file stays until it is removed.
+    pub fn keep_at(&mut self, checkpoint: Option<Checkpoint>) {
+        self.checkpoint = checkpoint;
+    }
+
+    /// When a render began, and what was prepared before it: a part of its time, too.
+    fn clock(&self) -> (Instant, f64) {
+        (Instant::now(), self.seconds.load + self.seconds.build + self.seconds.decode)
+    }
+
+    /// Traces the scene, or a share of it, or puts shares of its samples together.
+    fn trace(
+        &mut self,
+        shard: Option<Shard>,
+        shares: &[FilmFile],
+        progress: &Progress,
+    ) -> Result<Film, Error> {
+        self.prepare(progress)?;
+        let Loaded { scene, plan, neighbours, .. } = self.loaded()?;
+        let identity = match (&shard, &self.checkpoint) {
+            (None, None) if shares.is_empty() => Identity::new(),
+            _ => self.identity(scene, plan)?,
+        };
+        let course = Course { shard, shares, checkpoint: self.checkpoint.clone(), identity };
+        let (accel, start) = (self.built()?, Instant::now());
+        let header = header(scene, &fingerprints(scene, neighbours)?);
+        let others: Vec<FollowedFrame<'_>> =
+            neighbours.iter().filter_map(|other| other.followed(scene)).collect();
+        let prepared = Prepared { accel, images: &self.images, others: &others };
+        let film = etendue_render::trace(scene, plan, prepared, &header, &course, progress)?;
+        self.seconds.render = start.elapsed().as_secs_f64();
+        Ok(film)
+    }
+
+    /// What films must agree in to be of one picture.
+    fn identity(&self, scene: &Scene, plan: &Plan) -> Result<Identity, Error> {
+        let [width, height] = scene.camera.resolution();
+        let layers: Vec<_> = plan.layers.iter().map(|layer| layer.row().name).collect();
+        let own = [
+            ("version", SOFTWARE.to_owned()),
+            ("accelerator", self.built()?.report().backend),
+            ("resolution", format!("{width} x {height}")),
+            ("number of samples", plan.samples.to_string()),
+            ("seed", scene.render.seed.to_string()),
+            ("list of layers", layers.join(", ")),
+            ("precision", format!("{:?}", plan.precision).to_lowercase()),
+        ];
+        let own = own.map(|(key, value)| (key.to_owned(), value));
+        let prints = fingerprints(scene, &self.loaded()?.neighbours)?;
+        let prints = prints.into_iter().map(|(key, value)| (key.replace('_', " "), value));
+        Ok(own.into_iter().chain(prints).collect())
+    }
+
+    /// The rendering of a film, with its report.
+    fn conclude(
+        &mut self,
+        film: Film,
+        (start, before): (Instant, f64),
+        progress: &Progress,
+    ) -> Result<Rendering, Error> {
+        let loaded = self.loaded()?;
+        let (scene, plan, accel) = (Arc::clone(&loaded.scene), &loaded.plan, self.built()?);
+        let structure = loaded.accel.clone();
+        let fingerprints = fingerprints(&scene, &loaded.neighbours)?;
+        let header = header(&scene, &fingerprints);
+        let rendered = etendue_render::finish(&scene, plan, film, header, Some(accel))?;
+        let mut seconds = self.seconds;
+        seconds.total = start.elapsed().as_secs_f64() + before;
+        let mut more = rendered.notes.clone();
+        more.extend(not_finite(&rendered));
+        more.extend(changed(&scene));
+        let mut others = loaded.neighbours.iter().filter_map(|other| other.followed(&scene));
+        if others.any(|other| other.loses_some()) {
+            more.push(NOT_FOLLOWED.to_owned());
+        }
+        more.iter().for_each(|note| progress.note(note));
+        let mut notes = loaded.notes.clone();
+        notes.extend(self.images.faults.iter().cloned());
+        notes.extend(more);
+        let mut report = self.report(&scene, accel, &rendered, seconds)?;
+        report.notes = notes;
+        self.seconds = Seconds::default();
+        let Rendered { picture, band_film, .. } = rendered;
+        // The views of a light field are rendered when they are written.
+        let traced = structure
+            .filter(|_| scene.camera.light_field().is_some())
+            .map(|accel| (accel, Arc::clone(&self.images)));
+        Rendering::new(scene, (picture, band_film), traced, (report, fingerprints))
+    }
+
+    fn report(
+        &self,
+        scene: &Scene,
+        accel: &dyn Accel,
+        rendered: &Rendered,
+        seconds: Seconds,
+    ) -> Result<Report, Error> {
+        let (built, counts) = (accel.report(), accel.counts());
+        let (peak, private) = memory();
+        let sizes = self.images.sizes(scene);
+        Ok(Report {
+            software: SOFTWARE,
+            scene: scene.path.clone(),
+            scene_hash: scene.hash()?.to_string(),
+            image_hash: ImageHash::of(&rendered.picture).to_string(),
+            resolution: scene.camera.resolution(),
+            layers: rendered.picture.layers().iter().map(Layer::title).collect(),
+            accel: built.backend,
+            build_quality: format!("{:?}", built.quality).to_lowercase(),
+            threads: rayon::current_num_threads(),
+            seed: scene.render.seed,
+            samples: rendered.samples,
+            samples_wanted: rendered.samples_wanted,
+            sample_counts: rendered.sample_counts,
+            seconds,
+            rays: rendered.rays,
+            lens_rays: rendered.fates.total(),
+            lens_losses: rendered.fates.losses(),
+            mrays_per_second: rendered.rays as f64 / rendered.trace_time.as_secs_f64() / 1e6,
+            rechecked: counts.rechecked,
+            corrected: counts.corrected,
+            triangles: scene.geometry.triangles(),
+            triangles_unique: scene.geometry.triangles_unique(),
+            placements: scene.geometry.placements.len() as u64,
+            bvh_bytes: built.bytes,
+            geometry_bytes_mapped: scene.stats.bytes_mapped,
+            geometry_bytes_copied: scene.stats.bytes_copied + built.copied_bytes,
+            image_bytes: sizes.iter().map(|size| size.bytes).sum(),
+            images: sizes,
+            not_finite: rendered.light.not_finite,
+            peak_memory_bytes: peak,
+            peak_private_bytes: private,
+            notes: Vec::new(),
+            files: Vec::new(),
+        })
+    }
+}
