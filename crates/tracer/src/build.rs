@@ -103,31 +103,7 @@ impl MaterialSpec {
                 let scattering = Scattering::Dielectric(glass);
                 Material::new(name, paint("color", color, Bound::One, supply)?, scattering)
             }
-            Self::Gltf {
-                color,
-                metallic,
-                roughness,
-                ior,
-                transmission,
-                clearcoat,
-                clearcoat_roughness,
-                opacity,
-            } => {
-                let surface = GltfSurface {
-                    metallic: *metallic,
-                    roughness: *roughness,
-                    ior: *ior,
-                    transmission: *transmission,
-                    clearcoat: *clearcoat,
-                    clearcoat_roughness: *clearcoat_roughness,
-                    ..GltfSurface::default()
-                };
-                let paint = paint("color", color, Bound::One, supply)?;
-                let plain = Material::new(name, paint, Scattering::Gltf(Box::new(surface)));
-                let alpha =
-                    if *opacity < 1.0 { Alpha::Blend { factor: *opacity } } else { Alpha::Opaque };
-                Material { alpha, ..plain }
-            }
+            Self::Gltf { .. } => self.gltf(name, supply)?,
             Self::Emissive { radiance, illuminant, two_sided } => {
                 let radiance = paint("radiance", radiance, Bound::None, supply)?;
                 let emission = Emission {
@@ -150,6 +126,51 @@ impl MaterialSpec {
                 Material::new(name, paint, Scattering::Matte)
             }
         })
+    }
+
+    /// A glTF surface, and nothing of all others.
+    fn gltf(&self, name: &str, supply: &mut dyn Supply) -> Result<Material, Fault> {
+        let Self::Gltf {
+            color,
+            metallic,
+            roughness,
+            ior,
+            transmission,
+            clearcoat,
+            clearcoat_roughness,
+            sheen,
+            sheen_roughness,
+            anisotropy,
+            anisotropy_rotation,
+            opacity,
+        } = self
+        else {
+            return Ok(Material::unnamed());
+        };
+        let sheen = paint("sheen", sheen, Bound::One, supply)?;
+        let (sheen_color, sheen_color_texture) = match sheen {
+            Paint::Plain(color) => (color, None),
+            Paint::Image { factor, image } => (factor, Some(image)),
+            Paint::Checker { colors, .. } => (colors[0], None),
+        };
+        let surface = GltfSurface {
+            metallic: *metallic,
+            roughness: *roughness,
+            ior: *ior,
+            transmission: *transmission,
+            clearcoat: *clearcoat,
+            clearcoat_roughness: *clearcoat_roughness,
+            sheen_color,
+            sheen_color_texture,
+            sheen_roughness: *sheen_roughness,
+            anisotropy: *anisotropy,
+            anisotropy_rotation: anisotropy_rotation.to_radians(),
+            ..GltfSurface::default()
+        };
+        let paint = paint("color", color, Bound::One, supply)?;
+        let plain = Material::new(name, paint, Scattering::Gltf(Box::new(surface)));
+        let alpha = if *opacity < 1.0 { Alpha::Blend { factor: *opacity } } else { Alpha::Opaque };
+        Ok(Material { alpha, ..plain })
     }
 }
 

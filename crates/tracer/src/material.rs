@@ -175,6 +175,21 @@ pub struct GltfSurface {
     pub clearcoat_roughness: f64,
     /// Roughness in green (linear).
     pub clearcoat_roughness_texture: Option<TextureUse>,
+    /// Reflectance of a sheen (`KHR_materials_sheen`); black where there is none.
+    pub sheen_color: Color,
+    /// Colour (sRGB).
+    pub sheen_color_texture: Option<TextureUse>,
+    /// The sheen's roughness, 0..=1.
+    pub sheen_roughness: f64,
+    /// Roughness in alpha (linear).
+    pub sheen_roughness_texture: Option<TextureUse>,
+    /// How much rougher highlights are along the surface's grain than across it
+    /// (`KHR_materials_anisotropy`), 0..=1.
+    pub anisotropy: f64,
+    /// Where the grain goes: the angle from growing u towards falling v (rad).
+    pub anisotropy_rotation: f64,
+    /// The grain in red and green (over 0..=1 what is −1..=1), strength in blue (linear).
+    pub anisotropy_texture: Option<TextureUse>,
 }
 
 impl Default for GltfSurface {
@@ -195,6 +210,13 @@ impl Default for GltfSurface {
             clearcoat_texture: None,
             clearcoat_roughness: 0.0,
             clearcoat_roughness_texture: None,
+            sheen_color: [0.0; 3],
+            sheen_color_texture: None,
+            sheen_roughness: 0.0,
+            sheen_roughness_texture: None,
+            anisotropy: 0.0,
+            anisotropy_rotation: 0.0,
+            anisotropy_texture: None,
         }
     }
 }
@@ -290,6 +312,9 @@ impl Material {
             uses.extend(surface.transmission_texture.as_mut());
             uses.extend(surface.clearcoat_texture.as_mut());
             uses.extend(surface.clearcoat_roughness_texture.as_mut());
+            uses.extend(surface.sheen_color_texture.as_mut());
+            uses.extend(surface.sheen_roughness_texture.as_mut());
+            uses.extend(surface.anisotropy_texture.as_mut());
         }
         uses.extend(self.emission.as_mut().and_then(|emission| emission.radiance.image_mut()));
         uses.extend(self.normal_map.as_mut().map(|map| &mut map.image));

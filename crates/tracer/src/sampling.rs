@@ -34,6 +34,16 @@ impl Frame {
         Self { x, y, z }
     }
 
+    /// A frame around the unit vector `z` whose x axis is as near to `along` as it can; any where they are
+    /// parallel.
+    #[must_use]
+    pub fn along(z: DVec3, along: DVec3) -> Self {
+        match (along - z * z.dot(along)).try_normalize() {
+            Some(x) => Self { x, y: z.cross(x), z },
+            None => Self::around(z),
+        }
+    }
+
     /// Components of `world` along the three.
     #[must_use]
     pub fn local(&self, world: DVec3) -> DVec3 {

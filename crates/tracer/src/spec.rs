@@ -84,6 +84,21 @@ pub enum MaterialSpec {
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 1.0))]
         clearcoat_roughness: f64,
+        /// Reflectance of a sheen of fibres over all of it but the coat: linear RGB, each 0..=1, or an image.
+        #[serde(default = "no_sheen")]
+        sheen: PaintSpec,
+        /// Roughness of the sheen, 0 to 1.
+        #[serde(default = "default_gltf_roughness")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        sheen_roughness: f64,
+        /// How much rougher highlights are along the surface's grain than across it, 0 to 1.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        anisotropy: f64,
+        /// Where the grain goes: degrees from growing u of the texture coordinates, counter-clockwise as the
+        /// image is seen.
+        #[serde(default)]
+        anisotropy_rotation: f64,
         /// Share of the surface that is there, 0 to 1.
         #[serde(default = "one")]
         #[schemars(range(min = 0.0, max = 1.0))]
@@ -129,6 +144,10 @@ fn default_gltf_roughness() -> f64 {
 
 fn default_ior() -> f64 {
     1.5
+}
+
+fn no_sheen() -> PaintSpec {
+    PaintSpec::Color([0.0; 3])
 }
 
 fn one() -> f64 {

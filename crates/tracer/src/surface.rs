@@ -3,12 +3,16 @@
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{HitBatch, RayBatch};
 
-use crate::bsdf::{Bsdf, Coat, Layered, Model, fresnel};
+use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen, fresnel};
 use crate::material::{Alpha, GltfSurface, NormalMap};
 use crate::placed::PlacedSurface;
 use crate::reference::{SceneView, SurfacePoint};
+use crate::sampling::Frame;
 use crate::spawn::Anchor;
 use crate::{Color, Footprint, Ior, LightingContext, Material, Scattering};
+
+/// The least α across a grain.
+const SMOOTHEST_GRAIN: f64 = 1e-3;
 
 /// A hit seen from its ray.
 #[derive(Debug, Clone, Copy)]
@@ -105,12 +109,29 @@ impl<'a> SurfaceInteraction<'a> {
         // The extension caps the reflectance face on at 1.
         let most = if face_on > 0.0 { 1.0 / face_on } else { f64::INFINITY };
         let highlight = std::array::from_fn(|k| (own.specular_color[k] * tint[k]).min(most));
+        let shading = self.shading(around, geometric);
+        let alpha = roughness * roughness;
+        let grain = self.grain(around, own, shading);
+        let strength = grain.map_or(0.0, |(_, strength)| strength);
         let model = Model::Layered(Layered {
             metallic: (own.metallic * rough[2]).clamp(0.0, 1.0),
-            alpha: roughness * roughness,
+            // A grain has no single directions, however smooth it is across.
+            alpha: if strength > 0.0 { alpha.max(SMOOTHEST_GRAIN) } else { alpha },
+            along: alpha + (1.0 - alpha) * strength * strength,
             f0: face_on * specular,
             f90: specular,
             transmission: (own.transmission * texel(&own.transmission_texture)[0]).clamp(0.0, 1.0),
+            sheen: match own.sheen_color {
+                [0.0, 0.0, 0.0] => Sheen::default(),
+                color => {
+                    let tint = own.sheen_color_texture.as_ref();
+                    let tint = tint.map_or([1.0; 4], |image| around.tint(image, &self.spot));
+                    Sheen {
+                        color: std::array::from_fn(|k| (color[k] * tint[k]).clamp(0.0, 1.0)),
+                        roughness: own.sheen_roughness * texel(&own.sheen_roughness_texture)[3],
+                    }
+                }
+            },
             coat: match own.clearcoat {
                 0.0 => Coat::default(),
                 share => Coat {
@@ -121,9 +142,34 @@ impl<'a> SurfaceInteraction<'a> {
                 },
             },
         });
-        let base = self.color();
-        let shading = self.shading(around, geometric);
-        Bsdf::new(model, [geometric, shading], self.wo, [base, highlight])
+        let frame = match grain {
+            Some((along, _)) => Frame::along(shading, along),
+            None => Frame::around(shading),
+        };
+        Bsdf::turned(model, (geometric, frame), self.wo, [self.color(), highlight])
+    }
+
+    /// Where the grain goes, and how strong it is; `None` where there is none, or where no texture coordinates
+    /// tell where.
+    fn grain(
+        &self,
+        around: &SceneView<'_>,
+        own: &GltfSurface,
+        normal: DVec3,
+    ) -> Option<(DVec3, f64)> {
+        if own.anisotropy == 0.0 {
+            return None;
+        }
+        let image = own.anisotropy_texture.as_ref();
+        let [x, y, share, _] = match image.and_then(|image| around.lookup(image, &self.spot)) {
+            Some([x, y, share, _]) => [2.0 * x - 1.0, 2.0 * y - 1.0, share, 1.0],
+            None => [1.0, 0.0, 1.0, 1.0],
+        };
+        let (sin, cos) = own.anisotropy_rotation.sin_cos();
+        let [tangent, bitangent] =
+            self.spot.tangents(image.map_or(0, |i| i.uv_set as usize), normal)?;
+        let along = tangent * (cos * x - sin * y) + bitangent * (sin * x + cos * y);
+        Some((along, (own.anisotropy * share).clamp(0.0, 1.0)))
     }
 
     /// The shading normal on the viewer's side; the geometric one where the viewer would see its
@@ -158,18 +204,22 @@ impl SurfacePoint<'_> {
     /// The normal tilted by a normal map: +x along u, +y up the image, against v (glTF 2.0, section
     /// 3.9.3).
     fn mapped_normal(&self, around: &SceneView<'_>, map: &NormalMap, normal: DVec3) -> DVec3 {
-        let Some([along_u, along_v]) = self.texture_axes(map.image.uv_set as usize) else {
+        let Some([tangent, bitangent]) = self.tangents(map.image.uv_set as usize, normal) else {
             return normal;
         };
         let Some(texel) = around.lookup(&map.image, self) else { return normal };
         let [x, y, z, _] = texel.map(|c| 2.0 * c - 1.0);
-        let Some(tangent) = (along_u - normal * normal.dot(along_u)).try_normalize() else {
-            return normal;
-        };
-        let across = normal.cross(tangent);
-        let bitangent = if across.dot(along_v) > 0.0 { -across } else { across };
         let tilted = tangent * (x * map.scale) + bitangent * (y * map.scale) + normal * z;
         tilted.try_normalize().unwrap_or(normal)
+    }
+
+    /// Unit vectors at right angles to `normal` and each other: towards growing u of a set, and towards falling
+    /// v.
+    fn tangents(&self, set: usize, normal: DVec3) -> Option<[DVec3; 2]> {
+        let [along_u, along_v] = self.texture_axes(set)?;
+        let tangent = (along_u - normal * normal.dot(along_u)).try_normalize()?;
+        let across = normal.cross(tangent);
+        Some([tangent, if across.dot(along_v) > 0.0 { -across } else { across }])
     }
 }
 

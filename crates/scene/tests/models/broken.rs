@@ -137,15 +137,15 @@ fn extensions_are_named_with_what_to_do() {
     assert!(error(&path).contains("KHR_texture_basisu"));
     let bare = import_with(&folder, "ktx.glb", Wanted::NOTHING);
     assert!(bare.notes.iter().any(|note| note.subject == "KHR_texture_basisu"), "{:?}", bare.notes);
-    let sheen = json!({"extensionsRequired": ["KHR_materials_sheen"]});
-    let path = write(&folder, "sheen.glb", with(sheen, json!({})));
-    assert!(error(&path).contains("needs KHR_materials_sheen"), "{}", error(&path));
-    let bare = import_with(&folder, "sheen.glb", Wanted::NOTHING);
-    assert_eq!(bare.notes[0].subject, "KHR_materials_sheen", "depth needs no sheen");
-    let used = json!({"extensionsUsed": ["KHR_materials_sheen", "ACME_teapot"]});
+    let film = json!({"extensionsRequired": ["KHR_materials_iridescence"]});
+    let path = write(&folder, "film.glb", with(film, json!({})));
+    assert!(error(&path).contains("needs KHR_materials_iridescence"), "{}", error(&path));
+    let bare = import_with(&folder, "film.glb", Wanted::NOTHING);
+    assert_eq!(bare.notes[0].subject, "KHR_materials_iridescence", "depth needs no film");
+    let used = json!({"extensionsUsed": ["KHR_materials_iridescence", "ACME_teapot"]});
     let notes = load(&write(&folder, "used.glb", with(used, json!({})))).notes;
     let subjects: Vec<&str> = notes.iter().map(|note| note.subject.as_str()).collect();
-    assert_eq!(subjects[..2], ["KHR_materials_sheen", "ACME_teapot"]);
+    assert_eq!(subjects[..2], ["KHR_materials_iridescence", "ACME_teapot"]);
 }
 
 #[test]

@@ -7,12 +7,17 @@
 //! the way out, `(1 − E(μᵢ)) (1 − E(μₒ)) / (1 − Ē)`, with the mean albedo `Ē = 2 ∫ E μ dμ`: reciprocal,
 //! and both together never return more than falls in (Shirley et al., "A Practitioners' Assessment of
 //! Light Reflection Models", 1997; Kelemen and Szirmay-Kalos 2001).
+//!
+//! Of facets that are rougher along the surface than across it A and B are taken for the larger ones of both
+//! roughnesses, and the albedo for no less than a smooth sheet's, so that what lies beneath gets no more than
+//! there is.
 
 use std::sync::LazyLock;
 
 use etendue_geometry::glam::DVec3;
 
-use super::{fresnel, ggx};
+use super::fresnel;
+use super::ggx::{self, Facets};
 
 /// Knots in α, dense where sheets are smooth.
 const ROUGHNESSES: usize = 48;
@@ -112,22 +117,54 @@ fn entry(mu: f64, alpha: f64) -> [f64; 2] {
     sum.map(|s| s / f64::from(FACETS))
 }
 
-/// The albedo of one roughness: rows of the table, interpolated once.
+/// The albedo of one roughness, or of two at right angles.
 #[derive(Debug, Clone, Copy)]
 pub struct Albedo {
+    rows: Rows,
+    /// Of the other roughness.
+    across: Option<Rows>,
+    f0: f64,
+    f90: f64,
+}
+
+/// Rows of the table, interpolated once.
+#[derive(Debug, Clone, Copy)]
+struct Rows {
     alpha: f64,
     row: usize,
     share: f64,
-    f0: f64,
-    f90: f64,
+}
+
+impl Rows {
+    fn new(alpha: f64) -> Self {
+        let (row, share) = place::<ROUGHNESSES>(alpha.max(0.0).sqrt().sqrt());
+        Self { alpha, row, share }
+    }
+
+    fn terms(&self, mu: f64) -> [f64; 2] {
+        let (k, part) = place::<OBLIQUITIES>(obliquity(mu.max(0.0), self.alpha));
+        let at = |row: usize, term: usize| {
+            let entry = row * OBLIQUITIES + k;
+            TABLE.entries[entry][term] * (1.0 - part) + TABLE.entries[entry + 1][term] * part
+        };
+        [0, 1].map(|term| {
+            at(self.row, term) * (1.0 - self.share) + at(self.row + 1, term) * self.share
+        })
+    }
+
+    fn mean_terms(&self) -> [f64; 2] {
+        let [own, next] = [self.row, self.row + 1].map(|row| TABLE.means[row]);
+        [0, 1].map(|term| own[term] * (1.0 - self.share) + next[term] * self.share)
+    }
 }
 
 impl Albedo {
     /// Of a sheet with roughness `alpha` (0..=1) and reflectances `f0` face on and `f90` grazing.
     #[must_use]
-    pub fn new(alpha: f64, f0: f64, f90: f64) -> Self {
-        let (row, share) = place::<ROUGHNESSES>(alpha.max(0.0).sqrt().sqrt());
-        Self { alpha, row, share, f0, f90 }
+    pub fn new(alpha: impl Into<Facets>, f0: f64, f90: f64) -> Self {
+        let Facets { x, y } = alpha.into();
+        let across = (x.to_bits() != y.to_bits()).then(|| Rows::new(x));
+        Self { rows: Rows::new(y), across, f0, f90 }
     }
 
     /// For the cosine `mu` of the direction.
@@ -147,22 +184,33 @@ impl Albedo {
         self.f0 * a + self.f90 * b
     }
 
+    /// The albedo for the cosine `mu` of the direction, whose A and B are known; of facets rougher one way than the
+    /// other no less than that of a smooth sheet, which they may exceed both roughnesses' by at grazing
+    /// angles.
+    pub(super) fn bound(&self, terms: [f64; 2], mu: f64) -> f64 {
+        let own = self.of(terms);
+        if self.across.is_none() {
+            return own;
+        }
+        let w = fresnel::schlick_weight(mu.abs());
+        own.max(self.f0 * (1.0 - w) + self.f90 * w)
+    }
+
     /// A and B for the cosine `mu` of the direction. Their sum is what facets of reflectance 1 return.
     pub(super) fn terms(&self, mu: f64) -> [f64; 2] {
-        let (k, part) = place::<OBLIQUITIES>(obliquity(mu.max(0.0), self.alpha));
-        let at = |row: usize, term: usize| {
-            let entry = row * OBLIQUITIES + k;
-            TABLE.entries[entry][term] * (1.0 - part) + TABLE.entries[entry + 1][term] * part
-        };
-        [0, 1].map(|term| {
-            at(self.row, term) * (1.0 - self.share) + at(self.row + 1, term) * self.share
-        })
+        self.larger(|rows| rows.terms(mu))
     }
 
     /// Their means over directions.
     pub(super) fn mean_terms(&self) -> [f64; 2] {
-        let [own, next] = [self.row, self.row + 1].map(|row| TABLE.means[row]);
-        [0, 1].map(|term| own[term] * (1.0 - self.share) + next[term] * self.share)
+        self.larger(Rows::mean_terms)
+    }
+
+    fn larger(&self, terms: impl Fn(&Rows) -> [f64; 2]) -> [f64; 2] {
+        let own = terms(&self.rows);
+        let Some(across) = &self.across else { return own };
+        let [a, b] = terms(across);
+        [own[0].max(a), own[1].max(b)]
     }
 }
 

@@ -6,7 +6,8 @@
 //! `1 − F(h)`, which returns more than falls in at grazing angles; here the base gets what the sheet
 //! leaves on both ways ([`super::albedo`]). `KHR_materials_specular` and `_ior` set the sheet's
 //! reflectances, `KHR_materials_transmission` lets a share of the base through a thin wall. The metal
-//! keeps its energy as [`super::metal`] does.
+//! keeps its energy as [`super::metal`] does. `KHR_materials_anisotropy` makes facets rougher along the
+//! surface than across it, `KHR_materials_sheen` and `_clearcoat` lie over all of it, in this order.
 
 use std::f64::consts::PI;
 
@@ -14,7 +15,9 @@ use etendue_geometry::glam::DVec3;
 
 use super::albedo::Albedo;
 use super::coat::{self, Coat};
+use super::ggx::Facets;
 use super::metal::{deep, mean_reflectance, multiple};
+use super::sheen::{self, Sheen};
 use super::{Weights, fresnel, ggx, mirrored};
 use crate::sampling::cosine_direction;
 
@@ -25,13 +28,17 @@ pub struct Layered {
     pub metallic: f64,
     /// The square of the roughness, 0..=1; at 0 the sheet is a mirror.
     pub alpha: f64,
+    /// The same along the x axis of the shading frame: `alpha` or more.
+    pub along: f64,
     /// The dielectric's reflectance face on, before the highlights' colour.
     pub f0: f64,
     /// Its reflectance at grazing incidence (`specularFactor`).
     pub f90: f64,
     /// Share of the base that is a hole in a thin wall, 0..=1.
     pub transmission: f64,
-    /// A clear coat over all of it.
+    /// A sheen over all of it.
+    pub sheen: Sheen,
+    /// A clear coat over that.
     pub coat: Coat,
 }
 
@@ -71,27 +78,38 @@ pub(super) struct Viewed {
     dielectric_mean: f64,
     pub(super) mean: f64,
     chances: Chances,
+    sheen: Option<sheen::Seen>,
     coat: Option<coat::Seen>,
 }
 
 impl Layered {
     pub(super) fn is_delta(&self) -> bool {
         let matte = (1.0 - self.metallic) * (1.0 - self.transmission);
-        self.alpha == 0.0 && matte == 0.0 && self.coat.share == 0.0
+        self.alpha == 0.0 && matte == 0.0 && self.is_bare()
+    }
+
+    /// Whether neither a sheen nor a coat lies over it.
+    fn is_bare(&self) -> bool {
+        self.coat.share == 0.0 && self.sheen.color == [0.0; 3]
+    }
+
+    fn facets(&self) -> Facets {
+        Facets { x: self.along, y: self.alpha }
     }
 
     /// As seen from `wo`.
     pub(super) fn viewed(&self, wo: DVec3, peaks: &Peaks) -> Viewed {
-        let albedo = Albedo::new(self.alpha, (self.f0 * peaks.highlight).min(1.0), self.f90);
+        let albedo = Albedo::new(self.facets(), (self.f0 * peaks.highlight).min(1.0), self.f90);
         let ([a, b], means) = (albedo.terms(wo.z), albedo.mean_terms());
         let mut viewed = Viewed {
             peaks: *peaks,
             albedo,
-            dielectric: albedo.of([a, b]),
+            dielectric: albedo.bound([a, b], wo.z),
             facets: (a + b).min(1.0),
             dielectric_mean: albedo.of(means),
             mean: (means[0] + means[1]).min(1.0),
             chances: Chances { sheet: 0.0, base: 0.0, through: 0.0 },
+            sheen: self.sheen.seen(wo),
             coat: self.coat.seen(wo),
         };
         viewed.chances = self.chances(&viewed, peaks.base * a + b);
@@ -143,7 +161,7 @@ impl Layered {
             return Weights::default();
         }
         let [a, b] = viewed.albedo.terms(wi.z);
-        let dielectric = viewed.albedo.of([a, b]);
+        let dielectric = viewed.albedo.bound([a, b], wi.z);
         let below = 1.0 - viewed.dielectric_mean;
         let passed = (1.0 - viewed.dielectric).max(0.0) * (1.0 - dielectric).max(0.0);
         let base = if below > 0.0 { share * passed / below * wi.z / PI } else { 0.0 };
@@ -155,6 +173,7 @@ impl Layered {
     /// Value times cosine, and the density of [`Self::sample`].
     pub(super) fn evaluate(&self, wo: DVec3, wi: DVec3, viewed: &Viewed) -> (Weights, f64) {
         let below = self.evaluate_uncoated(wo, wi, viewed);
+        let below = viewed.sheen.map_or(below, |sheen| sheen.over(wo, wi, below));
         viewed.coat.map_or(below, |coat| coat.over(wo, wi, below))
     }
 
@@ -170,7 +189,7 @@ impl Layered {
         let mut weights = self.matte(wi, viewed);
         let mut pdf = chances.base * wi.z / PI;
         if self.alpha > 0.0 {
-            let (value, facets) = ggx::reflection(wo, wi, self.alpha);
+            let (value, facets) = ggx::reflection(wo, wi, self.facets());
             let cosine = (wo + wi).try_normalize().map_or(0.0, |h| wo.dot(h));
             weights = weights.plus(self.sheet(cosine).times(value));
             pdf += chances.sheet * facets;
@@ -182,16 +201,17 @@ impl Layered {
     /// reflection turned to the other side (`KHR_materials_transmission`).
     fn through(&self, wo: DVec3, wi: DVec3, peaks: &Peaks) -> (f64, f64) {
         let turned = DVec3::new(wi.x, wi.y, -wi.z);
-        let (value, pdf) = ggx::reflection(wo, turned, self.alpha);
+        let (value, pdf) = ggx::reflection(wo, turned, self.facets());
         let cosine = (wo + turned).try_normalize().map_or(0.0, |h| wo.dot(h));
         let share = (1.0 - self.metallic) * self.transmission;
         (share * self.passed(cosine, peaks) * value, pdf)
     }
 
-    /// What a smooth wall with its coat lets pass straight.
+    /// What a smooth wall with what lies over it lets pass straight.
     pub(super) fn straight_through(&self, wo: DVec3, peaks: &Peaks) -> Option<Weights> {
         let coat = self.coat.seen(wo).map_or(1.0, |coat| coat.passes(wo));
-        Some(self.straight(wo, peaks)?.times(coat))
+        let sheen = self.sheen.seen(wo).map_or(1.0, |sheen| sheen.passes(wo));
+        Some(self.straight(wo, peaks)?.times(coat * sheen))
     }
 
     fn straight(&self, wo: DVec3, peaks: &Peaks) -> Option<Weights> {
@@ -207,23 +227,28 @@ impl Layered {
         square: [f64; 2],
         viewed: &Viewed,
     ) -> Option<Found> {
-        let Some(coat) = &viewed.coat else {
+        let (sheen, coat) = (&viewed.sheen, &viewed.coat);
+        if sheen.is_none() && coat.is_none() {
             return self.sample_uncoated(wo, choice, square, viewed);
-        };
-        let wi = if choice < coat.returned {
-            coat.sample(wo, square)
-        } else {
-            let choice = (choice - coat.returned) / (1.0 - coat.returned);
-            let below = self.sample_uncoated(wo, choice, square, viewed)?;
-            if below.pdf == f64::INFINITY {
-                let passes = coat.passes(below.wi) / (1.0 - coat.returned);
-                return Some(Found { weights: below.weights.times(passes), ..below });
-            }
-            below.wi
-        };
-        if wi.z == 0.0 || (choice < coat.returned && wi.z < 0.0) {
-            return None;
         }
+        let returned = coat.map_or(0.0, |coat| coat.returned);
+        let fibres = (1.0 - returned) * sheen.map_or(0.0, |sheen| sheen.chance);
+        let wi = match (coat, sheen) {
+            (Some(coat), _) if choice < returned => above(coat.sample(wo, square))?,
+            (_, Some(_)) if choice < returned + fibres => above(sheen::Seen::sample(square))?,
+            _ => {
+                let rest = 1.0 - returned - fibres;
+                let choice = ((choice - returned - fibres) / rest).min(1.0);
+                let below = self.sample_uncoated(wo, choice, square, viewed)?;
+                if below.pdf == f64::INFINITY {
+                    let coat = coat.map_or(1.0, |coat| coat.passes(below.wi));
+                    let sheen = sheen.map_or(1.0, |sheen| sheen.passes(below.wi));
+                    let weights = below.weights.times(coat * sheen / rest);
+                    return Some(Found { weights, ..below });
+                }
+                below.wi
+            }
+        };
         let (weights, pdf) = self.evaluate(wo, wi, viewed);
         (pdf > 0.0).then(|| Found { wi, weights: weights.times(1.0 / pdf), pdf })
     }
@@ -263,7 +288,12 @@ impl Layered {
     }
 
     fn reflected(&self, wo: DVec3, square: [f64; 2]) -> DVec3 {
-        let h = ggx::sample_visible(wo, square, self.alpha);
+        let h = ggx::sample_visible(wo, square, self.facets());
         2.0 * wo.dot(h) * h - wo
     }
+}
+
+/// A direction above the surface.
+fn above(wi: DVec3) -> Option<DVec3> {
+    (wi.z > 0.0).then_some(wi)
 }

@@ -16,6 +16,7 @@ pub mod fresnel;
 pub mod ggx;
 mod layered;
 pub(crate) mod metal;
+mod sheen;
 
 use std::f64::consts::PI;
 
@@ -26,6 +27,7 @@ use crate::Color;
 use crate::sampling::{Frame, cosine_direction};
 pub use coat::Coat;
 pub use layered::Layered;
+pub use sheen::Sheen;
 
 /// A value as multiples of white, the surface's colour and others that follow from it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -40,6 +42,8 @@ pub struct Weights {
     pub dip: f64,
     /// Of the colour of light that met several facets.
     pub deep: f64,
+    /// Of the sheen's colour.
+    pub sheen: f64,
 }
 
 impl Weights {
@@ -68,6 +72,7 @@ impl Weights {
             highlight: self.highlight + other.highlight,
             dip: self.dip + other.dip,
             deep: self.deep + other.deep,
+            sheen: self.sheen + other.sheen,
         }
     }
 
@@ -78,6 +83,7 @@ impl Weights {
             highlight: self.highlight * factor,
             dip: self.dip * factor,
             deep: self.deep * factor,
+            sheen: self.sheen * factor,
         }
     }
 }
@@ -152,9 +158,18 @@ impl Bsdf {
         model: Model,
         [geometric, shading]: [DVec3; 2],
         wo: DVec3,
+        colors: [Color; 2],
+    ) -> Self {
+        Self::turned(model, (geometric, Frame::around(shading)), wo, colors)
+    }
+
+    /// As [`Self::new`], with a frame around the shading normal whose x axis goes along the surface's grain.
+    pub(crate) fn turned(
+        model: Model,
+        (geometric, frame): (DVec3, Frame),
+        wo: DVec3,
         [base, highlight]: [Color; 2],
     ) -> Self {
-        let frame = Frame::around(shading);
         let local = frame.local(wo);
         let (seen, mean) = match model {
             Model::Metal { alpha, .. } if alpha > 0.0 => {
@@ -187,6 +202,14 @@ impl Bsdf {
             Seen::Plain => 1.0,
             Seen::Metal(rough) => rough.mean,
             Seen::Layered(viewed) => viewed.mean,
+        }
+    }
+
+    /// The colour of its sheen.
+    pub(crate) fn sheen(&self) -> Color {
+        match self.model {
+            Model::Layered(layered) => layered.sheen.color,
+            _ => [0.0; 3],
         }
     }
 

@@ -287,5 +287,8 @@ fn in_band(spectral: &Spectral, bsdf: &Bsdf, value: Weights, k: usize) -> f64 {
     if value.deep != 0.0 {
         sum += value.deep * spectral.band(&bsdf.deep, k);
     }
+    if value.sheen != 0.0 {
+        sum += value.sheen * spectral.band(&bsdf.sheen(), k);
+    }
     sum
 }

@@ -42,6 +42,7 @@ fn support(name: &str) -> Option<Support> {
         | "KHR_materials_transmission"
         | "KHR_materials_emissive_strength"
         | "KHR_materials_specular"
+        | "KHR_materials_sheen"
         | "EXT_meshopt_compression"
         | "KHR_meshopt_compression"
         | "KHR_node_visibility"
@@ -55,6 +56,9 @@ fn support(name: &str) -> Option<Support> {
         ),
         "KHR_materials_clearcoat" => {
             Support::As("coats follow the normals of what is beneath them")
+        }
+        "KHR_materials_anisotropy" => {
+            Support::As("the grain follows the texture coordinates, not the tangents of vertices")
         }
         "KHR_materials_volume" => Support::As(
             "surfaces that are clear all over and have a thickness are bodies of glass; light passes \
@@ -83,7 +87,7 @@ pub(super) fn check(
     let mut missing = document.root.extensions_required.iter().filter_map(|name| {
         match support(name) {
             Some(Support::Full | Support::As(_) | Support::Without(_)) => None,
-            // A required look (a sheen, say) changes no geometry.
+            // A required look (a thin film, say) changes no geometry.
             Some(Support::Look) if !wanted.light => None,
             Some(Support::Look) => Some(refused(path, name, UNKNOWN)),
             // Draco's users often keep a plain copy that the primitives name.

@@ -17,7 +17,7 @@ use serde_json::Value;
 
 use super::buffers::{Bytes, data_uri, percent_decoded};
 use super::glossiness::Glossiness;
-use super::{Reader, extensions, volume};
+use super::{Reader, extensions, lobes, volume};
 use crate::import::note::{self, Note, NoteKind};
 use crate::import::{Import, ImportError, Strictness};
 
@@ -295,6 +295,7 @@ fn scattering(
     ] {
         *use_of = placed(key, texture(CLEARCOAT, key).as_ref(), Encoding::Linear)?;
     }
+    lobes::add(images, judge, material, &mut read, import)?;
     volume::body(judge, material, read, import)
 }
 

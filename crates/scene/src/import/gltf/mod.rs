@@ -19,6 +19,7 @@ mod glossiness;
 mod hierarchy;
 mod instancing;
 mod lights;
+mod lobes;
 mod material;
 mod meshopt;
 mod pose;
