@@ -64,6 +64,7 @@ impl SceneFile {
         for import in imports {
             parts.add_import(import);
         }
+        parts.settle_backs(self.spec.cull_backfaces);
         parts.files = instance_files;
         for (index, object) in objects.iter().enumerate() {
             self.check_overrides(&parts, object, index)?;

@@ -59,6 +59,16 @@ impl Parts {
         Self { materials, textures, lights, ..Self::default() }
     }
 
+    /// Leaves out the backs of surfaces that files give one side, or puts them back.
+    pub(crate) fn settle_backs(&mut self, cull: bool) {
+        for material in &mut self.materials {
+            material.one_sided &= cull;
+            if let Some(emission) = material.emission.as_mut().filter(|_| material.one_sided) {
+                emission.two_sided = false;
+            }
+        }
+    }
+
     pub(crate) fn add_import(&mut self, import: Import) {
         self.homes.push(Home {
             placements: import.placements,

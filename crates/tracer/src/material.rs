@@ -24,6 +24,8 @@ pub struct Material {
     pub emission: Option<Emission>,
     /// Where the surface is not there at all.
     pub alpha: Alpha,
+    /// The back is not there: rays from the camera, and those that go on from them, pass where they meet it.
+    pub one_sided: bool,
     /// Tilts of the normal.
     pub normal_map: Option<NormalMap>,
     /// How much of the light from all around reaches the surface.
@@ -274,6 +276,7 @@ impl Material {
             scattering,
             emission: None,
             alpha: Alpha::Opaque,
+            one_sided: false,
             normal_map: None,
             occlusion: None,
         }
@@ -348,7 +351,7 @@ impl Material {
     /// Whether rays may pass the surface as if it were not there.
     #[must_use]
     pub fn has_alpha(&self) -> bool {
-        self.alpha != Alpha::Opaque
+        self.alpha != Alpha::Opaque || self.one_sided
     }
 }
 

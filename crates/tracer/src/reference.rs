@@ -7,6 +7,7 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vertices};
 
 use crate::footprint::mean_of_squares;
+use crate::material::Alpha;
 use crate::{Color, Footprint, Image, Material, NormalKind, Paint, Pixel, Space, TextureUse};
 
 /// The frame that depths and camera-space vectors refer to.
@@ -180,7 +181,7 @@ impl SceneView<'_> {
     /// is not the share that is cut.
     #[must_use]
     pub fn base_color(&self, material: &Material, spot: &SurfacePoint<'_>) -> [f64; 4] {
-        let mut color = if material.has_alpha() {
+        let mut color = if material.alpha != Alpha::Opaque {
             self.paint(&material.base_color, &SurfacePoint { footprint: None, ..*spot })
         } else {
             self.paint(&material.base_color, spot)

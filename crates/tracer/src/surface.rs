@@ -51,6 +51,9 @@ impl<'a> SurfaceInteraction<'a> {
 
     /// Share of the surface that is there.
     pub(crate) fn opacity(&self) -> f64 {
+        if self.material.one_sided && !self.front {
+            return 0.0;
+        }
         match self.material.alpha {
             Alpha::Opaque => 1.0,
             Alpha::Mask { factor, cutoff } => f64::from(u8::from(factor * self.base[3] >= cutoff)),

@@ -291,6 +291,47 @@ fn alpha_cuts_or_thins() {
     }
 }
 
+/// With `cull_backfaces` a square that is not double-sided is there from its front and not from behind, to the camera
+/// and to what it would shade, and shines to its front alone; data have it all the same.
+#[test]
+fn backs_are_left_out_where_the_scene_says_so() {
+    let from = |z: f64, more: &Value| {
+        let mut scene = json!({"cull_backfaces": true, "layers": ["coverage"],
+            "camera": {"type": "orthographic", "height": 1, "sensor": {"resolution": [8, 8]},
+            "pose": {"from": [0, 0, z], "look_at": [0, 0, 0]}}});
+        for (key, value) in more.as_object().into_iter().flatten() {
+            scene[key] = value.clone();
+        }
+        scene
+    };
+    let black = |double_sided: bool| {
+        json!({"doubleSided": double_sided, "emissiveFactor": [0.5, 0.5, 0.5],
+            "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 1,
+                                     "roughnessFactor": 0}})
+    };
+    for (z, double_sided, known) in [(5.0, false, 0.5), (-5.0, false, 1.0), (-5.0, true, 0.5)] {
+        let bench = stage(&black(double_sided), &json!({}), &from(z, &json!({})));
+        assert_shows(&bench, [known; 3], &format!("from {z}, doubleSided {double_sided}"));
+        assert!(bench.array("coverage").iter().all(|share| *share == 1.0));
+    }
+    // A wall of reflectance 0.5 under a sun behind the camera, and the square between both: rays from the wall to the
+    // sun pass its back and not its front.
+    let floor = |turn: f64| {
+        json!({"lights": [{"type": "directional", "direction": [0, 0, 1],
+            "irradiance": [2.0 * PI, 2.0 * PI, 2.0 * PI]}],
+        "objects": [{"file": "m.gltf", "transform": {"rotate": [0, 1, 0, turn], "translate": [0, 0, -6]}},
+            {"shape": "rectangle", "width": 9, "height": 9, "material": "m",
+             "transform": {"rotate": [0, 1, 0, 180]}}],
+        "materials": {"m": {"type": "matte", "color": [0.5, 0.5, 0.5]}}})
+    };
+    let dark = json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1],
+        "metallicFactor": 1, "roughnessFactor": 0}});
+    for (turn, known) in [(0.0, 0.0), (180.0, 1.0)] {
+        let bench = stage(&dark, &json!({}), &from(-5.0, &floor(turn)));
+        assert_shows(&bench, [known; 3], &format!("shadow, turned by {turn}"));
+    }
+}
+
 /// Whatever `doubleSided` says, a surface is there from behind.
 #[test]
 fn surfaces_have_two_sides() {

@@ -30,6 +30,9 @@ pub struct SceneSpec {
     /// Which axis points up in OBJ and PLY files, which do not say; an object's own `up` goes before.
     #[serde(default)]
     pub up: Up,
+    /// Surfaces of glTF models that are not `doubleSided` are not there from behind.
+    #[serde(default)]
+    pub cull_backfaces: bool,
     /// What is in the scene; may be empty.
     #[serde(default)]
     pub objects: Vec<ObjectSpec>,

@@ -44,7 +44,7 @@ pub(super) fn load(reader: &Reader<'_>, import: &mut Import) -> Result<(), Impor
         let material = read(&mut images, &mut Judge { reader, subject }, material, import)?;
         import.materials.push(material);
     }
-    import.materials.push(Material::unnamed());
+    import.materials.push(Material { one_sided: reader.wanted.light, ..Material::unnamed() });
     Ok(())
 }
 
@@ -164,6 +164,9 @@ fn read(
             None => scattering(images, judge, material, import)?,
         };
         read.emission = emission(images, judge, material, import)?;
+        // Who looks out of a body of glass sees the backs of its surfaces.
+        let is_body = matches!(read.scattering, Scattering::Dielectric(_));
+        read.one_sided = !material.double_sided && !is_body;
         read.normal_map = match &material.normal_texture {
             Some(normal) => {
                 let moved = normal.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));
