@@ -1,4 +1,5 @@
-//! Rough boundaries of glass: GGX facets that reflect and refract.
+//! Rough boundaries of glass: GGX facets that reflect and refract, and what they send to one another
+//! ([`super::losses`]).
 //!
 //! # Sources
 //!
@@ -6,22 +7,48 @@
 //!   (half vector), 17 (its Jacobian) and 21 (value).
 //! * Radiance is compressed by the square of the index (Veach 1997, section 5.2.2).
 
+use std::f64::consts::PI;
+
 use etendue_geometry::glam::DVec3;
 
+use super::losses::Lacking;
 use super::{Weights, fresnel, ggx};
+use crate::sampling::cosine_direction;
 
-/// A rough boundary.
+/// A rough boundary, seen from one direction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rough {
     /// The square of the roughness, above 0.
-    pub(super) alpha: f64,
+    alpha: f64,
     /// Index behind the surface over the index in front.
-    pub(super) eta: f64,
+    eta: f64,
+    lacking: Option<Lacking>,
 }
 
 impl Rough {
+    pub(super) fn new(alpha: f64, eta: f64, wo: DVec3) -> Self {
+        Self { alpha, eta, lacking: Lacking::new(alpha, eta, wo.z) }
+    }
+
     /// Value times cosine, and the density of [`Self::sample`]; `wo` is above the surface.
     pub(super) fn evaluate(&self, wo: DVec3, wi: DVec3) -> (Weights, f64) {
+        let (mut weights, mut density) = self.once(wo, wi);
+        if let Some(lacking) = &self.lacking {
+            let cosine = wi.z.abs() / PI;
+            let share = if wi.z > 0.0 {
+                weights.white += lacking.above(wi.z) * cosine;
+                lacking.reflected
+            } else {
+                weights.base += lacking.below(-wi.z) * cosine;
+                1.0 - lacking.reflected
+            };
+            density = (1.0 - lacking.seen) * density + lacking.seen * share * cosine;
+        }
+        (weights, density)
+    }
+
+    /// Of light that met one facet.
+    fn once(&self, wo: DVec3, wi: DVec3) -> (Weights, f64) {
         let black = (Weights::default(), 0.0);
         if wi.z > 0.0 {
             let Some(h) = (wo + wi).try_normalize() else { return black };
@@ -46,8 +73,16 @@ impl Rough {
         (Weights::base(value), density * ggx::masking(wo, self.alpha))
     }
 
-    /// A direction by a visible facet, which reflects or refracts by Fresnel's share.
+    /// A direction: of the matte lobes by what is lacking, or by a visible facet, which reflects or refracts by
+    /// Fresnel's share.
     pub(super) fn sample(&self, wo: DVec3, choice: f64, square: [f64; 2]) -> Option<DVec3> {
+        let lacking = self.lacking.map_or(0.0, |lacking| lacking.seen);
+        if let Some(own) = self.lacking.filter(|own| choice < own.seen) {
+            let up = cosine_direction(square);
+            let reflects = choice < own.seen * own.reflected;
+            return Some(if reflects { up } else { DVec3::new(up.x, up.y, -up.z) });
+        }
+        let choice = (choice - lacking) / (1.0 - lacking);
         let h = ggx::sample_visible(wo, square, self.alpha);
         let cosine = wo.dot(h).clamp(0.0, 1.0);
         let (reflected, behind) = fresnel::dielectric(cosine, self.eta);

@@ -15,6 +15,7 @@ mod coat;
 pub mod fresnel;
 pub mod ggx;
 mod layered;
+mod losses;
 pub(crate) mod metal;
 mod sheen;
 
@@ -137,6 +138,7 @@ pub struct Bsdf {
 enum Seen {
     Plain,
     Metal(metal::Rough),
+    Glass(boundary::Rough),
     Layered(layered::Viewed),
 }
 
@@ -176,6 +178,9 @@ impl Bsdf {
                 let rough = metal::Rough::new(alpha, local);
                 (Seen::Metal(rough), Some(rough.mean))
             }
+            Model::Dielectric { alpha, eta } if alpha > 0.0 => {
+                (Seen::Glass(boundary::Rough::new(alpha, eta, local)), None)
+            }
             Model::Layered(layered) => {
                 let viewed = layered.viewed(local, &peaks([&base, &highlight]));
                 (Seen::Layered(viewed), (layered.metallic > 0.0).then_some(viewed.mean))
@@ -199,7 +204,7 @@ impl Bsdf {
     /// The share of light that facets of reflectance 1 return at once, over all directions.
     pub(crate) fn mean_albedo(&self) -> f64 {
         match self.seen {
-            Seen::Plain => 1.0,
+            Seen::Plain | Seen::Glass(_) => 1.0,
             Seen::Metal(rough) => rough.mean,
             Seen::Layered(viewed) => viewed.mean,
         }
@@ -244,9 +249,7 @@ impl Bsdf {
             (Model::Layered(layered), Seen::Layered(viewed)) => {
                 layered.evaluate(self.wo, local, &viewed)
             }
-            (Model::Dielectric { alpha, eta }, _) if alpha > 0.0 => {
-                boundary::Rough { alpha, eta }.evaluate(self.wo, local)
-            }
+            (_, Seen::Glass(rough)) => rough.evaluate(self.wo, local),
             (Model::Matte, _) if !transmits => (Weights::base(local.z / PI), local.z / PI),
             (_, Seen::Metal(rough)) if !transmits => rough.evaluate(self.wo, local),
             // All of their directions are single rays, or on the other side.
@@ -274,9 +277,9 @@ impl Bsdf {
                 };
                 self.sampled(rough.sample(self.wo, choice, square))
             }
-            Model::Dielectric { alpha: 0.0, eta } => self.boundary(eta, choice),
-            Model::Dielectric { alpha, eta } => {
-                self.sampled(boundary::Rough { alpha, eta }.sample(self.wo, choice, square)?)
+            Model::Dielectric { eta, .. } => {
+                let Seen::Glass(rough) = self.seen else { return self.boundary(eta, choice) };
+                self.sampled(rough.sample(self.wo, choice, square)?)
             }
             Model::Layered(layered) => {
                 let Seen::Layered(viewed) = self.seen else { return None };
@@ -294,9 +297,7 @@ impl Bsdf {
     fn sampled(&self, local: DVec3) -> Option<BsdfSample> {
         let (value, pdf) = match (self.model, self.seen) {
             (_, Seen::Metal(rough)) if local.z > 0.0 => rough.evaluate(self.wo, local),
-            (Model::Dielectric { alpha, eta }, _) => {
-                boundary::Rough { alpha, eta }.evaluate(self.wo, local)
-            }
+            (_, Seen::Glass(rough)) => rough.evaluate(self.wo, local),
             _ => return None,
         };
         if pdf <= 0.0 {
