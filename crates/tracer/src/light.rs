@@ -130,7 +130,7 @@ impl LightKind {
 pub enum EnvironmentImage {
     /// There is none: alike from all sides.
     Constant,
-    /// The one that lights models without a light ([`EnvironmentMap::studio`]).
+    /// The one that lights models without a light ([`crate::EnvironmentMap::studio`]).
     Studio,
     /// A clear sky.
     ClearSky(Box<ClearSky>),
