@@ -7,7 +7,7 @@ export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
 .PHONY: help setup render install view dist test test-embree4 test-window test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-decisions docs-figures docs-charts \
-	docs-stability gallery light-fields fingerprints fuzz-smoke fuzz-seeds clean
+	docs-stability gallery light-fields fingerprints fuzz-smoke fuzz-seeds sanitize clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -37,6 +37,7 @@ help:
 	@echo "make fingerprints  fingerprints of pictures, sensor images and lens tables, to move code without changing them"
 	@echo "make fuzz-smoke    changed inputs for every reader of files, a minute each"
 	@echo "make fuzz-seeds    write the inputs that cargo-fuzz starts from into fuzz/corpus"
+	@echo "make sanitize      the accelerator in pure Rust under the address sanitizer (a nightly compiler)"
 	@echo "make clean         remove target/ and out/"
 
 setup:
@@ -161,6 +162,11 @@ docs-stability: setup
 fingerprints: setup
 	cargo build --release -p etendue-cli
 	scripts/fingerprints.sh target/release/etendue $(BASE)
+
+# The tests of the pure-Rust tree, which has no unsafe code of its own, with every access to memory checked.
+sanitize:
+	EMBREE_DIR=/nonexistent RUSTFLAGS=-Zsanitizer=address cargo +nightly test -p etendue-accel \
+		--no-default-features --tests --target $(shell rustc -vV | sed -n 's/host: //p') --target-dir target/sanitize
 
 clean:
 	rm -rf target out
