@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-decisions docs-figures docs-charts \
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-decisions docs-figures docs-charts \
 	docs-stability gallery light-fields fingerprints fuzz-smoke fuzz-seeds sanitize clean
 
 help:
@@ -16,6 +16,7 @@ help:
 	@echo "make view          a window onto scenes/first-light.json; SCENE=… for another scene or model"
 	@echo "make test-window   drive a real window on a screen in memory (Xvfb)"
 	@echo "make test-slurm    run the jobs of scenes/cluster on a Slurm of one node, made for it"
+	@echo "make test-denoise  run the tests of render --denoise with Open Image Denoise from PyPI"
 	@echo "make python        build the Python package's wheel and test it in a fresh venv"
 	@echo "make install       install the command below PREFIX, /usr/local when it is not given"
 	@echo "make dist          a tarball, a .deb and a wheel in out/dist, tried in bare Debian 12 and 13 roots"
@@ -77,6 +78,10 @@ dist: setup
 
 test-embree4: setup
 	@scripts/test-embree4.sh
+
+test-denoise: setup
+	@scripts/setup.sh test
+	ETENDUE_OIDN="$$(scripts/oidn.sh)" cargo test -p etendue-cli --test cli denoise
 
 test-slurm: setup
 	@scripts/test-slurm.sh

@@ -66,5 +66,9 @@ IMAGES=target/light-field-images scripts/light-fields.sh --samples 32 --quiet
 step "window"
 scripts/test-window.sh
 
+step "Open Image Denoise, for the tests that denoise"
+ETENDUE_OIDN=$(scripts/oidn.sh)
+export ETENDUE_OIDN
+
 step "tests"
 run_tests --workspace --features etendue-cli/window

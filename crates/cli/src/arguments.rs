@@ -76,7 +76,8 @@ Files in the folder:
   layers.exr         every layer, Layer.Channel, 32-bit float
   NAME.npy           each layer as an array for numpy, 64-bit float where it is data
   picture.png        the picture, 8 bits, sRGB; render.exposure (stops, or auto), render.tone_map
-                     (none, agx, aces) and render.alpha say how it shows the light
+                     (none, agx, aces) and render.alpha say how it shows the light; with --denoise
+                     it shows the layer Denoised
   id_object.png, …   masks of ids, 16 bits: the numbers themselves
   NAME.preview.png   each layer to look at; not data
   camera.json        K, distortion and pose in OpenCV's convention
@@ -245,6 +246,12 @@ pub(crate) struct RenderArguments {
     /// (masks with a palette) are there, too
     #[arg(long, value_name = "LIST", default_value = "exr,png,npy,dng")]
     pub(crate) outputs: String,
+    /// Take the noise out of the picture of a tracer of light, by Intel's Open Image Denoise, which is to be
+    /// installed (`pip install pyoidn`; the environment variable `ETENDUE_OIDN` names its library): the layer
+    /// Denoised, which picture.png shows. The picture in EXR and NPY, and what a sensor makes of it (raw
+    /// files, exposures), keep their noise: those are data
+    #[arg(long)]
+    pub(crate) denoise: bool,
     /// Threads of build and render; 0 takes all that this process may use
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse::threads)]
     pub(crate) threads: usize,

@@ -29,6 +29,7 @@ pub(crate) fn carry_out(
     stop::listen();
     let outputs = Outputs::from_list(&arguments.outputs)
         .map_err(|message| Fault::refused(format!("--outputs: {message}")))?;
+    let outputs = Outputs { denoised: arguments.denoise, ..outputs };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads)
         .build()

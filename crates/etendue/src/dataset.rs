@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use etendue_camera::{CameraFile, Convention, PixelOrigin, ProjectionName};
 use etendue_geometry::glam::{DMat3, DQuat};
+use etendue_render::denoise::DENOISED;
 use etendue_render::output::conventions::{KITTI_DEPTH, TUM_DEPTH};
 use etendue_render::output::{Outputs, SOFTWARE, sidecar, write_whole};
 use etendue_scene::file::SamplesSpec;
@@ -219,6 +220,7 @@ fn layer_files(
         true => vec![String::new()],
         false => layer.row().names_in_files(),
     });
+    let names = names.chain(outputs.denoised.then(|| DENOISED.to_owned()));
     let endings = |name: String| {
         let files = rendering::layer_files(&name, outputs).into_iter().filter_map(|file| {
             let ending = file.split_once('.')?.1.to_owned();

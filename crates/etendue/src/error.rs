@@ -71,6 +71,7 @@ impl Error {
             Self::Scene(_) | Self::Refused(_) => true,
             Self::Render(error) => match error {
                 RenderError::Picture(error) => is_want_of_memory(error),
+                RenderError::Denoise(error) => error.is_refused(),
                 _ => true,
             },
             // Whether it can be written to was asked before: the disk is full, or the folder gone.

@@ -54,6 +54,7 @@
 //! | [`Frame`], [`Dataset`] | the pictures of a scene that has `frames`, and what others read of them |
 //! | [`Shard`], [`Shares`], [`Checkpoint`] | renders that are divided over machines, or interrupted |
 //! | [`TimeForecast`], [`Calibration`] | how long a render will take, by what this machine takes for a ray |
+//! | [`Denoiser`] | Open Image Denoise, where its library is there |
 //! | [`Progress`] | how far work is, and how it is stopped |
 //! | [`Error`] | why something could not be done, in a sentence |
 //! | [`places`] | where results go |
@@ -85,6 +86,7 @@ mod words;
 
 pub use dataset::Dataset;
 pub use error::Error;
+pub use etendue_oidn::{Denoiser, OidnError};
 pub use etendue_render::light_field::LightFieldViews;
 pub use etendue_render::output::{
     Channel, DistanceScale, Layer, Look, Outputs, Picture, Screen, Values,

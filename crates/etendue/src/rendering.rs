@@ -5,6 +5,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_accel::Accel;
+use etendue_oidn::Denoiser;
+use etendue_render::denoise::{self, DENOISED};
 use etendue_render::expose::{self, BandFilm, SensorLight};
 use etendue_render::light_field::{self, LightFieldSet};
 use etendue_render::output::conventions::Manner;
@@ -61,6 +63,28 @@ impl Rendering {
             Err(notes) => (None, notes),
         };
         Ok(Self { scene, picture, light, idle_notes, report, traced, fingerprints })
+    }
+
+    /// The same with the picture's noise taken out: beside the picture, which stays as it is, stands the
+    /// layer `Denoised`, and `picture.png` shows it. What the sensor makes of the light keeps its noise. The
+    /// layers `MeanAlbedo` and `MeanNormal`, where there are both, keep edges and patterns sharp.
+    ///
+    /// # Errors
+    ///
+    /// When the picture is no light in red, green and blue, there is too little memory, or the library fails.
+    pub fn denoised(mut self, denoiser: &Denoiser) -> Result<Self, Error> {
+        let start = Instant::now();
+        self.picture = denoise::denoised(self.picture, denoiser)?;
+        self.fingerprints.push(denoise::fingerprint());
+        let took = seconds(start.elapsed());
+        self.report.seconds.total += took;
+        self.report.layers.push(DENOISED.to_owned());
+        self.report.notes.push(format!(
+            "picture.png shows the layer {DENOISED}, by Open Image Denoise {} in {took:.2} s; the picture in \
+             EXR and NPY has its noise",
+            denoiser.version()
+        ));
+        Ok(self)
     }
 
     /// The scene as it was rendered.
@@ -256,7 +280,8 @@ impl Rendering {
                 return Err(RenderError::Stopped.into());
             }
             let [image, array] = image_and_array(&layer.name);
-            if outputs.png {
+            // The picture's PNG shows what is denoised.
+            if outputs.png && layer.name != DENOISED {
                 let bits = match layer.look {
                     Look::Distance => png::Bits::Sixteen,
                     _ => png::Bits::Eight,
@@ -348,7 +373,7 @@ pub(crate) fn certain_files(
 pub(crate) fn layer_files(layer: &str, outputs: Outputs) -> Vec<String> {
     let [image, array] = image_and_array(layer);
     let mask = (outputs.png && has_mask(layer), mask_of(layer));
-    let files = [(outputs.png, image), (outputs.npy, array), mask];
+    let files = [(outputs.png && layer != DENOISED, image), (outputs.npy, array), mask];
     let files = files.into_iter().filter_map(|(wanted, name)| wanted.then_some(name));
     files.chain(Manner::of(layer, outputs).map(|manner| in_manner(layer, manner))).collect()
 }

@@ -9,8 +9,9 @@ use std::sync::Arc;
 
 use etendue_accel::Accel;
 use etendue_geometry::Mesh;
+use etendue_oidn::Denoiser;
 use etendue_render::output::conventions::Manner;
-use etendue_render::{Checkpoint, Images, Plan, Seconds};
+use etendue_render::{Checkpoint, Images, Plan, Seconds, denoise};
 use etendue_scene::file::{FileKind, FramesSpec, SceneFile};
 use etendue_scene::{Cache, Frame, Scene, SceneError, Start};
 use serde_json::Value;
@@ -48,6 +49,8 @@ pub struct Session {
     seconds: Seconds,
     /// Where what there is of a render is kept.
     checkpoint: Option<Checkpoint>,
+    /// What takes the noise out of pictures, once it was asked for.
+    denoiser: Option<Denoiser>,
 }
 
 /// A scene, the structure over it, and its images.
@@ -141,6 +144,7 @@ impl Session {
             settings: Vec::new(),
             seconds: Seconds::default(),
             checkpoint: None,
+            denoiser: None,
         }
     }
 
@@ -304,7 +308,8 @@ impl Session {
         self.load(progress)?;
         let outputs = self.options.outputs;
         let Loaded { scene, plan, neighbours, .. } = self.loaded()?;
-        let prints = fingerprints(scene, neighbours)?;
+        let mut prints = fingerprints(scene, neighbours)?;
+        prints.extend(outputs.denoised.then(denoise::fingerprint));
         let mut files = certain_files(plan.names(scene), outputs);
         files.extend(scene.sensor.as_ref().map(|_| "sensor.json".to_owned()));
         Ok(pattern.is_complete(out, number, &prints, &files))

@@ -1,6 +1,7 @@
 //! Why a render comes to nothing.
 
 use etendue_accel::BuildError;
+use etendue_oidn::OidnError;
 use etendue_tracer::texture::ImageError;
 
 use crate::film::NoMemory;
@@ -78,6 +79,12 @@ pub enum RenderError {
     /// Shares of a render do not make a whole.
     #[error("{0}")]
     Shares(String),
+    /// The picture has no noise that could be taken away.
+    #[error("{0}")]
+    NotDenoised(String),
+    /// Open Image Denoise is not there, or failed.
+    #[error("--denoise: {0}")]
+    Denoise(#[from] OidnError),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,

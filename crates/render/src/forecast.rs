@@ -10,7 +10,7 @@ use crate::film::bytes_of_plane;
 use crate::images::{environment, wanted_images};
 use crate::output::Outputs;
 use crate::samples::BYTES_OF_SUM;
-use crate::{Plan, expose};
+use crate::{Plan, denoise, expose};
 
 const F32: u64 = size_of::<f32>() as u64;
 const U16: u64 = size_of::<u16>() as u64;
@@ -37,6 +37,7 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
     let is_gone_over = plan.passes.len() > 1;
     let look = if is_gone_over && outputs.png { picture + woven + PNG } else { 0 };
     let png = if outputs.png { PNG } else { 0 };
+    let denoised = if plan.denoised { denoise::BYTES } else { 0 };
     let sensor = scene.sensor.as_ref().filter(|_| scene.picture.is_some());
     let sensor = sensor.map_or(0, |sensor| bytes_of_sensor(scene, sensor, plan));
     let film = plan.layers.iter().map(|layer| bytes_of_layer(*layer, plan)).sum();
@@ -45,7 +46,7 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
         film: each(film),
         sums: each(bytes_of_sums(plan)),
         sensor: each(if sensor > 0 { sensor.max(woven) } else { 0 }),
-        files: each(look.max(png).max(if sensor > 0 { 0 } else { woven })),
+        files: each(look.max(png + denoised).max(if sensor > 0 { 0 } else { woven })),
         views: views(scene, plan, outputs),
         ..MemoryForecast::of(scene)
     }

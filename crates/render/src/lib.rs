@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`plan`] | what a scene needs, decided in one place, with reasons |
 //! | [`render`](mod@render) | build, decode, trace: from a loaded scene to a picture |
+//! | [`denoise`] | the picture without its noise, by Open Image Denoise |
 //! | [`expose`] | what the camera's sensor makes of the light |
 //! | [`light_field`] | what a light-field camera leaves beside its picture |
 //! | [`output`] | the named layers of a render, and EXR, PNG, NPY and JSON files of them |
@@ -15,6 +16,7 @@
 
 mod adaptive;
 mod checkpoint;
+pub mod denoise;
 mod error;
 pub mod expose;
 mod film;

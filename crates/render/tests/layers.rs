@@ -68,3 +68,28 @@ fn the_incidence_on_a_wall_is_the_field_angle_and_a_miss_is_infinite() {
     }
     assert!(hits > 100 && misses > 100, "{hits} {misses}");
 }
+
+#[test]
+fn guides_of_denoisers_are_means_over_the_samples_of_the_picture() {
+    // A pixel of which half shows a matte wall, and half a mirror that is turned by 60°.
+    let channels = layers(
+        r#"{"etendue": 1, "tracer": {"type": "direct"}, "layers": ["mean_albedo", "mean_normal"],
+            "render": {"samples": 256},
+            "camera": {"type": "orthographic", "height": 1,
+                "pose": {"from": [0, 0, 9], "look_at": [0, 0, 0]},
+                "sensor": {"resolution": [1, 1]}},
+            "materials": {"wall": {"type": "matte", "color": [0.2, 0.4, 0.6]},
+                "mirror": {"type": "mirror", "color": [0.9, 0.9, 0.9]}},
+            "objects": [{"shape": "rectangle", "width": 0.5, "height": 9, "material": "wall",
+                    "transform": {"translate": [-0.25, 0, 0]}},
+                {"shape": "rectangle", "width": 1, "height": 9, "material": "mirror",
+                    "transform": {"rotate": [0, 1, 0, 60], "translate": [0.25, 0, 0]}}]}"#,
+    );
+    let guides: Vec<f64> = channels[3..].iter().map(|channel| channel[0]).collect();
+    let sine = 60.0_f64.to_radians().sin();
+    let expected = [0.6, 0.7, 0.8, 0.5 * sine, 0.0, 0.75];
+    for (found, expected) in guides.iter().zip(expected) {
+        // Of 256 stratified samples one may lie on the other side of the middle.
+        assert!((found - expected).abs() <= 1.0 / 256.0 + 1e-6, "{guides:?}");
+    }
+}

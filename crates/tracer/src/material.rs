@@ -78,6 +78,15 @@ impl Scattering {
         }
     }
 
+    /// Whether it is made to show other surfaces, mirrored or through it.
+    #[must_use]
+    pub fn shows_others(&self) -> bool {
+        match self {
+            Self::Mirror | Self::Metal { .. } | Self::Dielectric(_) => true,
+            Self::Black | Self::Matte | Self::Unlit | Self::Gltf(_) => false,
+        }
+    }
+
     /// The glTF surface, of one.
     #[must_use]
     pub fn gltf(&self) -> Option<&GltfSurface> {

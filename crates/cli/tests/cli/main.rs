@@ -4,6 +4,7 @@ mod assets; // real models from outside the repository
 mod bad_input; // refused with exit code 2, one message, and nothing written
 mod bad_light; // materials, textures and lights that make no sense
 mod bench; // speed against accuracy on a tiny scene
+mod denoise; // pictures without their noise, where Open Image Denoise is there
 mod emva; // the characterisation of what the command writes
 mod exposures; // what a scene's sensor makes of a render
 mod figures; // models with skins, in the pose of their file

@@ -30,9 +30,15 @@ impl Bench {
 
     /// Runs `etendue` in the folder.
     pub(crate) fn run(&self, arguments: &[&str]) -> Output {
+        self.run_in(arguments, &[])
+    }
+
+    /// Runs `etendue` in the folder, with more in its environment.
+    pub(crate) fn run_in(&self, arguments: &[&str], environment: &[(&str, &str)]) -> Output {
         Command::new(env!("CARGO_BIN_EXE_etendue"))
             .args(arguments)
             .current_dir(self.folder.path())
+            .envs(environment.iter().copied())
             // What is measured of the machine is not left at home.
             .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
             .output()

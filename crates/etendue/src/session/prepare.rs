@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_render::output::Outputs;
-use etendue_render::{Plan, plan};
+use etendue_render::{Plan, denoise, plan};
 use etendue_scene::escape::one_line;
 use etendue_scene::file::SceneFile;
 use etendue_scene::memory::Budget;
@@ -48,6 +48,9 @@ impl Session {
         let mut scene = self.load_file(self.file(), progress)?;
         neighbours::refuse_views(&scene)?;
         neighbours::leave_out(&mut scene, &neighbours);
+        if self.options.outputs.denoised {
+            denoise::guide(&mut scene)?;
+        }
         let notes: Vec<String> = scene.notes.iter().map(in_words).collect();
         notes.iter().for_each(|note| progress.note(note));
         let plan = Plan::new(&scene, self.options.outputs);

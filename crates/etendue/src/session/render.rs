@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use etendue_accel::Accel;
+use etendue_oidn::Denoiser;
 use etendue_render::output::{ImageHash, Layer, SOFTWARE};
 use etendue_render::report::memory;
 use etendue_render::{
@@ -27,6 +28,7 @@ impl Session {
     /// As [`Self::prepare`], and when it is stopped before.
     pub fn render(&mut self, progress: &Progress) -> Result<Rendering, Error> {
         let clock = self.clock();
+        self.open_denoiser(progress)?;
         let film = self.trace(None, &[], progress)?;
         self.conclude(film, clock, progress)
     }
@@ -61,6 +63,7 @@ impl Session {
     /// As [`Self::scene_and_accel`]; when a share is missing, given twice, or of another render.
     pub fn merge(&mut self, shares: &Shares, progress: &Progress) -> Result<Rendering, Error> {
         let clock = self.clock();
+        self.open_denoiser(progress)?;
         self.prepare(progress)?;
         let film = if shares.are_of_samples() {
             self.trace(None, &shares.files, progress)?
@@ -159,7 +162,26 @@ impl Session {
         let traced = structure
             .filter(|_| scene.camera.light_field().is_some())
             .map(|accel| (accel, Arc::clone(&self.images)));
-        Rendering::new(scene, (picture, band_film), traced, (report, fingerprints))
+        let rendering =
+            Rendering::new(scene, (picture, band_film), traced, (report, fingerprints))?;
+        match &self.denoiser {
+            Some(denoiser) => {
+                let rendering = rendering.denoised(denoiser)?;
+                rendering.notes().last().into_iter().for_each(|note| progress.note(note));
+                Ok(rendering)
+            }
+            None => Ok(rendering),
+        }
+    }
+
+    /// Finds what takes the noise out of the picture, where that is wanted: before hours are spent on it.
+    fn open_denoiser(&mut self, progress: &Progress) -> Result<(), Error> {
+        self.load(progress)?;
+        if self.options.outputs.denoised && self.denoiser.is_none() {
+            let denoiser = Denoiser::open(rayon::current_num_threads());
+            self.denoiser = Some(denoiser.map_err(RenderError::from)?);
+        }
+        Ok(())
     }
 
     fn report(

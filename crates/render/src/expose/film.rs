@@ -119,8 +119,12 @@ pub(super) fn light_factor(scene: &Scene, sensor: &Sensor) -> f64 {
 
 /// The planes of a picture's linear sRGB.
 pub(super) fn colors(layers: &[Layer]) -> Option<[&[f32]; 3]> {
-    let root = layers.iter().find(|layer| layer.name.is_empty())?;
-    match root.channels.as_slice() {
+    three_planes(layers.iter().find(|layer| layer.name.is_empty())?)
+}
+
+/// The planes of a layer of three channels in f32.
+pub(crate) fn three_planes(layer: &Layer) -> Option<[&[f32]; 3]> {
+    match layer.channels.as_slice() {
         [r, g, b] => match (&r.values, &g.values, &b.values) {
             (Values::F32(r), Values::F32(g), Values::F32(b)) => Some([r, g, b]),
             _ => None,

@@ -28,7 +28,7 @@ use etendue_spectrum::Bands;
 
 pub(crate) use bands::{bands, explain_bands};
 pub use film::BandFilm;
-pub(crate) use film::{SPECTRUM, has_spectrum, spectrum};
+pub(crate) use film::{SPECTRUM, has_spectrum, spectrum, three_planes};
 pub(crate) use noise::NoiseOfPixels;
 
 use crate::film::NoMemory;

@@ -19,6 +19,9 @@ pub struct Outputs {
     pub flo: bool,
     /// Numbers of things as PNG with a palette.
     pub indexed: bool,
+    /// The picture without its noise, as a layer beside it and as the picture's PNG: see
+    /// [`crate::denoise`].
+    pub denoised: bool,
 }
 
 impl Outputs {
@@ -32,6 +35,7 @@ impl Outputs {
         kitti: false,
         flo: false,
         indexed: false,
+        denoised: false,
     };
 
     /// All but what only single benchmarks read.

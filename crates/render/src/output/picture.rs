@@ -264,7 +264,7 @@ impl Picture {
     }
 
     /// All tables of names, by the layers' names.
-    pub(super) fn all_names(&self) -> &[(String, Value)] {
+    pub(crate) fn all_names(&self) -> &[(String, Value)] {
         &self.names
     }
 

@@ -15,9 +15,11 @@ use ::png::{BitDepth, ColorType, EncodingError, Info, SrgbRenderingIntent};
 pub use super::look::Bits;
 use super::look::{Channels, Shown, mask, palette, show};
 use super::{Layer, Look, OutputError, PartFile, Picture, SOFTWARE};
+use crate::denoise::DENOISED;
 use crate::film::check_room;
 
-/// Writes the layer called `name` (empty for the picture itself) to `path`. `bits` is the depth of
+/// Writes the layer called `name` (empty for the picture itself, or for what it is without its noise where
+/// that is there) to `path`. `bits` is the depth of
 /// a preview; a sensor's digital numbers take the depth they need.
 ///
 /// # Errors
@@ -26,6 +28,8 @@ use crate::film::check_room;
 /// be written.
 pub fn write(path: &Path, picture: &Picture, name: &str, bits: Bits) -> Result<(), OutputError> {
     let layer = picture.require(name)?;
+    let denoised = picture.layer(DENOISED).filter(|_| name.is_empty());
+    let layer = denoised.unwrap_or(layer);
     let shown = match (layer.look, name) {
         (Look::Color, "") => picture.development().show(picture, layer, bits)?,
         _ => show(layer, bits)?,

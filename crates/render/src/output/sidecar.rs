@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 use serde_json::Value;
 
 use super::{OutputError, Picture, SOFTWARE, write_whole};
+use crate::denoise::DENOISED;
 
 /// Names and texts as a JSON object, in their own order; a text that is an object in JSON is that object.
 #[derive(Debug)]
@@ -67,10 +68,19 @@ pub fn write(path: &Path, picture: &Picture) -> Result<(), OutputError> {
         height: picture.height(),
         rows: "row 0 is the top, pixels run from left to right",
         header: Entries(picture.header()),
-        picture_png: picture.layer("").map(|_| picture.development().in_json()),
+        picture_png: picture.layer("").map(|_| picture_png(picture)),
         layers: layers.collect(),
     };
     write_json(path, &description)
+}
+
+/// What `picture.png` shows, and how.
+fn picture_png(picture: &Picture) -> Value {
+    let mut png = picture.development().in_json();
+    if let Some(layer) = picture.layer(DENOISED) {
+        png["layer"] = layer.title().into();
+    }
+    png
 }
 
 /// Writes `value` to `path` as indented JSON: reports, camera files and the like.

@@ -14,6 +14,7 @@ use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Needs, TextureScope};
 
 pub use self::words::Decision;
+use crate::denoise::DENOISED;
 use crate::expose;
 use crate::film::Precision;
 use crate::forecast::forecast;
@@ -72,6 +73,8 @@ pub struct Plan {
     pub precision: Precision,
     /// How precisely paths of light hit.
     pub light_precision: HitPrecision,
+    /// Whether the picture is denoised.
+    pub denoised: bool,
     /// What the numbers are that the picture's light is kept in.
     pub bands: Bands,
     /// What it will take, by counts and headers alone: within 1.5 of the peak of the example scenes.
@@ -163,6 +166,7 @@ impl Plan {
             refine: scene.plan.refine != Some(false),
             precision,
             light_precision,
+            denoised: outputs.denoised,
             bands: chosen.bands.clone(),
             memory: MemoryForecast::default(),
             decisions: Vec::new(),
@@ -180,7 +184,8 @@ impl Plan {
             false => layer.row().names_in_files(),
         };
         let spectrum = expose::has_spectrum(scene).then(|| expose::SPECTRUM.to_owned());
-        self.layers.iter().flat_map(names).chain(spectrum).collect()
+        let denoised = self.denoised.then(|| DENOISED.to_owned());
+        self.layers.iter().flat_map(names).chain(spectrum).chain(denoised).collect()
     }
 }
 

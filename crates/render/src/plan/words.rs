@@ -104,7 +104,9 @@ impl Plan {
         if let Some((choice, because)) = expose::explain_sensor(scene) {
             decide("sensor", &choice, because);
         }
-        for (what, choice, because) in self.explain_lens(scene) {
+        for (what, choice, because) in
+            self.explain_denoising().into_iter().chain(self.explain_lens(scene))
+        {
             decide(what, choice, because);
         }
         let (choice, because) = light_words(scene, needs);
@@ -261,6 +263,13 @@ impl Plan {
             decisions.push(("texture filter", choice, reason));
         }
         decisions
+    }
+
+    /// What becomes of the picture's noise, where something does.
+    fn explain_denoising(&self) -> Option<(&'static str, &'static str, String)> {
+        let because = "--denoise: by Open Image Denoise, which is guided by the layers MeanAlbedo and \
+                       MeanNormal; the picture and the sensor's images keep their noise";
+        self.denoised.then(|| ("denoising", "a layer beside the picture", because.to_owned()))
     }
 
     /// How wavelengths and the pupil of the camera's lens are sampled.

@@ -107,6 +107,17 @@ impl Seen<'_> {
         self.colors(|i| self.scene.albedo(self.traced.hits, i), out);
     }
 
+    /// Base colours over the footprint of each ray, and 1 where a surface shows others; misses are black.
+    pub(super) fn guiding_albedos(&self, out: &mut Columns) {
+        self.flats(out);
+        for (run, placement) in self.scene.runs(self.traced.hits) {
+            let material = self.scene.materials.get(placement.material as usize);
+            if material.is_some_and(|material| material.scattering.shows_others()) {
+                out[..3].iter_mut().for_each(|column| column[run.clone()].fill(1.0));
+            }
+        }
+    }
+
     /// 1 where a ray hits something, 1 for every ray, and 0: of weighted sums, the first is a share of
     /// the second. A lens that lets less through in the corners of the picture does not make them
     /// transparent.

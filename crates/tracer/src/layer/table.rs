@@ -263,6 +263,41 @@ layers! {
             ..colour("Albedo")
         }, |seen, out| seen.albedos(out);
 
+        /// `MeanAlbedo.R G B`: colour of the first surfaces, mean over the picture's samples.
+        MeanAlbedo = "mean_albedo": Layer {
+            taken: Taken::PictureSamples,
+            needs: BASE_COLOUR,
+            meaning: vec![
+                (
+                    "definition",
+                    "base colour of what is hit first, 1 of mirrors, metals and glass, mean over the \
+                     picture's samples, weighted as they are: a guide for denoisers",
+                ),
+                LINEAR,
+                ("miss", "0 0 0"),
+            ],
+            ..colour("MeanAlbedo")
+        }, |seen, out| seen.guiding_albedos(out);
+
+        /// `MeanNormal.X Y Z`: shading normals of the first surfaces, mean over the picture's samples.
+        MeanNormal = "mean_normal": Layer {
+            kept: Kept::Shown,
+            taken: Taken::PictureSamples,
+            needs: Needs { normals: true, ..SURFACE },
+            meaning: vec![
+                (
+                    "definition",
+                    "shading normal of what is hit first, mean over the picture's samples, weighted as they \
+                     are, and so no longer of length 1: a guide for denoisers; where a lens parts colours, x \
+                     goes the way of red, y of green and z of blue",
+                ),
+                ("unit", "1"),
+                frame(Space::World),
+                ("miss", "0 0 0"),
+            ],
+            ..measured("MeanNormal", &["X", "Y", "Z"], Look::Direction)
+        }, |seen, out| seen.normals(Space::World, NormalKind::Shading, out);
+
         /// `Uv.U V`: texture coordinates of the first set.
         Uv = "uv": Layer {
             needs: Needs { uvs: true, ..SURFACE },

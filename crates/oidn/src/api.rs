@@ -1,0 +1,76 @@
+//! The calls of `oidn.h` that are made: those of versions 1.4 and 2, which differ in names alone.
+
+use std::ffi::{c_char, c_int, c_void};
+
+use libloading::{Error, Library};
+
+/// A device or a filter of the library.
+type Handle = *mut c_void;
+
+/// Functions of the library, which stays loaded.
+pub(crate) struct Api {
+    pub(crate) new_device: unsafe extern "C" fn(c_int) -> Handle,
+    pub(crate) set_device_int: unsafe extern "C" fn(Handle, *const c_char, c_int),
+    pub(crate) set_device_bool: unsafe extern "C" fn(Handle, *const c_char, bool),
+    pub(crate) device_int: unsafe extern "C" fn(Handle, *const c_char) -> c_int,
+    pub(crate) commit_device: unsafe extern "C" fn(Handle),
+    pub(crate) device_error: unsafe extern "C" fn(Handle, *mut *const c_char) -> c_int,
+    pub(crate) release_device: unsafe extern "C" fn(Handle),
+    pub(crate) new_filter: unsafe extern "C" fn(Handle, *const c_char) -> Handle,
+    /// Filter, name, values, format, columns, rows, and in bytes: offset, strides of pixels and rows.
+    pub(crate) set_image: unsafe extern "C" fn(
+        Handle,
+        *const c_char,
+        *mut c_void,
+        c_int,
+        usize,
+        usize,
+        usize,
+        usize,
+        usize,
+    ),
+    pub(crate) set_filter_bool: unsafe extern "C" fn(Handle, *const c_char, bool),
+    pub(crate) commit_filter: unsafe extern "C" fn(Handle),
+    pub(crate) execute_filter: unsafe extern "C" fn(Handle),
+    pub(crate) release_filter: unsafe extern "C" fn(Handle),
+}
+
+impl Api {
+    /// The functions of a library.
+    ///
+    /// # Safety
+    ///
+    /// The library must be Open Image Denoise, and stay loaded.
+    pub(crate) unsafe fn of(library: &Library) -> Result<Self, Error> {
+        // SAFETY: the caller says that it is the library whose header gives these names their types.
+        unsafe {
+            Ok(Self {
+                new_device: function(library, &["oidnNewDevice"])?,
+                set_device_int: function(library, &["oidnSetDeviceInt", "oidnSetDevice1i"])?,
+                set_device_bool: function(library, &["oidnSetDeviceBool", "oidnSetDevice1b"])?,
+                device_int: function(library, &["oidnGetDeviceInt", "oidnGetDevice1i"])?,
+                commit_device: function(library, &["oidnCommitDevice"])?,
+                device_error: function(library, &["oidnGetDeviceError"])?,
+                release_device: function(library, &["oidnReleaseDevice"])?,
+                new_filter: function(library, &["oidnNewFilter"])?,
+                set_image: function(library, &["oidnSetSharedFilterImage"])?,
+                set_filter_bool: function(library, &["oidnSetFilterBool", "oidnSetFilter1b"])?,
+                commit_filter: function(library, &["oidnCommitFilter"])?,
+                execute_filter: function(library, &["oidnExecuteFilter"])?,
+                release_filter: function(library, &["oidnReleaseFilter"])?,
+            })
+        }
+    }
+}
+
+/// The function that goes by the first of these names which the library has.
+///
+/// # Safety
+///
+/// It must be of type `T`.
+unsafe fn function<T: Copy>(library: &Library, names: &[&str]) -> Result<T, Error> {
+    // SAFETY: the caller answers for the type.
+    let found = |name: &&str| unsafe { library.get::<T>(name.as_bytes()) }.map(|symbol| *symbol);
+    let [first, others @ ..] = names else { return Err(Error::DlSymUnknown) };
+    others.iter().fold(found(first), |before, name| before.or_else(|_| found(name)))
+}
