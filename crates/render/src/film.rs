@@ -143,7 +143,7 @@ pub(crate) struct StripLayer<'a> {
 }
 
 impl FilmLayer {
-    /// An empty layer; the picture of a tracer of light has a plane for each of `bands`. `Err` when there
+    /// An empty layer; light has a plane for each of `bands`. `Err` when there
     /// is no memory for it.
     pub(crate) fn new(
         spec: LayerSpec,
@@ -160,7 +160,7 @@ impl FilmLayer {
             })
         };
         let names: Vec<String> = match spec {
-            LayerSpec::Radiance => bands.names(),
+            _ if spec.is_light() => bands.names(),
             // Dots part the names of layers and channels in files.
             LayerSpec::Variance => {
                 bands.names().iter().map(|name| name.replace('.', "_")).collect()
@@ -171,10 +171,10 @@ impl FilmLayer {
         Ok(Self { spec, row, names, planes })
     }
 
-    /// Takes the light of a tracer out of its bands, whose place red, green and blue take; `None`
-    /// when they are the bands already.
+    /// Takes light out of its bands, whose place red, green and blue take; `None` when they are the bands
+    /// already.
     pub(crate) fn take_bands(&mut self, bands: &Bands) -> Result<Option<BandFilm>, NoMemory> {
-        if self.spec != LayerSpec::Radiance || *bands == Bands::Rgb {
+        if !self.spec.is_light() || *bands == Bands::Rgb {
             return Ok(None);
         }
         let planes = self.planes.iter().filter_map(|plane| match plane {

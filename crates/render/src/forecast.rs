@@ -83,18 +83,18 @@ fn bytes_of_sums(plan: &Plan) -> u64 {
 
 /// Values of a pixel that are averaged over samples.
 fn averaged(plan: &Plan) -> u64 {
-    let values = |layer: &LayerSpec| match layer {
-        LayerSpec::Radiance => plan.bands.count() as u64,
-        _ => 3,
+    let values = |layer: &LayerSpec| match layer.is_light() {
+        true => plan.bands.count() as u64,
+        false => 3,
     };
     plan.layers.iter().filter(|layer| layer.is_averaged()).map(values).sum()
 }
 
 /// Bytes a pixel of the planes of a layer.
 fn bytes_of_layer(layer: LayerSpec, plan: &Plan) -> u64 {
-    let planes = match layer {
-        LayerSpec::Radiance | LayerSpec::Variance => plan.bands.count(),
-        _ => layer.row().channels.len(),
+    let planes = match layer == LayerSpec::Variance || layer.is_light() {
+        true => plan.bands.count(),
+        false => layer.row().channels.len(),
     };
     planes as u64 * bytes_of_plane(layer, plan.precision)
 }

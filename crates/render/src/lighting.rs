@@ -132,7 +132,13 @@ fn lit_share(
         judged: None,
         shares: &[],
         keeper: None,
-        light: Some(LightPass { stage, tracer, camera: &camera, groups }),
+        light: Some(LightPass {
+            stage,
+            tracer,
+            camera: &camera,
+            groups,
+            layers: vec![LayerSpec::Radiance],
+        }),
         passes: &pass,
         picture: &|_, _| Err(PictureError::Empty { what: "the look".to_owned() }),
     };

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use etendue_camera::{BandGroup, Camera, PixelSamples, squares, squares_of_pair};
-use etendue_tracer::transport::RaySamples;
-use etendue_tracer::{LightingContext, Rules, Samples};
+use etendue_tracer::transport::{Parts, RaySamples};
+use etendue_tracer::{LayerSpec, LightingContext, Rules, Samples};
 
 use crate::samples::{Averaged, CAMERA_PAIRS, Memory};
 
@@ -21,6 +21,17 @@ pub(crate) struct LightPass<'a> {
     pub(crate) camera: &'a Camera,
     /// The bands that the camera sends separate ways.
     pub(crate) groups: Vec<BandGroup>,
+    /// The picture, and the parts of its light that have layers of their own.
+    pub(crate) layers: Vec<LayerSpec>,
+}
+
+/// The place of a layer among [`Parts`].
+fn part(layer: LayerSpec) -> usize {
+    match layer {
+        LayerSpec::Direct => 1,
+        LayerSpec::Indirect => 2,
+        _ => 0,
+    }
 }
 
 /// The random numbers of a batch of rays.
@@ -58,7 +69,7 @@ impl Averaged for LightPass<'_> {
     }
 
     fn shape(&self) -> [usize; 2] {
-        [1, self.stage.spectral.count()]
+        [self.layers.len(), self.stage.spectral.count()]
     }
 
     fn batch(&self) -> u32 {
@@ -66,9 +77,20 @@ impl Averaged for LightPass<'_> {
     }
 
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
-        let Memory { rays, numbers, scratch, values, traffic, .. } = memory;
+        let Memory { rays, numbers, scratch, values, light_in_parts, traffic, .. } = memory;
         numbers.of_ray.clone_from(&rays.sample);
-        let beam = RaySamples { rays: &rays.rays, samples: numbers, bands: bands.clone() };
-        traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, values);
+        let parts = if self.layers.len() > 1 { Parts::Scatterings } else { Parts::Whole };
+        let beam = RaySamples { rays: &rays.rays, samples: numbers, bands: bands.clone(), parts };
+        if parts == Parts::Whole {
+            traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, values);
+            return;
+        }
+        traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, light_in_parts);
+        let count = self.stage.spectral.count();
+        values.clear();
+        for ray in light_in_parts.chunks_exact(parts.count() * count) {
+            let of = |layer: &LayerSpec| &ray[part(*layer) * count..(part(*layer) + 1) * count];
+            self.layers.iter().for_each(|layer| values.extend_from_slice(of(layer)));
+        }
     }
 }

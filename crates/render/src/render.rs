@@ -255,6 +255,7 @@ pub fn trace(
         tracer: *rules,
         camera: &light_camera,
         groups: light_camera.band_groups(&plan.bands),
+        layers: plan.layers.iter().copied().filter(|layer| layer.is_light()).collect(),
     });
     let so_far = |layers: &[&FilmLayer], samples| so_far(scene, plan, header, layers, samples);
     let shard = course.shard.unwrap_or(Shard::ALL);
@@ -374,7 +375,9 @@ fn finished(
     let [width, height] = scene.camera.resolution().map(|side| side as usize);
     let mut band_film = None;
     for layer in &mut film {
-        band_film = band_film.or(layer.take_bands(&plan.bands)?);
+        let bands = layer.take_bands(&plan.bands)?;
+        // Of the picture: parts of its light are to look at.
+        band_film = band_film.or(bands.filter(|_| layer.spec == LayerSpec::Radiance));
     }
     let mut layers: Vec<Layer> = film
         .into_iter()

@@ -119,6 +119,8 @@ pub(crate) struct Memory {
     pub(crate) numbers: Numbers,
     pub(crate) rays: CameraRays,
     pub(crate) values: Vec<f64>,
+    /// `[ray][part][band]`, where light is told apart.
+    pub(crate) light_in_parts: Vec<f64>,
     pub(crate) hits: HitBatch,
     pub(crate) columns: Columns,
     pub(crate) scratch: Scratch,

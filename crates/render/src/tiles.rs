@@ -47,7 +47,7 @@ pub(crate) struct Job<'a> {
     pub(crate) sampling: Sampling,
     /// Which samples are taken of every pixel before the next are taken of any.
     pub(crate) passes: &'a [Range<u32>],
-    /// What fills [`LayerSpec::Radiance`].
+    /// What fills [`LayerSpec::Radiance`] and the parts of it.
     pub(crate) light: Option<LightPass<'a>>,
     /// The picture as it is on the film.
     pub(crate) picture: &'a ToPicture<'a>,
@@ -108,7 +108,7 @@ impl Job<'_> {
         let (mut told, film): (Vec<_>, Vec<_>) =
             film.iter_mut().partition(|layer| layer.spec.is_of_sampling());
         let (lit, seen): (Vec<_>, Vec<_>) =
-            film.into_iter().partition(|layer| layer.spec == LayerSpec::Radiance);
+            film.into_iter().partition(|layer| layer.spec.is_light());
         let (mut mean, mut centre): (Vec<_>, Vec<_>) =
             seen.into_iter().partition(|layer| self.is_averaged(layer.spec));
         let colors = Colors { job: self, layers: mean.iter().map(|layer| layer.spec).collect() };
@@ -164,7 +164,7 @@ impl Job<'_> {
     /// The rays of the camera that filling `film` takes.
     pub(crate) fn rays(&self, film: &[FilmLayer]) -> u64 {
         let film = film.iter().filter(|layer| !layer.spec.is_of_sampling());
-        let is_lit = |layer: &FilmLayer| layer.spec == LayerSpec::Radiance;
+        let is_lit = |layer: &FilmLayer| layer.spec.is_light();
         let is_mean = |layer: &FilmLayer| !is_lit(layer) && self.is_averaged(layer.spec);
         let any = |what: &dyn Fn(&FilmLayer) -> bool| film.clone().any(what);
         let sampled = usize::from(any(&is_lit)) + usize::from(any(&is_mean));

@@ -155,9 +155,9 @@ fn sensor(scene: &Scene, plan: &Plan, machine: &Calibration) -> f64 {
 /// The time of writing the layers (s).
 fn output(prospect: &Prospect<'_>, machine: &Calibration) -> f64 {
     let Prospect { scene, plan, outputs, .. } = *prospect;
-    let planes = |layer: &LayerSpec| match layer {
-        LayerSpec::Radiance | LayerSpec::Variance => plan.bands.count().max(3),
-        _ => layer.row().channels.len(),
+    let planes = |layer: &LayerSpec| match *layer == LayerSpec::Variance || layer.is_light() {
+        true => plan.bands.count().max(3),
+        false => layer.row().channels.len(),
     };
     let values: usize = plan.layers.iter().map(planes).sum();
     let each =

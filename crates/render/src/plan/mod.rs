@@ -107,11 +107,13 @@ fn sample_passes(
     }
     let [width, height] = scene.camera.resolution().map(u64::from);
     let colours = if passes.mean {
-        3 * scene.layers.iter().filter(|layer| layer.is_averaged()).count()
+        let is_seen = |layer: &&LayerSpec| layer.is_averaged() && !layer.is_light();
+        3 * scene.layers.iter().filter(is_seen).count()
     } else {
         0
     };
-    let bands = if passes.light { bands } else { 0 };
+    let lit = scene.layers.iter().filter(|layer| layer.is_light()).count();
+    let bands = if passes.light { lit * bands } else { 0 };
     let bytes = (width * height).saturating_mul(BYTES_OF_SUM * (colours + bands) as u64);
     match samples::passes(samples) {
         several if several.len() > 1 && bytes > MOST_BYTES_OF_SUMS => {
@@ -219,7 +221,7 @@ impl Passes {
         let averaged = samples > 1 || lens;
         let light = layers.contains(&LayerSpec::Radiance);
         let is_traced = |layer: &LayerSpec| !layer.is_of_sampling();
-        let seen = layers.iter().filter(|layer| **layer != LayerSpec::Radiance);
+        let seen = layers.iter().filter(|layer| !layer.is_light());
         let mut seen = seen.filter(|layer| is_traced(layer));
         let mean = averaged && seen.clone().any(|layer| layer.is_averaged());
         let centre = seen.any(|layer| !averaged || !layer.is_averaged());

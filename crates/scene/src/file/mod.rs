@@ -160,8 +160,9 @@ impl SceneFile {
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
         let spec = &file.spec;
-        let fault =
-            samples::fault(&spec.render, &spec.sampling_layers(), &file.value).or_else(|| {
+        let fault = samples::fault(&spec.render, &spec.sampling_layers(), &file.value)
+            .or_else(|| spec.layer_fault())
+            .or_else(|| {
                 let (key, why) = spec.plan.contradiction(spec.render.accel)?;
                 Some((format!("plan.{key}"), why))
             });

@@ -84,6 +84,17 @@ impl SceneSpec {
         all
     }
 
+    /// What is wrong with the layers: their place, and why.
+    pub(super) fn layer_fault(&self) -> Option<(String, String)> {
+        if self.picture() == Some(LayerSpec::Radiance) {
+            return None;
+        }
+        let number = self.layers.iter().position(|layer| layer.is_light())?;
+        let why = "is a part of the picture's light, and the picture shows none; give the scene a `tracer` \
+                   of light, such as {\"type\": \"path\"}, or leave the layer out";
+        Some((format!("layers[{number}]"), why.to_owned()))
+    }
+
     /// The layers that tell of samples which go on until an error is reached, by name.
     pub(super) fn sampling_layers(&self) -> Vec<&'static str> {
         let told = [(LayerSpec::SampleCount, "sample_count"), (LayerSpec::Variance, "variance")];

@@ -98,6 +98,8 @@ pub enum Taken {
     /// The mean over the samples of the picture, even if that is one alone: what the picture is to
     /// be judged by.
     PictureSamples,
+    /// The light of the samples of the picture, which a tracer follows: one number a spectral band.
+    Light,
     /// The sum of the first number over the samples of the picture, as a share of the sum of the
     /// second.
     PictureShare,
@@ -110,7 +112,7 @@ impl Taken {
     #[must_use]
     pub fn with_picture(self) -> bool {
         match self {
-            Self::ChiefRay | Self::Samples | Self::Sampling => false,
+            Self::ChiefRay | Self::Samples | Self::Light | Self::Sampling => false,
             Self::PictureSamples | Self::PictureShare => true,
         }
     }
@@ -141,6 +143,12 @@ impl LayerSpec {
     #[must_use]
     pub fn is_averaged(self) -> bool {
         !matches!(self.row().taken, Taken::ChiefRay | Taken::Sampling)
+    }
+
+    /// Whether the layer is light, or a part of it, which a tracer of light fills.
+    #[must_use]
+    pub fn is_light(self) -> bool {
+        self.row().taken == Taken::Light
     }
 
     /// Whether the layer tells of the samples of the picture.

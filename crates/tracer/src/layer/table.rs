@@ -110,6 +110,15 @@ fn colour(name: &'static str) -> Layer {
     }
 }
 
+/// A row to begin with: light that a tracer follows.
+fn light(name: &'static str) -> Layer {
+    Layer {
+        taken: Taken::Light,
+        needs: Needs { normals: true, light: true, ..BASE_COLOUR },
+        ..colour(name)
+    }
+}
+
 const SURFACE: Needs = Needs {
     surface: true,
     normals: false,
@@ -400,6 +409,34 @@ layers! {
             ..measured("Alpha", &["A"], Look::Share)
         }, |seen, out| seen.shares(out);
 
+        /// `Direct.R G B`: the part of the picture's light that one surface scattered at most.
+        Direct = "direct": Layer {
+            meaning: vec![
+                (
+                    "definition",
+                    "the part of the picture's light that came straight from lights to the camera, or was \
+                     scattered, mirrored or refracted by one surface; the picture is this and Indirect",
+                ),
+                LINEAR,
+                ("miss", "the environment's radiance"),
+            ],
+            ..light("Direct")
+        }, |_seen, _out| {};
+
+        /// `Indirect.R G B`: the rest of the picture's light.
+        Indirect = "indirect": Layer {
+            meaning: vec![
+                (
+                    "definition",
+                    "the part of the picture's light that two surfaces or more scattered, mirrored or \
+                     refracted on its way",
+                ),
+                LINEAR,
+                ("miss", "0 0 0"),
+            ],
+            ..light("Indirect")
+        }, |_seen, _out| {};
+
         /// `SampleCount.X`: samples that the pixel got.
         SampleCount = "sample_count": Layer {
             kept: Kept::Counted,
@@ -448,7 +485,6 @@ layers! {
         /// The picture of a tracer of light: radiance, one channel a spectral band. No file names it;
         /// it comes with the tracer, which fills it.
         Radiance: Layer {
-            needs: Needs { normals: true, light: true, ..BASE_COLOUR },
             meaning: vec![
                 (
                     "definition",
@@ -458,7 +494,7 @@ layers! {
                 ("unit", "1 (linear light; R G B: sRGB primaries)"),
                 ("miss", "the environment's radiance"),
             ],
-            ..colour("Radiance")
+            ..light("Radiance")
         }, |_seen, _out| {};
     }
 }

@@ -122,6 +122,38 @@ pub struct RaySamples<'a> {
     pub samples: &'a dyn Samples,
     /// The bands that these rays stand for: all, unless the camera sends wavelengths separate ways.
     pub bands: Range<usize>,
+    /// What of their light is told apart.
+    pub parts: Parts,
+}
+
+/// What of the light that rays carry is told apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Parts {
+    /// Nothing: there is one number a band, the whole.
+    #[default]
+    Whole,
+    /// How many surfaces scattered it. There are three numbers a band: the whole, the light that one
+    /// surface scattered at most, and the rest.
+    Scatterings,
+}
+
+impl Parts {
+    /// Numbers that there are of each band, the whole first.
+    #[must_use]
+    pub fn count(self) -> usize {
+        match self {
+            Self::Whole => 1,
+            Self::Scatterings => 3,
+        }
+    }
+
+    /// Where light of a ray is summed up that so many surfaces scattered.
+    fn row(self, ray: u32, scatterings: u32) -> u32 {
+        match self {
+            Self::Whole => ray,
+            Self::Scatterings => 3 * ray + 1 + u32::from(scatterings > 1),
+        }
+    }
 }
 
 /// Random numbers by ray and pair of dimensions, many at a time.
@@ -178,8 +210,9 @@ fn trace(
 ) -> RayStats {
     let count = stage.spectral.count();
     out.clear();
-    out.resize(beam.rays.len() * count, 0.0);
-    let mut tracing = Tracing { rules, stage, count, tally: RayStats::default() };
+    out.resize(beam.rays.len() * beam.parts.count() * count, 0.0);
+    let mut tracing =
+        Tracing { rules, stage, count, parts: beam.parts, tally: RayStats::default() };
     scratch.hits.detail = Detail::Surface;
     scratch.shadows.hits.detail = Detail::Surface;
     scratch.radiance.resize(count, 0.0);
@@ -216,6 +249,7 @@ struct Tracing<'a> {
     rules: Rules,
     stage: &'a LightingContext<'a>,
     count: usize,
+    parts: Parts,
     tally: RayStats,
 }
 
@@ -259,13 +293,22 @@ impl Tracing<'_> {
         }
     }
 
-    fn add(&mut self, light: &[f64], ray: u32, out: &mut [f64]) {
+    /// Adds light to one of the [rows](Parts::row), and to the whole of its ray.
+    fn add(&mut self, light: &[f64], row: u32, out: &mut [f64]) {
         if !light.iter().all(|band| band.is_finite()) {
             self.tally.not_finite += 1;
             return;
         }
-        let start = ray as usize * self.count;
-        out[start..start + self.count].iter_mut().zip(light).for_each(|(sum, band)| *sum += band);
+        let mut to = |row: usize| {
+            let start = row * self.count;
+            let sums = &mut out[start..start + self.count];
+            sums.iter_mut().zip(light).for_each(|(sum, band)| *sum += band);
+        };
+        let (row, rows) = (row as usize, self.parts.count());
+        to(row);
+        if rows > 1 {
+            to(row - row % rows);
+        }
     }
 }
 

@@ -50,7 +50,7 @@ impl Rules {
     }
 
     /// The radiance that arrives along each ray against its direction, in `beam.bands`: `out` is
-    /// `[ray][band]` with all bands of the stage, and is refilled; other bands are 0.
+    /// `[ray][part][band]` with `beam.parts` and all bands of the stage, and is refilled; other bands are 0.
     pub fn radiance(
         self,
         stage: &LightingContext<'_>,

@@ -12,7 +12,8 @@ use crate::surface::SurfaceInteraction;
 #[derive(Debug, Default)]
 pub(super) struct Shadows {
     pub(super) rays: RayBatch,
-    pub(super) ray: Vec<u32>,
+    /// Where each is summed up ([`super::Parts`]).
+    pub(super) row: Vec<u32>,
     /// `[shadow][band]`.
     pub(super) contribution: Vec<f64>,
     /// Their light can be met by no path that panes let through.
@@ -29,7 +30,7 @@ pub(super) struct Shadows {
 #[derive(Debug, Default)]
 struct Sorted {
     rays: RayBatch,
-    ray: Vec<u32>,
+    row: Vec<u32>,
     contribution: Vec<f64>,
     is_delta: Vec<bool>,
 }
@@ -37,14 +38,14 @@ struct Sorted {
 impl Shadows {
     pub(super) fn clear(&mut self) {
         self.rays.clear();
-        self.ray.clear();
+        self.row.clear();
         self.contribution.clear();
         self.is_delta.clear();
     }
 
     /// Notes what a ray brings: `light` times what its path carries and its weight.
-    fn note(&mut self, ray: u32, light: &[f64], throughput: &[f64], weight: f64) {
-        self.ray.push(ray);
+    fn note(&mut self, row: u32, light: &[f64], throughput: &[f64], weight: f64) {
+        self.row.push(row);
         self.is_delta.push(false);
         self.contribution.extend(light.iter().zip(throughput).map(|(l, t)| l * t * weight));
     }
@@ -52,24 +53,24 @@ impl Shadows {
     /// Puts rays side by side that run in about the same direction, `count` bands each, so that they
     /// are worth tracing as packets: those to a lamp of some size go all over it.
     pub(super) fn sort(&mut self, count: usize) {
-        let Self { rays, ray, contribution, is_delta, order, sorted, .. } = self;
+        let Self { rays, row, contribution, is_delta, order, sorted, .. } = self;
         order.clear();
-        order.extend((0_u32..).zip(0..ray.len()).map(|(number, i)| {
+        order.extend((0_u32..).zip(0..row.len()).map(|(number, i)| {
             u64::from(octant_cell(rays.direction(i))) << 32 | u64::from(number)
         }));
         order.sort_unstable();
         let order = || order.iter().map(|&key| (key & 0xffff_ffff) as usize);
-        let Sorted { rays: to, ray: number, contribution: light, is_delta: delta } = sorted;
+        let Sorted { rays: to, row: number, contribution: light, is_delta: delta } = sorted;
         to.gather(rays, order());
         number.clear();
-        number.extend(order().map(|i| ray[i]));
+        number.extend(order().map(|i| row[i]));
         light.clear();
         light.extend(order().flat_map(|i| &contribution[i * count..(i + 1) * count]));
         delta.clear();
         delta.extend(order().map(|i| is_delta[i]));
         std::mem::swap(is_delta, delta);
         std::mem::swap(rays, to);
-        std::mem::swap(ray, number);
+        std::mem::swap(row, number);
         std::mem::swap(contribution, light);
     }
 }
@@ -111,7 +112,8 @@ impl Tracing<'_> {
             let end = self.stage.anchor(point, hits.normal(i), origin, placed);
             let triangles = [left(last, i), [hits.placement[i], hits.triangle[i]]];
             push_to(&mut shadows.rays, origin, end.leave(-direction), triangles);
-            shadows.note(state.ray, radiance, last.throughput_of(i, self.count), weight);
+            let row = self.parts.row(state.ray, state.bounces);
+            shadows.note(row, radiance, last.throughput_of(i, self.count), weight);
         }
         let (lights, spectral) = (self.stage.lights, self.stage.spectral);
         let directions = missed.iter().map(|&i| last.rays.direction(i as usize));
@@ -121,8 +123,10 @@ impl Tracing<'_> {
             let limits = [0.0, f64::INFINITY];
             let triangles = [left(last, i), [MISS; 2]];
             shadows.rays.push_between_triangles(origin, direction, limits, triangles);
-            let weight = last.states[i].weight_against(pdf);
-            shadows.note(last.states[i].ray, light, last.throughput_of(i, self.count), weight);
+            let state = &last.states[i];
+            let (row, weight) =
+                (self.parts.row(state.ray, state.bounces), state.weight_against(pdf));
+            shadows.note(row, light, last.throughput_of(i, self.count), weight);
         });
         self.light(shadows, out);
     }
@@ -140,9 +144,9 @@ impl Tracing<'_> {
         } else {
             self.stage.accel.occluded(&shadows.rays, &mut shadows.blocked);
         }
-        for (k, &ray) in shadows.ray.iter().enumerate() {
+        for (k, &row) in shadows.row.iter().enumerate() {
             if !shadows.blocked[k] {
-                self.add(&shadows.contribution[k * self.count..(k + 1) * self.count], ray, out);
+                self.add(&shadows.contribution[k * self.count..(k + 1) * self.count], row, out);
             }
         }
     }

@@ -194,7 +194,10 @@ impl Tracing<'_> {
                 [[hits.placement[i], hits.triangle[i]], targets.id[lane]]
             }));
         }
-        shadows.ray.extend(picked.iter().map(|&lane| now.states[path[lane].0].ray));
+        shadows.row.extend(picked.iter().map(|&lane| {
+            let state = &now.states[path[lane].0];
+            self.parts.row(state.ray, state.bounces + 1)
+        }));
         shadows.is_delta.extend(picked.iter().map(|&lane| targets.is_delta[lane] > 0.0));
         for &lane in picked.iter() {
             let start = path[lane].0 * self.count;

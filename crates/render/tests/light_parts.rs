@@ -1,0 +1,115 @@
+//! The picture's light in two parts: what one surface scattered at most, and the rest.
+
+use etendue_accel::BuildOptions;
+use etendue_render::output::{Outputs, Picture};
+use etendue_render::{Images, Plan, build, plan, render};
+use etendue_scene::file::SceneFile;
+use etendue_scene::{LoadOptions, Scene, SceneError};
+use etendue_tracer::{Emission, Paint};
+
+fn read(text: &str) -> Result<SceneFile, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.json");
+    std::fs::write(&path, text).unwrap();
+    SceneFile::read(&path, &[])
+}
+
+fn load(text: &str) -> Scene {
+    let file = read(text).unwrap();
+    file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).unwrap()
+}
+
+fn picture(scene: &Scene) -> Picture {
+    let plan = Plan::new(scene, Outputs::from_list("exr").unwrap());
+    let accel = build(scene, &plan, &BuildOptions::default()).unwrap();
+    let images = Images::decode(scene, &plan, None).unwrap();
+    render(scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true).unwrap().picture
+}
+
+/// The values of a layer, channel by channel.
+fn values(picture: &Picture, layer: &str) -> Vec<f64> {
+    let channels = &picture.layer(layer).unwrap().channels;
+    assert_eq!(channels.len(), 3, "{layer}");
+    channels.iter().flat_map(|c| (0..c.values.len()).map(|i| c.values.at(i))).collect()
+}
+
+/// Within a closed box whose walls shine by 1 and return ρ, the light after n surfaces is ρⁿ.
+#[test]
+fn a_closed_furnace_in_parts() {
+    for (tracer, indirect) in [("direct", 0.0), ("path", 0.6 * 0.6 / (1.0 - 0.6))] {
+        let mut scene = load(&format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "{tracer}"}}, "layers": ["direct", "indirect"], "lights": [],
+                "camera": {{"type": "orthographic", "height": 1e-3,
+                    "pose": {{"from": [0.1, 0.2, 0.3], "look_at": [1, 0.1, 0.2]}},
+                    "sensor": {{"resolution": [8, 8]}}}},
+                "render": {{"samples": 256}},
+                "objects": [{{"shape": "box", "size": [2, 2, 2], "material": "wall"}}],
+                "materials": {{"wall": {{"type": "matte", "color": [0.6, 0.6, 0.6]}}}}}}"#
+        ));
+        let radiance = Paint::Plain([1.0; 3]);
+        scene.materials[0].emission =
+            Some(Emission { radiance, strength: 1.0, illuminant: None, two_sided: true });
+        let picture = picture(&scene);
+        for (layer, known) in [("Direct", 1.6), ("Indirect", indirect)] {
+            let found = values(&picture, layer);
+            let mean = found.iter().sum::<f64>() / found.len() as f64;
+            let variance = found.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+            let variance = variance / (found.len() as f64 - 1.0);
+            // The three colours share their paths: a third of the values are independent.
+            let bound = 4.0 * (3.0 * variance / found.len() as f64).sqrt() + 1e-6;
+            assert!((mean - known).abs() <= bound, "{tracer}, {layer}: {mean}, not {known}");
+        }
+    }
+}
+
+/// A room with a mirror, a ball of glass, a lamp, a sky and a point.
+fn room(layers: &str, sensor: &str) -> String {
+    format!(
+        r#"{{"etendue": 1, "tracer": {{"type": "path", "max_bounces": 6}}, "layers": {layers},
+            "render": {{"samples": 8}},
+            "camera": {{"type": "pinhole", "fov": 60, "pose": {{"from": [0, 1, 3], "look_at": [0, 0.6, 0]}},
+                "sensor": {sensor}}},
+            "lights": [{{"type": "point", "at": [1, 2, 1], "intensity": [2, 3, 4]}},
+                {{"type": "environment", "radiance": [0.2, 0.3, 0.4]}}],
+            "materials": {{"floor": {{"type": "matte", "color": [0.6, 0.5, 0.4]}},
+                "mirror": {{"type": "mirror", "color": [0.9, 0.9, 0.9]}},
+                "glass": {{"type": "dielectric", "ior": 1.5}},
+                "lamp": {{"type": "emissive", "radiance": [3, 2, 1]}}}},
+            "objects": [{{"shape": "rectangle", "width": 4, "height": 4, "material": "floor",
+                    "transform": {{"rotate": [1, 0, 0, -90]}}}},
+                {{"shape": "sphere", "radius": 0.4, "material": "mirror",
+                    "transform": {{"translate": [-0.6, 0.4, 0]}}}},
+                {{"shape": "sphere", "radius": 0.4, "material": "glass",
+                    "transform": {{"translate": [0.6, 0.4, 0]}}}},
+                {{"shape": "rectangle", "width": 0.5, "height": 0.5, "material": "lamp",
+                    "transform": {{"rotate": [1, 0, 0, 90], "translate": [0, 1.5, 0]}}}}]}}"#
+    )
+}
+
+#[test]
+fn the_parts_are_the_picture_and_leave_it_as_it_is() {
+    let plain = r#"{"resolution": [24, 16]}"#;
+    let bands = r#"{"type": "multispectral", "resolution": [24, 16],
+        "bands": {"from": 400, "to": 700, "count": 7}}"#;
+    for sensor in [plain, bands] {
+        let parts = picture(&load(&room(r#"["indirect", "direct", "flat"]"#, sensor)));
+        let whole = values(&parts, "");
+        let (direct, indirect) = (values(&parts, "Direct"), values(&parts, "Indirect"));
+        assert!(direct.iter().sum::<f64>() > 0.0 && indirect.iter().sum::<f64>() > 0.0);
+        for ((whole, direct), indirect) in whole.iter().zip(&direct).zip(&indirect) {
+            // All three are f32, and colours of bands are differences of them.
+            let bound = 4.0 * f64::from(f32::EPSILON) * (direct.abs() + indirect.abs()) + 1e-6;
+            assert!((direct + indirect - whole).abs() <= bound, "{direct} + {indirect}: {whole}");
+        }
+        let alone = picture(&load(&room("[]", sensor)));
+        assert_eq!(values(&alone, ""), whole, "{sensor}");
+    }
+}
+
+#[test]
+fn parts_of_light_without_light_are_refused() {
+    let text = r#"{"etendue": 1, "tracer": {"type": "facing"}, "layers": ["depth", "indirect"],
+        "objects": [{"shape": "sphere"}]}"#;
+    let error = read(text).unwrap_err().to_string();
+    assert!(error.contains("layers[1]") && error.contains("tracer"), "{error}");
+}
