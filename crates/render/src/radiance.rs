@@ -25,12 +25,39 @@ pub(crate) struct LightPass<'a> {
     pub(crate) layers: Vec<LayerSpec>,
 }
 
-/// The place of a layer among [`Parts`].
-fn part(layer: LayerSpec) -> usize {
-    match layer {
-        LayerSpec::Direct => 1,
-        LayerSpec::Indirect => 2,
-        _ => 0,
+impl LightPass<'_> {
+    /// Whether a layer counts light of the group of this number: that which one surface scattered at most,
+    /// and the rest.
+    fn counts(&self, layer: LayerSpec, group: usize) -> [bool; 2] {
+        match layer {
+            LayerSpec::Direct => [true, false],
+            LayerSpec::Indirect => [false, true],
+            LayerSpec::LightGroup { group: wanted } => {
+                [self.stage.lights.group_number(wanted) == Some(group); 2]
+            }
+            _ => [true; 2],
+        }
+    }
+
+    /// Adds up the parts of each ray's light, `[ray][part][band]`, that each layer counts.
+    fn gather(&self, parts: &[f64], groups: usize, values: &mut Vec<f64>) {
+        let count = self.stage.spectral.count();
+        values.clear();
+        for ray in parts.chunks_exact((1 + 2 * groups) * count) {
+            for &layer in &self.layers {
+                if layer == LayerSpec::Radiance {
+                    values.extend_from_slice(&ray[..count]);
+                    continue;
+                }
+                let start = values.len();
+                values.resize(start + count, 0.0);
+                let counted = (0..groups).flat_map(|group| self.counts(layer, group));
+                let parts = ray[count..].chunks_exact(count).zip(counted);
+                for (part, _) in parts.filter(|(_, counts)| *counts) {
+                    values[start..].iter_mut().zip(part).for_each(|(sum, band)| *sum += band);
+                }
+            }
+        }
     }
 }
 
@@ -79,18 +106,13 @@ impl Averaged for LightPass<'_> {
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
         let Memory { rays, numbers, scratch, values, light_in_parts, traffic, .. } = memory;
         numbers.of_ray.clone_from(&rays.sample);
-        let parts = if self.layers.len() > 1 { Parts::Scatterings } else { Parts::Whole };
+        let groups = self.stage.lights.group_count();
+        let parts = if self.layers.len() > 1 { Parts::Groups(groups) } else { Parts::Whole };
         let beam = RaySamples { rays: &rays.rays, samples: numbers, bands: bands.clone(), parts };
-        if parts == Parts::Whole {
-            traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, values);
-            return;
-        }
-        traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, light_in_parts);
-        let count = self.stage.spectral.count();
-        values.clear();
-        for ray in light_in_parts.chunks_exact(parts.count() * count) {
-            let of = |layer: &LayerSpec| &ray[part(*layer) * count..(part(*layer) + 1) * count];
-            self.layers.iter().for_each(|layer| values.extend_from_slice(of(layer)));
+        let light = if parts == Parts::Whole { &mut *values } else { &mut *light_in_parts };
+        traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, light);
+        if parts != Parts::Whole {
+            self.gather(light_in_parts, groups, values);
         }
     }
 }

@@ -107,8 +107,13 @@ fn a_closed_furnace() {
         );
         let shine = |scene: &mut Scene| {
             let radiance = Paint::Plain([1.0; 3]);
-            scene.materials[0].emission =
-                Some(Emission { radiance, strength: 1.0, illuminant: None, two_sided: true });
+            scene.materials[0].emission = Some(Emission {
+                radiance,
+                strength: 1.0,
+                illuminant: None,
+                two_sided: true,
+                group: None,
+            });
         };
         let eye = [[0.2, 0.1, 0.3], [-0.5, -1.0, 0.2]];
         check("furnace", 64, eye, &rest, shine, 0.0, |tracer| match tracer {

@@ -5,7 +5,7 @@ use etendue_render::output::{Outputs, Picture};
 use etendue_render::{Images, Plan, build, plan, render};
 use etendue_scene::file::SceneFile;
 use etendue_scene::{LoadOptions, Scene, SceneError};
-use etendue_tracer::{Emission, Paint};
+use etendue_tracer::{Emission, LayerSpec, LightGroup, Paint};
 
 fn read(text: &str) -> Result<SceneFile, SceneError> {
     let folder = tempfile::tempdir().unwrap();
@@ -47,16 +47,16 @@ fn a_closed_furnace_in_parts() {
                 "materials": {{"wall": {{"type": "matte", "color": [0.6, 0.6, 0.6]}}}}}}"#
         ));
         let radiance = Paint::Plain([1.0; 3]);
-        scene.materials[0].emission =
-            Some(Emission { radiance, strength: 1.0, illuminant: None, two_sided: true });
+        scene.materials[0].emission = Some(Emission {
+            radiance,
+            strength: 1.0,
+            illuminant: None,
+            two_sided: true,
+            group: None,
+        });
         let picture = picture(&scene);
         for (layer, known) in [("Direct", 1.6), ("Indirect", indirect)] {
-            let found = values(&picture, layer);
-            let mean = found.iter().sum::<f64>() / found.len() as f64;
-            let variance = found.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
-            let variance = variance / (found.len() as f64 - 1.0);
-            // The three colours share their paths: a third of the values are independent.
-            let bound = 4.0 * (3.0 * variance / found.len() as f64).sqrt() + 1e-6;
+            let [mean, bound] = mean(&picture, layer);
             assert!((mean - known).abs() <= bound, "{tracer}, {layer}: {mean}, not {known}");
         }
     }
@@ -69,12 +69,12 @@ fn room(layers: &str, sensor: &str) -> String {
             "render": {{"samples": 8}},
             "camera": {{"type": "pinhole", "fov": 60, "pose": {{"from": [0, 1, 3], "look_at": [0, 0.6, 0]}},
                 "sensor": {sensor}}},
-            "lights": [{{"type": "point", "at": [1, 2, 1], "intensity": [2, 3, 4]}},
+            "lights": [{{"type": "point", "at": [1, 2, 1], "intensity": [2, 3, 4], "group": "key"}},
                 {{"type": "environment", "radiance": [0.2, 0.3, 0.4]}}],
             "materials": {{"floor": {{"type": "matte", "color": [0.6, 0.5, 0.4]}},
                 "mirror": {{"type": "mirror", "color": [0.9, 0.9, 0.9]}},
                 "glass": {{"type": "dielectric", "ior": 1.5}},
-                "lamp": {{"type": "emissive", "radiance": [3, 2, 1]}}}},
+                "lamp": {{"type": "emissive", "radiance": [3, 2, 1], "group": "lamp"}}}},
             "objects": [{{"shape": "rectangle", "width": 4, "height": 4, "material": "floor",
                     "transform": {{"rotate": [1, 0, 0, -90]}}}},
                 {{"shape": "sphere", "radius": 0.4, "material": "mirror",
@@ -92,17 +92,90 @@ fn the_parts_are_the_picture_and_leave_it_as_it_is() {
     let bands = r#"{"type": "multispectral", "resolution": [24, 16],
         "bands": {"from": 400, "to": 700, "count": 7}}"#;
     for sensor in [plain, bands] {
-        let parts = picture(&load(&room(r#"["indirect", "direct", "flat"]"#, sensor)));
+        let parts =
+            picture(&load(&room(r#"["indirect", "direct", "flat", "light_groups"]"#, sensor)));
         let whole = values(&parts, "");
         let (direct, indirect) = (values(&parts, "Direct"), values(&parts, "Indirect"));
         assert!(direct.iter().sum::<f64>() > 0.0 && indirect.iter().sum::<f64>() > 0.0);
-        for ((whole, direct), indirect) in whole.iter().zip(&direct).zip(&indirect) {
-            // All three are f32, and colours of bands are differences of them.
-            let bound = 4.0 * f64::from(f32::EPSILON) * (direct.abs() + indirect.abs()) + 1e-6;
-            assert!((direct + indirect - whole).abs() <= bound, "{direct} + {indirect}: {whole}");
+        let groups = ["Light.key", "Light.lamp", "Light.other"].map(|layer| values(&parts, layer));
+        assert!(groups.iter().all(|group| group.iter().sum::<f64>() > 0.0));
+        for (i, whole) in whole.iter().enumerate() {
+            // All are f32, and colours of bands are differences of them.
+            let bound = 4.0 * f64::from(f32::EPSILON) * whole.abs() + 1e-6;
+            assert!((direct[i] + indirect[i] - whole).abs() <= bound, "pixel {i}: {whole}");
+            let sum: f64 = groups.iter().map(|group| group[i]).sum();
+            assert!((sum - whole).abs() <= bound, "pixel {i}: {sum}, not {whole}");
         }
         let alone = picture(&load(&room("[]", sensor)));
         assert_eq!(values(&alone, ""), whole, "{sensor}");
+    }
+}
+
+/// The mean of a layer's values, and four standard errors of it. The three colours share their paths: a
+/// third of the values are independent.
+fn mean(picture: &Picture, layer: &str) -> [f64; 2] {
+    let found = values(picture, layer);
+    let n = found.len() as f64;
+    let mean = found.iter().sum::<f64>() / n;
+    let variance = found.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    [mean, 4.0 * (3.0 * variance / n).sqrt() + 1e-6]
+}
+
+/// A floor of ρ = 0.5 under a sky of radiance 0.8 has ρ L, and under a point of intensity I at a height h
+/// above it ρ I / (π h²).
+#[test]
+fn each_group_is_the_picture_under_its_lights_alone() {
+    for tracer in ["direct", "path"] {
+        let picture = picture(&load(&format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "{tracer}"}}, "layers": ["light_groups"],
+                "camera": {{"type": "orthographic", "height": 1e-3,
+                    "pose": {{"from": [0, 5, 0.01], "look_at": [0, 0, 0]}},
+                    "sensor": {{"resolution": [8, 8]}}}},
+                "render": {{"samples": 256}},
+                "lights": [{{"type": "point", "at": [0, 2, 0], "intensity": [6, 6, 6], "group": "key"}},
+                    {{"type": "environment", "radiance": [0.8, 0.8, 0.8], "group": "sky"}},
+                    {{"type": "directional", "direction": [0, -1, 0], "irradiance": [2, 2, 2]}}],
+                "materials": {{"floor": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}}},
+                "objects": [{{"shape": "rectangle", "width": 40, "height": 40, "material": "floor",
+                    "transform": {{"rotate": [1, 0, 0, -90]}}}}]}}"#
+        )));
+        let pi = std::f64::consts::PI;
+        for (layer, known) in
+            [("Light.sky", 0.4), ("Light.key", 0.5 * 6.0 / (4.0 * pi)), ("Light.other", 1.0 / pi)]
+        {
+            let [mean, bound] = mean(&picture, layer);
+            assert!((mean - known).abs() <= bound, "{tracer}, {layer}: {mean}, not {known}");
+        }
+    }
+}
+
+/// As the furnace above, with a point within it.
+#[test]
+fn surfaces_that_shine_have_groups() {
+    let mut scene = load(
+        r#"{"etendue": 1, "tracer": {"type": "path"}, "layers": ["light_groups"],
+            "lights": [{"type": "point", "at": [0, 0, 0], "intensity": [1, 1, 1], "group": "key"}],
+            "camera": {"type": "orthographic", "height": 1e-3,
+                "pose": {"from": [0.1, 0.2, 0.3], "look_at": [1, 0.1, 0.2]},
+                "sensor": {"resolution": [8, 8]}},
+            "render": {"samples": 256},
+            "objects": [{"shape": "box", "size": [2, 2, 2], "material": "wall"}],
+            "materials": {"wall": {"type": "matte", "color": [0.6, 0.6, 0.6]}}}"#,
+    );
+    let walls = LightGroup::try_from("walls".to_owned()).unwrap();
+    let (radiance, group) = (Paint::Plain([1.0; 3]), Some(walls));
+    scene.materials[0].emission =
+        Some(Emission { radiance, strength: 1.0, illuminant: None, two_sided: true, group });
+    scene.layers.push(LayerSpec::LightGroup { group: walls });
+    let picture = picture(&scene);
+    let [found, bound] = mean(&picture, "Light.walls");
+    assert!((found - 2.5).abs() <= bound, "{found}");
+    assert_eq!(mean(&picture, "Light.other")[0], 0.0);
+    let whole = values(&picture, "");
+    let parts = ["Light.walls", "Light.key"].map(|layer| values(&picture, layer));
+    for (i, whole) in whole.iter().enumerate() {
+        // Three numbers in f32.
+        assert!((parts[0][i] + parts[1][i] - whole).abs() <= 1e-6 * whole, "pixel {i}");
     }
 }
 
@@ -112,4 +185,8 @@ fn parts_of_light_without_light_are_refused() {
         "objects": [{"shape": "sphere"}]}"#;
     let error = read(text).unwrap_err().to_string();
     assert!(error.contains("layers[1]") && error.contains("tracer"), "{error}");
+    let text = r#"{"etendue": 1, "tracer": {"type": "path"}, "objects": [{"shape": "sphere"}],
+        "lights": [{"type": "point", "at": [0, 2, 0], "intensity": [1, 1, 1], "group": "Key Light"}]}"#;
+    let error = read(text).unwrap_err().to_string();
+    assert!(error.contains("lights[0]") && error.contains("Key Light"), "{error}");
 }

@@ -104,13 +104,14 @@ impl MaterialSpec {
                 Material::new(name, paint("color", color, Bound::One, supply)?, scattering)
             }
             Self::Gltf { .. } => self.gltf(name, supply)?,
-            Self::Emissive { radiance, illuminant, two_sided } => {
+            Self::Emissive { radiance, illuminant, two_sided, group } => {
                 let radiance = paint("radiance", radiance, Bound::None, supply)?;
                 let emission = Emission {
                     radiance: radiance.clone(),
                     strength: 1.0,
                     illuminant: checked(*illuminant)?,
                     two_sided: *two_sided,
+                    group: *group,
                 };
                 let plain = Material::new(name, radiance, Scattering::Black);
                 Material { emission: Some(emission), ..plain }
@@ -182,10 +183,12 @@ impl LightSpec {
     /// On the first value that describes no light.
     pub fn build(&self, supply: &mut dyn Supply) -> Result<Vec<Light>, Fault> {
         let (key, color, illuminant) = match self {
-            Self::Sky { turbidity, sun, ground_albedo, scale, up, visible } => {
+            Self::Sky { turbidity, sun, ground_albedo, scale, up, visible, group: _ } => {
                 let sky = ClearSky::new(*turbidity, sun.elevation, *ground_albedo, sun.shines);
                 let sky = sky.ok_or_else(|| Fault::new("", "is no sky that the model knows"))?;
-                return shining(sky, sun.azimuth, *scale, (*up, *visible));
+                let lights = shining(sky, sun.azimuth, *scale, (*up, *visible))?;
+                let group = self.group();
+                return Ok(lights.into_iter().map(|light| Light { group, ..light }).collect());
             }
             Self::Point { intensity, illuminant, .. }
             | Self::Spot { intensity, illuminant, .. }
@@ -253,7 +256,12 @@ impl LightSpec {
                 LightKind::Environment { image, turn, visible: *visible }
             }
         };
-        Ok(vec![Light { kind, color: *color, illuminant: checked(*illuminant)? }])
+        Ok(vec![Light {
+            kind,
+            color: *color,
+            illuminant: checked(*illuminant)?,
+            group: self.group(),
+        }])
     }
 }
 
@@ -288,11 +296,12 @@ fn shining(
         },
         color: sky.sun().map(|part| part * scale),
         illuminant: None,
+        group: None,
     };
     let shines = sky.is_sunlit();
     let image = EnvironmentImage::ClearSky(Box::new(sky));
     let kind = LightKind::Environment { image, turn, visible };
-    let dome = Light { kind, color: [scale; 3], illuminant: None };
+    let dome = Light { kind, color: [scale; 3], illuminant: None, group: None };
     Ok(if shines { vec![dome, sun] } else { vec![dome] })
 }
 

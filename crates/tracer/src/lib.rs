@@ -16,7 +16,7 @@
 //! | [`material`], [`texture`] | surfaces, ready to be looked up |
 //! | [`footprint`] | how much of a surface a sample stands for |
 //! | [`bsdf`] | how surfaces scatter light |
-//! | [`light`], [`emitters`], [`environment`], [`clear_sky`] | where light comes from |
+//! | [`light`], [`group`], [`emitters`], [`environment`], [`clear_sky`] | where light comes from |
 //! | [`placed`] | what there is to know of each placement before any ray meets it |
 //! | [`spawn`] | where a ray that leaves a surface starts |
 //! | [`transport`] | batches of paths, and the rules of each tracer of light |
@@ -29,6 +29,7 @@ pub mod emitters;
 pub mod environment;
 pub mod footprint;
 pub mod goniometric;
+pub mod group;
 mod lamps;
 pub mod layer;
 pub mod light;
@@ -54,6 +55,7 @@ pub use emitters::Emitters;
 pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};
 pub use goniometric::Goniometric;
+pub use group::LightGroup;
 pub use layer::{Layer, LayerSpec, NormalKind, Space};
 pub use light::{EnvironmentImage, Light, LightKind};
 pub use lights::Lights;

@@ -11,7 +11,7 @@ use crate::light_tree::Cluster;
 use crate::projector::Projector;
 use crate::reference::SceneView;
 use crate::sky::Sky;
-use crate::{ClearSky, Color, TextureUse};
+use crate::{ClearSky, Color, LightGroup, TextureUse};
 
 /// A light of the scene, beside its emissive surfaces.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Light {
     pub color: Color,
     /// The spectrum that the colour multiplies; equal energy when absent.
     pub illuminant: Option<Illuminant>,
+    /// The group that it is of, if it names one.
+    pub group: Option<LightGroup>,
 }
 
 impl Light {
@@ -34,6 +36,7 @@ impl Light {
         },
         color: [1.0; 3],
         illuminant: None,
+        group: None,
     };
 
     /// Its intensity in the middle, or of what is measured the mean, over the three colours (W/sr).

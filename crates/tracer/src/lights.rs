@@ -9,11 +9,12 @@ use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
 use etendue_spectrum::NoOverlap;
 
-use crate::Material;
 use crate::environment::EnvironmentMap;
+use crate::group::Groups;
 use crate::lamps::{self, AreaLight, triangle_power};
 use crate::light::{EnvironmentImage, Light, LightKind, power, spot_falloff};
 use crate::light_tree::{self, Cluster, LightTree};
@@ -24,6 +25,7 @@ use crate::sampling::{
 use crate::sky::Sky;
 use crate::spectral::Spectral;
 use crate::target::{Chosen, Target, TargetKind};
+use crate::{LightGroup, Material};
 
 /// All lights of a scene, ready to be chosen from.
 #[derive(Debug)]
@@ -45,6 +47,7 @@ pub struct Lights {
     /// that shine alike all over give off in all bands.
     lamps: Vec<Option<AreaLight>>,
     lamp_bands: Vec<f64>,
+    groups: Groups,
 }
 
 impl Lights {
@@ -98,10 +101,26 @@ impl Lights {
         let tree = Self::plant(lights, &triangles, around, &mut powers);
         let picker =
             if lit { DiscreteDistribution::new(&powers) } else { DiscreteDistribution::default() };
+        let of_material = |material: &Material| material.emission.as_ref().and_then(|e| e.group);
+        let groups = Groups::of(
+            lights.iter().map(|light| light.group),
+            around.materials.iter().map(of_material),
+        );
         let lights = lights.to_vec();
         let (lamps, lamp_bands) = Default::default();
-        let mut all =
-            Self { lights, bands, sky, tints, first, triangles, picker, tree, lamps, lamp_bands };
+        let mut all = Self {
+            lights,
+            bands,
+            sky,
+            tints,
+            first,
+            triangles,
+            picker,
+            tree,
+            lamps,
+            lamp_bands,
+            groups,
+        };
         all.light_lamps(around, spectral);
         Ok(all)
     }
@@ -218,6 +237,37 @@ impl Lights {
         self.triangles.len()
     }
 
+    /// How many groups of lights there are.
+    #[must_use]
+    pub fn group_count(&self) -> usize {
+        self.groups.count()
+    }
+
+    /// The number of a group; `None` of one that no light is of.
+    #[must_use]
+    pub fn group_number(&self, group: LightGroup) -> Option<usize> {
+        self.groups.number(group)
+    }
+
+    /// The group of the sky.
+    pub(crate) fn group_of_sky(&self) -> u32 {
+        self.groups.of_light(self.sky.as_ref().map_or(0, |sky| sky.index))
+    }
+
+    /// The group of a surface that shines.
+    pub(crate) fn group_of_placement(&self, around: &SceneView<'_>, placement: u32) -> u32 {
+        let placement = around.geometry.placements.get(placement as usize);
+        placement.map_or(0, |placement| self.groups.of_material(placement.material))
+    }
+
+    /// The group of what was aimed at.
+    pub(crate) fn group_of(&self, around: &SceneView<'_>, [placement, light]: [u32; 2]) -> u32 {
+        match placement {
+            MISS => self.groups.of_light(light as usize),
+            placement => self.group_of_placement(around, placement),
+        }
+    }
+
     pub(crate) fn bands_of(&self, light: usize, count: usize) -> &[f64] {
         &self.bands[light * count..(light + 1) * count]
     }
@@ -234,7 +284,24 @@ impl Lights {
     ) -> Chosen {
         // What is left of the number that chose the light chooses the place: both stay even.
         let Some((index, rest, chance)) = self.pick(from, choice) else { return Chosen::Dark };
-        let square = [rest, v];
+        let (one, square) = ((index, chance), [rest, v]);
+        let mut chosen = self.place_on(around, spectral, from, one, square, radiance);
+        if let Chosen::Place(target) = &mut chosen {
+            target.light = u32::try_from(index).unwrap_or(MISS);
+        }
+        chosen
+    }
+
+    /// A place on light `index`, which was chosen with this chance, by `square`.
+    fn place_on(
+        &self,
+        around: &SceneView<'_>,
+        spectral: &Spectral,
+        from: DVec3,
+        (index, chance): (usize, f64),
+        square: [f64; 2],
+        radiance: &mut [f64],
+    ) -> Chosen {
         let Some(light) = self.lights.get(index) else {
             let number = index - self.lights.len();
             return self.place_on_lamp(around, spectral, number, square, chance, radiance).into();
@@ -304,6 +371,7 @@ impl Lights {
             magnitudes: lamp.magnitudes,
             density: chance / lamp.shape.area,
             id: lamp.id,
+            light: MISS,
         })
     }
 

@@ -3,8 +3,8 @@
 
 use etendue_spectrum::{Curve, Illuminant, Metal};
 
-use crate::TextureUse;
 use crate::texture::Encoding;
+use crate::{LightGroup, TextureUse};
 
 /// Linear RGB with the sRGB primaries, 0..=1 for reflectances.
 pub type Color = [f64; 3];
@@ -243,6 +243,8 @@ pub struct Emission {
     pub illuminant: Option<Illuminant>,
     /// The back shines too.
     pub two_sided: bool,
+    /// The group of lights that it is of, if it names one.
+    pub group: Option<LightGroup>,
 }
 
 /// Where a surface lets rays pass as if it were not there.

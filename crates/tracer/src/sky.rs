@@ -18,7 +18,7 @@ use crate::target::{Target, TargetKind};
 #[derive(Debug)]
 pub(crate) struct Sky {
     /// Which of the lights it is.
-    index: usize,
+    pub(crate) index: usize,
     map: Option<(Arc<EnvironmentMap>, MapSampler)>,
     world_from_map: DMat3,
     /// The camera sees it.
@@ -86,7 +86,8 @@ impl Sky {
         for ((&(lane, chance), &(direction, pdf)), color) in
             lanes.iter().zip(&*directions).zip(&*colors)
         {
-            let target = Target::bare(TargetKind::Far, direction, pdf * chance);
+            let bare = Target::bare(TargetKind::Far, direction, pdf * chance);
+            let target = Target { light: u32::try_from(self.index).unwrap_or(u32::MAX), ..bare };
             each(lane, (pdf > 0.0).then_some(target), color);
         }
     }

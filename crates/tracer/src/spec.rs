@@ -4,8 +4,8 @@ use etendue_spectrum::{Illuminant, Metal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Color;
 use crate::texture::{Filter, Wrap};
+use crate::{Color, LightGroup};
 
 /// The brightest that a light or a surface may be, in whichever unit: pictures hold no number above
 /// 3·10³⁸, and the powers of all lights are added up.
@@ -114,6 +114,9 @@ pub enum MaterialSpec {
         /// The back shines too.
         #[serde(default)]
         two_sided: bool,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
     },
     /// Matte squares of two colours over the surface's texture coordinates.
     Checker {
@@ -252,6 +255,9 @@ pub enum LightSpec {
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
     },
     /// A point that shines into a cone.
     Spot {
@@ -272,6 +278,9 @@ pub enum LightSpec {
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
     },
     /// Parallel light, as from the sun.
     Directional {
@@ -287,6 +296,9 @@ pub enum LightSpec {
         /// The spectrum that the irradiance multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
     },
     /// A point that shines by a measured distribution.
     Goniometric {
@@ -307,6 +319,9 @@ pub enum LightSpec {
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
     },
     /// A point that throws an image, as for structured light.
     Projector {
@@ -333,6 +348,9 @@ pub enum LightSpec {
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
     },
     /// Light from all around.
     Environment {
@@ -356,6 +374,9 @@ pub enum LightSpec {
         /// The spectrum that the radiance multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
     },
     /// A clear sky with its sun, and the ground below the horizon. It is the scene's environment.
     Sky {
@@ -380,6 +401,9 @@ pub enum LightSpec {
         /// The camera sees it where nothing is in the way.
         #[serde(default = "yes")]
         visible: bool,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
     },
 }
 
@@ -408,6 +432,38 @@ fn default_turbidity() -> f64 {
 
 fn default_ground() -> f64 {
     0.2
+}
+
+impl LightSpec {
+    /// The group that it is of, if it names one.
+    #[must_use]
+    pub fn group(&self) -> Option<LightGroup> {
+        match self {
+            Self::Point { group, .. }
+            | Self::Spot { group, .. }
+            | Self::Directional { group, .. }
+            | Self::Goniometric { group, .. }
+            | Self::Projector { group, .. }
+            | Self::Environment { group, .. }
+            | Self::Sky { group, .. } => *group,
+        }
+    }
+}
+
+impl MaterialSpec {
+    /// The group of lights that it is of, if it shines and names one.
+    #[must_use]
+    pub fn group(&self) -> Option<LightGroup> {
+        match self {
+            Self::Emissive { group, .. } => *group,
+            Self::Matte { .. }
+            | Self::Mirror { .. }
+            | Self::Metal { .. }
+            | Self::Dielectric { .. }
+            | Self::Gltf { .. }
+            | Self::Checker { .. } => None,
+        }
+    }
 }
 
 fn upwards() -> [f64; 3] {

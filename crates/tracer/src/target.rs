@@ -20,6 +20,8 @@ pub(crate) struct Target {
     pub(crate) density: f64,
     /// Placement and triangle, or [`MISS`].
     pub(crate) id: [u32; 2],
+    /// The number of the light that it is on, of those that are no triangle.
+    pub(crate) light: u32,
 }
 
 /// Kinds of places that light comes from.
@@ -71,6 +73,6 @@ impl Target {
     pub(crate) fn bare(kind: TargetKind, place: DVec3, density: f64) -> Self {
         let place = [place, DVec3::ZERO, DVec3::ZERO];
         let (normal, magnitudes) = (DVec3::ZERO, DVec3::ZERO);
-        Self { kind, place, normal, magnitudes, density, id: [MISS; 2] }
+        Self { kind, place, normal, magnitudes, density, id: [MISS; 2], light: MISS }
     }
 }

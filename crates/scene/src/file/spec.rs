@@ -1,10 +1,10 @@
 //! A scene file's top level.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use etendue_camera::CameraSpec;
-use etendue_tracer::{LayerSpec, LightSpec, MaterialSpec};
+use etendue_tracer::{LayerSpec, LightGroup, LightSpec, MaterialSpec};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -77,11 +77,26 @@ impl SceneSpec {
         };
         let wanted = self.layers.iter().copied().chain(behind.into_iter().flatten());
         for layer in picture.into_iter().chain(wanted) {
-            if !all.contains(&layer) {
-                all.push(layer);
+            let layers = match layer {
+                LayerSpec::LightGroups => self.light_groups(),
+                layer => vec![layer],
+            };
+            for layer in layers {
+                if !all.contains(&layer) {
+                    all.push(layer);
+                }
             }
         }
         all
+    }
+
+    /// The layer of each group of lights.
+    fn light_groups(&self) -> Vec<LayerSpec> {
+        let lights = self.lights.iter().flatten().filter_map(LightSpec::group);
+        let shining = self.materials.values().filter_map(MaterialSpec::group);
+        let groups: BTreeSet<LightGroup> =
+            lights.chain(shining).chain([LightGroup::OTHER]).collect();
+        groups.into_iter().map(|group| LayerSpec::LightGroup { group }).collect()
     }
 
     /// What is wrong with the layers: their place, and why.

@@ -2,9 +2,11 @@
 //! known of each, and everything else reads it.
 
 mod fill;
+mod layers;
 mod look;
 mod meaning;
 pub mod pair;
+mod rows;
 pub mod table;
 
 use std::borrow::Cow;

@@ -6,128 +6,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::layers::layers;
 use super::meaning::{CHIEF_RAY, LINEAR, definition_of_normals, frame, name_in, name_of_normals};
+use super::rows::{BASE_COLOUR, SURFACE, colour, light, measured};
 use super::{Columns, FrameStep, Kept, Layer, Look, NormalKind, Seen, Space, Taken};
-use crate::Needs;
-
-/// Makes [`LayerSpec`], what files may write of it, and its [`Layer`]s out of the table.
-macro_rules! layers {
-    (
-        files name {$(
-            $(#[$doc:meta])*
-            $named:ident $({ $($(#[$option_doc:meta])* $option:ident: $kind:ty),* })?
-                = $key:literal: $row:expr, |$seen:ident, $out:ident| $fill:expr;
-        )*}
-        no file names {$(
-            $(#[$own_doc:meta])* $own:ident: $own_row:expr, |$own_seen:ident, $own_out:ident| $own_fill:expr;
-        )*}
-    ) => {
-        /// A layer as the scene file writes it: a name (`"depth"`), or an object with a `type` and
-        /// options (`{"type": "normal", "space": "camera"}`).
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
-        #[serde(tag = "type", rename_all = "snake_case")]
-        pub enum LayerSpec {
-            $($(#[$doc])* $named $({ $($(#[$option_doc])* $option: $kind),* })?,)*
-            $($(#[$own_doc])* $own,)*
-        }
-
-        /// The same, with every option optional and unknown keys refused: what is read.
-        #[derive(Deserialize, schemars::JsonSchema)]
-        #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
-        pub(super) enum Written {
-            $($named { $($(#[serde(default)] $option: $kind),*)? },)*
-        }
-
-        impl From<Written> for LayerSpec {
-            fn from(written: Written) -> Self {
-                match written {
-                    $(Written::$named { $($($option),*)? } =>
-                        Self::$named $({ $($option),* })?,)*
-                }
-            }
-        }
-
-        impl LayerSpec {
-            /// Every layer by its plain name, in the order that help texts list them.
-            pub const NAMES: [&'static str; [$($key),*].len()] = [$($key),*];
-
-            /// The layer of this plain name, with default options.
-            #[must_use]
-            pub fn from_name(name: &str) -> Option<Self> {
-                Some(match name {
-                    $($key => Self::$named $({ $($option: <$kind>::default()),* })?,)*
-                    _ => return None,
-                })
-            }
-
-            /// What is known of the layer without rendering it.
-            #[must_use]
-            pub fn row(self) -> Layer {
-                match self {
-                    $(Self::$named $({ $($option),* })? => $row,)*
-                    $(Self::$own => $own_row,)*
-                }
-            }
-
-            /// Refills the first columns with the layer's channels, a number for each ray. A layer
-            /// that is averaged refills three.
-            pub fn fill(self, seen: &Seen<'_>, out: &mut Columns) {
-                match self {
-                    $(Self::$named $({ $($option),* })? => {
-                        let ($seen, $out) = (seen, out);
-                        $fill
-                    })*
-                    $(Self::$own => {
-                        let ($own_seen, $own_out) = (seen, out);
-                        $own_fill
-                    })*
-                }
-            }
-        }
-    };
-}
-
-/// A row to begin with: a measurement along the chief ray.
-fn measured(name: &'static str, channels: &'static [&'static str], look: Look) -> Layer {
-    Layer {
-        name: name.into(),
-        channels,
-        kept: Kept::Measured,
-        taken: Taken::ChiefRay,
-        look,
-        needs: Needs::default(),
-        meaning: Vec::new(),
-        apart: None,
-    }
-}
-
-/// A row to begin with: a colour, averaged over the samples.
-fn colour(name: &'static str) -> Layer {
-    Layer {
-        kept: Kept::Shown,
-        taken: Taken::Samples,
-        ..measured(name, &["R", "G", "B"], Look::Color)
-    }
-}
-
-/// A row to begin with: light that a tracer follows.
-fn light(name: &'static str) -> Layer {
-    Layer {
-        taken: Taken::Light,
-        needs: Needs { normals: true, light: true, ..BASE_COLOUR },
-        ..colour(name)
-    }
-}
-
-const SURFACE: Needs = Needs {
-    surface: true,
-    normals: false,
-    materials: false,
-    uvs: false,
-    light: false,
-    ambient: false,
-};
-const BASE_COLOUR: Needs = Needs { materials: true, uvs: true, ..SURFACE };
+use crate::{LightGroup, Needs};
 
 layers! {
     files name {
@@ -437,6 +320,9 @@ layers! {
             ..light("Indirect")
         }, |_seen, _out| {};
 
+        /// A layer `Light.NAME` for each group of lights: see [`Self::LightGroup`], which takes its place.
+        LightGroups = "light_groups": light("Light"), |_seen, _out| {};
+
         /// `SampleCount.X`: samples that the pixel got.
         SampleCount = "sample_count": Layer {
             kept: Kept::Counted,
@@ -465,6 +351,25 @@ layers! {
         }, |_seen, _out| {};
     }
     no file names {
+        /// `Light.NAME.R G B`: the part of the picture's light that comes from the lights of a group. No
+        /// file names it; [`Self::LightGroups`] asks for all.
+        LightGroup {
+            /// The group.
+            group: LightGroup
+        }: Layer {
+            name: format!("Light.{group}").into(),
+            meaning: vec![
+                (
+                    "definition",
+                    "the part of the picture's light that comes from the lights whose `group` is the layer's \
+                     name, and for `other` from those without one; the picture is the sum of all groups",
+                ),
+                LINEAR,
+                ("miss", "the environment's radiance, in its group"),
+            ],
+            ..light("")
+        }, |_seen, _out| {};
+
         /// `Backdrop.R G B`: the part of the picture's radiance that came past everything. No file
         /// names it; it comes with `render.alpha` and a tracer of light.
         Backdrop: Layer {

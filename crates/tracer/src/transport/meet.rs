@@ -28,7 +28,9 @@ impl Tracing<'_> {
             {
                 let throughput = now.throughput_of(i, self.count);
                 radiance.iter_mut().zip(throughput).for_each(|(r, t)| *r *= t * weight);
-                self.add(radiance, self.parts.row(state.ray, state.bounces), out);
+                let (lights, around) = (self.stage.lights, &self.stage.surroundings);
+                let group = || lights.group_of_placement(around, hits.placement[i]);
+                self.add(radiance, self.parts.row(state.ray, state.bounces, group), out);
             }
             // A last ray goes on only where the surface that it met may not be there.
             if placed.is_some_and(|placed| !state.is_last || placed.has_alpha)
@@ -44,7 +46,9 @@ impl Tracing<'_> {
             let weight = now.states[i].weight_against(pdf);
             let throughput = now.throughput_of(i, self.count);
             light.iter_mut().zip(throughput).for_each(|(r, t)| *r *= t * weight);
-            self.add(light, self.parts.row(now.states[i].ray, now.states[i].bounces), out);
+            let state = &now.states[i];
+            let row = self.parts.row(state.ray, state.bounces, || lights.group_of_sky());
+            self.add(light, row, out);
         });
     }
 

@@ -132,9 +132,9 @@ pub enum Parts {
     /// Nothing: there is one number a band, the whole.
     #[default]
     Whole,
-    /// How many surfaces scattered it. There are three numbers a band: the whole, the light that one
-    /// surface scattered at most, and the rest.
-    Scatterings,
+    /// Of how many groups of lights it comes, and how many surfaces scattered it. Behind the whole there are
+    /// two numbers a band of each group: of light that one surface scattered at most, and of the rest.
+    Groups(usize),
 }
 
 impl Parts {
@@ -143,15 +143,18 @@ impl Parts {
     pub fn count(self) -> usize {
         match self {
             Self::Whole => 1,
-            Self::Scatterings => 3,
+            Self::Groups(groups) => 1 + 2 * groups,
         }
     }
 
-    /// Where light of a ray is summed up that so many surfaces scattered.
-    fn row(self, ray: u32, scatterings: u32) -> u32 {
+    /// Where light of a ray is summed up that so many surfaces scattered, from a group's lights.
+    fn row(self, ray: u32, scatterings: u32, group: impl FnOnce() -> u32) -> u32 {
         match self {
             Self::Whole => ray,
-            Self::Scatterings => 3 * ray + 1 + u32::from(scatterings > 1),
+            Self::Groups(_) => {
+                let count = u32::try_from(self.count()).unwrap_or(u32::MAX);
+                count * ray + 1 + 2 * group() + u32::from(scatterings > 1)
+            }
         }
     }
 }

@@ -62,6 +62,8 @@ pub(super) struct Seen {
 #[derive(Debug)]
 pub(super) struct Targets {
     pub(super) id: [[u32; 2]; LANES],
+    /// The number of the light, where it is no triangle.
+    pub(super) light: [u32; LANES],
     pub(super) place: [[Row; 3]; 3],
     pub(super) normal: [Row; 3],
     pub(super) magnitudes: [Row; 3],
@@ -113,6 +115,7 @@ impl Default for Targets {
     fn default() -> Self {
         Self {
             id: [[MISS; 2]; LANES],
+            light: [MISS; LANES],
             place: [[ZERO; 3]; 3],
             normal: [ZERO; 3],
             magnitudes: [ZERO; 3],
@@ -204,6 +207,7 @@ impl Targets {
             return;
         };
         self.id[lane] = target.id;
+        self.light[lane] = target.light;
         for (rows, part) in self.place.iter_mut().zip(target.place) {
             put(rows, lane, part);
         }

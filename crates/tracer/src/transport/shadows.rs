@@ -112,7 +112,9 @@ impl Tracing<'_> {
             let end = self.stage.anchor(point, hits.normal(i), origin, placed);
             let triangles = [left(last, i), [hits.placement[i], hits.triangle[i]]];
             push_to(&mut shadows.rays, origin, end.leave(-direction), triangles);
-            let row = self.parts.row(state.ray, state.bounces);
+            let (lights, around) = (self.stage.lights, &self.stage.surroundings);
+            let group = || lights.group_of_placement(around, hits.placement[i]);
+            let row = self.parts.row(state.ray, state.bounces, group);
             shadows.note(row, radiance, last.throughput_of(i, self.count), weight);
         }
         let (lights, spectral) = (self.stage.lights, self.stage.spectral);
@@ -124,8 +126,8 @@ impl Tracing<'_> {
             let triangles = [left(last, i), [MISS; 2]];
             shadows.rays.push_between_triangles(origin, direction, limits, triangles);
             let state = &last.states[i];
-            let (row, weight) =
-                (self.parts.row(state.ray, state.bounces), state.weight_against(pdf));
+            let row = self.parts.row(state.ray, state.bounces, || lights.group_of_sky());
+            let weight = state.weight_against(pdf);
             shadows.note(row, light, last.throughput_of(i, self.count), weight);
         });
         self.light(shadows, out);

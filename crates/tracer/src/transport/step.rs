@@ -196,7 +196,9 @@ impl Tracing<'_> {
         }
         shadows.row.extend(picked.iter().map(|&lane| {
             let state = &now.states[path[lane].0];
-            self.parts.row(state.ray, state.bounces + 1)
+            let (lights, around) = (self.stage.lights, &self.stage.surroundings);
+            let group = || lights.group_of(around, [targets.id[lane][0], targets.light[lane]]);
+            self.parts.row(state.ray, state.bounces + 1, group)
         }));
         shadows.is_delta.extend(picked.iter().map(|&lane| targets.is_delta[lane] > 0.0));
         for &lane in picked.iter() {

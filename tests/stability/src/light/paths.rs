@@ -81,8 +81,13 @@ fn roulette(scale: Scale) -> Result<Outcome> {
         let mut scene = load(folder.path(), &text)?;
         for material in &mut scene.materials {
             let radiance = Paint::Plain([1.0; 3]);
-            material.emission =
-                Some(Emission { radiance, strength: 1.0, illuminant: None, two_sided: true });
+            material.emission = Some(Emission {
+                radiance,
+                strength: 1.0,
+                illuminant: None,
+                two_sided: true,
+                group: None,
+            });
         }
         let seen = Pixels::of(&scene)?;
         let known = 1.0 / (1.0 - albedo);

@@ -343,7 +343,7 @@ fn emission(
         Some(image) => Paint::Image { factor, image },
         None => Paint::Plain(factor),
     };
-    Ok(Some(Emission { radiance, strength, illuminant: None, two_sided: true }))
+    Ok(Some(Emission { radiance, strength, illuminant: None, two_sided: true, group: None }))
 }
 
 /// What crate `gltf` puts for an image that a texture does not name.

@@ -283,6 +283,7 @@ fn nearest(material: &tobj::Material, plain: Material) -> Material {
         strength: 1.0,
         illuminant: None,
         two_sided: true,
+        group: None,
     };
     let own = material.emissive.filter(|color| !dark(*color));
     let ambient = material.ambient.filter(|color| color.iter().any(|v| *v > 1.0));
