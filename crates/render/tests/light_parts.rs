@@ -6,16 +6,21 @@ use etendue_render::{Images, Plan, build, plan, render};
 use etendue_scene::file::SceneFile;
 use etendue_scene::{LoadOptions, Scene, SceneError};
 use etendue_tracer::{Emission, LayerSpec, LightGroup, Paint};
+use tempfile::TempDir;
 
-fn read(text: &str) -> Result<SceneFile, SceneError> {
-    let folder = tempfile::tempdir().unwrap();
+fn read(text: &str, folder: &TempDir) -> Result<SceneFile, SceneError> {
     let path = folder.path().join("scene.json");
     std::fs::write(&path, text).unwrap();
     SceneFile::read(&path, &[])
 }
 
+fn refusal(text: &str) -> String {
+    read(text, &tempfile::tempdir().unwrap()).unwrap_err().to_string()
+}
+
 fn load(text: &str) -> Scene {
-    let file = read(text).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = read(text, &folder).unwrap();
     file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).unwrap()
 }
 
@@ -183,10 +188,10 @@ fn surfaces_that_shine_have_groups() {
 fn parts_of_light_without_light_are_refused() {
     let text = r#"{"etendue": 1, "tracer": {"type": "facing"}, "layers": ["depth", "indirect"],
         "objects": [{"shape": "sphere"}]}"#;
-    let error = read(text).unwrap_err().to_string();
+    let error = refusal(text);
     assert!(error.contains("layers[1]") && error.contains("tracer"), "{error}");
     let text = r#"{"etendue": 1, "tracer": {"type": "path"}, "objects": [{"shape": "sphere"}],
         "lights": [{"type": "point", "at": [0, 2, 0], "intensity": [1, 1, 1], "group": "Key Light"}]}"#;
-    let error = read(text).unwrap_err().to_string();
+    let error = refusal(text);
     assert!(error.contains("lights[0]") && error.contains("Key Light"), "{error}");
 }
