@@ -215,8 +215,8 @@ impl Study {
 fn spread_of(blocks: &mut [f64]) -> Spread {
     blocks.sort_by(f64::total_cmp);
     let mean = blocks.iter().sum::<f64>() / blocks.len() as f64;
-    let share = |share: f64| blocks[(share * blocks.len() as f64) as usize];
-    Spread { mean, ninth: share(0.9), most: share(0.99) }
+    let of_hundred = |below: usize| blocks[blocks.len() * below / 100];
+    Spread { mean, ninth: of_hundred(90), most: of_hundred(99) }
 }
 
 fn loaded(file: &SceneFile) -> Scene {
