@@ -245,9 +245,9 @@ impl Bsdf {
             return (Weights::default(), 0.0);
         }
         let black = (Weights::default(), 0.0);
-        match (self.model, self.seen) {
+        match (&self.model, &self.seen) {
             (Model::Layered(layered), Seen::Layered(viewed)) => {
-                layered.evaluate(self.wo, local, &viewed)
+                layered.evaluate(self.wo, local, viewed)
             }
             (_, Seen::Glass(rough)) => rough.evaluate(self.wo, local),
             (Model::Matte, _) if !transmits => (Weights::base(local.z / PI), local.z / PI),
@@ -264,7 +264,7 @@ impl Bsdf {
         if self.wo.z <= 0.0 {
             return None;
         }
-        match self.model {
+        match &self.model {
             Model::Black => None,
             Model::Matte => {
                 let local = cosine_direction(square);
@@ -272,18 +272,20 @@ impl Bsdf {
             }
             Model::Mirror => self.single(mirrored(self.wo), Weights::base(1.0)),
             Model::Metal { .. } => {
-                let Seen::Metal(rough) = self.seen else {
+                let Seen::Metal(rough) = &self.seen else {
                     return self.single(mirrored(self.wo), metal::facets(self.wo.z));
                 };
                 self.sampled(rough.sample(self.wo, choice, square))
             }
             Model::Dielectric { eta, .. } => {
-                let Seen::Glass(rough) = self.seen else { return self.boundary(eta, choice) };
+                let Seen::Glass(rough) = &self.seen else {
+                    return self.boundary(*eta, choice);
+                };
                 self.sampled(rough.sample(self.wo, choice, square)?)
             }
             Model::Layered(layered) => {
-                let Seen::Layered(viewed) = self.seen else { return None };
-                let found = layered.sample(self.wo, choice, square, &viewed)?;
+                let Seen::Layered(viewed) = &self.seen else { return None };
+                let found = layered.sample(self.wo, choice, square, viewed)?;
                 if found.pdf == f64::INFINITY {
                     self.single(found.wi, found.weights)
                 } else {
@@ -295,9 +297,9 @@ impl Bsdf {
 
     /// A sampled direction with what [`Self::evaluate`] says of it.
     fn sampled(&self, local: DVec3) -> Option<BsdfSample> {
-        let (value, pdf) = match (self.model, self.seen) {
-            (_, Seen::Metal(rough)) if local.z > 0.0 => rough.evaluate(self.wo, local),
-            (_, Seen::Glass(rough)) => rough.evaluate(self.wo, local),
+        let (value, pdf) = match &self.seen {
+            Seen::Metal(rough) if local.z > 0.0 => rough.evaluate(self.wo, local),
+            Seen::Glass(rough) => rough.evaluate(self.wo, local),
             _ => return None,
         };
         if pdf <= 0.0 {
