@@ -39,7 +39,6 @@ def jobs(folder):
     yield "hits of data in f64", SCENES / "first-light.json", [], "plan.refine=false"
     data = ["tracer=null", 'layers=["depth"]']
     yield "no images for depth alone", textured, data, "plan.textures=true"
-    yield "images averaged over samples", textured, ["render.samples=64"], "plan.texture_filter=true"
 
 
 def rendered(scene, settings, folder):
