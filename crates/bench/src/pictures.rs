@@ -4,9 +4,9 @@ use etendue_accel::Accel;
 use etendue_camera::{Camera, Sampler};
 use etendue_geometry::HitPrecision;
 use etendue_render::output::{Outputs, Picture};
-use etendue_render::{Images, Plan, RenderError};
+use etendue_render::{Images, Plan, RenderError, accelerators};
 use etendue_scene::Scene;
-use etendue_scene::file::{LightPrecision, SamplesSpec};
+use etendue_scene::file::{AccelName, LightPrecision, SamplesSpec};
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 
@@ -80,11 +80,13 @@ impl<'a> Studio<'a> {
     }
 
     /// The precision of the hits that light is worked out from where nothing else is asked for; `None` where
-    /// the picture is not of light.
+    /// the picture is not of light, or the accelerator has one precision alone.
     #[must_use]
     pub fn precision(&self) -> Option<HitPrecision> {
         let plan = Plan::new(&self.scene, OUTPUTS);
-        plan.layers.contains(&LayerSpec::Radiance).then_some(plan.light_precision)
+        let accel = self.scene.render.accel.unwrap_or(accelerators()[0]);
+        let has_both = accel == AccelName::Embree && plan.layers.contains(&LayerSpec::Radiance);
+        has_both.then_some(plan.light_precision)
     }
 
     /// Makes the camera's pixels as large as it takes for `per_pixel` samples of each to be done in
