@@ -292,5 +292,5 @@ def mitsuba_light(mi, light, folder):
     if "image" in light:
         # Its images begin at another side.
         return {"type": "envmap", "filename": str(folder / light["image"]),
-                "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], -90)}
+                "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 180)}
     return {"type": "constant", "radiance": rgb(light["radiance"])}

@@ -33,6 +33,7 @@ pub mod group;
 mod lamps;
 pub mod layer;
 pub mod light;
+mod light_sampler;
 mod light_tree;
 pub mod lights;
 pub mod material;

@@ -154,18 +154,30 @@ pub(crate) fn mean(color: &Color) -> f64 {
     (color[0] + color[1] + color[2]) / 3.0
 }
 
-/// Power of a light (W), `far` being the area (m²) that the scene shows to far lights.
-pub(crate) fn power(light: &Light, around: &SceneView<'_>, far: f64, sky: Option<&Sky>) -> f64 {
+/// Irradiance (W/m²) of a surface that faces a light far away; 0 of any other.
+pub(crate) fn irradiance(light: &Light, sky: Option<&Sky>) -> f64 {
+    let own = mean(&light.color);
+    match &light.kind {
+        LightKind::Directional { .. } => own,
+        LightKind::Environment { .. } => PI * own * sky.map_or(1.0, Sky::mean),
+        LightKind::Point(_)
+        | LightKind::Spot { .. }
+        | LightKind::Projector(_)
+        | LightKind::Goniometric(_) => 0.0,
+    }
+}
+
+/// Power of a light near by (W); 0 of one far away.
+pub(crate) fn power(light: &Light, around: &SceneView<'_>) -> f64 {
     let own = mean(&light.color);
     match &light.kind {
         LightKind::Point(_) => 4.0 * PI * own,
+        // As bright as inside over the mean of both cones.
         LightKind::Spot { cos_outer, cos_inner, .. } => {
-            // As bright as inside over the mean of both cones.
             2.0 * PI * (1.0 - 0.5 * (cos_outer + cos_inner)) * own
         }
-        LightKind::Directional { .. } => far * own,
         LightKind::Projector(projector) => projector.solid_angle(around) * own,
         LightKind::Goniometric(_) => 4.0 * PI * light.intensity(),
-        LightKind::Environment { .. } => 4.0 * PI * far * own * sky.map_or(1.0, Sky::mean),
+        LightKind::Directional { .. } | LightKind::Environment { .. } => 0.0,
     }
 }

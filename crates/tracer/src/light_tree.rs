@@ -26,7 +26,7 @@ use etendue_geometry::glam::DVec3;
 
 use crate::sampling::ONE_BELOW;
 
-/// Fewer lights are chosen by their power.
+/// Fewer lights are chosen by their power where none is far away.
 pub(crate) const LEAST: usize = 5;
 
 /// So are more.
@@ -275,6 +275,11 @@ impl LightTree {
             return 1.0;
         }
         (self.below[k + 1] - self.below[k]) / (self.below[end] - self.below[begin])
+    }
+
+    /// What its lights may send to a point (m) that faces them all (W/m²).
+    pub(crate) fn importance(&self, from: DVec3) -> f64 {
+        self.nodes.first().map_or(0.0, |root| root.importance(from))
     }
 
     /// Whether a light is in it.

@@ -1,9 +1,4 @@
-//! The lights of a scene, and how one of them is chosen for a point.
-//!
-//! A light is chosen by its power (W, of the mean of the three colours), a triangle of an emissive
-//! mesh by its own: `π A L` for one side. Lights far away are counted by what falls onto the scene's
-//! sphere of radius R: `π R² E` for parallel light, `4 π² R² L` for an environment. Among several lights
-//! that are somewhere, one is chosen by what it may send to the point.
+//! The lights of a scene: what each gives off, and a place on one that is chosen for a point.
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -16,12 +11,10 @@ use etendue_spectrum::NoOverlap;
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
 use crate::lamps::{self, AreaLight, triangle_power};
-use crate::light::{EnvironmentImage, Light, LightKind, power, spot_falloff};
-use crate::light_tree::{self, Cluster, LightTree};
+use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
+use crate::light_sampler::{Candidate, LightSampler};
 use crate::reference::{SceneView, SurfacePoint};
-use crate::sampling::{
-    DiscreteDistribution, Frame, cone_direction, sphere_direction, triangle_point,
-};
+use crate::sampling::{Frame, cone_direction, sphere_direction, triangle_point};
 use crate::sky::Sky;
 use crate::spectral::Spectral;
 use crate::target::{Chosen, Target, TargetKind};
@@ -40,9 +33,7 @@ pub struct Lights {
     first: Vec<Option<u32>>,
     /// Placement and triangle of each emissive triangle, behind the lights.
     triangles: Vec<[u32; 2]>,
-    /// With a tree, what is in it has one choice together, the last.
-    picker: DiscreteDistribution,
-    tree: Option<LightTree>,
+    sampler: LightSampler,
     /// The emissive triangles where they are at most [`lamps::MOST`] (`None` without area), and what those
     /// that shine alike all over give off in all bands.
     lamps: Vec<Option<AreaLight>>,
@@ -73,21 +64,27 @@ impl Lights {
             }
         }
         let sky = Sky::of(lights, map);
-        let radius = 0.5 * around.geometry.loose_bounds().diagonal();
-        let far = if radius > 0.0 { PI * radius * radius } else { PI };
-        let mut powers: Vec<f64> =
-            lights.iter().map(|light| power(light, around, far, sky.as_ref())).collect();
+        let candidate = |light: &Light| match light.kind.cluster(light.intensity(), around) {
+            Some(cluster) => Candidate::near(power(light, around), cluster),
+            None => Candidate::Far { irradiance: irradiance(light, sky.as_ref()) },
+        };
+        let mut candidates: Vec<Candidate> = lights.iter().map(candidate).collect();
         let mut first = Vec::with_capacity(around.geometry.placements.len());
         let mut triangles = Vec::new();
         for (number, placement) in (0_u32..).zip(&around.geometry.placements) {
             let material = around.materials.get(placement.material as usize);
             let emits = material.is_some_and(|m| m.emission.is_some());
-            first.push(if emits { u32::try_from(powers.len()).ok() } else { None });
+            first.push(if emits { u32::try_from(candidates.len()).ok() } else { None });
             let Some(material) = material.filter(|_| emits) else { continue };
             let mesh = around.geometry.mesh_of(placement);
             for triangle in 0..mesh.triangles.len() {
-                powers.push(triangle_power(around, placement, triangle, material));
-                triangles.push([number, u32::try_from(triangle).unwrap_or(u32::MAX)]);
+                let id = [number, u32::try_from(triangle).unwrap_or(u32::MAX)];
+                let power = triangle_power(around, placement, triangle, material);
+                candidates.push(match lamps::cluster(around, id, power) {
+                    Some(cluster) => Candidate::near(power, cluster),
+                    None => Candidate::Dark,
+                });
+                triangles.push(id);
             }
         }
         let tint = |material: &Material| -> Result<Option<Vec<f64>>, NoOverlap> {
@@ -97,10 +94,7 @@ impl Lights {
             }
         };
         let tints = around.materials.iter().map(tint).collect::<Result<_, _>>()?;
-        let lit = powers.iter().any(|&p| p > 0.0);
-        let tree = Self::plant(lights, &triangles, around, &mut powers);
-        let picker =
-            if lit { DiscreteDistribution::new(&powers) } else { DiscreteDistribution::default() };
+        let sampler = LightSampler::new(&candidates, around.geometry.loose_bounds());
         let of_material = |material: &Material| material.emission.as_ref().and_then(|e| e.group);
         let groups = Groups::of(
             lights.iter().map(|light| light.group),
@@ -115,8 +109,7 @@ impl Lights {
             tints,
             first,
             triangles,
-            picker,
-            tree,
+            sampler,
             lamps,
             lamp_bands,
             groups,
@@ -125,55 +118,9 @@ impl Lights {
         Ok(all)
     }
 
-    /// The tree over what has a place, when that is worth one: their `powers` become 0, and their sum is
-    /// added behind all.
-    fn plant(
-        lights: &[Light],
-        triangles: &[[u32; 2]],
-        around: &SceneView<'_>,
-        powers: &mut Vec<f64>,
-    ) -> Option<LightTree> {
-        let near = lights.iter().map(|light| light.kind.cluster(light.intensity(), around));
-        let shining = triangles.iter().zip(&powers[lights.len()..]);
-        let all = near.chain(shining.map(|(&id, &power)| lamps::cluster(around, id, power)));
-        let all: Vec<_> = (0_u32..).zip(all).filter_map(|(k, c)| Some((k, c?))).collect();
-        if !(light_tree::LEAST..=light_tree::MOST).contains(&all.len()) {
-            return None;
-        }
-        let take = |&(number, _): &(u32, Cluster)| std::mem::take(&mut powers[number as usize]);
-        let sum = all.iter().map(take).sum();
-        powers.push(sum);
-        Some(LightTree::new(all, powers.len()))
-    }
-
-    /// A light for the point `from` (m) by `u` in 0..1: its number, what is left of `u`, and its chance.
-    fn pick(&self, from: DVec3, u: f64) -> Option<(usize, f64, f64)> {
-        let (index, rest, chance) = match self.picker.len() {
-            0 => return None,
-            1 => (0, u, 1.0),
-            _ => {
-                let (index, rest) = self.picker.pick(u);
-                (index, rest, self.picker.probability(index))
-            }
-        };
-        match &self.tree {
-            Some(tree) if index + 1 == self.picker.len() => {
-                let (number, rest, own) = tree.pick(from, rest)?;
-                Some((number, rest, chance * own))
-            }
-            _ => Some((index, rest, chance)),
-        }
-    }
-
-    /// The chance with which [`Self::pick`] picks light `index` for the point `from` (m).
+    /// The chance with which [`Self::choose`] chooses light `index` for the point `from` (m).
     pub(crate) fn chance(&self, from: DVec3, index: usize) -> f64 {
-        match (&self.tree, self.picker.len()) {
-            (_, 0) => 0.0,
-            (Some(tree), count) if tree.holds(index) => {
-                self.picker.probability(count - 1) * tree.chance(from, index)
-            }
-            _ => self.picker.probability(index),
-        }
+        self.sampler.chance(from, index)
     }
 
     /// Keeps emissive triangles ready.
@@ -203,7 +150,7 @@ impl Lights {
     /// Whether there is nothing to choose from.
     #[must_use]
     pub fn is_dark(&self) -> bool {
-        self.picker.is_empty()
+        self.sampler.is_empty()
     }
 
     /// Whether a ray that nobody aimed may come upon a light: not upon points and parallel light.
@@ -222,7 +169,7 @@ impl Lights {
     /// Whether there is more than one to choose from.
     #[must_use]
     pub fn are_several(&self) -> bool {
-        self.picker.len() > 1
+        self.sampler.are_several()
     }
 
     /// Whether light comes from where nothing is.
@@ -283,7 +230,9 @@ impl Lights {
         radiance: &mut [f64],
     ) -> Chosen {
         // What is left of the number that chose the light chooses the place: both stay even.
-        let Some((index, rest, chance)) = self.pick(from, choice) else { return Chosen::Dark };
+        let Some((index, rest, chance)) = self.sampler.pick(from, choice) else {
+            return Chosen::Dark;
+        };
         let (one, square) = ((index, chance), [rest, v]);
         let mut chosen = self.place_on(around, spectral, from, one, square, radiance);
         if let Chosen::Place(target) = &mut chosen {
@@ -406,7 +355,7 @@ impl Lights {
         direction: DVec3,
     ) -> f64 {
         let Some(Some(first)) = self.first.get(placement as usize) else { return 0.0 };
-        if self.picker.is_empty() {
+        if self.is_dark() {
             return 0.0;
         }
         let index = *first as usize + spot.triangle;

@@ -194,28 +194,34 @@ impl DiscreteDistribution {
     }
 }
 
-/// Places in the unit square by the weights of the cells of a grid, uniform within each.
+/// A place between 0 and 1 whose density goes from `start` to `end` in a straight line, to a factor (Pharr,
+/// Jakob and Humphreys, *Physically Based Rendering*, 4th edition, section A.5.1).
+#[must_use]
+#[inline]
+pub fn linear_place(u: f64, [start, end]: [f64; 2]) -> f64 {
+    let root = ((1.0 - u) * start * start + u * end * end).sqrt();
+    let sum = start + root;
+    // Where both are 0, or so small that their squares are.
+    if sum > 0.0 { (u * (start + end) / sum).min(ONE_BELOW) } else { u }
+}
+
+/// Cells of a grid by weight.
 #[derive(Debug, Clone)]
 pub struct GridDistribution {
     rows: DiscreteDistribution,
     columns: Vec<DiscreteDistribution>,
 }
 
-/// A row that was chosen, and where the column is looked for.
+/// A cell of a grid that was chosen.
 #[derive(Debug, Clone, Copy, Default)]
-struct Found {
-    row: usize,
-    down: f64,
-    across: f64,
+pub struct GridCell {
+    /// Its column and row.
+    pub at: [usize; 2],
+    /// What is left of the numbers that chose them, in 0..1.
+    pub rest: [f64; 2],
+    /// Its probability.
+    pub probability: f64,
     between: [usize; 2],
-}
-
-/// Places that are chosen together; kept for the next.
-#[derive(Debug, Clone, Default)]
-pub struct PlacesOnGrid {
-    found: Vec<Found>,
-    /// Places (u, v) and their density over the unit square.
-    pub chosen: Vec<([f64; 2], f64)>,
 }
 
 impl GridDistribution {
@@ -229,50 +235,25 @@ impl GridDistribution {
         }
     }
 
-    /// The place for each of `squares`, the first number along columns, and its density; `places` is
-    /// refilled. Neighbours in the square are neighbours on the grid.
+    /// The cell for each of `squares`, the first number along columns; `cells` is refilled. Neighbours in the
+    /// square are neighbours on the grid.
     ///
     /// Tables of large grids are in no cache near by: what is read of them is read in loops of little
     /// else, so that many reads are under way at once.
-    pub fn places(&self, squares: impl Iterator<Item = [f64; 2]>, places: &mut PlacesOnGrid) {
-        let PlacesOnGrid { found, chosen } = places;
-        found.clear();
-        found.extend(squares.map(|[u, v]| {
+    pub fn cells(&self, squares: impl Iterator<Item = [f64; 2]>, cells: &mut Vec<GridCell>) {
+        cells.clear();
+        cells.extend(squares.map(|[u, v]| {
             let (row, down) = self.rows.pick(v);
-            Found { row, down, across: u, between: [0; 2] }
+            GridCell { at: [0, row], rest: [u, down], ..GridCell::default() }
         }));
-        for found in found.iter_mut() {
-            found.between = self.columns[found.row].guided(found.across);
+        for cell in cells.iter_mut() {
+            cell.between = self.columns[cell.at[1]].guided(cell.rest[0]);
         }
-        chosen.clear();
-        chosen.extend(found.iter().map(|&Found { row, down, across, between }| {
-            let columns = &self.columns[row];
-            let (column, rest) = columns.pick_between(across, between);
-            let at = |cell: usize, rest: f64, cells: usize| {
-                ((cell as f64 + rest) / cells as f64).min(ONE_BELOW)
-            };
-            let place = [at(column, rest, columns.len()), at(row, down, self.columns.len())];
-            (place, self.density_of(row, column))
-        }));
-    }
-
-    /// The density of places at one, over the unit square.
-    #[must_use]
-    pub fn pdf(&self, [u, v]: [f64; 2]) -> f64 {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "u and v are in 0..=1"
-        )]
-        let cell = |x: f64, cells: usize| ((x * cells as f64) as usize).min(cells - 1);
-        let row = cell(v, self.columns.len());
-        self.density_of(row, cell(u, self.columns[row].len()))
-    }
-
-    fn density_of(&self, row: usize, column: usize) -> f64 {
-        let columns = &self.columns[row];
-        let cells = (self.columns.len() * columns.len()) as f64;
-        self.rows.probability(row) * columns.probability(column) * cells
+        for GridCell { at: [column, row], rest: [across, _], probability, between } in cells {
+            let columns = &self.columns[*row];
+            (*column, *across) = columns.pick_between(*across, *between);
+            *probability = self.rows.probability(*row) * columns.probability(*column);
+        }
     }
 }
 
@@ -324,26 +305,39 @@ mod tests {
     }
 
     #[test]
-    #[expect(clippy::cast_possible_truncation, reason = "a column or row below three")]
-    fn places_on_grids_have_their_density() {
+    fn cells_of_grids_have_their_probability() {
         let weights = [1.0, 0.0, 3.0, 0.0, 0.0, 0.0, 5.0, 0.0, 7.0];
         let grid = GridDistribution::new(3, &weights);
-        let mut places = PlacesOnGrid::default();
+        let mut cells = Vec::new();
         let n = 400;
         let mut counts = [0.0; 9];
         for k in 0..n * n {
             let square = [k % n, k / n].map(|i| (f64::from(i) + 0.5) / f64::from(n));
-            grid.places(std::iter::once(square), &mut places);
-            let (place, density) = places.chosen[0];
-            let [x, y] = place.map(|c| (c * 3.0) as usize);
+            grid.cells(std::iter::once(square), &mut cells);
+            let GridCell { at: [x, y], rest, probability, .. } = cells[0];
+            assert!(rest.iter().all(|rest| (0.0..1.0).contains(rest)));
             counts[y * 3 + x] += 1.0 / f64::from(n * n);
-            assert!((grid.pdf(place) - weights[y * 3 + x] * 9.0 / 16.0).abs() < 1e-12);
-            assert_eq!(grid.pdf(place), density);
+            assert!((probability - weights[y * 3 + x] / 16.0).abs() < 1e-12);
         }
         for (count, weight) in counts.iter().zip(weights) {
             // A regular grid: within a step along each side of the cell's share of the square.
             assert!((count - weight / 16.0).abs() < 4.0 / f64::from(n), "{counts:?}");
         }
+    }
+
+    /// The distribution function of a straight line, (s x + (e - s) x²/2) / ((s + e)/2), gives the number back.
+    #[test]
+    fn places_on_a_line_have_its_density() {
+        for [start, end] in [[1.0, 3.0], [0.0, 2.0], [5.0, 0.0], [1.0, 1.0], [1e-12, 1.0]] {
+            for k in 0..1_000 {
+                let u = f64::from(k) / 1_000.0;
+                let x = linear_place(u, [start, end]);
+                let below = (start * x + 0.5 * (end - start) * x * x) / (0.5 * (start + end));
+                // Some roundings, and one of a root where the density begins at 0.
+                assert!((below - u).abs() < 1e-14, "{start} {end} at {u}: {below}");
+            }
+        }
+        assert_eq!(linear_place(0.25, [0.0, 0.0]), 0.25);
     }
 
     #[test]

@@ -7,10 +7,9 @@ use std::sync::Arc;
 use etendue_geometry::glam::{DMat3, DVec3};
 
 use crate::Color;
-use crate::environment::{EnvironmentMap, MapSampler, place};
+use crate::environment::{EnvironmentMap, MapSampler, PlacesOnMap, place};
 use crate::light::{Light, LightKind};
 use crate::lights::Lights;
-use crate::sampling::PlacesOnGrid;
 use crate::spectral::Spectral;
 use crate::target::{Target, TargetKind};
 
@@ -31,7 +30,7 @@ pub(crate) struct Asked {
     /// Lanes and the chance of each.
     lanes: Vec<(usize, f64)>,
     squares: Vec<[f64; 2]>,
-    places: PlacesOnGrid,
+    places: PlacesOnMap,
     directions: Vec<(DVec3, f64)>,
     colors: Vec<Color>,
 }
@@ -94,40 +93,41 @@ impl Sky {
 }
 
 impl Lights {
-    /// Radiance that comes from each unit direction without meeting anything, and the density (1/sr),
-    /// chance included, with which [`Self::choose`] gives that direction. Both go to `each`, with the
-    /// number of the direction.
+    /// Radiance that comes to a point (m) from each unit direction without meeting anything, and the density
+    /// (1/sr), chance included, with which [`Self::choose`] gives that direction for that point. Both go to
+    /// `each`, with the number of the pair.
     pub(crate) fn environment(
         &self,
         spectral: &Spectral,
-        wanted: impl Iterator<Item = DVec3>,
+        wanted: impl Iterator<Item = (DVec3, DVec3)>,
         asked: &mut Asked,
         radiance: &mut [f64],
         mut each: impl FnMut(usize, f64, &mut [f64]),
     ) {
         let Some(sky) = &self.sky else { return };
-        let (own, chance) =
-            (self.bands_of(sky.index, radiance.len()), self.chance(DVec3::ZERO, sky.index));
+        let own = self.bands_of(sky.index, radiance.len());
+        let Asked { places, directions, colors, .. } = asked;
         let Some((map, sampler)) = &sky.map else {
-            for (number, _) in wanted.enumerate() {
+            for (number, (from, _)) in wanted.enumerate() {
                 radiance.copy_from_slice(own);
-                each(number, 0.25 / PI * chance, radiance);
+                each(number, 0.25 / PI * self.chance(from, sky.index), radiance);
             }
             return;
         };
-        let Asked { places, directions, colors, .. } = asked;
         directions.clear();
-        directions.extend(wanted.map(|world| (sky.world_from_map.transpose() * world, 0.0)));
+        directions.extend(wanted.map(|(from, world)| {
+            (sky.world_from_map.transpose() * world, self.chance(from, sky.index))
+        }));
         places.chosen.clear();
         places.chosen.extend(directions.iter().map(|&(local, _)| (place(local), 0.0)));
         colors.clear();
         colors.extend(places.chosen.iter().map(|&(at, _)| map.radiance_at(at)));
-        for ((local, pdf), &(at, _)) in directions.iter_mut().zip(&places.chosen) {
-            *pdf = sampler.pdf_at(*local, at);
+        for ((local, chance), &(at, _)) in directions.iter_mut().zip(&places.chosen) {
+            *chance *= sampler.pdf_at(*local, at);
         }
         for (number, (color, &(_, pdf))) in colors.iter().zip(&*directions).enumerate() {
             self.spread_sky(spectral, color, radiance);
-            each(number, pdf * chance, radiance);
+            each(number, pdf, radiance);
         }
     }
 

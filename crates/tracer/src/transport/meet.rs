@@ -40,8 +40,9 @@ impl Tracing<'_> {
             }
         }
         let (lights, spectral) = (self.stage.lights, self.stage.spectral);
-        let directions = missed.iter().map(|&i| now.rays.direction(i as usize));
-        lights.environment(spectral, directions, asked, radiance, |number, pdf, light| {
+        let wanted = missed.iter().map(|&i| i as usize);
+        let wanted = wanted.map(|i| (now.states[i].vertex, now.rays.direction(i)));
+        lights.environment(spectral, wanted, asked, radiance, |number, pdf, light| {
             let i = missed[number] as usize;
             let weight = now.states[i].weight_against(pdf);
             let throughput = now.throughput_of(i, self.count);

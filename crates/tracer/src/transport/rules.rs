@@ -3,7 +3,7 @@
 use super::{LightingContext, RaySamples, RayStats, Scratch, trace};
 
 /// Surfaces after which dim paths of [`Rules::path`] end by chance.
-const ROULETTE_AFTER: u32 = 4;
+const ROULETTE_AFTER: u32 = 5;
 
 /// A tracer of light: where its paths end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,7 +12,7 @@ pub struct Rules {
     pub bounces: u32,
     /// Which directions are followed beyond the first light that they meet.
     pub follow: Follow,
-    /// Surfaces after which dim paths may end by chance.
+    /// Surfaces after which paths go on with a chance of the root of what they carry of their brightest band.
     pub roulette: Option<u32>,
 }
 

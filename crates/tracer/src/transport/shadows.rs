@@ -118,8 +118,9 @@ impl Tracing<'_> {
             shadows.note(row, radiance, last.throughput_of(i, self.count), weight);
         }
         let (lights, spectral) = (self.stage.lights, self.stage.spectral);
-        let directions = missed.iter().map(|&i| last.rays.direction(i as usize));
-        lights.environment(spectral, directions, asked, radiance, |number, pdf, light| {
+        let wanted = missed.iter().map(|&i| i as usize);
+        let wanted = wanted.map(|i| (last.states[i].vertex, last.rays.direction(i)));
+        lights.environment(spectral, wanted, asked, radiance, |number, pdf, light| {
             let i = missed[number] as usize;
             let (origin, direction) = (last.rays.origin(i), last.rays.direction(i));
             let limits = [0.0, f64::INFINITY];

@@ -338,7 +338,8 @@ impl Tracing<'_> {
                 }
                 let bounces = state.bounces + 1;
                 if self.rules.roulette.is_some_and(|after| bounces >= after) && !state.is_last {
-                    let survival = most.min(0.95);
+                    // Its root: where few paths come this far, ending them saves little and leaves noise.
+                    let survival = most.sqrt().min(1.0);
                     if numbers.of(Draw::Chance, k)[1] >= survival {
                         continue;
                     }

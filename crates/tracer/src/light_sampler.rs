@@ -1,0 +1,215 @@
+//! Which light is asked for a point.
+//!
+//! Lights far away are chosen by the irradiance of a surface that faces them (W/m², of the mean of the three
+//! colours): `E` of parallel light, `π L` of an environment. Among lights near by, one is chosen by what it may
+//! send to the point ([`crate::light_tree`]); where there are very few or very many, and nothing is far away,
+//! by power (W): a triangle of an emissive mesh by `π A L` for one side. Between near and far the point decides
+//! by the same irradiances, but neither is chosen less often than in one of four cases: what is near may be
+//! behind a wall, and what is far outside of it.
+
+use std::f64::consts::PI;
+
+use etendue_geometry::Bounds;
+use etendue_geometry::glam::DVec3;
+
+use crate::light_tree::{self, Cluster, LightTree};
+use crate::sampling::{DiscreteDistribution, ONE_BELOW};
+
+/// The least chance of a light near by, and of one far away, where there are both.
+const LEAST_SHARE: f64 = 0.25;
+
+/// A light that may be chosen.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Candidate {
+    /// It has a place.
+    Near {
+        /// W.
+        power: f64,
+        cluster: Cluster,
+    },
+    /// It has none.
+    Far {
+        /// W/m².
+        irradiance: f64,
+    },
+    /// It sends nothing.
+    Dark,
+}
+
+impl Candidate {
+    /// A light that has a place, with its power (W).
+    pub(crate) fn near(power: f64, cluster: Cluster) -> Self {
+        Self::Near { power, cluster }
+    }
+}
+
+/// The lights by their chances.
+#[derive(Debug)]
+pub(crate) struct LightSampler {
+    /// Those that are in no tree.
+    others: DiscreteDistribution,
+    /// The irradiance that those send (W/m²), where there is a tree.
+    far: f64,
+    tree: Option<LightTree>,
+}
+
+impl LightSampler {
+    /// Over `candidates`, by their order, in a scene of these bounds (m).
+    pub(crate) fn new(candidates: &[Candidate], bounds: Bounds) -> Self {
+        let irradiance = |candidate: &Candidate| match candidate {
+            Candidate::Far { irradiance } => *irradiance,
+            Candidate::Near { .. } | Candidate::Dark => 0.0,
+        };
+        let far = candidates.iter().map(irradiance).sum();
+        let tree = plant(candidates, far > 0.0);
+        // What falls onto the sphere around the scene.
+        let radius = 0.5 * bounds.diagonal();
+        let across = if radius > 0.0 { PI * radius * radius } else { PI };
+        let weight = |candidate: &Candidate| match candidate {
+            Candidate::Near { power, .. } if tree.is_none() => *power,
+            Candidate::Far { irradiance } => across * irradiance,
+            Candidate::Near { .. } | Candidate::Dark => 0.0,
+        };
+        let weights: Vec<f64> = candidates.iter().map(weight).collect();
+        let others = match weights.iter().any(|&weight| weight > 0.0) {
+            true => DiscreteDistribution::new(&weights),
+            false => DiscreteDistribution::default(),
+        };
+        Self { others, far, tree }
+    }
+
+    /// Whether there is nothing to choose from.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.others.is_empty() && self.tree.is_none()
+    }
+
+    /// Whether there is more than one to choose from.
+    pub(crate) fn are_several(&self) -> bool {
+        self.others.len() > 1 || self.tree.is_some()
+    }
+
+    /// The chance with which a light of the tree is chosen for the point `from` (m), and none of the others.
+    fn share_of_tree(&self, tree: &LightTree, from: DVec3) -> f64 {
+        if self.others.is_empty() {
+            return 1.0;
+        }
+        match tree.importance(from) {
+            near if near > 0.0 => (near / (near + self.far)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE),
+            _ => 0.0,
+        }
+    }
+
+    /// A light for the point `from` (m) by `u` in 0..1: its number, what is left of `u`, and its chance.
+    pub(crate) fn pick(&self, from: DVec3, u: f64) -> Option<(usize, f64, f64)> {
+        let Some(tree) = &self.tree else { return self.pick_other(u) };
+        let share = self.share_of_tree(tree, from);
+        if u < share {
+            let (index, rest, chance) = tree.pick(from, u / share)?;
+            return Some((index, rest, share * chance));
+        }
+        let rest = ((u - share) / (1.0 - share)).min(ONE_BELOW);
+        let (index, rest, chance) = self.pick_other(rest)?;
+        Some((index, rest, (1.0 - share) * chance))
+    }
+
+    fn pick_other(&self, u: f64) -> Option<(usize, f64, f64)> {
+        match self.others.len() {
+            0 => None,
+            1 => Some((0, u, 1.0)),
+            _ => {
+                let (index, rest) = self.others.pick(u);
+                Some((index, rest, self.others.probability(index)))
+            }
+        }
+    }
+
+    /// The chance with which [`Self::pick`] picks light `index` for the point `from` (m).
+    pub(crate) fn chance(&self, from: DVec3, index: usize) -> f64 {
+        let other = || if self.others.is_empty() { 0.0 } else { self.others.probability(index) };
+        match &self.tree {
+            None => other(),
+            Some(tree) => {
+                let share = self.share_of_tree(tree, from);
+                match tree.holds(index) {
+                    true => share * tree.chance(from, index),
+                    false => (1.0 - share) * other(),
+                }
+            }
+        }
+    }
+}
+
+/// The tree over what has a place, when that is worth one.
+fn plant(candidates: &[Candidate], is_far: bool) -> Option<LightTree> {
+    let cluster = |candidate: &Candidate| match candidate {
+        Candidate::Near { cluster, .. } if cluster.intensity > 0.0 => Some(*cluster),
+        _ => None,
+    };
+    let near: Vec<_> =
+        (0_u32..).zip(candidates).filter_map(|(k, c)| Some((k, cluster(c)?))).collect();
+    let least = if is_far { 1 } else { light_tree::LEAST };
+    let is_worth_it = (least..=light_tree::MOST).contains(&near.len());
+    is_worth_it.then(|| LightTree::new(near, candidates.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::*;
+
+    /// A lamp of one W/sr at the origin that shines along +Y.
+    fn lamp() -> Candidate {
+        let bounds = Bounds { min: DVec3::ZERO, max: DVec3::ZERO };
+        let cluster =
+            Cluster { bounds, axis: DVec3::Y, cone: 0.0, reach: FRAC_PI_2, intensity: 1.0 };
+        Candidate::near(PI, cluster)
+    }
+
+    fn scene() -> Bounds {
+        Bounds { min: DVec3::splat(-50.0), max: DVec3::splat(50.0) }
+    }
+
+    /// Lights far away and one near by, of which a point farther away gets less.
+    #[test]
+    fn chances_are_those_of_picks_and_go_with_distance() {
+        let far = [2.0, 0.0, 1.0].map(|irradiance| Candidate::Far { irradiance });
+        let all = [far[0], lamp(), far[1], Candidate::Dark, far[2]];
+        let sampler = LightSampler::new(&all, scene());
+        // By 1/d² against 3, and never below a quarter or above three; nothing behind it.
+        let expected =
+            [(1.0, 0.25), (0.5, 4.0 / 7.0), (0.4, 6.25 / 9.25), (0.1, 0.75), (-1.0, 0.0)];
+        for (height, share) in expected {
+            let from = DVec3::Y * height;
+            let mut counts = [0_u32; 5];
+            let n = 10_000_u32;
+            for k in 0..n {
+                let u = (f64::from(k) + 0.5) / f64::from(n);
+                let (index, rest, chance) = sampler.pick(from, u).unwrap();
+                assert!((0.0..1.0).contains(&rest));
+                assert!((chance - sampler.chance(from, index)).abs() < 1e-12);
+                counts[index] += 1;
+            }
+            let chances = [0, 1, 2, 3, 4].map(|k| sampler.chance(from, k));
+            assert!((chances[1] - share).abs() < 1e-12, "{height}: {chances:?}");
+            assert!(
+                (chances[0] - (1.0 - share) * 2.0 / 3.0).abs() < 1e-12,
+                "{height}: {chances:?}"
+            );
+            assert_eq!(chances[2..4], [0.0; 2]);
+            for (count, chance) in counts.iter().zip(chances) {
+                // A regular grid meets an interval to within one step at each end.
+                assert!((f64::from(*count) / f64::from(n) - chance).abs() < 2.0 / f64::from(n));
+            }
+        }
+    }
+
+    #[test]
+    fn a_few_lamps_alone_are_chosen_by_power_and_none_is_dark() {
+        let sampler = LightSampler::new(&[lamp(), lamp()], scene());
+        assert_eq!(sampler.chance(DVec3::NEG_Y, 0), 0.5);
+        assert!(sampler.are_several() && !sampler.is_empty());
+        assert!(LightSampler::new(&[Candidate::Dark], scene()).is_empty());
+        assert!(LightSampler::new(&[], scene()).pick(DVec3::ZERO, 0.5).is_none());
+    }
+}
