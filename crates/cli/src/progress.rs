@@ -1,5 +1,6 @@
 //! Progress bars on a terminal, and nothing in a pipe.
 
+use std::collections::HashSet;
 use std::io::{IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -66,7 +67,7 @@ impl Phases {
     }
 
     /// The bars of all phases of a render, one after the other, and notes above them where they are
-    /// `said`.
+    /// `said`: each once, however many frames there are of which it is true.
     pub(crate) fn progress(self, says_notes: bool) -> etendue::Progress {
         let shown: Mutex<Option<(Phase, Progress)>> = Mutex::default();
         let told = move |phase: Phase, share: f64| {
@@ -78,8 +79,11 @@ impl Phases {
             }
             shown.as_ref().is_none_or(|(_, bar)| bar(share))
         };
+        let said = Mutex::new(HashSet::new());
         let note = move |note: &str| {
-            if says_notes {
+            let is_new =
+                || said.lock().unwrap_or_else(PoisonError::into_inner).insert(note.to_owned());
+            if says_notes && is_new() {
                 say(&format!("note: {note}"));
             }
         };

@@ -1,5 +1,6 @@
 //! `etendue render` of a scene with `frames`: a folder a frame, and what data sets want beside them.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -73,19 +74,28 @@ pub(crate) fn render(
             }
         }
     }
+    let gone = pattern.remove_from(out, frames.len());
     let beside = places::recorded(Ledger::open(out, "render"), || dataset.write(out))?;
     files.extend(beside);
     if let Some(path) = &arguments.report {
         sidecar::write_json(path, &reports)?;
     }
-    if !arguments.quiet && skipped > 0 {
-        say(&format!(
-            "{skipped} of {} frames were complete and are left as they are",
-            wanted.len()
-        ));
+    if !arguments.quiet {
+        tell(wanted.len(), skipped, &gone);
     }
     let lines: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     print_text(&lines.join("\n"))
+}
+
+/// Tells what of the folder's frames was left, and what has gone.
+fn tell(wanted: usize, skipped: usize, gone: &BTreeSet<usize>) {
+    if skipped > 0 {
+        say(&format!("{skipped} of {wanted} frames were complete and are left as they are"));
+    }
+    if let (Some(first), Some(last)) = (gone.first(), gone.last()) {
+        let count = gone.len();
+        say(&format!("frames {first} to {last} ({count}) of an earlier scene were removed"));
+    }
 }
 
 /// A folder that goes when this is dropped and nothing is in it.

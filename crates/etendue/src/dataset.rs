@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +17,9 @@ use etendue_scene::{Frame, Scene};
 use serde_json::{Map, Value, json};
 
 use crate::{Error, FramePattern, rendering};
+
+/// What lists them.
+const INDEX: &str = "index.json";
 
 /// The frames of a scene, as they are added.
 #[derive(Debug, Clone, Default)]
@@ -86,7 +90,7 @@ impl Dataset {
     ///
     /// When a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, Error> {
-        let mut files = vec![folder.join("index.json")];
+        let mut files = vec![folder.join(INDEX)];
         sidecar::write_json(&files[0], &self.index(folder))?;
         if self.entries.is_empty() || !self.entries.iter().all(Entry::has_k) {
             return Ok(files);
@@ -207,6 +211,15 @@ impl Dataset {
         let points = "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]\n".to_owned();
         [("cameras.txt", lines), ("images.txt", images), ("points3D.txt", points)]
     }
+}
+
+/// The numbers of the frames of the data set that was written to `folder`.
+pub(crate) fn numbers(folder: &Path) -> Vec<usize> {
+    let index = fs::read(folder.join(INDEX)).ok();
+    let index: Option<Value> = index.and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    let frames = index.as_ref().and_then(|index| index["frames"].as_array());
+    let number = |frame: &Value| usize::try_from(frame["frame"].as_u64()?).ok();
+    frames.into_iter().flatten().filter_map(number).collect()
 }
 
 /// The files of each layer by their ending, as seen from the data set's folder.

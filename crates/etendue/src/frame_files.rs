@@ -1,5 +1,6 @@
 //! Where the files of frames go, and which frames are complete.
 
+use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
@@ -7,7 +8,7 @@ use etendue_render::output::{Ledger, MANIFEST, OutputError, Outputs, sidecar};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::{Error, Progress, Rendering, Written, places};
+use crate::{Error, Progress, Rendering, Written, dataset, places};
 
 /// Names of the files of frames: `{frame}` stands for the frame's number in six digits, `{layer}` for the
 /// layer's name, and the ending follows.
@@ -168,6 +169,33 @@ impl FramePattern {
             sidecar::write_json(&record, &Record { fingerprints, files })?;
         }
         Ok(written)
+    }
+
+    /// Removes from `out` what an earlier run wrote of frames from `count` on, which the scene no longer has, as
+    /// far as it is as it was written; gives their numbers. Known are those of the data set's index and those
+    /// that follow the scene's last without a gap.
+    pub fn remove_from(&self, out: &Path, count: usize) -> BTreeSet<usize> {
+        let following = (count..).take_while(|&number| self.is_begun(out, number));
+        let listed = dataset::numbers(out).into_iter().filter(|number| *number >= count);
+        let gone: BTreeSet<usize> =
+            following.chain(listed).filter(|&number| self.is_begun(out, number)).collect();
+        gone.iter().for_each(|&number| self.remove(out, number));
+        gone
+    }
+
+    fn remove(&self, out: &Path, number: usize) {
+        if self.folder.is_some() {
+            return places::clear(&out.join(self.folder(number)));
+        }
+        let path = record_of(out, number);
+        for (name, size) in read_record(&path).unwrap_or_default().files {
+            let file = out.join(name);
+            // What cannot be removed is nobody's loss.
+            if fs::symlink_metadata(&file).is_ok_and(|data| data.is_file() && data.len() == size) {
+                let _ = fs::remove_file(file);
+            }
+        }
+        let _ = fs::remove_file(path);
     }
 
     fn take_to_places(

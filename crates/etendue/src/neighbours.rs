@@ -35,13 +35,38 @@ pub(crate) fn around<'f>(
     steps.iter().filter_map(frame).collect()
 }
 
-/// Leaves out the layers of `scene` that compare it with a frame which is not there, unless it has no others.
-pub(crate) fn leave_out(scene: &mut Scene, neighbours: &[Neighbour]) {
+/// Refuses layers that compare frames further apart than any of the scene's `count` frames are.
+pub(crate) fn refuse_far(scene: &Scene, count: usize) -> Result<(), Error> {
+    let is_far = |step: &FrameStep| step.frames().unsigned_abs() as usize >= count;
+    match steps(&scene.layers).into_iter().find(is_far) {
+        Some(step) => Err(Error::Refused(format!(
+            "{}: layers: `to`: {} leads out of the scene's frames, which are 0..{count}, from each of \
+             them: name a nearer frame, or leave the layer out",
+            scene.path.display(),
+            step.frames()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Leaves out the layers of `scene` that compare it with a frame which is not there, unless it has no others:
+/// then its picture is one of misses, and that is the note.
+#[must_use]
+pub(crate) fn leave_out(
+    scene: &mut Scene,
+    shown: Option<usize>,
+    neighbours: &[Neighbour],
+) -> Option<String> {
     let is_there = |step| neighbours.iter().any(|neighbour| neighbour.step == step);
     let is_kept = |layer: &LayerSpec| layer.step().is_none_or(is_there);
     if scene.layers.iter().any(is_kept) {
         scene.layers.retain(is_kept);
+        return None;
     }
+    let number = shown.filter(|_| !scene.layers.is_empty())?;
+    Some(format!(
+        "frame {number}: the scene has no frame that its layers could compare it with; all of it is a miss"
+    ))
 }
 
 impl Neighbour {

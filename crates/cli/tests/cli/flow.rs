@@ -217,3 +217,21 @@ fn a_changed_neighbour_is_no_complete_frame() {
     assert_ne!(time(), before);
     assert!(bench.array("frames/000000/flow") != flow);
 }
+
+#[test]
+fn a_frame_to_compare_with_that_is_not_there_is_told() {
+    let grid = json!({"type": "grid", "columns": 2, "spacing": "0.2 m"});
+    let bench = Bench::with_scene(&scene(&wall_and_square(), &grid, &json!(["flow"])).to_string());
+    let output = bench.run(&["render", "scene.json", "-o", "out"]);
+    assert!(output.status.success());
+    let said = text(&output.stderr);
+    assert!(said.contains("note: frame 1: ") && !said.contains("note: frame 0: "), "{said}");
+    assert!(bench.array("frames/000001/flow").iter().all(|flow| *flow == f64::INFINITY));
+    // None of the two frames has one that is two further.
+    let far = json!(["depth", {"type": "flow", "to": 2}]);
+    let bench = Bench::with_scene(&scene(&wall_and_square(), &grid, &far).to_string());
+    let output = bench.run(&["render", "scene.json", "-o", "out"]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = text(&output.stderr);
+    assert!(said.contains("scene.json: layers: `to`: 2") && said.contains("0..2"), "{said}");
+}

@@ -431,6 +431,9 @@ fn bad_frames_are_refused_by_number() {
     assert!(error.contains("line 1") && error.contains("nan"), "{error}");
     let error = refused(&poses("a.txt"), &[("a.txt", b"0 0 0\n")], &[]);
     assert!(error.contains("3 words") && error.contains("tx ty tz"), "{error}");
+    let falls = b"0.1 0 0 4 0 0 0 1\n0.2 0 0 4 0 0 0 1\n0.15 0 0 4 0 0 0 1\n";
+    let error = refused(&poses("a.txt"), &[("a.txt", falls)], &[]);
+    assert!(error.contains("time 0.15 in line 3, after 0.2"), "{error}");
     let error = refused(&poses("no.npy"), &[], &[]);
     assert!(error.contains("no such file"), "{error}");
     let error = refused(&json!({"type": "orbit", "count": 0}), &[], &[]);
@@ -459,4 +462,47 @@ fn bad_frames_are_refused_by_number() {
     assert!(error.contains("a.npy") && error.contains("finite"), "{error}");
     let error = refused(&json!({"type": "poses", "poses": [], "times": [1]}), &[], &[]);
     assert!(error.contains("1 times for 0 poses"), "{error}");
+}
+
+#[test]
+fn frames_that_the_scene_has_no_more_go() {
+    let orbit = |count: u32| scene(&json!({"type": "orbit", "count": count}));
+    let by_layer = ["--pattern", "{layer}/{frame}"];
+    for (pattern, gone) in [(&[][..], "frames/000003/depth.npy"), (&by_layer, "depth/000003.npy")] {
+        let bench = Bench::with_scene(&orbit(5));
+        bench.render(pattern);
+        // Something else beside them, and a gap, as after a render of a part.
+        std::fs::create_dir_all(bench.path("out/frames/000004")).unwrap();
+        bench.write("out/frames/000004/mine.txt", b"mine");
+        std::fs::remove_file(bench.path("out").join(gone)).unwrap();
+        bench.write("scene.json", orbit(3).as_bytes());
+        bench.render(pattern);
+        let name = |number: u32| gone.replace("000003", &format!("{number:06}"));
+        let is_there = |number| bench.path("out").join(name(number)).exists();
+        assert_eq!([0, 1, 2, 3, 4].map(is_there), [true, true, true, false, false], "{gone}");
+        assert!(!bench.path("out/frames/000003").exists());
+        assert!(!bench.path("out/frames/000004.json").exists());
+        assert!(bench.path("out/frames/000004/mine.txt").exists(), "what nobody rendered stays");
+        assert_eq!(bench.json("out/index.json")["frames"].as_array().map(Vec::len), Some(3));
+    }
+}
+
+#[test]
+fn a_note_on_every_frame_is_said_once() {
+    // Tracing light finds none in any of them.
+    let mut dark: Value =
+        serde_json::from_str(&scene(&json!({"type": "orbit", "count": 3}))).unwrap();
+    dark["tracer"] = json!({"type": "direct"});
+    let bench = Bench::with_scene(&dark.to_string());
+    let output = bench.run(&["render", "scene.json", "-o", "out", "--report", "report.json"]);
+    assert!(output.status.success());
+    let said = text(&output.stderr);
+    let mut notes: Vec<&str> = said.lines().filter(|line| line.starts_with("note: ")).collect();
+    let count = notes.len();
+    assert!(count > 0, "{said}");
+    notes.sort_unstable();
+    notes.dedup();
+    assert_eq!(notes.len(), count, "{said}");
+    let reports = bench.json("report.json");
+    assert!(reports.as_array().unwrap().iter().all(|report| report["notes"] != json!([])));
 }

@@ -47,11 +47,15 @@ impl Session {
         let neighbours = self.load_neighbours(progress)?;
         let mut scene = self.load_file(self.file(), progress)?;
         neighbours::refuse_views(&scene)?;
-        neighbours::leave_out(&mut scene, &neighbours);
+        if let Some(frames) = &self.frames {
+            neighbours::refuse_far(&scene, frames.len())?;
+        }
+        let shown = self.shown.as_ref().map(|(number, _)| *number);
+        let left = neighbours::leave_out(&mut scene, shown, &neighbours);
         if self.options.outputs.denoised {
             denoise::guide(&mut scene)?;
         }
-        let notes: Vec<String> = scene.notes.iter().map(in_words).collect();
+        let notes: Vec<String> = scene.notes.iter().map(in_words).chain(left).collect();
         notes.iter().for_each(|note| progress.note(note));
         let plan = Plan::new(&scene, self.options.outputs);
         let scene = Arc::new(scene);

@@ -23,6 +23,13 @@ pub(super) fn read(
             ));
         }
         let [time, x, y, z, a, b, c, d] = numbers(&words, number)?;
+        if let Some(before) = stations.last().and_then(|last: &Station| last.time)
+            && time < before
+        {
+            return Err(format!(
+                "has the time {time} in line {number}, after {before}: sort the lines by their times"
+            ));
+        }
         let pose = PoseSpec::Quaternion {
             quaternion: [a, b, c, d],
             translation: [x, y, z],
