@@ -91,9 +91,9 @@ impl Accel {
         let mut all = vec![false; rays.len()];
         py.detach(|| {
             all.par_chunks_mut(BATCH).enumerate().for_each_init(
-                || (RayBatch::with_capacity(BATCH), Vec::new()),
-                |(batch, blocked), (k, out)| {
-                    rays.fill(k, coherent, batch);
+                || (RayBatch::with_capacity(BATCH), Vec::with_capacity(BATCH), Vec::new()),
+                |(batch, lengths, blocked), (k, out)| {
+                    rays.fill(k, coherent, (batch, lengths));
                     self.accel.occluded(batch, blocked);
                     out.copy_from_slice(blocked);
                 },
@@ -124,14 +124,17 @@ impl Accel {
         let tuv = t.par_chunks_mut(BATCH).zip(u.par_chunks_mut(BATCH)).zip(v.par_chunks_mut(BATCH));
         let rest = triangle.par_chunks_mut(BATCH).zip(normal.par_chunks_mut(BATCH));
         tuv.zip(rest).enumerate().for_each_init(
-            || (RayBatch::with_capacity(BATCH), HitBatch::new(Detail::Surface)),
-            |(batch, hits), (k, (((t, u), v), (triangle, normal)))| {
-                rays.fill(k, coherent, batch);
+            || {
+                let hits = HitBatch::new(Detail::Surface);
+                (RayBatch::with_capacity(BATCH), Vec::with_capacity(BATCH), hits)
+            },
+            |(batch, lengths, hits), (k, (((t, u), v), (triangle, normal)))| {
+                rays.fill(k, coherent, (batch, lengths));
                 self.accel.closest(batch, hits);
                 u.copy_from_slice(&hits.u);
                 v.copy_from_slice(&hits.v);
                 for i in 0..t.len() {
-                    t[i] = hits.t[i] / rays.length(k * BATCH + i).max(f64::MIN_POSITIVE);
+                    t[i] = hits.t[i] / lengths[i].max(f64::MIN_POSITIVE);
                     triangle[i] = if hits.is_hit(i) { hits.triangle[i].into() } else { -1 };
                     normal[i] = hits.normal(i).to_array();
                 }
@@ -192,24 +195,25 @@ impl<'a> Rays<'a> {
         self.origins.len()
     }
 
-    fn length(&self, i: usize) -> f64 {
-        DVec3::from(self.directions[i]).length()
-    }
-
-    /// Refills `batch` with the rays of batch `k`, of unit directions. A ray that is not finite, or without
-    /// direction, misses.
-    fn fill(&self, k: usize, coherent: bool, batch: &mut RayBatch) {
+    /// Refills `batch` with the rays of batch `k`, of unit directions, and `lengths` with those that they came
+    /// with. A ray that is not finite, or without direction, misses.
+    fn fill(&self, k: usize, coherent: bool, (batch, lengths): (&mut RayBatch, &mut Vec<f64>)) {
         batch.clear();
+        lengths.clear();
         batch.coherent = coherent;
-        for i in k * BATCH..((k + 1) * BATCH).min(self.len()) {
-            let (origin, length) = (DVec3::from(self.origins[i]), self.length(i));
+        let here = k * BATCH..((k + 1) * BATCH).min(self.len());
+        let rays = self.origins[here.clone()].iter().zip(&self.directions[here.clone()]);
+        for (i, (&origin, &direction)) in here.zip(rays) {
+            let (origin, direction) = (DVec3::from(origin), DVec3::from(direction));
+            let length = direction.length();
+            lengths.push(length);
             let far = self.t_max.as_ref().map_or(f64::INFINITY, |t| t[i]) * length;
-            match DVec3::from(self.directions[i]).try_normalize() {
-                Some(direction) if origin.is_finite() && far >= 0.0 => {
-                    batch.push_between(origin, direction, 0.0, far);
-                }
+            let shrink = length.recip();
+            if shrink.is_finite() && shrink > 0.0 && origin.is_finite() && far >= 0.0 {
+                batch.push_between(origin, direction * shrink, 0.0, far);
+            } else {
                 // Ends before it starts.
-                _ => batch.push_between(DVec3::ZERO, DVec3::Z, 0.0, -1.0),
+                batch.push_between(DVec3::ZERO, DVec3::Z, 0.0, -1.0);
             }
         }
     }
