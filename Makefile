@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-decisions docs-figures docs-charts \
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-decisions bench-window docs-figures docs-charts \
 	docs-stability gallery light-fields fingerprints fuzz-smoke fuzz-seeds sanitize clean
 
 help:
@@ -14,7 +14,7 @@ help:
 	@echo "make test          install what is missing, run everything that CI runs"
 	@echo "make test-embree4  run the tests that touch Embree against Embree 4, in a Debian 13 root"
 	@echo "make view          a window onto scenes/first-light.json; SCENE=… for another scene or model"
-	@echo "make test-window   drive a real window on a screen in memory (Xvfb)"
+	@echo "make test-window   drive real windows on screens in memory: X11 (Xvfb) and Wayland (sway)"
 	@echo "make test-slurm    run the jobs of scenes/cluster on a Slurm of one node, made for it"
 	@echo "make test-denoise  run the tests of render --denoise with Open Image Denoise from PyPI"
 	@echo "make python        build the Python package's wheel and test it in a fresh venv"
@@ -29,6 +29,7 @@ help:
 	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/limits.md"
 	@echo "make bench-sampling  what samples that stop save; writes the measured part of docs/sampling.md"
 	@echo "make bench-forecast  render the example scenes, and hold the forecast of time against it"
+	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/window.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model"
 	@echo "make gallery       render the pictures of docs/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
@@ -57,6 +58,7 @@ view: setup
 test-window:
 	@scripts/setup.sh test
 	@scripts/test-window.sh
+	@scripts/test-wayland.sh
 
 test:
 	@scripts/setup.sh test
@@ -126,6 +128,12 @@ bench-forecast: setup
 bench-decisions: setup
 	cargo build --release -p etendue-cli
 	python3 benches/decisions.py $(ARGS)
+
+# With ETENDUE_ASSETS also on a textured model of the reference data.
+bench-window:
+	@scripts/setup.sh test
+	cargo build --release -p etendue-cli --features window
+	python3 benches/window.py $(ARGS)
 
 # ARGS=--quick takes lighter meshes
 docs-charts: setup

@@ -32,6 +32,8 @@ if [ "${1:-}" = test ]; then
         need "to read images back with Python's OpenEXR and numpy" python3-venv
     { command -v Xvfb && command -v xdotool && command -v import && command -v jq; } >/dev/null ||
         need "to drive a window on a screen in memory" xvfb xdotool imagemagick jq
+    { command -v sway && command -v grim && command -v wtype; } >/dev/null ||
+        need "to drive a window on Wayland" sway grim wtype
     ldconfig -p | grep -q libxkbcommon-x11 && any_file "/usr/lib/*/dri/*_dri.so" ||
         need "to draw a window without a graphics card: Mesa and X's libraries" \
             libgl1-mesa-dri libgl1 libegl1 libxkbcommon-x11-0 libxcursor1 libxi6 libx11-xcb1

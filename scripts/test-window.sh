@@ -148,6 +148,8 @@ done
 # A broken file is told, and changes nothing.
 echo '{ "etendue": 1, "camera": ' >"$home/broken.json"
 press ctrl+o
+sleep 0.5
+shoot asking-1x
 xdotool key ctrl+a
 xdotool type "$home/broken.json"
 press Return

@@ -17,6 +17,7 @@ use crate::form::Form;
 use crate::panels::{
     self,
     light_field::{LightField, Shows},
+    listing::Listing,
 };
 use crate::view::View;
 use crate::worker::{Kind, News, Shown, Task, Wake, Wish, Worker};
@@ -91,6 +92,8 @@ pub(crate) struct App {
     pub(crate) said: Option<String>,
     pub(crate) busy: Option<(&'static str, f64)>,
     pub(crate) asking: Option<(Asking, String)>,
+    /// What there is to choose from, while a path is asked for.
+    pub(crate) listing: Listing,
     /// The window's title.
     titled: String,
     /// The number of the last wish, and of the last one that was accepted.
@@ -142,6 +145,7 @@ impl App {
             said: None,
             busy: None,
             asking: None,
+            listing: Listing::default(),
             titled: String::new(),
             number: 0,
             accepted: None,
@@ -320,6 +324,16 @@ impl App {
             Err(error) => self.error = Some(error.to_string()),
         }
         ctx.request_repaint();
+    }
+
+    /// Asks for a file to open, beside the one that is.
+    pub(crate) fn ask_what_to_open(&mut self) {
+        let file = self.document.as_ref().map(|document| &document.path);
+        let file = file.or(self.still.as_ref().map(|(path, _)| path));
+        let folder =
+            file.and_then(|path| path.parent()).filter(|folder| **folder != *Path::new(""));
+        let folder = folder.map(|folder| folder.join("").display().to_string());
+        self.asking = Some((Asking::Open, folder.unwrap_or_default()));
     }
 
     pub(crate) fn open(&mut self, path: &Path) {

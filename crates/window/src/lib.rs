@@ -27,8 +27,9 @@ mod worker;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use eframe::egui;
+use eframe::{UserEvent, egui};
 use etendue::Options;
+use winit::event_loop::EventLoopBuilder;
 
 /// The window's first size (points).
 const SIZE: [f32; 2] = [1360.0, 860.0];
@@ -51,6 +52,19 @@ pub enum WindowError {
     Display(String),
 }
 
+/// An X server is taken before Wayland where there are both: winit knows of files dropped on a window from X alone.
+#[cfg_attr(
+    not(target_os = "linux"),
+    expect(unused_variables, reason = "there is one kind of window there")
+)]
+fn prefer_x11(builder: &mut EventLoopBuilder<UserEvent>, has_x11: bool) {
+    #[cfg(target_os = "linux")]
+    if has_x11 {
+        use winit::platform::x11::EventLoopBuilderExtX11;
+        builder.with_x11();
+    }
+}
+
 /// Opens a window, on `path` when it is given, and returns when it is closed.
 ///
 /// # Errors
@@ -58,8 +72,8 @@ pub enum WindowError {
 /// When there is no display, or it cannot show a window.
 pub fn run(path: Option<PathBuf>, options: Options) -> Result<(), WindowError> {
     let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
-    if cfg!(target_os = "linux") && !is_set("DISPLAY") {
-        // Without an X server there may be a Wayland compositor's, but it names that in DISPLAY, too.
+    let has_x11 = is_set("DISPLAY");
+    if cfg!(target_os = "linux") && !has_x11 && !is_set("WAYLAND_DISPLAY") {
         return Err(WindowError::NoDisplay);
     }
     let viewport = egui::ViewportBuilder::default()
@@ -68,7 +82,11 @@ pub fn run(path: Option<PathBuf>, options: Options) -> Result<(), WindowError> {
         .with_inner_size(SIZE)
         .with_min_inner_size([640.0, 400.0])
         .with_drag_and_drop(true);
-    let native = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
+    let native = eframe::NativeOptions {
+        viewport,
+        event_loop_builder: Some(Box::new(move |builder| prefer_x11(builder, has_x11))),
+        ..eframe::NativeOptions::default()
+    };
     let make = move |context: &eframe::CreationContext<'_>| {
         let painter = context.egui_ctx.clone();
         let wake = Arc::new(move || painter.request_repaint());

@@ -35,7 +35,7 @@ impl App {
             self.save();
         }
         if pressed(&OPEN) {
-            self.asking = Some((Asking::Open, String::new()));
+            self.ask_what_to_open();
         }
         if pressed(&RENDER) && self.document.is_some() {
             self.asking = Some((Asking::Render, "out".to_owned()));

@@ -9,6 +9,9 @@ use super::*;
 /// How long the scene is turned.
 const TURN: Duration = Duration::from_secs(5);
 
+/// How many changes are waited for.
+const CHANGES: usize = 15;
+
 /// Opens a scene, turns it, and prints what was seen.
 fn measure(path: &Path) {
     let start = Instant::now();
@@ -34,14 +37,42 @@ fn measure(path: &Path) {
     }
     let rate = f64::from(updates) / start.elapsed().as_secs_f64();
     let size = window.app.picture.as_ref().unwrap().screen.size;
+    let [still, busy] = [true, false].map(|is_settled| delays(&mut window, is_settled));
     println!(
-        "{}: first picture after {:.2} s, whole after {:.2} s; {rate:.0} pictures a second while turned, of {} x {}",
+        "{}: first picture after {:.2} s, whole after {:.2} s; {rate:.0} pictures a second while turned, of {} x {}; \
+         from a change to its picture {still} at rest, {busy} while it renders",
         path.file_name().unwrap_or_default().display(),
         first.as_secs_f64(),
         whole.as_secs_f64(),
         size[0],
         size[1],
     );
+}
+
+/// The median and the longest time from a change of the camera to the first picture of it; of a picture
+/// that is whole when it is changed, or is still being refined.
+fn delays(window: &mut Driver, is_settled: bool) -> String {
+    let mut delays: Vec<_> = (0..CHANGES)
+        .map(|_| {
+            let wait = Instant::now();
+            match is_settled {
+                true => window.settle(),
+                // Refining has begun, as after a hand that rested for a moment.
+                false => window.until("a while", |_| wait.elapsed() > Duration::from_millis(150)),
+            }
+            let viewpoint = window.app.viewpoint().unwrap().orbited([0.02, 0.0]);
+            let ctx = window.ctx.clone();
+            let before = window.app.picture.as_ref().map_or(0, |picture| picture.number);
+            let start = Instant::now();
+            window.app.stand(&ctx, &viewpoint);
+            window.until("a picture of the change", |app| {
+                app.picture.as_ref().is_some_and(|picture| picture.number > before)
+            });
+            start.elapsed().as_secs_f64() * 1e3
+        })
+        .collect();
+    delays.sort_by(f64::total_cmp);
+    format!("{:.0} ms (longest {:.0})", delays[CHANGES / 2], delays[CHANGES - 1])
 }
 
 #[test]

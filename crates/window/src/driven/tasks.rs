@@ -87,3 +87,25 @@ fn a_place_that_takes_no_files_is_told() {
     assert!(error.contains("scene.json"), "{error}");
     assert!(window.app.document.is_some());
 }
+
+#[test]
+fn a_file_is_chosen_from_what_its_folder_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut window = Driver::open(&scene_file(folder.path()));
+    window.settle();
+    fs::create_dir(folder.path().join("other")).unwrap();
+    fs::write(folder.path().join("other/moved.json"), scene().to_string()).unwrap();
+    fs::write(folder.path().join("other/notes.txt"), "").unwrap();
+    window.press(Key::O, Modifiers::COMMAND);
+    window.click("entry=other");
+    let text = |window: &Driver| window.app.asking.clone().unwrap().1;
+    assert_eq!(Path::new(&text(&window)), folder.path().join("other"));
+    // What is written of a name leaves those that have it.
+    window.press(Key::End, Modifiers::NONE);
+    window.step(vec![Event::Text("OVE".to_owned())]);
+    window.click("entry=moved.json");
+    assert!(text(&window).ends_with("moved.json"), "{}", text(&window));
+    window.click("do it");
+    window.until("the other file", |app| app.title().starts_with("moved.json"));
+    assert!(window.app.asking.is_none());
+}

@@ -1,19 +1,20 @@
-//! A small window that asks for a path.
+//! A small window that asks for a path: written, or chosen from what is there.
 
 use std::path::PathBuf;
 
 use eframe::egui::{self, Context, Key};
 
 use super::bar::button;
+use super::listing::{Kinds, Listing};
 use crate::app::{App, Asking};
 use crate::form::mark;
 
 pub(crate) fn show(app: &mut App, ctx: &Context) {
     let Some((asking, mut path)) = app.asking.take() else { return };
-    let (title, action) = match asking {
-        Asking::Open => ("Open a scene, a model, a lens or an image", "Open"),
-        Asking::SaveAs => ("Save the scene as", "Save"),
-        Asking::Render => ("Render into the folder", "Render"),
+    let (title, action, kinds) = match asking {
+        Asking::Open => ("Open a scene, a model, a lens or an image", "Open", Kinds::Open),
+        Asking::SaveAs => ("Save the scene as", "Save", Kinds::Save),
+        Asking::Render => ("Render into the folder", "Render", Kinds::Folders),
     };
     let mut is_done = false;
     let mut is_cancelled = ctx.input(|input| input.key_pressed(Key::Escape));
@@ -26,8 +27,9 @@ pub(crate) fn show(app: &mut App, ctx: &Context) {
             field.request_focus();
         }
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+        let chosen = app.listing.show(ui, &mut path, kinds);
         ui.horizontal(|ui| {
-            is_done = button(ui, "do it", action, "Enter") || entered;
+            is_done = button(ui, "do it", action, "Enter") || entered || chosen;
             is_cancelled |= button(ui, "let it be", "Cancel", "Escape");
         });
     });
@@ -41,5 +43,8 @@ pub(crate) fn show(app: &mut App, ctx: &Context) {
         }
     } else if !is_cancelled && !is_done {
         app.asking = Some((asking, path));
+        return;
     }
+    // The next one looks anew.
+    app.listing = Listing::default();
 }

@@ -24,10 +24,6 @@ pub(crate) fn show(app: &mut App, ctx: &Context) {
 }
 
 fn files(app: &mut App, ui: &mut Ui) {
-    let file = app.document.as_ref().map(|document| &document.path);
-    let file = file.or(app.still.as_ref().map(|(path, _)| path));
-    let folder = file.and_then(|path| path.parent());
-    let folder = folder.map(|folder| folder.display().to_string()).unwrap_or_default();
     let is_open = app.document.is_some();
     if button(
         ui,
@@ -35,7 +31,7 @@ fn files(app: &mut App, ui: &mut Ui) {
         "Open",
         "Open a scene, a model, a lens or an image (Ctrl+O); or drop one on the window",
     ) {
-        app.asking = Some((Asking::Open, folder));
+        app.ask_what_to_open();
     }
     ui.add_enabled_ui(is_open, |ui| {
         if button(ui, "save", "Save", "Write the scene to its file (Ctrl+S)") {
