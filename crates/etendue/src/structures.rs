@@ -11,7 +11,6 @@ use etendue_geometry::{Geometry, HitPrecision};
 use etendue_render::{Plan, RenderError};
 use etendue_scene::Scene;
 use etendue_scene::file::AccelName;
-use etendue_tracer::LayerSpec;
 
 /// The structures that were built last.
 #[derive(Debug, Default)]
@@ -34,7 +33,7 @@ struct Built {
 
 /// Whether a picture depends on how the structure was built.
 fn wants_new(plan: &Plan) -> bool {
-    plan.light_precision == HitPrecision::Single && plan.layers.contains(&LayerSpec::Radiance)
+    plan.light_precision == HitPrecision::Single && plan.layers.iter().any(|l| l.is_averaged())
 }
 
 impl Structures {

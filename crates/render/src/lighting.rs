@@ -120,6 +120,7 @@ fn lit_share(
         groups: groups.clone(),
         surroundings: stage.surroundings,
         detail: Detail::Distance,
+        precision: stage.precision,
         sampling: Sampling {
             samples: SAMPLES,
             sampler: scene.render.sampler,

@@ -271,6 +271,7 @@ pub fn trace(
         groups: camera.band_groups(&Bands::Rgb),
         surroundings,
         detail: plan.detail,
+        precision: plan.light_precision,
         sampling: Sampling {
             samples: plan.samples,
             sampler: scene.render.sampler,

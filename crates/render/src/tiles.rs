@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use etendue_accel::Accel;
 use etendue_camera::{BandGroup, Camera, CameraRays};
-use etendue_geometry::{Detail, HitBatch, RayBatch};
+use etendue_geometry::{Detail, HitBatch, HitPrecision, RayBatch};
 use etendue_optics::element::FateCounts;
 use etendue_tracer::layer::{Columns, OtherFrame, Seen};
 use etendue_tracer::{LayerSpec, RayStats, SceneView, Traced};
@@ -44,6 +44,8 @@ pub(crate) struct Job<'a> {
     pub(crate) groups: Vec<BandGroup>,
     pub(crate) surroundings: SceneView<'a>,
     pub(crate) detail: Detail,
+    /// Of hits whose colours are averaged.
+    pub(crate) precision: HitPrecision,
     pub(crate) sampling: Sampling,
     /// Which samples are taken of every pixel before the next are taken of any.
     pub(crate) passes: &'a [Range<u32>],
@@ -268,6 +270,7 @@ impl Averaged for Colors<'_> {
     fn trace(&self, bands: &Range<usize>, memory: &mut Memory) {
         let Memory { rays: CameraRays { rays, .. }, hits, columns, values, traffic, .. } = memory;
         hits.detail = self.job.detail;
+        rays.precision = self.job.precision;
         self.job.accel.closest(rays, hits);
         traffic.chief_rays += rays.len() as u64;
         let count = 3 * self.layers.len();

@@ -9,8 +9,8 @@ use etendue_scene::Scene;
 use etendue_scene::file::{LightPrecision, TracerRow, TracerSpec};
 use etendue_scene::memory::Size;
 use etendue_sensor::BandChoice;
-use etendue_tracer::Needs;
 use etendue_tracer::layer::Kept;
+use etendue_tracer::{LayerSpec, Needs};
 use serde::Serialize;
 
 use super::{
@@ -141,12 +141,12 @@ impl Plan {
                 "NPY files hold what was computed",
             ),
         );
-        if needs.light {
+        if needs.light || self.averages_colors() {
             let choice = match self.light_precision {
                 HitPrecision::Single => "32 bits",
                 HitPrecision::Double => "64 bits",
             };
-            decide("light paths", choice, why_precision);
+            decide(if needs.light { "light paths" } else { "sampled hits" }, choice, why_precision);
         }
         let memory = self.memory.to_string();
         let (total, parts) = memory.split_once(" (").unwrap_or((&memory, ""));
@@ -157,6 +157,12 @@ impl Plan {
             }
         }
         decisions
+    }
+
+    /// Whether colours of surfaces are averaged over samples.
+    fn averages_colors(&self) -> bool {
+        let is_color = |layer: &LayerSpec| layer.is_averaged() && !layer.is_light();
+        self.samples > 1 && self.layers.iter().any(is_color)
     }
 
     /// How a decision is overruled, and what it saves.
@@ -174,7 +180,7 @@ impl Plan {
             "texture filter" => by("plan.texture_filter", spec.texture_filter.is_some(), None),
             "build quality" => by("plan.build_quality", spec.build_quality.is_some(), None),
             "refinement" => by("plan.refine", spec.refine.is_some(), None),
-            "light paths" => {
+            "light paths" | "sampled hits" => {
                 let forced = spec.light_precision != LightPrecision::Auto;
                 by("plan.light_precision", forced, None)
             }
