@@ -12,8 +12,8 @@ other processes disturb less than they do the wall's: for etendue what a run of 
 takes beyond a plain one, for Mitsuba `render` of a loaded scene, once warmed up.
 
 How noisy a picture is: two renders with different seeds, the root of the mean square of their
-difference over the root of two, relative to the mean. Where the noise differs, time times its square
-is the cost of one error.
+difference over the root of two, relative to the mean; and the same by the median. Where the noise
+differs, time times its square is the cost of one error.
 """
 
 import json
@@ -219,6 +219,13 @@ def noise(one, other):
     return float(difference / np.mean(one))
 
 
+def typical_noise(one, other):
+    """The same by the median: of normal errors it is 0.6745 standard deviations from the mean."""
+    import numpy as np
+
+    return float(np.median(np.abs(one - other)) / np.sqrt(2) / 0.6745 / np.mean(one))
+
+
 def bound(folder):
     """Processor seconds that Embree's bare loop takes for the blob's rays of the first surface."""
     path = Path(folder) / "scene.json"
@@ -275,6 +282,8 @@ def measure(arguments, folder):
             "seconds": seconds,
             "noise": {title: noise(*pair[:2]) if len(pair) > 1 else float("nan")
                       for title, pair in pictures.items()},
+            "typical": {title: typical_noise(*pair[:2]) if len(pair) > 1 else float("nan")
+                        for title, pair in pictures.items()},
             "mean": {title: float(np.mean(pair)) for title, pair in pictures.items()},
             "rays": report["rays"],
             "bound": limit if job in JOBS else None,
@@ -295,7 +304,9 @@ def page(results, remarks, arguments):
         f"seconds of all threads ({os.cpu_count()} cores), medians of {arguments.rounds} rounds (of "
         "the scalar variant half as many) in which the programs take turns, with the fastest and "
         "the slowest. *Noise* is the relative standard error of a pixel, from two seeds; *cost* is time "
-        "times noise squared against etendue's: how much longer the other takes to one error. etendue "
+        "times noise squared against etendue's: how much longer the other takes to one error. *Typical* is the noise "
+        "by the median of all pixels: the mean square is mostly that of few, the edges of lamps that are seen "
+        "and sparkles. etendue "
         "draws Sobol points and starts rays by their error bounds, in the precision that its plan chooses; Mitsuba "
         "draws numbers by three of its samplers. Its thin lens does not dim towards the corners, etendue's does "
         "by cos⁴: hence the means.", "",
@@ -307,13 +318,14 @@ def page(results, remarks, arguments):
         middle = {title: statistics.median(all) for title, all in result["seconds"].items()}
         own = middle["etendue"] * result["noise"]["etendue"] ** 2
         lines += [f"## {job[0].upper() + job[1:]}", "",
-                  "| | seconds | noise | mean | etendue is faster by | cost at one error |",
-                  "|---|---|---|---|---|---|"]
+                  "| | seconds | noise | typical | mean | etendue is faster by | cost at one error |",
+                  "|---|---|---|---|---|---|---|"]
         for title, all in result["seconds"].items():
             cost = middle[title] * result["noise"][title] ** 2 / own
             lines.append(
                 f"| {title} | {middle[title]:.2f} ({min(all):.2f} to {max(all):.2f}) "
-                f"| {known(100 * result['noise'][title])} % | {result['mean'][title]:.4f} "
+                f"| {known(100 * result['noise'][title])} % | {known(100 * result['typical'][title])} % "
+                f"| {result['mean'][title]:.4f} "
                 f"| {middle[title] / middle['etendue']:.2f} | {known(cost)} |")
         lines += [""]
         limit = result["bound"]
