@@ -1,6 +1,7 @@
-//! A logarithmic axis in pixels.
+//! An axis in pixels.
 
 use crate::chart::Axis;
+use crate::numbers::short;
 
 /// Room for zeros at the low end of an axis (pixels).
 const ZERO: f64 = 36.0;
@@ -8,46 +9,56 @@ const ZERO: f64 = 36.0;
 /// Ticks within a decade where few decades are shown.
 const FINE: [f64; 3] = [1.0, 2.0, 5.0];
 
+/// The least distance of ticks on a linear axis (pixels).
+const APART: f64 = 64.0;
+
 /// From values to pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scale {
-    /// The ends in powers of ten.
-    exponents: [f64; 2],
+    /// The ends: values on a linear axis, else powers of ten.
+    ends: [f64; 2],
+    linear: bool,
     /// Where they are.
     pixels: [f64; 2],
-    /// Where zeros are.
+    /// Where zeros are, when they have a place of their own.
     zero: Option<f64>,
 }
 
 impl Scale {
-    /// `axis` over all positive `values`, and zeros when it names them and there is one, from one of
-    /// `pixels` to the other.
+    /// `axis` over all `values` that it has a place for, from one of `pixels` to the other.
     pub(crate) fn new(
         values: impl Iterator<Item = f64> + Clone,
         axis: &Axis,
         [from, to]: [f64; 2],
     ) -> Self {
+        let finite = values.clone().filter(|value| value.is_finite());
+        let ends = |of: [f64; 2], [low, high]: [f64; 2]| [of[0].min(low), of[1].max(high)];
+        if axis.linear {
+            let [low, high] = finite.fold([0.0; 2], |of, value| ends(of, [value; 2]));
+            let high = if low < high { high } else { low + 1.0 };
+            return Self { ends: [low, high], linear: true, pixels: [from, to], zero: None };
+        }
         let has_zero = axis.zero.is_some() && values.clone().any(|value| value == 0.0);
-        let positive = values.filter(|&value| value > 0.0 && value.is_finite());
-        let [low, high] = positive
-            .fold([f64::INFINITY, 0.0f64], |[low, high], value| [low.min(value), high.max(value)]);
+        let positive = finite.filter(|&value| value > 0.0);
+        let [low, high] = positive.fold([f64::INFINITY, 0.0], |of, value| ends(of, [value; 2]));
         let [low, high] = if low <= high { [low, high] } else { [0.1, 1.0] };
-        let exponents = widened([low.log10(), high.log10()], axis.fits);
+        let ends = widened([low.log10(), high.log10()], axis.fits);
         let direction = (to - from).signum();
         let start = if has_zero { from + direction * ZERO } else { from };
         let zero = has_zero.then_some(from + direction * 0.4 * ZERO);
-        Self { exponents, pixels: [start, to], zero }
+        Self { ends, linear: false, pixels: [start, to], zero }
     }
 
     /// Where `value` is; `None` where it has no place.
     pub(crate) fn at(&self, value: f64) -> Option<f64> {
-        if value == 0.0 {
+        if value == 0.0 && !self.linear {
             return self.zero;
         }
-        let [low, high] = self.exponents;
-        let share = (value.log10() - low) / (high - low);
+        let [low, high] = self.ends;
+        let along = if self.linear { value } else { value.log10() };
+        let share = (along - low) / (high - low);
         let [from, to] = self.pixels;
-        (value > 0.0 && share.is_finite()).then_some(from + share * (to - from))
+        share.is_finite().then_some(from + share * (to - from))
     }
 
     /// Where zeros are, if anything is there.
@@ -55,14 +66,34 @@ impl Scale {
         self.zero
     }
 
-    /// Where the logarithmic part begins.
+    /// Where the place of zeros ends.
     pub(crate) fn start(&self) -> f64 {
         self.pixels[0]
     }
 
     /// The values to be named, and where they are.
     pub(crate) fn ticks(&self) -> Vec<(String, f64)> {
-        let [low, high] = self.exponents;
+        if self.linear { self.even_ticks() } else { self.ticks_by_decade() }
+    }
+
+    fn even_ticks(&self) -> Vec<(String, f64)> {
+        let ([low, high], [from, to]) = (self.ends, self.pixels);
+        let span = high - low;
+        let most = ((to - from).abs() / APART).floor().max(1.0);
+        let least = span / most;
+        let decade = 10f64.powf(least.log10().floor());
+        let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * decade);
+        let step = steps.into_iter().find(|step| *step >= least * (1.0 - 1e-9)).unwrap_or(span);
+        let numbers = whole((low / step).ceil())..=whole((high / step + 1e-9).floor());
+        let tick = |number: i32| {
+            let value = f64::from(number) * step;
+            self.at(value).map(|at| (short(value), at))
+        };
+        numbers.filter_map(tick).collect()
+    }
+
+    fn ticks_by_decade(&self) -> Vec<(String, f64)> {
+        let [low, high] = self.ends;
         let (steps, every): (&[f64], i32) = match high - low {
             span if span < 2.2 => (&FINE, 1),
             span if span < 8.5 => (&FINE[..1], 1),
@@ -84,7 +115,7 @@ impl Scale {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "exponents of f64")]
+#[expect(clippy::cast_possible_truncation, reason = "exponents and numbers of ticks")]
 fn whole(value: f64) -> i32 {
     value as i32
 }
@@ -140,6 +171,21 @@ mod tests {
         assert!(places[0] > scale.start() && scale.start() >= places[1]);
         assert_eq!([scale.at(-1.0), scale.at(f64::NAN), scale.at(f64::INFINITY)], [None; 3]);
         assert_eq!(Scale::new(values.into_iter(), &Axis::new("error"), [400.0, 0.0]).at(0.0), None);
+    }
+
+    #[test]
+    fn a_linear_axis_begins_at_zero_and_has_round_ticks() {
+        let named = |values: &[f64], pixels: [f64; 2]| {
+            let scale = Scale::new(values.iter().copied(), &Axis::linear("height"), pixels);
+            scale.ticks().into_iter().map(|(name, _)| name).collect::<Vec<_>>()
+        };
+        assert_eq!(named(&[3.0, 21.6], [0.0, 600.0]), ["0", "5", "10", "15", "20"]);
+        assert_eq!(named(&[1.0], [300.0, 0.0]), ["0", "0.5", "1"]);
+        assert_eq!(named(&[-1.0, 1.0], [0.0, 300.0]), ["-1", "-0.5", "0", "0.5", "1"]);
+        assert_eq!(named(&[], [0.0, 300.0]), named(&[1.0, f64::NAN], [0.0, 300.0]));
+        let scale = Scale::new([0.0, 20.0].into_iter(), &Axis::linear("height"), [100.0, 0.0]);
+        assert_eq!([0.0, 5.0, 20.0].map(|value| scale.at(value)), [100.0, 75.0, 0.0].map(Some));
+        assert_eq!((scale.at(f64::NAN), scale.zero()), (None, None));
     }
 
     #[test]

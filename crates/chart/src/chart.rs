@@ -5,7 +5,7 @@ use crate::draw;
 /// The colour of what is no contestant: limits and models.
 pub const GREY: usize = 7;
 
-/// A chart: points and lines over two logarithmic axes.
+/// A chart: points and lines over two axes.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Chart {
     /// The first line.
@@ -20,7 +20,7 @@ pub struct Chart {
     pub front: bool,
 }
 
-/// A logarithmic axis.
+/// An axis, logarithmic unless it is said to be linear.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Axis {
     /// What is measured, with its unit.
@@ -30,6 +30,8 @@ pub struct Axis {
     pub zero: Option<String>,
     /// Whether it ends where the values do, and not at the next power of ten.
     pub fits: bool,
+    /// Whether it is linear, from 0 on.
+    pub linear: bool,
 }
 
 /// Points of one name and colour.
@@ -37,7 +39,8 @@ pub struct Axis {
 pub struct Series {
     /// The name, which stands beside one of the points; none when empty.
     pub name: String,
-    /// The points. Those that are negative or not finite are left out.
+    /// The points. Those that are not finite are left out, and those that a logarithmic axis has no
+    /// place for.
     pub points: Vec<Point>,
     /// Whether a line joins them, in their order.
     pub joined: bool,
@@ -95,10 +98,16 @@ pub enum Theme {
 }
 
 impl Axis {
-    /// An axis whose zeros are left out.
+    /// A logarithmic axis whose zeros are left out.
     #[must_use]
     pub fn new(label: impl Into<String>) -> Self {
-        Self { label: label.into(), zero: None, fits: false }
+        Self { label: label.into(), ..Self::default() }
+    }
+
+    /// A linear axis from 0 on.
+    #[must_use]
+    pub fn linear(label: impl Into<String>) -> Self {
+        Self { linear: true, ..Self::new(label) }
     }
 
     /// The same, ending where the values do.

@@ -1,12 +1,12 @@
 //! Charts as SVG.
 
+use svg::Node;
 use svg::node::element::{Circle, Group, Rectangle, Text};
-use svg::{Document, Node};
 
 use crate::axis::Scale;
 use crate::chart::{Chart, Mark, Point, Stroke, Theme};
 use crate::front::front;
-use crate::ink::{self, Anchor, COLOURS, dashed, line, path, rounded, straight, text};
+use crate::ink::{Anchor, COLOURS, dashed, document, line, path, rounded, straight, text};
 use crate::names::{self, Area, LINE, Obstacle};
 
 const LEFT: f64 = 84.0;
@@ -14,6 +14,9 @@ const RIGHT: f64 = 22.0;
 const HEAD: f64 = 40.0;
 const NOTE: f64 = 18.0;
 const FOOT: f64 = 54.0;
+
+/// Dashes of the line above the place of zeros.
+const ZEROS: &str = "3 4";
 
 /// Steps along a line (pixels) in which it keeps names away.
 const STEP: f64 = 9.0;
@@ -54,16 +57,6 @@ pub(crate) fn rows(charts: &[Chart], theme: Theme) -> String {
     document([BESIDE.width * columns as f64, height], theme).add(all).to_string()
 }
 
-fn document([width, height]: [f64; 2], theme: Theme) -> Document {
-    let paper = Rectangle::new().set("class", "paper").set("width", width).set("height", height);
-    Document::new()
-        .set("viewBox", (0, 0, width, height))
-        .set("width", width)
-        .set("height", height)
-        .add(ink::style(theme))
-        .add(paper)
-}
-
 impl Room {
     /// Height of all of `chart` (pixels).
     fn height(self, chart: &Chart) -> f64 {
@@ -98,7 +91,7 @@ impl Room {
 fn is_shown(chart: &Chart, point: &Point) -> bool {
     let axes = chart.axes.iter().zip(point.at);
     axes.into_iter().all(|(axis, value)| {
-        value.is_finite() && (value > 0.0 || (value == 0.0 && axis.zero.is_some()))
+        value.is_finite() && (axis.linear || value > 0.0 || (value == 0.0 && axis.zero.is_some()))
     })
 }
 
@@ -156,13 +149,13 @@ impl Drawing<'_> {
         let [across, upwards] = &self.chart.axes;
         if let (Some(at), Some(name)) = (self.y.zero(), &upwards.zero) {
             let start = self.y.start();
-            dashed(group, [left, start], [right, start]);
+            dashed(group, [left, start], [right, start], ZEROS);
             text(group, [left - 8.0, at + 4.0], Anchor::End, "", "0");
             text(group, [right - 4.0, start - 5.0], Anchor::End, "small", name);
         }
         if let (Some(at), Some(name)) = (self.x.zero(), &across.zero) {
             let start = self.x.start();
-            dashed(group, [start, bottom], [start, top]);
+            dashed(group, [start, bottom], [start, top], ZEROS);
             text(group, [at, bottom + 18.0], Anchor::Middle, "", "0");
             text(group, [left + 4.0, top + 12.0], Anchor::Start, "small", name);
         }

@@ -1,8 +1,8 @@
 //! Lines and letters in the colours of a theme.
 
-use svg::Node;
 use svg::node::element::path::Data;
-use svg::node::element::{Group, Line, Path, Style, Text};
+use svg::node::element::{Group, Line, Path, Rectangle, Style, Text};
+use svg::{Document, Node};
 
 use crate::chart::{Stroke, Theme};
 
@@ -13,7 +13,8 @@ text { font-family: sans-serif; font-size: 12px; fill: #24292f; }
 .paper { fill: #ffffff; } .halo { fill: #ffffff; fill-opacity: 0.82; }
 .ink { stroke: #57606a; fill: none; } .faint { stroke: #d8dee4; fill: none; }
 .front { stroke: #57606a; stroke-opacity: 0.3; fill: none; stroke-width: 7px; }
-.ring { fill: #ffffff; }
+.ring { fill: #ffffff; } .dot { fill-opacity: 0.7; }
+.glass { fill: #b6d7f2; fill-opacity: 0.55; }
 .s0 { stroke: #0550ae; } .s1 { stroke: #1a7f37; } .s2 { stroke: #cf222e; }
 .s3 { stroke: #8250df; } .s4 { stroke: #bc4c00; } .s5 { stroke: #0b7285; }
 .s6 { stroke: #bf3989; } .s7 { stroke: #57606a; }
@@ -26,6 +27,7 @@ const DARK: &str = "\
 @media (prefers-color-scheme: dark) {
 text { fill: #e6edf3; } .small { fill: #9198a1; }
 .paper { fill: #0d1117; } .halo { fill: #0d1117; } .ring { fill: #0d1117; }
+.glass { fill: #2f6f9f; }
 .ink { stroke: #9198a1; } .faint { stroke: #30363d; } .front { stroke: #9198a1; }
 .s0 { stroke: #79c0ff; } .s1 { stroke: #56d364; } .s2 { stroke: #ff7b72; }
 .s3 { stroke: #d2a8ff; } .s4 { stroke: #ffa657; } .s5 { stroke: #66d9e8; }
@@ -36,22 +38,33 @@ text { fill: #e6edf3; } .small { fill: #9198a1; }
 }
 ";
 
-/// The style's sheet.
-pub(crate) fn style(theme: Theme) -> Style {
-    Style::new(match theme {
+/// A document of one size (pixels): the style's sheet, and paper.
+pub(crate) fn document([width, height]: [f64; 2], theme: Theme) -> Document {
+    let style = match theme {
         Theme::Reader => format!("{LIGHT}{DARK}"),
         Theme::Light => LIGHT.to_owned(),
-    })
+    };
+    let (width, height) = (rounded(width), rounded(height));
+    let paper = Rectangle::new().set("class", "paper").set("width", width).set("height", height);
+    Document::new()
+        .set("viewBox", (0, 0, width, height))
+        .set("width", width)
+        .set("height", height)
+        .add(Style::new(style))
+        .add(paper)
 }
 
 /// Colours that the style has.
 pub(crate) const COLOURS: usize = 8;
 
 /// Where a text stands against its place.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Anchor {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    /// It begins there.
     Start,
+    /// Its middle is there.
     Middle,
+    /// It ends there.
     End,
 }
 
@@ -80,16 +93,13 @@ pub(crate) fn line(document: &mut Group, from: [f64; 2], to: [f64; 2], class: &s
     document.append(straight(from, to).set("class", class));
 }
 
-pub(crate) fn dashed(document: &mut Group, from: [f64; 2], to: [f64; 2]) {
-    document.append(straight(from, to).set("class", "ink").set("stroke-dasharray", "3 4"));
+pub(crate) fn dashed(document: &mut Group, from: [f64; 2], to: [f64; 2], dashes: &str) {
+    document.append(straight(from, to).set("class", "ink").set("stroke-dasharray", dashes));
 }
 
 pub(crate) fn path(document: &mut Group, points: &[[f64; 2]], class: &str, stroke: Stroke) {
-    let [first, rest @ ..] = points else { return };
-    let pair = |point: &[f64; 2]| (rounded(point[0]), rounded(point[1]));
-    let data =
-        rest.iter().fold(Data::new().move_to(pair(first)), |d, point| d.line_to(pair(point)));
-    let mut path = Path::new().set("class", class).set("fill", "none").set("d", data);
+    let Some(path) = polyline(points, false) else { return };
+    let mut path = path.set("class", class).set("fill", "none");
     if class != "front" {
         path = path.set("stroke-width", 1.6);
     }
@@ -99,6 +109,15 @@ pub(crate) fn path(document: &mut Group, points: &[[f64; 2]], class: &str, strok
         Stroke::Dotted => path = path.set("stroke-dasharray", "2 3"),
     }
     document.append(path);
+}
+
+/// A line through `points`, and back to the first of them when it is closed; none without points.
+pub(crate) fn polyline(points: &[[f64; 2]], closed: bool) -> Option<Path> {
+    let [first, rest @ ..] = points else { return None };
+    let pair = |point: &[f64; 2]| (rounded(point[0]), rounded(point[1]));
+    let open =
+        rest.iter().fold(Data::new().move_to(pair(first)), |d, point| d.line_to(pair(point)));
+    Some(Path::new().set("d", if closed { open.close() } else { open }))
 }
 
 /// A hundredth of a pixel is more than enough; files stay small.

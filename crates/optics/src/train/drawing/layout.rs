@@ -1,8 +1,9 @@
 //! The lens cut along y and z.
 
+use etendue_chart::{Anchor, Canvas, Theme, round_length, short};
 use glam::DVec3;
 
-use super::{Anchor, COLOURS, Canvas, round_length, short, title};
+use super::{COLOURS, title};
 use crate::element::{Clip, RayStatus, Symbol};
 use crate::train::{Element, LensReport, MonochromaticTrain, OpticalTrain, Side};
 
@@ -31,12 +32,14 @@ pub fn layout(
     train: &OpticalTrain,
     report: &LensReport,
 ) -> Result<String, crate::glass::GlassError> {
+    // What is to be drawn, and the view that holds it.
     let at = train.at(train.wavelength())?;
     let end = end_of(train, report);
     let fields = drawn_fields(report);
     let fans: Vec<Fan> = fields.iter().map(|&field| fan(train, &at, report, field, end)).collect();
     let heights = heights(train, &fans);
     let view = View::around(train, &heights, &fans, report, end);
+    // Glass first, then rays, then the elements' lines over both.
     let mut canvas = Canvas::new(WIDTH, view.height, &title(report));
     glasses(&mut canvas, &view, &bodies(train, &at, &heights));
     canvas.dashed(view.pixel([view.left, 0.0]), view.pixel([view.right, 0.0]), "10 3 2 3");
@@ -44,7 +47,7 @@ pub fn layout(
         for ray in &fan.rays {
             let points: Vec<[f64; 2]> = ray.iter().map(|&point| view.pixel(point)).collect();
             for piece in view.pieces(&points) {
-                canvas.path(&piece, &format!("c{}", i % COLOURS), 0.8);
+                canvas.path(&piece, &format!("s{}", i % COLOURS), 0.8);
             }
         }
     }
@@ -58,7 +61,7 @@ pub fn layout(
     let drawn = fields.iter().zip(&fans).enumerate().filter(|(_, (_, fan))| !fan.rays.is_empty());
     let drawn: Vec<(usize, f64)> = drawn.map(|(i, (&field, _))| (i, field)).collect();
     legend(&mut canvas, &view, &drawn);
-    Ok(canvas.finish())
+    Ok(canvas.svg(Theme::Reader))
 }
 
 /// Where rays end (mm): at the sensor, or a little behind the lens.
@@ -305,7 +308,7 @@ fn body(train: &OpticalTrain, heights: &[f64], [front, back]: [usize; 2]) -> Bod
 fn glasses(canvas: &mut Canvas, view: &View, bodies: &[Body]) {
     for Body { outline, front } in bodies {
         let outline: Vec<[f64; 2]> = outline.iter().map(|&point| view.pixel(point)).collect();
-        canvas.path(&outline, "glass", 0.0);
+        canvas.glass(&outline);
         let count = *front;
         if count > 0 && outline.len() > count + 2 {
             let rims = [&outline[count - 1..count + 3], &outline[outline.len() - 3..]];
@@ -366,7 +369,7 @@ fn legend(canvas: &mut Canvas, view: &View, fields: &[(usize, f64)]) {
     canvas.cover([0.0, view.height - FOOT + 6.0], [WIDTH, FOOT]);
     for (place, &(colour, field)) in (0_u32..).zip(fields) {
         let x = MARGIN + 90.0 * f64::from(place);
-        canvas.path(&[[x, y - 4.0], [x + 24.0, y - 4.0]], &format!("c{}", colour % COLOURS), 2.0);
+        canvas.path(&[[x, y - 4.0], [x + 24.0, y - 4.0]], &format!("s{}", colour % COLOURS), 2.0);
         canvas.text([x + 30.0, y], Anchor::Start, "small", &format!("{}\u{b0}", short(field)));
     }
     let length = round_length(140.0 / view.scale);

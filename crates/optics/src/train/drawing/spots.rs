@@ -1,8 +1,9 @@
 //! Spot diagrams: one box a field, one colour a wavelength, the same scale in all.
 
+use etendue_chart::{Anchor, Canvas, Theme, round_length, short};
 use glam::DVec2;
 
-use super::{Anchor, COLOURS, Canvas, round_length, short, title};
+use super::{COLOURS, title};
 use crate::glass::GlassError;
 use crate::train::analysis::{Spot, spot};
 use crate::train::{LensReport, OpticalTrain};
@@ -37,7 +38,7 @@ pub fn spots(train: &OpticalTrain, report: &LensReport) -> Result<String, GlassE
             [GAP + size(i % columns, BOX + GAP), HEAD + size(i / columns, BOX + CAPTION + GAP)];
         spots.draw(&mut canvas, corner, scale, report);
     }
-    Ok(canvas.finish())
+    Ok(canvas.svg(Theme::Reader))
 }
 
 /// The spots of one field by wavelength.
@@ -109,11 +110,13 @@ impl SpotBox {
             let class = format!("f{}", i % COLOURS);
             for point in spot.iter().flat_map(|spot| self.points(spot)) {
                 let at = [middle[0] + point.x * scale, middle[1] - point.y * scale];
-                canvas.circle(at, 0.9, &class);
+                canvas.dot(at, 0.9, &class);
             }
         }
-        if let Some(radius) = airy_radius(report) {
-            canvas.airy(middle, radius * scale);
+        // A ring of less than a pixel says nothing.
+        let airy = airy_radius(report).map(|radius| radius * scale);
+        if let Some(radius) = airy.filter(|radius| (1.0..0.5 * BOX).contains(radius)) {
+            canvas.ring(middle, radius);
         }
         let caption = match self.rms() {
             Some(rms) => format!("RMS {} \u{b5}m", short(1e3 * rms)),
@@ -130,21 +133,6 @@ fn airy_radius(report: &LensReport) -> Option<f64> {
     report.paraxial.f_number.map(|n| 1.22 * report.wavelength * 1e-6 * n)
 }
 
-impl Canvas {
-    fn airy(&mut self, at: [f64; 2], radius: f64) {
-        // A dot of less than a pixel says nothing.
-        if (1.0..0.5 * BOX).contains(&radius) {
-            let circle = svg::node::element::Circle::new()
-                .set("cx", super::rounded(at[0]))
-                .set("cy", super::rounded(at[1]))
-                .set("r", super::rounded(radius))
-                .set("class", "ink")
-                .set("stroke-dasharray", "4 3");
-            self.add(circle);
-        }
-    }
-}
-
 fn legend(canvas: &mut Canvas, report: &LensReport, boxes: &[SpotBox], scale: f64, width: f64) {
     let y = 52.0;
     if boxes.is_empty() {
@@ -153,7 +141,7 @@ fn legend(canvas: &mut Canvas, report: &LensReport, boxes: &[SpotBox], scale: f6
     }
     for (i, wavelength) in drawn_wavelengths(report).iter().enumerate() {
         let x = 22.0 + 110.0 * f64::from(u32::try_from(i).unwrap_or(0));
-        canvas.circle([x, y - 4.0], 4.0, &format!("f{}", i % COLOURS));
+        canvas.dot([x, y - 4.0], 4.0, &format!("f{}", i % COLOURS));
         canvas.text([x + 9.0, y], Anchor::Start, "small", &format!("{wavelength} nm"));
     }
     let length = round_length(90.0 / scale);
