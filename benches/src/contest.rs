@@ -14,7 +14,7 @@ use etendue_geometry::{Detail, HitBatch, RayBatch};
 use rustix::time::{ClockId, clock_gettime};
 
 use crate::rays::BATCH;
-use etendue_accel::limit::{BareScene, Packet, Single, WIDTH};
+use crate::limit::{BareScene, Packet, Single, WIDTH};
 
 /// Batches a chunk: its rays stay in the second-level cache.
 const CHUNK: usize = 16;

@@ -7,7 +7,7 @@ use etendue_geometry::{Geometry, RayBatch};
 
 use crate::contest::{Contestant, LimitPackets, LimitSingles, Ours, Query};
 use crate::rays::one_by_one;
-use etendue_accel::limit::{BareScene, Mode, Packet, Single};
+use crate::limit::{BareScene, Mode, Packet, Single};
 
 /// The structures of every contestant over one geometry.
 #[derive(Debug)]

@@ -13,8 +13,6 @@
 mod device;
 mod filter;
 mod instanced;
-#[cfg(feature = "limit")]
-pub mod limit;
 mod shape;
 mod trace;
 

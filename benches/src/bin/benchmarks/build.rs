@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
-use etendue_accel::limit::{BareScene, Mode};
+use etendue_benches::limit::{BareScene, Mode};
 use etendue_accel::{Accel, BuildOptions, Bvh, Embree, Exact, Quality};
 use etendue_bench::rounds::{Turn, take_turns, wall};
 use etendue_benches::effort::{Effort, in_short};

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use etendue_accel::limit::{BareScene, Mode, Packet};
+use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_accel::{Accel, BuildOptions};
 use etendue_bench::rounds::{Turn, take_turns, wall};
 use etendue_benches::effort::Effort;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, ensure};
-use etendue_accel::limit::{BareScene, Mode, Packet};
+use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_accel::{BuildOptions, Quality};
 use etendue_bench::machine::Memory;
 use etendue_bench::rounds::{Turn, take_turns, wall};
