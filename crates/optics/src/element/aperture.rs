@@ -143,10 +143,8 @@ impl Opening {
     #[must_use]
     pub fn transmission(&self, x: f64, y: f64) -> f64 {
         let open = match self {
-            Self::Circle { radius } => x * x + y * y <= radius * radius,
-            Self::Polygon { normals, apothem, .. } => {
-                normals.iter().all(|n| x * n[0] + y * n[1] <= *apothem)
-            }
+            Self::Circle { radius } => in_circle(*radius, x, y),
+            Self::Polygon { normals, apothem, .. } => in_polygon(normals, *apothem, x, y),
             Self::Image(picture) => return picture.value(x, y),
         };
         f64::from(u8::from(open))
@@ -177,6 +175,19 @@ impl Opening {
     pub fn is_round(&self) -> bool {
         matches!(self, Self::Circle { .. })
     }
+}
+
+/// Whether a place (mm) lies inside of a circle.
+#[inline(always)]
+pub(super) fn in_circle(radius: f64, x: f64, y: f64) -> bool {
+    x * x + y * y <= radius * radius
+}
+
+/// Whether a place (mm) lies inside of a regular polygon; without branches, so that loops vectorise.
+#[inline(always)]
+pub(super) fn in_polygon(normals: &[[f64; 2]], apothem: f64, x: f64, y: f64) -> bool {
+    let beyond = |n: &[f64; 2]| x * n[0] + y * n[1] - apothem;
+    normals.iter().fold(f64::NEG_INFINITY, |worst, n| worst.max(beyond(n))) <= 0.0
 }
 
 #[cfg(test)]

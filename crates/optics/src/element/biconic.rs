@@ -5,17 +5,16 @@
 //! OpticStudio (*User Manual*, "Biconic"; `BICONICX` in its files). With equal sections it is the
 //! conic.
 //!
-//! Rays are met by Newton's method from where they meet the vertex' plane; a root that it does not find
-//! is looked for by bisection, as with an [asphere](super::asphere).
+//! Rays are met by [Newton's method](super::newton) from where they meet the vertex' plane.
 
 use std::f64::consts::TAU;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::asphere::{MOST_STEPS, SETTLED, first_root, interval};
+use super::newton::Profile;
 use super::rays::Ray;
-use super::refract::{Media, Refracted, TOUCH};
+use super::refract::Media;
 use super::surface::{checked_semi_diameter, vertex_curvature};
 use crate::glass::GlassSpec;
 use etendue_geometry::units::Millimetres;
@@ -86,6 +85,7 @@ impl BiconicSpec {
 
 impl Biconic {
     /// (1 + k) c² along x and y.
+    #[inline(always)]
     fn limits(&self) -> [f64; 2] {
         std::array::from_fn(|i| (1.0 + self.conic[i]) * self.curvature[i] * self.curvature[i])
     }
@@ -121,13 +121,8 @@ impl Biconic {
         std::iter::once(format!("{along_x}, {y} along y")).chain(conics).collect()
     }
 
-    fn exists(&self, [x, y]: [f64; 2]) -> bool {
-        let [a, b] = self.limits();
-        a * x * x + b * y * y <= 1.0
-    }
-
-    /// The sag, and its derivatives by x and y. Beyond its domain it goes on as if at the edge, which
-    /// keeps an iteration going and is refused in the end.
+    /// The sag, and its derivatives by x and y.
+    #[inline(always)]
     fn profile(&self, [x, y]: [f64; 2]) -> (f64, [f64; 2]) {
         let [a, b] = self.limits();
         let [c, d] = self.curvature;
@@ -138,80 +133,61 @@ impl Biconic {
         let bend = rise / (below * below * root.max(1e-12));
         (rise / below, [x * (2.0 * c / below + a * bend), y * (2.0 * d / below + b * bend)])
     }
+}
 
-    /// sag − z, and −d/dt of it, at a place of a ray.
-    fn residual(&self, at: Ray) -> (f64, f64) {
-        let [x, y, z] = at.position;
-        let (sag, [along_x, along_y]) = self.profile([x, y]);
+impl Profile for Biconic {
+    /// ∂z/∂x and ∂z/∂y.
+    type Slope = [f64; 2];
+
+    #[inline(always)]
+    fn begin(&self, ray: Ray) -> (Ray, f64) {
+        let travel = -ray.position[2] / ray.direction[2];
+        (ray.advanced(travel), travel)
+    }
+
+    #[inline(always)]
+    fn sag_and_slope(&self, at: Ray) -> (f64, [f64; 2]) {
+        let [x, y, _] = at.position;
+        self.profile([x, y])
+    }
+
+    #[inline(always)]
+    fn slope_at(&self, root: Ray, _slope: [f64; 2]) -> [f64; 2] {
+        self.sag_and_slope(root).1
+    }
+
+    #[inline(always)]
+    fn along(&self, at: Ray, [along_x, along_y]: [f64; 2]) -> f64 {
         let [u, v, w] = at.direction;
-        (sag - z, w - along_x * u - along_y * v)
+        w - along_x * u - along_y * v
     }
 
-    /// A ray in the surface's frame.
-    pub(crate) fn refract(&self, media: Media, ray: Ray, clip2: f64) -> Refracted {
-        let Some(there) = self.newton(ray).or_else(|| self.search(ray, clip2)) else {
-            return Refracted { ray, t: 0.0, hit: false, clear: false, through: false };
-        };
-        let [x, y, _] = there.position;
-        let (_, [along_x, along_y]) = self.profile([x, y]);
+    #[inline(always)]
+    fn exists(&self, [x, y]: [f64; 2]) -> bool {
+        let [a, b] = self.limits();
+        a * x * x + b * y * y <= 1.0
+    }
+
+    #[inline(always)]
+    fn refract(&self, media: Media, at: Ray, [along_x, along_y]: [f64; 2]) -> (Ray, bool) {
         let normal = [-along_x, -along_y, 1.0];
-        let along: f64 = (0..3).map(|i| there.direction[i] * normal[i]).sum();
+        let along: f64 = (0..3).map(|i| at.direction[i] * normal[i]).sum();
         let length2 = 1.0 + along_x * along_x + along_y * along_y;
-        let (ray, through) = media.refract(there, normal, length2, along * along, along);
-        Refracted { ray, t: 0.0, hit: true, clear: x * x + y * y <= clip2, through }
+        media.refract(at, normal, length2, along * along, along)
     }
 
-    fn newton(&self, ray: Ray) -> Option<Ray> {
-        let mut travel = -ray.position[2] / ray.direction[2];
-        let mut at = ray.advanced(travel);
-        for _ in 0..MOST_STEPS {
-            let (short, along) = self.residual(at);
-            let step = short / along;
-            if !step.is_finite() {
-                return None;
-            }
-            at = at.advanced(step);
-            travel += step;
-            if step.abs() <= SETTLED {
-                let [x, y, _] = at.position;
-                let forwards = self.residual(at).1 * at.direction[2] > 0.0;
-                return (self.exists([x, y]) && forwards && travel > -TOUCH).then_some(at);
-            }
-        }
-        None
-    }
-
-    /// The first root ahead, among changes of sign on the part of the ray that runs through the box
-    /// around the surface.
-    fn search(&self, ray: Ray, clip2: f64) -> Option<Ray> {
-        let Ray { position: [x, y, z], direction: [u, v, w] } = ray;
-        // Where neither the domain nor the rim ends the surface, its greater radius twice over does.
-        let radii = self.curvature.iter().filter(|c| **c != 0.0).map(|c| (2.0 / c).abs());
-        let own = radii.fold(0.0, f64::max).max(10.0);
-        let foot = ray.advanced(-(x * u + y * v + z * w)).position;
-        let near = 4.0 * foot[0].hypot(foot[1]) + own;
-        let clear = if clip2.is_finite() { 2.0 * clip2.sqrt() } else { f64::INFINITY };
+    fn extent(&self) -> [f64; 2] {
         let ends = self.limits().into_iter().filter(|limit| *limit > 0.0);
-        let far = ends.fold(f64::INFINITY, f64::min).sqrt().recip();
-        let far = if far > 0.0 { far } else { f64::INFINITY };
-        let reach = far.min(clear).min(near);
-        let across = interval(u * u + v * v, x * u + y * v, x * x + y * y - reach * reach)?;
+        let end = ends.fold(f64::INFINITY, f64::min).sqrt().recip();
+        let radii = self.curvature.iter().filter(|c| **c != 0.0).map(|c| (2.0 / c).abs());
+        [if end > 0.0 { end } else { f64::INFINITY }, radii.fold(0.0, f64::max).max(10.0)]
+    }
+
+    fn sags(&self, reach: f64) -> [f64; 2] {
         // Sections through the axis are monotonous, so the extremes are at the vertex and the rim.
         let rim = (0..64).map(|i| (TAU * f64::from(i) / 64.0).sin_cos());
         let sags = rim.map(|(sine, cosine)| self.profile([reach * cosine, reach * sine]).0);
-        let (low, high) = sags.fold((0.0_f64, 0.0_f64), |(l, h), sag| (l.min(sag), h.max(sag)));
-        let slack = 0.1 * (high - low) + 1e-6;
-        let mut range = [across[0].max(-TOUCH), across[1]];
-        if w != 0.0 {
-            let ends = [(low - slack - z) / w, (high + slack - z) / w];
-            range = [range[0].max(ends[0].min(ends[1])), range[1].min(ends[0].max(ends[1]))];
-        }
-        if !(range[0] < range[1] && range.iter().all(|end| end.is_finite())) {
-            return None;
-        }
-        let there = ray.advanced(first_root(range, |t| -self.residual(ray.advanced(t)).0)?);
-        let [x, y, _] = there.position;
-        self.exists([x, y]).then_some(there)
+        sags.fold([0.0; 2], |[low, high], sag| [low.min(sag), high.max(sag)])
     }
 }
 
@@ -219,6 +195,7 @@ impl Biconic {
 mod tests {
     use super::*;
     use crate::element::SurfaceSpec;
+    use crate::element::newton::cross;
     use crate::element::refract::Refraction;
 
     fn read(json: &str) -> Result<Biconic, String> {
@@ -241,7 +218,7 @@ mod tests {
         assert!((biconic.domain() / domain - 1.0).abs() < 1e-15);
         for (x, y) in [(0.0, 0.0), (3.0, -4.0), (-12.0, 9.0)] {
             let start = ray([x, y, -30.0], [0.1, -0.05, 1.0]);
-            let ours = biconic.refract(conic.media, start, 1e9);
+            let ours = cross(&biconic, conic.media, start, 1e9);
             let theirs = conic.exactly(start, 1e9);
             assert!(ours.hit && ours.through);
             for axis in 0..3 {
@@ -284,7 +261,7 @@ mod tests {
                 let mut start = [0.0, 0.0, -3.0];
                 start[axis] = height;
                 let media = Media::new(1.0, n);
-                let out = s.refract(media, ray(start, [0.0, 0.0, 1.0]), 1e9).ray;
+                let out = cross(&s, media, ray(start, [0.0, 0.0, 1.0]), 1e9).ray;
                 let t = -out.position[axis] / out.direction[axis];
                 assert!((out.position[2] + t * out.direction[2] - focus).abs() < 1e-11, "{height}");
                 assert_eq!(out.direction[1 - axis], 0.0);
@@ -296,12 +273,12 @@ mod tests {
     fn a_cylinder_bends_along_one_axis_alone_and_is_met_beside_its_domain() {
         let s = read(r#"{"radius_x": 10}"#).unwrap();
         let media = Media::new(1.0, 1.5);
-        let out = s.refract(media, ray([3.0, 50.0, -5.0], [0.0, 0.2, 1.0]), 1e9);
+        let out = cross(&s, media, ray([3.0, 50.0, -5.0], [0.0, 0.2, 1.0]), 1e9);
         assert!(out.hit && (out.ray.position[2] - (10.0 - 91.0_f64.sqrt())).abs() < 1e-14);
         // Snell along the cylinder: the component of n d along its axis is kept.
         let along = 0.2 / (1.0_f64 + 0.04).sqrt();
         assert!((out.ray.direction[1] - along / 1.5).abs() < 1e-15);
-        assert!(!s.refract(media, ray([11.0, 0.0, -5.0], [0.0, 0.0, 1.0]), 1e9).hit);
+        assert!(!cross(&s, media, ray([11.0, 0.0, -5.0], [0.0, 0.0, 1.0]), 1e9).hit);
         assert_eq!((s.sag([11.0, 0.0]), s.sag([0.0, 99.0])), (None, Some(0.0)));
     }
 
@@ -316,7 +293,7 @@ mod tests {
                     [f64::from(i), f64::from(j), -20.0],
                     [0.08 * f64::from(j), 0.05 * f64::from(i), 1.0],
                 );
-                let at = s.refract(media, start, 1e9);
+                let at = cross(&s, media, start, 1e9);
                 let [x, y, z] = at.ray.position;
                 if at.hit {
                     hits += 1;

@@ -160,6 +160,7 @@ impl MicrolensArraySpec {
     ///
     /// A sentence on the number that describes no array.
     pub fn build(&self) -> Result<MicrolensArray, String> {
+        // Its size against its pitch.
         let [width, height] = self.size.map(|side| side.0);
         let pitch = self.pitch.0;
         if !(width > 0.0 && height > 0.0 && width.is_finite() && height.is_finite()) {
@@ -177,6 +178,7 @@ impl MicrolensArraySpec {
         if width.max(height) / pitch > MOST_CELLS {
             return Err(format!("pitch is {pitch} mm: over a million lenslets a side"));
         }
+        // The grid, and the openings in it.
         let offset = self.offset.map(|length| length.0);
         if !(self.rotation.0.is_finite() && offset.iter().all(|x| x.abs() <= 1e6 * pitch)) {
             return Err("rotation and offset must be finite, and the offset at most a million \

@@ -11,6 +11,7 @@ mod lattice;
 mod lenslets;
 mod losses;
 mod microlens_array;
+mod newton;
 mod part;
 mod picture;
 mod rays;

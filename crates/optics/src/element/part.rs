@@ -317,6 +317,7 @@ impl Part {
         transmission: &dyn Fn(&Curve) -> f64,
     ) -> [Action; 2] {
         let both = |action: Action| [action.clone(), action];
+        // From the object's side, and from the sensor's.
         match self {
             Self::Surface(surface) => [
                 Action::refract(Refraction::new(surface.clone(), before, behind)),

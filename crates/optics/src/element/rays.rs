@@ -231,7 +231,7 @@ impl Block {
 
 /// One lane of three arrays; `map` would copy the arrays and keep loops from being vectorised.
 #[inline(always)]
-pub(crate) fn at_lane(axes: &[[f64; LANES]; 3], lane: usize) -> [f64; 3] {
+pub(crate) fn at_lane<const N: usize>(axes: &[[f64; N]; 3], lane: usize) -> [f64; 3] {
     [axes[0][lane], axes[1][lane], axes[2][lane]]
 }
 

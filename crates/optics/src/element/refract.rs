@@ -164,16 +164,6 @@ impl Refraction {
         let clear = rival_is_elsewhere::<SPHERE>(&self.surface, ray);
         Refracted { hit: crossing.hit & clear, ..crossing }
     }
-
-    /// A ray at a point of an asphere in its frame, with (∂z/∂x)/x = `slope` there.
-    #[inline(always)]
-    pub(crate) fn at_slope(&self, ray: Ray, slope: f64) -> (Ray, bool) {
-        let [x, y, _] = ray.position;
-        let [u, v, w] = ray.direction;
-        let m = [-slope * x, -slope * y, 1.0];
-        let along = u * m[0] + v * m[1] + w;
-        self.media.refract(ray, m, 1.0 + slope * slope * (x * x + y * y), along * along, along)
-    }
 }
 
 /// Where a ray meets a conic.
@@ -247,12 +237,29 @@ pub(crate) fn each_lane(
     z: f64,
     cross: impl Fn(Ray) -> Refracted,
 ) -> bool {
+    each_numbered_lane(
+        block,
+        element,
+        z,
+        #[inline(always)]
+        |_, ray| cross(ray),
+    )
+}
+
+/// As [`each_lane`], for what also wants to know the ray's place in the block.
+#[inline(always)]
+pub(crate) fn each_numbered_lane(
+    block: &mut Block,
+    element: usize,
+    z: f64,
+    cross: impl Fn(usize, Ray) -> Refracted,
+) -> bool {
     let vignetted = RayStatus::Vignetted { element }.code();
     let mut pending = 0;
     for lane in 0..LANES {
         let old = block.ray(lane);
         let [x, y, depth] = old.position;
-        let mut new = cross(Ray { position: [x, y, depth - z], ..old });
+        let mut new = cross(lane, Ray { position: [x, y, depth - z], ..old });
         new.ray.position[2] += z;
         let outcome = block.outcome[lane];
         let alive = outcome == 0;

@@ -6,12 +6,13 @@
 
 use std::sync::Arc;
 
-use super::aperture::Opening;
+use super::aperture::{Opening, in_circle, in_polygon};
 use super::biconic::Biconic;
 use super::filter::Filter;
 use super::frame::Frame;
 use super::lenslets::Lenslets;
 use super::losses::Loss;
+use super::newton::{cross, cross_block};
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
 use super::refract::{Media, Refracted, Refraction, each_lane};
 use super::thin_lens::at_thin_lens;
@@ -129,6 +130,7 @@ impl Step {
 
     #[inline(always)]
     fn run_at(&self, block: &mut Block, clip: Clip, z: f64) {
+        // A kernel for each action; those that cannot decide a ray leave it pending.
         let pending = match &self.action {
             Action::Plane(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
@@ -146,11 +148,11 @@ impl Step {
             }
             Action::Asphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
-                refraction.asphere_lanes(block, self.element, z, clip2)
+                cross_block(&refraction.surface, refraction.media, block, self.element, z, clip2)
             }
             Action::Biconic { surface, media } => {
                 let clip2 = limit(surface.semi_diameter, clip);
-                each_lane(block, self.element, z, |ray| surface.refract(*media, ray, clip2))
+                cross_block(surface, *media, block, self.element, z, clip2)
             }
             Action::ThinLens { power, semi_diameter } => {
                 let clip2 = limit(*semi_diameter, clip);
@@ -176,6 +178,7 @@ impl Step {
                 false
             }
         };
+        // Rays that are left go one by one.
         if pending {
             self.decide(block, clip);
         }
@@ -189,14 +192,10 @@ impl Step {
         }
         match opening {
             Opening::Circle { radius } => {
-                let radius2 = radius * radius;
-                self.sheet(block, z, |x, y| x * x + y * y <= radius2);
+                self.sheet(block, z, |x, y| in_circle(*radius, x, y));
             }
             Opening::Polygon { normals, apothem, .. } => {
-                self.sheet(block, z, |x, y| {
-                    let beyond = |n: &[f64; 2]| x * n[0] + y * n[1] - apothem;
-                    normals.iter().fold(f64::NEG_INFINITY, |worst, n| worst.max(beyond(n))) <= 0.0
-                });
+                self.sheet(block, z, |x, y| in_polygon(normals, *apothem, x, y));
             }
             Opening::Image(_) => self.run_placed(block, clip),
         }
@@ -299,11 +298,11 @@ impl Step {
             }
             Action::Asphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
-                self.crossed(refraction.at_asphere(ray, clip2))
+                self.crossed(cross(&refraction.surface, refraction.media, ray, clip2))
             }
             Action::Biconic { surface, media } => {
                 let clip2 = limit(surface.semi_diameter, clip);
-                self.crossed(surface.refract(*media, ray, clip2))
+                self.crossed(cross(surface, *media, ray, clip2))
             }
             Action::ThinLens { power, semi_diameter } => {
                 self.crossed(at_thin_lens(*power, ray, limit(*semi_diameter, clip)))

@@ -1,0 +1,246 @@
+//! Rays at a surface z = sag(x, y) that is met in no closed form: aspheres and biconics.
+//!
+//! Newton's method on F(t) = z − sag(x, y) along the ray, side by side on any number of rays. It is
+//! stopped once a step is under 10⁻¹⁰ mm: convergence being quadratic, the error left is that squared
+//! times the surface's curvature, far under 10⁻¹⁴ mm. A root that the ray crosses from behind, or one
+//! that Newton does not find, is looked for again by bisection of the part of the ray that runs near the
+//! surface, from its start on.
+
+use super::rays::{Block, LANES, Ray, at_lane};
+use super::refract::{Media, Refracted, TOUCH, each_numbered_lane};
+
+/// The step (mm) at which the method has arrived.
+const SETTLED: f64 = 1e-10;
+const MOST_STEPS: usize = 20;
+
+/// How many pieces of a ray are looked at for a change of sign.
+const PIECES: u32 = 256;
+
+/// A surface in its own frame (mm), as the search for its crossing with a ray asks for it.
+pub(super) trait Profile {
+    /// The slope at a place.
+    type Slope: Copy + Default;
+
+    /// The ray at the place where the method begins, and how far that is (mm); not finite where there
+    /// is no such place.
+    fn begin(&self, ray: Ray) -> (Ray, f64);
+
+    /// The sag (mm) and the slope at the ray's place. Beyond its domain the surface goes on as if at
+    /// the edge, which keeps an iteration going and is refused in the end.
+    fn sag_and_slope(&self, at: Ray) -> (f64, Self::Slope);
+
+    /// The slope at the root, where the last step began with `slope`, within [`SETTLED`] of it.
+    fn slope_at(&self, root: Ray, slope: Self::Slope) -> Self::Slope;
+
+    /// dF/dt at the ray's place.
+    fn along(&self, at: Ray, slope: Self::Slope) -> f64;
+
+    /// Whether the surface exists at a place.
+    fn exists(&self, place: [f64; 2]) -> bool;
+
+    /// The ray as it goes on from its place on the surface, and whether it does.
+    fn refract(&self, media: Media, at: Ray, slope: Self::Slope) -> (Ray, bool);
+
+    /// The distance from the axis beyond which none of it exists, and another of the size of its radii
+    /// of curvature (mm).
+    fn extent(&self) -> [f64; 2];
+
+    /// The least and the greatest sag up to `reach` from the axis (mm).
+    fn sags(&self, reach: f64) -> [f64; 2];
+}
+
+/// Takes a block through a surface at `z` (mm), as [`super::refract::each_lane`] does for conics; says
+/// whether rays are left for [`cross`] to decide.
+#[inline(always)]
+pub(super) fn cross_block<P: Profile>(
+    surface: &P,
+    media: Media,
+    block: &mut Block,
+    element: usize,
+    z: f64,
+    clip2: f64,
+) -> bool {
+    let newton = Newton::<LANES, P>::run(
+        surface,
+        #[inline(always)]
+        |lane| {
+            let mut ray = block.ray(lane);
+            ray.position[2] -= z;
+            (ray, block.outcome[lane] == 0)
+        },
+    );
+    each_numbered_lane(
+        block,
+        element,
+        z,
+        #[inline(always)]
+        |lane, _| newton.refracted(surface, media, clip2, lane),
+    )
+}
+
+/// A ray in the surface's frame: Newton first, then the search.
+pub(super) fn cross<P: Profile>(surface: &P, media: Media, ray: Ray, clip2: f64) -> Refracted {
+    let met = Newton::<1, P>::run(surface, |_| (ray, true)).refracted(surface, media, clip2, 0);
+    if met.hit {
+        return met;
+    }
+    let Some(root) = search(surface, ray, clip2) else {
+        return Refracted { ray, t: 0.0, hit: false, clear: false, through: false };
+    };
+    let [x, y, _] = root.position;
+    let (out, through) = surface.refract(media, root, surface.sag_and_slope(root).1);
+    Refracted { ray: out, t: 0.0, hit: true, clear: x * x + y * y <= clip2, through }
+}
+
+/// Newton's method on `N` rays side by side.
+struct Newton<const N: usize, P: Profile> {
+    position: [[f64; N]; 3],
+    direction: [[f64; N]; 3],
+    /// Distance from the ray's start (mm).
+    travel: [f64; N],
+    /// The step taken last (mm).
+    last: [f64; N],
+    /// The slope where the last step began.
+    slope: [P::Slope; N],
+    /// 1 while the ray has not settled; a settled one is left alone, so that no ray's last bits
+    /// depend on its neighbours.
+    active: [u64; N],
+}
+
+impl<const N: usize, P: Profile> Newton<N, P> {
+    /// Runs the method on rays in the surface's frame; those that come with `false` are left out.
+    #[inline(always)]
+    fn run(surface: &P, rays: impl Fn(usize) -> (Ray, bool)) -> Self {
+        let mut newton = Self::begin(surface, rays);
+        for _ in 0..MOST_STEPS {
+            if newton.step(surface) {
+                break;
+            }
+        }
+        newton
+    }
+
+    #[inline(always)]
+    fn begin(surface: &P, rays: impl Fn(usize) -> (Ray, bool)) -> Self {
+        let mut newton = Self {
+            position: [[0.0; N]; 3],
+            direction: [[0.0; N]; 3],
+            travel: [0.0; N],
+            last: [f64::INFINITY; N],
+            slope: [P::Slope::default(); N],
+            active: [0; N],
+        };
+        for lane in 0..N {
+            let (ray, alive) = rays(lane);
+            let (begun, travel) = surface.begin(ray);
+            for axis in 0..3 {
+                newton.position[axis][lane] = begun.position[axis];
+                newton.direction[axis][lane] = begun.direction[axis];
+            }
+            newton.travel[lane] = travel;
+            newton.active[lane] = u64::from(alive & (travel.abs() < f64::INFINITY));
+        }
+        newton
+    }
+
+    /// One step of all rays; whether all have settled.
+    #[inline(always)]
+    fn step(&mut self, surface: &P) -> bool {
+        let mut moving = 0;
+        for lane in 0..N {
+            let ray = self.ray(lane);
+            let (sag, slope) = surface.sag_and_slope(ray);
+            let active = self.active[lane] != 0;
+            let step = (sag - ray.position[2]) / surface.along(ray, slope);
+            let next = ray.advanced(step);
+            for axis in 0..3 {
+                let old = self.position[axis][lane];
+                self.position[axis][lane] = if active { next.position[axis] } else { old };
+            }
+            self.travel[lane] = if active { self.travel[lane] + step } else { self.travel[lane] };
+            self.last[lane] = if active { step } else { self.last[lane] };
+            self.slope[lane] = if active { slope } else { self.slope[lane] };
+            let settled = step.abs() <= SETTLED;
+            let still = u64::from(active & !settled);
+            self.active[lane] = still;
+            moving |= still;
+        }
+        moving == 0
+    }
+
+    /// What became of a ray; no hit where [`search`] has to look again.
+    #[inline(always)]
+    fn refracted(&self, surface: &P, media: Media, clip2: f64, lane: usize) -> Refracted {
+        let root = self.ray(lane);
+        let [x, y, _] = root.position;
+        let slope = surface.slope_at(root, self.slope[lane]);
+        let t = self.travel[lane];
+        let hit = (self.last[lane].abs() <= SETTLED)
+            & (t > -TOUCH)
+            & surface.exists([x, y])
+            & (surface.along(root, slope) * root.direction[2] > 0.0);
+        let (ray, through) = surface.refract(media, root, slope);
+        Refracted { ray, t, hit, clear: x * x + y * y <= clip2, through }
+    }
+
+    #[inline(always)]
+    fn ray(&self, lane: usize) -> Ray {
+        Ray { position: at_lane(&self.position, lane), direction: at_lane(&self.direction, lane) }
+    }
+}
+
+/// The first root ahead, among changes of sign on the part of the ray that runs through the box around
+/// the surface.
+fn search<P: Profile>(surface: &P, ray: Ray, clip2: f64) -> Option<Ray> {
+    let behind = |t: f64| {
+        let at = ray.advanced(t);
+        at.position[2] - surface.sag_and_slope(at).0
+    };
+    let root = ray.advanced(first_root(near_surface(surface, ray, clip2)?, behind)?);
+    let [x, y, _] = root.position;
+    surface.exists([x, y]).then_some(root)
+}
+
+/// From where to where the ray is both near the surface's depths and no farther from the axis than the
+/// surface reaches.
+fn near_surface<P: Profile>(surface: &P, ray: Ray, clip2: f64) -> Option<[f64; 2]> {
+    let Ray { position: [x, y, z], direction: [u, v, w] } = ray;
+    let foot = ray.advanced(-(x * u + y * v + z * w));
+    let height = foot.position[0].hypot(foot.position[1]);
+    let clear = if clip2.is_finite() { 2.0 * clip2.sqrt() } else { f64::INFINITY };
+    let [end, own] = surface.extent();
+    let reach = end.min(clear).min(4.0 * height + own);
+    let across = interval(u * u + v * v, x * u + y * v, x * x + y * y - reach * reach)?;
+    let [low, high] = surface.sags(reach);
+    let slack = 0.1 * (high - low) + 1e-6;
+    let mut range = [across[0].max(-TOUCH), across[1]];
+    if w != 0.0 {
+        let ends = [(low - slack - z) / w, (high + slack - z) / w];
+        range = [range[0].max(ends[0].min(ends[1])), range[1].min(ends[0].max(ends[1]))];
+    }
+    (range[0] < range[1] && range[0].is_finite() && range[1].is_finite()).then_some(range)
+}
+
+/// The first root of `at` from `from` to `to`, among changes of sign between [`PIECES`] places.
+fn first_root([from, to]: [f64; 2], at: impl Fn(f64) -> f64) -> Option<f64> {
+    let place = |i: u32| from + (to - from) * f64::from(i) / f64::from(PIECES);
+    let (mut low, mut high) = (1..=PIECES)
+        .map(|i| (place(i - 1), place(i)))
+        .find(|&(a, b)| (at(a) <= 0.0) != (at(b) <= 0.0))?;
+    let before = at(low) <= 0.0;
+    // 2⁻⁶⁰ of a stretch of metres is less than the last bit of a millimetre.
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if (at(middle) <= 0.0) == before { low = middle } else { high = middle }
+    }
+    Some(0.5 * (low + high))
+}
+
+/// Where a t² + 2b t + c ≤ 0.
+fn interval(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
+    if a <= 0.0 {
+        return (c <= 0.0).then_some([f64::NEG_INFINITY, f64::INFINITY]);
+    }
+    let root = (b * b - a * c).sqrt();
+    (root >= 0.0).then(|| [(-b - root) / a, (-b + root) / a])
+}
