@@ -64,12 +64,14 @@ impl Embree {
         geometry: Arc<Geometry>,
         options: &BuildOptions,
     ) -> Result<Self, BuildError> {
+        // Around the frame in which f32 loses least.
         let start = Instant::now();
         let bounds = geometry.loose_bounds();
         check_scale(bounds)?;
         let frame = Frame::of(bounds);
         let scene =
             Scene::build(geometry, frame.origin, options, before.map(|before| &before.scene))?;
+        // What was built, in words and numbers.
         let mode = match (options.robust, options.refine) {
             (true, true) => "robust + f64",
             (true, false) => "robust",
@@ -131,6 +133,7 @@ impl Embree {
     /// Looks again at what is wrong, and at what [`recheck`] suspects.
     fn look_again(&self, rays: &RayBatch, hits: &mut HitBatch, scratch: &mut Scratch) {
         let Scratch { rays: rays32, again, found, solved, suspects, doubtful, .. } = scratch;
+        // Hits of the other side than most, and misses among hits: rays beside them are traced.
         suspects.clear();
         if solved.both_sides {
             recheck::minority_sides(hits, &solved.front, suspects);
@@ -143,6 +146,7 @@ impl Embree {
         if !suspects.is_empty() {
             self.ask_beside(rays, hits, rays32, again, found, suspects);
         }
+        // What is in doubt after that is decided exactly.
         suspects.append(doubtful);
         if !solved.all_valid {
             let invalid = (0..).zip(&solved.valid).filter(|(_, valid)| !**valid);
@@ -376,6 +380,7 @@ impl Accel for Embree {
             let geometry = self.scene.geometry();
             scratch.doubtful.clear();
             scratch.rays.convert(rays, &self.frame);
+            // Embree finds; rays that start on surfaces have their hits judged on the way.
             if self.checks() && Self::start_on_surfaces(rays) {
                 scratch.ends.spare(geometry, rays, &mut scratch.rays, &mut scratch.lanes);
                 let mut judged =
@@ -387,8 +392,10 @@ impl Accel for Embree {
                 }
                 self.scene.closest(&scratch.rays, rays.coherent, &mut scratch.found);
             }
+            // f64 measures.
             std::mem::swap(&mut hits.placement, &mut scratch.found.placement);
             std::mem::swap(&mut hits.triangle, &mut scratch.found.triangle);
+            // f64 measures, and what is in doubt is looked at again.
             solve::solve(geometry, rays, hits, &mut scratch.lanes, &mut scratch.solved);
             if self.checks() {
                 self.look_again(rays, hits, scratch);

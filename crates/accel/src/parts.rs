@@ -57,6 +57,7 @@ impl Layout {
             world: Instance::parallel(MISS, world_frame, 0.0),
             world_frame,
         };
+        // Meshes that are placed once are baked into the world; others are parts of their own.
         let mut part_of_mesh = vec![None; geometry.meshes.len()];
         let mut baked = Vec::new();
         for (i, placement) in geometry.placements.iter().enumerate() {
@@ -82,6 +83,7 @@ impl Layout {
             });
             layout.instances.push(instance.of(part));
         }
+        // The world's own instance, as far as what was baked into it reaches.
         layout.bake_together(geometry, baked);
         let reach = geometry.placements.iter().map(|p| baked_reach(geometry, p, world_frame));
         layout.world = Instance::parallel(MISS, world_frame, reach.fold(0.0, f64::max));

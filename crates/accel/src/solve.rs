@@ -231,6 +231,7 @@ impl Lanes {
 fn see(lanes: &mut Lanes, range: Range<usize>, place: &Place<'_>, origin: [&[f64]; 3]) {
     let Range { start, end } = range;
     let Lanes { narrow, corners, a, e1, e2, magnitude, handedness, .. } = lanes;
+    // Corners in f64, and from them the edges.
     if place.narrow {
         for (wide, narrow) in corners.iter_mut().flatten().zip(narrow.iter().flatten()) {
             for (wide, &narrow) in wide[start..end].iter_mut().zip(&narrow[start..end]) {
@@ -248,12 +249,14 @@ fn see(lanes: &mut Lanes, range: Range<usize>, place: &Place<'_>, origin: [&[f64
             e2[axis][i] = r[axis][i] - p[axis][i];
         }
     }
+    // Into the world's axes.
     if !place.moved_only {
         let linear = &place.transform.linear;
         for vectors in [&mut *a, &mut *e1, &mut *e2] {
             turn(linear, vectors, start, end);
         }
     }
+    // Relative to the ray's origin, with twice the digits in the translation.
     let (high, low) = (place.transform.translation, place.transform.translation_low);
     for axis in 0..3 {
         let origin = &origin[axis][..end - start];

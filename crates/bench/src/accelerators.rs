@@ -165,6 +165,7 @@ pub fn measure(
     effort: &Effort,
     progress: Progress<'_>,
 ) -> Result<Vec<Finding>, BenchError> {
+    // Rays in batches of each width, and the hits that others are compared with.
     let pools = pools(&effort.threads)?;
     let batches: Vec<Vec<RayBatch>> =
         effort.widths.iter().map(|&width| rays.batches(width)).collect();
@@ -172,6 +173,7 @@ pub fn measure(
     let rounds = effort.rounds.max(1);
     let steps = (1 + rounds * effort.methods.len()) as f64;
     let mut done = 1.0;
+    // Methods take turns: each builds, and traces every batch on every number of threads.
     let mut entries: Vec<Entry> = effort.methods.iter().map(|&m| Entry::new(m, effort)).collect();
     for round in 0..rounds {
         for who in order(round, entries.len()) {

@@ -203,6 +203,7 @@ impl CameraSpec {
         let subject = || subject().into();
         let (mut sensor, mut light_field) = (self.sensor().clone(), None);
         let lens = |(pose, lens)| (pose, Projection::Lens(Arc::new(lens)));
+        // What each kind makes of its keys.
         let (pose, projection) = match self {
             Self::Pinhole(spec) => {
                 let (pose, pinhole) = spec.build(subject)?;

@@ -105,6 +105,7 @@ impl Camera {
     /// The camera as `camera.json` tells it.
     #[must_use]
     pub fn opencv(&self) -> CameraFile {
+        // What every camera has.
         let mut file = CameraFile {
             projection: ProjectionName::Perspective,
             resolution: self.resolution(),
@@ -119,6 +120,7 @@ impl Camera {
             focal_length_mm: None,
             lens: self.lens().map(LensFacts::of),
         };
+        // What its projection adds.
         match self.projection() {
             Projection::Pinhole(pinhole) => {
                 file.pixel_origin = pinhole.pixel_origin();

@@ -52,6 +52,7 @@ impl PinholeSpec {
         &self,
         subject: impl FnOnce() -> Subject<'a>,
     ) -> Result<(Pose, Pinhole), CameraError> {
+        // Intrinsics as given, or by the field of view.
         let intrinsics = match (&self.intrinsics, self.fov) {
             (Some(_), Some(_)) => {
                 return Err(CameraError::new(
@@ -80,6 +81,7 @@ impl PinholeSpec {
             None => PixelOrigin::Center,
         };
         let pinhole = Pinhole { intrinsics, distortion, pixel_origin };
+        // Without a pose the whole subject is framed.
         let pose = match &self.pose {
             Some(pose) => pose.build()?,
             None => framing::perspective(subject(), pinhole.reach(self.sensor.resolution)),

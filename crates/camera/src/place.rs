@@ -27,6 +27,7 @@ impl Camera {
     pub fn place_of(&self, offset: DVec3) -> Option<[f64; 2]> {
         let pose = self.pose();
         let [x, y, z] = [pose.right(), -pose.up(), pose.forward()].map(|axis| axis.dot(offset));
+        // Closed forms where there are any; through a lens, by rays from the paraxial place on.
         let place = match self.projection() {
             Projection::Pinhole(pinhole) => {
                 let tangents = match pinhole.distortion() {

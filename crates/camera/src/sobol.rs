@@ -91,6 +91,7 @@ fn side_by_side<const N: usize>(
     directions: &[[u32; BITS]; DIMENSIONS],
 ) -> [[f64; 2]; N] {
     const DIMENSION: [u32; 2] = [0x912f_69ba, 0x174f_18ab];
+    // The scrambled index and the seed of each sequence.
     let (mut index, mut seed) = ([0; N], [0; N]);
     for i in 0..N {
         seed[i] = hash(keys[i].seed);
@@ -98,6 +99,7 @@ fn side_by_side<const N: usize>(
     }
     let mut out = [[0.0; 2]; N];
     for k in 0..2 {
+        // A dimension of Sobol's sequence: XOR of the direction numbers of the index' bits.
         let mut number = [0; N];
         match first + k {
             0 => number = index,
@@ -110,6 +112,7 @@ fn side_by_side<const N: usize>(
                 }
             }
         }
+        // Scrambled by Owen's method: 32 bits of it, and 21 more by hashing.
         let salt = hash(DIMENSION[k].wrapping_add(u32::try_from(first).unwrap_or(0)));
         for i in 0..N {
             let scramble = hash(seed[i] ^ salt);

@@ -429,6 +429,7 @@ impl SceneArguments {
 
     /// The settings and options as overrides of the scene's values, the later the stronger.
     pub(crate) fn overrides(&self) -> Vec<(String, String)> {
+        // Options that stand for keys come after `--set`, and so overrule it.
         let mut overrides = self.settings.clone();
         let mut set = |key: &str, value: String| overrides.push((key.to_owned(), value));
         if let Some(layers) = &self.layers {

@@ -48,6 +48,7 @@ pub(crate) fn run(arguments: &BenchArguments) -> Result<(), Fault> {
 fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     let phases = Phases::new(arguments.quiet);
     places::folder(&arguments.output)?;
+    // The scene, with a picture where parts need one.
     let has = |part| arguments.only.is_empty() || arguments.only.contains(&part);
     let has_pictures = has(PartArgument::Samplers) || has(PartArgument::Cameras);
     let mut notes = Vec::new();
@@ -60,6 +61,7 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     let mut session = Session::open_with(&scene_arguments.scene, options)?;
     let progress = phases.progress(false);
     let scene = session.scene(&progress)?;
+    // Results must not be written over inputs.
     let results = file_names().map(|name| arguments.output.join(name)).collect::<Vec<_>>();
     places::keep_apart(&scene.inputs, &results)?;
     let mut findings = Findings {
@@ -71,6 +73,7 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
         cameras: None,
         notes,
     };
+    // The parts that were asked for, and their files.
     if has(PartArgument::Accelerators) {
         accelerators(arguments, scene, phases, &mut findings)?;
     }
@@ -110,6 +113,7 @@ fn accelerators(
 ) -> Result<(), Fault> {
     let quick = usize::from(arguments.quick);
     let mut rays = Rays::primary(&scene.camera, arguments.rays.unwrap_or(RAYS[quick]));
+    // Incoherent rays start where the camera's hit.
     if arguments.scattered {
         let options =
             BuildOptions { memory_limit: arguments.memory_limit, ..BuildOptions::default() };
@@ -122,6 +126,7 @@ fn accelerators(
         let many = format!("Rays: {} scattered from what the camera sees", rays.len());
         findings.scene.push(many);
     }
+    // What is measured of each method.
     let effort = accelerators::Effort {
         methods: Method::all().to_vec(),
         widths: sorted(arguments.batches.as_deref().unwrap_or(BATCHES[quick])),
@@ -161,6 +166,7 @@ fn pictures(
     findings: &mut Findings,
 ) -> Result<(), Fault> {
     let quick = usize::from(arguments.quick);
+    // How many samples, and the time that they may take.
     let counts = match &arguments.sample_counts {
         Some(counts) => sorted(counts),
         None => SAMPLES[quick].to_vec(),

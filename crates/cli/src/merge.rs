@@ -67,6 +67,7 @@ fn as_asked(arguments: &MergeArguments, shares: &Shares) -> Result<RenderArgumen
             "{first}: does not say how it was rendered: it is a checkpoint, and no share"
         ))
     };
+    // The command line that rendered the shares, and where that was.
     let origin = shares.origin().ok_or_else(unknown)?;
     let folder = origin.get("folder").and_then(Value::as_str).map(Path::new).ok_or_else(unknown)?;
     let words = origin.get("arguments").and_then(Value::as_array).ok_or_else(unknown)?;
@@ -75,6 +76,7 @@ fn as_asked(arguments: &MergeArguments, shares: &Shares) -> Result<RenderArgumen
     else {
         return Err(unknown());
     };
+    // Its files are relative to that place; where results go is this command's own.
     let own = |path: &PathBuf| folder.join(path);
     asked.scene.glass_catalogs = asked.scene.glass_catalogs.iter().map(own).collect();
     asked.scene.scene = arguments.scene.clone().unwrap_or_else(|| own(&asked.scene.scene));

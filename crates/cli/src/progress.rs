@@ -93,6 +93,7 @@ impl Phases {
     /// Begins a phase. The function is told the share done and answers whether to go on; the bar
     /// goes away with the last of its owners.
     pub(crate) fn begin(self, name: &'static str) -> Progress {
+        // The bar, and what the forecast expects of the render.
         let bar = Bar(if self.shown {
             let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
             let style =
@@ -109,6 +110,7 @@ impl Phases {
             false => None,
         };
         let start = Instant::now();
+        // Moved by each share; false ends the work.
         Arc::new(move |share| {
             let left = remaining(share, start.elapsed().as_secs_f64(), expected);
             if let Some(left) = left.and_then(|left| Duration::try_from_secs_f64(left).ok()) {

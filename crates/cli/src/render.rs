@@ -127,12 +127,14 @@ pub(crate) fn write(
     {
         say(&format!("note: {partial}"));
     }
+    // Files, in a folder of their own when the picture is partial.
     let folder = &rendering.place_in(&arguments.output);
     if *folder != arguments.output {
         places::folder(folder)?;
     }
     let written = rendering.write_with(folder, outputs, &progress)?;
     drop(progress);
+    // The report, on disk and in words.
     let mut report = rendering.report_of(&written);
     report.notes.extend(partial.clone());
     if let Some(path) = &arguments.report {

@@ -134,6 +134,7 @@ fn list(as_json: bool) -> Result<(), Fault> {
         ("dark_current", "dark e⁻/s", 12),
         ("full_well", "well e⁻", 10),
     ];
+    // The titles, and a line for each preset.
     let mut text = format!("{:<11}", "preset");
     for (_, title, width) in columns {
         let _ = write!(text, "{title:>width$}");
@@ -171,6 +172,7 @@ fn curves(arguments: &SensorArguments, name: &str, file: &SensorFile) -> Result<
     if let Some(folder) = &arguments.output {
         places::folder(folder)?;
     }
+    // Measure first; then the files, and what is printed.
     let curves =
         PhotonTransfer::measure(&file.sensor, &options).map_err(|error| file.fault(&error))?;
     let preset = file.spec.model.map(|model| Card::new(model.preset()));
@@ -213,12 +215,14 @@ fn series(arguments: &SensorArguments, file: &SensorFile, folder: &Path) -> Resu
         ..Options::default()
     };
     let series = Series::plan(&file.sensor, &options).map_err(|error| file.fault(&error))?;
+    // Where the images go, which must not be over an input.
     let files: Vec<PathBuf> = names(&series).map(|name| folder.join(name)).collect();
     places::keep_apart([], &files)?;
     places::folder(folder)?;
     let total = series.len();
     let progress = Phases::new(arguments.quiet).begin("expose");
     let start = SystemTime::now();
+    // The images, one exposure after the other; those of a series that ends early are listed, too.
     places::recorded(Ledger::open(folder, "sensor --emva"), || {
         let written = series
             .write(&file.sensor, &options, folder, |done| progress(done as f64 / total as f64))

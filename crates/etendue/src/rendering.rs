@@ -201,11 +201,13 @@ impl Rendering {
         progress: &Progress,
     ) -> Result<Written, Error> {
         let start = Instant::now();
+        // Results must not be written over inputs.
         let names = self.picture.layers().iter().map(|layer| layer.name.clone());
         let results = files_of(&self.scene, names, outputs);
         let results: Vec<PathBuf> = results.map(|name| folder.join(name)).collect();
         places::keep_apart(&self.scene.inputs, &results)?;
         let mut folders = Vec::new();
+        // Layers, exposures and the light field's set, recorded in the folder's manifest.
         let mut written = places::recorded(Ledger::open(folder, "render"), || {
             let mut files = self.write_layers(folder, outputs, progress)?;
             let mut notes = self.idle_notes.clone();
@@ -224,6 +226,7 @@ impl Rendering {
         for below in folders {
             places::recorded(Ledger::open(&below, "render"), || Ok::<_, Error>(()))?;
         }
+        // A whole picture takes the place of a partial one.
         if self.partial().is_none() {
             places::clear(&folder.join(PARTIAL));
         }

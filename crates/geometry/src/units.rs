@@ -127,6 +127,7 @@ impl Dimension {
     /// When the number or the unit is missing, unknown or not finite.
     pub fn parse(self, text: &str, target: &str) -> Result<f64, QuantityError> {
         let trimmed = text.trim();
+        // A number, and a unit that this quantity has.
         let (number, unit) = split_number(trimmed);
         let Ok(value) = number.parse::<f64>() else {
             let example = format!("50 {target}");
@@ -154,6 +155,7 @@ impl Dimension {
                 known,
             });
         };
+        // From one unit to the other by whole numbers, which rounds once.
         let scaled = rescale(value, up * target_down, down * target_up);
         if scaled.is_finite() {
             Ok(scaled)

@@ -132,6 +132,7 @@ fn grey(bytes: &[u8], header: &Header, name: &Text, limits: Limits) -> Result<Ra
 
 /// Reads all channels of the first layer as they are.
 pub(crate) fn channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, DecodeError> {
+    // The header is judged before anything is decoded.
     let about = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
     let header = about.headers.iter().find(|header| !header.deep).ok_or(DecodeError::Channels)?;
     let side = [header.layer_size.x(), header.layer_size.y()].map(|side| side as u64);
@@ -145,6 +146,7 @@ pub(crate) fn channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, Deco
         .from_buffered(Cursor::new(bytes))?;
     let layer = image.layer_data;
     let size = [layer.size.x(), layer.size.y()];
+    // Words and numbers; channels at less than full resolution are left out.
     let texts = image.attributes.other.iter().chain(&layer.attributes.other);
     let texts = texts.filter_map(|(name, value)| match value {
         AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),

@@ -236,6 +236,7 @@ pub(crate) fn strips<'a>(
     [width, height]: [u32; 2],
     strip_height: u32,
 ) -> Vec<Mutex<Option<Strip<'a>>>> {
+    // Strips without their numbers, and then each layer's rows dealt out to them.
     let mut strips: Vec<Strip<'a>> = (0..height.div_ceil(strip_height))
         .map(|k| {
             let top = k * strip_height;

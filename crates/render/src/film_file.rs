@@ -300,6 +300,7 @@ impl FilmFile {
         sums: &mut [&mut [Sum]],
         [width, height]: [u32; 2],
     ) -> Result<(), FilmError> {
+        // Where each section of the file belongs.
         let planes = layers.iter_mut().flat_map(|layer| layer.named_planes_mut());
         let planes = planes.map(|(name, plane)| (name, SectionMut::Plane(plane)));
         let sums = sums.iter_mut().enumerate();
@@ -309,6 +310,7 @@ impl FilmFile {
         let numbers = &self.bytes[self.start..self.bytes.len() - 8];
         let mut at = 0;
         let shard = self.header.shard;
+        // The sections, in the order of the file, each of the share's pixels alone.
         for (name, kind) in &self.header.sections {
             let Some(section) = wanted.remove(name) else {
                 return Err(self.error(format!("has {name}, which this render has not")));

@@ -56,6 +56,7 @@ impl Images {
     ) -> Result<Self, RenderError> {
         let limits = Limits::within(memory);
         let wanted = wanted_images(scene, plan);
+        // What is known stays; all else is decoded, side by side.
         let results: Vec<_> = scene
             .textures
             .par_iter()
@@ -117,6 +118,7 @@ impl Images {
         before: &Self,
     ) -> Result<(), ImageError> {
         let Some(image) = environment(scene) else { return Ok(()) };
+        // A file is read again when it has changed.
         let stamp = match image {
             EnvironmentImage::File(path) => Stamp::of(path),
             EnvironmentImage::Studio
@@ -124,6 +126,7 @@ impl Images {
             | EnvironmentImage::Constant => None,
         };
         self.sky = Some((image.clone(), stamp));
+        // The map as it was, or made anew.
         let known = before.environment.as_ref().filter(|_| before.sky == self.sky);
         let map = match (known, image) {
             (Some(known), _) => Arc::clone(known),

@@ -66,6 +66,7 @@ pub(crate) fn settle(
         return Ok(lighting);
     }
     let spectral = Spectral::new(&Bands::Rgb);
+    // The scene by its own lights alone.
     let lights = Lights::new(&lighting.lights, lighting.map.clone(), &surroundings, &spectral)
         .map_err(|error| RenderError::Lights(error.to_string()))?;
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials);
@@ -83,6 +84,7 @@ pub(crate) fn settle(
     if lit.is_none_or(|share| share >= LIT) {
         return Ok(lighting);
     }
+    // They leave it dark: the studio shines as well.
     lighting.lights.push(Light::STUDIO);
     lighting.map = Some(Arc::new(EnvironmentMap::studio()));
     lighting.note = Some(
@@ -101,6 +103,7 @@ fn lit_share(
     stage: LightingContext<'_>,
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<Option<f64>, RenderError> {
+    // A coarse picture of light alone.
     let [width, height] = scene.camera.resolution();
     let camera = scene.camera.coarser(width.max(height).div_ceil(SIDE));
     let camera = match camera.lens() {
@@ -147,6 +150,7 @@ fn lit_share(
     let watcher = Watcher::new(&watch, job.rays(&film));
     job.run(&mut film, &watcher)?;
     let [light, coverage] = film.map(|layer| layer.into_planes());
+    // How many of the pixels that see something are lit.
     let (mut seen, mut lit) = (0_u32, 0_u32);
     for i in 0..pixels {
         if coverage[0].at(i) > 0.0 {
@@ -164,6 +168,7 @@ pub(crate) fn verdict((camera, accel): (&Camera, &dyn Accel), picture: &Picture)
     let planes: Vec<&Values> = layer.channels.iter().map(|channel| &channel.values).collect();
     let [r, g, b] = *planes.as_slice() else { return None };
     let develop = picture.development();
+    // Pixels without light, black ones and clipped ones.
     let (mut seen, mut dark, mut black, mut clipped) = (0_u32, 0_u32, 0_u32, 0_u32);
     for i in seen_pixels(camera, accel) {
         let rgb = [r, g, b].map(|plane| plane.at(i));
@@ -177,6 +182,7 @@ pub(crate) fn verdict((camera, accel): (&Camera, &dyn Accel), picture: &Picture)
         |count: u32| format!("picture: {:.0} % of what the camera sees", 100.0 * share(count));
     let auto = "`--set render.exposure=auto`, or a number of stops, mends picture.png; EXR and NPY \
                 keep the radiance as it is";
+    // The worst that holds of nearly all of them.
     if share(dark) >= NEARLY_ALL {
         return Some(format!(
             "{} sends no light at all: its materials are black, or no light reaches it; name other \

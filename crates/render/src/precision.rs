@@ -18,6 +18,7 @@ const NOISE_OF_A_SAMPLE: f64 = 0.25;
 
 /// The precision of a scene's light paths for so many samples a pixel, and why.
 pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, String) {
+    // What the scene asks for goes first.
     match scene.plan.light_precision {
         LightPrecision::Double => {
             return (HitPrecision::Double, "the scene asks for it".to_owned());
@@ -30,6 +31,7 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
     if scene.render.accel.unwrap_or(accelerators()[0]) != AccelName::Embree {
         return (HitPrecision::Double, "the accelerator works in f64".to_owned());
     }
+    // By how much f32 misplaces rays, against the smallest triangle and what noise hides.
     let offset = offset(scene);
     let noise = NOISE_OF_A_SAMPLE / f64::from(samples).sqrt();
     let Some((least, edge)) = smallest(scene) else {

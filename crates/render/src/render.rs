@@ -219,12 +219,14 @@ pub fn trace(
     let resolution = scene.camera.resolution();
     let mut layers = empty_film(scene, plan)?;
     let start = Instant::now();
+    // Cameras opened for the wavelengths of data and of light.
     let open = |bands: &Bands| match plan.pupil {
         true => scene.camera.opened(bands).map_err(|e| RenderError::Camera(e.why)),
         false => Ok(scene.camera.clone()),
     };
     let camera = open(&Bands::Rgb)?;
     let light_camera = if plan.bands == Bands::Rgb { camera.clone() } else { open(&plan.bands)? };
+    // Lights, the studio among them where all else leaves the scene dark.
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
     let spectral = Spectral::new(&plan.bands);
     let mut notes = Vec::new();
@@ -239,6 +241,7 @@ pub fn trace(
         }
         _ => None,
     };
+    // What light passes ask of the scene.
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials);
     let light = lit.as_ref().map(|(rules, lights)| LightPass {
@@ -257,6 +260,7 @@ pub fn trace(
         groups: light_camera.band_groups(&plan.bands),
         layers: plan.layers.iter().copied().filter(|layer| layer.is_light()).collect(),
     });
+    // The passes, kept shorter where a checkpoint is written after each.
     let so_far = |layers: &[&FilmLayer], samples| so_far(scene, plan, header, layers, samples);
     let shard = course.shard.unwrap_or(Shard::ALL);
     let checkpoint = course.checkpoint.as_ref();
@@ -264,6 +268,7 @@ pub fn trace(
     let passes = if is_kept { short_passes(plan.samples) } else { plan.passes.clone() };
     let others: Vec<&dyn OtherFrame> = others.iter().map(|other| other as _).collect();
     let rule = Rule::of(scene, plan);
+    // All of it as one job, tile by tile.
     let job = Job {
         accel,
         others: &others,
@@ -288,6 +293,7 @@ pub fn trace(
         shares: course.shares,
         keeper: checkpoint.map(|file| Keeper::new(file, &course.identity, shard, resolution)),
     };
+    // What was traced, and what a user should know of it.
     let watcher = Watcher::new(watch, job.rays(&layers));
     let Done { traffic: counts, passed, sums, centres } = job.run(&mut layers, &watcher)?;
     notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
@@ -335,6 +341,7 @@ pub fn finish(
     let Passed { samples, is_complete, counts: sample_counts } = passed;
     let samples_wanted = if is_complete { samples } else { plan.samples };
     let RayCounts { chief_rays, light, fates } = counts;
+    // A lens through which no ray came has no picture.
     if let (true, 0, Some(element)) =
         (fates.total() > 0, fates.exited, fates.farthest_from_sensor())
     {
@@ -344,6 +351,7 @@ pub fn finish(
     notes.extend(sample_counts.filter(|_| is_complete).and_then(|counts| counts.note()));
     let words = sample_counts.map_or_else(|| samples.to_string(), |counts| counts.words());
     let header = marked(header, words, [samples, samples_wanted]);
+    // The film as a picture, and whether it is black or clipped.
     let (picture, band_film) = finished(scene, plan, layers, header)?;
     if let (Some(camera), Some(accel)) = (&camera, accel)
         && scene.picture == Some(LayerSpec::Radiance)

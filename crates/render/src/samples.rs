@@ -316,6 +316,7 @@ impl Adding<'_> {
             let wants = |&(x, y): &(u32, u32)| {
                 self.blocks.is_none_or(|blocks| blocks.wants([tile.left + x, tile.top + y]))
             };
+            // Pixels that want more samples, with what they have so far.
             let pixels: Vec<(u32, u32)> = tile.pixels().filter(wants).collect();
             let places = pixels.iter().map(|&(x, y)| tile.index(x, y, width));
             memory.sums.clear();
@@ -325,6 +326,7 @@ impl Adding<'_> {
                 }),
                 None => memory.sums.resize(pixels.len() * count, Sum::default()),
             }
+            // Samples for these, and back to where their sums are kept.
             self.tile(tile, &pixels, memory)?;
             for (at, sums) in places.zip(memory.sums.chunks(count)) {
                 match &mut kept {
@@ -370,11 +372,13 @@ impl Adding<'_> {
         let Memory { numbers, film, .. } = memory;
         let numbers: &mut Vec<(PixelSamples, u32)> = &mut numbers.samples;
         numbers.clear();
+        // The numbers of all samples of these pixels.
         for &(x, y) in pixels {
             let of = |index| self.sampling.of(tile.left + x, tile.top + y, index);
             numbers.extend(range.clone().map(of));
         }
         let count = numbers.len();
+        // Their places on the sensor, in the pupil, and in the spectrum.
         let draw = |pair, out: &mut Vec<_>| squares_of_pair(numbers.iter().copied(), pair, out);
         film.clear();
         let mut places = Vec::new();

@@ -181,11 +181,13 @@ impl Film {
         let mut layers = empty_film(scene, plan)?;
         must_be_whole(shares, identity).map_err(RenderError::Shares)?;
         let counts = Mutex::new(RayCounts::default());
+        // Each fills its own pixels, or adds its own samples.
         for share in shares {
             share.fill(&mut layers.iter_mut().collect::<Vec<_>>(), &mut [], resolution)?;
             RayCounts::add(&counts, share.counts(), &FateCounts::default());
         }
         let counts = counts.into_inner().unwrap_or_else(PoisonError::into_inner);
+        // Samples by pixel, where the shares counted them.
         let of_pixels = shares.iter().filter_map(|share| share.header.sample_counts);
         let of_pixels = of_pixels.reduce(SampleCounts::and);
         let samples = of_pixels.map_or(plan.samples, |counts| counts.least);
@@ -240,6 +242,7 @@ pub(crate) fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<
     };
     let Shard { count, by, .. } = first.header.shard;
     let mut found: BTreeMap<Shard, &FilmFile> = BTreeMap::new();
+    // Each is of the same render and the same division, and none is there twice.
     for share in shares {
         share.must_be_of(identity).map_err(|error| error.to_string())?;
         let shard = share.header.shard;
@@ -259,6 +262,7 @@ pub(crate) fn must_be_whole(shares: &[FilmFile], identity: &Identity) -> Result<
             return Err(format!("{path}: is share {shard}, as {other} is; give each once"));
         }
     }
+    // None is missing.
     let missing = (0..count).map(|index| Shard { index, count, by });
     let missing: Vec<String> = missing
         .filter(|shard| !found.contains_key(shard))

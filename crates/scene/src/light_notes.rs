@@ -11,6 +11,7 @@ use crate::import::{Note, NoteKind};
 pub(crate) fn of(geometry: &Geometry, materials: &[Material], lights: &[Light]) -> Vec<Note> {
     let mut placed: BTreeMap<u32, f64> = BTreeMap::new();
     let mut bends: Vec<&str> = Vec::new();
+    // Some area of every material that shines, and the glasses.
     for placement in &geometry.placements {
         let Some(material) = materials.get(placement.material as usize) else { continue };
         if material.emission.is_some() {
@@ -24,6 +25,7 @@ pub(crate) fn of(geometry: &Geometry, materials: &[Material], lights: &[Light]) 
             bends.push(&material.name);
         }
     }
+    // Materials that shine and have none.
     let mut notes: Vec<Note> = placed
         .into_iter()
         .filter(|(_, area)| *area == 0.0)
@@ -32,6 +34,7 @@ pub(crate) fn of(geometry: &Geometry, materials: &[Material], lights: &[Light]) 
             note(format!("material \"{}\"", materials[number as usize].name), message)
         })
         .collect();
+    // Lights that no path can find behind glass.
     let is_point = |light: &&Light| !matches!(light.kind, LightKind::Environment { .. });
     let points = lights.iter().filter(is_point).count() as u64;
     if points > 0 && !bends.is_empty() {

@@ -225,6 +225,7 @@ impl SceneFile {
     ) -> Result<Scene, SceneError> {
         let built = self.kept_camera(parts.geometry, &parts.cameras, (folder, options), kept)?;
         let KeptCamera { geometry, camera, origin: camera_origin, files: camera_files, .. } = built;
+        // Every file that the scene is made of.
         let opened = parts.stats.files.iter().map(|(path, _)| path.clone());
         let images = parts.textures.iter().filter_map(Texture::file);
         let skies = parts.lights.iter().filter_map(Light::file);
@@ -243,6 +244,7 @@ impl SceneFile {
         inputs.extend(files.iter().map(|(_, path)| path.clone()));
         inputs.sort();
         inputs.dedup();
+        // What a user should know of it.
         let mut notes = parts.notes;
         notes.extend(self.unused_materials());
         notes.extend(nothing_to_draw(&geometry));

@@ -44,6 +44,7 @@ pub(crate) fn read(
     let (text, data) = split(bytes)?;
     let broken = |why: String| format!("has a broken header: {why}; write it with numpy.save");
     let text = std::str::from_utf8(text).map_err(|_| broken("it is not UTF-8".to_owned()))?;
+    // What kind of numbers, in which order, and how many.
     let header = Header::parse(text).map_err(broken)?;
     let (kind, order) = number(header.kind)?;
     fits(&header.shape)?;
@@ -61,6 +62,7 @@ pub(crate) fn read(
         let has = data.len();
         format!("ends before its last number: {has} bytes follow where its shape is {shape:?}")
     })?;
+    // All as f64.
     let numbers = match kind {
         Number::F32 => {
             let of = match order {
@@ -140,6 +142,7 @@ impl<'a> Header<'a> {
         let mut rest = Rest(text);
         let (mut kind, mut fortran_order, mut shape) = (None, None, None);
         rest.expect('{')?;
+        // A dictionary of Python's with three keys, each once.
         while !rest.takes('}') {
             let key = rest.string()?;
             rest.expect(':')?;

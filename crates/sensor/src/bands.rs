@@ -75,6 +75,7 @@ impl Sensor {
         if !counts && (ideal || spec.bands.is_some()) {
             return Ok(BandChoice { bands: self.response.bands.clone(), error: None });
         }
+        // The range in which the sensor sees the light, or the bands that are asked for.
         let filters = filters(spec)?.filters;
         let given = spec.bands.as_ref().map(|grid| grid.edges().to_vec());
         let range = match &given {
@@ -85,12 +86,14 @@ impl Sensor {
         let Some(table) = Table::new(self, &filters, light, range, &edges) else {
             return Ok(BandChoice { bands: self.response.bands.clone(), error: None });
         };
+        // The bands of ideal filters will do where they count the same electrons.
         if ideal {
             let error = table.error_of(&self.response, &filters, &self.settings.efficiency, light);
             if error <= TOLERANCE {
                 return Ok(BandChoice { bands: self.response.bands.clone(), error: Some(error) });
             }
         }
+        // Otherwise bands are divided until they do.
         let fixed = table.cells_at(&edges);
         let may_divide = given.is_none() || multispectral;
         let cells = if may_divide { table.divided(&fixed) } else { fixed };
@@ -245,11 +248,14 @@ impl Table {
         for (light, spectrum) in spectra.iter().enumerate() {
             for (channel, response) in responses.iter().enumerate() {
                 for &filter in &filters {
+                    // What the channel counts of a white surface.
                     let mut base = product(&[spectrum, response]);
                     if let Some(f) = filter {
                         base = product(&[&base, &passed[f]]);
                     }
                     let white: f64 = nodes.sums(&[&base]).last().copied().unwrap_or(0.0);
+                    // And of surfaces in all products of primary colours; those that are nearly
+                    // black are judged against white.
                     for colors in products(colored) {
                         let mut values = base.clone();
                         for k in colors.into_iter().flatten() {
@@ -381,6 +387,7 @@ impl Table {
         let in_bands = |curve: &Curve, outside| {
             bands.from_curve(curve, outside).unwrap_or_else(|_| vec![0.0; count])
         };
+        // Electrons, light and filters in the bands of the response.
         let electrons: Vec<Vec<f64>> = filters
             .iter()
             .map(|f| (0..count).map(|i| photons_caught(bands, i, f, efficiency)).collect())
@@ -390,6 +397,7 @@ impl Table {
         let spectra: Vec<_> = spectra.iter().map(|s| in_bands(s, Outside::Zero)).collect();
         let passed: Vec<_> = light.filters.iter().map(|t| in_bands(t, Outside::Held)).collect();
         let colors = bands.from_rgb();
+        // The count in these bands against the exact one.
         let off = |trial: &Trial| {
             let counted = |i: usize| {
                 let colors = trial.colors.into_iter().flatten().map(|k| colors[i][k]);

@@ -193,10 +193,12 @@ fn dark_signal(dark: f64, mean: &mut Lane) {
 /// n ~ Poisson(μ): electrons of light and of heat together, for a sum of Poisson variables is one.
 #[inline(always)]
 fn shot_noise(chain: &Chain, place: Place, mean: &mut Lane, normals: &Lane, units: &Lane) {
+    // A first try for all; most pixels are done with it.
     let mut electrons = [0.0; BLOCK];
     for i in 0..BLOCK {
         electrons[i] = first_try(mean[i], normals[i], units[i]);
     }
+    // Small means by a table; pixels whose try was refused are left open.
     let mut open = [0; BLOCK];
     let mut count = 0;
     let parts = electrons.as_chunks_mut::<GROUP>().0.iter_mut();
@@ -212,6 +214,7 @@ fn shot_noise(chain: &Chain, place: Place, mean: &mut Lane, normals: &Lane, unit
             }
         }
     }
+    // Those are finished, as many together as there are.
     for chosen in open[..count].chunks(FINISHED_TOGETHER) {
         let pixel = |i: usize| Open {
             mean: mean[i],

@@ -59,6 +59,7 @@ impl Sensor {
         let (width, height) = (width.map_err(|_| too_large())?, height.map_err(|_| too_large())?);
         let bytes = u32::try_from(2 * image.values.len()).map_err(|_| too_large())?;
         let photometric = if pattern.is_some() { CFA } else { LINEAR_RAW };
+        // What TIFF 6.0 asks for.
         directory.write_tag(Tag::NewSubfileType, 0u32)?;
         directory.write_tag(Tag::ImageWidth, width)?;
         directory.write_tag(Tag::ImageLength, height)?;
@@ -75,11 +76,14 @@ impl Sensor {
         directory.write_tag(Tag::StripOffsets, offset)?;
         directory.write_tag(Tag::RowsPerStrip, height)?;
         directory.write_tag(Tag::StripByteCounts, bytes)?;
+        // What DNG adds, by the numbers of its specification: version, model, black and white
+        // level.
         let unknown = Tag::Unknown;
         directory.write_tag(unknown(50_706), [1u8, 4, 0, 0].as_slice())?;
         directory.write_tag(unknown(50_708), model)?;
         directory.write_tag(unknown(50_714), rational(self.black_level()))?;
         directory.write_tag(unknown(50_717), self.white_level_of_file())?;
+        // The mosaic of filters, the matrix from XYZ to the camera's colours, and its white.
         if let Some([rows, columns, codes @ ..]) = pattern.as_deref() {
             let period = [u16::from(*rows), u16::from(*columns)];
             directory.write_tag(unknown(33_421), period.as_slice())?;

@@ -216,6 +216,7 @@ fn numbered(cfa: &CfaSpec, letters: &[char]) -> Vec<Vec<usize>> {
 }
 
 fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
+    // Channels with curves of their own.
     if let Some(channels) = &spec.channels {
         if channels.is_empty() {
             let why = "name one channel at least";
@@ -242,6 +243,7 @@ fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
         let names = channels.iter().map(|channel| channel.name.clone()).collect();
         return Ok(Filtered { names, filters, pattern: None });
     }
+    // Or one channel a band.
     let Some(grid) = &spec.bands else {
         let why = "a multispectral sensor needs the edges of its bands (nm), or `channels`";
         return Err(SensorError::Missing { key: "bands", why });

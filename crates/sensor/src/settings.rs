@@ -68,6 +68,7 @@ impl Settings {
         let counts = spec.system_gain.is_some() || preset.is_some();
         let noise =
             spec.noise.unwrap_or(if counts { NoiseModel::Poisson } else { NoiseModel::None });
+        // Each value as it is written, else of the preset, else that of an ideal sensor.
         let mut settings = Self {
             resolution: spec.resolution.or(preset.map(|p| p.resolution.value)).unwrap_or([1024; 2]),
             pixel_pitch: spec
@@ -104,6 +105,8 @@ impl Settings {
             radiometry: spec.radiometry.unwrap_or_default(),
             notes: Vec::new(),
         };
+        // Values that contradict one another are refused, and the dark current is brought to the
+        // temperature.
         settings.check_pixels()?;
         settings.check_electrons()?;
         settings.check_converter(spec.full_well)?;
@@ -244,6 +247,7 @@ impl Settings {
 
     /// Takes the dark current to the sensor's temperature: `μ_I·2^((ϑ − ϑ_ref)/ϑ_d)`.
     fn warm(&mut self, spec: &SensorSpec) -> Result<(), SensorError> {
+        // The temperature, that at which the dark current was measured, and what doubles it.
         let preset = spec.model.map(Model::preset);
         let reference = spec
             .dark_current_temperature
@@ -269,6 +273,7 @@ impl Settings {
             return Ok(());
         };
         positive("dark_current_doubling", doubling, "kelvin, above 0")?;
+        // Dark current doubles every `doubling` kelvins.
         let factor = ((temperature - reference) / doubling).exp2();
         let demand = "a temperature at which the dark current can be counted";
         let warm = self.dark_current * factor;

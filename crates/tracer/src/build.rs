@@ -148,12 +148,14 @@ impl MaterialSpec {
         else {
             return Ok(Material::unnamed());
         };
+        // Sheen has one colour or an image, and no checker.
         let sheen = paint("sheen", sheen, Bound::One, supply)?;
         let (sheen_color, sheen_color_texture) = match sheen {
             Paint::Plain(color) => (color, None),
             Paint::Image { factor, image } => (factor, Some(image)),
             Paint::Checker { colors, .. } => (colors[0], None),
         };
+        // The surface below its colour, and what shows through both.
         let surface = GltfSurface {
             metallic: *metallic,
             roughness: *roughness,

@@ -76,6 +76,7 @@ impl Photometry {
     /// A sentence on what is wrong.
     pub fn parse(text: &str) -> Result<Self, String> {
         let lines = &mut text.lines();
+        // All after the line TILT= is numbers, whatever the lines.
         let tilt = lines.find_map(|line| line.trim().strip_prefix("TILT="));
         let tilt = tilt.ok_or("has no line TILT=; is it an IES file (LM-63)?")?.trim();
         let words = lines.flat_map(|line| line.split([' ', '\t', ',']));
@@ -84,18 +85,22 @@ impl Photometry {
             number.ok_or_else(|| format!("\"{}\" is no number", word.escape_debug()))
         });
         let mut next = |what: &str| numbers.next().unwrap_or(Err(format!("ends before {what}")));
+        // The lamp's own tilt, which is not asked for.
         if tilt == "INCLUDE" {
             next("the lamp's tilt")?;
             for _ in 0..2 * count(next("the angles of tilt")?, "angles of tilt")? {
                 next("the lamp's tilt")?;
             }
         }
+        // Lamps, lumens, multiplier, numbers of angles, type and units; then sizes, ballast and
+        // watts.
         let [_, _, multiplier, verticals, horizontals, kind] =
             array(|| next("the luminaire's figures"))?;
         let [_, _, _, _, ballast, _, _] = array(|| next("the luminaire's figures"))?;
         if kind != 1.0 {
             return Err(format!("is photometry of type {kind}; type C (1) alone is read"));
         }
+        // The angles, which have to cover whole quarters.
         let mut angles = |number: f64, what: &str| -> Result<Vec<f64>, String> {
             let all =
                 (0..count(number, what)?).map(|_| next(what)).collect::<Result<Vec<_>, _>>()?;
@@ -114,6 +119,7 @@ impl Photometry {
             return Err("has horizontal angles other than from 0 to 0, 90, 180 or 360".to_owned());
         }
         let scale = multiplier * ballast;
+        // The intensities, one vertical fan after the other.
         let candela = (0..vertical.len() * horizontal.len())
             .map(|_| Ok(next("all candela values")? * scale))
             .collect::<Result<Vec<f64>, String>>()?;

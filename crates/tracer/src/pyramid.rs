@@ -106,6 +106,7 @@ fn halved(
     let size = [(width / 2).max(1), (height / 2).max(1)];
     let (columns, rows) = (shares(width, size[0]), shares(height, size[1]));
     let mut values = room(size[0] * size[1] * channels)?;
+    // Each texel is the mean of those below it, by the share that it has of them.
     for row in &rows {
         for column in &columns {
             let mut sum = [0.0; 4];

@@ -77,11 +77,14 @@ impl FrameRays {
         let mut rays = Self::ZERO;
         let mut odd = 0_u32;
         for i in 0..PACKET {
+            // Far origins and directions of other lengths would lose too much: none of the packet
+            // is taken.
             let [x, y, z] = instance.offset([origin[0][i], origin[1][i], origin[2][i]]);
             let distance = x.abs() + y.abs() + z.abs();
             let [dx, dy, dz] = [direction[0][i], direction[1][i], direction[2][i]];
             let stretch = dx * dx + dy * dy + dz * dz - 1.0;
             odd |= u32::from(!((distance * scale <= FAR) & (stretch.abs() < 0.1))) << i;
+            // Rounded so that no box is missed: a nearer start, and a margin for the origin.
             let near = (t_min[i] * scale) as f32;
             rays.near[i] = near - near.abs() * f32::EPSILON;
             let size = largest(x.abs(), y.abs(), z.abs()) * scale;

@@ -26,6 +26,7 @@ const PARALLEL_NODES: usize = 1 << 13;
 /// The tree of eight children a node; `None` when it has too many cells to number.
 pub(super) fn fold(tree: &Tree, leaf: &impl WriteLeaf) -> Option<WideTree> {
     let Some(root) = tree.nodes.first() else { return Some(WideTree::default()) };
+    // The top of the tree, and its subtrees side by side.
     let mut top = Fold::new(tree, leaf);
     top.later = Some(Vec::new());
     top.node(0, tree.nodes.len());
@@ -38,6 +39,7 @@ pub(super) fn fold(tree: &Tree, leaf: &impl WriteLeaf) -> Option<WideTree> {
             fold.piece
         })
         .collect();
+    // Where each piece will stand, and who refers to it.
     let mut place = top.piece.cells.len();
     for (subtree, piece) in later.iter().zip(&mut pieces) {
         piece.place = place;
@@ -48,6 +50,7 @@ pub(super) fn fold(tree: &Tree, leaf: &impl WriteLeaf) -> Option<WideTree> {
     if len > MOST_CELLS {
         return None;
     }
+    // All pieces into one piece of memory.
     let cells = Arena::new(len, |cells| {
         let mut targets = Vec::with_capacity(pieces.len() + 1);
         let mut rest = cells;
@@ -125,6 +128,7 @@ impl<'a, L: WriteLeaf> Fold<'a, L> {
     fn node(&mut self, root: usize, size: usize) {
         let at = self.piece.cells.len();
         let children = self.open(root, size);
+        // The boxes of its children.
         let mut node = NO_CHILDREN;
         for (slot, &(child, _)) in children.list[..children.len].iter().enumerate() {
             let child = &self.tree.nodes[child];
@@ -133,6 +137,8 @@ impl<'a, L: WriteLeaf> Fold<'a, L> {
                 node[2 * axis + 1].0[slot] = child.hi[axis];
             }
         }
+        // Leaves follow their node; subtrees follow these, or are left for later when they are
+        // large.
         self.piece.cells.extend(node);
         self.piece.nodes.push(at);
         for (slot, &(child, _)) in children.list[..children.len].iter().enumerate() {

@@ -41,6 +41,7 @@ pub(super) fn partition_wide(
     grid: &Grid,
     split: Split,
 ) -> [Side; 2] {
+    // How much of each chunk goes to which side.
     let chunks: Vec<[Side; 2]> = refs
         .par_chunks(CHUNK)
         .map(|chunk| {
@@ -61,6 +62,7 @@ pub(super) fn partition_wide(
             side.extent = side.extent.union(part.extent);
         }
     }
+    // Each chunk has a part of both sides to itself.
     let (mut lefts, mut rights) = spare[..refs.len()].split_at_mut(sides[0].len);
     let mut targets = Vec::with_capacity(chunks.len());
     for [left, right] in &chunks {

@@ -50,6 +50,7 @@ fn against_time(findings: &[Finding], error: Measure) -> Chart {
         .filter(|&threads| threads != most)
         .map(|threads| threads.to_string())
         .collect();
+    // What the marks mean.
     let mut marks = match most {
         1 => "disks: 1 thread".to_owned(),
         _ => format!("disks: {most} threads"),
@@ -62,6 +63,7 @@ fn against_time(findings: &[Finding], error: Measure) -> Chart {
     }
     notes.push(marks);
     notes.push("shaded: the Pareto front, which nothing else of all threads beats in both".into());
+    // A series for each method and number of threads, in the method's colour.
     let mut series = Vec::new();
     for (colour, method) in methods(findings).into_iter().enumerate() {
         for threads in threads(findings) {

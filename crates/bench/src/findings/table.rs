@@ -119,6 +119,7 @@ fn accelerator(finding: &accelerators::Finding) -> Vec<(&'static str, Cell)> {
     let rays = errors.rays as f64;
     let rate = |seconds: f64| rays / seconds / 1e6;
     let shown_rate = |rate: f64| Cell::number(rate, format!("{rate:.2}"));
+    // Hidden columns are in the CSV alone.
     vec![
         ("method", Cell::word(finding.method)),
         ("backend", Cell::hidden(&finding.backend)),

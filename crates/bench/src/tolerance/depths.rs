@@ -42,6 +42,7 @@ fn around(
 ) -> Vec<f64> {
     let picture = camera.resolution().map(f64::from);
     let (mut columns, mut rows) = (Vec::new(), Vec::new());
+    // Chief rays through even places around the middle, as far as the picture goes.
     for y in 0..ACROSS {
         for x in 0..ACROSS {
             let share = |i: u32| (f64::from(i) + 0.5) / f64::from(ACROSS) - 0.5;
@@ -56,6 +57,7 @@ fn around(
     camera.rays_through(&columns, &rows, &mut rays);
     let mut hits = HitBatch::new(Detail::Distance);
     accel.closest(&rays, &mut hits);
+    // Depths along the axis; misses count as infinity where the camera sees so far.
     let pose = camera.pose();
     let depth = |i: usize| match hits.is_hit(i) {
         true => {
@@ -67,6 +69,7 @@ fn around(
     let mut depths: Vec<f64> = (0..rays.len()).filter_map(depth).filter(|z| *z > 0.0).collect();
     depths.sort_by(f64::total_cmp);
     let Some(last) = depths.len().checked_sub(1) else { return depths };
+    // The nearest, the median and the farthest.
     let mut few = vec![depths[0], depths[last / 2], depths[last]];
     few.dedup();
     few

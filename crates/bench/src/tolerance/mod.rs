@@ -137,6 +137,7 @@ pub fn compare(
     if scene.camera.lens().is_some_and(|lens| lens.lenslets().is_some()) {
         return Err(BenchError::NoLens("lenslets cut its picture up, which no simpler lens does"));
     }
+    // The models, and the places and depths at which they are compared.
     let bands = Plan::new(scene, Outputs::ALL).bands;
     let (models, mut notes) = models(scene, &bands, tolerance)?;
     let mut places = depths::places(scene, accel);
@@ -145,6 +146,7 @@ pub fn compare(
         notes.push("the camera sees no surface: compared at the distance in focus".to_owned());
         places.iter_mut().for_each(|place| place.depths.push(in_focus.abs()));
     }
+    // What a pixel sees through each, against the full train.
     let groups = scene.camera.band_groups(&bands).len();
     let rays = RAYS[usize::from(groups > 3)];
     let all: Vec<Vec<Seen>> =
@@ -156,6 +158,7 @@ pub fn compare(
         .zip(&all)
         .map(|((name, _), own)| finding(name, (own, full), &places, (scale, tolerance)))
         .collect();
+    // What each costs, where there is a picture to time.
     match Studio::with_sensor(scene, accel) {
         Ok(mut studio) => {
             let times = cost::seconds_a_sample(&mut studio, &models, progress)?;
@@ -227,9 +230,11 @@ fn finding(
 ) -> Finding {
     let [mut chief_ray, mut centroid, mut blur, mut colour, mut light] = [Worst::default(); 5];
     for ((own, full), place) in own.iter().zip(full).zip(places) {
+        // Light depends on the place alone.
         for (a, b) in own.bands.iter().zip(&full.bands) {
             light.raise((a.light - b.light).abs(), place, None);
         }
+        // Chief rays, blur and colour also on the depth.
         for &depth in &place.depths {
             let nearness = 1.0 / depth;
             let at = Some(nearness);

@@ -265,6 +265,7 @@ fn mount(setup: &Setup<'_>) -> Result<Option<SensorMount>, CameraError> {
 fn pitch(train: &OpticalTrain, setup: &Setup<'_>, z: f64) -> Result<f64, CameraError> {
     let rows = f64::from(setup.sensor.resolution[1]);
     let given = [setup.sensor_height.is_some(), setup.fov.is_some()];
+    // One of three keys gives the size of a pixel.
     match (setup.sensor.pixel_pitch, given) {
         (Some(pitch), [false, false]) => Ok(1e-3 * pitch.0),
         (None, [false, false]) => Err(CameraError::new(

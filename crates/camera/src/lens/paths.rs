@@ -21,6 +21,7 @@ impl LensCamera {
     /// None where no light arrives.
     #[must_use]
     pub fn paths(&self, place: [f64; 2], count: u32) -> Vec<Vec<[f64; 2]>> {
+        // The chief ray, and the plane of the axis and the place.
         let film = self.focused.film();
         let start = film.frame.point(film.place(place[0], place[1]).extend(0.0));
         let lens = self.design();
@@ -32,6 +33,7 @@ impl LensCamera {
         let Some(across) = (height - chief * height.dot(chief)).try_normalize() else {
             return Vec::new();
         };
+        // The steepest rays to both sides that leave the lens.
         let send = |slope: f64| through(lens, start, (chief + across * slope).normalize());
         let edge = |side: f64| {
             let slopes =
@@ -39,6 +41,7 @@ impl LensCamera {
             slopes.into_iter().find(|&slope| send(slope).is_some())
         };
         let (Some(low), Some(high)) = (edge(-1.0), edge(1.0)) else { return Vec::new() };
+        // Even slopes between them.
         let share = |i: u32| if count > 1 { f64::from(i) / f64::from(count - 1) } else { 0.5 };
         let lead = 0.3 * (start.z.abs() + self.focused.train().last_vertex().abs());
         (0..count)

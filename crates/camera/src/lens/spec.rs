@@ -331,6 +331,7 @@ impl ThinLensCameraSpec {
             return Err(CameraError::new("fov", why));
         }
         let rows = f64::from(setup.sensor.resolution[1]);
+        // The sensor's height, and the distance from which it fills the field of view.
         let height = match (setup.sensor.pixel_pitch, setup.sensor_height) {
             (Some(pitch), None) => 1e-3 * pitch.0 * rows,
             (None, height @ Some(_)) => positive(height, "sensor_height")?,
@@ -345,6 +346,8 @@ impl ThinLensCameraSpec {
             }
         };
         let image = 0.5 * height / (0.5 * fov.to_radians()).tan();
+        // That distance is the focal length at infinity, and the image's distance of anything
+        // nearer.
         match setup.focus {
             None => Ok(image),
             Some(Focus::Distance(distance)) if distance > 0.0 => {

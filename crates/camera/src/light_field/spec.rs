@@ -182,6 +182,7 @@ impl LightFieldSpec {
 
     /// The main lens with its stop set, and its picture of what is in focus.
     fn main(&self, resolve: Resolve<'_>) -> Result<Main, CameraError> {
+        // A thin lens with what stands around it, or a lens from its file; its stop set.
         let train = match (&self.focal_length, &self.lens) {
             (Some(Millimetres(focal_length)), None) => {
                 let thin = ThinLensCameraSpec {
@@ -224,6 +225,7 @@ impl LightFieldSpec {
             let why = "has a microlens array already; the camera `lens` takes such a lens";
             return Err(CameraError::new("lens", why));
         }
+        // Where its picture is, and its exit pupil as the lenslets see it.
         let focus = self.focus_distance.map_or(f64::INFINITY, |distance| distance.0);
         let picture_z = train
             .sensor_z(Focus::Distance(focus))
@@ -281,6 +283,7 @@ impl MicrolensesSpec {
         {
             return Err(fault("sensor_distance", format!("{b} mm is not above zero")));
         }
+        // The array by itself, then where it stands behind the main lens.
         let elements = self.elements(main, sensor)?;
         let file = LensFile::new(elements);
         let rear = file
@@ -298,6 +301,7 @@ impl MicrolensesSpec {
             let why = "lenslets need a main lens before them whose stop is in it".to_owned();
             return Err(fault("pitch", why));
         };
+        // The sensor stands where it is told to, or where the lenslets see sharp.
         let distance = match self.sensor_distance {
             Some(Millimetres(distance)) => distance,
             None => view.sensor_distance(picture),
@@ -335,6 +339,7 @@ impl MicrolensesSpec {
             types: self.types.clone(),
             pattern: self.pattern.clone(),
         };
+        // Thin lenslets are one array.
         let Some([front, rear]) = self.radii else {
             let focal_length = match (self.focal_length, self.types.first()) {
                 (None, Some(first)) if first.focal_length.is_some() => first.focal_length,
@@ -343,6 +348,7 @@ impl MicrolensesSpec {
             let array = MicrolensArraySpec { focal_length, ..thin };
             return Ok(vec![ElementSpec::new(PartSpec::MicrolensArray(array), 0.0)]);
         };
+        // Thick ones are two, with glass between them; a filter stands on the first face.
         let lacks =
             |key: &str| CameraError::new(format!("microlenses.{key}"), "is missing beside `radii`");
         let thickness = self.thickness.ok_or_else(|| lacks("thickness"))?.0;
@@ -377,6 +383,7 @@ impl MicrolensesSpec {
     fn thin_focal_length(&self, main: &Main) -> Result<f64, CameraError> {
         let Millimetres(picture) = self.picture_distance;
         let pitch = self.pitch.0;
+        // The distance of the sensor that a focal length is to go with.
         let distance = match (self.focal_length, self.f_number, self.sensor_distance) {
             (Some(_), Some(_), _) => {
                 let why = "is given beside `focal_length`; remove one of them";
@@ -406,6 +413,7 @@ impl MicrolensesSpec {
                 return Err(CameraError::new("microlenses.pitch", why));
             }
         };
+        // A picture in front of the array or behind it is focused on the sensor (1/f = 1/a + 1/b).
         let power = 1.0 / distance + if picture == 0.0 { 0.0 } else { 1.0 / picture };
         Ok(1.0 / power)
     }

@@ -67,6 +67,7 @@ impl ViewGrid {
         else {
             return Err(fault("the lens is telecentric towards the object: views have no places"));
         };
+        // The array as it appears from the entrance pupil: its distance, and its scale.
         let plane = view.front_z - view.principal_distance(0);
         let to_array = view.main.to_plane(plane).map_err(|e| fault(&e.to_string()))?;
         let scale = to_array.image_scale(pupil);
@@ -74,6 +75,7 @@ impl ViewGrid {
         if !(focus != 0.0 && scale.abs() > 0.0 && scale.is_finite()) {
             return Err(fault("the array stands at an image of the stop: there are no views"));
         }
+        // A view is seen through as much of the opening as one pixel behind a lenslet sees.
         let [slope, _] = lenslets.central();
         let a_pixel = scale.abs() * slope * 1e-3 * focused.pixel_pitch();
         let stop = &view.main.elements()[view.main.stop()];

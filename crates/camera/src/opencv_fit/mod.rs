@@ -116,6 +116,7 @@ impl OpencvFit {
         let start = start(camera)?;
         let distance = distance_in_focus(camera);
         let sights = sights(camera);
+        // The first model within the tolerance, or the better one.
         let candidates = [models::standard, models::fisheye];
         let mut best: Option<(f64, Model, Distortion)> = None;
         let mut why = None;
@@ -138,6 +139,7 @@ impl OpencvFit {
         }
         let none = || CameraError::new("lens", "neither of OpenCV's models fits its chief rays");
         let (_, model, distortion) = best.ok_or_else(|| why.unwrap_or_else(none))?;
+        // What it misses, and how far it holds.
         let mut notes = Vec::new();
         let dark = COUNT - sights.len();
         if dark > 0 {
@@ -236,6 +238,7 @@ fn residuals(
     intrinsics: &Intrinsics,
     distortion: &Distortion,
 ) -> Residuals {
+    // How far off each place is, and its radius and field.
     let told: Vec<([f64; 2], f64)> = sights
         .iter()
         .map(|sight| {
@@ -248,6 +251,7 @@ fn residuals(
     };
     let largest = |offs: &[f64]| offs.iter().copied().fold(0.0, f64::max);
     let reach = told.iter().map(|([radius, _], _)| *radius).fold(0.0, f64::max);
+    // Rings of even width about the middle of the picture.
     let ring = |i: u32| {
         let edge = |i: u32| reach * f64::from(i) / f64::from(RINGS);
         let inside = |radius: f64| radius <= edge(i + 1) && (i == 0 || radius > edge(i));

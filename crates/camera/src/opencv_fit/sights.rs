@@ -47,8 +47,10 @@ pub(super) fn sights(camera: &Camera) -> Vec<Sight> {
             rows.push(share(row) * height);
         }
     }
+    // The chief ray of each.
     let mut rays = RayBatch::default();
     camera.rays_through(&columns, &rows, &mut rays);
+    // In OpenCV's frame, from the point that is nearest to the camera.
     let pose = camera.pose();
     let to_camera = pose.rotation.transpose();
     let opencv = |v: DVec3| {

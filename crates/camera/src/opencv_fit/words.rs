@@ -12,6 +12,7 @@ impl fmt::Display for OpencvFit {
             "K           fx {fx:.4}  fy {fy:.4}  cx {cx:.4}  cy {cy:.4} px, counted from the centre of the \
              top left pixel"
         )?;
+        // The camera, by the names that OpenCV gives.
         let names: &[&str] = match self.model {
             "fisheye" => &["k1", "k2", "k3", "k4"],
             _ => &["k1", "k2", "p1", "p2", "k3"],
@@ -23,6 +24,7 @@ impl fmt::Display for OpencvFit {
             Some(distance) => writeln!(f, "fitted at   {distance:.4} m, the distance in focus")?,
             None => writeln!(f, "fitted at   infinity, the distance in focus")?,
         }
+        // How well it fits, and how far it holds.
         let residuals = &self.residuals;
         writeln!(
             f,

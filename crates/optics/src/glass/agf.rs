@@ -67,6 +67,7 @@ impl AgfCatalogue {
             let mut words = line.split_whitespace();
             let command = words.next().unwrap_or_default();
             let fault = |why: &str| AgfError::Line { line: number, why: why.to_owned() };
+            // An entry begins with NM and ends before the next one; other lines are about it.
             match (command, &mut entry) {
                 ("NM", previous) => {
                     let next = Entry::named(number, words).ok_or_else(|| {

@@ -76,6 +76,7 @@ impl LensFile {
         if !(wavelength > 0.0 && wavelength.is_finite()) {
             return Err(LensError::Wavelength(wavelength));
         }
+        // Elements one after the other, each with the medium behind it.
         let catalogues = self.catalogues(resolve)?;
         let mut media = vec![Glass::air()];
         let mut elements = Vec::with_capacity(self.elements.len());

@@ -216,6 +216,7 @@ impl OpticalTrain {
     pub fn outside_of_range(&self, wavelengths: &[f64]) -> Vec<String> {
         let mut notes = Vec::new();
         let mut tell = |what: String, [from, to]: [f64; 2]| {
+            // The wavelengths that lie outside, in few words.
             let mut outside: Vec<f64> = wavelengths.to_vec();
             outside.retain(|nm| !(*nm >= from && *nm <= to));
             outside.sort_by(f64::total_cmp);
@@ -233,6 +234,7 @@ impl OpticalTrain {
                 notes.push(note);
             }
         };
+        // Of all glasses and filters.
         for glass in &self.media {
             tell(format!("glass {}", glass.name), glass.range);
         }

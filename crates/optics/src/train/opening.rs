@@ -110,6 +110,7 @@ impl OpticalTrain {
         if ended(0.0).is_some() {
             return None;
         }
+        // The first step that ends, and then by halves of it.
         let step = limit / f64::from(RAYS);
         let Some(first) = (1..=RAYS).map(|i| step * f64::from(i)).find(|&i| ended(i).is_some())
         else {
@@ -124,6 +125,7 @@ impl OpticalTrain {
                 Some(at) => (high, element) = (middle, at),
             }
         }
+        // Where the last ray to pass crosses the stop.
         let (position, direction) = ray(low);
         let [x, y] = at.crossing(from, self.stop, Ray::new(position, direction)?)?;
         let stop_radius = x.hypot(y);

@@ -115,11 +115,13 @@ impl OpticalTrain {
         let all = self.matrix(&indices, 0, self.elements.len());
         let (before, behind) = (indices[0], indices[indices.len() - 1]);
         let scale: f64 = (0..self.elements.len()).map(|i| self.power(&indices, i).abs()).sum();
+        // A lens has focal points unless its power is lost in rounding.
         let afocal = all.c.abs() <= AFOCAL * scale || all.c == 0.0;
         let focal = |value: f64| (!afocal && value.is_finite()).then_some(value);
         let last = self.last_vertex();
         let efl = focal(-1.0 / all.c);
         let bfl = focal(-behind * all.a / all.c);
+        // The entrance pupil is the stop's image by what stands before it.
         let entrance = self.entrance_pupil(&indices);
         let radius = entrance.1.map(|m| self.stop_radius() / m.abs()).filter(|r| r.is_finite());
         let entrance_pupil = Pupil { z: entrance.0, diameter: radius.map(|r| 2.0 * r) };

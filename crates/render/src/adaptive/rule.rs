@@ -49,6 +49,7 @@ impl Rule {
                 (count > 0.0).then(|| sum / count / share)
             }
             Self::RelativeError(share) => {
+                // Two sets differ by twice the variance of their mean.
                 let (mut variance, mut mean) = (0.0, 0.0);
                 for Sampled { sets: [a, b], .. } in pixels {
                     for (a, b) in a.iter().zip(b) {

@@ -81,6 +81,7 @@ pub(super) fn unknown(scene: &Scene, bands: &Bands) -> Vec<String> {
 
 /// Lights, filters and colours that the bands have to tell apart.
 fn illumination(scene: &Scene) -> Illumination {
+    // The lights' spectra, and whether any of them is coloured.
     let mut spectra: Vec<Curve> = Vec::new();
     let mut add = |illuminant: Option<Illuminant>| {
         let curve = illuminant.and_then(|i| i.curve().ok()).unwrap_or(Curve::ONE);
@@ -104,6 +105,7 @@ fn illumination(scene: &Scene) -> Illumination {
         };
         coloured_light |= image || !is_grey(&light.color);
     }
+    // The same of materials that something is made of.
     let mut used = vec![false; scene.materials.len()];
     let mut coloured = false;
     for placement in &scene.geometry.placements {
@@ -119,6 +121,7 @@ fn illumination(scene: &Scene) -> Illumination {
         }
         coloured |= reflects_colour(material);
     }
+    // How many colours multiply on the way to the sensor.
     let light = scene.tracer.and_then(|tracer| tracer.row().light);
     let surfaces = 1 + usize::from(light.is_some_and(|light| light.rules.bounces > 1));
     let filters = scene.camera.lens().map(|lens| lens.filter_curves()).unwrap_or_default();

@@ -167,6 +167,7 @@ impl Writer<'_> {
         let path = self.folder.join(&name);
         let model = self.sensor.spec().model.map_or("etendue", |model| model.preset().name);
         let mut refused = None;
+        // An image that no DNG can hold is not written, and that is no fault.
         let written = write_whole(&path, |part| {
             let mut out = BufWriter::new(part);
             match self.sensor.write_dng(image, model, &mut out) {
@@ -178,6 +179,7 @@ impl Writer<'_> {
                 Err(error) => Err(io::Error::other(error)),
             }
         });
+        // Said once for all shots.
         match (refused, written) {
             (Some(why), _) => {
                 let note = format!("no DNG is written: {why}");
@@ -200,12 +202,14 @@ impl Writer<'_> {
     fn moments(&mut self, shot: Exposure) -> Result<MomentFiles, ExposeError> {
         #[expect(clippy::cast_possible_truncation, reason = "fewer than shots")]
         let number = self.moments.len() as u32;
+        // Frames of one exposure have the same moments.
         let several = self.sensor.shots().any(|other| other.exposure != shot.exposure);
         let name = |stem: &str| match several {
             true => self.name(stem, number, "npy"),
             false => format!("{stem}.npy"),
         };
         let names = [name("mean"), name("variance")];
+        // Mean and variance, a file each.
         let moments = self.sensor.moments(self.film(), shot)?;
         let depth = moments.depth;
         for ((stem, definition, unit, values), name) in [

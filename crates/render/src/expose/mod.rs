@@ -197,6 +197,7 @@ pub fn write(
         exposed: Exposed { files: Vec::new(), notes: light.notes.clone() },
     };
     let mut sidecar = Sidecar::new(sensor, light.seeds[0]);
+    // One shot after the other, each with its entry in the sidecar.
     for (done, shot) in shots.iter().enumerate() {
         if !progress(done as f64 / shots.len() as f64) {
             return Err(ExposeError::Stopped);

@@ -89,6 +89,7 @@ impl Geometry {
         grid: &ViewGrid,
         depth: &[f64],
     ) -> Self {
+        // The grid, and where its lenslets are seen.
         let lenslets = &light_field.grid;
         let lens = camera.lens();
         let height = match lenslets.grid {
@@ -98,6 +99,7 @@ impl Geometry {
         let centres = lens.map(|lens| {
             by_rows(light_field, |row, col| light_field.centre(lens, row, col).map(from_centre))
         });
+        // Disparities of what is seen, in the middle and at both ends.
         let disparities = || depth.iter().filter(|z| z.is_finite()).map(|&z| grid.disparity(z));
         let middle = (lenslets.rows / 2 * lenslets.cols + lenslets.cols / 2) as usize;
         let focus = grid.focus();

@@ -230,6 +230,7 @@ impl Writer<'_> {
     /// Views side by side, as one array, and one file each; `shown` says how.
     fn views(&mut self, stem: &str, views: &Views, shown: &Picture) -> Result<(), LightFieldError> {
         let side_by_side = views.side_by_side()?.developed(*shown.development());
+        // Side by side as one picture, as one array, and view by view.
         if self.outputs.exr {
             let place = self.place(&format!("{stem}.exr"));
             exr::write(&place, &side_by_side, &exr::Options::default())?;

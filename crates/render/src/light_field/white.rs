@@ -27,6 +27,7 @@ pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, Lig
         for column in 0..width {
             for (number, group) in groups.iter().enumerate() {
                 let mut light = 0.0;
+                // More samples only where the first ones differ.
                 for samples in SAMPLES {
                     film.clear();
                     film.group = number;
@@ -49,6 +50,7 @@ pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, Lig
         let plane = |k: usize| sums.iter().map(|sum| sum[k] as f32).collect();
         [plane(0), plane(1), plane(2)]
     };
+    // All rows as one picture.
     let rows: Vec<[Vec<f32>; 3]> = (0..height).into_par_iter().map(row).collect();
     let channel = |(k, name): (usize, &str)| {
         let values = rows.iter().flat_map(|row| row[k].iter().copied()).collect();

@@ -101,6 +101,7 @@ impl Development {
             _ => [planes[0].at(i); 3],
         };
         let note = format!("sRGB; {}", self.in_words());
+        // Without alpha: colour, or grey of one channel.
         let alpha = picture.layer("Alpha").and_then(|layer| layer.channels.first());
         let Some(alpha) = alpha.filter(|_| self.alpha) else {
             return match planes.len() {
@@ -111,6 +112,7 @@ impl Development {
                 }
             };
         };
+        // With it: light without the backdrop, over the share that the subject has.
         let backdrop: Vec<&Values> = picture
             .layer("Backdrop")
             .map(|layer| layer.channels.iter().map(|channel| &channel.values).collect())

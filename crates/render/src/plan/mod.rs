@@ -127,6 +127,7 @@ impl Plan {
     /// The plan for `scene`, written as `outputs`.
     #[must_use]
     pub fn new(scene: &Scene, outputs: Outputs) -> Self {
+        // What the layers need of hits, and how many rays that takes.
         let layers = scene.layers.clone();
         let needs = needs(&layers);
         let lens = scene.camera.has_pupil();
@@ -143,11 +144,13 @@ impl Plan {
             * (u64::from(passes.centre)
                 + sampled(passes.mean)
                 + sampled(passes.light) * RAYS_A_SAMPLE_OF_LIGHT);
+        // How well to build for so many rays, and how exactly to trace.
         let triangles = scene.geometry.triangles_unique();
         let quality = forced_quality(scene).unwrap_or_else(|| quality_for(rays, triangles));
         let detail = if needs.surface { Detail::Surface } else { Detail::Distance };
         let precision = if outputs.npy { Precision::Double } else { Precision::Single };
         let (light_precision, why_precision) = light_precision(scene, samples);
+        // Whether images are decoded at all.
         let wants_images = needs.materials && scene.plan.textures != Some(false);
         let images = (wants_images && !scene.textures.is_empty())
             .then_some(TextureScope { light: needs.light, ambient: needs.ambient });
@@ -173,6 +176,7 @@ impl Plan {
             memory: MemoryForecast::default(),
             decisions: Vec::new(),
         };
+        // Memory and reasons follow from all other decisions.
         plan.memory = forecast(scene, &plan, outputs);
         plan.decisions = plan.explain(scene, &chosen, (needs, passes), (triangles, why_precision));
         plan

@@ -90,6 +90,7 @@ impl Plan {
             });
         };
         let on = |yes| if yes { "on" } else { "off" };
+        // What is traced: rays, samples, passes, wavelengths, the sensor, the lens.
         decide("rays", &self.rays.to_string(), self.ray_words(passes));
         if passes.mean || passes.light {
             let note = self.stopping_note.as_ref();
@@ -109,6 +110,7 @@ impl Plan {
         {
             decide(what, choice, because);
         }
+        // What is asked of surfaces and lights.
         let (choice, because) = light_words(scene, needs);
         decide("shadows and bounces", &choice, because);
         for (what, choice, because) in surface_words(needs) {
@@ -121,6 +123,7 @@ impl Plan {
         for (what, choice, because) in self.explain_textures(scene, needs) {
             decide(what, choice, because);
         }
+        // How exactly, and in how much memory.
         let (choice, because) = self.explain_quality(scene, triangles);
         decide("build quality", choice, because);
         decide(
@@ -151,6 +154,7 @@ impl Plan {
         let memory = self.memory.to_string();
         let (total, parts) = memory.split_once(" (").unwrap_or((&memory, ""));
         decide("memory", total, parts.replacen(')', "", 1));
+        // Which of these a key of the scene overrules.
         for decision in &mut decisions {
             if let Some(Overruling { key, forced, saves }) = self.overruling(scene, decision.what) {
                 (decision.key, decision.forced, decision.saves) = (Some(key), forced, saves);
@@ -245,6 +249,7 @@ impl Plan {
         scene: &Scene,
         needs: Needs,
     ) -> Vec<(&'static str, &'static str, String)> {
+        // Whether materials are looked at, and their images with them.
         let because = match (needs.materials, scene.textures.len()) {
             (true, n) if needs.light => format!("light is scattered by them; {n} images named"),
             (true, n) => format!("a layer shows base colour; {n} images named"),
@@ -258,6 +263,7 @@ impl Plan {
             (needed, _) => (if needed { "on" } else { "off" }, because),
         };
         let mut decisions = vec![("materials and textures", on, because)];
+        // How images are filtered.
         if self.images.is_some() {
             let reason = match (self.footprint, scene.plan.texture_filter) {
                 (true, _) => "the camera tells what a sample covers",

@@ -161,6 +161,7 @@ impl Scanner<'_> {
             let start = self.at;
             let key = self.string();
             let member = self.step(start, || join(path, &key));
+            // Keys that stand twice, or are too long to be shown.
             if self.wanted.is_none() {
                 let wrong = |reason| Wrong { at: start, reason };
                 if key.len() > LONGEST_KEY {

@@ -65,6 +65,7 @@ pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<String, 
     if steps.len() > MOST_STEPS {
         return Err(OverrideError::TooDeep { steps: steps.len() });
     }
+    // From the root along the steps; missing objects are made.
     let mut here = root;
     let mut walked = String::new();
     for step in &steps {
@@ -93,6 +94,7 @@ pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<String, 
             }
         };
     }
+    // JSON where it reads as such, else a string.
     let is_number = text.trim_start().starts_with(|c: char| c.is_ascii_digit() || c == '-');
     *here = match serde_json::from_str(text) {
         Ok(value) => value,

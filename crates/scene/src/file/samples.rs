@@ -152,6 +152,7 @@ pub(super) fn fault(
     value: &Value,
 ) -> Option<(String, String)> {
     let at = |key: &str, why: &str| Some((format!("render.samples{key}"), why.to_owned()));
+    // Rules that never stop, or at once.
     let [min, max] = match render.samples {
         SamplesSpec::Count(_) | SamplesSpec::Time(_) if !layers.is_empty() => {
             let why = format!(
@@ -180,6 +181,7 @@ pub(super) fn fault(
         SamplesSpec::SensorNoise(SensorNoiseSpec { min, max, .. })
         | SamplesSpec::RelativeError(RelativeErrorSpec { min, max, .. }) => [min, max],
     };
+    // What goes beside a rule: its bounds, and a sampler that needs no number beforehand.
     if min > max {
         let key = match value.pointer("/render/samples/min") {
             Some(_) => ".min",

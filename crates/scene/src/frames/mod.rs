@@ -211,6 +211,7 @@ fn read(
     let text = |path: &PathBuf| {
         String::from_utf8(bytes(path)?).map_err(|_| "is not UTF-8 text".to_owned())
     };
+    // Each format's own reader.
     match format {
         TrajectoryFormat::Npy => {
             let array = npy::read(&bytes(&path)?, |shape| match shape {

@@ -44,6 +44,7 @@ fn settings<'v>(value: &dyn Fn(&str) -> Option<&'v Value>) -> Result<Vec<(String
     let number = |key: &str| value(key).and_then(Value::as_f64);
     let Some(fx) = number("fl_x") else { return Ok(Vec::new()) };
     let fy = number("fl_y").unwrap_or(fx);
+    // Intrinsics, with the centre in the middle unless it is given.
     let side = |key: &str| {
         let side = value(key).and_then(Value::as_u64).and_then(|side| u32::try_from(side).ok());
         side.ok_or_else(|| format!("with a focal length and without its size \"{key}\""))
@@ -51,6 +52,7 @@ fn settings<'v>(value: &dyn Fn(&str) -> Option<&'v Value>) -> Result<Vec<(String
     let resolution = [side("w")?, side("h")?];
     let [width, height] = resolution.map(f64::from);
     let centre = [number("cx").unwrap_or(0.5 * width), number("cy").unwrap_or(0.5 * height)];
+    // Distortion by the name of the camera model; terms that are zero are left out.
     let model = value("camera_model").and_then(Value::as_str).unwrap_or("OPENCV");
     let of = |keys: &[&'static str]| -> Vec<(&'static str, f64)> {
         keys.iter()

@@ -84,6 +84,7 @@ impl SceneFile {
         options: &LoadOptions<'_>,
     ) -> Result<(Camera, CameraOrigin), SceneError> {
         let own = self.camera_spec();
+        // A camera of the model, with the scene's own sensor when it has one; else the scene's.
         let (spec, origin) = match options.camera {
             Some(wanted) => {
                 let (index, camera) = cameras::pick(cameras, wanted).map_err(|reason| {
@@ -103,6 +104,7 @@ impl SceneFile {
             None if own.has_pose() => (own, CameraOrigin::Scene),
             None => (own, CameraOrigin::Framed),
         };
+        // Without a pose it frames what is there.
         let vertices = Vertices(geometry);
         let camera = spec
             .build(|| facing::subject(&vertices), &|name| files.find(name))

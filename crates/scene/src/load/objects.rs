@@ -128,6 +128,7 @@ impl SceneFile {
             let at = join(at, "transform");
             self.fault(&if key.is_empty() { at } else { join(&at, key) }, why)
         })?;
+        // The scene's own materials, for all of the object or by the model's names.
         let named = |name: &str, at: &str| {
             let position = own.materials.iter().position(|material| material.name == name);
             let position = position.and_then(|position| u32::try_from(position).ok());
@@ -142,6 +143,7 @@ impl SceneFile {
             let at = join(&join(at, "materials"), theirs);
             overrides.insert(theirs.clone(), named(ours, &at)?);
         }
+        // Each copy is turned upright, placed among the copies, and then in the world.
         let instances = Instances::resolve(spec.instances.as_ref(), &join(at, "instances"), folder)
             .map_err(|(at, why)| self.fault(&at, why))?;
         own.files.extend(instances.file);

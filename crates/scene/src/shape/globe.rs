@@ -71,6 +71,7 @@ impl Globe {
     ) -> Option<Mesh> {
         let cuts = self.cut_edges();
         let triangles = self.triangles(&cuts, wanted.uvs);
+        // Places first; normals and texture coordinates where they are wanted.
         let places = Places { globe: self, cuts: &cuts, seam: wanted.uvs, go_on };
         let (floats, bounds) = places.positions(relief)?;
         let count = places.count();

@@ -147,6 +147,7 @@ impl PhotonTransfer {
                 self.wavelength, self.saturation_electrons,
             )],
             axes: [Axis::new("photons a pixel").fitted(), Axis::new("SNR").fitted()],
+            // Curves first, then what is read off them.
             series: vec![
                 self.line(EXACT, &|p| [p.photons, p.snr]),
                 self.line(NORMAL, &|p| [p.photons, p.snr_normal]),

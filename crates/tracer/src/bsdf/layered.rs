@@ -233,6 +233,7 @@ impl Layered {
         }
         let returned = coat.map_or(0.0, |coat| coat.returned);
         let fibres = (1.0 - returned) * sheen.map_or(0.0, |sheen| sheen.chance);
+        // The coat, the fibres, or what is below both, which may be one direction alone.
         let wi = match (coat, sheen) {
             (Some(coat), _) if choice < returned => above(coat.sample(wo, square))?,
             (_, Some(_)) if choice < returned + fibres => above(sheen::Seen::sample(square))?,
@@ -261,6 +262,7 @@ impl Layered {
         viewed: &Viewed,
     ) -> Option<Found> {
         let Viewed { chances, peaks, .. } = viewed;
+        // The reflecting sheet, the base below it, or straight through both.
         let wi = if choice < chances.sheet {
             if self.alpha == 0.0 {
                 let weights = self.sheet(wo.z).times(1.0 / chances.sheet);
@@ -283,6 +285,7 @@ impl Layered {
         if (wi.z < 0.0) != below || wi.z == 0.0 {
             return None;
         }
+        // Weighed by all ways in which this direction could have been found.
         let (weights, pdf) = self.evaluate_uncoated(wo, wi, viewed);
         (pdf > 0.0).then(|| Found { wi, weights: weights.times(1.0 / pdf), pdf })
     }

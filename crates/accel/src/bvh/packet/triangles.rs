@@ -121,6 +121,7 @@ impl<'a, 'b, L: Lanes, S: Sink> TriangleLeaves<'a, 'b, L, S> {
         }
         let (leaf, place) =
             (self.lanes.store_sixteen(self.leaf), self.lanes.store_sixteen(self.place));
+        // The triangle that each ray has found, as it is seen from the ray's origin.
         let zero = [0.0; PACKET];
         let mut lines =
             Lines { corners: [[zero; 3]; 3], direction: self.packet.direction.map(|d| *d) };
@@ -144,6 +145,7 @@ impl<'a, 'b, L: Lanes, S: Sink> TriangleLeaves<'a, 'b, L, S> {
             }
             triangles[lane] = triangle;
         }
+        // Measured side by side, and told to each ray.
         let [t, u, v] = watertight::locate_many(&lines, self.pending);
         for lane in bits(self.pending) {
             let hit = watertight::Hit { t: t[lane], u: u[lane], v: v[lane], front: true };
@@ -169,6 +171,8 @@ impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, '_, L, S> {
                 continue;
             }
             any |= look.maybe;
+            // Rays that surely hit it, before anything else so far, are measured later and
+            // together.
             let sure = look.maybe
                 & look.inside
                 & l.le(self.surely_near, look.closest)
@@ -179,6 +183,7 @@ impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, '_, L, S> {
             self.leaf = l.select(sure, l.splat(f32::from_bits(leaf.0)), self.leaf);
             let place = f32::from_bits(u32::from(i.to_le_bytes()[0]));
             self.place = l.select(sure, l.splat(place), self.place);
+            // The others are decided now.
             if look.maybe != sure {
                 self.test_exactly(numbers, n, i, look.maybe & !sure);
             }

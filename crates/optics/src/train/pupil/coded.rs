@@ -185,6 +185,7 @@ impl Coded {
     fn fill_fine(&mut self, mask: &Picture, margin: DVec2) {
         let count = MASK * FINE;
         let cell = self.size / count as f64;
+        // What passes each cell.
         let sums = Sums::of(mask);
         let open: Vec<f64> = (0..count * count)
             .map(|i| {
@@ -192,6 +193,8 @@ impl Coded {
                 sums.mean(mask, low, low + cell)
             })
             .collect();
+        // Cells near open ones are never left out: the picture of the mask is only known to a
+        // margin.
         let reach = (margin / cell).min(DVec2::splat(WIDEST_MARGIN * count as f64)).ceil();
         #[expect(
             clippy::cast_possible_truncation,
@@ -202,6 +205,7 @@ impl Coded {
         let widened =
             greatest_around(&greatest_around(&open, count, across, 1), count, down, count);
         let density = |i: usize| open[i].max(FLOOR * widened[i]);
+        // A histogram for each interval of the coarse grid.
         self.fine = (0..MASK * MASK)
             .map(|interval| {
                 let [x, y] = [interval % MASK * FINE, interval / MASK * FINE];

@@ -66,6 +66,8 @@ impl LensletPupil {
         let turned = |corners: Vec<[f64; 2]>| -> Vec<DVec2> {
             corners.into_iter().map(|p| DVec2::from(array.lattice.turned(p))).collect()
         };
+        // The openings of this array and of the others, from a lenslet's centre, and what is
+        // between them.
         let opening = turned(array.opening_corners());
         let around = opening.iter().map(|p| p.length()).fold(0.0, f64::max);
         let others = view
@@ -79,6 +81,8 @@ impl LensletPupil {
             }
             Gaps::Opaque => Vec::new(),
         };
+        // Outlines of the main lens' light over the array, in slopes without their drift with the
+        // place.
         let main = without_masks(&without_filters(&view.main));
         let drift = match view.exit_pupil_z() {
             Some(z) if (view.front_z - z).abs() > 1e-9 => -1.0 / (view.front_z - z),
@@ -243,11 +247,14 @@ impl LensletPupil {
         if outside.max_element() > self.around {
             return None;
         }
+        // The main lens' opening as the sensor sees it through the lenslet: scaled by kappa, and
+        // shifted.
         let extent = self.table.at(centre)?;
         let away = centre - film.truncate();
         let kappa = sight.slope[0] - self.drift * sight.height[0];
         let shift = away * (sight.slope[1] - self.drift * sight.height[1]);
         let reach = kappa.abs() * self.around;
+        // Whether the opening, or another array's, cuts the lenslet's own.
         let mut cut = false;
         for k in 0..NORMALS {
             let here = normal(k).dot(shift);
@@ -259,6 +266,7 @@ impl LensletPupil {
         }
         let round = array.shape == LensletShape::Round;
         let checked = array.shape == LensletShape::Round || self.mixed();
+        // Uncut, the region is the opening itself.
         if !cut && self.others.is_empty() {
             if round {
                 return Some(Region::Disk { centre, radius: array.reach });
@@ -266,6 +274,7 @@ impl LensletPupil {
             let area = self.area;
             return Some(Region::Whole { centre, area, cell: Some(cell), checked });
         }
+        // Else it is what of the opening the others leave.
         let mut corners: Vec<[f64; 2]> = self.opening.iter().map(|p| p.to_array()).collect();
         if cut {
             let seen = self.outline(&extent).map(|m| ((m - shift) / kappa).to_array());
@@ -287,6 +296,8 @@ impl LensletPupil {
     fn add_gaps(&self, film: DVec3, middle: DVec2, regions: &mut Vec<Region>) {
         let Some(extent) = self.table.at(middle) else { return };
         let sight = self.view.sight_past(film.z);
+        // The main lens' opening in the array's plane, as it is seen through gaps, which have no
+        // power.
         let kappa = sight.slope[0] - self.drift * sight.height[0];
         let shift = (middle - film.truncate()) * (sight.slope[1] - self.drift * sight.height[1]);
         let seen = self.outline(&extent).map(|m| middle + (m - shift) / kappa);
@@ -296,6 +307,7 @@ impl LensletPupil {
             (0..NORMALS).all(|k| (seen[(k + 1) % NORMALS] - seen[k]).perp_dot(*p - seen[k]) >= 0.0)
         };
         let clip = seen.map(|p| p.to_array());
+        // The pieces of gaps that lie in it or are cut by it.
         let array = &self.view.array;
         let around = array.lattice.pitch;
         let local = (centre - self.view.decentre).to_array();

@@ -54,6 +54,7 @@ impl ExitPupil {
         if self.layout == Layout::Radial {
             self.radius = lit_radius(train, lenses, self.sensor.vertex.z, self.radius);
         }
+        // The frame of slopes around the light at each node, from its neighbour's.
         let [columns, rows] = self.intervals();
         for row in 0..=rows {
             for column in 0..=columns {
@@ -63,9 +64,11 @@ impl ExitPupil {
                 self.nodes.push(node);
             }
         }
+        // The outline between nodes, twice as fine in place and angle.
         let margins = self.margins();
         self.continue_frames();
         let fine = self.measure_fine(lenses);
+        // Each node's reach is the widest around it, so that no light between nodes is lost.
         let [fine_columns, fine_rows] = [2 * columns + 1, 2 * rows + 1];
         for row in 0..=rows {
             for column in 0..=columns {
@@ -288,6 +291,7 @@ fn frame_at(
     let mut window: Option<Window> = None;
     let mut chief = None;
     for lens in lenses {
+        // Around the neighbour's frame first, else anywhere.
         let near = previous
             .filter(|node| !node.is_dark())
             .and_then(|node| Window::near(node.centre, node.half * 1.5, lens, film));

@@ -196,6 +196,8 @@ impl ExitPupil {
             index2: 1.0,
             radius: half_size.length(),
         };
+        // Behind lenslets each of them has a pupil of its own; other arrays are aimed at as they
+        // are.
         if let Some(view) = train.behind_lenslets() {
             pupil.index2 = train.at(wavelengths[0])?.index_before_sensor().powi(2);
             let lenslets = LensletPupil::new(train, view, wavelengths, &pupil)?;
@@ -204,15 +206,18 @@ impl ExitPupil {
         if let Some(first) = train.first_array() {
             return Self::of_rear(train, first, wavelengths, sensor_z, half_size.to_array());
         }
+        // Masks are left out of what is measured: what they pass is drawn from within it.
         let masked = train;
         let train = &without_masks(masked);
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
         let Some(first) = lenses.first() else { return Err(ExitPupilError::Sensor) };
         pupil.index2 = first.index_before_sensor().powi(2);
+        // A round opening as the only rim is known in closed form.
         pupil.disk = Disk::of(train, &pupil.sensor, half_size);
         if pupil.disk.is_some() {
             return Ok(pupil);
         }
+        // All others are measured by rays at nodes over the sensor.
         pupil.measure(train, &lenses);
         if pupil.nodes.iter().all(Outline::is_dark) {
             return Err(blocked(train, first, pupil.sensor.vertex));

@@ -163,6 +163,7 @@ impl LensReport {
                  it; rays do meet its lenslets"
             )
         }));
+        // Where the sensor stands; a lens as written may go without.
         let sensor_z = match (train.sensor_z(inquiry.focus), inquiry.focus) {
             (Ok(z), _) => Some(z),
             (Err(error), Focus::AsWritten) => {
@@ -171,9 +172,11 @@ impl LensReport {
             }
             (Err(error), _) => return Err(error.into()),
         };
+        // What of the field reaches the sensor, and the fields to look at.
         let circle = sensor_z.and_then(|z| image_circle(train, &at, z, farthest(train, z)));
         let half_field = sensor_z.zip(circle).and_then(|(z, r)| half_field(train, &at, z, r));
         let fields = inquiry.fields(half_field)?;
+        // The lens by itself, and then what arrives on the sensor.
         let mut report = Self {
             name: train.name().to_owned(),
             source: train.source().to_owned(),

@@ -105,6 +105,7 @@ impl LensReport {
             ],
             &["deg", "mm", "%", "um", "um", "um", "mm", "%", "%"],
         );
+        // A row for each field, with a dash for what there is none of.
         for &field in &self.fields {
             let spot = self.spots.iter().find(|s| s.field == field);
             let distortion = self.distortion.iter().find(|d| d.field == field);

@@ -46,6 +46,7 @@ impl Fields {
         let (mut angles, mut notes): (Vec<f64>, Vec<String>) = (Vec::new(), Vec::new());
         for [x, y] in self.points().take(most) {
             let height = unit * if x == 0.0 { y } else { x.hypot(y) };
+            // FTYP: angles, heights of the object, or heights of the paraxial or real image.
             let found = match self.kind {
                 0 if x == 0.0 => Ok(y),
                 0 => Ok(x.to_radians().tan().hypot(y.to_radians().tan()).atan().to_degrees()),

@@ -80,6 +80,7 @@ impl ZemaxLens {
     /// error names the line.
     pub fn read(bytes: &[u8]) -> Result<Self, ZemaxError> {
         let text = text::decode(bytes)?;
+        // The lines of the file, and the elements that they describe.
         let sheet = Sheet::read(&text)?;
         let mut importer =
             Importer { sheet: &sheet, elements: Vec::new(), notes: Vec::new(), object_z: None };
@@ -91,11 +92,14 @@ impl ZemaxLens {
                 "the file has no surface that does anything",
             ));
         }
+        // The lens that a lens file would hold.
         let mut file = LensFile { name: sheet.name.clone(), elements, ..LensFile::default() };
         "a Zemax file".clone_into(&mut file.source);
         file.sensor = (sensor != SensorMount::default()).then_some(sensor);
         let wavelengths = sheet.wavelengths_nm();
         file.wavelength = wavelengths.first().copied().map(Nanometres);
+        // What only the built train tells: the stop, field angles, and whether the focal length is
+        // as stated.
         let train = open_stop(&mut file, &sheet, object_z, &mut notes)?;
         let (fields, left_out) = sheet.fields.angles(sheet.unit, &train, object_z);
         notes.extend(left_out);
@@ -364,12 +368,15 @@ impl Row {
             }
         };
         match self.shape {
+            // PARM 1 to 8 are the coefficients of r² to r¹⁶.
             Shape::EvenAsphere => {
                 for (&number, parameter) in self.parameters.iter().filter(|p| (1..=8).contains(p.0))
                 {
                     add(2 * number, parameter.value);
                 }
             }
+            // XDAT 1 is the number of terms, 2 the radius that r is divided by, and the
+            // coefficients follow.
             Shape::ExtendedAsphere => {
                 let terms = self.extra.get(&1).map_or(0.0, |p| p.value);
                 let radius = self.extra.get(&2).map_or(1.0, |p| p.value);

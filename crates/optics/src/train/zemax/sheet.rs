@@ -141,11 +141,13 @@ impl Sheet {
         let mut sheet = Self { unit: 1.0, configurations: 1, ..Self::default() };
         let mut in_surface = false;
         for (number, written) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
+            // A command, and what it is given.
             let trimmed = written.trim();
             let (command, rest) = trimmed.split_once(char::is_whitespace).unwrap_or((trimmed, ""));
             let line = Line { number, command, rest: rest.trim() };
             sheet.last_line = number;
             let indented = written.starts_with(char::is_whitespace);
+            // Indented lines after a SURF are about that surface, all others about the lens.
             let known = match command {
                 "" => true,
                 "SURF" => {

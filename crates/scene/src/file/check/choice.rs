@@ -121,6 +121,7 @@ impl<'a> Checker<'a> {
     ) -> Outcome {
         let mut ways = Vec::new();
         let mut words = Vec::new();
+        // By which words or keys the branches are told apart.
         for branch in branches {
             let word = branch.pointer(&format!("/properties/{tag}/const")).and_then(Value::as_str);
             let required = branch.pointer("/required/0").and_then(Value::as_str);
@@ -132,6 +133,7 @@ impl<'a> Checker<'a> {
         }
         ways.push(format!("`{tag}` (one of {})", words.join(", ")));
         let ways = ways.join(" or ");
+        // A key that none of them has is the first suspect.
         let known: Vec<&str> = branches.iter().flat_map(|branch| keys_of(branch)).collect();
         match members.keys().find(|key| !known.contains(&key.as_str())) {
             Some(key) => {
