@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 
 /// A library and the header that describes it.
-struct Embree {
+struct Library {
     major: u32,
     header: PathBuf,
 }
 
-const NO_EMBREE: &str = "Embree was not found: install it with `apt install libembree-dev` (or set \
+const NO_EMBREE: &str = "Library was not found: install it with `apt install libembree-dev` (or set \
     EMBREE_DIR to a folder with include/ and lib/), or build without it: `cargo build -p etendue-cli \
     --no-default-features`";
 
-const NO_LIBCLANG: &str = "libclang, which reads Embree's header, was not found: install it with \
-    `apt install libclang-dev` (or set LIBCLANG_PATH to its folder), or build without Embree: \
+const NO_LIBCLANG: &str = "libclang, which reads Library's header, was not found: install it with \
+    `apt install libclang-dev` (or set LIBCLANG_PATH to its folder), or build without Library: \
     `cargo build -p etendue-cli --no-default-features`";
 
 fn main() {
@@ -41,7 +41,7 @@ fn build() -> Result<(), String> {
 }
 
 /// The Embree of the folder that `EMBREE_DIR` names, which must have one.
-fn given(dir: &Path) -> Result<Embree, String> {
+fn given(dir: &Path) -> Result<Library, String> {
     let embree = find(&dir.join("include"))
         .ok_or_else(|| format!("EMBREE_DIR={}: {NO_EMBREE}", dir.display()))?;
     for lib in ["lib", "lib64"].map(|lib| dir.join(lib)).iter().filter(|lib| lib.is_dir()) {
@@ -51,9 +51,9 @@ fn given(dir: &Path) -> Result<Embree, String> {
 }
 
 /// The newest Embree with a header below `include`.
-fn find(include: &Path) -> Option<Embree> {
+fn find(include: &Path) -> Option<Library> {
     [4, 3]
-        .map(|major| Embree { major, header: include.join(format!("embree{major}/rtcore.h")) })
+        .map(|major| Library { major, header: include.join(format!("embree{major}/rtcore.h")) })
         .into_iter()
         .find(|embree| embree.header.is_file())
 }
@@ -61,7 +61,7 @@ fn find(include: &Path) -> Option<Embree> {
 /// Writes the bindings. At build time, because the size of a hit record depends on how the
 /// installed Embree was configured; C's enums become integer newtypes, so that a value this header
 /// does not list is not undefined behaviour. Bindgen asserts every size, alignment and offset.
-fn generate(embree: &Embree) -> Result<(), String> {
+fn generate(embree: &Library) -> Result<(), String> {
     clang_sys::load().map_err(|_| NO_LIBCLANG)?;
     let header = embree.header.to_str().ok_or("the path of Embree's header is not UTF-8")?;
     let out = std::env::var("OUT_DIR").map_err(|error| format!("OUT_DIR: {error}"))?;

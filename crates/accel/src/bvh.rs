@@ -35,18 +35,18 @@ use rayon::prelude::*;
 use self::fold::{Instances, Triangles, fold};
 use self::lanes::{Lanes, Portable};
 use self::single::{AnyHit, Batch, Sink};
-use self::wide::{MOST_IN_LEAF, Units, WideTree};
+use self::wide::{LeafUnits, MOST_IN_LEAF, WideTree};
 use crate::nearest::Nearest;
-use crate::parts::{Baking, Instance, Layout, Members, Part, outward};
+use crate::parts::{Baking, Blas, Instance, Layout, Members, outward};
 use crate::tree::{LeafSize, Ref, Tree};
-use crate::watch::{Watch, with_threads};
+use crate::watch::{BuildWatch, with_threads};
 use crate::{Accel, BuildError, BuildOptions, BuildReport, Quality};
 
 /// The pure-Rust bounding volume hierarchy.
 pub struct Bvh {
     geometry: Arc<Geometry>,
     layout: Layout,
-    parts: Vec<Shape>,
+    parts: Vec<PartTree>,
     /// Over the instances; empty when there is only one.
     top: WideTree,
     isa: Isa,
@@ -55,13 +55,13 @@ pub struct Bvh {
 
 /// A part's tree.
 #[derive(Debug)]
-struct Shape {
+struct PartTree {
     tree: WideTree,
     /// Whose triangles these are.
     owner: Owner,
     /// How the meshes' own coordinates follow from those in the leaves, when they do to the bit:
     /// then a hit needs nothing but the leaf.
-    units: Option<Units>,
+    units: Option<LeafUnits>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -134,11 +134,11 @@ impl Bvh {
         let layout = Layout::new(&geometry, Baking::UsedOnce);
         layout.check_size(&geometry, options, "bvh", [BYTES_PER_TRIANGLE, BYTES_PER_INSTANCE])?;
         let total = layout.triangles(&geometry) + layout.instances.len() as u64;
-        let watch = Watch::new(options, total);
+        let watch = BuildWatch::new(options, total);
         let (parts, top) = with_threads(options, || {
             let mut parts = Vec::with_capacity(layout.parts.len());
             for part in &layout.parts {
-                parts.push(Shape::new(part, &geometry, &watch)?);
+                parts.push(PartTree::new(part, &geometry, &watch)?);
             }
             let top = top_tree(&layout, &geometry, &parts, &watch)?;
             Ok((parts, top))
@@ -155,8 +155,8 @@ impl Bvh {
     }
 }
 
-impl Shape {
-    fn new(part: &Part, geometry: &Geometry, watch: &Watch<'_>) -> Result<Self, BuildError> {
+impl PartTree {
+    fn new(part: &Blas, geometry: &Geometry, watch: &BuildWatch<'_>) -> Result<Self, BuildError> {
         let tree = Tree::build(part.refs(geometry), LEAF, watch)?;
         let owner = match &part.members {
             Members::Mesh(_) => Owner::Instance,
@@ -171,7 +171,7 @@ impl Shape {
                 Owner::Instance => Some(part.source(geometry, MISS)),
                 Owner::Leaf => None,
             },
-            units: Units::of(part.frame),
+            units: LeafUnits::of(part.frame),
             is_exact: part.is_unturned(geometry).into(),
         };
         let tree = fold(&tree, &leaf).ok_or_else(|| part.too_large(geometry, "bvh"))?;
@@ -189,8 +189,8 @@ impl Shape {
 fn top_tree(
     layout: &Layout,
     geometry: &Geometry,
-    parts: &[Shape],
-    watch: &Watch<'_>,
+    parts: &[PartTree],
+    watch: &BuildWatch<'_>,
 ) -> Result<WideTree, BuildError> {
     let count = u32::try_from(layout.instances.len()).unwrap_or(u32::MAX);
     if count < 2 {

@@ -8,12 +8,12 @@ use std::time::Instant;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch};
 
-use crate::embree::{ExactFilter, Found, Scene, Search, version};
+use crate::embree::{ExactFilter, FoundHits, NearestSearch, Scene, version};
 use crate::end_triangles::EndTriangles;
 use crate::nearest::{Nearest, Query};
 use crate::recheck;
-use crate::single::{Frame, Rays32};
-use crate::solve::{self, Lanes, Solved};
+use crate::single::{F32Frame, Rays32};
+use crate::solve::{self, ChunkTriangles, Solved};
 use crate::{Accel, BuildError, BuildOptions, BuildReport, Counts};
 
 /// Bundles around a ray before it is believed to miss.
@@ -23,7 +23,7 @@ const TURNS: u32 = 4;
 #[derive(Debug)]
 pub struct Embree {
     scene: Scene,
-    frame: Frame,
+    frame: F32Frame,
     robust: bool,
     refine: bool,
     report: BuildReport,
@@ -33,19 +33,19 @@ pub struct Embree {
 
 /// What a thread needs while it works on a batch; kept between batches.
 #[derive(Default)]
-struct Scratch {
+struct BatchScratch {
     rays: Rays32,
     again: Rays32,
-    found: Found,
+    found: FoundHits,
     solved: Solved,
-    lanes: Box<Lanes>,
+    lanes: Box<ChunkTriangles>,
     ends: EndTriangles,
     suspects: Vec<u32>,
     doubtful: Vec<u32>,
 }
 
 thread_local! {
-    static SCRATCH: RefCell<Scratch> = RefCell::default();
+    static SCRATCH: RefCell<BatchScratch> = RefCell::default();
 }
 
 impl Embree {
@@ -68,7 +68,7 @@ impl Embree {
         let start = Instant::now();
         let bounds = geometry.loose_bounds();
         check_scale(bounds)?;
-        let frame = Frame::of(bounds);
+        let frame = F32Frame::of(bounds);
         let scene =
             Scene::build(geometry, frame.origin, options, before.map(|before| &before.scene))?;
         // What was built, in words and numbers.
@@ -108,8 +108,8 @@ impl Embree {
     }
 
     /// The closest hits as single precision has them.
-    fn closest_as_found(&self, rays: &RayBatch, hits: &mut HitBatch, scratch: &mut Scratch) {
-        let Scratch { rays: rays32, found, .. } = scratch;
+    fn closest_as_found(&self, rays: &RayBatch, hits: &mut HitBatch, scratch: &mut BatchScratch) {
+        let BatchScratch { rays: rays32, found, .. } = scratch;
         rays32.convert(rays, &self.frame);
         self.scene.closest_in_packets(rays32, rays.coherent, found);
         std::mem::swap(&mut hits.placement, &mut found.placement);
@@ -131,8 +131,8 @@ impl Embree {
     }
 
     /// Looks again at what is wrong, and at what [`recheck`] suspects.
-    fn look_again(&self, rays: &RayBatch, hits: &mut HitBatch, scratch: &mut Scratch) {
-        let Scratch { rays: rays32, again, found, solved, suspects, doubtful, .. } = scratch;
+    fn look_again(&self, rays: &RayBatch, hits: &mut HitBatch, scratch: &mut BatchScratch) {
+        let BatchScratch { rays: rays32, again, found, solved, suspects, doubtful, .. } = scratch;
         // Hits of the other side than most, and misses among hits: rays beside them are traced.
         suspects.clear();
         if solved.both_sides {
@@ -183,7 +183,7 @@ impl Embree {
         hits: &HitBatch,
         rays32: &Rays32,
         again: &mut Rays32,
-        found: &mut Found,
+        found: &mut FoundHits,
         suspects: &mut Vec<u32>,
     ) {
         again.clear();
@@ -244,7 +244,7 @@ impl Embree {
         i: usize,
         rays32: &Rays32,
         again: &mut Rays32,
-        found: &mut Found,
+        found: &mut FoundHits,
     ) {
         let first = (hits.placement[i] != MISS).then_some(hits.t[i]);
         hits.clear_hit(i);
@@ -258,7 +258,7 @@ impl Embree {
         rays: &RayBatch,
         rays32: &Rays32,
         again: &mut Rays32,
-        found: &mut Found,
+        found: &mut FoundHits,
         suspects: &[u32],
         blocked: &mut [bool],
     ) {
@@ -275,14 +275,14 @@ impl Embree {
         i: usize,
         rays32: &Rays32,
         again: &mut Rays32,
-        found: &mut Found,
+        found: &mut FoundHits,
         first: Option<f64>,
     ) -> Nearest {
         let Some(query) = Query::of(rays, i) else { return Nearest::none(0.0) };
         let advance = rays32.advance[i];
         let t = first.map_or_else(|| rays32.reach(i, &self.frame), |t| t - advance);
         let slack = rays32.slack(i, t);
-        let mut search = Search::new(self.scene.geometry(), query, advance, slack);
+        let mut search = NearestSearch::new(self.scene.geometry(), query, advance, slack);
         // Where it should be, as rounding has it: mostly the neighbour of what was found first.
         again.clear();
         again.push_unturned(rays, rays32, i);
@@ -318,8 +318,8 @@ impl Embree {
         rays32: &Rays32,
         i: usize,
         again: &mut Rays32,
-        search: &mut Search<'_>,
-        found: &mut Found,
+        search: &mut NearestSearch<'_>,
+        found: &mut FoundHits,
     ) {
         again.clear();
         for &shift in shifts {
@@ -331,7 +331,7 @@ impl Embree {
 
 /// What single precision found, as hits: all but their placements and triangles.
 #[multiversion::multiversion(targets = "simd")]
-fn widen(found: &Found, advance: &[f64], hits: &mut HitBatch) {
+fn widen(found: &FoundHits, advance: &[f64], hits: &mut HitBatch) {
     let n = hits.t.len();
     let HitBatch { detail, t, placement, u, v, normal, .. } = hits;
     let placement = &placement[..n];
@@ -411,8 +411,9 @@ impl Accel for Embree {
         blocked.clear();
         blocked.resize(rays.len(), false);
         SCRATCH.with_borrow_mut(|scratch| {
-            let Scratch { rays: rays32, again, found, suspects, doubtful, ends, lanes, .. } =
-                scratch;
+            let BatchScratch {
+                rays: rays32, again, found, suspects, doubtful, ends, lanes, ..
+            } = scratch;
             rays32.convert(rays, &self.frame);
             if rays.precision == HitPrecision::Single {
                 self.scene.occluded_in_packets(rays32, rays.coherent, blocked);

@@ -1,5 +1,5 @@
 #![expect(unsafe_code, reason = "Embree's C interface; the rest of the workspace has none")]
-//! Embree behind four owners, each of one handle that it releases itself: [`Device`], [`Shape`],
+//! Embree behind four owners, each of one handle that it releases itself: [`Device`], [`EmbreeGeometry`],
 //! [`SceneBuilder`] and [`Scene`].
 //!
 //! * `SceneBuilder` can be changed and not traced, `Scene` traced and not changed: Embree wants
@@ -26,14 +26,14 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Geometry, Mesh, Placement, Transform};
 
 use self::device::Device;
-use self::instanced::{Instanced, Kind};
-use self::shape::Shape;
+use self::instanced::{InstanceKind, Instanced};
+use self::shape::EmbreeGeometry;
 use crate::single;
 use crate::{BuildError, BuildOptions, Quality};
 
 pub use self::device::{Version, version};
-pub(crate) use self::filter::{ExactFilter, Search};
-pub(crate) use self::trace::Found;
+pub(crate) use self::filter::{ExactFilter, NearestSearch};
+pub(crate) use self::trace::FoundHits;
 
 type ProgressFn = dyn Fn(f64) -> bool + Send + Sync;
 
@@ -107,7 +107,7 @@ impl<'a> SceneBuilder<'a> {
         Ok(Self { device, handle })
     }
 
-    fn attach(&mut self, shape: &Shape, id: u32) {
+    fn attach(&mut self, shape: &EmbreeGeometry, id: u32) {
         // SAFETY: both are live; the scene retains the geometry.
         unsafe {
             sys::rtcAttachGeometryByID(self.handle.0.as_ptr(), shape.handle.as_ptr(), id);
@@ -183,7 +183,8 @@ impl Scene {
             }
             let mut scene = None;
             let to_frame = Transform::new(DMat3::IDENTITY, -mesh_origin(mesh));
-            if wanted && let Some(shape) = Shape::mesh(&device, mesh, &to_frame, options)? {
+            if wanted && let Some(shape) = EmbreeGeometry::mesh(&device, mesh, &to_frame, options)?
+            {
                 let mut builder = SceneBuilder::new(&device, options)?;
                 copied_bytes += shape.copied_bytes;
                 builder.attach(&shape, 0);
@@ -198,13 +199,18 @@ impl Scene {
             let mut to_frame = placement.world_from_mesh;
             to_frame.translation -= origin;
             let shape = match (kind, &shared[placement.mesh as usize]) {
-                (Kind::LeftOut, _) => continue,
-                (Kind::Instance, Some(scene)) => {
+                (InstanceKind::LeftOut, _) => continue,
+                (InstanceKind::Instance, Some(scene)) => {
                     let back = Transform::new(DMat3::IDENTITY, mesh_origin(mesh));
-                    Some(Shape::instance(&device, scene, &to_frame.then_inner(&back), options)?)
+                    Some(EmbreeGeometry::instance(
+                        &device,
+                        scene,
+                        &to_frame.then_inner(&back),
+                        options,
+                    )?)
                 }
-                (Kind::Instance | Kind::Baked, _) => {
-                    Shape::mesh(&device, mesh, &to_frame, options)?
+                (InstanceKind::Instance | InstanceKind::Baked, _) => {
+                    EmbreeGeometry::mesh(&device, mesh, &to_frame, options)?
                 }
             };
             let Some(shape) = shape else { continue };
@@ -248,11 +254,11 @@ impl Scene {
 /// [`Scene::turns`]: an instance's normal is its mesh's own; one that was baked into a mirror image is of
 /// the wrong side.
 fn turns(geometry: &Geometry, instanced: &Instanced) -> Option<Vec<DMat3>> {
-    let turn = |(placement, kind): (&Placement, &Kind)| {
+    let turn = |(placement, kind): (&Placement, &InstanceKind)| {
         let transform = &placement.world_from_mesh;
         match kind {
-            Kind::Instance => transform.normal_matrix(),
-            Kind::Baked | Kind::LeftOut => DMat3::IDENTITY * transform.handedness(),
+            InstanceKind::Instance => transform.normal_matrix(),
+            InstanceKind::Baked | InstanceKind::LeftOut => DMat3::IDENTITY * transform.handedness(),
         }
     };
     let turns: Vec<DMat3> =
@@ -262,5 +268,5 @@ fn turns(geometry: &Geometry, instanced: &Instanced) -> Option<Vec<DMat3>> {
 
 /// The origin that an instanced mesh is traced relative to: its own, unless it lies far from it.
 fn mesh_origin(mesh: &Mesh) -> DVec3 {
-    single::Frame::of(mesh.bounds).origin
+    single::F32Frame::of(mesh.bounds).origin
 }

@@ -21,7 +21,7 @@ use std::ops::Range;
 use etendue_geometry::{Geometry, MISS, RayBatch};
 
 use crate::single::{F32_EPSILON, Rays32, round};
-use crate::solve::{LANES, Lane, Lanes};
+use crate::solve::{ChunkTriangles, LANES, Lane};
 use crate::triangle::{at, cross, cross_plane, dot, minus};
 
 /// What rounding may misplace a start by, per sum of its coordinates: half a unit in the last place of
@@ -60,7 +60,7 @@ impl EndTriangles {
         geometry: &Geometry,
         rays: &RayBatch,
         rays32: &mut Rays32,
-        lanes: &mut Lanes,
+        lanes: &mut ChunkTriangles,
     ) {
         let Some(triangles) = rays.endpoint_triangles() else { return };
         self.placement.clear();
@@ -87,8 +87,8 @@ impl EndTriangles {
 
 /// The formula of this module's head for the rays of `range`, whose triangles are in `lanes`.
 #[multiversion::multiversion(targets = "simd")]
-fn measure(lanes: &Lanes, rays32: &Rays32, range: Range<usize>, out: &mut Clear) {
-    let Lanes { a, e1, e2, d, .. } = lanes;
+fn measure(lanes: &ChunkTriangles, rays32: &Rays32, range: Range<usize>, out: &mut Clear) {
+    let ChunkTriangles { a, e1, e2, d, .. } = lanes;
     let mut size = [0.0; LANES];
     for axis in &rays32.origin {
         for (size, &x) in size.iter_mut().zip(&axis[range.clone()]) {

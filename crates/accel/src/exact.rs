@@ -17,10 +17,10 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
 use rayon::prelude::*;
 
-use crate::nearest::{Nearest, Query, Triangle, View};
-use crate::parts::{Baking, Instance, Layout, LocalRay, Part, outward};
+use crate::nearest::{Nearest, PlacementView, Query, Triangle};
+use crate::parts::{Baking, Blas, Instance, Layout, LocalRay, outward};
 use crate::tree::{LeafSize, MAX_DEPTH, Node, Ref, Tree};
-use crate::watch::{Watch, with_threads};
+use crate::watch::{BuildWatch, with_threads};
 use crate::{Accel, BuildError, BuildOptions, BuildReport, Quality};
 
 /// The exact f64 backend.
@@ -35,14 +35,14 @@ pub struct Exact {
 /// A tree with f64 boxes.
 #[derive(Debug, Default)]
 struct Boxes {
-    nodes: Vec<WideNode>,
+    nodes: Vec<ExactNode>,
     /// In leaf order: placement and triangle, or a number of an instance twice.
     items: Vec<[u32; 2]>,
 }
 
 /// A node of [`Tree`] with its box in f64.
 #[derive(Debug)]
-struct WideNode {
+struct ExactNode {
     bounds: Bounds,
     node: Node,
 }
@@ -52,7 +52,7 @@ const LEAF: LeafSize = LeafSize { most: 4, block: 1 };
 /// Bytes a triangle at the height of a build: refs twice, nodes (at most one and a half with this
 /// leaf size), items.
 const BYTES_PER_TRIANGLE: u64 = 2 * size_of::<Ref>() as u64
-    + 3 * (size_of::<WideNode>() + size_of::<Node>()) as u64 / 2
+    + 3 * (size_of::<ExactNode>() + size_of::<Node>()) as u64 / 2
     + size_of::<[u32; 2]>() as u64;
 const BYTES_PER_INSTANCE: u64 = BYTES_PER_TRIANGLE + size_of::<Instance>() as u64;
 
@@ -70,7 +70,7 @@ impl Exact {
         let layout = Layout::new(&geometry, Baking::Singular);
         layout.check_size(&geometry, options, "exact", [BYTES_PER_TRIANGLE, BYTES_PER_INSTANCE])?;
         let total = layout.triangles(&geometry) + layout.instances.len() as u64;
-        let watch = Watch::new(options, total);
+        let watch = BuildWatch::new(options, total);
         let (parts, top) = with_threads(options, || {
             let mut parts = Vec::with_capacity(layout.parts.len());
             for part in &layout.parts {
@@ -83,7 +83,7 @@ impl Exact {
     }
 
     /// The closest hit of one ray.
-    fn nearest(&self, query: &Query, stack: &mut Stack) -> Nearest {
+    fn nearest(&self, query: &Query, stack: &mut ExactStack) -> Nearest {
         let mut nearest = Nearest::none(query.t_max);
         self.visit(query, stack, &mut |placement, triangle| {
             let triangle = Triangle::of(&self.geometry, placement, triangle);
@@ -97,7 +97,7 @@ impl Exact {
 
     fn test(&self, query: &Query, triangle: &Triangle) -> Option<crate::watertight::Hit> {
         let placement = &self.geometry.placements[triangle.placement as usize];
-        query.test(&View::new(&placement.world_from_mesh), triangle.corners)
+        query.test(&PlacementView::new(&placement.world_from_mesh), triangle.corners)
     }
 
     /// Shows every triangle near the ray to `see`, roughly from near to far, which answers how far
@@ -105,7 +105,7 @@ impl Exact {
     fn visit(
         &self,
         query: &Query,
-        stack: &mut Stack,
+        stack: &mut ExactStack,
         see: &mut impl FnMut(u32, u32) -> Option<f64>,
     ) {
         let world = self.layout.world.ray(query.origin, query.direction);
@@ -131,9 +131,9 @@ impl Exact {
 
 /// Nodes still to visit with the distance at which the ray enters them, one list a level.
 #[derive(Default)]
-struct Stack([Vec<(u32, f64)>; 2]);
+struct ExactStack([Vec<(u32, f64)>; 2]);
 
-impl Stack {
+impl ExactStack {
     fn new() -> Self {
         Self([(); 2].map(|()| Vec::with_capacity(MAX_DEPTH)))
     }
@@ -142,7 +142,7 @@ impl Stack {
 impl Accel for Exact {
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
         hits.reset(rays.len());
-        let mut stack = Stack::new();
+        let mut stack = ExactStack::new();
         for i in 0..rays.len() {
             if let Some(query) = Query::of(rays, i) {
                 self.nearest(&query, &mut stack).write(&self.geometry, hits, i);
@@ -152,7 +152,7 @@ impl Accel for Exact {
 
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {
         blocked.clear();
-        let mut stack = Stack::new();
+        let mut stack = ExactStack::new();
         blocked.extend((0..rays.len()).map(|i| {
             let Some(query) = Query::of(rays, i) else { return false };
             let mut found = false;
@@ -188,7 +188,11 @@ impl fmt::Debug for Exact {
 }
 
 impl Boxes {
-    fn over_part(part: &Part, geometry: &Geometry, watch: &Watch<'_>) -> Result<Self, BuildError> {
+    fn over_part(
+        part: &Blas,
+        geometry: &Geometry,
+        watch: &BuildWatch<'_>,
+    ) -> Result<Self, BuildError> {
         let tree = Tree::build(part.refs(geometry), LEAF, watch)?;
         Ok(Self::around(tree, |[placement, triangle]| {
             let mut bounds = Bounds::EMPTY;
@@ -201,7 +205,7 @@ impl Boxes {
         layout: &Layout,
         geometry: &Geometry,
         parts: &[Self],
-        watch: &Watch<'_>,
+        watch: &BuildWatch<'_>,
     ) -> Result<Self, BuildError> {
         let bounds = |i: u32| {
             let instance = &layout.instances[i as usize];
@@ -227,8 +231,8 @@ impl Boxes {
             items[range].iter().fold(Bounds::EMPTY, |all, &item| all.union(bounds(item)))
         };
         let nodes = tree.nodes.into_par_iter();
-        let mut nodes: Vec<WideNode> =
-            nodes.map(|node| WideNode { bounds: leaf(&node), node }).collect();
+        let mut nodes: Vec<ExactNode> =
+            nodes.map(|node| ExactNode { bounds: leaf(&node), node }).collect();
         // Children stand after their parents.
         for i in (0..nodes.len()).rev() {
             if nodes[i].node.leaf().is_none() {
@@ -244,7 +248,7 @@ impl Boxes {
     }
 
     fn bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<WideNode>()
+        self.nodes.capacity() * size_of::<ExactNode>()
             + self.items.capacity() * size_of::<[u32; 2]>()
     }
 

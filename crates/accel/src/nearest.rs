@@ -33,7 +33,11 @@ impl Query {
 
     /// The exact answer for one triangle, given by its corners in the mesh's frame.
     #[inline(always)]
-    pub(crate) fn test(&self, view: &View<'_>, [a, b, c]: [DVec3; 3]) -> Option<watertight::Hit> {
+    pub(crate) fn test(
+        &self,
+        view: &PlacementView<'_>,
+        [a, b, c]: [DVec3; 3],
+    ) -> Option<watertight::Hit> {
         let [a, b, c] = view.seen_from(self.origin, [a, b, c]);
         let hit = watertight::intersect(a, b, c, self.direction)?;
         (hit.t >= self.t_min && hit.t <= self.t_max).then_some(hit)
@@ -41,7 +45,7 @@ impl Query {
 
     /// As [`Self::test`], with the reason.
     #[cfg(feature = "embree")]
-    pub(crate) fn judge(&self, view: &View<'_>, corners: [DVec3; 3]) -> Verdict {
+    pub(crate) fn judge(&self, view: &PlacementView<'_>, corners: [DVec3; 3]) -> Verdict {
         let [a, b, c] = view.seen_from(self.origin, corners);
         match watertight::intersect(a, b, c, self.direction) {
             Some(hit) if hit.t >= self.t_min && hit.t <= self.t_max => Verdict::Hit(hit),
@@ -65,12 +69,12 @@ pub(crate) enum Verdict {
 
 /// A placement's transform, applied as [`Transform::point_from`] does but once for all corners.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct View<'a> {
+pub(crate) struct PlacementView<'a> {
     transform: &'a Transform,
     is_parallel: bool,
 }
 
-impl<'a> View<'a> {
+impl<'a> PlacementView<'a> {
     #[inline(always)]
     pub(crate) fn new(transform: &'a Transform) -> Self {
         Self { transform, is_parallel: transform.linear == DMat3::IDENTITY }

@@ -22,12 +22,12 @@ use crate::{BuildError, BuildOptions};
 
 pub(crate) use self::frame::{Frame, outward};
 pub(crate) use self::instance::{Instance, LocalRay, LocalRays};
-pub(crate) use self::part::{Members, Part, Source};
+pub(crate) use self::part::{Blas, Members, MeshTriangles};
 
 /// All parts and instances of a scene, and the frame of the tree over the instances.
 #[derive(Debug)]
 pub(crate) struct Layout {
-    pub(crate) parts: Vec<Part>,
+    pub(crate) parts: Vec<Blas>,
     pub(crate) instances: Vec<Instance>,
     /// Where the whole scene lies, parallel to the world.
     pub(crate) world: Instance,
@@ -78,7 +78,7 @@ impl Layout {
             };
             let part = *part_of_mesh[placement.mesh as usize].get_or_insert_with(|| {
                 let members = Members::Mesh(placement.mesh);
-                layout.parts.push(Part { frame, members });
+                layout.parts.push(Blas { frame, members });
                 index(layout.parts.len() - 1)
             });
             layout.instances.push(instance.of(part));
@@ -148,7 +148,7 @@ impl Layout {
         let frame = Frame::around(bounds);
         let reach = members().map(|p| baked_reach(geometry, p, frame)).fold(0.0, f64::max);
         let part = index(self.parts.len());
-        self.parts.push(Part { frame, members: Members::Baked(placements) });
+        self.parts.push(Blas { frame, members: Members::Baked(placements) });
         self.instances.push(Instance::parallel(part, frame, reach));
     }
 }

@@ -6,7 +6,7 @@ use etendue_geometry::{Bounds, HitPrecision, RayBatch};
 
 /// The box of a scene and the origin that single-precision coordinates are relative to.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Frame {
+pub(crate) struct F32Frame {
     /// Origin of the single-precision coordinates (m, world).
     pub(crate) origin: DVec3,
     /// Centre of the scene's box, from `origin` (m).
@@ -56,7 +56,7 @@ const MOST_RADII: f64 = 1e12;
 /// rounding in telling so, at distances of up to 10¹² radii.
 const SPHERE_SLACK: f64 = 1e-3;
 
-impl Frame {
+impl F32Frame {
     pub(crate) fn of(bounds: Bounds) -> Self {
         let radius = (bounds.diagonal() * 0.5).max(f64::from(f32::MIN_POSITIVE));
         let centre = bounds.centre();
@@ -113,7 +113,7 @@ impl Rays32 {
     }
 
     /// How far (m, likewise) ray `i` may meet anything in `frame`.
-    pub(crate) fn reach(&self, i: usize, frame: &Frame) -> f64 {
+    pub(crate) fn reach(&self, i: usize, frame: &F32Frame) -> f64 {
         let [x, y, z] = self.origin.each_ref().map(|axis| f64::from(axis[i]));
         frame.centre.distance(DVec3::new(x, y, z)) + frame.radius
     }
@@ -151,7 +151,7 @@ impl Rays32 {
 
     /// Converts `rays` for a scene in `frame`, turned aside a little where their hits are to be decided
     /// in f64.
-    pub(crate) fn convert(&mut self, rays: &RayBatch, frame: &Frame) {
+    pub(crate) fn convert(&mut self, rays: &RayBatch, frame: &F32Frame) {
         self.resize(rays.len());
         let nudge = match rays.precision {
             HitPrecision::Double => NUDGE,
@@ -193,7 +193,7 @@ pub(crate) fn round(x: f64) -> f32 {
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn convert(out: &mut Rays32, rays: &RayBatch, frame: &Frame, nudge: f64) {
+fn convert(out: &mut Rays32, rays: &RayBatch, frame: &F32Frame, nudge: f64) {
     let n = rays.len();
     let [ox, oy, oz] = rays.origins().map(|array| &array[..n]);
     let [dx, dy, dz] = rays.directions().map(|array| &array[..n]);

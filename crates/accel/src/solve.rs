@@ -39,7 +39,7 @@ pub(crate) type Lane = [f64; LANES];
 
 /// The triangles of one chunk of rays as seen from the rays' origins, and what comes of them.
 #[derive(Debug)]
-pub(crate) struct Lanes {
+pub(crate) struct ChunkTriangles {
     /// Which corners each triangle has.
     indices: [[u32; 3]; LANES],
     /// The corners `[corner][axis]` in their mesh, as most meshes have them, and in f64.
@@ -62,7 +62,7 @@ pub(crate) struct Lanes {
     n: [Lane; 3],
 }
 
-impl Default for Lanes {
+impl Default for ChunkTriangles {
     fn default() -> Self {
         let zero = [0.0; LANES];
         Self {
@@ -104,7 +104,7 @@ pub(crate) fn solve(
     geometry: &Geometry,
     rays: &RayBatch,
     hits: &mut HitBatch,
-    lanes: &mut Lanes,
+    lanes: &mut ChunkTriangles,
     solved: &mut Solved,
 ) {
     solved.valid.resize(rays.len(), true);
@@ -131,16 +131,16 @@ fn leading(values: &[u32], wanted: impl Fn(&u32) -> bool) -> usize {
 }
 
 /// A placement's transform with what is asked of it for every hit.
-struct Place<'a> {
+struct PlacedTransform<'a> {
     transform: &'a Transform,
     handedness: f64,
     /// Nothing to multiply.
     moved_only: bool,
-    /// The corners are in [`Lanes::narrow`].
+    /// The corners are in [`ChunkTriangles::narrow`].
     narrow: bool,
 }
 
-impl Lanes {
+impl ChunkTriangles {
     /// Fills the lanes with one triangle a ray, by placement and triangle, for the rays of `range`. Where
     /// there is none, whatever stands in the lanes is measured and not looked at.
     pub(crate) fn gather(
@@ -211,7 +211,7 @@ impl Lanes {
             }
         };
         let transform = &placement.world_from_mesh;
-        let place = Place {
+        let place = PlacedTransform {
             transform,
             handedness: transform.handedness(),
             moved_only: transform.linear == DMat3::IDENTITY,
@@ -222,15 +222,20 @@ impl Lanes {
     }
 
     /// Brings the corners of some lanes to where they are seen from the rays' origins.
-    fn put(&mut self, range: Range<usize>, place: &Place<'_>, origin: [&[f64]; 3]) {
+    fn put(&mut self, range: Range<usize>, place: &PlacedTransform<'_>, origin: [&[f64]; 3]) {
         see(self, range, place, origin);
     }
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn see(lanes: &mut Lanes, range: Range<usize>, place: &Place<'_>, origin: [&[f64]; 3]) {
+fn see(
+    lanes: &mut ChunkTriangles,
+    range: Range<usize>,
+    place: &PlacedTransform<'_>,
+    origin: [&[f64]; 3],
+) {
     let Range { start, end } = range;
-    let Lanes { narrow, corners, a, e1, e2, magnitude, handedness, .. } = lanes;
+    let ChunkTriangles { narrow, corners, a, e1, e2, magnitude, handedness, .. } = lanes;
     // Corners in f64, and from them the edges.
     if place.narrow {
         for (wide, narrow) in corners.iter_mut().flatten().zip(narrow.iter().flatten()) {
@@ -282,8 +287,9 @@ fn turn(linear: &DMat3, vectors: &mut [Lane; 3], start: usize, end: usize) {
 
 /// Where each ray meets its triangle's plane, and whether that is inside of the triangle.
 #[multiversion::multiversion(targets = "simd")]
-fn measure(lanes: &mut Lanes, want_normal: bool) {
-    let Lanes { a, e1, e2, d, magnitude, handedness, t, u, v, excess, front, n, .. } = lanes;
+fn measure(lanes: &mut ChunkTriangles, want_normal: bool) {
+    let ChunkTriangles { a, e1, e2, d, magnitude, handedness, t, u, v, excess, front, n, .. } =
+        lanes;
     for i in 0..LANES {
         let [p, b, c] = [at(a, i), at(e1, i), at(e2, i)];
         let crossing = cross_plane(p, b, c, at(d, i));
@@ -311,7 +317,7 @@ fn measure(lanes: &mut Lanes, want_normal: bool) {
 }
 
 /// What one chunk says of all its hits.
-struct Seen {
+struct ChunkSides {
     all_valid: bool,
     front: bool,
     back: bool,
@@ -324,9 +330,9 @@ fn scatter(
     hits: &mut HitBatch,
     start: usize,
     count: usize,
-    lanes: &Lanes,
+    lanes: &ChunkTriangles,
     solved: &mut Solved,
-) -> Seen {
+) -> ChunkSides {
     let range = start..start + count;
     let placement = &hits.placement[range.clone()];
     let (t_min, t_max) = (&rays.t_min()[range.clone()], &rays.t_max()[range.clone()]);
@@ -334,7 +340,7 @@ fn scatter(
     let (excess, front) = (&lanes.excess[..count], &lanes.front[..count]);
     let valid_out = &mut solved.valid[range.clone()];
     let front_out = &mut solved.front[range.clone()];
-    let mut seen = Seen { all_valid: true, front: false, back: false };
+    let mut seen = ChunkSides { all_valid: true, front: false, back: false };
     for i in 0..count {
         let hit = placement[i] != MISS;
         // Written so that NaN, from a triangle seen edge-on, is invalid.

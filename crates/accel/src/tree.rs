@@ -15,11 +15,11 @@ use bytemuck::{Pod, Zeroable};
 use etendue_geometry::glam::Vec4;
 use rayon::prelude::*;
 
-use self::bins::{Bins, Grid};
-use self::extent::{Extent, half_area};
-use self::partition::{Side, halve, partition, partition_wide};
+use self::bins::{BinGrid, Bins};
+use self::extent::{RefBounds, half_area};
+use self::partition::{SplitSide, halve, partition, partition_wide};
 use crate::BuildError;
-use crate::watch::Watch;
+use crate::watch::BuildWatch;
 
 /// The box of one thing, with two numbers by which its owner knows it.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -110,14 +110,14 @@ impl Tree {
     pub(crate) fn build(
         mut refs: Vec<Ref>,
         leaf: LeafSize,
-        watch: &Watch<'_>,
+        watch: &BuildWatch<'_>,
     ) -> Result<Self, BuildError> {
         if refs.is_empty() {
             return Ok(Self { nodes: Vec::new(), refs });
         }
         let mut spare = vec![Ref::zeroed(); if refs.len() >= WIDE_NODE { refs.len() } else { 0 }];
-        let extent = Extent::of(&refs);
-        let grown = Task { leaf, watch }.grow(&mut refs, &mut spare, 0, 0, extent)?;
+        let extent = RefBounds::of(&refs);
+        let grown = BuildTask { leaf, watch }.grow(&mut refs, &mut spare, 0, 0, extent)?;
         drop(spare);
         let mut nodes = Vec::with_capacity(grown.len());
         grown.flatten(&mut nodes);
@@ -159,12 +159,12 @@ fn index(i: usize) -> u32 {
 }
 
 #[derive(Clone, Copy)]
-struct Task<'a> {
+struct BuildTask<'a> {
     leaf: LeafSize,
-    watch: &'a Watch<'a>,
+    watch: &'a BuildWatch<'a>,
 }
 
-impl Task<'_> {
+impl BuildTask<'_> {
     /// The subtree over `refs`, which begin at `first` in the whole.
     fn grow(
         self,
@@ -172,7 +172,7 @@ impl Task<'_> {
         spare: &mut [Ref],
         first: usize,
         depth: usize,
-        extent: Extent,
+        extent: RefBounds,
     ) -> Result<Grown, BuildError> {
         if refs.len() < PARALLEL_NODE {
             let mut nodes = Vec::with_capacity(refs.len());
@@ -200,7 +200,7 @@ impl Task<'_> {
         refs: &mut [Ref],
         first: usize,
         depth: usize,
-        extent: Extent,
+        extent: RefBounds,
         work: &mut (&mut Vec<Node>, &mut Bins),
     ) {
         let (nodes, bins) = work;
@@ -228,14 +228,14 @@ impl Task<'_> {
         refs: &mut [Ref],
         spare: &mut [Ref],
         depth: usize,
-        extent: &Extent,
+        extent: &RefBounds,
         bins: &mut Bins,
-    ) -> Option<[Side; 2]> {
+    ) -> Option<[SplitSide; 2]> {
         let smallest = self.leaf.block.min(self.leaf.most);
         if refs.len() <= smallest || depth >= SAH_DEPTH {
             return None;
         }
-        let grid = Grid::new(extent, refs.len());
+        let grid = BinGrid::new(extent, refs.len());
         let wide = refs.len() >= WIDE_NODE;
         if wide {
             let bin = |chunk: &[Ref]| Bins::EMPTY.filled(&grid, chunk);

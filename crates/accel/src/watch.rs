@@ -5,14 +5,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use crate::{BuildError, BuildOptions};
 
 /// Counts triangles as they are put in place, tells the caller, and hears whether to go on.
-pub(crate) struct Watch<'a> {
+pub(crate) struct BuildWatch<'a> {
     options: &'a BuildOptions,
     total: u64,
     done: AtomicU64,
     stopped: AtomicBool,
 }
 
-impl<'a> Watch<'a> {
+impl<'a> BuildWatch<'a> {
     pub(crate) fn new(options: &'a BuildOptions, total: u64) -> Self {
         Self { options, total, done: AtomicU64::new(0), stopped: AtomicBool::new(false) }
     }

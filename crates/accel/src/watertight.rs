@@ -202,13 +202,13 @@ pub(crate) fn locate_many<const N: usize>(lines: &Lines<N>, wanted: u32) -> [[f6
 /// Distance and weights of a line that is known to meet the triangle.
 #[inline]
 fn locate(a: DVec3, b: DVec3, c: DVec3, d: DVec3, front: bool) -> Hit {
-    let Plain { t, u, v, is_delicate } =
+    let PlainResult { t, u, v, is_delicate } =
         locate_plainly([a, b, c].map(|corner| corner.to_array()), d.to_array());
     if is_delicate { locate_carefully([a, b, c], d, front) } else { Hit { t, u, v, front } }
 }
 
 /// What the plain formula says, and whether the careful one has to take over.
-struct Plain {
+struct PlainResult {
     t: f64,
     u: f64,
     v: f64,
@@ -217,7 +217,7 @@ struct Plain {
 
 /// The plain formula. Edges are differences of neighbours, so they have no rounding to speak of.
 #[inline(always)]
-fn locate_plainly([a, b, c]: [Vector; 3], d: Vector) -> Plain {
+fn locate_plainly([a, b, c]: [Vector; 3], d: Vector) -> PlainResult {
     let (e1, e2) = (minus(b, a), minus(c, a));
     let crossing = cross_plane(a, e1, e2, d);
     let (nn, nd) = (dot(crossing.normal, crossing.normal), crossing.along);
@@ -228,7 +228,7 @@ fn locate_plainly([a, b, c]: [Vector; 3], d: Vector) -> Plain {
     let u = (crossing.u * scale).clamp(0.0, 1.0);
     // Not `clamp`, which panics where `u` is no number.
     let v = (crossing.v * scale).max(0.0).min(1.0 - u);
-    Plain { t: crossing.t * scale, u, v, is_delicate }
+    PlainResult { t: crossing.t * scale, u, v, is_delicate }
 }
 
 /// As [`locate`] for needles, grazed triangles and extreme sizes: works from the corner with the

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::hits::{HitErrors, Hits, trace};
 use crate::rays::Rays;
-use crate::rounds::{Series, Spread, order};
+use crate::rounds::{Series, TimeSpread, order};
 use crate::{BenchError, Progress};
 
 /// The width of a batch in a render: the pixels of a tile.
@@ -140,13 +140,13 @@ pub struct Finding {
     /// Threads that traced.
     pub threads: usize,
     /// Of the build, on all threads (s).
-    pub build_seconds: Spread,
+    pub build_seconds: TimeSpread,
     /// Bytes of the structure without the geometry that it shares.
     pub bytes: u64,
     /// Bytes of geometry that it had to copy.
     pub copied_bytes: u64,
     /// Wall time of tracing all rays with their normals (s).
-    pub seconds: Spread,
+    pub seconds: TimeSpread,
     /// Millions of rays a second, by the median.
     pub mrays_per_second: f64,
     /// Against the reference.
@@ -174,7 +174,8 @@ pub fn measure(
     let steps = (1 + rounds * effort.methods.len()) as f64;
     let mut done = 1.0;
     // Methods take turns: each builds, and traces every batch on every number of threads.
-    let mut entries: Vec<Entry> = effort.methods.iter().map(|&m| Entry::new(m, effort)).collect();
+    let mut entries: Vec<MethodRun> =
+        effort.methods.iter().map(|&m| MethodRun::new(m, effort)).collect();
     for round in 0..rounds {
         for who in order(round, entries.len()) {
             if !progress(done / steps) {
@@ -235,7 +236,7 @@ fn time(accel: &dyn Accel, batches: &[RayBatch], pool: &ThreadPool) -> f64 {
 }
 
 /// One method while it is measured.
-struct Entry {
+struct MethodRun {
     method: Method,
     backend: String,
     bytes: u64,
@@ -247,7 +248,7 @@ struct Entry {
     traces: Vec<Series>,
 }
 
-impl Entry {
+impl MethodRun {
     fn new(method: Method, effort: &Effort) -> Self {
         Self {
             method,

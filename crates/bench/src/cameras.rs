@@ -25,7 +25,7 @@ use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 
 use crate::pictures::{Studio, opened};
-use crate::rounds::{Spread, order};
+use crate::rounds::{TimeSpread, order};
 use crate::samplers::{Converged, Effort, Entry};
 use crate::{BenchError, Progress};
 
@@ -50,7 +50,7 @@ pub struct Finding {
     /// Samples a pixel.
     pub samples: u32,
     /// Wall time of tracing the picture on all threads (s).
-    pub seconds: Spread,
+    pub seconds: TimeSpread,
     /// The root of the mean squared difference to the full train's converged picture.
     pub rmse: f64,
     /// The same over the mean of that picture.
@@ -105,7 +105,7 @@ pub fn measure(
 }
 
 /// A model of a lens: what it is called, and its camera.
-pub type Model = (&'static str, Camera);
+pub type LensModel = (&'static str, Camera);
 
 /// All models of a camera's lens, the simplest first, and what is missing for which reason.
 ///
@@ -113,7 +113,7 @@ pub type Model = (&'static str, Camera);
 ///
 /// [`BenchError::NoLens`] when the camera has none, or one without a finite entrance pupil or focal
 /// length.
-pub fn models(full: &Camera) -> Result<(Vec<Model>, Vec<String>), BenchError> {
+pub fn models(full: &Camera) -> Result<(Vec<LensModel>, Vec<String>), BenchError> {
     let lens = full.lens().ok_or(BenchError::NoLens("the camera has none"))?;
     let gauss = Gauss::of(full, lens)?;
     let mut models = Vec::new();

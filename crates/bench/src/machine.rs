@@ -71,7 +71,7 @@ fn kilobytes(file: &str, field: &str) -> u64 {
 
 /// What this process holds (bytes); zeros where the system does not tell.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Memory {
+pub struct ProcessMemory {
     /// Its own.
     pub private: u64,
     /// Pages of mapped files, which the system may take back.
@@ -80,7 +80,7 @@ pub struct Memory {
     pub peak: u64,
 }
 
-impl Memory {
+impl ProcessMemory {
     /// Now.
     #[must_use]
     pub fn now() -> Self {

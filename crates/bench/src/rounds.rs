@@ -45,16 +45,19 @@ impl Series {
 
     /// The three numbers that are told of it; `None` without rounds.
     #[must_use]
-    pub fn spread(&self) -> Option<Spread> {
-        let spread =
-            || Spread { median: self.median(), fastest: self.fastest(), slowest: self.slowest() };
+    pub fn spread(&self) -> Option<TimeSpread> {
+        let spread = || TimeSpread {
+            median: self.median(),
+            fastest: self.fastest(),
+            slowest: self.slowest(),
+        };
         (!self.0.is_empty()).then(spread)
     }
 }
 
 /// Times of all rounds in three numbers (s).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Spread {
+pub struct TimeSpread {
     /// The median.
     pub median: f64,
     /// The fastest round.

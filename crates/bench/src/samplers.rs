@@ -7,7 +7,7 @@ use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 
 use crate::pictures::{Sampling, Studio, mean, mean_square};
-use crate::rounds::{Series, Spread, order};
+use crate::rounds::{Series, TimeSpread, order};
 use crate::{BenchError, Progress};
 
 /// How much is measured.
@@ -55,7 +55,7 @@ pub struct Finding {
     /// Samples a pixel.
     pub samples: u32,
     /// Wall time of tracing the picture on all threads (s).
-    pub seconds: Spread,
+    pub seconds: TimeSpread,
     /// The root of the mean squared difference to the converged picture.
     pub rmse: f64,
     /// The same over the mean of the converged picture.

@@ -20,13 +20,13 @@ const FLAT: [f64; 3] = [0.1, 0.02, 0.1];
 const THREE_QUARTER: DVec3 = DVec3::new(0.6, 0.45, 1.0);
 
 /// The support function of a set of points: how far they reach.
-pub trait Support {
+pub trait SupportFunction {
     /// For each of `directions` (of any length), the greatest dot product of it with a point taken from
     /// `origin`; −∞ without points.
     fn support(&self, origin: DVec3, directions: &[DVec3]) -> Vec<f64>;
 }
 
-impl Support for Bounds {
+impl SupportFunction for Bounds {
     fn support(&self, origin: DVec3, directions: &[DVec3]) -> Vec<f64> {
         let corners = self.corners().map(|corner| corner - origin);
         let most = |d: &DVec3| corners.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.dot(*d)));
@@ -42,7 +42,7 @@ pub struct Subject<'a> {
     /// Where it is best looked at from.
     pub viewpoint: Viewpoint,
     /// Its points; the corners of the box when absent.
-    pub points: Option<&'a dyn Support>,
+    pub points: Option<&'a dyn SupportFunction>,
 }
 
 impl fmt::Debug for Subject<'_> {
@@ -344,7 +344,7 @@ mod tests {
     #[test]
     fn margins_are_even_on_both_sides_of_both_axes() {
         struct Points(Vec<DVec3>);
-        impl Support for Points {
+        impl SupportFunction for Points {
             fn support(&self, origin: DVec3, directions: &[DVec3]) -> Vec<f64> {
                 let dot = |d: &DVec3| {
                     self.0.iter().map(|p| (*p - origin).dot(*d)).fold(f64::MIN, f64::max)

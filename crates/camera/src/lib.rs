@@ -31,7 +31,7 @@ pub use camera::{Camera, CameraSpec, PixelBlock, PixelExtent, Projection};
 pub use camera_file::{CameraFile, ProjectionName};
 pub use distortion::{Distortion, DistortionSpec};
 pub use error::CameraError;
-pub use framing::{Subject, Support, Viewpoint};
+pub use framing::{Subject, SupportFunction, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin};
 pub use lens::{
     BandGroup, ChromaticRealLensCameraSpec, LensCamera, LensCameraSpec, RealLensCameraSpec,

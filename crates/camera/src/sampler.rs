@@ -6,7 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::sobol::{self, Key};
+use crate::sobol::{self, SobolKey};
 
 /// The point sets that samples come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
@@ -111,7 +111,7 @@ impl PixelSamples {
     /// surface's light and direction (the pairs 0, 1, 4 and 5) make the picture together and are dimensions
     /// of one set; each other pair is a set for itself. Sets have 2¹⁶ points, and start over, scrambled
     /// anew.
-    fn sobol_key(&self, index: u32, pair: u32) -> (Key, usize) {
+    fn sobol_key(&self, index: u32, pair: u32) -> (SobolKey, usize) {
         if self.sampler == Sampler::BlueNoise {
             return (self.blue_noise_key(index, pair), 0);
         }
@@ -125,19 +125,19 @@ impl PixelSamples {
         let again = (index >> 16).wrapping_mul(0x85eb_ca6b);
         #[expect(clippy::cast_possible_truncation, reason = "the low half is the seed")]
         let seed = (self.seed as u32).wrapping_add(apart.wrapping_mul(0x9e37_79b9));
-        (Key { index: index & 0xffff, seed: seed.wrapping_add(again) }, first)
+        (SobolKey { index: index & 0xffff, seed: seed.wrapping_add(again) }, first)
     }
 
     /// Which point of the picture's sequence a sample is. The scrambling of indices ([`sobol`]) puts the halves
     /// of each square of the Z-order curve, and then each half's, in an order of the pair's own. What is
     /// beyond 2³² points, of large pictures or many samples, is a sequence for itself.
-    fn blue_noise_key(&self, index: u32, pair: u32) -> Key {
+    fn blue_noise_key(&self, index: u32, pair: u32) -> SobolKey {
         let own = u64::from(self.place) * u64::from(self.count.next_power_of_two());
         let all = own + u64::from(index);
         let of_sequence = (all >> 32) << 32 | u64::from(pair);
         #[expect(clippy::cast_possible_truncation, reason = "halves")]
         let (index, seed) = (all as u32, mix(self.seed ^ mix(of_sequence)) as u32);
-        Key { index, seed }
+        SobolKey { index, seed }
     }
 
     /// Columns and rows whose product is at most the number of samples and is nearest to a square.
@@ -168,7 +168,7 @@ pub fn squares_of_pair(
         dimensions = first;
         key
     };
-    let keys: Vec<Key> = samples.map(key).collect();
+    let keys: Vec<SobolKey> = samples.map(key).collect();
     out.resize(keys.len(), [0.0; 2]);
     sobol::points(&keys, dimensions, out);
 }
@@ -183,7 +183,7 @@ pub fn squares(wanted: &[(PixelSamples, u32, u32)], out: &mut Vec<[f64; 2]>) {
     }
     let key = |&(pixel, index, pair): &(PixelSamples, u32, u32)| pixel.sobol_key(index, pair);
     if wanted.iter().all(|wanted| key(wanted).1 == 0) {
-        let keys: Vec<Key> = wanted.iter().map(|wanted| key(wanted).0).collect();
+        let keys: Vec<SobolKey> = wanted.iter().map(|wanted| key(wanted).0).collect();
         out.resize(keys.len(), [0.0; 2]);
         return sobol::points(&keys, 0, out);
     }

@@ -37,7 +37,7 @@ static DIRECTIONS: LazyLock<[[u32; BITS]; DIMENSIONS]> = LazyLock::new(|| {
 
 /// A sample of a scrambled set.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Key {
+pub(crate) struct SobolKey {
     /// Which sample, below 2¹⁶.
     pub(crate) index: u32,
     /// Which scrambling.
@@ -46,19 +46,19 @@ pub(crate) struct Key {
 
 /// The point of each of `keys` in dimensions `first` and `first + 1`; `first` is even and below eight.
 /// `out` is as long as `keys`.
-pub(crate) fn points(keys: &[Key], first: usize, out: &mut [[f64; 2]]) {
+pub(crate) fn points(keys: &[SobolKey], first: usize, out: &mut [[f64; 2]]) {
     scrambled(keys, first, &DIRECTIONS, out);
 }
 
 /// The point of one key in dimensions `first` and `first + 1`.
-pub(crate) fn point(key: Key, first: usize) -> [f64; 2] {
+pub(crate) fn point(key: SobolKey, first: usize) -> [f64; 2] {
     let [point] = side_by_side([key], first, &DIRECTIONS);
     point
 }
 
 #[multiversion::multiversion(targets = "simd")]
 fn scrambled(
-    keys: &[Key],
+    keys: &[SobolKey],
     first: usize,
     directions: &[[u32; BITS]; DIMENSIONS],
     out: &mut [[f64; 2]],
@@ -68,7 +68,7 @@ fn scrambled(
     for (keys, out) in whole.iter().zip(to) {
         *out = side_by_side(*keys, first, directions);
     }
-    let mut lanes = [Key::default(); LANES];
+    let mut lanes = [SobolKey::default(); LANES];
     lanes[..rest.len()].copy_from_slice(rest);
     to_rest.copy_from_slice(&side_by_side(lanes, first, directions)[..rest.len()]);
 }
@@ -86,7 +86,7 @@ fn second_reversed(index: u32) -> u32 {
 
 #[inline(always)]
 fn side_by_side<const N: usize>(
-    keys: [Key; N],
+    keys: [SobolKey; N],
     first: usize,
     directions: &[[u32; BITS]; DIMENSIONS],
 ) -> [[f64; 2]; N] {
@@ -149,7 +149,8 @@ mod tests {
     fn points_are_a_net_in_every_elementary_interval() {
         for (m, first, seed) in [(4, 0, 1), (6, 64, 2), (8, 1 << 15, 3)] {
             let count = 1_u32 << m;
-            let keys: Vec<Key> = (first..first + count).map(|index| Key { index, seed }).collect();
+            let keys: Vec<SobolKey> =
+                (first..first + count).map(|index| SobolKey { index, seed }).collect();
             let mut out = vec![[0.0; 2]; keys.len()];
             points(&keys, 0, &mut out);
             for a in 0..=m {
@@ -166,7 +167,8 @@ mod tests {
 
     #[test]
     fn many_points_are_those_one_by_one() {
-        let keys: Vec<Key> = (0..77).map(|i: u32| Key { index: i * 7919, seed: i / 5 }).collect();
+        let keys: Vec<SobolKey> =
+            (0..77).map(|i: u32| SobolKey { index: i * 7919, seed: i / 5 }).collect();
         let mut out = vec![[0.0; 2]; keys.len()];
         for first in [0, 2, 4, 6] {
             points(&keys, first, &mut out);
@@ -184,7 +186,7 @@ mod tests {
             let sum = own.fold(0, |sum, bit| sum ^ directions[bit]);
             assert_eq!(sum, sobol_rev(0x5a3c_u32.reverse_bits(), d as u32), "{d}");
         }
-        let keys: Vec<Key> = (192..256).map(|index| Key { index, seed: 11 }).collect();
+        let keys: Vec<SobolKey> = (192..256).map(|index| SobolKey { index, seed: 11 }).collect();
         let mut out = vec![[0.0; 2]; keys.len()];
         for first in [0, 2, 4, 6] {
             points(&keys, first, &mut out);
@@ -202,9 +204,10 @@ mod tests {
     #[test]
     fn pairs_are_independent() {
         let count = 1 << 14;
-        let keys =
-            |pair: u32| (0..count).map(move |i| Key { index: i % 64, seed: i / 64 * 8 + pair });
-        let product = |(a, b): (Key, Key)| point(a, 0)[0] * point(b, 0)[0];
+        let keys = |pair: u32| {
+            (0..count).map(move |i| SobolKey { index: i % 64, seed: i / 64 * 8 + pair })
+        };
+        let product = |(a, b): (SobolKey, SobolKey)| point(a, 0)[0] * point(b, 0)[0];
         let mean = keys(0).zip(keys(1)).map(product).sum::<f64>() / f64::from(count);
         // Four standard errors.
         assert!((mean - 0.25).abs() < 4.0 * 0.2205 / 128.0, "{mean}");
@@ -215,8 +218,8 @@ mod tests {
     #[test]
     fn the_last_bits_are_random() {
         let count = 1 << 16;
-        let keys: Vec<Key> =
-            (0..count).map(|i| Key { index: i % 256, seed: hash(i / 256) }).collect();
+        let keys: Vec<SobolKey> =
+            (0..count).map(|i| SobolKey { index: i % 256, seed: hash(i / 256) }).collect();
         let mut out = vec![[0.0; 2]; keys.len()];
         points(&keys, 2, &mut out);
         for bit in 25..=53 {

@@ -14,7 +14,7 @@ const APART: f64 = 64.0;
 
 /// From values to pixels.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Scale {
+pub(crate) struct AxisScale {
     /// The ends: values on a linear axis, else powers of ten.
     ends: [f64; 2],
     linear: bool,
@@ -24,7 +24,7 @@ pub(crate) struct Scale {
     zero: Option<f64>,
 }
 
-impl Scale {
+impl AxisScale {
     /// `axis` over all `values` that it has a place for, from one of `pixels` to the other.
     pub(crate) fn new(
         values: impl Iterator<Item = f64> + Clone,
@@ -163,27 +163,30 @@ mod tests {
     fn values_keep_their_order_and_zero_lies_below() {
         let values = [0.0, 1e-9, 3e-4, 2.0];
         let named = Axis::new("error").with_zero("none");
-        let scale = Scale::new(values.into_iter(), &named, [400.0, 0.0]);
+        let scale = AxisScale::new(values.into_iter(), &named, [400.0, 0.0]);
         let places: Vec<f64> = values.iter().map(|&v| scale.at(v).unwrap()).collect();
         // Upwards on a page is towards smaller numbers.
         assert!(places.is_sorted_by(|a, b| a > b), "{places:?}");
         assert!(places.iter().all(|y| (0.0..=400.0).contains(y)));
         assert!(places[0] > scale.start() && scale.start() >= places[1]);
         assert_eq!([scale.at(-1.0), scale.at(f64::NAN), scale.at(f64::INFINITY)], [None; 3]);
-        assert_eq!(Scale::new(values.into_iter(), &Axis::new("error"), [400.0, 0.0]).at(0.0), None);
+        assert_eq!(
+            AxisScale::new(values.into_iter(), &Axis::new("error"), [400.0, 0.0]).at(0.0),
+            None
+        );
     }
 
     #[test]
     fn a_linear_axis_begins_at_zero_and_has_round_ticks() {
         let named = |values: &[f64], pixels: [f64; 2]| {
-            let scale = Scale::new(values.iter().copied(), &Axis::linear("height"), pixels);
+            let scale = AxisScale::new(values.iter().copied(), &Axis::linear("height"), pixels);
             scale.ticks().into_iter().map(|(name, _)| name).collect::<Vec<_>>()
         };
         assert_eq!(named(&[3.0, 21.6], [0.0, 600.0]), ["0", "5", "10", "15", "20"]);
         assert_eq!(named(&[1.0], [300.0, 0.0]), ["0", "0.5", "1"]);
         assert_eq!(named(&[-1.0, 1.0], [0.0, 300.0]), ["-1", "-0.5", "0", "0.5", "1"]);
         assert_eq!(named(&[], [0.0, 300.0]), named(&[1.0, f64::NAN], [0.0, 300.0]));
-        let scale = Scale::new([0.0, 20.0].into_iter(), &Axis::linear("height"), [100.0, 0.0]);
+        let scale = AxisScale::new([0.0, 20.0].into_iter(), &Axis::linear("height"), [100.0, 0.0]);
         assert_eq!([0.0, 5.0, 20.0].map(|value| scale.at(value)), [100.0, 75.0, 0.0].map(Some));
         assert_eq!((scale.at(f64::NAN), scale.zero()), (None, None));
     }
@@ -192,7 +195,7 @@ mod tests {
     fn ticks_lie_inside_and_are_few() {
         for [low, high] in [[1.0, 1.0], [0.9, 7.0], [1e-3, 40.0], [1e-17, 1.0], [3e-300, 1e300]] {
             for axis in [Axis::new("error"), Axis::new("error").fitted()] {
-                let scale = Scale::new([low, high].into_iter(), &axis, [0.0, 600.0]);
+                let scale = AxisScale::new([low, high].into_iter(), &axis, [0.0, 600.0]);
                 let ticks = scale.ticks();
                 assert!((1..=12).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
                 assert!(ticks.iter().all(|(_, at)| (-0.1..=600.1).contains(at)), "{ticks:?}");

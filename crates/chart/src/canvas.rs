@@ -4,7 +4,7 @@ use svg::Node;
 use svg::node::element::{Circle, Group, Rectangle};
 
 use crate::chart::Theme;
-use crate::ink::{self, Anchor, polyline, rounded};
+use crate::ink::{self, TextAnchor, polyline, rounded};
 
 /// A drawing in pixels, y downwards. Its classes are those of the style: `ink` and `faint` for lines,
 /// `glass` for bodies, `s0` to `s7` for lines and `f0` to `f7` for dots in the colours of charts.
@@ -19,12 +19,12 @@ impl Canvas {
     #[must_use]
     pub fn new(width: f64, height: f64, title: &str) -> Self {
         let mut canvas = Self { size: [width, height], group: Group::new() };
-        canvas.text([16.0, 26.0], Anchor::Start, "title", title);
+        canvas.text([16.0, 26.0], TextAnchor::Start, "title", title);
         canvas
     }
 
     /// Words beside a place.
-    pub fn text(&mut self, at: [f64; 2], anchor: Anchor, class: &str, words: &str) {
+    pub fn text(&mut self, at: [f64; 2], anchor: TextAnchor, class: &str, words: &str) {
         ink::text(&mut self.group, at, anchor, class, words);
     }
 

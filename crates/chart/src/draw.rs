@@ -3,11 +3,11 @@
 use svg::Node;
 use svg::node::element::{Circle, Group, Rectangle, Text};
 
-use crate::axis::Scale;
+use crate::axis::AxisScale;
 use crate::chart::{Chart, Mark, Point, Stroke, Theme};
 use crate::front::front;
-use crate::ink::{Anchor, COLOURS, dashed, document, line, path, rounded, straight, text};
-use crate::names::{self, Area, LINE, Obstacle};
+use crate::ink::{COLOURS, TextAnchor, dashed, document, line, path, rounded, straight, text};
+use crate::names::{self, LINE, LabelArea, Obstacle};
 
 const LEFT: f64 = 84.0;
 const RIGHT: f64 = 22.0;
@@ -65,7 +65,8 @@ impl Room {
 
     fn draw(self, chart: &Chart) -> Group {
         let top = HEAD + NOTE * chart.notes.len() as f64;
-        let frame = Area { left: LEFT, top, right: self.width - RIGHT, bottom: top + self.plot };
+        let frame =
+            LabelArea { left: LEFT, top, right: self.width - RIGHT, bottom: top + self.plot };
         let values = |axis: usize| {
             let points = chart.series.iter().flat_map(|series| &series.points);
             // What has no place on the other axis does not stretch this one.
@@ -75,8 +76,8 @@ impl Room {
         let drawing = Drawing {
             chart,
             frame,
-            x: Scale::new(values(0), x, [frame.left, frame.right]),
-            y: Scale::new(values(1), y, [frame.bottom, frame.top]),
+            x: AxisScale::new(values(0), x, [frame.left, frame.right]),
+            y: AxisScale::new(values(1), y, [frame.bottom, frame.top]),
         };
         let mut group = Group::new();
         drawing.heading(&mut group);
@@ -97,9 +98,9 @@ fn is_shown(chart: &Chart, point: &Point) -> bool {
 
 struct Drawing<'a> {
     chart: &'a Chart,
-    frame: Area,
-    x: Scale,
-    y: Scale,
+    frame: LabelArea,
+    x: AxisScale,
+    y: AxisScale,
 }
 
 impl Drawing<'_> {
@@ -114,29 +115,29 @@ impl Drawing<'_> {
     }
 
     fn heading(&self, group: &mut Group) {
-        text(group, [LEFT, 25.0], Anchor::Start, "title", &self.chart.title);
+        text(group, [LEFT, 25.0], TextAnchor::Start, "title", &self.chart.title);
         for (i, note) in self.chart.notes.iter().enumerate() {
             let y = 25.0 + NOTE * (i as f64 + 1.0);
-            text(group, [LEFT, y], Anchor::Start, "small", note);
+            text(group, [LEFT, y], TextAnchor::Start, "small", note);
         }
     }
 
     fn axes(&self, group: &mut Group) {
-        let Area { left, top, right, bottom } = self.frame;
+        let LabelArea { left, top, right, bottom } = self.frame;
         for (name, at) in self.x.ticks() {
             line(group, [at, top], [at, bottom], "faint");
-            text(group, [at, bottom + 18.0], Anchor::Middle, "", &name);
+            text(group, [at, bottom + 18.0], TextAnchor::Middle, "", &name);
         }
         for (name, at) in self.y.ticks() {
             line(group, [left, at], [right, at], "faint");
-            text(group, [left - 8.0, at + 4.0], Anchor::End, "", &name);
+            text(group, [left - 8.0, at + 4.0], TextAnchor::End, "", &name);
         }
         self.zeros(group);
         line(group, [left, bottom], [right, bottom], "ink");
         line(group, [left, bottom], [left, top], "ink");
         let [across, upwards] = &self.chart.axes;
         let middle = 0.5 * (left + right);
-        text(group, [middle, bottom + 42.0], Anchor::Middle, "", &across.label);
+        text(group, [middle, bottom + 42.0], TextAnchor::Middle, "", &across.label);
         let upright = Text::new(&upwards.label)
             .set("transform", format!("translate(18 {}) rotate(-90)", 0.5 * (top + bottom)))
             .set("text-anchor", "middle");
@@ -145,19 +146,19 @@ impl Drawing<'_> {
 
     /// A dashed line above the place of zeros, and their name.
     fn zeros(&self, group: &mut Group) {
-        let Area { left, top, right, bottom } = self.frame;
+        let LabelArea { left, top, right, bottom } = self.frame;
         let [across, upwards] = &self.chart.axes;
         if let (Some(at), Some(name)) = (self.y.zero(), &upwards.zero) {
             let start = self.y.start();
             dashed(group, [left, start], [right, start], ZEROS);
-            text(group, [left - 8.0, at + 4.0], Anchor::End, "", "0");
-            text(group, [right - 4.0, start - 5.0], Anchor::End, "small", name);
+            text(group, [left - 8.0, at + 4.0], TextAnchor::End, "", "0");
+            text(group, [right - 4.0, start - 5.0], TextAnchor::End, "small", name);
         }
         if let (Some(at), Some(name)) = (self.x.zero(), &across.zero) {
             let start = self.x.start();
             dashed(group, [start, bottom], [start, top], ZEROS);
-            text(group, [at, bottom + 18.0], Anchor::Middle, "", "0");
-            text(group, [left + 4.0, top + 12.0], Anchor::Start, "small", name);
+            text(group, [at, bottom + 18.0], TextAnchor::Middle, "", "0");
+            text(group, [left + 4.0, top + 12.0], TextAnchor::Start, "small", name);
         }
     }
 
@@ -223,7 +224,7 @@ impl Drawing<'_> {
         for (i, series) in self.chart.series.iter().enumerate() {
             let places = self.places(i);
             for (place, _) in &places {
-                obstacles.push(Obstacle { area: Area::around(*place, 5.0), weight: 3.0 });
+                obstacles.push(Obstacle { area: LabelArea::around(*place, 5.0), weight: 3.0 });
             }
             if series.joined {
                 along(&places, &mut obstacles);
@@ -240,7 +241,7 @@ impl Drawing<'_> {
         if let (Some(_), Some(name)) = (self.y.zero(), &self.chart.axes[1].zero) {
             let width = 6.6 * name.chars().count() as f64;
             let (right, bottom) = (self.frame.right, self.y.start());
-            let area = Area { left: right - width, top: bottom - 16.0, right, bottom };
+            let area = LabelArea { left: right - width, top: bottom - 16.0, right, bottom };
             obstacles.push(Obstacle { area, weight: 20.0 });
         }
         let placed = names::place(&names, &obstacles, &self.frame);
@@ -251,7 +252,7 @@ impl Drawing<'_> {
                 let leader = straight(from, to).set("class", format!("s{colour}"));
                 group.append(leader.set("stroke-width", 0.8).set("stroke-opacity", 0.7));
             }
-            let Area { left, top, right, bottom } = placed.area;
+            let LabelArea { left, top, right, bottom } = placed.area;
             let halo = Rectangle::new()
                 .set("class", "halo")
                 .set("x", rounded(left))
@@ -260,7 +261,7 @@ impl Drawing<'_> {
                 .set("height", rounded(bottom - top));
             group.append(halo);
             let at = [0.5 * (left + right), top + 0.77 * LINE];
-            text(group, at, Anchor::Middle, &format!("f{colour}"), name);
+            text(group, at, TextAnchor::Middle, &format!("f{colour}"), name);
         }
     }
 }
@@ -274,7 +275,7 @@ fn along(places: &[([f64; 2], Mark)], obstacles: &mut Vec<Obstacle>) {
         while done < length {
             let share = done / length;
             let at = [0, 1].map(|k| from[k] + share * (to[k] - from[k]));
-            obstacles.push(Obstacle { area: Area::around(at, 3.0), weight: 1.0 });
+            obstacles.push(Obstacle { area: LabelArea::around(at, 3.0), weight: 1.0 });
             done += STEP;
         }
     }

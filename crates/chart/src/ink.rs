@@ -59,7 +59,7 @@ pub(crate) const COLOURS: usize = 8;
 
 /// Where a text stands against its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Anchor {
+pub enum TextAnchor {
     /// It begins there.
     Start,
     /// Its middle is there.
@@ -68,11 +68,17 @@ pub enum Anchor {
     End,
 }
 
-pub(crate) fn text(document: &mut Group, at: [f64; 2], anchor: Anchor, class: &str, words: &str) {
+pub(crate) fn text(
+    document: &mut Group,
+    at: [f64; 2],
+    anchor: TextAnchor,
+    class: &str,
+    words: &str,
+) {
     let anchor = match anchor {
-        Anchor::Start => "start",
-        Anchor::Middle => "middle",
-        Anchor::End => "end",
+        TextAnchor::Start => "start",
+        TextAnchor::Middle => "middle",
+        TextAnchor::End => "end",
     };
     let text = Text::new(words)
         .set("x", rounded(at[0]))

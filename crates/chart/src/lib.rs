@@ -28,5 +28,5 @@ mod numbers;
 pub use canvas::Canvas;
 pub use chart::{Axis, Chart, GREY, Mark, Point, Series, Stroke, Theme, side_by_side};
 pub use front::front;
-pub use ink::Anchor;
+pub use ink::TextAnchor;
 pub use numbers::{round_length, short};

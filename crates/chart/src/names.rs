@@ -2,14 +2,14 @@
 
 /// A rectangle: left, top, right, bottom (pixels).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Area {
+pub(crate) struct LabelArea {
     pub(crate) left: f64,
     pub(crate) top: f64,
     pub(crate) right: f64,
     pub(crate) bottom: f64,
 }
 
-impl Area {
+impl LabelArea {
     /// The pixels that two areas share (square pixels).
     pub(crate) fn shared(&self, other: &Self) -> f64 {
         let width = self.right.min(other.right) - self.left.max(other.left);
@@ -38,16 +38,16 @@ impl Area {
 /// What a name would rather not cover: marks and lines.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Obstacle {
-    pub(crate) area: Area,
+    pub(crate) area: LabelArea,
     /// Against a pixel of distance.
     pub(crate) weight: f64,
 }
 
 /// A name that has found its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedName {
     /// What the letters cover.
-    pub(crate) area: Area,
+    pub(crate) area: LabelArea,
     /// A line from the name to its point, where that is not near.
     pub(crate) leader: Option<[[f64; 2]; 2]>,
 }
@@ -71,9 +71,9 @@ const ON_A_NAME: f64 = 1e6;
 pub(crate) fn place(
     names: &[(&str, Vec<[f64; 2]>)],
     obstacles: &[Obstacle],
-    page: &Area,
-) -> Vec<Option<Placed>> {
-    let mut taken: Vec<Area> = Vec::new();
+    page: &LabelArea,
+) -> Vec<Option<PlacedName>> {
+    let mut taken: Vec<LabelArea> = Vec::new();
     let mut places = Vec::new();
     for (name, points) in names {
         let width = LETTER * name.chars().count() as f64 + 4.0;
@@ -88,25 +88,25 @@ pub(crate) fn place(
             taken.push(area);
             let end = area.nearest(point);
             let far = (end[0] - point[0]).hypot(end[1] - point[1]) > NEAR;
-            Placed { area, leader: far.then_some([end, point]) }
+            PlacedName { area, leader: far.then_some([end, point]) }
         }));
     }
     places
 }
 
 /// Places of a name of `width` at a distance of `reach` around `point`.
-fn around(point: [f64; 2], reach: f64, width: f64) -> impl Iterator<Item = (Area, [f64; 2])> {
+fn around(point: [f64; 2], reach: f64, width: f64) -> impl Iterator<Item = (LabelArea, [f64; 2])> {
     (0..16).map(move |k| {
         let angle = std::f64::consts::TAU * f64::from(k) / 16.0;
         let (x, y) = (point[0] + reach * angle.cos(), point[1] - reach * angle.sin());
         // The name grows away from the point.
         let left = x - width * 0.5 * (1.0 - angle.cos());
         let top = y - LINE * 0.5 * (1.0 + angle.sin());
-        (Area { left, top, right: left + width, bottom: top + LINE }, point)
+        (LabelArea { left, top, right: left + width, bottom: top + LINE }, point)
     })
 }
 
-fn cost(area: &Area, point: [f64; 2], taken: &[Area], obstacles: &[Obstacle]) -> f64 {
+fn cost(area: &LabelArea, point: [f64; 2], taken: &[LabelArea], obstacles: &[Obstacle]) -> f64 {
     let names: f64 = taken.iter().map(|other| area.shared(other)).sum();
     let marks: f64 = obstacles.iter().map(|o| o.weight * area.shared(&o.area)).sum();
     let [x, y] = area.nearest(point);
@@ -119,14 +119,16 @@ mod tests {
 
     #[test]
     fn names_of_crowded_points_do_not_overlap() {
-        let page = Area { left: 0.0, top: 0.0, right: 700.0, bottom: 400.0 };
+        let page = LabelArea { left: 0.0, top: 0.0, right: 700.0, bottom: 400.0 };
         // Twelve points within a few pixels.
         let at = |i: u32| [350.0 + f64::from(i % 4), 200.0 + f64::from(i / 4)];
         let names: Vec<(&str, Vec<[f64; 2]>)> =
             (0..12).map(|i| ("embree robust + f64", vec![at(i)])).collect();
-        let obstacles: Vec<Obstacle> =
-            (0..12).map(|i| Obstacle { area: Area::around(at(i), 4.0), weight: 2.0 }).collect();
-        let placed: Vec<Placed> = place(&names, &obstacles, &page).into_iter().flatten().collect();
+        let obstacles: Vec<Obstacle> = (0..12)
+            .map(|i| Obstacle { area: LabelArea::around(at(i), 4.0), weight: 2.0 })
+            .collect();
+        let placed: Vec<PlacedName> =
+            place(&names, &obstacles, &page).into_iter().flatten().collect();
         assert_eq!(placed.len(), 12);
         for (i, a) in placed.iter().enumerate() {
             assert!(a.area.is_inside(&page));

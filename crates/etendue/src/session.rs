@@ -40,7 +40,7 @@ pub struct Session {
     frames: Option<Arc<[Frame]>>,
     options: Options,
     cache: Cache,
-    loaded: Option<Loaded>,
+    loaded: Option<LoadedScene>,
     structures: Structures,
     images: Arc<Images>,
     /// What was set since it was opened.
@@ -57,7 +57,7 @@ pub struct Session {
 pub(crate) type Ready = (Arc<Scene>, Arc<dyn Accel>, Arc<Images>);
 
 /// The scene as it is now.
-struct Loaded {
+struct LoadedScene {
     scene: Arc<Scene>,
     plan: Plan,
     notes: Vec<String>,
@@ -307,7 +307,7 @@ impl Session {
     ) -> Result<bool, Error> {
         self.load(progress)?;
         let outputs = self.options.outputs;
-        let Loaded { scene, plan, neighbours, .. } = self.loaded()?;
+        let LoadedScene { scene, plan, neighbours, .. } = self.loaded()?;
         let mut prints = fingerprints(scene, neighbours)?;
         prints.extend(outputs.denoised.then(denoise::fingerprint));
         let mut files = certain_files(plan.names(scene), outputs);
@@ -322,7 +322,7 @@ impl Session {
     /// As [`Self::scene`].
     pub fn prospect(&mut self, progress: &Progress) -> Result<Prospect<'_>, Error> {
         self.load(progress)?;
-        let Loaded { scene, plan, .. } = self.loaded()?;
+        let LoadedScene { scene, plan, .. } = self.loaded()?;
         let (outputs, load) = (self.options.outputs, self.seconds.load);
         Ok(Prospect { scene, plan, outputs, load })
     }

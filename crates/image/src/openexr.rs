@@ -15,14 +15,14 @@ pub(crate) const SIGNATURE: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
 /// Where the texels of a layer go in its display window.
 #[derive(Debug, Clone, Copy)]
-struct Window {
+struct DisplayWindow {
     size: [usize; 2],
     /// The layer's corner in the display window.
     corner: [i32; 2],
     channels: usize,
 }
 
-impl Window {
+impl DisplayWindow {
     /// The first value of a texel of the layer; `None` outside of the display window.
     fn place(self, texel: Vec2<usize>) -> Option<usize> {
         let at = |k: usize, index: usize| {
@@ -70,7 +70,7 @@ fn has(header: &Header, name: &str) -> bool {
 }
 
 /// The window of `header`, with so many values that it and what the file itself has are within limits.
-fn window(header: &Header, channels: usize, limits: Limits) -> Result<Window, DecodeError> {
+fn window(header: &Header, channels: usize, limits: Limits) -> Result<DisplayWindow, DecodeError> {
     let shown = header.shared_attributes.display_window;
     let texel = 4 * channels as u64;
     let layer = [header.layer_size.x(), header.layer_size.y()].map(|side| side as u64);
@@ -82,7 +82,7 @@ fn window(header: &Header, channels: usize, limits: Limits) -> Result<Window, De
     let corner = [offset(own.x(), shown.position.x()), offset(own.y(), shown.position.y())];
     // Memory is asked for here, where it may be refused; below the decoder asks for it.
     drop(zeroed::<f32>(size[0] * size[1] * channels)?);
-    Ok(Window { size, corner, channels })
+    Ok(DisplayWindow { size, corner, channels })
 }
 
 fn colours(bytes: &[u8], header: &Header, limits: Limits) -> Result<Raster, DecodeError> {

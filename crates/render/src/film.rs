@@ -80,13 +80,13 @@ pub(crate) struct FilmLayer {
 
 /// Rows of one plane, lent to one thread.
 #[derive(Debug)]
-pub(crate) enum Rows<'a> {
+pub(crate) enum PlaneRows<'a> {
     F32(&'a mut [f32]),
     F64(&'a mut [f64]),
     U32(&'a mut [u32]),
 }
 
-impl Rows<'_> {
+impl PlaneRows<'_> {
     /// Writes a number to the pixel at `index` of the rows.
     #[expect(
         clippy::cast_possible_truncation,
@@ -139,7 +139,7 @@ pub(crate) struct Strip<'a> {
 pub(crate) struct StripLayer<'a> {
     pub(crate) spec: LayerSpec,
     pub(crate) taken: Taken,
-    pub(crate) planes: Vec<Rows<'a>>,
+    pub(crate) planes: Vec<PlaneRows<'a>>,
 }
 
 impl FilmLayer {
@@ -250,10 +250,10 @@ pub(crate) fn strips<'a>(
             strip.layers.push(StripLayer { spec, taken, planes: Vec::new() });
         }
         for plane in &mut layer.planes {
-            let rows: Vec<Rows<'_>> = match plane {
-                Values::F32(values) => values.chunks_mut(chunk).map(Rows::F32).collect(),
-                Values::F64(values) => values.chunks_mut(chunk).map(Rows::F64).collect(),
-                Values::U32(values) => values.chunks_mut(chunk).map(Rows::U32).collect(),
+            let rows: Vec<PlaneRows<'_>> = match plane {
+                Values::F32(values) => values.chunks_mut(chunk).map(PlaneRows::F32).collect(),
+                Values::F64(values) => values.chunks_mut(chunk).map(PlaneRows::F64).collect(),
+                Values::U32(values) => values.chunks_mut(chunk).map(PlaneRows::U32).collect(),
                 Values::U16(_) => Vec::new(),
             };
             for (strip, rows) in strips.iter_mut().zip(rows) {

@@ -31,7 +31,7 @@ pub type Identity = Vec<(String, String)>;
 
 /// What became of rays, as a file has it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-struct Counts {
+struct FilmCounts {
     /// Wall time of the tracing.
     seconds: f64,
     chief_rays: u64,
@@ -45,7 +45,7 @@ struct Counts {
     unlit: u64,
 }
 
-impl Counts {
+impl FilmCounts {
     fn of(counts: &RayCounts, time: Duration) -> Self {
         let RayCounts { chief_rays, light, fates } = counts.clone();
         let RayStats { rays, shadow_rays, not_finite } = light;
@@ -65,10 +65,10 @@ impl Counts {
     }
 }
 
-impl From<Counts> for RayCounts {
-    fn from(counts: Counts) -> Self {
-        let Counts { rays, shadow_rays, not_finite, .. } = counts;
-        let Counts { exited, missed, reflected, vignetted, unlit, .. } = counts;
+impl From<FilmCounts> for RayCounts {
+    fn from(counts: FilmCounts) -> Self {
+        let FilmCounts { rays, shadow_rays, not_finite, .. } = counts;
+        let FilmCounts { exited, missed, reflected, vignetted, unlit, .. } = counts;
         Self {
             chief_rays: counts.chief_rays,
             light: RayStats { rays, shadow_rays, not_finite },
@@ -90,13 +90,13 @@ pub struct FilmHeader {
     /// How many samples the pixels have, where that differs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_counts: Option<SampleCounts>,
-    counts: Counts,
+    counts: FilmCounts,
     /// The names of what is kept, and the type of its numbers.
     sections: Vec<(String, String)>,
 }
 
 /// Numbers of a film, by name.
-enum Section<'a> {
+enum FilmSection<'a> {
     Plane(&'a Values),
     Sums(&'a [Sum]),
 }
@@ -135,12 +135,12 @@ impl Writing<'_> {
         sums: &[&[Sum]],
     ) -> Result<(), OutputError> {
         let planes = layers.iter().flat_map(|layer| layer.named_planes());
-        let planes = planes.map(|(name, plane)| (name, Section::Plane(plane)));
-        let sums = sums.iter().enumerate().map(|(k, sums)| (sums_name(k), Section::Sums(sums)));
-        let sections: Vec<(String, Section<'_>)> = planes.chain(sums).collect();
-        let kind = |section: &Section<'_>| match section {
-            Section::Plane(values) => values.type_name().to_owned(),
-            Section::Sums(_) => SUMS.to_owned(),
+        let planes = planes.map(|(name, plane)| (name, FilmSection::Plane(plane)));
+        let sums = sums.iter().enumerate().map(|(k, sums)| (sums_name(k), FilmSection::Sums(sums)));
+        let sections: Vec<(String, FilmSection<'_>)> = planes.chain(sums).collect();
+        let kind = |section: &FilmSection<'_>| match section {
+            FilmSection::Plane(values) => values.type_name().to_owned(),
+            FilmSection::Sums(_) => SUMS.to_owned(),
         };
         let header = FilmHeader {
             identity: self.identity.clone(),
@@ -148,7 +148,7 @@ impl Writing<'_> {
             shard: self.shard,
             samples: self.samples,
             sample_counts: self.sample_counts,
-            counts: Counts::of(self.counts, self.trace_time),
+            counts: FilmCounts::of(self.counts, self.trace_time),
             sections: sections.iter().map(|(name, s)| (name.clone(), kind(s))).collect(),
         };
         write_whole(path, |part| {
@@ -166,11 +166,11 @@ impl Writing<'_> {
         })
     }
 
-    fn write_section(&self, file: &mut impl Write, section: &Section<'_>) -> io::Result<()> {
+    fn write_section(&self, file: &mut impl Write, section: &FilmSection<'_>) -> io::Result<()> {
         let pixels = self.resolution.iter().map(|&side| side as usize).product::<usize>();
         let row = self.resolution[0] as usize;
         match section {
-            Section::Plane(values) => {
+            FilmSection::Plane(values) => {
                 let bytes = values.value_bytes();
                 let mut buffer = Vec::new();
                 for part in self.shard.parts(values.len(), row) {
@@ -179,7 +179,7 @@ impl Writing<'_> {
                     file.write_all(&buffer)?;
                 }
             }
-            Section::Sums(sums) => {
+            FilmSection::Sums(sums) => {
                 let a_row = sums.len() / pixels.max(1) * row;
                 for part in self.shard.parts(sums.len(), a_row) {
                     for number in sums[part].iter().flat_map(|sum| sum.parts()) {

@@ -23,7 +23,7 @@ pub struct Images {
     /// The image of the environment.
     pub environment: Option<Arc<EnvironmentMap>>,
     /// What each texture was decoded from, and what is wrong with it.
-    origins: Vec<Option<Origin>>,
+    origins: Vec<Option<ImageOrigin>>,
     /// What the environment was read from, and its file as it was.
     sky: Option<(EnvironmentImage, Option<Stamp>)>,
     /// What could not be decoded, in words.
@@ -64,7 +64,7 @@ impl Images {
             .enumerate()
             .map(|(i, (texture, encodings))| {
                 let encodings = (*encodings)?;
-                let origin = Origin::of(texture, encodings);
+                let origin = ImageOrigin::of(texture, encodings);
                 Some(match self.known(i, &origin) {
                     Some(known) => Ok(known),
                     None => decoded(texture, origin, limits),
@@ -85,7 +85,7 @@ impl Images {
     }
 
     /// The image of texture `i`, where it was decoded from the same.
-    fn known(&self, i: usize, origin: &Origin) -> Option<(Arc<Image>, Origin)> {
+    fn known(&self, i: usize, origin: &ImageOrigin) -> Option<(Arc<Image>, ImageOrigin)> {
         let known = self.origins.get(i)?.as_ref().filter(|known| known.is_same(origin))?;
         Some((Arc::clone(self.decoded.get(i)?.as_ref()?), known.clone()))
     }
@@ -195,7 +195,7 @@ pub(crate) fn wanted_images(scene: &Scene, plan: &Plan) -> Vec<Option<Encodings>
 
 /// What an image was decoded from, and what is wrong with it.
 #[derive(Debug, Clone)]
-struct Origin {
+struct ImageOrigin {
     source: ImageSource,
     /// The file as it was.
     stamp: Option<Stamp>,
@@ -206,7 +206,7 @@ struct Origin {
     fault: Option<String>,
 }
 
-impl Origin {
+impl ImageOrigin {
     fn of(texture: &Texture, encodings: Encodings) -> Self {
         Self {
             source: texture.source.clone(),
@@ -240,9 +240,9 @@ impl Origin {
 /// renders a model often cannot.
 fn decoded(
     texture: &Texture,
-    mut origin: Origin,
+    mut origin: ImageOrigin,
     limits: Limits,
-) -> Result<(Arc<Image>, Origin), ImageError> {
+) -> Result<(Arc<Image>, ImageOrigin), ImageError> {
     let decode = || -> Result<Image, ImageError> {
         let mut image = texture.decode(limits)?;
         for encoding in origin.encodings.into_iter().flatten() {

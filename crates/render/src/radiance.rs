@@ -63,14 +63,14 @@ impl LightPass<'_> {
 
 /// The random numbers of a batch of rays.
 #[derive(Debug, Default)]
-pub(crate) struct Numbers {
+pub(crate) struct SampleNumbers {
     /// The pixel's numbers and the sample's index of each sample of the film.
     pub(crate) samples: Vec<(PixelSamples, u32)>,
     /// The sample of each ray.
     of_ray: Vec<u32>,
 }
 
-impl Samples for Numbers {
+impl Samples for SampleNumbers {
     fn squares(&self, wanted: &[(u32, u32)], out: &mut Vec<[f64; 2]>) {
         let sample_of = |ray: u32| self.samples[self.of_ray[ray as usize] as usize];
         let Some(&(_, pair)) = wanted.first() else { return out.clear() };

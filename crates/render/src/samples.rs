@@ -18,9 +18,9 @@ use etendue_tracer::Scratch;
 use etendue_tracer::layer::{Columns, Taken};
 use rayon::prelude::*;
 
-use crate::adaptive::Blocks;
-use crate::film::{FilmLayer, NoMemory, Rows, Strip, filled, strips, take};
-use crate::radiance::Numbers;
+use crate::adaptive::SampleBlocks;
+use crate::film::{FilmLayer, NoMemory, PlaneRows, Strip, filled, strips, take};
+use crate::radiance::SampleNumbers;
 use crate::shard::Shard;
 use crate::tiles::{RayCounts, TILE, Tile};
 use crate::watch::{Stopped, Watcher};
@@ -116,7 +116,7 @@ pub(crate) trait Averaged: Sync {
 #[derive(Debug, Default)]
 pub(crate) struct Memory {
     /// What the samples of the batch are sampled by, and the sample of each ray.
-    pub(crate) numbers: Numbers,
+    pub(crate) numbers: SampleNumbers,
     pub(crate) rays: CameraRays,
     pub(crate) values: Vec<f64>,
     /// `[ray][part][band]`, where light is told apart.
@@ -201,7 +201,7 @@ impl<'a> Averaging<'a> {
     pub(crate) fn add(
         &mut self,
         pass: &Range<u32>,
-        blocks: Option<&Blocks>,
+        blocks: Option<&SampleBlocks>,
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
@@ -287,7 +287,7 @@ pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usiz
             continue;
         }
         for (plane, sum) in layer.planes.iter_mut().zip(sums) {
-            Rows::put(plane, index, sum.total() / f64::from(samples));
+            PlaneRows::put(plane, index, sum.total() / f64::from(samples));
         }
     }
 }
@@ -297,7 +297,7 @@ struct Adding<'a> {
     what: &'a dyn Averaged,
     sampling: Sampling,
     pass: &'a Range<u32>,
-    blocks: Option<&'a Blocks>,
+    blocks: Option<&'a SampleBlocks>,
     watcher: &'a Watcher<'a>,
 }
 

@@ -205,7 +205,7 @@ impl Job<'_> {
             let Some(mut strip) = take(strip).filter(|_| self.sampling.shard.owns(k)) else {
                 return Ok(());
             };
-            let mut batch = Batch::new(self.detail);
+            let mut batch = RayBuffers::new(self.detail);
             let done = self.fill(&mut strip, width, &mut batch, watcher);
             let own = RayCounts { chief_rays: batch.traced, ..RayCounts::default() };
             RayCounts::add(traffic, own, &FateCounts::default());
@@ -217,14 +217,14 @@ impl Job<'_> {
         &self,
         strip: &mut Strip<'_>,
         width: u32,
-        batch: &mut Batch,
+        batch: &mut RayBuffers,
         watcher: &Watcher<'_>,
     ) -> Result<(), Stopped> {
         for tile in Tile::across(width, strip) {
             batch.aim_at_centres(self.camera, tile);
             self.accel.closest(&batch.rays, &mut batch.hits);
             batch.traced += batch.rays.len() as u64;
-            let Batch { rays, hits, columns, rows, places, values, .. } = &mut *batch;
+            let RayBuffers { rays, hits, columns, rows, places, values, .. } = &mut *batch;
             let seen = Seen { places: [columns, rows], ..self.seen(Traced { rays, hits }) };
             for layer in &mut strip.layers {
                 layer.spec.fill(&seen, values);
@@ -323,7 +323,7 @@ fn even_bits(k: u32) -> u32 {
 }
 
 /// One thread's rays and hits.
-struct Batch {
+struct RayBuffers {
     rays: RayBatch,
     hits: HitBatch,
     columns: Vec<f64>,
@@ -337,7 +337,7 @@ struct Batch {
     traced: u64,
 }
 
-impl Batch {
+impl RayBuffers {
     fn new(detail: Detail) -> Self {
         Self {
             rays: RayBatch::default(),

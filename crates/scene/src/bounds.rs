@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use etendue_camera::Support;
+use etendue_camera::SupportFunction;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Geometry, Placement};
 use rayon::prelude::*;
@@ -43,9 +43,9 @@ pub(crate) fn tight(geometry: &Geometry) -> Bounds {
 }
 
 /// The vertices of all triangles in world space, as a camera that frames them asks.
-pub(crate) struct Vertices<'a>(pub(crate) &'a Geometry);
+pub(crate) struct WorldVertices<'a>(pub(crate) &'a Geometry);
 
-impl Support for Vertices<'_> {
+impl SupportFunction for WorldVertices<'_> {
     /// Visits the placements that may reach farthest first, and no other once their boxes do not.
     fn support(&self, origin: DVec3, directions: &[DVec3]) -> Vec<f64> {
         let geometry = self.0;
@@ -179,13 +179,13 @@ mod tests {
                 }
             }
         }
-        let found = Vertices(&geometry).support(origin, &directions);
+        let found = WorldVertices(&geometry).support(origin, &directions);
         for (found, expected) in found.iter().zip(expected) {
             // A few roundings of numbers near 10.
             assert!((found - expected).abs() < 1e-13, "{found} {expected}");
         }
         assert_eq!(
-            Vertices(&Geometry::default()).support(origin, &[DVec3::X]),
+            WorldVertices(&Geometry::default()).support(origin, &[DVec3::X]),
             [f64::NEG_INFINITY]
         );
     }

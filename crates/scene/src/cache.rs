@@ -43,7 +43,7 @@ pub(crate) enum Origin {
 
 /// How a model was read.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Manner {
+pub(crate) struct ImportManner {
     pub(crate) wanted: Wanted,
     pub(crate) strictness: Strictness,
     pub(crate) root: Option<PathBuf>,
@@ -54,7 +54,7 @@ pub(crate) struct Manner {
 #[derive(Debug)]
 struct Kept {
     origin: Origin,
-    manner: Manner,
+    manner: ImportManner,
     import: Arc<Import>,
     /// Its files as they were.
     files: Vec<(PathBuf, Stamp)>,
@@ -119,7 +119,7 @@ impl Cache {
     }
 
     /// The model, where it was read in this manner and its files have not changed since.
-    pub(crate) fn model(&self, origin: &Origin, manner: &Manner) -> Option<Arc<Import>> {
+    pub(crate) fn model(&self, origin: &Origin, manner: &ImportManner) -> Option<Arc<Import>> {
         let mut kept = locked(&self.kept);
         let known = kept.iter_mut().find(|k| k.origin == *origin && k.manner == *manner)?;
         if !are_current(&known.files) {
@@ -131,7 +131,7 @@ impl Cache {
 
     /// Keeps a model. Corners and triangles that are the same as before, when less or more was read of
     /// the file, are in memory once.
-    pub(crate) fn keep(&self, origin: Origin, manner: Manner, import: &mut Import) {
+    pub(crate) fn keep(&self, origin: Origin, manner: ImportManner, import: &mut Import) {
         let mut kept = locked(&self.kept);
         kept.retain(|k| !(k.origin == origin && k.manner == manner));
         for other in kept.iter().filter(|k| k.origin == origin) {

@@ -8,7 +8,7 @@ use etendue_camera::{Pose, Subject, Viewpoint};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Geometry, Placement, Transform};
 
-use crate::bounds::{self, Vertices};
+use crate::bounds::{self, WorldVertices};
 
 /// Columns and rows of a coarse picture.
 const CELLS: usize = 48;
@@ -29,7 +29,7 @@ const MOST_TRIANGLES: u64 = 10_000_000;
 const INSIDE: f64 = 0.1;
 
 /// What a camera without a pose has to frame, and from where.
-pub(crate) fn subject<'a>(vertices: &'a Vertices<'a>) -> Subject<'a> {
+pub(crate) fn subject<'a>(vertices: &'a WorldVertices<'a>) -> Subject<'a> {
     let geometry = vertices.0;
     let subject = Subject { points: Some(vertices), ..Subject::from(bounds::tight(geometry)) };
     let bounds = subject.bounds;
@@ -37,7 +37,7 @@ pub(crate) fn subject<'a>(vertices: &'a Vertices<'a>) -> Subject<'a> {
     if !is_box || bounds.diagonal() == 0.0 || geometry.triangles() > MOST_TRIANGLES {
         return subject;
     }
-    let usual = Seen::of(geometry, bounds, &subject.view());
+    let usual = CoarseCounts::of(geometry, bounds, &subject.view());
     if usual.backs() <= MOST_BACKS {
         return subject;
     }
@@ -57,7 +57,7 @@ fn viewpoint(geometry: &Geometry, subject: &Subject<'_>) -> Viewpoint {
     let mut is_closed = true;
     for side in [DVec3::Z, DVec3::NEG_Z, DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
         let view = Subject { viewpoint: Viewpoint::Side(side), ..*subject }.view();
-        let seen = Seen::of(geometry, bounds, &view);
+        let seen = CoarseCounts::of(geometry, bounds, &view);
         if seen.backs() < 1.0 - MOSTLY && (side.y == 0.0 || seen.is_full() && is_low(bounds)) {
             return Viewpoint::Side(side);
         }
@@ -79,13 +79,13 @@ fn is_low(bounds: Bounds) -> bool {
 
 /// What a coarse parallel picture shows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Seen {
+struct CoarseCounts {
     fronts: u32,
     backs: u32,
     nothing: u32,
 }
 
-impl Seen {
+impl CoarseCounts {
     /// A picture of `bounds` in the direction of `view`.
     fn of(geometry: &Geometry, bounds: Bounds, view: &Pose) -> Self {
         let mut picture = Coarse::new(bounds, view);
@@ -221,12 +221,12 @@ fn place_within(geometry: &Geometry, bounds: Bounds, forward: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
-    use etendue_geometry::{Mesh, Positions, Vertices as Vertices3};
+    use etendue_geometry::{Mesh, Positions, Vertices};
 
     use super::*;
 
     fn viewpoint_of(geometry: &Geometry) -> Viewpoint {
-        subject(&Vertices(geometry)).viewpoint
+        subject(&WorldVertices(geometry)).viewpoint
     }
 
     /// The corner of a box of these half-sides whose number's bits are x, y and z.
@@ -244,7 +244,7 @@ mod tests {
             [[a, b, c], [a, c, d]]
         };
         let triangles: Vec<[u32; 3]> = sides.iter().flat_map(two).collect();
-        Mesh::new("", Positions::F32(Vertices3::from_arrays(&positions)), triangles.into())
+        Mesh::new("", Positions::F32(Vertices::from_arrays(&positions)), triangles.into())
     }
 
     fn at(mesh: u32, scale: DVec3, place: DVec3) -> Placement {
@@ -294,7 +294,7 @@ mod tests {
     #[test]
     fn a_closed_room_is_seen_from_within() {
         let geometry = room(&[], true);
-        let vertices = Vertices(&geometry);
+        let vertices = WorldVertices(&geometry);
         let subject = subject(&vertices);
         let Viewpoint::Within(place) = subject.viewpoint else { panic!("{subject:?}") };
         let (low, high) = (subject.bounds.min, subject.bounds.max);
@@ -318,7 +318,7 @@ mod tests {
             triangles.push([first, first + 1, first + 2]);
         }
         let mesh =
-            Mesh::new("", Positions::F32(Vertices3::from_arrays(&positions)), triangles.into());
+            Mesh::new("", Positions::F32(Vertices::from_arrays(&positions)), triangles.into());
         Geometry { meshes: vec![mesh], placements: vec![at(0, DVec3::ONE, DVec3::ZERO)] }
     }
 
@@ -327,7 +327,7 @@ mod tests {
         for height in [2.0, 5.0] {
             for leaves in [6, 40] {
                 let geometry = palm(height, leaves);
-                let vertices = Vertices(&geometry);
+                let vertices = WorldVertices(&geometry);
                 let up = subject(&vertices).view().forward().y.abs();
                 assert!(up < 0.7, "{leaves} leaves at {height}: looked at along {up}");
             }

@@ -13,7 +13,7 @@ use etendue_geometry::{Bounds, Geometry};
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
 
-use crate::cache::{KeptCamera, Manner};
+use crate::cache::{ImportManner, KeptCamera};
 use crate::doctor::memory;
 use crate::file::{FileKind, ObjectSpec, SceneFile, join, join_index};
 use crate::identity::Ingredients;
@@ -133,7 +133,7 @@ impl SceneFile {
             true => memory::structure(triangles),
             false => 0,
         };
-        let manner = Manner {
+        let manner = ImportManner {
             wanted,
             strictness: options.strictness,
             root: folder.limit().map(std::path::Path::to_owned),
@@ -145,7 +145,7 @@ impl SceneFile {
             .map(|origin| {
                 let at = join_index("objects", origin.user);
                 let known = origin.kind.kept();
-                let manner = Manner { play: origin.kind.play(), ..manner.clone() };
+                let manner = ImportManner { play: origin.kind.play(), ..manner.clone() };
                 if let Some(import) = known.as_ref().and_then(|known| kept.model(known, &manner)) {
                     return self.again(&import, budget, &objects[origin.user].title, structure);
                 }

@@ -31,7 +31,7 @@ enum Number {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Order {
+enum ByteOrder {
     Little,
     Big,
 }
@@ -45,7 +45,7 @@ pub(crate) fn read(
     let broken = |why: String| format!("has a broken header: {why}; write it with numpy.save");
     let text = std::str::from_utf8(text).map_err(|_| broken("it is not UTF-8".to_owned()))?;
     // What kind of numbers, in which order, and how many.
-    let header = Header::parse(text).map_err(broken)?;
+    let header = NpyHeader::parse(text).map_err(broken)?;
     let (kind, order) = number(header.kind)?;
     fits(&header.shape)?;
     if header.fortran_order {
@@ -66,15 +66,15 @@ pub(crate) fn read(
     let numbers = match kind {
         Number::F32 => {
             let of = match order {
-                Order::Little => f32::from_le_bytes,
-                Order::Big => f32::from_be_bytes,
+                ByteOrder::Little => f32::from_le_bytes,
+                ByteOrder::Big => f32::from_be_bytes,
             };
             data.as_chunks().0.iter().map(|&bytes| f64::from(of(bytes))).collect()
         }
         Number::F64 => {
             let of = match order {
-                Order::Little => f64::from_le_bytes,
-                Order::Big => f64::from_be_bytes,
+                ByteOrder::Little => f64::from_le_bytes,
+                ByteOrder::Big => f64::from_be_bytes,
             };
             data.as_chunks().0.iter().map(|&bytes| of(bytes)).collect()
         }
@@ -110,11 +110,11 @@ fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
 }
 
 /// The type that `descr` names.
-fn number(descr: &str) -> Result<(Number, Order), String> {
-    let native = if cfg!(target_endian = "little") { Order::Little } else { Order::Big };
+fn number(descr: &str) -> Result<(Number, ByteOrder), String> {
+    let native = if cfg!(target_endian = "little") { ByteOrder::Little } else { ByteOrder::Big };
     let (order, kind) = match descr.split_at_checked(1) {
-        Some(("<", kind)) => (Order::Little, kind),
-        Some((">", kind)) => (Order::Big, kind),
+        Some(("<", kind)) => (ByteOrder::Little, kind),
+        Some((">", kind)) => (ByteOrder::Big, kind),
         Some(("=", kind)) => (native, kind),
         _ => (native, descr),
     };
@@ -130,13 +130,13 @@ fn number(descr: &str) -> Result<(Number, Order), String> {
 
 /// What the header says.
 #[derive(Debug, PartialEq)]
-struct Header<'a> {
+struct NpyHeader<'a> {
     kind: &'a str,
     fortran_order: bool,
     shape: Vec<usize>,
 }
 
-impl<'a> Header<'a> {
+impl<'a> NpyHeader<'a> {
     /// Reads `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4, 4), }`, keys in any order.
     fn parse(text: &'a str) -> Result<Self, String> {
         let mut rest = Rest(text);

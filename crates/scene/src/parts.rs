@@ -113,7 +113,8 @@ impl Parts {
     pub(crate) fn place(&mut self, object: &Object, split_nodes: bool) -> Result<(), &'static str> {
         let home = &self.homes[object.origin];
         let sum = |offset: usize, index: u32| u32::try_from(offset + index as usize).ok();
-        let mut numbers = Numbers::new(object, &home.placements, split_nodes, &mut self.register)?;
+        let mut numbers =
+            PlacementNumbers::new(object, &home.placements, split_nodes, &mut self.register)?;
         let first_object = numbers.first_object;
         for placement in &home.placements {
             let own = sum(home.materials, placement.material).ok_or("materials")?;
@@ -179,7 +180,7 @@ impl Parts {
 }
 
 /// The numbers that the placements of one object get.
-struct Numbers<'a> {
+struct PlacementNumbers<'a> {
     object: &'a Object,
     register: &'a mut Register,
     /// The object's index; of a model split into its nodes, that of the first.
@@ -202,7 +203,7 @@ struct PlacedNode {
     each: u32,
 }
 
-impl<'a> Numbers<'a> {
+impl<'a> PlacementNumbers<'a> {
     fn new(
         object: &'a Object,
         placements: &[ImportedPlacement],

@@ -44,7 +44,7 @@ impl Folder {
 
     /// Where `written` leads, to be opened and, with links followed, to be compared. The error says
     /// what is wrong with it.
-    pub(crate) fn find(&self, written: &str) -> Result<Found, String> {
+    pub(crate) fn find(&self, written: &str) -> Result<FoundFile, String> {
         let outside = |how: &str| {
             format!(
                 "\"{written}\" {how}the scene's folder {}; move the file there, or pass \
@@ -76,7 +76,7 @@ impl Folder {
             _ => format!("\"{written}\" cannot be read: {error}"),
         })?;
         self.found.lock().unwrap_or_else(PoisonError::into_inner).insert(path.clone());
-        Ok(Found { path, real })
+        Ok(FoundFile { path, real })
     }
 
     /// The files that were found so far, each once.
@@ -95,7 +95,7 @@ impl Folder {
 
 /// A file that a scene names.
 #[derive(Debug, Clone)]
-pub(crate) struct Found {
+pub(crate) struct FoundFile {
     /// As the scene reaches it.
     pub(crate) path: PathBuf,
     /// Without links.

@@ -18,7 +18,7 @@ use etendue_spectrum::{Bands, Curve, Grid, Outside, WeightedBands, rgb};
 use crate::response::{Filter, Response, filters, photons_caught, sensitive_range};
 use crate::spec::{Radiometry, SensorKind};
 use crate::{Sensor, SensorError};
-use nodes::{Nodes, Sums, cell_edges, product};
+use nodes::{Nodes, RunningSums, cell_edges, product};
 
 /// By how much of themselves electrons may differ from an integration in steps of a nanometre.
 pub const TOLERANCE: f64 = 1e-3;
@@ -83,7 +83,7 @@ impl Sensor {
             None => lit_range(sensitive_range(&self.settings.efficiency, &filters), light)?,
         };
         let edges = given.clone().unwrap_or(range.to_vec());
-        let Some(table) = Table::new(self, &filters, light, range, &edges) else {
+        let Some(table) = BandTable::new(self, &filters, light, range, &edges) else {
             return Ok(BandChoice { bands: self.response.bands.clone(), error: None });
         };
         // The bands of ideal filters will do where they count the same electrons.
@@ -130,27 +130,27 @@ struct Trial {
     channel: usize,
     filter: Option<usize>,
     colors: [Option<usize>; 2],
-    exact: Sums,
+    exact: RunningSums,
     /// What an error is a part of.
     scale: f64,
 }
 
 /// Integrals over narrow cells, from which those over any band follow.
-struct Table {
+struct BandTable {
     /// Of the cells (nm).
     edges: Vec<f64>,
     /// The sensor's: of all channels together.
-    seen: Sums,
+    seen: RunningSums,
     /// Of each light, by the sensor.
-    lights: Vec<Sums>,
+    lights: Vec<RunningSums>,
     /// Of the mean light, by the sensor.
-    weight: Sums,
+    weight: RunningSums,
     /// Of each primary, by sensor and mean light.
-    primaries: [Sums; 3],
+    primaries: [RunningSums; 3],
     /// Of each filter, likewise.
-    filters: Vec<Sums>,
+    filters: Vec<RunningSums>,
     /// Of the mean light by each channel.
-    channels: Vec<Sums>,
+    channels: Vec<RunningSums>,
     trials: Vec<Trial>,
     sensitivity: Curve,
     mean_light: Curve,
@@ -169,7 +169,7 @@ fn inside(curve: &Curve, nm: f64) -> f64 {
     curve.at(nm).unwrap_or(0.0)
 }
 
-impl Table {
+impl BandTable {
     /// `None` when it would be too large.
     fn new(
         sensor: &Sensor,
@@ -278,7 +278,7 @@ impl Table {
     /// The electrons that a band of cells loses of a trial (or finds too many), as a part of its
     /// scale.
     fn lost(&self, trial: &Trial, [a, b]: [usize; 2]) -> f64 {
-        let over = |sums: &Sums| sums[b] - sums[a];
+        let over = |sums: &RunningSums| sums[b] - sums[a];
         let (seen, weight) = (over(&self.seen), over(&self.weight));
         let mut counted = 0.0;
         if seen > 0.0 && weight > 0.0 {

@@ -22,8 +22,8 @@
 
 use crate::clipping::clipped;
 use crate::normal::{ln, pair};
-use crate::philox::{Key, Site, Stage, unit32, unit52};
-use crate::poisson::{FINISHED_TOGETHER, Open, PD_FROM, finish, first_try, small_means};
+use crate::philox::{PhiloxKey, Site, Stage, unit32, unit52};
+use crate::poisson::{FINISHED_TOGETHER, OpenPixel, PD_FROM, finish, first_try, small_means};
 use crate::spec::NoiseModel;
 
 /// Pixels of a block: enough to fill vectors, few enough to stay in the nearest cache.
@@ -33,7 +33,7 @@ pub(crate) const BLOCK: usize = 128;
 const GROUP: usize = 32;
 
 /// One number a pixel of a block.
-pub(crate) type Lane = [f64; BLOCK];
+pub(crate) type BlockValues = [f64; BLOCK];
 
 /// 2⁵²: a number below 2³², added to it, is rounded to an integer (half to even) that stands in the
 /// low bits.
@@ -62,19 +62,19 @@ pub(crate) struct Chain {
     /// Share of hot pixels, and the mean of their extra dark signal (e⁻).
     pub(crate) hot: Option<[f64; 2]>,
     /// The seed of temporal noise.
-    pub(crate) temporal: Key,
+    pub(crate) temporal: PhiloxKey,
     /// The serial number.
-    pub(crate) pattern: Key,
+    pub(crate) pattern: PhiloxKey,
 }
 
 /// A block's place: `site` and its first column.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct BlockPlace {
     pub(crate) site: Site,
     pub(crate) column: u32,
 }
 
-impl Place {
+impl BlockPlace {
     /// The column of pixel `i` of the block.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "less than a block")]
@@ -88,9 +88,9 @@ impl Place {
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn expose(
     chain: &Chain,
-    place: Place,
-    mean: &mut Lane,
-    offset: &mut Lane,
+    place: BlockPlace,
+    mean: &mut BlockValues,
+    offset: &mut BlockValues,
     out: &mut [u16; BLOCK],
 ) {
     if chain.noise == NoiseModel::None {
@@ -119,9 +119,9 @@ pub(crate) fn expose(
 pub(crate) fn moments(
     chain: &Chain,
     shared: f64,
-    place: Place,
-    mean: &mut Lane,
-    variance: &mut Lane,
+    place: BlockPlace,
+    mean: &mut BlockValues,
+    variance: &mut BlockValues,
 ) {
     let mut offset = [0.0; BLOCK];
     if chain.has_pattern() {
@@ -145,7 +145,12 @@ impl Chain {
 
 /// Two normal deviates and a uniform one a pixel.
 #[inline(always)]
-fn deviates(key: &Key, place: Place, normals: &mut [Lane; 2], units: &mut Lane) {
+fn deviates(
+    key: &PhiloxKey,
+    place: BlockPlace,
+    normals: &mut [BlockValues; 2],
+    units: &mut BlockValues,
+) {
     for i in 0..BLOCK {
         let counter = place.site.counter(place.at(i), Stage::Temporal, 0);
         let [a, b, c, d] = key.words(counter);
@@ -156,7 +161,7 @@ fn deviates(key: &Key, place: Place, normals: &mut [Lane; 2], units: &mut Lane) 
 
 /// PRNU, DSNU and hot pixels: the same in every frame of a sensor.
 #[inline(always)]
-fn pattern(chain: &Chain, place: Place, mean: &mut Lane, offset: &mut Lane) {
+fn pattern(chain: &Chain, place: BlockPlace, mean: &mut BlockValues, offset: &mut BlockValues) {
     let site = Site { frame: 0, ..place.site };
     let mut chance = [0.0; BLOCK];
     for i in 0..BLOCK {
@@ -184,7 +189,7 @@ fn photo_response(prnu: f64, z: f64, mean: f64) -> f64 {
 
 /// `μ = μₑ + μ_I·T`.
 #[inline(always)]
-fn dark_signal(dark: f64, mean: &mut Lane) {
+fn dark_signal(dark: f64, mean: &mut BlockValues) {
     for mean in mean {
         *mean += dark;
     }
@@ -192,7 +197,13 @@ fn dark_signal(dark: f64, mean: &mut Lane) {
 
 /// n ~ Poisson(μ): electrons of light and of heat together, for a sum of Poisson variables is one.
 #[inline(always)]
-fn shot_noise(chain: &Chain, place: Place, mean: &mut Lane, normals: &Lane, units: &Lane) {
+fn shot_noise(
+    chain: &Chain,
+    place: BlockPlace,
+    mean: &mut BlockValues,
+    normals: &BlockValues,
+    units: &BlockValues,
+) {
     // A first try for all; most pixels are done with it.
     let mut electrons = [0.0; BLOCK];
     for i in 0..BLOCK {
@@ -216,7 +227,7 @@ fn shot_noise(chain: &Chain, place: Place, mean: &mut Lane, normals: &Lane, unit
     }
     // Those are finished, as many together as there are.
     for chosen in open[..count].chunks(FINISHED_TOGETHER) {
-        let pixel = |i: usize| Open {
+        let pixel = |i: usize| OpenPixel {
             mean: mean[i],
             normal: normals[i],
             unit: units[i],
@@ -238,7 +249,7 @@ fn any(values: &[f64; GROUP], condition: impl Fn(f64) -> bool) -> bool {
 
 /// n ~ N(μ, μ), the approximation.
 #[inline(always)]
-fn normal_shot_noise(mean: &mut Lane, normals: &Lane) {
+fn normal_shot_noise(mean: &mut BlockValues, normals: &BlockValues) {
     for (mean, z) in mean.iter_mut().zip(normals) {
         *mean += mean.sqrt() * z;
     }
@@ -246,7 +257,7 @@ fn normal_shot_noise(mean: &mut Lane, normals: &Lane) {
 
 /// No more electrons than the pixel holds.
 #[inline(always)]
-fn full_well(capacity: f64, electrons: &mut Lane) {
+fn full_well(capacity: f64, electrons: &mut BlockValues) {
     for electrons in electrons {
         *electrons = electrons.min(capacity);
     }
@@ -254,7 +265,7 @@ fn full_well(capacity: f64, electrons: &mut Lane) {
 
 /// `n + σ_read·z` + offsets (e⁻).
 #[inline(always)]
-fn read_out(sigma: f64, normals: &Lane, offset: &Lane, electrons: &mut Lane) {
+fn read_out(sigma: f64, normals: &BlockValues, offset: &BlockValues, electrons: &mut BlockValues) {
     for i in 0..BLOCK {
         electrons[i] += sigma * normals[i] + offset[i];
     }
@@ -263,7 +274,7 @@ fn read_out(sigma: f64, normals: &Lane, offset: &Lane, electrons: &mut Lane) {
 /// y = clip(round(K·n + black), 0, 2ᵇ − 1), half to even.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "at most 2¹⁶ − 1 after clipping")]
-fn convert(chain: &Chain, electrons: &Lane, out: &mut [u16; BLOCK]) {
+fn convert(chain: &Chain, electrons: &BlockValues, out: &mut [u16; BLOCK]) {
     for i in 0..BLOCK {
         let level = (chain.gain * electrons[i] + chain.black).clamp(0.0, chain.white);
         out[i] = (level + TO_INTEGER).to_bits() as u16;

@@ -70,14 +70,14 @@ pub struct Manifest {
     /// Bits of the converter.
     pub bits: u32,
     /// Two bright and two dark files at each exposure time, ascending.
-    pub steps: Vec<Step>,
+    pub steps: Vec<SeriesStep>,
     /// Sixteen bright and sixteen dark files at half saturation.
-    pub spatial: Step,
+    pub spatial: SeriesStep,
 }
 
 /// The files of one exposure time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Step {
+pub struct SeriesStep {
     /// Exposure time (s).
     pub exposure_s: f64,
     /// Mean photons a pixel in the bright files.
@@ -120,7 +120,7 @@ pub struct Series {
 }
 
 /// One image to be made.
-struct Picture<'a> {
+struct SeriesImage<'a> {
     name: &'a str,
     photons: f64,
     shot: Exposure,
@@ -154,12 +154,13 @@ impl Series {
                 (0..frames).map(|frame| format!("{kind}_{prefix}_{frame:02}.png")).collect()
             };
             let photons = light.rounded(photons_a_second * exposure_s);
-            let step = Step { exposure_s, photons, bright: files("bright"), dark: files("dark") };
+            let step =
+                SeriesStep { exposure_s, photons, bright: files("bright"), dark: files("dark") };
             (step, nanoseconds)
         };
         let count = options.steps;
         let each = |i: usize| step(longest * i as f64 / count as f64, &format!("{i:03}"), 2);
-        let (steps, mut times): (Vec<Step>, Vec<u64>) = (1..=count).map(each).unzip();
+        let (steps, mut times): (Vec<SeriesStep>, Vec<u64>) = (1..=count).map(each).unzip();
         let (spatial, time) = step(0.5 * saturating, "spatial", SPATIAL);
         times.push(time);
         let manifest = Manifest { bits: sensor.bit_depth(), steps, spatial };
@@ -228,18 +229,18 @@ impl Series {
         text
     }
 
-    fn steps(&self) -> impl Iterator<Item = &Step> {
+    fn steps(&self) -> impl Iterator<Item = &SeriesStep> {
         self.manifest.steps.iter().chain([&self.manifest.spatial])
     }
 
     /// All images; every one is a frame of its own.
-    fn pictures(&self) -> Vec<Picture<'_>> {
+    fn pictures(&self) -> Vec<SeriesImage<'_>> {
         let named = self.steps().flat_map(|step| {
             let bright = step.bright.iter().map(|name| (step.photons, name));
             let dark = step.dark.iter().map(|name| (0.0, name));
             bright.chain(dark).map(|(photons, name)| (step.exposure_s, photons, name))
         });
-        let numbered = named.zip(0..).map(|((exposure, photons, name), frame)| Picture {
+        let numbered = named.zip(0..).map(|((exposure, photons, name), frame)| SeriesImage {
             name,
             photons,
             shot: Exposure { exposure, frame },

@@ -135,7 +135,7 @@ impl SensorError {
     pub fn why(&self) -> String {
         match self {
             Self::Value { value, demand, .. } => {
-                format!("expected {demand}, found {}", Shown(*value))
+                format!("expected {demand}, found {}", Readable(*value))
             }
             Self::Missing { why, .. } => format!("is missing: {why}"),
             Self::Misplaced { why, .. } => format!("is of no use here: {why}"),
@@ -143,8 +143,8 @@ impl SensorError {
             Self::FullWell { full_well, gain } => format!(
                 "{} e⁻ times the system_gain of {} DN/e⁻ is not half a digital number: every pixel \
                  would be black; one of the two is too small",
-                Shown(*full_well),
-                Shown(*gain)
+                Readable(*full_well),
+                Readable(*gain)
             ),
             Self::Pattern(why) => why.clone(),
             Self::Channel { index, why } => format!("the name of channel {index} {why}"),
@@ -189,9 +189,9 @@ impl fmt::Display for SensorError {
 impl std::error::Error for SensorError {}
 
 /// A number as people write it: neither 300 digits nor 300 zeros.
-struct Shown(f64);
+struct Readable(f64);
 
-impl fmt::Display for Shown {
+impl fmt::Display for Readable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(value) = *self;
         if value == 0.0 || (1e-4..1e15).contains(&value.abs()) {

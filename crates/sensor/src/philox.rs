@@ -21,9 +21,9 @@ const LOW: u64 = 0xFFFF_FFFF;
 
 /// A random sequence: the seed of temporal noise, or the serial number of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Key([u32; ROUNDS], [u32; ROUNDS]);
+pub(crate) struct PhiloxKey([u32; ROUNDS], [u32; ROUNDS]);
 
-impl Key {
+impl PhiloxKey {
     #[expect(clippy::cast_possible_truncation, reason = "the halves of a word")]
     pub(crate) fn new(seed: u64) -> Self {
         let halves = [seed as u32, (seed >> 32) as u32];
@@ -39,8 +39,12 @@ impl Key {
     /// those of two seeds.
     #[expect(clippy::cast_possible_truncation, reason = "the halves of a word")]
     pub(crate) fn temporal(seed: u64, serial: u64) -> Self {
-        let [a, b, ..] =
-            Self::new(seed).words([serial as u32, (serial >> 32) as u32, 0, Stage::Key as u32]);
+        let [a, b, ..] = Self::new(seed).words([
+            serial as u32,
+            (serial >> 32) as u32,
+            0,
+            Stage::PhiloxKey as u32,
+        ]);
         Self::new(a | b << 32)
     }
 
@@ -68,8 +72,9 @@ pub fn mixed_seed(seed: u64, identity: &[u8]) -> u64 {
         bytes[..part.len()].copy_from_slice(part);
         let word = u64::from_le_bytes(bytes);
         #[expect(clippy::cast_possible_truncation, reason = "the halves of a word")]
-        let counter = [word as u32, (word >> 32) as u32, part.len() as u32, Stage::Key as u32];
-        let [a, b, ..] = Key::new(mixed).words(counter);
+        let counter =
+            [word as u32, (word >> 32) as u32, part.len() as u32, Stage::PhiloxKey as u32];
+        let [a, b, ..] = PhiloxKey::new(mixed).words(counter);
         mixed = a | b << 32;
     }
     mixed
@@ -92,7 +97,7 @@ pub(crate) enum Stage {
     /// How hot.
     HotPixel = 6,
     /// Keys of other sequences. It is no pixel's: stages of pixels stand in the highest bits.
-    Key = 7,
+    PhiloxKey = 7,
 }
 
 /// Channels that a counter has room for.
@@ -151,7 +156,7 @@ mod tests {
             ),
         ];
         for (counter, seed, expected) in answers {
-            assert_eq!(Key::new(seed).words(counter), expected);
+            assert_eq!(PhiloxKey::new(seed).words(counter), expected);
         }
     }
 
@@ -165,7 +170,7 @@ mod tests {
             assert!(!seeds[..i].contains(seed), "{seeds:?}");
         }
         assert_eq!((mixed_seed(3, b""), mixed_seed(3, b"a")), (3, mixed_seed(3, b"a")));
-        let key = |seed, serial| Key::temporal(seed, serial);
+        let key = |seed, serial| PhiloxKey::temporal(seed, serial);
         assert!(key(1, 2) != key(2, 1) && key(1, 2) != key(1, 3) && key(0, 1) != key(1, 0));
     }
 

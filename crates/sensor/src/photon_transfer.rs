@@ -67,12 +67,12 @@ pub struct PhotonTransfer {
     /// Electrons up to which no pixel saturates; beyond, curves show the clipping (e⁻).
     pub unclipped_electrons: f64,
     /// The curves, by rising photons: the last two saturate.
-    pub points: Vec<Point>,
+    pub points: Vec<CurvePoint>,
 }
 
 /// A point of the curves. Signals are above the dark one; variances are temporal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Point {
+pub struct CurvePoint {
     /// Mean photons a pixel.
     pub photons: f64,
     /// Mean photo-electrons a pixel (e⁻).
@@ -117,7 +117,7 @@ impl PhotonTransfer {
                 0.1f64.min(most * 1e-3).powf(1.0 - part) * most.powf(part)
             }
         };
-        let points: Vec<Point> = (0..count)
+        let points: Vec<CurvePoint> = (0..count)
             .into_par_iter()
             .map(|i| bench.point(i, electrons(i)))
             .collect::<Result<_, _>>()?;
@@ -134,7 +134,7 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    fn point(&self, index: usize, electrons: f64) -> Result<Point, SensorError> {
+    fn point(&self, index: usize, electrons: f64) -> Result<CurvePoint, SensorError> {
         let photons = self.light.rounded(electrons / self.light.efficiency);
         let electrons = photons * self.light.efficiency;
         let [signal, variance] = self.pair(index, photons, NoiseModel::Poisson)?;
@@ -144,7 +144,7 @@ impl Bench<'_> {
         let ratio = |signal: f64, variance: f64| {
             if variance > 0.0 { signal.max(0.0) / variance.sqrt() } else { 0.0 }
         };
-        Ok(Point {
+        Ok(CurvePoint {
             photons,
             electrons,
             signal,
@@ -191,7 +191,7 @@ impl Bench<'_> {
         self.sensor.read_noise().powi(2) + self.sensor.dark_current() * self.exposure
     }
 
-    fn summed_up(&self, wavelength: f64, points: Vec<Point>) -> PhotonTransfer {
+    fn summed_up(&self, wavelength: f64, points: Vec<CurvePoint>) -> PhotonTransfer {
         let efficiency = self.light.efficiency;
         let gain = self.sensor.system_gain();
         let saturation = self.sensor.saturation();
@@ -285,7 +285,7 @@ mod tests {
         for model in crate::Model::ALL {
             let (_, curves) =
                 measured(model.preset().name.to_lowercase().replace('-', "").as_str());
-            let drawn: Vec<&Point> = curves.drawn().collect();
+            let drawn: Vec<&CurvePoint> = curves.drawn().collect();
             assert_eq!(drawn.len(), curves.points.len() - 2, "{model:?}");
             for p in drawn {
                 // A part in 256 of scatter: of variances of 65 536 pixels, and of the normal one's.

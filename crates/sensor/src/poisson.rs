@@ -17,7 +17,7 @@
 //! * Small means: L. Devroye, "Non-Uniform Random Variate Generation", 1986, section X.3.3.
 
 use crate::normal::{exp, floor, ln, ln_1p};
-use crate::philox::{Key, Site, Stage, unit32, unit52};
+use crate::philox::{PhiloxKey, Site, Stage, unit32, unit52};
 
 /// Mean from which algorithm PD holds.
 pub(crate) const PD_FROM: f64 = 10.0;
@@ -109,7 +109,7 @@ const INVERSES: [f64; 36] = {
 
 /// A pixel that is still [`OPEN`], with the numbers of its first try, which the full test still uses.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Open {
+pub(crate) struct OpenPixel {
     pub(crate) mean: f64,
     pub(crate) normal: f64,
     pub(crate) unit: f64,
@@ -122,8 +122,8 @@ pub(crate) const FINISHED_TOGETHER: usize = 8;
 /// The deviates of open pixels.
 #[inline(always)]
 pub(crate) fn finish(
-    open: &[Open; FINISHED_TOGETHER],
-    key: &Key,
+    open: &[OpenPixel; FINISHED_TOGETHER],
+    key: &PhiloxKey,
     site: Site,
 ) -> [f64; FINISHED_TOGETHER] {
     let mut electrons = full_tests(open, key, site);
@@ -159,7 +159,11 @@ fn tail_of_small_mean(mean: f64, above: f64) -> f64 {
 /// Steps Q, E and H: the quotient test of the first try, then double exponential deviates until one
 /// is accepted (the bound on tries is a guard that is never met). Means out of range give numbers without meaning.
 #[inline(always)]
-fn full_tests(open: &[Open; FINISHED_TOGETHER], key: &Key, site: Site) -> [f64; FINISHED_TOGETHER] {
+fn full_tests(
+    open: &[OpenPixel; FINISHED_TOGETHER],
+    key: &PhiloxKey,
+    site: Site,
+) -> [f64; FINISHED_TOGETHER] {
     let mean = open.map(|open| open.mean.clamp(PD_FROM, UNCOUNTABLE));
     let normal = open.map(|open| open.normal);
     let unit = open.map(|open| open.unit);
@@ -192,7 +196,7 @@ fn quotient_tests<const N: usize>(mean: &[f64; N], normal: &[f64; N], unit: &[f6
 #[inline(always)]
 fn exponential_tries<const N: usize>(
     mean: &[f64; N],
-    key: &Key,
+    key: &PhiloxKey,
     site: Site,
     columns: &[u32; N],
     draw: u16,

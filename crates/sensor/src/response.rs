@@ -15,7 +15,7 @@ use etendue_spectrum::{Band, Bands, Curve, Grid, PLANCK, SPEED_OF_LIGHT, VISIBLE
 
 use crate::philox::MOST_CHANNELS;
 use crate::preset::nikon_d5100;
-use crate::settings::Settings;
+use crate::settings::SensorSettings;
 use crate::spec::{FilterSet, Filters, Radiometry, SensorKind, SensorSpec};
 use crate::{CfaSpec, SensorError};
 
@@ -124,7 +124,7 @@ impl Response {
     /// For the fewest bands that the sensor can tell apart, or for given ones.
     pub(crate) fn new(
         spec: &SensorSpec,
-        settings: &Settings,
+        settings: &SensorSettings,
         given: Option<Bands>,
     ) -> Result<Self, SensorError> {
         let Filtered { names, filters, pattern } = filters(spec)?;
@@ -277,7 +277,7 @@ fn transmission(curve: &Curve, key: impl Fn() -> String) -> Result<Curve, Sensor
 /// The fewest bands that the sensor can tell apart.
 fn fewest_bands(
     spec: &SensorSpec,
-    settings: &Settings,
+    settings: &SensorSettings,
     filters: &[Filter],
 ) -> Result<Bands, SensorError> {
     if let Some(grid) = &spec.bands {
@@ -306,7 +306,7 @@ fn channel(
     holder: &'static str,
     [filter, ideal]: [&Filter; 2],
     bands: &Bands,
-    settings: &Settings,
+    settings: &SensorSettings,
 ) -> Result<Channel, SensorError> {
     let count = bands.count();
     let caught = |i: usize| photons_caught(bands, i, filter, &settings.efficiency);
@@ -396,7 +396,7 @@ pub(crate) fn photons_caught(bands: &Bands, i: usize, filter: &Filter, efficienc
 
 /// Digital mode: the most sensitive channel's value for 1 in all bands becomes full scale, in
 /// electrons.
-fn to_full_scale(channels: &mut [Channel], settings: &Settings) {
+fn to_full_scale(channels: &mut [Channel], settings: &SensorSettings) {
     let white = |channel: &Channel| channel.primaries.iter().sum::<f64>();
     let most = channels.iter().map(white).fold(0.0, f64::max);
     let full_scale = (settings.white() - settings.black) / settings.gain;

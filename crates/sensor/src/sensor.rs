@@ -4,13 +4,13 @@ use etendue_geometry::units::Micrometres;
 use etendue_spectrum::{Bands, Curve};
 use rayon::prelude::*;
 
-use crate::chain::{self, BLOCK, Chain, Lane, Place};
+use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain};
 use crate::film::{Exposure, Film, InvalidValues, Moments, RawImage};
 use crate::normal::pair;
-use crate::philox::{Key, Site, Stage};
+use crate::philox::{PhiloxKey, Site, Stage};
 use crate::response::Response;
 use crate::responsivity::Responsivity;
-use crate::settings::Settings;
+use crate::settings::SensorSettings;
 use crate::spec::{HotPixels, NoiseModel, Radiometry, SensorSpec};
 use crate::{CfaSpec, SensorError};
 
@@ -18,7 +18,7 @@ use crate::{CfaSpec, SensorError};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
     spec: SensorSpec,
-    pub(crate) settings: Settings,
+    pub(crate) settings: SensorSettings,
     pub(crate) response: Response,
     pub(crate) cfa: Option<CfaSpec>,
 }
@@ -30,7 +30,7 @@ impl Sensor {
     ///
     /// [`SensorError`] for any number or curve that is none, and for a channel that would be black.
     pub fn new(spec: &SensorSpec) -> Result<Self, SensorError> {
-        let settings = Settings::new(spec)?;
+        let settings = SensorSettings::new(spec)?;
         let response = Response::new(spec, &settings, None)?;
         Ok(Self { spec: spec.clone(), settings, response, cfa: spec.cfa.clone() })
     }
@@ -330,8 +330,8 @@ impl Sensor {
             prnu: s.prnu,
             dsnu: s.dsnu,
             hot: s.hot_pixels.map(hot),
-            temporal: Key::temporal(seed, s.serial),
-            pattern: Key::new(s.serial),
+            temporal: PhiloxKey::temporal(seed, s.serial),
+            pattern: PhiloxKey::new(s.serial),
         }
     }
 }
@@ -405,7 +405,7 @@ impl<'a> Exposing<'a> {
     fn blocks(
         &self,
         row: usize,
-        mut each: impl FnMut(Place, usize, usize, usize, &mut Lane),
+        mut each: impl FnMut(BlockPlace, usize, usize, usize, &mut BlockValues),
     ) -> InvalidValues {
         let width = self.sensor.settings.resolution[0] as usize;
         let bands = self.sensor.response.bands.count();
@@ -427,7 +427,7 @@ impl<'a> Exposing<'a> {
                 mean[count..].fill(last);
                 let site = self.site(row, channel);
                 #[expect(clippy::cast_possible_truncation, reason = "sides have 16 bits")]
-                each(Place { site, column: start as u32 }, start, channel, count, &mut mean);
+                each(BlockPlace { site, column: start as u32 }, start, channel, count, &mut mean);
             }
         }
         invalid
@@ -460,7 +460,7 @@ impl<'a> Exposing<'a> {
     }
 }
 
-fn one_normal(key: &Key, site: Site, column: u32, stage: Stage) -> f64 {
+fn one_normal(key: &PhiloxKey, site: Site, column: u32, stage: Stage) -> f64 {
     let [a, b, c, _] = key.words(site.counter(column, stage, 0));
     pair([a, b, c])[0]
 }

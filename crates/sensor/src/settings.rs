@@ -19,7 +19,7 @@ const MOST_CURRENT: f64 = 1e15;
 
 /// A sensor's numbers, in the units of [`SensorSpec`].
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Settings {
+pub(crate) struct SensorSettings {
     pub(crate) resolution: [u32; 2],
     pub(crate) pixel_pitch: f64,
     pub(crate) efficiency: Curve,
@@ -51,7 +51,7 @@ pub(crate) struct Settings {
     pub(crate) notes: Vec<String>,
 }
 
-impl Settings {
+impl SensorSettings {
     /// 2ᵇ − 1 (DN).
     pub(crate) fn white(&self) -> f64 {
         f64::from((1u32 << self.bit_depth) - 1)

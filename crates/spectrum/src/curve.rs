@@ -25,11 +25,11 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    shape: Shape,
+    shape: CurveShape,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Shape {
+enum CurveShape {
     Flat(f64),
     /// At least two, all finite, wavelengths positive and strictly ascending.
     Sampled(Vec<[f64; 2]>),
@@ -109,7 +109,7 @@ impl Curve {
         if !value.is_finite() {
             return Err(CurveError::NotFinite { index: 0, wavelength: f64::NAN, value });
         }
-        Ok(Self { shape: Shape::Flat(value) })
+        Ok(Self { shape: CurveShape::Flat(value) })
     }
 
     /// Samples `[nm, value]` joined by straight lines.
@@ -132,17 +132,17 @@ impl Curve {
         match samples.as_slice() {
             [] => Err(CurveError::Empty),
             &[[wavelength, _]] => Err(CurveError::Single { wavelength }),
-            _ => Ok(Self { shape: Shape::Sampled(samples) }),
+            _ => Ok(Self { shape: CurveShape::Sampled(samples) }),
         }
     }
 
     /// 1 at every wavelength.
-    pub const ONE: Self = Self { shape: Shape::Flat(1.0) };
+    pub const ONE: Self = Self { shape: CurveShape::Flat(1.0) };
 
     /// Samples that this crate makes and whose tests see to their order.
     pub(crate) fn trusted(samples: Vec<[f64; 2]>) -> Self {
         debug_assert!(Self::sampled(samples.clone()).is_ok(), "samples out of order");
-        Self { shape: Shape::Sampled(samples) }
+        Self { shape: CurveShape::Sampled(samples) }
     }
 
     /// Equally spaced samples: `values[i]` is at `start + i·step` (nm).
@@ -160,8 +160,8 @@ impl Curve {
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
         match &self.shape {
-            Shape::Flat(_) => [0.0, f64::INFINITY],
-            Shape::Sampled(s) => [s[0][0], s[s.len() - 1][0]],
+            CurveShape::Flat(_) => [0.0, f64::INFINITY],
+            CurveShape::Sampled(s) => [s[0][0], s[s.len() - 1][0]],
         }
     }
 
@@ -169,8 +169,8 @@ impl Curve {
     #[must_use]
     pub fn as_flat(&self) -> Option<f64> {
         match self.shape {
-            Shape::Flat(value) => Some(value),
-            Shape::Sampled(_) => None,
+            CurveShape::Flat(value) => Some(value),
+            CurveShape::Sampled(_) => None,
         }
     }
 
@@ -178,8 +178,8 @@ impl Curve {
     #[must_use]
     pub fn samples(&self) -> &[[f64; 2]] {
         match &self.shape {
-            Shape::Flat(_) => &[],
-            Shape::Sampled(samples) => samples,
+            CurveShape::Flat(_) => &[],
+            CurveShape::Sampled(samples) => samples,
         }
     }
 
@@ -194,8 +194,8 @@ impl Curve {
     #[must_use]
     pub fn held(&self, wavelength: f64) -> f64 {
         let samples = match &self.shape {
-            Shape::Flat(value) => return *value,
-            Shape::Sampled(samples) => samples,
+            CurveShape::Flat(value) => return *value,
+            CurveShape::Sampled(samples) => samples,
         };
         let after = samples.partition_point(|&[nm, _]| nm <= wavelength);
         if after == 0 {
@@ -212,7 +212,7 @@ impl Curve {
     /// not reach them.
     #[must_use]
     pub fn held_over(&self, from: f64, to: f64) -> Self {
-        let Shape::Sampled(samples) = &self.shape else { return self.clone() };
+        let CurveShape::Sampled(samples) = &self.shape else { return self.clone() };
         let mut samples = samples.clone();
         let [first, last] = [samples[0], samples[samples.len() - 1]];
         if from > 0.0 && from < first[0] {
@@ -221,15 +221,15 @@ impl Curve {
         if to.is_finite() && to > last[0] {
             samples.push([to, last[1]]);
         }
-        Self { shape: Shape::Sampled(samples) }
+        Self { shape: CurveShape::Sampled(samples) }
     }
 
     /// The least and the greatest value.
     #[must_use]
     pub fn extent(&self) -> [f64; 2] {
         match &self.shape {
-            Shape::Flat(value) => [*value, *value],
-            Shape::Sampled(samples) => {
+            CurveShape::Flat(value) => [*value, *value],
+            CurveShape::Sampled(samples) => {
                 samples.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], s| {
                     [low.min(s[1]), high.max(s[1])]
                 })
@@ -258,8 +258,8 @@ impl Curve {
     pub fn within(self, low: f64, high: f64) -> Result<Self, CurveError> {
         let outside = |value: f64| !(low..=high).contains(&value);
         let found = match &self.shape {
-            Shape::Flat(value) => outside(*value).then_some((None, *value)),
-            Shape::Sampled(samples) => {
+            CurveShape::Flat(value) => outside(*value).then_some((None, *value)),
+            CurveShape::Sampled(samples) => {
                 samples.iter().find(|s| outside(s[1])).map(|s| (Some(s[0]), s[1]))
             }
         };
@@ -278,8 +278,8 @@ impl Curve {
     /// When a product is not finite.
     pub fn scaled(&self, factor: f64) -> Result<Self, CurveError> {
         match &self.shape {
-            Shape::Flat(value) => Self::flat(value * factor),
-            Shape::Sampled(samples) => {
+            CurveShape::Flat(value) => Self::flat(value * factor),
+            CurveShape::Sampled(samples) => {
                 Self::sampled(samples.iter().map(|&[nm, value]| [nm, value * factor]).collect())
             }
         }
@@ -343,8 +343,8 @@ impl TryFrom<Vec<[f64; 2]>> for Curve {
 impl Serialize for Curve {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match &self.shape {
-            Shape::Flat(value) => serializer.serialize_f64(*value),
-            Shape::Sampled(samples) => samples.serialize(serializer),
+            CurveShape::Flat(value) => serializer.serialize_f64(*value),
+            CurveShape::Sampled(samples) => samples.serialize(serializer),
         }
     }
 }

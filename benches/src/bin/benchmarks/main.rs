@@ -70,7 +70,7 @@ enum Command {
         light: Vec<f64>,
     },
     /// Print the memory of this process after each stage of a render
-    Memory {
+    ProcessMemory {
         /// The scene
         scene: PathBuf,
     },
@@ -95,7 +95,7 @@ fn main() -> anyhow::Result<()> {
             let light = etendue_geometry::glam::DVec3::from_slice(light);
             return light::print_bound(scene, *triangles, light);
         }
-        Some(Command::Memory { scene }) => return whole::print_memory(scene),
+        Some(Command::ProcessMemory { scene }) => return whole::print_memory(scene),
         None => {}
     }
     let effort = arguments.effort;

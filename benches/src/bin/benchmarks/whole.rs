@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, ensure};
-use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_accel::{BuildOptions, Quality};
-use etendue_bench::machine::Memory;
+use etendue_bench::machine::ProcessMemory;
 use etendue_bench::rounds::{Turn, take_turns, wall};
 use etendue_benches::contest::{LimitPackets, Query, time};
 use etendue_benches::effort::Effort;
+use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_benches::meshes;
 use etendue_benches::rays::View;
 use etendue_render::output::Outputs;
@@ -162,19 +162,19 @@ fn contest(effort: Effort, mesh: &str, triangles: u64, job: &Job) -> anyhow::Res
 
 /// Renders the scene at `path` in this process, and prints what it holds after each stage.
 pub(crate) fn print_memory(path: &Path) -> anyhow::Result<()> {
-    let start = Memory::now();
+    let start = ProcessMemory::now();
     let file = SceneFile::read(path, &[])?;
     let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default())?;
     let plan = Plan::new(&scene, Outputs { exr: true, ..Outputs::NONE });
-    let load = Memory::now();
+    let load = ProcessMemory::now();
     let accel = etendue_render::build(&scene, &plan, &BuildOptions::default())?;
-    let build = Memory::now();
+    let build = ProcessMemory::now();
     let images = Images::decode(&scene, &plan, None)?;
     let rendered =
         etendue_render::render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true)?;
-    let render = Memory::now();
+    let render = ProcessMemory::now();
     drop(rendered);
-    let show = |memory: Memory| json!({"private": memory.private, "mapped": memory.mapped});
+    let show = |memory: ProcessMemory| json!({"private": memory.private, "mapped": memory.mapped});
     println!(
         "{}",
         json!({"start": show(start), "load": show(load), "build": show(build),

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 
 use super::arena::Arena;
 use super::wide::{
-    Cell, Child, INSTANCE_NUMBERS, LEAF_CELLS, LeafNumbers, MOST_CELLS, MOST_IN_LEAF, NO_CHILDREN,
-    Units, WideTree,
+    Cell, Child, INSTANCE_NUMBERS, LEAF_CELLS, LeafNumbers, LeafUnits, MOST_CELLS, MOST_IN_LEAF,
+    NO_CHILDREN, WideTree,
 };
-use crate::parts::{Part, Source};
+use crate::parts::{Blas, MeshTriangles};
 use crate::tree::{Ref, Tree};
 
 /// Writes the numbers of a leaf.
@@ -203,12 +203,12 @@ impl<'a, L: WriteLeaf> Fold<'a, L> {
 
 /// Leaves of triangles.
 pub(super) struct Triangles<'a> {
-    pub(super) part: &'a Part,
+    pub(super) part: &'a Blas,
     pub(super) geometry: &'a Geometry,
     /// Where all triangles come from; `None` where placements have to be told apart.
-    pub(super) only: Option<Source<'a>>,
+    pub(super) only: Option<MeshTriangles<'a>>,
     /// How the mesh's coordinates would follow from the leaves', and whether they all do.
-    pub(super) units: Units,
+    pub(super) units: LeafUnits,
     pub(super) is_exact: AtomicBool,
 }
 

@@ -13,7 +13,7 @@ use etendue_geometry::RayBatch;
 use etendue_geometry::glam::DVec3;
 use pulp::NullaryFnOnce;
 
-use self::triangles::TriangleLeaves;
+use self::triangles::PacketTriangles;
 use super::Bvh;
 use super::bundle::{Bundle, EachRay, FEWEST, FrameRays, PACKET, bits};
 use super::lanes::{Arithmetic, Lanes};
@@ -122,7 +122,7 @@ impl<'a, S: Sink> Packet<'a, S> {
         let stack = &mut stacks.inner;
         let far = self.farthest(lanes, rays, group);
         let each = EachRay::new(lanes, rays, group);
-        let mut leaves = InstanceLeaves { lanes, bvh, packet: self, rays, each, group, stack };
+        let mut leaves = PacketInstances { lanes, bvh, packet: self, rays, each, group, stack };
         traverse(lanes, &bvh.top.cells, &bundle.boxes, far, &mut stacks.outer, &mut leaves);
     }
 
@@ -211,7 +211,7 @@ fn soundness(
 }
 
 /// Leaves of the tree over the instances.
-struct InstanceLeaves<'a, 'b, L: Lanes, S> {
+struct PacketInstances<'a, 'b, L: Lanes, S> {
     lanes: L,
     bvh: &'a Bvh,
     packet: &'a mut Packet<'b, S>,
@@ -221,7 +221,7 @@ struct InstanceLeaves<'a, 'b, L: Lanes, S> {
     stack: &'a mut Stack,
 }
 
-impl<L: Lanes, S: Sink> Leaves for InstanceLeaves<'_, '_, L, S> {
+impl<L: Lanes, S: Sink> Leaves for PacketInstances<'_, '_, L, S> {
     #[inline(always)]
     fn see(&mut self, leaf: Child, _: f32) -> Option<f32> {
         let (lanes, bvh) = (self.lanes, self.bvh);
@@ -264,7 +264,7 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for VisitTogether<'_, '_, L, S> {
                 let cells: &[Cell] = &bvh.parts[instance.part as usize].tree.cells;
                 let triangles = PlacedTriangles::new(bvh, instance);
                 let mut leaves =
-                    TriangleLeaves::new(lanes, cells, triangles, packet, &rays, together, &bundle);
+                    PacketTriangles::new(lanes, cells, triangles, packet, &rays, together, &bundle);
                 let far = leaves.farthest();
                 traverse(lanes, cells, &bundle.boxes, far, stack, &mut leaves);
                 leaves.measure_pending();

@@ -2,16 +2,16 @@
 
 use etendue_geometry::Mesh;
 
-use super::wide::{LeafNumbers, Units};
+use super::wide::{LeafNumbers, LeafUnits};
 use super::{Bvh, Owner};
-use crate::nearest::{Triangle, View};
+use crate::nearest::{PlacementView, Triangle};
 use crate::parts::Instance;
 
 /// A placement with what the exact test needs of it.
 #[derive(Clone, Copy)]
 pub(super) struct Placed<'a> {
     pub(super) placement: u32,
-    pub(super) view: View<'a>,
+    pub(super) view: PlacementView<'a>,
     mesh: &'a Mesh,
 }
 
@@ -19,7 +19,7 @@ impl<'a> Placed<'a> {
     #[inline(always)]
     fn new(bvh: &'a Bvh, placement: u32) -> Self {
         let place = &bvh.geometry.placements[placement as usize];
-        let view = View::new(&place.world_from_mesh);
+        let view = PlacementView::new(&place.world_from_mesh);
         Self { placement, view, mesh: bvh.geometry.mesh_of(place) }
     }
 }
@@ -29,7 +29,7 @@ pub(super) struct PlacedTriangles<'a> {
     bvh: &'a Bvh,
     /// The placement, where there is but one.
     only: Option<Placed<'a>>,
-    units: Option<Units>,
+    units: Option<LeafUnits>,
 }
 
 impl<'a> PlacedTriangles<'a> {

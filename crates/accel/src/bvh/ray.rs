@@ -236,7 +236,7 @@ impl<L: Arithmetic> TriangleTest<L> {
     /// What some rays (this test being that of a different ray in each lane) make of triangle `i` of
     /// a leaf before `far`.
     #[inline(always)]
-    pub(super) fn look(&self, l: L, runs: &Runs<'_>, i: usize, far: L::F) -> Look<L> {
+    pub(super) fn look(&self, l: L, runs: &Runs<'_>, i: usize, far: L::F) -> TriangleLook<L> {
         let [a, b, c] = runs.corners;
         let a = self.shear(l, [l.splat(a[0][i]), l.splat(a[1][i]), l.splat(a[2][i])]);
         let b = self.shear(l, [l.splat(b[0][i]), l.splat(b[1][i]), l.splat(b[2][i])]);
@@ -245,7 +245,7 @@ impl<L: Arithmetic> TriangleTest<L> {
     }
 
     #[inline(always)]
-    fn decide(&self, l: L, [a, b, c]: [Sheared<L>; 3], far: L::F) -> Look<L> {
+    fn decide(&self, l: L, [a, b, c]: [Sheared<L>; 3], far: L::F) -> TriangleLook<L> {
         let (u, v, w) = (edge(l, c, b), edge(l, a, c), edge(l, b, a));
         let sizes = l.add(l.add(size(l, a), size(l, b)), l.add(size(l, c), self.error));
         let error = l.mul(sizes, self.error);
@@ -258,7 +258,7 @@ impl<L: Arithmetic> TriangleTest<L> {
             (l.mul(a.z, self.shear[2]), l.mul(b.z, self.shear[2]), l.mul(c.z, self.shear[2]));
         let closest = l.sub(l.min(l.min(az, bz), cz), self.error);
         let farthest = l.add(l.max(l.max(az, bz), cz), self.error);
-        Look {
+        TriangleLook {
             maybe: inside & l.le(closest, far) & l.le(self.near, farthest),
             inside: l.le(error, least) | l.le(most, negative),
             closest,
@@ -278,7 +278,7 @@ impl<L: Arithmetic> TriangleTest<L> {
 
 /// What single precision can tell about rays and a triangle.
 #[derive(Clone, Copy)]
-pub(super) struct Look<L: Arithmetic> {
+pub(super) struct TriangleLook<L: Arithmetic> {
     /// The lanes that f64 might call a hit within the limits.
     pub(super) maybe: u32,
     /// The lanes that f64 will certainly call inside.

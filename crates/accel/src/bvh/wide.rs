@@ -115,12 +115,12 @@ impl WideTree {
 
 /// How a leaf's coordinates relate to the mesh's: `p / scale + origin`, exactly.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Units {
+pub(super) struct LeafUnits {
     origin: DVec3,
     inverse_scale: f64,
 }
 
-impl Units {
+impl LeafUnits {
     pub(super) fn of(frame: Frame) -> Self {
         Self { origin: frame.origin, inverse_scale: 1.0 / frame.scale }
     }

@@ -12,7 +12,7 @@ use crate::{BuildError, BuildOptions};
 
 /// What Embree's callbacks write to while a device lives.
 #[derive(Default)]
-struct Watch {
+struct DeviceWatch {
     /// The first error since it was last taken.
     error: Mutex<Option<(sys::RTCError, String)>>,
     /// Bytes that Embree holds now.
@@ -24,13 +24,13 @@ struct Watch {
 /// An Embree device: its threads, its memory and its errors.
 pub(crate) struct Device {
     pub(super) handle: NonNull<sys::RTCDeviceTy>,
-    watch: Box<Watch>,
+    watch: Box<DeviceWatch>,
     /// Rays per packet: 16, 8, 4, or 1 where the processor has no packets worth it.
     pub(super) width: usize,
 }
 
 // SAFETY: the handle is reference-counted atomically by Embree, its functions may be called from any
-// thread, and everything in `Watch` is atomic or locked.
+// thread, and everything in `DeviceWatch` is atomic or locked.
 unsafe impl Send for Device {}
 // SAFETY: as above.
 unsafe impl Sync for Device {}
@@ -58,7 +58,7 @@ impl Device {
             });
         };
         let limit = options.memory_limit.map(|bytes| i64::try_from(bytes).unwrap_or(i64::MAX));
-        let watch = Box::new(Watch { limit, ..Watch::default() });
+        let watch = Box::new(DeviceWatch { limit, ..DeviceWatch::default() });
         let user: *mut c_void = ptr::from_ref(&*watch).cast_mut().cast();
         // SAFETY: `watch` is boxed, so its address holds for as long as the device, which is
         // released in `drop` before it. The callbacks only read it, through atomics and a lock.
@@ -127,10 +127,10 @@ impl fmt::Debug for Device {
 }
 
 unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError, text: *const c_char) {
-    // SAFETY: `user` is the `Watch` that `Device::new` registered; the text is a C string or null.
+    // SAFETY: `user` is the `DeviceWatch` that `Device::new` registered; the text is a C string or null.
     let (watch, text) = unsafe {
         let text = if text.is_null() { c"" } else { CStr::from_ptr(text) };
-        (&*user.cast::<Watch>(), text.to_string_lossy())
+        (&*user.cast::<DeviceWatch>(), text.to_string_lossy())
     };
     let name = match code {
         sys::RTC_ERROR_INVALID_ARGUMENT => "invalid argument",
@@ -147,8 +147,8 @@ unsafe extern "C" fn on_error(user: *mut c_void, code: sys::RTCError, text: *con
 }
 
 unsafe extern "C" fn on_memory(user: *mut c_void, bytes: isize, post: bool) -> bool {
-    // SAFETY: `user` is the `Watch` that `Device::new` registered.
-    let watch = unsafe { &*user.cast::<Watch>() };
+    // SAFETY: `user` is the `DeviceWatch` that `Device::new` registered.
+    let watch = unsafe { &*user.cast::<DeviceWatch>() };
     let now = watch.bytes.fetch_add(bytes as i64, Ordering::Relaxed) + bytes as i64;
     // Embree only lets an allocation be refused before it is made.
     let refuse = bytes > 0 && !post && watch.limit.is_some_and(|limit| now > limit);

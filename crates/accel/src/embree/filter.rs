@@ -10,11 +10,11 @@ use embree4_sys as sys;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, MISS, RayBatch};
 
-use crate::nearest::{Nearest, Query, Triangle, Verdict, View};
+use crate::nearest::{Nearest, PlacementView, Query, Triangle, Verdict};
 use crate::single::{self, Rays32};
 
 /// The hits that a filter is asked about: one for each lane of a packet.
-struct Lanes {
+struct PacketHits {
     valid: *mut c_int,
     ray: *mut f32,
     hit: *const u32,
@@ -28,7 +28,7 @@ const HIT_PRIMITIVE: usize = 5;
 const HIT_GEOMETRY: usize = 6;
 const HIT_INSTANCE: usize = 7;
 
-impl Lanes {
+impl PacketHits {
     /// # Safety
     ///
     /// `args` must be what Embree passed to a filter, and not outlive the call.
@@ -44,11 +44,11 @@ impl Lanes {
     }
 
     /// Calls `keep` for every hit there is, and refuses those for which it answers `false`.
-    fn judge(&self, mut keep: impl FnMut(Hit<'_>) -> bool) {
+    fn judge(&self, mut keep: impl FnMut(LaneHit<'_>) -> bool) {
         for lane in 0..self.width {
             // SAFETY: Embree gives `width` flags, and as many of each number of rays and hits.
             unsafe {
-                if *self.valid.add(lane) != 0 && !keep(Hit { lanes: self, lane }) {
+                if *self.valid.add(lane) != 0 && !keep(LaneHit { lanes: self, lane }) {
                     *self.valid.add(lane) = 0;
                 }
             }
@@ -57,12 +57,12 @@ impl Lanes {
 }
 
 /// One lane.
-struct Hit<'a> {
-    lanes: &'a Lanes,
+struct LaneHit<'a> {
+    lanes: &'a PacketHits,
     lane: usize,
 }
 
-impl Hit<'_> {
+impl LaneHit<'_> {
     fn of_ray(&self, array: usize) -> f32 {
         // SAFETY: the arrays of a ray stand behind each other, `width` numbers of four bytes each.
         unsafe { *self.lanes.ray.add(array * self.lanes.width + self.lane) }
@@ -105,7 +105,7 @@ impl Hit<'_> {
 /// What the exact test says of a ray and a triangle.
 fn verdict(geometry: &Geometry, query: &Query, triangle: &Triangle) -> Verdict {
     let placement = &geometry.placements[triangle.placement as usize];
-    query.judge(&View::new(&placement.world_from_mesh), triangle.corners)
+    query.judge(&PlacementView::new(&placement.world_from_mesh), triangle.corners)
 }
 
 /// The rays of a query whose hits are decided one by one.
@@ -132,13 +132,13 @@ impl<'a> ExactFilter<'a> {
     }
 
     /// Whether a hit is certainly behind the ray's nearest distance that counts.
-    fn is_clear(&self, hit: &Hit<'_>) -> bool {
+    fn is_clear(&self, hit: &LaneHit<'_>) -> bool {
         let i = hit.id();
         let near = f64::from(self.rays32.t_near[i]);
         f64::from(hit.t()) > near + 2.0 * self.rays32.slack(i, near)
     }
 
-    fn keeps(&mut self, hit: &Hit<'_>) -> bool {
+    fn keeps(&mut self, hit: &LaneHit<'_>) -> bool {
         let i = hit.id();
         let ends = self.rays.endpoint_triangles();
         if ends.is_some_and(|ends| ends[i].contains(&hit.met())) {
@@ -168,8 +168,9 @@ impl<'a> ExactFilter<'a> {
 /// For Embree, in queries whose context is a [`ExactFilter`].
 pub(super) unsafe extern "C" fn keep_exact(args: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: Embree's own arguments, and the query's context, which nobody else uses meanwhile.
-    let (lanes, judged) =
-        unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<ExactFilter<'_>>()) };
+    let (lanes, judged) = unsafe {
+        (PacketHits::of(args), &mut *sys::filter_context(args).cast::<ExactFilter<'_>>())
+    };
     lanes.judge(|hit| judged.keeps(&hit));
 }
 
@@ -180,14 +181,15 @@ pub(super) unsafe extern "C" fn keep_exact(args: *const sys::RTCFilterFunctionNA
 /// As for [`keep_exact`].
 pub(super) unsafe extern "C" fn keep_clear(args: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: as in `keep_exact`.
-    let (lanes, judged) =
-        unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<ExactFilter<'_>>()) };
+    let (lanes, judged) = unsafe {
+        (PacketHits::of(args), &mut *sys::filter_context(args).cast::<ExactFilter<'_>>())
+    };
     lanes.judge(|hit| judged.is_clear(&hit) || judged.keeps(&hit));
 }
 
 /// The nearest of the triangles that a bundle of rays around one ray meets and that one ray hits.
 #[repr(C)]
-pub(crate) struct Search<'a> {
+pub(crate) struct NearestSearch<'a> {
     /// First, because this is what Embree hands on.
     context: sys::RTCRayQueryContext,
     geometry: &'a Geometry,
@@ -204,7 +206,7 @@ pub(crate) struct Search<'a> {
     nearest_moment: DVec3,
 }
 
-impl<'a> Search<'a> {
+impl<'a> NearestSearch<'a> {
     /// For a ray of which nothing is known, moved `advance` ahead; distances may be off by `slack`.
     pub(crate) fn new(geometry: &'a Geometry, query: Query, advance: f64, slack: f64) -> Self {
         Self {
@@ -226,7 +228,7 @@ impl<'a> Search<'a> {
 
     fn note_corners(&mut self, triangle: &Triangle) {
         let placement = &self.geometry.placements[triangle.placement as usize];
-        let view = View::new(&placement.world_from_mesh);
+        let view = PlacementView::new(&placement.world_from_mesh);
         for corner in view.seen_from(self.query.origin, triangle.corners) {
             let moment = moment(self.query.direction, corner);
             if moment.length_squared() < self.nearest_moment.length_squared() {
@@ -243,7 +245,7 @@ impl<'a> Search<'a> {
         (moment.is_finite() && way != DVec3::ZERO).then_some(way)
     }
 
-    fn keeps(&mut self, hit: &Hit<'_>) -> bool {
+    fn keeps(&mut self, hit: &LaneHit<'_>) -> bool {
         let triangle = hit.triangle(self.geometry);
         let exact = match verdict(self.geometry, &self.query, &triangle) {
             Verdict::Hit(exact) => exact,
@@ -276,14 +278,15 @@ fn moment(a: DVec3, b: DVec3) -> DVec3 {
     )
 }
 
-/// Notes the nearest exact hit in a [`Search`].
+/// Notes the nearest exact hit in a [`NearestSearch`].
 ///
 /// # Safety
 ///
-/// For Embree, in closest-hit queries whose context is a [`Search`].
+/// For Embree, in closest-hit queries whose context is a [`NearestSearch`].
 pub(super) unsafe extern "C" fn search(args: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: as in `keep_exact`.
-    let (lanes, search) =
-        unsafe { (Lanes::of(args), &mut *sys::filter_context(args).cast::<Search<'_>>()) };
+    let (lanes, search) = unsafe {
+        (PacketHits::of(args), &mut *sys::filter_context(args).cast::<NearestSearch<'_>>())
+    };
     lanes.judge(|hit| search.keeps(&hit));
 }

@@ -7,7 +7,7 @@ use etendue_geometry::{Bounds, Geometry, Placement, Transform};
 
 /// What becomes of a placement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum InstanceKind {
     /// Nothing to see, or another stands in the same place.
     LeftOut,
     /// Its triangles are moved.
@@ -18,7 +18,7 @@ pub(super) enum Kind {
 
 /// What becomes of each placement, and which meshes get a scene of their own.
 pub(super) struct Instanced {
-    pub(super) placements: Vec<Kind>,
+    pub(super) placements: Vec<InstanceKind>,
     pub(super) meshes: Vec<bool>,
 }
 
@@ -45,24 +45,24 @@ impl Instanced {
         let kind = |placement: &Placement| {
             let (mesh, transform) = (placement.mesh as usize, &placement.world_from_mesh);
             if !transform.is_finite() || !geometry.has_area(placement) {
-                return Kind::LeftOut;
+                return InstanceKind::LeftOut;
             }
             if uses[mesh] < 2 && !(moves && is_large(mesh)) {
-                return Kind::Baked;
+                return InstanceKind::Baked;
             }
             // Of several in the very same place the first is the one that is seen.
             if !seen.insert((mesh, bits_of(transform))) {
-                return Kind::LeftOut;
+                return InstanceKind::LeftOut;
             }
             if !is_sound(&transform.linear) {
-                return Kind::Baked;
+                return InstanceKind::Baked;
             }
             let steps = steps_of_f32(geometry.meshes[mesh].bounds, transform, origin);
             if steps < LEAST_STEPS {
-                return if steps < 0.5 { Kind::LeftOut } else { Kind::Baked };
+                return if steps < 0.5 { InstanceKind::LeftOut } else { InstanceKind::Baked };
             }
             meshes[mesh] = true;
-            Kind::Instance
+            InstanceKind::Instance
         };
         let placements = geometry.placements.iter().map(kind).collect();
         Self { placements, meshes }

@@ -12,12 +12,12 @@ use super::device::Device;
 use crate::{BuildError, BuildOptions};
 
 /// One mesh or instance, before it is attached to a scene.
-pub(super) struct Shape {
+pub(super) struct EmbreeGeometry {
     pub(super) handle: NonNull<sys::RTCGeometryTy>,
     pub(super) copied_bytes: u64,
 }
 
-impl Shape {
+impl EmbreeGeometry {
     fn new(
         device: &Device,
         kind: sys::RTCGeometryType,
@@ -206,7 +206,7 @@ impl Shape {
     }
 }
 
-impl Drop for Shape {
+impl Drop for EmbreeGeometry {
     fn drop(&mut self) {
         // SAFETY: releases the reference that `rtcNewGeometry` gave; scenes hold their own.
         unsafe { sys::rtcReleaseGeometry(self.handle.as_ptr()) };

@@ -4,12 +4,12 @@ use embree4_sys as sys;
 use etendue_geometry::{Geometry, MISS, Mesh, Positions};
 
 use super::Scene;
-use super::filter::{self, ExactFilter, Search};
+use super::filter::{self, ExactFilter, NearestSearch};
 use crate::single::Rays32;
 
 /// What single precision found for a batch of rays.
 #[derive(Debug, Default)]
-pub(crate) struct Found {
+pub(crate) struct FoundHits {
     /// Placement of each hit, or [`MISS`].
     pub(crate) placement: Vec<u32>,
     /// Triangle of each hit, or [`MISS`].
@@ -25,7 +25,7 @@ pub(crate) struct Found {
     pub(crate) normal: [Vec<f32>; 3],
 }
 
-impl Found {
+impl FoundHits {
     fn resize(&mut self, len: usize) {
         self.placement.resize(len, MISS);
         self.triangle.resize(len, MISS);
@@ -40,7 +40,7 @@ impl Found {
 
 impl Scene {
     /// The closest hit of each ray in single precision.
-    pub(crate) fn closest(&self, rays: &Rays32, coherent: bool, found: &mut Found) {
+    pub(crate) fn closest(&self, rays: &Rays32, coherent: bool, found: &mut FoundHits) {
         self.intersect(rays, coherent, &mut intersect_arguments(coherent), found);
     }
 
@@ -50,7 +50,7 @@ impl Scene {
         &self,
         rays: &Rays32,
         judged: &mut ExactFilter<'_>,
-        found: &mut Found,
+        found: &mut FoundHits,
     ) {
         let mut arguments = intersect_arguments(false);
         arguments.flags |= sys::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
@@ -60,7 +60,12 @@ impl Scene {
     }
 
     /// Looks with all of `rays`, which stand for one, for the nearest exact hit.
-    pub(crate) fn search(&self, rays: &Rays32, search: &mut Search<'_>, found: &mut Found) {
+    pub(crate) fn search(
+        &self,
+        rays: &Rays32,
+        search: &mut NearestSearch<'_>,
+        found: &mut FoundHits,
+    ) {
         let coherent = rays.len() > 1;
         let mut arguments = intersect_arguments(coherent);
         arguments.flags |= sys::RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
@@ -70,7 +75,7 @@ impl Scene {
     }
 
     /// As [`Self::closest`], in packets whether coherent or not: for hits that nobody judges.
-    pub(crate) fn closest_in_packets(&self, rays: &Rays32, coherent: bool, found: &mut Found) {
+    pub(crate) fn closest_in_packets(&self, rays: &Rays32, coherent: bool, found: &mut FoundHits) {
         found.has_surface = true;
         // As for occlusion: only packets that keep together are known to come back from instances.
         let in_packets = coherent || !self.has_instances;
@@ -88,7 +93,7 @@ impl Scene {
         rays: &Rays32,
         in_packets: bool,
         arguments: &mut sys::RTCIntersectArguments,
-        found: &mut Found,
+        found: &mut FoundHits,
     ) {
         found.resize(rays.len());
         match (in_packets, self.device.width) {
@@ -140,7 +145,7 @@ impl Scene {
         &self,
         rays: &Rays32,
         arguments: &mut sys::RTCIntersectArguments,
-        found: &mut Found,
+        found: &mut FoundHits,
     ) {
         let mut ahead = Ahead::new(&self.geometry);
         for i in 0..rays.len() {
@@ -310,7 +315,7 @@ macro_rules! packets {
                 &self,
                 rays: &Rays32,
                 arguments: &mut sys::RTCIntersectArguments,
-                found: &mut Found,
+                found: &mut FoundHits,
             ) {
                 let mut query = Aligned(sys::$rayhit::default());
                 query.0.ray.mask = [u32::MAX; $width];
@@ -340,7 +345,7 @@ macro_rules! packets {
                     put(&mut found.triangle, start, count, &hit.primID);
                     put(&mut found.t, start, count, &query.0.ray.tfar);
                     if found.has_surface {
-                        let Found { weights: [u, v], normal: [x, y, z], .. } = found;
+                        let FoundHits { weights: [u, v], normal: [x, y, z], .. } = found;
                         put(u, start, count, &hit.u);
                         put(v, start, count, &hit.v);
                         put(x, start, count, &hit.Ng_x);

@@ -20,7 +20,7 @@ pub(crate) enum Members {
 
 /// A set of triangles in one frame.
 #[derive(Debug, Clone)]
-pub(crate) struct Part {
+pub(crate) struct Blas {
     pub(crate) frame: Frame,
     pub(crate) members: Members,
 }
@@ -29,7 +29,7 @@ pub(crate) struct Part {
 /// a triangle takes two to three.
 pub(super) const MOST_TRIANGLES: usize = 90_000_000;
 
-impl Part {
+impl Blas {
     /// The number of triangles, those without area included.
     pub(crate) fn len(&self, geometry: &Geometry) -> usize {
         match &self.members {
@@ -76,7 +76,7 @@ impl Part {
     }
 
     /// Where the triangles of one of this part's meshes are.
-    pub(crate) fn source<'a>(&self, geometry: &'a Geometry, placement: u32) -> Source<'a> {
+    pub(crate) fn source<'a>(&self, geometry: &'a Geometry, placement: u32) -> MeshTriangles<'a> {
         let (mesh, transform) = match &self.members {
             Members::Mesh(mesh) => (*mesh, None),
             Members::Baked(_) => {
@@ -86,7 +86,7 @@ impl Part {
             }
         };
         let mesh = &geometry.meshes[mesh as usize];
-        Source {
+        MeshTriangles {
             frame: self.frame,
             transform,
             triangles: &mesh.triangles,
@@ -149,7 +149,7 @@ impl Part {
 
 /// The triangles of one mesh on their way into a frame, for loops over many.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Source<'a> {
+pub(crate) struct MeshTriangles<'a> {
     frame: Frame,
     /// `None` when it changes nothing, or when the frame is the mesh's own.
     transform: Option<&'a Transform>,
@@ -163,7 +163,7 @@ enum Slice<'a> {
     F64(&'a [[f64; 3]]),
 }
 
-impl Source<'_> {
+impl MeshTriangles<'_> {
     /// The corners of a triangle in the mesh's frame.
     #[inline(always)]
     pub(crate) fn local_corners(&self, triangle: u32) -> [DVec3; 3] {

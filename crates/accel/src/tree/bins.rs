@@ -3,10 +3,10 @@
 use etendue_geometry::glam::Vec4;
 
 use super::Ref;
-use super::extent::{Extent, half_area};
+use super::extent::{RefBounds, half_area};
 
 /// Where bins begin.
-pub(super) struct Grid {
+pub(super) struct BinGrid {
     start: Vec4,
     /// Bins per length; 0 along an axis without extent.
     scale: Vec4,
@@ -21,8 +21,8 @@ pub(super) struct Split {
     pub(super) cost: f32,
 }
 
-impl Grid {
-    pub(super) fn new(extent: &Extent, len: usize) -> Self {
+impl BinGrid {
+    pub(super) fn new(extent: &RefBounds, len: usize) -> Self {
         let bins = (4 + len / 20).min(BINS);
         let size = extent.centroid_hi - extent.centroid_lo;
         let scale = |size: f32| {
@@ -65,13 +65,13 @@ impl Bins {
         count: [[0; BINS]; 3],
     };
 
-    pub(super) fn filled(mut self, grid: &Grid, refs: &[Ref]) -> Self {
+    pub(super) fn filled(mut self, grid: &BinGrid, refs: &[Ref]) -> Self {
         self.fill(grid, refs);
         self
     }
 
     /// Fills the bins of `grid` with `refs`; what was in them before is forgotten.
-    pub(super) fn fill(&mut self, grid: &Grid, refs: &[Ref]) {
+    pub(super) fn fill(&mut self, grid: &BinGrid, refs: &[Ref]) {
         for axis in 0..3 {
             self.lo[axis][..=grid.last].fill(Vec4::INFINITY);
             self.hi[axis][..=grid.last].fill(Vec4::NEG_INFINITY);
@@ -88,9 +88,9 @@ impl Bins {
     }
 
     /// The boxes of what lies in bins below and from `split` on.
-    pub(super) fn sides(&self, grid: &Grid, split: Split) -> [Extent; 2] {
+    pub(super) fn sides(&self, grid: &BinGrid, split: Split) -> [RefBounds; 2] {
         let union = |bins: std::ops::Range<usize>| {
-            bins.fold(Extent::EMPTY, |all, bin| Extent {
+            bins.fold(RefBounds::EMPTY, |all, bin| RefBounds {
                 lo: all.lo.min(self.lo[split.axis][bin]),
                 hi: all.hi.max(self.hi[split.axis][bin]),
                 ..all
@@ -99,7 +99,7 @@ impl Bins {
         [union(0..split.bin), union(split.bin..grid.last + 1)]
     }
 
-    pub(super) fn merge(mut self, other: &Self, grid: &Grid) -> Self {
+    pub(super) fn merge(mut self, other: &Self, grid: &BinGrid) -> Self {
         for axis in 0..3 {
             for bin in 0..=grid.last {
                 self.lo[axis][bin] = self.lo[axis][bin].min(other.lo[axis][bin]);
@@ -111,7 +111,7 @@ impl Bins {
     }
 
     /// The border with the least sum of areas, each times the blocks of refs on its side.
-    pub(super) fn cheapest(&self, grid: &Grid, block: usize) -> Option<Split> {
+    pub(super) fn cheapest(&self, grid: &BinGrid, block: usize) -> Option<Split> {
         let mut best: Option<Split> = None;
         let last = grid.last;
         for axis in (0..3).filter(|&axis| grid.scale[axis] > 0.0) {

@@ -7,14 +7,14 @@ use super::{CHUNK, Node, Ref, WIDE_NODE};
 
 /// The boxes of a set of refs: around all of them, and around their centroids (times two).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Extent {
+pub(super) struct RefBounds {
     pub(super) lo: Vec4,
     pub(super) hi: Vec4,
     pub(super) centroid_lo: Vec4,
     pub(super) centroid_hi: Vec4,
 }
 
-impl Extent {
+impl RefBounds {
     pub(super) const EMPTY: Self = Self {
         lo: Vec4::INFINITY,
         hi: Vec4::NEG_INFINITY,

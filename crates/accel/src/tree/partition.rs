@@ -2,24 +2,29 @@
 
 use rayon::prelude::*;
 
-use super::bins::{Bins, Grid, Split};
-use super::extent::Extent;
+use super::bins::{BinGrid, Bins, Split};
+use super::extent::RefBounds;
 use super::{CHUNK, Ref};
 
 /// One side of a split.
-pub(super) struct Side {
+pub(super) struct SplitSide {
     pub(super) len: usize,
-    pub(super) extent: Extent,
+    pub(super) extent: RefBounds,
 }
 
 /// The first and the second half of `refs`, as they stand.
-pub(super) fn halve(refs: &[Ref]) -> [Side; 2] {
+pub(super) fn halve(refs: &[Ref]) -> [SplitSide; 2] {
     let (a, b) = refs.split_at(refs.len() / 2);
-    [a, b].map(|half| Side { len: half.len(), extent: Extent::of(half) })
+    [a, b].map(|half| SplitSide { len: half.len(), extent: RefBounds::of(half) })
 }
 
 /// Brings the left refs to the front, in place.
-pub(super) fn partition(refs: &mut [Ref], grid: &Grid, split: Split, bins: &Bins) -> [Side; 2] {
+pub(super) fn partition(
+    refs: &mut [Ref],
+    grid: &BinGrid,
+    split: Split,
+    bins: &Bins,
+) -> [SplitSide; 2] {
     let mut len = 0;
     // Swaps whether it must or not: which side a ref goes to cannot be predicted.
     for i in 0..refs.len() {
@@ -31,21 +36,22 @@ pub(super) fn partition(refs: &mut [Ref], grid: &Grid, split: Split, bins: &Bins
     let (left_refs, right_refs) = refs.split_at(len);
     left.include_centroids(left_refs);
     right.include_centroids(right_refs);
-    [Side { len, extent: left }, Side { len: right_refs.len(), extent: right }]
+    [SplitSide { len, extent: left }, SplitSide { len: right_refs.len(), extent: right }]
 }
 
 /// As [`partition`], in parallel: every chunk is told where its left and right refs go.
 pub(super) fn partition_wide(
     refs: &mut [Ref],
     spare: &mut [Ref],
-    grid: &Grid,
+    grid: &BinGrid,
     split: Split,
-) -> [Side; 2] {
+) -> [SplitSide; 2] {
     // How much of each chunk goes to which side.
-    let chunks: Vec<[Side; 2]> = refs
+    let chunks: Vec<[SplitSide; 2]> = refs
         .par_chunks(CHUNK)
         .map(|chunk| {
-            let mut sides = [Extent::EMPTY, Extent::EMPTY].map(|extent| Side { len: 0, extent });
+            let mut sides =
+                [RefBounds::EMPTY, RefBounds::EMPTY].map(|extent| SplitSide { len: 0, extent });
             for r in chunk {
                 let corners = r.corners();
                 let side = &mut sides[usize::from(!grid.is_left(corners, split))];
@@ -55,7 +61,7 @@ pub(super) fn partition_wide(
             sides
         })
         .collect();
-    let mut sides = [Extent::EMPTY, Extent::EMPTY].map(|extent| Side { len: 0, extent });
+    let mut sides = [RefBounds::EMPTY, RefBounds::EMPTY].map(|extent| SplitSide { len: 0, extent });
     for chunk in &chunks {
         for (side, part) in sides.iter_mut().zip(chunk) {
             side.len += part.len;

@@ -6,10 +6,10 @@ use crate::cameras::Cameras;
 use crate::samplers::{Converged, Samplers};
 
 /// What stands on a chart of one finding: its name, samples, seconds and relative error.
-type Row = (&'static str, u32, f64, f64);
+type ChartRow = (&'static str, u32, f64, f64);
 
 pub(super) fn samplers(found: &Samplers) -> Vec<(&'static str, Chart)> {
-    let rows: Vec<Row> = found
+    let rows: Vec<ChartRow> = found
         .findings
         .iter()
         .map(|f| (f.sampler, f.samples, f.seconds.median, f.relative_rmse))
@@ -27,7 +27,7 @@ pub(super) fn samplers(found: &Samplers) -> Vec<(&'static str, Chart)> {
 }
 
 pub(super) fn cameras(found: &Cameras) -> Vec<(&'static str, Chart)> {
-    let rows: Vec<Row> = found
+    let rows: Vec<ChartRow> = found
         .findings
         .iter()
         .map(|f| (f.model, f.samples, f.seconds.median, f.relative_rmse))
@@ -43,7 +43,7 @@ pub(super) fn cameras(found: &Cameras) -> Vec<(&'static str, Chart)> {
 
 /// Pictures against a converged one.
 struct Pictures<'a> {
-    rows: &'a [Row],
+    rows: &'a [ChartRow],
     resolution: [u32; 2],
     converged: &'a Converged,
     /// What they are compared with.
@@ -53,7 +53,7 @@ struct Pictures<'a> {
 impl Pictures<'_> {
     fn against_time(&self, title: &str) -> Chart {
         let [width, height] = self.resolution.map(f64::from);
-        let micros = |row: &Row| row.2 / (width * height) * 1e6;
+        let micros = |row: &ChartRow| row.2 / (width * height) * 1e6;
         let across = Axis::new("wall time a pixel (µs), all threads");
         let mut chart = self.chart(title, across, &micros);
         chart.notes.push(format!(
@@ -68,7 +68,7 @@ impl Pictures<'_> {
         self.chart(title, Axis::new("samples a pixel"), &|row| f64::from(row.1))
     }
 
-    fn chart(&self, title: &str, across: Axis, value: &dyn Fn(&Row) -> f64) -> Chart {
+    fn chart(&self, title: &str, across: Axis, value: &dyn Fn(&ChartRow) -> f64) -> Chart {
         let [width, height] = self.resolution;
         let upwards = Axis::new(format!("RMSE to {}, share of its mean", self.of));
         let note = format!(
@@ -94,7 +94,7 @@ impl Pictures<'_> {
     }
 
     /// A line at the error of the converged picture itself, below which nothing can be told.
-    fn own_error(&self, value: &dyn Fn(&Row) -> f64) -> Option<Series> {
+    fn own_error(&self, value: &dyn Fn(&ChartRow) -> f64) -> Option<Series> {
         let values = || self.rows.iter().map(value).filter(|value| *value > 0.0);
         let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
         let error = self.converged.rmse / self.converged.mean;
@@ -111,7 +111,7 @@ impl Pictures<'_> {
 }
 
 /// The numbers of samples behind `what`.
-fn counted(what: &str, rows: &[Row]) -> String {
+fn counted(what: &str, rows: &[ChartRow]) -> String {
     let mut counts: Vec<u32> = rows.iter().map(|row| row.1).collect();
     counts.sort_unstable();
     counts.dedup();

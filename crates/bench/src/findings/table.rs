@@ -3,19 +3,19 @@
 use crate::accelerators;
 use crate::cameras::Cameras;
 use crate::hits::Quantiles;
-use crate::rounds::Spread;
+use crate::rounds::TimeSpread;
 use crate::samplers::Samplers;
 
 /// A value in both its forms.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Cell {
+pub(super) struct TableCell {
     /// Rounded, for a person; `None` leaves the column out of the terminal.
     shown: Option<String>,
     /// In full.
     full: String,
 }
 
-impl Cell {
+impl TableCell {
     fn word(word: impl Into<String>) -> Self {
         let full = word.into();
         Self { shown: Some(full.clone()), full }
@@ -48,14 +48,14 @@ impl Cell {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Table {
     titles: Vec<&'static str>,
-    rows: Vec<Vec<Cell>>,
+    rows: Vec<Vec<TableCell>>,
 }
 
 impl Table {
     /// Rows of titled cells; all have the same titles.
-    fn new(rows: Vec<Vec<(&'static str, Cell)>>) -> Self {
+    fn new(rows: Vec<Vec<(&'static str, TableCell)>>) -> Self {
         let titles = rows.first().map(|row| row.iter().map(|(title, _)| *title).collect());
-        let cells = |row: Vec<(_, Cell)>| row.into_iter().map(|(_, cell)| cell).collect();
+        let cells = |row: Vec<(_, TableCell)>| row.into_iter().map(|(_, cell)| cell).collect();
         Self { titles: titles.unwrap_or_default(), rows: rows.into_iter().map(cells).collect() }
     }
 
@@ -111,44 +111,44 @@ pub(super) fn accelerators(findings: &[accelerators::Finding]) -> Table {
     Table::new(findings.iter().map(accelerator).collect())
 }
 
-fn accelerator(finding: &accelerators::Finding) -> Vec<(&'static str, Cell)> {
+fn accelerator(finding: &accelerators::Finding) -> Vec<(&'static str, TableCell)> {
     let errors = &finding.errors;
     let of = |quantiles: Option<Quantiles>, which: fn(Quantiles) -> f64| quantiles.map(which);
-    let mega = |bytes: u64| Cell::number(bytes as f64, format!("{:.1}", bytes as f64 / 1e6));
-    let seconds = |value: f64| Cell::number(value, format!("{value:.3}"));
+    let mega = |bytes: u64| TableCell::number(bytes as f64, format!("{:.1}", bytes as f64 / 1e6));
+    let seconds = |value: f64| TableCell::number(value, format!("{value:.3}"));
     let rays = errors.rays as f64;
     let rate = |seconds: f64| rays / seconds / 1e6;
-    let shown_rate = |rate: f64| Cell::number(rate, format!("{rate:.2}"));
+    let shown_rate = |rate: f64| TableCell::number(rate, format!("{rate:.2}"));
     // Hidden columns are in the CSV alone.
     vec![
-        ("method", Cell::word(finding.method)),
-        ("backend", Cell::hidden(&finding.backend)),
-        ("batch", Cell::count(finding.width as u64)),
-        ("threads", Cell::count(finding.threads as u64)),
+        ("method", TableCell::word(finding.method)),
+        ("backend", TableCell::hidden(&finding.backend)),
+        ("batch", TableCell::count(finding.width as u64)),
+        ("threads", TableCell::count(finding.threads as u64)),
         ("build_s", seconds(finding.build_seconds.median)),
-        ("build_fastest_s", Cell::hidden(finding.build_seconds.fastest)),
-        ("build_slowest_s", Cell::hidden(finding.build_seconds.slowest)),
+        ("build_fastest_s", TableCell::hidden(finding.build_seconds.fastest)),
+        ("build_slowest_s", TableCell::hidden(finding.build_seconds.slowest)),
         ("MB", mega(finding.bytes)),
-        ("copied_MB", Cell::hidden(finding.copied_bytes as f64 / 1e6)),
+        ("copied_MB", TableCell::hidden(finding.copied_bytes as f64 / 1e6)),
         ("trace_s", seconds(finding.seconds.median)),
-        ("trace_fastest_s", Cell::hidden(finding.seconds.fastest)),
-        ("trace_slowest_s", Cell::hidden(finding.seconds.slowest)),
+        ("trace_fastest_s", TableCell::hidden(finding.seconds.fastest)),
+        ("trace_slowest_s", TableCell::hidden(finding.seconds.slowest)),
         ("Mrays/s", shown_rate(finding.mrays_per_second)),
         ("slowest", shown_rate(rate(finding.seconds.slowest))),
         ("fastest", shown_rate(rate(finding.seconds.fastest))),
-        ("rays", Cell::hidden(errors.rays)),
-        ("hits", Cell::hidden(errors.hits)),
-        ("missed", Cell::count(errors.missed)),
-        ("false", Cell::count(errors.false_hits)),
-        ("wrong_triangle", Cell::count(errors.wrong_triangle)),
-        ("ties", Cell::hidden(errors.ties)),
-        ("depth_max_m", Cell::error(of(errors.distance, |q| q.max))),
-        ("depth_p99.9_m", Cell::error(of(errors.distance, |q| q.p999))),
+        ("rays", TableCell::hidden(errors.rays)),
+        ("hits", TableCell::hidden(errors.hits)),
+        ("missed", TableCell::count(errors.missed)),
+        ("false", TableCell::count(errors.false_hits)),
+        ("wrong_triangle", TableCell::count(errors.wrong_triangle)),
+        ("ties", TableCell::hidden(errors.ties)),
+        ("depth_max_m", TableCell::error(of(errors.distance, |q| q.max))),
+        ("depth_p99.9_m", TableCell::error(of(errors.distance, |q| q.p999))),
         ("depth_median_m", hidden_error(of(errors.distance, |q| q.median))),
         ("depth_rel_max", hidden_error(of(errors.relative_distance, |q| q.max))),
-        ("depth_rel_p99.9", Cell::error(of(errors.relative_distance, |q| q.p999))),
+        ("depth_rel_p99.9", TableCell::error(of(errors.relative_distance, |q| q.p999))),
         ("depth_rel_median", hidden_error(of(errors.relative_distance, |q| q.median))),
-        ("normal_max_deg", Cell::error(of(errors.normal_angle, |q| q.max))),
+        ("normal_max_deg", TableCell::error(of(errors.normal_angle, |q| q.max))),
         ("normal_p99.9_deg", hidden_error(of(errors.normal_angle, |q| q.p999))),
         ("normal_median_deg", hidden_error(of(errors.normal_angle, |q| q.median))),
     ]
@@ -156,7 +156,7 @@ fn accelerator(finding: &accelerators::Finding) -> Vec<(&'static str, Cell)> {
 
 pub(super) fn samplers(found: &Samplers) -> Table {
     let row = |finding: &crate::samplers::Finding| {
-        let name = ("sampler", Cell::word(finding.sampler));
+        let name = ("sampler", TableCell::word(finding.sampler));
         picture(name, finding.samples, finding.seconds, [finding.rmse, finding.relative_rmse])
     };
     Table::new(found.findings.iter().map(row).collect())
@@ -164,32 +164,32 @@ pub(super) fn samplers(found: &Samplers) -> Table {
 
 pub(super) fn cameras(found: &Cameras) -> Table {
     let row = |finding: &crate::cameras::Finding| {
-        let name = ("model", Cell::word(finding.model));
+        let name = ("model", TableCell::word(finding.model));
         picture(name, finding.samples, finding.seconds, [finding.rmse, finding.relative_rmse])
     };
     Table::new(found.findings.iter().map(row).collect())
 }
 
 fn picture(
-    name: (&'static str, Cell),
+    name: (&'static str, TableCell),
     samples: u32,
-    seconds: Spread,
+    seconds: TimeSpread,
     [rmse, relative]: [f64; 2],
-) -> Vec<(&'static str, Cell)> {
-    let shown = |value: f64| Cell::number(value, format!("{value:.4}"));
+) -> Vec<(&'static str, TableCell)> {
+    let shown = |value: f64| TableCell::number(value, format!("{value:.4}"));
     vec![
         name,
-        ("samples", Cell::count(samples.into())),
+        ("samples", TableCell::count(samples.into())),
         ("trace_s", shown(seconds.median)),
         ("fastest_s", shown(seconds.fastest)),
         ("slowest_s", shown(seconds.slowest)),
-        ("rmse", Cell::error(Some(rmse))),
-        ("relative_rmse", Cell::error(Some(relative))),
+        ("rmse", TableCell::error(Some(rmse))),
+        ("relative_rmse", TableCell::error(Some(relative))),
     ]
 }
 
-fn hidden_error(value: Option<f64>) -> Cell {
-    Cell::hidden(value.map_or_else(String::new, |value| value.to_string()))
+fn hidden_error(value: Option<f64>) -> TableCell {
+    TableCell::hidden(value.map_or_else(String::new, |value| value.to_string()))
 }
 
 #[cfg(test)]
@@ -200,9 +200,9 @@ mod tests {
     fn both_forms_have_the_same_rows() {
         let row = |name: &str, value: f64| {
             vec![
-                ("name", Cell::word(name)),
-                ("all_digits", Cell::hidden(value)),
-                ("error", Cell::error(Some(value))),
+                ("name", TableCell::word(name)),
+                ("all_digits", TableCell::hidden(value)),
+                ("error", TableCell::error(Some(value))),
             ]
         };
         let table = Table::new(vec![row("a, b", 0.123456789), row("c", 0.0)]);

@@ -3,7 +3,7 @@
 use etendue_camera::Sampler;
 use etendue_scene::file::LightPrecision;
 
-use super::super::cameras::Model;
+use super::super::cameras::LensModel;
 use crate::pictures::{Sampling, Studio};
 use crate::rounds::{Series, order};
 use crate::{BenchError, Progress};
@@ -21,7 +21,7 @@ const PIXELS: u64 = 20_000;
 /// threads, the median of the rounds.
 pub(super) fn seconds_a_sample(
     studio: &mut Studio<'_>,
-    models: &[Model],
+    models: &[LensModel],
     progress: Progress<'_>,
 ) -> Result<Vec<f64>, BenchError> {
     let mut series = vec![Series::default(); models.len()];

@@ -26,8 +26,8 @@ use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use serde::Serialize;
 
-use self::seen::{Seen, seen};
-use crate::cameras::{self, Model};
+use self::seen::{PlaceView, seen};
+use crate::cameras::{self, LensModel};
 use crate::pictures::Studio;
 use crate::{BenchError, Progress};
 
@@ -149,7 +149,7 @@ pub fn compare(
     // What a pixel sees through each, against the full train.
     let groups = scene.camera.band_groups(&bands).len();
     let rays = RAYS[usize::from(groups > 3)];
-    let all: Vec<Vec<Seen>> =
+    let all: Vec<Vec<PlaceView>> =
         models.iter().map(|(_, camera)| seen(camera, &bands, &places, rays)).collect();
     let full = all.last().map_or(&[][..], |seen| seen);
     let scale = cameras::scale(&scene.camera).unwrap_or(f64::NAN);
@@ -192,7 +192,7 @@ fn models(
     scene: &Scene,
     bands: &Bands,
     tolerance: Tolerance,
-) -> Result<(Vec<Model>, Vec<String>), BenchError> {
+) -> Result<(Vec<LensModel>, Vec<String>), BenchError> {
     let (mut models, mut notes) = cameras::models(&scene.camera)?;
     match OpencvFit::new(&scene.camera, tolerance.pixels)
         .and_then(|fit| fit.camera.build(|| Bounds::EMPTY, &|name| Err(name.to_owned())))
@@ -224,7 +224,7 @@ fn ends(places: &[Place]) -> Vec<f64> {
 /// What a model misses of the full train.
 fn finding(
     model: &'static str,
-    (own, full): (&[Seen], &[Seen]),
+    (own, full): (&[PlaceView], &[PlaceView]),
     places: &[Place],
     (scale, tolerance): (f64, Tolerance),
 ) -> Finding {

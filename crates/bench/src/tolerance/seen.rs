@@ -13,7 +13,7 @@ use super::Place;
 
 /// What is seen from one place.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct PlaceView {
     /// The chief ray; `None` where the camera sees nothing.
     pub(super) chief: Option<Line>,
     /// The light of each band.
@@ -91,7 +91,7 @@ impl BandRays {
     }
 }
 
-impl Seen {
+impl PlaceView {
     /// The middle of the light of all bands together, each counted alike.
     pub(super) fn centroid(&self, nearness: f64) -> Option<DVec2> {
         let lit: Vec<DVec2> =
@@ -102,7 +102,7 @@ impl Seen {
 
 /// What `camera`, opened for `bands`, sees from each of `places`, by `rays` of each band or group of
 /// bands.
-pub(super) fn seen(camera: &Camera, bands: &Bands, places: &[Place], rays: u32) -> Vec<Seen> {
+pub(super) fn seen(camera: &Camera, bands: &Bands, places: &[Place], rays: u32) -> Vec<PlaceView> {
     let (columns, rows): (Vec<f64>, Vec<f64>) =
         places.iter().map(|place| (place.column, place.row)).unzip();
     let mut chief = RayBatch::default();
@@ -114,7 +114,7 @@ pub(super) fn seen(camera: &Camera, bands: &Bands, places: &[Place], rays: u32) 
     for (i, place) in places.iter().enumerate() {
         let sees = chief.t_max()[i] >= 0.0;
         let line = Line::of(camera.pose(), chief.origin(i), chief.direction(i));
-        let mut seen = Seen { chief: line.filter(|_| sees), bands: Vec::new() };
+        let mut seen = PlaceView { chief: line.filter(|_| sees), bands: Vec::new() };
         // The same places of the pupil for every camera, and everywhere.
         let points = Sampler::Sobol.pixel(0, 0, 0, rays);
         for (number, group) in groups.iter().enumerate() {

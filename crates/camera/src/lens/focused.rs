@@ -19,7 +19,7 @@ const FARTHEST_PUPIL: f64 = 1e6;
 pub struct Focused {
     train: OpticalTrain,
     paraxial: Paraxial,
-    film: Film,
+    film: FilmGrid,
     view: View,
     /// The plane in focus (m) from the camera's origin; infinite, or negative behind it, too.
     object_distance: f64,
@@ -43,7 +43,7 @@ pub enum View {
 
 /// Pixels on a sensor in lens coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Film {
+pub(crate) struct FilmGrid {
     /// The sensor's place.
     pub(crate) frame: Frame,
     /// From one pixel's centre to the next (mm).
@@ -54,7 +54,7 @@ pub(crate) struct Film {
     pub(crate) turn: f64,
 }
 
-impl Film {
+impl FilmGrid {
     /// A place of the picture (pixels from the corner) on the sensor: x and y from its centre (mm) in
     /// the lens' axes.
     pub(crate) fn place(&self, column: f64, row: f64) -> DVec2 {
@@ -110,7 +110,7 @@ impl Focused {
         let pupil = paraxial.entrance_pupil.z.filter(|z| z.abs() < far);
         let all = train.to_plane(z).map_err(fault)?;
         let scale = pupil.map(|pupil| all.image_scale(pupil));
-        let mut film = Film {
+        let mut film = FilmGrid {
             frame: train.sensor_frame(z),
             pitch: 0.0,
             centre: 0.5 * DVec2::from(setup.sensor.resolution.map(f64::from)),
@@ -145,7 +145,7 @@ impl Focused {
     /// The same on pixels `factor` times as large.
     pub(crate) fn coarser(&self, factor: f64) -> Self {
         let pitch = self.film.pitch * factor;
-        let film = Film { pitch, centre: self.film.centre / factor, ..self.film };
+        let film = FilmGrid { pitch, centre: self.film.centre / factor, ..self.film };
         let view = match self.view {
             View::Perspective(k) => View::Perspective(k.coarser(factor)),
             View::Parallel { metres_per_pixel, centre } => View::Parallel {
@@ -220,7 +220,7 @@ impl Focused {
         self.origin
     }
 
-    pub(crate) fn film(&self) -> &Film {
+    pub(crate) fn film(&self) -> &FilmGrid {
         &self.film
     }
 

@@ -23,14 +23,14 @@ pub(crate) enum ImageCircle {
     /// The same in all directions.
     Circle(f64),
     /// By direction, evenly over a full turn from +x; straight lines join them.
-    Outline(Vec<Reach>),
+    Outline(Vec<LightReach>),
     /// Nothing is known: the centre is dark.
     Unknown,
 }
 
 /// How far light arrives in one direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Reach {
+pub(crate) struct LightReach {
     /// To its edge, or as far as was looked (mm).
     distance: f64,
     /// Whether it is dark behind.
@@ -57,14 +57,14 @@ impl ImageCircle {
             let axis = direction(i);
             let border = BEYOND * (half / axis.abs()).min_element();
             if lit(axis * border) {
-                return Reach { distance: border, ends: false };
+                return LightReach { distance: border, ends: false };
             }
             let (mut low, mut high) = (0.0, border);
             while high - low > CLOSE * high {
                 let middle = 0.5 * (low + high);
                 if lit(axis * middle) { low = middle } else { high = middle }
             }
-            Reach { distance: high, ends: true }
+            LightReach { distance: high, ends: true }
         };
         Self::Outline((0..DIRECTIONS).map(edge).collect())
     }

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::lens_camera::LensCamera;
 use crate::{CameraRays, FilmSamples, Pose};
 use etendue_optics::element::{Block, Clip, LANES};
-use etendue_optics::train::pupil::{Bundle, Disk};
+use etendue_optics::train::pupil::{Disk, DiskSamples};
 use etendue_optics::train::{ExitPupil, MonochromaticTrain, Side};
 
 impl LensCamera {
@@ -71,7 +71,8 @@ impl LensCamera {
             out.squares.push(samples.pupil[i]);
         }
         let scale = pupil.index2() / self.solid_angle;
-        let bundle = Bundle { sensor: &film.frame, scale, film: [x, y], squares: &out.squares };
+        let bundle =
+            DiskSamples { sensor: &film.frame, scale, film: [x, y], squares: &out.squares };
         disk.fill(&bundle, &mut out.in_lens);
     }
 

@@ -161,7 +161,7 @@ impl ViewGrid {
     }
 
     /// Pixels of a place in the picture, from the view's corner, and which view it is in.
-    fn place(&self, column: f64, row: f64) -> Place {
+    fn place(&self, column: f64, row: f64) -> ViewPlace {
         let split = |at: f64, side: u32| {
             let at = at * self.coarse;
             let side = f64::from(side);
@@ -179,7 +179,7 @@ impl ViewGrid {
         )]
         let cell = self.grid.cell(row as u32, col as u32);
         let middle = 0.5 * f64::from(self.views - 1);
-        Place { view: DVec2::new(across - middle, down - middle), cell, within: [right, below] }
+        ViewPlace { view: DVec2::new(across - middle, down - middle), cell, within: [right, below] }
     }
 
     /// The ray from a viewpoint (mm right, mm up) that meets the array at `a` (mm): origin and direction
@@ -249,7 +249,7 @@ impl ViewGrid {
 }
 
 /// A place of the picture.
-struct Place {
+struct ViewPlace {
     /// The view, from the middle one: right and down.
     view: DVec2,
     cell: [f64; 2],

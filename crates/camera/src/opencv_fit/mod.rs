@@ -17,8 +17,8 @@ mod words;
 
 use serde::Serialize;
 
-use self::models::Model;
-use self::sights::{COUNT, Sight, sights};
+use self::models::OpencvModel;
+use self::sights::{COUNT, PixelSight, sights};
 use crate::distortion::Distortion;
 use crate::lens::focused::View;
 use crate::{
@@ -51,7 +51,7 @@ pub struct OpencvFit {
     /// How far the lens' chief rays are seen from where they belong.
     pub residuals: Residuals,
     /// Where it stays within the tolerance.
-    pub holds: Region,
+    pub holds: FitRegion,
     /// What else a user should know, in sentences.
     pub notes: Vec<String>,
 }
@@ -66,12 +66,12 @@ pub struct Residuals {
     /// The largest.
     pub largest: f64,
     /// By distance from the principal point, from the inside outwards.
-    pub rings: Vec<Ring>,
+    pub rings: Vec<ResidualRing>,
 }
 
 /// The residuals of a ring of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Ring {
+pub struct ResidualRing {
     /// Its outer radius about the principal point (pixels).
     pub radius: f64,
     /// The widest angle from the axis in it (degrees).
@@ -84,7 +84,7 @@ pub struct Ring {
 
 /// Where a fit holds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Region {
+pub struct FitRegion {
     /// The residual that is allowed (pixels).
     pub tolerance: f64,
     /// The share of the picture's places with less, at the distance of the fit (0..=1).
@@ -118,7 +118,7 @@ impl OpencvFit {
         let sights = sights(camera);
         // The first model within the tolerance, or the better one.
         let candidates = [models::standard, models::fisheye];
-        let mut best: Option<(f64, Model, Distortion)> = None;
+        let mut best: Option<(f64, OpencvModel, Distortion)> = None;
         let mut why = None;
         for fit in candidates {
             let Some(model) = fit(&sights, distance, &start) else { continue };
@@ -187,7 +187,7 @@ fn distance_in_focus(camera: &Camera) -> f64 {
 }
 
 /// The camera of a model, standing where `camera` does.
-fn as_spec(camera: &Camera, (intrinsics, distortion): &Model) -> CameraSpec {
+fn as_spec(camera: &Camera, (intrinsics, distortion): &OpencvModel) -> CameraSpec {
     let [fx, fy] = intrinsics.focal;
     let origin = PixelOrigin::Center;
     let [cx, cy] = intrinsics.centre.map(|c| c - origin.to_corner());
@@ -204,7 +204,7 @@ fn as_spec(camera: &Camera, (intrinsics, distortion): &Model) -> CameraSpec {
 }
 
 /// The distortion of a model, as the scene's camera has it.
-fn build(camera: &Camera, model: &Model) -> Result<Distortion, CameraError> {
+fn build(camera: &Camera, model: &OpencvModel) -> Result<Distortion, CameraError> {
     let built = as_spec(camera, model).build(|| Bounds::EMPTY, &|name| Err(name.to_owned()))?;
     match built.projection() {
         crate::Projection::Pinhole(pinhole) => pinhole.distortion().cloned(),
@@ -214,26 +214,31 @@ fn build(camera: &Camera, model: &Model) -> Result<Distortion, CameraError> {
 }
 
 /// How far (pixels) a chief ray, at a distance (m), is seen from its own place.
-fn residual(sight: &Sight, distance: f64, intrinsics: &Intrinsics, distortion: &Distortion) -> f64 {
+fn residual(
+    sight: &PixelSight,
+    distance: f64,
+    intrinsics: &Intrinsics,
+    distortion: &Distortion,
+) -> f64 {
     let seen = intrinsics.project(distortion.distort(sight.at(distance).to_array()));
     (seen[0] - sight.pixel[0]).hypot(seen[1] - sight.pixel[1])
 }
 
-fn worst(sights: &[Sight], distance: f64, intrinsics: &Intrinsics, built: &Distortion) -> f64 {
+fn worst(sights: &[PixelSight], distance: f64, intrinsics: &Intrinsics, built: &Distortion) -> f64 {
     let off = sights.iter().map(|sight| residual(sight, distance, intrinsics, built));
     // A residual that is no number is none that holds.
     off.map(|off| if off.is_nan() { f64::INFINITY } else { off }).fold(0.0, f64::max)
 }
 
 /// How far from the principal point a place lies (pixels), and a ray from the axis (degrees).
-fn field(sight: &Sight, distance: f64, centre: [f64; 2]) -> [f64; 2] {
+fn field(sight: &PixelSight, distance: f64, centre: [f64; 2]) -> [f64; 2] {
     let direction = sight.at(distance);
     let radius = (sight.pixel[0] - centre[0]).hypot(sight.pixel[1] - centre[1]);
     [radius, direction.x.hypot(direction.y).atan2(direction.z).to_degrees()]
 }
 
 fn residuals(
-    sights: &[Sight],
+    sights: &[PixelSight],
     distance: f64,
     intrinsics: &Intrinsics,
     distortion: &Distortion,
@@ -258,7 +263,7 @@ fn residuals(
         let of_ring: Vec<_> = told.iter().filter(|([radius, _], _)| inside(*radius)).collect();
         let offs: Vec<f64> = of_ring.iter().map(|(_, off)| *off).collect();
         let field = of_ring.iter().map(|([_, field], _)| *field).fold(0.0, f64::max);
-        (!offs.is_empty()).then(|| Ring {
+        (!offs.is_empty()).then(|| ResidualRing {
             radius: edge(i + 1),
             field,
             rms: rms(&offs),
@@ -276,11 +281,11 @@ fn residuals(
 
 /// Where the fit stays within a tolerance (pixels).
 fn holds(
-    sights: &[Sight],
+    sights: &[PixelSight],
     distance: f64,
     (intrinsics, distortion): (&Intrinsics, &Distortion),
     tolerance: f64,
-) -> Region {
+) -> FitRegion {
     let mut places: Vec<([f64; 2], bool)> = sights
         .iter()
         .map(|sight| {
@@ -294,14 +299,14 @@ fn holds(
     let within = places.iter().filter(|(_, within)| *within).count();
     let at = |distance: f64| worst(sights, distance, intrinsics, distortion) <= tolerance;
     let (nearest, farthest) = if at(distance) { range(distance, &at) } else { (None, None) };
-    Region {
+    FitRegion {
         tolerance,
         share: within as f64 / places.len().max(1) as f64,
         radius,
         field,
         nearest,
         farthest,
-        pupil_wander: 1e3 * sights.iter().map(Sight::wander).fold(0.0, f64::max),
+        pupil_wander: 1e3 * sights.iter().map(PixelSight::wander).fold(0.0, f64::max),
     }
 }
 

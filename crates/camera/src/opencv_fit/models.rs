@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::sights::Sight;
-use super::solve::{Row, least_squares};
+use super::sights::PixelSight;
+use super::solve::{ResidualRow, least_squares};
 use crate::Intrinsics;
 use crate::distortion::{BrownConrady, DistortionSpec, Fisheye};
 
@@ -11,17 +11,21 @@ use crate::distortion::{BrownConrady, DistortionSpec, Fisheye};
 const WIDEST: f64 = 0.02;
 
 /// A camera matrix and a distortion.
-pub(super) type Model = (Intrinsics, DistortionSpec);
+pub(super) type OpencvModel = (Intrinsics, DistortionSpec);
 
 /// The standard model (k1, k2, p1, p2, k3) that comes nearest to `sights` at a `distance` (m), from the
 /// intrinsics `start` on.
-pub(super) fn standard(sights: &[Sight], distance: f64, start: &Intrinsics) -> Option<Model> {
+pub(super) fn standard(
+    sights: &[PixelSight],
+    distance: f64,
+    start: &Intrinsics,
+) -> Option<OpencvModel> {
     let seen: Vec<([f64; 2], [f64; 2])> = sights
         .iter()
         .map(|sight| (sight.at(distance), sight.pixel))
         .map(|(d, pixel)| (d.z > WIDEST).then(|| ([d.x / d.z, d.y / d.z], pixel)))
         .collect::<Option<_>>()?;
-    let rows = |at: &[f64; 9]| -> Vec<Row<9>> {
+    let rows = |at: &[f64; 9]| -> Vec<ResidualRow<9>> {
         seen.iter().flat_map(|&(tangents, pixel)| standard_rows(at, tangents, pixel)).collect()
     };
     let [fx, fy] = start.focal;
@@ -35,7 +39,7 @@ pub(super) fn standard(sights: &[Sight], distance: f64, start: &Intrinsics) -> O
 
 /// How far the column and the row of a point are from `pixel`, and their derivatives by fx, fy, cx, cy,
 /// k1, k2, p1, p2, k3.
-fn standard_rows(at: &[f64; 9], [x, y]: [f64; 2], pixel: [f64; 2]) -> [Row<9>; 2] {
+fn standard_rows(at: &[f64; 9], [x, y]: [f64; 2], pixel: [f64; 2]) -> [ResidualRow<9>; 2] {
     let [fx, fy, cx, cy, k1, k2, p1, p2, k3] = *at;
     let r2 = x * x + y * y;
     let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
@@ -52,10 +56,14 @@ fn standard_rows(at: &[f64; 9], [x, y]: [f64; 2], pixel: [f64; 2]) -> [Row<9>; 2
 }
 
 /// The fisheye model (k1, k2, k3, k4) that comes nearest.
-pub(super) fn fisheye(sights: &[Sight], distance: f64, start: &Intrinsics) -> Option<Model> {
+pub(super) fn fisheye(
+    sights: &[PixelSight],
+    distance: f64,
+    start: &Intrinsics,
+) -> Option<OpencvModel> {
     let seen: Vec<(DVec3, [f64; 2])> =
         sights.iter().map(|sight| (sight.at(distance), sight.pixel)).collect();
-    let rows = |at: &[f64; 8]| -> Vec<Row<8>> {
+    let rows = |at: &[f64; 8]| -> Vec<ResidualRow<8>> {
         seen.iter().flat_map(|&(direction, pixel)| fisheye_rows(at, direction, pixel)).collect()
     };
     let [fx, fy] = start.focal;
@@ -67,7 +75,7 @@ pub(super) fn fisheye(sights: &[Sight], distance: f64, start: &Intrinsics) -> Op
 }
 
 /// As [`standard_rows`], by fx, fy, cx, cy, k1, k2, k3, k4.
-fn fisheye_rows(at: &[f64; 8], direction: DVec3, pixel: [f64; 2]) -> [Row<8>; 2] {
+fn fisheye_rows(at: &[f64; 8], direction: DVec3, pixel: [f64; 2]) -> [ResidualRow<8>; 2] {
     let [fx, fy, cx, cy, k1, k2, k3, k4] = *at;
     let across = direction.x.hypot(direction.y);
     let theta = across.atan2(direction.z);
@@ -99,7 +107,7 @@ mod tests {
             "pixel_origin": "corner"}, "pose": {"from": [9, 2, 3], "look_at": [0, 1, 0]},
             "sensor": {"resolution": [640, 480]}"#;
         let start = Intrinsics { focal: [700.0; 2], centre: [320.0, 240.0], skew: 0.0 };
-        type Fit = fn(&[Sight], f64, &Intrinsics) -> Option<Model>;
+        type Fit = fn(&[PixelSight], f64, &Intrinsics) -> Option<OpencvModel>;
         let models: [(&str, Fit); 2] = [
             (
                 r#"{"type": "brown_conrady", "k1": -0.21, "k2": 0.08, "p1": 0.001, "p2": -0.0007,

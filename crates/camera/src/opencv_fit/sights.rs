@@ -13,7 +13,7 @@ pub(super) const COUNT: usize = (PLACES * PLACES) as usize;
 
 /// A chief ray. Axes are OpenCV's: x right, y down, z forward.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sight {
+pub(super) struct PixelSight {
     /// The place in the picture (pixels from the outer corner of the top left pixel).
     pub(super) pixel: [f64; 2],
     /// The point of the ray that is nearest to the entrance pupil's middle, from there (m).
@@ -21,7 +21,7 @@ pub(super) struct Sight {
     direction: DVec3,
 }
 
-impl Sight {
+impl PixelSight {
     /// The direction from the entrance pupil's middle to where the ray is at a `distance` (m).
     pub(super) fn at(&self, distance: f64) -> DVec3 {
         match distance.is_finite() {
@@ -37,7 +37,7 @@ impl Sight {
 }
 
 /// The chief rays of places all over the picture; places that see nothing have none.
-pub(super) fn sights(camera: &Camera) -> Vec<Sight> {
+pub(super) fn sights(camera: &Camera) -> Vec<PixelSight> {
     let [width, height] = camera.resolution().map(f64::from);
     let share = |i: u32| f64::from(i) / f64::from(PLACES - 1);
     let (mut columns, mut rows) = (Vec::new(), Vec::new());
@@ -61,7 +61,7 @@ pub(super) fn sights(camera: &Camera) -> Vec<Sight> {
     let sight = |i: usize| {
         let (origin, direction) = (rays.origin(i) - pose.position, rays.direction(i));
         let nearest = origin - direction * origin.dot(direction);
-        Sight {
+        PixelSight {
             pixel: [columns[i], rows[i]],
             origin: opencv(nearest),
             direction: opencv(direction),

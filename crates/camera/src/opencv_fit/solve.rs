@@ -7,13 +7,13 @@ const MOST_STEPS: usize = 50;
 const ENOUGH: f64 = 1e-14;
 
 /// How far off a model is at one place (pixels), and the derivatives of that by its parameters.
-pub(super) type Row<const N: usize> = (f64, [f64; N]);
+pub(super) type ResidualRow<const N: usize> = (f64, [f64; N]);
 
 /// The parameters from `start` on at which the squares of all `rows` have the least sum; `None` when
 /// they do not tell the parameters apart.
 pub(super) fn least_squares<const N: usize>(
     start: [f64; N],
-    rows: impl Fn(&[f64; N]) -> Vec<Row<N>>,
+    rows: impl Fn(&[f64; N]) -> Vec<ResidualRow<N>>,
 ) -> Option<[f64; N]> {
     let mut at = start;
     let mut here = rows(&at);
@@ -38,12 +38,12 @@ pub(super) fn least_squares<const N: usize>(
     at.iter().all(|x| x.is_finite()).then_some(at)
 }
 
-fn sum_of_squares<const N: usize>(rows: &[Row<N>]) -> f64 {
+fn sum_of_squares<const N: usize>(rows: &[ResidualRow<N>]) -> f64 {
     rows.iter().map(|(off, _)| off * off).sum()
 }
 
 /// The solution of the normal equations, by Cholesky's factors of a matrix with a diagonal of 1.
-fn step<const N: usize>(rows: &[Row<N>]) -> Option<[f64; N]> {
+fn step<const N: usize>(rows: &[ResidualRow<N>]) -> Option<[f64; N]> {
     let mut matrix = [[0.0; N]; N];
     let mut right = [0.0; N];
     for (off, by) in rows {
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_bent_model_is_found_from_afar() {
-        let rows = |&[a, b]: &[f64; 2]| -> Vec<Row<2>> {
+        let rows = |&[a, b]: &[f64; 2]| -> Vec<ResidualRow<2>> {
             let row = |i: u32| {
                 let x = f64::from(i) / 10.0;
                 let model = a * (b * x).exp();

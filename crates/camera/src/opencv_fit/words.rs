@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{OpencvFit, Region};
+use super::{FitRegion, OpencvFit};
 
 impl fmt::Display for OpencvFit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -53,7 +53,7 @@ impl fmt::Display for OpencvFit {
     }
 }
 
-impl fmt::Display for Region {
+impl fmt::Display for FitRegion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let tolerance = self.tolerance;
         if self.share < 1.0 {

@@ -19,7 +19,7 @@ const MOST_BYTES: u64 = 1 << 20;
 /// What is kept: rates by the machine that they were measured on.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Kept {
+struct KeptRates {
     machines: BTreeMap<String, Calibration>,
 }
 
@@ -76,7 +76,7 @@ fn keep(path: &Path, rates: Calibration) -> Result<(), Error> {
 }
 
 /// What is kept; nothing when it cannot be read.
-fn read(path: &Path) -> Kept {
+fn read(path: &Path) -> KeptRates {
     let is_small =
         std::fs::metadata(path).is_ok_and(|file| file.is_file() && file.len() <= MOST_BYTES);
     let text =

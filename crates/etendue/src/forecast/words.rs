@@ -8,7 +8,7 @@ use super::TimeForecast;
 
 impl fmt::Display for TimeForecast {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ({})", Seconds(self.total), self.stages())
+        write!(f, "{} ({})", ForecastTime(self.total), self.stages())
     }
 }
 
@@ -28,7 +28,7 @@ impl TimeForecast {
         let shown =
             stages.iter().filter(|(name, time)| *time > 0.0 || !["sensor", "views"].contains(name));
         let words: Vec<String> =
-            shown.map(|(name, time)| format!("{name} {}", Seconds(*time))).collect();
+            shown.map(|(name, time)| format!("{name} {}", ForecastTime(*time))).collect();
         words.join(", ")
     }
 
@@ -41,7 +41,7 @@ impl TimeForecast {
         };
         Decision {
             what: "time",
-            choice: Seconds(self.total).to_string(),
+            choice: ForecastTime(self.total).to_string(),
             because: format!("{}; {by}", self.stages()),
             saves: None,
             key: None,
@@ -51,9 +51,9 @@ impl TimeForecast {
 }
 
 /// A time with the digits that a forecast has.
-struct Seconds(f64);
+struct ForecastTime(f64);
 
-impl fmt::Display for Seconds {
+impl fmt::Display for ForecastTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             time if time >= 5400.0 => write!(f, "{:.1} h", time / 3600.0),

@@ -11,7 +11,7 @@ use etendue_scene::file::SceneFile;
 use etendue_scene::memory::Budget;
 use etendue_scene::{Frame, LoadOptions, Scene, Strictness};
 
-use super::{Loaded, Ready, Session};
+use super::{LoadedScene, Ready, Session};
 use crate::neighbours::{self, Neighbour};
 use crate::progress::Phase;
 use crate::words::in_words;
@@ -20,7 +20,7 @@ use crate::{Error, Progress};
 impl Session {
     /// The scene, the structure over it and its images, once they are [prepared](Self::prepare).
     pub(crate) fn prepared(&self) -> Result<Ready, Error> {
-        let Loaded { scene, accel, .. } = self.loaded()?;
+        let LoadedScene { scene, accel, .. } = self.loaded()?;
         let accel = accel.clone().ok_or_else(not_built)?;
         Ok((Arc::clone(scene), accel, Arc::clone(&self.images)))
     }
@@ -30,7 +30,7 @@ impl Session {
         self.options.outputs
     }
 
-    pub(super) fn loaded(&self) -> Result<&Loaded, Error> {
+    pub(super) fn loaded(&self) -> Result<&LoadedScene, Error> {
         self.loaded.as_ref().ok_or_else(|| Error::Refused("the scene is not loaded".to_owned()))
     }
 
@@ -60,7 +60,7 @@ impl Session {
         let plan = Plan::new(&scene, self.options.outputs);
         let scene = Arc::new(scene);
         self.loaded =
-            Some(Loaded { scene, plan, notes, accel: None, neighbours, is_decoded: false });
+            Some(LoadedScene { scene, plan, notes, accel: None, neighbours, is_decoded: false });
         self.seconds.load += start.elapsed().as_secs_f64();
         Ok(())
     }
@@ -119,7 +119,7 @@ impl Session {
             ..BuildOptions::default()
         };
         let Some(loaded) = &mut self.loaded else { return Ok(()) };
-        let Loaded { scene, plan, accel, neighbours, .. } = loaded;
+        let LoadedScene { scene, plan, accel, neighbours, .. } = loaded;
         let structures = &mut self.structures;
         let mut is_new = false;
         // What is free now was judged when the structure was built; a limit holds for every picture.
@@ -147,7 +147,7 @@ impl Session {
 
     /// Decodes the images that the plan wants, unless they are.
     pub(super) fn decode(&mut self, progress: &Progress) -> Result<(), Error> {
-        let Loaded { scene, plan, is_decoded, .. } = self.loaded()?;
+        let LoadedScene { scene, plan, is_decoded, .. } = self.loaded()?;
         if *is_decoded {
             return Ok(());
         }

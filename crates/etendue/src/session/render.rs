@@ -15,7 +15,7 @@ use etendue_render::{
 use etendue_scene::Scene;
 use serde_json::Value;
 
-use super::{Loaded, Session};
+use super::{LoadedScene, Session};
 use crate::words::{NOT_FOLLOWED, changed, fingerprints, header, not_finite};
 use crate::{Error, Progress, Rendering, Shares};
 
@@ -47,7 +47,7 @@ impl Session {
         progress: &Progress,
     ) -> Result<(), Error> {
         let film = self.trace(Some(shard), &[], progress)?;
-        let Loaded { scene, plan, .. } = self.loaded()?;
+        let LoadedScene { scene, plan, .. } = self.loaded()?;
         if !film.is_complete() {
             return Err(RenderError::Stopped.into());
         }
@@ -68,7 +68,7 @@ impl Session {
         let film = if shares.are_of_samples() {
             self.trace(None, &shares.files, progress)?
         } else {
-            let Loaded { scene, plan, .. } = self.loaded()?;
+            let LoadedScene { scene, plan, .. } = self.loaded()?;
             Film::merged(scene, plan, &shares.files, &self.identity(scene, plan)?)?
         };
         self.conclude(film, clock, progress)
@@ -93,7 +93,7 @@ impl Session {
         progress: &Progress,
     ) -> Result<Film, Error> {
         self.prepare(progress)?;
-        let Loaded { scene, plan, neighbours, .. } = self.loaded()?;
+        let LoadedScene { scene, plan, neighbours, .. } = self.loaded()?;
         let identity = match (&shard, &self.checkpoint) {
             (None, None) if shares.is_empty() => Identity::new(),
             _ => self.identity(scene, plan)?,

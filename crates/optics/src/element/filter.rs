@@ -46,11 +46,11 @@ pub struct Filter {
     /// The curves of the filter.
     pub curves: Vec<Curve>,
     /// Which curve is where; the first one everywhere when there is none.
-    map: Option<Map>,
+    map: Option<CurveMap>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct Map {
+struct CurveMap {
     picture: Picture,
     curve_of_pixel: Vec<u32>,
 }
@@ -73,7 +73,7 @@ impl FilterSpec {
                 let picture = Picture::read(file, width.0, height, resolve)?;
                 let curves = self.curves.values().map(sound).collect::<Result<Vec<_>, _>>()?;
                 let curve_of_pixel = self.curves_of(&picture, file)?;
-                let map = Some(Map { picture, curve_of_pixel });
+                let map = Some(CurveMap { picture, curve_of_pixel });
                 Ok(Filter { semi_diameter, curves, map })
             }
             _ => Err("give either transmission, or image with width and curves".to_owned()),

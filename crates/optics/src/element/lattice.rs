@@ -38,7 +38,7 @@ pub struct Lattice {
 
 /// Where a point lies in its cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cell {
+pub struct LatticeCell {
     /// Which: steps along the rows, and rows. In a hexagonal grid a row begins half a pitch further
     /// than the one before.
     pub index: [f64; 2],
@@ -57,13 +57,13 @@ fn nearest(x: f64) -> f64 {
 impl Lattice {
     /// The cell of a point of the plane (mm).
     #[must_use]
-    pub fn cell(&self, x: f64, y: f64) -> Cell {
+    pub fn cell(&self, x: f64, y: f64) -> LatticeCell {
         self.cell_of(self.grid, x, y)
     }
 
     /// The same with a packing that the compiler knows.
     #[inline(always)]
-    pub(crate) fn cell_of(&self, grid: Grid, x: f64, y: f64) -> Cell {
+    pub(crate) fn cell_of(&self, grid: Grid, x: f64, y: f64) -> LatticeCell {
         let [c, s] = self.turn;
         let (x, y) = (x - self.offset[0], y - self.offset[1]);
         let scale = 1.0 / self.pitch;
@@ -85,7 +85,7 @@ impl Lattice {
         };
         let local = [local[0] * self.pitch, local[1] * self.pitch];
         let away = [c * local[0] - s * local[1], s * local[0] + c * local[1]];
-        Cell { index, local, away }
+        LatticeCell { index, local, away }
     }
 
     /// Whether a point (mm from a cell's centre, in the array's own axes) is of this cell, whatever

@@ -35,7 +35,7 @@ enum Kinds {
 }
 
 /// A point of the array's plane.
-struct Place {
+struct PlanePoint {
     /// Which cell.
     index: [f64; 2],
     /// From the lenslet's centre (mm).
@@ -139,13 +139,18 @@ impl Lenslets {
     }
 
     #[inline(always)]
-    fn place(&self, (grid, shape): (Grid, LensletShape), [x, y]: [f64; 2], clip: Clip) -> Place {
+    fn place(
+        &self,
+        (grid, shape): (Grid, LensletShape),
+        [x, y]: [f64; 2],
+        clip: Clip,
+    ) -> PlanePoint {
         let array = &*self.array;
         let cell = array.lattice.cell_of(grid, x, y);
         let passes_gaps = array.gaps == Gaps::Clear;
         let inside = array.is_open_as(shape, cell.local);
         let off = clip == Clip::Off;
-        Place {
+        PlanePoint {
             index: cell.index,
             away: cell.away,
             open: inside | (off & !passes_gaps),

@@ -33,7 +33,7 @@ pub use aperture::{ApertureSpec, CircularSpec, MaskSpec, Opening, PolygonSpec};
 pub use biconic::{Biconic, BiconicSpec};
 pub use filter::{Filter, FilterSpec};
 pub use frame::Frame;
-pub use lattice::{Cell, Grid, Lattice};
+pub use lattice::{Grid, Lattice, LatticeCell};
 pub use losses::{Coating, LossesSpec, Plain, Reflection};
 pub use microlens_array::{
     Gaps, Lenslet, LensletShape, LensletSpec, MicrolensArray, MicrolensArraySpec, clipped,

@@ -62,7 +62,7 @@ impl AgfCatalogue {
     pub fn read(name: &str, bytes: &[u8]) -> Result<Self, AgfError> {
         let text = decode(bytes);
         let mut catalogue = Self { name: name.to_owned(), glasses: BTreeMap::new() };
-        let mut entry: Option<Entry<'_>> = None;
+        let mut entry: Option<AgfEntry<'_>> = None;
         for (number, line) in (1..).zip(text.lines()) {
             let mut words = line.split_whitespace();
             let command = words.next().unwrap_or_default();
@@ -70,7 +70,7 @@ impl AgfCatalogue {
             // An entry begins with NM and ends before the next one; other lines are about it.
             match (command, &mut entry) {
                 ("NM", previous) => {
-                    let next = Entry::named(number, words).ok_or_else(|| {
+                    let next = AgfEntry::named(number, words).ok_or_else(|| {
                         fault("NM needs a name and the number of a formula, 1 to 13")
                     })?;
                     if let Some(done) = previous.replace(next) {
@@ -110,7 +110,7 @@ impl AgfCatalogue {
         self.glasses.keys().map(String::as_str)
     }
 
-    fn add(&mut self, entry: &Entry<'_>) -> Result<(), AgfError> {
+    fn add(&mut self, entry: &AgfEntry<'_>) -> Result<(), AgfError> {
         let fault = |why: String| AgfError::Line { line: entry.line, why };
         let dispersion = formula(entry.formula, &entry.coefficients).ok_or_else(|| {
             fault(format!("{} has too few coefficients for formula {}", entry.name, entry.formula))
@@ -148,7 +148,7 @@ impl AgfCatalogue {
 }
 
 /// One glass on its way.
-struct Entry<'a> {
+struct AgfEntry<'a> {
     line: usize,
     name: &'a str,
     formula: u32,
@@ -157,7 +157,7 @@ struct Entry<'a> {
     transmissions: Vec<Vec<f64>>,
 }
 
-impl<'a> Entry<'a> {
+impl<'a> AgfEntry<'a> {
     fn named(line: usize, mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
         let name = words.next()?;
         // Written as a whole number, or as 2.0.

@@ -44,14 +44,14 @@ pub struct BehindLenslets {
     /// each medium behind it.
     behind: Vec<[f64; 3]>,
     /// What each type of lenslet does on the way from the rearmost array to the lens before.
-    kinds: Vec<Kind>,
+    kinds: Vec<ParaxialLenslet>,
     /// The index before the lenslets.
     index: f64,
 }
 
 /// A type of lenslet to first order, traced from the sensor.
 #[derive(Debug, Clone)]
-struct Kind {
+struct ParaxialLenslet {
     /// On height and reduced slope, from before the rearmost array to in front of the first element.
     all: Abcd,
     /// The same to the other arrays, whose openings the light has to pass.
@@ -203,7 +203,13 @@ impl OpticalTrain {
         main
     }
 
-    fn lenslet_kind(&self, indices: &[f64], front: usize, rear: usize, kind: usize) -> Kind {
+    fn lenslet_kind(
+        &self,
+        indices: &[f64],
+        front: usize,
+        rear: usize,
+        kind: usize,
+    ) -> ParaxialLenslet {
         let mut all = Abcd::ONE;
         let mut to_arrays = Vec::new();
         for i in (front..=rear).rev() {
@@ -224,7 +230,7 @@ impl OpticalTrain {
                 all = all.then(Abcd::gap(gap / indices[i]));
             }
         }
-        Kind { all, to_arrays }
+        ParaxialLenslet { all, to_arrays }
     }
 
     /// The same lens with its lenslets, and all behind them, moved along the axis so that they see sharp

@@ -4,8 +4,8 @@ use etendue_scene::file::SETS;
 use etendue_tracer::LayerSpec;
 use rayon::prelude::*;
 
-use super::{Blocks, variance_of_mean};
-use crate::film::{FilmLayer, Rows, strips, take};
+use super::{SampleBlocks, variance_of_mean};
+use crate::film::{FilmLayer, PlaneRows, strips, take};
 use crate::samples::{Averaging, Sum, put, split};
 use crate::tiles::TILE;
 
@@ -45,7 +45,7 @@ impl Averaging<'_> {
     }
 
     /// Writes to the layers the means of what is settled, and of the `samples` samples that others have.
-    pub(crate) fn show_settled(&mut self, blocks: &Blocks, samples: u32) {
+    pub(crate) fn show_settled(&mut self, blocks: &SampleBlocks, samples: u32) {
         let values = self.values();
         let Self { what, layers, sums, .. } = self;
         let resolution @ [width, _] = what.camera().resolution();
@@ -71,7 +71,7 @@ impl Averaging<'_> {
     pub(crate) fn tell(
         &self,
         told: &mut [&mut FilmLayer],
-        blocks: &Blocks,
+        blocks: &SampleBlocks,
         (samples, first): (u32, usize),
     ) {
         let resolution @ [width, _] = self.what.camera().resolution();
@@ -90,7 +90,7 @@ impl Averaging<'_> {
                         _ => a.iter().zip(b).map(variance).collect(),
                     };
                     for (plane, number) in layer.planes.iter_mut().zip(numbers) {
-                        Rows::put(plane, index, number);
+                        PlaneRows::put(plane, index, number);
                     }
                 }
             }

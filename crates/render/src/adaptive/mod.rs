@@ -44,7 +44,7 @@ const ROWS_OF_STRIP: usize = (TILE / BLOCK) as usize;
 
 /// What is known of a block.
 #[derive(Debug, Clone, Copy, Default)]
-struct Block {
+struct SampleBlock {
     /// Samples after which the number of a half was decided by the block's other half; 0 before.
     passed: [u32; HALVES],
     /// Samples of each pixel of a half, when they are settled; 0 before.
@@ -53,7 +53,7 @@ struct Block {
     error: [f64; HALVES],
 }
 
-impl Block {
+impl SampleBlock {
     fn wants_more(&self) -> bool {
         self.settled.contains(&0)
     }
@@ -76,20 +76,20 @@ impl Block {
 
 /// The blocks of a picture, in rows from the top.
 #[derive(Debug, Clone)]
-pub(crate) struct Blocks {
+pub(crate) struct SampleBlocks {
     resolution: [u32; 2],
     across: usize,
-    blocks: Vec<Block>,
+    blocks: Vec<SampleBlock>,
 }
 
-impl Blocks {
+impl SampleBlocks {
     fn new(resolution: [u32; 2]) -> Self {
         let [across, down] = resolution.map(|side| side.div_ceil(BLOCK) as usize);
-        Self { resolution, across, blocks: vec![Block::default(); across * down] }
+        Self { resolution, across, blocks: vec![SampleBlock::default(); across * down] }
     }
 
     /// The block of a pixel.
-    fn of(&self, pixel: [u32; 2]) -> &Block {
+    fn of(&self, pixel: [u32; 2]) -> &SampleBlock {
         &self.blocks[self.index(pixel)]
     }
 
@@ -189,7 +189,7 @@ pub(crate) struct Adaptive<'a> {
     /// Samples after which a pixel is given up.
     most: u32,
     shard: Shard,
-    pub(crate) blocks: Blocks,
+    pub(crate) blocks: SampleBlocks,
     /// Which part of what is averaged is judged, and its first value of a pixel.
     judged: (usize, usize),
 }
@@ -201,7 +201,7 @@ impl<'a> Adaptive<'a> {
         shard: Shard,
         judged: (usize, usize),
     ) -> Self {
-        Self { rule, most, shard, blocks: Blocks::new(resolution), judged }
+        Self { rule, most, shard, blocks: SampleBlocks::new(resolution), judged }
     }
 
     /// Judges what there is after `samples` samples of each pixel that wanted them, and settles what is
@@ -257,9 +257,9 @@ impl<'a> Adaptive<'a> {
     /// Settles the halves of blocks that have passed with those beside them, and those that have had the
     /// most.
     fn decide(&mut self, samples: u32) {
-        let Self { blocks: Blocks { across, blocks, .. }, most, shard, .. } = self;
+        let Self { blocks: SampleBlocks { across, blocks, .. }, most, shard, .. } = self;
         let (across, strip) = (*across, ROWS_OF_STRIP * *across);
-        let near: Vec<[bool; HALVES]> = blocks.iter().map(Block::is_near).collect();
+        let near: Vec<[bool; HALVES]> = blocks.iter().map(SampleBlock::is_near).collect();
         for (index, block) in blocks.iter_mut().enumerate() {
             if !shard.owns(index / strip) {
                 continue;
@@ -275,7 +275,7 @@ impl<'a> Adaptive<'a> {
             let around: Vec<usize> = around
                 .filter(|other| *other < near.len() && other / strip == index / strip)
                 .collect();
-            let Block { passed, settled, .. } = block;
+            let SampleBlock { passed, settled, .. } = block;
             for (half, (settled, passed)) in settled.iter_mut().zip(passed).enumerate() {
                 let has_passed = *passed > 0 && around.iter().all(|&other| near[other][half]);
                 if *settled == 0 && (has_passed || samples >= *most) {

@@ -28,7 +28,7 @@ pub(super) fn name(digits: usize, stem: &str, number: u32, ending: &str) -> Stri
 }
 
 /// Writes one exposure after the other.
-pub(super) struct Writer<'a> {
+pub(super) struct ExposureWriter<'a> {
     pub(super) sensor: &'a Sensor,
     pub(super) light: &'a SensorLight,
     pub(super) folder: &'a Path,
@@ -41,7 +41,7 @@ pub(super) struct Writer<'a> {
     pub(super) exposed: Exposed,
 }
 
-impl Writer<'_> {
+impl ExposureWriter<'_> {
     fn film(&self) -> Film<'_> {
         self.light.film()
     }

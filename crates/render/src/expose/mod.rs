@@ -33,7 +33,7 @@ pub(crate) use noise::NoiseOfPixels;
 
 use crate::film::NoMemory;
 use crate::output::{OutputError, Outputs, Picture, PictureError, sidecar};
-use files::{Sidecar, Writer};
+use files::{ExposureWriter, Sidecar};
 use film::colors;
 
 /// Why an exposure came to nothing.
@@ -186,7 +186,7 @@ pub fn write(
     let sensor = light.sensor();
     let shots: Vec<Exposure> = sensor.shots().collect();
     let digits = digits(shots.len());
-    let mut writer = Writer {
+    let mut writer = ExposureWriter {
         sensor,
         light,
         folder,

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// What a decoder needs, and what it may be scored against.
 #[derive(Debug, Serialize)]
-pub(super) struct Geometry {
+pub(super) struct LightFieldGeometry {
     /// What pixel coordinates count from.
     pixel_origin: PixelOrigin,
     /// `rect` or `hex`.
@@ -82,7 +82,7 @@ const ABOUT: [&str; 5] = [
      it",
 ];
 
-impl Geometry {
+impl LightFieldGeometry {
     pub(super) fn new(
         camera: &Camera,
         light_field: &LightField,

@@ -34,7 +34,7 @@ use crate::output::{
 };
 use crate::{Images, Plan, RenderError, render};
 
-use geometry::Geometry;
+use geometry::LightFieldGeometry;
 pub use looking::LightFieldViews;
 use views::Views;
 
@@ -114,7 +114,7 @@ pub fn write(
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<LightFieldSet, LightFieldError> {
     let scene = rendering.scene;
-    let mut set = Writer { folder, outputs, written: LightFieldSet::default() };
+    let mut set = SetWriter { folder, outputs, written: LightFieldSet::default() };
     let Some(light_field) = scene.camera.light_field() else { return Ok(set.written) };
     let reference = match scene.camera.projection() {
         Projection::Views(_) => scene.camera.clone(),
@@ -128,7 +128,7 @@ pub fn write(
     let depth = central_depth(rendering, &reference, outputs, &|share| progress(0.1 * share))?;
     // Without a lens there is nothing to open.
     let camera = scene.camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
-    let geometry = Geometry::new(&camera, light_field, grid, &depth);
+    let geometry = LightFieldGeometry::new(&camera, light_field, grid, &depth);
     sidecar::write_json(&set.place("geometry.json"), &geometry)?;
     set.depth(grid, &depth)?;
     if raw.is_some() {
@@ -200,13 +200,13 @@ fn central_depth(
 }
 
 /// Where the set goes.
-struct Writer<'a> {
+struct SetWriter<'a> {
     folder: &'a Path,
     outputs: Outputs,
     written: LightFieldSet,
 }
 
-impl Writer<'_> {
+impl SetWriter<'_> {
     fn place(&mut self, name: &str) -> PathBuf {
         let path = self.folder.join(name);
         self.written.files.push(path.clone());

@@ -12,7 +12,7 @@ use crate::output::{Channel, Layer, Look, Picture, PictureError, Values};
 
 /// The values of all views.
 #[derive(Debug, Clone)]
-pub(super) struct Array {
+pub(super) struct ViewArray {
     /// `[down][across][row][column][channel]`.
     pub(super) values: Vec<f32>,
     channels: usize,
@@ -26,9 +26,9 @@ pub(super) struct Views {
     /// Columns and rows of each.
     pub(super) size: [u32; 2],
     /// Red, green and blue.
-    pub(super) colors: Array,
+    pub(super) colors: ViewArray,
     /// The bands of a spectrum, where the picture has one.
-    pub(super) spectrum: Option<Array>,
+    pub(super) spectrum: Option<ViewArray>,
 }
 
 impl Views {
@@ -54,7 +54,7 @@ impl Views {
                     .collect::<Vec<f32>>()
             };
             let views: Vec<Vec<f32>> = (0..n * n).into_par_iter().map(view).collect();
-            Array { values: views.concat(), channels: planes.len() }
+            ViewArray { values: views.concat(), channels: planes.len() }
         };
         let empty = || PictureError::Empty { what: "the raw picture".to_owned() };
         let colors = decode(&planes(picture, "").ok_or_else(empty)?);
@@ -77,7 +77,7 @@ impl Views {
                     }
                 }
             }
-            Array { values, channels: planes.len() }
+            ViewArray { values, channels: planes.len() }
         };
         let colors = split(&planes(picture, "").unwrap_or_default());
         let spectrum = planes(picture, BANDS).map(|planes| split(&planes));
@@ -85,7 +85,7 @@ impl Views {
     }
 
     /// The shape of one of its arrays.
-    pub(super) fn shape(&self, array: &Array) -> [u64; 5] {
+    pub(super) fn shape(&self, array: &ViewArray) -> [u64; 5] {
         let [cols, rows] = self.size.map(u64::from);
         let views = u64::from(self.views);
         [views, views, rows, cols, array.channels as u64]
@@ -211,7 +211,7 @@ mod tests {
                 values.extend([value; 3]);
             }
         }
-        let colors = Array { values, channels: 3 };
+        let colors = ViewArray { values, channels: 3 };
         let views = Views { views: n, size: [cols, rows], colors, spectrum: None };
         let sharp = views.averaged(disparity).unwrap();
         let value = sharp.layer("").unwrap().channels[1].values.at((5 * cols + 6) as usize);

@@ -6,24 +6,24 @@ use std::sync::{Mutex, PoisonError};
 use super::OutputError;
 
 /// The inputs of this process, by name and by what they are.
-static INPUTS: Mutex<Vec<(PathBuf, Identity)>> = Mutex::new(Vec::new());
+static INPUTS: Mutex<Vec<(PathBuf, FileIdentity)>> = Mutex::new(Vec::new());
 
 /// What two names of one file share, links followed: device and inode.
 #[cfg(unix)]
-type Identity = (u64, u64);
+type FileIdentity = (u64, u64);
 
 /// What two names of one file share: its place without links.
 #[cfg(not(unix))]
-type Identity = PathBuf;
+type FileIdentity = PathBuf;
 
 #[cfg(unix)]
-fn identity(path: &Path) -> Option<Identity> {
+fn identity(path: &Path) -> Option<FileIdentity> {
     use std::os::unix::fs::MetadataExt;
     std::fs::metadata(path).ok().map(|data| (data.dev(), data.ino()))
 }
 
 #[cfg(not(unix))]
-fn identity(path: &Path) -> Option<Identity> {
+fn identity(path: &Path) -> Option<FileIdentity> {
     path.canonicalize().ok()
 }
 

@@ -20,7 +20,7 @@ use crate::{
 };
 
 pub use memory::MemoryForecast;
-pub use precision::Precision;
+pub use precision::StepSizes;
 
 /// What `etendue check` tells of a scene or model. Serialises to what `--json` prints.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -48,7 +48,7 @@ pub struct Diagnosis {
     /// Triangles that are no good.
     pub defects: Defects,
     /// How exactly places can be told.
-    pub precision: Option<Precision>,
+    pub precision: Option<StepSizes>,
     /// The camera that a render would use, as `camera.json` tells it.
     pub camera: CameraFile,
     /// Where that camera came from, in words.
@@ -191,7 +191,7 @@ impl Diagnosis {
                 duplicate: geometry.meshes.iter().map(duplicates::count).sum(),
                 out_of_range: 0,
             },
-            precision: Precision::of(geometry, around),
+            precision: StepSizes::of(geometry, around),
             camera: scene.camera.opencv(),
             camera_origin: match &scene.camera_origin {
                 CameraOrigin::Scene => "the scene file".to_owned(),

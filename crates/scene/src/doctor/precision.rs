@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// Steps between neighbouring numbers at the scene's size and distance (m).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Precision {
+pub struct StepSizes {
     /// The largest coordinate in world space (m).
     pub farthest_coordinate: f64,
     /// The step of the coordinates as the files store them, carried into the world (m): finer than
@@ -22,7 +22,7 @@ pub struct Precision {
     pub f64_step: f64,
 }
 
-impl Precision {
+impl StepSizes {
     /// The forecast; `None` for a scene without triangles.
     pub(super) fn of(geometry: &Geometry, around: Bounds) -> Option<Self> {
         if around.is_empty() {
@@ -99,10 +99,10 @@ mod tests {
                 world_from_mesh: Transform::new(DMat3::IDENTITY * 0.5, DVec3::splat(1e7)),
             }],
         };
-        let forecast = Precision::of(&geometry, geometry.bounds()).unwrap();
+        let forecast = StepSizes::of(&geometry, geometry.bounds()).unwrap();
         assert_eq!(forecast.f32_step_in_world, 1.0);
         assert_eq!(forecast.f32_step_from_centre, 0.5 * f64::from(f32::EPSILON));
         assert_eq!(forecast.input_step, f64::from(f32::EPSILON), "2 m stored, halved on placing");
-        assert!(Precision::of(&Geometry::default(), Bounds::EMPTY).is_none());
+        assert!(StepSizes::of(&Geometry::default(), Bounds::EMPTY).is_none());
     }
 }

@@ -12,7 +12,7 @@ use schemars::generate::SchemaSettings;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::{SceneFile, Written, check, lenient, read_document};
+use super::{SceneFile, WrittenPlaces, check, lenient, read_document};
 use crate::SceneError;
 use crate::paths::{Folder, Reach};
 use crate::words::plain;
@@ -126,15 +126,15 @@ pub fn trace_rays(lens: &OpticalTrain, path: &Path) -> Result<TracedRays, SceneE
         .map_err(|RayError { index, key, why }| written.fault(&format!("rays[{index}].{key}"), why))
 }
 
-fn read(path: &Path) -> Result<(Written, Value), SceneError> {
+fn read(path: &Path) -> Result<(WrittenPlaces, Value), SceneError> {
     let (document, mut value) = read_document(path).map_err(not_a_lens)?;
     lenient::tidy(&mut value);
-    Ok((Written::new(path, Some(document)), value))
+    Ok((WrittenPlaces::new(path, Some(document)), value))
 }
 
 fn read_as<T: DeserializeOwned>(
     schema: &Value,
-    written: &Written,
+    written: &WrittenPlaces,
     value: &Value,
 ) -> Result<T, SceneError> {
     check::check(schema, value).map_err(|problem| written.fault(&problem.path, problem.reason))?;
@@ -155,7 +155,7 @@ fn inputs(file: &Path, folder: &Folder) -> Vec<PathBuf> {
     [vec![file.to_owned()], folder.found()].concat()
 }
 
-fn build(written: &Written, value: &Value, reach: Reach) -> Result<ReadLens, SceneError> {
+fn build(written: &WrittenPlaces, value: &Value, reach: Reach) -> Result<ReadLens, SceneError> {
     let file: LensFile = read_as(&LENS, written, value)?;
     let folder = folder(&written.path, reach)?;
     let train = file
@@ -203,7 +203,7 @@ fn not_a_lens(error: SceneError) -> SceneError {
 }
 
 /// The error with the place in the file that it is about.
-fn fault(written: &Written, error: &LensError) -> SceneError {
+fn fault(written: &WrittenPlaces, error: &LensError) -> SceneError {
     let element = |index: &usize| format!("elements[{index}]");
     match error {
         LensError::Empty => written.fault("elements", "has no element; a lens needs at least one"),

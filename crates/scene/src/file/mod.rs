@@ -35,7 +35,7 @@ pub use settings::{
     AccelName, Auto, BuildQuality, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec,
     ToneMap, TracerRow, TracerSpec,
 };
-pub use spec::{SceneSpec, Version};
+pub use spec::{FormatVersion, SceneSpec};
 
 pub(crate) use check::{kind_of, nearest, suggest};
 pub(crate) use document::{join, join_index};
@@ -58,7 +58,7 @@ const LONGEST: u64 = 64 << 20;
 /// A scene file, read and checked for itself; nothing it names has been opened.
 #[derive(Debug, Clone)]
 pub struct SceneFile {
-    written: Written,
+    written: WrittenPlaces,
     kind: FileKind,
     /// All values with the settings applied.
     value: Value,
@@ -70,7 +70,7 @@ pub struct SceneFile {
 
 /// Where the values of a file were written, to say where something is wrong.
 #[derive(Debug, Clone)]
-struct Written {
+struct WrittenPlaces {
     path: PathBuf,
     /// The text; none for a model.
     document: Option<Document>,
@@ -115,7 +115,7 @@ impl SceneFile {
         if let Value::Object(members) = &mut value {
             members.entry("camera").or_insert_with(|| json!({ "type": "pinhole" }));
         }
-        Self::of(Written::new(path, document), kind, value, overrides)
+        Self::of(WrittenPlaces::new(path, document), kind, value, overrides)
     }
 
     /// The scene that `value` describes, which stands in no file. What it names lies in `folder`.
@@ -128,7 +128,7 @@ impl SceneFile {
             members.entry("etendue").or_insert_with(|| json!(1));
             members.entry("camera").or_insert_with(|| json!({ "type": "pinhole" }));
         }
-        let written = Written::new(&folder.join(IN_MEMORY), None);
+        let written = WrittenPlaces::new(&folder.join(IN_MEMORY), None);
         Self::of(written, FileKind::Scene, value, &[])
     }
 
@@ -143,7 +143,7 @@ impl SceneFile {
     }
 
     fn of(
-        mut written: Written,
+        mut written: WrittenPlaces,
         kind: FileKind,
         mut value: Value,
         overrides: &[(String, String)],
@@ -239,7 +239,7 @@ impl SceneFile {
     }
 }
 
-impl Written {
+impl WrittenPlaces {
     fn new(path: &Path, document: Option<Document>) -> Self {
         Self { path: path.to_owned(), document, settings: BTreeMap::new(), frame: None }
     }

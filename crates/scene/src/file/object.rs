@@ -121,7 +121,7 @@ struct Common {
 /// A model.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Model {
+struct WrittenModel {
     /// A glTF, GLB, OBJ or PLY file, relative to the scene file.
     #[serde(rename = "file")]
     _file: String,
@@ -174,7 +174,7 @@ impl JsonSchema for ObjectSpec {
     /// unknown keys, so the parts are joined here.
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let common = Common::json_schema(generator);
-        let mut kinds = vec![Model::json_schema(generator).to_value()];
+        let mut kinds = vec![WrittenModel::json_schema(generator).to_value()];
         match ShapeSpec::json_schema(generator).get("oneOf") {
             Some(Value::Array(shapes)) => kinds.extend(shapes.iter().cloned()),
             _ => kinds.push(ShapeSpec::json_schema(generator).to_value()),

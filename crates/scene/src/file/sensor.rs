@@ -5,7 +5,7 @@ use std::path::Path;
 use etendue_sensor::{Sensor, SensorError, SensorSpec};
 use serde_json::{Value, json};
 
-use super::{Written, check, lenient, read_document, schema};
+use super::{WrittenPlaces, check, lenient, read_document, schema};
 use crate::SceneError;
 use crate::words::plain;
 
@@ -20,7 +20,7 @@ pub struct SensorFile {
     pub spec: SensorSpec,
     /// The sensor of it.
     pub sensor: Sensor,
-    written: Written,
+    written: WrittenPlaces,
     /// The path of the sensor's object; empty when the file is the sensor.
     place: &'static str,
 }
@@ -36,7 +36,7 @@ impl SensorFile {
     /// names the file, the place and the remedy.
     pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, SceneError> {
         let (document, value) = read_document(path)?;
-        Self::of(Written::new(path, Some(document)), value, overrides)
+        Self::of(WrittenPlaces::new(path, Some(document)), value, overrides)
     }
 
     /// A sensor given by its values, such as those of a preset; `name` stands for the file.
@@ -49,11 +49,11 @@ impl SensorFile {
         value: Value,
         overrides: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        Self::of(Written::new(name, None), value, overrides)
+        Self::of(WrittenPlaces::new(name, None), value, overrides)
     }
 
     fn of(
-        mut written: Written,
+        mut written: WrittenPlaces,
         mut value: Value,
         overrides: &[(String, String)],
     ) -> Result<Self, SceneError> {
@@ -87,7 +87,7 @@ impl SensorFile {
 fn built(
     object: &Value,
     place: &str,
-    written: &Written,
+    written: &WrittenPlaces,
 ) -> Result<(SensorSpec, Sensor), SceneError> {
     let spec: SensorSpec = serde_path_to_error::deserialize(object).map_err(|error| {
         let path = inside(place, &error.path().to_string());
@@ -100,7 +100,10 @@ fn built(
 
 /// Takes the sensor out of a scene that fits the schema, and leaves the camera its grid of pixels.
 /// The sensor is `None` when it is no more than that grid.
-pub(super) fn split(scene: &mut Value, written: &Written) -> Result<Option<Sensor>, SceneError> {
+pub(super) fn split(
+    scene: &mut Value,
+    written: &WrittenPlaces,
+) -> Result<Option<Sensor>, SceneError> {
     let Some(object) = scene.pointer_mut("/camera/sensor").filter(|object| object.is_object())
     else {
         return Ok(None);

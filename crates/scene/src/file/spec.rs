@@ -16,7 +16,7 @@ use super::{FramesSpec, ObjectSpec, PlanSpec, RenderSpec, TracerSpec, Up};
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
     /// The version of the format.
-    pub etendue: Version,
+    pub etendue: FormatVersion,
     /// The camera; a pinhole that frames the scene when absent.
     #[serde(default)]
     pub camera: Option<CameraSpec>,
@@ -122,20 +122,20 @@ impl SceneSpec {
 
 /// The number 1: the version of the format that this program reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Version;
+pub struct FormatVersion;
 
-impl Version {
+impl FormatVersion {
     /// The number.
     pub const NUMBER: u64 = 1;
 }
 
-impl Serialize for Version {
+impl Serialize for FormatVersion {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_u64(Self::NUMBER)
     }
 }
 
-impl<'de> Deserialize<'de> for Version {
+impl<'de> Deserialize<'de> for FormatVersion {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         match u64::deserialize(deserializer)? {
             Self::NUMBER => Ok(Self),
@@ -144,7 +144,7 @@ impl<'de> Deserialize<'de> for Version {
     }
 }
 
-impl JsonSchema for Version {
+impl JsonSchema for FormatVersion {
     fn schema_name() -> Cow<'static, str> {
         "Version".into()
     }

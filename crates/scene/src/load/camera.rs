@@ -9,7 +9,7 @@ use etendue_geometry::Geometry;
 use etendue_sensor::Sensor;
 use etendue_spectrum::Bands;
 
-use crate::bounds::Vertices;
+use crate::bounds::WorldVertices;
 use crate::cache::{self, KeptCamera};
 use crate::cameras::{self, CameraOrigin, SceneCamera};
 use crate::file::SceneFile;
@@ -105,7 +105,7 @@ impl SceneFile {
             None => (own, CameraOrigin::Framed),
         };
         // Without a pose it frames what is there.
-        let vertices = Vertices(geometry);
+        let vertices = WorldVertices(geometry);
         let camera = spec
             .build(|| facing::subject(&vertices), &|name| files.find(name))
             .map_err(|error| self.camera_fault(&error))?;

@@ -13,7 +13,7 @@ use crate::file::{
 use crate::import::{Import, Note, NoteKind, Play};
 use crate::instances::Instances;
 use crate::parts::{Object, Parts};
-use crate::paths::{Folder, Found};
+use crate::paths::{Folder, FoundFile};
 use crate::shape::ShapeSpec;
 use crate::{Cache, SceneError, cache};
 
@@ -76,7 +76,7 @@ impl SceneFile {
                     })
                 }
                 Source::File(written) => {
-                    let Found { path, real } = self.find(folder, index, written)?;
+                    let FoundFile { path, real } = self.find(folder, index, written)?;
                     let path = files.entry(real).or_insert(path).clone();
                     let kind = OriginKind::File(path, self.play(spec, &at)?);
                     origins.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
@@ -208,13 +208,13 @@ impl SceneFile {
         folder: &Folder,
         index: usize,
         written: &str,
-    ) -> Result<Found, SceneError> {
+    ) -> Result<FoundFile, SceneError> {
         let own_name = self.path().file_name().unwrap_or_default().to_string_lossy();
         if self.kind() == FileKind::Model && written == own_name {
             let path = self.path().to_owned();
             let real =
                 path.canonicalize().map_err(|source| SceneError::unreadable(&path, source))?;
-            return Ok(Found { path, real });
+            return Ok(FoundFile { path, real });
         }
         let at = join(&join_index("objects", index), "file");
         folder.find(written).map_err(|why| self.fault(&at, why))

@@ -33,14 +33,14 @@ pub(super) struct Globe {
 
 /// Where a vertex is: fractions of a half turn from the north pole and of a turn to the east.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct GlobePoint {
     south: f64,
     east: f64,
 }
 
 /// Triangles between two rings, in one quadrant: `2m + 1` of them.
 #[derive(Clone, Copy)]
-struct Row {
+struct GlobeRow {
     /// Index of the row from the north, 0..2n.
     index: u32,
     /// Rings from the nearer pole to the inner ring.
@@ -131,9 +131,9 @@ impl Globe {
         u32::try_from(ring).unwrap_or(u32::MAX)
     }
 
-    fn rows(&self) -> impl Iterator<Item = Row> + use<> {
+    fn rows(&self) -> impl Iterator<Item = GlobeRow> + use<> {
         let n = self.n;
-        (0..2 * n).map(move |index| Row { index, m: index.min(2 * n - 1 - index) })
+        (0..2 * n).map(move |index| GlobeRow { index, m: index.min(2 * n - 1 - index) })
     }
 
     /// The first triangle of row `index`.
@@ -147,7 +147,7 @@ impl Globe {
         let n = u64::from(self.n);
         let (pairs, cuts) = (4 * n * (n - 1), u64::from(self.cuts));
         let mut rows = self.rows();
-        let mut row = Row { index: 0, m: 0 };
+        let mut row = GlobeRow { index: 0, m: 0 };
         let (mut first, mut behind) = (0, 0);
         let mut edges = Vec::with_capacity(self.cuts as usize);
         for cut in 0..cuts {
@@ -168,7 +168,7 @@ impl Globe {
     fn triangles(&self, cuts: &[Cut], seam: bool) -> Vec<[u32; 3]> {
         let whole = 8 * (self.n as usize).pow(2);
         let mut triangles = vec![[0; 3]; whole + 2 * cuts.len()];
-        let mut rows: Vec<(Row, &mut [[u32; 3]])> = Vec::with_capacity(2 * self.n as usize);
+        let mut rows: Vec<(GlobeRow, &mut [[u32; 3]])> = Vec::with_capacity(2 * self.n as usize);
         let mut rest = &mut triangles[..whole];
         for row in self.rows() {
             let (own, behind) = rest.split_at_mut(4 * (2 * row.m as usize + 1));
@@ -199,7 +199,7 @@ impl Globe {
     }
 
     /// The triangles of one row, quadrant by quadrant from west to east.
-    fn fill_row(&self, row: Row, seam: bool, to: &mut [[u32; 3]]) {
+    fn fill_row(&self, row: GlobeRow, seam: bool, to: &mut [[u32; 3]]) {
         let north = row.index < self.n;
         let (inner, outer) =
             if north { (row.index, row.index + 1) } else { (row.index + 1, row.index) };
@@ -221,11 +221,11 @@ impl Globe {
         }
     }
 
-    fn ring(&self, r: u32, seam: bool) -> Ring {
+    fn ring(&self, r: u32, seam: bool) -> GlobeRing {
         let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
         let start = index(self.ring_start(r));
         let is_pole = r == 0 || r == 2 * self.n;
-        Ring {
+        GlobeRing {
             start,
             size: self.ring_size(r),
             east: if seam && !is_pole {
@@ -238,14 +238,14 @@ impl Globe {
 }
 
 /// The vertices of one ring.
-struct Ring {
+struct GlobeRing {
     start: u32,
     size: u32,
     /// The vertex after the last: the first again, or its double on the seam.
     east: u32,
 }
 
-impl Ring {
+impl GlobeRing {
     fn at(&self, k: u32) -> u32 {
         if k < self.size { self.start + k } else { self.east }
     }
@@ -254,7 +254,7 @@ impl Ring {
 /// An edge to cut: between the triangles 2j and 2j + 1 of a row's quadrant.
 #[derive(Clone, Copy)]
 struct Cut {
-    row: Row,
+    row: GlobeRow,
     quadrant: u32,
     j: u32,
 }
@@ -274,7 +274,7 @@ impl Places<'_> {
     }
 
     fn positions(&self, relief: &Relief) -> Option<(Vec<f32>, Bounds)> {
-        let point = |place: Place| relief.point(place.direction()).as_vec3().to_array();
+        let point = |place: GlobePoint| relief.point(place.direction()).as_vec3().to_array();
         let floats = self.each(point)?;
         let bounds = floats[..3 * self.count()]
             .par_chunks(3 * CHUNK)
@@ -303,12 +303,15 @@ impl Places<'_> {
     }
 
     /// `N` floats for each vertex, in parallel, and the padding; `None` when it was stopped.
-    fn each<const N: usize>(&self, value: impl Fn(Place) -> [f32; N] + Sync) -> Option<Vec<f32>> {
+    fn each<const N: usize>(
+        &self,
+        value: impl Fn(GlobePoint) -> [f32; N] + Sync,
+    ) -> Option<Vec<f32>> {
         let rings = self.globe.ring_vertices();
         let mut floats = vec![0.0; self.count() * N + PADDING];
         let (of_rings, of_others) = floats.split_at_mut(rings * N);
         of_rings.par_chunks_mut(CHUNK * N).enumerate().try_for_each(|(number, chunk)| {
-            let mut walk = Walk::at(self.globe, number * CHUNK);
+            let mut walk = GlobeWalk::at(self.globe, number * CHUNK);
             for to in chunk.chunks_exact_mut(N) {
                 to.copy_from_slice(&value(walk.next_place()));
             }
@@ -321,30 +324,30 @@ impl Places<'_> {
         Some(floats)
     }
 
-    fn seam_places(&self) -> impl Iterator<Item = Place> {
+    fn seam_places(&self) -> impl Iterator<Item = GlobePoint> {
         let rings = 2 * self.globe.n;
         let behind = if self.seam { rings } else { 1 };
-        (1..behind).map(move |r| Place { south: f64::from(r) / f64::from(rings), east: 1.0 })
+        (1..behind).map(move |r| GlobePoint { south: f64::from(r) / f64::from(rings), east: 1.0 })
     }
 }
 
 impl Cut {
     /// The middle of the edge.
-    fn place(&self, globe: &Globe) -> Place {
+    fn place(&self, globe: &Globe) -> GlobePoint {
         let (m, rings) = (self.row.m, f64::from(2 * globe.n));
         let north = self.row.index < globe.n;
         let inner = if north { self.row.index } else { self.row.index + 1 };
         let east_in = f64::from(self.quadrant * m + self.j) / f64::from(4 * m);
         let east_out = f64::from(self.quadrant * (m + 1) + self.j + 1) / f64::from(4 * (m + 1));
         let towards_equator = if north { 0.5 } else { -0.5 };
-        Place {
+        GlobePoint {
             south: (f64::from(inner) + towards_equator) / rings,
             east: f64::midpoint(east_in, east_out),
         }
     }
 }
 
-impl Place {
+impl GlobePoint {
     /// The unit direction: +Y at the north pole, +Z in the west and east, +X a quarter from there.
     #[inline]
     fn direction(self) -> DVec3 {
@@ -355,13 +358,13 @@ impl Place {
 }
 
 /// Steps through the vertices of the rings.
-struct Walk<'a> {
+struct GlobeWalk<'a> {
     globe: &'a Globe,
     ring: u32,
     k: u32,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> GlobeWalk<'a> {
     fn at(globe: &'a Globe, vertex: usize) -> Self {
         let ring = globe.ring_of(vertex);
         let k = u32::try_from(vertex - globe.ring_start(ring)).unwrap_or(0);
@@ -369,9 +372,9 @@ impl<'a> Walk<'a> {
     }
 
     #[inline]
-    fn next_place(&mut self) -> Place {
+    fn next_place(&mut self) -> GlobePoint {
         let size = self.globe.ring_size(self.ring);
-        let place = Place {
+        let place = GlobePoint {
             south: f64::from(self.ring) / f64::from(2 * self.globe.n),
             east: f64::from(self.k) / f64::from(size),
         };
@@ -395,7 +398,7 @@ pub(super) fn disk(radius: f64, triangles: u64, wanted: Wanted) -> Mesh {
     let n = if 4 * n * n < triangles { n + 1 } else { n };
     let globe = Globe { n: u32::try_from(n).unwrap_or(u32::from(u16::MAX)), cuts: 0 };
     let count = globe.ring_start(globe.n) + globe.ring_size(globe.n) as usize;
-    let mut walk = Walk::at(&globe, 0);
+    let mut walk = GlobeWalk::at(&globe, 0);
     // The place as a fraction of the radius along x and y, y up.
     let places: Vec<[f64; 2]> = (0..count)
         .map(|_| {

@@ -12,7 +12,7 @@ const CELLS: f64 = 400.0;
 const FINE: f64 = 4.0;
 
 /// Sums of something over all cells before each edge.
-pub(super) type Sums = Vec<f64>;
+pub(super) type RunningSums = Vec<f64>;
 
 pub(super) fn product(factors: &[&[f64]]) -> Vec<f64> {
     let count = factors.first().map_or(0, |factor| factor.len());
@@ -63,7 +63,7 @@ impl Nodes {
     }
 
     /// Integrals of a product over all cells before each edge.
-    pub(super) fn sums(&self, factors: &[&[f64]]) -> Sums {
+    pub(super) fn sums(&self, factors: &[&[f64]]) -> RunningSums {
         let values = product(factors);
         let mut sums = Vec::with_capacity(self.half.len() + 1);
         let mut sum = 0.0;

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use etendue_chart::{Axis, Chart, GREY, Series, Stroke, Theme, side_by_side};
 
-use super::{PhotonTransfer, Point};
+use super::{CurvePoint, PhotonTransfer};
 
 /// Name, colour and stroke of a line.
-type Look = (&'static str, usize, Stroke);
+type LineStyle = (&'static str, usize, Stroke);
 
 impl PhotonTransfer {
     /// The figures and curves as text.
@@ -84,7 +84,7 @@ impl PhotonTransfer {
     }
 
     /// Points at which nothing is clipped: beyond, less and less noise is no better signal.
-    pub(super) fn drawn(&self) -> impl Iterator<Item = &Point> {
+    pub(super) fn drawn(&self) -> impl Iterator<Item = &CurvePoint> {
         self.points.iter().filter(|point| point.electrons <= 1.000_001 * self.unclipped_electrons)
     }
 
@@ -94,7 +94,11 @@ impl PhotonTransfer {
         side_by_side(&[self.transfer_chart(name), self.ratio_chart(name)], Theme::Reader)
     }
 
-    fn line(&self, (name, colour, stroke): Look, point: &dyn Fn(&Point) -> [f64; 2]) -> Series {
+    fn line(
+        &self,
+        (name, colour, stroke): LineStyle,
+        point: &dyn Fn(&CurvePoint) -> [f64; 2],
+    ) -> Series {
         Series { colour, stroke, ..Series::curve(name, self.drawn().map(point)) }
     }
 
@@ -107,7 +111,7 @@ impl PhotonTransfer {
         };
         let dark = (gain * self.dark_noise).powi(2) + 1.0 / 12.0;
         let full = gain * self.saturation_electrons;
-        let values = |value: fn(&Point) -> f64| self.drawn().map(value).filter(|v| *v > 0.0);
+        let values = |value: fn(&CurvePoint) -> f64| self.drawn().map(value).filter(|v| *v > 0.0);
         let left = values(|p| p.signal).fold(f64::INFINITY, f64::min);
         let bottom = values(|p| p.variance).fold(dark, f64::min);
         let top = values(|p| p.variance_expected).fold(dark, f64::max);
@@ -133,7 +137,7 @@ impl PhotonTransfer {
     fn ratio_chart(&self, name: &str) -> Chart {
         let decibel = |ratio: f64| 20.0 * ratio.log10();
         let (low, high) = (self.threshold_photons, self.saturation_photons);
-        let values = |value: fn(&Point) -> f64| self.drawn().map(value).filter(|v| *v > 0.0);
+        let values = |value: fn(&CurvePoint) -> f64| self.drawn().map(value).filter(|v| *v > 0.0);
         let bottom = values(|p| p.snr_expected).fold(1.0, f64::min);
         let mark = |name: String, at: [f64; 2]| Series {
             joined: false,
@@ -170,10 +174,10 @@ impl PhotonTransfer {
     }
 }
 
-const EXACT: Look = ("exact Poisson", 0, Stroke::Solid);
-const NORMAL: Look = ("normal approximation", 2, Stroke::Dashed);
-const MODEL: Look = ("linear model", GREY, Stroke::Dotted);
-const IDEAL: Look = ("ideal sensor", 1, Stroke::Solid);
+const EXACT: LineStyle = ("exact Poisson", 0, Stroke::Solid);
+const NORMAL: LineStyle = ("normal approximation", 2, Stroke::Dashed);
+const MODEL: LineStyle = ("linear model", GREY, Stroke::Dotted);
+const IDEAL: LineStyle = ("ideal sensor", 1, Stroke::Solid);
 
 /// A straight line that marks a figure, with places along it for its name.
 fn guide(name: &str, from: [f64; 2], to: [f64; 2]) -> Series {

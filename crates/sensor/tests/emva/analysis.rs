@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use etendue_sensor::emva::{MANIFEST, Manifest, Step};
+use etendue_sensor::emva::{MANIFEST, Manifest, SeriesStep};
 
 /// A parameter as measured.
 #[derive(Debug, Clone, Copy)]
@@ -191,7 +191,7 @@ fn image(folder: &Path, name: &str) -> Vec<f64> {
     image.as_raw().iter().map(|&y| f64::from(y)).collect()
 }
 
-fn exposed(folder: &Path, step: &Step) -> Exposed {
+fn exposed(folder: &Path, step: &SeriesStep) -> Exposed {
     let pair = |files: &[String]| {
         let [a, b] = [0, 1].map(|i| image(folder, &files[i]));
         let count = a.len() as f64;

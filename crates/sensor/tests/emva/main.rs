@@ -7,7 +7,7 @@ mod reference;
 
 use std::collections::BTreeSet;
 
-use etendue_sensor::emva::{DESCRIPTOR, MANIFEST, Manifest, Options, Series, Step};
+use etendue_sensor::emva::{DESCRIPTOR, MANIFEST, Manifest, Options, Series, SeriesStep};
 use etendue_sensor::{Sensor, SensorSpec};
 use serde_json::{Value, json};
 
@@ -44,7 +44,7 @@ fn a_series_is_what_a_characterisation_wants() {
     assert!(flux.iter().all(|f| (f / flux[0] - 1.0).abs() < 1e-6), "constant light");
     let efficiency = sensor.quantum_efficiency().at(525.0).unwrap();
     // Of light and dark current together: saturated at the last step but one, and half of that.
-    let filled = |step: &Step| {
+    let filled = |step: &SeriesStep| {
         let dark = sensor.dark_current() * step.exposure_s;
         (step.photons * efficiency + dark) / sensor.saturation()
     };

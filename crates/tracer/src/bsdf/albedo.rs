@@ -33,16 +33,16 @@ const SMOOTHEST: f64 = 1e-6;
 const FACETS: u32 = 1024;
 
 #[derive(Debug)]
-struct Table {
+struct AlbedoTable {
     /// (A, B) by roughness, then [`obliquity`].
     entries: Vec<[f64; 2]>,
     /// Their means over directions, by roughness.
     means: Vec<[f64; 2]>,
 }
 
-static TABLE: LazyLock<Table> = LazyLock::new(Table::new);
+static TABLE: LazyLock<AlbedoTable> = LazyLock::new(AlbedoTable::new);
 
-impl Table {
+impl AlbedoTable {
     fn new() -> Self {
         let mut entries = Vec::with_capacity(ROUGHNESSES * OBLIQUITIES);
         let mut means = Vec::with_capacity(ROUGHNESSES);
@@ -120,22 +120,22 @@ fn entry(mu: f64, alpha: f64) -> [f64; 2] {
 /// The albedo of one roughness, or of two at right angles.
 #[derive(Debug, Clone, Copy)]
 pub struct Albedo {
-    rows: Rows,
+    rows: AlbedoRows,
     /// Of the other roughness.
-    across: Option<Rows>,
+    across: Option<AlbedoRows>,
     f0: f64,
     f90: f64,
 }
 
 /// Rows of the table, interpolated once.
 #[derive(Debug, Clone, Copy)]
-struct Rows {
+struct AlbedoRows {
     alpha: f64,
     row: usize,
     share: f64,
 }
 
-impl Rows {
+impl AlbedoRows {
     fn new(alpha: f64) -> Self {
         let (row, share) = place::<ROUGHNESSES>(alpha.max(0.0).sqrt().sqrt());
         Self { alpha, row, share }
@@ -163,8 +163,8 @@ impl Albedo {
     #[must_use]
     pub fn new(alpha: impl Into<Facets>, f0: f64, f90: f64) -> Self {
         let Facets { x, y } = alpha.into();
-        let across = (x.to_bits() != y.to_bits()).then(|| Rows::new(x));
-        Self { rows: Rows::new(y), across, f0, f90 }
+        let across = (x.to_bits() != y.to_bits()).then(|| AlbedoRows::new(x));
+        Self { rows: AlbedoRows::new(y), across, f0, f90 }
     }
 
     /// For the cosine `mu` of the direction.
@@ -203,10 +203,10 @@ impl Albedo {
 
     /// Their means over directions.
     pub(super) fn mean_terms(&self) -> [f64; 2] {
-        self.larger(Rows::mean_terms)
+        self.larger(AlbedoRows::mean_terms)
     }
 
-    fn larger(&self, terms: impl Fn(&Rows) -> [f64; 2]) -> [f64; 2] {
+    fn larger(&self, terms: impl Fn(&AlbedoRows) -> [f64; 2]) -> [f64; 2] {
         let own = terms(&self.rows);
         let Some(across) = &self.across else { return own };
         let [a, b] = terms(across);

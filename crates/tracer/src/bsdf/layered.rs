@@ -51,7 +51,7 @@ pub(super) struct Peaks {
 
 /// A sampled direction in the shading frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Found {
+pub(super) struct LayeredSample {
     pub(super) wi: DVec3,
     pub(super) weights: Weights,
     pub(super) pdf: f64,
@@ -67,7 +67,7 @@ struct Chances {
 
 /// The model as seen from one direction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Viewed {
+pub(super) struct LayeredView {
     peaks: Peaks,
     /// Of the dielectric.
     albedo: Albedo,
@@ -98,10 +98,10 @@ impl Layered {
     }
 
     /// As seen from `wo`.
-    pub(super) fn viewed(&self, wo: DVec3, peaks: &Peaks) -> Viewed {
+    pub(super) fn viewed(&self, wo: DVec3, peaks: &Peaks) -> LayeredView {
         let albedo = Albedo::new(self.facets(), (self.f0 * peaks.highlight).min(1.0), self.f90);
         let ([a, b], means) = (albedo.terms(wo.z), albedo.mean_terms());
-        let mut viewed = Viewed {
+        let mut viewed = LayeredView {
             peaks: *peaks,
             albedo,
             dielectric: albedo.bound([a, b], wo.z),
@@ -117,7 +117,7 @@ impl Layered {
     }
 
     /// By what each part returns of a white light, the metal's facets `metal` of it.
-    fn chances(&self, viewed: &Viewed, metal: f64) -> Chances {
+    fn chances(&self, viewed: &LayeredView, metal: f64) -> Chances {
         let m = self.metallic;
         let dielectric = viewed.dielectric.min(1.0);
         let below = (1.0 - m) * (1.0 - dielectric) * viewed.peaks.base;
@@ -154,7 +154,7 @@ impl Layered {
 
     /// Value times cosine of what is alike from all sides: the base that is seen through the sheet, per
     /// its colour, and light that met several facets of the metal.
-    fn matte(&self, wi: DVec3, viewed: &Viewed) -> Weights {
+    fn matte(&self, wi: DVec3, viewed: &LayeredView) -> Weights {
         let share = (1.0 - self.metallic) * (1.0 - self.transmission);
         let rough = self.metallic > 0.0 && self.alpha > 0.0;
         if share == 0.0 && !rough {
@@ -171,14 +171,14 @@ impl Layered {
     }
 
     /// Value times cosine, and the density of [`Self::sample`].
-    pub(super) fn evaluate(&self, wo: DVec3, wi: DVec3, viewed: &Viewed) -> (Weights, f64) {
+    pub(super) fn evaluate(&self, wo: DVec3, wi: DVec3, viewed: &LayeredView) -> (Weights, f64) {
         let below = self.evaluate_uncoated(wo, wi, viewed);
         let below = viewed.sheen.map_or(below, |sheen| sheen.over(wo, wi, below));
         viewed.coat.map_or(below, |coat| coat.over(wo, wi, below))
     }
 
-    fn evaluate_uncoated(&self, wo: DVec3, wi: DVec3, viewed: &Viewed) -> (Weights, f64) {
-        let Viewed { chances, peaks, .. } = viewed;
+    fn evaluate_uncoated(&self, wo: DVec3, wi: DVec3, viewed: &LayeredView) -> (Weights, f64) {
+        let LayeredView { chances, peaks, .. } = viewed;
         if wi.z < 0.0 {
             if self.transmission == 0.0 || self.alpha == 0.0 {
                 return (Weights::default(), 0.0);
@@ -225,8 +225,8 @@ impl Layered {
         wo: DVec3,
         choice: f64,
         square: [f64; 2],
-        viewed: &Viewed,
-    ) -> Option<Found> {
+        viewed: &LayeredView,
+    ) -> Option<LayeredSample> {
         let (sheen, coat) = (&viewed.sheen, &viewed.coat);
         if sheen.is_none() && coat.is_none() {
             return self.sample_uncoated(wo, choice, square, viewed);
@@ -245,13 +245,13 @@ impl Layered {
                     let coat = coat.map_or(1.0, |coat| coat.passes(below.wi));
                     let sheen = sheen.map_or(1.0, |sheen| sheen.passes(below.wi));
                     let weights = below.weights.times(coat * sheen / rest);
-                    return Some(Found { weights, ..below });
+                    return Some(LayeredSample { weights, ..below });
                 }
                 below.wi
             }
         };
         let (weights, pdf) = self.evaluate(wo, wi, viewed);
-        (pdf > 0.0).then(|| Found { wi, weights: weights.times(1.0 / pdf), pdf })
+        (pdf > 0.0).then(|| LayeredSample { wi, weights: weights.times(1.0 / pdf), pdf })
     }
 
     fn sample_uncoated(
@@ -259,14 +259,14 @@ impl Layered {
         wo: DVec3,
         choice: f64,
         square: [f64; 2],
-        viewed: &Viewed,
-    ) -> Option<Found> {
-        let Viewed { chances, peaks, .. } = viewed;
+        viewed: &LayeredView,
+    ) -> Option<LayeredSample> {
+        let LayeredView { chances, peaks, .. } = viewed;
         // The reflecting sheet, the base below it, or straight through both.
         let wi = if choice < chances.sheet {
             if self.alpha == 0.0 {
                 let weights = self.sheet(wo.z).times(1.0 / chances.sheet);
-                return Some(Found { wi: mirrored(wo), weights, pdf: f64::INFINITY });
+                return Some(LayeredSample { wi: mirrored(wo), weights, pdf: f64::INFINITY });
             }
             self.reflected(wo, square)
         } else if choice < chances.sheet + chances.base {
@@ -274,7 +274,7 @@ impl Layered {
         } else if chances.through > 0.0 {
             if self.alpha == 0.0 {
                 let weights = self.straight(wo, peaks)?.times(1.0 / chances.through);
-                return Some(Found { wi: -wo, weights, pdf: f64::INFINITY });
+                return Some(LayeredSample { wi: -wo, weights, pdf: f64::INFINITY });
             }
             let up = self.reflected(wo, square);
             DVec3::new(up.x, up.y, -up.z)
@@ -287,7 +287,7 @@ impl Layered {
         }
         // Weighed by all ways in which this direction could have been found.
         let (weights, pdf) = self.evaluate_uncoated(wo, wi, viewed);
-        (pdf > 0.0).then(|| Found { wi, weights: weights.times(1.0 / pdf), pdf })
+        (pdf > 0.0).then(|| LayeredSample { wi, weights: weights.times(1.0 / pdf), pdf })
     }
 
     fn reflected(&self, wo: DVec3, square: [f64; 2]) -> DVec3 {

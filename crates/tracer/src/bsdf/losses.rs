@@ -113,7 +113,7 @@ fn entry(mu: f64, alpha: f64, eta: f64) -> f64 {
 
 /// The losses of one side of a boundary.
 #[derive(Debug, Clone, Copy)]
-struct Side {
+struct BoundarySide {
     index: usize,
     share: f64,
     /// Knot in √α and the share of the next.
@@ -124,7 +124,7 @@ struct Side {
     passes: f64,
 }
 
-impl Side {
+impl BoundarySide {
     fn new(alpha: f64, eta: f64) -> Self {
         let (index, share) = place(0.5 + 0.5 * eta.ln() / MOST.ln(), INDICES);
         let rough = place(alpha.sqrt(), ROUGHNESSES);
@@ -163,8 +163,8 @@ fn passes(eta: f64) -> f64 {
 /// What a rough boundary lacks, seen from one direction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lacking {
-    own: Side,
-    other: Side,
+    own: BoundarySide,
+    other: BoundarySide,
     eta: f64,
     /// L for the direction of the viewer: how often the matte lobes are sampled.
     pub(super) seen: f64,
@@ -180,7 +180,7 @@ impl Lacking {
         if alpha < SMOOTHEST || !known {
             return None;
         }
-        let (own, other) = (Side::new(alpha, eta), Side::new(alpha, 1.0 / eta));
+        let (own, other) = (BoundarySide::new(alpha, eta), BoundarySide::new(alpha, 1.0 / eta));
         if own.mean <= EXACT || other.mean <= EXACT {
             return None;
         }

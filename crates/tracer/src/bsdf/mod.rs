@@ -139,7 +139,7 @@ enum Seen {
     Plain,
     Metal(metal::Rough),
     Glass(boundary::Rough),
-    Layered(layered::Viewed),
+    Layered(layered::LayeredView),
 }
 
 /// A direction that light comes from, chosen in proportion to what it contributes.

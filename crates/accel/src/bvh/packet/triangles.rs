@@ -18,7 +18,7 @@ use crate::nearest::Triangle;
 use crate::watertight::{self, Lines};
 
 /// Leaves of a part, for a bundle of rays.
-pub(super) struct TriangleLeaves<'a, 'b, L: Lanes, S> {
+pub(super) struct PacketTriangles<'a, 'b, L: Lanes, S> {
     lanes: L,
     cells: &'a [Cell],
     triangles: PlacedTriangles<'a>,
@@ -42,7 +42,7 @@ pub(super) struct TriangleLeaves<'a, 'b, L: Lanes, S> {
 
 type Wide<L> = <<L as Lanes>::Sixteen as Arithmetic>::F;
 
-impl<'a, 'b, L: Lanes, S: Sink> TriangleLeaves<'a, 'b, L, S> {
+impl<'a, 'b, L: Lanes, S: Sink> PacketTriangles<'a, 'b, L, S> {
     #[inline(always)]
     pub(super) fn new(
         lanes: L,
@@ -156,7 +156,7 @@ impl<'a, 'b, L: Lanes, S: Sink> TriangleLeaves<'a, 'b, L, S> {
     }
 }
 
-impl<L: Lanes, S: Sink> Leaves for TriangleLeaves<'_, '_, L, S> {
+impl<L: Lanes, S: Sink> Leaves for PacketTriangles<'_, '_, L, S> {
     #[inline(always)]
     fn see(&mut self, leaf: Child, far: f32) -> Option<f32> {
         let l = self.lanes.sixteen();

@@ -8,7 +8,7 @@ use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 
 /// Distortion at one field angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Distortion {
+pub struct FieldDistortion {
     /// The angle off the axis (degrees).
     pub field: f64,
     /// Height at which the real chief ray meets the reference plane (mm).
@@ -29,7 +29,7 @@ pub fn distortion(
     at: &MonochromaticTrain,
     field: f64,
     reference_z: f64,
-) -> Option<Distortion> {
+) -> Option<FieldDistortion> {
     let y_real = chief_height(train, at, field, reference_z)?;
     let efl = train.paraxial(at.wavelength()).ok()?.efl?;
     if field.abs() >= 90.0 {
@@ -44,7 +44,7 @@ pub fn distortion(
         true => 0.0,
         false => 100.0 * (y_real - centre - y_paraxial) / y_paraxial,
     };
-    Some(Distortion { field, y_real, y_paraxial, percent })
+    Some(FieldDistortion { field, y_real, y_paraxial, percent })
 }
 
 /// The height (mm) at which the chief ray of a field angle (degrees) meets the plane at

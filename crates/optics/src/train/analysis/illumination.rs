@@ -35,7 +35,7 @@ const SHIFTS: [f64; 2] = [0.618_033_988_749_895, 0.414_213_562_373_095];
 
 /// Illumination at one field angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
-pub struct Illumination {
+pub struct FieldIllumination {
     /// The angle off the axis (degrees).
     pub field: f64,
     /// Height of its chief ray on the sensor (mm).
@@ -55,7 +55,7 @@ pub fn illumination(
     at: &MonochromaticTrain,
     fields: &[f64],
     sensor_z: f64,
-) -> Vec<Illumination> {
+) -> Vec<FieldIllumination> {
     let on_axis = projected_solid_angle(train, at, DVec3::new(0.0, 0.0, sensor_z));
     let mut points = Vec::with_capacity(fields.len());
     for &field in fields {
@@ -63,7 +63,7 @@ pub fn illumination(
         let film = DVec3::new(0.0, image_y, sensor_z);
         let projected_solid_angle = projected_solid_angle(train, at, film);
         let relative = if on_axis > 0.0 { projected_solid_angle / on_axis } else { 0.0 };
-        points.push(Illumination { field, image_y, projected_solid_angle, relative });
+        points.push(FieldIllumination { field, image_y, projected_solid_angle, relative });
     }
     points
 }

@@ -6,9 +6,9 @@ mod illumination;
 mod spots;
 
 pub use colour::{ColourShift, colour_shifts};
-pub use distortion::{Distortion, distortion};
+pub use distortion::{FieldDistortion, distortion};
 pub use illumination::{
-    Illumination, half_field, illumination, image_circle, projected_solid_angle,
+    FieldIllumination, half_field, illumination, image_circle, projected_solid_angle,
 };
 pub use spots::{Spot, spot};
 

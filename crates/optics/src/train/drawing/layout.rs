@@ -1,6 +1,6 @@
 //! The lens cut along y and z.
 
-use etendue_chart::{Anchor, Canvas, Theme, round_length, short};
+use etendue_chart::{Canvas, TextAnchor, Theme, round_length, short};
 use glam::DVec3;
 
 use super::{COLOURS, title};
@@ -38,7 +38,7 @@ pub fn layout(
     let fields = drawn_fields(report);
     let fans: Vec<Fan> = fields.iter().map(|&field| fan(train, &at, report, field, end)).collect();
     let heights = heights(train, &fans);
-    let view = View::around(train, &heights, &fans, report, end);
+    let view = DrawingView::around(train, &heights, &fans, report, end);
     // Glass first, then rays, then the elements' lines over both.
     let mut canvas = Canvas::new(WIDTH, view.height, &title(report));
     glasses(&mut canvas, &view, &bodies(train, &at, &heights));
@@ -168,7 +168,7 @@ pub(super) fn heights(train: &OpticalTrain, fans: &[Fan]) -> Vec<f64> {
 }
 
 /// From millimetres to pixels.
-struct View {
+struct DrawingView {
     left: f64,
     right: f64,
     top: f64,
@@ -178,7 +178,7 @@ struct View {
     sensor: f64,
 }
 
-impl View {
+impl DrawingView {
     fn around(
         train: &OpticalTrain,
         heights: &[f64],
@@ -305,7 +305,7 @@ fn body(train: &OpticalTrain, heights: &[f64], [front, back]: [usize; 2]) -> Bod
     Body { outline, front: if tilted { 0 } else { first.len() } }
 }
 
-fn glasses(canvas: &mut Canvas, view: &View, bodies: &[Body]) {
+fn glasses(canvas: &mut Canvas, view: &DrawingView, bodies: &[Body]) {
     for Body { outline, front } in bodies {
         let outline: Vec<[f64; 2]> = outline.iter().map(|&point| view.pixel(point)).collect();
         canvas.glass(&outline);
@@ -349,7 +349,7 @@ pub(super) fn strokes(element: &Element, height: f64, pixel: f64) -> Vec<(Vec<[f
     }
 }
 
-fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: bool) {
+fn draw(canvas: &mut Canvas, view: &DrawingView, element: &Element, height: f64, stop: bool) {
     for (line, width) in strokes(element, height, 1.0 / view.scale) {
         let points: Vec<[f64; 2]> = line.iter().map(|&point| view.pixel(point)).collect();
         canvas.path(&points, "ink", width);
@@ -358,23 +358,23 @@ fn draw(canvas: &mut Canvas, view: &View, element: &Element, height: f64, stop: 
         let top = element.frame.point(DVec3::new(0.0, -height, 0.0));
         let [x, y] = view.pixel([top.z, top.y]);
         let below = if element.part.symbol() == Symbol::Opening { 26.0 } else { 14.0 };
-        canvas.text([x, y + below], Anchor::Middle, "small", "stop");
+        canvas.text([x, y + below], TextAnchor::Middle, "small", "stop");
     }
 }
 
 /// Fields of which rays were drawn, by the number of their colour, and a scale.
-fn legend(canvas: &mut Canvas, view: &View, fields: &[(usize, f64)]) {
+fn legend(canvas: &mut Canvas, view: &DrawingView, fields: &[(usize, f64)]) {
     let y = view.height - 14.0;
     // Beams from the side may reach down here.
     canvas.cover([0.0, view.height - FOOT + 6.0], [WIDTH, FOOT]);
     for (place, &(colour, field)) in (0_u32..).zip(fields) {
         let x = MARGIN + 90.0 * f64::from(place);
         canvas.path(&[[x, y - 4.0], [x + 24.0, y - 4.0]], &format!("s{}", colour % COLOURS), 2.0);
-        canvas.text([x + 30.0, y], Anchor::Start, "small", &format!("{}\u{b0}", short(field)));
+        canvas.text([x + 30.0, y], TextAnchor::Start, "small", &format!("{}\u{b0}", short(field)));
     }
     let length = round_length(140.0 / view.scale);
     let right = WIDTH - MARGIN;
     let left = right - length * view.scale;
     canvas.path(&[[left, y - 4.0], [right, y - 4.0]], "ink", 2.0);
-    canvas.text([left - 8.0, y], Anchor::End, "small", &format!("{} mm", short(length)));
+    canvas.text([left - 8.0, y], TextAnchor::End, "small", &format!("{} mm", short(length)));
 }

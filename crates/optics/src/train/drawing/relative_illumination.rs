@@ -4,7 +4,7 @@ use etendue_chart::{Axis, Chart, Series, Theme};
 
 use super::title;
 use crate::glass::GlassError;
-use crate::train::analysis::{Illumination, illumination};
+use crate::train::analysis::{FieldIllumination, illumination};
 use crate::train::{LensReport, OpticalTrain};
 
 /// Fields on the curve.
@@ -21,16 +21,23 @@ pub fn relative_illumination(
     report: &LensReport,
 ) -> Result<String, GlassError> {
     let curve = curve(train, report)?;
-    let line = |name: &str, colour: usize, value: fn(&Illumination) -> f64| Series {
+    let line = |name: &str, colour: usize, value: fn(&FieldIllumination) -> f64| Series {
         colour,
         ..Series::curve(name, curve.iter().map(|p| [p.image_y.abs(), 100.0 * value(p)]))
     };
     // cos⁴ of the field angle.
-    let cosine4 = |p: &Illumination| p.field.to_radians().cos().max(0.0).powi(4);
+    let cosine4 = |p: &FieldIllumination| p.field.to_radians().cos().max(0.0).powi(4);
     let chart = Chart {
         title: title(report),
-        notes: curve.is_empty().then(|| "no image, no illumination".to_owned()).into_iter().collect(),
-        axes: [Axis::linear("height on the sensor (mm)"), Axis::linear("share of that on the axis (%)")],
+        notes: curve
+            .is_empty()
+            .then(|| "no image, no illumination".to_owned())
+            .into_iter()
+            .collect(),
+        axes: [
+            Axis::linear("height on the sensor (mm)"),
+            Axis::linear("share of that on the axis (%)"),
+        ],
         series: vec![
             line("relative illumination", 0, |p| p.relative),
             line("cos\u{2074} of the field angle", 4, cosine4),
@@ -41,7 +48,7 @@ pub fn relative_illumination(
 }
 
 /// The illumination up to the image circle or the widest field; empty without an image.
-fn curve(train: &OpticalTrain, report: &LensReport) -> Result<Vec<Illumination>, GlassError> {
+fn curve(train: &OpticalTrain, report: &LensReport) -> Result<Vec<FieldIllumination>, GlassError> {
     let Some(z) = report.sensor_z else { return Ok(Vec::new()) };
     let named = report.fields.iter().fold(0.0_f64, |widest, field| widest.max(field.abs()));
     let widest = report.field_of_view.map_or(named, |full| 0.5 * full);

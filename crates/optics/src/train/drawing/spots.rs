@@ -1,6 +1,6 @@
 //! Spot diagrams: one box a field, one colour a wavelength, the same scale in all.
 
-use etendue_chart::{Anchor, Canvas, Theme, round_length, short};
+use etendue_chart::{Canvas, TextAnchor, Theme, round_length, short};
 use glam::DVec2;
 
 use super::{COLOURS, title};
@@ -123,8 +123,8 @@ impl SpotBox {
             None => "no light".to_owned(),
         };
         let field = format!("{}\u{b0}", short(self.field));
-        canvas.text([x, bottom + 16.0], Anchor::Start, "", &field);
-        canvas.text([right, bottom + 16.0], Anchor::End, "", &caption);
+        canvas.text([x, bottom + 16.0], TextAnchor::Start, "", &field);
+        canvas.text([right, bottom + 16.0], TextAnchor::End, "", &caption);
     }
 }
 
@@ -136,18 +136,18 @@ fn airy_radius(report: &LensReport) -> Option<f64> {
 fn legend(canvas: &mut Canvas, report: &LensReport, boxes: &[SpotBox], scale: f64, width: f64) {
     let y = 52.0;
     if boxes.is_empty() {
-        canvas.text([16.0, y], Anchor::Start, "", "no image, no spots");
+        canvas.text([16.0, y], TextAnchor::Start, "", "no image, no spots");
         return;
     }
     for (i, wavelength) in drawn_wavelengths(report).iter().enumerate() {
         let x = 22.0 + 110.0 * f64::from(u32::try_from(i).unwrap_or(0));
         canvas.dot([x, y - 4.0], 4.0, &format!("f{}", i % COLOURS));
-        canvas.text([x + 9.0, y], Anchor::Start, "small", &format!("{wavelength} nm"));
+        canvas.text([x + 9.0, y], TextAnchor::Start, "small", &format!("{wavelength} nm"));
     }
     let length = round_length(90.0 / scale);
     let right = width - GAP;
     let left = right - length * scale;
     canvas.path(&[[left, y - 4.0], [right, y - 4.0]], "ink", 2.0);
     let words = format!("{} \u{b5}m", short(1e3 * length));
-    canvas.text([left - 8.0, y], Anchor::End, "small", &words);
+    canvas.text([left - 8.0, y], TextAnchor::End, "small", &words);
 }

@@ -4,18 +4,18 @@
 use glam::DVec2;
 
 use super::Outline;
-use super::place::{Place, between};
+use super::place::{NodePlace, between};
 
 /// The outline from one point of the sensor.
-pub(super) struct Bound<'a> {
+pub(super) struct PupilBound<'a> {
     pub(super) nodes: &'a [Outline],
     /// Between which nodes; `None` for a disk.
-    pub(super) place: Option<Place>,
+    pub(super) place: Option<NodePlace>,
     /// Centre and half axes in slopes, as the nodes are turned.
     pub(super) frame: [DVec2; 2],
 }
 
-impl Bound<'_> {
+impl PupilBound<'_> {
     /// The radius in the frame at a share of a full turn.
     fn reach(&self, turn: f64) -> f64 {
         self.place.as_ref().map_or(1.0, |place| {

@@ -63,7 +63,7 @@ pub(super) struct Coded {
 }
 
 /// Nodes of the sensor around a point of it, and their weights.
-type Nodes = [(usize, f64); 16];
+type NodeWeights = [(usize, f64); 16];
 
 /// A direction drawn from a mask.
 #[derive(Debug, Clone, Copy)]
@@ -75,10 +75,10 @@ pub(super) struct Aimed {
 }
 
 /// A point of the sensor between nodes.
-pub(super) struct Seen<'a> {
+pub(super) struct MaskView<'a> {
     coded: &'a Coded,
     coarse: &'a Histogram,
-    nodes: Nodes,
+    nodes: NodeWeights,
 }
 
 impl Coded {
@@ -93,7 +93,7 @@ impl Coded {
     ) -> Option<Self> {
         let (element, mask) = first_mask(train)?;
         let lens = lenses.get(lenses.len() / 2)?;
-        let view = View { clear, lens, element };
+        let view = ClearLens { clear, lens, element };
         let mut coded = Self::around(mask, half_size, DVec2::ZERO)?;
         let mut nodes = coded.solve(&view, sensor);
         let mut margin = coded.greatest_miss(lenses, element, sensor);
@@ -109,9 +109,9 @@ impl Coded {
     }
 
     /// Solves the directions from the sensor's nodes to those of the mask.
-    fn solve(&mut self, view: &View<'_>, sensor: &Frame) -> Vec<Option<Node>> {
+    fn solve(&mut self, view: &ClearLens<'_>, sensor: &Frame) -> Vec<Option<MaskNode>> {
         let place = |i: usize| sensor.point(self.film_node(i).extend(0.0));
-        let nodes: Vec<Option<Node>> = (0..(FILM + 1) * (FILM + 1))
+        let nodes: Vec<Option<MaskNode>> = (0..(FILM + 1) * (FILM + 1))
             .map(|i| view.node(place(i), |x, y| self.mask_node(x, y)))
             .collect();
         self.slopes = nodes
@@ -219,7 +219,7 @@ impl Coded {
 
     /// The density over the mask's intervals: what is open of each, and how much of it other rims let
     /// through from the corners of an interval of the sensor.
-    fn fill_coarse(&mut self, nodes: &[Option<Node>]) {
+    fn fill_coarse(&mut self, nodes: &[Option<MaskNode>]) {
         let interval = |i: usize| {
             let [column, row] = [i % FILM, i / FILM].map(first_of_four);
             let node = |at: usize| &nodes[(row + at / 4) * (FILM + 1) + column + at % 4];
@@ -228,7 +228,8 @@ impl Coded {
             }
             let corner = i / FILM * (FILM + 1) + i % FILM;
             let corners = [corner, corner + 1, corner + FILM + 1, corner + FILM + 2];
-            let seen: Vec<&Node> = corners.iter().filter_map(|&at| nodes[at].as_ref()).collect();
+            let seen: Vec<&MaskNode> =
+                corners.iter().filter_map(|&at| nodes[at].as_ref()).collect();
             let values: Vec<f64> = (0..MASK * MASK)
                 .map(|cell| {
                     let open = self.fine[cell].as_ref().map_or(0.0, Histogram::mean);
@@ -248,7 +249,7 @@ impl Coded {
 
     /// The nodes around a point of the sensor (mm) and their weights, of Lagrange's cubics; `None`
     /// beyond its edge.
-    fn nodes_around(&self, film: DVec2) -> Option<Nodes> {
+    fn nodes_around(&self, film: DVec2) -> Option<NodeWeights> {
         let (at, [right, down]) = self.film_interval(film)?;
         let first = [at % FILM, at / FILM].map(first_of_four);
         let across = cubics((at % FILM) as f64 + right - first[0] as f64);
@@ -281,14 +282,14 @@ impl Coded {
     }
 
     /// Whence and how: what a point of the sensor (mm) sees of the mask. `None` where nothing is known.
-    pub(super) fn seen_from(&self, film: DVec2) -> Option<Seen<'_>> {
+    pub(super) fn seen_from(&self, film: DVec2) -> Option<MaskView<'_>> {
         let (interval, _) = self.film_interval(film)?;
         let coarse = self.coarse[interval].as_ref()?;
-        Some(Seen { coded: self, coarse, nodes: self.nodes_around(film)? })
+        Some(MaskView { coded: self, coarse, nodes: self.nodes_around(film)? })
     }
 
     /// Slopes towards a place in one of the mask's intervals, and their derivatives by that place.
-    fn map(&self, nodes: &Nodes, [x, y]: [usize; 2], [s, t]: [f64; 2]) -> (DVec2, DMat2) {
+    fn map(&self, nodes: &NodeWeights, [x, y]: [usize; 2], [s, t]: [f64; 2]) -> (DVec2, DMat2) {
         let at = |x: usize, y: usize| -> DVec2 {
             nodes.iter().map(|&(node, weight)| self.slopes[node][y][x] * weight).sum()
         };
@@ -300,7 +301,7 @@ impl Coded {
     }
 }
 
-impl Seen<'_> {
+impl MaskView<'_> {
     /// A direction for a place in the unit square: towards a point of the mask for most of the square,
     /// and of the whole pupil as `anywhere` gives them with their density, per area of slopes, for the
     /// rest. `density` is that of the whole pupil's anywhere.
@@ -393,22 +394,22 @@ fn cubics(x: f64) -> [f64; 4] {
 }
 
 /// What a node of the sensor sees of the mask's nodes.
-struct Node {
+struct MaskNode {
     slopes: [[DVec2; MASK + 1]; MASK + 1],
     /// Whether all other rims let the ray through.
     passes: [[bool; MASK + 1]; MASK + 1],
 }
 
 /// A lens with its masks clear, and the mask in it.
-struct View<'a> {
+struct ClearLens<'a> {
     clear: &'a OpticalTrain,
     lens: &'a MonochromaticTrain,
     element: usize,
 }
 
-impl View<'_> {
+impl ClearLens<'_> {
     /// Solves the directions from `film` (mm) to the nodes of the mask; `None` when its middle has none.
-    fn node(&self, film: DVec3, mask: impl Fn(f64, f64) -> DVec2) -> Option<Node> {
+    fn node(&self, film: DVec3, mask: impl Fn(f64, f64) -> DVec2) -> Option<MaskNode> {
         let middle = mask(0.5 * MASK as f64, 0.5 * MASK as f64);
         let to =
             |target, start| slopes_to(self.clear, self.lens, film, (self.element, target), start);
@@ -423,7 +424,7 @@ impl View<'_> {
         let by = |step: DVec2| Some((crossing(centre + step)? - there) / STEP);
         let derivative = DMat2::from_cols(by(DVec2::X * STEP)?, by(DVec2::Y * STEP)?);
         let inverse = derivative.inverse();
-        let mut node = Node {
+        let mut node = MaskNode {
             slopes: [[DVec2::ZERO; MASK + 1]; MASK + 1],
             passes: [[false; MASK + 1]; MASK + 1],
         };

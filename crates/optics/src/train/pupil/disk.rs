@@ -21,7 +21,7 @@ pub struct Disk {
 
 /// From samples of the film to weighted rays.
 #[derive(Debug, Clone, Copy)]
-pub struct Bundle<'a> {
+pub struct DiskSamples<'a> {
     /// The sensor's place.
     pub sensor: &'a Frame,
     /// Weight of a sample per its projected solid angle (1/sr).
@@ -75,15 +75,15 @@ impl Disk {
     }
 
     /// Refills `rays` with one ray a sample, as [`super::ExitPupil::sample`] gives them one by one.
-    pub fn fill(&self, bundle: &Bundle<'_>, rays: &mut LensRays) {
+    pub fn fill(&self, bundle: &DiskSamples<'_>, rays: &mut LensRays) {
         rays.resize(bundle.squares.len());
         fill_blocks(self, bundle, &mut rays.blocks);
     }
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn fill_blocks(disk: &Disk, bundle: &Bundle<'_>, blocks: &mut [Block]) {
-    let Bundle { sensor, scale, film, squares } = *bundle;
+fn fill_blocks(disk: &Disk, bundle: &DiskSamples<'_>, blocks: &mut [Block]) {
+    let DiskSamples { sensor, scale, film, squares } = *bundle;
     let Frame { vertex, rotation } = *sensor;
     let (right, up, normal) = (rotation.x_axis, rotation.y_axis, rotation.z_axis);
     let factor = scale * PI * disk.radius * disk.radius;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::place::between;
 use super::search::Window;
-use super::{ANGLES, ExitPupil, Layout, Outline, PLANAR_INTERVALS, RADIAL_INTERVALS, turn_of};
+use super::{ANGLES, ExitPupil, NodeLayout, Outline, PLANAR_INTERVALS, RADIAL_INTERVALS, turn_of};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::aim::towards_lens;
 use crate::train::{MonochromaticTrain, OpticalTrain, Side};
@@ -33,8 +33,8 @@ impl ExitPupil {
         #[expect(clippy::cast_precision_loss, reason = "a few dozen nodes")]
         let share = |i: usize, intervals: usize| i as f64 / (2 * intervals) as f64;
         match self.layout {
-            Layout::Radial => DVec2::new(self.radius * share(column, RADIAL_INTERVALS), 0.0),
-            Layout::Planar => {
+            NodeLayout::Radial => DVec2::new(self.radius * share(column, RADIAL_INTERVALS), 0.0),
+            NodeLayout::Planar => {
                 let across =
                     DVec2::new(share(column, PLANAR_INTERVALS), share(row, PLANAR_INTERVALS));
                 (2.0 * across - 1.0) * self.half_size
@@ -45,13 +45,13 @@ impl ExitPupil {
     /// Intervals between nodes along both directions.
     fn intervals(&self) -> [usize; 2] {
         match self.layout {
-            Layout::Radial => [RADIAL_INTERVALS, 0],
-            Layout::Planar => [PLANAR_INTERVALS, PLANAR_INTERVALS],
+            NodeLayout::Radial => [RADIAL_INTERVALS, 0],
+            NodeLayout::Planar => [PLANAR_INTERVALS, PLANAR_INTERVALS],
         }
     }
 
     pub(super) fn measure(&mut self, train: &OpticalTrain, lenses: &[MonochromaticTrain]) {
-        if self.layout == Layout::Radial {
+        if self.layout == NodeLayout::Radial {
             self.radius = lit_radius(train, lenses, self.sensor.vertex.z, self.radius);
         }
         // The frame of slopes around the light at each node, from its neighbour's.
@@ -213,8 +213,8 @@ impl ExitPupil {
         for i in first..first + CHECKS {
             let u = ROBERTS.map(|alpha| (0.5 + alpha * f64::from(i)).fract());
             let film = match self.layout {
-                Layout::Radial => DVec2::new(self.radius * u[0].sqrt(), 0.0),
-                Layout::Planar => (2.0 * DVec2::new(u[0], u[3]) - 1.0) * self.half_size,
+                NodeLayout::Radial => DVec2::new(self.radius * u[0].sqrt(), 0.0),
+                NodeLayout::Planar => (2.0 * DVec2::new(u[0], u[3]) - 1.0) * self.half_size,
             };
             let Some(place) = self.place(film) else { continue };
             let Some([centre, half]) = self.frame(film) else { continue };

@@ -40,7 +40,7 @@ mod search;
 
 use glam::{DVec2, DVec3};
 
-use self::bound::Bound;
+use self::bound::PupilBound;
 use self::clear::without_masks;
 use self::coded::Coded;
 use self::place::turn_of;
@@ -50,7 +50,7 @@ use crate::element::{Clip, FateCounts, Frame, LensRays, RayStatus};
 use crate::glass::GlassError;
 
 pub use clear::{without_dimming, without_filters};
-pub use disk::{Bundle, Disk};
+pub use disk::{Disk, DiskSamples};
 pub use lenslets::LensletPupil;
 pub use measure::lit_radius;
 pub use search::Window;
@@ -117,7 +117,7 @@ pub struct PupilSample {
 pub struct ExitPupil {
     sensor: Frame,
     half_size: DVec2,
-    layout: Layout,
+    layout: NodeLayout,
     /// The pupil in closed form; there are no nodes then.
     disk: Option<Disk>,
     nodes: Vec<Outline>,
@@ -132,7 +132,7 @@ pub struct ExitPupil {
 
 /// How nodes lie on the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Layout {
+enum NodeLayout {
     /// On a radius, for all directions across the sensor.
     Radial,
     /// On a grid.
@@ -188,7 +188,7 @@ impl ExitPupil {
         let mut pupil = Self {
             sensor: train.sensor_frame(sensor_z),
             half_size,
-            layout: if symmetric { Layout::Radial } else { Layout::Planar },
+            layout: if symmetric { NodeLayout::Radial } else { NodeLayout::Planar },
             disk: None,
             nodes: Vec::new(),
             coded: None,
@@ -253,7 +253,7 @@ impl ExitPupil {
     /// and more rays are lost.
     #[must_use]
     pub fn is_radial(&self) -> bool {
-        self.layout == Layout::Radial
+        self.layout == NodeLayout::Radial
     }
 
     /// The pupil in closed form, if it has one.
@@ -304,10 +304,10 @@ impl ExitPupil {
     }
 
     /// The bound from a point of the sensor (mm); `None` where no light arrives.
-    fn bound(&self, film: DVec2) -> Option<Bound<'_>> {
+    fn bound(&self, film: DVec2) -> Option<PupilBound<'_>> {
         let bound = if let Some(disk) = &self.disk {
             let (centre, radius) = disk.seen_from(self.film_point(film));
-            Bound { nodes: &[], place: None, frame: [centre, DVec2::splat(radius)] }
+            PupilBound { nodes: &[], place: None, frame: [centre, DVec2::splat(radius)] }
         } else {
             let place = self.place(film)?;
             let mut frame = [DVec2::ZERO; 2];
@@ -315,7 +315,7 @@ impl ExitPupil {
                 frame[0] += self.nodes[node].centre * weight;
                 frame[1] += self.nodes[node].half * weight;
             }
-            Bound { nodes: &self.nodes, place: Some(place), frame }
+            PupilBound { nodes: &self.nodes, place: Some(place), frame }
         };
         (bound.frame[1].min_element() > 0.0).then_some(bound)
     }

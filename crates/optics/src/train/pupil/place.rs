@@ -2,18 +2,18 @@
 
 use glam::DVec2;
 
-use super::{ANGLES, ExitPupil, Layout, PLANAR_INTERVALS};
+use super::{ANGLES, ExitPupil, NodeLayout, PLANAR_INTERVALS};
 
 impl ExitPupil {
-    pub(super) fn place(&self, film: DVec2) -> Option<Place> {
+    pub(super) fn place(&self, film: DVec2) -> Option<NodePlace> {
         match self.layout {
             _ if self.nodes.is_empty() => None,
-            Layout::Radial => self.radial_place(film),
-            Layout::Planar => self.planar_place(film),
+            NodeLayout::Radial => self.radial_place(film),
+            NodeLayout::Planar => self.planar_place(film),
         }
     }
 
-    fn radial_place(&self, film: DVec2) -> Option<Place> {
+    fn radial_place(&self, film: DVec2) -> Option<NodePlace> {
         let r = film.length();
         let intervals = self.nodes.len() - 1;
         #[expect(clippy::cast_precision_loss, reason = "a few dozen nodes")]
@@ -21,10 +21,10 @@ impl ExitPupil {
         let (low, share) = split(at, intervals)?;
         let axis = if r > 0.0 { film / r } else { DVec2::X };
         let nodes = [(low, 1.0 - share), (low + 1, share), (low, 0.0), (low, 0.0)];
-        Some(Place { axis, nodes })
+        Some(NodePlace { axis, nodes })
     }
 
-    fn planar_place(&self, film: DVec2) -> Option<Place> {
+    fn planar_place(&self, film: DVec2) -> Option<NodePlace> {
         let along = |x: f64, half: f64| {
             #[expect(clippy::cast_precision_loss, reason = "8 intervals")]
             let at =
@@ -40,18 +40,18 @@ impl ExitPupil {
             (node(0, 1), (1.0 - right) * down),
             (node(1, 1), right * down),
         ];
-        Some(Place { axis: DVec2::X, nodes })
+        Some(NodePlace { axis: DVec2::X, nodes })
     }
 }
 
 /// Which nodes a point of the sensor lies between, and how it is turned against them.
-pub(super) struct Place {
+pub(super) struct NodePlace {
     /// The direction on the sensor that is the nodes' +x.
     pub(super) axis: DVec2,
     pub(super) nodes: [(usize, f64); 4],
 }
 
-impl Place {
+impl NodePlace {
     pub(super) fn turned(&self, slopes: DVec2) -> DVec2 {
         self.axis.rotate(slopes)
     }

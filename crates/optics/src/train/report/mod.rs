@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::analysis::{
-    Distortion, Illumination, Spot, colour_shifts, distortion, half_field, illumination,
+    FieldDistortion, FieldIllumination, Spot, colour_shifts, distortion, half_field, illumination,
     image_circle, spot,
 };
 use super::{Focus, MonochromaticTrain, OpticalTrain, Paraxial};
@@ -59,7 +59,7 @@ pub struct LensReport {
     /// Where its numbers come from; empty when its file does not say.
     pub source: String,
     /// The units of all that follows.
-    pub units: Units,
+    pub units: ReportUnits,
     /// The wavelength of all that names no other (nm).
     pub wavelength: f64,
     /// The elements from the object side.
@@ -80,9 +80,9 @@ pub struct LensReport {
     /// Spots at those fields that light reaches.
     pub spots: Vec<Spot>,
     /// Distortion at those fields whose chief ray arrives.
-    pub distortion: Vec<Distortion>,
+    pub distortion: Vec<FieldDistortion>,
     /// Relative illumination at those fields whose chief ray arrives.
-    pub relative_illumination: Vec<Illumination>,
+    pub relative_illumination: Vec<FieldIllumination>,
     /// Each wavelength against the design's.
     pub colour: Vec<ColourRow>,
     /// Glasses and filters that are not stated for one of the wavelengths, in sentences.
@@ -93,7 +93,7 @@ pub struct LensReport {
 
 /// Units of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct Units {
+pub struct ReportUnits {
     length: &'static str,
     wavelength: &'static str,
     angle: &'static str,
@@ -101,7 +101,7 @@ pub struct Units {
     projected_solid_angle: &'static str,
 }
 
-const UNITS: Units = Units {
+const UNITS: ReportUnits = ReportUnits {
     length: "mm",
     wavelength: "nm",
     angle: "degree",

@@ -29,7 +29,7 @@ impl Display for LensReport {
 
 impl LensReport {
     fn write_elements(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let mut table = Table::new(
+        let mut table = TextTable::new(
             &["#", "element", "radius", "thickness", "semi-diameter", "behind it", "index", ""],
             &["", "", "mm", "mm", "mm", "", "", ""],
         );
@@ -91,7 +91,7 @@ impl LensReport {
         if self.sensor_z.is_none() {
             return Ok(());
         }
-        let mut table = Table::new(
+        let mut table = TextTable::new(
             &[
                 "field",
                 "height",
@@ -143,7 +143,7 @@ impl LensReport {
         head.extend(shown.iter().map(String::as_str));
         let mut units = vec!["nm", "mm", "mm", "mm"];
         units.resize(head.len(), "um");
-        let mut table = Table::new(&head, &units);
+        let mut table = TextTable::new(&head, &units);
         for row in &self.colour {
             let mut cells = vec![
                 row.wavelength.to_string(),
@@ -188,11 +188,11 @@ fn share(part: usize, whole: usize) -> f64 {
 }
 
 /// Cells in columns: numbers to the right, words to the left.
-struct Table {
+struct TextTable {
     rows: Vec<Vec<String>>,
 }
 
-impl Table {
+impl TextTable {
     fn new(head: &[&str], units: &[&str]) -> Self {
         let row = |cells: &[&str]| cells.iter().map(|&cell| cell.to_owned()).collect();
         Self { rows: vec![row(head), row(units)] }
@@ -203,7 +203,7 @@ impl Table {
     }
 }
 
-impl Display for Table {
+impl Display for TextTable {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
         let cells = |column: usize| self.rows.iter().filter_map(move |row| row.get(column));

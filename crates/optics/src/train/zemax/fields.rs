@@ -1,7 +1,7 @@
 //! Field points, given as angles or heights, to field angles.
 
 use super::ZemaxError;
-use super::sheet::Line;
+use super::sheet::SheetLine;
 use crate::train::analysis::chief_height;
 use crate::train::{Focus, OpticalTrain};
 
@@ -25,7 +25,7 @@ pub(super) struct Fields {
 
 impl Fields {
     /// Kind, normalisation, number of fields, number of wavelengths.
-    pub(super) fn set_kind(&mut self, line: &Line<'_>) -> Result<(), ZemaxError> {
+    pub(super) fn set_kind(&mut self, line: &SheetLine<'_>) -> Result<(), ZemaxError> {
         self.kind = line.index(0)?;
         self.count = line.word(2).map(|_| line.index(2)).transpose()?;
         self.wavelengths = line.word(3).map(|_| line.index(3)).transpose()?;

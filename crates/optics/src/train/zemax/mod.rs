@@ -28,8 +28,8 @@ use super::{LensError, LensFile, OpticalTrain, SensorMount};
 use crate::element::{ElementSpec, PartSpec, SurfaceSpec, ThinLensSpec};
 use crate::glass::{GlassSpec, Makers};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
-use place::{Axes, Placed};
-use sheet::{Aperture, Parameter, Row, Shape, Sheet};
+use place::{Axes, SheetPlace};
+use sheet::{Aperture, Parameter, SheetRow, SurfaceShape, ZemaxSheet};
 
 /// A difference of focal lengths that is more than rounding (share).
 const SAME_FOCAL_LENGTH: f64 = 1e-3;
@@ -81,7 +81,7 @@ impl ZemaxLens {
     pub fn read(bytes: &[u8]) -> Result<Self, ZemaxError> {
         let text = text::decode(bytes)?;
         // The lines of the file, and the elements that they describe.
-        let sheet = Sheet::read(&text)?;
+        let sheet = ZemaxSheet::read(&text)?;
         let mut importer =
             Importer { sheet: &sheet, elements: Vec::new(), notes: Vec::new(), object_z: None };
         let sensor = importer.convert()?;
@@ -135,7 +135,7 @@ impl ZemaxLens {
 
 /// Rows on their way to elements.
 struct Importer<'a> {
-    sheet: &'a Sheet,
+    sheet: &'a ZemaxSheet,
     elements: Vec<ElementSpec>,
     notes: Vec<String>,
     /// z of an object at a finite distance in lens coordinates (mm).
@@ -159,7 +159,7 @@ impl Importer<'_> {
         let mut medium_is_air = true;
         let (mut first_z, mut last_z) = (None, None);
         for row in inner {
-            if row.shape == Shape::CoordinateBreak {
+            if row.shape == SurfaceShape::CoordinateBreak {
                 axes = axes.broken(&row.coordinate_break(unit));
             } else {
                 let flat_in_air = row.is_flat() && medium_is_air && row.glass.is_none();
@@ -186,7 +186,7 @@ impl Importer<'_> {
         Ok(SensorMount { tilt: image.tilt.map(Degrees), decentre: image.decentre.map(Millimetres) })
     }
 
-    fn look_at_ends(&mut self, object: &Row, image: &Row) -> Result<(), ZemaxError> {
+    fn look_at_ends(&mut self, object: &SheetRow, image: &SheetRow) -> Result<(), ZemaxError> {
         if let Some(glass) = &object.glass {
             let why = "the object stands in a glass; lenses here begin in air";
             return Err(ZemaxError::new(glass.line, why));
@@ -205,10 +205,10 @@ impl Importer<'_> {
     }
 
     /// What a row is; `None` for a plane between air and air that does nothing.
-    fn part(&mut self, row: &Row, flat_in_air: bool) -> Result<Option<PartSpec>, ZemaxError> {
+    fn part(&mut self, row: &SheetRow, flat_in_air: bool) -> Result<Option<PartSpec>, ZemaxError> {
         let unit = self.sheet.unit;
         let semi_diameter = row.semi_diameter().map(|length| length * unit);
-        if row.shape == Shape::Paraxial {
+        if row.shape == SurfaceShape::Paraxial {
             let focal_length = row.parameters.get(&1).map_or(100.0, |p| p.value) * unit;
             if focal_length == 0.0 {
                 return Err(ZemaxError::new(row.line, "a paraxial lens of focal length 0"));
@@ -241,7 +241,7 @@ impl Importer<'_> {
         })))
     }
 
-    fn glass(&self, glass: &sheet::Glass) -> Result<GlassSpec, ZemaxError> {
+    fn glass(&self, glass: &sheet::SheetGlass) -> Result<GlassSpec, ZemaxError> {
         let spec = match glass.model {
             None => GlassSpec::Named(glass.name.clone()),
             // OpticStudio takes an Abbe number of 0 for a glass without dispersion.
@@ -265,7 +265,13 @@ impl Importer<'_> {
         })
     }
 
-    fn place(&mut self, part: PartSpec, row: &Row, placed: &Placed, last_z: &mut Option<f64>) {
+    fn place(
+        &mut self,
+        part: PartSpec,
+        row: &SheetRow,
+        placed: &SheetPlace,
+        last_z: &mut Option<f64>,
+    ) {
         if let (Some(last), Some(z)) = (self.elements.last_mut(), *last_z) {
             last.mount.thickness = Millimetres(placed.z - z);
         }
@@ -294,7 +300,7 @@ fn with_entrance_pupil(
 /// Sets the stop by the system's aperture, and gives the lens.
 fn open_stop(
     file: &mut LensFile,
-    sheet: &Sheet,
+    sheet: &ZemaxSheet,
     object_z: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<OpticalTrain, ZemaxError> {
@@ -344,16 +350,16 @@ fn open_stop(
     build(file)
 }
 
-impl Row {
+impl SheetRow {
     fn is_flat(&self) -> bool {
         let bends = |(number, parameter): (&usize, &Parameter)| {
-            parameter.value != 0.0 && (self.shape == Shape::EvenAsphere || *number > 2)
+            parameter.value != 0.0 && (self.shape == SurfaceShape::EvenAsphere || *number > 2)
         };
         let terms = match self.shape {
-            Shape::EvenAsphere => &self.parameters,
-            Shape::ExtendedAsphere => &self.extra,
-            Shape::Standard => return self.curvature == 0.0,
-            Shape::Paraxial | Shape::CoordinateBreak => return false,
+            SurfaceShape::EvenAsphere => &self.parameters,
+            SurfaceShape::ExtendedAsphere => &self.extra,
+            SurfaceShape::Standard => return self.curvature == 0.0,
+            SurfaceShape::Paraxial | SurfaceShape::CoordinateBreak => return false,
         };
         self.curvature == 0.0 && !terms.iter().any(bends)
     }
@@ -369,7 +375,7 @@ impl Row {
         };
         match self.shape {
             // PARM 1 to 8 are the coefficients of r² to r¹⁶.
-            Shape::EvenAsphere => {
+            SurfaceShape::EvenAsphere => {
                 for (&number, parameter) in self.parameters.iter().filter(|p| (1..=8).contains(p.0))
                 {
                     add(2 * number, parameter.value);
@@ -377,7 +383,7 @@ impl Row {
             }
             // XDAT 1 is the number of terms, 2 the radius that r is divided by, and the
             // coefficients follow.
-            Shape::ExtendedAsphere => {
+            SurfaceShape::ExtendedAsphere => {
                 let terms = self.extra.get(&1).map_or(0.0, |p| p.value);
                 let radius = self.extra.get(&2).map_or(1.0, |p| p.value);
                 let last = self.extra.range(3..).rfind(|(_, p)| p.value != 0.0);

@@ -30,7 +30,7 @@ pub(super) struct Axes {
 
 /// Where a surface stands, as a lens file says it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Placed {
+pub(super) struct SheetPlace {
     pub(super) z: f64,
     pub(super) decentre: [f64; 2],
     pub(super) tilt: [f64; 2],
@@ -63,13 +63,13 @@ impl Axes {
         Self { origin: self.origin + self.rotation.z_axis * thickness, ..self }
     }
 
-    pub(super) fn placed(&self) -> Placed {
+    pub(super) fn placed(&self) -> SheetPlace {
         // Rx(a) Ry(b) takes z to (sin b, -sin a cos b, cos a cos b).
         let axis = self.rotation.z_axis;
         let about_x = (-axis.y).atan2(axis.z).to_degrees();
         let about_y = axis.x.atan2(axis.y.hypot(axis.z)).to_degrees();
         let clean = |value: f64, small: f64| if value.abs() <= small { 0.0 } else { value };
-        Placed {
+        SheetPlace {
             z: self.origin.z,
             decentre: [self.origin.x, self.origin.y].map(|length| clean(length, NO_LENGTH)),
             tilt: [about_x, about_y].map(|angle| clean(angle, NO_TILT)),

@@ -16,11 +16,11 @@ const MOST_WAVELENGTHS: usize = 24;
 
 /// A whole file.
 #[derive(Debug, Default)]
-pub(super) struct Sheet {
+pub(super) struct ZemaxSheet {
     pub(super) name: String,
     /// Millimetres in the file's unit of length.
     pub(super) unit: f64,
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Vec<SheetRow>,
     /// The system's aperture and its line.
     pub(super) aperture: Option<(usize, Aperture)>,
     /// In the order in which glasses are looked for.
@@ -47,13 +47,13 @@ pub(super) enum Aperture {
 
 /// A surface.
 #[derive(Debug, Default)]
-pub(super) struct Row {
+pub(super) struct SheetRow {
     pub(super) line: usize,
-    pub(super) shape: Shape,
+    pub(super) shape: SurfaceShape,
     pub(super) curvature: f64,
     pub(super) conic: f64,
     pub(super) thickness: f64,
-    pub(super) glass: Option<Glass>,
+    pub(super) glass: Option<SheetGlass>,
     pub(super) stop: bool,
     pub(super) parameters: BTreeMap<usize, Parameter>,
     pub(super) extra: BTreeMap<usize, Parameter>,
@@ -64,7 +64,7 @@ pub(super) struct Row {
 
 /// The types that have a counterpart here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Shape {
+pub(super) enum SurfaceShape {
     #[default]
     Standard,
     EvenAsphere,
@@ -74,7 +74,7 @@ pub(super) enum Shape {
 }
 
 #[derive(Debug)]
-pub(super) struct Glass {
+pub(super) struct SheetGlass {
     pub(super) line: usize,
     pub(super) name: String,
     /// nd and Abbe number of a glass that is nothing else.
@@ -94,13 +94,13 @@ struct Ignored {
 }
 
 /// One line, taken apart.
-pub(super) struct Line<'a> {
+pub(super) struct SheetLine<'a> {
     number: usize,
     command: &'a str,
     rest: &'a str,
 }
 
-impl Line<'_> {
+impl SheetLine<'_> {
     fn error(&self, why: impl std::fmt::Display) -> ZemaxError {
         ZemaxError::new(self.number, format!("{}: {why}", self.command))
     }
@@ -136,7 +136,7 @@ impl Line<'_> {
     }
 }
 
-impl Sheet {
+impl ZemaxSheet {
     pub(super) fn read(text: &str) -> Result<Self, ZemaxError> {
         let mut sheet = Self { unit: 1.0, configurations: 1, ..Self::default() };
         let mut in_surface = false;
@@ -144,7 +144,7 @@ impl Sheet {
             // A command, and what it is given.
             let trimmed = written.trim();
             let (command, rest) = trimmed.split_once(char::is_whitespace).unwrap_or((trimmed, ""));
-            let line = Line { number, command, rest: rest.trim() };
+            let line = SheetLine { number, command, rest: rest.trim() };
             sheet.last_line = number;
             let indented = written.starts_with(char::is_whitespace);
             // Indented lines after a SURF are about that surface, all others about the lens.
@@ -173,19 +173,19 @@ impl Sheet {
         Ok(sheet)
     }
 
-    fn begin_surface(&mut self, line: &Line<'_>) -> Result<(), ZemaxError> {
+    fn begin_surface(&mut self, line: &SheetLine<'_>) -> Result<(), ZemaxError> {
         if line.index(0)? != self.rows.len() {
             return Err(line.error(format!("expected surface {} here", self.rows.len())));
         }
         if self.rows.len() >= MOST_SURFACES {
             return Err(line.error(format!("more than {MOST_SURFACES} surfaces")));
         }
-        self.rows.push(Row { line: line.number, ..Row::default() });
+        self.rows.push(SheetRow { line: line.number, ..SheetRow::default() });
         Ok(())
     }
 
     /// Whether the line is understood.
-    fn read_header(&mut self, line: &Line<'_>) -> Result<bool, ZemaxError> {
+    fn read_header(&mut self, line: &SheetLine<'_>) -> Result<bool, ZemaxError> {
         match line.command {
             "NAME" => line.rest.trim_matches('"').clone_into(&mut self.name),
             "MODE" if line.word(0) == Some("SEQ") => {}
@@ -217,7 +217,7 @@ impl Sheet {
         Ok(true)
     }
 
-    fn set_aperture(&mut self, line: &Line<'_>) -> Result<(), ZemaxError> {
+    fn set_aperture(&mut self, line: &SheetLine<'_>) -> Result<(), ZemaxError> {
         let value = line.number(0)?;
         // Files list apertures that are not in use with the value 0.
         if value == 0.0 {
@@ -257,7 +257,7 @@ impl Sheet {
     }
 
     /// `EFFL value`, or the operand of the merit function with a target that has a weight.
-    fn state_focal_length(&mut self, line: &Line<'_>) -> Result<(), ZemaxError> {
+    fn state_focal_length(&mut self, line: &SheetLine<'_>) -> Result<(), ZemaxError> {
         let numbers = line.numbers()?;
         let stated = match numbers[..] {
             [value] => Some(value),
@@ -268,7 +268,7 @@ impl Sheet {
         Ok(())
     }
 
-    fn ignore(&mut self, line: &Line<'_>) {
+    fn ignore(&mut self, line: &SheetLine<'_>) {
         let ignored = self
             .ignored
             .entry(line.command.to_owned())
@@ -324,9 +324,9 @@ impl Sheet {
     }
 }
 
-impl Row {
+impl SheetRow {
     /// Whether the line is understood.
-    fn read(&mut self, line: &Line<'_>) -> Result<bool, ZemaxError> {
+    fn read(&mut self, line: &SheetLine<'_>) -> Result<bool, ZemaxError> {
         match line.command {
             "STOP" => self.stop = true,
             "TYPE" => self.shape = shape(line)?,
@@ -386,7 +386,7 @@ impl Row {
     }
 }
 
-fn unit(line: &Line<'_>) -> Result<f64, ZemaxError> {
+fn unit(line: &SheetLine<'_>) -> Result<f64, ZemaxError> {
     match line.word(0) {
         Some("MM") => Ok(1.0),
         Some("CM") => Ok(10.0),
@@ -404,13 +404,13 @@ fn maker(catalogue: &str) -> String {
     catalogue.split(['_', '-']).next().unwrap_or_default().to_owned()
 }
 
-fn shape(line: &Line<'_>) -> Result<Shape, ZemaxError> {
+fn shape(line: &SheetLine<'_>) -> Result<SurfaceShape, ZemaxError> {
     match line.word(0) {
-        Some("STANDARD") => Ok(Shape::Standard),
-        Some("EVENASPH") => Ok(Shape::EvenAsphere),
-        Some("XASPHERE") => Ok(Shape::ExtendedAsphere),
-        Some("PARAXIAL") => Ok(Shape::Paraxial),
-        Some("COORDBRK") => Ok(Shape::CoordinateBreak),
+        Some("STANDARD") => Ok(SurfaceShape::Standard),
+        Some("EVENASPH") => Ok(SurfaceShape::EvenAsphere),
+        Some("XASPHERE") => Ok(SurfaceShape::ExtendedAsphere),
+        Some("PARAXIAL") => Ok(SurfaceShape::Paraxial),
+        Some("COORDBRK") => Ok(SurfaceShape::CoordinateBreak),
         other => Err(line.error(format!(
             "the surface type {} has no counterpart here; known: STANDARD, EVENASPH, XASPHERE, \
              PARAXIAL, COORDBRK",
@@ -419,7 +419,7 @@ fn shape(line: &Line<'_>) -> Result<Shape, ZemaxError> {
     }
 }
 
-fn glass(line: &Line<'_>) -> Result<Option<Glass>, ZemaxError> {
+fn glass(line: &SheetLine<'_>) -> Result<Option<SheetGlass>, ZemaxError> {
     let name = line.word(0).ok_or_else(|| line.error("a name is missing"))?;
     if name == "MIRROR" {
         return Err(line.error("mirrors cannot be imported; lenses here only refract"));
@@ -430,7 +430,7 @@ fn glass(line: &Line<'_>) -> Result<Option<Glass>, ZemaxError> {
     }
     let is_model = name == "___BLANK" || line.word(1) == Some("1");
     let model = if is_model { Some([line.number(3)?, line.number_or(4, 0.0)?]) } else { None };
-    Ok(Some(Glass { line: line.number, name: name.to_owned(), model }))
+    Ok(Some(SheetGlass { line: line.number, name: name.to_owned(), model }))
 }
 
 /// `EFL 50`, `EFL=50 mm`, `EFFL: 50` somewhere in a title or a note.
