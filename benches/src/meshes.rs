@@ -45,15 +45,7 @@ impl Random {
 
 /// One mesh where it is.
 fn alone(mesh: Mesh) -> Arc<Geometry> {
-    let here = Placement {
-        mesh: 0,
-        object: 0,
-        instance: 0,
-        node: 0,
-        material: 0,
-        world_from_mesh: Transform::IDENTITY,
-    };
-    Arc::new(Geometry { meshes: vec![mesh], placements: vec![here] })
+    Arc::new(Geometry::alone(mesh, Transform::IDENTITY))
 }
 
 /// A closed sphere with hills and valleys: coherent surfaces, small triangles.
@@ -102,14 +94,7 @@ pub fn forest(side: u32) -> Result<Arc<Geometry>, ShapeError> {
             let place = 2.0 * (DVec3::new(f64::from(x) - half, 0.0, f64::from(z) - half)) + shift;
             let turn = DQuat::from_rotation_y(std::f64::consts::TAU * random.unit());
             let scale = DVec3::splat(0.5 + random.unit());
-            placements.push(Placement {
-                mesh: 0,
-                object: 0,
-                instance: 0,
-                node: 0,
-                material: 0,
-                world_from_mesh: Transform::from_trs(place, turn, scale),
-            });
+            placements.push(Placement::of(0, Transform::from_trs(place, turn, scale)));
         }
     }
     Ok(Arc::new(Geometry { meshes: vec![blob_mesh(10_000)?], placements }))

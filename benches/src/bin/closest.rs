@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use etendue_accel::{Accel, BuildOptions, Embree};
-use etendue_geometry::{Detail, Geometry, HitBatch, Mesh, Placement, RayBatch, Transform};
+use etendue_geometry::{Detail, Geometry, HitBatch, Mesh, RayBatch, Transform};
 use rayon::prelude::*;
 
 /// Rays in a batch, as the Python package has it.
@@ -23,10 +23,7 @@ fn main() -> Result<()> {
     let faces: Vec<[u32; 3]> = bytemuck::pod_collect_to_vec(&read("faces.u32")?);
     let mesh =
         Mesh::from_arrays("mesh", &rows("vertices.f64")?, &faces).map_err(anyhow::Error::msg)?;
-    let world_from_mesh = Transform::IDENTITY;
-    let placement =
-        Placement { mesh: 0, object: 0, instance: 0, node: 0, material: 0, world_from_mesh };
-    let geometry = Arc::new(Geometry { meshes: vec![mesh], placements: vec![placement] });
+    let geometry = Arc::new(Geometry::alone(mesh, Transform::IDENTITY));
     let accel = Embree::build(geometry, &BuildOptions::default())?;
     let (origins, directions) = (rows("origins.f64")?, rows("directions.f64")?);
     let mut batches: Vec<(RayBatch, HitBatch)> = origins

@@ -144,7 +144,7 @@ impl Layout {
     /// Adds a part for `placements`, parallel to the world.
     fn bake(&mut self, geometry: &Geometry, placements: Vec<u32>) {
         let members = || placements.iter().map(|&i| &geometry.placements[i as usize]);
-        let bounds = members().fold(Bounds::EMPTY, |all, p| all.union(loose_bounds(geometry, p)));
+        let bounds = members().fold(Bounds::EMPTY, |all, p| all.union(geometry.loose_bounds_of(p)));
         let frame = Frame::around(bounds);
         let reach = members().map(|p| baked_reach(geometry, p, frame)).fold(0.0, f64::max);
         let part = index(self.parts.len());
@@ -159,17 +159,6 @@ fn index(i: usize) -> u32 {
     i as u32
 }
 
-fn loose_bounds(geometry: &Geometry, placement: &Placement) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    let local = geometry.mesh_of(placement).bounds;
-    if !local.is_empty() {
-        for corner in local.corners() {
-            bounds.include(placement.world_from_mesh.point(corner));
-        }
-    }
-    bounds
-}
-
 /// The magnitudes that a placement's corners are summed from in `frame`.
 fn baked_reach(geometry: &Geometry, placement: &Placement, frame: Frame) -> f64 {
     let transform = &placement.world_from_mesh;
@@ -181,6 +170,6 @@ fn baked_reach(geometry: &Geometry, placement: &Placement, frame: Frame) -> f64 
 /// Whether a placed mesh's typical triangle is large against what f32 resolves in `frame`.
 fn is_coarse(geometry: &Geometry, placement: &Placement, frame: Frame) -> bool {
     let triangles = geometry.mesh_of(placement).triangles.len() as f64;
-    let size = loose_bounds(geometry, placement).diagonal() / triangles.sqrt();
+    let size = geometry.loose_bounds_of(placement).diagonal() / triangles.sqrt();
     size * frame.scale > BAKED_RESOLUTION * f64::from(f32::EPSILON)
 }

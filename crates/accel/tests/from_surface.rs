@@ -5,7 +5,7 @@ use std::sync::Arc;
 use etendue_accel::{Accel, BuildOptions, Bvh, Exact};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{
-    Detail, Geometry, HitBatch, MISS, Mesh, Placement, Positions, RayBatch, Transform, Vertices,
+    Detail, Geometry, HitBatch, MISS, Mesh, Positions, RayBatch, Transform, Vertices,
 };
 
 /// A cube of half-edge 1, seen from within and without.
@@ -35,17 +35,7 @@ fn backends(geometry: &Arc<Geometry>) -> Vec<Box<dyn Accel>> {
 fn rays_neither_stick_nor_leak() {
     for (scale, far) in [(1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1.0, 1e6)] {
         let place = Transform::new(DMat3::IDENTITY * scale, DVec3::splat(far));
-        let geometry = Arc::new(Geometry {
-            meshes: vec![cube()],
-            placements: vec![Placement {
-                mesh: 0,
-                object: 0,
-                instance: 0,
-                node: 0,
-                material: 0,
-                world_from_mesh: place,
-            }],
-        });
+        let geometry = Arc::new(Geometry::alone(cube(), place));
         // What a spawned ray is off by: 32 roundings of the numbers involved.
         let off = 32.0 * f64::EPSILON * 3.0 * (scale + far);
         let mut rays = RayBatch::default().from_surfaces();

@@ -25,8 +25,8 @@ use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 
 use crate::pictures::{Studio, opened};
-use crate::rounds::{TimeSpread, order};
-use crate::samplers::{Converged, Effort, Entry};
+use crate::rounds::TimeSpread;
+use crate::samplers::{Converged, Effort, Entry, take_pictures};
 use crate::{BenchError, Progress};
 
 /// What was measured of one scene.
@@ -75,21 +75,10 @@ pub fn measure(
     let full = studio.camera().clone();
     let (models, notes) = models(&full)?;
     let converged = Converged::render(studio, &full, effort.converged)?;
-    let mut done = f64::from(effort.converged);
     let mut entries: Vec<Entry<usize>> =
         (0..models.len()).flat_map(|model| Entry::each(model, &effort.counts)).collect();
-    for round in 0..rounds {
-        for who in order(round, entries.len()) {
-            if !progress(done / all) {
-                return Err(BenchError::Stopped);
-            }
-            let entry = &mut entries[who];
-            let camera = &models[entry.of].1;
-            let how = (Sampler::Sobol, LightPrecision::Auto);
-            entry.take(studio, camera, how, round, &converged)?;
-            done += f64::from(entry.samples);
-        }
-    }
+    let way = |of: &usize| (&models[*of].1, (Sampler::Sobol, LightPrecision::Auto));
+    take_pictures(studio, &mut entries, (effort, &converged, all), &way, progress)?;
     let finding = |entry: &Entry<usize>| {
         let rmse = entry.rmse();
         Some(Finding {

@@ -141,19 +141,19 @@ mod tests {
     use super::*;
     use etendue_accel::{BuildOptions, Exact};
     use etendue_camera::{CameraSpec, Pose};
-    use etendue_geometry::{Geometry, Mesh, Placement, Positions, Transform, Vertices};
+    use etendue_geometry::{Geometry, Mesh, Positions, Transform, Vertices};
+
+    fn build(spec: &CameraSpec) -> Camera {
+        let frame = || -> etendue_geometry::Bounds { unreachable!("the pose is given") };
+        spec.build(frame, &|_| unreachable!()).unwrap()
+    }
 
     #[test]
     fn batches_hold_every_pixel_once_in_one_order() {
         let pose = Pose::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y).unwrap();
         let mut spec = CameraSpec::perspective(pose, 0.7, 1.0);
         spec.sensor_mut().resolution = [40, 21];
-        let camera = spec
-            .build(
-                || -> etendue_geometry::Bounds { unreachable!("the pose is given") },
-                &|_| unreachable!(),
-            )
-            .unwrap();
+        let camera = build(&spec);
         let rays = Rays::primary(&camera, usize::MAX);
         assert_eq!(rays.len(), 40 * 21);
         let mut ends: Vec<[u64; 2]> = (0..rays.len())
@@ -171,12 +171,7 @@ mod tests {
         }
         // Every column and row of tiles has its share.
         spec.sensor_mut().resolution = [1024, 1024];
-        let camera = spec
-            .build(
-                || -> etendue_geometry::Bounds { unreachable!("the pose is given") },
-                &|_| unreachable!(),
-            )
-            .unwrap();
+        let camera = build(&spec);
         let some = Rays::primary(&camera, 64 * 256);
         for axis in 0..2 {
             let side = |k: &f64| usize::from(*k > 0.0);
@@ -186,12 +181,7 @@ mod tests {
         }
         // Whole tiles, no more than asked for.
         spec.sensor_mut().resolution = [40, 21];
-        let camera = spec
-            .build(
-                || -> etendue_geometry::Bounds { unreachable!("the pose is given") },
-                &|_| unreachable!(),
-            )
-            .unwrap();
+        let camera = build(&spec);
         assert_eq!(Rays::primary(&camera, 600).len() % 16, 0);
         assert!(Rays::primary(&camera, 600).len() <= 600);
     }
@@ -204,15 +194,7 @@ mod tests {
             Positions::F32(Vertices::from_arrays(&corners)),
             vec![[0, 1, 2]].into(),
         );
-        let placement = Placement {
-            mesh: 0,
-            object: 0,
-            instance: 0,
-            node: 0,
-            material: 0,
-            world_from_mesh: Transform::IDENTITY,
-        };
-        let geometry = Geometry { meshes: vec![mesh], placements: vec![placement] };
+        let geometry = Geometry::alone(mesh, Transform::IDENTITY);
         let accel = Exact::build(Arc::new(geometry), &BuildOptions::default()).unwrap();
         let mut rays = RayBatch::default();
         for i in 0..40_000 {

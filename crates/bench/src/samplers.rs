@@ -109,20 +109,10 @@ pub fn measure(
     studio.fit(all, effort.seconds)?;
     let camera = studio.camera().clone();
     let converged = Converged::render(studio, &camera, effort.converged)?;
-    let mut done = f64::from(effort.converged);
     let mut entries: Vec<Entry<Contestant>> =
         contestants.iter().flat_map(|&who| Entry::each(who, &effort.counts)).collect();
-    for round in 0..rounds {
-        for who in order(round, entries.len()) {
-            if !progress(done / all) {
-                return Err(BenchError::Stopped);
-            }
-            let entry = &mut entries[who];
-            let Contestant { sampler, precision, .. } = entry.of;
-            entry.take(studio, &camera, (sampler, precision), round, &converged)?;
-            done += f64::from(entry.samples);
-        }
-    }
+    let way = |of: &Contestant| (&camera, (of.sampler, of.precision));
+    take_pictures(studio, &mut entries, (effort, &converged, all), &way, progress)?;
     let finding = |entry: &Entry<Contestant>| {
         let rmse = entry.rmse();
         Some(Finding {
@@ -135,6 +125,33 @@ pub fn measure(
     };
     let findings = entries.iter().filter_map(finding).collect();
     Ok(Samplers { resolution: camera.resolution(), converged, findings })
+}
+
+/// How a contestant's picture is made: its camera, its point set, and the precision of hits.
+pub(crate) type Way<'a> = (&'a Camera, (Sampler, LightPrecision));
+
+/// Renders all entries in turn, round after round, to `all` samples a pixel with those of the converged
+/// picture.
+pub(crate) fn take_pictures<'a, T: Clone>(
+    studio: &mut Studio<'_>,
+    entries: &mut [Entry<T>],
+    (effort, converged, all): (&Effort, &Converged, f64),
+    way: &dyn Fn(&T) -> Way<'a>,
+    progress: Progress<'_>,
+) -> Result<(), BenchError> {
+    let mut done = f64::from(effort.converged);
+    for round in 0..effort.rounds.max(1) {
+        for who in order(round, entries.len()) {
+            if !progress(done / all) {
+                return Err(BenchError::Stopped);
+            }
+            let entry = &mut entries[who];
+            let (camera, how) = way(&entry.of);
+            entry.take(studio, camera, how, round, converged)?;
+            done += f64::from(entry.samples);
+        }
+    }
+    Ok(())
 }
 
 impl Converged {

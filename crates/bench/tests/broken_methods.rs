@@ -10,7 +10,7 @@ use etendue_bench::findings::Findings;
 use etendue_bench::rays::Rays;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::units::Metres;
-use etendue_geometry::{Geometry, Placement, RayBatch, Transform};
+use etendue_geometry::{Geometry, RayBatch, Transform};
 use etendue_scene::import::Wanted;
 use etendue_scene::shape::ShapeSpec;
 
@@ -21,9 +21,7 @@ fn blob(place: DVec3) -> Arc<Geometry> {
     let mesh = shape.build(Wanted::NOTHING).unwrap();
     let mut world_from_mesh = Transform::IDENTITY;
     world_from_mesh.translation = place;
-    let placement =
-        Placement { mesh: 0, object: 0, instance: 0, node: 0, material: 0, world_from_mesh };
-    Arc::new(Geometry { meshes: vec![mesh], placements: vec![placement] })
+    Arc::new(Geometry::alone(mesh, world_from_mesh))
 }
 
 /// Rays from inside at every vertex of the mesh and at two places of every edge: where robustness is

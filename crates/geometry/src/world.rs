@@ -22,6 +22,14 @@ pub struct Placement {
     pub world_from_mesh: Transform,
 }
 
+impl Placement {
+    /// A mesh at a place: of the first object, node and material.
+    #[must_use]
+    pub fn of(mesh: u32, world_from_mesh: Transform) -> Self {
+        Self { mesh, object: 0, instance: 0, node: 0, material: 0, world_from_mesh }
+    }
+}
+
 /// All meshes and placements of a scene.
 #[derive(Debug, Clone, Default)]
 pub struct Geometry {
@@ -32,6 +40,12 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// One mesh at one place.
+    #[must_use]
+    pub fn alone(mesh: Mesh, world_from_mesh: Transform) -> Self {
+        Self { meshes: vec![mesh], placements: vec![Placement::of(0, world_from_mesh)] }
+    }
+
     /// Whether a ray meets the same triangles in the same places as in `other`, whose meshes are the same
     /// in memory.
     #[must_use]
@@ -82,13 +96,18 @@ impl Geometry {
     /// own box, so it is loose where a placement turns its mesh.
     #[must_use]
     pub fn loose_bounds(&self) -> Bounds {
+        let boxes = self.placements.iter().map(|placement| self.loose_bounds_of(placement));
+        boxes.fold(Bounds::EMPTY, Bounds::union)
+    }
+
+    /// The same box around one placement (m); empty for a mesh without a box.
+    #[must_use]
+    pub fn loose_bounds_of(&self, placement: &Placement) -> Bounds {
         let mut bounds = Bounds::EMPTY;
-        for placement in &self.placements {
-            let local = self.mesh_of(placement).bounds;
-            if !local.is_empty() {
-                for corner in local.corners() {
-                    bounds.include(placement.world_from_mesh.point(corner));
-                }
+        let local = self.mesh_of(placement).bounds;
+        if !local.is_empty() {
+            for corner in local.corners() {
+                bounds.include(placement.world_from_mesh.point(corner));
             }
         }
         bounds

@@ -16,7 +16,7 @@ pub(crate) fn tight(geometry: &Geometry) -> Bounds {
     let placements = &geometry.placements;
     let all: Vec<(Bounds, &Placement)> = placements
         .par_iter()
-        .map(|placement| (loose(geometry, placement), placement))
+        .map(|placement| (geometry.loose_bounds_of(placement), placement))
         .filter(|(bounds, _)| !bounds.is_empty())
         .collect();
     let mut bounds = Bounds::EMPTY;
@@ -53,7 +53,7 @@ impl SupportFunction for WorldVertices<'_> {
         let boxes: Vec<Vec<f64>> = geometry
             .placements
             .par_iter()
-            .map(|placement| match loose(geometry, placement) {
+            .map(|placement| match geometry.loose_bounds_of(placement) {
                 bounds if bounds.is_empty() => Vec::new(),
                 bounds => bounds.support(origin, directions),
             })
@@ -103,17 +103,6 @@ fn farthest(
     })
 }
 
-fn loose(geometry: &Geometry, placement: &Placement) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    let local = geometry.mesh_of(placement).bounds;
-    if !local.is_empty() {
-        for corner in local.corners() {
-            bounds.include(placement.world_from_mesh.point(corner));
-        }
-    }
-    bounds
-}
-
 fn exact(geometry: &Geometry, placement: &Placement) -> Bounds {
     const CHUNK: usize = 1 << 16;
     let mesh = geometry.mesh_of(placement);
@@ -150,14 +139,7 @@ mod tests {
                 2.1 * i,
             ));
             let at = DVec3::new((37.0 * i) % 11.0, (53.0 * i) % 7.0, (71.0 * i) % 5.0);
-            Placement {
-                mesh: 0,
-                object: 0,
-                instance: 0,
-                node: 0,
-                material: 0,
-                world_from_mesh: Transform::new(turned, at),
-            }
+            Placement::of(0, Transform::new(turned, at))
         };
         Geometry {
             meshes: vec![Mesh::new("", positions, vec![[0, 1, 2]].into())],

@@ -249,7 +249,7 @@ mod tests {
 
     fn at(mesh: u32, scale: DVec3, place: DVec3) -> Placement {
         let world_from_mesh = Transform::new(DMat3::from_diagonal(scale), place);
-        Placement { mesh, object: 0, instance: 0, node: 0, material: 0, world_from_mesh }
+        Placement::of(mesh, world_from_mesh)
     }
 
     /// A box of the given sides, turned inside out by a map that leaves its triangles alone, and what

@@ -96,7 +96,7 @@ pub(crate) fn mesh(name: &str, positions: &[[f32; 3]], triangles: Vec<[u32; 3]>)
 }
 
 pub(crate) fn placed(mesh: u32, world_from_mesh: Transform) -> Placement {
-    Placement { mesh, object: 0, instance: 0, node: 0, material: 0, world_from_mesh }
+    Placement::of(mesh, world_from_mesh)
 }
 
 /// Each mesh once, where it is.

@@ -1,13 +1,6 @@
 //! The cheapest camera within a tolerance: every model of the scene's own lens, compared with the full
-//! train by what a pixel sees.
-//!
-//! | model | what it keeps of the lens |
-//! |---|---|
-//! | `pinhole` | where its entrance pupil is, and the scale of the picture |
-//! | `opencv` | also its distortion, as OpenCV's model fits it |
-//! | `thin` | focal length, f-number and the plane in focus: blur, and no distortion |
-//! | `thick` | also how far its pupils are from its principal planes: falloff |
-//! | `full` | everything |
+//! train by what a pixel sees. The models are those of [`crate::cameras`], and after `pinhole` one more:
+//! `opencv` also keeps the lens' distortion, as OpenCV's model fits it.
 //!
 //! Models are compared at places all over the picture, and at each of them at the depths that the scene
 //! itself has there.

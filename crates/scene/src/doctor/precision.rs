@@ -72,7 +72,7 @@ fn input_step(geometry: &Geometry) -> f64 {
 #[cfg(test)]
 mod tests {
     use etendue_geometry::glam::DMat3;
-    use etendue_geometry::{Mesh, Placement, Transform, Vertices};
+    use etendue_geometry::{Mesh, Transform, Vertices};
 
     use super::*;
 
@@ -88,17 +88,8 @@ mod tests {
         let corners = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
         let positions = Positions::F32(Vertices::from_arrays(&corners));
         let mesh = Mesh::new("", positions, vec![[0, 1, 2]].into());
-        let geometry = Geometry {
-            meshes: vec![mesh],
-            placements: vec![Placement {
-                mesh: 0,
-                object: 0,
-                instance: 0,
-                node: 0,
-                material: 0,
-                world_from_mesh: Transform::new(DMat3::IDENTITY * 0.5, DVec3::splat(1e7)),
-            }],
-        };
+        let geometry =
+            Geometry::alone(mesh, Transform::new(DMat3::IDENTITY * 0.5, DVec3::splat(1e7)));
         let forecast = StepSizes::of(&geometry, geometry.bounds()).unwrap();
         assert_eq!(forecast.f32_step_in_world, 1.0);
         assert_eq!(forecast.f32_step_from_centre, 0.5 * f64::from(f32::EPSILON));

@@ -58,7 +58,7 @@ pub(super) fn loose(name: &str, corners: &[[f32; 3]]) -> Mesh {
 }
 
 pub(super) fn placed(mesh: u32, world_from_mesh: Transform) -> Placement {
-    Placement { mesh, object: 0, instance: 0, node: 0, material: 0, world_from_mesh }
+    Placement::of(mesh, world_from_mesh)
 }
 
 /// Each mesh once, where it is.
