@@ -199,7 +199,7 @@ impl ChunkTriangles {
                 }
                 true
             }
-            positions => {
+            positions @ (Positions::F32(_) | Positions::F64(_)) => {
                 for lane in here.clone() {
                     for (k, corner) in self.indices[lane].into_iter().enumerate() {
                         let point = positions.get(corner as usize);

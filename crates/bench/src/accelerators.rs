@@ -85,7 +85,12 @@ impl Method {
         Ok(match self {
             Self::Bvh => Box::new(Bvh::build(geometry, options)?),
             Self::Exact => Box::new(Exact::build(geometry, options)?),
-            _ => embree(geometry, &BuildOptions { robust, refine, ..options.clone() })?,
+            Self::EmbreeFast
+            | Self::EmbreeFastRefined
+            | Self::EmbreeRobust
+            | Self::EmbreeRefined => {
+                embree(geometry, &BuildOptions { robust, refine, ..options.clone() })?
+            }
         })
     }
 }

@@ -295,7 +295,7 @@ impl Camera {
     pub fn central_view(&self) -> Option<Self> {
         match &self.projection {
             Projection::Views(views) => Some(self.looking(views.central())),
-            _ => None,
+            Projection::Pinhole(_) | Projection::Orthographic(_) | Projection::Lens(_) => None,
         }
     }
 
@@ -317,7 +317,7 @@ impl Camera {
         match &self.projection {
             Projection::Lens(lens) => Some(lens.solid_angle()),
             Projection::Views(views) => Some(views.solid_angle()),
-            _ => None,
+            Projection::Pinhole(_) | Projection::Orthographic(_) => None,
         }
     }
 
@@ -327,7 +327,9 @@ impl Camera {
     pub fn pixel_pitch(&self) -> Option<f64> {
         match &self.projection {
             Projection::Lens(lens) => Some(lens.focused().pixel_pitch()),
-            _ => self.sensor.pixel_pitch.map(|pitch| pitch.0),
+            Projection::Pinhole(_) | Projection::Orthographic(_) | Projection::Views(_) => {
+                self.sensor.pixel_pitch.map(|pitch| pitch.0)
+            }
         }
     }
 
@@ -362,7 +364,7 @@ impl Camera {
     pub fn lens(&self) -> Option<&LensCamera> {
         match &self.projection {
             Projection::Lens(lens) => Some(lens),
-            _ => None,
+            Projection::Pinhole(_) | Projection::Orthographic(_) | Projection::Views(_) => None,
         }
     }
 
@@ -372,7 +374,9 @@ impl Camera {
     pub fn band_groups(&self, bands: &Bands) -> Vec<BandGroup> {
         match &self.projection {
             Projection::Lens(lens) => lens.band_groups(bands),
-            _ => vec![BandGroup { bands: 0..bands.count(), wavelength: None }],
+            Projection::Pinhole(_) | Projection::Orthographic(_) | Projection::Views(_) => {
+                vec![BandGroup { bands: 0..bands.count(), wavelength: None }]
+            }
         }
     }
 
@@ -385,7 +389,9 @@ impl Camera {
     pub fn opened(&self, bands: &Bands) -> Result<Self, CameraError> {
         let projection = match &self.projection {
             Projection::Lens(lens) => Projection::Lens(Arc::new(lens.opened(bands)?)),
-            other => other.clone(),
+            other @ (Projection::Pinhole(_)
+            | Projection::Orthographic(_)
+            | Projection::Views(_)) => other.clone(),
         };
         Ok(Self { projection, ..self.clone() })
     }

@@ -87,7 +87,7 @@ impl Subject<'_> {
     pub fn view(&self) -> Pose {
         let (towards, up) = match self.viewpoint {
             Viewpoint::Side(towards) => (towards, upright(towards)),
-            _ => usual(self.bounds),
+            Viewpoint::Usual | Viewpoint::Within(_) => usual(self.bounds),
         };
         Pose::look_at(towards, DVec3::ZERO, up).unwrap_or(Pose::IDENTITY)
     }
@@ -270,7 +270,7 @@ pub(crate) fn orthographic(subject: Subject<'_>, aspect: f64) -> (Pose, f64) {
     let view = subject.view();
     let position = match subject.viewpoint {
         Viewpoint::Within(position) => position,
-        _ => {
+        Viewpoint::Usual | Viewpoint::Side(_) => {
             let centre = bounds.centre();
             let axes = [view.rotation.x_axis, view.rotation.y_axis];
             let sides = [axes[0], -axes[0], axes[1], -axes[1]];

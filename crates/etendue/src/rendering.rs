@@ -287,7 +287,13 @@ impl Rendering {
             if outputs.png && layer.name != DENOISED {
                 let bits = match layer.look {
                     Look::Distance => png::Bits::Sixteen,
-                    _ => png::Bits::Eight,
+                    Look::Color
+                    | Look::Direction
+                    | Look::Extent
+                    | Look::Ids
+                    | Look::Share
+                    | Look::Cube
+                    | Look::Counts { .. } => png::Bits::Eight,
                 };
                 png::write(&place(image), picture, &layer.name, bits)?;
                 let mask = mask_of(&layer.name);

@@ -197,7 +197,7 @@ fn arrange(layer: &mut Layer) {
     let look = named.filter(|look| match look {
         Look::Distance | Look::Share => count == 1,
         Look::Direction => count == 3,
-        _ => true,
+        Look::Color | Look::Extent | Look::Ids | Look::Cube | Look::Counts { .. } => true,
     });
     layer.look = look.unwrap_or(own);
     let is_float = layer.channels.iter().any(|channel| matches!(channel.values, Values::F32(_)));

@@ -179,7 +179,7 @@ impl FilmLayer {
         }
         let planes = self.planes.iter().filter_map(|plane| match plane {
             Values::F32(values) => Some(values.as_slice()),
-            _ => None,
+            Values::F64(_) | Values::U16(_) | Values::U32(_) => None,
         });
         let film = BandFilm::woven(bands.clone(), &planes.collect::<Vec<_>>())?;
         // Bands are not kept twice while colours are made of them.

@@ -338,7 +338,9 @@ impl FilmFile {
                         }
                     }
                 }
-                _ => return Err(self.error(format!("has {name} as {kind}"))),
+                SectionMut::Plane(_) | SectionMut::Sums(_) => {
+                    return Err(self.error(format!("has {name} as {kind}")));
+                }
             }
         }
         match wanted.into_keys().next() {

@@ -60,7 +60,7 @@ impl Stopping {
     pub fn time(self) -> Option<Duration> {
         match self {
             Self::Time(time) => Some(time),
-            _ => None,
+            Self::Count | Self::SensorNoise(_) | Self::RelativeError(_) => None,
         }
     }
 
@@ -82,7 +82,7 @@ impl Stopping {
                 "{least} to {most} a pixel, block by block: more would be lost in the variance that \
                  shot, read-out, dark current and quantisation have at the pixel's signal"
             ),
-            _ => format!(
+            (Self::RelativeError(_) | Self::Count | Self::Time(_), _) => format!(
                 "{least} to {most} a pixel, block by block, by the differences of their sets"
             ),
         };

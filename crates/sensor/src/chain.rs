@@ -107,7 +107,7 @@ pub(crate) fn expose(
     deviates(&chain.temporal, place, &mut normals, &mut units);
     match chain.noise {
         NoiseModel::Poisson => shot_noise(chain, place, mean, &normals[0], &units),
-        _ => normal_shot_noise(mean, &normals[0]),
+        NoiseModel::Normal | NoiseModel::None => normal_shot_noise(mean, &normals[0]),
     }
     full_well(chain.full_well, mean);
     read_out(chain.read_noise, &normals[1], offset, mean);

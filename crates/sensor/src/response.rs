@@ -144,7 +144,7 @@ impl Response {
         let alone = filters.iter().all(own);
         let holder = match spec.kind {
             SensorKind::Multispectral => "channels",
-            _ => "filters",
+            SensorKind::Raw | SensorKind::Rgb => "filters",
         };
         let mut channels = Vec::with_capacity(filters.len());
         for (name, filter) in names.into_iter().zip(&filters) {
@@ -314,7 +314,7 @@ fn channel(
     if electrons.iter().all(|&value| value <= 0.0) {
         let key = match filter {
             Filter::Curve(_) => holder,
-            _ => "quantum_efficiency",
+            Filter::Clear | Filter::Primary(_) | Filter::Band(_) => "quantum_efficiency",
         };
         return Err(SensorError::Blind { key, channel: name, bands: bands.range() });
     }

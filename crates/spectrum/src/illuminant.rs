@@ -60,7 +60,12 @@ impl Illuminant {
             Self::BlackBody(kelvin) if !(500.0..=100_000.0).contains(&kelvin) => {
                 Err(IlluminantError::BlackBody(kelvin))
             }
-            _ => Ok(self),
+            Self::EqualEnergy
+            | Self::A
+            | Self::D50
+            | Self::D65
+            | Self::Daylight(_)
+            | Self::BlackBody(_) => Ok(self),
         }
     }
 

@@ -43,7 +43,11 @@ impl Light {
     pub(crate) fn intensity(&self) -> f64 {
         let measured = match &self.kind {
             LightKind::Goniometric(measured) => measured.photometry.mean(),
-            _ => 1.0,
+            LightKind::Point(_)
+            | LightKind::Spot { .. }
+            | LightKind::Directional { .. }
+            | LightKind::Projector(_)
+            | LightKind::Environment { .. } => 1.0,
         };
         measured * mean(&self.color)
     }
@@ -53,7 +57,11 @@ impl Light {
     pub fn texture(&self) -> Option<&TextureUse> {
         match &self.kind {
             LightKind::Projector(projector) => projector.image.image(),
-            _ => None,
+            LightKind::Point(_)
+            | LightKind::Spot { .. }
+            | LightKind::Directional { .. }
+            | LightKind::Goniometric(_)
+            | LightKind::Environment { .. } => None,
         }
     }
 
@@ -63,7 +71,11 @@ impl Light {
         match &self.kind {
             LightKind::Environment { image: EnvironmentImage::File(path), .. } => Some(path),
             LightKind::Goniometric(measured) => Some(&measured.file),
-            _ => None,
+            LightKind::Point(_)
+            | LightKind::Spot { .. }
+            | LightKind::Directional { .. }
+            | LightKind::Projector(_)
+            | LightKind::Environment { .. } => None,
         }
     }
 }

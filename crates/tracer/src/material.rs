@@ -355,7 +355,12 @@ impl Material {
     pub fn absorption(&self) -> Option<Absorption> {
         match &self.scattering {
             Scattering::Dielectric(glass) => glass.absorption,
-            _ => None,
+            Scattering::Black
+            | Scattering::Matte
+            | Scattering::Unlit
+            | Scattering::Mirror
+            | Scattering::Metal { .. }
+            | Scattering::Gltf(_) => None,
         }
     }
 

@@ -60,7 +60,7 @@ impl PlacedSurfaces {
                 is_tilted: material.normal_map.is_some() || mesh.normals.is_some(),
                 color: match material.base_color {
                     Paint::Plain(color) if !colored => Some(color.map(|c| c.clamp(0.0, 1.0))),
-                    _ => None,
+                    Paint::Plain(_) | Paint::Checker { .. } | Paint::Image { .. } => None,
                 },
             })
         };

@@ -54,7 +54,9 @@ impl EmbreeGeometry {
                 shape.share_vertices(vertices);
                 sift(mesh, test, &[])
             }
-            positions => sift(mesh, test, shape.copy_positions(device, positions, to_frame)?),
+            positions @ (Positions::F32(_) | Positions::F64(_)) => {
+                sift(mesh, test, shape.copy_positions(device, positions, to_frame)?)
+            }
         };
         match kept {
             None => shape.share_triangles(mesh),

@@ -90,7 +90,7 @@ impl Focused {
         let unfocused = |fault: FocusError| {
             let key = match focus {
                 Focus::Sensor(_) => "sensor_distance",
-                _ => "focus_distance",
+                Focus::AsWritten | Focus::Infinity | Focus::Distance(_) => "focus_distance",
             };
             CameraError::new(key, fault.to_string())
         };
@@ -100,7 +100,9 @@ impl Focused {
                 let focused = train.with_lenslets_focused(distance).map_err(unfocused)?;
                 (focused, Focus::AsWritten)
             }
-            _ => (train, focus),
+            Focus::AsWritten | Focus::Infinity | Focus::Distance(_) | Focus::Sensor(_) => {
+                (train, focus)
+            }
         };
         let z = train.sensor_z(focus).map_err(unfocused)?;
         let fault =

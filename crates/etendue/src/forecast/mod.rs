@@ -75,7 +75,9 @@ impl TimeForecast {
         let Prospect { scene, plan, load, .. } = *prospect;
         let trace = match plan.stopping {
             Stopping::Time(time) => time.as_secs_f64(),
-            _ => plan.rays as f64 * machine.ray,
+            Stopping::Count | Stopping::SensorNoise(_) | Stopping::RelativeError(_) => {
+                plan.rays as f64 * machine.ray
+            }
         };
         let views = 0.0;
         let build = build_time(scene, plan, machine);
@@ -110,7 +112,9 @@ impl TimeForecast {
         let pilot = Pilot { scene, accel: &*accel, images: &images, until };
         let trace = match plan.stopping {
             Stopping::Time(time) => time.as_secs_f64(),
-            _ => pilot.picture(&scene.camera)?,
+            Stopping::Count | Stopping::SensorNoise(_) | Stopping::RelativeError(_) => {
+                pilot.picture(&scene.camera)?
+            }
         };
         let views = match (scene.camera.lens(), scene.camera.reference_views()) {
             (Some(_), Ok(views)) if scene.picture.is_some() => pilot.picture(&views)?,

@@ -292,7 +292,12 @@ impl Part {
                 [one] => Some(one),
                 _ => None,
             },
-            _ => None,
+            Self::Surface(_)
+            | Self::Biconic(_)
+            | Self::ThinLens(_)
+            | Self::Aperture(_)
+            | Self::Filter(_)
+            | Self::MicrolensArray(_) => None,
         }
     }
 

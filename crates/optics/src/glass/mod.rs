@@ -195,7 +195,11 @@ impl GlassSpec {
     pub fn resolve_in(&self, own: &[AgfCatalogue]) -> Result<Glass, GlassError> {
         let found = match self {
             Self::Named(name) => catalogue::find_in(own, name),
-            _ => None,
+            Self::Constant(_)
+            | Self::Abbe { .. }
+            | Self::Sellmeier { .. }
+            | Self::Power(_)
+            | Self::Cauchy(_) => None,
         };
         found.map_or_else(|| self.resolve(), |glass| Ok(glass.clone()))
     }

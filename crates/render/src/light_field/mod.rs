@@ -118,7 +118,7 @@ pub fn write(
     let Some(light_field) = scene.camera.light_field() else { return Ok(set.written) };
     let reference = match scene.camera.projection() {
         Projection::Views(_) => scene.camera.clone(),
-        _ => scene
+        Projection::Pinhole(_) | Projection::Orthographic(_) | Projection::Lens(_) => scene
             .camera
             .reference_views()
             .map_err(|error| RenderError::Camera(error.to_string()))?,
@@ -332,7 +332,7 @@ fn planes<'a>(picture: &'a Picture, layer: &str) -> Option<Vec<&'a [f32]>> {
     let layer = picture.layer(layer)?;
     let plane = |channel: &'a Channel| match &channel.values {
         Values::F32(values) => Some(values.as_slice()),
-        _ => None,
+        Values::F64(_) | Values::U16(_) | Values::U32(_) => None,
     };
     layer.channels.iter().map(plane).collect()
 }

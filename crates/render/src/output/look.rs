@@ -30,7 +30,7 @@ pub(super) fn lacks(layer: &Layer) -> Option<&'static str> {
 fn fits_bits(values: &Values, bits: u8) -> bool {
     match values {
         Values::U16(values) => values.par_iter().max().is_none_or(|&m| u32::from(m) >> bits == 0),
-        _ => false,
+        Values::F32(_) | Values::F64(_) | Values::U32(_) => false,
     }
 }
 

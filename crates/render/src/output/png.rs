@@ -106,7 +106,13 @@ fn texts(picture: &Picture, layer: &Layer, shown: &Shown) -> Vec<ITXtChunk> {
     let comment = match layer.look {
         Look::Counts { .. } => "data",
         _ if shown.note.starts_with("data") => "data",
-        _ => "preview, not data: the values are in the EXR and NPY files",
+        Look::Color
+        | Look::Distance
+        | Look::Direction
+        | Look::Extent
+        | Look::Ids
+        | Look::Share
+        | Look::Cube => "preview, not data: the values are in the EXR and NPY files",
     };
     let title = layer.title();
     let fixed = [

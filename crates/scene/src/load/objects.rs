@@ -111,7 +111,9 @@ impl SceneFile {
             Source::File(path) if !names_no_up(path) => {
                 Ok(Some(Play { which: name.clone(), time: time.0 }))
             }
-            _ => Err(self.fault(&join(at, "animation"), "only glTF files have animations")),
+            Source::File(_) | Source::Shape(_) => {
+                Err(self.fault(&join(at, "animation"), "only glTF files have animations"))
+            }
         }
     }
 

@@ -185,7 +185,11 @@ impl Bsdf {
                 let viewed = layered.viewed(local, &peaks([&base, &highlight]));
                 (Seen::Layered(viewed), (layered.metallic > 0.0).then_some(viewed.mean))
             }
-            _ => (Seen::Plain, None),
+            Model::Black
+            | Model::Matte
+            | Model::Mirror
+            | Model::Metal { .. }
+            | Model::Dielectric { .. } => (Seen::Plain, None),
         };
         let deep = mean.map_or([0.0; 3], |mean| {
             base.map(|c| metal::multiple(metal::mean_reflectance(c, 0.0), mean))
@@ -197,7 +201,11 @@ impl Bsdf {
     pub(crate) fn named(&self) -> Option<Metal> {
         match self.model {
             Model::Metal { named, .. } => named,
-            _ => None,
+            Model::Black
+            | Model::Matte
+            | Model::Mirror
+            | Model::Dielectric { .. }
+            | Model::Layered(_) => None,
         }
     }
 
@@ -214,7 +222,11 @@ impl Bsdf {
     pub(crate) fn sheen(&self) -> Color {
         match self.model {
             Model::Layered(layered) => layered.sheen.color,
-            _ => [0.0; 3],
+            Model::Black
+            | Model::Matte
+            | Model::Mirror
+            | Model::Metal { .. }
+            | Model::Dielectric { .. } => [0.0; 3],
         }
     }
 
@@ -244,7 +256,6 @@ impl Bsdf {
         if transmits != (local.z < 0.0) || local.z == 0.0 || self.wo.z <= 0.0 {
             return (Weights::default(), 0.0);
         }
-        let black = (Weights::default(), 0.0);
         match (&self.model, &self.seen) {
             (Model::Layered(layered), Seen::Layered(viewed)) => {
                 layered.evaluate(self.wo, local, viewed)
@@ -253,7 +264,15 @@ impl Bsdf {
             (Model::Matte, _) if !transmits => (Weights::base(local.z / PI), local.z / PI),
             (_, Seen::Metal(rough)) if !transmits => rough.evaluate(self.wo, local),
             // All of their directions are single rays, or on the other side.
-            _ => black,
+            (
+                Model::Black
+                | Model::Matte
+                | Model::Mirror
+                | Model::Metal { .. }
+                | Model::Dielectric { .. }
+                | Model::Layered(_),
+                Seen::Plain | Seen::Metal(_) | Seen::Layered(_),
+            ) => (Weights::default(), 0.0),
         }
     }
 
@@ -300,7 +319,7 @@ impl Bsdf {
         let (value, pdf) = match &self.seen {
             Seen::Metal(rough) if local.z > 0.0 => rough.evaluate(self.wo, local),
             Seen::Glass(rough) => rough.evaluate(self.wo, local),
-            _ => return None,
+            Seen::Plain | Seen::Metal(_) | Seen::Layered(_) => return None,
         };
         if pdf <= 0.0 {
             return None;

@@ -178,7 +178,7 @@ impl SceneView<'_> {
         let colored = material.vertex_colors && self.geometry.mesh_of(placement).colors.is_some();
         match material.base_color {
             Paint::Plain(color) if !colored => Some(color),
-            _ => None,
+            Paint::Plain(_) | Paint::Checker { .. } | Paint::Image { .. } => None,
         }
     }
 

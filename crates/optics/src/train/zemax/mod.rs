@@ -345,7 +345,10 @@ fn open_stop(
     match &mut stop.part {
         PartSpec::Surface(surface) => surface.semi_diameter = Some(Millimetres(radius)),
         PartSpec::ThinLens(lens) => lens.semi_diameter = Some(Millimetres(radius)),
-        part => *part = PartSpec::circular(radius),
+        part @ (PartSpec::Biconic(_)
+        | PartSpec::Aperture(_)
+        | PartSpec::Filter(_)
+        | PartSpec::MicrolensArray(_)) => *part = PartSpec::circular(radius),
     }
     build(file)
 }
@@ -401,7 +404,7 @@ impl SheetRow {
                     }
                 }
             }
-            _ => {}
+            SurfaceShape::Standard | SurfaceShape::Paraxial | SurfaceShape::CoordinateBreak => {}
         }
         Ok(terms)
     }
