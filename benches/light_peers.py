@@ -349,7 +349,7 @@ def page(results, remarks, arguments):
 REASONS = (
     "Both programs have Embree find the hits in f32. Mitsuba's LLVM variant compiles each scene into one loop over a whole "
     "vector of samples in f32; etendue works on patches of 64 hits in f64, matte surfaces in loops that vectorise, and asks "
-    "other surfaces and images one by one. A direction that is followed for its light alone asks the lamps first.")
+    "other surfaces and images one by one. A direction that is followed for its light alone is first traced through the emissive surfaces alone.")
 
 
 def known(number):

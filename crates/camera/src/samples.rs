@@ -2,7 +2,7 @@
 
 use etendue_geometry::RayBatch;
 
-use etendue_optics::element::{FateCounts, LensRays};
+use etendue_optics::element::{StatusCounts, LensRays};
 
 /// Where a batch of samples lies: on the film, in the pupil, and at which wavelength. The arrays have
 /// one entry a sample.
@@ -34,7 +34,7 @@ pub struct CameraRays {
     /// The sample of each ray.
     pub sample: Vec<u32>,
     /// What became of the rays inside the lens, over all batches since it was last emptied.
-    pub fates: FateCounts,
+    pub statuses: StatusCounts,
     /// The rays while they are in the lens.
     pub(crate) in_lens: LensRays,
     /// Where the samples lie on the sensor (mm), one array an axis, and in the unit square.

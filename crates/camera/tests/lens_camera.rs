@@ -123,7 +123,7 @@ fn no_ray_of_a_thin_lens_is_lost_at_its_rim() {
         let camera = at_origin(&format!("{THIN}{special}"));
         for place in [[150.0, 100.0], [0.0, 0.0], [299.5, 12.25]] {
             let rays = sampled(&camera, place, 0, 10_000);
-            assert_eq!((rays.fates.exited, rays.fates.total()), (10_000, 10_000), "{special}");
+            assert_eq!((rays.statuses.exited, rays.statuses.total()), (10_000, 10_000), "{special}");
             assert_eq!(rays.rays.len(), 10_000);
         }
     }
@@ -158,8 +158,8 @@ fn an_unvignetted_pixel_on_the_axis_weighs_1_and_corners_are_vignetted() {
     let axis = sampled(&camera, [180.0, 120.0], 0, COUNT);
     // As in the thin lens, and 1e-4 for the sum over a grid that is the yardstick.
     assert!((mean_weight(&axis, COUNT) - 1.0).abs() < 1e-3);
-    assert!(axis.fates.exited as f64 > 0.95 * f64::from(COUNT), "{:?}", axis.fates.losses());
-    assert_eq!(axis.fates.total(), u64::from(COUNT));
+    assert!(axis.statuses.exited as f64 > 0.95 * f64::from(COUNT), "{:?}", axis.statuses.losses());
+    assert_eq!(axis.statuses.total(), u64::from(COUNT));
     let corner = sampled(&camera, [0.0, 0.0], 0, COUNT);
     let weight = mean_weight(&corner, COUNT);
     let tangent: f64 = 21.6 / 50.0;

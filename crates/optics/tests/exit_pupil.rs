@@ -302,7 +302,7 @@ fn finely_summed(
             at.trace(Side::Sensor, Clip::On, &mut rays);
             sum += rays.passed_throughput();
             for column in 0..cells {
-                if rays.fate(column as usize) == etendue_optics::element::RayStatus::Exited {
+                if rays.status(column as usize) == etendue_optics::element::RayStatus::Exited {
                     (min, max) = (min.min(cell(column)), max.max(cell(column)));
                 }
             }

@@ -18,16 +18,16 @@ fn preset(name: &str) -> OpticalTrain {
     build(&std::fs::read_to_string(path).unwrap())
 }
 
-fn fate(train: &OpticalTrain, clip: Clip, origin: [f64; 3], direction: [f64; 3]) -> RayStatus {
+fn status(train: &OpticalTrain, clip: Clip, origin: [f64; 3], direction: [f64; 3]) -> RayStatus {
     let at = train.at(587.56).unwrap();
     let path = at.path(Side::Object, clip, origin.into(), direction.into());
     assert!(path.points.iter().all(|p| p.is_finite()));
     let mut rays = LensRays::default();
     rays.push(origin.into(), direction.into());
     at.trace(Side::Object, clip, &mut rays);
-    assert_eq!(rays.fate(0), path.fate, "a batch of one ends as the single ray does");
+    assert_eq!(rays.status(0), path.status, "a batch of one ends as the single ray does");
     assert!(rays.position(0).is_finite() && rays.direction(0).is_finite());
-    path.fate
+    path.status
 }
 
 #[test]
@@ -95,12 +95,12 @@ fn a_stop_may_be_drawn_behind_the_vertex_of_a_lens_that_bulges_past_it() {
     );
     for y in [0.0, 0.3, 0.9, 0.999] {
         assert_eq!(
-            fate(&train, Clip::On, [0.0, y, -5.0], [0.0, 0.0, 1.0]),
+            status(&train, Clip::On, [0.0, y, -5.0], [0.0, 0.0, 1.0]),
             RayStatus::Exited,
             "{y}"
         );
     }
-    let outside = fate(&train, Clip::On, [0.0, 1.001, -5.0], [0.0, 0.0, 1.0]);
+    let outside = status(&train, Clip::On, [0.0, 1.001, -5.0], [0.0, 0.0, 1.0]);
     assert_eq!(outside, RayStatus::Vignetted { element: 0 });
 }
 

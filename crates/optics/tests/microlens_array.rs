@@ -31,7 +31,7 @@ fn behind(train: &OpticalTrain, x: f64, y: f64) -> Result<DVec2, RayStatus> {
     let slopes = DVec3::new(0.01, -0.02, 1.0);
     let start = DVec3::new(x, y, 0.0) - 5.0 * slopes;
     let path = train.at(550.0).unwrap().path(Side::Object, Clip::On, start, slopes);
-    let direction = path.direction.ok_or(path.fate)?;
+    let direction = path.direction.ok_or(path.status)?;
     let last = *path.points.last().unwrap();
     Ok((last + direction * ((3.0 - last.z) / direction.z)).truncate())
 }
@@ -164,7 +164,7 @@ fn batches_are_single_rays_to_the_bit() {
             at.trace(side, Clip::On, &mut rays);
             at.trace_singly(side, Clip::On, &mut singly);
             for i in 0..rays.len() {
-                assert_eq!(rays.fate(i), singly.fate(i), "{keys} {side:?} {i}");
+                assert_eq!(rays.status(i), singly.status(i), "{keys} {side:?} {i}");
                 assert_eq!(rays.position(i), singly.position(i), "{keys} {side:?} {i}");
                 assert_eq!(rays.direction(i), singly.direction(i), "{keys} {side:?} {i}");
                 assert_eq!(rays.throughput(i), singly.throughput(i), "{keys} {side:?} {i}");
@@ -237,15 +237,15 @@ fn share_inside(
         let start = pupil.film_point(film);
         let cell = view.own_cell(start, chief).unwrap();
         let direction = view.central_slopes(start, cell).extend(-1.0);
-        if at.path(Side::Sensor, Clip::On, start, direction).fate == RayStatus::Exited {
+        if at.path(Side::Sensor, Clip::On, start, direction).status == RayStatus::Exited {
             begun += 1;
-            through += u32::from(rays.fate(i) == RayStatus::Exited);
+            through += u32::from(rays.status(i) == RayStatus::Exited);
         }
     }
     f64::from(through) / f64::from(begun)
 }
 
-/// Points of an area of the sensor, and the rays from there with their fates.
+/// Points of an area of the sensor, and the rays from there with their statuses.
 fn traced(
     train: &OpticalTrain,
     pupil: &ExitPupil,
@@ -268,7 +268,7 @@ fn traced(
 /// Mean throughput and its standard error.
 fn irradiance(rays: &LensRays) -> [f64; 2] {
     let values = (0..rays.len())
-        .map(|i| if rays.fate(i) == RayStatus::Exited { rays.throughput(i) } else { 0.0 });
+        .map(|i| if rays.status(i) == RayStatus::Exited { rays.throughput(i) } else { 0.0 });
     let (sum, squares) = values.fold((0.0, 0.0), |(s, q), v| (s + v, q + v * v));
     let n = rays.len() as f64;
     let mean = sum / n;

@@ -127,7 +127,7 @@ fn every_ray_meets_every_surface_where_it_should() {
                 "miss" => RayStatus::Missed { element: index(&ray["fail_surface"]) },
                 _ => RayStatus::TotalInternalReflection { element: index(&ray["fail_surface"]) },
             };
-            assert_eq!(path.fate, expected, "{what}");
+            assert_eq!(path.status, expected, "{what}");
             let points = ray["points"].as_array().unwrap();
             assert_eq!(path.points.len(), points.len(), "{what}");
             for (ours, theirs) in path.points.iter().zip(points) {
@@ -153,18 +153,18 @@ fn rays_are_clipped_at_the_first_surface_that_they_meet_outside_its_rim() {
         for ray in system.json["rays"].as_array().unwrap() {
             let at = system.at(number(&ray["wavelength"]));
             let [origin, direction] = [vector(&ray["origin"]), vector(&ray["dir"])];
-            let fate = at.path(side(ray), Clip::On, origin, direction).fate;
+            let status = at.path(side(ray), Clip::On, origin, direction).status;
             let what = format!("{} {}", system.name, ray["tag"]);
             if !ray["contested"].is_null() {
-                assert_ne!(fate, RayStatus::Exited, "{what}: contested rays are dead");
+                assert_ne!(status, RayStatus::Exited, "{what}: contested rays are dead");
                 continue;
             }
             match (&ray["clip_surface"], ray["status"].as_str().unwrap()) {
                 (element @ Value::Number(_), _) => {
-                    assert_eq!(fate, RayStatus::Vignetted { element: index(element) }, "{what}");
+                    assert_eq!(status, RayStatus::Vignetted { element: index(element) }, "{what}");
                 }
-                (_, "ok") => assert_eq!(fate, RayStatus::Exited, "{what}"),
-                (_, _) => assert_eq!(fate.element(), Some(index(&ray["fail_surface"])), "{what}"),
+                (_, "ok") => assert_eq!(status, RayStatus::Exited, "{what}"),
+                (_, _) => assert_eq!(status.element(), Some(index(&ray["fail_surface"])), "{what}"),
             }
         }
     }
@@ -187,7 +187,7 @@ fn a_batch_gives_the_bits_of_single_rays() {
                 at.trace_singly(from, clip, &mut single);
                 for i in 0..batch.len() {
                     let what = format!("{} ray {i} {from:?} {clip:?}", system.name);
-                    assert_eq!(batch.fate(i), single.fate(i), "{what}");
+                    assert_eq!(batch.status(i), single.status(i), "{what}");
                     assert_eq!(batch.position(i), single.position(i), "{what}");
                     assert_eq!(batch.direction(i), single.direction(i), "{what}");
                 }

@@ -111,10 +111,10 @@ impl Lens {
         let positions = ends.iter().map(|end| end.ray.position).collect();
         let turned = ends.iter().map(|end| end.ray.direction).collect();
         let throughput: Vec<f64> = ends.iter().map(|end| end.throughput).collect();
-        let status: Vec<u8> = ends.iter().map(|end| code(end.fate)).collect();
+        let status: Vec<u8> = ends.iter().map(|end| code(end.status)).collect();
         let element =
-            |fate: RayStatus| fate.element().and_then(|e| i32::try_from(e).ok()).unwrap_or(-1);
-        let elements: Vec<i32> = ends.iter().map(|end| element(end.fate)).collect();
+            |status: RayStatus| status.element().and_then(|e| i32::try_from(e).ok()).unwrap_or(-1);
+        let elements: Vec<i32> = ends.iter().map(|end| element(end.status)).collect();
         Ok((
             of_triples(py, positions)?,
             of_triples(py, turned)?,
@@ -125,8 +125,8 @@ impl Lens {
     }
 }
 
-fn code(fate: RayStatus) -> u8 {
-    match fate {
+fn code(status: RayStatus) -> u8 {
+    match status {
         RayStatus::Exited => 0,
         RayStatus::Missed { .. } => 1,
         RayStatus::TotalInternalReflection { .. } => 2,

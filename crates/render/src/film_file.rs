@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use etendue_geometry::files;
-use etendue_optics::element::FateCounts;
+use etendue_optics::element::StatusCounts;
 use etendue_tracer::RayStats;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
@@ -47,9 +47,9 @@ struct FilmCounts {
 
 impl FilmCounts {
     fn of(counts: &RayCounts, time: Duration) -> Self {
-        let RayCounts { chief_rays, light, fates } = counts.clone();
+        let RayCounts { chief_rays, light, statuses } = counts.clone();
         let RayStats { rays, shadow_rays, not_finite } = light;
-        let FateCounts { exited, missed, reflected, vignetted, unlit } = fates;
+        let StatusCounts { exited, missed, reflected, vignetted, unlit } = statuses;
         Self {
             seconds: time.as_secs_f64(),
             chief_rays,
@@ -72,7 +72,7 @@ impl From<FilmCounts> for RayCounts {
         Self {
             chief_rays: counts.chief_rays,
             light: RayStats { rays, shadow_rays, not_finite },
-            fates: FateCounts { exited, missed, reflected, vignetted, unlit },
+            statuses: StatusCounts { exited, missed, reflected, vignetted, unlit },
         }
     }
 }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildOptions};
 use etendue_camera::{Camera, PixelExtent};
-use etendue_optics::element::FateCounts;
+use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightRow, SETS};
 use etendue_spectrum::Bands;
@@ -52,7 +52,7 @@ pub struct Rendered {
     /// Rays traced, to lights included.
     pub rays: u64,
     /// What became of the rays inside the camera's lens; all 0 without one.
-    pub fates: FateCounts,
+    pub statuses: StatusCounts,
     /// What of it was light's.
     pub light: RayStats,
     /// Wall time of the tracing alone.
@@ -343,12 +343,12 @@ pub fn finish(
     let Film { layers, counts, passed, trace_time, mut notes, camera, .. } = film;
     let Passed { samples, is_complete, counts: sample_counts } = passed;
     let samples_wanted = if is_complete { samples } else { plan.samples };
-    let RayCounts { chief_rays, light, fates } = counts;
+    let RayCounts { chief_rays, light, statuses } = counts;
     // A lens through which no ray came has no picture.
     if let (true, 0, Some(element)) =
-        (fates.total() > 0, fates.exited, fates.farthest_from_sensor())
+        (statuses.total() > 0, statuses.exited, statuses.farthest_from_sensor())
     {
-        return Err(RenderError::Dark { element, losses: fates.losses() });
+        return Err(RenderError::Dark { element, losses: statuses.losses() });
     }
     notes.extend(plan.stopping_note.clone());
     notes.extend(sample_counts.filter(|_| is_complete).and_then(|counts| counts.note()));
@@ -371,7 +371,7 @@ pub fn finish(
         band_film,
         rays,
         light,
-        fates,
+        statuses,
         trace_time,
         notes,
     })

@@ -219,8 +219,8 @@ impl<'a> Averaging<'a> {
             let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
             let mut memory = spare().pop().unwrap_or_default();
             let done = adding.fill(&mut strip, take(kept), &mut memory);
-            let fates = std::mem::take(&mut memory.rays.fates);
-            RayCounts::add(traffic, std::mem::take(&mut memory.traffic), &fates);
+            let statuses = std::mem::take(&mut memory.rays.statuses);
+            RayCounts::add(traffic, std::mem::take(&mut memory.traffic), &statuses);
             spare().push(memory);
             done
         })

@@ -8,7 +8,7 @@ use std::str::FromStr;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use etendue_optics::element::FateCounts;
+use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
 use serde::{Deserialize, Serialize};
 
@@ -184,7 +184,7 @@ impl Film {
         // Each fills its own pixels, or adds its own samples.
         for share in shares {
             share.fill(&mut layers.iter_mut().collect::<Vec<_>>(), &mut [], resolution)?;
-            RayCounts::add(&counts, share.counts(), &FateCounts::default());
+            RayCounts::add(&counts, share.counts(), &StatusCounts::default());
         }
         let counts = counts.into_inner().unwrap_or_else(PoisonError::into_inner);
         // Samples by pixel, where the shares counted them.
@@ -230,7 +230,7 @@ pub(crate) fn put_together(
         for (part, own) in averaged.iter_mut().zip(&own) {
             part.sums_mut().iter_mut().zip(own).for_each(|(sum, own)| sum.add_sum(*own));
         }
-        RayCounts::add(&counts, share.counts(), &FateCounts::default());
+        RayCounts::add(&counts, share.counts(), &StatusCounts::default());
     }
     Ok(counts.into_inner().unwrap_or_else(PoisonError::into_inner))
 }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use etendue_accel::Accel;
 use etendue_camera::{BandGroup, Camera, CameraRays};
 use etendue_geometry::{Detail, HitBatch, HitPrecision, RayBatch};
-use etendue_optics::element::FateCounts;
+use etendue_optics::element::StatusCounts;
 use etendue_tracer::layer::{Columns, OtherFrame, Seen};
 use etendue_tracer::{LayerSpec, RayStats, SceneView, Traced};
 use rayon::prelude::*;
@@ -73,17 +73,17 @@ pub(crate) struct RayCounts {
     /// Rays of the radiance pass.
     pub(crate) light: RayStats,
     /// What became of rays inside the camera's lens.
-    pub(crate) fates: FateCounts,
+    pub(crate) statuses: StatusCounts,
 }
 
 impl RayCounts {
-    /// Adds what one thread traced, and the fates of its rays.
-    pub(crate) fn add(all: &Mutex<Self>, own: Self, fates: &FateCounts) {
+    /// Adds what one thread traced, and the statuses of its rays.
+    pub(crate) fn add(all: &Mutex<Self>, own: Self, statuses: &StatusCounts) {
         let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
         all.chief_rays += own.chief_rays;
         all.light += own.light;
-        all.fates.merge(&own.fates);
-        all.fates.merge(fates);
+        all.statuses.merge(&own.statuses);
+        all.statuses.merge(statuses);
     }
 }
 
@@ -208,7 +208,7 @@ impl Job<'_> {
             let mut batch = RayBuffers::new(self.detail);
             let done = self.fill(&mut strip, width, &mut batch, watcher);
             let own = RayCounts { chief_rays: batch.traced, ..RayCounts::default() };
-            RayCounts::add(traffic, own, &FateCounts::default());
+            RayCounts::add(traffic, own, &StatusCounts::default());
             done
         })
     }

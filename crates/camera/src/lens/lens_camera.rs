@@ -305,7 +305,7 @@ impl LensCamera {
         };
         let end = self.design.run(Side::Sensor, clip, Ray::new(start, direction)?);
         let ray = end.ray;
-        (end.fate == RayStatus::Exited).then(|| (ray.position.into(), ray.direction.into()))
+        (end.status == RayStatus::Exited).then(|| (ray.position.into(), ray.direction.into()))
     }
 
     /// The slopes (right, down) at which a place of the picture (pixels) is seen; infinite when it is

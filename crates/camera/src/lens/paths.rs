@@ -59,5 +59,5 @@ impl LensCamera {
 /// The way of a ray that leaves the lens.
 fn through(lens: &MonochromaticTrain, start: DVec3, direction: DVec3) -> Option<RayPath> {
     let path = lens.path(Side::Sensor, Clip::On, start, direction);
-    (path.fate == RayStatus::Exited).then_some(path)
+    (path.status == RayStatus::Exited).then_some(path)
 }

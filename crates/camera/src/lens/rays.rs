@@ -45,7 +45,7 @@ impl LensCamera {
             None => self.aim_at_pupil(pupil, samples, first, out),
         }
         lens.trace(Side::Sensor, Clip::On, &mut out.in_lens);
-        out.fates.add_all(&out.in_lens);
+        out.statuses.add_all(&out.in_lens);
         self.leave(pose, first, out);
     }
 
@@ -99,7 +99,7 @@ impl LensCamera {
                     out.sample[kept] = number;
                     kept += 1;
                 }
-                None => out.fates.unlit += 1,
+                None => out.statuses.unlit += 1,
             }
         }
         out.sample.truncate(kept);

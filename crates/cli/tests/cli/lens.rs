@@ -78,18 +78,18 @@ fn assert_near(ours: &Value, theirs: &Value, tolerance: f64, what: &str) {
 
 /// One ray, traced without clipping, against the reference.
 fn assert_unclipped(ours: &Value, theirs: &Value, what: &str) {
-    let (fate, element) = match theirs["status"].as_str().unwrap() {
+    let (status, element) = match theirs["status"].as_str().unwrap() {
         "ok" => ("exited", &Value::Null),
         "miss" => ("missed", &theirs["fail_surface"]),
         _ => ("total_internal_reflection", &theirs["fail_surface"]),
     };
-    assert_eq!((ours["fate"].as_str().unwrap(), &ours["element"]), (fate, element), "{what}");
+    assert_eq!((ours["status"].as_str().unwrap(), &ours["element"]), (status, element), "{what}");
     let points = theirs["points"].as_array().unwrap();
     assert_eq!(ours["points"].as_array().unwrap().len(), points.len(), "{what}");
     for (i, point) in points.iter().enumerate() {
         assert_near(&ours["points"][i], point, POINT, what);
     }
-    match fate {
+    match status {
         "exited" => assert_near(&ours["direction"], &theirs["exit_dir"], COSINE, what),
         _ => assert!(ours["direction"].is_null(), "{what}"),
     }
@@ -98,9 +98,9 @@ fn assert_unclipped(ours: &Value, theirs: &Value, what: &str) {
 /// One ray, traced with clipping, against the reference.
 fn assert_clipped(ours: &Value, theirs: &Value, what: &str) {
     if !theirs["contested"].is_null() {
-        assert_ne!(ours["fate"], "exited", "{what}: contested rays are dead");
+        assert_ne!(ours["status"], "exited", "{what}: contested rays are dead");
     } else if !theirs["clip_surface"].is_null() {
-        assert_eq!(ours["fate"], "vignetted", "{what}");
+        assert_eq!(ours["status"], "vignetted", "{what}");
         assert_eq!(ours["element"], theirs["clip_surface"], "{what}");
     } else {
         assert_unclipped(ours, theirs, what);

@@ -71,7 +71,7 @@ impl RayStatus {
 
 /// How many rays ended in which way.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct FateCounts {
+pub struct StatusCounts {
     /// Rays that left the train.
     pub exited: u64,
     /// Rays that missed element `i`.
@@ -84,7 +84,7 @@ pub struct FateCounts {
     pub unlit: u64,
 }
 
-impl FateCounts {
+impl StatusCounts {
     /// Counts for a train of `elements` elements, all 0.
     #[must_use]
     pub fn new(elements: usize) -> Self {
@@ -93,8 +93,8 @@ impl FateCounts {
     }
 
     /// Counts one ray.
-    pub fn add(&mut self, fate: RayStatus) {
-        let (counts, element) = match fate {
+    pub fn add(&mut self, status: RayStatus) {
+        let (counts, element) = match status {
             RayStatus::Exited => {
                 self.exited += 1;
                 return;
@@ -380,13 +380,13 @@ impl LensRays {
 
     /// What became of ray `i`; [`RayStatus::Exited`] as long as nothing ended it.
     #[must_use]
-    pub fn fate(&self, i: usize) -> RayStatus {
+    pub fn status(&self, i: usize) -> RayStatus {
         RayStatus::from_code(self.blocks[i / LANES].outcome[i % LANES])
     }
 
     /// Ends ray `i` in the given way; [`RayStatus::Exited`] revives it.
-    pub fn set_fate(&mut self, i: usize, fate: RayStatus) {
-        self.blocks[i / LANES].outcome[i % LANES] = fate.code();
+    pub fn set_status(&mut self, i: usize, status: RayStatus) {
+        self.blocks[i / LANES].outcome[i % LANES] = status.code();
     }
 
     /// The sum of the throughputs of the rays that left.
@@ -417,11 +417,11 @@ mod tests {
         assert_eq!((rays.len(), rays.exited()), (LANES + 3, LANES + 3));
         assert_eq!(rays.position(LANES + 1), DVec3::new(33.0, 1.0, 2.0));
         assert_eq!(rays.direction(7), DVec3::Z);
-        rays.set_fate(33, RayStatus::Vignetted { element: 4 });
-        rays.set_fate(34, RayStatus::TotalInternalReflection { element: 70_000 });
-        assert_eq!(rays.fate(33), RayStatus::Vignetted { element: 4 });
-        assert_eq!(rays.fate(34), RayStatus::TotalInternalReflection { element: 70_000 });
-        let mut counts = FateCounts::new(5);
+        rays.set_status(33, RayStatus::Vignetted { element: 4 });
+        rays.set_status(34, RayStatus::TotalInternalReflection { element: 70_000 });
+        assert_eq!(rays.status(33), RayStatus::Vignetted { element: 4 });
+        assert_eq!(rays.status(34), RayStatus::TotalInternalReflection { element: 70_000 });
+        let mut counts = StatusCounts::new(5);
         counts.add_all(&rays);
         assert_eq!((counts.exited, counts.total()), (33, 35));
         assert_eq!(counts.losses()[0], "vignetted at element 4: 2.857 %");
@@ -434,7 +434,7 @@ mod tests {
         rays.push(DVec3::ZERO, DVec3::ZERO);
         rays.push(DVec3::ZERO, DVec3::new(0.0, f64::INFINITY, 1.0));
         for i in 0..3 {
-            assert_eq!(rays.fate(i), RayStatus::Missed { element: 0 });
+            assert_eq!(rays.status(i), RayStatus::Missed { element: 0 });
             assert!(rays.position(i).is_finite() && rays.direction(i).is_finite());
         }
         rays.push(DVec3::ZERO, DVec3::new(0.0, 3e-300, 4e-300));

@@ -77,7 +77,7 @@ impl Action {
 /// What became of a single ray at an element.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Traversal {
-    pub(crate) fate: RayStatus,
+    pub(crate) status: RayStatus,
     /// The ray as it goes on; as it came unless [`RayStatus::Exited`].
     pub(crate) ray: Ray,
     /// Where it met the element, in lens coordinates; `None` when it missed.
@@ -233,16 +233,16 @@ impl Step {
     fn decide(&self, block: &mut Block, clip: Clip) {
         for lane in 0..LANES {
             if block.outcome[lane] == PENDING {
-                let passage = self.pass_one(block.ray(lane), clip);
-                let mut ray = passage.ray;
-                if let (RayStatus::Vignetted { .. }, Some(point)) = (passage.fate, passage.point)
+                let traversal = self.pass_one(block.ray(lane), clip);
+                let mut ray = traversal.ray;
+                if let (RayStatus::Vignetted { .. }, Some(point)) = (traversal.status, traversal.point)
                     && self.moves()
                 {
                     ray.position = point;
                 }
                 block.set_ray(lane, ray);
-                block.throughput[lane] *= passage.transmission;
-                block.outcome[lane] = passage.fate.code();
+                block.throughput[lane] *= traversal.transmission;
+                block.outcome[lane] = traversal.status.code();
             }
         }
     }
@@ -255,11 +255,11 @@ impl Step {
     /// Takes one ray through the element.
     #[inline]
     pub(crate) fn run_one(&self, ray: Ray, clip: Clip) -> Traversal {
-        let mut passage = self.pass_one(ray, clip);
-        if let (Some(loss), RayStatus::Exited) = (&self.loss, passage.fate) {
-            passage.transmission *= loss.share(ray, passage.ray);
+        let mut traversal = self.pass_one(ray, clip);
+        if let (Some(loss), RayStatus::Exited) = (&self.loss, traversal.status) {
+            traversal.transmission *= loss.share(ray, traversal.ray);
         }
-        passage
+        traversal
     }
 
     #[inline]
@@ -268,25 +268,25 @@ impl Step {
             let z = self.frame.vertex.z;
             let mut local = ray;
             local.position[2] -= z;
-            let mut passage = self.local(local, clip);
-            passage.ray.position[2] += z;
-            if let Some(point) = &mut passage.point {
+            let mut traversal = self.local(local, clip);
+            traversal.ray.position[2] += z;
+            if let Some(point) = &mut traversal.point {
                 point[2] += z;
             }
-            return self.settle(ray, passage);
+            return self.settle(ray, traversal);
         }
-        let mut passage = self.local(self.frame.enter(ray), clip);
-        passage.ray = self.frame.leave(passage.ray);
-        passage.point = passage.point.map(|p| self.frame.point(p.into()).to_array());
-        self.settle(ray, passage)
+        let mut traversal = self.local(self.frame.enter(ray), clip);
+        traversal.ray = self.frame.leave(traversal.ray);
+        traversal.point = traversal.point.map(|p| self.frame.point(p.into()).to_array());
+        self.settle(ray, traversal)
     }
 
     /// Rays that end, and rays that only pass a sheet, stay as they came to the last bit.
-    fn settle(&self, ray: Ray, passage: Traversal) -> Traversal {
-        if passage.fate == RayStatus::Exited && self.moves() {
-            passage
+    fn settle(&self, ray: Ray, traversal: Traversal) -> Traversal {
+        if traversal.status == RayStatus::Exited && self.moves() {
+            traversal
         } else {
-            Traversal { ray, ..passage }
+            Traversal { ray, ..traversal }
         }
     }
 
@@ -325,14 +325,14 @@ impl Step {
 
     fn crossed(&self, crossing: Refracted) -> Traversal {
         let element = self.element;
-        let fate = match crossing {
+        let status = match crossing {
             Refracted { hit: false, .. } => RayStatus::Missed { element },
             Refracted { clear: false, .. } => RayStatus::Vignetted { element },
             Refracted { through: false, .. } => RayStatus::TotalInternalReflection { element },
             _ => RayStatus::Exited,
         };
         let point = crossing.hit.then_some(crossing.ray.position);
-        Traversal { fate, ray: crossing.ray, point, transmission: 1.0 }
+        Traversal { status, ray: crossing.ray, point, transmission: 1.0 }
     }
 
     fn sheet_crossed(
@@ -345,7 +345,7 @@ impl Step {
         let t = -ray.position[2] / ray.direction[2];
         if !t.is_finite() {
             return Traversal {
-                fate: RayStatus::Missed { element },
+                status: RayStatus::Missed { element },
                 ray,
                 point: None,
                 transmission: 0.0,
@@ -355,7 +355,7 @@ impl Step {
         point[2] = 0.0;
         let transmission = transmission([point[0], point[1]]);
         let passes = transmission > 0.0 || clip == Clip::Off;
-        let fate = if passes { RayStatus::Exited } else { RayStatus::Vignetted { element } };
-        Traversal { fate, ray, point: Some(point), transmission }
+        let status = if passes { RayStatus::Exited } else { RayStatus::Vignetted { element } };
+        Traversal { status, ray, point: Some(point), transmission }
     }
 }

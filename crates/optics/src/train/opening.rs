@@ -100,7 +100,7 @@ impl OpticalTrain {
     ) -> Option<Edge> {
         let ended = |i: f64| {
             let (position, direction) = ray(i);
-            match at.path(from, Clip::On, position, direction).fate {
+            match at.path(from, Clip::On, position, direction).status {
                 RayStatus::Exited => None,
                 RayStatus::Missed { element }
                 | RayStatus::TotalInternalReflection { element }

@@ -55,7 +55,7 @@ pub struct TracedRays {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TracedRay {
     /// How it ended.
-    pub fate: FateName,
+    pub status: StatusName,
     /// The element at which it ended, from 0 on the object side; `null` when it exited.
     pub element: Option<usize>,
     /// Where it met each element that it reached (mm), in the order in which it met them.
@@ -64,10 +64,10 @@ pub struct TracedRay {
     pub direction: Option<[f64; 3]>,
 }
 
-/// A fate without its element.
+/// A status without its element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum FateName {
+pub enum StatusName {
     /// It left the lens.
     Exited,
     /// It does not meet the element.
@@ -149,15 +149,15 @@ impl GivenRay {
 
 impl From<RayPath> for TracedRay {
     fn from(path: RayPath) -> Self {
-        let fate = match path.fate {
-            RayStatus::Exited => FateName::Exited,
-            RayStatus::Missed { .. } => FateName::Missed,
-            RayStatus::TotalInternalReflection { .. } => FateName::TotalInternalReflection,
-            RayStatus::Vignetted { .. } => FateName::Vignetted,
+        let status = match path.status {
+            RayStatus::Exited => StatusName::Exited,
+            RayStatus::Missed { .. } => StatusName::Missed,
+            RayStatus::TotalInternalReflection { .. } => StatusName::TotalInternalReflection,
+            RayStatus::Vignetted { .. } => StatusName::Vignetted,
         };
         Self {
-            fate,
-            element: path.fate.element(),
+            status,
+            element: path.status.element(),
             points: path.points.iter().map(DVec3::to_array).collect(),
             direction: path.direction.map(|d| d.to_array()),
         }
@@ -169,8 +169,8 @@ impl fmt::Display for TracedRays {
         let place = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z})");
         for (i, ray) in self.rays.iter().enumerate() {
             match ray.element {
-                None => writeln!(f, "ray {i}: {}", ray.fate)?,
-                Some(element) => writeln!(f, "ray {i}: {} element {element}", ray.fate)?,
+                None => writeln!(f, "ray {i}: {}", ray.status)?,
+                Some(element) => writeln!(f, "ray {i}: {} element {element}", ray.status)?,
             }
             for point in &ray.points {
                 writeln!(f, "  at {}", place(*point))?;
@@ -183,7 +183,7 @@ impl fmt::Display for TracedRays {
     }
 }
 
-impl fmt::Display for FateName {
+impl fmt::Display for StatusName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Exited => "exited",
@@ -223,19 +223,19 @@ mod tests {
         );
         let traced = serde_json::to_value(lens().trace_file(&file).unwrap()).unwrap();
         let sag = 20.0 - 319.0_f64.sqrt();
-        assert_eq!(traced["rays"][0]["fate"], "exited");
+        assert_eq!(traced["rays"][0]["status"], "exited");
         assert_eq!(traced["rays"][0]["element"], serde_json::Value::Null);
         assert_eq!(
             traced["rays"][0]["points"],
             serde_json::json!([[0.0, 0.0, 0.0], [0.0, 0.0, 4.0]])
         );
         assert_eq!(traced["rays"][0]["direction"], serde_json::json!([0.0, 0.0, 1.0]));
-        assert_eq!(traced["rays"][1]["fate"], "vignetted");
+        assert_eq!(traced["rays"][1]["status"], "vignetted");
         assert_eq!(traced["rays"][1]["element"], 0);
         let z = traced["rays"][1]["points"][0][2].as_f64().unwrap();
         assert!((z - sag).abs() < 1e-14, "two roundings of a number near 20: {z}");
         assert_eq!(traced["rays"][1]["direction"], serde_json::Value::Null);
-        assert_eq!(traced["rays"][2]["fate"], "missed");
+        assert_eq!(traced["rays"][2]["status"], "missed");
         assert_eq!(traced["rays"][2]["points"], serde_json::json!([]));
     }
 

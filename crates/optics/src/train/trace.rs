@@ -36,7 +36,7 @@ pub struct MonochromaticTrain {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayPath {
     /// What became of it.
-    pub fate: RayStatus,
+    pub status: RayStatus,
     /// Where it met each element that it reached (mm), in the order in which it met them. The last
     /// one is where it was vignetted or totally reflected, if it was.
     pub points: Vec<DVec3>,
@@ -126,7 +126,7 @@ impl MonochromaticTrain {
     }
 
     /// Takes a batch through the lens: positions end on the last refracting element, directions are
-    /// those behind it, throughputs are multiplied by what apertures and filters pass, and fates say
+    /// those behind it, throughputs are multiplied by what apertures and filters pass, and statuses say
     /// who left. Rays that ended already stay as they are.
     ///
     /// The same ray gives the same bits in any batch, and on any processor: the arithmetic is
@@ -155,7 +155,7 @@ impl MonochromaticTrain {
                     let end = self.run(from, clip, block.ray(lane));
                     block.set_ray(lane, end.ray);
                     block.throughput[lane] *= end.throughput;
-                    block.outcome[lane] = end.fate.code();
+                    block.outcome[lane] = end.status.code();
                 }
             }
         }
@@ -165,23 +165,23 @@ impl MonochromaticTrain {
     #[must_use]
     pub fn path(&self, from: Side, clip: Clip, position: DVec3, direction: DVec3) -> RayPath {
         let mut path = RayPath {
-            fate: RayStatus::Missed { element: 0 },
+            status: RayStatus::Missed { element: 0 },
             points: Vec::new(),
             direction: None,
             throughput: 1.0,
         };
         let Some(mut ray) = Ray::new(position, direction) else { return path };
         for step in self.steps(from) {
-            let passage = step.run_one(ray, clip);
-            path.points.extend(passage.point.map(DVec3::from));
-            path.throughput *= passage.transmission;
-            path.fate = passage.fate;
-            ray = passage.ray;
-            if passage.fate != RayStatus::Exited {
+            let traversal = step.run_one(ray, clip);
+            path.points.extend(traversal.point.map(DVec3::from));
+            path.throughput *= traversal.transmission;
+            path.status = traversal.status;
+            ray = traversal.ray;
+            if traversal.status != RayStatus::Exited {
                 return path;
             }
         }
-        path.fate = RayStatus::Exited;
+        path.status = RayStatus::Exited;
         path.direction = Some(ray.direction.into());
         path
     }
@@ -189,14 +189,14 @@ impl MonochromaticTrain {
     /// One ray to its end.
     #[inline]
     pub fn run(&self, from: Side, clip: Clip, ray: Ray) -> End {
-        let mut end = End { fate: RayStatus::Exited, ray, throughput: 1.0 };
+        let mut end = End { status: RayStatus::Exited, ray, throughput: 1.0 };
         for step in self.steps(from) {
-            let passage = step.run_one(end.ray, clip);
-            end.throughput *= passage.transmission;
-            end.fate = passage.fate;
-            end.ray = passage.ray;
-            if passage.fate != RayStatus::Exited {
-                if let (RayStatus::Vignetted { .. }, Some(point)) = (passage.fate, passage.point)
+            let traversal = step.run_one(end.ray, clip);
+            end.throughput *= traversal.transmission;
+            end.status = traversal.status;
+            end.ray = traversal.ray;
+            if traversal.status != RayStatus::Exited {
+                if let (RayStatus::Vignetted { .. }, Some(point)) = (traversal.status, traversal.point)
                     && step.moves()
                 {
                     end.ray.position = point;
@@ -211,16 +211,16 @@ impl MonochromaticTrain {
     /// when it does not get there.
     pub(crate) fn crossing(&self, from: Side, element: usize, mut ray: Ray) -> Option<[f64; 2]> {
         for step in self.steps(from) {
-            let passage = step.run_one(ray, Clip::Off);
+            let traversal = step.run_one(ray, Clip::Off);
             if step.element == element {
                 let local = step.frame.rotation.transpose()
-                    * (DVec3::from(passage.point?) - step.frame.vertex);
+                    * (DVec3::from(traversal.point?) - step.frame.vertex);
                 return Some([local.x, local.y]);
             }
-            if passage.fate != RayStatus::Exited {
+            if traversal.status != RayStatus::Exited {
                 return None;
             }
-            ray = passage.ray;
+            ray = traversal.ray;
         }
         None
     }
@@ -230,7 +230,7 @@ impl MonochromaticTrain {
 #[derive(Debug, Clone, Copy)]
 pub struct End {
     /// Outcome: where and how the ray ended.
-    pub fate: RayStatus,
+    pub status: RayStatus,
     /// The ray as it leaves, or where it ended (mm).
     pub ray: Ray,
     /// What apertures and filters pass of it.

@@ -16,7 +16,7 @@ pub(super) fn lens(json: &str) -> Result<OpticalTrain> {
 
 /// What becomes of a ray from the object side. A batch of one has to end as the single ray does, and
 /// all numbers have to be finite.
-pub(super) fn fate(
+pub(super) fn status(
     train: &OpticalTrain,
     clip: Clip,
     from: DVec3,
@@ -31,19 +31,19 @@ pub(super) fn fate(
     if !finite || !path.points.iter().all(|p| p.is_finite()) {
         return Err(anyhow!("a ray from {from} along {along} has numbers that are not finite"));
     }
-    if rays.fate(0) != path.fate {
+    if rays.status(0) != path.status {
         return Err(anyhow!(
             "a batch of one ends as {:?}, the ray as {:?}",
-            rays.fate(0),
-            path.fate
+            rays.status(0),
+            path.status
         ));
     }
-    Ok(path.fate)
+    Ok(path.status)
 }
 
 /// What becomes of a ray parallel to the axis at the height `y` (mm).
 pub(super) fn parallel(train: &OpticalTrain, clip: Clip, y: f64) -> Result<RayStatus> {
-    fate(train, clip, DVec3::new(0.0, y, -5.0), DVec3::Z)
+    status(train, clip, DVec3::new(0.0, y, -5.0), DVec3::Z)
 }
 
 /// The greatest height (mm) between `low` and `high` from which parallel rays get through, to the last

@@ -8,7 +8,7 @@ use etendue_optics::element::{Clip, LensRays, PartSpec, RayStatus, SurfaceSpec};
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{Focus, FocusError, LensFile, Side};
 
-use super::bench::{YELLOW, fate, greatest_height, lens, parallel};
+use super::bench::{YELLOW, status, greatest_height, lens, parallel};
 use crate::{Case, Outcome, Scale};
 
 /// A ball of glass, its front half the surface.
@@ -106,7 +106,7 @@ fn missed(_: Scale) -> Result<Outcome> {
     outcome.must(off <= 1e-12, || format!("{found} mm"));
     let beside = parallel(&train, Clip::Off, 10.001)?;
     outcome.must(beside == RayStatus::Missed { element: 0 }, || format!("beside it: {beside:?}"));
-    let across = fate(&train, Clip::Off, DVec3::new(0.0, -30.0, -5.0), DVec3::Y)?;
+    let across = status(&train, Clip::Off, DVec3::new(0.0, -30.0, -5.0), DVec3::Y)?;
     outcome.must(across == RayStatus::Missed { element: 0 }, || format!("across: {across:?}"));
     Ok(outcome)
 }
@@ -121,7 +121,7 @@ fn wrong_root(scale: Scale) -> Result<Outcome> {
             // Inside the ball, behind the front half, onwards.
             let share = |n: i32| f64::from(n) / f64::from(steps);
             let from = DVec3::new(0.0, 6.0 * share(i), 4.5 + 5.0 * share(k));
-            let ends = fate(&train, Clip::Off, from, DVec3::new(0.0, 0.1 * share(k), 1.0))?;
+            let ends = status(&train, Clip::Off, from, DVec3::new(0.0, 0.1 * share(k), 1.0))?;
             asked += 1;
             wrong += usize::from(ends != RayStatus::Missed { element: 0 });
         }
@@ -158,7 +158,7 @@ fn steep_asphere(scale: Scale) -> Result<Outcome> {
         if let Some(met) = path.points.first() {
             worst = worst.max((met.z - sagitta(met.truncate().length())).abs());
         }
-        match path.fate {
+        match path.status {
             RayStatus::Exited => ends[0] += 1,
             RayStatus::Missed { .. } => ends[1] += 1,
             _ => ends[2] += 1,
@@ -216,7 +216,7 @@ fn flat(_: Scale) -> Result<Outcome> {
             let curved = trace(Some(sign * radius))?;
             for i in 0..plane.len() {
                 outcome
-                    .must(curved.fate(i) == RayStatus::Exited, || format!("{:?}", curved.fate(i)));
+                    .must(curved.status(i) == RayStatus::Exited, || format!("{:?}", curved.status(i)));
                 worst = worst.max((curved.direction(i) - plane.direction(i)).length());
             }
         }

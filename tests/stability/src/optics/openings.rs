@@ -10,7 +10,7 @@ use etendue_optics::train::{
     ExitPupil, ExitPupilError, Focus, LensFile, OpticalTrain, PupilSample, Side,
 };
 
-use super::bench::{YELLOW, fate, lens, parallel};
+use super::bench::{YELLOW, status, lens, parallel};
 use crate::{Case, Outcome, Scale, rendered};
 
 pub(super) const CLOSED: Case = Case {
@@ -92,7 +92,7 @@ fn f_0_5(scale: Scale) -> Result<Outcome> {
     let mut lost = 0;
     for i in 0..120 {
         let from = DVec3::new(0.0, 0.1 * f64::from(i), -9.0);
-        let ends = fate(&real, Clip::On, from, DVec3::Z)?;
+        let ends = status(&real, Clip::On, from, DVec3::Z)?;
         outcome.must(i > 0 || ends == RayStatus::Exited, || format!("the axis: {ends:?}"));
         lost += u32::from(ends != RayStatus::Exited);
     }

@@ -21,7 +21,7 @@ pub(super) const ANY_LENS: Case = Case {
     name: "any_lens_and_any_ray",
     regime: "random trains of 1 to 7 elements, lens-like and absurd (radii from 10⁻⁹ to 10¹² mm, tilts to \
         90 degrees, 16th powers), and rays with any f64 for a coordinate, from either side",
-    must: "no NaN and no infinity anywhere, unit directions, a fate by name; a batch gives the bits of \
+    must: "no NaN and no infinity anywhere, unit directions, a status by name; a batch gives the bits of \
         single rays",
     limit: None,
     run: any_lens,
@@ -133,19 +133,19 @@ fn trace(train: &OpticalTrain, shower: &Shower, exited: &Cell<u64>) -> TestCaseR
         let (p, d) = (batch.position(i), batch.direction(i));
         prop_assert!(p.is_finite() && d.is_finite(), "{p} {d}");
         prop_assert!(batch.throughput(i).is_finite());
-        if batch.fate(i) == RayStatus::Exited {
+        if batch.status(i) == RayStatus::Exited {
             // Each of up to 8 elements rounds a direction a few times.
             prop_assert!((d.length() - 1.0).abs() < 1e-9, "{}", d.length() - 1.0);
             exited.set(exited.get() + 1);
         } else {
-            let element = batch.fate(i).element();
+            let element = batch.status(i).element();
             prop_assert!(element.is_some_and(|element| element < train.elements().len()));
         }
-        prop_assert_eq!(batch.fate(i), single.fate(i));
+        prop_assert_eq!(batch.status(i), single.status(i));
         prop_assert_eq!(p, single.position(i));
         prop_assert_eq!(d, single.direction(i));
         let path = at.path(from, clip, position, direction);
-        prop_assert_eq!(path.fate, batch.fate(i));
+        prop_assert_eq!(path.status, batch.status(i));
         prop_assert!(path.points.iter().all(|p| p.is_finite()));
     }
     Ok(())

@@ -52,7 +52,7 @@ pub fn spot(
 ) -> Option<Spot> {
     let rays = beam(train, at, field)?;
     let mut hits = Vec::with_capacity(rays.len());
-    for i in (0..rays.len()).filter(|&i| rays.fate(i) == RayStatus::Exited) {
+    for i in (0..rays.len()).filter(|&i| rays.status(i) == RayStatus::Exited) {
         let (position, direction) = (rays.position(i), rays.direction(i));
         let slopes = direction.truncate() / direction.z;
         let place = position.truncate() + slopes * (reference_z - position.z);

@@ -142,7 +142,7 @@ fn trace(
     end: f64,
 ) -> Option<Vec<[f64; 2]>> {
     let path = at.path(Side::Object, Clip::On, position, direction);
-    let (RayStatus::Exited, Some(out)) = (path.fate, path.direction) else { return None };
+    let (RayStatus::Exited, Some(out)) = (path.status, path.direction) else { return None };
     let (first, last) = (*path.points.first()?, *path.points.last()?);
     let lead = 0.25 * (end.abs() + train.lateral_scale());
     let start = first - direction * lead;

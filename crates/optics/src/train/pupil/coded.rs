@@ -436,7 +436,7 @@ impl ClearLens<'_> {
                 let found = to(target, Some(guess).filter(|guess| guess.is_finite()));
                 node.slopes[y][x] = found.unwrap_or(guess);
                 let ray = Ray::new(film, towards_lens(node.slopes[y][x]))?;
-                let passes = self.lens.run(Side::Sensor, Clip::On, ray).fate == RayStatus::Exited;
+                let passes = self.lens.run(Side::Sensor, Clip::On, ray).status == RayStatus::Exited;
                 node.passes[y][x] = found.is_some() && passes;
             }
         }

@@ -382,7 +382,7 @@ impl LensletPupil {
         lens.trace(Side::Sensor, Clip::On, &mut rays);
         let (mut passed, mut strays) = (0, 0);
         for (i, (film, at)) in aims.into_iter().enumerate() {
-            if rays.fate(i) == RayStatus::Exited {
+            if rays.status(i) == RayStatus::Exited {
                 passed += 1;
                 strays += u32::from(!self.aims_at(film, at));
             }

@@ -226,7 +226,7 @@ impl ExitPupil {
             strays.push(Stray { nodes: place.nodes, turn: u[1], radius });
         }
         lens.trace(Side::Sensor, Clip::On, &mut rays);
-        let passed = |i: &usize| rays.fate(*i) == RayStatus::Exited;
+        let passed = |i: &usize| rays.status(*i) == RayStatus::Exited;
         (0..rays.len()).filter(passed).map(|i| strays[i]).collect()
     }
 
@@ -334,7 +334,7 @@ fn widen(
             rays.push(film, towards_lens(centre + directions[i] * radius));
         }
         lens.trace(Side::Sensor, Clip::On, &mut rays);
-        (0..rays.len()).map(|i| rays.fate(i) == RayStatus::Exited).collect()
+        (0..rays.len()).map(|i| rays.status(i) == RayStatus::Exited).collect()
     };
     let step = OUTERMOST / f64::from(scanned);
     let scan: Vec<(usize, f64)> =

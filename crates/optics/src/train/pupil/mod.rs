@@ -46,7 +46,7 @@ use self::coded::Coded;
 use self::place::turn_of;
 use super::aim::towards_lens;
 use super::{MonochromaticTrain, OpticalTrain, Side};
-use crate::element::{Clip, FateCounts, Frame, LensRays, RayStatus};
+use crate::element::{Clip, StatusCounts, Frame, LensRays, RayStatus};
 use crate::glass::GlassError;
 
 pub use clear::{without_dimming, without_filters};
@@ -330,7 +330,7 @@ impl ExitPupil {
                 Some(sample) => rays.push_weighted(at, sample.direction, sample.weight),
                 None => {
                     rays.push_weighted(at, DVec3::NEG_Z, 0.0);
-                    rays.set_fate(rays.len() - 1, RayStatus::Vignetted { element: 0 });
+                    rays.set_status(rays.len() - 1, RayStatus::Vignetted { element: 0 });
                 }
             }
         }
@@ -384,7 +384,7 @@ impl ExitPupil {
 
 /// The error that names what blocks the light.
 pub fn blocked(train: &OpticalTrain, lens: &MonochromaticTrain, film: DVec3) -> ExitPupilError {
-    let mut counts = FateCounts::new(train.elements.len());
+    let mut counts = StatusCounts::new(train.elements.len());
     match Window::probe(train, film) {
         Some(mut rays) => {
             lens.trace(Side::Sensor, Clip::On, &mut rays);

@@ -177,7 +177,7 @@ fn tight_outline(main: &ExitPupil, lenses: &[MonochromaticTrain], at: DVec2) -> 
                 rays.push(film, towards_lens(centre + (ends[i] - centre) * share));
             }
             lens.trace(Side::Sensor, Clip::On, &mut rays);
-            let exited = (0..rays.len()).map(|i| rays.fate(i) == RayStatus::Exited);
+            let exited = (0..rays.len()).map(|i| rays.status(i) == RayStatus::Exited);
             passed.iter_mut().zip(exited).for_each(|(any, one)| *any |= one);
         }
         passed

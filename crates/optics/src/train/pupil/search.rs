@@ -135,7 +135,7 @@ impl Window {
         let mut rays = self.rays(film, grid);
         at.trace(Side::Sensor, Clip::On, &mut rays);
         let (mut min, mut max) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        for i in (0..grid * grid).filter(|&i| rays.fate(i as usize) == RayStatus::Exited) {
+        for i in (0..grid * grid).filter(|&i| rays.status(i as usize) == RayStatus::Exited) {
             min = min.min(self.cell(i, grid));
             max = max.max(self.cell(i, grid));
         }

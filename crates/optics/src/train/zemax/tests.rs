@@ -182,7 +182,7 @@ fn a_coordinate_break_and_back_tilts_one_element() {
             at.path(Side::Object, Clip::On, DVec3::new(x, y, -20.0), DVec3::new(0.01, 0.02, 1.0))
         };
         let (a, b) = (path(&ours), path(&theirs));
-        assert_eq!((a.fate, b.fate), (RayStatus::Exited, RayStatus::Exited));
+        assert_eq!((a.status, b.status), (RayStatus::Exited, RayStatus::Exited));
         // A few roundings of lengths near 20 mm.
         assert!((a.points[1] - b.points[1]).length() < 1e-13);
         assert!((a.direction.unwrap() - b.direction.unwrap()).length() < 1e-15);
@@ -418,8 +418,8 @@ fn a_double_gauss_comes_back_as_it_went() {
             at.path(Side::Object, Clip::On, DVec3::new(x, y, -20.0), DVec3::new(0.0, 0.1, 1.0))
         };
         let (a, b) = (path(&a), path(&b));
-        assert_eq!(a.fate, b.fate);
-        exited += u32::from(a.fate == RayStatus::Exited);
+        assert_eq!(a.status, b.status);
+        exited += u32::from(a.status == RayStatus::Exited);
         for (p, q) in a.points.iter().zip(&b.points) {
             assert!((*p - *q).length() < 1e-13, "a radius and its inverse's inverse");
         }
