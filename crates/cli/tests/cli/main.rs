@@ -12,12 +12,14 @@ mod files; // what is no file, what costs without end, what real programs write
 mod flow; // layers that compare two frames
 mod frames; // many pictures of one scene, and trajectories of others
 mod gallery; // the page of pictures, its commands and its scenes
-mod gltf_looks; // materials, lights and textures of models, with closed-form answers
+mod gltf_looks; // materials and lights of models, with closed-form answers
+mod gltf_textures; // textures of models, likewise
 mod hidden; // meshes of one point, nodes scaled to 0
 mod ids; // numbers of objects, copies, nodes and materials, and their names
 mod images; // textures and environments of every kind and size
 mod leniency; // comments, schema addresses, resolutions as words, quiet
-mod lens; // lenses against other software, and what is refused
+mod lens; // tables, drawings and files of lenses, and what is refused
+mod lens_reference; // lenses against other software
 mod lens_pictures; // pictures through lenses, with closed-form answers
 mod light_fields; // lenslets, arrays of cameras, and the page about them
 mod limits; // what the page on limits lists
