@@ -272,10 +272,6 @@ fn decoded(
 pub(crate) fn environment(scene: &Scene) -> Option<&EnvironmentImage> {
     scene.lights.iter().find_map(|light| match &light.kind {
         LightKind::Environment { image, .. } => Some(image),
-        LightKind::Point(_)
-        | LightKind::Spot { .. }
-        | LightKind::Directional { .. }
-        | LightKind::Projector(_)
-        | LightKind::Goniometric(_) => None,
+        _ => None,
     })
 }

@@ -156,10 +156,7 @@ impl Course<'_> {
             _ if stopping.is_adaptive() && self.shard.is_some_and(Shard::is_of_samples) => {
                 Err(RenderError::SampleShares)
             }
-            Stopping::Count
-            | Stopping::SensorNoise(_)
-            | Stopping::RelativeError(_)
-            | Stopping::Time(_) => Ok(()),
+            _ => Ok(()),
         }
     }
 }

@@ -81,11 +81,7 @@ impl ViewGrid {
         let stop = &view.main.elements()[view.main.stop()];
         let opening = match &stop.part {
             Part::Aperture(opening) => Arc::clone(opening),
-            part @ (Part::Surface(_)
-            | Part::Biconic(_)
-            | Part::ThinLens(_)
-            | Part::Filter(_)
-            | Part::MicrolensArray(_)) => Arc::new(Opening::Circle { radius: part.clear_radius() }),
+            part => Arc::new(Opening::Circle { radius: part.clear_radius() }),
         };
         Ok(Self {
             grid: light_field.grid.clone(),

@@ -208,9 +208,7 @@ fn build(camera: &Camera, model: &OpencvModel) -> Result<Distortion, CameraError
     let built = as_spec(camera, model).build(|| Bounds::EMPTY, &|name| Err(name.to_owned()))?;
     match built.projection() {
         crate::Projection::Pinhole(pinhole) => pinhole.distortion().cloned(),
-        crate::Projection::Orthographic(_)
-        | crate::Projection::Lens(_)
-        | crate::Projection::Views(_) => None,
+        _ => None,
     }
     .ok_or_else(|| CameraError::new("lens", "the fit has no distortion"))
 }

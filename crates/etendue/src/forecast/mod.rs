@@ -75,9 +75,7 @@ impl TimeForecast {
         let Prospect { scene, plan, load, .. } = *prospect;
         let trace = match plan.stopping {
             Stopping::Time(time) => time.as_secs_f64(),
-            Stopping::Count | Stopping::SensorNoise(_) | Stopping::RelativeError(_) => {
-                plan.rays as f64 * machine.ray
-            }
+            _ => plan.rays as f64 * machine.ray,
         };
         let views = 0.0;
         let build = build_time(scene, plan, machine);
@@ -112,9 +110,7 @@ impl TimeForecast {
         let pilot = Pilot { scene, accel: &*accel, images: &images, until };
         let trace = match plan.stopping {
             Stopping::Time(time) => time.as_secs_f64(),
-            Stopping::Count | Stopping::SensorNoise(_) | Stopping::RelativeError(_) => {
-                pilot.picture(&scene.camera)?
-            }
+            _ => pilot.picture(&scene.camera)?,
         };
         let views = match (scene.camera.lens(), scene.camera.reference_views()) {
             (Some(_), Ok(views)) if scene.picture.is_some() => pilot.picture(&views)?,

@@ -165,11 +165,7 @@ impl OpticalTrain {
                         && other.types.len() == array.types.len()
                         && element.frame.vertex.truncate() == decentre
                 }
-                part @ (Part::Surface(_)
-                | Part::Biconic(_)
-                | Part::ThinLens(_)
-                | Part::Aperture(_)
-                | Part::Filter(_)) => part.is_plane(),
+                part => part.is_plane(),
             };
             if !fits {
                 return None;

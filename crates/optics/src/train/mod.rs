@@ -241,11 +241,7 @@ impl OpticalTrain {
         for (i, element) in self.elements.iter().enumerate() {
             match &element.part {
                 Part::Filter(filter) => tell(format!("the filter elements[{i}]"), filter.range()),
-                part @ (Part::Surface(_)
-                | Part::Biconic(_)
-                | Part::ThinLens(_)
-                | Part::Aperture(_)
-                | Part::MicrolensArray(_)) => {
+                part => {
                     for curve in part.curves() {
                         tell(format!("a filter of the lenslets elements[{i}]"), curve.range());
                     }

@@ -34,9 +34,7 @@ impl LightFieldViews {
         };
         let reference = match camera.projection() {
             Projection::Views(_) => camera.clone(),
-            Projection::Pinhole(_) | Projection::Orthographic(_) | Projection::Lens(_) => {
-                camera.reference_views().map_err(|e| RenderError::Camera(e.to_string()))?
-            }
+            _ => camera.reference_views().map_err(|e| RenderError::Camera(e.to_string()))?,
         };
         let Projection::Views(grid) = reference.projection() else { return Ok(None) };
         let views = match camera.lens() {

@@ -118,7 +118,7 @@ pub fn write(
     let Some(light_field) = scene.camera.light_field() else { return Ok(set.written) };
     let reference = match scene.camera.projection() {
         Projection::Views(_) => scene.camera.clone(),
-        Projection::Pinhole(_) | Projection::Orthographic(_) | Projection::Lens(_) => scene
+        _ => scene
             .camera
             .reference_views()
             .map_err(|error| RenderError::Camera(error.to_string()))?,

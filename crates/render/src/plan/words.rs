@@ -295,10 +295,7 @@ impl Plan {
             Projection::Views(_) if self.pupil => {
                 ("on", "each view is averaged over its own part of the opening".to_owned())
             }
-            Projection::Pinhole(_)
-            | Projection::Orthographic(_)
-            | Projection::Lens(_)
-            | Projection::Views(_) => pupil(lens, self.pupil, self.samples),
+            _ => pupil(lens, self.pupil, self.samples),
         };
         [
             ("rays of a wavelength", rays, wavelengths(apart, self.pupil, each)),

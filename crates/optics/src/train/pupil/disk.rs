@@ -49,15 +49,9 @@ impl Disk {
                     Opening::Circle { radius } if radius > 0.0 && disk.is_none() => {
                         disk = Some(Self { centre: element.frame.vertex, radius });
                     }
-                    Opening::Circle { .. } | Opening::Polygon { .. } | Opening::Image(_) => {
-                        return None;
-                    }
+                    _ => return None,
                 },
-                Part::Surface(_)
-                | Part::Biconic(_)
-                | Part::ThinLens(_)
-                | Part::Filter(_)
-                | Part::MicrolensArray(_) => return None,
+                _ => return None,
             }
         }
         let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];

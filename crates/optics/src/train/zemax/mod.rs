@@ -345,10 +345,8 @@ fn open_stop(
     match &mut stop.part {
         PartSpec::Surface(surface) => surface.semi_diameter = Some(Millimetres(radius)),
         PartSpec::ThinLens(lens) => lens.semi_diameter = Some(Millimetres(radius)),
-        part @ (PartSpec::Biconic(_)
-        | PartSpec::Aperture(_)
-        | PartSpec::Filter(_)
-        | PartSpec::MicrolensArray(_)) => *part = PartSpec::circular(radius),
+        PartSpec::Biconic(surface) => surface.semi_diameter = Some(Millimetres(radius)),
+        part => *part = PartSpec::circular(radius),
     }
     build(file)
 }
