@@ -45,14 +45,14 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  etendue check scenes/first-light.json\n  \
                             etendue check model.glb --json")]
     Check(CheckArguments),
-    /// Say what a render would do, and why
+    /// Print what a render would do, and why
     #[command(after_help = "Example:\n  etendue plan scenes/first-light.json\n  \
                             etendue plan scenes/double-gauss.json --models --tolerance \"0.5 px,5 %\"")]
     Plan(PlanArguments),
     /// Show what a sensor makes of light, or make the images that EMVA 1288 characterises it by
     #[command(after_help = SENSOR_HELP)]
     Sensor(SensorArguments),
-    /// Open a window onto a scene, a lens or an image: look, change the camera, ask pixels, save
+    /// Open a window onto a scene, a lens or an image: look, change the camera, inspect pixels, save
     #[command(after_help = VIEW_HELP)]
     View(ViewArguments),
     /// Analyse a lens, or trace given rays through it
@@ -65,7 +65,7 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  etendue schema > scene.schema.json\n  \
                             etendue schema lens > lens.schema.json")]
     Schema {
-        /// Of what
+        /// The kind of file
         #[arg(value_enum, default_value_t = SchemaArgument::Scene)]
         of: SchemaArgument,
     },
@@ -161,16 +161,17 @@ pub(crate) struct SceneArguments {
     /// Which axis points up in OBJ and PLY files, which do not say
     #[arg(long, value_name = "AXIS", value_enum)]
     pub(crate) up: Option<UpArgument>,
-    /// Samples a pixel of colours; data layers take the pixel's centre
+    /// Samples per pixel of the picture; data layers take the pixel's centre
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576))]
     pub(crate) samples: Option<u32>,
     /// Seed of the samples
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
-    /// What finds the hits
+    /// The accelerator that finds the hits
     #[arg(long, value_enum)]
     pub(crate) accel: Option<AccelArgument>,
-    /// Look glasses up in this catalogue (Zemax' AGF format) first; the last one given is asked first
+    /// A glass catalogue in Zemax' AGF format, searched before the built-in one; the last one given is
+    /// searched first
     #[arg(long = "glass-catalog", value_name = "FILE")]
     pub(crate) glass_catalogs: Vec<PathBuf>,
     /// Refuse defects of the data (NaN positions, broken images) instead of dropping them
@@ -229,9 +230,9 @@ impl From<ShardByArgument> for ShardBy {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum AccelMode {
-    /// Closed meshes have no leaks: suspicious rays are looked at again in f64
+    /// Watertight on closed meshes: suspicious rays are traced again in f64
     Robust,
-    /// No second look: some rays slip through edges and corners
+    /// Faster: some rays slip through edges and corners
     Fast,
 }
 
@@ -246,7 +247,7 @@ pub(crate) struct RenderArguments {
     /// (masks with a palette) are there, too
     #[arg(long, value_name = "LIST", default_value = "exr,png,npy,dng")]
     pub(crate) outputs: String,
-    /// Take the noise out of the picture of a tracer of light, by Intel's Open Image Denoise, which is to be
+    /// Denoise the picture of a tracer of light by Intel's Open Image Denoise, which is to be
     /// installed (`pip install pyoidn`; the environment variable `ETENDUE_OIDN` names its library): the layer
     /// Denoised, which picture.png shows. The picture in EXR and NPY, and what a sensor makes of it (raw
     /// files, exposures), keep their noise: those are data
@@ -255,7 +256,7 @@ pub(crate) struct RenderArguments {
     /// Threads of build and render; 0 takes all that this process may use
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse::threads)]
     pub(crate) threads: usize,
-    /// How carefully Embree looks; the other accelerators always are robust
+    /// Embree's traversal mode; the other accelerators are always robust
     #[arg(long, value_enum, default_value_t = AccelMode::Robust)]
     pub(crate) accel_mode: AccelMode,
     /// Make Embree use this instruction set: sse2, sse4.2, avx, avx2 or avx512
@@ -285,11 +286,11 @@ pub(crate) struct RenderArguments {
     /// Render only this share of the picture, e.g. 3/8, into shard-3-of-8.film, for `etendue merge`
     #[arg(long, value_name = "NUMBER/COUNT", value_parser = str::parse::<Shard>)]
     pub(crate) shard: Option<Shard>,
-    /// What is dealt out to shares
+    /// The unit by which the picture is divided into shares
     #[arg(long, value_name = "WHAT", value_enum, default_value_t, requires = "shard")]
     pub(crate) shard_by: ShardByArgument,
-    /// Keep what there is on the way, in checkpoint.film, so often at most; the same command goes on from
-    /// there after an interruption, and its picture is the same to the bit
+    /// Write a checkpoint, checkpoint.film, at most this often; after an interruption the same command goes
+    /// on from there, and its picture is the same to the bit
     #[arg(long, value_name = "SECONDS", num_args = 0..=1, default_missing_value = "60",
           value_parser = parse::seconds)]
     pub(crate) checkpoint: Option<f64>,

@@ -44,7 +44,7 @@ pub(crate) struct LensArguments {
     /// with its residuals, where it holds, and as the camera of a scene; with -o, into opencv.json there
     #[arg(long, conflicts_with = "rays")]
     pub(crate) fit_opencv: bool,
-    /// What the fit may be off by: "0.5 px", which is the default
+    /// The tolerance of the fit: "0.5 px", which is the default
     #[arg(long, value_name = "PIXELS", value_parser = parse::pixels, requires = "fit_opencv")]
     pub(crate) tolerance: Option<f64>,
     /// Columns and rows of the picture that is fitted, 1536x1024 when absent
@@ -65,7 +65,8 @@ pub(crate) struct LensArguments {
     /// Open or close the stop to this f-number
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     pub(crate) f_number: Option<f64>,
-    /// Look glasses up in this catalogue (Zemax' AGF format) first; the last one given is asked first
+    /// A glass catalogue in Zemax' AGF format, searched before the built-in one; the last one given is
+    /// searched first
     #[arg(long = "glass-catalog", value_name = "FILE")]
     pub(crate) glass_catalogs: Vec<PathBuf>,
     /// Refuse wavelengths outside of what the glasses are stated for instead of warning
