@@ -96,6 +96,7 @@ impl HitErrors {
         for ((a, i), (b, j)) in each(hits).zip(each(reference)) {
             errors.rays += 1;
             errors.hits += u64::from(b.is_hit(j));
+            // Hits of nearly one distance are ties, and no wrong triangles.
             match (a.is_hit(i), b.is_hit(j)) {
                 (false, true) => errors.missed += 1,
                 (true, false) => errors.false_hits += 1,

@@ -212,12 +212,14 @@ impl BrownConrady {
         let r2 = x * x + y * y;
         let top = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));
         let bottom = 1.0 + r2 * (self.k4 + r2 * (self.k5 + r2 * self.k6));
+        // The radial factor, the prisms, and their derivatives by r².
         let top_by_r2 = self.k1 + r2 * (2.0 * self.k2 + r2 * 3.0 * self.k3);
         let bottom_by_r2 = self.k4 + r2 * (2.0 * self.k5 + r2 * 3.0 * self.k6);
         let radial = top / bottom;
         let radial_by_r2 = (top_by_r2 - radial * bottom_by_r2) / bottom;
         let prism = [r2 * (self.s1 + r2 * self.s2), r2 * (self.s3 + r2 * self.s4)];
         let prism_by_r2 = [self.s1 + 2.0 * r2 * self.s2, self.s3 + 2.0 * r2 * self.s4];
+        // With the tangential terms, and the derivatives by x and y.
         let (p1, p2) = (self.p1, self.p2);
         let seen = [
             x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) + prism[0],

@@ -134,6 +134,7 @@ impl Writing<'_> {
         layers: &[&FilmLayer],
         sums: &[&[Sum]],
     ) -> Result<(), OutputError> {
+        // The sections, and the header that lists them.
         let planes = layers.iter().flat_map(|layer| layer.named_planes());
         let planes = planes.map(|(name, plane)| (name, FilmSection::Plane(plane)));
         let sums = sums.iter().enumerate().map(|(k, sums)| (sums_name(k), FilmSection::Sums(sums)));
@@ -151,6 +152,7 @@ impl Writing<'_> {
             counts: FilmCounts::of(self.counts, self.trace_time),
             sections: sections.iter().map(|(name, s)| (name.clone(), kind(s))).collect(),
         };
+        // Both, and a hash of them at the end.
         write_whole(path, |part| {
             let mut file = Hashed { hash: Xxh3::new(), file: BufWriter::new(part) };
             let header = serde_json::to_vec(&header)?;

@@ -199,6 +199,7 @@ impl Preset {
             (key, text.trim_end_matches('0').trim_end_matches('.').to_owned(), origin)
         };
         let [columns, rows] = self.resolution.value;
+        // Whole numbers, numbers, and the curve in words.
         let mut facts = vec![
             ("resolution", format!("{columns} × {rows}"), self.resolution.origin),
             ("bit_depth", self.bit_depth.value.to_string(), self.bit_depth.origin),

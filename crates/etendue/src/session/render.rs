@@ -191,6 +191,7 @@ impl Session {
         rendered: &Rendered,
         seconds: Seconds,
     ) -> Result<Report, Error> {
+        // What the structure, the process and the images say of themselves.
         let (built, counts) = (accel.report(), accel.counts());
         let (peak, private) = memory();
         let sizes = self.images.sizes(scene);

@@ -228,6 +228,7 @@ impl MicrolensArraySpec {
     }
 
     fn lenslet(&self, own: &LensletSpec) -> Result<Lenslet, String> {
+        // The type's own shape, or that of all.
         let (focal_length, radius) = match (own.focal_length, own.radius) {
             (None, None) => (self.focal_length, self.radius),
             own => own,

@@ -350,6 +350,7 @@ impl OpticalTrain {
 
     pub(crate) fn oddities(&self) -> Vec<String> {
         let mut notes = Vec::new();
+        // Glasses that several makers have.
         for glass in self.media.iter().filter(|g| !g.namesakes.is_empty()) {
             let others = glass.namesakes.join(" and ");
             let note = format!(
@@ -369,6 +370,7 @@ impl OpticalTrain {
                 ));
             }
         }
+        // Elements that run into one another, and a stop that is not filled.
         notes.extend(self.crossings());
         notes.extend(self.unfilled_stop());
         if !self.elements.iter().all(|e| e.frame.is_axial()) {

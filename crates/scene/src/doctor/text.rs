@@ -13,6 +13,7 @@ impl fmt::Display for Diagnosis {
         let row = |f: &mut fmt::Formatter<'_>, name: &str, value: &dyn fmt::Display| {
             writeln!(f, "{name:<13} {value}")
         };
+        // What is in the file.
         row(f, "file", &self.file.display())?;
         row(f, "triangles", &self.count())?;
         match &self.bounds {
@@ -25,6 +26,7 @@ impl fmt::Display for Diagnosis {
         }
         row(f, "units", &self.units.remark)?;
         self.list_objects(f)?;
+        // What is wrong with it, and how exact it is.
         row(f, "defects", &self.defects_in_words())?;
         if let Some(p) = &self.precision {
             let text = format!(
@@ -34,6 +36,7 @@ impl fmt::Display for Diagnosis {
             );
             row(f, "precision", &text)?;
         }
+        // What looks at it, and what lights it.
         let [width, height] = self.camera.resolution;
         row(f, "camera", &format!("{width} × {height}, {}", self.camera_origin))?;
         if let Some(frames) = self.frames {
@@ -57,6 +60,7 @@ impl fmt::Display for Diagnosis {
         if self.lights > 0 {
             row(f, "lights", &format!("{} in the models", self.lights))?;
         }
+        // What it needs, what is left over, and what was found.
         row(f, "memory", &self.memory)?;
         for path in self.unused_files.iter().take(LISTED) {
             row(f, "unused file", &one_line(&path.to_string_lossy()))?;
