@@ -2,7 +2,7 @@
 
 use etendue_geometry::RayBatch;
 
-use etendue_optics::element::{StatusCounts, LensRays};
+use etendue_optics::element::{LensRays, StatusCounts};
 
 /// Where a batch of samples lies: on the film, in the pupil, and at which wavelength. The arrays have
 /// one entry a sample.

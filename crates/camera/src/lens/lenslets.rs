@@ -88,6 +88,7 @@ impl LensletChiefs {
         let direction = self.chief_slopes(at)?.extend(-1.0).normalize();
         let start = Ray::new(at.extend(self.view.front_z), direction)?;
         let end = self.main.run(Side::Sensor, Clip::Off, start);
-        (end.status == RayStatus::Exited).then(|| (end.ray.position.into(), end.ray.direction.into()))
+        (end.status == RayStatus::Exited)
+            .then(|| (end.ray.position.into(), end.ray.direction.into()))
     }
 }

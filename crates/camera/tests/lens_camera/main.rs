@@ -126,7 +126,11 @@ fn no_ray_of_a_thin_lens_is_lost_at_its_rim() {
         let camera = at_origin(&format!("{THIN}{special}"));
         for place in [[150.0, 100.0], [0.0, 0.0], [299.5, 12.25]] {
             let rays = sampled(&camera, place, 0, 10_000);
-            assert_eq!((rays.statuses.exited, rays.statuses.total()), (10_000, 10_000), "{special}");
+            assert_eq!(
+                (rays.statuses.exited, rays.statuses.total()),
+                (10_000, 10_000),
+                "{special}"
+            );
             assert_eq!(rays.rays.len(), 10_000);
         }
     }

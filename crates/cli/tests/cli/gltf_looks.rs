@@ -467,4 +467,3 @@ fn specular_glossiness_is_a_reflectance_over_a_diffuse_colour() {
     bench.write("t.png", &texels(GREY));
     assert_shows(&bench, [0.215_860_5; 3], "a mirror by its texture");
 }
-

@@ -19,8 +19,8 @@ mod ids; // numbers of objects, copies, nodes and materials, and their names
 mod images; // textures and environments of every kind and size
 mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // tables, drawings and files of lenses, and what is refused
-mod lens_reference; // lenses against other software
 mod lens_pictures; // pictures through lenses, with closed-form answers
+mod lens_reference; // lenses against other software
 mod light_fields; // lenslets, arrays of cameras, and the page about them
 mod limits; // what the page on limits lists
 mod memory; // refused before it is taken

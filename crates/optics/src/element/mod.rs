@@ -40,7 +40,7 @@ pub use microlens_array::{
 };
 pub use part::{Part, PartSpec, Symbol};
 pub use picture::{Picture, Resolve};
-pub use rays::{StatusCounts, LensRays, RayStatus};
+pub use rays::{LensRays, RayStatus, StatusCounts};
 pub use step::Clip;
 pub use surface::{Surface, SurfaceSpec};
 pub use thin_lens::{ThinLens, ThinLensSpec};

@@ -235,7 +235,8 @@ impl Step {
             if block.outcome[lane] == PENDING {
                 let traversal = self.pass_one(block.ray(lane), clip);
                 let mut ray = traversal.ray;
-                if let (RayStatus::Vignetted { .. }, Some(point)) = (traversal.status, traversal.point)
+                if let (RayStatus::Vignetted { .. }, Some(point)) =
+                    (traversal.status, traversal.point)
                     && self.moves()
                 {
                     ray.position = point;

@@ -196,7 +196,8 @@ impl MonochromaticTrain {
             end.status = traversal.status;
             end.ray = traversal.ray;
             if traversal.status != RayStatus::Exited {
-                if let (RayStatus::Vignetted { .. }, Some(point)) = (traversal.status, traversal.point)
+                if let (RayStatus::Vignetted { .. }, Some(point)) =
+                    (traversal.status, traversal.point)
                     && step.moves()
                 {
                     end.ray.position = point;

@@ -8,7 +8,7 @@ use etendue_optics::element::{Clip, LensRays, PartSpec, RayStatus, SurfaceSpec};
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{Focus, FocusError, LensFile, Side};
 
-use super::bench::{YELLOW, status, greatest_height, lens, parallel};
+use super::bench::{YELLOW, greatest_height, lens, parallel, status};
 use crate::{Case, Outcome, Scale};
 
 /// A ball of glass, its front half the surface.
@@ -215,8 +215,9 @@ fn flat(_: Scale) -> Result<Outcome> {
         for sign in [1.0, -1.0] {
             let curved = trace(Some(sign * radius))?;
             for i in 0..plane.len() {
-                outcome
-                    .must(curved.status(i) == RayStatus::Exited, || format!("{:?}", curved.status(i)));
+                outcome.must(curved.status(i) == RayStatus::Exited, || {
+                    format!("{:?}", curved.status(i))
+                });
                 worst = worst.max((curved.direction(i) - plane.direction(i)).length());
             }
         }

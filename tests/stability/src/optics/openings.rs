@@ -10,7 +10,7 @@ use etendue_optics::train::{
     ExitPupil, ExitPupilError, Focus, LensFile, OpticalTrain, PupilSample, Side,
 };
 
-use super::bench::{YELLOW, status, lens, parallel};
+use super::bench::{YELLOW, lens, parallel, status};
 use crate::{Case, Outcome, Scale, rendered};
 
 pub(super) const CLOSED: Case = Case {

@@ -46,7 +46,7 @@ use self::coded::Coded;
 use self::place::turn_of;
 use super::aim::towards_lens;
 use super::{MonochromaticTrain, OpticalTrain, Side};
-use crate::element::{Clip, StatusCounts, Frame, LensRays, RayStatus};
+use crate::element::{Clip, Frame, LensRays, RayStatus, StatusCounts};
 use crate::glass::GlassError;
 
 pub use clear::{without_dimming, without_filters};
