@@ -7,7 +7,7 @@ export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
 .PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-decisions bench-window docs-figures docs-charts \
-	docs-stability gallery light-fields fingerprints fuzz-smoke fuzz-seeds sanitize clean
+	docs-stability gallery light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -38,6 +38,7 @@ help:
 	@echo "make docs-stability  take every method to where it fails, at full scale, write docs/stability.md"
 	@echo "make fingerprints  fingerprints of pictures, sensor images and lens tables, to move code without changing them"
 	@echo "make fuzz-smoke    changed inputs for every reader of files, a minute each"
+	@echo "make fuzz          an hour of coverage-guided fuzzing, which cargo-fuzz and a nightly compiler take"
 	@echo "make fuzz-seeds    write the inputs that cargo-fuzz starts from into fuzz/corpus"
 	@echo "make sanitize      the accelerator in pure Rust under the address sanitizer (a nightly compiler)"
 	@echo "make clean         remove target/ and out/"
@@ -162,6 +163,11 @@ light-fields: setup
 fuzz-smoke: setup
 	cargo build -p etendue-fuzz
 	target/debug/fuzz-smoke $(ARGS)
+
+# An hour of processor time, divided among all readers: ARGS="--minutes 10 glb texture" for less of fewer,
+# ARGS="--page docs/limits.md" to write the table there. What fails is kept in out/fuzz-guided.
+fuzz: setup
+	python3 scripts/fuzz.py $(ARGS)
 
 # The seeds for `cargo +nightly fuzz run TARGET`, in fuzz/corpus.
 fuzz-seeds: setup

@@ -1,15 +1,4 @@
 #![no_main]
 //! `mask_png` of `tests/fuzz`.
 
-use std::sync::LazyLock;
-
-use libfuzzer_sys::fuzz_target;
-
-static FOLDER: LazyLock<tempfile::TempDir> =
-    LazyLock::new(|| tempfile::tempdir().expect("a temporary folder"));
-
-fuzz_target!(|data: &[u8]| {
-    if let Some(target) = etendue_fuzz::targets::named("mask_png") {
-        (target.run)(data, FOLDER.path());
-    }
-});
+libfuzzer_sys::fuzz_target!(|data: &[u8]| etendue_fuzz::guided::read("mask_png", data));

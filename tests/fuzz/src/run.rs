@@ -161,7 +161,7 @@ impl Watch {
 }
 
 /// The processor time of this process and all its threads so far.
-fn processor_time() -> Duration {
+pub(crate) fn processor_time() -> Duration {
     let time = clock_gettime(ClockId::ProcessCPUTime);
     let [seconds, nanoseconds] = [time.tv_sec, time.tv_nsec].map(u64::try_from);
     Duration::from_secs(seconds.unwrap_or(0)) + Duration::from_nanos(nanoseconds.unwrap_or(0))
