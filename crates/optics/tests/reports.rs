@@ -37,6 +37,34 @@ fn a_glass_out_of_its_range_is_told_once() {
     assert_eq!(achromat(0.0).outside_of_range(&[587.56]), Vec::<String>::new());
 }
 
+/// Numbers of the lens file state no range; no glass at all is known there.
+#[test]
+fn wavelengths_of_no_glass_are_told() {
+    let singlet = build(
+        r#"{"elements": [{"type": "surface", "radius": 50, "thickness": 3, "glass": {"n": 1.5},
+            "semi_diameter": 8}, {"type": "surface", "radius": -50}]}"#,
+    );
+    let notes = singlet.outside_of_range(&[100.0, 587.56]);
+    assert_eq!(notes.len(), 1, "air is known everywhere: {notes:?}");
+    let words = "glass n = 1.5 states no range, others are known from 240 to 14000 nm, and 100 nm lies outside";
+    assert_eq!(notes[0], words);
+    assert_eq!(singlet.outside_of_range(&[240.0, 14_000.0]), Vec::<String>::new());
+}
+
+/// The range that all glasses share is that of the catalogue's own lines.
+#[test]
+fn the_range_of_all_glasses_is_the_catalogues() {
+    use etendue_optics::glass::{Glass, Makers, catalogue};
+    let ranges = catalogue().names().filter_map(|name| {
+        let glass = catalogue().find(name, Makers::default()).ok()?;
+        (glass.maker.is_some() && glass.range[0] > 0.0 && glass.range[1].is_finite())
+            .then_some(glass.range)
+    });
+    let widest =
+        ranges.fold([f64::INFINITY, 0.0], |a: [f64; 2], b| [a[0].min(b[0]), a[1].max(b[1])]);
+    assert_eq!(widest, Glass::RANGE_OF_ALL);
+}
+
 #[test]
 fn a_closed_stop_is_told() {
     let closed = build(

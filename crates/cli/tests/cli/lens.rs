@@ -232,6 +232,9 @@ fn wavelengths_out_of_range_are_warned_of_once_or_refused() {
     assert!(output.status.success());
     assert_eq!(text(&output.stderr).matches("N-BK7").count(), 1, "{}", text(&output.stderr));
     refused(&bench, &[&arguments[1..], &["--strict"]].concat(), &["N-BK7", "3000 nm"]);
+    // Numbers state no range, and no glass is known there.
+    bench.write("lens.json", LENS.replace("\"N-BK7\"", "{\"n\": 1.5}").as_bytes());
+    refused(&bench, &["lens.json", "--wavelengths", "100", "--strict"], &["n = 1.5", "100 nm"]);
 }
 
 #[test]

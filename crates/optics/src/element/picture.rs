@@ -121,8 +121,7 @@ fn read(path: &Path) -> Result<Pixels, String> {
             "has {width} x {height} texels, and a mask has {MOST_PIXELS} at most: make it smaller"
         ));
     }
-    let mut values = Vec::new();
-    values.try_reserve_exact(raster.len()).map_err(|_| "does not fit into memory".to_owned())?;
+    let mut values = etendue_image::room(raster.len()).map_err(|_| "does not fit into memory")?;
     for [red, green, blue, alpha] in (0..raster.len()).map(|i| raster.texel(i)) {
         if red != green || red != blue {
             return Err("is coloured; a mask must be grey".to_owned());

@@ -141,6 +141,16 @@ impl Glass {
         wavelength >= self.range[0] && wavelength <= self.range[1]
     }
 
+    /// The wavelengths for which a glass of one maker or another is stated (nm).
+    pub const RANGE_OF_ALL: [f64; 2] = [240.0, 14_000.0];
+
+    /// Whether there are wavelengths for which it is not stated, which may be [known](Self::range). Numbers
+    /// that a lens file gives do not say; air needs not.
+    #[must_use]
+    pub fn states_range(&self) -> bool {
+        self.range != [0.0, f64::INFINITY] || self.dispersion == Dispersion::Constant(1.0)
+    }
+
     /// Whether the index depends on the wavelength.
     #[must_use]
     pub fn is_dispersive(&self) -> bool {

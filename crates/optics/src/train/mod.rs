@@ -215,7 +215,7 @@ impl OpticalTrain {
     #[must_use]
     pub fn outside_of_range(&self, wavelengths: &[f64]) -> Vec<String> {
         let mut notes = Vec::new();
-        let mut tell = |what: String, [from, to]: [f64; 2]| {
+        let mut tell = |known: String, [from, to]: [f64; 2]| {
             // The wavelengths that lie outside, in few words.
             let mut outside: Vec<f64> = wavelengths.to_vec();
             outside.retain(|nm| !(*nm >= from && *nm <= to));
@@ -229,21 +229,30 @@ impl OpticalTrain {
                     format!("{} wavelengths from {first} to {last} nm lie", outside.len())
                 }
             };
-            let note = format!("{what} is known from {from} to {to} nm, and {those} outside");
+            let note = format!("{known} from {from} to {to} nm, and {those} outside");
             if !notes.contains(&note) {
                 notes.push(note);
             }
         };
         // Of all glasses and filters.
         for glass in &self.media {
-            tell(format!("glass {}", glass.name), glass.range);
+            match glass.states_range() {
+                true => tell(format!("glass {} is known", glass.name), glass.range),
+                false => {
+                    let known = format!("glass {} states no range, others are known", glass.name);
+                    tell(known, Glass::RANGE_OF_ALL);
+                }
+            }
         }
         for (i, element) in self.elements.iter().enumerate() {
             match &element.part {
-                Part::Filter(filter) => tell(format!("the filter elements[{i}]"), filter.range()),
+                Part::Filter(filter) => {
+                    tell(format!("the filter elements[{i}] is known"), filter.range());
+                }
                 part => {
                     for curve in part.curves() {
-                        tell(format!("a filter of the lenslets elements[{i}]"), curve.range());
+                        let known = format!("a filter of the lenslets elements[{i}] is known");
+                        tell(known, curve.range());
                     }
                 }
             }
