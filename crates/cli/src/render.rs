@@ -129,6 +129,11 @@ pub(crate) fn write(
     }
     // Files, in a folder of their own when the picture is partial.
     let folder = &rendering.place_in(&arguments.output);
+    if let (Some(partial), Some(samples)) = (&partial, rendering.outdone_in(folder)) {
+        let folder = folder.display();
+        let stays = format!("{partial}; the picture of {samples} samples in {folder} stays");
+        return Err(Fault::failed(stays));
+    }
     if *folder != arguments.output {
         places::folder(folder)?;
     }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
+use etendue_render::denoise;
 use etendue_render::output::{Ledger, MANIFEST, OutputError, Outputs, sidecar};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -237,17 +238,40 @@ fn read_record(path: &Path) -> Option<Record> {
 /// and all as they were written.
 fn is_rendered(folder: &Path, fingerprints: &[(String, String)], files: &[String]) -> bool {
     let Some((header, found)) = complete_picture(folder) else { return false };
-    let is_same = |(key, print): &(String, String)| {
-        header.get(key).and_then(Value::as_str) == Some(print.as_str())
-    };
-    fingerprints.iter().all(is_same)
+    // What its noise was taken out of is another picture.
+    let (denoised, _) = denoise::fingerprint();
+    let is_wanted = fingerprints.iter().any(|(key, _)| *key == denoised);
+    is_of(&header, fingerprints)
+        && (is_wanted || header.get(&denoised).is_none())
         && files.iter().all(|file| found.contains_key(file))
         && Ledger::open(folder, "render").is_whole()
 }
 
-/// The header and the files of the picture in `folder`; `None` when there is none, when a file of it is
-/// missing, or when it was stopped before all samples were taken.
+/// Whether a header has these fingerprints among its entries.
+fn is_of(header: &Value, fingerprints: &[(String, String)]) -> bool {
+    let is_same = |(key, print): &(String, String)| {
+        header.get(key).and_then(Value::as_str) == Some(print.as_str())
+    };
+    fingerprints.iter().all(is_same)
+}
+
+/// The header and the files of the picture in `folder`, as [`picture`]; `None` also when it was stopped before
+/// all samples were taken.
 pub(crate) fn complete_picture(folder: &Path) -> Option<(Value, Map<String, Value>)> {
+    picture(folder).filter(|(header, _)| header.get("partial").is_none())
+}
+
+/// The samples a pixel of the picture with these fingerprints in `folder`, where it was stopped before all of
+/// them were taken.
+pub(crate) fn stopped_samples(folder: &Path, fingerprints: &[(String, String)]) -> Option<u64> {
+    let (header, _) = picture(folder)?;
+    header.get("partial").filter(|_| is_of(&header, fingerprints))?;
+    header.get("samples")?.as_str()?.parse().ok()
+}
+
+/// The header and the files of the picture in `folder`; `None` when there is none, or when a file of it is
+/// missing.
+fn picture(folder: &Path) -> Option<(Value, Map<String, Value>)> {
     let read = |name: &str| -> Option<Value> {
         serde_json::from_slice(&fs::read(folder.join(name)).ok()?).ok()
     };
@@ -259,8 +283,7 @@ pub(crate) fn complete_picture(folder: &Path) -> Option<(Value, Map<String, Valu
         let bytes = print.get("bytes").and_then(Value::as_u64);
         folder.join(name).metadata().is_ok_and(|data| Some(data.len()) == bytes)
     };
-    let is_complete = header.get("partial").is_none() && files.iter().all(is_there);
-    is_complete.then_some((header, files))
+    files.iter().all(is_there).then_some((header, files))
 }
 
 #[cfg(test)]

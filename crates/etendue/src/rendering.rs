@@ -18,7 +18,7 @@ use etendue_render::{Images, Plan, RenderError, Report};
 use etendue_scene::Scene;
 use etendue_sensor::{Exposure, RawImage};
 
-use crate::frame_files::complete_picture;
+use crate::frame_files::{complete_picture, stopped_samples};
 use crate::progress::Phase;
 use crate::{Error, Progress, places};
 
@@ -175,6 +175,15 @@ impl Rendering {
             Some(_) => folder.join(PARTIAL),
             None => folder.to_owned(),
         }
+    }
+
+    /// The samples a pixel of a stopped picture of the same scene in `folder`, where it has more of them than
+    /// this one, which was stopped earlier: it would be a loss to write this one over it.
+    #[must_use]
+    pub fn outdone_in(&self, folder: &Path) -> Option<u64> {
+        self.partial()?;
+        let samples = stopped_samples(folder, &self.fingerprints)?;
+        (samples > u64::from(self.report.samples)).then_some(samples)
     }
 
     /// Writes all files into `folder`, which is made when it is missing; each appears when it is complete.

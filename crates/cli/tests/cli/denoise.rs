@@ -156,6 +156,10 @@ fn frames_are_denoised_and_known_as_complete() {
         "{}",
         text(&output.stderr)
     );
+    // Without it they are other pictures.
+    let output = bench.run(&again);
+    assert!(!text(&output.stderr).contains("were complete"), "{}", text(&output.stderr));
+    assert!(!bench.path("out/frames/000001/denoised.npy").exists());
 }
 
 #[test]

@@ -123,6 +123,15 @@ fn a_stopped_picture_does_not_replace_a_complete_one() {
     running.wait_for(&bench.path("out/picture.so-far.png"));
     running.signal("INT");
     let (status, _, err) = running.end();
+    // What was shown on the way is no file of it.
+    assert!(
+        bench
+            .json("out/partial/etendue-manifest.json")
+            .pointer("/files/render/picture.png")
+            .is_some()
+    );
+    let listed = bench.json("out/partial/etendue-manifest.json").to_string();
+    assert!(!listed.contains("so-far"), "{listed}");
     assert!(
         status.code() == Some(1) && err.contains("the picture so far is in out/partial"),
         "{err}"
@@ -132,6 +141,46 @@ fn a_stopped_picture_does_not_replace_a_complete_one() {
     // The next complete one ends its stay.
     bench.render(&["--samples", "4"]);
     assert!(!bench.path("out/partial").exists());
+}
+
+#[test]
+fn a_stopped_picture_does_not_replace_one_that_was_stopped_later() {
+    let bench = Bench::with_scene(ENDLESS);
+    let so_far = bench.path("out/picture.so-far.png");
+    let shown = || so_far.metadata().and_then(|about| about.modified()).ok();
+    let mut running = Running::start(&bench, &RENDER);
+    running.wait_for(&so_far);
+    // It is shown again when a hundred times as long has gone by as showing it takes.
+    let first = shown();
+    running
+        .wait_until("the picture is shown again", || shown().is_some_and(|at| Some(at) != first));
+    running.signal("INT");
+    let samples = |said: &str| -> u64 {
+        let rest = said.split("stopped after ").nth(1).expect("how many samples there are");
+        rest.split(' ').next().and_then(|number| number.parse().ok()).expect("a number")
+    };
+    let (_, _, err) = running.end();
+    let many = samples(&err);
+    let before = std::fs::read(bench.path("out/layers.exr")).expect("an EXR");
+
+    let mut running = Running::start(&bench, &RENDER);
+    running.wait_for(&so_far);
+    running.signal("INT");
+    let (status, out, err) = running.end();
+    assert_eq!(status.code(), Some(1), "{err}");
+    let few = samples(&err);
+    let is_same = std::fs::read(bench.path("out/layers.exr")).expect("an EXR") == before;
+    assert_eq!(is_same, few <= many, "{many} samples, and then {few}");
+    if few < many {
+        let stays = format!("the picture of {many} samples in out stays");
+        assert!(err.contains(&stays) && out.is_empty(), "{err}");
+    }
+    // Of another scene it is another picture.
+    let mut running = Running::start(&bench, &[&RENDER[..], &["--seed", "9"]].concat());
+    running.wait_for(&so_far);
+    running.signal("INT");
+    let (_, out, err) = running.end();
+    assert!(out.contains("out/layers.exr") && !err.contains("stays"), "{err}");
 }
 
 #[test]

@@ -110,15 +110,16 @@ pub fn note_finished(path: PathBuf) {
     FINISHED.lock().unwrap_or_else(PoisonError::into_inner).insert(path);
 }
 
-/// The files of `folder` that were finished since this was last asked.
+/// The files of `folder` that were finished since this was last asked, without those that go with the work.
 pub(super) fn take_finished(folder: &Path) -> Vec<PathBuf> {
+    let temporary = open_parts();
     let mut finished = FINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     let here: Vec<PathBuf> =
         finished.iter().filter(|path| path.parent() == Some(folder)).cloned().collect();
     here.iter().for_each(|path| {
         finished.remove(path);
     });
-    here
+    here.into_iter().filter(|path| !temporary.contains(path)).collect()
 }
 
 fn open_set() -> MutexGuard<'static, BTreeSet<PathBuf>> {
