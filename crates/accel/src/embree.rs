@@ -129,8 +129,20 @@ impl<'a> SceneBuilder<'a> {
             // SAFETY: the scene is live and ours alone.
             unsafe { sys::rtcCommitScene(scene) };
         }
-        self.device.check("rtcCommitScene")?;
-        Ok(self.handle)
+        match self.device.check("rtcCommitScene") {
+            Ok(()) => Ok(self.handle),
+            Err(error) => {
+                let is_asked_for =
+                    matches!(error, BuildError::Stopped | BuildError::MemoryLimit { .. });
+                if !is_asked_for {
+                    // TBB may have failed in setting the build off, and left the group of its tasks
+                    // unfinished: the destructor of that group throws out of Embree's, which ends the
+                    // process. What the scene still holds is small; its triangles are freed.
+                    std::mem::forget(self.handle);
+                }
+                Err(error)
+            }
+        }
     }
 }
 

@@ -178,7 +178,8 @@ pub enum BuildError {
         /// The limit (bytes).
         limit: u64,
     },
-    /// The machine has no more memory to give. What was built so far is freed.
+    /// The machine has no more memory to give. What was built so far is freed, but for the handle of a
+    /// scene of Embree's.
     #[error(
         "the machine has too little free memory for the {backend} structure ({call}); end other \
          programs, or place fewer or lighter meshes"

@@ -12,6 +12,7 @@ mod opencv;
 mod plan;
 mod progress;
 mod render;
+mod room;
 mod sensor;
 mod sequence;
 mod stop;
@@ -31,7 +32,13 @@ fn main() -> ExitCode {
         version::print();
         return ExitCode::SUCCESS;
     }
-    if let Some(Err(fault)) = cli.command.as_ref().map(glasses::open) {
+    let threads = match &cli.command {
+        Some(Command::Render(arguments)) => arguments.threads,
+        _ => 0,
+    };
+    let ready =
+        room::secure(threads).and_then(|()| cli.command.as_ref().map_or(Ok(()), glasses::open));
+    if let Err(fault) = ready {
         fault.print();
         return fault.exit_code();
     }

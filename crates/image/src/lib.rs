@@ -261,10 +261,20 @@ fn filled<T: Pod>(decoder: impl ImageDecoder, count: usize) -> Result<Vec<T>, De
 
 /// So many zeros, where there is memory for them.
 fn zeroed<T: Pod>(count: usize) -> Result<Vec<T>, DecodeError> {
-    let mut values = Vec::new();
-    let bytes = (count * size_of::<T>()) as u64;
-    values.try_reserve_exact(count).map_err(|_| DecodeError::Memory { bytes })?;
+    let mut values = room(count)?;
     values.resize(count, T::zeroed());
+    Ok(values)
+}
+
+/// Room for so many values.
+///
+/// # Errors
+///
+/// When the system has no memory for them.
+pub fn room<T>(count: usize) -> Result<Vec<T>, DecodeError> {
+    let mut values = Vec::new();
+    let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
+    values.try_reserve_exact(count).map_err(|_| DecodeError::Memory { bytes })?;
     Ok(values)
 }
 

@@ -8,7 +8,7 @@ use exr::meta::MetaData;
 use exr::meta::header::Header;
 use exr::prelude::*;
 
-use crate::{DecodeError, ExrChannels, Limits, Plane, Raster, Samples, zeroed};
+use crate::{DecodeError, ExrChannels, Limits, Plane, Raster, Samples, room};
 
 /// What every EXR file begins with.
 pub(crate) const SIGNATURE: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
@@ -81,7 +81,7 @@ fn window(header: &Header, channels: usize, limits: Limits) -> Result<DisplayWin
     let own = header.own_attributes.layer_position;
     let corner = [offset(own.x(), shown.position.x()), offset(own.y(), shown.position.y())];
     // Memory is asked for here, where it may be refused; below the decoder asks for it.
-    drop(zeroed::<f32>(size[0] * size[1] * channels)?);
+    drop(room::<f32>(size[0] * size[1] * channels)?);
     Ok(DisplayWindow { size, corner, channels })
 }
 
@@ -136,7 +136,10 @@ pub(crate) fn channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, Deco
     let about = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
     let header = about.headers.iter().find(|header| !header.deep).ok_or(DecodeError::Channels)?;
     let side = [header.layer_size.x(), header.layer_size.y()].map(|side| side as u64);
-    limits.judge(side, 4 * header.channels.list.len() as u64)?;
+    let channels = header.channels.list.len();
+    let texels = limits.judge(side, 4 * channels as u64)?;
+    // As in `window`; halves become floats beside what was decoded.
+    drop(room::<f32>(2 * texels * channels)?);
     let image = read()
         .no_deep_data()
         .largest_resolution_level()

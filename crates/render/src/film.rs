@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use etendue_scene::memory::Size;
+use etendue_scene::memory::{Size, has_room};
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 use etendue_tracer::layer::{self, Kept, Look, Taken};
@@ -56,8 +56,8 @@ pub struct NoMemory {
 
 /// Whether there is memory for so many bytes now: for a library that would abort without.
 pub(crate) fn check_room(bytes: usize) -> Result<(), NoMemory> {
-    let reserved = Vec::<u8>::new().try_reserve_exact(bytes);
-    reserved.map_err(|_| NoMemory { bytes: bytes as u64 })
+    let bytes = bytes as u64;
+    if has_room(bytes) { Ok(()) } else { Err(NoMemory { bytes }) }
 }
 
 /// `count` times `value`, where there is memory for it.

@@ -9,6 +9,7 @@ use etendue_geometry::{MappedFile, Transform};
 use rayon::prelude::*;
 
 use crate::file::{InstancesSpec, TransformSpec, join, join_index};
+use crate::memory::has_room;
 use crate::npy;
 use crate::paths::Folder;
 
@@ -58,7 +59,11 @@ fn read(path: &Path) -> Result<Vec<Transform>, String> {
         [_, 3 | 4, 4] => Ok(()),
         other => Err(format!("has the shape {other:?} instead of n × 4 × 4 or n × 3 × 4")),
     })?;
-    let rows = array.shape[1];
+    let [count, rows] = [array.shape[0], array.shape[1]];
+    // They are made side by side with what is wrong with them, and then kept alone.
+    if !has_room(2 * count as u64 * size_of::<Transform>() as u64) {
+        return Err(format!("holds {count} matrices, and the system has no memory for them"));
+    }
     let transforms = array.numbers.par_chunks_exact(4 * rows).enumerate().map(|(index, matrix)| {
         of_rows(matrix).build().map_err(|(_, why)| format!("has a matrix {index} that {why}"))
     });

@@ -6,6 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use rayon::prelude::*;
+
 /// The most memory that may be taken (bytes), and who says so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limit {
@@ -26,6 +28,8 @@ pub enum LimitSource {
     Group,
     /// The shell's limit of addresses, `ulimit -v`.
     Addresses,
+    /// The system, which gave no more when it was asked.
+    System,
 }
 
 impl Limit {
@@ -61,6 +65,7 @@ impl fmt::Display for Limit {
             LimitSource::Machine => write!(f, "the machine has {size} free"),
             LimitSource::Group => write!(f, "the container has {size} free"),
             LimitSource::Addresses => write!(f, "the shell's limit (ulimit -v) leaves {size}"),
+            LimitSource::System => write!(f, "the system gives no more"),
         }
     }
 }
@@ -90,7 +95,41 @@ fn group_has_free(root: &Path) -> Option<u64> {
     folder.ancestors().take_while(|folder| folder.starts_with(&top)).filter_map(free).min()
 }
 
-/// What `ulimit -v` leaves.
+/// What `ulimit -v` leaves to this process (bytes); `None` without such a limit, or where the system does
+/// not tell.
+#[must_use]
+pub fn addresses() -> Option<u64> {
+    addresses_left(Path::new("/"))
+}
+
+/// Whether the system gives so many bytes in one piece now. A library that is about to take them, or a
+/// growing list, would end the process otherwise.
+#[must_use]
+pub fn has_room(bytes: u64) -> bool {
+    let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
+    // What is small is there before and after whatever is large.
+    bytes < SMALL || Vec::<u8>::new().try_reserve_exact(bytes).is_ok()
+}
+
+/// What is not asked for (bytes): the library keeps as much as this in hand of its own accord.
+const SMALL: usize = 1 << 17;
+
+/// Bytes that JSON of these bytes takes once it is read: a value for each comma, and a table of keys for
+/// each object. `{"a":0},` are the most for their length.
+#[must_use]
+pub fn of_json(json: &[u8]) -> u64 {
+    const VALUE: u64 = size_of::<serde_json::Value>() as u64;
+    // The leaf of a `BTreeMap`: eleven keys and values, and the way up.
+    const OBJECT: u64 = 11 * (size_of::<String>() as u64 + VALUE) + 16;
+    let of = |byte: &u8| match byte {
+        b',' => VALUE,
+        b'{' => OBJECT,
+        _ => 0,
+    };
+    json.par_chunks(1 << 20).map(|part| part.iter().map(of).sum::<u64>()).sum::<u64>()
+        + json.len() as u64
+}
+
 fn addresses_left(root: &Path) -> Option<u64> {
     let text = fs::read_to_string(root.join("proc/self/limits")).ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("Max address space"))?;
@@ -123,7 +162,7 @@ impl Budget {
     ///
     /// # Errors
     ///
-    /// When they and all that was spoken for before are over the limit.
+    /// When they and all that was spoken for before are over the limit, or the system has not as many now.
     pub fn take(&self, bytes: u64) -> Result<(), TooMuch> {
         let add = |taken: u64| Some(taken.saturating_add(bytes));
         let before = self.taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
@@ -132,7 +171,12 @@ impl Budget {
             Some(limit) if before.saturating_add(bytes) > limit.bytes => {
                 Err(TooMuch { bytes, before, limit })
             }
-            _ => Ok(()),
+            _ if has_room(bytes) => Ok(()),
+            _ => Err(TooMuch {
+                bytes,
+                before,
+                limit: Limit { bytes: 0, source: LimitSource::System },
+            }),
         }
     }
 }
@@ -226,5 +270,46 @@ mod tests {
         assert!(message.contains("needs 1 B of memory beside 1.0 MiB"), "{message}");
         assert!(message.contains("--memory-limit allows 1.0 MiB"), "{message}");
         assert!(Budget::new(Some(1)).take(u64::MAX).is_err());
+    }
+
+    /// More than any processor has addresses.
+    #[test]
+    fn what_the_system_does_not_give_is_refused_without_a_limit() {
+        let message = Budget::default().take(1 << 62).unwrap_err().to_string();
+        assert!(message.contains("the system gives no more"), "{message}");
+        assert!(Budget::default().take(1 << 20).is_ok());
+    }
+
+    /// Against what the lists and tables of the values hold.
+    #[test]
+    fn json_is_spoken_for_before_it_is_read() {
+        fn held(value: &serde_json::Value) -> u64 {
+            use serde_json::Value;
+            let own = size_of::<Value>() as u64;
+            own + match value {
+                Value::Array(values) => values.iter().map(held).sum(),
+                // A leaf holds five keys at least.
+                Value::Object(map) => {
+                    let pair = size_of::<String>() as u64 + own;
+                    5 * pair
+                        + map.iter().map(|(key, value)| key.len() as u64 + held(value)).sum::<u64>()
+                }
+                Value::String(text) => text.len() as u64,
+                _ => 0,
+            }
+        }
+        for text in [
+            format!("[{}{{}}]", r#"{"a":0},"#.repeat(1000)),
+            format!("[{}0]", "0,".repeat(1000)),
+            format!("{}{}", "[".repeat(100), "]".repeat(100)),
+            format!("\"{}\"", "x".repeat(1000)),
+        ] {
+            let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+            let (held, spoken) = (held(&value), of_json(text.as_bytes()));
+            assert!(
+                spoken + 100 * size_of::<serde_json::Value>() as u64 >= held,
+                "{spoken} for {held}"
+            );
+        }
     }
 }

@@ -8,6 +8,8 @@
 //! Kern, *A Simple File Format for NumPy Arrays*, NEP 1 (2007), with versions 2 and 3 of the format
 //! as `numpy.lib.format` describes them.
 
+use crate::memory::has_room;
+
 /// The longest header (bytes), as NumPy's own reader has it.
 const LONGEST_HEADER: usize = 10_000;
 
@@ -62,6 +64,10 @@ pub(crate) fn read(
         let has = data.len();
         format!("ends before its last number: {has} bytes follow where its shape is {shape:?}")
     })?;
+    let count = data.len() / size;
+    if !has_room((count * size_of::<f64>()) as u64) {
+        return Err(format!("holds {count} numbers, and the system has no memory for them"));
+    }
     // All as f64.
     let numbers = match kind {
         Number::F32 => {

@@ -5,7 +5,7 @@
 //! by half a percent. Those of floats, which have no upper end, are f32. A pyramid takes two thirds of
 //! the memory of its image, or a third where that has 16 bits or f32.
 
-use etendue_image::{DecodeError, Raster, Samples};
+use etendue_image::{DecodeError, Raster, Samples, room};
 
 use crate::texture::{Wrap, bilinear};
 
@@ -129,14 +129,6 @@ fn halved(
         }
     }
     Ok(Raster::new(size, channels, Samples::F32(values)))
-}
-
-/// Room for so many values, where there is memory for them.
-fn room<T>(count: usize) -> Result<Vec<T>, DecodeError> {
-    let mut values = Vec::new();
-    let bytes = (count * size_of::<T>()) as u64;
-    values.try_reserve_exact(count).map_err(|_| DecodeError::Memory { bytes })?;
-    Ok(values)
 }
 
 /// For each of `to` intervals, which of `from` it covers and by what share of itself.

@@ -104,6 +104,10 @@ impl Device {
         Err(match code {
             sys::RTC_ERROR_CANCELLED => BuildError::Stopped,
             sys::RTC_ERROR_OUT_OF_MEMORY => BuildError::OutOfMemory { backend: "Embree", call },
+            // TBB's words for threads whose stacks have no room; of these Embree knows no code.
+            _ if message.contains("pthread_create") => {
+                BuildError::OutOfMemory { backend: "Embree", call }
+            }
             _ => BuildError::Library { call, message },
         })
     }

@@ -216,6 +216,48 @@ fn plans_and_checks_tell_what_memory_a_render_takes() {
     assert_eq!(of(&samples, "sums"), 10_000 * 3 * 16, "a sum and its remainder for each colour");
 }
 
+/// From where the program is hardly loaded to more than any of these takes.
+#[test]
+fn no_command_aborts_where_addresses_are_few() {
+    let bench = Bench::with_scene(BOX);
+    bench.write(
+        "lens.json",
+        br#"{"elements": [{"type": "surface", "radius": 50, "thickness": 4, "glass": "N-BK7",
+            "semi_diameter": 9}, {"type": "surface", "radius": -50}]}"#,
+    );
+    // As large as makes Embree build with all threads.
+    let blob = json!({"etendue": 1, "objects": [{"shape": "blob", "triangles": 100_000}]});
+    bench.write("blob.json", blob.to_string().as_bytes());
+    let small = ["--set", "camera.sensor.resolution=[32,24]"];
+    let render = |scene| [&["render", scene, "-o", "o", "--quiet"], &small[..]].concat();
+    let commands: [&[&str]; 5] = [
+        &["check", "scene.json"],
+        &["plan", "scene.json"],
+        &["lens", "lens.json"],
+        &render("scene.json"),
+        &render("blob.json"),
+    ];
+    let mut done = 0;
+    for megabytes in (100..600).step_by(30).chain([700, 850, 1000, 1400, 2000]) {
+        for arguments in commands {
+            let output = run(&bench, megabytes * 1000, arguments);
+            let said = text(&output.stderr);
+            let at = format!("{megabytes} MB, {arguments:?}: {:?}: {said}", output.status);
+            match output.status.code() {
+                Some(0) => done += 1,
+                Some(2) => {
+                    let is_sentence = said.starts_with("error: ") && said.lines().count() == 1;
+                    assert!(is_sentence, "{at}");
+                }
+                // Before the program is there, the system's loader speaks.
+                Some(127) => assert!(said.contains("shared librar"), "{at}"),
+                _ => panic!("{at}"),
+            }
+        }
+    }
+    assert!(done >= commands.len(), "where there is enough, all of them work");
+}
+
 /// A skinned mesh of few bytes a vertex and a mesh whose long name each of its primitives has.
 #[test]
 fn names_of_meshes_are_spoken_for() {

@@ -171,6 +171,12 @@ fn not_built() -> Error {
     Error::Refused("the structure is not built".to_owned())
 }
 
+/// Small lists, and buffers of files that are written (bytes).
+const BESIDE: u64 = 16 << 20;
+
+/// The stack of a thread of Embree's, and its small lists (bytes).
+const THREAD: u64 = 6 << 20;
+
 /// Refuses what will not fit into the memory that is allowed, or else free.
 fn fits(scene: &Scene, plan: &Plan, limit: Option<u64>) -> Result<(), Error> {
     let memory = &plan.memory;
@@ -179,7 +185,13 @@ fn fits(scene: &Scene, plan: &Plan, limit: Option<u64>) -> Result<(), Error> {
         // What was loaded is no longer free.
         None => memory.to_come(),
     };
-    let Err(error) = Budget::new(limit).take(bytes) else { return Ok(()) };
+    // Asked of the system, too, with what is beside what is counted.
+    let threads = rayon::current_num_threads() as u64;
+    let with_threads = bytes.saturating_add(BESIDE + THREAD.saturating_mul(threads));
+    let taken = Budget::new(limit).take(bytes);
+    let Err(error) = taken.and_then(|()| Budget::default().take(with_threads)) else {
+        return Ok(());
+    };
     let [width, height] = scene.camera.resolution();
     let images = scene.textures.iter().map(|texture| (texture.decoded_bytes(), &texture.name));
     let largest = match images.max() {

@@ -41,6 +41,7 @@ pub(crate) use check::{kind_of, nearest, suggest};
 pub(crate) use document::{join, join_index};
 
 use crate::SceneError;
+use crate::memory::{has_room, of_json};
 use crate::sniff::what_it_is;
 use crate::words::plain;
 use document::{Document, excerpt};
@@ -305,6 +306,10 @@ fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
     let not_a_scene = |reason| SceneError::NotAScene { file: path.to_owned(), reason };
     if let Some(what) = what_it_is(&bytes) {
         return Err(not_a_scene(format!("is {what}, not JSON text")));
+    }
+    // Its text is kept beside its values.
+    if !has_room(of_json(&bytes) + bytes.len() as u64) {
+        return Err(not_a_scene("is more than the system has memory for".to_owned()));
     }
     let text = String::from_utf8(bytes).map_err(|error| {
         not_a_scene(format!("is not UTF-8 text (byte {})", error.utf8_error().valid_up_to()))

@@ -85,6 +85,25 @@ impl Files {
         })
     }
 
+    /// Refuses what the system has no room for while `place` of `file` is read.
+    ///
+    /// # Errors
+    ///
+    /// When it has not so many bytes now.
+    pub(super) fn require_room(
+        &self,
+        file: &Path,
+        place: &str,
+        bytes: u64,
+    ) -> Result<(), ImportError> {
+        // Not of the model's own account: it is given back as soon as the place is read.
+        Budget::default().take(bytes).map_err(|source| ImportError::Memory {
+            file: file.to_owned(),
+            place: place.to_owned(),
+            source,
+        })
+    }
+
     /// Where `written`, a path inside the model, leads; see [`Self::locate_beside`].
     pub(super) fn locate(&self, written: &str) -> Result<Option<PathBuf>, ImportError> {
         self.locate_in(&self.folder, written)

@@ -31,6 +31,7 @@ use std::path::Path;
 
 use super::files::Files;
 use super::{Import, ImportError, Options, Wanted, note};
+use crate::memory::of_json;
 use buffers::Buffers;
 use document::Document;
 
@@ -87,6 +88,7 @@ pub(super) fn import(
 ) -> Result<Import, ImportError> {
     let map = files.map_model(path)?;
     let container = glb::open(path, &map)?;
+    files.require_room(path, "its JSON", of_json(container.json))?;
     let mut document = document::parse(path, container.json, container.in_glb)?;
     let mut import = Import::default();
     extensions::check(path, &document, wanted, &mut import.notes)?;

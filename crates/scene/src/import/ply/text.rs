@@ -48,6 +48,7 @@ pub(super) fn read(
     let columns =
         Columns::of(element, wanted, true).map_err(|reason| Fault::new(header.data, reason))?;
     let mut matrix = Matrix { width: element.properties.len(), values: Vec::new() };
+    matrix.values.reserve_exact(parts.iter().map(|part| part.values.len()).sum());
     let mut faces = Faces::default();
     for mut part in parts {
         matrix.values.append(&mut part.values);

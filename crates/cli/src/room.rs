@@ -1,0 +1,57 @@
+//! Whether there is room for the program itself where the shell limits its addresses (`ulimit -v`).
+//!
+//! What a scene takes is forecast and refused by name. Stacks of threads, and the lists of a few bytes
+//! that are everywhere, are not: without room for them a library ends the process.
+
+use std::os::unix::process::CommandExt;
+use std::process::Command;
+
+use etendue_scene::memory::{Size, addresses};
+
+use crate::fault::Fault;
+
+/// The C library gives each thread that asks it for memory 64 MiB of addresses of its own, used or not:
+/// with one such arena for all, a limit holds what is used.
+const ARENAS: (&str, &str) = ("MALLOC_ARENA_MAX", "1");
+
+/// What the program itself takes beside its threads (bytes).
+const ITSELF: u64 = 40 << 20;
+
+/// What each thread takes (bytes): a stack of ours, one of Embree's, and their small lists.
+const THREAD: u64 = 8 << 20;
+
+/// Refuses to work on so many threads (all, for 0) where the shell leaves too few addresses. Under such a
+/// limit the program starts itself anew, with one arena.
+pub(crate) fn secure(threads: usize) -> Result<(), Fault> {
+    let Some(left) = addresses() else { return Ok(()) };
+    if std::env::var_os(ARENAS.0).is_none() {
+        restart();
+    }
+    let threads = if threads == 0 { all_threads() } else { threads };
+    let needed = ITSELF + THREAD.saturating_mul(threads as u64);
+    if left >= needed {
+        return Ok(());
+    }
+    let plural = if threads == 1 { "" } else { "s" };
+    Err(Fault::refused(format!(
+        "the shell's limit (ulimit -v) leaves {}, and the program itself needs {} with {threads} thread{plural}; \
+         raise the limit",
+        Size(left),
+        Size(needed)
+    )))
+}
+
+/// The same command once more, in this process. Returns where that cannot be had, and then goes on.
+fn restart() {
+    let Ok(program) = std::env::current_exe() else { return };
+    let mut arguments = std::env::args_os();
+    let name = arguments.next().unwrap_or_else(|| program.clone().into_os_string());
+    let _ = Command::new(program).arg0(name).args(arguments).env(ARENAS.0, ARENAS.1).exec();
+}
+
+/// As many as the thread pool takes.
+fn all_threads() -> usize {
+    let named = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse().ok());
+    let named = named.filter(|&threads: &usize| threads > 0);
+    named.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
