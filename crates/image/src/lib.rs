@@ -29,11 +29,20 @@ pub const MOST_BYTES: u64 = 1 << 31;
 pub struct Limits {
     /// Bytes of its decoded values.
     pub bytes: u64,
+    /// Bytes of its file, which are out of proportion to much more.
+    file: u64,
 }
+
+/// Bytes that an image may take, however small its file is.
+const MADE_OF_NOTHING: u64 = 512 << 20;
+
+/// As many more for each byte of its file. One colour all over is a thousandth of its texels, at most
+/// (deflate), a picture a hundredth.
+const MADE_PER_BYTE: u64 = 256;
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { bytes: MOST_BYTES }
+        Self { bytes: MOST_BYTES, file: u64::MAX }
     }
 }
 
@@ -41,7 +50,12 @@ impl Limits {
     /// [`MOST_BYTES`], or less where a whole render may not take as much.
     #[must_use]
     pub fn within(memory: Option<u64>) -> Self {
-        Self { bytes: memory.unwrap_or(MOST_BYTES).min(MOST_BYTES) }
+        Self { bytes: memory.unwrap_or(MOST_BYTES).min(MOST_BYTES), ..Self::default() }
+    }
+
+    /// The same, and no more than is in proportion to the `file`'s bytes.
+    fn of(self, file: &[u8]) -> Self {
+        Self { file: file.len() as u64, ..self }
     }
 
     /// The number of texels of an image of `width` × `height`, each of which takes `texel` bytes.
@@ -55,6 +69,9 @@ impl Limits {
         let bytes = width * height * texel;
         if bytes > self.bytes {
             return Err(DecodeError::Size { width, height, bytes, most: self.bytes });
+        }
+        if bytes > MADE_OF_NOTHING.saturating_add(self.file.saturating_mul(MADE_PER_BYTE)) {
+            return Err(DecodeError::Proportion { width, height, bytes, file: self.file });
         }
         usize::try_from(width * height).map_err(|_| DecodeError::Memory { bytes })
     }
@@ -99,6 +116,22 @@ pub enum DecodeError {
         bytes: u64,
         /// Bytes that it may take.
         most: u64,
+    },
+    /// It takes far more memory than its file.
+    #[error(
+        "it has {width} x {height} texels, which take {:.2} GB decoded, out of all proportion to the {file} \
+         bytes of the file: make it smaller",
+        giga(*bytes)
+    )]
+    Proportion {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+        /// Bytes that it takes.
+        bytes: u64,
+        /// Bytes of the file.
+        file: u64,
     },
     /// The system has less memory than it takes.
     #[error("it takes {:.2} GB decoded, and the system has less: make it smaller", giga(*bytes))]
@@ -147,7 +180,7 @@ fn giga(bytes: u64) -> f64 {
 pub fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {
     // Decoders are others' code over hostile input. They get no state that a panic could leave broken:
     // all that one has seen is dropped with it.
-    let decoded = catch_unwind(AssertUnwindSafe(|| decode_unguarded(bytes, limits)));
+    let decoded = catch_unwind(AssertUnwindSafe(|| decode_unguarded(bytes, limits.of(bytes))));
     decoded.unwrap_or(Err(DecodeError::Panic))
 }
 
@@ -184,7 +217,7 @@ pub fn is_exr(bytes: &[u8]) -> bool {
 ///
 /// When it is over `limits`, no EXR file, or broken.
 pub fn exr_channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, DecodeError> {
-    let read = catch_unwind(AssertUnwindSafe(|| openexr::channels(bytes, limits)));
+    let read = catch_unwind(AssertUnwindSafe(|| openexr::channels(bytes, limits.of(bytes))));
     read.unwrap_or(Err(DecodeError::Panic))
 }
 

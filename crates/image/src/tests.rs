@@ -74,7 +74,7 @@ fn exr_files_of_one_channel_are_grey_and_halves_are_packed() {
         assert_eq!((raster.size(), raster.texel(5)), ([2, 3], [value, value, value, 1.0]));
         // A tenth is no half; the others are.
         assert_eq!(raster.bytes(), if own == 0.1 { 24 } else { 12 });
-        let small = decode(&bytes, Limits { bytes: 23 });
+        let small = decode(&bytes, Limits::within(Some(23)));
         assert!(matches!(small, Err(DecodeError::Size { bytes: 24, .. })), "{small:?}");
     }
 }
@@ -96,6 +96,10 @@ fn sizes_are_judged_before_anything_is_decoded() {
     let large = message(32_768);
     assert!(large.contains("32768 x 32768 texels, which take 3.22 GB"), "{large}");
     assert!(message(40_000).contains("32768 a side"), "{}", message(40_000));
+    // What fits, but not into so few bytes, whatever the compression.
+    let made_of_nothing = message(16_384);
+    let words = "which take 0.81 GB decoded, out of all proportion to the 45 bytes";
+    assert!(made_of_nothing.contains(words), "{made_of_nothing}");
     let limited = decode(&header(1_024), Limits::within(Some(3 << 20))).unwrap_err();
     assert!(!matches!(limited, DecodeError::Size { .. }), "{limited}");
     let limited = decode(&header(1_024), Limits::within(Some((3 << 20) - 1))).unwrap_err();

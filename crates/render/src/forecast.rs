@@ -1,5 +1,6 @@
 //! How much memory a render will take, from counts and headers alone.
 
+use etendue_image::MOST_BYTES;
 use etendue_scene::file::SETS;
 use etendue_scene::{MemoryForecast, Scene};
 use etendue_sensor::{Sensor, SensorKind};
@@ -123,7 +124,11 @@ fn images(scene: &Scene, plan: &Plan) -> u64 {
     let wanted = wanted_images(scene, plan);
     let pairs = scene.textures.iter().zip(&wanted).filter(|(_, wanted)| wanted.is_some());
     let textures = pairs.map(|(texture, _)| {
-        let bytes = texture.decoded_bytes();
+        let bytes = match texture.decoded_bytes() {
+            // Too large to be decoded at all: what is said of it is that.
+            bytes if bytes > MOST_BYTES => 0,
+            bytes => bytes,
+        };
         // The pyramid of means, of 16 bits a channel.
         if plan.footprint { bytes.saturating_add(bytes / 3 * 2) } else { bytes }
     });

@@ -112,7 +112,7 @@ type Pixels = ([usize; 2], Vec<f64>, f64);
 
 fn read(path: &Path) -> Result<Pixels, String> {
     let bytes = files::read(path, LONGEST).map_err(|e| format!("cannot be read: {e}"))?;
-    let limits = Limits { bytes: MOST_BYTES };
+    let limits = Limits::within(Some(MOST_BYTES));
     let raster = etendue_image::decode(&bytes, limits)
         .map_err(|e| format!("is not a picture that can be read: {e}"))?;
     if raster.len() > MOST_PIXELS {
