@@ -41,6 +41,11 @@ pub(crate) fn render(
         session.show(frame)?;
         if arguments.resume && session.is_complete((out, &pattern), frame.number, progress)? {
             skipped += 1;
+            if let Some(own) = pattern.own_folder(frame.number) {
+                // A kill while its manifest was written anew leaves a part of that. What cannot be removed is
+                // nobody's loss.
+                let _ = places::folder(&out.join(own));
+            }
             remove(out.join(checkpoint_of(frame)))?;
             dataset.add(frame, session.scene(progress)?, &pattern, outputs)?;
             continue;

@@ -264,10 +264,14 @@ fn complete_frames_are_left_and_the_rest_is_rendered() {
             .unwrap()
     };
     let before = [time(0), time(1), time(2)];
+    // What a kill leaves of a manifest that was written anew.
+    let part = bench.path("out/frames/000002/.etendue-manifest.json.abc123.part");
+    std::fs::write(&part, b"").unwrap();
     // A frame that lost a file, and one that was stopped.
     std::fs::remove_file(bench.path("out/frames/000001/depth.npy")).unwrap();
     bench.render(&["--resume"]);
     assert_eq!([time(0), time(2)], [before[0], before[2]]);
+    assert!(!part.exists(), "frames that are left as they are, too, are tidied");
     assert_ne!(time(1), before[1]);
     assert!(bench.path("out/frames/000003/layers.exr").exists());
     assert_eq!(bench.json("out/index.json")["frames"].as_array().map(Vec::len), Some(4));
