@@ -34,11 +34,10 @@ pub struct Limits {
 }
 
 /// Bytes that an image may take, however small its file is.
-const MADE_OF_NOTHING: u64 = 512 << 20;
+const MADE_OF_NOTHING: u64 = 128 << 20;
 
-/// As many more for each byte of its file. One colour all over is a thousandth of its texels, at most
-/// (deflate), a picture a hundredth.
-const MADE_PER_BYTE: u64 = 256;
+/// As many more for each byte of its file: what deflate makes of one colour all over, 1032 to 1.
+const MADE_PER_BYTE: u64 = 1024;
 
 impl Default for Limits {
     fn default() -> Self {
