@@ -4,11 +4,11 @@ use std::io::{BufRead, Cursor};
 // The prelude below has another.
 use std::result::Result;
 
-use exr::meta::MetaData;
 use exr::meta::header::Header;
+use exr::meta::{BlockDescription, MetaData};
 use exr::prelude::*;
 
-use crate::{DecodeError, ExrChannels, Limits, Plane, Raster, Samples, room};
+use crate::{DecodeError, ExrChannels, Limits, MOST_BYTES, Plane, Raster, Samples, room};
 
 /// What every EXR file begins with.
 pub(crate) const SIGNATURE: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
@@ -38,6 +38,7 @@ impl DisplayWindow {
 /// beside them where it is. Texels of the display window that the layer does not cover are 0.
 pub(crate) fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {
     let about = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
+    judge_blocks(&about, limits)?;
     let flat = || about.headers.iter().filter(|header| !header.deep);
     let rgb = |header: &&Header| ["R", "G", "B"].iter().all(|name| has(header, name));
     if let Some(header) = flat().find(rgb) {
@@ -54,6 +55,23 @@ pub(crate) fn decode(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError
     let found = flat().find_map(|header| Some((header, lone(header)?)));
     let (header, name) = found.ok_or(DecodeError::Channels)?;
     grey(bytes, header, &name, limits)
+}
+
+/// Whether the blocks that a file is divided into are in proportion to it: a tile may be larger than its image,
+/// and the decoder takes its memory before it reads it.
+fn judge_blocks(about: &MetaData, limits: Limits) -> Result<(), DecodeError> {
+    let limits = Limits { bytes: MOST_BYTES, ..limits };
+    for header in about.headers.iter().filter(|header| !header.deep) {
+        let size = match header.blocks {
+            BlockDescription::Tiles(tiles) => tiles.tile_size,
+            BlockDescription::ScanLines => {
+                Vec2(header.layer_size.x(), header.compression.scan_lines_per_block())
+            }
+        };
+        let size = [size.x(), size.y()].map(|side| side as u64);
+        limits.judge(size, header.channels.bytes_per_pixel as u64)?;
+    }
+    Ok(())
 }
 
 /// Bytes that the first layer takes, with no more than four channels.
@@ -134,6 +152,7 @@ fn grey(bytes: &[u8], header: &Header, name: &Text, limits: Limits) -> Result<Ra
 pub(crate) fn channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, DecodeError> {
     // The header is judged before anything is decoded.
     let about = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
+    judge_blocks(&about, limits)?;
     let header = about.headers.iter().find(|header| !header.deep).ok_or(DecodeError::Channels)?;
     let side = [header.layer_size.x(), header.layer_size.y()].map(|side| side as u64);
     let channels = header.channels.list.len();
