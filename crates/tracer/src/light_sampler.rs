@@ -100,6 +100,7 @@ impl LightSampler {
     }
 
     /// A light for the point `from` (m) by `u` in 0..1: its number, what is left of `u`, and its chance.
+    #[inline]
     pub(crate) fn pick(&self, from: DVec3, u: f64) -> Option<(usize, f64, f64)> {
         let Some(tree) = &self.tree else { return self.pick_other(u) };
         let share = self.share_of_tree(tree, from);
@@ -112,6 +113,7 @@ impl LightSampler {
         Some((index, rest, (1.0 - share) * chance))
     }
 
+    #[inline]
     fn pick_other(&self, u: f64) -> Option<(usize, f64, f64)> {
         match self.others.len() {
             0 => None,

@@ -221,6 +221,8 @@ impl Lights {
 
     /// Chooses a light for the point `from` (m) and a place on it by `square` (in 0..1); its radiance (of
     /// a point its intensity) goes to `radiance`.
+    // Called for every hit from one place, with a large answer that is not to be copied.
+    #[inline(always)]
     pub(crate) fn choose(
         &self,
         around: &SceneView<'_>,
@@ -242,6 +244,7 @@ impl Lights {
     }
 
     /// A place on light `index`, which was chosen with this chance, by `square`.
+    #[inline(always)]
     fn place_on(
         &self,
         around: &SceneView<'_>,
@@ -290,6 +293,7 @@ impl Lights {
     }
 
     /// A place on an emissive triangle.
+    #[inline]
     fn place_on_lamp(
         &self,
         around: &SceneView<'_>,

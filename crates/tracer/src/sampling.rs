@@ -161,6 +161,7 @@ impl DiscreteDistribution {
     /// The index for `u` in 0..1, and `u` stretched to 0..1 again for the next choice. An index
     /// without weight is never chosen.
     #[must_use]
+    #[inline]
     pub fn pick(&self, u: f64) -> (usize, f64) {
         self.pick_between(u, self.guided(u))
     }
