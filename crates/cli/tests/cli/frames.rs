@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::run::{Bench, text};
 
 /// A ball on a floor and the frames of it.
-fn scene(frames: &Value) -> String {
+pub(crate) fn scene(frames: &Value) -> String {
     json!({
         "etendue": 1,
         "tracer": {"type": "facing"},
@@ -466,29 +466,6 @@ fn bad_frames_are_refused_by_number() {
     assert!(error.contains("a.npy") && error.contains("finite"), "{error}");
     let error = refused(&json!({"type": "poses", "poses": [], "times": [1]}), &[], &[]);
     assert!(error.contains("1 times for 0 poses"), "{error}");
-}
-
-#[test]
-fn frames_that_the_scene_has_no_more_go() {
-    let orbit = |count: u32| scene(&json!({"type": "orbit", "count": count}));
-    let by_layer = ["--pattern", "{layer}/{frame}"];
-    for (pattern, gone) in [(&[][..], "frames/000003/depth.npy"), (&by_layer, "depth/000003.npy")] {
-        let bench = Bench::with_scene(&orbit(5));
-        bench.render(pattern);
-        // Something else beside them, and a gap, as after a render of a part.
-        std::fs::create_dir_all(bench.path("out/frames/000004")).unwrap();
-        bench.write("out/frames/000004/mine.txt", b"mine");
-        std::fs::remove_file(bench.path("out").join(gone)).unwrap();
-        bench.write("scene.json", orbit(3).as_bytes());
-        bench.render(pattern);
-        let name = |number: u32| gone.replace("000003", &format!("{number:06}"));
-        let is_there = |number| bench.path("out").join(name(number)).exists();
-        assert_eq!([0, 1, 2, 3, 4].map(is_there), [true, true, true, false, false], "{gone}");
-        assert!(!bench.path("out/frames/000003").exists());
-        assert!(!bench.path("out/frames/000004.json").exists());
-        assert!(bench.path("out/frames/000004/mine.txt").exists(), "what nobody rendered stays");
-        assert_eq!(bench.json("out/index.json")["frames"].as_array().map(Vec::len), Some(3));
-    }
 }
 
 #[test]
