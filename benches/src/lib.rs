@@ -1,14 +1,14 @@
+#![forbid(unsafe_code)]
 //! What the benchmarks share: meshes, rays, the contestants, and how they are timed.
 //!
 //! **The limit** is Embree called directly, a bare loop over prepared records with nothing of ours
-//! in between ([`limit`]). Everything else is given as a ratio to it, measured in the same run, the
+//! in between ([`etendue_accel::limit`]). Everything else is given as a ratio to it, measured in the same run, the
 //! contestants taking turns. Medians and the machine's description come from [`etendue_bench`].
 //!
 //! # Map
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`limit`] | Embree's bare loop |
 //! | [`meshes`] | blob, soup and forest, made by generators |
 //! | [`rays`] | primary, sampled, incoherent and occlusion rays in batches |
 //! | [`contest`] | who is timed, on which clock, and in which order |
@@ -20,6 +20,5 @@ pub mod contest;
 pub mod effort;
 pub mod field;
 pub mod files;
-pub mod limit;
 pub mod meshes;
 pub mod rays;

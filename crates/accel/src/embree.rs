@@ -13,6 +13,8 @@
 mod device;
 mod filter;
 mod instanced;
+#[cfg(feature = "limit")]
+pub mod limit;
 mod shape;
 mod trace;
 
