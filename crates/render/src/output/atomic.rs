@@ -8,7 +8,7 @@
 //! finish wins. The rename is atomic for everyone who looks at the folder; data may still be on its
 //! way to the disk when it happens, so a power cut within seconds can lose it.
 //!
-//! Files of one set ([`Together`]) take their names when all of them are complete.
+//! Files of one set ([`Together`](super::Together)) take their names when all of them are complete.
 //!
 //! Part files are locked by the process that writes them. One that is not is left from a process that
 //! was killed, and the next one that writes into the folder removes it.
@@ -20,90 +20,15 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tempfile::{Builder, NamedTempFile, TempPath};
+use tempfile::{Builder, NamedTempFile};
 
-use super::{OutputError, refuse_inputs};
+use super::{OutputError, refuse_inputs, together};
 
 /// The part files of this process, for a signal handler: what a signal ends is not dropped.
 static OPEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// The files that this process finished, until somebody asks.
 static FINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-/// Complete files that wait for the others of their set, with the folder of it.
-static WAITING: Mutex<Vec<WaitingSet>> = Mutex::new(Vec::new());
-
-/// The files of a [`Together`] of this number.
-#[derive(Debug)]
-struct WaitingSet {
-    number: u64,
-    folder: PathBuf,
-    files: Vec<Waiting>,
-}
-
-fn waiting_sets() -> MutexGuard<'static, Vec<WaitingSet>> {
-    WAITING.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Files that are kept open while they wait: a process may not have many more.
-const MOST_OPEN: usize = 200;
-
-/// A complete file without its name.
-#[derive(Debug)]
-struct Waiting {
-    path: TempPath,
-    target: PathBuf,
-    /// Shows other processes that it is in use.
-    _lock: Option<File>,
-    _entry: Entry,
-}
-
-/// A set of files in one folder and below it, which take their names together: what is finished while
-/// this lives waits, and is gone when this is dropped before [`Self::finish`].
-#[derive(Debug)]
-pub struct Together {
-    number: u64,
-}
-
-impl Together {
-    /// Of the files below `folder`.
-    #[must_use]
-    pub fn in_folder(folder: &Path) -> Self {
-        let mut sets = waiting_sets();
-        let number = sets.iter().map(|set| set.number + 1).max().unwrap_or(0);
-        sets.push(WaitingSet { number, folder: folder.to_owned(), files: Vec::new() });
-        Self { number }
-    }
-
-    /// Its files; none when they were taken.
-    fn take(&self) -> Vec<Waiting> {
-        let mut sets = waiting_sets();
-        let found = sets.iter().position(|set| set.number == self.number);
-        found.map(|at| sets.remove(at).files).unwrap_or_default()
-    }
-
-    /// Gives all files their names.
-    ///
-    /// # Errors
-    ///
-    /// [`OutputError::Io`] when one cannot be renamed; it and those after it are removed then.
-    pub fn finish(self) -> Result<(), OutputError> {
-        let files = self.take();
-        // The number may be another set's from now on.
-        std::mem::forget(self);
-        for Waiting { path, target, .. } in files {
-            path.persist(&target).map_err(|failed| OutputError::io(&target, failed.error))?;
-            note_finished(target);
-        }
-        Ok(())
-    }
-}
-
-impl Drop for Together {
-    fn drop(&mut self) {
-        drop(self.take());
-    }
-}
 
 /// Notes that `path` was written whole, by other means than a [`PartFile`].
 pub fn note_finished(path: PathBuf) {
@@ -289,8 +214,8 @@ impl PartFile {
         }
     }
 
-    /// Gives the file its name, in place of what had it before; of a set ([`Together`]) when all its
-    /// files are complete.
+    /// Gives the file its name, in place of what had it before; of a set ([`Together`](super::Together))
+    /// when all its files are complete.
     ///
     /// # Errors
     ///
@@ -299,14 +224,7 @@ impl PartFile {
         let Self { content, target } = self;
         let done = match content {
             Content::Beside { file, _entry } => {
-                let mut sets = waiting_sets();
-                if let Some(set) = sets.iter_mut().rfind(|set| target.starts_with(&set.folder)) {
-                    let (file, path) = file.into_parts();
-                    let _lock = (set.files.len() < MOST_OPEN).then_some(file);
-                    set.files.push(Waiting { path, target, _lock, _entry });
-                    return Ok(());
-                }
-                drop(sets);
+                let Some(file) = together::wait(file, &target, _entry) else { return Ok(()) };
                 file.persist(&target).map(drop).map_err(|failed| failed.error)
             }
             Content::Apart { mut file, to } => to.fill(&target, &mut file),
@@ -398,7 +316,7 @@ impl Drop for Temporary {
 
 /// A path in [`OPEN`], for as long as this lives.
 #[derive(Debug)]
-struct Entry(PathBuf);
+pub(super) struct Entry(PathBuf);
 
 impl Drop for Entry {
     fn drop(&mut self) {

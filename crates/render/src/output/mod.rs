@@ -49,10 +49,11 @@ mod look;
 mod outputs;
 mod picture;
 mod screen;
+mod together;
 
 pub use atomic::{
-    PartFile, Temporary, Together, note_finished, open_parts, prepare_folder, remove_open_parts,
-    write_over, write_whole,
+    PartFile, Temporary, note_finished, open_parts, prepare_folder, remove_open_parts, write_over,
+    write_whole,
 };
 pub use develop::Development;
 pub(crate) use develop::luminance;
@@ -64,6 +65,7 @@ pub use look::Look;
 pub use outputs::Outputs;
 pub use picture::{Channel, Layer, Picture, Values};
 pub use screen::{DistanceScale, Screen};
+pub use together::Together;
 
 /// What wrote a file, for its header.
 pub const SOFTWARE: &str = concat!("etendue ", env!("CARGO_PKG_VERSION"));

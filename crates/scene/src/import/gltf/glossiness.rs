@@ -10,7 +10,8 @@ use gltf::json;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::material::{Images, Judge, MIRROR};
+use super::images::Images;
+use super::material::{Judge, MIRROR};
 use crate::import::{Import, ImportError};
 
 const NAME: &str = "KHR_materials_pbrSpecularGlossiness";

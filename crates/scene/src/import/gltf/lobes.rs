@@ -6,7 +6,8 @@ use etendue_tracer::texture::Encoding;
 use gltf::json;
 use serde::Deserialize;
 
-use super::material::{Images, Judge};
+use super::images::Images;
+use super::material::Judge;
 use crate::import::{Import, ImportError};
 
 const SHEEN: &str = "KHR_materials_sheen";

@@ -5,19 +5,18 @@
 
 use etendue_tracer::material::{Alpha, GltfSurface, NormalMap, Occlusion};
 use etendue_tracer::spec::BRIGHTEST;
-use etendue_tracer::texture::{Encoding, Filter, Wrap};
-use etendue_tracer::{Emission, ImageSource, Material, Paint, Scattering, Texture, TextureUse};
+use etendue_tracer::texture::Encoding;
+use etendue_tracer::{Emission, Material, Paint, Scattering};
 use gltf::json;
 use json::extensions::texture::TextureTransform;
 use json::material::AlphaMode;
-use json::texture::{MagFilter, WrappingMode};
 use json::validation::Checked;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::buffers::{Bytes, data_uri, percent_decoded};
 use super::glossiness::Glossiness;
-use super::{Reader, extensions, lobes, volume};
+use super::images::Images;
+use super::{Reader, lobes, volume};
 use crate::import::note::{self, Note, NoteKind};
 use crate::import::{Import, ImportError, Strictness};
 
@@ -37,7 +36,7 @@ pub(super) fn number(
 
 /// Reads the document's materials into `import`, and the nameless one behind them.
 pub(super) fn load(reader: &Reader<'_>, import: &mut Import) -> Result<(), ImportError> {
-    let mut images = Images { reader, of_texture: vec![None; reader.document.root.textures.len()] };
+    let mut images = Images::new(reader);
     for (index, material) in reader.document.root.materials.iter().enumerate() {
         let named = material.name.clone().filter(|name| !name.is_empty());
         let subject = named.unwrap_or_else(|| format!("materials[{index}]"));
@@ -344,158 +343,4 @@ fn emission(
         None => Paint::Plain(factor),
     };
     Ok(Some(Emission { radiance, strength, illuminant: None, two_sided: true, group: None }))
-}
-
-/// What crate `gltf` puts for an image that a texture does not name.
-const NO_IMAGE: usize = u32::MAX as usize;
-
-/// The textures that materials name, each located once.
-pub(super) struct Images<'a> {
-    reader: &'a Reader<'a>,
-    /// For each texture of the document: unseen, unusable, or its index in the import.
-    of_texture: Vec<Option<Option<u32>>>,
-}
-
-impl Images<'_> {
-    pub(super) fn use_of(
-        &mut self,
-        from: &str,
-        info: &json::texture::Info,
-        encoding: Encoding,
-        import: &mut Import,
-    ) -> Result<Option<TextureUse>, ImportError> {
-        let index = info.index.value();
-        let known = self.of_texture.get(index).copied().flatten();
-        let texture = match known {
-            Some(texture) => texture,
-            None => {
-                let located = self.locate(index, from, import)?;
-                if let Some(known) = self.of_texture.get_mut(index) {
-                    *known = Some(located);
-                }
-                located
-            }
-        };
-        let Some(texture) = texture else { return Ok(None) };
-        let moved = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
-        Ok(Some(TextureUse {
-            texture,
-            uv_set: moved.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord),
-            transform: moved.map_or(TextureUse::UNCHANGED, matrix),
-            encoding,
-        }))
-    }
-
-    /// Finds the image of texture `index`, which `from` names; `None`, with a note, when it cannot be used.
-    fn locate(
-        &self,
-        index: usize,
-        from: &str,
-        import: &mut Import,
-    ) -> Result<Option<u32>, ImportError> {
-        let reader = self.reader;
-        let root = &reader.document.root;
-        let place = || format!("textures[{index}]");
-        let Some(texture) = root.textures.get(index) else {
-            return Err(reader.absent(from, "texture", index, root.textures.len()));
-        };
-        // Extensions put the image elsewhere and may leave the plain one out.
-        let plain = Some(texture.source.value()).filter(|&source| source != NO_IMAGE);
-        let Some(source) = plain.or_else(|| extensions::webp_image(texture)) else {
-            if let Some(note) = extensions::encoded_texture(reader.file, texture, reader.wanted)? {
-                note::push(&mut import.notes, note);
-                return Ok(None);
-            }
-            return Err(reader.damaged(place(), "it has no image; export the file again"));
-        };
-        let Some(image) = root.images.get(source) else {
-            return Err(reader.absent(place() + ".source", "image", source, root.images.len()));
-        };
-        let Some(source) = self.source(source, image, import)? else {
-            return Ok(None);
-        };
-        let number = u32::try_from(import.textures.len())
-            .map_err(|_| reader.damaged(place(), "there are more than 32 bits can count"))?;
-        let sampler = match texture.sampler {
-            Some(index) => Some(root.samplers.get(index.value()).ok_or_else(|| {
-                let from = place() + ".sampler";
-                reader.absent(from, "sampler", index.value(), root.samplers.len())
-            })?),
-            None => None,
-        };
-        import.textures.push(Texture {
-            name: label(texture, image, index),
-            source,
-            wrap: sampler.map_or([Wrap::Repeat; 2], |s| [wrap(&s.wrap_s), wrap(&s.wrap_t)]),
-            filter: match sampler.and_then(|s| s.mag_filter.as_ref()) {
-                Some(Checked::Valid(MagFilter::Nearest)) => Filter::Nearest,
-                _ => Filter::Bilinear,
-            },
-            named_by_scene: false,
-        });
-        Ok(Some(number))
-    }
-
-    fn source(
-        &self,
-        index: usize,
-        image: &json::Image,
-        import: &mut Import,
-    ) -> Result<Option<ImageSource>, ImportError> {
-        let reader = self.reader;
-        let place = || format!("images[{index}]");
-        if let Some(view) = image.buffer_view {
-            let view = reader.view(view.value(), &(place() + ".bufferView"))?;
-            let bytes = match view.bytes {
-                Bytes::Mapped { .. } => view.bytes.view(view.start, view.len),
-                Bytes::Memory(_) => None,
-            };
-            let copied =
-                || view.bytes.as_slice()[view.start..view.start + view.len].to_vec().into();
-            return Ok(Some(ImageSource::Bytes(bytes.unwrap_or_else(copied))));
-        }
-        let Some(uri) = &image.uri else {
-            let reason = "it has neither a uri nor a bufferView; export the file again";
-            return Err(reader.damaged(place(), reason));
-        };
-        if let Some(data) = data_uri(uri) {
-            let bytes = data.map_err(|reason| reader.damaged(place(), reason))?;
-            return Ok(Some(ImageSource::Bytes(bytes.into())));
-        }
-        let written = percent_decoded(uri);
-        match reader.files.locate(&written)? {
-            Some(file) => Ok(Some(ImageSource::File(file))),
-            None if reader.options.strictness == Strictness::Strict => {
-                Err(reader.damaged(place(), format!("\"{written}\" does not exist")))
-            }
-            None => {
-                note::push(&mut import.notes, note::missing_image(written));
-                Ok(Some(ImageSource::Missing))
-            }
-        }
-    }
-}
-
-/// What to call a texture in messages.
-fn label(texture: &json::Texture, image: &json::Image, index: usize) -> String {
-    let named = texture.name.as_ref().or(image.name.as_ref());
-    let file = || image.uri.as_ref().filter(|uri| !uri.starts_with("data:"));
-    named.or_else(file).cloned().unwrap_or_else(|| format!("textures[{index}]"))
-}
-
-fn wrap(mode: &Checked<WrappingMode>) -> Wrap {
-    match mode {
-        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::ClampToEdge,
-        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::MirroredRepeat,
-        Checked::Valid(WrappingMode::Repeat) | Checked::Invalid => Wrap::Repeat,
-    }
-}
-
-/// `KHR_texture_transform`: translation · rotation · scale, with v downwards, so that a positive
-/// rotation turns the coordinates clockwise as numbers go.
-fn matrix(transform: &TextureTransform) -> [[f64; 3]; 2] {
-    let [x, y] = transform.offset.0.map(f64::from);
-    let [scale_u, scale_v] = transform.scale.0.map(f64::from);
-    let (sin, cos) = f64::from(transform.rotation.0).sin_cos();
-    [[cos * scale_u, sin * scale_v, x], [-sin * scale_u, cos * scale_v, y]]
 }

@@ -17,6 +17,7 @@ mod extensions;
 mod glb;
 mod glossiness;
 mod hierarchy;
+mod images;
 mod instancing;
 mod lights;
 mod lobes;
