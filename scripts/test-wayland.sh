@@ -2,37 +2,10 @@
 # A real window on Wayland, without any X server: a compositor in memory (sway) shows it, and keys drive it. What it
 # renders is what the command line renders, to the bit. A screenshot is left in out/window.
 set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")/.."
+NAME=test-wayland
+. "$(dirname "${BASH_SOURCE[0]}")/window-tests.sh"
 
-# ETENDUE names a command with the window that is built already, as the workspace's tests leave one.
-[ -n "${ETENDUE:-}" ] || cargo build -p etendue-cli --features window
-etendue=$(realpath "${ETENDUE:-target/debug/etendue}")
-shots=$PWD/out/window
-home=$(mktemp -d)
-mkdir -p "$shots" "$home/run"
-
-pids=()
-finish() {
-    for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done
-    wait "${pids[@]}" 2>/dev/null || true
-    rm -rf "$home"
-}
-trap finish EXIT
-
-fail() {
-    echo "test-wayland: $1" >&2
-    cat "$home/said" "$home/sway.log" >&2 2>/dev/null || true
-    exit 1
-}
-
-# until_so SECONDS COMMAND...: waits until the command succeeds.
-until_so() {
-    local end=$((SECONDS + $1))
-    while ! "${@:2}" >/dev/null 2>&1; do
-        [ "$SECONDS" -lt "$end" ] || return 1
-        sleep 0.2
-    done
-}
+mkdir "$home/run"
 
 has_socket() {
     compgen -G "$home/run/wayland-[0-9]" && compgen -G "$home/run/sway-ipc.*"
@@ -74,18 +47,13 @@ keys() {
 }
 
 keys r "$home/shown"
-# The manifest is written last.
-until_so 60 test -s "$home/shown/etendue-manifest.json" || fail "nothing was rendered into a folder"
 "$etendue" render "$home/small.json" -o "$home/saved" --quiet >/dev/null
-for file in picture.png depth.npy normal.npy layers.exr; do
-    cmp "$home/saved/$file" "$home/shown/$file" || fail "$file of the window and of the command line differ"
-done
+same_files
 cp "$home/small.json" "$home/other.json"
 keys o "$home/other.json"
 until_so 60 title_is "other.json - etendue" || fail "the other scene is not opened"
 grim "$shots/wayland.png"
 [ "$(identify -format %k "$shots/wayland.png")" -gt 500 ] || fail "there is no picture in $shots/wayland.png"
 wtype -s 1000 -M ctrl -k q -m ctrl -s 300
-until_so 60 bash -c "! kill -0 $pid" || fail "the window does not close"
-wait "$pid" || fail "the window ends with $?"
+has_ended "$pid"
 echo "the window works on Wayland; the screenshot is $shots/wayland.png"

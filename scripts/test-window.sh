@@ -4,39 +4,8 @@
 # out/window, at once and twice the size, dark and light. docs/images/window.png is lens-1x.png of
 # RESOLUTION=[480,320] SAMPLES=32.
 set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")/.."
-
-# ETENDUE names a command with the window that is built already, as the workspace's tests leave one.
-[ -n "${ETENDUE:-}" ] || cargo build -p etendue-cli --features window
-etendue=$(realpath "${ETENDUE:-target/debug/etendue}")
-shots=$PWD/out/window
-home=$(mktemp -d)
-mkdir -p "$shots"
-
-pids=()
-finish() {
-    for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done
-    wait "${pids[@]}" 2>/dev/null || true
-    rm -rf "$home"
-}
-trap finish EXIT
-
-fail() {
-    echo "test-window: $1" >&2
-    import -window root "$shots/failed.png" 2>/dev/null || true
-    cat "$home/said" >&2 2>/dev/null || true
-    rm -rf "$shots/failed" && cp -r "$home" "$shots/failed"
-    exit 1
-}
-
-# until_so SECONDS COMMAND...: waits until the command succeeds.
-until_so() {
-    local end=$((SECONDS + $1))
-    while ! "${@:2}" >/dev/null 2>&1; do
-        [ "$SECONDS" -lt "$end" ] || return 1
-        sleep 0.2
-    done
-}
+NAME=test-window
+. "$(dirname "${BASH_SOURCE[0]}")/window-tests.sh"
 
 # Without a display it is said what to do, and the exit code is 2.
 code=0
@@ -98,8 +67,7 @@ press() {
 # close_window: by its own shortcut, to the exit code 0.
 close_window() {
     press ctrl+q
-    until_so 60 bash -c "! kill -0 $pid" || fail "the window does not close"
-    wait "$pid" || fail "the window ends with $?"
+    has_ended "$pid"
 }
 
 cp -r scenes/double-gauss.json scenes/lenses "$home/"
@@ -139,11 +107,7 @@ press ctrl+r
 xdotool key ctrl+a
 xdotool type "$home/shown"
 press Return
-# The manifest is written last.
-until_so 60 test -s "$home/shown/etendue-manifest.json" || fail "nothing was rendered into a folder"
-for file in picture.png depth.npy normal.npy layers.exr; do
-    cmp "$home/saved/$file" "$home/shown/$file" || fail "$file of the window and of the command line differ"
-done
+same_files
 
 # A broken file is told, and changes nothing.
 echo '{ "etendue": 1, "camera": ' >"$home/broken.json"
