@@ -44,23 +44,10 @@ impl Sampler {
     /// The samples of the pixel in `column` and `row`, of which there will be `count`.
     #[must_use]
     pub fn pixel(self, seed: u64, column: u32, row: u32, count: u32) -> PixelSamples {
-        self.pixel_in_set(seed, [column, row], 0, count)
-    }
-
-    /// As [`Self::pixel`], in one of up to 2¹⁶ sets that know nothing of each other: means over the
-    /// samples of different sets are independent random numbers.
-    #[must_use]
-    pub fn pixel_in_set(
-        self,
-        seed: u64,
-        [column, row]: [u32; 2],
-        set: u16,
-        count: u32,
-    ) -> PixelSamples {
         // A picture's sides have 16 bits.
-        let pixel = u64::from(row) << 32 | u64::from(set) << 16 | u64::from(column);
+        let pixel = u64::from(row) << 32 | u64::from(column);
         // All pixels have parts of one sequence.
-        let own = if self == Self::BlueNoise { u64::from(set) << 16 } else { pixel };
+        let own = if self == Self::BlueNoise { 0 } else { pixel };
         let place = spread_bits(column) | spread_bits(row) << 1;
         PixelSamples { sampler: self, seed: mix(seed ^ mix(own)), count: count.max(1), place }
     }
@@ -83,7 +70,7 @@ impl PixelSamples {
         let random = |salt: u64| unit(mix(key ^ mix(u64::from(index) << 8 | salt)));
         match self.sampler {
             Sampler::Sobol | Sampler::BlueNoise => {
-                let (key, first) = self.sobol_key(index, pair);
+                let (key, first) = self.sobol_key(index, pair, &mut Sequence::default());
                 sobol::point(key, first)
             }
             Sampler::Independent => [random(0), random(1)],
@@ -111,9 +98,10 @@ impl PixelSamples {
     /// surface's light and direction (the pairs 0, 1, 4 and 5) make the picture together and are dimensions
     /// of one set; each other pair is a set for itself. Sets have 2¹⁶ points, and start over, scrambled
     /// anew.
-    fn sobol_key(&self, index: u32, pair: u32) -> (SobolKey, usize) {
+    #[inline]
+    fn sobol_key(&self, index: u32, pair: u32, sequence: &mut Sequence) -> (SobolKey, usize) {
         if self.sampler == Sampler::BlueNoise {
-            return (self.blue_noise_key(index, pair), 0);
+            return (self.blue_noise_key(index, pair, sequence), 0);
         }
         let (first, apart) = match pair {
             0 => (0, 0),
@@ -131,12 +119,14 @@ impl PixelSamples {
     /// Which point of the picture's sequence a sample is. The scrambling of indices ([`sobol`]) puts the halves
     /// of each square of the Z-order curve, and then each half's, in an order of the pair's own. What is
     /// beyond 2³² points, of large pictures or many samples, is a sequence for itself.
-    fn blue_noise_key(&self, index: u32, pair: u32) -> SobolKey {
+    #[inline]
+    fn blue_noise_key(&self, index: u32, pair: u32, sequence: &mut Sequence) -> SobolKey {
         let own = u64::from(self.place) * u64::from(self.count.next_power_of_two());
         let all = own + u64::from(index);
         let of_sequence = (all >> 32) << 32 | u64::from(pair);
-        #[expect(clippy::cast_possible_truncation, reason = "halves")]
-        let (index, seed) = (all as u32, mix(self.seed ^ mix(of_sequence)) as u32);
+        let seed = sequence.scrambling(self.seed, of_sequence);
+        #[expect(clippy::cast_possible_truncation, reason = "the low half")]
+        let index = all as u32;
         SobolKey { index, seed }
     }
 
@@ -158,17 +148,19 @@ pub fn squares_of_pair(
     out: &mut Vec<[f64; 2]>,
 ) {
     out.clear();
-    if samples.clone().any(|(pixel, _)| !pixel.sampler.is_sobol()) {
+    let mut keys = Vec::with_capacity(samples.size_hint().0);
+    let (mut dimensions, mut is_sobol) = (0, true);
+    let mut sequence = Sequence::default();
+    for (pixel, index) in samples.clone() {
+        is_sobol &= pixel.sampler.is_sobol();
+        let (key, first) = pixel.sobol_key(index, pair, &mut sequence);
+        keys.push(key);
+        dimensions = first;
+    }
+    if !is_sobol {
         out.extend(samples.map(|(pixel, index)| pixel.square(index, pair)));
         return;
     }
-    let mut dimensions = 0;
-    let key = |(pixel, index): (PixelSamples, u32)| {
-        let (key, first) = pixel.sobol_key(index, pair);
-        dimensions = first;
-        key
-    };
-    let keys: Vec<SobolKey> = samples.map(key).collect();
     out.resize(keys.len(), [0.0; 2]);
     sobol::points(&keys, dimensions, out);
 }
@@ -181,13 +173,40 @@ pub fn squares(wanted: &[(PixelSamples, u32, u32)], out: &mut Vec<[f64; 2]>) {
         out.extend(wanted.iter().map(|(pixel, index, pair)| pixel.square(*index, *pair)));
         return;
     }
-    let key = |&(pixel, index, pair): &(PixelSamples, u32, u32)| pixel.sobol_key(index, pair);
-    if wanted.iter().all(|wanted| key(wanted).1 == 0) {
-        let keys: Vec<SobolKey> = wanted.iter().map(|wanted| key(wanted).0).collect();
+    let mut sequence = Sequence::default();
+    let key = |&(pixel, index, pair): &(PixelSamples, u32, u32)| {
+        pixel.sobol_key(index, pair, &mut sequence)
+    };
+    let keys: Vec<(SobolKey, usize)> = wanted.iter().map(key).collect();
+    if keys.iter().all(|&(_, first)| first == 0) {
+        let keys: Vec<SobolKey> = keys.into_iter().map(|(key, _)| key).collect();
         out.resize(keys.len(), [0.0; 2]);
         return sobol::points(&keys, 0, out);
     }
     out.extend(wanted.iter().map(|&(pixel, index, pair)| pixel.square(index, pair)));
+}
+
+/// The scrambling of the sequence that was asked for last: that of nearly all samples of a batch.
+#[derive(Debug, Default)]
+struct Sequence {
+    last: Option<(u64, u64, u32)>,
+}
+
+impl Sequence {
+    #[inline]
+    fn scrambling(&mut self, seed: u64, number: u64) -> u32 {
+        match self.last {
+            Some((of_seed, of_number, scrambling)) if (of_seed, of_number) == (seed, number) => {
+                scrambling
+            }
+            _ => {
+                #[expect(clippy::cast_possible_truncation, reason = "the low half is the seed")]
+                let scrambling = mix(seed ^ mix(number)) as u32;
+                self.last = Some((seed, number, scrambling));
+                scrambling
+            }
+        }
+    }
 }
 
 /// The lower 16 bits, each with a 0 behind it.
@@ -326,28 +345,6 @@ mod tests {
             assert_eq!(at(1, 1), at(1, 1), "{sampler:?}");
             assert_ne!(at(1, 1), at(1, 2), "{sampler:?}");
             assert_ne!(at(1, 1), at(2, 1), "{sampler:?}");
-        }
-    }
-
-    /// The means of two sets of samples of a pixel do not know of each other. Of Sobol points of one set
-    /// they do: the halves of a net fill each other's gaps, with a correlation near −1.
-    #[test]
-    fn sets_are_independent() {
-        let repeats = 4000;
-        for sampler in [Sampler::Sobol, Sampler::Independent] {
-            let (mut products, mut squares) = (0.0, 0.0);
-            for k in 0..repeats {
-                let mean = |set: u16| -> f64 {
-                    let samples = sampler.pixel_in_set(k, [3, 5], set, 16);
-                    (0..16).map(|i| samples.square(i, 0)[0] - 0.5).sum::<f64>() / 16.0
-                };
-                let means = [mean(0), mean(1)];
-                products += means[0] * means[1];
-                squares += means[0] * means[0];
-            }
-            let correlation = products / squares;
-            // Four standard errors.
-            assert!(correlation.abs() < 4.0 / 4000_f64.sqrt(), "{sampler:?}: {correlation}");
         }
     }
 }

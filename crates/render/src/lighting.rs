@@ -134,6 +134,7 @@ fn lit_share(
         rule: None,
         time: None,
         judged: None,
+        least: 0,
         shares: &[],
         keeper: None,
         light: Some(LightPass {

@@ -91,8 +91,8 @@ impl Job<'_> {
         };
         let judged = parts.iter().enumerate().find_map(place).unwrap_or((0, 0));
         let sampling = &self.sampling;
-        let limits = (rule, sampling.samples);
-        Some(Adaptive::new(limits, self.camera.resolution(), sampling.shard, judged))
+        let limits = [self.least, sampling.samples];
+        Some(Adaptive::new(rule, limits, self.camera.resolution(), sampling.shard, judged))
     }
 
     /// The samples after the next pass; `None` when there is no time for one.
@@ -126,7 +126,7 @@ impl Job<'_> {
     }
 }
 
-/// Judges what there is after `samples` samples of each pixel that wanted them, and shows it.
+/// Judges what there is after `samples` samples of each pixel that wanted them, where it is time, and shows it.
 fn judged(
     adaptive: &mut Adaptive<'_>,
     samples: u32,
@@ -134,7 +134,9 @@ fn judged(
     beside: &mut Beside<'_, '_>,
     watcher: &Watcher<'_>,
 ) -> Passed {
-    adaptive.judge(samples, parts);
+    if adaptive.judges_at(samples) {
+        adaptive.judge(samples, parts);
+    }
     parts.iter_mut().for_each(|part| part.show_settled(&adaptive.blocks, samples));
     if !beside.told.is_empty() {
         adaptive.tell(samples, parts, beside.told);
@@ -142,5 +144,5 @@ fn judged(
     watcher.expect(adaptive.to_come(samples) * parts.len() as u64);
     let counts = adaptive.counts(samples);
     let least = counts.map_or(samples, |counts| counts.least);
-    Passed { samples: least, is_complete: !adaptive.goes_on(), counts }
+    Passed { samples: least, is_complete: !adaptive.goes_on(samples), counts }
 }

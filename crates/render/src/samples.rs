@@ -78,18 +78,16 @@ pub(crate) struct Sampling {
     pub(crate) seed: u64,
     /// The share of the pixels, or of the samples, that is rendered.
     pub(crate) shard: Shard,
-    /// Independent sets that the samples of a pixel are of, in turn.
+    /// Sets that the samples of a pixel are of: two of which the first has those before the last power of
+    /// two ([`of_first_set`]), or one.
     pub(crate) sets: u32,
 }
 
 impl Sampling {
-    /// What sample `index` of a pixel is sampled by, and its index there.
-    fn of(&self, column: u32, row: u32, index: u32) -> (PixelSamples, u32) {
-        let Self { samples, sampler, seed, sets, .. } = *self;
-        #[expect(clippy::cast_possible_truncation, reason = "below the few sets that there are")]
-        let set = (index % sets) as u16;
-        let pixel = sampler.pixel_in_set(seed, [column, row], set, samples.div_ceil(sets));
-        (pixel, index / sets)
+    /// Appends what each sample of a pixel in `range` is sampled by, and its index there.
+    fn extend(&self, pixel: [u32; 2], range: Range<u32>, numbers: &mut Vec<(PixelSamples, u32)>) {
+        let pixel = self.sampler.pixel(self.seed, pixel[0], pixel[1], self.samples);
+        numbers.extend(range.map(|index| (pixel, index)));
     }
 
     /// The samples that the share has.
@@ -139,13 +137,12 @@ pub(crate) struct Sum {
 }
 
 impl Sum {
+    /// By Knuth's sum of two numbers without loss, which asks neither for the larger.
+    #[inline]
     fn add(&mut self, value: f64) {
         let sum = self.sum + value;
-        self.lost += if self.sum.abs() >= value.abs() {
-            (self.sum - sum) + value
-        } else {
-            (value - sum) + self.sum
-        };
+        let of_value = sum - self.sum;
+        self.lost += (self.sum - (sum - of_value)) + (value - of_value);
         self.sum = sum;
     }
 
@@ -260,6 +257,20 @@ impl<'a> Averaging<'a> {
     }
 }
 
+/// Of the samples of a pixel, those of the first of two sets: as many as the largest power of two below them,
+/// so that of a power of two both sets have the half.
+pub(crate) fn of_first_set(samples: u32) -> u32 {
+    1 << samples.saturating_sub(1).max(1).ilog2()
+}
+
+/// Puts the sums of both sets of a pixel into the first.
+fn join_sets(sums: &mut [Sum]) {
+    let (first, second) = sums.split_at_mut(sums.len() / 2);
+    for (first, second) in first.iter_mut().zip(second) {
+        first.add_sum(std::mem::take(second));
+    }
+}
+
 type Shared<T> = Mutex<Option<T>>;
 
 /// The sums of each strip; of nothing when none are kept.
@@ -312,9 +323,11 @@ impl Adding<'_> {
         let [width, _] = self.what.camera().resolution();
         let [layers, bands] = self.what.shape();
         let count = layers * bands * self.sampling.sets as usize;
+        let Range { start, end } = *self.pass;
+        let starts_set = self.sampling.sets > 1 && start > 0 && of_first_set(end) == start;
         for tile in Tile::across(width, strip) {
             let wants = |&(x, y): &(u32, u32)| {
-                self.blocks.is_none_or(|blocks| blocks.wants([tile.left + x, tile.top + y]))
+                self.blocks.is_none_or(|blocks| blocks.wants([tile.left + x, tile.top + y], start))
             };
             // Pixels that want more samples, with what they have so far.
             let pixels: Vec<(u32, u32)> = tile.pixels().filter(wants).collect();
@@ -323,6 +336,10 @@ impl Adding<'_> {
             match &kept {
                 Some(kept) => places.clone().for_each(|at| {
                     memory.sums.extend_from_slice(&kept[at * count..(at + 1) * count]);
+                    if starts_set {
+                        let start = memory.sums.len() - count;
+                        join_sets(&mut memory.sums[start..]);
+                    }
                 }),
                 None => memory.sums.resize(pixels.len() * count, Sum::default()),
             }
@@ -341,17 +358,19 @@ impl Adding<'_> {
     fn tile(&self, tile: Tile, pixels: &[(u32, u32)], memory: &mut Memory) -> Result<(), Stopped> {
         let shape @ [layers, bands] = self.what.shape();
         let sets = self.sampling.sets as usize;
+        let of_first = of_first_set(self.pass.end);
         let at_once = (self.pass.end - self.pass.start).clamp(1, self.what.batch());
         let pixels_at_once = (self.what.batch() / at_once) as usize;
         for (k, pixels) in pixels.chunks(pixels_at_once).enumerate() {
             let start = k * pixels_at_once * layers * bands * sets;
             for first in self.pass.clone().step_by(at_once as usize) {
                 let range = first..self.pass.end.min(first + at_once);
-                let a_pixel = range.len();
+                let a_pixel = range.end - range.start;
                 // The sum of each sample of the batch: the pixel's, or that of its set.
                 let slot = |sample: u32| {
-                    let (pixel, index) = (sample as usize / a_pixel, sample as usize % a_pixel);
-                    pixel * sets + (first as usize + index) % sets
+                    let pixel = sample / a_pixel;
+                    let index = first + (sample - pixel * a_pixel);
+                    pixel as usize * sets + usize::from(sets > 1 && index >= of_first)
                 };
                 self.place(tile, (pixels, range), memory);
                 for (number, group) in self.what.groups().iter().enumerate() {
@@ -360,7 +379,7 @@ impl Adding<'_> {
                     self.what.trace(&group.bands, memory);
                     memory.add(start, slot, shape, &group.bands);
                 }
-                self.watcher.did(pixels.len() as u64 * a_pixel as u64)?;
+                self.watcher.did(pixels.len() as u64 * u64::from(a_pixel))?;
             }
         }
         Ok(())
@@ -374,8 +393,7 @@ impl Adding<'_> {
         numbers.clear();
         // The numbers of all samples of these pixels.
         for &(x, y) in pixels {
-            let of = |index| self.sampling.of(tile.left + x, tile.top + y, index);
-            numbers.extend(range.clone().map(of));
+            self.sampling.extend([tile.left + x, tile.top + y], range.clone(), numbers);
         }
         let count = numbers.len();
         // Their places on the sensor, in the pupil, and in the spectrum.
@@ -414,13 +432,12 @@ impl Memory {
         let Self { rays: CameraRays { sample, weight, .. }, values, sums, order, .. } = self;
         let count = layers * bands;
         let mut add = |ray: usize| {
-            let at = start + slot(sample[ray]) * count;
-            let sums = &mut sums[at..at + count];
-            let values = &values[ray * count..(ray + 1) * count];
-            for first in (0..count).step_by(bands.max(1)) {
-                for k in first + group.start..first + group.end {
-                    sums[k].add(values[k] * weight[ray]);
-                }
+            let (at, weight) = (start + slot(sample[ray]) * count, weight[ray]);
+            let sums = sums[at..at + count].chunks_exact_mut(bands.max(1));
+            let values = values[ray * count..(ray + 1) * count].chunks_exact(bands.max(1));
+            for (sums, values) in sums.zip(values) {
+                let values = &values[group.clone()];
+                sums[group.clone()].iter_mut().zip(values).for_each(|(sum, v)| sum.add(v * weight));
             }
         };
         if sample.is_sorted() {

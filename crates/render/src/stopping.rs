@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use etendue_scene::Scene;
-use etendue_scene::file::{SAMPLES_AT_ONCE, SamplesSpec};
+use etendue_scene::file::SamplesSpec;
 use etendue_sensor::NoiseModel;
 
 /// The relative error that stands in for a sensor's noise where there is none.
@@ -82,22 +82,26 @@ impl Stopping {
                 "{least} to {most} a pixel, block by block: more would be lost in the variance that \
                  shot, read-out, dark current and quantisation have at the pixel's signal"
             ),
-            (Self::RelativeError(_) | Self::Count | Self::Time(_), _) => format!(
-                "{least} to {most} a pixel, block by block, by the differences of their sets"
-            ),
+            (Self::RelativeError(_) | Self::Count | Self::Time(_), _) => {
+                format!("{least} to {most} a pixel, block by block, by how far their halves differ")
+            }
         };
         (choice, because)
     }
 }
 
-/// The passes of samples that are judged on the way: after the fewest that there may be, and then
-/// whenever they have become a quarter more. A step of a factor is overshot by half of it on average,
-/// and each judgement costs a look at all sums.
+/// The passes of samples that are judged on the way. Sobol points are evenest where they are a power of two,
+/// so each pass but the last ends at one, or half-way to the next: there those end of which the former tells
+/// that it will do ([`crate::adaptive`]). The first two powers only show how fast the error falls.
 pub(crate) fn judged_passes(least: u32, most: u32) -> Vec<Range<u32>> {
-    let mut passes: Vec<Range<u32>> = std::iter::once(0..least.min(most)).collect();
+    let first = (least / 4).next_power_of_two().max(2).min(most);
+    let mut passes: Vec<Range<u32>> = std::iter::once(0..first).collect();
     while let Some(end) = passes.last().map(|pass| pass.end).filter(|end| *end < most) {
-        let more = (end / 4).next_multiple_of(SAMPLES_AT_ONCE).max(SAMPLES_AT_ONCE);
-        passes.push(end..most.min(end.saturating_add(more)));
+        let next = match end.is_power_of_two() && end >= least {
+            true => end.saturating_add(end / 2),
+            false => end.saturating_add(1).checked_next_power_of_two().unwrap_or(most),
+        };
+        passes.push(end..most.min(next));
     }
     passes
 }
@@ -107,15 +111,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn judged_passes_cover_all_samples_in_whole_sets() {
-        for (least, most) in [(4, 4), (16, 16), (16, 4096), (64, 1 << 20), (8, 12), (4096, 16)] {
+    fn judged_passes_cover_all_samples_and_meet_powers_of_two() {
+        let ends = |least, most| -> Vec<u32> {
+            judged_passes(least, most).iter().map(|pass| pass.end).collect()
+        };
+        assert_eq!(ends(16, 100), [4, 8, 16, 24, 32, 48, 64, 96, 100]);
+        assert_eq!(ends(4, 4), [2, 4]);
+        assert_eq!(ends(12, 12), [4, 8, 12]);
+        for (least, most) in [(16, 16), (16, 4096), (64, 1 << 20), (8, 12), (4, u32::MAX)] {
             let passes = judged_passes(least, most);
-            assert_eq!((passes[0].start, passes[0].end), (0, least.min(most)));
+            assert_eq!(passes[0].start, 0);
             assert_eq!(passes.last().unwrap().end, most);
             assert!(passes.windows(2).all(|pair| pair[0].end == pair[1].start));
-            assert!(passes.iter().all(|pass| pass.len() % 4 == 0), "{passes:?}");
-            assert!(passes[1..].iter().all(|pass| pass.end <= pass.start + pass.start / 4 + 4));
-            assert!(passes.len() < 60, "{}", passes.len());
+            assert!(passes.iter().any(|pass| pass.end == least));
+            let judged = passes.iter().filter(|pass| pass.end.is_power_of_two());
+            assert_eq!(judged.count() as u32, most.ilog2() + 1 - passes[0].end.ilog2());
         }
     }
 }

@@ -4,7 +4,8 @@ use etendue_scene::file::SETS;
 use etendue_tracer::LayerSpec;
 use rayon::prelude::*;
 
-use super::{SampleBlocks, variance_of_mean};
+use super::rule::sizes;
+use super::{SampleBlocks, convergence, variance_of_mean};
 use crate::film::{FilmLayer, PlaneRows, strips, take};
 use crate::samples::{Averaging, Sum, put, split};
 use crate::tiles::TILE;
@@ -81,9 +82,11 @@ impl Averaging<'_> {
             for (index, place) in places(strip.top, width).take(pixels).enumerate() {
                 let samples = blocks.samples(place, samples);
                 let [a, b] = self.sampled(place, first).sets;
-                let of_set = f64::from(samples / SETS);
-                let variance =
-                    |(a, b): (&Sum, &Sum)| variance_of_mean((a.total() - b.total()) / of_set);
+                let of_set = sizes(samples);
+                let share = convergence::share_of_independent(samples, blocks.slope(place));
+                let variance = |(a, b): (&Sum, &Sum)| {
+                    share * variance_of_mean(a.total() / of_set[0] - b.total() / of_set[1])
+                };
                 for layer in &mut strip.layers {
                     let numbers: Vec<f64> = match layer.spec {
                         LayerSpec::SampleCount => vec![f64::from(samples)],

@@ -1,24 +1,26 @@
 //! Samples until an error is reached: which parts of the picture want more.
 //!
-//! The samples of a pixel are of two independent sets, in turn; the difference of their means tells the
-//! variance of the pixel's. After each pass a block of 8 by 8 pixels is judged twice: by the pixels of one
-//! colour of a chessboard, and by those of the other. What is judged by one half of the pixels decides
-//! how many samples the *other* half gets.
+//! The samples of a pixel are points of one sequence, which are evenest when they are a power of two. Then
+//! the picture is judged: the means of the pixel's first half and of its second tell the variance of the
+//! whole ([`convergence`]). A block of 8 by 8 pixels is judged twice: by the pixels of one colour of a
+//! chessboard, and by those of the other. What is judged by one half of the pixels decides how many samples
+//! the *other* half gets: none, half as many again, or as many again.
 //!
 //! So a pixel's samples have no part in deciding their own number, and its mean is without bias whatever
-//! the rule is: the expected value of a mean of N independent samples is theirs if N does not depend on
-//! them, and pixels' samples know nothing of each other. Where the same samples decide and are counted,
+//! the rule is: the expected value of a mean of N samples is theirs if N does not depend on them, and
+//! pixels' samples know nothing of each other. Where the same samples decide and are counted,
 //! pixels that happen to be dark and even stop early, and the picture is too dark (Kirk & Arvo, "Unbiased
 //! sampling techniques for image synthesis", 1991, who propose to throw the deciding samples away; Pharr,
 //! Jakob & Humphreys, "Physically Based Rendering", 4th edition, 2023, section 8.1 on the bias of adaptive
-//! sampling). Here nothing is thrown away. What it costs: two sets of Sobol points fill a pixel less
-//! evenly than one, and what is uneven in a single pixel alone is found by its neighbours or not at all.
+//! sampling). Here nothing is thrown away. What it costs: what is uneven in a single pixel alone is found by
+//! its neighbours or not at all.
 //!
 //! A block goes on as long as it has not passed, or one of the blocks beside, above and below it has more
 //! than twice the error that is allowed: so what is hard is found from the blocks around it, too, and
 //! numbers of samples change gradually, without a seam. Blocks belong to strips of rows, as the shares of a
 //! render do, and look no further.
 
+mod convergence;
 mod halves;
 mod rule;
 
@@ -39,30 +41,54 @@ const BLOCK: u32 = 8;
 /// get about so many times its samples.
 const NEAR: f64 = 2.0;
 
+/// What the error may be for half as many samples again to do: they leave two thirds of a variance at most
+/// ([`convergence`]).
+const MIDWAY: f64 = 1.5;
+
 /// Rows of blocks in a strip of rows.
 const ROWS_OF_STRIP: usize = (TILE / BLOCK) as usize;
 
 /// What is known of a block.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct SampleBlock {
-    /// Samples after which the number of a half was decided by the block's other half; 0 before.
+    /// Samples with which the block's other half found that a half will do; 0 before.
     passed: [u32; HALVES],
-    /// Samples of each pixel of a half, when they are settled; 0 before.
+    /// Samples of each pixel of a half, when they are settled, which may be before it has them; 0 before.
     settled: [u32; HALVES],
     /// The error that is found in each half, as a share of what is allowed.
     error: [f64; HALVES],
+    /// What the two sets of its pixels' samples would tell if they were independent, likewise, and what they
+    /// told when there were half as many.
+    apart: [f64; HALVES],
+    apart_before: [f64; HALVES],
+    /// How fast the variance falls.
+    slope: [f64; HALVES],
+}
+
+impl Default for SampleBlock {
+    fn default() -> Self {
+        Self {
+            passed: [0; HALVES],
+            settled: [0; HALVES],
+            error: [0.0; HALVES],
+            apart: [0.0; HALVES],
+            apart_before: [0.0; HALVES],
+            slope: [1.0; HALVES],
+        }
+    }
 }
 
 impl SampleBlock {
-    fn wants_more(&self) -> bool {
-        self.settled.contains(&0)
+    /// Whether a half is to have more than `samples` samples.
+    fn wants(&self, half: usize, samples: u32) -> bool {
+        self.settled[half] == 0 || self.settled[half] > samples
     }
 
     /// Samples of each pixel of a half, `samples` being what it has while it goes on.
     fn samples(&self, half: usize, samples: u32) -> u32 {
         match self.settled[half] {
             0 => samples,
-            settled => settled,
+            settled => settled.min(samples),
         }
     }
 
@@ -98,9 +124,29 @@ impl SampleBlocks {
         (y / BLOCK) as usize * self.across + (x / BLOCK) as usize
     }
 
-    /// Whether a pixel is to have more samples.
-    pub(crate) fn wants(&self, pixel: [u32; 2]) -> bool {
-        self.of(pixel).settled[half_of(pixel)] == 0
+    /// Whether a pixel is to have more than `samples` samples.
+    pub(crate) fn wants(&self, pixel: [u32; 2], samples: u32) -> bool {
+        self.of(pixel).wants(half_of(pixel), samples)
+    }
+
+    /// How fast the variance of a pixel's mean falls.
+    fn slope(&self, pixel: [u32; 2]) -> f64 {
+        self.of(pixel).slope[half_of(pixel)]
+    }
+
+    /// The blocks beside, above and below one, in its strip of rows.
+    fn around(&self, index: usize) -> impl Iterator<Item = usize> + use<> {
+        let (across, count) = (self.across, self.blocks.len());
+        let strip = ROWS_OF_STRIP * across;
+        let column = index % across;
+        let around = [
+            (column > 0).then(|| index - 1),
+            (column + 1 < across).then_some(index + 1),
+            index.checked_sub(across),
+            Some(index + across),
+        ];
+        let around = around.into_iter().flatten();
+        around.filter(move |other| *other < count && other / strip == index / strip)
     }
 
     /// Samples of a pixel, `samples` being what it has while it goes on.
@@ -186,8 +232,8 @@ impl SampleCounts {
 /// Judges the samples of a picture.
 pub(crate) struct Adaptive<'a> {
     rule: &'a Rule,
-    /// Samples after which a pixel is given up.
-    most: u32,
+    /// Samples that each pixel gets, and after which it is given up.
+    limits: [u32; 2],
     shard: Shard,
     pub(crate) blocks: SampleBlocks,
     /// Which part of what is averaged is judged, and its first value of a pixel.
@@ -196,19 +242,28 @@ pub(crate) struct Adaptive<'a> {
 
 impl<'a> Adaptive<'a> {
     pub(crate) fn new(
-        (rule, most): (&'a Rule, u32),
+        rule: &'a Rule,
+        limits: [u32; 2],
         resolution: [u32; 2],
         shard: Shard,
         judged: (usize, usize),
     ) -> Self {
-        Self { rule, most, shard, blocks: SampleBlocks::new(resolution), judged }
+        Self { rule, limits, shard, blocks: SampleBlocks::new(resolution), judged }
+    }
+
+    /// Whether it is time to judge after so many samples: when both sets have as many, and at the end.
+    pub(crate) fn judges_at(&self, samples: u32) -> bool {
+        samples.is_power_of_two() || samples >= self.limits[1]
     }
 
     /// Judges what there is after `samples` samples of each pixel that wanted them, and settles what is
     /// done.
     pub(crate) fn judge(&mut self, samples: u32, parts: &[Averaging<'_>]) {
         self.measure(samples, &parts[self.judged.0]);
-        self.decide(samples);
+        self.estimate(samples);
+        if samples >= self.limits[0] {
+            self.decide(samples);
+        }
     }
 
     /// Writes to the layers `told` what sampling found of itself.
@@ -216,9 +271,10 @@ impl<'a> Adaptive<'a> {
         parts[self.judged.0].tell(told, &self.blocks, (samples, self.judged.1));
     }
 
-    /// Whether any pixel wants more.
-    pub(crate) fn goes_on(&self) -> bool {
-        self.owned().any(|index| self.blocks.blocks[index].wants_more())
+    /// Whether any pixel wants more than `samples`.
+    pub(crate) fn goes_on(&self, samples: u32) -> bool {
+        let blocks = &self.blocks.blocks;
+        self.owned().any(|index| (0..HALVES).any(|half| blocks[index].wants(half, samples)))
     }
 
     /// The blocks of this share.
@@ -227,59 +283,93 @@ impl<'a> Adaptive<'a> {
         (0..self.blocks.blocks.len()).filter(move |index| self.shard.owns(index / strip))
     }
 
-    /// Measures the errors of the blocks that go on, and marks halves whose number they decide.
+    /// Measures how far the sets are apart in the blocks that go on.
     fn measure(&mut self, samples: u32, part: &Averaging<'_>) {
         let pixels = self.blocks.clone();
         let (shard, rule, first) = (self.shard, self.rule, self.judged.1);
         let strip = ROWS_OF_STRIP * pixels.across;
         self.blocks.blocks.par_iter_mut().enumerate().for_each(|(index, block)| {
-            if !block.wants_more() || !shard.owns(index / strip) {
+            if !shard.owns(index / strip) {
                 return;
             }
-            let found = [0, 1].map(|half| {
+            let apart = [0, 1].map(|half| {
                 let pixels = pixels.pixels(index).filter(|pixel| half_of(*pixel) == half);
-                let has = block.samples(half, samples);
-                let sampled = pixels.map(|pixel| part.sampled(pixel, first));
-                // What is settled stands for what it would be with as many samples as the others have.
-                rule.error(sampled, has).map(|error| error * f64::from(has) / f64::from(samples))
+                let goes_on = block.settled[half] == 0;
+                goes_on.then(|| {
+                    let sampled = pixels.map(|pixel| part.sampled(pixel, first));
+                    rule.error(sampled, samples)
+                })
             });
             // A single pixel has no other half.
-            let either = found[0].or(found[1]).unwrap_or(0.0);
-            block.error = found.map(|error| error.unwrap_or(either));
-            for half in 0..HALVES {
-                if block.passed[half] == 0 && block.error[HALVES - 1 - half] <= 1.0 {
-                    block.passed[half] = samples;
+            let either = apart.iter().copied().flatten().flatten().next().unwrap_or(0.0);
+            for (half, apart) in apart.into_iter().enumerate() {
+                if let Some(apart) = apart {
+                    block.apart_before[half] = block.apart[half];
+                    block.apart[half] = apart.unwrap_or(either);
                 }
             }
         });
     }
 
+    /// Tells the errors of the blocks by how far their sets are apart, and how fast that falls in them and
+    /// the blocks around them.
+    fn estimate(&mut self, samples: u32) {
+        let before = self.blocks.clone();
+        for (index, block) in self.blocks.blocks.iter_mut().enumerate() {
+            for half in 0..HALVES {
+                if block.settled[half] > 0 {
+                    // What is settled stands for what it would be with as many samples as the others have.
+                    block.error[half] *= 0.5;
+                    continue;
+                }
+                let around = before.around(index).chain([index]).map(|at| &before.blocks[at]);
+                let goes_on = around.filter(|block| block.settled[half] == 0);
+                let (last, now) = goes_on.fold((0.0, 0.0), |(last, now), block| {
+                    (last + block.apart_before[half], now + block.apart[half])
+                });
+                let slope = if samples.is_power_of_two() {
+                    convergence::slope(last, now)
+                } else {
+                    block.slope[half]
+                };
+                let share = convergence::share_of_independent(samples, slope);
+                (block.slope[half], block.error[half]) = (slope, share * block.apart[half]);
+            }
+        }
+    }
+
     /// Settles the halves of blocks that have passed with those beside them, and those that have had the
     /// most.
     fn decide(&mut self, samples: u32) {
-        let Self { blocks: SampleBlocks { across, blocks, .. }, most, shard, .. } = self;
-        let (across, strip) = (*across, ROWS_OF_STRIP * *across);
-        let near: Vec<[bool; HALVES]> = blocks.iter().map(SampleBlock::is_near).collect();
-        for (index, block) in blocks.iter_mut().enumerate() {
-            if !shard.owns(index / strip) {
+        let [_, most] = self.limits;
+        let strip = ROWS_OF_STRIP * self.blocks.across;
+        let later = samples.saturating_add(samples / 2);
+        // How many samples do, by the other half of the block.
+        for block in &mut self.blocks.blocks {
+            for half in 0..HALVES {
+                let error = block.error[HALVES - 1 - half];
+                let will_do = error <= MIDWAY && samples.is_power_of_two() && later <= most;
+                if block.passed[half] == 0 && (error <= 1.0 || will_do) {
+                    block.passed[half] = if error <= 1.0 { samples } else { later };
+                }
+            }
+        }
+        let near: Vec<[bool; HALVES]> =
+            self.blocks.blocks.iter().map(SampleBlock::is_near).collect();
+        for index in 0..near.len() {
+            if !self.shard.owns(index / strip) {
                 continue;
             }
-            let column = index % across;
-            let around = [
-                (column > 0).then(|| index - 1),
-                (column + 1 < across).then_some(index + 1),
-                index.checked_sub(across),
-                Some(index + across),
-            ];
-            let around = around.into_iter().flatten();
-            let around: Vec<usize> = around
-                .filter(|other| *other < near.len() && other / strip == index / strip)
-                .collect();
-            let SampleBlock { passed, settled, .. } = block;
-            for (half, (settled, passed)) in settled.iter_mut().zip(passed).enumerate() {
-                let has_passed = *passed > 0 && around.iter().all(|&other| near[other][half]);
-                if *settled == 0 && (has_passed || samples >= *most) {
-                    *settled = samples;
+            for half in 0..HALVES {
+                let is_near = self.blocks.around(index).all(|other| near[other][half]);
+                let SampleBlock { passed, settled, .. } = &mut self.blocks.blocks[index];
+                if settled[half] > 0 {
+                    continue;
+                }
+                if passed[half] > 0 && is_near {
+                    settled[half] = passed[half].max(samples);
+                } else if samples >= most {
+                    settled[half] = samples;
                 }
             }
         }
@@ -288,22 +378,25 @@ impl<'a> Adaptive<'a> {
     /// The rays that are still to come after `samples` samples, by what blocks lack, for each part that
     /// is averaged.
     pub(crate) fn to_come(&self, samples: u32) -> u64 {
-        let more = |index: usize| {
+        let [_, most] = self.limits;
+        let more = |(index, half): (usize, usize)| {
             let block = &self.blocks.blocks[index];
-            let going_on = block.settled.iter().filter(|settled| **settled == 0).count();
-            let error = block.error[0].max(block.error[1]);
             // A variance falls at least as one over the number of samples.
-            let wanted = (f64::from(samples) * error.clamp(1.0, 1e6)).min(f64::from(self.most));
+            let error = block.error[0].max(block.error[1]).clamp(1.0, 1e6);
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
                 reason = "a forecast"
             )]
-            let wanted = (wanted as u32).max(samples) - samples;
-            let pixels = going_on as u64 * u64::from(BLOCK * BLOCK) / HALVES as u64;
-            u64::from(wanted.max(samples / 4)) * pixels
+            let wanted = (f64::from(samples) * error).min(f64::from(most)) as u32;
+            let wanted = match block.settled[half] {
+                0 => wanted.max(samples + samples / 2).min(most),
+                settled => settled,
+            };
+            let pixels = u64::from(BLOCK * BLOCK) / HALVES as u64;
+            u64::from(wanted.saturating_sub(samples)) * pixels
         };
-        self.owned().map(more).sum()
+        self.owned().flat_map(|index| [(index, 0), (index, 1)]).map(more).sum()
     }
 
     /// How many samples the pixels got.

@@ -1,12 +1,11 @@
 //! When the error of a block's samples is small enough.
 
-use etendue_scene::Scene;
-use etendue_scene::file::SETS;
-
 use super::halves::Sampled;
 use crate::Plan;
 use crate::expose::NoiseOfPixels;
+use crate::samples::of_first_set;
 use crate::stopping::Stopping;
+use etendue_scene::Scene;
 
 /// What the error of samples is held against.
 pub(crate) enum Rule {
@@ -29,20 +28,21 @@ impl Rule {
         }
     }
 
-    /// The variance of the mean of some pixels' samples as a share of what is allowed: in the mean over the
-    /// pixels. `samples` is what each pixel has. `None` of no pixels.
+    /// The variance of the mean of two sets of some pixels' samples as a share of what is allowed, as if
+    /// each were for itself: in the mean over the pixels. `samples` is what each pixel has. `None` of no
+    /// pixels.
     pub(super) fn error<'a>(
         &self,
         pixels: impl Iterator<Item = Sampled<'a>>,
         samples: u32,
     ) -> Option<f64> {
-        let of_set = f64::from(samples / SETS);
+        let of_set = sizes(samples);
         let mut count = 0.0;
         match self {
             Self::SensorNoise(noise, share) => {
                 let mut sum = 0.0;
                 for Sampled { pixel, sets: [a, b] } in pixels {
-                    let light = |set: usize, band: usize| [a, b][set][band].total() / of_set;
+                    let light = |set: usize, band: usize| [a, b][set][band].total() / of_set[set];
                     sum += noise.share(pixel, light);
                     count += 1.0;
                 }
@@ -53,7 +53,7 @@ impl Rule {
                 let (mut variance, mut mean) = (0.0, 0.0);
                 for Sampled { sets: [a, b], .. } in pixels {
                     for (a, b) in a.iter().zip(b) {
-                        let [a, b] = [a.total() / of_set, b.total() / of_set];
+                        let [a, b] = [a.total() / of_set[0], b.total() / of_set[1]];
                         variance += variance_of_mean(a - b);
                         mean += 0.5 * (a + b);
                         count += 1.0;
@@ -69,7 +69,14 @@ impl Rule {
     }
 }
 
-/// The variance of the mean of two sets, by the difference of their means: a quarter of its square.
+/// Samples in each of the two sets that `samples` are of.
+pub(super) fn sizes(samples: u32) -> [f64; 2] {
+    let first = of_first_set(samples).min(samples);
+    [first, samples - first].map(|count| f64::from(count.max(1)))
+}
+
+/// The variance of the mean of two independent sets of one size, by the difference of their means: a quarter
+/// of its square.
 pub(crate) fn variance_of_mean(difference: f64) -> f64 {
     0.25 * difference * difference
 }

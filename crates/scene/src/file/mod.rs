@@ -27,7 +27,7 @@ pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, trace_ray
 pub use object::{AnimationSpec, InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
 pub use overrides::OverrideError;
 pub use samples::{
-    RelativeErrorSpec, SAMPLES_AT_ONCE, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
+    LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
 };
 pub use schema::scene_schema;
 pub use sensor::SensorFile;

@@ -8,11 +8,11 @@ use serde_json::Value;
 
 use super::RenderSpec;
 
-/// The independent sets that the samples of a pixel are of where they go on until an error is reached.
+/// The sets that the samples of a pixel are of where they go on until an error is reached.
 pub const SETS: u32 = 2;
 
-/// Samples come in multiples of this, two in each set: odd numbers of Sobol points are uneven.
-pub const SAMPLES_AT_ONCE: u32 = 2 * SETS;
+/// The fewest samples that an error is told by; `max` is a multiple of it.
+pub const LEAST_SAMPLES: u32 = 4;
 
 /// How many samples a pixel gets.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,7 +39,7 @@ pub struct SensorNoiseSpec {
     #[serde(default = "tenth")]
     #[schemars(range(min = 0, max = 1))]
     pub fraction: f64,
-    /// Samples that each pixel gets in any case; rounded up to a multiple of four.
+    /// Samples that each pixel gets in any case; rounded up to a power of two, four at least.
     #[serde(default = "sixteen")]
     #[schemars(range(min = 1, max = 1_048_576))]
     pub min: u32,
@@ -64,7 +64,7 @@ pub struct RelativeErrorSpec {
     /// The standard deviation of the samples' mean, as a share of it (above 0, at most 1).
     #[schemars(range(min = 0, max = 1))]
     pub relative_error: f64,
-    /// Samples that each pixel gets in any case; rounded up to a multiple of four.
+    /// Samples that each pixel gets in any case; rounded up to a power of two, four at least.
     #[serde(default = "sixteen")]
     #[schemars(range(min = 1, max = 1_048_576))]
     pub min: u32,
@@ -109,7 +109,9 @@ impl SamplesSpec {
         match self {
             Self::Count(count) => count,
             Self::SensorNoise(SensorNoiseSpec { max, .. })
-            | Self::RelativeError(RelativeErrorSpec { max, .. }) => whole_sets(max),
+            | Self::RelativeError(RelativeErrorSpec { max, .. }) => {
+                max.next_multiple_of(LEAST_SAMPLES)
+            }
             Self::Time(TimeSpec { max, .. }) => max,
         }
     }
@@ -120,7 +122,9 @@ impl SamplesSpec {
         match self {
             Self::Count(count) => count,
             Self::SensorNoise(SensorNoiseSpec { min, .. })
-            | Self::RelativeError(RelativeErrorSpec { min, .. }) => whole_sets(min),
+            | Self::RelativeError(RelativeErrorSpec { min, .. }) => {
+                min.next_power_of_two().max(LEAST_SAMPLES).min(self.most())
+            }
             Self::Time(_) => 1,
         }
     }
@@ -138,11 +142,6 @@ impl SamplesSpec {
     pub fn is_adaptive(self) -> bool {
         matches!(self, Self::SensorNoise(_) | Self::RelativeError(_))
     }
-}
-
-/// `count`, or the next number that is as many samples in each set.
-fn whole_sets(count: u32) -> u32 {
-    count.next_multiple_of(SAMPLES_AT_ONCE)
 }
 
 /// What makes no sense of `render.samples` in the scene `value`, and its path.
