@@ -34,6 +34,7 @@ if [ "${1:-}" = test ]; then
         need "to drive a window on a screen in memory" xvfb xdotool imagemagick jq
     { command -v sway && command -v grim && command -v wtype; } >/dev/null ||
         need "to drive a window on Wayland" sway grim wtype
+    ldconfig -p | grep -q libwayland-egl.so.1 || need "to draw a window on Wayland" libwayland-egl1
     ldconfig -p | grep -q libxkbcommon-x11 && any_file "/usr/lib/*/dri/*_dri.so" ||
         need "to draw a window without a graphics card: Mesa and X's libraries" \
             libgl1-mesa-dri libgl1 libegl1 libxkbcommon-x11-0 libxcursor1 libxi6 libx11-xcb1

@@ -44,6 +44,12 @@ pub enum WindowError {
          connect with X forwarding (ssh -X), or render to files with `etendue render`"
     )]
     NoDisplay,
+    /// Wayland is there, and what draws on it is not.
+    #[error(
+        "windows are drawn on Wayland by the library libwayland-egl.so.1, which is not here: install it \
+         (on Debian `apt install libwayland-egl1`), or render to files with `etendue render`"
+    )]
+    NoWaylandEgl,
     /// The screen, or OpenGL on it, cannot be used.
     #[error(
         "the window cannot be opened: {0}; over SSH, connect with X forwarding (ssh -X), or render to \
@@ -75,6 +81,10 @@ pub fn run(path: Option<PathBuf>, options: Options) -> Result<(), WindowError> {
     let has_x11 = is_set("DISPLAY");
     if cfg!(target_os = "linux") && !has_x11 && !is_set("WAYLAND_DISPLAY") {
         return Err(WindowError::NoDisplay);
+    }
+    #[cfg(target_os = "linux")]
+    if !has_x11 && !wayland_sys::egl::is_lib_available() {
+        return Err(WindowError::NoWaylandEgl);
     }
     let viewport = egui::ViewportBuilder::default()
         .with_title("etendue")
