@@ -134,7 +134,6 @@ fn lit_share(
         rule: None,
         time: None,
         judged: None,
-        least: 0,
         shares: &[],
         keeper: None,
         light: Some(LightPass {

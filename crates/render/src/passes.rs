@@ -91,7 +91,7 @@ impl Job<'_> {
         };
         let judged = parts.iter().enumerate().find_map(place).unwrap_or((0, 0));
         let sampling = &self.sampling;
-        let limits = [self.least, sampling.samples];
+        let limits = [rule.least, sampling.samples];
         Some(Adaptive::new(rule, limits, self.camera.resolution(), sampling.shard, judged))
     }
 

@@ -287,7 +287,6 @@ pub fn trace(
         rule,
         time: plan.stopping.time(),
         judged: scene.picture,
-        least: scene.render.samples.least(),
         passes: &passes,
         light,
         picture: &so_far,

@@ -125,7 +125,7 @@ mod tests {
             assert!(passes.windows(2).all(|pair| pair[0].end == pair[1].start));
             assert!(passes.iter().any(|pass| pass.end == least));
             let judged = passes.iter().filter(|pass| pass.end.is_power_of_two());
-            assert_eq!(judged.count() as u32, most.ilog2() + 1 - passes[0].end.ilog2());
+            assert_eq!(judged.count(), (most.ilog2() + 1 - passes[0].end.ilog2()) as usize);
         }
     }
 }

@@ -59,8 +59,6 @@ pub(crate) struct Job<'a> {
     pub(crate) time: Option<Duration>,
     /// Which layer is the picture, by whose error samples are judged.
     pub(crate) judged: Option<LayerSpec>,
-    /// Samples that each pixel gets before its error may stop it.
-    pub(crate) least: u32,
     /// Shares of the samples, which are put together instead of being traced.
     pub(crate) shares: &'a [FilmFile],
     /// Who keeps it on disk.

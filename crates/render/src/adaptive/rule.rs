@@ -7,8 +7,15 @@ use crate::samples::of_first_set;
 use crate::stopping::Stopping;
 use etendue_scene::Scene;
 
+/// When samples are enough.
+pub(crate) struct Rule {
+    /// Not before there are so many of each pixel.
+    pub(crate) least: u32,
+    allowed: Allowed,
+}
+
 /// What the error of samples is held against.
-pub(crate) enum Rule {
+enum Allowed {
     /// The noise of the sensor, of which the variance of the samples' mean may be this share.
     SensorNoise(Box<NoiseOfPixels>, f64),
     /// The light itself, of which the standard deviation may be this share.
@@ -18,14 +25,15 @@ pub(crate) enum Rule {
 impl Rule {
     /// The rule of a plan; `None` where the number of samples is given.
     pub(crate) fn of(scene: &Scene, plan: &Plan) -> Option<Self> {
-        match plan.stopping {
-            Stopping::Count | Stopping::Time(_) => None,
-            Stopping::RelativeError(share) => Some(Self::RelativeError(share)),
+        let allowed = match plan.stopping {
+            Stopping::Count | Stopping::Time(_) => return None,
+            Stopping::RelativeError(share) => Allowed::RelativeError(share),
             Stopping::SensorNoise(share) => {
                 let noise = NoiseOfPixels::of(scene, &plan.bands)?;
-                Some(Self::SensorNoise(Box::new(noise), share))
+                Allowed::SensorNoise(Box::new(noise), share)
             }
-        }
+        };
+        Some(Self { least: scene.render.samples.least(), allowed })
     }
 
     /// The variance of the mean of two sets of some pixels' samples as a share of what is allowed, as if
@@ -38,8 +46,8 @@ impl Rule {
     ) -> Option<f64> {
         let of_set = sizes(samples);
         let mut count = 0.0;
-        match self {
-            Self::SensorNoise(noise, share) => {
+        match &self.allowed {
+            Allowed::SensorNoise(noise, share) => {
                 let mut sum = 0.0;
                 for Sampled { pixel, sets: [a, b] } in pixels {
                     let light = |set: usize, band: usize| [a, b][set][band].total() / of_set[set];
@@ -48,7 +56,7 @@ impl Rule {
                 }
                 (count > 0.0).then(|| sum / count / share)
             }
-            Self::RelativeError(share) => {
+            Allowed::RelativeError(share) => {
                 // Two sets differ by twice the variance of their mean.
                 let (mut variance, mut mean) = (0.0, 0.0);
                 for Sampled { sets: [a, b], .. } in pixels {
