@@ -207,7 +207,8 @@ impl Plan {
         }
         let because = match &self.passes[..] {
             [first, ..] if self.stopping.is_adaptive() => format!(
-                "at most: the picture can be seen after {} samples a pixel, and is judged after each",
+                "at most: the picture can be seen after {} samples a pixel, and is judged where they are \
+                 a power of two",
                 first.end
             ),
             [first, .., last] => format!(
