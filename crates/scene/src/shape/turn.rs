@@ -36,9 +36,10 @@ pub(super) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     };
     let sin = angle + angle * square * polynomial(&SIN);
     let cos = 1.0 - 0.5 * square + square * square * polynomial(&COS);
-    let quarters = quarters.rem_euclid(4.0);
-    let (sin, cos) = if quarters % 2.0 == 1.0 { (cos, -sin) } else { (sin, cos) };
-    if quarters >= 2.0 { (-sin, -cos) } else { (sin, cos) }
+    #[expect(clippy::cast_possible_truncation, reason = "whole, and below 2⁵²")]
+    let quadrant = quarters as i64 & 3;
+    let (sin, cos) = if quadrant & 1 == 1 { (cos, -sin) } else { (sin, cos) };
+    if quadrant >= 2 { (-sin, -cos) } else { (sin, cos) }
 }
 
 #[cfg(test)]
