@@ -52,7 +52,7 @@ pub(crate) fn points(keys: &[SobolKey], first: usize, out: &mut [[f64; 2]]) {
 
 /// The point of one key in dimensions `first` and `first + 1`.
 pub(crate) fn point(key: SobolKey, first: usize) -> [f64; 2] {
-    let [point] = side_by_side([key], first, &DIRECTIONS);
+    let [point] = side_by_side([key.index], |_| key.seed, first, &DIRECTIONS);
     point
 }
 
@@ -66,11 +66,28 @@ fn scrambled(
     let (whole, rest) = keys.as_chunks::<LANES>();
     let (to, to_rest) = out.as_chunks_mut::<LANES>();
     for (keys, out) in whole.iter().zip(to) {
-        *out = side_by_side(*keys, first, directions);
+        *out = chunk(keys, first, directions);
     }
-    let mut lanes = [SobolKey::default(); LANES];
-    lanes[..rest.len()].copy_from_slice(rest);
-    to_rest.copy_from_slice(&side_by_side(lanes, first, directions)[..rest.len()]);
+    if let Some(last) = rest.last() {
+        let mut lanes = [*last; LANES];
+        lanes[..rest.len()].copy_from_slice(rest);
+        to_rest.copy_from_slice(&chunk(&lanes, first, directions)[..rest.len()]);
+    }
+}
+
+/// Where all are of one scrambling, as nearly always, what goes into it is hashed once.
+#[inline(always)]
+fn chunk(
+    keys: &[SobolKey; LANES],
+    first: usize,
+    directions: &[[u32; BITS]; DIMENSIONS],
+) -> [[f64; 2]; LANES] {
+    let [index, seeds] = [keys.map(|key| key.index), keys.map(|key| key.seed)];
+    let seed = seeds[0];
+    match seeds.iter().fold(0, |others, other| others | (other ^ seed)) {
+        0 => side_by_side(index, |_| seed, first, directions),
+        _ => side_by_side(index, |i| seeds[i], first, directions),
+    }
 }
 
 /// The second dimension of point `index`, its bits reversed.
@@ -86,16 +103,16 @@ fn second_reversed(index: u32) -> u32 {
 
 #[inline(always)]
 fn side_by_side<const N: usize>(
-    keys: [SobolKey; N],
+    keys: [u32; N],
+    seed: impl Fn(usize) -> u32,
     first: usize,
     directions: &[[u32; BITS]; DIMENSIONS],
 ) -> [[f64; 2]; N] {
     const DIMENSION: [u32; 2] = [0x912f_69ba, 0x174f_18ab];
-    // The scrambled index and the seed of each sequence.
-    let (mut index, mut seed) = ([0; N], [0; N]);
+    // The scrambled index of each sequence.
+    let mut index = [0; N];
     for i in 0..N {
-        seed[i] = hash(keys[i].seed);
-        index[i] = owen_scramble_rev(keys[i].index.reverse_bits(), seed[i]).reverse_bits();
+        index[i] = owen_scramble_rev(keys[i].reverse_bits(), hash(seed(i))).reverse_bits();
     }
     let mut out = [[0.0; 2]; N];
     for k in 0..2 {
@@ -115,7 +132,7 @@ fn side_by_side<const N: usize>(
         // Scrambled by Owen's method: 32 bits of it, and 21 more by hashing.
         let salt = hash(DIMENSION[k].wrapping_add(u32::try_from(first).unwrap_or(0)));
         for i in 0..N {
-            let scramble = hash(seed[i] ^ salt);
+            let scramble = hash(hash(seed(i)) ^ salt);
             let high = owen_scramble_rev(number[i], scramble).reverse_bits();
             let low = hash(high ^ scramble) >> 11;
             out[i][k] = (f64::from(high) + f64::from(low) / TWO_TO_21) / TWO_TO_32;
