@@ -1,0 +1,133 @@
+//! Chances beside picks, and picks beside what lights bring.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use etendue_geometry::Bounds;
+
+use super::*;
+
+/// xorshift*: Vigna 2016.
+fn random() -> impl FnMut() -> f64 {
+    let mut state = 0x1234_5678_9abc_def1_u64;
+    move || {
+        state ^= state >> 12;
+        state ^= state << 25;
+        state ^= state >> 27;
+        (state.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+fn at(place: DVec3, axis: DVec3, cone: f64, intensity: f64) -> Cluster {
+    let bounds = Bounds { min: place, max: place };
+    Cluster { bounds, axis, cone, reach: FRAC_PI_2, intensity }
+}
+
+/// Lamps that shine to one side, and points, in a room of two metres.
+fn lights(count: u32, mut random: impl FnMut() -> f64) -> Vec<(u32, Cluster)> {
+    let mut vector = move || DVec3::from([random(), random(), random()].map(|x| 2.0 * x - 1.0));
+    (0..count)
+        .map(|k| {
+            let (place, axis) = (vector(), vector().normalize());
+            let cone = if k % 2 == 0 { PI } else { 0.0 };
+            let mut light = at(place, axis, cone, 0.1 + f64::from(k % 7));
+            if k % 2 == 1 {
+                light.bounds.max += 0.03 * vector().abs();
+            }
+            (k, light)
+        })
+        .collect()
+}
+
+#[test]
+fn picks_have_the_chances_that_are_stated() {
+    let all = lights(200, random());
+    let tree = LightTree::new(all.clone(), 200);
+    let mut random = random();
+    for _ in 0..20 {
+        let from = DVec3::from([random(), random(), random()].map(|x| 3.0 * x - 1.5));
+        let chances: Vec<f64> = (0..200).map(|k| tree.chance(from, k)).collect();
+        let sum: f64 = chances.iter().sum();
+        // A node may promise what none of its lights keeps.
+        assert!((0.5..1.0 + 1e-12).contains(&sum), "{sum}");
+        let steps = 20_000;
+        let mut counts = vec![0.0; 200];
+        for k in 0..steps {
+            let u = (f64::from(k) + 0.5) / f64::from(steps);
+            let Some((number, rest, chance)) = tree.pick(from, u) else { continue };
+            assert!((chance / chances[number] - 1.0).abs() < 1e-9);
+            assert!((0.0..1.0).contains(&rest));
+            counts[number] += 1.0 / f64::from(steps);
+        }
+        for (count, chance) in counts.iter().zip(&chances) {
+            // A regular grid meets an interval to within one step.
+            assert!((count - chance).abs() <= 1.001 / f64::from(steps), "{count} {chance}");
+        }
+    }
+}
+
+/// Wherever a lamp's front is seen, it may be picked.
+#[test]
+fn nothing_that_shines_is_left_out() {
+    let all = lights(200, random());
+    let tree = LightTree::new(all.clone(), 200);
+    let mut random = random();
+    let (mut seen, mut dark) = (0, 0);
+    for _ in 0..500 {
+        let from = DVec3::from([random(), random(), random()].map(|x| 3.0 * x - 1.5));
+        for (number, light) in &all {
+            let corners = light.bounds.corners();
+            let shines = |corner: &DVec3| (from - *corner).dot(light.axis) > 0.0;
+            let chance = tree.chance(from, *number as usize);
+            if light.cone >= PI || corners.iter().any(shines) {
+                assert!(chance > 0.0, "{number} from {from}");
+                seen += 1;
+            } else if chance == 0.0 {
+                dark += 1;
+            }
+        }
+    }
+    assert!(seen > 50_000 && dark > 10_000, "{seen} {dark}");
+}
+
+/// The variance of one light's share over its chance, Σ eᵢ²/pᵢ − (Σ eᵢ)², of 100 points in a room:
+/// less than a third of that by power.
+#[test]
+fn near_lights_are_picked_more_often() {
+    let mut random = random();
+    let mut place = || DVec3::from([random(), random(), random()].map(|x| 2.0 * x - 1.0));
+    let all: Vec<_> =
+        (0..100).map(|k| (k, at(place(), DVec3::Y, PI, 0.02 + 0.04 * f64::from(k % 3)))).collect();
+    let tree = LightTree::new(all.clone(), 100);
+    let power: f64 = all.iter().map(|(_, light)| light.intensity).sum();
+    let (mut by_tree, mut by_power) = (0.0, 0.0);
+    for _ in 0..200 {
+        // On the floor, which faces +Y.
+        let from = DVec3::new(place().x, -1.0, place().z);
+        let (mut sum, mut of_tree, mut of_power) = (0.0, 0.0, 0.0);
+        for (number, light) in &all {
+            let way = light.bounds.min - from;
+            let brings = light.intensity * way.normalize().y / way.length_squared();
+            sum += brings;
+            of_tree += brings * brings / tree.chance(from, *number as usize);
+            of_power += brings * brings / (light.intensity / power);
+        }
+        by_tree += of_tree / (sum * sum) - 1.0;
+        by_power += of_power / (sum * sum) - 1.0;
+    }
+    assert!(by_tree < by_power / 3.0, "{by_tree} {by_power}");
+}
+
+#[test]
+fn lights_in_one_place_and_along_a_line_are_parted_too() {
+    for step in [0.0, 1.0] {
+        let line = |k: u32| (k, at(DVec3::X * (step * f64::from(k)), DVec3::Y, 0.0, 1.0));
+        let tree = LightTree::new((0..1000).map(line).collect(), 1000);
+        let from = DVec3::new(3.0, 4.0, 0.0);
+        let sum: f64 = (0..1000).map(|k| tree.chance(from, k)).sum();
+        assert!((sum - 1.0).abs() < 1e-12, "{sum}");
+    }
+    // All face away; along a line, the ball around a far node reaches to the other side.
+    let here = (0..1000).map(|k| (k, at(DVec3::X, DVec3::Y, 0.0, 1.0))).collect();
+    let behind = DVec3::new(3.0, -4.0, 0.0);
+    assert!(LightTree::new(here, 1000).pick(behind, 0.5).is_none());
+}
