@@ -11,6 +11,7 @@
 //! Electrons count as right within [`TOLERANCE`] of themselves; of colours darker than a tenth of
 //! white, within that of a tenth of white, and behind two pure colours within that of white.
 
+mod division;
 mod nodes;
 
 use etendue_spectrum::{Bands, Curve, Grid, Outside, WeightedBands, rgb};
@@ -18,19 +19,14 @@ use etendue_spectrum::{Bands, Curve, Grid, Outside, WeightedBands, rgb};
 use crate::response::{Filter, Response, filters, photons_caught, sensitive_range};
 use crate::spec::{Radiometry, SensorKind};
 use crate::{Sensor, SensorError};
+use division::Division;
 use nodes::{Nodes, RunningSums, cell_edges, product};
 
 /// By how much of themselves electrons may differ from an integration in steps of a nanometre.
 pub const TOLERANCE: f64 = 1e-3;
 
-/// Bands beyond which nobody divides.
-const MOST_BANDS: usize = 256;
-
 /// Numbers beyond which a table is not made: sensors of very many channels.
 const MOST_NUMBERS: usize = 2_000_000;
-
-/// Places at which a band's division is tried.
-const PLACES: usize = 24;
 
 /// Parts of white: darker light need not be better than this part of it is, behind no colour, one and
 /// two. Two pure colours one behind the other are nearly black, and no surface's.
@@ -96,8 +92,9 @@ impl Sensor {
         // Otherwise bands are divided until they do.
         let fixed = table.cells_at(&edges);
         let may_divide = given.is_none() || multispectral;
-        let cells = if may_divide { table.divided(&fixed) } else { fixed };
-        let error = Some(table.worst(&cells));
+        let division = Division::of(&table);
+        let cells = if may_divide { division.divided(&fixed) } else { fixed };
+        let error = Some(division.worst(&cells));
         let edges = cells.iter().map(|&cell| table.edges[cell]).collect();
         let bands = match Grid::from_edges(edges) {
             Ok(grid) => Bands::Weighted(
@@ -275,37 +272,28 @@ impl BandTable {
         }
     }
 
-    /// The electrons that a band of cells loses of a trial (or finds too many), as a part of its
-    /// scale.
-    fn lost(&self, trial: &Trial, [a, b]: [usize; 2]) -> f64 {
+    /// The electrons that a band of cells loses of each trial (or finds too many), as a part of its scale.
+    fn losses(&self, [a, b]: [usize; 2]) -> Vec<f64> {
         let over = |sums: &RunningSums| sums[b] - sums[a];
         let (seen, weight) = (over(&self.seen), over(&self.weight));
-        let mut counted = 0.0;
-        if seen > 0.0 && weight > 0.0 {
-            // 1 in the band is the mean light, scaled to a mean of 1.
-            counted = over(&self.channels[trial.channel]) * seen / weight;
-            counted *= over(&self.lights[trial.light]) / seen;
-            for k in trial.colors.into_iter().flatten() {
-                counted *= over(&self.primaries[k]) / weight;
-            }
-            if let Some(filter) = trial.filter {
-                counted *= over(&self.filters[filter]) / weight;
-            }
+        let lost = |trial: &Trial, counted: f64| (counted - over(&trial.exact)) / trial.scale;
+        if seen <= 0.0 || weight <= 0.0 {
+            return self.trials.iter().map(|trial| lost(trial, 0.0)).collect();
         }
-        (counted - over(&trial.exact)) / trial.scale
-    }
-
-    /// The most that any trial is off in all bands together.
-    fn worst(&self, cells: &[usize]) -> f64 {
-        let total = |trial: &Trial| -> f64 {
-            cells.windows(2).map(|ends| self.lost(trial, [ends[0], ends[1]])).sum::<f64>().abs()
+        // 1 in the band is the mean light, scaled to a mean of 1.
+        let share = |of: f64| move |sums: &RunningSums| over(sums) / of;
+        let channels: Vec<f64> = self.channels.iter().map(|c| over(c) * seen / weight).collect();
+        let lights: Vec<f64> = self.lights.iter().map(share(seen)).collect();
+        let filters: Vec<f64> = self.filters.iter().map(share(weight)).collect();
+        let primaries = self.primaries.each_ref().map(share(weight));
+        let counted = |trial: &Trial| {
+            let mut counted = channels[trial.channel] * lights[trial.light];
+            for k in trial.colors.into_iter().flatten() {
+                counted *= primaries[k];
+            }
+            counted * trial.filter.map_or(1.0, |filter| filters[filter])
         };
-        self.trials.iter().map(total).fold(0.0, f64::max)
-    }
-
-    /// The most that a band is off for any trial.
-    fn worst_of(&self, band: [usize; 2]) -> f64 {
-        self.trials.iter().map(|trial| self.lost(trial, band).abs()).fold(0.0, f64::max)
+        self.trials.iter().map(|trial| lost(trial, counted(trial))).collect()
     }
 
     /// The cells that begin at these wavelengths, which are edges of cells.
@@ -315,63 +303,6 @@ impl BandTable {
             edges.iter().map(|edge| near(edge).min(self.edges.len() - 1)).collect();
         cells.dedup();
         cells
-    }
-
-    /// Bands divided until they are good, and joined where they stay so; `fixed` edges stay.
-    fn divided(&self, fixed: &[usize]) -> Vec<usize> {
-        let mut cells = fixed.to_vec();
-        while cells.len() <= MOST_BANDS && self.worst(&cells) > TOLERANCE {
-            let pairs = cells.windows(2).filter(|ends| ends[1] - ends[0] > 1);
-            let lossy = pairs
-                .map(|ends| [ends[0], ends[1]])
-                .max_by(|a, b| self.worst_of(*a).total_cmp(&self.worst_of(*b)));
-            let Some(band) = lossy else { break };
-            let cut = self.best_cut(band);
-            cells.insert(cells.partition_point(|cell| *cell < cut), cut);
-        }
-        let limit = self.worst(&cells).max(TOLERANCE);
-        self.joined(cells, fixed, limit)
-    }
-
-    /// Where to divide a band so that the worse of its halves is best.
-    fn best_cut(&self, [a, b]: [usize; 2]) -> usize {
-        let places = (b - a - 1).min(PLACES);
-        let cuts = (1..=places).map(|i| a + ((b - a) * i).div_ceil(places + 1).clamp(1, b - a - 1));
-        let loss = |cut: usize| {
-            let halves =
-                |trial: &Trial| self.lost(trial, [a, cut]).abs() + self.lost(trial, [cut, b]).abs();
-            self.trials.iter().map(halves).fold(0.0, f64::max)
-        };
-        cuts.map(|cut| (loss(cut), cut))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map_or(a + (b - a) / 2, |(_, cut)| cut)
-    }
-
-    /// Bands joined as long as that keeps the worst error below a limit.
-    fn joined(&self, mut cells: Vec<usize>, fixed: &[usize], limit: f64) -> Vec<usize> {
-        let lost = |trial: &Trial, ends: &[usize]| self.lost(trial, [ends[0], ends[1]]);
-        let total = |trial| -> f64 { cells.windows(2).map(|ends| lost(trial, ends)).sum() };
-        let mut totals: Vec<f64> = self.trials.iter().map(total).collect();
-        loop {
-            // What leaving out an edge changes.
-            let change = |trial: &Trial, i: usize, cells: &[usize]| {
-                self.lost(trial, [cells[i - 1], cells[i + 1]])
-                    - lost(trial, &cells[i - 1..=i])
-                    - lost(trial, &cells[i..=i + 1])
-            };
-            let worst = |i: usize| {
-                let each = self.trials.iter().zip(&totals);
-                each.map(|(trial, total)| (total + change(trial, i, &cells)).abs())
-                    .fold(0.0, f64::max)
-            };
-            let free = (1..cells.len() - 1).filter(|&i| !fixed.contains(&cells[i]));
-            let best = free.map(|i| (worst(i), i)).min_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((_, i)) = best.filter(|(worst, _)| *worst <= limit) else { return cells };
-            for (trial, total) in self.trials.iter().zip(&mut totals) {
-                *total += change(trial, i, &cells);
-            }
-            cells.remove(i);
-        }
     }
 
     /// What a sensor loses in bands that are not bands.
