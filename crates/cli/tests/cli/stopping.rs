@@ -22,9 +22,9 @@ const LARGE: &str = r#"{"etendue": 1, "layers": ["depth"],
 struct Running(Child);
 
 impl Running {
-    /// Heeding Ctrl-C, which tests that run in the background are started to ignore.
+    /// Heeding signals that tests are started to ignore: Ctrl-C in the background, SIGHUP under `nohup`.
     fn start(bench: &Bench, arguments: &[&str]) -> Self {
-        let command = ["--default-signal=INT", env!("CARGO_BIN_EXE_etendue")];
+        let command = ["--default-signal=INT,TERM,HUP", env!("CARGO_BIN_EXE_etendue")];
         Self::spawn(Command::new("env").args(command).args(arguments), bench)
     }
 
