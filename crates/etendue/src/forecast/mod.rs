@@ -45,7 +45,7 @@ pub struct TimeForecast {
     pub trace: f64,
     /// What the sensor makes of the light, with its files.
     pub sensor: f64,
-    /// The views of a light field.
+    /// The views of a light field, and its white image.
     pub views: f64,
     /// Writing the layers.
     pub output: f64,
@@ -113,7 +113,9 @@ impl TimeForecast {
             _ => pilot.picture(&scene.camera)?,
         };
         let views = match (scene.camera.lens(), scene.camera.reference_views()) {
-            (Some(_), Ok(views)) if scene.picture.is_some() => pilot.picture(&views)?,
+            (Some(_), Ok(views)) if scene.picture.is_some() => {
+                pilot.picture(&views)? + pilot.white()?
+            }
             _ => 0.0,
         };
         Ok(Self { load, build, trace, views, is_piloted: true, ..counted }.summed())

@@ -4,10 +4,12 @@ use std::time::Instant;
 
 use etendue_accel::Accel;
 use etendue_camera::Camera;
+use etendue_render::light_field::white_rows;
 use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan, RenderError, render};
 use etendue_scene::Scene;
 use etendue_scene::file::SamplesSpec;
+use etendue_spectrum::Bands;
 
 use crate::Error;
 
@@ -19,6 +21,9 @@ const SAMPLES: [u32; 2] = [1, 4];
 
 /// Pixels of a small picture whose samples stop by themselves.
 const ADAPTIVE: f64 = 3_000.0;
+
+/// Pixels of a white image that are traced, about: in whole rows, as there are more samples at the rims of lenslets.
+const WHITE_PIXELS: u32 = 18_000;
 
 /// How often each is traced: the fastest counts, which nothing else has disturbed.
 const TIMES: usize = 2;
@@ -57,6 +62,21 @@ impl Pilot<'_> {
         let once = (first - each * large).max(0.0);
         let pixel = (each - sample * f64::from(one)).max(0.0);
         Ok(opening + once + all * (pixel + sample * self.samples(camera)?))
+    }
+
+    /// The time (s) of a light field's white image, by some of its rows.
+    pub(super) fn white(&self) -> Result<f64, Error> {
+        let start = Instant::now();
+        let camera = &self.scene.camera;
+        let camera = &camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
+        let opening = start.elapsed().as_secs_f64();
+        let [width, height] = camera.resolution();
+        let step = height.div_ceil((WHITE_PIXELS / width.max(1)).max(1));
+        let rows: Vec<u32> = (step / 2..height).step_by(step.max(1) as usize).collect();
+        let start = Instant::now();
+        std::hint::black_box(white_rows(camera, &self.scene.render, &rows));
+        let a_row = start.elapsed().as_secs_f64() / rows.len().max(1) as f64;
+        Ok(opening + a_row * f64::from(height))
     }
 
     /// The samples that pixels of `camera` will have in the mean.

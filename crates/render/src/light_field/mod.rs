@@ -37,6 +37,7 @@ use crate::{Images, Plan, RenderError, render};
 use geometry::LightFieldGeometry;
 pub use looking::LightFieldViews;
 use views::Views;
+pub use white::white_rows;
 
 /// Why the set is not complete.
 #[derive(Debug, thiserror::Error)]

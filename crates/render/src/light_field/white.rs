@@ -19,9 +19,41 @@ const ALIKE: f64 = 0.6;
 
 /// What a picture of radiance 1 everywhere is to a camera that is opened for red, green and blue.
 pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, LightFieldError> {
-    let groups = camera.band_groups(&Bands::Rgb);
     let [width, height] = camera.resolution();
-    let row = |row: u32| -> [Vec<f32>; 3] {
+    let rows = white_rows(camera, spec, &(0..height).collect::<Vec<u32>>());
+    let channel = |(k, name): (usize, &str)| {
+        let values = rows.iter().flat_map(|row| row[k].iter().copied()).collect();
+        Channel { name: name.to_owned(), values: Values::F32(values) }
+    };
+    let channels = ["R", "G", "B"].into_iter().enumerate().map(channel).collect();
+    let meaning = vec![(
+        "definition".to_owned(),
+        "the picture of a radiance of 1 from everywhere".to_owned(),
+    )];
+    let layer = Layer { name: String::new(), look: Look::Color, channels, meaning };
+    Ok(Picture::new(width as usize, height as usize, vec![layer], Vec::new())?)
+}
+
+/// The samples of a pixel.
+fn place(film: &mut FilmSamples, spec: &RenderSpec, [column, row]: [u32; 2], samples: u32) {
+    let pixel = spec.sampler.pixel(spec.seed, column, row, samples);
+    let numbers = (0..samples).map(|index| (pixel, index));
+    let mut squares = [Vec::new(), Vec::new(), Vec::new()];
+    for (pair, out) in (0..).zip(&mut squares) {
+        squares_of_pair(numbers.clone(), pair, out);
+    }
+    let [places, pupil, spectrum] = squares;
+    for ((place, pupil), spectrum) in places.iter().zip(pupil).zip(spectrum) {
+        film.push([f64::from(column) + place[0], f64::from(row) + place[1]], pupil, spectrum[0]);
+    }
+}
+
+/// These rows of the white image of a camera that is opened for red, green and blue, each in three bands.
+#[must_use]
+pub fn white_rows(camera: &Camera, spec: &RenderSpec, rows: &[u32]) -> Vec<[Vec<f32>; 3]> {
+    let groups = camera.band_groups(&Bands::Rgb);
+    let [width, _] = camera.resolution();
+    let row = |&row: &u32| -> [Vec<f32>; 3] {
         let mut sums = vec![[0.0; 3]; width as usize];
         let (mut film, mut rays) = (FilmSamples::default(), CameraRays::default());
         for column in 0..width {
@@ -50,31 +82,5 @@ pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, Lig
         let plane = |k: usize| sums.iter().map(|sum| sum[k] as f32).collect();
         [plane(0), plane(1), plane(2)]
     };
-    // All rows as one picture.
-    let rows: Vec<[Vec<f32>; 3]> = (0..height).into_par_iter().map(row).collect();
-    let channel = |(k, name): (usize, &str)| {
-        let values = rows.iter().flat_map(|row| row[k].iter().copied()).collect();
-        Channel { name: name.to_owned(), values: Values::F32(values) }
-    };
-    let channels = ["R", "G", "B"].into_iter().enumerate().map(channel).collect();
-    let meaning = vec![(
-        "definition".to_owned(),
-        "the picture of a radiance of 1 from everywhere".to_owned(),
-    )];
-    let layer = Layer { name: String::new(), look: Look::Color, channels, meaning };
-    Ok(Picture::new(width as usize, height as usize, vec![layer], Vec::new())?)
-}
-
-/// The samples of a pixel.
-fn place(film: &mut FilmSamples, spec: &RenderSpec, [column, row]: [u32; 2], samples: u32) {
-    let pixel = spec.sampler.pixel(spec.seed, column, row, samples);
-    let numbers = (0..samples).map(|index| (pixel, index));
-    let mut squares = [Vec::new(), Vec::new(), Vec::new()];
-    for (pair, out) in (0..).zip(&mut squares) {
-        squares_of_pair(numbers.clone(), pair, out);
-    }
-    let [places, pupil, spectrum] = squares;
-    for ((place, pupil), spectrum) in places.iter().zip(pupil).zip(spectrum) {
-        film.push([f64::from(column) + place[0], f64::from(row) + place[1]], pupil, spectrum[0]);
-    }
+    rows.par_iter().map(row).collect()
 }
