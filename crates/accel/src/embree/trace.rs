@@ -250,7 +250,7 @@ fn is_coherent(flags: sys::RTCRayQueryFlags) -> bool {
 /// Whether rays spread by more than a few degrees, as those to lamps on all sides do. Embree follows a
 /// packet by the frustum around it, and where that is wide, occlusion takes longer than one by one: a
 /// hundred times as long for rays aimed at all corners of a mesh (`corners_and_edges_occlusion` of the
-/// stability suite).
+/// stability suite). Told that they are not coherent, it follows each ray of the packet by itself.
 fn run_apart(rays: &Rays32, start: usize, count: usize) -> bool {
     const MOST: f32 = 0.25;
     rays.direction.iter().any(|axis| {
@@ -363,9 +363,12 @@ macro_rules! packets {
             ) {
                 let mut query = Aligned(sys::$ray::default());
                 query.0.mask = [u32::MAX; $width];
+                let mut spread = *arguments;
+                spread.flags = sys::RTC_RAY_QUERY_FLAG_INCOHERENT;
                 for start in (0..rays.len()).step_by($width) {
                     let count = $width.min(rays.len() - start);
-                    if is_coherent(arguments.flags) && run_apart(rays, start, count) {
+                    let apart = is_coherent(arguments.flags) && run_apart(rays, start, count);
+                    if apart && arguments.filter.is_some() {
                         for i in start..start + count {
                             blocked[i] = self.is_occluded(rays, i, arguments);
                         }
@@ -379,7 +382,7 @@ macro_rules! packets {
                             valid.0.as_ptr(),
                             self.handle.0.as_ptr(),
                             &mut query.0,
-                            arguments,
+                            if apart { &mut spread } else { &mut *arguments },
                         );
                     }
                     let tfar = &query.0.tfar[..count];
