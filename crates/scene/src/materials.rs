@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use etendue_optics::glass::GlassSpec;
 use etendue_spectrum::Curve;
-use etendue_tracer::build::{Fault, Supply};
+use etendue_tracer::spec::{Fault, Supply};
 use etendue_tracer::spec::{ImageSpec, IorSpec};
 use etendue_tracer::{ImageSource, Ior, Light, LightKind, Material, Paint, Texture, TextureUse};
 use serde_json::Value;

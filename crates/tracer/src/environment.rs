@@ -11,6 +11,7 @@ use etendue_image::Limits;
 
 use crate::Color;
 use crate::sampling::{GridCell, GridDistribution, ONE_BELOW, linear_place};
+use crate::spec::BRIGHTEST;
 use crate::texture::{ImageError, read_file, read_image};
 
 /// The most cells of the grid that directions are chosen on, across and down.
@@ -23,7 +24,7 @@ pub struct EnvironmentMap {
     height: usize,
     /// Linear RGB, row 0 at the top.
     texels: Vec<[f32; 3]>,
-    /// Texels that were not finite or below zero, and count as black.
+    /// Texels that were not finite, below zero or above [`BRIGHTEST`], and count as black.
     pub dropped: u64,
 }
 
@@ -52,8 +53,9 @@ impl EnvironmentMap {
         texels.resize(width * height, [0.0; 3]);
         let mut dropped = 0;
         for texel in &mut texels {
-            if !texel.iter().all(|c| c.is_finite() && *c >= 0.0) {
-                *texel = texel.map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 });
+            let is_sound = |c: f32| (0.0..=BRIGHTEST).contains(&f64::from(c));
+            if !texel.iter().all(|c| is_sound(*c)) {
+                *texel = texel.map(|c| if is_sound(c) { c } else { 0.0 });
                 dropped += 1;
             }
         }

@@ -12,10 +12,10 @@
 //! |---|---|
 //! | [`layer`] | the table of layers, and what fills each |
 //! | [`reference`](mod@reference) | what a ray meets first, without light |
-//! | [`spec`], [`build`] | materials and lights as scene files write them, and which surfaces they are |
+//! | [`spec`] | materials and lights as scene files write them, and which surfaces they are |
 //! | [`material`], [`texture`] | surfaces, ready to be looked up |
 //! | [`footprint`] | how much of a surface a sample stands for |
-//! | [`bsdf`] | how surfaces scatter light |
+//! | [`scattering`], [`bsdf`] | how surfaces scatter light: by which model, and its formulas |
 //! | [`light`], [`group`], [`emitters`], [`environment`], [`clear_sky`] | where light comes from |
 //! | [`placed`] | what there is to know of each placement before any ray meets it |
 //! | [`spawn`] | where a ray that leaves a surface starts |
@@ -23,7 +23,6 @@
 //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
 pub mod bsdf;
-pub mod build;
 pub mod clear_sky;
 pub mod emitters;
 pub mod environment;
@@ -42,6 +41,7 @@ pub mod projector;
 mod pyramid;
 pub mod reference;
 pub mod sampling;
+pub mod scattering;
 mod sky;
 pub mod spawn;
 pub mod spec;
@@ -60,12 +60,11 @@ pub use group::LightGroup;
 pub use layer::{Layer, LayerSpec, NormalKind, Space};
 pub use light::{EnvironmentImage, Light, LightKind};
 pub use lights::Lights;
-pub use material::{
-    Absorption, Color, Emission, Glass, Ior, Material, Paint, Scattering, TextureScope,
-};
+pub use material::{Color, Emission, Material, Paint, TextureScope};
 pub use placed::PlacedSurfaces;
 pub use projector::Projector;
 pub use reference::{Needs, SceneView, SurfacePoint, Traced, View};
+pub use scattering::{Absorption, Glass, Ior, Scattering};
 pub use spec::{LightSpec, MaterialSpec};
 pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};

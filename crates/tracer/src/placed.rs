@@ -4,7 +4,7 @@
 use etendue_geometry::Geometry;
 use etendue_geometry::glam::{DMat3, DVec3};
 
-use crate::material::Absorption;
+use crate::scattering::Absorption;
 use crate::spawn::magnitudes;
 use crate::{Color, Material, Paint, Scattering};
 

@@ -3,16 +3,12 @@
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{HitBatch, RayBatch};
 
-use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen, fresnel};
-use crate::material::{Alpha, GltfSurface, NormalMap};
+use crate::bsdf::Bsdf;
+use crate::material::{Alpha, NormalMap};
 use crate::placed::PlacedSurface;
 use crate::reference::{SceneView, SurfacePoint};
-use crate::sampling::Frame;
 use crate::spawn::Anchor;
-use crate::{Color, Footprint, Ior, LightingContext, Material, Scattering};
-
-/// The least α across a grain.
-const SMOOTHEST_GRAIN: f64 = 1e-3;
+use crate::{Color, Footprint, Ior, LightingContext, Material};
 
 /// A hit seen from its ray.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +21,7 @@ pub(crate) struct SurfaceInteraction<'a> {
     pub(crate) front: bool,
     /// Base colour and alpha.
     pub(crate) base: [f64; 4],
-    wo: DVec3,
+    pub(crate) wo: DVec3,
 }
 
 impl<'a> SurfaceInteraction<'a> {
@@ -61,31 +57,15 @@ impl<'a> SurfaceInteraction<'a> {
         }
     }
 
-    /// The base colour alone, contribution to what a surface can reflect.
+    /// How it scatters light of the wavelength (nm).
+    pub(crate) fn bsdf(&self, around: &SceneView<'_>, wavelength: f64) -> Bsdf {
+        self.material.scattering.bsdf(self, around, wavelength)
+    }
+
+    /// The base colour alone, the share of light that a surface can reflect.
     pub(crate) fn color(&self) -> Color {
         let [r, g, b, _] = self.base;
         [r, g, b].map(|c| c.clamp(0.0, 1.0))
-    }
-
-    /// How it scatters light of the wavelength (nm).
-    pub(crate) fn bsdf(&self, around: &SceneView<'_>, wavelength: f64) -> Bsdf {
-        let side = if self.front { 1.0 } else { -1.0 };
-        let geometric = self.anchor.normal * side;
-        let model = match &self.material.scattering {
-            Scattering::Black | Scattering::Unlit => Model::Black,
-            Scattering::Matte => Model::Matte,
-            Scattering::Mirror => Model::Mirror,
-            Scattering::Metal { roughness, named } => {
-                Model::Metal { alpha: roughness * roughness, named: *named }
-            }
-            Scattering::Dielectric(glass) => Model::Dielectric {
-                alpha: glass.roughness * glass.roughness,
-                eta: self.eta(&glass.ior, wavelength),
-            },
-            Scattering::Gltf(surface) => return self.layered(around, surface, geometric),
-        };
-        let shading = self.shading(around, geometric);
-        Bsdf::new(model, [geometric, shading], self.wo, [self.color(), [1.0; 3]])
     }
 
     /// Index behind the surface over the index in front, as seen from its ray, at a wavelength (nm).
@@ -94,96 +74,16 @@ impl<'a> SurfaceInteraction<'a> {
         if self.front { n } else { 1.0 / n }
     }
 
-    fn layered(&self, around: &SceneView<'_>, own: &GltfSurface, geometric: DVec3) -> Bsdf {
-        let texel = |image: &Option<_>| match image {
-            Some(image) => around.texel(image, &self.spot),
-            None => [1.0; 4],
-        };
-        let rough = texel(&own.metallic_roughness);
-        let roughness = match &own.glossiness_texture {
-            Some(_) => 1.0 - (1.0 - own.roughness) * texel(&own.glossiness_texture)[3],
-            None => own.roughness * rough[1],
-        };
-        let roughness = roughness.clamp(0.0, 1.0);
-        let specular = (own.specular * texel(&own.specular_texture)[3]).clamp(0.0, 1.0);
-        let face_on = fresnel::normal_reflectance(own.ior);
-        let tint = own.specular_color_texture.as_ref();
-        let tint = tint.map_or([1.0; 4], |image| around.tint(image, &self.spot));
-        // The extension caps the reflectance face on at 1.
-        let most = if face_on > 0.0 { 1.0 / face_on } else { f64::INFINITY };
-        let highlight = std::array::from_fn(|k| (own.specular_color[k] * tint[k]).min(most));
-        let shading = self.shading(around, geometric);
-        let alpha = roughness * roughness;
-        let grain = self.grain(around, own, shading);
-        let strength = grain.map_or(0.0, |(_, strength)| strength);
-        let model = Model::Layered(Layered {
-            metallic: (own.metallic * rough[2]).clamp(0.0, 1.0),
-            // A grain has no single directions, however smooth it is across.
-            alpha: if strength > 0.0 { alpha.max(SMOOTHEST_GRAIN) } else { alpha },
-            along: alpha + (1.0 - alpha) * strength * strength,
-            f0: face_on * specular,
-            f90: specular,
-            transmission: (own.transmission * texel(&own.transmission_texture)[0]).clamp(0.0, 1.0),
-            sheen: match own.sheen_color {
-                [0.0, 0.0, 0.0] => Sheen::default(),
-                color => {
-                    let tint = own.sheen_color_texture.as_ref();
-                    let tint = tint.map_or([1.0; 4], |image| around.tint(image, &self.spot));
-                    Sheen {
-                        color: std::array::from_fn(|k| (color[k] * tint[k]).clamp(0.0, 1.0)),
-                        roughness: own.sheen_roughness * texel(&own.sheen_roughness_texture)[3],
-                    }
-                }
-            },
-            coat: match own.clearcoat {
-                0.0 => Coat::default(),
-                share => Coat {
-                    share: (share * texel(&own.clearcoat_texture)[0]).clamp(0.0, 1.0),
-                    alpha: (own.clearcoat_roughness * texel(&own.clearcoat_roughness_texture)[1])
-                        .clamp(0.0, 1.0)
-                        .powi(2),
-                },
-            },
-        });
-        let frame = match grain {
-            Some((along, _)) => Frame::along(shading, along),
-            None => Frame::around(shading),
-        };
-        Bsdf::turned(model, (geometric, frame), self.wo, [self.color(), highlight])
-    }
-
-    /// Where the grain goes, and how strong it is; `None` where there is none, or where no texture coordinates
-    /// tell where.
-    fn grain(
-        &self,
-        around: &SceneView<'_>,
-        own: &GltfSurface,
-        normal: DVec3,
-    ) -> Option<(DVec3, f64)> {
-        if own.anisotropy == 0.0 {
-            return None;
-        }
-        let image = own.anisotropy_texture.as_ref();
-        let [x, y, share, _] = match image.and_then(|image| around.lookup(image, &self.spot)) {
-            Some([x, y, share, _]) => [2.0 * x - 1.0, 2.0 * y - 1.0, share, 1.0],
-            None => [1.0, 0.0, 1.0, 1.0],
-        };
-        let (sin, cos) = own.anisotropy_rotation.sin_cos();
-        let [tangent, bitangent] =
-            self.spot.tangents(image.map_or(0, |i| i.uv_set as usize), normal)?;
-        let along = tangent * (cos * x - sin * y) + bitangent * (sin * x + cos * y);
-        Some((along, (own.anisotropy * share).clamp(0.0, 1.0)))
-    }
-
-    /// The shading normal on the viewer's side; the geometric one where the viewer would see its
-    /// back.
-    fn shading(&self, around: &SceneView<'_>, geometric: DVec3) -> DVec3 {
-        if !self.placed.is_tilted {
-            return geometric;
-        }
+    /// The geometric and the shading normal on the viewer's side; the latter is the geometric one where the
+    /// viewer would see its back.
+    pub(crate) fn normals(&self, around: &SceneView<'_>) -> (DVec3, DVec3) {
         let (turn, front) = (self.placed.turn.as_ref(), self.anchor.normal);
+        let geometric = if self.front { front } else { -front };
+        if !self.placed.is_tilted {
+            return (geometric, geometric);
+        }
         let normal = self.spot.tilted_normal(around, self.material, turn, front);
-        facing(if self.front { normal } else { -normal }, geometric, self.wo)
+        (geometric, facing(if self.front { normal } else { -normal }, geometric, self.wo))
     }
 }
 
@@ -218,7 +118,7 @@ impl SurfacePoint<'_> {
 
     /// Unit vectors at right angles to `normal` and each other: towards growing u of a set, and towards falling
     /// v.
-    fn tangents(&self, set: usize, normal: DVec3) -> Option<[DVec3; 2]> {
+    pub(crate) fn tangents(&self, set: usize, normal: DVec3) -> Option<[DVec3; 2]> {
         let [along_u, along_v] = self.texture_axes(set)?;
         let tangent = (along_u - normal * normal.dot(along_u)).try_normalize()?;
         let across = normal.cross(tangent);

@@ -4,7 +4,7 @@
 //! it (Khronos, "Specular-glossiness materials"): a dielectric with the reflectance as its colour
 //! face on, over the diffuse colour. Roughness is 1 − glossiness.
 
-use etendue_tracer::material::GltfSurface;
+use etendue_tracer::scattering::GltfSurface;
 use etendue_tracer::texture::Encoding;
 use gltf::json;
 use serde::Deserialize;

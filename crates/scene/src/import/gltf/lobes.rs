@@ -1,7 +1,7 @@
 //! What lies over a metallic-roughness surface or shapes its highlights: sheen and anisotropy.
 
 use etendue_tracer::TextureUse;
-use etendue_tracer::material::GltfSurface;
+use etendue_tracer::scattering::GltfSurface;
 use etendue_tracer::texture::Encoding;
 use gltf::json;
 use serde::Deserialize;

@@ -3,7 +3,8 @@
 //! Factors are linear (glTF 2.0, section 3.9.2). Materials keep the document's numbers; what names
 //! none gets one more at the end.
 
-use etendue_tracer::material::{Alpha, GltfSurface, NormalMap, Occlusion};
+use etendue_tracer::material::{Alpha, NormalMap, Occlusion};
+use etendue_tracer::scattering::GltfSurface;
 use etendue_tracer::spec::BRIGHTEST;
 use etendue_tracer::texture::Encoding;
 use etendue_tracer::{Emission, Material, Paint, Scattering};

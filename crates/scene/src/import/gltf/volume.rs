@@ -1,6 +1,6 @@
 //! Bodies of glass (`KHR_materials_volume`): closed surfaces that refract, and absorb on the way through.
 
-use etendue_tracer::material::{Absorption, Glass, GltfSurface};
+use etendue_tracer::scattering::{Absorption, Glass, GltfSurface};
 use etendue_tracer::{Ior, Scattering};
 use gltf::json;
 use serde::Deserialize;

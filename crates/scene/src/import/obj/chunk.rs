@@ -41,6 +41,8 @@ pub(super) struct Chunk {
     pub statements: Vec<(usize, Statement)>,
     /// Lines and points, which have no surface.
     pub without_surface: u64,
+    /// Curves and surfaces of splines.
+    pub free_form: u64,
     /// Faces of fewer than three corners.
     pub too_small: u64,
 }
@@ -91,7 +93,8 @@ impl Chunk {
                     continue;
                 }
                 Some(b"l" | b"p") => chunk.without_surface += 1,
-                // Comments, smoothing groups, curves, display attributes, blank lines.
+                Some(b"curv" | b"curv2" | b"surf") => chunk.free_form += 1,
+                // Comments, smoothing groups, display attributes, blank lines.
                 _ => {}
             }
             words.end_line();

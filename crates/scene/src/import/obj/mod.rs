@@ -135,6 +135,14 @@ fn note_leftovers(chunks: &[Chunk], missing: u64, notes: &mut Vec<Note>) {
         let message = "points and lines have no surface and are left out";
         note::push(notes, Note::new(NoteKind::Unsupported, "l, p", message).counted(lines));
     }
+    let free_form: u64 = chunks.iter().map(|chunk| chunk.free_form).sum();
+    if free_form > 0 {
+        let message = "free-form curves and surfaces are left out; export the model as polygons";
+        note::push(
+            notes,
+            Note::new(NoteKind::Unsupported, "curv, surf", message).counted(free_form),
+        );
+    }
     let small: u64 = chunks.iter().map(|chunk| chunk.too_small).sum();
     if small > 0 {
         let message = "faces of fewer than three corners are left out";

@@ -9,7 +9,8 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use etendue_tracer::material::{Alpha, GltfSurface};
+use etendue_tracer::material::Alpha;
+use etendue_tracer::scattering::GltfSurface;
 use etendue_tracer::spec::BRIGHTEST;
 use etendue_tracer::texture::{Encoding, Filter, Wrap};
 use etendue_tracer::{

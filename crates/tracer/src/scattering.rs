@@ -1,0 +1,345 @@
+//! How materials scatter light, and by which model of a surface.
+
+use etendue_geometry::glam::DVec3;
+use etendue_spectrum::{Curve, Metal};
+
+use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen, fresnel};
+use crate::reference::SceneView;
+use crate::sampling::Frame;
+use crate::surface::SurfaceInteraction;
+use crate::{Color, TextureUse};
+
+/// The least α across a grain.
+const SMOOTHEST_GRAIN: f64 = 1e-3;
+
+/// How a surface scatters light.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Scattering {
+    /// Not at all.
+    Black,
+    /// Alike in all directions (Lambert).
+    Matte,
+    /// Not at all, but it shows its base colour to whoever looks (`KHR_materials_unlit`).
+    Unlit,
+    /// As a mirror.
+    Mirror,
+    /// As metal with GGX facets.
+    Metal {
+        /// Roughness, 0..=1; its square is GGX's α.
+        roughness: f64,
+        /// The metal whose measured index it has, in place of the base colour.
+        named: Option<Metal>,
+    },
+    /// As a boundary of glass; the front is outside.
+    Dielectric(Glass),
+    /// As glTF's metallic-roughness surfaces.
+    Gltf(Box<GltfSurface>),
+}
+
+impl Scattering {
+    /// Whether it scatters light in several ways, among which is chosen.
+    #[must_use]
+    pub fn has_parts(&self) -> bool {
+        match self {
+            Self::Dielectric(_) | Self::Gltf(_) => true,
+            Self::Metal { roughness, .. } => *roughness > 0.0,
+            Self::Black | Self::Matte | Self::Unlit | Self::Mirror => false,
+        }
+    }
+
+    /// Whether it is made to show other surfaces, mirrored or through it.
+    #[must_use]
+    pub fn shows_others(&self) -> bool {
+        match self {
+            Self::Mirror | Self::Metal { .. } | Self::Dielectric(_) => true,
+            Self::Black | Self::Matte | Self::Unlit | Self::Gltf(_) => false,
+        }
+    }
+
+    /// What the body behind its front takes from light.
+    #[must_use]
+    pub fn absorption(&self) -> Option<Absorption> {
+        match self {
+            Self::Dielectric(glass) => glass.absorption,
+            Self::Black
+            | Self::Matte
+            | Self::Unlit
+            | Self::Mirror
+            | Self::Metal { .. }
+            | Self::Gltf(_) => None,
+        }
+    }
+
+    /// The textures that it looks at.
+    pub(crate) fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureUse> {
+        let surface = if let Self::Gltf(surface) = self { Some(surface) } else { None };
+        let textures = surface.map(|surface| {
+            [
+                &mut surface.metallic_roughness,
+                &mut surface.glossiness_texture,
+                &mut surface.specular_texture,
+                &mut surface.specular_color_texture,
+                &mut surface.transmission_texture,
+                &mut surface.clearcoat_texture,
+                &mut surface.clearcoat_roughness_texture,
+                &mut surface.sheen_color_texture,
+                &mut surface.sheen_roughness_texture,
+                &mut surface.anisotropy_texture,
+            ]
+        });
+        textures.into_iter().flatten().flatten()
+    }
+
+    /// The model of it where it was met, for light of a wavelength (nm).
+    pub(crate) fn bsdf(
+        &self,
+        met: &SurfaceInteraction<'_>,
+        around: &SceneView<'_>,
+        wavelength: f64,
+    ) -> Bsdf {
+        let model = match self {
+            Self::Black | Self::Unlit => Model::Black,
+            Self::Matte => Model::Matte,
+            Self::Mirror => Model::Mirror,
+            Self::Metal { roughness, named } => {
+                Model::Metal { alpha: roughness * roughness, named: *named }
+            }
+            Self::Dielectric(glass) => Model::Dielectric {
+                alpha: glass.roughness * glass.roughness,
+                eta: met.eta(&glass.ior, wavelength),
+            },
+            Self::Gltf(surface) => return surface.bsdf(met, around),
+        };
+        let (geometric, shading) = met.normals(around);
+        Bsdf::new(model, [geometric, shading], met.wo, [met.color(), [1.0; 3]])
+    }
+
+    /// The glTF surface, of one.
+    #[must_use]
+    pub fn gltf(&self) -> Option<&GltfSurface> {
+        match self {
+            Self::Gltf(surface) => Some(surface),
+            Self::Black
+            | Self::Matte
+            | Self::Unlit
+            | Self::Mirror
+            | Self::Metal { .. }
+            | Self::Dielectric(_) => None,
+        }
+    }
+}
+
+/// A body of glass, water or the like.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Glass {
+    /// Its refractive index.
+    pub ior: Ior,
+    /// Roughness of its surface, 0..=1; its square is GGX's α.
+    pub roughness: f64,
+    /// What is left of light on its way through.
+    pub absorption: Option<Absorption>,
+}
+
+impl Glass {
+    /// Smooth and clear.
+    #[must_use]
+    pub fn clear(ior: Ior) -> Self {
+        Self { ior, roughness: 0.0, absorption: None }
+    }
+}
+
+/// Light that a body takes away on the way through it, by Beer and Lambert: after a way `s` there is
+/// `color` to the power `s` / `distance` left (`KHR_materials_volume`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Absorption {
+    /// What is left after `distance`.
+    pub color: Color,
+    /// m, above 0.
+    pub distance: f64,
+}
+
+/// A refractive index.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ior {
+    /// The same for all wavelengths.
+    Constant(f64),
+    /// By wavelength (nm).
+    Dispersive(Curve),
+}
+
+impl Ior {
+    /// The index at a wavelength (nm).
+    #[must_use]
+    pub fn at(&self, wavelength: f64) -> f64 {
+        match self {
+            Self::Constant(n) => *n,
+            Self::Dispersive(curve) => curve.held(wavelength),
+        }
+    }
+}
+
+/// glTF's metallic-roughness parameters. Textures multiply their factors, by the channels that glTF
+/// prescribes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GltfSurface {
+    /// Share of metal, 0..=1.
+    pub metallic: f64,
+    /// Roughness, 0..=1; its square is GGX's α.
+    pub roughness: f64,
+    /// Roughness in green, metal in blue (linear).
+    pub metallic_roughness: Option<TextureUse>,
+    /// Glossiness in alpha, which makes the roughness 1 − (1 − roughness) · alpha in place of
+    /// [`Self::metallic_roughness`] (`KHR_materials_pbrSpecularGlossiness`).
+    pub glossiness_texture: Option<TextureUse>,
+    /// Refractive index of the dielectric (`KHR_materials_ior`).
+    pub ior: f64,
+    /// Strength of the dielectric's reflection (`KHR_materials_specular`), 0..=1.
+    pub specular: f64,
+    /// Strength in alpha (linear).
+    pub specular_texture: Option<TextureUse>,
+    /// Colour of the dielectric's reflection face on; may exceed 1.
+    pub specular_color: Color,
+    /// Colour (sRGB).
+    pub specular_color_texture: Option<TextureUse>,
+    /// Share of light that passes a thin wall (`KHR_materials_transmission`), 0..=1.
+    pub transmission: f64,
+    /// Share in red (linear).
+    pub transmission_texture: Option<TextureUse>,
+    /// Share of a clear coat over all of it (`KHR_materials_clearcoat`), 0..=1.
+    pub clearcoat: f64,
+    /// Share in red (linear).
+    pub clearcoat_texture: Option<TextureUse>,
+    /// The coat's roughness, 0..=1.
+    pub clearcoat_roughness: f64,
+    /// Roughness in green (linear).
+    pub clearcoat_roughness_texture: Option<TextureUse>,
+    /// Reflectance of a sheen (`KHR_materials_sheen`); black where there is none.
+    pub sheen_color: Color,
+    /// Colour (sRGB).
+    pub sheen_color_texture: Option<TextureUse>,
+    /// The sheen's roughness, 0..=1.
+    pub sheen_roughness: f64,
+    /// Roughness in alpha (linear).
+    pub sheen_roughness_texture: Option<TextureUse>,
+    /// How much rougher highlights are along the surface's grain than across it
+    /// (`KHR_materials_anisotropy`), 0..=1.
+    pub anisotropy: f64,
+    /// Where the grain goes: the angle from growing u towards falling v (rad).
+    pub anisotropy_rotation: f64,
+    /// The grain in red and green (over 0..=1 what is −1..=1), strength in blue (linear).
+    pub anisotropy_texture: Option<TextureUse>,
+}
+
+impl Default for GltfSurface {
+    fn default() -> Self {
+        Self {
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_roughness: None,
+            glossiness_texture: None,
+            ior: 1.5,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: [1.0; 3],
+            specular_color_texture: None,
+            transmission: 0.0,
+            transmission_texture: None,
+            clearcoat: 0.0,
+            clearcoat_texture: None,
+            clearcoat_roughness: 0.0,
+            clearcoat_roughness_texture: None,
+            sheen_color: [0.0; 3],
+            sheen_color_texture: None,
+            sheen_roughness: 0.0,
+            sheen_roughness_texture: None,
+            anisotropy: 0.0,
+            anisotropy_rotation: 0.0,
+            anisotropy_texture: None,
+        }
+    }
+}
+
+impl GltfSurface {
+    /// Its layers where it was met.
+    fn bsdf(&self, met: &SurfaceInteraction<'_>, around: &SceneView<'_>) -> Bsdf {
+        let texel = |image: &Option<_>| match image {
+            Some(image) => around.texel(image, &met.spot),
+            None => [1.0; 4],
+        };
+        let rough = texel(&self.metallic_roughness);
+        let roughness = match &self.glossiness_texture {
+            Some(_) => 1.0 - (1.0 - self.roughness) * texel(&self.glossiness_texture)[3],
+            None => self.roughness * rough[1],
+        };
+        let roughness = roughness.clamp(0.0, 1.0);
+        let specular = (self.specular * texel(&self.specular_texture)[3]).clamp(0.0, 1.0);
+        let face_on = fresnel::normal_reflectance(self.ior);
+        let tint = self.specular_color_texture.as_ref();
+        let tint = tint.map_or([1.0; 4], |image| around.tint(image, &met.spot));
+        // The extension caps the reflectance face on at 1.
+        let most = if face_on > 0.0 { 1.0 / face_on } else { f64::INFINITY };
+        let highlight = std::array::from_fn(|k| (self.specular_color[k] * tint[k]).min(most));
+        let (geometric, shading) = met.normals(around);
+        let alpha = roughness * roughness;
+        let grain = self.grain(met, around, shading);
+        let strength = grain.map_or(0.0, |(_, strength)| strength);
+        let model = Model::Layered(Layered {
+            metallic: (self.metallic * rough[2]).clamp(0.0, 1.0),
+            // A grain has no single directions, however smooth it is across.
+            alpha: if strength > 0.0 { alpha.max(SMOOTHEST_GRAIN) } else { alpha },
+            along: alpha + (1.0 - alpha) * strength * strength,
+            f0: face_on * specular,
+            f90: specular,
+            transmission: (self.transmission * texel(&self.transmission_texture)[0])
+                .clamp(0.0, 1.0),
+            sheen: match self.sheen_color {
+                [0.0, 0.0, 0.0] => Sheen::default(),
+                color => {
+                    let tint = self.sheen_color_texture.as_ref();
+                    let tint = tint.map_or([1.0; 4], |image| around.tint(image, &met.spot));
+                    Sheen {
+                        color: std::array::from_fn(|k| (color[k] * tint[k]).clamp(0.0, 1.0)),
+                        roughness: self.sheen_roughness * texel(&self.sheen_roughness_texture)[3],
+                    }
+                }
+            },
+            coat: match self.clearcoat {
+                0.0 => Coat::default(),
+                share => Coat {
+                    share: (share * texel(&self.clearcoat_texture)[0]).clamp(0.0, 1.0),
+                    alpha: (self.clearcoat_roughness * texel(&self.clearcoat_roughness_texture)[1])
+                        .clamp(0.0, 1.0)
+                        .powi(2),
+                },
+            },
+        });
+        let frame = match grain {
+            Some((along, _)) => Frame::along(shading, along),
+            None => Frame::around(shading),
+        };
+        Bsdf::turned(model, (geometric, frame), met.wo, [met.color(), highlight])
+    }
+
+    /// Where the grain goes, and how strong it is; `None` where there is none, or where no texture coordinates
+    /// tell where.
+    fn grain(
+        &self,
+        met: &SurfaceInteraction<'_>,
+        around: &SceneView<'_>,
+        normal: DVec3,
+    ) -> Option<(DVec3, f64)> {
+        if self.anisotropy == 0.0 {
+            return None;
+        }
+        let image = self.anisotropy_texture.as_ref();
+        let [x, y, share, _] = match image.and_then(|image| around.lookup(image, &met.spot)) {
+            Some([x, y, share, _]) => [2.0 * x - 1.0, 2.0 * y - 1.0, share, 1.0],
+            None => [1.0, 0.0, 1.0, 1.0],
+        };
+        let (sin, cos) = self.anisotropy_rotation.sin_cos();
+        let [tangent, bitangent] =
+            met.spot.tangents(image.map_or(0, |i| i.uv_set as usize), normal)?;
+        let along = tangent * (cos * x - sin * y) + bitangent * (sin * x + cos * y);
+        Some((along, (self.anisotropy * share).clamp(0.0, 1.0)))
+    }
+}

@@ -1,0 +1,389 @@
+//! Lights as the scene file writes them, and those that are traced.
+
+use etendue_geometry::glam::{DMat3, DQuat, DVec3};
+use etendue_spectrum::Illuminant;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Bound, Fault, PaintSpec, Supply, checked, in_bounds, one, paint, white};
+use crate::clear_sky::SUN_DIAMETER;
+use crate::goniometric::{Goniometric, Photometry};
+use crate::{ClearSky, Color, EnvironmentImage, Light, LightGroup, LightKind, Projector};
+
+/// A light as the scene file writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum LightSpec {
+    /// A point that shines alike in all directions.
+    Point {
+        /// Where it is (m).
+        at: [f64; 3],
+        /// Radiant intensity, linear RGB: at 1 m it gives this irradiance.
+        intensity: Color,
+        /// The spectrum that the intensity multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
+    },
+    /// A point that shines into a cone.
+    Spot {
+        /// Where it is (m).
+        at: [f64; 3],
+        /// A point that it is aimed at (m).
+        look_at: [f64; 3],
+        /// Radiant intensity within the inner cone, linear RGB.
+        intensity: Color,
+        /// Half-angle of the cone (degrees, at most 90).
+        #[serde(default = "default_cone")]
+        #[schemars(range(min = 0.0, max = 90.0))]
+        cone: f64,
+        /// Half-angle within which the light is at its full (degrees); from there it falls to 0.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 90.0))]
+        inner_cone: f64,
+        /// The spectrum that the intensity multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
+    },
+    /// Parallel light, as from the sun.
+    Directional {
+        /// Where the light goes.
+        direction: [f64; 3],
+        /// Irradiance on a surface that faces it, linear RGB.
+        irradiance: Color,
+        /// Diameter of the disk that it comes from, as seen from the scene (degrees; the sun's is 0.53).
+        /// Shadows have soft edges by it; no ray of the camera meets the disk.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 90.0))]
+        angle: f64,
+        /// The spectrum that the irradiance multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
+    },
+    /// A point that shines by a measured distribution.
+    Goniometric {
+        /// Where it is (m).
+        at: [f64; 3],
+        /// An IES file (LM-63, type C), relative to the scene file.
+        file: String,
+        /// Where the luminaire's downward direction points: the plane of the horizontal angle 0 is turned from
+        /// +X the shortest way.
+        #[serde(default = "downwards")]
+        direction: [f64; 3],
+        /// Turns it about that direction (degrees, counter-clockwise from above).
+        #[serde(default)]
+        rotate: f64,
+        /// Multiplies the file's candela: linear RGB.
+        #[serde(default = "white")]
+        intensity: Color,
+        /// The spectrum that the intensity multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
+    },
+    /// A point that throws an image, as for structured light.
+    Projector {
+        /// Where it is (m).
+        at: [f64; 3],
+        /// A point that it is aimed at (m).
+        look_at: [f64; 3],
+        /// What is up in the image.
+        #[serde(default = "upwards")]
+        up: [f64; 3],
+        /// Angle across the image (degrees).
+        #[serde(default = "default_throw")]
+        #[schemars(range(min = 0.0, max = 179.0))]
+        fov: f64,
+        /// Width over height; that of the image when absent, of a plain colour 1.
+        #[serde(default)]
+        aspect: Option<f64>,
+        /// What is thrown: an image, or a colour. It is seen as from the projector.
+        #[serde(default)]
+        image: PaintSpec,
+        /// Radiant intensity along the axis where the image is white, linear RGB: on a screen that faces it at
+        /// 1 m the image has this irradiance all over.
+        intensity: Color,
+        /// The spectrum that the intensity multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
+    },
+    /// Light from all around.
+    Environment {
+        /// Radiance, linear RGB; multiplies the image.
+        #[serde(default = "white")]
+        radiance: Color,
+        /// A latitude-longitude image (HDR, EXR, PNG or JPEG), relative to the scene file. Its middle
+        /// is at −Z, its top at +Y.
+        #[serde(default)]
+        image: Option<String>,
+        /// Turns the image about its top (degrees, counter-clockwise from above).
+        #[serde(default)]
+        rotate: f64,
+        /// Where the image's top is: the image is tilted the shortest way from +Y.
+        #[serde(default = "upwards")]
+        up: [f64; 3],
+        /// The camera sees it where nothing is in the way; if not, it lights, and is seen in mirrors and
+        /// through glass.
+        #[serde(default = "yes")]
+        visible: bool,
+        /// The spectrum that the radiance multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
+    },
+    /// A clear sky with its sun, and the ground below the horizon. It is the scene's environment.
+    Sky {
+        /// How hazy the air is: 1 (none but air) to 10.
+        #[serde(default = "default_turbidity")]
+        #[schemars(range(min = 1.0, max = 10.0))]
+        turbidity: f64,
+        /// The sun.
+        #[serde(default)]
+        sun: SunSpec,
+        /// Reflectance of the ground, 0 to 1.
+        #[serde(default = "default_ground")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        ground_albedo: f64,
+        /// Multiplies all of it: at 1, radiance 1 is 1 W/(m² sr nm).
+        #[serde(default = "one")]
+        #[schemars(range(min = 0.0))]
+        scale: f64,
+        /// Where the zenith is: the sky is tilted the shortest way from +Y.
+        #[serde(default = "upwards")]
+        up: [f64; 3],
+        /// The camera sees it where nothing is in the way.
+        #[serde(default = "yes")]
+        visible: bool,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
+    },
+}
+
+/// Where the sun of a sky stands.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SunSpec {
+    /// Degrees above the horizon, 0 to 90.
+    #[schemars(range(min = 0.0, max = 90.0))]
+    pub elevation: f64,
+    /// Degrees from −Z, clockwise from above: at 90 it stands over +X.
+    pub azimuth: f64,
+    /// The sun itself shines; if not, its sky alone does, as when a cloud hides it.
+    pub shines: bool,
+}
+
+impl Default for SunSpec {
+    fn default() -> Self {
+        Self { elevation: 45.0, azimuth: 0.0, shines: true }
+    }
+}
+
+impl LightSpec {
+    /// The light; of a sky the sun, too.
+    ///
+    /// # Errors
+    ///
+    /// On the first value that describes no light.
+    pub fn build(&self, supply: &mut dyn Supply) -> Result<Vec<Light>, Fault> {
+        let (key, color, illuminant) = match self {
+            Self::Sky { turbidity, sun, ground_albedo, scale, up, visible, group: _ } => {
+                let sky = ClearSky::new(*turbidity, sun.elevation, *ground_albedo, sun.shines);
+                let sky = sky.ok_or_else(|| Fault::new("", "is no sky that the model knows"))?;
+                let lights = shining(sky, sun.azimuth, *scale, (*up, *visible))?;
+                let group = self.group();
+                return Ok(lights.into_iter().map(|light| Light { group, ..light }).collect());
+            }
+            Self::Point { intensity, illuminant, .. }
+            | Self::Spot { intensity, illuminant, .. }
+            | Self::Goniometric { intensity, illuminant, .. }
+            | Self::Projector { intensity, illuminant, .. } => ("intensity", intensity, illuminant),
+            Self::Directional { irradiance, illuminant, .. } => {
+                ("irradiance", irradiance, illuminant)
+            }
+            Self::Environment { radiance, illuminant, .. } => ("radiance", radiance, illuminant),
+        };
+        in_bounds(key, color, Bound::None)?;
+        let kind = match self {
+            Self::Sky { .. } => return Ok(Vec::new()),
+            Self::Point { at, .. } => LightKind::Point(DVec3::from(*at)),
+            Self::Spot { at, look_at, cone, inner_cone, .. } => {
+                let at = DVec3::from(*at);
+                if inner_cone > cone {
+                    let why = format!("{inner_cone} is wider than `cone`, {cone}");
+                    return Err(Fault::new("inner_cone", why));
+                }
+                LightKind::Spot {
+                    at,
+                    axis: unit("look_at", DVec3::from(*look_at) - at)?,
+                    cos_outer: cone.to_radians().cos(),
+                    cos_inner: inner_cone.to_radians().cos(),
+                }
+            }
+            Self::Directional { direction, angle, .. } => LightKind::Directional {
+                along: unit("direction", DVec3::from(*direction))?,
+                cos_radius: (0.5 * angle).to_radians().cos(),
+            },
+            Self::Goniometric { at, file, direction, rotate, .. } => {
+                let below = unit("direction", DVec3::from(*direction))?;
+                let measured = goniometric(DVec3::from(*at), below, *rotate, (file, supply))?;
+                LightKind::Goniometric(Box::new(measured))
+            }
+            Self::Projector { at, look_at, up, fov, aspect, image, .. } => {
+                let at = DVec3::from(*at);
+                let back = unit("look_at", at - DVec3::from(*look_at))?;
+                let right = DVec3::from(*up).cross(back).try_normalize().ok_or_else(|| {
+                    let why = "has no length or lies along the view from `at` to `look_at`; choose another, such \
+                               as [0, 0, -1]";
+                    Fault::new("up", why)
+                })?;
+                if !(*fov > 0.0 && *fov < 180.0) {
+                    return Err(Fault::new("fov", format!("{fov} is not between 0 and 180")));
+                }
+                if let Some(aspect) = aspect.filter(|aspect| !(*aspect > 0.0 && aspect.is_finite()))
+                {
+                    return Err(Fault::new("aspect", format!("{aspect} is not above zero")));
+                }
+                LightKind::Projector(Box::new(Projector {
+                    at,
+                    axes: DMat3::from_cols(right, back.cross(right), back),
+                    tangent: (0.5 * fov).to_radians().tan(),
+                    aspect: *aspect,
+                    image: paint("image", image, Bound::None, supply)?,
+                }))
+            }
+            Self::Environment { image, rotate, up, visible, .. } => {
+                let image = match image {
+                    None => EnvironmentImage::Constant,
+                    Some(written) => {
+                        let found = supply.file(written).map_err(|why| Fault::new("image", why))?;
+                        EnvironmentImage::File(found)
+                    }
+                };
+                let turn = tilted(*up, *rotate)?;
+                LightKind::Environment { image, turn, visible: *visible }
+            }
+        };
+        Ok(vec![Light {
+            kind,
+            color: *color,
+            illuminant: checked(*illuminant)?,
+            group: self.group(),
+        }])
+    }
+
+    /// The group that it is of, if it names one.
+    #[must_use]
+    pub fn group(&self) -> Option<LightGroup> {
+        match self {
+            Self::Point { group, .. }
+            | Self::Spot { group, .. }
+            | Self::Directional { group, .. }
+            | Self::Goniometric { group, .. }
+            | Self::Projector { group, .. }
+            | Self::Environment { group, .. }
+            | Self::Sky { group, .. } => *group,
+        }
+    }
+}
+
+fn unit(key: &str, v: DVec3) -> Result<DVec3, Fault> {
+    v.try_normalize().ok_or_else(|| Fault::new(key, "gives no direction"))
+}
+
+/// What brings an environment's directions into the world: its top from +Y to `up` the shortest way, after a
+/// turn by `rotate` (degrees, counter-clockwise from above).
+fn tilted(up: [f64; 3], rotate: f64) -> Result<DMat3, Fault> {
+    let tilt = DQuat::from_rotation_arc(DVec3::Y, unit("up", DVec3::from(up))?);
+    Ok(DMat3::from_quat(tilt) * DMat3::from_rotation_y(rotate.to_radians()))
+}
+
+/// A sky as an environment, and its sun as parallel light from a disk.
+fn shining(
+    sky: ClearSky,
+    azimuth: f64,
+    scale: f64,
+    (up, visible): ([f64; 3], bool),
+) -> Result<Vec<Light>, Fault> {
+    in_bounds("scale", &[scale; 3], Bound::None)?;
+    if !azimuth.is_finite() {
+        return Err(Fault::new("sun.azimuth", format!("{azimuth} is no angle")));
+    }
+    // Clockwise from above.
+    let turn = tilted(up, -azimuth)?;
+    let sun = Light {
+        kind: LightKind::Directional {
+            along: -(turn * sky.toward_sun()),
+            cos_radius: (0.5 * SUN_DIAMETER).to_radians().cos(),
+        },
+        color: sky.sun().map(|part| part * scale),
+        illuminant: None,
+        group: None,
+    };
+    let shines = sky.is_sunlit();
+    let image = EnvironmentImage::ClearSky(Box::new(sky));
+    let kind = LightKind::Environment { image, turn, visible };
+    let dome = Light { kind, color: [scale; 3], illuminant: None, group: None };
+    Ok(if shines { vec![dome, sun] } else { vec![dome] })
+}
+
+/// A luminaire at a point (m) whose downward direction is `below` (unit), turned by `rotate` (degrees), by its
+/// file.
+fn goniometric(
+    at: DVec3,
+    below: DVec3,
+    rotate: f64,
+    (file, supply): (&str, &mut dyn Supply),
+) -> Result<Goniometric, Fault> {
+    let tilt = DMat3::from_quat(DQuat::from_rotation_arc(DVec3::NEG_Y, below));
+    let turn = tilt * DMat3::from_rotation_y(rotate.to_radians());
+    let path = supply.file(file).map_err(|why| Fault::new("file", why))?;
+    let photometry =
+        Photometry::read(&path).map_err(|why| Fault::new("file", format!("\"{file}\" {why}")))?;
+    // A quarter turn from +X, counter-clockwise from above, is −Z.
+    let axes = DMat3::from_cols(turn.x_axis, -turn.z_axis, turn.y_axis);
+    Ok(Goniometric { at, axes, file: path, photometry })
+}
+
+fn default_turbidity() -> f64 {
+    3.0
+}
+
+fn default_ground() -> f64 {
+    0.2
+}
+
+fn upwards() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+fn downwards() -> [f64; 3] {
+    [0.0, -1.0, 0.0]
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn default_throw() -> f64 {
+    40.0
+}
+
+fn default_cone() -> f64 {
+    30.0
+}

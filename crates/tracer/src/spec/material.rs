@@ -1,0 +1,332 @@
+//! Materials as the scene file writes them, and the surfaces that they are.
+
+use etendue_spectrum::{Illuminant, Metal, rgb};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Bound, Fault, PaintSpec, Supply, checked, in_bounds, one, paint};
+use crate::material::Alpha;
+use crate::scattering::{Absorption, Glass, GltfSurface};
+use crate::{Color, Emission, LightGroup, Material, Paint, Scattering};
+
+/// A material as the scene file writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum MaterialSpec {
+    /// A Lambert reflector.
+    Matte {
+        /// Reflectance: linear RGB, each 0..=1, or an image.
+        color: PaintSpec,
+    },
+    /// A perfect mirror.
+    Mirror {
+        /// Reflectance: linear RGB, each 0..=1, or an image.
+        #[serde(default)]
+        color: PaintSpec,
+    },
+    /// A metal with GGX facets: of a colour, or of a measured metal.
+    Metal {
+        /// Reflectance face on: linear RGB, each 0..=1, or an image. Either this or `metal`.
+        #[serde(default)]
+        color: Option<PaintSpec>,
+        /// The metal whose measured index decides what is reflected at which wavelength.
+        #[serde(default)]
+        metal: Option<Metal>,
+        /// Roughness, 0 (a mirror) to 1.
+        #[serde(default = "default_roughness")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        roughness: f64,
+    },
+    /// A boundary of glass, water or the like. The front of its triangles is outside.
+    Dielectric {
+        /// Refractive index: a number (at least 1), a glass of the catalogue, or `{"nd", "vd"}`.
+        #[serde(default)]
+        ior: IorSpec,
+        /// Tint of what passes: linear RGB, each 0..=1.
+        #[serde(default)]
+        color: PaintSpec,
+        /// Roughness, 0 (smooth) to 1: facets reflect and refract.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        roughness: f64,
+        /// What the body takes from light on its way through; nothing when absent.
+        #[serde(default)]
+        absorption: Option<AbsorptionSpec>,
+    },
+    /// glTF's metallic-roughness surface.
+    Gltf {
+        /// Base colour: linear RGB, each 0..=1, or an image.
+        #[serde(default)]
+        color: PaintSpec,
+        /// Share of metal, 0 to 1.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        metallic: f64,
+        /// Roughness, 0 to 1.
+        #[serde(default = "default_gltf_roughness")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        roughness: f64,
+        /// Refractive index of the coat, at least 1.
+        #[serde(default = "default_ior")]
+        #[schemars(range(min = 1.0))]
+        ior: f64,
+        /// Share of the base that lets light through a thin wall, 0 to 1.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        transmission: f64,
+        /// Share of the surface under a clear coat, 0 to 1.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        clearcoat: f64,
+        /// Roughness of the clear coat, 0 to 1.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        clearcoat_roughness: f64,
+        /// Reflectance of a sheen of fibres over all of it but the coat: linear RGB, each 0..=1, or an image.
+        #[serde(default = "no_sheen")]
+        sheen: PaintSpec,
+        /// Roughness of the sheen, 0 to 1.
+        #[serde(default = "default_gltf_roughness")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        sheen_roughness: f64,
+        /// How much rougher highlights are along the surface's grain than across it, 0 to 1.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        anisotropy: f64,
+        /// Where the grain goes: degrees from growing u of the texture coordinates, counter-clockwise as the
+        /// image is seen.
+        #[serde(default)]
+        anisotropy_rotation: f64,
+        /// Share of the surface that is there, 0 to 1.
+        #[serde(default = "one")]
+        #[schemars(range(min = 0.0, max = 1.0))]
+        opacity: f64,
+    },
+    /// A surface that shines and reflects nothing.
+    Emissive {
+        /// Radiance: linear RGB (not below zero), or an image.
+        radiance: PaintSpec,
+        /// The spectrum that the radiance multiplies; equal energy when absent.
+        #[serde(default)]
+        illuminant: Option<Illuminant>,
+        /// The back shines too.
+        #[serde(default)]
+        two_sided: bool,
+        /// The group that the layer request `light_groups` shows it with.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        group: Option<LightGroup>,
+    },
+    /// Matte squares of two colours over the surface's texture coordinates.
+    Checker {
+        /// The two reflectances, linear RGB.
+        #[serde(default = "default_checker_colors")]
+        colors: [Color; 2],
+        /// Squares along one unit of the texture coordinates (> 0).
+        #[serde(default = "default_checker_squares")]
+        squares: f64,
+    },
+}
+
+/// A refractive index as the scene file writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum IorSpec {
+    /// The same for all wavelengths, at least 1.
+    Constant(f64),
+    /// A glass of the catalogue.
+    Glass(String),
+    /// By the index and Abbe number of the helium d line.
+    Abbe(AbbeSpec),
+}
+
+impl Default for IorSpec {
+    fn default() -> Self {
+        Self::Constant(1.5)
+    }
+}
+
+/// Index and dispersion of a glass.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AbbeSpec {
+    /// Index at 587.56 nm, at least 1.
+    pub nd: f64,
+    /// Abbe number (> 0).
+    pub vd: f64,
+}
+
+/// Absorption of a body, by Beer and Lambert.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AbsorptionSpec {
+    /// What is left of light after `distance`: linear RGB, each 0..=1.
+    pub color: Color,
+    /// m (> 0).
+    pub distance: f64,
+}
+
+impl MaterialSpec {
+    /// The surface, called `name`.
+    ///
+    /// # Errors
+    ///
+    /// On the first value that describes no surface.
+    pub fn build(&self, name: &str, supply: &mut dyn Supply) -> Result<Material, Fault> {
+        Ok(match self {
+            Self::Matte { color } => {
+                Material::new(name, paint("color", color, Bound::One, supply)?, Scattering::Matte)
+            }
+            Self::Mirror { color } => {
+                Material::new(name, paint("color", color, Bound::One, supply)?, Scattering::Mirror)
+            }
+            Self::Metal { color, metal, roughness } => {
+                let scattering = Scattering::Metal { roughness: *roughness, named: *metal };
+                let paint = match (color, metal) {
+                    (Some(color), None) => paint("color", color, Bound::One, supply)?,
+                    (None, Some(metal)) => Paint::Plain(look(*metal)),
+                    (None, None) => {
+                        let why = "is missing: give it, or a `metal` (\"gold\", \"silver\", …)";
+                        return Err(Fault::new("color", why));
+                    }
+                    (Some(_), Some(_)) => {
+                        let why = "is given with `metal`, which has its own: leave one of them out";
+                        return Err(Fault::new("color", why));
+                    }
+                };
+                Material::new(name, paint, scattering)
+            }
+            Self::Dielectric { ior, color, roughness, absorption } => {
+                let glass = Glass {
+                    ior: supply.index(ior).map_err(|why| Fault::new("ior", why))?,
+                    roughness: *roughness,
+                    absorption: absorption.as_ref().map(absorbing).transpose()?,
+                };
+                let scattering = Scattering::Dielectric(glass);
+                Material::new(name, paint("color", color, Bound::One, supply)?, scattering)
+            }
+            Self::Gltf { .. } => self.gltf(name, supply)?,
+            Self::Emissive { radiance, illuminant, two_sided, group } => {
+                let radiance = paint("radiance", radiance, Bound::None, supply)?;
+                let emission = Emission {
+                    radiance: radiance.clone(),
+                    strength: 1.0,
+                    illuminant: checked(*illuminant)?,
+                    two_sided: *two_sided,
+                    group: *group,
+                };
+                let plain = Material::new(name, radiance, Scattering::Black);
+                Material { emission: Some(emission), ..plain }
+            }
+            Self::Checker { colors, squares } => {
+                for color in colors {
+                    in_bounds("colors", color, Bound::One)?;
+                }
+                if squares.is_nan() || *squares <= 0.0 {
+                    return Err(Fault::new("squares", format!("{squares} is not above zero")));
+                }
+                let paint = Paint::Checker { colors: *colors, squares: *squares };
+                Material::new(name, paint, Scattering::Matte)
+            }
+        })
+    }
+
+    /// A glTF surface, and nothing of all others.
+    fn gltf(&self, name: &str, supply: &mut dyn Supply) -> Result<Material, Fault> {
+        let Self::Gltf {
+            color,
+            metallic,
+            roughness,
+            ior,
+            transmission,
+            clearcoat,
+            clearcoat_roughness,
+            sheen,
+            sheen_roughness,
+            anisotropy,
+            anisotropy_rotation,
+            opacity,
+        } = self
+        else {
+            return Ok(Material::unnamed());
+        };
+        // Sheen has one colour or an image, and no checker.
+        let sheen = paint("sheen", sheen, Bound::One, supply)?;
+        let (sheen_color, sheen_color_texture) = match sheen {
+            Paint::Plain(color) => (color, None),
+            Paint::Image { factor, image } => (factor, Some(image)),
+            Paint::Checker { colors, .. } => (colors[0], None),
+        };
+        // The surface below its colour, and what shows through both.
+        let surface = GltfSurface {
+            metallic: *metallic,
+            roughness: *roughness,
+            ior: *ior,
+            transmission: *transmission,
+            clearcoat: *clearcoat,
+            clearcoat_roughness: *clearcoat_roughness,
+            sheen_color,
+            sheen_color_texture,
+            sheen_roughness: *sheen_roughness,
+            anisotropy: *anisotropy,
+            anisotropy_rotation: anisotropy_rotation.to_radians(),
+            ..GltfSurface::default()
+        };
+        let paint = paint("color", color, Bound::One, supply)?;
+        let plain = Material::new(name, paint, Scattering::Gltf(Box::new(surface)));
+        let alpha = if *opacity < 1.0 { Alpha::Blend { factor: *opacity } } else { Alpha::Opaque };
+        Ok(Material { alpha, ..plain })
+    }
+
+    /// The group of lights that it is of, if it shines and names one.
+    #[must_use]
+    pub fn group(&self) -> Option<LightGroup> {
+        match self {
+            Self::Emissive { group, .. } => *group,
+            Self::Matte { .. }
+            | Self::Mirror { .. }
+            | Self::Metal { .. }
+            | Self::Dielectric { .. }
+            | Self::Gltf { .. }
+            | Self::Checker { .. } => None,
+        }
+    }
+}
+
+/// What a metal looks like face on: linear RGB in 0..=1.
+fn look(metal: Metal) -> Color {
+    rgb::colour(&metal.reflectance(1.0)).map(|part| part.clamp(0.0, 1.0))
+}
+
+fn absorbing(spec: &AbsorptionSpec) -> Result<Absorption, Fault> {
+    let AbsorptionSpec { color, distance } = *spec;
+    in_bounds("absorption.color", &color, Bound::One)?;
+    if distance.is_nan() || distance <= 0.0 {
+        let why = format!("{distance} is not above zero");
+        return Err(Fault::new("absorption.distance", why));
+    }
+    Ok(Absorption { color, distance })
+}
+
+fn default_checker_colors() -> [Color; 2] {
+    [[0.8; 3], [0.2; 3]]
+}
+
+fn default_checker_squares() -> f64 {
+    8.0
+}
+
+fn default_roughness() -> f64 {
+    0.2
+}
+
+fn default_gltf_roughness() -> f64 {
+    0.5
+}
+
+fn default_ior() -> f64 {
+    1.5
+}
+
+fn no_sheen() -> PaintSpec {
+    PaintSpec::Color([0.0; 3])
+}
