@@ -37,6 +37,12 @@ pub fn keep_apart<'p>(
     inputs: impl IntoIterator<Item = &'p PathBuf>,
     outputs: &[PathBuf],
 ) -> Result<(), Error> {
+    if let Some(path) = outputs.iter().find(|path| path.is_dir()) {
+        let path = path.display();
+        let why =
+            format!("{path}: is a folder, where a file is to be written; remove or rename it");
+        return Err(Error::Refused(why));
+    }
     protect_inputs(inputs.into_iter().map(PathBuf::as_path));
     Ok(refuse_inputs(outputs.iter().map(PathBuf::as_path))?)
 }

@@ -9,10 +9,7 @@ use etendue_oidn::Denoiser;
 use etendue_render::denoise::{self, DENOISED};
 use etendue_render::expose::{self, BandFilm, SensorLight};
 use etendue_render::light_field::{self, LightFieldSet};
-use etendue_render::output::conventions::Manner;
-use etendue_render::output::{
-    Layer, Ledger, Look, MANIFEST, Outputs, Picture, exr, npy, png, sidecar,
-};
+use etendue_render::output::{Layer, LayerFile, Ledger, MANIFEST, Outputs, Picture, exr, sidecar};
 use etendue_render::report::seconds;
 use etendue_render::{Images, Plan, RenderError, Report};
 use etendue_scene::Scene;
@@ -291,33 +288,9 @@ impl Rendering {
             if !progress.goes_on(Phase::Write, 0.5 + 0.5 * done as f64 / total) {
                 return Err(RenderError::Stopped.into());
             }
-            let [image, array] = image_and_array(&layer.name);
-            // The picture's PNG shows what is denoised.
-            if outputs.png && layer.name != DENOISED {
-                let bits = match layer.look {
-                    Look::Distance => png::Bits::Sixteen,
-                    Look::Color
-                    | Look::Direction
-                    | Look::Extent
-                    | Look::Ids
-                    | Look::Share
-                    | Look::Cube
-                    | Look::Counts { .. } => png::Bits::Eight,
-                };
-                png::write(&place(image), picture, &layer.name, bits)?;
-                let mask = mask_of(&layer.name);
-                if png::has_mask(layer)
-                    && png::write_mask(&folder.join(&mask), picture, &layer.name)?
-                {
-                    place(mask);
-                }
-            }
-            if outputs.npy {
-                npy::write(&place(array), picture, &layer.name)?;
-            }
-            for manner in Manner::of(&layer.name, outputs) {
-                let name = in_manner(&layer.name, manner);
-                if manner.write(&folder.join(&name), picture, &layer.name)? {
+            for file in LayerFile::of(&layer.name, outputs) {
+                let name = file.name(&layer.name);
+                if file.write(&folder.join(&name), picture, &layer.name)? {
                     place(name);
                 }
             }
@@ -344,31 +317,6 @@ fn files_of(
     always.into_iter().chain(layers).chain(beside)
 }
 
-/// The files of a layer: to look at, and for numpy.
-fn image_and_array(layer: &str) -> [String; 2] {
-    let stem = stem(layer);
-    let image = match layer {
-        "" => format!("{stem}.png"),
-        _ => format!("{stem}.preview.png"),
-    };
-    [image, format!("{stem}.npy")]
-}
-
-/// Whether a layer's numbers are identities, which a mask may hold.
-fn has_mask(layer: &str) -> bool {
-    layer.starts_with("Id.") || layer == "MaterialId"
-}
-
-/// The file of a layer's numbers, where they are identities.
-fn mask_of(layer: &str) -> String {
-    format!("{}.png", stem(layer))
-}
-
-/// The file of a layer in the manner of a benchmark.
-fn in_manner(layer: &str, manner: Manner) -> String {
-    format!("{}.{}", stem(layer), manner.ending())
-}
-
 /// The files that a render leaves of these layers whatever they hold. A mask is not among them: its numbers
 /// may be too large for it.
 pub(crate) fn certain_files(
@@ -376,12 +324,8 @@ pub(crate) fn certain_files(
     outputs: Outputs,
 ) -> Vec<String> {
     let of = |layer: String| {
-        let indexed = in_manner(&layer, Manner::Indexed);
-        let mask = mask_of(&layer);
-        let has_mask = has_mask(&layer);
-        layer_files(&layer, outputs)
-            .into_iter()
-            .filter(move |file| *file != indexed && !(has_mask && *file == mask))
+        let certain = LayerFile::of(&layer, outputs).filter(|file| file.is_certain());
+        certain.map(|file| file.name(&layer)).collect::<Vec<_>>()
     };
     let files = layers.into_iter().flat_map(of);
     files.chain(outputs.exr.then(|| "layers.exr".to_owned())).collect()
@@ -389,25 +333,5 @@ pub(crate) fn certain_files(
 
 /// Those of them that are wanted.
 pub(crate) fn layer_files(layer: &str, outputs: Outputs) -> Vec<String> {
-    let [image, array] = image_and_array(layer);
-    let mask = (outputs.png && has_mask(layer), mask_of(layer));
-    let files = [(outputs.png && layer != DENOISED, image), (outputs.npy, array), mask];
-    let files = files.into_iter().filter_map(|(wanted, name)| wanted.then_some(name));
-    files.chain(Manner::of(layer, outputs).map(|manner| in_manner(layer, manner))).collect()
-}
-
-/// A layer's file name: `NormalCamera` is `normal_camera`, `Id.object` `id_object`, the picture
-/// `picture`.
-fn stem(layer: &str) -> String {
-    if layer.is_empty() {
-        return "picture".to_owned();
-    }
-    let mut stem = String::new();
-    for c in layer.replace('.', "_").chars() {
-        if c.is_ascii_uppercase() && !stem.is_empty() {
-            stem.push('_');
-        }
-        stem.push(c.to_ascii_lowercase());
-    }
-    stem
+    LayerFile::of(layer, outputs).map(|file| file.name(layer)).collect()
 }

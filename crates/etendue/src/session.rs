@@ -10,7 +10,7 @@ use std::sync::Arc;
 use etendue_accel::Accel;
 use etendue_geometry::Mesh;
 use etendue_oidn::Denoiser;
-use etendue_render::output::conventions::Manner;
+use etendue_render::output::LayerFile;
 use etendue_render::{Checkpoint, Images, Plan, Seconds, denoise};
 use etendue_scene::file::{FileKind, FramesSpec, SceneFile};
 use etendue_scene::{Cache, Frame, Scene, SceneError, Start};
@@ -385,7 +385,7 @@ impl Session {
         self.load(progress)?;
         let (outputs, loaded) = (self.options.outputs, self.loaded()?);
         let layers = loaded.plan.names(&loaded.scene);
-        if let Some([output, wanted]) = Manner::without_layer(outputs, &layers) {
+        if let Some([output, wanted]) = LayerFile::without_layer(outputs, &layers) {
             let why = format!(
                 "outputs: `{output}` is a file of {wanted}, and the scene has no such layer; add it to \
                  `layers`, or leave `{output}` out"

@@ -9,7 +9,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use super::look::{Bits, Channels, Shown, fill, indices};
-use super::{Layer, OutputError, Outputs, Picture, png, write_whole};
+use super::{Layer, OutputError, Picture, png, write_whole};
 use crate::film::NoMemory;
 
 /// Numbers a metre in TUM's depth images.
@@ -24,93 +24,30 @@ pub const KITTI_FLOW: f64 = 64.0;
 /// What `.flo` files have where nothing is known: anything above 10⁹.
 const UNKNOWN: f32 = 1e10;
 
-/// A file of one layer in the manner of a benchmark.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Manner {
-    /// Depth of the TUM RGB-D benchmark.
-    TumDepth,
-    /// Depth of KITTI.
-    KittiDepth,
-    /// Disparity of KITTI.
-    KittiDisparity,
-    /// Flow of KITTI.
-    KittiFlow,
-    /// Flow of the Middlebury benchmark.
-    Flo,
-    /// Numbers of things as indices of a palette.
-    Indexed,
+/// The layer as 16-bit PNG of `factor` a unit.
+pub(super) fn write_scaled(
+    path: &Path,
+    (picture, layer): (&Picture, &Layer),
+    (factor, unit): (f64, &str),
+) -> Result<(), OutputError> {
+    png::write_shown(path, picture, layer, &scaled(layer, factor, unit)?)
 }
 
-impl Manner {
-    /// Those of the layer called `layer` among `outputs`.
-    pub fn of(layer: &str, outputs: Outputs) -> impl Iterator<Item = Self> {
-        let is = |start: &str| layer.starts_with(start);
-        let named = layer == "MaterialId" || is("Id.") && layer != "Id.primitive";
-        let all = [
-            (outputs.tum && layer == "Depth", Self::TumDepth),
-            (outputs.kitti && layer == "Depth", Self::KittiDepth),
-            (outputs.kitti && is("Disparity"), Self::KittiDisparity),
-            (outputs.kitti && is("Flow"), Self::KittiFlow),
-            (outputs.flo && is("Flow"), Self::Flo),
-            (outputs.indexed && named, Self::Indexed),
-        ];
-        all.into_iter().filter_map(|(wanted, manner)| wanted.then_some(manner))
-    }
+/// The layer as KITTI's flow.
+pub(super) fn write_flow(
+    path: &Path,
+    (picture, layer): (&Picture, &Layer),
+) -> Result<(), OutputError> {
+    png::write_shown(path, picture, layer, &flow(layer)?)
+}
 
-    /// What of `outputs` none of `layers` is written as: the word for it, and the layers that are.
-    #[must_use]
-    pub fn without_layer(outputs: Outputs, layers: &[String]) -> Option<[&'static str; 2]> {
-        let all = [
-            (Outputs { tum: outputs.tum, ..Outputs::NONE }, ["tum", "depth"]),
-            (
-                Outputs { kitti: outputs.kitti, ..Outputs::NONE },
-                ["kitti", "depth, disparity or flow"],
-            ),
-            (Outputs { flo: outputs.flo, ..Outputs::NONE }, ["flo", "flow"]),
-            (
-                Outputs { indexed: outputs.indexed, ..Outputs::NONE },
-                ["indexed", "ids or material_id"],
-            ),
-        ];
-        let lacks = |alone: Outputs| {
-            alone != Outputs::NONE
-                && layers.iter().all(|name| Self::of(name, alone).next().is_none())
-        };
-        all.into_iter().find_map(|(alone, words)| lacks(alone).then_some(words))
-    }
-
-    /// What follows the layer's name in the file's.
-    #[must_use]
-    pub fn ending(self) -> &'static str {
-        match self {
-            Self::TumDepth => "tum.png",
-            Self::KittiDepth | Self::KittiDisparity | Self::KittiFlow => "kitti.png",
-            Self::Flo => "flo",
-            Self::Indexed => "indexed.png",
-        }
-    }
-
-    /// Writes the layer called `name` to `path`. `false` when its numbers do not fit into the format, and
-    /// nothing is written.
-    ///
-    /// # Errors
-    ///
-    /// When there is no such layer, or the file cannot be written.
-    pub fn write(self, path: &Path, picture: &Picture, name: &str) -> Result<bool, OutputError> {
-        let layer = picture.require(name)?;
-        let shown = match self {
-            Self::TumDepth => scaled(layer, TUM_DEPTH, "metres")?,
-            Self::KittiDepth => scaled(layer, KITTI_DEPTH, "metres")?,
-            Self::KittiDisparity => scaled(layer, KITTI_DEPTH, "pixels")?,
-            Self::KittiFlow => flow(layer)?,
-            Self::Flo => return flo(path, picture, layer).map(|()| true),
-            Self::Indexed => match indices(layer)? {
-                Some(shown) => shown,
-                None => return Ok(false),
-            },
-        };
-        png::write_shown(path, picture, layer, &shown).map(|()| true)
-    }
+/// The numbers of the layer as indices of a palette; `false` where they do not fit.
+pub(super) fn write_indexed(
+    path: &Path,
+    (picture, layer): (&Picture, &Layer),
+) -> Result<bool, OutputError> {
+    let Some(shown) = indices(layer)? else { return Ok(false) };
+    png::write_shown(path, picture, layer, &shown).map(|()| true)
 }
 
 /// The nearest of `1..=65535`; 0 where it is another number.
@@ -145,7 +82,10 @@ fn flow(layer: &Layer) -> Result<Shown, NoMemory> {
 }
 
 /// `PIEH`, columns and rows, and two little-endian floats a pixel.
-fn flo(path: &Path, picture: &Picture, layer: &Layer) -> Result<(), OutputError> {
+pub(super) fn write_flo(
+    path: &Path,
+    (picture, layer): (&Picture, &Layer),
+) -> Result<(), OutputError> {
     let [x, y] = [0, 1].map(|k| &layer.channels[k].values);
     let side = |side: usize| {
         i32::try_from(side)
@@ -171,22 +111,8 @@ fn flo(path: &Path, picture: &Picture, layer: &Layer) -> Result<(), OutputError>
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Channel, Look, Values};
+    use super::super::{Channel, LayerFile, Look, Values};
     use super::*;
-
-    #[test]
-    fn outputs_that_no_layer_serves_are_named() {
-        let lacks = |list: &str, layers: &[&str]| {
-            let layers: Vec<String> = layers.iter().map(|&name| name.to_owned()).collect();
-            Manner::without_layer(Outputs::from_list(list).unwrap(), &layers).map(|words| words[0])
-        };
-        // A depth that is the picture has no name.
-        assert_eq!(lacks("png,tum", &["", "Normal"]), Some("tum"));
-        assert_eq!(lacks("kitti,tum", &["Depth"]), None);
-        assert_eq!(lacks("kitti,flo", &["Depth"]), Some("flo"));
-        assert_eq!(lacks("indexed", &["Id.primitive"]), Some("indexed"));
-        assert_eq!(lacks("exr,png,npy,dng", &[]), None);
-    }
 
     fn picture(name: &str, look: Look, planes: Vec<Values>) -> Picture {
         let channel = |(k, values): (usize, Values)| Channel { name: ["X", "Y"][k].into(), values };
@@ -195,7 +121,7 @@ mod tests {
         Picture::new(4, 1, vec![layer], Vec::new()).unwrap()
     }
 
-    fn read(manner: Manner, picture: &Picture, name: &str) -> image::DynamicImage {
+    fn read(manner: LayerFile, picture: &Picture, name: &str) -> image::DynamicImage {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         assert!(manner.write(&path, picture, name).unwrap());
@@ -206,13 +132,13 @@ mod tests {
     fn depth_is_sixteen_bits_of_a_stated_factor() {
         let depth = Values::F64(vec![1.0, 2.5, f64::INFINITY, 14.0]);
         let picture = picture("Depth", Look::Distance, vec![depth]);
-        let image::DynamicImage::ImageLuma16(tum) = read(Manner::TumDepth, &picture, "Depth")
+        let image::DynamicImage::ImageLuma16(tum) = read(LayerFile::TumDepth, &picture, "Depth")
         else {
             panic!("16 bits, grey")
         };
         // 14 m is beyond 13.107 m.
         assert_eq!(tum.into_raw(), [5000, 12500, 0, 0]);
-        let kitti = read(Manner::KittiDepth, &picture, "Depth").into_luma16();
+        let kitti = read(LayerFile::KittiDepth, &picture, "Depth").into_luma16();
         assert_eq!(kitti.into_raw(), [256, 640, 0, 3584]);
     }
 
@@ -221,7 +147,7 @@ mod tests {
         let x = Values::F64(vec![0.0, -1.5, f64::INFINITY, 600.0]);
         let y = Values::F64(vec![1.0, 0.25, f64::INFINITY, 0.0]);
         let picture = picture("Flow", Look::Extent, vec![x, y]);
-        let image::DynamicImage::ImageRgb16(kitti) = read(Manner::KittiFlow, &picture, "Flow")
+        let image::DynamicImage::ImageRgb16(kitti) = read(LayerFile::KittiFlow, &picture, "Flow")
         else {
             panic!("16 bits, three channels")
         };
@@ -229,7 +155,7 @@ mod tests {
         assert_eq!(kitti.into_raw(), expected.as_flattened());
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.flo");
-        assert!(Manner::Flo.write(&path, &picture, "Flow").unwrap());
+        assert!(LayerFile::Flo.write(&path, &picture, "Flow").unwrap());
         let bytes = std::fs::read(&path).unwrap();
         let float = |i: usize| f32::from_le_bytes(bytes[4 * i..4 * i + 4].try_into().unwrap());
         // The sanity check of the benchmark's own reader.
@@ -244,7 +170,7 @@ mod tests {
             |largest| picture("Id.object", Look::Ids, vec![Values::U32(vec![0, 1, 2, largest])]);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        assert!(Manner::Indexed.write(&path, &ids(255), "Id.object").unwrap());
+        assert!(LayerFile::Indexed.write(&path, &ids(255), "Id.object").unwrap());
         let decoder =
             ::png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&path).unwrap()));
         let mut reader = decoder.read_info().unwrap();
@@ -253,6 +179,6 @@ mod tests {
         let mut bytes = [0; 4];
         reader.next_frame(&mut bytes).unwrap();
         assert_eq!(bytes, [0, 1, 2, 255]);
-        assert!(!Manner::Indexed.write(&path, &ids(256), "Id.object").unwrap());
+        assert!(!LayerFile::Indexed.write(&path, &ids(256), "Id.object").unwrap());
     }
 }

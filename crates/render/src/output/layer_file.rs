@@ -1,0 +1,168 @@
+//! The files that one layer leaves: which there are for which layers, their names, and what writes each.
+
+use std::path::Path;
+
+use super::conventions::{self, KITTI_DEPTH, TUM_DEPTH};
+use super::png::Bits;
+use super::{Look, OutputError, Outputs, Picture, npy, png};
+use crate::denoise::DENOISED;
+
+/// A file of one layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LayerFile {
+    /// To look at.
+    Preview,
+    /// Numbers of things as 16-bit PNG.
+    Mask,
+    /// For numpy.
+    Array,
+    /// Depth of the TUM RGB-D benchmark.
+    TumDepth,
+    /// Depth of KITTI.
+    KittiDepth,
+    /// Disparity of KITTI.
+    KittiDisparity,
+    /// Flow of KITTI.
+    KittiFlow,
+    /// Flow of the Middlebury benchmark.
+    Flo,
+    /// Numbers of things as indices of a palette.
+    Indexed,
+}
+
+impl LayerFile {
+    /// Those of the layer called `layer` (empty for the picture itself) among `outputs`, in the order in which
+    /// they are written.
+    pub fn of(layer: &str, outputs: Outputs) -> impl Iterator<Item = Self> {
+        let is = |start: &str| layer.starts_with(start);
+        let named = layer == "MaterialId" || is("Id.") && layer != "Id.primitive";
+        let all = [
+            // The picture's own shows what is denoised.
+            (outputs.png && layer != DENOISED, Self::Preview),
+            (outputs.png && named, Self::Mask),
+            (outputs.npy, Self::Array),
+            (outputs.tum && layer == "Depth", Self::TumDepth),
+            (outputs.kitti && layer == "Depth", Self::KittiDepth),
+            (outputs.kitti && is("Disparity"), Self::KittiDisparity),
+            (outputs.kitti && is("Flow"), Self::KittiFlow),
+            (outputs.flo && is("Flow"), Self::Flo),
+            (outputs.indexed && named, Self::Indexed),
+        ];
+        all.into_iter().filter_map(|(wanted, file)| wanted.then_some(file))
+    }
+
+    /// What of `outputs` none of `layers` is written as: the word for it, and the layers that are.
+    #[must_use]
+    pub fn without_layer(outputs: Outputs, layers: &[String]) -> Option<[&'static str; 2]> {
+        let none = Outputs::NONE;
+        let all = [
+            (Outputs { tum: outputs.tum, ..none }, ["tum", "depth"]),
+            (Outputs { kitti: outputs.kitti, ..none }, ["kitti", "depth, disparity or flow"]),
+            (Outputs { flo: outputs.flo, ..none }, ["flo", "flow"]),
+            (Outputs { indexed: outputs.indexed, ..none }, ["indexed", "ids or material_id"]),
+        ];
+        let lacks = |alone: Outputs| {
+            alone != none && layers.iter().all(|name| Self::of(name, alone).next().is_none())
+        };
+        all.into_iter().find_map(|(alone, words)| lacks(alone).then_some(words))
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(self, layer: &str) -> String {
+        let ending = match self {
+            Self::Preview if layer.is_empty() => "png",
+            Self::Preview => "preview.png",
+            Self::Mask => "png",
+            Self::Array => "npy",
+            Self::TumDepth => "tum.png",
+            Self::KittiDepth | Self::KittiDisparity | Self::KittiFlow => "kitti.png",
+            Self::Flo => "flo",
+            Self::Indexed => "indexed.png",
+        };
+        format!("{}.{ending}", stem(layer))
+    }
+
+    /// Whether it is written whatever the layer holds: numbers may be too large for masks.
+    #[must_use]
+    pub fn is_certain(self) -> bool {
+        !matches!(self, Self::Mask | Self::Indexed)
+    }
+
+    /// Writes the layer called `name` to `path`. `false` when its numbers do not fit into the format, and
+    /// nothing is written.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such layer, or the file cannot be written.
+    pub fn write(self, path: &Path, picture: &Picture, name: &str) -> Result<bool, OutputError> {
+        let layer = picture.require(name)?;
+        let of = (picture, layer);
+        match self {
+            Self::Preview => {
+                let is_distance = layer.look == Look::Distance;
+                let bits = if is_distance { Bits::Sixteen } else { Bits::Eight };
+                png::write(path, picture, name, bits)?;
+            }
+            Self::Mask => return png::write_mask(path, picture, name),
+            Self::Array => npy::write(path, picture, name)?,
+            Self::TumDepth => conventions::write_scaled(path, of, (TUM_DEPTH, "metres"))?,
+            Self::KittiDepth => conventions::write_scaled(path, of, (KITTI_DEPTH, "metres"))?,
+            Self::KittiDisparity => conventions::write_scaled(path, of, (KITTI_DEPTH, "pixels"))?,
+            Self::KittiFlow => conventions::write_flow(path, of)?,
+            Self::Flo => conventions::write_flo(path, of)?,
+            Self::Indexed => return conventions::write_indexed(path, of),
+        }
+        Ok(true)
+    }
+}
+
+/// A layer's name as files have it: `NormalCamera` is `normal_camera`, `Id.object` `id_object`, the picture
+/// `picture`.
+fn stem(layer: &str) -> String {
+    if layer.is_empty() {
+        return "picture".to_owned();
+    }
+    let mut stem = String::new();
+    for c in layer.replace('.', "_").chars() {
+        if c.is_ascii_uppercase() && !stem.is_empty() {
+            stem.push('_');
+        }
+        stem.push(c.to_ascii_lowercase());
+    }
+    stem
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outputs_that_no_layer_serves_are_named() {
+        let lacks = |list: &str, layers: &[&str]| {
+            let layers: Vec<String> = layers.iter().map(|&name| name.to_owned()).collect();
+            LayerFile::without_layer(Outputs::from_list(list).unwrap(), &layers)
+                .map(|words| words[0])
+        };
+        // A depth that is the picture has no name.
+        assert_eq!(lacks("png,tum", &["", "Normal"]), Some("tum"));
+        assert_eq!(lacks("kitti,tum", &["Depth"]), None);
+        assert_eq!(lacks("kitti,flo", &["Depth"]), Some("flo"));
+        assert_eq!(lacks("indexed", &["Id.primitive"]), Some("indexed"));
+        assert_eq!(lacks("exr,png,npy,dng", &[]), None);
+    }
+
+    #[test]
+    fn names_are_those_of_layers_in_lower_case() {
+        let files = |layer: &str, list: &str| {
+            let files = LayerFile::of(layer, Outputs::from_list(list).unwrap());
+            files.map(|file| file.name(layer)).collect::<Vec<_>>()
+        };
+        assert_eq!(files("", "exr,png,npy"), ["picture.png", "picture.npy"]);
+        assert_eq!(files("NormalCamera", "png"), ["normal_camera.preview.png"]);
+        let of_ids = ["id_object.preview.png", "id_object.png", "id_object.indexed.png"];
+        assert_eq!(files("Id.object", "png,indexed"), of_ids);
+        assert_eq!(files("Id.primitive", "png,indexed"), ["id_primitive.preview.png"]);
+        assert_eq!(files(DENOISED, "png,npy"), ["denoised.npy"]);
+    }
+}
