@@ -126,8 +126,8 @@ impl Bvh {
     ///
     /// # Errors
     ///
-    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::TooLarge`]
-    /// for more triangles than leaves can number; [`BuildError::Stopped`] when the progress
+    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::Scale`] beyond
+    /// 10⁹⁰ m and below 10⁻⁹⁰ m; [`BuildError::TooLarge`] for more triangles than leaves can number; [`BuildError::Stopped`] when the progress
     /// function answered `false`; [`BuildError::Library`] when threads cannot be had.
     pub fn build(geometry: Arc<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
         let start = Instant::now();

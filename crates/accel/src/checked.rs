@@ -6,11 +6,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch};
+use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch};
 
 use crate::embree::{ExactFilter, FoundHits, NearestSearch, Scene, version};
 use crate::end_triangles::EndTriangles;
 use crate::nearest::{Nearest, Query};
+use crate::parts::check_scale;
 use crate::recheck;
 use crate::single::{F32Frame, Rays32};
 use crate::solve::{self, ChunkTriangles, Solved};
@@ -67,7 +68,8 @@ impl Embree {
         // Around the frame in which f32 loses least.
         let start = Instant::now();
         let bounds = geometry.loose_bounds();
-        check_scale(bounds)?;
+        // Embree multiplies three lengths of a triangle, which have to stay in single precision.
+        check_scale(bounds, "Embree", [1e-12, 1e12])?;
         let frame = F32Frame::of(bounds);
         let scene =
             Scene::build(geometry, frame.origin, options, before.map(|before| &before.scene))?;
@@ -357,17 +359,6 @@ fn widen(found: &FoundHits, advance: &[f64], hits: &mut HitBatch) {
         y[i] = keep(own[1]);
         z[i] = keep(own[2]);
     }
-}
-
-/// Embree multiplies three lengths of a triangle, which have to stay in single precision.
-fn check_scale(bounds: Bounds) -> Result<(), BuildError> {
-    const LEAST: f64 = 1e-12;
-    const MOST: f64 = 1e12;
-    let extent = if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).max_element() };
-    if extent == 0.0 || (LEAST..=MOST).contains(&extent) {
-        return Ok(());
-    }
-    Err(BuildError::Scale { backend: "Embree", extent, least: LEAST, most: MOST })
 }
 
 impl Accel for Embree {

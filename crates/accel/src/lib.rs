@@ -204,10 +204,11 @@ pub enum BuildError {
         /// The most it takes.
         limit: u64,
     },
-    /// A scene so large or so small that the backend's single-precision numbers cannot hold it.
+    /// A scene so large or so small that the numbers of the backend cannot hold it.
     #[error(
         "the scene measures {extent:.1e} m, and the {backend} structure holds {least:.0e} to \
-         {most:.0e} m; scale its objects, or use --accel bvh"
+         {most:.0e} m; scale its objects{}",
+        if *backend == "Embree" { ", or use --accel bvh" } else { "" }
     )]
     Scale {
         /// The backend that was asked to build.

@@ -34,6 +34,19 @@ pub(crate) struct Layout {
     pub(crate) world_frame: Frame,
 }
 
+/// Refuses a scene whose longest side is none of `least` to `most` (m).
+pub(crate) fn check_scale(
+    bounds: Bounds,
+    backend: &'static str,
+    [least, most]: [f64; 2],
+) -> Result<(), BuildError> {
+    let extent = if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).max_element() };
+    if extent == 0.0 || (least..=most).contains(&extent) {
+        return Ok(());
+    }
+    Err(BuildError::Scale { backend, extent, least, most })
+}
+
 /// What is baked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Baking {
@@ -95,12 +108,12 @@ impl Layout {
         self.parts.iter().map(|part| part.len(geometry) as u64).sum()
     }
 
-    /// Refuses what cannot be numbered, and what would take more than the caller's memory limit at
-    /// so many bytes a triangle and an instance.
+    /// Refuses what cannot be numbered or measured, and what would take more than the caller's memory limit
+    /// at so many bytes a triangle and an instance.
     ///
     /// # Errors
     ///
-    /// [`BuildError::TooLarge`] and [`BuildError::MemoryLimit`].
+    /// [`BuildError::Scale`], [`BuildError::TooLarge`] and [`BuildError::MemoryLimit`].
     pub(crate) fn check_size(
         &self,
         geometry: &Geometry,
@@ -108,6 +121,8 @@ impl Layout {
         backend: &'static str,
         [per_triangle, per_instance]: [u64; 2],
     ) -> Result<(), BuildError> {
+        // Products of three lengths have to stay in double precision.
+        check_scale(geometry.loose_bounds(), backend, [1e-90, 1e90])?;
         for part in &self.parts {
             if part.len(geometry) > MOST_TRIANGLES {
                 return Err(part.too_large(geometry, backend));

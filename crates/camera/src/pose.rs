@@ -231,6 +231,9 @@ impl PoseSpec {
         if !(from.is_finite() && at.is_finite() && up.is_finite()) {
             return fault("pose", "a number is not finite".to_owned());
         }
+        if !(at - from).length().is_finite() {
+            return fault("pose", "a number is too large".to_owned());
+        }
         if unit(at - from).is_none() {
             return fault(
                 "pose.look_at",

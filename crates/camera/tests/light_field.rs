@@ -114,6 +114,8 @@ fn distances_follow_from_f_numbers_and_mismatches_are_told() {
     assert!(!told(&matched).contains("lenslets"), "{}", told(&matched));
     assert!(told(&light_field(r#""f_number": 6"#, "").unwrap()).contains("overlap"));
     assert!(told(&light_field(r#""f_number": 3"#, "").unwrap()).contains("dark"));
+    let opaque = light_field(r#""transmission": 0"#, "").unwrap_err().to_string();
+    assert!(opaque.contains("no light gets through any lenslet"), "{opaque}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ mod parse;
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use etendue::{Shard, ShardBy};
 use etendue_bench::tolerance::Tolerance;
 use etendue_scene::import::Strictness;
@@ -69,6 +69,17 @@ pub(crate) enum Command {
         #[arg(value_enum, default_value_t = SchemaArgument::Scene)]
         of: SchemaArgument,
     },
+}
+
+/// What was asked for.
+pub(crate) fn parse() -> Cli {
+    // A number below zero is a value, which the option's own check refuses in its own words.
+    let takes_value = |arg: &clap::Arg| !arg.is_positional() && arg.get_action().takes_values();
+    let command = Cli::command().mut_subcommands(|command| {
+        command
+            .mut_args(|arg| if takes_value(&arg) { arg.allow_negative_numbers(true) } else { arg })
+    });
+    Cli::from_arg_matches(&command.get_matches()).unwrap_or_else(|error| error.exit())
 }
 
 const RENDER_HELP: &str = "\
@@ -360,7 +371,7 @@ pub(crate) struct PlanArguments {
     #[arg(long)]
     pub(crate) models: bool,
     /// What a model may be off by: pixels, and a share of the light when that is to be judged as well
-    #[arg(long, value_name = "PIXELS[,SHARE]", default_value = "0.5 px", value_parser = parse::tolerance)]
+    #[arg(long, value_name = "PIXELS[,SHARE]", default_value = "0.5 px", requires = "models", value_parser = parse::tolerance)]
     pub(crate) tolerance: Tolerance,
     /// Print JSON for machines
     #[arg(long)]

@@ -21,13 +21,13 @@ mod view;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser};
+use clap::CommandFactory;
 
 use arguments::{Cli, Command, SchemaArgument};
 use fault::Fault;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = arguments::parse();
     if cli.version {
         version::print();
         return ExitCode::SUCCESS;

@@ -32,18 +32,18 @@ pub fn fingerprint() -> (String, String) {
 pub fn guide(scene: &mut Scene) -> Result<(), RenderError> {
     let refused = |why: &str| {
         let path = scene.path.display();
-        Err(RenderError::NotDenoised(format!("{path}: --denoise {why}; leave it out")))
+        Err(RenderError::NotDenoised(format!("{path}: --denoise {why}")))
     };
     if scene.picture != Some(LayerSpec::Radiance) {
         return refused(
             "takes away the noise of light, and the picture shows none: give the scene a `tracer` of light, \
-             such as {\"type\": \"path\"}, or",
+             such as {\"type\": \"path\"}, or leave it out",
         );
     }
     if has_spectrum(scene) {
         return refused(
             "knows red, green and blue alone, and camera.sensor is `multispectral`: its bands would keep \
-             their noise",
+             their noise; leave it out",
         );
     }
     for layer in [LayerSpec::MeanAlbedo, LayerSpec::MeanNormal] {

@@ -250,7 +250,7 @@ impl FilmFile {
         let body = bytes.strip_prefix(MAGIC).ok_or_else(|| {
             refused("is no part of a render; give files that `etendue render --shard` wrote")
         })?;
-        let torn = || refused("is not whole; render this part again");
+        let torn = || refused("is not whole; remove it, and render this part again");
         let (content, hash) = bytes.split_last_chunk::<8>().ok_or_else(torn)?;
         if xxh3_64(content) != u64::from_le_bytes(*hash) {
             return Err(torn());

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use etendue_geometry::files::Stamp;
 use etendue_image::Limits;
 use etendue_scene::Scene;
+use etendue_tracer::spec::BRIGHTEST;
 use etendue_tracer::texture::{Encoding, Filter, ImageError, Wrap};
 use etendue_tracer::{
     EnvironmentImage, EnvironmentMap, Image, ImageSource, LayerSpec, Light, LightKind, Texture,
@@ -137,7 +138,8 @@ impl Images {
         };
         if map.dropped > 0 {
             self.faults.push(format!(
-                "the environment has {} pixels that are not finite or below zero; they are black",
+                "the environment has {} pixels that are not finite, below zero or above {BRIGHTEST:e}; \
+                 they are black",
                 map.dropped
             ));
         }

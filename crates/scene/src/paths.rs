@@ -75,6 +75,9 @@ impl Folder {
             }
             _ => format!("\"{written}\" cannot be read: {error}"),
         })?;
+        if real.is_dir() {
+            return Err(format!("\"{written}\" is a folder; name a file"));
+        }
         self.found.lock().unwrap_or_else(PoisonError::into_inner).insert(path.clone());
         Ok(FoundFile { path, real })
     }

@@ -189,6 +189,7 @@ fn samples_that_would_never_stop_or_are_none_are_refused_by_path() {
     let noise = |more: &str| format!(r#"{{"samples": {{"until": "sensor-noise"{more}}}}}"#);
     let cases = [
         (noise(r#", "fraction": 0"#), "render.samples.fraction: sampling would never stop"),
+        (noise(r#", "fraction": 1e-300"#), "render.samples.fraction: sampling would never stop"),
         (noise(r#", "fraction": -0.5"#), "render.samples.fraction: -0.5 is below the least, 0"),
         (noise(r#", "fraction": 1.5"#), "render.samples.fraction: 1.5 is above the most, 1"),
         (
@@ -264,6 +265,7 @@ fn impossible_cameras_are_refused_by_path() {
             "camera.pose.look_at: is the same point as `from`",
         ),
         (r#""pose": {"from": [0, 5, 0], "look_at": [0, 0, 0]}"#, "camera.pose.up: lies along"),
+        (r#""pose": {"from": [1e300, 5, 0], "look_at": [0, 0, 0]}"#, "pose: a number is too large"),
         (
             r#""pose": {"matrix": [[0,0,0,0],[0,0,0,0],[0,0,0,0],[0,0,0,1]],
                 "maps": "world_from_camera", "convention": "gltf"}"#,

@@ -162,6 +162,19 @@ fn meshes_collapsed_to_a_point_are_left_out() {
     }
 }
 
+/// Lengths whose squares no number holds.
+#[test]
+fn scenes_that_no_number_holds_are_refused_by_every_backend() {
+    for scale in [1e154, 1e300, 1e-150, 1e-300] {
+        let place = Transform::from_trs(DVec3::ZERO, DQuat::IDENTITY, DVec3::splat(scale));
+        let geometry = at(vec![blob(4)], vec![placed(0, place)]);
+        for (name, build) in BACKENDS {
+            let built = build(Arc::clone(&geometry), &BuildOptions::default());
+            assert!(matches!(built, Err(BuildError::Scale { .. })), "{name}, {scale:e}");
+        }
+    }
+}
+
 /// Triangles without area are left out, and those behind them keep their numbers.
 #[test]
 fn numbers_stay_those_of_the_file() {

@@ -303,4 +303,32 @@ fn options_that_mean_nothing_are_refused() {
     refused(&bench, &["--set", "render.samples=0"], &["samples"]);
     refused(&bench, &["--memory-limit", "4 elephants"], &["memory-limit"]);
     refused(&bench, &["--camera", "front"], &["front"]);
+    for option in ["--samples", "--seed", "--threads", "--memory-limit", "--checkpoint"] {
+        refused(&bench, &[option, "-1"], &["invalid value '-1'", option]);
+    }
+    let twice = "camera={\"type\": \"pinhole\", \"fov\": 3, \"fov\": 40}";
+    refused(&bench, &["--set", twice], &["fov stands here a second time"]);
+    refused_command(&bench, &["plan", "scene.json", "--tolerance", "1 px"], &["--models"]);
+}
+
+#[test]
+fn lenses_that_leave_no_opening_are_refused() {
+    let camera = |number: &str| {
+        format!(
+            r#"{{"etendue": 1, "camera": {{"type": "thin_lens", "focal_length": 50, "f_number": {number},
+            "focus_distance": 3, "sensor_height": 24}}}}"#
+        )
+    };
+    refused_scene(&camera("1e300"), &["camera.f_number", "an opening of 2.5e-299 mm"]);
+}
+
+#[test]
+fn a_folder_where_a_file_is_to_be_is_refused_before_rendering() {
+    let bench = Bench::with_scene(r#"{"etendue": 1}"#);
+    std::fs::create_dir_all(bench.path("out/picture.png")).unwrap();
+    let output = bench.run(&["render", "scene.json", "-o", "out"]);
+    let message = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("picture.png: is a folder, where a file is to be"), "{message}");
+    assert!(!bench.path("out/etendue-manifest.json").exists());
 }

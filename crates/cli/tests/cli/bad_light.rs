@@ -131,6 +131,13 @@ fn values_that_no_material_or_light_can_have_are_refused_by_path() {
         (light(r#"{"type": "sky", "scale": -1}"#), "lights[0].scale"),
         (light(r#"{"type": "sky", "up": [0, 0, 0]}"#), "lights[0].up: gives no direction"),
         (light(r#"{"type": "environment", "image": "sky.exr"}"#), "lights[0].image: no such file"),
+        (light(r#"{"type": "environment", "image": "."}"#), "lights[0].image: \".\" is a folder"),
+        (
+            light(
+                r#"{"type": "projector", "at": [0, 2, 0], "look_at": [0, 0, 0], "intensity": [1, 1, 1]}"#,
+            ),
+            "lights[0].up: has no length or lies along the view",
+        ),
         (
             light(r#"{"type": "directional", "direction": [0, 0, 0], "irradiance": [1, 1, 1]}"#),
             "lights[0].direction",
@@ -219,7 +226,7 @@ fn an_environment_that_is_no_number_is_black_and_counted_or_refused_when_strict(
     assert!(picture.iter().all(|p| p.is_finite() && *p > 0.3 && *p < 1.0), "{picture:?}");
     let bench = bench.expect("the bench of the render");
     let notes = bench.json("report.json")["notes"].to_string();
-    assert!(notes.contains("32 pixels that are not finite or below zero"), "{notes}");
+    assert!(notes.contains("32 pixels that are not finite, below zero or above 1e30"), "{notes}");
     let output = bench.run(&["render", "scene.json", "-o", "strict", "--strict"]);
     assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
 }

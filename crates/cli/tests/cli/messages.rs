@@ -55,6 +55,11 @@ fn files_of_other_kinds_are_named() {
         refused(name, &[0; 5000], &["nothing but zeros"]);
         refused(name, b"<!DOCTYPE html><p>404</p>", &["a web page"]);
     }
+    refused(
+        "c.stl",
+        b"solid cube\nfacet normal 0 0 1\n",
+        &["text that is no JSON", ".obj or .ply"],
+    );
     refused("b.gltf", b"ply\nformat ascii 1.0\n", &["a PLY model, not glTF"]);
     refused("b.obj", b"glTF\x02\0\0\0", &["a binary glTF file (.glb), not an OBJ model"]);
     refused("b.json", b"glTF\x02\0\0\0", &["a binary glTF file (.glb), not JSON text"]);

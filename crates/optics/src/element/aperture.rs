@@ -59,6 +59,10 @@ pub struct MaskSpec {
 /// The most blades; a real iris has about 20.
 const MOST_BLADES: u32 = 1024;
 
+/// Radius (mm) of the smallest opening that lets rays through beside each other: squares of smaller ones would
+/// soon be no numbers.
+pub(crate) const SMALLEST_RADIUS: f64 = 1e-9;
+
 /// An opening in its own plane (mm).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Opening {
@@ -88,8 +92,9 @@ impl ApertureSpec {
     /// A sentence on the number or file that describes no opening.
     pub fn build(&self, resolve: Resolve<'_>) -> Result<Opening, String> {
         let radius = |radius: Millimetres| {
-            let sound = radius.0 >= 0.0 && radius.0.is_finite();
-            sound.then_some(radius.0).ok_or("radius must be a length from 0 on".to_owned())
+            let sound = radius.0 == 0.0 || radius.0 >= SMALLEST_RADIUS && radius.0.is_finite();
+            let why = || format!("radius must be 0, or a length from {SMALLEST_RADIUS:e} mm on");
+            sound.then_some(radius.0).ok_or_else(why)
         };
         match self {
             Self::Circular(spec) => Ok(Opening::Circle { radius: radius(spec.radius)? }),
@@ -239,7 +244,9 @@ mod tests {
     #[test]
     fn what_is_no_opening_is_refused_in_words() {
         let error = |json| build(json).unwrap_err();
-        assert!(error(r#"{"shape": "circular", "radius": -1}"#).contains("from 0 on"));
+        assert!(
+            error(r#"{"shape": "circular", "radius": -1}"#).contains("a length from 1e-9 mm on")
+        );
         assert!(error(r#"{"shape": "polygon", "radius": 1, "blades": 2}"#).contains("3 to"));
         assert!(error(r#"{"shape": "star", "radius": 1}"#).contains("unknown variant `star`"));
         assert!(error(r#"{"shape": "circular", "radius": 1, "blades": 5}"#).contains("blades"));

@@ -279,6 +279,15 @@ impl MicrolensArraySpec {
     }
 
     fn filters(&self) -> Result<Vec<Curve>, String> {
+        let filters = self.transmissions()?;
+        let is_opaque = |curve: &Curve| curve.extent()[1] <= 0.0;
+        if !filters.is_empty() && filters.iter().all(is_opaque) {
+            return Err("transmission is 0: no light gets through any lenslet".to_owned());
+        }
+        Ok(filters)
+    }
+
+    fn transmissions(&self) -> Result<Vec<Curve>, String> {
         let own = self.types.iter().any(|one| one.transmission.is_some());
         if self.transmission.is_none() && !own {
             return Ok(Vec::new());

@@ -2,7 +2,7 @@
 //!
 //! To add a part: its own file, and a variant of [`Part`] and [`PartSpec`] in `part.rs`.
 
-mod aperture;
+pub(crate) mod aperture;
 mod asphere;
 mod biconic;
 mod filter;

@@ -58,7 +58,8 @@ pub enum FocusError {
     },
     /// Inside the focal length, or the lens diverges.
     #[error(
-        "an object at {distance} m has no real image behind the lens: it would be at z = {image} mm"
+        "an object at {} has no real image behind the lens: it would be at z = {image} mm",
+        if distance.is_finite() { format!("{distance} m") } else { "infinity".to_owned() }
     )]
     Virtual {
         /// The distance asked for (m); infinite for infinity.

@@ -30,6 +30,7 @@ pub mod report;
 pub mod trace;
 pub mod zemax;
 
+use crate::element::aperture::SMALLEST_RADIUS;
 use crate::element::{Frame, LossesSpec, Symbol};
 use crate::glass::{Glass, GlassError};
 
@@ -306,7 +307,12 @@ impl OpticalTrain {
         if !(f_number > 0.0 && f_number.is_finite()) {
             return Err(error("the f-number must be positive"));
         }
-        Ok(0.5 * efl.abs() / f_number * magnification.abs())
+        let radius = 0.5 * efl.abs() / f_number * magnification.abs();
+        if radius < SMALLEST_RADIUS {
+            let why = format!("f/{f_number} would leave an opening of {radius:.1e} mm");
+            return Err(error(&why));
+        }
+        Ok(radius)
     }
 
     /// The same lens analysed, focused and its stop set at another wavelength (nm).

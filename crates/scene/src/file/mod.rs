@@ -315,6 +315,11 @@ fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
         not_a_scene(format!("is not UTF-8 text (byte {})", error.utf8_error().valid_up_to()))
     })?;
     let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
+    // Text of another format, such as an STL model's: a name that is none of ours tells.
+    let is_named_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    if !is_named_json && !text.trim_start().starts_with(['{', '[']) {
+        return Err(not_a_scene("is text that is no JSON".to_owned()));
+    }
     Document::parse(text.clone()).map_err(|fault| SceneError::Syntax {
         file: path.to_owned(),
         place: fault.place,

@@ -2,6 +2,8 @@
 
 use serde_json::{Map, Value};
 
+use super::document::Document;
+
 use super::document::{join, join_index};
 
 /// The most steps of a path: half as many as the levels of a JSON text.
@@ -41,6 +43,12 @@ pub enum OverrideError {
     TooLarge {
         /// The number as given.
         text: String,
+    },
+    /// JSON that no scene file may hold.
+    #[error("{reason}")]
+    Refused {
+        /// Why.
+        reason: String,
     },
     /// A value on the way that has nothing inside.
     #[error("{parent} is {found}, which has no `{step}`")]
@@ -96,8 +104,12 @@ pub(crate) fn apply(root: &mut Value, path: &str, text: &str) -> Result<String, 
     }
     // JSON where it reads as such, else a string.
     let is_number = text.trim_start().starts_with(|c: char| c.is_ascii_digit() || c == '-');
-    *here = match serde_json::from_str(text) {
-        Ok(value) => value,
+    *here = match serde_json::from_str::<Value>(text) {
+        // As strictly as files are read.
+        Ok(_) => match Document::parse(text.to_owned()) {
+            Ok((_, value)) => value,
+            Err(fault) => return Err(OverrideError::Refused { reason: fault.reason }),
+        },
         Err(_) if is_number && text.trim().parse().is_ok_and(f64::is_infinite) => {
             return Err(OverrideError::TooLarge { text: text.trim().to_owned() });
         }

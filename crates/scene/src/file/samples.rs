@@ -94,6 +94,9 @@ fn sixteen() -> u32 {
     16
 }
 
+/// Errors under this are reached by no number of samples.
+const LEAST_ERROR: f64 = 1e-9;
+
 fn four_thousand() -> u32 {
     4096
 }
@@ -167,14 +170,14 @@ pub(super) fn fault(
             return at(".time", "no samples are taken in no time; give it more than 0 s");
         }
         SamplesSpec::Time(_) => [0, 0],
-        SamplesSpec::SensorNoise(SensorNoiseSpec { fraction, .. }) if fraction <= 0.0 => {
-            let why = "sampling would never stop; give it more than 0, such as 0.1";
+        SamplesSpec::SensorNoise(SensorNoiseSpec { fraction, .. }) if fraction < LEAST_ERROR => {
+            let why = "sampling would never stop; give it more than 1e-9, such as 0.1";
             return at(".fraction", why);
         }
         SamplesSpec::RelativeError(RelativeErrorSpec { relative_error, .. })
-            if relative_error <= 0.0 =>
+            if relative_error < LEAST_ERROR =>
         {
-            let why = "sampling would never stop; give it more than 0, such as 0.02";
+            let why = "sampling would never stop; give it more than 1e-9, such as 0.02";
             return at(".relative_error", why);
         }
         SamplesSpec::SensorNoise(SensorNoiseSpec { min, max, .. })

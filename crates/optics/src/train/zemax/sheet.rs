@@ -308,6 +308,16 @@ impl ZemaxSheet {
                 self.configurations
             ));
         }
+        if self.wavelengths.iter().any(|&micrometres| micrometres <= 0.0) {
+            notes.push("a wavelength of 0 or less is none, and is left out".to_owned());
+        }
+        if !self.wavelengths.is_empty() && self.primary > self.wavelengths.len() {
+            notes.push(format!(
+                "the primary wavelength is number {} of {}; the first is taken",
+                self.primary,
+                self.wavelengths.len()
+            ));
+        }
         let mut left_out: Vec<(&String, &Ignored)> = self.ignored.iter().collect();
         left_out.sort_by_key(|(_, ignored)| ignored.first);
         let words: Vec<String> = left_out
@@ -344,7 +354,13 @@ impl SheetRow {
                 self.extra.insert(line.index(0)?, parameter);
             }
             "DIAM" => {
-                self.semi_diameter = Some(line.number(0)?).filter(|length| *length > 0.0);
+                let length = line.number(0)?;
+                if length < 0.0 {
+                    return Err(
+                        line.error(format!("a semi-diameter of {length} must not be below zero"))
+                    );
+                }
+                self.semi_diameter = Some(length).filter(|length| *length > 0.0);
                 self.fixed = line.number_or(1, 0.0)? == 1.0;
             }
             "CLAP" | "FLAP" => {
