@@ -113,7 +113,7 @@ impl LightSampler {
         Some((index, rest, (1.0 - share) * chance))
     }
 
-    #[inline]
+    #[inline(always)]
     fn pick_other(&self, u: f64) -> Option<(usize, f64, f64)> {
         match self.others.len() {
             0 => None,

@@ -48,6 +48,11 @@ impl Spectral {
         self.from_rgb.len()
     }
 
+    /// Whether the bands are linear red, green and blue.
+    pub(crate) fn is_rgb(&self) -> bool {
+        self.is_rgb
+    }
+
     /// The wavelength that stands for band `i` (nm).
     #[must_use]
     pub fn wavelength(&self, i: usize) -> f64 {

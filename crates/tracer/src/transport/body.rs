@@ -5,7 +5,7 @@ use etendue_geometry::glam::DVec3;
 
 use super::{Scratch, Tracing};
 
-impl Tracing<'_> {
+impl<const RGB: bool> Tracing<'_, RGB> {
     /// Takes from each path what the body that it went through absorbs. A path that leaves into the open
     /// without having met the body's other side (a surface that is not closed) loses nothing.
     pub(super) fn absorb(&self, scratch: &mut Scratch) {
@@ -15,7 +15,7 @@ impl Tracing<'_> {
             let body = self.stage.placed.get(state.inside).and_then(|placed| placed.absorption);
             let Some(absorption) = body.filter(|_| hits.is_hit(i)) else { continue };
             let ways = hits.t[i] / absorption.distance;
-            let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
+            let throughput = &mut now.throughput[i * self.count()..(i + 1) * self.count()];
             for (k, band) in throughput.iter_mut().enumerate() {
                 *band *= spectral.band(&absorption.color, k).max(0.0).powf(ways);
             }

@@ -9,7 +9,7 @@ use etendue_geometry::glam::DVec3;
 
 use super::numbers::Draw;
 use super::paths::State;
-use super::{Scratch, Tracing, in_band};
+use super::{Scratch, Tracing};
 use crate::Ior;
 use crate::bsdf::{Bsdf, BsdfSample};
 use crate::spectral::Spectral;
@@ -36,7 +36,7 @@ pub(super) struct Boundary<'a> {
     pub(super) bsdf: Bsdf,
 }
 
-impl Tracing<'_> {
+impl<const RGB: bool> Tracing<'_, RGB> {
     /// The step of a path that still carries several bands at a boundary whose index is each one's own.
     pub(super) fn disperse(&self, boundary: &Boundary<'_>, scratch: &mut Scratch) {
         let (i, k) = boundary.path;
@@ -44,9 +44,9 @@ impl Tracing<'_> {
         let passages = self.passages(boundary, scratch, [pick, place]);
         let live = passages.len() as f64;
         let mean = passages.iter().map(|passage| passage.reflectance).sum::<f64>() / live;
-        let throughput = scratch.now.throughput[i * self.count..(i + 1) * self.count].to_vec();
+        let throughput = scratch.now.throughput[i * self.count()..(i + 1) * self.count()].to_vec();
         let choice = scratch.numbers.of(Draw::Choice, k)[1];
-        let mut sent = vec![0.0; self.count];
+        let mut sent = vec![0.0; self.count()];
         if choice < mean {
             let Some(mirrored) = boundary.bsdf.mirrored() else { return };
             for passage in &passages {
@@ -61,8 +61,7 @@ impl Tracing<'_> {
             let passage = &passages[(stratum as usize).min(passages.len() - 1)];
             let passed = (1.0 - passage.reflectance) / (1.0 - mean) * live / parts as f64;
             let Some(refracted) = boundary.bsdf.refracted(passage.eta) else { continue };
-            let tint =
-                in_band(self.stage.spectral, &boundary.bsdf, refracted.weights, passage.band);
+            let tint = self.in_band(&boundary.bsdf, refracted.weights, passage.band);
             sent.fill(0.0);
             sent[passage.band] = throughput[passage.band] * passed * tint;
             let way = (&refracted, Some(passage.wavelength));
@@ -77,14 +76,14 @@ impl Tracing<'_> {
         scratch: &Scratch,
         [_, place]: [f64; 2],
     ) -> Vec<TransmittedBand> {
-        let start = boundary.path.0 * self.count;
+        let start = boundary.path.0 * self.count();
         let live = |&band: &usize| scratch.now.throughput[start + band] > 0.0;
         let passage = |band| {
             let wavelength = self.stage.spectral.wavelength_at(band, place);
             let eta = boundary.met.eta(boundary.ior, wavelength);
             TransmittedBand { band, wavelength, eta, reflectance: boundary.bsdf.reflectance(eta) }
         };
-        (0..self.count).filter(live).map(passage).collect()
+        (0..self.count()).filter(live).map(passage).collect()
     }
 
     /// Notes a path along a direction that only the boundary can give, unless it carries nothing, ends
@@ -107,7 +106,7 @@ impl Tracing<'_> {
         let is_last = bounces >= self.rules.bounces;
         if self.rules.roulette.is_some_and(|after| bounces >= after) && !is_last {
             // As likely for all parts of a path, or those of its dim bands would be noise.
-            let survival = most_before(now.throughput_of(i, self.count)).min(0.95);
+            let survival = most_before(now.throughput_of(i, self.count())).min(0.95);
             if numbers.of(Draw::Chance, k)[1] >= survival {
                 return;
             }

@@ -11,7 +11,7 @@ use crate::surface::SurfaceInteraction;
 /// The most steps of a path: surfaces that let it pass count, and may be many.
 const MOST_STEPS: u32 = 4096;
 
-impl Tracing<'_> {
+impl<const RGB: bool> Tracing<'_, RGB> {
     /// Adds the light that paths met by themselves, and lists those that go on.
     pub(super) fn meet(&mut self, scratch: &mut Scratch, out: &mut [f64]) {
         let Scratch { now, hits, alive, radiance, missed, asked, .. } = scratch;
@@ -26,7 +26,7 @@ impl Tracing<'_> {
             if placed.is_some_and(|placed| placed.is_seen)
                 && let Some(weight) = self.met(now, hits, i, radiance)
             {
-                let throughput = now.throughput_of(i, self.count);
+                let throughput = now.throughput_of(i, self.count());
                 radiance.iter_mut().zip(throughput).for_each(|(r, t)| *r *= t * weight);
                 let (lights, around) = (self.stage.lights, &self.stage.surroundings);
                 let group = || lights.group_of_placement(around, hits.placement[i]);
@@ -45,7 +45,7 @@ impl Tracing<'_> {
         lights.environment(spectral, wanted, asked, radiance, |number, pdf, light| {
             let i = missed[number] as usize;
             let weight = now.states[i].weight_against(pdf);
-            let throughput = now.throughput_of(i, self.count);
+            let throughput = now.throughput_of(i, self.count());
             light.iter_mut().zip(throughput).for_each(|(r, t)| *r *= t * weight);
             let state = &now.states[i];
             let row = self.parts.row(state.ray, state.bounces, || lights.group_of_sky());

@@ -35,7 +35,6 @@ use self::patch::Patch;
 use self::paths::{Paths, State};
 pub use self::rules::{Follow, Rules};
 use self::shadows::Shadows;
-use crate::Material;
 use crate::bsdf::{Bsdf, Weights, metal};
 use crate::emitters::Emitters;
 use crate::lights::Lights;
@@ -44,6 +43,7 @@ use crate::reference::SceneView;
 use crate::sky::Asked;
 use crate::spawn::{self, Anchor};
 use crate::spectral::Spectral;
+use crate::{Color, Material};
 
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
@@ -211,11 +211,24 @@ fn trace(
     scratch: &mut Scratch,
     out: &mut Vec<f64>,
 ) -> RayStats {
+    match stage.spectral.is_rgb() {
+        true => trace_bands::<true>(rules, stage, beam, scratch, out),
+        false => trace_bands::<false>(rules, stage, beam, scratch, out),
+    }
+}
+
+fn trace_bands<const RGB: bool>(
+    rules: Rules,
+    stage: &LightingContext<'_>,
+    beam: &RaySamples<'_>,
+    scratch: &mut Scratch,
+    out: &mut Vec<f64>,
+) -> RayStats {
     let count = stage.spectral.count();
     out.clear();
     out.resize(beam.rays.len() * beam.parts.count() * count, 0.0);
     let mut tracing =
-        Tracing { rules, stage, count, parts: beam.parts, tally: RayStats::default() };
+        Tracing::<RGB> { rules, stage, parts: beam.parts, tally: RayStats::default() };
     scratch.hits.detail = Detail::Surface;
     scratch.shadows.hits.detail = Detail::Surface;
     scratch.radiance.resize(count, 0.0);
@@ -248,15 +261,28 @@ fn trace(
     tracing.tally
 }
 
-struct Tracing<'a> {
+/// One tracing of a batch. The bands of nearly all pictures are red, green and blue: that there are three, and
+/// that colours are what they carry, is then known when the program is compiled.
+struct Tracing<'a, const RGB: bool> {
     rules: Rules,
     stage: &'a LightingContext<'a>,
-    count: usize,
     parts: Parts,
     tally: RayStats,
 }
 
-impl Tracing<'_> {
+impl<const RGB: bool> Tracing<'_, RGB> {
+    /// How many bands there are.
+    #[inline(always)]
+    fn count(&self) -> usize {
+        if RGB { 3 } else { self.stage.spectral.count() }
+    }
+
+    /// A linear sRGB colour in band `k`.
+    #[inline(always)]
+    fn band(&self, color: &Color, k: usize) -> f64 {
+        if RGB { color[k] } else { self.stage.spectral.band(color, k) }
+    }
+
     fn start(&self, beam: &RaySamples<'_>, paths: &mut Paths) {
         paths.clear();
         paths.rays.copy_from(beam.rays);
@@ -274,7 +300,7 @@ impl Tracing<'_> {
                 is_last: false,
                 cone: self.stage.surroundings.view.cone(beam.rays.direction(i)),
             });
-            let bands = 0..self.count;
+            let bands = 0..self.count();
             paths.throughput.extend(bands.map(|k| f64::from(u8::from(beam.bands.contains(&k)))));
         }
     }
@@ -303,8 +329,8 @@ impl Tracing<'_> {
             return;
         }
         let mut to = |row: usize| {
-            let start = row * self.count;
-            let sums = &mut out[start..start + self.count];
+            let start = row * self.count();
+            let sums = &mut out[start..start + self.count()];
             sums.iter_mut().zip(light).for_each(|(sum, band)| *sum += band);
         };
         let (row, rows) = (row as usize, self.parts.count());
@@ -313,28 +339,29 @@ impl Tracing<'_> {
             to(row - row % rows);
         }
     }
-}
 
-/// The value in band `k`.
-fn in_band(spectral: &Spectral, bsdf: &Bsdf, value: Weights, k: usize) -> f64 {
-    let mut sum = value.white;
-    if let Some(named) = bsdf.named() {
-        let [face_on, dip] = spectral.metal(named, k);
-        let mean = metal::mean_reflectance(face_on, dip);
-        let deep = metal::multiple(mean, bsdf.mean_albedo());
-        return (sum + value.base * face_on + value.dip * dip + value.deep * deep).max(0.0);
+    /// What a surface has of light in band `k`.
+    #[inline]
+    fn in_band(&self, bsdf: &Bsdf, value: Weights, k: usize) -> f64 {
+        let mut sum = value.white;
+        if let Some(named) = bsdf.named() {
+            let [face_on, dip] = self.stage.spectral.metal(named, k);
+            let mean = metal::mean_reflectance(face_on, dip);
+            let deep = metal::multiple(mean, bsdf.mean_albedo());
+            return (sum + value.base * face_on + value.dip * dip + value.deep * deep).max(0.0);
+        }
+        if value.base != 0.0 {
+            sum += value.base * self.band(&bsdf.base, k);
+        }
+        if value.highlight != 0.0 {
+            sum += value.highlight * self.band(&bsdf.highlight, k);
+        }
+        if value.deep != 0.0 {
+            sum += value.deep * self.band(&bsdf.deep, k);
+        }
+        if value.sheen != 0.0 {
+            sum += value.sheen * self.band(&bsdf.sheen(), k);
+        }
+        sum
     }
-    if value.base != 0.0 {
-        sum += value.base * spectral.band(&bsdf.base, k);
-    }
-    if value.highlight != 0.0 {
-        sum += value.highlight * spectral.band(&bsdf.highlight, k);
-    }
-    if value.deep != 0.0 {
-        sum += value.deep * spectral.band(&bsdf.deep, k);
-    }
-    if value.sheen != 0.0 {
-        sum += value.sheen * spectral.band(&bsdf.sheen(), k);
-    }
-    sum
 }

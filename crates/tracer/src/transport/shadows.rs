@@ -4,7 +4,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, MISS, PlacedTriangle, RayBatch};
 
 use super::paths::Paths;
-use super::{LightingContext, Scratch, Tracing, Traits, in_band};
+use super::{LightingContext, Scratch, Tracing, Traits};
 use crate::emitters::Emitters;
 use crate::surface::SurfaceInteraction;
 
@@ -78,7 +78,7 @@ impl Shadows {
 /// Rays whose transparency is looked through, one surface after the other.
 const MOST_LAYERS: u32 = 256;
 
-impl Tracing<'_> {
+impl<const RGB: bool> Tracing<'_, RGB> {
     /// Whether paths that only look for light ask what shines before they ask the scene. Through
     /// surfaces that are partly there they have to be followed.
     pub(super) fn traces_emitters(&self) -> bool {
@@ -115,7 +115,7 @@ impl Tracing<'_> {
             let (lights, around) = (self.stage.lights, &self.stage.surroundings);
             let group = || lights.group_of_placement(around, hits.placement[i]);
             let row = self.parts.row(state.ray, state.bounces, group);
-            shadows.note(row, radiance, last.throughput_of(i, self.count), weight);
+            shadows.note(row, radiance, last.throughput_of(i, self.count()), weight);
         }
         let (lights, spectral) = (self.stage.lights, self.stage.spectral);
         let wanted = missed.iter().map(|&i| i as usize);
@@ -129,7 +129,7 @@ impl Tracing<'_> {
             let state = &last.states[i];
             let row = self.parts.row(state.ray, state.bounces, || lights.group_of_sky());
             let weight = state.weight_against(pdf);
-            shadows.note(row, light, last.throughput_of(i, self.count), weight);
+            shadows.note(row, light, last.throughput_of(i, self.count()), weight);
         });
         self.light(shadows, out);
     }
@@ -149,7 +149,7 @@ impl Tracing<'_> {
         }
         for (k, &row) in shadows.row.iter().enumerate() {
             if !shadows.blocked[k] {
-                self.add(&shadows.contribution[k * self.count..(k + 1) * self.count], row, out);
+                self.add(&shadows.contribution[k * self.count()..(k + 1) * self.count()], row, out);
             }
         }
     }
@@ -177,7 +177,7 @@ impl Tracing<'_> {
                     blocked[i as usize] = false;
                     continue;
                 };
-                let own = i as usize * self.count..(i as usize + 1) * self.count;
+                let own = i as usize * self.count()..(i as usize + 1) * self.count();
                 if self.dim(&met, is_delta[i as usize], &mut contribution[own]) {
                     let direction = again.direction(k);
                     let origin = met.anchor.leave(direction);
@@ -201,7 +201,7 @@ impl Tracing<'_> {
         let pane = (is_delta && traits.has_panes).then(|| met.bsdf(around, spectral.wavelength(0)));
         let passed = pane.as_ref().and_then(|pane| Some((pane, pane.straight_through()?)));
         for (k, band) in light.iter_mut().enumerate() {
-            let pane = passed.map_or(0.0, |(pane, weights)| in_band(spectral, pane, weights, k));
+            let pane = passed.map_or(0.0, |(pane, weights)| self.in_band(pane, weights, k));
             *band *= 1.0 - opacity + opacity * pane;
         }
         light.iter().any(|band| *band > 0.0)

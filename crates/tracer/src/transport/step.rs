@@ -9,7 +9,7 @@ use super::dispersion::{Boundary, keep_one};
 use super::numbers::Draw;
 use super::patch::{LANES, Patch, at, put};
 use super::paths::State;
-use super::{Follow, Scratch, Tracing, in_band, kernels};
+use super::{Follow, Scratch, Tracing, kernels};
 use crate::bsdf::Weights;
 use crate::placed::PlacedSurface;
 use crate::reference::SurfacePoint;
@@ -18,7 +18,7 @@ use crate::surface::SurfaceInteraction;
 use crate::target::Chosen;
 use crate::{Ior, Scattering};
 
-impl Tracing<'_> {
+impl<const RGB: bool> Tracing<'_, RGB> {
     /// The step of all paths that go on.
     pub(super) fn step_all(&mut self, scratch: &mut Scratch) {
         let mut patch = std::mem::take(&mut scratch.patch);
@@ -112,7 +112,7 @@ impl Tracing<'_> {
         let Some(met) = SurfaceInteraction::new(self.stage, &now.rays, hits, i, footprint) else {
             return;
         };
-        let bands = i * self.count..(i + 1) * self.count;
+        let bands = i * self.count()..(i + 1) * self.count();
         if met.material.has_alpha() && numbers.of(Draw::Chance, k)[0] >= met.opacity() {
             let direction = now.rays.direction(i);
             let mut state = now.states[i];
@@ -149,7 +149,7 @@ impl Tracing<'_> {
     /// Chooses a light for each hit, and a place on it.
     fn choose(&self, scratch: &mut Scratch, patch: &mut Patch) {
         let super::LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
-        let (numbers, asked, count) = (&scratch.numbers, &mut scratch.asked, self.count);
+        let (numbers, asked, count) = (&scratch.numbers, &mut scratch.asked, self.count());
         patch.radiance.resize(LANES * count, 0.0);
         asked.clear();
         for lane in 0..patch.count {
@@ -202,25 +202,23 @@ impl Tracing<'_> {
         }));
         shadows.is_delta.extend(picked.iter().map(|&lane| targets.is_delta[lane] > 0.0));
         for &lane in picked.iter() {
-            let start = path[lane].0 * self.count;
-            let throughput = &now.throughput[start..start + self.count];
-            let light = radiance[lane * self.count..(lane + 1) * self.count].iter().zip(throughput);
+            let start = path[lane].0 * self.count();
+            let throughput = &now.throughput[start..start + self.count()];
+            let light =
+                radiance[lane * self.count()..(lane + 1) * self.count()].iter().zip(throughput);
             let (light, value) = (light.enumerate(), away.value[lane]);
-            let spectral = self.stage.spectral;
             match bsdfs.get(lane) {
                 None => {
                     let color = &colors[lane];
                     shadows
                         .contribution
-                        .extend(light.map(|(k, (l, t))| l * t * value * spectral.band(color, k)));
+                        .extend(light.map(|(k, (l, t))| l * t * value * self.band(color, k)));
                 }
                 Some(bsdf) => {
                     let (weights, _) = bsdf.evaluate(at(&away.toward, lane));
-                    shadows
-                        .contribution
-                        .extend(light.map(|(k, (l, t))| {
-                            l * t * value * in_band(spectral, bsdf, weights, k)
-                        }));
+                    shadows.contribution.extend(
+                        light.map(|(k, (l, t))| l * t * value * self.in_band(bsdf, weights, k)),
+                    );
                 }
             }
         }
@@ -257,9 +255,9 @@ impl Tracing<'_> {
             if pdf <= 0.0 || (is_last && !hittable) {
                 continue;
             }
-            let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
+            let throughput = &mut now.throughput[i * self.count()..(i + 1) * self.count()];
             for (k, band) in throughput.iter_mut().enumerate() {
-                *band *= self.stage.spectral.band(&patch.colors[lane], k);
+                *band *= self.band(&patch.colors[lane], k);
             }
             state.cone = None;
             state.pdf = pdf;
@@ -290,9 +288,9 @@ impl Tracing<'_> {
             if state.is_last && !single && !hittable {
                 continue;
             }
-            let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
+            let throughput = &mut now.throughput[i * self.count()..(i + 1) * self.count()];
             for (k, band) in throughput.iter_mut().enumerate() {
-                *band *= in_band(self.stage.spectral, &bsdf, scattered.weights, k);
+                *band *= self.in_band(&bsdf, scattered.weights, k);
             }
             // Seen by chance from one point, a surface is a point.
             state.cone = state.cone.filter(|_| single).map(|cone| cone.after(hits.t[i]));
@@ -330,7 +328,7 @@ impl Tracing<'_> {
                 if asks != is_last {
                     continue;
                 }
-                let throughput = &mut now.throughput[i * self.count..(i + 1) * self.count];
+                let throughput = &mut now.throughput[i * self.count()..(i + 1) * self.count()];
                 let most = throughput.iter().copied().fold(0.0, f64::max);
                 let ray = || (at(&patch.away.start, lane), at(&patch.away.along, lane));
                 if most <= 0.0 || (asks && !self.may_shine(ray())) {
