@@ -123,12 +123,10 @@ fn bytes_of_sensor(scene: &Scene, sensor: &Sensor, plan: &Plan) -> u64 {
 fn images(scene: &Scene, plan: &Plan) -> u64 {
     let wanted = wanted_images(scene, plan);
     let pairs = scene.textures.iter().zip(&wanted).filter(|(_, wanted)| wanted.is_some());
+    // Of an image that is too large to be decoded at all, that is what is said.
+    let decodable = |bytes: u64| if bytes > MOST_BYTES { 0 } else { bytes };
     let textures = pairs.map(|(texture, _)| {
-        let bytes = match texture.decoded_bytes() {
-            // Too large to be decoded at all: what is said of it is that.
-            bytes if bytes > MOST_BYTES => 0,
-            bytes => bytes,
-        };
+        let bytes = decodable(texture.decoded_bytes());
         // The pyramid of means, of 16 bits a channel.
         if plan.footprint { bytes.saturating_add(bytes / 3 * 2) } else { bytes }
     });
@@ -141,7 +139,7 @@ fn images(scene: &Scene, plan: &Plan) -> u64 {
                 clippy::cast_sign_loss,
                 reason = "a forecast"
             )]
-            let bytes = (texture::decoded_bytes(path) as f64 * ENVIRONMENT) as u64;
+            let bytes = (decodable(texture::decoded_bytes(path)) as f64 * ENVIRONMENT) as u64;
             textures.saturating_add(bytes)
         }
         Some(EnvironmentImage::ClearSky(_)) if plan.layers.contains(&LayerSpec::Radiance) => {

@@ -370,6 +370,10 @@ impl ThinLensCameraSpec {
         focal_length: f64,
         resolve: Resolve<'_>,
     ) -> Result<OpticalTrain, CameraError> {
+        if focal_length == 0.0 || !focal_length.is_finite() {
+            let why = format!("{focal_length} mm is no focal length");
+            return Err(CameraError::new("focal_length", why));
+        }
         let has_opening = |e: &PlacedSpec| matches!(e.element.part, PartSpec::Aperture(_));
         let opening = match (&self.aperture, self.f_number) {
             (Some(aperture), _) => Some(PartSpec::Aperture(aperture.clone())),

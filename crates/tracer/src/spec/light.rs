@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{Bound, Fault, PaintSpec, Supply, checked, in_bounds, one, paint, white};
 use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
-use crate::{ClearSky, Color, EnvironmentImage, Light, LightGroup, LightKind, Projector};
+use crate::{ClearSky, Color, EnvironmentImage, Light, LightGroup, LightKind, Paint, Projector};
 
 /// A light as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -245,27 +245,10 @@ impl LightSpec {
                 LightKind::Goniometric(Box::new(measured))
             }
             Self::Projector { at, look_at, up, fov, aspect, image, .. } => {
-                let at = DVec3::from(*at);
-                let back = unit("look_at", at - DVec3::from(*look_at))?;
-                let right = DVec3::from(*up).cross(back).try_normalize().ok_or_else(|| {
-                    let why = "has no length or lies along the view from `at` to `look_at`; choose another, such \
-                               as [0, 0, -1]";
-                    Fault::new("up", why)
-                })?;
-                if !(*fov > 0.0 && *fov < 180.0) {
-                    return Err(Fault::new("fov", format!("{fov} is not between 0 and 180")));
-                }
-                if let Some(aspect) = aspect.filter(|aspect| !(*aspect > 0.0 && aspect.is_finite()))
-                {
-                    return Err(Fault::new("aspect", format!("{aspect} is not above zero")));
-                }
-                LightKind::Projector(Box::new(Projector {
-                    at,
-                    axes: DMat3::from_cols(right, back.cross(right), back),
-                    tangent: (0.5 * fov).to_radians().tan(),
-                    aspect: *aspect,
-                    image: paint("image", image, Bound::None, supply)?,
-                }))
+                let ends = [*at, *look_at].map(DVec3::from);
+                let image = paint("image", image, Bound::None, supply)?;
+                let shape = (*fov, *aspect, image);
+                LightKind::Projector(Box::new(projector(ends, DVec3::from(*up), shape)?))
             }
             Self::Environment { image, rotate, up, visible, .. } => {
                 let image = match image {
@@ -340,6 +323,29 @@ fn shining(
     let kind = LightKind::Environment { image, turn, visible };
     let dome = Light { kind, color: [scale; 3], illuminant: None, group: None };
     Ok(if shines { vec![dome, sun] } else { vec![dome] })
+}
+
+/// A projector at the first point (m) that is aimed at the second, of an angle across (degrees), a width over
+/// height, and what it throws.
+fn projector(
+    [at, look_at]: [DVec3; 2],
+    up: DVec3,
+    (fov, aspect, image): (f64, Option<f64>, Paint),
+) -> Result<Projector, Fault> {
+    let back = unit("look_at", at - look_at)?;
+    let right = up.cross(back).try_normalize().ok_or_else(|| {
+        let why = "has no length or lies along the view from `at` to `look_at`; choose another, such as \
+                   [0, 0, -1]";
+        Fault::new("up", why)
+    })?;
+    if !(fov > 0.0 && fov < 180.0) {
+        return Err(Fault::new("fov", format!("{fov} is not between 0 and 180")));
+    }
+    if let Some(aspect) = aspect.filter(|aspect| !(*aspect > 0.0 && aspect.is_finite())) {
+        return Err(Fault::new("aspect", format!("{aspect} is not above zero")));
+    }
+    let axes = DMat3::from_cols(right, back.cross(right), back);
+    Ok(Projector { at, axes, tangent: (0.5 * fov).to_radians().tan(), aspect, image })
 }
 
 /// A luminaire at a point (m) whose downward direction is `below` (unit), turned by `rotate` (degrees), by its
