@@ -179,8 +179,8 @@ pub(crate) struct SceneArguments {
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
     /// The accelerator that finds the hits
-    #[arg(long, value_enum)]
-    pub(crate) accel: Option<AccelArgument>,
+    #[arg(long, value_parser = parse::accelerators())]
+    pub(crate) accel: Option<String>,
     /// A glass catalogue in Zemax' AGF format, searched before the built-in one; the last one given is
     /// searched first
     #[arg(long = "glass-catalog", value_name = "FILE")]
@@ -209,16 +209,6 @@ pub(crate) enum UpArgument {
     Y,
     /// +Z, as in many CAD and scanning programs
     Z,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum AccelArgument {
-    /// Intel's Embree
-    Embree,
-    /// Pure Rust
-    Bvh,
-    /// The f64 reference: slow and right
-    Exact,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
@@ -461,13 +451,8 @@ impl SceneArguments {
         if let Some(seed) = self.seed {
             set("render.seed", seed.to_string());
         }
-        if let Some(accel) = self.accel {
-            let name = match accel {
-                AccelArgument::Embree => "embree",
-                AccelArgument::Bvh => "bvh",
-                AccelArgument::Exact => "exact",
-            };
-            set("render.accel", name.to_owned());
+        if let Some(accel) = &self.accel {
+            set("render.accel", accel.clone());
         }
         overrides
     }

@@ -1,7 +1,9 @@
 //! Values of arguments from their words, or what would have been one.
 
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use etendue_bench::tolerance::Tolerance;
 use etendue_geometry::units::Dimension;
+use etendue_scene::file::AccelName;
 use etendue_tracer::LayerSpec;
 
 /// More threads than any machine has cores only make a machine unusable.
@@ -28,6 +30,13 @@ pub(super) fn layer(name: &str) -> Result<String, String> {
         Some(_) => Ok(name.to_owned()),
         None => Err(format!("known layers: {}", LayerSpec::NAMES.join(", "))),
     }
+}
+
+/// The accelerators' names, with what each is.
+pub(super) fn accelerators() -> PossibleValuesParser {
+    PossibleValuesParser::new(
+        AccelName::ALL.map(|(_, [name, words])| PossibleValue::new(name).help(words)),
+    )
 }
 
 pub(super) fn threads(text: &str) -> Result<usize, String> {

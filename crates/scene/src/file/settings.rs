@@ -278,3 +278,24 @@ pub enum AccelName {
     /// The f64 reference.
     Exact,
 }
+
+impl AccelName {
+    /// What scenes and commands call each, and what it is.
+    pub const ALL: [(Self, [&str; 2]); 3] = [
+        (Self::Embree, ["embree", "Intel's Embree"]),
+        (Self::Bvh, ["bvh", "Pure Rust"]),
+        (Self::Exact, ["exact", "The f64 reference: slow and right"]),
+    ];
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accelerators_are_called_as_scenes_write_them() {
+        for (accel, [name, _]) in AccelName::ALL {
+            assert_eq!(serde_json::to_value(accel).unwrap(), name);
+        }
+    }
+}
