@@ -50,7 +50,9 @@ GOALS = {"direct, point light": (1.5, 2.5), "direct, area light": (1.5, 2.0),
          "path, area light": (1.2, 1.5)}
 GOALS |= {job: goals for job, (_, *goals) in light_scenes.JOBS.items()}
 LENS = "Cornell box, path of 5 bounces, through the double Gauss"
-ALL = [*GOALS, LENS]
+# The same with rays of all bands together, as at the design wavelength (`plan.dispersion`).
+SHARED = f"{LENS}, without dispersion"
+ALL = [*GOALS, LENS, SHARED]
 LENS_GOAL = 1.5
 
 
@@ -104,6 +106,8 @@ def files_of(job, folder):
     through = scenes.cornell(5)
     lens = json.loads((program.ROOT / "scenes/lenses/double-gauss.json").read_text())
     (Path(folder) / "lens.json").write_text(json.dumps(lens))
+    if job == SHARED:
+        through["plan"] = {"dispersion": False}
     camera = through["camera"]
     through["camera"] = {"type": "lens", "lens": "lens.json", "f_number": 2.8, "focus_distance": "4.4 m",
                          "sensor_height": "28 mm", "pose": camera["pose"], "sensor": camera["sensor"]}
@@ -375,10 +379,11 @@ def goals(results):
         lines.append(f"| {job} | {times[best]:.2f} | ≥ {same} | {verdict(times[best], same)} "
                      f"| {known(costs[best])} | ≥ {error} | {verdict(costs[best], error)} |")
     straight = results.get("Cornell box, path of 5 bounces")
-    if LENS in results and straight:
-        ratio = middle(results[LENS], "etendue") / middle(straight, "etendue")
-        lines += ["", f"Through the double Gauss the room takes {ratio:.2f} times as long as through a pinhole "
-                  f"(goal: at most {LENS_GOAL}): {'met' if ratio <= LENS_GOAL else '**missed**'}."]
+    for job, manner in [(LENS, "each band by its own index"), (SHARED, "all bands as at the design wavelength")]:
+        if job in results and straight:
+            ratio = middle(results[job], "etendue") / middle(straight, "etendue")
+            lines += ["", f"Through the double Gauss, {manner}, the room takes {ratio:.2f} times as long as through "
+                      f"a pinhole (goal: at most {LENS_GOAL}): {'met' if ratio <= LENS_GOAL else '**missed**'}."]
     return lines
 
 

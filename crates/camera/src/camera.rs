@@ -380,6 +380,19 @@ impl Camera {
         }
     }
 
+    /// The same with rays of its lens that run as at the design wavelength in all bands: colours are neither
+    /// displaced nor blurred by it.
+    #[must_use]
+    pub fn without_dispersion(&self) -> Self {
+        let projection = match &self.projection {
+            Projection::Lens(lens) => Projection::Lens(Arc::new(lens.without_dispersion())),
+            other @ (Projection::Pinhole(_)
+            | Projection::Orthographic(_)
+            | Projection::Views(_)) => other.clone(),
+        };
+        Self { projection, ..self.clone() }
+    }
+
     /// The camera with all measured that sampling its pupil for `bands` needs; to be done once,
     /// before [`Self::sample_rays`] is asked from many threads.
     ///

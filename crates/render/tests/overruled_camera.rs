@@ -118,6 +118,32 @@ fn bands_share_rays_where_nothing_parts_them() {
     assert!(off > 0.0 && off < 0.01, "{off}");
 }
 
+/// A lens taken as at its design wavelength shows a grey scene grey to the bit, with a third of the rays; with
+/// each band on its own way edges are coloured, by the tenth of a pixel that the lens displaces them.
+#[test]
+fn a_lens_without_dispersion_takes_one_ray_for_all_bands() {
+    let more = |plan: Value| {
+        json!({ "tracer": { "type": "direct" }, "render": { "samples": 64 }, "plan": plan,
+                "lights": [{ "type": "environment", "radiance": [1, 1, 1] }] })
+    };
+    let own = scene(&double_gauss(), &more(json!({})));
+    let shared = scene(&double_gauss(), &more(json!({ "dispersion": false })));
+    let what = "rays of a wavelength";
+    assert_eq!((choice(&own, what), choice(&shared, what)), ("their own".into(), "shared".into()));
+    let [own, shared] = [own, shared].map(|scene| rendered(&scene, |_| {}));
+    let is_grey = |done: &Rendered| {
+        let values = bits(done, "");
+        let (red, rest) = values.split_at(values.len() / 3);
+        rest.chunks(red.len()).all(|band| band == red)
+    };
+    assert!(is_grey(&shared) && !is_grey(&own));
+    // Rays to the sky go on from what was hit, so these are about a third.
+    let share = shared.light.rays as f64 / own.light.rays as f64;
+    assert!((share - 1.0 / 3.0).abs() < 0.01, "{share}");
+    let off = difference(&layer(&own, ""), &layer(&shared, ""));
+    assert!(off > 0.0 && off < 0.02, "{off}");
+}
+
 /// Red, green and blue are enough of a grey scene under even light: 31 bands, which the test forces, see it
 /// alike along the same paths.
 #[test]

@@ -11,7 +11,7 @@ mod seen;
 mod words;
 
 use etendue_accel::Accel;
-use etendue_camera::OpencvFit;
+use etendue_camera::{Camera, OpencvFit};
 use etendue_geometry::Bounds;
 use etendue_render::Plan;
 use etendue_render::output::Outputs;
@@ -74,7 +74,7 @@ pub struct Comparison {
 /// What a model misses, and what it costs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// `pinhole`, `opencv`, `thin`, `thick` or `full`.
+    /// `pinhole`, `opencv`, `thin`, `thick`, `undispersed` or `full`.
     pub model: &'static str,
     /// How far chief rays are from the train's (pixels).
     pub chief_ray: Worst,
@@ -195,6 +195,12 @@ fn models(
             models.insert(after, ("opencv", camera));
         }
         Err(error) => notes.push(format!("no `opencv` model of this lens: {error}")),
+    }
+    // All of the lens, as at its design wavelength.
+    let undispersed = scene.camera.without_dispersion();
+    let rays = |camera: &Camera| camera.band_groups(bands).len();
+    if rays(&undispersed) < rays(&scene.camera) {
+        models.insert(models.len() - 1, ("undispersed", undispersed));
     }
     for (_, camera) in &mut models {
         let opened = camera.opened(bands);

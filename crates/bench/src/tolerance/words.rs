@@ -15,7 +15,7 @@ impl fmt::Display for Comparison {
         )?;
         writeln!(
             f,
-            "model    chief ray (px)  centroid (px)  blur (px)  colour (px)  light (%)  \
+            "model        chief ray (px)  centroid (px)  blur (px)  colour (px)  light (%)  \
              ns a sample  times as fast"
         )?;
         for finding in &self.models {
@@ -56,7 +56,11 @@ impl Comparison {
             }
             _ => String::new(),
         };
-        write!(f, "cheapest within {pixels} px{light}: {}{saving}", self.cheapest)
+        let key = match self.cheapest {
+            "undispersed" => ", which is `\"plan\": {\"dispersion\": false}`",
+            _ => "",
+        };
+        write!(f, "cheapest within {pixels} px{light}: {}{key}{saving}", self.cheapest)
     }
 }
 
@@ -64,7 +68,7 @@ fn line(f: &mut fmt::Formatter<'_>, finding: &Finding) -> fmt::Result {
     let Finding { model, chief_ray, centroid, blur, colour, light, .. } = finding;
     write!(
         f,
-        "{model:7}  {:14.3}  {:13.3}  {:9.3}  {:11.3}  {:9.2}",
+        "{model:11}  {:14.3}  {:13.3}  {:9.3}  {:11.3}  {:9.2}",
         chief_ray.value,
         centroid.value,
         blur.value,

@@ -56,6 +56,8 @@ pub struct LensCamera {
     /// Projected solid angle of the unvignetted pupil seen from the axis (sr).
     pub(super) solid_angle: f64,
     pub(super) opened: Option<Arc<Opened>>,
+    /// Rays of all bands run as at the design wavelength.
+    one_wavelength: bool,
 }
 
 /// The exit pupil measured at the wavelengths that are wanted.
@@ -77,7 +79,7 @@ pub(super) struct OpenedGroup {
 impl PartialEq for LensCamera {
     fn eq(&self, other: &Self) -> bool {
         // All else follows from it.
-        self.focused == other.focused
+        self.focused == other.focused && self.one_wavelength == other.one_wavelength
     }
 }
 
@@ -118,7 +120,8 @@ impl LensCamera {
         let solid_angle = unvignetted(focused.train(), &design, &focused);
         let straight = unbent.at(unbent.wavelength()).unwrap_or_else(|_| design.clone());
         let chief = ChiefTable::new(&unbent, &frame, half, &straight);
-        Ok(Self { focused, design, chief, lenslets, lit, solid_angle, opened: None })
+        let (opened, one_wavelength) = Default::default();
+        Ok(Self { focused, design, chief, lenslets, lit, solid_angle, opened, one_wavelength })
     }
 
     /// The lens and its sensor.
@@ -159,12 +162,35 @@ impl LensCamera {
         self.solid_angle
     }
 
+    /// The same with rays that run as at the design wavelength in all bands. What coloured filters pass stays
+    /// each band's own.
+    pub(crate) fn without_dispersion(&self) -> Self {
+        Self { one_wavelength: true, opened: None, ..self.clone() }
+    }
+
+    /// Whether rays of other wavelengths run differently, or lose another share on the way.
+    fn tells_wavelengths_apart(&self) -> bool {
+        let train = self.focused.train();
+        let mut curves = train.elements().iter().flat_map(|element| element.part.curves());
+        curves.any(|curve| curve.as_flat().is_none()) || self.runs_apart()
+    }
+
+    /// Whether glass, or what it loses, makes another lens of each wavelength.
+    fn runs_apart(&self) -> bool {
+        let train = self.focused.train();
+        let losses = train.losses();
+        let coated = matches!(losses.reflection, Some(Reflection::Coated(_)));
+        let absorbs =
+            losses.absorption && train.media().iter().any(|g| g.absorption(550.0).is_some());
+        !self.one_wavelength && (coated || absorbs || train.is_dispersive())
+    }
+
     /// Which of `bands` need rays of their own: each where the lens tells wavelengths apart and there
     /// are several, else none.
     #[must_use]
     pub fn band_groups(&self, bands: &Bands) -> Vec<BandGroup> {
         let count = bands.count();
-        if count < 2 || !tells_wavelengths_apart(self.focused.train()) {
+        if count < 2 || !self.tells_wavelengths_apart() {
             return vec![BandGroup { bands: 0..count, wavelength: None }];
         }
         let group = |i| BandGroup { bands: i..i + 1, wavelength: Some(bands.wavelength(i)) };
@@ -216,11 +242,11 @@ impl LensCamera {
         let spread = bands.spread(group.bands.start, &uniform_filters(train));
         let one = |nm| Spread { wavelengths: vec![nm], overlap: spread.overlap };
         match group.wavelength {
-            _ if !tells_wavelengths_apart(train) || group.bands.len() > 1 => {
+            _ if !self.tells_wavelengths_apart() || group.bands.len() > 1 => {
                 Spread { wavelengths: vec![train.wavelength()], overlap: 1.0 }
             }
-            Some(nm) if !runs_apart(train) => one(nm),
-            None if !runs_apart(train) => one(train.wavelength()),
+            Some(nm) if !self.runs_apart() => one(nm),
+            None if !self.runs_apart() => one(train.wavelength()),
             _ => spread,
         }
     }
@@ -434,20 +460,6 @@ fn through_filters(
         train.at_with(nm, &passes)
     };
     wavelengths.iter().map(lens).collect()
-}
-
-/// Whether rays of other wavelengths run differently, or lose another share on the way.
-fn tells_wavelengths_apart(train: &OpticalTrain) -> bool {
-    let mut curves = train.elements().iter().flat_map(|element| element.part.curves());
-    curves.any(|curve| curve.as_flat().is_none()) || runs_apart(train)
-}
-
-/// Whether glass, or what it loses, makes another lens of each wavelength.
-fn runs_apart(train: &OpticalTrain) -> bool {
-    let losses = train.losses();
-    let coated = matches!(losses.reflection, Some(Reflection::Coated(_)));
-    let absorbs = losses.absorption && train.media().iter().any(|g| g.absorption(550.0).is_some());
-    coated || absorbs || train.is_dispersive()
 }
 
 /// The pupil as seen from the axis with all filters and masks clear; from elsewhere when the axis is

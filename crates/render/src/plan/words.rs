@@ -181,6 +181,7 @@ impl Plan {
                     .then(|| format!("{} of {} images", Size(bytes), scene.textures.len()));
                 by("plan.textures", spec.textures.is_some(), saved)
             }
+            "rays of a wavelength" => by("plan.dispersion", spec.dispersion.is_some(), None),
             "texture filter" => by("plan.texture_filter", spec.texture_filter.is_some(), None),
             "build quality" => by("plan.build_quality", spec.build_quality.is_some(), None),
             "refinement" => by("plan.refine", spec.refine.is_some(), None),
@@ -292,16 +293,20 @@ impl Plan {
         let each = lens.map_or(1, |lens| lens.wavelengths_a_group(&self.bands));
         let apart = groups > 1 || each > 1;
         let rays = if apart && self.pupil { "their own" } else { "shared" };
+        let disperses = lens.is_some_and(|lens| lens.focused().train().is_dispersive());
+        let is_forced = scene.plan.dispersion == Some(false) && disperses && !apart;
+        let because_apart = match is_forced {
+            true => "the scene takes the lens as at its design wavelength; else each would run its own way"
+                .to_owned(),
+            false => wavelengths(apart, self.pupil, each),
+        };
         let (pupil, because) = match scene.camera.projection() {
             Projection::Views(_) if self.pupil => {
                 ("on", "each view is averaged over its own part of the opening".to_owned())
             }
             _ => pupil(lens, self.pupil, self.samples),
         };
-        [
-            ("rays of a wavelength", rays, wavelengths(apart, self.pupil, each)),
-            ("pupil", pupil, because),
-        ]
+        [("rays of a wavelength", rays, because_apart), ("pupil", pupil, because)]
     }
 }
 

@@ -154,6 +154,10 @@ pub struct PlanSpec {
     /// factors alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub textures: Option<bool>,
+    /// Whether rays of each band run by the lens' indices at its own wavelengths (true), or those of all bands
+    /// together, as at the design wavelength, so that the lens shows no colour errors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dispersion: Option<bool>,
     /// Whether images are averaged over what a sample covers; where the camera tells that when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub texture_filter: Option<bool>,

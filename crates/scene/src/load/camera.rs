@@ -43,7 +43,8 @@ impl SceneFile {
 
     /// All that makes the camera but the geometry.
     pub(super) fn camera_words(&self, options: &LoadOptions<'_>) -> String {
-        format!("{:?} {}", options.camera, self.value().get("camera").unwrap_or_default())
+        let camera = self.value().get("camera").unwrap_or_default();
+        format!("{:?} {:?} {camera}", options.camera, self.spec.plan.dispersion)
     }
 
     /// The camera over `geometry`; the one before when nothing has changed that it depends on.
@@ -109,6 +110,10 @@ impl SceneFile {
         let camera = spec
             .build(|| facing::subject(&vertices), &|name| files.find(name))
             .map_err(|error| self.camera_fault(&error))?;
+        let camera = match self.spec.plan.dispersion {
+            Some(false) => camera.without_dispersion(),
+            Some(true) | None => camera,
+        };
         Ok((camera, origin))
     }
 
