@@ -56,6 +56,9 @@ struct Arguments {
     /// Measure fewer numbers of samples and exposure times.
     #[arg(long)]
     quick: bool,
+    /// Measure only what planning costs, and print it.
+    #[arg(long)]
+    planning: bool,
 }
 
 /// How much is measured.
@@ -77,6 +80,11 @@ impl Effort {
 fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     let effort = Effort::of(arguments.quick);
+    if arguments.planning {
+        let study = Study::open(&arguments.scenes.join("paper/fig3.json"), arguments.width)?;
+        print!("{}", planner(&study).trim_start());
+        return Ok(());
+    }
     let mut text = String::new();
     let _ = write!(
         text,
