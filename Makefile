@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-decisions bench-window docs-figures docs-charts \
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-decisions bench-window docs-figures docs-charts \
 	docs-stability gallery light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
@@ -25,6 +25,7 @@ help:
 	@echo "make bench-lens    time rays through a lens against optiland, from PyPI"
 	@echo "make bench-python  rays from Python against Rust, Open3D and embreex; frames against their rays"
 	@echo "make bench-light   light against Mitsuba 3, from PyPI; writes docs/benchmarks-light.md"
+	@echo "make bench-cycles  light against Blender's Cycles, from PyPI; writes docs/benchmarks-cycles.md"
 	@echo "make bench-sensor  time one exposure against numpy, prysm and emva1288, from PyPI"
 	@echo "make bench-limits  scenes and pictures as large as most machines take; writes docs/limits.md"
 	@echo "make bench-sampling  what samples that stop save; writes the measured part of docs/sampling.md"
@@ -106,6 +107,10 @@ bench-python: setup
 bench-light: setup
 	cargo build --release -p etendue-cli -p etendue-benches
 	scripts/bench-peers.sh light_peers.py $(ARGS)
+
+bench-cycles: setup
+	cargo build --release -p etendue-cli -p etendue-benches
+	scripts/bench-peers.sh cycles_peers.py $(ARGS)
 
 bench-lens:
 	cargo build --release -p etendue-optics --example trace_lens

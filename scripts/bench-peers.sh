@@ -23,11 +23,22 @@ need_mitsuba() {
     has_library libLLVM || need "Mitsuba's variant for processors compiles with it" libllvm19
 }
 
+need_blender() {
+    has_library libX11.so.6 || need "Blender loads it" libx11-6
+    has_library libXrender.so.1 || need "Blender loads it" libxrender1
+    has_library libXfixes.so.3 || need "Blender loads it" libxfixes3
+    has_library libXi.so.6 || need "Blender loads it" libxi6
+    has_library libxkbcommon.so.0 || need "Blender loads it" libxkbcommon0
+    has_library libSM.so.6 || need "Blender loads it" libsm6
+    has_library libGL.so.1 || need "Blender loads it" libgl1
+}
+
 PATH=$PATH:/usr/sbin:/sbin
 python3 -c "import ensurepip, venv" 2>/dev/null || need "for the programs' own folder" python3-venv
 case $script in
 peers.py) need_open3d && need_mitsuba ;;
 light_peers.py) need_mitsuba ;;
+cycles_peers.py) need_blender ;;
 python_peers.py) need_open3d ;;
 esac
 # Without them the programs that want them are left out, by name.
