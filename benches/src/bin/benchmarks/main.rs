@@ -70,6 +70,7 @@ enum Command {
         light: Vec<f64>,
     },
     /// Print the memory of this process after each stage of a render
+    #[command(name = whole::MEMORY)]
     ProcessMemory {
         /// The scene
         scene: PathBuf,

@@ -21,6 +21,9 @@ use serde_json::{Value, json};
 
 use crate::findings::{Contest, Findings, Part, Record};
 
+/// The command of this program that prints the memory of a render.
+pub(crate) const MEMORY: &str = "memory";
+
 /// The contestants, as the page shows them.
 pub(crate) const ETENDUE: &str = "`etendue render`, whole process";
 pub(crate) const LEAST: &str = "read + default build + limit's traversal";
@@ -101,7 +104,7 @@ impl Job {
     /// What a process of its own holds after each stage.
     fn memory(&self) -> anyhow::Result<Vec<(String, f64)>> {
         let output =
-            Command::new(std::env::current_exe()?).arg("memory").arg(self.scene()).output()?;
+            Command::new(std::env::current_exe()?).arg(MEMORY).arg(self.scene()).output()?;
         ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let stages: Value = serde_json::from_slice(&output.stdout)?;
         let mut numbers = Vec::new();

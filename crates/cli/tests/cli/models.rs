@@ -76,11 +76,12 @@ fn plan_names_the_cheapest_model_within_a_tolerance() {
     let all = printed(&bench, &["plan", "scene.json", "--models", "--json"]);
     let names: Vec<&str> =
         all["models"].as_array().unwrap().iter().map(|m| m["model"].as_str().unwrap()).collect();
-    assert_eq!(names, ["pinhole", "opencv", "thin", "thick", "full"]);
+    assert_eq!(names, ["pinhole", "opencv", "thin", "thick", "undispersed", "full"]);
     // A pixel is an eighth of that of the example: nothing that the train does shows but distortion and blur.
     assert_eq!(all["cheapest"], "opencv", "{all}");
     assert!(all["saving"].as_f64().is_some_and(f64::is_finite), "{all}");
     let words = bench.run(&["plan", "scene.json", "--models", "--tolerance", "0.5 px,2 %"]);
     let words = text(&words.stdout);
-    assert!(words.contains("cheapest within 0.5 px and 2 % of light: full"), "{words}");
+    let cheapest = "cheapest within 0.5 px and 2 % of light: undispersed, which is `\"plan\": {\"dispersion\": false}`";
+    assert!(words.contains(cheapest), "{words}");
 }
