@@ -126,9 +126,9 @@ impl Bvh {
     ///
     /// # Errors
     ///
-    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::Scale`] beyond
-    /// 10⁹⁰ m and below 10⁻⁹⁰ m; [`BuildError::TooLarge`] for more triangles than leaves can number; [`BuildError::Stopped`] when the progress
-    /// function answered `false`; [`BuildError::Library`] when threads cannot be had.
+    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::Scale`] beyond 10⁹⁰ m and below
+    /// 10⁻⁹⁰ m; [`BuildError::TooLarge`] for more triangles than leaves can number; [`BuildError::Stopped`] when the
+    /// progress function answered `false`; [`BuildError::Library`] when threads cannot be had.
     pub fn build(geometry: Arc<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
         let start = Instant::now();
         let layout = Layout::new(&geometry, Baking::UsedOnce);

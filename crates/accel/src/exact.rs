@@ -62,9 +62,9 @@ impl Exact {
     ///
     /// # Errors
     ///
-    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::Scale`] beyond
-    /// 10⁹⁰ m and below 10⁻⁹⁰ m; [`BuildError::TooLarge`] for a mesh of more than 2³¹ triangles; [`BuildError::Stopped`] when the progress function
-    /// answered `false`; [`BuildError::Library`] when threads cannot be had.
+    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::Scale`] beyond 10⁹⁰ m and below
+    /// 10⁻⁹⁰ m; [`BuildError::TooLarge`] for a mesh of more than 2³¹ triangles; [`BuildError::Stopped`] when the
+    /// progress function answered `false`; [`BuildError::Library`] when threads cannot be had.
     pub fn build(geometry: Arc<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
         let start = Instant::now();
         let layout = Layout::new(&geometry, Baking::Singular);

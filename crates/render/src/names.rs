@@ -4,7 +4,7 @@ use etendue_scene::Scene;
 use etendue_tracer::LayerSpec;
 use serde_json::Value;
 
-use crate::output::{Picture, exr, png};
+use crate::output::{Picture, exr, has_mask};
 
 /// A table of names for each layer of ids among those of `scene`.
 pub(crate) fn tables(scene: &Scene) -> Vec<(String, Value)> {
@@ -37,7 +37,7 @@ pub(crate) fn notes(picture: &Picture) -> Vec<String> {
     }
     for layer in picture.layers() {
         let largest = layer.channels.first().map_or(0, |c| c.values.largest_integer());
-        if png::has_mask(layer) && largest > u16::MAX.into() {
+        if has_mask(&layer.name) && largest > u16::MAX.into() {
             notes.push(format!(
                 "{}: its numbers reach {largest}, more than a 16-bit PNG holds, so there is no mask; \
                  take the NPY or the EXR",

@@ -18,6 +18,7 @@
 
 mod alone;
 pub mod chief;
+pub mod focus_distance;
 pub mod focused;
 mod image_circle;
 pub mod lens_camera;

@@ -1,62 +1,20 @@
 //! The cameras with a lens as the scene file writes them, and the lens that each one is.
 
-use std::borrow::Cow;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use schemars::{JsonSchema, Schema, SchemaGenerator};
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
+use super::focus_distance::FocusDistance;
 use super::focused::{Focused, View, positive};
 use super::lens_camera::LensCamera;
 use super::source::{LensSource, PlacedSpec, in_camera};
 use crate::framing::{self, Reach, Subject};
 use crate::{CameraError, Pose, PoseSpec, SensorSpec};
-use etendue_geometry::units::{Degrees, Metres, Millimetres};
+use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_optics::element::{
     ApertureSpec, ElementSpec, LossesSpec, PartSpec, Resolve, SurfaceSpec, ThinLensSpec,
 };
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{Focus, LensFile, OpticalTrain};
-
-/// The distance of what is in focus (m); a file may write "infinity".
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FocusDistance(pub f64);
-
-/// How files write an object at infinity.
-const INFINITY: [&str; 2] = ["infinity", "inf"];
-
-impl Serialize for FocusDistance {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self.0 == f64::INFINITY {
-            true => serializer.serialize_str(INFINITY[0]),
-            false => Metres(self.0).serialize(serializer),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for FocusDistance {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let value = serde_json::Value::deserialize(deserializer)?;
-        if value.as_str().is_some_and(|text| INFINITY.contains(&text.trim())) {
-            return Ok(Self(f64::INFINITY));
-        }
-        Metres::deserialize(value).map(|metres| Self(metres.0)).map_err(D::Error::custom)
-    }
-}
-
-impl JsonSchema for FocusDistance {
-    fn schema_name() -> Cow<'static, str> {
-        "FocusDistance".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let mut schema = Metres::json_schema(generator);
-        let about = "A number in m, a string with a unit, or \"infinity\".";
-        schema.insert("description".to_owned(), about.into());
-        schema.insert("x-also".to_owned(), INFINITY.as_slice().into());
-        schema
-    }
-}
 
 /// What the cameras with a lens have in common.
 #[derive(Debug, Clone, Copy)]

@@ -10,8 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use super::LightField;
 use crate::framing::Subject;
+use crate::lens::focus_distance::FocusDistance;
 use crate::lens::source::{PlacedSpec, in_camera};
-use crate::lens::spec::{FocusDistance, Setup, ThinLensCameraSpec, place};
+use crate::lens::spec::{Setup, ThinLensCameraSpec, place};
 use crate::lens::{LensCamera, LensSource};
 use crate::{CameraError, Pose, PoseSpec, SensorSpec};
 use etendue_geometry::units::{Degrees, Millimetres};

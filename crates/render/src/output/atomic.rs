@@ -22,6 +22,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{Builder, NamedTempFile};
 
+use super::special::Special;
 use super::{OutputError, refuse_inputs, together};
 
 /// The part files of this process, for a signal handler: what a signal ends is not dropped.
@@ -163,15 +164,6 @@ enum Content {
     Apart { file: File, to: Special },
 }
 
-/// A target that is no regular file to be replaced.
-#[derive(Debug)]
-enum Special {
-    /// A device, a pipe or a socket.
-    Device,
-    /// What this process writes to as its standard output or error.
-    Stream(File),
-}
-
 impl PartFile {
     /// Opens a part file beside `target`. Its permissions are those of any new file.
     ///
@@ -233,48 +225,6 @@ impl PartFile {
         note_finished(target);
         Ok(())
     }
-}
-
-impl Special {
-    /// What `target` is when it is no regular file to be replaced.
-    fn of(target: &Path) -> Option<Self> {
-        let found = fs::metadata(target).ok()?;
-        match own_stream(&found) {
-            Some(stream) => Some(Self::Stream(stream)),
-            None => (!found.is_file()).then_some(Self::Device),
-        }
-    }
-
-    /// Writes all of `content`.
-    fn fill(self, target: &Path, content: &mut File) -> io::Result<()> {
-        content.rewind()?;
-        let mut to = match self {
-            Self::Stream(stream) => stream,
-            // Not made anew when it is gone: then it is no device any more.
-            Self::Device => File::options().write(true).open(target)?,
-        };
-        io::copy(content, &mut to)?;
-        to.flush()
-    }
-}
-
-/// The standard output or error of this process, when it goes to `target`: opened by its path, as
-/// /dev/stdout is, a file would be written from its start.
-#[cfg(unix)]
-fn own_stream(target: &fs::Metadata) -> Option<File> {
-    use std::os::fd::AsFd;
-    use std::os::unix::fs::MetadataExt;
-    let (out, error) = (io::stdout(), io::stderr());
-    [out.as_fd(), error.as_fd()].into_iter().find_map(|stream| {
-        let stream = File::from(stream.try_clone_to_owned().ok()?);
-        let found = stream.metadata().ok()?;
-        ((found.dev(), found.ino()) == (target.dev(), target.ino())).then_some(stream)
-    })
-}
-
-#[cfg(not(unix))]
-fn own_stream(_target: &fs::Metadata) -> Option<File> {
-    None
 }
 
 impl Write for PartFile {

@@ -35,7 +35,7 @@ impl LayerFile {
     /// they are written.
     pub fn of(layer: &str, outputs: Outputs) -> impl Iterator<Item = Self> {
         let is = |start: &str| layer.starts_with(start);
-        let named = layer == "MaterialId" || is("Id.") && layer != "Id.primitive";
+        let named = has_mask(layer);
         let all = [
             // The picture's own shows what is denoised.
             (outputs.png && layer != DENOISED, Self::Preview),
@@ -86,7 +86,16 @@ impl LayerFile {
     /// Whether it is written whatever the layer holds: numbers may be too large for masks.
     #[must_use]
     pub fn is_certain(self) -> bool {
-        !matches!(self, Self::Mask | Self::Indexed)
+        match self {
+            Self::Mask | Self::Indexed => false,
+            Self::Preview
+            | Self::Array
+            | Self::TumDepth
+            | Self::KittiDepth
+            | Self::KittiDisparity
+            | Self::KittiFlow
+            | Self::Flo => true,
+        }
     }
 
     /// Writes the layer called `name` to `path`. `false` when its numbers do not fit into the format, and
@@ -100,8 +109,16 @@ impl LayerFile {
         let of = (picture, layer);
         match self {
             Self::Preview => {
-                let is_distance = layer.look == Look::Distance;
-                let bits = if is_distance { Bits::Sixteen } else { Bits::Eight };
+                let bits = match layer.look {
+                    Look::Distance => Bits::Sixteen,
+                    Look::Color
+                    | Look::Direction
+                    | Look::Extent
+                    | Look::Ids
+                    | Look::Share
+                    | Look::Cube
+                    | Look::Counts { .. } => Bits::Eight,
+                };
                 png::write(path, picture, name, bits)?;
             }
             Self::Mask => return png::write_mask(path, picture, name),
@@ -115,6 +132,11 @@ impl LayerFile {
         }
         Ok(true)
     }
+}
+
+/// Whether a layer's numbers are worth a mask: names of things, and not the numbers of triangles.
+pub(crate) fn has_mask(layer: &str) -> bool {
+    layer == "MaterialId" || layer.starts_with("Id.") && layer != "Id.primitive"
 }
 
 /// A layer's name as files have it: `NormalCamera` is `normal_camera`, `Id.object` `id_object`, the picture

@@ -50,6 +50,7 @@ mod look;
 mod outputs;
 mod picture;
 mod screen;
+mod special;
 mod together;
 
 pub use atomic::{
@@ -62,6 +63,7 @@ pub use error::{OutputError, PictureError};
 pub use hash::ImageHash;
 pub use inputs::{protect_inputs, refuse_inputs};
 pub use layer_file::LayerFile;
+pub(crate) use layer_file::has_mask;
 pub use ledger::{Ledger, MANIFEST};
 pub use look::Look;
 pub use outputs::Outputs;

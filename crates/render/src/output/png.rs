@@ -37,12 +37,6 @@ pub fn write(path: &Path, picture: &Picture, name: &str, bits: Bits) -> Result<(
     write_shown(path, picture, layer, &shown)
 }
 
-/// Whether a layer's numbers are worth a mask: names of things, and not the numbers of triangles.
-#[must_use]
-pub fn has_mask(layer: &Layer) -> bool {
-    layer.look == Look::Ids && layer.name != "Id.primitive"
-}
-
 /// Writes the numbers of the layer of ids called `name` to `path`: 16 bits, grey, not scaled. `false`
 /// when a number needs more bits, and nothing is written.
 ///
