@@ -63,6 +63,7 @@ in_namespace '
     [ -z "$assets" ] || mount --bind -o ro "$assets" /mnt/assets
     exec chroot --userspec="$user" /mnt env -i HOME=/tmp LANG=C.UTF-8 PATH=/toolchain/bin:/usr/bin:/bin \
         CARGO_HOME=/cargo CARGO_TARGET_DIR=/target ${assets:+ETENDUE_ASSETS=/assets} \
+        CARGO_INCREMENTAL="${CARGO_INCREMENTAL:-1}" CARGO_PROFILE_DEV_DEBUG="${CARGO_PROFILE_DEV_DEBUG:-line-tables-only}" \
         sh -c "cd /checkout; exec cargo test --offline --locked -p embree4-sys -p etendue-accel -p etendue-stability -p etendue -p etendue-cli"
 ' "$PWD/$root" "${CARGO_HOME:-$HOME/.cargo}" "$(rustc --print sysroot)" "${ETENDUE_ASSETS:-}" \
     "$(id -u):$(id -g)"

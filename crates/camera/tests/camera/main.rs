@@ -1,0 +1,7 @@
+//! Cameras: the rays that they send out, and what is refused.
+
+mod coarser;
+mod lens_camera;
+mod light_field;
+mod opencv_fit;
+mod unprojection;

@@ -1,0 +1,74 @@
+//! The widest opening of a lens: what is accepted has its light, and what is wider is refused.
+
+use std::f64::consts::PI;
+
+use etendue_optics::train::analysis::projected_solid_angle;
+use etendue_optics::train::{Focus, OpticalTrain};
+use glam::DVec3;
+
+use crate::{build, preset};
+
+/// The projected solid angle of the exit pupil from the axis over π/(4N²), which is that of a lens
+/// that obeys the sine condition (E. Abbe; W. J. Smith, *Modern Optical Engineering*).
+fn light(train: &OpticalTrain) -> f64 {
+    let z = train.sensor_z(Focus::Infinity).unwrap();
+    let at = train.at(train.wavelength()).unwrap();
+    let n = train.paraxial(train.wavelength()).unwrap().f_number.unwrap();
+    projected_solid_angle(train, &at, DVec3::new(0.0, 0.0, z)) * 4.0 * n * n / PI
+}
+
+#[test]
+fn a_lens_opened_as_far_as_it_goes_has_the_light_of_its_f_number() {
+    for name in ["double-gauss", "telephoto", "fisheye"] {
+        let train = preset(name);
+        let widest = train.widest_opening().unwrap();
+        let at = |share: f64| {
+            light(&train.clone().with_stop_radius(share * widest.stop_radius).unwrap())
+        };
+        let [closed, open, beyond] = [0.96, 1.0, 1.04].map(at);
+        // Up to there the light follows the f-number on paper, but for the lens' offence against the
+        // sine condition; beyond it is the same light on a larger number.
+        assert!((open / closed - 1.0).abs() < 0.015, "{name}: {open} and {closed}");
+        assert!((beyond * 1.04 * 1.04 / open - 1.0).abs() < 0.015, "{name}: {beyond}, {open}");
+        println!("{name}: f/{:.3}: {closed:.4} {open:.4} {beyond:.4}", widest.f_number);
+        // A tenth of a stop wider is refused by the number that it has.
+        let refused = train.with_f_number(0.965 * widest.f_number).unwrap_err().to_string();
+        let number = format!("f/{}", (100.0 * widest.f_number).ceil() / 100.0);
+        assert!(refused.contains(&number) && refused.contains("at most"), "{refused}");
+    }
+}
+
+#[test]
+fn a_rim_in_front_limits_the_beam_exactly() {
+    // A thin lens of 50 mm behind a hole of radius 5: f/5, whatever the stop behind is.
+    let train = build(
+        r#"{"elements": [
+            {"type": "aperture", "shape": "circular", "radius": 5, "thickness": 3},
+            {"type": "thin_lens", "focal_length": 50},
+            {"type": "aperture", "shape": "circular", "radius": 9, "stop": true}]}"#,
+    );
+    let widest = train.widest_opening().unwrap();
+    // Forty halvings of a step of a tenth of a millimetre.
+    assert!((widest.f_number - 5.0).abs() < 1e-10, "{widest:?}");
+    assert_eq!(widest.element, 0);
+    assert!(train.notes().iter().any(|note| note.contains("on paper")), "{:?}", train.notes());
+    assert!(train.clone().with_f_number(4.9).is_err());
+    assert!(train.with_f_number(5.0).is_ok());
+}
+
+#[test]
+fn irises_open_masks_do_not_limit_and_unlimited_lenses_have_no_widest() {
+    let iris = build(
+        r#"{"elements": [{"type": "thin_lens", "focal_length": 50, "semi_diameter": 12.5},
+            {"type": "aperture", "shape": "polygon", "blades": 6, "radius": 2, "stop": true}]}"#,
+    );
+    let widest = iris.widest_opening().unwrap();
+    assert!((widest.f_number - 2.0).abs() < 1e-10, "{widest:?}");
+    assert!(iris.with_f_number(2.0).is_ok());
+    let free = build(
+        r#"{"elements": [{"type": "thin_lens", "focal_length": 50},
+            {"type": "aperture", "shape": "circular", "radius": 2}]}"#,
+    );
+    assert_eq!(free.widest_opening(), None);
+    assert!(free.with_f_number(0.5).is_ok());
+}

@@ -1,0 +1,324 @@
+//! What a light-field camera leaves, read back: the views decoded from its raw picture are those of an
+//! ideal lens, and things stand in them where the formula says.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use etendue_render::Plan;
+use etendue_render::light_field::{self, Rendering};
+use etendue_render::output::Outputs;
+
+use crate::steps::{load, load_in, prepare, rendered, trace};
+
+const OUTPUTS: Outputs = Outputs { npy: true, ..Outputs::NONE };
+
+/// Writes the set of a scene, whose file is put into the folder, too.
+fn write_scene(folder: &Path, text: &str) -> serde_json::Value {
+    let scene = load_in(folder, text);
+    let plan = Plan::new(&scene, OUTPUTS);
+    let (accel, images) = prepare(&scene, &plan);
+    let rendered = trace(&scene, &plan, &*accel, &images);
+    let rendering = Rendering { scene: &scene, accel: &*accel, images: &images };
+    let set =
+        light_field::write(rendering, &rendered.picture, folder, OUTPUTS, &|_: f64| true).unwrap();
+    let promised = light_field::file_names(&scene);
+    for file in &set.files {
+        let name = file.strip_prefix(folder).unwrap().to_str().unwrap();
+        assert!(promised.iter().any(|promised| promised == name), "{name}");
+        assert!(file.exists(), "{name}");
+    }
+    serde_json::from_slice(&std::fs::read(folder.join("geometry.json")).unwrap()).unwrap()
+}
+
+/// Of a wall at `depth` (m) before a lens of 20 mm that is focused at 0.5 m: the width of `columns` columns
+/// of a view, each 0.1 mm wide at 20.8333 mm behind the lens.
+fn on_the_wall(columns: f64, depth: f64) -> f64 {
+    columns * depth * 0.1 / (1.0 / (1.0 / 20.0 - 1.0 / 500.0))
+}
+
+/// A camera of 20 mm f/4 with lenslets of 0.1 mm.
+fn camera(kind: &str, microlenses: &str, resolution: [u32; 2], more: &str) -> String {
+    format!(
+        r#"{{"type": "{kind}", "focal_length": 20, "f_number": 4, "focus_distance": 0.5,
+            "microlenses": {{"pitch": 0.1 {microlenses}}}, {more}
+            "pose": {{"from": [0, 0, 0.5], "look_at": [0, 0, 0]}},
+            "sensor": {{"resolution": {resolution:?}, "pixel_pitch": 8}}}}"#
+    )
+}
+
+/// Writes the set of a camera that looks at a wall of squares at `depth` (m), each of which is 3.5 columns
+/// of a view wide.
+fn write(folder: &Path, depth: f64, kind: &str, microlenses: &str) -> serde_json::Value {
+    let (width, z) = (80.0 * on_the_wall(3.5, depth), 0.5 - depth);
+    // Stripes, nearly: a row sees one square above the other at most once.
+    let height = 40.0 * width;
+    let camera = camera(kind, microlenses, [640, 100], "");
+    write_scene(
+        folder,
+        &format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "flat"}}, "render": {{"samples": 32}},
+            "camera": {camera},
+            "materials": {{"a": {{"type": "checker", "colors": [[0.9, 0.8, 0.7], [0.1, 0.2, 0.3]], "squares": 80}}}},
+            "objects": [{{"shape": "rectangle", "width": {width}, "height": {height}, "material": "a",
+                "transform": {{"translate": [0.0003, 0.0007, {z}]}}}}]}}"#
+        ),
+    )
+}
+
+/// The same before waves of 7 columns of a view, which have no harmonics: pixels of a view that sample
+/// squares take their thirteenth and fifteenth for their first.
+fn write_waves(folder: &Path, depth: f64) -> serde_json::Value {
+    const TEXELS: u32 = 128;
+    let wave = |x: u32, _| {
+        let phase = TAU * (f64::from(x) + 0.5) / f64::from(TEXELS);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "16 bits")]
+        image::Luma([(65535.0 * (0.5 + 0.4 * phase.cos())).round() as u16])
+    };
+    image::ImageBuffer::from_fn(TEXELS, 1, wave).save(folder.join("wave.png")).unwrap();
+    let (width, z) = (40.0 * on_the_wall(7.0, depth), 0.5 - depth);
+    let camera = camera("light_field", "", [640, 40], "");
+    write_scene(
+        folder,
+        &format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "flat"}}, "render": {{"samples": 16}},
+            "camera": {camera},
+            "materials": {{"a": {{"type": "matte",
+                "color": {{"image": "wave.png", "encoding": "linear", "repeat": [40, 1]}}}}}},
+            "objects": [{{"shape": "rectangle", "width": {width}, "height": {width}, "material": "a",
+                "transform": {{"translate": [0.0003, 0, {z}]}}}}]}}"#
+        ),
+    )
+}
+
+/// An array of f32 of a file: its shape and values.
+fn array(path: &Path) -> (Vec<usize>, Vec<f64>) {
+    let bytes = std::fs::read(path).unwrap();
+    let end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = std::str::from_utf8(&bytes[10..end]).unwrap();
+    let shape = header.split('(').nth(1).unwrap().split(')').next().unwrap();
+    let shape = shape.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+    let numbers = bytes[end..].chunks(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()).into());
+    (shape, numbers.collect())
+}
+
+/// Green of one view, row by row.
+fn view(shape: &[usize], values: &[f64], across: usize, down: usize) -> Vec<Vec<f64>> {
+    let [_, n, rows, cols, channels] = shape[..] else { panic!("{shape:?}") };
+    let start = (down * n + across) * rows * cols * channels;
+    let row = |row: usize| {
+        (0..cols).map(|col| values[start + (row * cols + col) * channels + 1]).collect()
+    };
+    (0..rows).map(row).collect()
+}
+
+/// How far the waves of one view are moved to the right against those of another (columns): by the phase of
+/// their period of 7 columns, in a Hann window.
+fn shift(from: &[Vec<f64>], to: &[Vec<f64>]) -> f64 {
+    let wave = |row: &[f64]| {
+        let n = row.len() as f64;
+        let window = |i: usize| 1.0 - (TAU * (i as f64 + 0.5) / n).cos();
+        // Without its mean, of which the window would let some through.
+        let mean: f64 = row.iter().enumerate().map(|(i, v)| window(i) * v).sum::<f64>() / n;
+        row.iter().enumerate().fold([0.0; 2], |[re, im], (i, value)| {
+            let (sine, cosine) = (TAU * i as f64 / 7.0).sin_cos();
+            let value = window(i) * (value - mean);
+            [re + value * cosine, im - value * sine]
+        })
+    };
+    let pairs = from.iter().zip(to).map(|(a, b)| (wave(a), wave(b)));
+    let [re, im] = pairs.fold([0.0; 2], |[re, im], (a, b)| {
+        [re + a[0] * b[0] + a[1] * b[1], im + a[0] * b[1] - a[1] * b[0]]
+    });
+    -im.atan2(re) * 7.0 / TAU
+}
+
+#[test]
+fn decoded_views_are_those_of_an_ideal_lens() {
+    for microlenses in ["", r#", "rotation": 2"#, r#", "grid": "hexagonal", "aperture": "round""#] {
+        let folder = tempfile::tempdir().unwrap();
+        let geometry = write(folder.path(), 0.45, "light_field", microlenses);
+        let (shape, decoded) = array(&folder.path().join("views.npy"));
+        let (same, reference) = array(&folder.path().join("reference.npy"));
+        assert_eq!(shape, same);
+        assert_eq!(geometry["views"], shape[0] as u64);
+        let size = shape[2..].iter().product::<usize>();
+        let psnr = decoded.chunks(size).zip(reference.chunks(size)).map(|(a, b)| {
+            let squares: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
+            -10.0 * (squares / size as f64).log10()
+        });
+        let worst = psnr.fold(f64::INFINITY, f64::min);
+        println!("{microlenses}: worst view {worst:.1} dB");
+        assert!(worst > 40.0, "{microlenses}: {worst}");
+    }
+}
+
+#[test]
+fn disparity_against_depth_has_the_slope_of_the_formula() {
+    let mut points = Vec::new();
+    for depth in [0.36, 0.42, 0.5, 0.8, 1.5] {
+        let folder = tempfile::tempdir().unwrap();
+        let geometry = write_waves(folder.path(), depth);
+        let (shape, views) = array(&folder.path().join("views.npy"));
+        let n = shape[0];
+        let middle = n / 2;
+        let [first, last] = [0, n - 1].map(|across| view(&shape, &views, across, middle));
+        let measured = -shift(&first, &last) / (n - 1) as f64;
+        let expected = geometry["expected_disparity"].as_f64().unwrap();
+        let [baseline, focal] = ["baseline_m", "focal_length_px"]
+            .map(|key| geometry["disparity"][key].as_f64().unwrap());
+        assert!((expected - baseline * focal * (1.0 / depth - 2.0)).abs() < 1e-9, "{depth}");
+        println!("{depth} m: {measured:.5} and {expected:.5}");
+        // cos⁴ falls across each lenslet, by 4 s/b of its light a length at slope s: its middle moves by
+        // that times pitch²/12, which is 0.0016 columns a view at all depths. The formula itself holds ray
+        // by ray (camera/tests/light_field.rs).
+        assert!((measured - expected - 0.0016).abs() < 4e-4, "{depth}: {measured} {expected}");
+        points.push([expected, measured]);
+        let pfm = std::fs::read(folder.path().join("central_disparity.pfm")).unwrap();
+        let value = f32::from_le_bytes(pfm[pfm.len() - 4..].try_into().unwrap());
+        assert!((f64::from(value) - expected).abs() < 1e-6, "a wall square to the axis");
+    }
+    let count = points.len() as f64;
+    let mean = [0, 1].map(|k| points.iter().map(|p| p[k]).sum::<f64>() / count);
+    let sum =
+        |k: usize| -> f64 { points.iter().map(|p| (p[0] - mean[0]) * (p[k] - mean[k])).sum() };
+    let slope = sum(1) / sum(0);
+    println!("slope {slope:.5} of the formula's");
+    assert!((slope - 1.0).abs() < 0.005, "{slope}");
+}
+
+#[test]
+fn a_reference_camera_leaves_its_views_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let geometry = write(folder.path(), 0.4, "light_field_reference", "");
+    let (shape, _) = array(&folder.path().join("views.npy"));
+    assert_eq!(geometry["rows"], shape[2] as u64);
+    assert!(geometry["centres_px"].is_null(), "there is no raw picture");
+    assert!(!folder.path().join("white.npy").exists());
+    assert!(!folder.path().join("reference.npy").exists());
+}
+
+/// How far plain centroids of the white picture, over circles as wide as the images are apart, are from the
+/// places of `key` (pixels): the worst of those within `within` (pixels) of the picture's middle column.
+fn worst_centroid(folder: &Path, geometry: &serde_json::Value, key: &str, within: f64) -> f64 {
+    let (shape, white) = array(&folder.join("white.npy"));
+    let width = shape[1];
+    let places = |key: &str| -> Vec<[f64; 2]> {
+        let rows = geometry[key].as_array().unwrap().iter();
+        rows.flat_map(|row| row.as_array().unwrap())
+            .map(|place| [0, 1].map(|k| place[k].as_f64().unwrap()))
+            .collect()
+    };
+    let reach = 0.5 * geometry["pitch_px"].as_f64().unwrap() + 0.5;
+    let mut worst = 0.0_f64;
+    for ([x, y], expected) in places("centres_px").into_iter().zip(places(key)) {
+        if (x - 0.5 * width as f64).abs() > within {
+            continue;
+        }
+        let (mut sum, mut mean) = (0.0, [0.0; 2]);
+        for (k, value) in white.iter().skip(1).step_by(3).enumerate() {
+            let at = [(k % width) as f64, (k / width) as f64];
+            if (at[0] - x).hypot(at[1] - y) < reach {
+                sum += value;
+                mean = [mean[0] + value * at[0], mean[1] + value * at[1]];
+            }
+        }
+        worst = worst.max((mean[0] / sum - expected[0]).hypot(mean[1] / sum - expected[1]));
+    }
+    println!("{key} within {within} px: worst {worst:.4} px");
+    worst
+}
+
+/// Lenslets that are slower than the main lens leave dark pixels between their images, so that a centroid is
+/// that of one image.
+#[test]
+fn white_images_stand_where_the_geometry_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let geometry = write(folder.path(), 0.4, "light_field", r#", "f_number": 3.4, "rotation": 1"#);
+    // Further out cos⁴ moves the centroid by more: 4 × slope × 0.1 × a quarter of the radius.
+    let worst = worst_centroid(folder.path(), &geometry, "centres_px", 120.0);
+    assert!(worst < 0.05, "{worst}");
+    let worst = worst_centroid(folder.path(), &geometry, "centroids_px", f64::INFINITY);
+    assert!(worst < 0.05, "{worst}");
+}
+
+/// A ring before the lens cuts into the light of the outer lenslets: their images are no longer round, and
+/// the centroids stand a pixel beside the chief rays.
+#[test]
+fn centroids_of_vignetted_images_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let ring =
+        r#""elements": [{"type": "aperture", "shape": "circular", "radius": 2.6, "at": -15}],"#;
+    let camera = camera("light_field", r#", "f_number": 3.4"#, [640, 60], ring);
+    let text = format!(
+        r#"{{"etendue": 1, "tracer": {{"type": "flat"}}, "render": {{"samples": 1}},
+        "camera": {camera}, "objects": [{{"shape": "sphere"}}]}}"#
+    );
+    let geometry = write_scene(folder.path(), &text);
+    let beside = worst_centroid(folder.path(), &geometry, "centres_px", f64::INFINITY);
+    assert!(beside > 0.5, "{beside}: it cuts");
+    let worst = worst_centroid(folder.path(), &geometry, "centroids_px", f64::INFINITY);
+    assert!(worst < 0.05, "{worst}");
+}
+
+/// A hyperspectral light field: what a pinhole with the same sensor sees of a wall of one colour is what
+/// every pixel of every view has in each band, once its own cos⁴ is allowed for.
+#[test]
+fn spectra_of_views_are_those_of_what_they_see() {
+    let scene = |camera: &str| {
+        format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "direct"}}, "render": {{"samples": 16}},
+            "camera": {camera},
+            "materials": {{"a": {{"type": "emissive", "radiance": [0.7, 0.4, 0.1]}}}},
+            "objects": [{{"shape": "rectangle", "width": 1, "height": 1, "material": "a"}}]}}"#
+        )
+    };
+    let sensor = |resolution: [u32; 2]| {
+        format!(
+            r#""type": "multispectral", "bands": [450, 520, 590, 660], "noise": "none",
+            "resolution": {resolution:?}"#
+        )
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let ours = camera("light_field", r#", "f_number": 3.4"#, [120, 60], "")
+        .replace(r#""resolution": [120, 60]"#, &sensor([120, 60]));
+    let geometry = write_scene(folder.path(), &scene(&ours));
+    let bands = 3;
+    let [n, rows, cols] = ["views", "rows", "cols"]
+        .map(|key| usize::try_from(geometry[key].as_u64().unwrap()).unwrap());
+    let (shape, decoded) = array(&folder.path().join("views_spectrum.npy"));
+    let (same, reference) = array(&folder.path().join("reference_spectrum.npy"));
+    assert_eq!(shape, [n, n, rows, cols, bands]);
+    assert_eq!(same, shape);
+    let pinhole = format!(
+        r#"{{"type": "pinhole", "fov": 20, "pose": {{"from": [0, 0, 0.5], "look_at": [0, 0, 0]}},
+            "sensor": {{{}}}}}"#,
+        sensor([4, 4])
+    );
+    let spectrum = spectrum_of(&scene(&pinhole));
+    assert!(spectrum[0] < 0.5 * spectrum[2], "{spectrum:?}: the wall is red");
+    let middle = (n / 2 * n + n / 2) * rows * cols;
+    for (name, values, off) in [("reference", &reference, 2e-3), ("views", &decoded, 5e-3)] {
+        let pixel = |k: usize| &values[k * bands..(k + 1) * bands];
+        // In the middle view's middle cos⁴ of f/4 is within a lenslet 1 − 4/3/8²/4 of 1.
+        let found = pixel(middle + rows / 2 * cols + cols / 2);
+        for (band, (found, expected)) in found.iter().zip(&spectrum).enumerate() {
+            assert!((found / expected - 1.0).abs() < 0.015, "{name} {band}: {found} {expected}");
+        }
+        // Elsewhere all bands are dimmed alike.
+        for k in 0..n * n * rows * cols {
+            let share = pixel(k)[1] / spectrum[1];
+            for (found, expected) in pixel(k).iter().zip(&spectrum) {
+                assert!((found / expected - share).abs() < off, "{name} {k}: {found} {expected}");
+            }
+        }
+    }
+}
+
+/// The bands of the pixel in the middle of a scene's picture.
+fn spectrum_of(text: &str) -> Vec<f64> {
+    let scene = load(text);
+    let picture = rendered(&scene, &Plan::new(&scene, OUTPUTS)).picture;
+    let layer = picture.layer("Spectrum").unwrap();
+    let middle = picture.height() / 2 * picture.width() + picture.width() / 2;
+    layer.channels.iter().map(|channel| channel.values.at(middle)).collect()
+}

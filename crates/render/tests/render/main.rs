@@ -1,0 +1,16 @@
+//! Whole renders: from the text of a scene to the values of its layers.
+
+mod adaptive;
+mod dispersion;
+mod known_radiance;
+mod layers;
+mod light_field;
+mod light_parts;
+mod light_sampling;
+mod many_lights;
+mod overruled;
+mod overruled_camera;
+mod passes;
+mod second_readers;
+mod steps;
+mod textures;

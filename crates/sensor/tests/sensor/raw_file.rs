@@ -1,0 +1,179 @@
+//! A DNG carries what a raw converter needs to know.
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::process::Command;
+
+use etendue_sensor::dng::DngError;
+use etendue_sensor::{Exposure, Film, RawImage, Sensor, SensorSpec};
+use serde_json::{Value, json};
+
+use crate::environment;
+
+fn taken(spec: Value) -> (Sensor, RawImage) {
+    let spec: SensorSpec = serde_json::from_value(spec).unwrap();
+    let sensor = Sensor::new(&spec).unwrap();
+    let [width, height] = sensor.resolution();
+    let count = width as usize * height as usize * sensor.bands().count();
+    let film: Vec<f32> = (0..count).map(|i| (i % 50) as f32 / 50.0).collect();
+    let image =
+        sensor.expose(Film { values: &film }, Exposure { exposure: 0.01, frame: 0 }, 0).unwrap();
+    (sensor, image)
+}
+
+fn written(sensor: &Sensor, image: &RawImage) -> Result<Vec<u8>, DngError> {
+    let mut bytes = Cursor::new(Vec::new());
+    sensor.write_dng(image, "imx183", &mut bytes)?;
+    Ok(bytes.into_inner())
+}
+
+/// The values of a TIFF's first directory, by tag: bytes of its `count` values.
+fn directory(file: &[u8]) -> BTreeMap<u16, Vec<u8>> {
+    assert_eq!(&file[..4], b"II*\0", "a little-endian TIFF");
+    let short = |at: usize| u16::from_le_bytes([file[at], file[at + 1]]);
+    let long = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+    let start = long(4);
+    let entry = |i: u16| {
+        let at = start + 2 + 12 * usize::from(i);
+        // Sizes of TIFF 6.0's types, page 15.
+        let size = [0, 1, 1, 2, 4, 8, 1, 1, 2, 4, 8, 4, 8][usize::from(short(at + 2))];
+        let bytes = size * long(at + 4);
+        let from = if bytes <= 4 { at + 8 } else { long(at + 8) };
+        (short(at), file[from..from + bytes].to_vec())
+    };
+    (0..short(start)).map(entry).collect()
+}
+
+fn longs(bytes: &[u8]) -> Vec<u32> {
+    bytes.as_chunks().0.iter().map(|b| u32::from_le_bytes(*b)).collect()
+}
+
+fn shorts(bytes: &[u8]) -> Vec<u16> {
+    bytes.as_chunks().0.iter().map(|b| u16::from_le_bytes(*b)).collect()
+}
+
+/// The well of an IMX250 is full before its converter ends: what a raw converter must take for white.
+#[test]
+fn white_is_where_the_first_of_well_and_converter_ends() {
+    for (model, white) in [("imx250", 3779), ("imx183", 4095)] {
+        let spec = json!({"type": "raw", "model": model, "resolution": [8, 6]});
+        let (sensor, image) = taken(spec);
+        let tags = directory(&written(&sensor, &image).unwrap());
+        assert_eq!(shorts(&tags[&50_717]), [white], "{model}");
+    }
+}
+
+#[test]
+fn numbers_pattern_and_levels_come_back() {
+    let spec = json!({
+        "type": "raw", "model": "imx183", "resolution": [60, 40], "cfa": "gbrg", "black_level": 38.25,
+    });
+    let (sensor, image) = taken(spec);
+    let file = written(&sensor, &image).unwrap();
+    let tags = directory(&file);
+    assert_eq!(longs(&tags[&256]), [60]);
+    assert_eq!(longs(&tags[&257]), [40]);
+    assert_eq!(shorts(&tags[&262]), [32_803], "photometric interpretation: colour filter array");
+    assert_eq!(shorts(&tags[&33_421]), [2, 2], "period");
+    assert_eq!(tags[&33_422], [1, 2, 0, 1], "green blue, red green");
+    assert_eq!(tags[&50_706], [1, 4, 0, 0], "version");
+    assert_eq!(longs(&tags[&50_714]), [382_500, 10_000], "black");
+    assert_eq!(shorts(&tags[&50_717]), [4095], "white");
+    assert_eq!(&tags[&50_708], b"imx183\0");
+    let offset = longs(&tags[&273])[0] as usize;
+    assert_eq!(longs(&tags[&279]), [4800]);
+    assert_eq!(shorts(&file[offset..offset + 4800]), image.values);
+    // ColorMatrix1 takes D65 white to the neutral of the camera.
+    let signed = |bytes: &[u8]| -> Vec<f64> {
+        longs(bytes)
+            .as_chunks()
+            .0
+            .iter()
+            .map(|[n, d]| f64::from(n.cast_signed()) / f64::from(*d))
+            .collect()
+    };
+    let (matrix, neutral) = (signed(&tags[&50_721]), signed(&tags[&50_728]));
+    let white = [0.3127 / 0.3290, 1.0, 0.3583 / 0.3290];
+    for (row, neutral) in matrix.as_chunks::<3>().0.iter().zip(neutral) {
+        let seen: f64 = row.iter().zip(white).map(|(entry, xyz)| entry * xyz).sum();
+        // Entries have four decimals.
+        assert!((seen - neutral).abs() < 3e-4, "{seen} {neutral}");
+    }
+}
+
+#[test]
+fn monochrome_sensors_write_linear_raw() {
+    let (sensor, image) = taken(json!({ "type": "raw", "resolution": [8, 8] }));
+    let tags = directory(&written(&sensor, &image).unwrap());
+    assert_eq!(shorts(&tags[&262]), [34_892]);
+    assert!(!tags.contains_key(&33_422));
+}
+
+#[test]
+fn what_is_no_raw_is_refused() {
+    let (sensor, image) = taken(json!({ "type": "rgb", "resolution": [4, 4] }));
+    assert!(written(&sensor, &image).unwrap_err().to_string().contains("3 channels"));
+    let (sensor, image) = taken(json!({ "type": "raw", "cfa": "rgbw", "resolution": [4, 4] }));
+    assert!(written(&sensor, &image).unwrap_err().to_string().contains("no filter `w`"));
+}
+
+/// Colours as an independent raw converter (`LibRaw`, of Python's `rawpy`) develops them, in the four
+/// quarters of a picture: pattern, levels, balance and matrix are right, and up is up.
+#[test]
+fn a_raw_converter_develops_the_colours() {
+    let python = match environment::python_with("rawpy-0.28.0", &["rawpy==0.28.0"]) {
+        Ok(python) => python,
+        Err(why) => {
+            println!("skipped: the raw converter rawpy cannot be had: {why}");
+            return;
+        }
+    };
+    // Top left, top right, bottom left, bottom right, in linear sRGB.
+    let colours = [[0.7, 0.05, 0.05], [0.05, 0.6, 0.05], [0.05, 0.05, 0.7], [0.8, 0.8, 0.8]];
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("raw.dng");
+    let program = "import rawpy, sys, json
+raw = rawpy.imread(sys.argv[1])
+look = raw.postprocess(use_camera_wb=True, no_auto_bright=True, output_bps=8)
+height, width = look.shape[:2]
+quarter = lambda i: look[(1 + 2 * (i // 2)) * height // 4 - 4:, (1 + 2 * (i % 2)) * width // 4 - 4:]
+print(json.dumps({
+    'pattern': ''.join(chr(raw.color_desc[i]) for i in raw.raw_pattern.flatten()),
+    'black': raw.black_level_per_channel, 'white': int(raw.white_level),
+    'look': [quarter(i)[:8, :8].reshape(-1, 3).mean(0).tolist() for i in range(4)]}))";
+    for (cfa, pattern) in [("rggb", "RGGB"), ("gbrg", "GBRG"), ("grbg", "GRBG"), ("bggr", "BGGR")] {
+        let spec = json!({
+            "type": "raw", "model": "imx183", "resolution": [96, 64], "cfa": cfa,
+            "filters": "nikon_d5100",
+        });
+        let sensor = Sensor::new(&serde_json::from_value(spec).unwrap()).unwrap();
+        let rows = sensor.bands().from_rgb();
+        let film: Vec<f32> = (0..96 * 64)
+            .flat_map(|i| {
+                let colour = colours[(i / 96 / 32) * 2 + i % 96 / 48];
+                #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+                let band = |row: &[f64; 3]| (0..3).map(|k| row[k] * colour[k]).sum::<f64>() as f32;
+                rows.iter().map(band).collect::<Vec<f32>>()
+            })
+            .collect();
+        let shot = Exposure { exposure: 0.01, frame: 0 };
+        let image = sensor.expose(Film { values: &film }, shot, 0).unwrap();
+        std::fs::write(&path, written(&sensor, &image).unwrap()).unwrap();
+        let out = Command::new(&python).args(["-c", program]).arg(&path).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let read: Value = serde_json::from_slice(&out.stdout).unwrap();
+        // It counts the second green as a colour of its own.
+        assert_eq!(read["pattern"].as_str().unwrap(), pattern);
+        assert_eq!(read["white"], 4095);
+        assert_eq!(read["black"], json!([38, 38, 38, 38]));
+        for (i, colour) in colours.iter().enumerate() {
+            for (k, linear) in colour.iter().enumerate() {
+                let found = read["look"][i][k].as_f64().unwrap();
+                let expected = 255.0 * etendue_spectrum::colour::srgb_encode(*linear);
+                // The converter's tone curve is BT.709's, up to 14 of 255 darker than sRGB's; filters
+                // of a real camera and a matrix of three by three miss a colour by about as much.
+                assert!((found - expected).abs() < 30.0, "{cfa} {i} {k}: {found}, not {expected}");
+            }
+        }
+    }
+}
