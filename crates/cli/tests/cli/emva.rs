@@ -1,7 +1,9 @@
 //! The command's series through the reference implementation of EMVA 1288; without a network it is
 //! skipped, and says so.
 
-#[path = "../../../sensor/tests/emva/python.rs"]
+#[path = "../../../sensor/tests/sensor/environment.rs"]
+mod environment;
+#[path = "../../../sensor/tests/sensor/emva/python.rs"]
 mod python;
 
 use serde_json::json;

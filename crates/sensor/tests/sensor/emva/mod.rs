@@ -11,6 +11,8 @@ use etendue_sensor::emva::{DESCRIPTOR, MANIFEST, Manifest, Options, Series, Seri
 use etendue_sensor::{Sensor, SensorSpec};
 use serde_json::{Value, json};
 
+use crate::environment;
+
 pub(crate) fn sensor(spec: Value) -> Sensor {
     let spec: SensorSpec = serde_json::from_value(spec).unwrap();
     Sensor::new(&spec).unwrap()

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::environment;
+use super::environment;
 
 /// A Python that has the reference implementation; `Err` says why there is none.
 pub(crate) fn python() -> Result<PathBuf, String> {
@@ -17,7 +17,7 @@ pub(crate) fn python() -> Result<PathBuf, String> {
 pub(crate) fn characterised(python: &Path, descriptor: &Path) -> Value {
     // The file of this module is compiled into the tests of another crate, too.
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a folder of crates");
-    let script = crates.join("sensor/tests/emva/characterise.py");
+    let script = crates.join("sensor/tests/sensor/emva/characterise.py");
     let out = Command::new(python).arg(script).arg(descriptor).output().unwrap();
     let errors = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.success(), "the reference implementation failed: {errors}");
