@@ -323,6 +323,12 @@ impl Film {
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
+
+    /// Wall time of its tracing alone.
+    #[must_use]
+    pub fn trace_time(&self) -> Duration {
+        self.trace_time
+    }
 }
 
 /// The picture on a film. With an accelerator it is judged, too, whether it is black.

@@ -54,6 +54,20 @@ impl Shard {
         (1..=count).contains(&number).then(|| Self { index: number - 1, count, by })
     }
 
+    /// About `wanted` strips of a picture of `height` rows, from all over it.
+    #[must_use]
+    pub fn sample(height: u32, wanted: u32) -> Self {
+        let every = (height.div_ceil(TILE) / wanted.max(1)).max(1);
+        Self { index: every / 2, count: every, by: ShardBy::Rows }
+    }
+
+    /// No row of a picture of `height`: what is left to do is what is done once.
+    #[must_use]
+    pub fn nothing(height: u32) -> Self {
+        let strips = height.div_ceil(TILE);
+        Self { index: strips, count: strips + 1, by: ShardBy::Rows }
+    }
+
     /// The same share of what `by` says.
     #[must_use]
     pub fn by(self, by: ShardBy) -> Self {
@@ -100,7 +114,8 @@ impl Shard {
     }
 
     /// How many of `height` rows are.
-    pub(crate) fn rows(self, height: u32) -> u32 {
+    #[must_use]
+    pub fn rows(self, height: u32) -> u32 {
         let strips = 0..height.div_ceil(TILE);
         strips
             .filter(|&strip| self.owns(strip as usize))

@@ -35,6 +35,8 @@ pub struct Calibration {
     pub npy: f64,
     /// A pixel of a layer's picture.
     pub png: f64,
+    /// What all three take together, against one after the other.
+    pub together: f64,
     /// A pixel of a raw sensor's files, without noise.
     pub raw: f64,
     /// A pixel of a colour sensor's files, without noise.
@@ -67,9 +69,9 @@ impl Calibration {
 
     /// Whether every rate is a time.
     pub(super) fn is_sound(&self) -> bool {
-        let Self { build, ray, exr, npy, png, raw, rgb, noise } = *self;
+        let Self { build, ray, exr, npy, png, together, raw, rgb, noise } = *self;
         let all = [ray, exr, npy, png, raw, rgb].into_iter().chain(build).chain(noise);
-        all.into_iter().all(|rate| (0.0..1.0).contains(&rate))
+        all.into_iter().all(|rate| (0.0..1.0).contains(&rate)) && (0.0..=1.0).contains(&together)
     }
 
     /// Measures this machine, in a second or so: small scenes are rendered and written into `folder`.
@@ -96,9 +98,11 @@ impl Calibration {
         // Red, green, blue, a depth, and three numbers of a normal, in three layers.
         let (values, layers) = (7.0 * pixels, 3.0 * pixels);
         let beyond = |time: f64| (time - nothing).max(0.0);
-        let exr = beyond(only(Outputs { exr: true, ..Outputs::NONE })?) / values;
-        let npy = beyond(only(Outputs { npy: true, ..Outputs::NONE })?) / values;
-        let png = beyond(only(Outputs { png: true, ..Outputs::NONE })?) / layers;
+        let exr = beyond(only(Outputs { exr: true, ..Outputs::NONE })?);
+        let npy = beyond(only(Outputs { npy: true, ..Outputs::NONE })?);
+        let png = beyond(only(Outputs { png: true, ..Outputs::NONE })?);
+        let together = beyond(only(Outputs::ALL)?) / (exr + npy + png).max(f64::MIN_POSITIVE);
+        let (exr, npy, png) = (exr / values, npy / values, png / layers);
         let exposed = |kind: &str, noise: &str| -> Result<f64, Error> {
             let sensor = json!({ "type": kind, "noise": noise, "resolution": RESOLUTION,
                 "quantum_efficiency": 0.6, "read_noise": 2, "bit_depth": 12, "system_gain": 0.5 });
@@ -108,7 +112,7 @@ impl Calibration {
         let [raw, rgb] = [exposed("raw", "none")?, exposed("rgb", "none")?];
         let noise = [exposed("raw", "poisson")?, exposed("raw", "normal")?];
         let noise = noise.map(|time| (time - raw).max(0.0));
-        Ok(Self { build, ray, exr, npy, png, raw, rgb, noise })
+        Ok(Self { build, ray, exr, npy, png, together: together.min(1.0), raw, rgb, noise })
     }
 }
 

@@ -111,6 +111,7 @@ mod tests {
         exr: 1e-8,
         npy: 1e-8,
         png: 1e-8,
+        together: 0.5,
         raw: 1e-8,
         rgb: 1e-8,
         noise: [1e-8, 1e-9],

@@ -2,8 +2,8 @@
 //!
 //! Counts of the plan times what this machine takes for each of them, which a short [`Calibration`] has
 //! measured and the machine keeps. What rays cost in this very scene no count tells: where its structure is
-//! built in a moment, a few small pictures of it are traced and what they took is carried to the picture's own
-//! size and samples.
+//! built in a moment, some strips of its picture are traced with a few samples, and what they took is carried to
+//! all rows and samples.
 
 mod calibration;
 mod kept;
@@ -27,7 +27,7 @@ use crate::Error;
 /// The longest build (s), by the machine's rates, that is done for a forecast.
 const LONGEST_BUILD: f64 = 1.0;
 
-/// The longest that small pictures are traced for one: where rays take as long as in a pile of triangles in one
+/// The longest that parts of the picture are traced for one: where rays take as long as in a pile of triangles in one
 /// place, they are counted instead.
 const LONGEST_PILOT: Duration = Duration::from_secs(3);
 
@@ -51,7 +51,7 @@ pub struct TimeForecast {
     pub output: f64,
     /// All of it.
     pub total: f64,
-    /// Whether small pictures of the scene itself were traced, or rays were only counted.
+    /// Whether parts of the picture were traced, or rays were only counted.
     pub is_piloted: bool,
 }
 
@@ -83,8 +83,8 @@ impl TimeForecast {
         Self { load, build, trace, sensor, views, output, total: 0.0, is_piloted: false }.summed()
     }
 
-    /// As [`Self::counted`], with small pictures of the scene itself where its structure is built and its
-    /// images are decoded in a moment, and where it can be rendered at all.
+    /// As [`Self::counted`], with parts of the picture traced where its structure is built and its images are
+    /// decoded in a moment, and where it can be rendered at all.
     #[must_use]
     pub fn new(prospect: &Prospect<'_>, machine: &Calibration) -> Self {
         let counted = Self::counted(prospect, machine);
@@ -164,7 +164,11 @@ fn output(prospect: &Prospect<'_>, machine: &Calibration) -> f64 {
     let values: usize = plan.layers.iter().map(planes).sum();
     let each =
         |wanted: bool, rate: f64, count: usize| if wanted { rate * count as f64 } else { 0.0 };
+    let formats =
+        [outputs.exr, outputs.npy, outputs.png].into_iter().filter(|&wanted| wanted).count();
+    let together = if formats > 1 { machine.together } else { 1.0 };
     pixels(scene)
+        * together
         * (each(outputs.exr, machine.exr, values)
             + each(outputs.npy, machine.npy, values)
             + each(outputs.png, machine.png, plan.layers.len()))

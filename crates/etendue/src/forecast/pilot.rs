@@ -1,4 +1,7 @@
-//! Small pictures of a scene, and what they tell of its picture.
+//! Parts of a picture, traced to tell what the whole will take.
+//!
+//! Some of the picture's own strips of rows, and not a smaller picture: a mesh of a million triangles is met by
+//! rays as near each other as those of the render, which its caches make half as dear.
 
 use std::time::Instant;
 
@@ -6,18 +9,21 @@ use etendue_accel::Accel;
 use etendue_camera::Camera;
 use etendue_render::light_field::white_rows;
 use etendue_render::output::Outputs;
-use etendue_render::{Images, Plan, RenderError, render};
+use etendue_render::{Course, Images, Plan, Prepared, RenderError, Shard, render, trace};
 use etendue_scene::Scene;
 use etendue_scene::file::SamplesSpec;
 use etendue_spectrum::Bands;
 
 use crate::Error;
 
-/// Pixels of the larger and the smaller of the small pictures, about.
-const PIXELS: [f64; 2] = [12_000.0, 3_000.0];
+/// Strips of rows that are traced at least, and for each thread: one that waits for the last is not the
+/// render's.
+const STRIPS: u32 = 6;
+const STRIPS_OF_THREAD: u32 = 3;
 
-/// Samples a pixel of the larger one.
-const SAMPLES: [u32; 2] = [1, 4];
+/// The most samples of a pixel of theirs, and the time (s) that is given to one such trace.
+const MOST_SAMPLES: u32 = 16;
+const BUDGET: f64 = 0.25;
 
 /// Pixels of a small picture whose samples stop by themselves.
 const ADAPTIVE: f64 = 3_000.0;
@@ -26,9 +32,9 @@ const ADAPTIVE: f64 = 3_000.0;
 const WHITE_PIXELS: u32 = 18_000;
 
 /// How often each is traced: the fastest counts, which nothing else has disturbed.
-const TIMES: usize = 2;
+const TIMES: usize = 3;
 
-/// What small pictures of a scene are traced by.
+/// What parts of a picture are traced by.
 pub(super) struct Pilot<'a> {
     pub(super) scene: &'a Scene,
     pub(super) accel: &'a dyn Accel,
@@ -39,29 +45,35 @@ pub(super) struct Pilot<'a> {
 
 impl Pilot<'_> {
     /// The time (s) of tracing the scene's picture through `camera`: what is done once, what each pixel
-    /// takes, and each of its samples, by three small pictures.
+    /// takes, and each of its samples, by strips of it.
     pub(super) fn picture(&self, camera: &Camera) -> Result<f64, Error> {
         // A lens' pupil is measured once for a picture, and here once for all.
         let start = Instant::now();
         let bands = Plan::new(self.scene, Outputs::ALL).bands;
         let camera = &camera.opened(&bands).map_err(|e| RenderError::Camera(e.why))?;
         let opening = start.elapsed().as_secs_f64();
-        let [large, small] = PIXELS.map(|pixels| coarser(camera, pixels));
-        let [one, several] = SAMPLES;
-        // Threads and caches wake.
-        self.seconds(&small, SamplesSpec::Count(one))?;
-        let first = self.fastest(&large, one)?;
-        let more = self.fastest(&large, several)?;
-        let few = self.fastest(&small, one)?;
-        let [all, large, small] = [camera, &large, &small].map(pixels);
-        let sample = ((more - first) / (f64::from(several - one) * large)).max(0.0);
-        let each = match large > 1.2 * small {
-            true => ((first - few) / (large - small)).max(0.0),
-            false => first / large,
-        };
-        let once = (first - each * large).max(0.0);
-        let pixel = (each - sample * f64::from(one)).max(0.0);
-        Ok(opening + once + all * (pixel + sample * self.samples(camera)?))
+        let height = camera.resolution()[1];
+        let share = Shard::sample(height, STRIPS.max(STRIPS_OF_THREAD * threads()));
+        let traced = f64::from(share.rows(height)) / f64::from(height);
+        // What the first trace has beyond the others: tables are filled, threads and caches wake.
+        let (waking, first) = self.traced(camera, share, 1)?;
+        let (_, bare) = self.traced(camera, Shard::nothing(height), 1)?;
+        let first = (first - bare).max(0.0) / traced;
+        let once = opening + waking + bare;
+        let samples = self.samples(camera)?;
+        if samples <= 1.0 {
+            return Ok(once + first);
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a small count"
+        )]
+        let several = (BUDGET / (first * traced)).min(samples) as u32;
+        let several = several.clamp(2, MOST_SAMPLES);
+        let more = (self.traced(camera, share, several)?.1 - bare).max(0.0) / traced;
+        let sample = ((more - first) / f64::from(several - 1)).max(0.0);
+        Ok(once + more + sample * (samples - f64::from(several)))
     }
 
     /// The time (s) of a light field's white image, by some of its rows.
@@ -79,51 +91,59 @@ impl Pilot<'_> {
         Ok(opening + a_row * f64::from(height))
     }
 
+    /// Of tracing a share of `camera`'s picture with `samples` a pixel in one pass: how much longer the first
+    /// time took than the fastest one, and that (s).
+    fn traced(&self, camera: &Camera, share: Shard, samples: u32) -> Result<(f64, f64), Error> {
+        let mut scene = self.scene.clone();
+        scene.camera = camera.clone();
+        scene.render.samples = SamplesSpec::Count(samples);
+        scene.layers.retain(|layer| !layer.is_of_sampling());
+        let mut plan = Plan::new(&scene, Outputs::ALL);
+        plan.passes = std::iter::once(0..samples).collect();
+        let prepared = Prepared { accel: self.accel, images: self.images, others: &[] };
+        let course = Course { shard: Some(share), ..Course::default() };
+        let mut times = [0.0; TIMES];
+        for time in &mut times {
+            let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| self.goes_on())?;
+            *time = film.trace_time().as_secs_f64();
+            if !self.goes_on() {
+                return Err(RenderError::Stopped.into());
+            }
+        }
+        let fastest = times.into_iter().fold(f64::INFINITY, f64::min);
+        Ok((times[0] - fastest, fastest))
+    }
+
     /// The samples that pixels of `camera` will have in the mean.
     fn samples(&self, camera: &Camera) -> Result<f64, Error> {
         let spec = self.scene.render.samples;
         if !spec.is_adaptive() {
             return Ok(f64::from(spec.most()));
         }
-        let (_, counted) = self.seconds(&coarser(camera, ADAPTIVE), spec)?;
-        Ok(counted.unwrap_or(f64::from(spec.typical())))
-    }
-
-    fn fastest(&self, camera: &Camera, samples: u32) -> Result<f64, Error> {
-        let mut fastest = f64::INFINITY;
-        for _ in 0..TIMES {
-            fastest = fastest.min(self.seconds(camera, SamplesSpec::Count(samples))?.0);
-        }
-        Ok(fastest)
-    }
-
-    /// The time (s) of a picture, and the samples that its pixels have where these stop by themselves.
-    fn seconds(&self, camera: &Camera, samples: SamplesSpec) -> Result<(f64, Option<f64>), Error> {
         let mut scene = self.scene.clone();
-        scene.camera = camera.clone();
-        scene.render.samples = samples;
-        if !samples.is_adaptive() {
-            scene.layers.retain(|layer| !layer.is_of_sampling());
-        }
+        scene.camera = coarser(camera, ADAPTIVE);
         let plan = Plan::new(&scene, Outputs::ALL);
-        let start = Instant::now();
-        let goes_on = |_: f64| Instant::now() < self.until;
-        let done = render(&scene, &plan, self.accel, self.images, Vec::new(), &goes_on)?;
-        if !goes_on(1.0) {
+        let watch = |_: f64| self.goes_on();
+        let done = render(&scene, &plan, self.accel, self.images, Vec::new(), &watch)?;
+        if !self.goes_on() {
             return Err(RenderError::Stopped.into());
         }
-        let time = done.trace_time.min(start.elapsed()).as_secs_f64();
-        Ok((time, done.sample_counts.map(|counts| counts.mean())))
+        Ok(done.sample_counts.map_or(f64::from(spec.typical()), |counts| counts.mean()))
+    }
+
+    fn goes_on(&self) -> bool {
+        Instant::now() < self.until
     }
 }
 
-fn pixels(camera: &Camera) -> f64 {
-    camera.resolution().map(f64::from).iter().product()
+fn threads() -> u32 {
+    u32::try_from(rayon::current_num_threads()).unwrap_or(u32::MAX)
 }
 
 /// The same view on about so many pixels.
 fn coarser(camera: &Camera, few: f64) -> Camera {
-    let factor = (pixels(camera) / few).sqrt().round().max(1.0);
+    let pixels: f64 = camera.resolution().map(f64::from).iter().product();
+    let factor = (pixels / few).sqrt().round().max(1.0);
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

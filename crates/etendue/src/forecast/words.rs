@@ -36,7 +36,7 @@ impl TimeForecast {
     #[must_use]
     pub fn decision(&self) -> Decision {
         let by = match self.is_piloted {
-            true => "by this machine's rates and small pictures of the scene",
+            true => "by this machine's rates and strips of the picture",
             false => "by this machine's rates and the plan's counts",
         };
         Decision {
