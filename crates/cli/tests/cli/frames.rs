@@ -68,13 +68,18 @@ fn check_and_plan_know_of_frames() {
         let told = text(&output.stdout);
         assert!(told.lines().any(|line| line.starts_with(counted)), "{told}");
     }
-    let bench = Bench::with_scene(&scene(&json!([{}, {"camera.fob": 40}])));
-    for command in ["check", "plan", "render"] {
-        let more: &[&str] = if command == "render" { &["-o", "out"] } else { &[] };
-        let output = bench.run(&[&[command, "scene.json"], more].concat());
-        assert_eq!(output.status.code(), Some(2), "{command}");
-        let why = text(&output.stderr);
-        assert!(why.contains("frames[1]") && why.contains("fob"), "{command}: {why}");
+    for (key, value) in [("fob", 40), ("fov", 300)] {
+        let wrong = json!({ format!("camera.{key}"): value });
+        let bench = Bench::with_scene(&scene(&json!([{}, wrong])));
+        for command in ["check", "plan", "render"] {
+            let more: &[&str] = if command == "render" { &["-o", "out"] } else { &[] };
+            let output = bench.run(&[&[command, "scene.json"], more].concat());
+            assert_eq!(output.status.code(), Some(2), "{command}");
+            let why = text(&output.stderr);
+            assert_eq!(why.matches("frames[1]").count(), 1, "{command}: {why}");
+            assert!(why.contains(key), "{command}: {why}");
+        }
+        assert!(!bench.path("out/frames/000000").exists(), "nothing is rendered first");
     }
 }
 

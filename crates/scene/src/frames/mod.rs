@@ -109,7 +109,13 @@ impl SceneFile {
         }
         if let FramesSpec::List(_) = spec {
             // Known now, and not when it is that frame's turn.
-            frames.iter().try_for_each(|frame| self.at(frame).map(drop))?;
+            let folder = Folder::open(self.folder(), reach)?;
+            for frame in &frames {
+                let file = self.at(frame)?;
+                if frame.settings.iter().any(|(path, _)| path.starts_with("camera")) {
+                    file.camera_alone(&folder)?;
+                }
+            }
         }
         Ok(Some(frames))
     }
@@ -123,8 +129,9 @@ impl SceneFile {
         let settings: Vec<(String, String)> =
             frame.settings.iter().map(|(path, value)| (path.clone(), value.to_string())).collect();
         let in_frame = |error: SceneError| {
-            let why = error.to_string();
-            self.fault(&join_index("frames", frame.number), why)
+            let (at, why) = (join_index("frames", frame.number), error.to_string());
+            // A wrong value's own place begins with the frame.
+            self.fault(&at, why.strip_prefix(&format!("{at}: ")).unwrap_or(&why))
         };
         self.without_frames()?.of_frame(frame.number).with(&settings).map_err(in_frame)
     }
