@@ -108,11 +108,12 @@ impl SceneFile {
             );
         }
         if let FramesSpec::List(_) = spec {
-            // Known now, and not when it is that frame's turn.
+            // Known now, and not when it is that frame's turn; but for lenses, which take some milliseconds each.
             let folder = Folder::open(self.folder(), reach)?;
             for frame in &frames {
                 let file = self.at(frame)?;
-                if frame.settings.iter().any(|(path, _)| path.starts_with("camera")) {
+                if let Some(CameraSpec::Pinhole(_) | CameraSpec::Orthographic(_)) = file.spec.camera
+                {
                     file.camera_alone(&folder)?;
                 }
             }
