@@ -51,6 +51,9 @@ const DEEP: u32 = 12;
 /// Squared distance over squared radius from which on a branch's lights are as good as in one place.
 const FAR: f64 = 16.0;
 
+/// The node whose one branch has all lights.
+const ALL: usize = 0;
+
 /// Half-angle (radians) of a cone within which lights shine the same way.
 const ALIKE: f64 = 0.3;
 
@@ -104,6 +107,45 @@ impl Node {
         self.branches[lane] = branch;
     }
 
+    /// The centre of the first branch (m).
+    #[inline]
+    fn first_centre(&self) -> DVec3 {
+        self.centre.map(|axis| axis[0]).into()
+    }
+
+    /// What a branch may send to a point at a squared distance (m²), where all shine to all sides.
+    #[inline(always)]
+    fn around(&self, k: usize, squared: f64) -> f64 {
+        let near = self.intensity[k] / squared;
+        let near = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
+        let is_within = squared <= self.radius[k] * self.radius[k];
+        if is_within { self.within[k] } else { near }
+    }
+
+    /// The same where they shine ahead.
+    #[inline(always)]
+    fn ahead(&self, k: usize, from: [f64; 3], squared: f64) -> f64 {
+        let inverse = 1.0 / squared.sqrt();
+        let near = self.intensity[k] * inverse * inverse;
+        let near = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
+        // The angle to the axis, less the cone's, less the ball's.
+        let along = |axis: usize| (from[axis] - self.centre[axis][k]) * self.axis[axis][k];
+        let along = along(0) + along(1) + along(2);
+        let cosine = (along * inverse).clamp(-1.0, 1.0);
+        let angle =
+            less([cosine, (1.0 - cosine * cosine).sqrt()], [self.cone[0][k], self.cone[1][k]]);
+        let sine = self.radius[k] * inverse;
+        let rest = 1.0 - sine * sine;
+        let ball = if rest > 0.0 { rest } else { 0.0 };
+        let [cosine, _] = less(angle, [ball.sqrt(), sine]);
+        // A light at the very end of its reach is met by a bound with room for rounding.
+        let reaches = cosine + 1e-9 > self.cos_reach[k];
+        let facing = if cosine > 1e-9 { cosine } else { 1e-9 };
+        let outside = if reaches { near * facing } else { 0.0 };
+        let is_within = squared <= self.radius[k] * self.radius[k];
+        if is_within { self.within[k] } else { outside }
+    }
+
     /// Whether one of the lights of a branch at this squared distance (m²) is chosen by intensity.
     fn is_end(&self, lane: usize, squared: f64) -> bool {
         let Branch { node, alike, .. } = self.branches[lane];
@@ -136,34 +178,12 @@ fn view(node: &Node, from: DVec3, view: &mut View) {
     }
     if node.is_around {
         for k in 0..WIDTH {
-            let near = node.intensity[k] / view.squared[k];
-            let near = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
-            let is_within = view.squared[k] <= node.radius[k] * node.radius[k];
-            view.importance[k] = if is_within { node.within[k] } else { near };
+            view.importance[k] = node.around(k, view.squared[k]);
         }
         return;
     }
     for k in 0..WIDTH {
-        let squared = view.squared[k];
-        let inverse = 1.0 / squared.sqrt();
-        let near = node.intensity[k] * inverse * inverse;
-        let near = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
-        // The angle to the axis, less the cone's, less the ball's.
-        let along = |axis: usize| (from[axis] - node.centre[axis][k]) * node.axis[axis][k];
-        let along = along(0) + along(1) + along(2);
-        let cosine = (along * inverse).clamp(-1.0, 1.0);
-        let angle =
-            less([cosine, (1.0 - cosine * cosine).sqrt()], [node.cone[0][k], node.cone[1][k]]);
-        let sine = node.radius[k] * inverse;
-        let rest = 1.0 - sine * sine;
-        let ball = if rest > 0.0 { rest } else { 0.0 };
-        let [cosine, _] = less(angle, [ball.sqrt(), sine]);
-        // A light at the very end of its reach is met by a bound with room for rounding.
-        let reaches = cosine + 1e-9 > node.cos_reach[k];
-        let facing = if cosine > 1e-9 { cosine } else { 1e-9 };
-        let outside = if reaches { near * facing } else { 0.0 };
-        let is_within = squared <= node.radius[k] * node.radius[k];
-        view.importance[k] = if is_within { node.within[k] } else { outside };
+        view.importance[k] = node.ahead(k, from, view.squared[k]);
     }
 }
 
@@ -277,30 +297,33 @@ impl LightTree {
         Grown { cluster: all, is_points, branch }
     }
 
-    /// Where a point (m) begins to ask: what parts all lights, unless it need not.
+    /// Where a point (m) begins to ask: what parts all lights, unless it need not ([`ALL`]).
     fn start(&self, from: DVec3) -> usize {
-        let goes_on = |whole: &Node| {
-            let [x, y, z] = whole.centre.map(|axis| axis[0]);
-            !whole.is_end(0, from.distance_squared(DVec3::new(x, y, z)))
-        };
+        let goes_on = |whole: &Node| !whole.is_end(0, from.distance_squared(whole.first_centre()));
         usize::from(self.nodes.first().is_some_and(goes_on))
     }
 
     /// A light for a point (m) by `u` in 0..1: its number, what is left of `u`, and its chance. `None` where
     /// none shines.
     pub(crate) fn pick(&self, from: DVec3, mut u: f64) -> Option<(usize, f64, f64)> {
-        let mut seen = View::default();
-        let (mut at, mut chance) = (self.start(from), 1.0);
-        let branch = loop {
-            let node = self.nodes.get(at)?;
-            view(node, from, &mut seen);
-            let (lane, rest, share) = seen.pick(u)?;
-            (u, chance) = (rest, chance * share);
-            let branch = node.branches[lane];
-            if node.is_end(lane, seen.squared[lane]) {
-                break branch;
+        let mut chance = 1.0;
+        let branch = match self.start(from) {
+            ALL if self.importance(from) > 0.0 => self.nodes[ALL].branches[0],
+            ALL => return None,
+            mut at => {
+                let mut seen = View::default();
+                loop {
+                    let node = self.nodes.get(at)?;
+                    view(node, from, &mut seen);
+                    let (lane, rest, share) = seen.pick(u)?;
+                    (u, chance) = (rest, chance * share);
+                    let branch = node.branches[lane];
+                    if node.is_end(lane, seen.squared[lane]) {
+                        break branch;
+                    }
+                    at = branch.node as usize;
+                }
             }
-            at = branch.node as usize;
         };
         let [begin, end] = branch.lights.map(|k| k as usize);
         if end - begin == 1 {
@@ -324,11 +347,12 @@ impl LightTree {
 
     /// What its lights may send to a point (m) that faces them all (W/m²).
     pub(crate) fn importance(&self, from: DVec3) -> f64 {
-        let mut seen = View::default();
-        if let Some(whole) = self.nodes.first() {
-            view(whole, from, &mut seen);
+        let Some(whole) = self.nodes.first() else { return 0.0 };
+        let squared = from.distance_squared(whole.first_centre());
+        match whole.is_around {
+            true => whole.around(0, squared),
+            false => whole.ahead(0, from.to_array(), squared),
         }
-        seen.importance[0]
     }
 
     /// Whether a light is in it.
@@ -341,8 +365,13 @@ impl LightTree {
         let Some(&place) = self.places.get(number).filter(|&&place| place != MISS) else {
             return 0.0;
         };
-        let mut seen = View::default();
         let (mut at, mut chance) = (self.start(from), 1.0);
+        if at == ALL {
+            let lights = self.nodes[ALL].branches[0].lights.map(|k| k as usize);
+            let is_seen = self.importance(from) > 0.0;
+            return if is_seen { self.share(place as usize, lights) } else { 0.0 };
+        }
+        let mut seen = View::default();
         while let Some(node) = self.nodes.get(at) {
             let holds = |branch: &Branch| (branch.lights[0]..branch.lights[1]).contains(&place);
             let Some(lane) = node.branches.iter().position(holds) else { return 0.0 };
