@@ -25,6 +25,9 @@ const STRIPS_OF_THREAD: u32 = 3;
 const MOST_SAMPLES: u32 = 16;
 const BUDGET: f64 = 0.25;
 
+/// The most bytes of a film that is there as a whole for it; a larger picture is traced on larger pixels.
+const MOST_FILM: f64 = 256e6;
+
 /// Pixels of a small picture whose samples stop by themselves.
 const ADAPTIVE: f64 = 3_000.0;
 
@@ -49,18 +52,25 @@ impl Pilot<'_> {
     pub(super) fn picture(&self, camera: &Camera) -> Result<f64, Error> {
         // A lens' pupil is measured once for a picture, and here once for all.
         let start = Instant::now();
-        let bands = Plan::new(self.scene, Outputs::ALL).bands;
-        let camera = &camera.opened(&bands).map_err(|e| RenderError::Camera(e.why))?;
+        let plan = Plan::new(self.scene, Outputs::ALL);
+        let whole = &camera.opened(&plan.bands).map_err(|e| RenderError::Camera(e.why))?;
         let opening = start.elapsed().as_secs_f64();
+        let film = plan.memory.film as f64 / pixels(&self.scene.camera) * pixels(whole);
+        let camera = match film > MOST_FILM {
+            true => &coarser(whole, pixels(whole) * MOST_FILM / film),
+            false => whole,
+        };
         let height = camera.resolution()[1];
         let share = Shard::sample(height, STRIPS.max(STRIPS_OF_THREAD * threads()));
-        let traced = f64::from(share.rows(height)) / f64::from(height);
+        // The part of the whole picture's pixels that is traced.
+        let rows = f64::from(share.rows(height)) / f64::from(height);
+        let traced = rows * pixels(camera) / pixels(whole);
         // What the first trace has beyond the others: tables are filled, threads and caches wake.
         let (waking, first) = self.traced(camera, share, 1)?;
         let (_, bare) = self.traced(camera, Shard::nothing(height), 1)?;
         let first = (first - bare).max(0.0) / traced;
         let once = opening + waking + bare;
-        let samples = self.samples(camera)?;
+        let samples = self.samples(whole)?;
         if samples <= 1.0 {
             return Ok(once + first);
         }
@@ -136,14 +146,17 @@ impl Pilot<'_> {
     }
 }
 
+fn pixels(camera: &Camera) -> f64 {
+    camera.resolution().map(f64::from).iter().product()
+}
+
 fn threads() -> u32 {
     u32::try_from(rayon::current_num_threads()).unwrap_or(u32::MAX)
 }
 
 /// The same view on about so many pixels.
 fn coarser(camera: &Camera, few: f64) -> Camera {
-    let pixels: f64 = camera.resolution().map(f64::from).iter().product();
-    let factor = (pixels / few).sqrt().round().max(1.0);
+    let factor = (pixels(camera) / few).sqrt().round().max(1.0);
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
