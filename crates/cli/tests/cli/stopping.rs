@@ -255,7 +255,7 @@ fn loading_and_building_stop_too() {
 fn the_second_signal_ends_at_once_and_one_that_nohup_ignores_does_nothing() {
     let bench = Bench::with_scene(ENDLESS);
     let script = format!(
-        "trap '' HUP; exec '{}' render scene.json -o out --quiet",
+        "trap '' HUP; exec env --default-signal=INT '{}' render scene.json -o out --quiet",
         env!("CARGO_BIN_EXE_etendue")
     );
     let mut running = Running::spawn(Command::new("sh").args(["-c", &script]), &bench);
