@@ -1,9 +1,9 @@
 //! The picture's light in two parts: what one surface scattered at most, and the rest.
 
 use etendue_render::output::Picture;
-use etendue_tracer::{Emission, LayerSpec, LightGroup, Paint};
+use etendue_tracer::{Emission, LayerSpec, LightGroup};
 
-use crate::steps::{channels, load, picture, read};
+use crate::steps::{channels, glow, load, picture, read};
 
 fn refusal(text: &str) -> String {
     read(tempfile::tempdir().unwrap().path(), text).unwrap_err().to_string()
@@ -29,14 +29,7 @@ fn a_closed_furnace_in_parts() {
                 "objects": [{{"shape": "box", "size": [2, 2, 2], "material": "wall"}}],
                 "materials": {{"wall": {{"type": "matte", "color": [0.6, 0.6, 0.6]}}}}}}"#
         ));
-        let radiance = Paint::Plain([1.0; 3]);
-        scene.materials[0].emission = Some(Emission {
-            radiance,
-            strength: 1.0,
-            illuminant: None,
-            two_sided: true,
-            group: None,
-        });
+        scene.materials[0].emission = Some(glow());
         let picture = picture(&scene);
         for (layer, known) in [("Direct", 1.6), ("Indirect", indirect)] {
             let [mean, bound] = mean(&picture, layer);
@@ -146,9 +139,7 @@ fn surfaces_that_shine_have_groups() {
             "materials": {"wall": {"type": "matte", "color": [0.6, 0.6, 0.6]}}}"#,
     );
     let walls = LightGroup::try_from("walls".to_owned()).unwrap();
-    let (radiance, group) = (Paint::Plain([1.0; 3]), Some(walls));
-    scene.materials[0].emission =
-        Some(Emission { radiance, strength: 1.0, illuminant: None, two_sided: true, group });
+    scene.materials[0].emission = Some(Emission { group: Some(walls), ..glow() });
     scene.layers.push(LayerSpec::LightGroup { group: walls });
     let picture = picture(&scene);
     let [found, bound] = mean(&picture, "Light.walls");

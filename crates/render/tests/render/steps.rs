@@ -7,6 +7,7 @@ use etendue_render::output::{Outputs, Picture};
 use etendue_render::{Images, Plan, Rendered, build, plan, render};
 use etendue_scene::file::SceneFile;
 use etendue_scene::{LoadOptions, Scene, SceneError};
+use etendue_tracer::{Emission, Paint};
 use serde_json::Value;
 
 /// The scene `text` as a file in `folder`, where what it names is looked for.
@@ -31,6 +32,12 @@ pub(crate) fn load(text: &str) -> Scene {
 
 pub(crate) fn load_json(folder: &Path, scene: Value) -> Scene {
     loaded(&SceneFile::from_json(folder, scene).unwrap())
+}
+
+/// A surface that shines by 1 on both sides.
+pub(crate) fn glow() -> Emission {
+    let radiance = Paint::Plain([1.0; 3]);
+    Emission { radiance, strength: 1.0, illuminant: None, two_sided: true, group: None }
 }
 
 /// What rays meet: the structure, and images without a fault.

@@ -130,9 +130,12 @@ impl SceneFile {
         let settings: Vec<(String, String)> =
             frame.settings.iter().map(|(path, value)| (path.clone(), value.to_string())).collect();
         let in_frame = |error: SceneError| {
-            let (at, why) = (join_index("frames", frame.number), error.to_string());
-            // A wrong value's own place begins with the frame.
-            self.fault(&at, why.strip_prefix(&format!("{at}: ")).unwrap_or(&why))
+            let why = match error {
+                // Its place is the frame, which is told here.
+                SceneError::Invalid { path, reason, .. } => format!("{path}: {reason}"),
+                other => other.to_string(),
+            };
+            self.fault(&join_index("frames", frame.number), why)
         };
         self.without_frames()?.of_frame(frame.number).with(&settings).map_err(in_frame)
     }

@@ -1,24 +1,12 @@
 //! Every asset of the shared test data has exactly the triangles and the box that an independent
 //! reader found.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use etendue_geometry::{Bounds, Geometry, Placement};
 use etendue_scene::import::{Import, Options, Wanted, import};
 
-/// The folder of test data; says so and gives `None` when there is none.
-fn assets() -> Option<PathBuf> {
-    let folder = match std::env::var_os("ETENDUE_ASSETS") {
-        Some(folder) => PathBuf::from(folder),
-        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
-    };
-    let folder = folder.join("data");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: no test data in {}; set ETENDUE_ASSETS", folder.display());
-    None
-}
+use crate::test_data;
 
 fn geometry(import: &Import) -> Geometry {
     let placement = |p: &etendue_scene::import::ImportedPlacement| Placement {
@@ -77,7 +65,7 @@ const KOALA: &str = "-1.89076 -1.43612 -4.22494 1.89066 3.93034 5.04552";
 
 #[test]
 fn gltf_assets_have_their_triangles_and_boxes() {
-    let Some(folder) = assets() else { return };
+    let Some(folder) = test_data() else { return };
     for (path, triangles, printed) in GLTF {
         let import = load(&folder.join("gltf").join(path));
         let (has, bounds) = measure(&import);
@@ -109,7 +97,7 @@ const OBJ: [(&str, u64); 14] = [
 
 #[test]
 fn obj_assets_have_their_triangles_and_boxes() {
-    let Some(folder) = assets() else { return };
+    let Some(folder) = test_data() else { return };
     for (path, triangles) in OBJ {
         let import = load(&folder.join("obj").join(path));
         let (has, bounds) = measure(&import);
@@ -144,7 +132,7 @@ fn corners(import: &Import) -> Vec<[f32; 3]> {
 
 #[test]
 fn the_koala_is_the_same_as_obj_and_glb() {
-    let Some(folder) = assets() else { return };
+    let Some(folder) = test_data() else { return };
     let (obj, glb) = (load(&folder.join("obj/koala.obj")), load(&folder.join("gltf/koala.glb")));
     assert_eq!(corners(&obj), corners(&glb));
     assert_eq!(glb.stats.bytes_copied, 0, "a plain GLB is used where it is mapped");
@@ -153,7 +141,7 @@ fn the_koala_is_the_same_as_obj_and_glb() {
 
 #[test]
 fn a_face_that_bends_back_on_itself_keeps_its_area() {
-    let Some(folder) = assets() else { return };
+    let Some(folder) = test_data() else { return };
     let import = load(&folder.join("obj/tricky/concave_polygon.obj"));
     let (mut vector, mut total) = (etendue_geometry::glam::DVec3::ZERO, 0.0);
     for corners in corners(&import).chunks_exact(3) {
@@ -183,7 +171,7 @@ fn sorted(corners: &[[f32; 3]]) -> Vec<[[u32; 3]; 3]> {
 #[test]
 #[expect(clippy::cast_possible_truncation, reason = "the same rounding as ours")]
 fn obj_meshes_are_those_that_tobj_reads() {
-    let Some(folder) = assets() else { return };
+    let Some(folder) = test_data() else { return };
     // tobj fans concave faces and refuses normals that do not exist.
     let cannot = [
         "tricky/concave_polygon.obj",

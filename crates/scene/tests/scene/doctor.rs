@@ -2,24 +2,14 @@
 
 use std::f64::consts::SQRT_2;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use etendue_scene::{Diagnosis, LoadOptions, doctor};
 
+use crate::test_data;
+
 fn check(path: &Path) -> Diagnosis {
     doctor::check(path, &[], &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
-}
-
-/// The folder of shared test data, if this machine has it.
-fn assets() -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("ETENDUE_ASSETS").map_or(beside, PathBuf::from);
-    if folder.join("data").is_dir() {
-        Some(folder.join("data"))
-    } else {
-        println!("skipped: no test data; name their folder in ETENDUE_ASSETS");
-        None
-    }
 }
 
 #[test]
@@ -91,7 +81,7 @@ fn odd_sizes_are_questioned() {
 
 #[test]
 fn cameras_and_lights_of_models_are_told() {
-    let Some(data) = assets() else { return };
+    let Some(data) = test_data() else { return };
     let found = check(&data.join("gltf/Cameras/Cameras.gltf"));
     let kinds: Vec<&str> = found.cameras.iter().map(|camera| camera.kind).collect();
     assert_eq!(kinds, ["pinhole", "orthographic"]);
@@ -101,7 +91,7 @@ fn cameras_and_lights_of_models_are_told() {
 
 #[test]
 fn a_models_camera_keeps_its_field_of_view() {
-    let Some(data) = assets() else { return };
+    let Some(data) = test_data() else { return };
     let path = data.join("gltf/Cameras/Cameras.gltf");
     let with = |camera| {
         let options = LoadOptions { camera: Some(camera), ..LoadOptions::default() };
@@ -122,7 +112,7 @@ fn a_models_camera_keeps_its_field_of_view() {
 
 #[test]
 fn boxes_and_counts_agree_with_an_independent_reader() {
-    let Some(data) = assets() else { return };
+    let Some(data) = test_data() else { return };
     // From the table that comes with the files; five digits after the point.
     let table = [
         (

@@ -6,3 +6,17 @@ mod doctor;
 mod documents;
 mod models;
 mod scenes;
+
+use std::path::{Path, PathBuf};
+
+/// The folder of shared test data, if this machine has it.
+fn test_data() -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let folder = std::env::var_os("ETENDUE_ASSETS").map_or(beside, PathBuf::from);
+    if folder.join("data").is_dir() {
+        Some(folder.join("data"))
+    } else {
+        println!("skipped: no test data; name their folder in ETENDUE_ASSETS");
+        None
+    }
+}

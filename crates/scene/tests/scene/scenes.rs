@@ -7,6 +7,8 @@ use etendue_geometry::glam::DVec3;
 use etendue_scene::{CameraOrigin, LoadOptions, Scene, SceneFile, Wanted, scene_schema};
 use etendue_tracer::LayerSpec;
 
+use crate::test_data;
+
 fn load(path: &Path, settings: &[(&str, &str)]) -> Scene {
     let settings: Vec<(String, String)> =
         settings.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
@@ -20,18 +22,6 @@ fn from_text(text: &str, settings: &[(&str, &str)]) -> Scene {
     let path = folder.path().join("scene.json");
     fs::write(&path, text).unwrap();
     load(&path, settings)
-}
-
-/// The folder of shared test data, if this machine has it.
-fn assets() -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("ETENDUE_ASSETS").map_or(beside, PathBuf::from);
-    if folder.join("data").is_dir() {
-        Some(folder.join("data"))
-    } else {
-        println!("skipped: no test data; name their folder in ETENDUE_ASSETS");
-        None
-    }
 }
 
 fn examples() -> Vec<PathBuf> {
@@ -427,7 +417,7 @@ fn the_schema_is_a_schema() {
 
 #[test]
 fn a_model_has_an_object_for_each_of_its_nodes() {
-    let Some(data) = assets() else { return };
+    let Some(data) = test_data() else { return };
     let scene = load(&data.join("gltf/SharedMesh/02_shared_mesh.gltf"), &[]);
     assert_eq!(scene.objects.len(), 2, "{:?}", scene.objects);
     assert_eq!(scene.geometry.uses(), [2], "two nodes, one mesh");
@@ -437,7 +427,7 @@ fn a_model_has_an_object_for_each_of_its_nodes() {
 
 #[test]
 fn a_models_camera_moves_with_its_object_and_keeps_the_scenes_resolution() {
-    let Some(data) = assets() else { return };
+    let Some(data) = test_data() else { return };
     let folder = tempfile::tempdir().unwrap();
     fs::copy(data.join("gltf/Cameras/Cameras.gltf"), folder.path().join("c.gltf")).unwrap();
     let path = folder.path().join("s.json");

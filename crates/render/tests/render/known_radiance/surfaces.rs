@@ -1,10 +1,9 @@
 //! Surfaces of every kind in light that is even.
 
 use etendue_scene::Scene;
-use etendue_tracer::{Emission, Paint};
 
 use super::{assert_shows, check, patch, picture, ways};
-use crate::steps::load;
+use crate::steps::{glow, load};
 
 /// Inside of a closed box whose walls shine by 1 and return ρ: 1 + ρ + ρ² + … = 1/(1 − ρ), and 1 + ρ
 /// after one bounce.
@@ -16,16 +15,7 @@ fn a_closed_furnace() {
             "objects": [{{"shape": "box", "size": [2, 2, 2], "material": "wall"}}],
             "materials": {{"wall": {{"type": "matte", "color": [{albedo}, {albedo}, {albedo}]}}}}"#
         );
-        let shine = |scene: &mut Scene| {
-            let radiance = Paint::Plain([1.0; 3]);
-            scene.materials[0].emission = Some(Emission {
-                radiance,
-                strength: 1.0,
-                illuminant: None,
-                two_sided: true,
-                group: None,
-            });
-        };
+        let shine = |scene: &mut Scene| scene.materials[0].emission = Some(glow());
         let eye = [[0.2, 0.1, 0.3], [-0.5, -1.0, 0.2]];
         check("furnace", 64, eye, &rest, shine, 0.0, |tracer| match tracer {
             "path" => 1.0 / (1.0 - albedo),
