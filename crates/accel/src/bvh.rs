@@ -29,13 +29,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_geometry::glam::Vec3;
-use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
+use etendue_geometry::{Bounds, Coplanar, Geometry, HitBatch, MISS, RayBatch};
 use rayon::prelude::*;
 
 use self::fold::{Instances, Triangles, fold};
 use self::lanes::{Lanes, Portable};
 use self::single::{AnyHit, Batch, Sink};
 use self::wide::{LeafUnits, MOST_IN_LEAF, WideTree};
+use crate::coplanar::settle;
 use crate::nearest::Nearest;
 use crate::parts::{Baking, Blas, Instance, Layout, Members, outward};
 use crate::tree::{LeafSize, Ref, Tree};
@@ -49,6 +50,7 @@ pub struct Bvh {
     parts: Vec<PartTree>,
     /// Over the instances; empty when there is only one.
     top: WideTree,
+    coplanar: Coplanar,
     isa: Isa,
     time: Duration,
 }
@@ -126,8 +128,8 @@ impl Bvh {
     ///
     /// # Errors
     ///
-    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::Scale`] beyond 10⁹⁰ m and below
-    /// 10⁻⁹⁰ m; [`BuildError::TooLarge`] for more triangles than leaves can number; [`BuildError::Stopped`] when the
+    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::Scale`] beyond 10¹² m and below
+    /// 10⁻¹² m; [`BuildError::TooLarge`] for more triangles than leaves can number; [`BuildError::Stopped`] when the
     /// progress function answered `false`; [`BuildError::Library`] when threads cannot be had.
     pub fn build(geometry: Arc<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
         let start = Instant::now();
@@ -143,7 +145,8 @@ impl Bvh {
             let top = top_tree(&layout, &geometry, &parts, &watch)?;
             Ok((parts, top))
         })?;
-        Ok(Self { geometry, layout, parts, top, isa: Isa::detect(), time: start.elapsed() })
+        let (coplanar, isa) = (Coplanar::of(&geometry), Isa::detect());
+        Ok(Self { geometry, layout, parts, top, coplanar, isa, time: start.elapsed() })
     }
 
     /// A number that differs when the trees do.
@@ -232,6 +235,7 @@ impl Accel for Bvh {
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
         hits.reset(rays.len());
         self.dispatch(rays, |i, nearest: Nearest| nearest.write(&self.geometry, hits, i));
+        settle(&self.coplanar, &self.geometry, rays, hits);
     }
 
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {

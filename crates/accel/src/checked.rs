@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch};
+use etendue_geometry::{Coplanar, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch};
 
+use crate::coplanar::settle;
 use crate::embree::{ExactFilter, FoundHits, NearestSearch, Scene, version};
 use crate::end_triangles::EndTriangles;
 use crate::nearest::{Nearest, Query};
@@ -25,6 +26,7 @@ const TURNS: u32 = 4;
 pub struct Embree {
     scene: Scene,
     frame: F32Frame,
+    coplanar: Coplanar,
     robust: bool,
     refine: bool,
     report: BuildReport,
@@ -68,11 +70,11 @@ impl Embree {
         // Around the frame in which f32 loses least.
         let start = Instant::now();
         let bounds = geometry.loose_bounds();
-        // Embree multiplies three lengths of a triangle, which have to stay in single precision.
-        check_scale(bounds, "Embree", [1e-12, 1e12])?;
+        check_scale(bounds)?;
         let frame = F32Frame::of(bounds);
         let scene =
             Scene::build(geometry, frame.origin, options, before.map(|before| &before.scene))?;
+        let coplanar = Coplanar::of(scene.geometry());
         // What was built, in words and numbers.
         let mode = match (options.robust, options.refine) {
             (true, true) => "robust + f64",
@@ -90,6 +92,7 @@ impl Embree {
         Ok(Self {
             scene,
             frame,
+            coplanar,
             robust: options.robust,
             refine: options.refine,
             report,
@@ -366,7 +369,8 @@ impl Accel for Embree {
         hits.resize(rays.len());
         SCRATCH.with_borrow_mut(|scratch| {
             if rays.precision == HitPrecision::Single {
-                return self.closest_as_found(rays, hits, scratch);
+                self.closest_as_found(rays, hits, scratch);
+                return settle(&self.coplanar, self.scene.geometry(), rays, hits);
             }
             let geometry = self.scene.geometry();
             scratch.doubtful.clear();
@@ -395,6 +399,7 @@ impl Accel for Embree {
                     hits.t[i] = f64::from(scratch.found.t[i]) + scratch.rays.advance[i];
                 }
             }
+            settle(&self.coplanar, geometry, rays, hits);
         });
     }
 

@@ -158,6 +158,8 @@ pub(crate) struct Scene {
     geometry: Arc<Geometry>,
     /// Some meshes are scenes of their own.
     has_instances: bool,
+    /// Built in Embree's compact mode.
+    is_compact: bool,
     /// What brings the normal that Embree gives of each placement into the world; `None` where that is
     /// true of all as they are.
     turns: Option<Vec<DMat3>>,
@@ -235,7 +237,17 @@ impl Scene {
         let handle = builder.commit(options.progress.as_deref())?;
         let has_instances = instanced.meshes.contains(&true);
         let turns = turns(&geometry, &instanced);
-        Ok(Self { handle, shared, device, geometry, has_instances, turns, copied_bytes })
+        let is_compact = options.compact;
+        Ok(Self {
+            handle,
+            shared,
+            device,
+            geometry,
+            has_instances,
+            is_compact,
+            turns,
+            copied_bytes,
+        })
     }
 
     /// The scene of mesh `index`, where that is `mesh`.

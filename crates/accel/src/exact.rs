@@ -14,9 +14,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Geometry, HitBatch, MISS, RayBatch};
+use etendue_geometry::{Bounds, Coplanar, Geometry, HitBatch, MISS, RayBatch};
 use rayon::prelude::*;
 
+use crate::coplanar::settle;
 use crate::nearest::{Nearest, PlacementView, Query, Triangle};
 use crate::parts::{Baking, Blas, Instance, Layout, LocalRay, outward};
 use crate::tree::{LeafSize, MAX_DEPTH, Node, Ref, Tree};
@@ -29,6 +30,7 @@ pub struct Exact {
     layout: Layout,
     parts: Vec<Boxes>,
     top: Boxes,
+    coplanar: Coplanar,
     time: Duration,
 }
 
@@ -62,8 +64,8 @@ impl Exact {
     ///
     /// # Errors
     ///
-    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::Scale`] beyond 10⁹⁰ m and below
-    /// 10⁻⁹⁰ m; [`BuildError::TooLarge`] for a mesh of more than 2³¹ triangles; [`BuildError::Stopped`] when the
+    /// [`BuildError::MemoryLimit`], before anything large is allocated; [`BuildError::Scale`] beyond 10¹² m and below
+    /// 10⁻¹² m; [`BuildError::TooLarge`] for a mesh of more than 2³¹ triangles; [`BuildError::Stopped`] when the
     /// progress function answered `false`; [`BuildError::Library`] when threads cannot be had.
     pub fn build(geometry: Arc<Geometry>, options: &BuildOptions) -> Result<Self, BuildError> {
         let start = Instant::now();
@@ -79,7 +81,8 @@ impl Exact {
             let top = Boxes::over_instances(&layout, &geometry, &parts, &watch)?;
             Ok((parts, top))
         })?;
-        Ok(Self { geometry, layout, parts, top, time: start.elapsed() })
+        let coplanar = Coplanar::of(&geometry);
+        Ok(Self { geometry, layout, parts, top, coplanar, time: start.elapsed() })
     }
 
     /// The closest hit of one ray.
@@ -148,6 +151,7 @@ impl Accel for Exact {
                 self.nearest(&query, &mut stack).write(&self.geometry, hits, i);
             }
         }
+        settle(&self.coplanar, &self.geometry, rays, hits);
     }
 
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {

@@ -16,6 +16,7 @@
 mod bvh;
 #[cfg(feature = "embree")]
 mod checked;
+mod coplanar;
 #[cfg(feature = "embree")]
 mod embree;
 #[cfg(feature = "embree")]
@@ -53,8 +54,9 @@ pub use exact::Exact;
 pub trait Accel: Send + Sync + fmt::Debug {
     /// The closest hit of each ray. `hits` is resized to the batch, and filled to its detail.
     ///
-    /// Among hits at the very same distance the one of the lowest placement, then the lowest
-    /// triangle, wins.
+    /// Among hits in one place the one of the latest placement wins, then the lowest triangle: those at the
+    /// very same distance, and those of [triangles in one plane](etendue_geometry::Coplanar) within 64 units
+    /// in the last place (f64) of the largest of the distance and the coordinates of the ray's origin.
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch);
 
     /// Whether anything lies between each ray's `t_min` and `t_max`. `blocked` is resized.
@@ -204,20 +206,17 @@ pub enum BuildError {
         /// The most it takes.
         limit: u64,
     },
-    /// A scene so large or so small that the numbers of the backend cannot hold it.
+    /// A scene so large or so small that no backend tells its parts apart.
     #[error(
-        "the scene measures {extent:.1e} m, and the {backend} structure holds {least:.0e} to \
-         {most:.0e} m; scale its objects{}",
-        if *backend == "Embree" { ", or use --accel bvh" } else { "" }
+        "the scene measures {extent:.1e} m, and accelerators hold {least:.0e} to {most:.0e} m; scale its \
+         objects, or leave out what stands far from the others"
     )]
     Scale {
-        /// The backend that was asked to build.
-        backend: &'static str,
         /// The scene's longest side (m).
         extent: f64,
-        /// The shortest that the backend holds (m).
+        /// The shortest that they hold (m).
         least: f64,
-        /// The longest that the backend holds (m).
+        /// The longest that they hold (m).
         most: f64,
     },
     /// The caller's progress function asked to stop.

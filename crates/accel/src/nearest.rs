@@ -131,17 +131,24 @@ impl Nearest {
         Self { t: t_max, placement, triangle, u: 0.0, v: 0.0, normal }
     }
 
-    /// Takes `hit` when it is closer, or as close and of a lower placement, then triangle.
+    /// Takes `hit` when it is closer, or as close and of a later placement, then of a lower triangle.
     #[inline(always)]
     pub(crate) fn offer(&mut self, hit: watertight::Hit, triangle: &Triangle) {
         let &Triangle { placement, number, corners } = triangle;
-        let closer = hit.t < self.t
-            || (hit.t == self.t && (placement, number) < (self.placement, self.triangle));
+        let closer = hit.t < self.t || (hit.t == self.t && self.is_before(placement, number));
         if closer {
             // Now, while the corners are at hand: afterwards they would have to be fetched anew.
             let normal = local_normal(corners);
             *self = Self { t: hit.t, placement, triangle: number, u: hit.u, v: hit.v, normal };
         }
+    }
+
+    /// Whether a triangle as near goes before it, as anything does before a miss.
+    #[inline(always)]
+    fn is_before(&self, placement: u32, number: u32) -> bool {
+        self.placement == MISS
+            || placement > self.placement
+            || (placement == self.placement && number < self.triangle)
     }
 
     /// Writes the answer into place `i` of a batch that has been reset to misses.
@@ -206,8 +213,8 @@ mod tests {
     }
 
     #[test]
-    fn ties_go_to_the_lower_placement_then_triangle_in_any_order() {
-        let offers = [(2.0, 0, 0), (1.0, 3, 4), (1.0, 2, 9), (1.0, 2, 7), (1.5, 0, 0)];
+    fn ties_go_to_the_later_placement_then_the_lower_triangle_in_any_order() {
+        let offers = [(2.0, 9, 0), (1.0, 1, 4), (1.0, 2, 9), (1.0, 2, 7), (1.5, 8, 0)];
         for start in 0..offers.len() {
             let mut nearest = Nearest::none(f64::INFINITY);
             for k in 0..offers.len() {

@@ -34,17 +34,19 @@ pub(crate) struct Layout {
     pub(crate) world_frame: Frame,
 }
 
-/// Refuses a scene whose longest side is none of `least` to `most` (m).
-pub(crate) fn check_scale(
-    bounds: Bounds,
-    backend: &'static str,
-    [least, most]: [f64; 2],
-) -> Result<(), BuildError> {
+/// The longest sides of scenes (m) that every accelerator takes: products of three of Embree's lengths stay in
+/// single precision, and the trees' boxes, which are widened by what f64 rounds off at the scene's size, still
+/// tell its parts from one another.
+const LENGTHS: [f64; 2] = [1e-12, 1e12];
+
+/// Refuses a scene whose longest side is none of [`LENGTHS`].
+pub(crate) fn check_scale(bounds: Bounds) -> Result<(), BuildError> {
     let extent = if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).max_element() };
+    let [least, most] = LENGTHS;
     if extent == 0.0 || (least..=most).contains(&extent) {
         return Ok(());
     }
-    Err(BuildError::Scale { backend, extent, least, most })
+    Err(BuildError::Scale { extent, least, most })
 }
 
 /// What is baked.
@@ -121,8 +123,7 @@ impl Layout {
         backend: &'static str,
         [per_triangle, per_instance]: [u64; 2],
     ) -> Result<(), BuildError> {
-        // Products of three lengths have to stay in double precision.
-        check_scale(geometry.loose_bounds(), backend, [1e-90, 1e90])?;
+        check_scale(geometry.loose_bounds())?;
         for part in &self.parts {
             if part.len(geometry) > MOST_TRIANGLES {
                 return Err(part.too_large(geometry, backend));

@@ -252,10 +252,12 @@ impl BuildTask<'_> {
                 return None;
             }
         }
-        Some(if wide {
+        let sides = if wide {
             partition_wide(refs, spare, &grid, split)
         } else {
             partition(refs, &grid, split, bins)
-        })
+        };
+        // Where numbers overflow, bins may tell nothing apart; a side without refs would be no node.
+        sides.iter().all(|side| side.len > 0).then_some(sides)
     }
 }

@@ -244,6 +244,14 @@ impl Camera {
         self.light_field.as_deref()
     }
 
+    /// Why a light-field camera's picture holds no views; `None` of other cameras, of an ideal one, and
+    /// where it does.
+    #[must_use]
+    pub fn no_views(&self) -> Option<&str> {
+        self.lens()?;
+        self.light_field()?.no_views.as_deref()
+    }
+
     /// A light-field camera's views as an ideal lens has them.
     ///
     /// # Errors

@@ -118,6 +118,7 @@ impl DistortionSpec {
             Self::BrownConrady(model) => {
                 let mut limit = 0.0_f64;
                 for point in border {
+                    plausible(point)?;
                     let [x, y] = model.track(point).map_err(folded)?;
                     limit = limit.max(x.hypot(y));
                 }
@@ -128,6 +129,25 @@ impl DistortionSpec {
         };
         Ok(Distortion { spec: self.clone(), limit })
     }
+}
+
+/// The largest tangent of a border for which the model is worth inverting: it is of lenses that see half a
+/// space at most, and 1000 is 89.94° from the axis.
+const WIDEST: f64 = 1000.0;
+
+/// Refuses a picture that reaches where no lens of the model sees, before anything is inverted there.
+fn plausible([x, y]: [f64; 2]) -> Result<(), CameraError> {
+    if x.abs().max(y.abs()) <= WIDEST {
+        return Ok(());
+    }
+    let angle = x.hypot(y).atan().to_degrees();
+    Err(CameraError::new(
+        "distortion",
+        format!(
+            "the picture reaches {angle:.4}° from the axis, where no lens of this model sees; check the focal \
+             lengths (fx, fy) and the resolution, which are in pixels, or leave out the distortion"
+        ),
+    ))
 }
 
 fn folded(tangent: f64) -> CameraError {
@@ -270,10 +290,16 @@ impl BrownConrady {
     /// the picture's own side of every fold. The error is the tangent at which the model folds.
     fn track(&self, seen: [f64; 2]) -> Result<[f64; 2], f64> {
         // Shares of the way; a step that fails is halved until it is plain that it is no step but
-        // a fold.
+        // a fold, and steps grow again where they arrive: what is steep at the axis only is left in a few.
+        const LONGEST: f64 = 1.0 / 16.0;
         const SHORTEST: f64 = 1.0 / 65_536.0;
-        let (mut at, mut done, mut step) = ([0.0; 2], 0.0, 1.0 / 16.0);
-        while done < 1.0 {
+        /// Steps after which a way that goes on in the shortest ones is given up as a fold.
+        const MOST_STEPS: u32 = 4096;
+        let (mut at, mut done, mut step) = ([0.0; 2], 0.0, LONGEST);
+        for _ in 0..MOST_STEPS {
+            if done >= 1.0 {
+                return Ok(at);
+            }
             let next = f64::min(done + step, 1.0);
             // On in the same direction; near the axis all these maps are the identity.
             let start =
@@ -285,12 +311,13 @@ impl BrownConrady {
                 Some(found) => {
                     at = found;
                     done = next;
+                    step = f64::min(2.0 * step, LONGEST);
                 }
                 None if step > SHORTEST => step *= 0.5,
-                None => return Err(at[0].hypot(at[1])),
+                None => break,
             }
         }
-        Ok(at)
+        if done >= 1.0 { Ok(at) } else { Err(at[0].hypot(at[1])) }
     }
 
     /// The undistorted tangents seen at `seen`. `limit` is the largest tangent in the picture.
@@ -445,6 +472,25 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// r + k r³ rises for ever, so all of it has an inverse, as steep as it may be beside the axis.
+    #[test]
+    fn what_is_steep_far_out_comes_back_and_what_no_lens_sees_is_refused() {
+        let spec =
+            |k1| DistortionSpec::BrownConrady(BrownConrady { k1, ..BrownConrady::default() });
+        for (k1, reach) in [(0.01, 1000.0), (1.0, 1000.0), (10.0, 1000.0)] {
+            let model = spec(k1).build([[reach, 0.0], [0.0, reach]].into_iter()).unwrap();
+            for share in 1..=64 {
+                let seen = [reach * f64::from(share) / 64.0, 0.0];
+                let again = model.distort(model.undistort(seen).unwrap());
+                // A dozen roundings of a number of this size, as steep as the map is there.
+                assert!((again[0] - seen[0]).abs() < 1e-10 * reach, "{k1}, {seen:?}: {again:?}");
+            }
+        }
+        // A focal length of 2e-5 pixels: 16 of them reach 4e5 to each side.
+        let error = spec(0.01).build([[4e5, 0.3]].into_iter()).unwrap_err();
+        assert!(error.why.contains("89.9999°") && error.why.contains("fx, fy"), "{error}");
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub enum Sampler {
 }
 
 /// The samples of one pixel.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PixelSamples {
     sampler: Sampler,
     seed: u64,

@@ -29,4 +29,4 @@ pub use canvas::Canvas;
 pub use chart::{Axis, Chart, GREY, Mark, Point, Series, Stroke, Theme, side_by_side};
 pub use front::front;
 pub use ink::TextAnchor;
-pub use numbers::{round_length, short};
+pub use numbers::{round_length, short, significant};

@@ -24,6 +24,26 @@ pub fn short(value: f64) -> String {
     text.parse::<f64>().map_or(text, |rounded| rounded.to_string())
 }
 
+/// Six significant digits, without zeros at the end.
+#[must_use]
+pub fn significant(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let size = value.abs().log10().floor();
+    if !(-5.0..7.0).contains(&size) {
+        return format!("{value:.4e}");
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 10")]
+    let decimals = (5.0 - size).max(0.0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -36,5 +56,8 @@ mod tests {
         assert_eq!(round_length(0.0), 1.0);
         assert_eq!(short(0.123_456), "0.1235");
         assert_eq!(short(-20.0), "-20");
+        // Twice half of 6.942.
+        assert_eq!(significant(6.941_999_999_999_999), "6.942");
+        assert_eq!(significant(-1500.0), "-1500");
     }
 }

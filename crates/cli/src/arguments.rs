@@ -9,8 +9,9 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use etendue::{Shard, ShardBy};
 use etendue_bench::tolerance::Tolerance;
+use etendue_files::{Opener, Reach};
+use etendue_scene::LoadOptions;
 use etendue_scene::import::Strictness;
-use etendue_scene::{LoadOptions, Reach};
 use etendue_tracer::LayerSpec;
 
 pub(crate) use bench::{BenchArguments, PartArgument};
@@ -263,8 +264,8 @@ pub(crate) struct RenderArguments {
     /// Make Embree use this instruction set: sse2, sse4.2, avx, avx2 or avx512
     #[arg(long, value_name = "NAME")]
     pub(crate) isa: Option<String>,
-    /// Refuse pictures that would need more memory than this beside the program itself, e.g. 800M or 4G
-    /// (bytes, 1024-based), before work on them starts; without it, more than the system has free
+    /// Refuse pictures that may need more memory than this in all, program and mapped files included, e.g. 800M
+    /// or 4G (bytes, 1024-based), before work on them starts; without it, more than the system has free
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(crate) memory_limit: Option<u64>,
     /// Read models into memory instead of using them where their files are mapped: other programs may
@@ -419,11 +420,16 @@ impl Command {
 }
 
 impl SceneArguments {
+    /// Where the scene's files may be.
+    pub(crate) fn reach(&self) -> Reach {
+        if self.allow_outside { Reach::Anywhere } else { Reach::OwnFolder }
+    }
+
     /// How the scene is to be loaded.
     pub(crate) fn load_options(&self) -> LoadOptions<'_> {
         LoadOptions {
             strictness: if self.strict { Strictness::Strict } else { Strictness::Tolerant },
-            reach: if self.allow_outside { Reach::Anywhere } else { Reach::OwnFolder },
+            opener: Opener::new(self.reach()),
             camera: self.camera.as_deref(),
             ..LoadOptions::default()
         }

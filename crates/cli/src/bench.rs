@@ -14,8 +14,9 @@ use etendue_bench::rays::Rays;
 use etendue_bench::samplers;
 use etendue_bench::{drawing, machine};
 use etendue_chart::Theme;
+use etendue_files::{Ledger, MANIFEST, Transaction};
 use etendue_render::Plan;
-use etendue_render::output::{Ledger, MANIFEST, Outputs, sidecar, write_whole};
+use etendue_render::output::{Outputs, sidecar};
 use etendue_scene::Scene;
 use etendue_scene::file::SceneFile;
 
@@ -82,7 +83,7 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
         pictures(arguments, (scene, accel), phases, &mut findings)?;
     }
     let ledger = Ledger::open(&arguments.output, "bench");
-    let files = places::recorded(ledger, || write(arguments, &findings))?;
+    let files = places::recorded(ledger, &session.inputs(), |to| write(to, arguments, &findings))?;
     print_text(&findings.text())?;
     if !arguments.quiet {
         let lines = findings.notes.iter().map(|note| format!("note: {note}"));
@@ -241,13 +242,17 @@ fn file_names() -> impl Iterator<Item = String> {
 }
 
 /// Writes all files; each appears when it is complete.
-fn write(arguments: &BenchArguments, findings: &Findings) -> Result<Vec<PathBuf>, Fault> {
+fn write(
+    to: &Transaction,
+    arguments: &BenchArguments,
+    findings: &Findings,
+) -> Result<Vec<PathBuf>, Fault> {
     let place = |name: &str| arguments.output.join(name);
     let mut files = vec![place("bench.json")];
-    sidecar::write_json(&files[0], findings)?;
+    sidecar::write_json(to, &files[0], findings)?;
     let mut save = |name: String, bytes: &[u8]| {
         let path = place(&name);
-        write_whole(&path, |file| file.write_all(bytes))?;
+        to.write(&path, |file| file.write_all(bytes))?;
         files.push(path);
         Ok::<(), Fault>(())
     };

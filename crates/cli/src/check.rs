@@ -5,14 +5,14 @@ use std::time::Instant;
 use etendue::{Calibration, Prospect, TimeForecast};
 use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan};
-use etendue_scene::doctor::Diagnosis;
+use etendue_scene::doctor::{Diagnosis, Finding};
 use etendue_scene::file::SceneFile;
 use etendue_scene::{Start, Wanted};
 
 use serde::Serialize;
 
 use crate::arguments::CheckArguments;
-use crate::fault::{Fault, print_json, print_text};
+use crate::fault::{Fault, Versioned, print_json, print_text};
 
 pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
     let options = &arguments.scene;
@@ -25,17 +25,17 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
         return Err(Fault::refused(fault));
     }
     let load = start.elapsed().as_secs_f64();
-    let frames = file.frames(options.load_options().reach, || Ok(Start::of(&scene)))?;
+    let frames = file.frames(&options.load_options().opener, || Ok(Start::of(&scene)))?;
     let plan = Plan::new(&scene, Outputs::ALL);
     let prospect = Prospect { scene: &scene, plan: &plan, outputs: Outputs::ALL, load };
     let time = TimeForecast::new(&prospect, &Calibration::of_this_machine()?);
-    let diagnosis = Diagnosis {
-        memory: plan.memory,
-        frames: frames.map(|frames| frames.len()),
-        ..Diagnosis::of(&scene, file.kind())
-    };
+    let mut diagnosis = Diagnosis { memory: plan.memory, ..Diagnosis::of(&scene, file.kind()) };
+    if let Some(frames) = frames {
+        diagnosis.frames = Some(frames.frames.len());
+        diagnosis.findings.extend(frames.notes.iter().map(Finding::from));
+    }
     match arguments.json {
-        true => print_json(&Checked { diagnosis, time }),
+        true => print_json(&Versioned::new(&Checked { diagnosis, time })),
         false => print_text(&format!("{diagnosis}{:<13} {time}", "time")),
     }
 }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use etendue_accel::BuildError;
 use etendue_bench::BenchError;
+use etendue_files::WriteError;
 use etendue_render::RenderError;
 use etendue_render::output::OutputError;
 use etendue_scene::SceneError;
@@ -76,7 +77,7 @@ macro_rules! as_the_library {
     )*};
 }
 
-as_the_library!(SceneError, RenderError, OutputError);
+as_the_library!(SceneError, RenderError, OutputError, WriteError);
 
 impl From<BenchError> for Fault {
     fn from(error: BenchError) -> Self {
@@ -102,6 +103,21 @@ impl From<EmvaError> for Fault {
 pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<(), Fault> {
     let json = serde_json::to_string_pretty(value).map_err(|error| Fault::Failed(error.into()))?;
     print_raw(&printable_json(&json))
+}
+
+/// What a program reads, with the version of its keys: a key that goes, or means something else, makes the next
+/// one.
+#[derive(serde::Serialize)]
+pub(crate) struct Versioned<'a, T> {
+    version: u32,
+    #[serde(flatten)]
+    value: &'a T,
+}
+
+impl<'a, T> Versioned<'a, T> {
+    pub(crate) fn new(value: &'a T) -> Self {
+        Self { version: 1, value }
+    }
 }
 
 /// Prints `value` as JSON on one line to standard output.

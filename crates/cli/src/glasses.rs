@@ -1,16 +1,12 @@
 //! `--glass-catalog`: the user's own catalogues of glasses.
 
-use std::path::PathBuf;
-
 use etendue_optics::glass::{AgfCatalogue, add_catalogues};
-use etendue_render::output::protect_inputs;
 
 use crate::arguments::Command;
 use crate::fault::Fault;
 
 /// Opens the catalogues that a command names, for all lenses that it reads.
 pub(crate) fn open(command: &Command) -> Result<(), Fault> {
-    protect_inputs(command.glass_catalogs().iter().map(PathBuf::as_path));
     let mut catalogues = Vec::new();
     for path in command.glass_catalogs() {
         let opened = AgfCatalogue::open(path);

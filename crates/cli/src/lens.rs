@@ -4,25 +4,27 @@ use std::io::Write;
 use std::path::Path;
 
 use etendue::places;
+use etendue_files::{Reach, Transaction};
 use etendue_geometry::units::Dimension;
 use etendue_optics::train::{Focus, Inquiry, LensReport, OpticalTrain, drawing};
-use etendue_render::output::{sidecar, write_whole};
-use etendue_scene::Reach;
+use etendue_render::output::sidecar;
 use etendue_scene::escape::one_line;
-use etendue_scene::file::{ReadLens, read_lens, trace_rays};
+use etendue_scene::file::{ReadLens, read_lens_at, trace_rays};
 
 use crate::arguments::LensArguments;
-use crate::fault::{Fault, print_json, print_json_line, print_text};
+use crate::fault::{Fault, Versioned, print_json, print_json_line, print_text};
 use crate::opencv;
 use crate::progress::say;
 
 pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
     let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
-    let mut lens = read_lens(&arguments.lens, reach)?;
+    let mut lens = read_lens_at(&arguments.lens, reach, arguments.configuration)?;
     let files: &[&str] = if arguments.fit_opencv { &[opencv::FILE] } else { &DRAWINGS };
     let drawn = arguments.output.iter().flat_map(|dir| files.iter().map(|name| dir.join(name)));
     let results: Vec<_> = drawn.chain(arguments.save.clone()).collect();
-    places::keep_apart(lens.inputs.iter().chain(&arguments.rays), &results)?;
+    lens.inputs.extend(arguments.rays.iter().chain(&arguments.glass_catalogs).cloned());
+    places::keep_apart(&lens.inputs, &results)?;
+    let to = Transaction::at_once().keeping(&lens.inputs);
     if let Some(path) = &arguments.save {
         places::file(path)?;
     }
@@ -30,21 +32,21 @@ pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
         let file = lens.file.as_ref().ok_or_else(|| {
             Fault::refused("--save: the lens of a scene cannot be saved; give its own file")
         })?;
-        sidecar::write_json(path, file)?;
+        sidecar::write_json(&to, path, file)?;
     }
     lens.train = adjusted(lens.train, arguments)?;
     match &arguments.rays {
-        _ if arguments.fit_opencv => opencv::fit(&lens, arguments),
+        _ if arguments.fit_opencv => opencv::fit(&lens, arguments, &to),
         Some(rays) => {
             let traced = trace_rays(&lens.train, rays)?;
             warn(&traced.out_of_range, arguments)?;
             match arguments.json {
                 // On one line: there may be millions of them.
-                true => print_json_line(&traced),
+                true => print_json_line(&Versioned::new(&traced)),
                 false => print_text(&traced.to_string()),
             }
         }
-        None => report(&lens, arguments),
+        None => report(&lens, arguments, &to),
     }
 }
 
@@ -64,7 +66,7 @@ fn adjusted(mut train: OpticalTrain, arguments: &LensArguments) -> Result<Optica
     Ok(train)
 }
 
-fn report(lens: &ReadLens, arguments: &LensArguments) -> Result<(), Fault> {
+fn report(lens: &ReadLens, arguments: &LensArguments, to: &Transaction) -> Result<(), Fault> {
     let named = |list: &[f64]| (!list.is_empty()).then(|| list.to_vec());
     let inquiry = Inquiry {
         wavelengths: arguments.wavelengths.clone().or_else(|| named(&lens.wavelengths)),
@@ -75,11 +77,11 @@ fn report(lens: &ReadLens, arguments: &LensArguments) -> Result<(), Fault> {
         .map_err(|error| Fault::refused(format!("{}: {error}", arguments.lens.display())))?;
     report.notes.splice(..0, lens.notes.iter().cloned());
     if let Some(folder) = &arguments.output {
-        draw(&lens.train, &report, folder, arguments.quiet)?;
+        draw(&lens.train, &report, (to, folder), arguments.quiet)?;
     }
     if arguments.json {
         warn(&report.out_of_range, arguments)?;
-        print_json(&report)
+        print_json(&Versioned::new(&report))
     } else {
         if arguments.strict {
             warn(&report.out_of_range, arguments)?;
@@ -100,7 +102,7 @@ const DRAWINGS: [&str; 3] = ["layout.svg", "spots.svg", "illumination.svg"];
 fn draw(
     train: &OpticalTrain,
     report: &LensReport,
-    folder: &Path,
+    (to, folder): (&Transaction, &Path),
     quiet: bool,
 ) -> Result<(), Fault> {
     let pictures = [
@@ -112,7 +114,7 @@ fn draw(
     for (name, picture) in DRAWINGS.into_iter().zip(pictures) {
         let picture = picture.map_err(|error| Fault::Refused(error.into()))?;
         let path = folder.join(name);
-        write_whole(&path, |file| file.write_all(picture.as_bytes()))?;
+        to.write(&path, |file| file.write_all(picture.as_bytes()))?;
         // Standard output has the numbers.
         if !quiet {
             say(&format!("wrote {}", path.display()));

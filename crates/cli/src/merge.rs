@@ -27,7 +27,8 @@ pub(crate) fn render_shard(
     let path = folder.join(format!("{stem}.film"));
     let name = format!("{stem}.checkpoint.film");
     let checkpoint = render::keep(arguments, session, folder, &name);
-    places::keep_apart(&session.scene(progress)?.inputs, std::slice::from_ref(&path))?;
+    session.scene(progress)?;
+    places::keep_apart(&session.inputs(), std::slice::from_ref(&path))?;
     session.render_shard(shard, &path, &origin()?, progress)?;
     print_text(&path.display().to_string())?;
     checkpoint.map_or(Ok(()), render::remove)
@@ -46,14 +47,11 @@ pub(crate) fn run(arguments: &MergeArguments) -> Result<(), Fault> {
     let asked = as_asked(arguments, &shares)?;
     render::carry_out(&asked, |outputs| {
         places::folder(&asked.output)?;
-        if let Some(path) = &asked.report {
-            places::file(path)?;
-        }
         let mut session = render::open(&asked, outputs)?;
         let progress = Phases::new(asked.quiet).progress(!asked.quiet);
         let results = session.check_place(&asked.output, &[], &progress)?;
         places::keep_apart(&arguments.shares, &results)?;
-        render::keep_report_apart(&asked, &mut session, &results)?;
+        render::keep_report_apart(&asked, &session, &results)?;
         let rendering = session.merge(&shares, &progress)?;
         render::write(&asked, &rendering, outputs, progress)
     })

@@ -1,6 +1,7 @@
 //! `etendue lens --fit-opencv`: OpenCV's camera for a lens.
 
 use etendue_camera::{Camera, OpencvFit, SensorSpec};
+use etendue_files::Transaction;
 use etendue_geometry::units::Micrometres;
 use etendue_optics::train::analysis::chief_height;
 use etendue_optics::train::{Inquiry, LensReport, OpticalTrain};
@@ -8,7 +9,7 @@ use etendue_render::output::sidecar;
 use etendue_scene::file::ReadLens;
 
 use crate::arguments::LensArguments;
-use crate::fault::{Fault, print_json, print_text};
+use crate::fault::{Fault, Versioned, print_json, print_text};
 use crate::progress::say;
 
 /// The file that holds a fit.
@@ -25,7 +26,11 @@ const CORNERS: f64 = 0.9;
 const WIDEST: f64 = 20.0;
 
 /// Fits OpenCV's camera to a lens, and prints or writes it.
-pub(crate) fn fit(lens: &ReadLens, arguments: &LensArguments) -> Result<(), Fault> {
+pub(crate) fn fit(
+    lens: &ReadLens,
+    arguments: &LensArguments,
+    to: &Transaction,
+) -> Result<(), Fault> {
     let camera = camera(lens, arguments)?;
     let fit = OpencvFit::new(&camera, arguments.tolerance.unwrap_or(OpencvFit::TOLERANCE));
     let path = arguments.lens.display();
@@ -33,12 +38,12 @@ pub(crate) fn fit(lens: &ReadLens, arguments: &LensArguments) -> Result<(), Faul
     if let Some(folder) = &arguments.output {
         etendue::places::folder(folder)?;
         let path = folder.join(FILE);
-        sidecar::write_json(&path, &fit)?;
+        sidecar::write_json(to, &path, &Versioned::new(&fit))?;
         if !arguments.quiet {
             say(&format!("wrote {}", path.display()));
         }
     }
-    if arguments.json { print_json(&fit) } else { print_text(&fit.to_string()) }
+    if arguments.json { print_json(&Versioned::new(&fit)) } else { print_text(&fit.to_string()) }
 }
 
 /// The scene's camera, or the lens with a picture in its image circle.

@@ -5,7 +5,7 @@ use etendue_bench::tolerance;
 use etendue_render::Decision;
 
 use crate::arguments::PlanArguments;
-use crate::fault::{Fault, print_json, print_text};
+use crate::fault::{Fault, Versioned, print_json, print_text};
 use crate::progress::Phases;
 use crate::render::options;
 use crate::stop;
@@ -53,5 +53,9 @@ fn compare_models(arguments: &PlanArguments) -> Result<(), Fault> {
                 fault => fault,
             }
         })?;
-    if arguments.json { print_json(&compared) } else { print_text(&compared.to_string()) }
+    if arguments.json {
+        print_json(&Versioned::new(&compared))
+    } else {
+        print_text(&compared.to_string())
+    }
 }

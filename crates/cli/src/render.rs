@@ -9,7 +9,8 @@ use etendue::{
     Calibration, Checkpoint, Error, Options, Progress, Rendering, Session, SoFar, TimeForecast,
     places,
 };
-use etendue_render::output::{Outputs, Temporary, png, sidecar};
+use etendue_files::{Temporary, Transaction, real_place};
+use etendue_render::output::{Outputs, png, sidecar};
 use etendue_render::{RenderError, Report, Seconds};
 
 use crate::arguments::{AccelMode, RenderArguments, SceneArguments};
@@ -52,7 +53,8 @@ pub(crate) fn options(arguments: &SceneArguments) -> Options {
     Options {
         settings: arguments.overrides(),
         strictness: options.strictness,
-        reach: options.reach,
+        reach: arguments.reach(),
+        inputs: arguments.glass_catalogs.clone(),
         camera: arguments.camera.clone(),
         ..Options::default()
     }
@@ -60,11 +62,8 @@ pub(crate) fn options(arguments: &SceneArguments) -> Options {
 
 fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     let folder = &arguments.output;
-    // Whether they can be written is better known now than after the render.
+    // Whether it can be written is better known now than after the render.
     places::folder(folder)?;
-    if let Some(path) = &arguments.report {
-        places::file(path)?;
-    }
     let mut session = open(arguments, outputs)?;
     let progress = Phases::new(arguments.quiet).progress(!arguments.quiet);
     if let Some(frames) = session.frames(&progress)? {
@@ -77,11 +76,11 @@ fn render(arguments: &RenderArguments, outputs: Outputs) -> Result<(), Fault> {
     if let Some(shard) = arguments.shard.map(|shard| shard.by(arguments.shard_by.into())) {
         return merge::render_shard(arguments, &mut session, shard, &progress);
     }
-    let watching = Watching::new(arguments, outputs);
-    let progress = progress.with_looks(move |so_far| watching.look(so_far));
     let checkpoint = keep(arguments, &mut session, folder, CHECKPOINT);
     let results = session.check_place(folder, &[SO_FAR, CHECKPOINT], &progress)?;
-    keep_report_apart(arguments, &mut session, &results)?;
+    keep_report_apart(arguments, &session, &results)?;
+    let watching = Watching::new(arguments, outputs, &session);
+    let progress = progress.with_looks(move |so_far| watching.look(so_far));
     // By what is kept of this machine; a render does not begin with measuring it.
     if let Some(machine) = Calibration::kept() {
         expect(TimeForecast::counted(&session.prospect(&progress)?, &machine).trace);
@@ -143,7 +142,8 @@ pub(crate) fn write(
     let mut report = rendering.report_of(&written);
     report.notes.extend(partial.clone());
     if let Some(path) = &arguments.report {
-        sidecar::write_json(path, &report)?;
+        let to = Transaction::at_once().keeping(&rendering.scene().inputs);
+        sidecar::write_json(&to, path, &report)?;
     }
     if !arguments.quiet {
         summarise(&report);
@@ -170,27 +170,31 @@ pub(crate) fn open(arguments: &RenderArguments, outputs: Outputs) -> Result<Sess
     Session::open_with(&arguments.scene.scene, options)
 }
 
-/// Refuses to write the report over a result, or over what the scene is made of.
+/// Refuses to write the report over a result, over what the scene is made of, or where nothing can be written.
 pub(crate) fn keep_report_apart(
     arguments: &RenderArguments,
-    session: &mut Session,
+    session: &Session,
     results: &[PathBuf],
 ) -> Result<(), Fault> {
+    refuse_result(arguments, results)?;
+    let report = arguments.report.as_slice();
+    places::keep_apart(&session.inputs(), report)?;
+    Ok(report.iter().try_for_each(|path| places::file(path))?)
+}
+
+/// Refuses a report that is one of `results`.
+pub(crate) fn refuse_result(arguments: &RenderArguments, results: &[PathBuf]) -> Result<(), Fault> {
     let Some(report) = &arguments.report else { return Ok(()) };
-    let folder = report.parent().map(|folder| match folder.as_os_str().is_empty() {
-        true => Path::new("."),
-        false => folder,
-    });
-    let results_folder = arguments.output.canonicalize().ok();
-    let is_inside = folder.and_then(|folder| folder.canonicalize().ok()) == results_folder;
-    if is_inside && results.iter().any(|path| path.file_name() == report.file_name()) {
-        return Err(Fault::refused(format!(
+    let place = real_place(report);
+    let is_it =
+        |path: &&PathBuf| path.file_name() == report.file_name() && real_place(path) == place;
+    match results.iter().find(is_it) {
+        None => Ok(()),
+        Some(_) => Err(Fault::refused(format!(
             "--report {}: a result has this name; choose another one",
             report.display()
-        )));
+        ))),
     }
-    let scene = session.scene(&Progress::none())?;
-    Ok(places::keep_apart(&scene.inputs, std::slice::from_ref(report))?)
 }
 
 /// What a stop left of the picture, in words; `None` when it is complete.
@@ -208,6 +212,7 @@ pub(crate) fn heed_stop(rendering: &Rendering, discards: bool) -> Result<Option<
 /// The picture so far, beside the results.
 struct Watching {
     keeps: bool,
+    to: Transaction,
     /// Where the picture so far is shown; nowhere when no PNG is wanted. It goes when this does, and
     /// so does that of a run that was killed.
     place: Option<(PathBuf, Temporary)>,
@@ -226,12 +231,14 @@ const SO_FAR: &str = "picture.so-far.png";
 const SHARE_OF_LOOKS: f64 = 0.01;
 
 impl Watching {
-    fn new(arguments: &RenderArguments, outputs: Outputs) -> Self {
+    fn new(arguments: &RenderArguments, outputs: Outputs, session: &Session) -> Self {
         Self {
             keeps: !arguments.discard_partial,
+            to: Transaction::at_once().keeping(&session.inputs()),
             place: outputs.png.then(|| {
                 let place = arguments.output.join(SO_FAR);
-                (place.clone(), Temporary::new(place))
+                let temporary = Temporary::new(&place);
+                (place, temporary)
             }),
             start: Instant::now(),
             shown: Mutex::default(),
@@ -261,7 +268,7 @@ impl Watching {
         // A look is a favour: the render goes on without it, and the results will say what is wrong
         // with the folder.
         if let Ok(picture) = so_far.picture() {
-            let _ = png::write(place, &picture, "", png::Bits::Eight);
+            let _ = png::write(&self.to, place, &picture, "", png::Bits::Eight);
         }
         *shown = Some((start.elapsed(), Instant::now()));
     }

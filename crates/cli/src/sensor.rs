@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use etendue::places;
-use etendue_render::output::{Ledger, note_finished, sidecar, write_whole};
+use etendue_files::{Ledger, Transaction};
+use etendue_render::output::sidecar;
 use etendue_scene::file::SensorFile;
 use etendue_sensor::emva::{DESCRIPTOR, EmvaError, MANIFEST, Options, Series};
 use etendue_sensor::photon_transfer::{self, PhotonTransfer};
@@ -33,8 +34,8 @@ pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
     let drawn = arguments.output.iter().flat_map(|folder| CURVES.map(|name| folder.join(name)));
     places::keep_apart(&inputs, &drawn.collect::<Vec<_>>())?;
     match &arguments.emva {
-        Some(folder) => series(arguments, &file, folder),
-        None => curves(arguments, name, &file),
+        Some(folder) => series(arguments, &inputs, &file, folder),
+        None => curves(arguments, &inputs, &file),
     }
 }
 
@@ -163,7 +164,8 @@ struct Curves<'a> {
     curves: PhotonTransfer,
 }
 
-fn curves(arguments: &SensorArguments, name: &str, file: &SensorFile) -> Result<(), Fault> {
+fn curves(arguments: &SensorArguments, inputs: &[PathBuf], file: &SensorFile) -> Result<(), Fault> {
+    let name = arguments.sensor.as_deref().unwrap_or_default();
     let options = photon_transfer::Options {
         wavelength: arguments.wavelength,
         seed: arguments.seed,
@@ -178,11 +180,12 @@ fn curves(arguments: &SensorArguments, name: &str, file: &SensorFile) -> Result<
     let preset = file.spec.model.map(|model| Card::new(model.preset()));
     let found = Curves { sensor: &file.spec, preset, notes: file.sensor.notes(), curves };
     if let Some(folder) = &arguments.output {
+        let to = Transaction::at_once().keeping(inputs);
         let [svg, data] = CURVES.map(|name| folder.join(name));
         let file_name = Path::new(name).file_name().unwrap_or_default().to_string_lossy();
         let drawn = found.curves.svg(found.preset.as_ref().map_or(&*file_name, |card| card.name));
-        write_whole(&svg, |part| part.write_all(drawn.as_bytes()))?;
-        sidecar::write_json(&data, &found)?;
+        to.write(&svg, |part| part.write_all(drawn.as_bytes()))?;
+        sidecar::write_json(&to, &data, &found)?;
         if !arguments.quiet {
             [svg, data].iter().for_each(|path| say(&path.display().to_string()));
         }
@@ -207,7 +210,12 @@ fn names(series: &Series) -> impl Iterator<Item = &str> {
     images.map(String::as_str).chain([MANIFEST, DESCRIPTOR])
 }
 
-fn series(arguments: &SensorArguments, file: &SensorFile, folder: &Path) -> Result<(), Fault> {
+fn series(
+    arguments: &SensorArguments,
+    inputs: &[PathBuf],
+    file: &SensorFile,
+    folder: &Path,
+) -> Result<(), Fault> {
     let options = Options {
         steps: arguments.steps,
         seed: arguments.seed,
@@ -217,13 +225,13 @@ fn series(arguments: &SensorArguments, file: &SensorFile, folder: &Path) -> Resu
     let series = Series::plan(&file.sensor, &options).map_err(|error| file.fault(&error))?;
     // Where the images go, which must not be over an input.
     let files: Vec<PathBuf> = names(&series).map(|name| folder.join(name)).collect();
-    places::keep_apart([], &files)?;
+    places::keep_apart(inputs, &files)?;
     places::folder(folder)?;
     let total = series.len();
     let progress = Phases::new(arguments.quiet).begin("expose");
     let start = SystemTime::now();
     // The images, one exposure after the other; those of a series that ends early are listed, too.
-    places::recorded(Ledger::open(folder, "sensor --emva"), || {
+    places::recorded(Ledger::open(folder, "sensor --emva"), inputs, |to| {
         let written = series
             .write(&file.sensor, &options, folder, |done| progress(done as f64 / total as f64))
             .map_err(|error| match error {
@@ -234,7 +242,7 @@ fn series(arguments: &SensorArguments, file: &SensorFile, folder: &Path) -> Resu
             let changed = path.metadata().and_then(|data| data.modified());
             written.is_ok() || changed.is_ok_and(|when| when >= start)
         };
-        files.into_iter().filter(is_new).for_each(note_finished);
+        files.into_iter().filter(is_new).for_each(|path| to.note_finished(path));
         written
     })?;
     drop(progress);

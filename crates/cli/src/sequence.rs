@@ -5,15 +5,13 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use etendue::{Dataset, Frame, Progress, Session, places};
-use etendue_render::output::{Ledger, MANIFEST, Outputs, sidecar};
+use etendue_files::{Ledger, Transaction};
+use etendue_render::output::{Outputs, sidecar};
 
 use crate::arguments::RenderArguments;
 use crate::fault::{Fault, print_text};
 use crate::progress::say;
-use crate::render::{heed_stop, keep, remove};
-
-/// The names of what is written beside the folder of the frames.
-const BESIDE: [&str; 3] = ["index.json", "transforms.json", MANIFEST];
+use crate::render::{heed_stop, keep, keep_report_apart, refuse_result, remove};
 
 pub(crate) fn render(
     arguments: &RenderArguments,
@@ -30,9 +28,14 @@ pub(crate) fn render(
     let out = &arguments.output;
     let range = arguments.frames.clone().unwrap_or(0..frames.len());
     let wanted = chosen(frames, &range)?;
-    let beside: Vec<PathBuf> = BESIDE.iter().map(|name| out.join(name)).collect();
-    places::keep_apart(&session.scene(progress)?.inputs, &beside)?;
+    session.check_outputs(frames)?;
     let pattern = arguments.pattern.clone().unwrap_or_default();
+    // All names are known before the first frame is written.
+    let is_no_result = |results: &[PathBuf]| refuse_result(arguments, results);
+    session.check_frames((out, &pattern), wanted, progress, is_no_result)?;
+    keep_report_apart(arguments, session, &[])?;
+    let mut ledger = Ledger::open(out, "render");
+    ledger.list_below(frames.iter().map(|frame| pattern.list_of(frame.number)));
     let mut dataset = Dataset::default();
     let mut files = Vec::new();
     let mut reports = Vec::new();
@@ -52,12 +55,16 @@ pub(crate) fn render(
         }
         let folder = EmptyFolder(out.join(pattern.folder(frame.number)));
         let results = session.check_place(&folder.0, &[], progress)?;
-        let inputs = &session.scene(progress)?.inputs;
-        pattern.keep_apart(out, frame.number, (inputs, &results))?;
+        let results = results.iter().filter_map(|path| path.strip_prefix(&folder.0).ok()?.to_str());
+        let names: Vec<String> = results.map(str::to_owned).collect();
+        pattern.keep_apart(out, frame.number, (&session.inputs(), &names))?;
         let checkpoint = keep(arguments, session, out, &checkpoint_of(frame));
         let rendering = session.render(progress)?;
         if let Some(partial) = heed_stop(&rendering, true)? {
             return Err(Fault::failed(partial));
+        }
+        if reports.is_empty() {
+            ledger.save()?;
         }
         let written = pattern.write(&rendering, out, frame.number, (outputs, progress))?;
         checkpoint.map_or(Ok(()), remove)?;
@@ -80,10 +87,11 @@ pub(crate) fn render(
         }
     }
     let gone = pattern.remove_from(out, frames.len());
-    let beside = places::recorded(Ledger::open(out, "render"), || dataset.write(out))?;
+    let inputs = session.inputs();
+    let beside = places::recorded(ledger, &inputs, |to| dataset.write(to, out))?;
     files.extend(beside);
     if let Some(path) = &arguments.report {
-        sidecar::write_json(path, &reports)?;
+        sidecar::write_json(&Transaction::at_once().keeping(&inputs), path, &reports)?;
     }
     if !arguments.quiet {
         tell(wanted.len(), skipped, &gone);

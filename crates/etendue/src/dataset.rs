@@ -8,18 +8,26 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use etendue_camera::{CameraFile, Convention, PixelOrigin, ProjectionName};
+use etendue_files::{MANIFEST, SOFTWARE, Transaction};
 use etendue_geometry::glam::{DMat3, DQuat};
 use etendue_render::denoise::DENOISED;
 use etendue_render::output::conventions::{KITTI_DEPTH, TUM_DEPTH};
-use etendue_render::output::{Outputs, SOFTWARE, sidecar, write_whole};
+use etendue_render::output::{Outputs, sidecar};
 use etendue_scene::file::SamplesSpec;
-use etendue_scene::{Frame, Scene};
+use etendue_scene::{Frame, RigCamera, Scene};
 use serde_json::{Map, Value, json};
 
 use crate::{Error, FramePattern, rendering};
 
 /// What lists them.
 const INDEX: &str = "index.json";
+
+/// What nerfstudio reads.
+const TRANSFORMS: &str = "transforms.json";
+
+/// COLMAP's text model: its folder and files.
+const COLMAP_FOLDER: &str = "colmap";
+const COLMAP: [&str; 3] = ["cameras.txt", "images.txt", "points3D.txt"];
 
 /// The frames of a scene, as they are added.
 #[derive(Debug, Clone, Default)]
@@ -31,6 +39,7 @@ pub struct Dataset {
 #[derive(Debug, Clone)]
 struct Entry {
     number: usize,
+    rig: Option<RigCamera>,
     time: Option<f64>,
     folder: Option<String>,
     /// What it is called where it has no picture.
@@ -67,6 +76,7 @@ impl Dataset {
             at,
             Entry {
                 number: frame.number,
+                rig: frame.rig.clone(),
                 time: frame.time,
                 folder: pattern.own_folder(frame.number),
                 name: pattern.place(frame.number, "picture"),
@@ -83,25 +93,31 @@ impl Dataset {
         Ok(())
     }
 
+    /// The names of the files that it may write, as seen from its folder.
+    pub fn file_names() -> impl Iterator<Item = String> {
+        let colmap = COLMAP.map(|name| format!("{COLMAP_FOLDER}/{name}"));
+        [INDEX, TRANSFORMS, MANIFEST].map(str::to_owned).into_iter().chain(colmap)
+    }
+
     /// Writes `index.json`, and where every camera has a K, `transforms.json` and the folder `colmap`.
     /// Gives the files.
     ///
     /// # Errors
     ///
     /// When a file cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    pub fn write(&self, to: &Transaction, folder: &Path) -> Result<Vec<PathBuf>, Error> {
         let mut files = vec![folder.join(INDEX)];
-        sidecar::write_json(&files[0], &self.index(folder))?;
+        sidecar::write_json(to, &files[0], &self.index(folder))?;
         if self.entries.is_empty() || !self.entries.iter().all(Entry::has_k) {
             return Ok(files);
         }
-        let transforms = folder.join("transforms.json");
-        sidecar::write_json(&transforms, &self.transforms())?;
+        let transforms = folder.join(TRANSFORMS);
+        sidecar::write_json(to, &transforms, &self.transforms())?;
         files.push(transforms);
-        crate::places::folder(&folder.join("colmap"))?;
+        crate::places::folder(&folder.join(COLMAP_FOLDER))?;
         for (name, text) in self.colmap() {
-            let path = folder.join("colmap").join(name);
-            write_whole(&path, |file| file.write_all(text.as_bytes()))?;
+            let path = folder.join(COLMAP_FOLDER).join(name);
+            to.write(&path, |file| file.write_all(text.as_bytes()))?;
             files.push(path);
         }
         Ok(files)
@@ -114,14 +130,19 @@ impl Dataset {
             layers
                 .values_mut()
                 .for_each(|files| files.retain(|_, file| folder.join(file).exists()));
-            json!({
+            let mut frame = json!({
                 "frame": entry.number, "time_s": entry.time, "folder": entry.folder,
                 "files": layers,
                 "K": entry.camera.k, "pixel_origin": entry.camera.pixel_origin,
                 "distortion": entry.camera.distortion, "resolution": entry.camera.resolution,
                 "camera_from_world": entry.camera.camera_from_world, "convention": "opencv",
                 "seed": entry.seed, "samples": entry.samples, "scene_hash": entry.scene_hash,
-            })
+            });
+            if let Some(RigCamera { moment, camera, name, .. }) = &entry.rig {
+                frame["moment"] = json!(moment);
+                frame["rig_camera"] = json!({ "number": camera, "name": name });
+            }
+            frame
         };
         json!({
             "software": SOFTWARE,
@@ -209,7 +230,8 @@ impl Dataset {
             let _ = writeln!(lines, "{id} {camera}");
         }
         let points = "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]\n".to_owned();
-        [("cameras.txt", lines), ("images.txt", images), ("points3D.txt", points)]
+        let [a, b, c] = COLMAP;
+        [(a, lines), (b, images), (c, points)]
     }
 }
 

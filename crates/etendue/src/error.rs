@@ -3,6 +3,7 @@
 use std::io;
 
 use etendue_accel::BuildError;
+use etendue_files::WriteError;
 use etendue_render::RenderError;
 use etendue_render::expose::ExposeError;
 use etendue_render::light_field::LightFieldError;
@@ -16,6 +17,12 @@ impl From<LightFieldError> for Error {
             LightFieldError::Output(error) => Self::Output(error),
             other => Self::LightField(other),
         }
+    }
+}
+
+impl From<WriteError> for Error {
+    fn from(error: WriteError) -> Self {
+        Self::Output(error.into())
     }
 }
 
@@ -41,7 +48,7 @@ pub enum Error {
     LightField(LightFieldError),
     /// A place for results that cannot be written to, known before any work.
     #[error(transparent)]
-    Place(OutputError),
+    Place(WriteError),
     /// Something else that the caller can mend.
     #[error("{0}")]
     Refused(String),
@@ -76,7 +83,7 @@ impl Error {
             },
             // Whether it can be written to was asked before: the disk is full, or the folder gone.
             Self::Output(error) | Self::Expose(ExposeError::Output(error)) => {
-                !matches!(error, OutputError::Io { .. })
+                !matches!(error, OutputError::File(WriteError::Io { .. }))
             }
             Self::Expose(ExposeError::Memory(_)) => true,
             Self::Expose(ExposeError::Picture(error)) => is_want_of_memory(error),
@@ -91,7 +98,7 @@ fn is_want_of_memory(error: &PictureError) -> bool {
     matches!(error, PictureError::Memory(_))
 }
 
-fn has_no_room(error: &OutputError) -> bool {
+fn has_no_room(error: &WriteError) -> bool {
     use io::ErrorKind::{QuotaExceeded, StorageFull};
-    matches!(error, OutputError::Io { source, .. } if matches!(source.kind(), StorageFull | QuotaExceeded))
+    matches!(error, WriteError::Io { source, .. } if matches!(source.kind(), StorageFull | QuotaExceeded))
 }

@@ -1,11 +1,12 @@
 //! Where the files of frames go, and which frames are complete.
 
 use std::collections::BTreeSet;
+use std::fs;
 use std::path::{Component, Path, PathBuf};
-use std::{fs, io};
 
+use etendue_files::{Ledger, MANIFEST, Transaction, WriteError, remove_empty_folders};
 use etendue_render::denoise;
-use etendue_render::output::{Ledger, MANIFEST, OutputError, Outputs, sidecar};
+use etendue_render::output::{Outputs, sidecar};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -121,7 +122,15 @@ impl FramePattern {
         }
     }
 
-    /// Refuses a place that is one of the scene's own files.
+    /// The place, as seen from the folder of all frames, that lists the files of frame `number`: its own folder
+    /// with a manifest, or a record.
+    #[must_use]
+    pub fn list_of(&self, number: usize) -> String {
+        self.own_folder(number).unwrap_or_else(|| numbered(RECORD, number))
+    }
+
+    /// Refuses a frame of which a file, of those that are called `names` in a folder of their own, would take
+    /// the place of an input; gives their places.
     ///
     /// # Errors
     ///
@@ -130,11 +139,13 @@ impl FramePattern {
         &self,
         out: &Path,
         number: usize,
-        (inputs, results): (&[PathBuf], &[PathBuf]),
-    ) -> Result<(), Error> {
-        let names = results.iter().filter_map(|path| path.file_name()?.to_str());
-        let places: Vec<PathBuf> = names.map(|name| out.join(self.place(number, name))).collect();
-        places::keep_apart(inputs, &places)
+        (inputs, names): (&[PathBuf], &[String]),
+    ) -> Result<Vec<PathBuf>, Error> {
+        let places = names.iter().map(|name| out.join(self.place(number, name)));
+        let record = self.folder.is_none().then(|| record_of(out, number));
+        let places: Vec<PathBuf> = places.chain(record).collect();
+        places::keep_apart(inputs, &places)?;
+        Ok(places)
     }
 
     /// Writes a frame. Its files lie in their places when all of them are complete, and what an earlier run
@@ -158,8 +169,8 @@ impl FramePattern {
             let before = read_record(&record).unwrap_or_default();
             // Until the new record is there, the frame is not complete.
             let _ = fs::remove_file(&record);
-            let moved = self.take_to_places(out, number, &written.files);
-            let files = moved.map_err(|(path, error)| OutputError::io(&path, error))?;
+            let inputs = &rendering.scene.inputs;
+            let files = self.take_to_places(out, number, (&written.files, inputs))?;
             for (old, _) in before.files.iter().filter(|old| files.iter().all(|new| new.0 != old.0))
             {
                 let _ = fs::remove_file(out.join(old));
@@ -167,7 +178,8 @@ impl FramePattern {
             let _ = fs::remove_file(folder.join(MANIFEST)).and_then(|()| fs::remove_dir(&folder));
             written.files = files.iter().map(|(name, _)| out.join(name)).collect();
             let fingerprints = rendering.fingerprints().to_vec();
-            sidecar::write_json(&record, &Record { fingerprints, files })?;
+            let to = Transaction::at_once().keeping(&rendering.scene.inputs);
+            sidecar::write_json(&to, &record, &Record { fingerprints, files })?;
         }
         Ok(written)
     }
@@ -188,38 +200,59 @@ impl FramePattern {
         if self.folder.is_some() {
             return places::clear(&out.join(self.folder(number)));
         }
-        let path = record_of(out, number);
-        for (name, size) in read_record(&path).unwrap_or_default().files {
-            let file = out.join(name);
-            // What cannot be removed is nobody's loss.
-            if fs::symlink_metadata(&file).is_ok_and(|data| data.is_file() && data.len() == size) {
-                let _ = fs::remove_file(file);
-            }
-        }
-        let _ = fs::remove_file(path);
+        remove_recorded(out, &record_of(out, number));
     }
 
     fn take_to_places(
         &self,
         out: &Path,
         number: usize,
-        files: &[PathBuf],
-    ) -> Result<Vec<(String, u64)>, (PathBuf, io::Error)> {
+        (files, inputs): (&[PathBuf], &[PathBuf]),
+    ) -> Result<Vec<(String, u64)>, WriteError> {
+        let folder = out.join(self.folder(number));
+        let to = Transaction::new().keeping(inputs);
         let mut moved = Vec::new();
         for path in files {
-            let Some(name) = path.file_name().and_then(|name| name.to_str()) else { continue };
+            let name = path.strip_prefix(&folder).ok().and_then(Path::to_str);
+            let Some(name) = name else { continue };
             let place = self.place(number, name);
             let target = out.join(&place);
+            to.refuse_inputs([&*target])?;
             let size = target
                 .parent()
                 .map_or(Ok(()), fs::create_dir_all)
                 .and_then(|()| fs::rename(path, &target))
                 .and_then(|()| Ok(target.metadata()?.len()))
-                .map_err(|error| (target, error))?;
+                .map_err(|error| WriteError::io(&target, error))?;
+            remove_empty_folders(&folder, path);
             moved.push((place, size));
         }
         Ok(moved)
     }
+}
+
+/// What lists the files of a frame, where they lie among those of others.
+const RECORD: &str = "frames/{frame}.json";
+
+/// Whether a place that lists files is a record, and no folder.
+pub(crate) fn is_record(place: &Path) -> bool {
+    place.extension().is_some_and(|ending| ending == "json")
+}
+
+/// Removes from `out` what a record lists, as far as it has the size that it had, and the record.
+pub(crate) fn remove_recorded(out: &Path, path: &Path) {
+    let is_plain =
+        |name: &str| Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+    let files = read_record(path).unwrap_or_default().files;
+    for (name, size) in files.iter().filter(|(name, _)| is_plain(name)) {
+        let file = out.join(name);
+        // What cannot be removed is nobody's loss.
+        if fs::symlink_metadata(&file).is_ok_and(|data| data.is_file() && data.len() == *size) {
+            let _ = fs::remove_file(&file);
+            remove_empty_folders(out, &file);
+        }
+    }
+    let _ = fs::remove_file(path);
 }
 
 fn numbered(text: &str, number: usize) -> String {
@@ -227,7 +260,7 @@ fn numbered(text: &str, number: usize) -> String {
 }
 
 fn record_of(out: &Path, number: usize) -> PathBuf {
-    out.join(numbered("frames/{frame}.json", number))
+    out.join(numbered(RECORD, number))
 }
 
 fn read_record(path: &Path) -> Option<Record> {

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use etendue_files::Reach;
 use etendue_optics::train::drawing::Section;
 use etendue_optics::train::{Focus, Inquiry, LensReport};
-use etendue_scene::Reach;
 use etendue_scene::file::read_lens;
 use serde_json::{Value, json};
 

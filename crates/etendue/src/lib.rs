@@ -86,6 +86,7 @@ mod words;
 
 pub use dataset::Dataset;
 pub use error::Error;
+pub use etendue_files::Reach;
 pub use etendue_oidn::{Denoiser, OidnError};
 pub use etendue_render::light_field::LightFieldViews;
 pub use etendue_render::output::{
@@ -93,7 +94,7 @@ pub use etendue_render::output::{
 };
 pub use etendue_render::{Checkpoint, Plan, Report, Shard, ShardBy, SoFar};
 pub use etendue_scene::file::scene_schema;
-pub use etendue_scene::{Frame, Reach, Scene, Strictness};
+pub use etendue_scene::{Frame, RigCamera, Scene, Strictness};
 pub use forecast::{Calibration, Prospect, TimeForecast};
 pub use frame_files::FramePattern;
 pub use inspector::{Inspector, Probe};

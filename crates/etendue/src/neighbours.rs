@@ -7,7 +7,7 @@ use etendue_accel::Accel;
 use etendue_render::FollowedFrame;
 use etendue_scene::{Frame, Scene};
 use etendue_tracer::LayerSpec;
-use etendue_tracer::layer::FrameStep;
+use etendue_tracer::layer::{Along, FrameStep};
 
 use crate::Error;
 
@@ -31,20 +31,40 @@ pub(crate) fn around<'f>(
     number: usize,
     steps: &BTreeSet<FrameStep>,
 ) -> Vec<(FrameStep, &'f Frame)> {
-    let frame = |&step: &FrameStep| Some((step, frames.get(step.from(number)?)?));
+    let Some(shown) = frames.get(number) else { return Vec::new() };
+    let frame = |&step: &FrameStep| Some((step, frames.get(target(shown, step)?)?));
     steps.iter().filter_map(frame).collect()
 }
 
-/// Refuses layers that compare frames further apart than any of the scene's `count` frames are.
-pub(crate) fn refuse_far(scene: &Scene, count: usize) -> Result<(), Error> {
-    let is_far = |step: &FrameStep| step.frames().unsigned_abs() as usize >= count;
+/// The number of the frame that is a step away from `frame`, if the rig has such a camera.
+fn target(frame: &Frame, step: FrameStep) -> Option<usize> {
+    let Some(rig) = &frame.rig else { return step.from(frame.number) };
+    let (moment, camera) = match step.along() {
+        Along::Frames => (step.from(rig.moment)?, rig.camera),
+        Along::Cameras => (rig.moment, step.from(rig.camera).filter(|camera| *camera < rig.count)?),
+    };
+    moment.checked_mul(rig.count)?.checked_add(camera)
+}
+
+/// Refuses layers that compare frames further apart than any of the scene's are.
+pub(crate) fn refuse_far(scene: &Scene, frames: &[Frame]) -> Result<(), Error> {
+    let rig = frames.first().and_then(|frame| frame.rig.as_ref());
+    let extent = |step: &FrameStep| match (rig, step.along()) {
+        (None, _) => (frames.len(), "the scene's frames"),
+        (Some(rig), Along::Frames) => (frames.len() / rig.count, "the rig's moments"),
+        (Some(rig), Along::Cameras) => (rig.count, "the rig's cameras"),
+    };
+    let is_far = |step: &FrameStep| step.count().unsigned_abs() as usize >= extent(step).0;
     match steps(&scene.layers).into_iter().find(is_far) {
-        Some(step) => Err(Error::Refused(format!(
-            "{}: layers: `to`: {} leads out of the scene's frames, which are 0..{count}, from each of \
-             them: name a nearer frame, or leave the layer out",
-            scene.path.display(),
-            step.frames()
-        ))),
+        Some(step) => {
+            let (count, what) = extent(&step);
+            Err(Error::Refused(format!(
+                "{}: layers: `to`: {} leads out of {what}, which are 0..{count}, from each of them: name a \
+                 nearer one, or leave the layer out",
+                scene.path.display(),
+                step.count()
+            )))
+        }
         None => Ok(()),
     }
 }
@@ -77,11 +97,12 @@ impl Neighbour {
 
     /// What tells, in the header of files, which frame it was.
     pub(crate) fn header(&self) -> Result<(String, String), Error> {
-        let (frames, way) = match self.step.frames() {
-            on if on > 0 => (on.unsigned_abs(), "on"),
-            back => (back.unsigned_abs(), "back"),
+        let way = if self.step.count() > 0 { "on" } else { "back" };
+        let along = match self.step.along() {
+            Along::Frames => "",
+            Along::Cameras => "camera_",
         };
-        let key = format!("scene_hash_{frames}_{way}");
+        let key = format!("scene_hash_{along}{}_{way}", self.step.count().unsigned_abs());
         Ok((key, self.scene.hash()?.to_string()))
     }
 }

@@ -1,7 +1,10 @@
 //! How a scene is opened.
 
+use std::path::PathBuf;
+
+use etendue_files::Reach;
 use etendue_render::output::Outputs;
-use etendue_scene::{Reach, Strictness};
+use etendue_scene::Strictness;
 
 /// How a scene is opened and built.
 #[derive(Debug, Clone)]
@@ -12,6 +15,9 @@ pub struct Options {
     pub strictness: Strictness,
     /// Whether files outside of the scene's folder may be read.
     pub reach: Reach,
+    /// Files that the caller has read for the scene, such as glass catalogues: they are not written over, and
+    /// the scene's hash sees them.
+    pub inputs: Vec<PathBuf>,
     /// A camera of one of the models by name or number, in place of the scene's.
     pub camera: Option<String>,
     /// The most memory that may be taken (bytes); `None` for what the system has free.
@@ -36,6 +42,7 @@ impl Default for Options {
             settings: Vec::new(),
             strictness: Strictness::default(),
             reach: Reach::default(),
+            inputs: Vec::new(),
             camera: None,
             memory_limit: None,
             copy: false,

@@ -3,12 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use etendue_render::output::{
-    Ledger, MANIFEST, OutputError, PartFile, Together, prepare_folder, protect_inputs,
-    refuse_inputs,
+use etendue_files::{
+    Ledger, MANIFEST, Transaction, WriteError, prepare_folder, remove_empty_folders,
 };
 
-use crate::Error;
+use crate::{Error, frame_files};
 
 /// Makes `folder` and checks that it can be written to.
 ///
@@ -25,7 +24,7 @@ pub fn folder(folder: &Path) -> Result<(), Error> {
 ///
 /// When it cannot.
 pub fn file(file: &Path) -> Result<(), Error> {
-    PartFile::create(file).map(drop).map_err(Error::Place)
+    Transaction::at_once().create(file).map(drop).map_err(Error::Place)
 }
 
 /// Refuses to write to any of `outputs` that is one of `inputs`, also through links.
@@ -43,30 +42,31 @@ pub fn keep_apart<'p>(
             format!("{path}: is a folder, where a file is to be written; remove or rename it");
         return Err(Error::Refused(why));
     }
-    protect_inputs(inputs.into_iter().map(PathBuf::as_path));
-    Ok(refuse_inputs(outputs.iter().map(PathBuf::as_path))?)
+    let files = Transaction::new().keeping(inputs);
+    Ok(files.refuse_inputs(outputs.iter().map(PathBuf::as_path))?)
 }
 
-/// Runs `write`, and gives the files that it wrote into the ledger's folder their names when all of them
-/// are complete: when it fails, what was there before stays as it was. Those that stand in the manifest
-/// from before and were not written again are removed.
+/// Runs `write`, and gives the files that it wrote their names when all of them are complete: when it
+/// fails, what was there before stays as it was. None of them takes the place of one of `inputs`. What
+/// stands in the ledger's manifest from before and was not written again is removed.
 ///
 /// # Errors
 ///
-/// Those of `write`, and when the manifest cannot be written.
-pub fn recorded<T, E: From<OutputError>>(
+/// Those of `write`; when a file has become an input's; and when the manifest cannot be written.
+pub fn recorded<T, E: From<WriteError>>(
     mut ledger: Ledger,
-    write: impl FnOnce() -> Result<T, E>,
+    inputs: &[PathBuf],
+    write: impl FnOnce(&Transaction) -> Result<T, E>,
 ) -> Result<T, E> {
-    let set = Together::in_folder(ledger.folder());
-    let written = write().and_then(|written| {
-        set.finish()?;
+    let files = Transaction::new().keeping(inputs);
+    let written = write(&files).and_then(|written| {
+        files.commit()?;
         Ok(written)
     });
-    let recorded = ledger.record();
+    let recorded = ledger.record(&files.finished());
     let written = written?;
     recorded?;
-    ledger.clear()?;
+    clear_listed(&mut ledger)?;
     Ok(written)
 }
 
@@ -74,11 +74,24 @@ pub fn recorded<T, E: From<OutputError>>(
 /// nothing else is in it.
 pub(crate) fn clear(folder: &Path) {
     let manifest = folder.join(MANIFEST);
-    // What cannot be removed is nobody's loss: it is marked as what it is.
-    if manifest.is_file() && Ledger::open(folder, "render").clear().is_ok() {
-        let is_left_alone = fs::read_dir(folder).is_ok_and(|entries| entries.count() == 1);
-        if is_left_alone && fs::remove_file(manifest).is_ok() {
-            let _ = fs::remove_dir(folder);
-        }
+    if !manifest.is_file() {
+        return;
     }
+    let mut ledger = Ledger::open(folder, "render");
+    // What cannot be removed is nobody's loss: it is marked as what it is.
+    if clear_listed(&mut ledger).is_ok() && ledger.is_empty() && fs::remove_file(manifest).is_ok() {
+        let _ = fs::remove_dir(folder);
+    }
+}
+
+/// Removes what a ledger lists from before and not again, also in places below that list files of their own.
+fn clear_listed(ledger: &mut Ledger) -> Result<(), WriteError> {
+    for place in ledger.stale_below() {
+        match frame_files::is_record(&place) {
+            true => frame_files::remove_recorded(ledger.folder(), &place),
+            false => clear(&place),
+        }
+        remove_empty_folders(ledger.folder(), &place);
+    }
+    ledger.clear()
 }

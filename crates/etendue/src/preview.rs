@@ -144,7 +144,8 @@ impl Preview {
         Ok(reading)
     }
 
-    /// The views of a light-field camera's picture; `None` of other cameras.
+    /// The views of a light-field camera's picture; `None` of other cameras, and of those that have no
+    /// views.
     ///
     /// # Errors
     ///

@@ -5,14 +5,16 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_accel::Accel;
+use etendue_files::{Ledger, MANIFEST, Transaction};
 use etendue_oidn::Denoiser;
 use etendue_render::denoise::{self, DENOISED};
 use etendue_render::expose::{self, BandFilm, SensorLight};
 use etendue_render::light_field::{self, LightFieldSet};
-use etendue_render::output::{Layer, LayerFile, Ledger, MANIFEST, Outputs, Picture, exr, sidecar};
+use etendue_render::output::{Layer, LayerFile, Outputs, Picture, exr, sidecar};
 use etendue_render::report::seconds;
 use etendue_render::{Images, Plan, RenderError, Report};
 use etendue_scene::Scene;
+use etendue_scene::file::SceneSpec;
 use etendue_sensor::{Exposure, RawImage};
 
 use crate::frame_files::{complete_picture, stopped_samples};
@@ -212,26 +214,22 @@ impl Rendering {
         let results = files_of(&self.scene, names, outputs);
         let results: Vec<PathBuf> = results.map(|name| folder.join(name)).collect();
         places::keep_apart(&self.scene.inputs, &results)?;
-        let mut folders = Vec::new();
         // Layers, exposures and the light field's set, recorded in the folder's manifest.
-        let mut written = places::recorded(Ledger::open(folder, "render"), || {
-            let mut files = self.write_layers(folder, outputs, progress)?;
-            let mut notes = self.idle_notes.clone();
-            if let Some(light) = &self.light {
-                let goes_on = |share| progress.goes_on(Phase::Expose, share);
-                let exposed = expose::write(light, folder, outputs, &goes_on)?;
-                files.extend(exposed.files);
-                notes.extend(exposed.notes);
-            }
-            let set = self.write_light_field(folder, outputs, progress)?;
-            files.extend(set.files);
-            notes.extend(set.notes);
-            folders = set.folders;
-            Ok::<_, Error>(Written { files, notes, time: Duration::ZERO })
-        })?;
-        for below in folders {
-            places::recorded(Ledger::open(&below, "render"), || Ok::<_, Error>(()))?;
-        }
+        let mut written =
+            places::recorded(Ledger::open(folder, "render"), &self.scene.inputs, |to| {
+                let (mut files, mut notes) = self.write_layers((to, folder), outputs, progress)?;
+                notes.extend(self.idle_notes.iter().cloned());
+                if let Some(light) = &self.light {
+                    let goes_on = |share| progress.goes_on(Phase::Expose, share);
+                    let exposed = expose::write(light, (to, folder), outputs, &goes_on)?;
+                    files.extend(exposed.files);
+                    notes.extend(exposed.notes);
+                }
+                let set = self.write_light_field((to, folder), outputs, progress)?;
+                files.extend(set.files);
+                notes.extend(set.notes);
+                Ok::<_, Error>(Written { files, notes, time: Duration::ZERO })
+            })?;
         // A whole picture takes the place of a partial one.
         if self.partial().is_none() {
             places::clear(&folder.join(PARTIAL));
@@ -255,24 +253,25 @@ impl Rendering {
     /// What a light-field camera leaves beside its picture; nothing of others.
     fn write_light_field(
         &self,
-        folder: &Path,
+        to: (&Transaction, &Path),
         outputs: Outputs,
         progress: &Progress,
     ) -> Result<LightFieldSet, Error> {
         let Some((accel, images)) = &self.traced else { return Ok(LightFieldSet::default()) };
         let rendering = light_field::Rendering { scene: &self.scene, accel: &**accel, images };
         let goes_on = |share| progress.goes_on(Phase::LightField, share);
-        Ok(light_field::write(rendering, &self.picture, folder, outputs, &goes_on)?)
+        Ok(light_field::write(rendering, &self.picture, to, outputs, &goes_on)?)
     }
 
+    /// The files of layers, and what a user should know of them.
     fn write_layers(
         &self,
-        folder: &Path,
+        (to, folder): (&Transaction, &Path),
         outputs: Outputs,
         progress: &Progress,
-    ) -> Result<Vec<PathBuf>, Error> {
+    ) -> Result<(Vec<PathBuf>, Vec<String>), Error> {
         let (picture, camera) = (&self.picture, &self.scene.camera);
-        let mut files = Vec::new();
+        let (mut files, mut notes) = (Vec::new(), Vec::new());
         let mut place = |name: String| {
             let path = folder.join(name);
             files.push(path.clone());
@@ -281,7 +280,7 @@ impl Rendering {
         if outputs.exr {
             let goes_on = |share: f64| progress.goes_on(Phase::Write, share * 0.5);
             let options = exr::Options { progress: Some(&goes_on), ..Default::default() };
-            exr::write(&place("layers.exr".to_owned()), picture, &options)?;
+            exr::write(to, &place("layers.exr".to_owned()), picture, &options)?;
         }
         let total = picture.layers().len() as f64;
         for (done, layer) in picture.layers().iter().enumerate() {
@@ -290,14 +289,15 @@ impl Rendering {
             }
             for file in LayerFile::of(&layer.name, outputs) {
                 let name = file.name(&layer.name);
-                if file.write(&folder.join(&name), picture, &layer.name)? {
+                if file.write(to, &folder.join(&name), picture, &layer.name)? {
+                    notes.extend(file.note(picture, &layer.name));
                     place(name);
                 }
             }
         }
-        sidecar::write_json(&place("camera.json".to_owned()), &camera.opencv())?;
-        sidecar::write(&place("layers.json".to_owned()), picture)?;
-        Ok(files)
+        sidecar::write_json(to, &place("camera.json".to_owned()), &camera.opencv())?;
+        sidecar::write(to, &place("layers.json".to_owned()), picture)?;
+        Ok((files, notes))
     }
 }
 
@@ -329,6 +329,15 @@ pub(crate) fn certain_files(
     };
     let files = layers.into_iter().flat_map(of);
     files.chain(outputs.exr.then(|| "layers.exr".to_owned())).collect()
+}
+
+/// The names in files of the layers that a scene asks for; the picture's is empty.
+pub(crate) fn layer_names(spec: &SceneSpec) -> impl Iterator<Item = String> {
+    let picture = spec.picture();
+    spec.all_layers().into_iter().flat_map(move |layer| match Some(layer) == picture {
+        true => vec![String::new()],
+        false => layer.row().names_in_files(),
+    })
 }
 
 /// Those of them that are wanted.

@@ -1,14 +1,39 @@
-//! A changed scene as a file.
+//! A changed scene as a file, or as values that another process takes.
 
 use std::io::Write;
 use std::path::Path;
 
-use etendue_render::output::{write_over, write_whole};
-use etendue_scene::file::FileKind;
+use etendue_files::Transaction;
+use etendue_geometry::Mesh;
+use etendue_scene::file::{FileKind, SceneFile};
+use serde_json::Value;
 
-use crate::{Error, Progress, Session, places};
+use crate::{Error, Options, Progress, Session, places};
 
 impl Session {
+    /// A session of what [`origin`](Self::origin) gave of another one, be it in another process. With its
+    /// options and [`meshes`](Self::meshes) its pictures are the same to the bit.
+    ///
+    /// # Errors
+    ///
+    /// When the scene says something that the format does not know.
+    pub fn restore(path: impl AsRef<Path>, scene: Value, options: Options) -> Result<Self, Error> {
+        Ok(Self::of(SceneFile::restore(path.as_ref(), scene)?, options))
+    }
+
+    /// The path of the scene, or where it would stand, and the values of the whole scene, whichever frame is
+    /// shown.
+    #[must_use]
+    pub fn origin(&self) -> (&Path, &Value) {
+        let file = self.whole();
+        (file.path(), file.value())
+    }
+
+    /// Names and meshes that [`insert_mesh`](Self::insert_mesh) brought.
+    pub fn meshes(&self) -> impl Iterator<Item = (&str, &Mesh)> {
+        self.cache().meshes()
+    }
+
     /// Writes the scene as it is now to `path` as JSON; it may take the place of the file that it was
     /// opened from. Rendered from there, it is the same picture to the bit.
     ///
@@ -35,10 +60,11 @@ impl Session {
         }
         let text = format!("{:#}", self.values());
         if path == own && !is_model {
-            return Ok(write_over(path, |part| writeln!(part, "{text}"))?);
+            return Ok(Transaction::at_once().write(path, |part| writeln!(part, "{text}"))?);
         }
         places::keep_apart(&inputs, &[path.to_owned()])?;
-        Ok(write_whole(path, |part| writeln!(part, "{text}"))?)
+        let files = Transaction::at_once().keeping(&inputs);
+        Ok(files.write(path, |part| writeln!(part, "{text}"))?)
     }
 }
 

@@ -8,20 +8,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use etendue_accel::Accel;
+use etendue_files::Opener;
 use etendue_geometry::Mesh;
 use etendue_oidn::Denoiser;
-use etendue_render::output::LayerFile;
+use etendue_render::output::{LayerFile, Outputs};
 use etendue_render::{Checkpoint, Images, Plan, Seconds, denoise};
 use etendue_scene::file::{FileKind, FramesSpec, SceneFile};
-use etendue_scene::{Cache, Frame, Scene, SceneError, Start};
+use etendue_scene::{Cache, Frame, Frames, Scene, SceneError, Start};
+use etendue_tracer::LayerSpec;
 use serde_json::Value;
 
 use crate::changes;
 use crate::neighbours::{self, Neighbour};
 use crate::rendering::{certain_files, file_names};
 use crate::structures::Structures;
-use crate::words::fingerprints;
-use crate::{Error, FramePattern, Options, Progress, Prospect, places};
+use crate::words::{fingerprints, in_words};
+use crate::{Dataset, Error, FramePattern, Options, Progress, Prospect, places, rendering};
 
 /// A scene that is opened once, changed by [`set`](Self::set) and rendered as often as one likes.
 ///
@@ -38,7 +40,11 @@ pub struct Session {
     shown: Option<(usize, SceneFile)>,
     /// All frames, where layers compare them.
     frames: Option<Arc<[Frame]>>,
+    /// What a user should know of the file that the frames come from.
+    frame_notes: Vec<String>,
     options: Options,
+    /// Opens what the scene and its frames name, and knows what that was.
+    opener: Opener,
     cache: Cache,
     loaded: Option<LoadedScene>,
     structures: Structures,
@@ -131,11 +137,15 @@ impl Session {
         Ok(Self::of(file, options))
     }
 
-    fn of(file: SceneFile, options: Options) -> Self {
+    pub(crate) fn of(file: SceneFile, options: Options) -> Self {
+        let opener = Opener::new(options.reach);
+        opener.record(options.inputs.iter().cloned());
         Self {
             file,
             shown: None,
             frames: None,
+            frame_notes: Vec::new(),
+            opener,
             options,
             cache: Cache::default(),
             loaded: None,
@@ -251,6 +261,15 @@ impl Session {
         self.shown.as_ref().map_or(&self.file, |(_, shown)| shown)
     }
 
+    /// The scene file as it is now, whichever frame is shown.
+    pub(crate) fn whole(&self) -> &SceneFile {
+        &self.file
+    }
+
+    pub(crate) fn cache(&self) -> &Cache {
+        &self.cache
+    }
+
     /// The frames of the scene, in order; `None` when its file has no `frames` and is one picture.
     ///
     /// # Errors
@@ -267,9 +286,27 @@ impl Session {
             let scene = self.loaded.as_ref().map(|loaded| &loaded.scene);
             scene.map(|scene| Start::of(scene)).ok_or(SceneError::Stopped)
         };
-        let frames = self.file.frames(self.options.reach, start)?;
-        self.frames = frames.as_deref().map(Arc::from);
-        Ok(frames)
+        let Some(Frames { frames, notes }) = self.file.frames(&self.opener, start)? else {
+            return Ok(None);
+        };
+        if let Some(camera) = &self.options.camera {
+            let sets_camera = |(path, _): &&(String, Value)| {
+                path == "camera"
+                    || path.starts_with("camera.") && !path.starts_with("camera.sensor")
+            };
+            if let Some((path, _)) =
+                frames.iter().flat_map(|frame| &frame.settings).find(sets_camera)
+            {
+                return Err(Error::Refused(format!(
+                    "--camera {camera}: frames set {path} of the scene's own camera, which it takes the place \
+                     of; leave one of them out"
+                )));
+            }
+        }
+        self.frames = Some(Arc::from(&*frames));
+        self.frame_notes = notes.iter().map(in_words).collect();
+        self.frame_notes.iter().for_each(|note| progress.note(note));
+        Ok(Some(frames))
     }
 
     /// Takes the scene to one of its [`frames`](Self::frames): what is rendered next is that picture, as if
@@ -288,9 +325,25 @@ impl Session {
         Ok(())
     }
 
+    /// Checks that each kind of file that is wanted is one of a layer of the scene, or of some of its `frames`.
+    ///
+    /// # Errors
+    ///
+    /// When one is not.
+    pub fn check_outputs(&self, frames: &[Frame]) -> Result<(), Error> {
+        let mut layers = self.file.spec.all_layers();
+        let sets_layers =
+            |frame: &&Frame| frame.settings.iter().any(|(path, _)| path.starts_with("layers"));
+        for frame in frames.iter().filter(sets_layers) {
+            layers.extend(self.file.at(frame)?.spec.all_layers());
+        }
+        refuse_idle(self.options.outputs, &layers)
+    }
+
     fn leave_frame(&mut self) {
         self.shown = None;
         self.frames = None;
+        self.frame_notes.clear();
         self.loaded = None;
     }
 
@@ -369,6 +422,52 @@ impl Session {
         self.decode(progress)
     }
 
+    /// Checks, before the first of `frames` is rendered into `out`, that no file of any of them, nor of the data
+    /// set that they make, takes the place of a file that the scene or a frame names. `also` judges the places
+    /// of each in turn.
+    ///
+    /// # Errors
+    ///
+    /// When one does; the message names it. Those of `also`, and as [`Self::scene`].
+    pub fn check_frames<E: From<Error>>(
+        &mut self,
+        (out, pattern): (&Path, &FramePattern),
+        frames: &[Frame],
+        progress: &Progress,
+        also: impl Fn(&[PathBuf]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.load(progress)?;
+        // Any word that a frame sets may be a file's name; those that are none are not found.
+        if let Ok(folder) = self.opener.folder(self.file.folder()) {
+            let settings = frames.iter().flat_map(|frame| &frame.settings);
+            let values = settings.filter(|(path, _)| path != POSE).map(|(_, value)| value);
+            values.flat_map(words_of).for_each(|word| drop(folder.find(word)));
+        }
+        let inputs = self.opener.found();
+        let beside: Vec<PathBuf> = Dataset::file_names().map(|name| out.join(name)).collect();
+        places::keep_apart(&inputs, &beside)?;
+        also(&beside)?;
+        let (outputs, loaded) = (self.options.outputs, self.loaded()?);
+        let common = file_names(&loaded.scene, &loaded.plan, outputs);
+        for frame in frames {
+            let mut names = common.clone();
+            let mut paths = frame.settings.iter().map(|(path, _)| path);
+            if paths.any(|path| path.starts_with("layers") || path.starts_with("tracer")) {
+                let shown = self.file.at(frame).map_err(Error::from)?;
+                let layers = rendering::layer_names(&shown.spec);
+                names.extend(layers.flat_map(|layer| rendering::layer_files(&layer, outputs)));
+            }
+            also(&pattern.keep_apart(out, frame.number, (&inputs, &names))?)?;
+        }
+        Ok(())
+    }
+
+    /// Every file that was opened for the session so far, or that a user has told it to keep.
+    #[must_use]
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        self.opener.found()
+    }
+
     /// Checks that results can be written into `folder`, which is made, without any file of the scene being
     /// overwritten. `also` are names of more files that the caller is to write there.
     ///
@@ -384,18 +483,39 @@ impl Session {
         places::folder(folder)?;
         self.load(progress)?;
         let (outputs, loaded) = (self.options.outputs, self.loaded()?);
-        let layers = loaded.plan.names(&loaded.scene);
-        if let Some([output, wanted]) = LayerFile::without_layer(outputs, &layers) {
-            let why = format!(
-                "outputs: `{output}` is a file of {wanted}, and the scene has no such layer; add it to \
-                 `layers`, or leave `{output}` out"
-            );
-            return Err(Error::Refused(why));
+        // A frame may lack what others of its scene have: the last one has no flow.
+        if self.shown.is_none() {
+            refuse_idle(outputs, &self.file.spec.all_layers())?;
         }
         let names = file_names(&loaded.scene, &loaded.plan, outputs);
         let names = names.into_iter().chain(also.iter().map(|&name| name.to_owned()));
         let results: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();
         places::keep_apart(&loaded.scene.inputs, &results)?;
         Ok(results)
+    }
+}
+
+/// What frames of a path set, and nothing else.
+const POSE: &str = "camera.pose";
+
+/// The texts in a value.
+fn words_of(value: &Value) -> Vec<&str> {
+    match value {
+        Value::String(word) => vec![word],
+        Value::Array(list) => list.iter().flat_map(words_of).collect(),
+        Value::Object(members) => members.values().flat_map(words_of).collect(),
+        Value::Null | Value::Bool(_) | Value::Number(_) => Vec::new(),
+    }
+}
+
+/// Refuses files that none of `layers` is written as.
+fn refuse_idle(outputs: Outputs, layers: &[LayerSpec]) -> Result<(), Error> {
+    let names: Vec<String> = layers.iter().flat_map(|layer| layer.row().names_in_files()).collect();
+    match LayerFile::without_layer(outputs, &names) {
+        None => Ok(()),
+        Some([output, wanted]) => Err(Error::Refused(format!(
+            "outputs: `{output}` is a file of {wanted}, and the scene has no such layer; add it to \
+             `layers`, or leave `{output}` out"
+        ))),
     }
 }

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use etendue_geometry::files;
 use etendue_image::{ExrChannels, Limits, MOST_BYTES, Plane, Raster, Samples};
 use etendue_render::output::{Channel, Layer, Look, Picture, Screen, Values};
 use serde_json::Value;
@@ -48,7 +47,8 @@ impl Still {
     /// When it cannot be read, is no image, or takes more than 2 GiB.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refused = |why: String| Error::Refused(format!("{}: {why}", path.display()));
-        let bytes = files::read(path, MOST_BYTES).map_err(|error| refused(error.to_string()))?;
+        let bytes =
+            etendue_files::read(path, MOST_BYTES).map_err(|error| refused(error.to_string()))?;
         let limits = Limits::default();
         if etendue_image::is_exr(&bytes) {
             let channels = etendue_image::exr_channels(&bytes, limits);

@@ -1,9 +1,15 @@
 //! One session, many pictures.
 
+#[path = "session/frame_noise.rs"]
+mod frame_noise;
+#[path = "session/outputs.rs"]
+mod outputs;
+
 use std::fs;
 use std::path::Path;
 
-use etendue::{Options, Outputs, Phase, Progress, Rendering, Session};
+use etendue::{Error, Options, Outputs, Phase, Progress, Rendering, Session, places};
+use etendue_files::Ledger;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -240,4 +246,50 @@ fn arrays_make_scenes_and_bad_ones_are_named() {
     }
     let error = Session::from_json(".", scene).unwrap().scene(&Progress::none()).unwrap_err();
     assert!(error.to_string().contains("tile"), "{error}");
+}
+
+/// While one thread fills a set of files in a folder, another renders below it: each has its own files.
+#[test]
+fn a_set_in_another_thread_takes_no_file_of_a_folder_below() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, below) = (folder.path().join("out"), folder.path().join("out/below"));
+    let (_home, mut session) = opened();
+    let rendering = render(&mut session);
+    places::folder(&out).unwrap();
+    let mut written = Vec::new();
+    let stopped = places::recorded(Ledger::open(&out, "render"), &[], |files| {
+        files.write(&out.join("a"), |_| Ok(())).map_err(Error::from)?;
+        let inner = std::thread::scope(|scope| {
+            scope.spawn(|| rendering.write(&below, Outputs::ALL)).join()
+        });
+        written = inner.unwrap()?.files;
+        assert!(written.iter().all(|path| path.exists()));
+        Err::<(), _>(Error::Refused("stopped".to_owned()))
+    });
+    assert!(stopped.is_err() && written.len() > 5);
+    assert!(written.iter().all(|path| path.exists()));
+    assert!(below.join("etendue-manifest.json").exists() && !out.join("a").exists());
+}
+
+/// Scenes that are written, rendered and removed: file systems give the number of a removed file to the next.
+#[test]
+fn a_thousand_temporary_scenes_are_rendered_one_after_the_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.json");
+    let scene = json!({
+        "etendue": 1, "layers": ["coverage"], "render": {"samples": 1, "accel": "bvh"},
+        "camera": {"type": "pinhole", "sensor": {"resolution": [1, 1]},
+                   "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]}},
+        "objects": [{"shape": "rectangle", "width": 1, "height": 1}]
+    });
+    let outputs = Outputs { npy: true, ..Outputs::NONE };
+    let options = Options { outputs, ..Options::default() };
+    for round in 0..1000 {
+        fs::write(&path, scene.to_string()).unwrap();
+        let mut session = Session::open_with(&path, options.clone()).unwrap();
+        let rendering = render(&mut session);
+        fs::remove_file(&path).unwrap();
+        let written = rendering.write(folder.path(), outputs);
+        assert!(written.is_ok(), "round {round}: {}", written.unwrap_err());
+    }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bytemuck::AnyBitPattern;
 
-use crate::MappedFile;
+use etendue_files::MappedFile;
 
 /// A shared, immutable slice of plain values. Cloning shares the values; their address never
 /// changes while a clone lives, so a C library may keep a pointer beside one.

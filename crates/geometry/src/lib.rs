@@ -19,8 +19,6 @@
 //! | [`bounds`] | axis-aligned boxes |
 //! | [`buffer`] | plain values owned by a `Vec` or by a mapped file |
 //! | [`disk`] | the unit square on the unit disk |
-//! | [`files`] | the one place that opens files for reading |
-//! | [`mapped`] | the one place that maps files |
 //! | [`mesh`] | a triangle mesh and its vertex attributes |
 //! | [`transform`] | affine maps whose translation keeps 106 bits |
 //! | [`units`] | lengths, angles and times with their units, as files write them |
@@ -30,9 +28,8 @@ pub mod area;
 pub mod batch;
 pub mod bounds;
 pub mod buffer;
+pub mod coplanar;
 pub mod disk;
-pub mod files;
-pub mod mapped;
 pub mod mesh;
 pub mod transform;
 pub mod units;
@@ -42,7 +39,7 @@ pub use area::{AreaTest, is_degenerate};
 pub use batch::{Detail, HitBatch, HitPrecision, MISS, PlacedTriangle, RayBatch, RaysMut};
 pub use bounds::Bounds;
 pub use buffer::Buffer;
-pub use mapped::MappedFile;
+pub use coplanar::Coplanar;
 pub use mesh::{Mesh, Positions, Vertices};
 pub use transform::Transform;
 pub use world::{Geometry, Placement};

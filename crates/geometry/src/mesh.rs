@@ -136,7 +136,8 @@ pub struct Mesh {
     pub uvs: Vec<Vertices<2>>,
     /// Linear colour a corner (RGBA, 0..=1).
     pub colors: Option<Vertices<4>>,
-    /// The box of all positions that triangles use (m).
+    /// The box of all triangles that have an area (m): what is a point or a line is not drawn, and sets no
+    /// frame.
     pub bounds: Bounds,
     /// How many triangles are points or lines ([`is_degenerate`]): accelerators leave them out.
     pub degenerate: u64,
@@ -154,8 +155,10 @@ impl Mesh {
         let mut degenerate = 0;
         for triangle in triangles.iter() {
             let corners = triangle.map(|i| positions.get(i as usize));
-            corners.into_iter().for_each(|corner| bounds.include(corner));
-            degenerate += u64::from(is_degenerate(corners));
+            match is_degenerate(corners) {
+                true => degenerate += 1,
+                false => corners.into_iter().for_each(|corner| bounds.include(corner)),
+            }
         }
         Self {
             name: name.into(),

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::{Bounds, Mesh, Transform};
+use crate::{AreaTest, Bounds, Mesh, Transform};
 
 /// One mesh at one place. A mesh placed twice is stored once.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,12 +100,12 @@ impl Geometry {
         boxes.fold(Bounds::EMPTY, Bounds::union)
     }
 
-    /// The same box around one placement (m); empty for a mesh without a box.
+    /// The same box around one placement (m); empty where nothing has an area.
     #[must_use]
     pub fn loose_bounds_of(&self, placement: &Placement) -> Bounds {
         let mut bounds = Bounds::EMPTY;
         let local = self.mesh_of(placement).bounds;
-        if !local.is_empty() {
+        if !local.is_empty() && self.has_area(placement) {
             for corner in local.corners() {
                 bounds.include(placement.world_from_mesh.point(corner));
             }
@@ -113,7 +113,7 @@ impl Geometry {
         bounds
     }
 
-    /// The tight box around all triangles in world space (m). Visits every corner.
+    /// The tight box around all triangles with an area in world space (m). Visits every corner.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         let mut bounds = Bounds::EMPTY;
@@ -123,9 +123,12 @@ impl Geometry {
                 bounds = bounds.union(mesh.bounds);
                 continue;
             }
-            for &corner in mesh.triangles.iter().flatten() {
-                let local: DVec3 = mesh.positions.get(corner as usize);
-                bounds.include(placement.world_from_mesh.point(local));
+            let test = AreaTest::under(mesh, &placement.world_from_mesh.linear);
+            for i in (0..mesh.triangles.len()).filter(|&i| test.keeps(i)) {
+                let corners: [DVec3; 3] = mesh.corners(i);
+                for corner in corners {
+                    bounds.include(placement.world_from_mesh.point(corner));
+                }
             }
         }
         bounds

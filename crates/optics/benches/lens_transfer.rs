@@ -124,7 +124,7 @@ fn lenslets(criterion: &mut Criterion) {
             let r =
                 [0.856_674_883, 0.733_891_857, 0.628_706_721, 0.538_597_270].map(|a| unit(i, a));
             let film = (2.0 * DVec2::new(r[0], r[1]) - 1.0) * DVec2::new(2.0, 1.5);
-            let Some(sample) = pupil.sample(film, [r[2], r[3]]) else { continue };
+            let Some(sample) = pupil.sample(film, [r[2], r[3]], 587.56) else { continue };
             let mut one = LensRays::with_capacity(1);
             one.push(pupil.film_point(film), sample.direction);
             at.trace(Side::Sensor, Clip::On, &mut one);
@@ -161,7 +161,7 @@ fn pupil(criterion: &mut Criterion) {
     group.bench_function("sample", |bencher| {
         bencher.iter(|| {
             rays.clear();
-            pupil.push_rays(black_box(&film), &u, &mut rays);
+            pupil.push_rays(black_box(&film), &u, 587.56, &mut rays);
         });
     });
     group.finish();

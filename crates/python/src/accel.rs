@@ -11,7 +11,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 
-use crate::arrays::{of_triples, refused, triples};
+use crate::arrays::{of_mesh, of_triples, refused, triples};
+use crate::words::in_python;
+use crate::work::{Stop, interruptible};
 
 /// Rays in a batch: as many as stay in a core's cache.
 const BATCH: usize = 1024;
@@ -20,6 +22,7 @@ const BATCH: usize = 1024;
 #[pyclass(frozen)]
 pub struct Accel {
     accel: Box<dyn etendue_accel::Accel>,
+    geometry: Arc<Geometry>,
 }
 
 #[pymethods]
@@ -30,6 +33,7 @@ impl Accel {
         vertices: PyReadonlyArray2<'_, f64>,
         faces: PyReadonlyArray2<'_, u32>,
         backend: &str,
+        threads: usize,
     ) -> PyResult<Self> {
         let (vertices, faces) = (triples("vertices", &vertices)?, triples("faces", &faces)?);
         let mesh = Mesh::from_arrays("mesh", &vertices, &faces).map_err(refused)?;
@@ -37,15 +41,31 @@ impl Accel {
         let placement =
             Placement { mesh: 0, object: 0, instance: 0, node: 0, material: 0, world_from_mesh };
         let geometry = Arc::new(Geometry { meshes: vec![mesh], placements: vec![placement] });
-        let options = BuildOptions::default();
-        let built: Result<Box<dyn etendue_accel::Accel>, _> = py.detach(|| match backend {
-            #[cfg(feature = "embree")]
-            "embree" => Ok(Box::new(etendue_accel::Embree::build(geometry, &options)?) as _),
-            "bvh" => Ok(Box::new(etendue_accel::Bvh::build(geometry, &options)?) as _),
-            "exact" => Ok(Box::new(etendue_accel::Exact::build(geometry, &options)?) as _),
-            other => Err(Unbuilt::Unknown(other.to_owned())),
-        });
-        Ok(Self { accel: built.map_err(|error: Unbuilt| refused(error.words()))? })
+        let stop = Stop::default();
+        let build = || {
+            let options = BuildOptions {
+                threads: rayon::current_num_threads(),
+                progress: Some(stop.heeded()),
+                ..BuildOptions::default()
+            };
+            let geometry = Arc::clone(&geometry);
+            let built: Box<dyn etendue_accel::Accel> = match backend {
+                #[cfg(feature = "embree")]
+                "embree" => Box::new(etendue_accel::Embree::build(geometry, &options)?),
+                "bvh" => Box::new(etendue_accel::Bvh::build(geometry, &options)?),
+                "exact" => Box::new(etendue_accel::Exact::build(geometry, &options)?),
+                other => return Err(Unbuilt::Unknown(other.to_owned())),
+            };
+            Ok(built)
+        };
+        let built = interruptible(py, threads, &stop, build)?;
+        let accel = built.map_err(|error: Unbuilt| refused(error.words()))?;
+        Ok(Self { accel, geometry })
+    }
+
+    /// Vertices and faces.
+    fn mesh<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        of_mesh(py, &self.geometry.meshes[0])
     }
 
     fn report(&self) -> String {
@@ -66,9 +86,11 @@ impl Accel {
         directions: PyReadonlyArray2<'_, f64>,
         t_max: Option<PyReadonlyArray1<'_, f64>>,
         coherent: bool,
+        threads: usize,
     ) -> PyResult<Bound<'py, PyDict>> {
         let rays = Rays::new(&origins, &directions, t_max.as_ref())?;
-        let found = py.detach(|| self.found(&rays, coherent));
+        let stop = Stop::default();
+        let found = interruptible(py, threads, &stop, || self.found(&rays, coherent, &stop))?;
         let all = PyDict::new(py);
         all.set_item("t", found.t.into_pyarray(py))?;
         all.set_item("u", found.u.into_pyarray(py))?;
@@ -86,19 +108,24 @@ impl Accel {
         directions: PyReadonlyArray2<'_, f64>,
         t_max: Option<PyReadonlyArray1<'_, f64>>,
         coherent: bool,
+        threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
         let rays = Rays::new(&origins, &directions, t_max.as_ref())?;
         let mut all = vec![false; rays.len()];
-        py.detach(|| {
+        let stop = Stop::default();
+        interruptible(py, threads, &stop, || {
             all.par_chunks_mut(BATCH).enumerate().for_each_init(
                 || (RayBatch::with_capacity(BATCH), Vec::with_capacity(BATCH), Vec::new()),
                 |(batch, lengths, blocked), (k, out)| {
+                    if stop.is_asked_for() {
+                        return;
+                    }
                     rays.fill(k, coherent, (batch, lengths));
                     self.accel.occluded(batch, blocked);
                     out.copy_from_slice(blocked);
                 },
             );
-        });
+        })?;
         Ok(all.into_pyarray(py).into_any())
     }
 }
@@ -115,7 +142,7 @@ struct Found {
 }
 
 impl Accel {
-    fn found(&self, rays: &Rays<'_>, coherent: bool) -> Found {
+    fn found(&self, rays: &Rays<'_>, coherent: bool, stop: &Stop) -> Found {
         let count = rays.len();
         let numbers = || vec![0.0; count];
         let (t, u, v) = (numbers(), numbers(), numbers());
@@ -129,6 +156,9 @@ impl Accel {
                 (RayBatch::with_capacity(BATCH), Vec::with_capacity(BATCH), hits)
             },
             |(batch, lengths, hits), (k, (((t, u), v), (triangle, normal)))| {
+                if stop.is_asked_for() {
+                    return;
+                }
                 rays.fill(k, coherent, (batch, lengths));
                 self.accel.closest(batch, hits);
                 u.copy_from_slice(&hits.u);
@@ -158,7 +188,7 @@ impl From<etendue_accel::BuildError> for Unbuilt {
 impl Unbuilt {
     fn words(&self) -> String {
         match self {
-            Self::Build(error) => error.to_string(),
+            Self::Build(error) => in_python(&error.to_string()),
             Self::Unknown(name) => format!("no accelerator \"{name}\"; known: embree, bvh, exact"),
         }
     }

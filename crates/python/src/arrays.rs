@@ -1,25 +1,52 @@
 //! Errors and arrays between Rust and Python.
 
 use std::borrow::Cow;
+use std::io;
 
 use etendue::Error;
+use etendue_geometry::Mesh;
 use etendue_render::output::{Layer, Values};
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2};
-use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{
+    PyFileNotFoundError, PyKeyboardInterrupt, PyOSError, PyPermissionError, PyRuntimeError,
+    PyValueError,
+};
 use pyo3::prelude::*;
 
-/// An error as Python has it: what the caller can mend is a `ValueError`.
+use crate::words::in_python;
+
+/// An error as Python has it: what the system refused is an `OSError`, such as `FileNotFoundError`, what
+/// else the caller can mend a `ValueError`.
 pub(crate) fn raised(error: Error) -> PyErr {
-    match error {
-        error if error.is_stopped() => PyKeyboardInterrupt::new_err("stopped"),
-        error if error.is_refused() => PyValueError::new_err(with_causes(&error)),
-        error => PyRuntimeError::new_err(with_causes(&error)),
+    let message = in_python(&with_causes(&error));
+    match system_error(&error) {
+        _ if error.is_stopped() => PyKeyboardInterrupt::new_err("stopped"),
+        Some(io::ErrorKind::NotFound) => PyFileNotFoundError::new_err(message),
+        Some(io::ErrorKind::PermissionDenied) => PyPermissionError::new_err(message),
+        Some(_) => PyOSError::new_err(message),
+        None if error.is_refused() => PyValueError::new_err(message),
+        None => PyRuntimeError::new_err(message),
     }
+}
+
+/// What the system said to a file, if that is at the root of `error`.
+fn system_error(error: &Error) -> Option<io::ErrorKind> {
+    if let Error::Scene(scene) = error
+        && scene.is_missing_file()
+    {
+        return Some(io::ErrorKind::NotFound);
+    }
+    let error: &(dyn std::error::Error + 'static) = error;
+    std::iter::successors(Some(error), |error| error.source()).find_map(|cause| {
+        let io = cause.downcast_ref::<io::Error>()?;
+        // What a reader makes up of a file's contents has no number.
+        io.raw_os_error().map(|_| io.kind())
+    })
 }
 
 /// A `ValueError` of what something says.
 pub(crate) fn refused(error: impl std::fmt::Display) -> PyErr {
-    PyValueError::new_err(error.to_string())
+    PyValueError::new_err(in_python(&error.to_string()))
 }
 
 fn with_causes(error: &dyn std::error::Error) -> String {
@@ -97,4 +124,16 @@ pub(crate) fn shaped(
 pub(crate) fn of_triples(py: Python<'_>, rows: Vec<[f64; 3]>) -> PyResult<Bound<'_, PyAny>> {
     let count = rows.len();
     Ok(rows.into_flattened().into_pyarray(py).reshape([count, 3])?.into_any())
+}
+
+/// Vertices (m) and faces of a mesh.
+pub(crate) fn of_mesh<'py>(
+    py: Python<'py>,
+    mesh: &Mesh,
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    let positions = &mesh.positions;
+    let vertices = (0..positions.len()).map(|i| positions.get(i).to_array()).collect();
+    let faces: Vec<u32> = mesh.triangles.iter().copied().flatten().collect();
+    let faces = faces.into_pyarray(py).reshape([mesh.triangles.len(), 3])?.into_any();
+    Ok((of_triples(py, vertices)?, faces))
 }

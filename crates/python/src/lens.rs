@@ -2,16 +2,18 @@
 
 use std::path::Path;
 
+use etendue::Reach;
 use etendue_optics::element::{Clip, Ray, RayStatus};
 use etendue_optics::train::{Focus, OpticalTrain, Side};
-use etendue_scene::Reach;
 use etendue_scene::file::read_lens;
 use numpy::{IntoPyArray, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 
-use crate::arrays::{of_triples, refused, triples};
+use crate::arrays::{of_triples, raised, refused, triples};
+use crate::words::in_python;
+use crate::work::{Stop, interruptible};
 
 /// A lens of a lens file, a Zemax file or a scene.
 #[pyclass(frozen)]
@@ -23,14 +25,23 @@ pub struct Lens {
 #[pymethods]
 impl Lens {
     #[new]
-    fn new(path: &str, f_number: Option<f64>, allow_outside: bool) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        path: &str,
+        f_number: Option<f64>,
+        allow_outside: bool,
+    ) -> PyResult<Self> {
         let reach = if allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
-        let read = read_lens(Path::new(path), reach).map_err(refused)?;
+        let read = read_lens(Path::new(path), reach).map_err(|error| raised(error.into()))?;
         let train = match f_number {
-            Some(f_number) => read.train.with_f_number(f_number).map_err(refused)?,
+            // Measured again, on all processors.
+            Some(f_number) => {
+                let measure = || read.train.with_f_number(f_number);
+                interruptible(py, 0, &Stop::default(), measure)?.map_err(refused)?
+            }
             None => read.train,
         };
-        let notes = read.notes.iter().chain(train.notes()).cloned().collect();
+        let notes = read.notes.iter().chain(train.notes()).map(|note| in_python(note)).collect();
         Ok(Self { train, notes })
     }
 
@@ -79,8 +90,7 @@ impl Lens {
         origins: PyReadonlyArray2<'_, f64>,
         directions: PyReadonlyArray2<'_, f64>,
         wavelength: f64,
-        from_sensor: bool,
-        clip: bool,
+        manner: (bool, bool, usize),
     ) -> PyResult<(
         Bound<'py, PyAny>,
         Bound<'py, PyAny>,
@@ -88,6 +98,7 @@ impl Lens {
         Bound<'py, PyAny>,
         Bound<'py, PyAny>,
     )> {
+        let (from_sensor, clip, threads) = manner;
         let (origins, directions) =
             (triples("origins", &origins)?, triples("directions", &directions)?);
         if origins.len() != directions.len() {
@@ -106,8 +117,11 @@ impl Lens {
         let at = self.train.at(wavelength).map_err(refused)?;
         let side = if from_sensor { Side::Sensor } else { Side::Object };
         let clip = if clip { Clip::On } else { Clip::Off };
-        let ends: Vec<_> =
-            py.detach(|| rays.par_iter().map(|&ray| at.run(side, clip, ray)).collect());
+        let stop = Stop::default();
+        let trace = |&ray: &Ray| (!stop.is_asked_for()).then(|| at.run(side, clip, ray));
+        let all = || rays.par_iter().map(trace).collect::<Option<Vec<_>>>();
+        // None of them is left out unless it was stopped, which has raised.
+        let ends = interruptible(py, threads, &stop, all)?.unwrap_or_default();
         let positions = ends.iter().map(|end| end.ray.position).collect();
         let turned = ends.iter().map(|end| end.ray.direction).collect();
         let throughput: Vec<f64> = ends.iter().map(|end| end.throughput).collect();

@@ -9,6 +9,8 @@ mod arrays;
 mod lens;
 mod scene;
 mod sensor;
+mod words;
+mod work;
 
 use pyo3::prelude::*;
 

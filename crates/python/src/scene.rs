@@ -1,28 +1,43 @@
 //! Scenes and their pictures.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc;
-use std::time::{Duration, Instant};
-
-use etendue::{Options, Outputs, Progress, Reach, Strictness};
+use etendue::{Error, Options, Outputs, Progress, Reach, Strictness};
+use etendue_files::Transaction;
 use etendue_render::output::{png, sidecar};
 use numpy::{IntoPyArray, PyReadonlyArray2};
-use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::Value;
 
-use crate::arrays::{of_layer, raised, refused, shaped, triples};
+use crate::arrays::{of_layer, of_mesh, raised, refused, shaped, triples};
+use crate::words::in_python;
+use crate::work::{Stop, interruptible};
 
-/// How often Python is asked whether Ctrl-C was pressed, and shown progress (ms).
-const LOOK: u64 = 50;
+/// Name, vertices and faces.
+type NamedMesh<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 /// A scene that is opened once, changed and rendered often.
 #[pyclass]
 pub struct Session {
     session: etendue::Session,
     frames: Vec<etendue::Frame>,
+}
+
+impl Session {
+    fn of(session: etendue::Session) -> Self {
+        Self { session, frames: Vec::new() }
+    }
+
+    /// Work on the session that tells `callback` how far it is.
+    fn work<T: Send>(
+        &mut self,
+        py: Python<'_>,
+        (threads, callback): (usize, Option<Py<PyAny>>),
+        work: impl FnOnce(&mut etendue::Session, &Progress) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
+        let stop = Stop::default();
+        let (session, progress) = (&mut self.session, stop.progress(callback));
+        interruptible(py, threads, &stop, || work(session, &progress))?.map_err(raised)
+    }
 }
 
 #[pymethods]
@@ -36,8 +51,7 @@ impl Session {
         memory_limit: Option<u64>,
     ) -> PyResult<Self> {
         let options = options(settings, strict, allow_outside, memory_limit);
-        let session = etendue::Session::open_with(path, options).map_err(raised)?;
-        Ok(Self { session, frames: Vec::new() })
+        Ok(Self::of(etendue::Session::open_with(path, options).map_err(raised)?))
     }
 
     #[staticmethod]
@@ -51,7 +65,36 @@ impl Session {
         let scene: Value = serde_json::from_str(scene).map_err(refused)?;
         let options = options(Vec::new(), strict, allow_outside, memory_limit);
         let session = etendue::Session::from_json_with(folder, scene, options).map_err(raised)?;
-        Ok(Self { session, frames: Vec::new() })
+        Ok(Self::of(session))
+    }
+
+    /// A session that `origin` and `insert_mesh` describe.
+    #[staticmethod]
+    fn restore(
+        path: &str,
+        scene: &str,
+        strict: bool,
+        allow_outside: bool,
+        memory_limit: Option<u64>,
+    ) -> PyResult<Self> {
+        let scene: Value = serde_json::from_str(scene).map_err(refused)?;
+        let options = options(Vec::new(), strict, allow_outside, memory_limit);
+        Ok(Self::of(etendue::Session::restore(path, scene, options).map_err(raised)?))
+    }
+
+    /// The scene's path, and the values of the whole scene as JSON.
+    fn origin(&self) -> (String, String) {
+        let (path, values) = self.session.origin();
+        (path.display().to_string(), values.to_string())
+    }
+
+    /// Names, vertices and faces of the meshes that `insert_mesh` brought.
+    fn meshes<'py>(&self, py: Python<'py>) -> PyResult<Vec<NamedMesh<'py>>> {
+        let meshes = self.session.meshes().map(|(name, mesh)| {
+            let (vertices, faces) = of_mesh(py, mesh)?;
+            Ok((name.to_owned(), vertices, faces))
+        });
+        meshes.collect()
     }
 
     fn insert_mesh(
@@ -73,28 +116,34 @@ impl Session {
         self.session.values().to_string()
     }
 
-    fn plan(&mut self, py: Python<'_>) -> PyResult<String> {
-        py.detach(|| self.session.plan(&Progress::none()).map(ToString::to_string)).map_err(raised)
+    fn plan(&mut self, py: Python<'_>, threads: usize) -> PyResult<String> {
+        let plan = |session: &mut etendue::Session, progress: &Progress| {
+            session.plan(progress).map(ToString::to_string)
+        };
+        self.work(py, (threads, None), plan).map(|plan| in_python(&plan))
     }
 
     /// The number of frames; 0 for one picture.
-    fn load_frames(&mut self, py: Python<'_>) -> PyResult<usize> {
-        let frames = py.detach(|| self.session.frames(&Progress::none())).map_err(raised)?;
+    fn load_frames(&mut self, py: Python<'_>, threads: usize) -> PyResult<usize> {
+        let frames = self.work(py, (threads, None), etendue::Session::frames)?;
         self.frames = frames.unwrap_or_default();
         Ok(self.frames.len())
     }
 
-    fn show(&mut self, frame: usize) -> PyResult<()> {
-        let frame = self.frames.get(frame).ok_or_else(|| refused("no such frame"))?;
-        self.session.show(frame).map_err(raised)
+    fn show(&mut self, py: Python<'_>, frame: usize, threads: usize) -> PyResult<()> {
+        let frame = self.frames.get(frame).cloned().ok_or_else(|| refused("no such frame"))?;
+        self.work(py, (threads, None), |session, _| session.show(&frame))
     }
 
-    /// Renders without Python's lock; `told` is called with the stage and the share done now and then.
-    fn render(&mut self, py: Python<'_>, told: Option<Py<PyAny>>) -> PyResult<Rendering> {
-        let progress = watched(told);
-        let session = &mut self.session;
-        let rendering = interruptible(py, &progress, || session.render(&progress))?;
-        Ok(Rendering { rendering })
+    /// Renders without Python's lock; `callback` is called with the phase and the share done now and then.
+    fn render(
+        &mut self,
+        py: Python<'_>,
+        callback: Option<Py<PyAny>>,
+        threads: usize,
+    ) -> PyResult<Rendering> {
+        let rendering = self.work(py, (threads, callback), etendue::Session::render)?;
+        Ok(Rendering { rendering, threads })
     }
 }
 
@@ -113,63 +162,31 @@ fn options(
     }
 }
 
-/// Progress that shows itself to Python and stops when Python is interrupted.
-fn watched(told: Option<Py<PyAny>>) -> Progress {
-    let start = Instant::now();
-    let next = Arc::new(AtomicU64::new(0));
-    Progress::new(move |stage, share| {
-        let now = u64::try_from(start.elapsed().as_millis()).unwrap_or(u64::MAX);
-        let due = next.load(Ordering::Relaxed);
-        let later = now + LOOK;
-        let is_mine = now >= due
-            && next.compare_exchange(due, later, Ordering::Relaxed, Ordering::Relaxed).is_ok();
-        if !is_mine {
-            return true;
-        }
-        let Some(told) = &told else { return true };
-        // What a callback raises stops the work.
-        Python::attach(|py| told.call1(py, (stage.name(), share)).is_ok())
-    })
-}
-
-/// Does `work` in a thread of its own, without Python's lock, while this one asks whether Ctrl-C was pressed:
-/// Python tells no other thread. Then the work is stopped, and what it left is dropped.
-fn interruptible<T: Send>(
-    py: Python<'_>,
-    progress: &Progress,
-    work: impl FnOnce() -> Result<T, etendue::Error> + Send,
-) -> PyResult<T> {
-    let mut interrupted = None;
-    let done = py.detach(|| {
-        std::thread::scope(|scope| {
-            let (sender, receiver) = mpsc::channel();
-            scope.spawn(move || sender.send(work()));
-            loop {
-                match receiver.recv_timeout(Duration::from_millis(LOOK)) {
-                    Ok(done) => return Some(done),
-                    // The work panicked, which was told.
-                    Err(mpsc::RecvTimeoutError::Disconnected) => return None,
-                    Err(mpsc::RecvTimeoutError::Timeout) => {
-                        if let Err(raised) = Python::attach(|py| py.check_signals()) {
-                            interrupted = Some(raised);
-                            progress.cancel();
-                        }
-                    }
-                }
-            }
-        })
-    });
-    match (interrupted, done) {
-        (Some(raised), _) => Err(raised),
-        (None, Some(done)) => done.map_err(raised),
-        (None, None) => Err(PyRuntimeError::new_err("a fault of etendue; see the message above")),
-    }
-}
-
 /// A rendered picture with its layers.
 #[pyclass(frozen)]
 pub struct Rendering {
     rendering: etendue::Rendering,
+    threads: usize,
+}
+
+impl Rendering {
+    fn work<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&etendue::Rendering, &Progress) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
+        let stop = Stop::default();
+        let progress = stop.progress(None);
+        let work = || work(&self.rendering, &progress);
+        interruptible(py, self.threads, &stop, work)?.map_err(raised)
+    }
+}
+
+impl Rendering {
+    /// Files by themselves, which are none of the scene's.
+    fn alone(&self) -> Transaction {
+        Transaction::at_once().keeping(&self.rendering.scene().inputs)
+    }
 }
 
 #[pymethods]
@@ -197,14 +214,16 @@ impl Rendering {
     /// The digital numbers of an exposure.
     fn raw<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Some(exposure) = self.rendering.exposures().nth(index) else { return Ok(None) };
-        let image = py.detach(|| self.rendering.raw(exposure)).map_err(raised)?;
+        let image = self.work(py, |rendering, _| rendering.raw(exposure))?;
         let Some(image) = image else { return Ok(None) };
         let (width, height, depth) = (image.width, image.height, image.depth);
         shaped(image.values.into_pyarray(py).into_any(), [height, width, depth]).map(Some)
     }
 
     fn report(&self) -> PyResult<String> {
-        serde_json::to_string(self.rendering.report()).map_err(refused)
+        let mut report = self.rendering.report().clone();
+        report.notes = report.notes.iter().map(|note| in_python(note)).collect();
+        serde_json::to_string(&report).map_err(refused)
     }
 
     /// `camera.json`.
@@ -214,22 +233,30 @@ impl Rendering {
 
     fn write(&self, py: Python<'_>, folder: &str, outputs: &str) -> PyResult<Vec<String>> {
         let outputs = Outputs::from_list(outputs).map_err(refused)?;
-        let progress = watched(None);
-        let written = interruptible(py, &progress, || {
+        let written = self.work(py, |rendering, progress| {
             etendue::places::folder(folder.as_ref())?;
-            self.rendering.write_with(folder.as_ref(), outputs, &progress)
+            rendering.write_with(folder.as_ref(), outputs, progress)
         })?;
         Ok(written.files.iter().map(|path| path.display().to_string()).collect())
     }
 
     /// Writes one layer as a picture.
-    fn write_png(&self, path: &str, name: &str) -> PyResult<()> {
-        png::write(path.as_ref(), self.rendering.picture(), name, png::Bits::Eight).map_err(refused)
+    fn write_png(&self, py: Python<'_>, path: &str, name: &str) -> PyResult<()> {
+        self.work(py, |rendering, _| {
+            Ok(png::write(
+                &self.alone(),
+                path.as_ref(),
+                rendering.picture(),
+                name,
+                png::Bits::Eight,
+            )?)
+        })
     }
 
     /// Writes what the layers mean.
     fn write_meaning(&self, path: &str) -> PyResult<()> {
-        sidecar::write(path.as_ref(), self.rendering.picture()).map_err(refused)
+        sidecar::write(&self.alone(), path.as_ref(), self.rendering.picture())
+            .map_err(|e| raised(e.into()))
     }
 
     fn counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

@@ -9,7 +9,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 
-use crate::arrays::{refused, shaped};
+use crate::arrays::{raised, refused, shaped};
+use crate::work::{Stop, interruptible};
 
 /// A sensor of the trade, or of a file.
 #[pyclass(frozen)]
@@ -32,7 +33,7 @@ impl Sensor {
             })?;
             SensorFile::of_value(path, json!({ "type": "raw", "model": model }), &settings)
         };
-        Ok(Self { sensor: file.map_err(refused)?.sensor })
+        Ok(Self { sensor: file.map_err(|error| raised(error.into()))?.sensor })
     }
 
     fn facts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -66,10 +67,9 @@ impl Sensor {
         let array = electrons.as_array();
         let size = [array.ncols(), array.nrows()];
         let electrons: Vec<f64> = array.iter().copied().collect();
-        let image = py.detach(|| {
-            self.sensor.expose_electrons(&electrons, size, Exposure { exposure, frame }, seed)
-        });
-        let image = image.map_err(refused)?;
+        let expose =
+            || self.sensor.expose_electrons(&electrons, size, Exposure { exposure, frame }, seed);
+        let image = interruptible(py, 0, &Stop::default(), expose)?.map_err(refused)?;
         shaped(image.values.into_pyarray(py).into_any(), [size[1], size[0], 1])
     }
 }

@@ -86,8 +86,6 @@ def test_what_is_refused_is_a_value_error_and_leaves_the_scene():
         etendue.Scene(QUAD, [[0.0, 1.0, 2.0]])
     with pytest.raises(ValueError, match="come together"):
         etendue.Scene(QUAD)
-    with pytest.raises(ValueError, match="nowhere.json"):
-        etendue.load("nowhere.json")
     np.testing.assert_allclose(scene.render()["depth"], 3.0, rtol=EPSILON)
 
 
@@ -203,6 +201,91 @@ def test_a_scene_is_one_threads_at_a_time():
     assert len(seen) == 2 and "another thread" in seen[1]
 
 
+def test_what_a_callback_raises_comes_out():
+    class Mine(Exception):
+        pass
+
+    def told(stage, share):
+        # Late, when what there is of the picture would do.
+        if stage == "render" and share > 0:
+            raise Mine("enough")
+
+    scene = etendue.Scene(
+        objects=[{"shape": "sphere"}],
+        tracer={"type": "path"},
+        render={"samples": 1 << 20},
+        camera={"type": "pinhole", "sensor": {"resolution": [64, 64]}},
+    )
+    with pytest.raises(Mine, match="enough"):
+        scene.render(progress=told)
+    # The scene is none the worse.
+    assert scene.render(samples=1).report["samples"] == 1
+
+
+def test_files_that_fail_are_os_errors(tmp_path):
+    def missing(**scene):
+        return etendue.Scene(folder=tmp_path, layers=["depth"], **scene).render
+
+    camera = quad()["camera"]
+    paint = {"m": {"type": "matte", "color": {"image": "gone.png"}}}
+    ball = [{"shape": "sphere", "material": "m"}]
+    lens = {"type": "lens", "lens": "gone.json", "sensor": {"resolution": [8, 6]}}
+    for call in [
+        lambda: etendue.load(tmp_path / "gone.json"),
+        lambda: etendue.load(tmp_path / "gone.glb").render(),
+        lambda: etendue.Lens(tmp_path / "gone.zmx"),
+        lambda: etendue.Sensor(tmp_path / "gone.json"),
+        missing(camera=camera, objects=[{"file": "gone.obj"}]),
+        missing(camera=lens, objects=[{"shape": "sphere"}]),
+        missing(camera=camera, objects=ball, materials=paint, tracer={"type": "path"}),
+        lambda: list(quad(frames={"type": "trajectory", "file": "gone.json"}).frames()),
+    ]:
+        with pytest.raises(FileNotFoundError, match="gone"):
+            call()
+    (tmp_path / "file").write_text("")
+    shot = quad().render()
+    for folder in ["file", "file/below"]:
+        with pytest.raises(OSError, match="cannot write .*file"):
+            shot.write(tmp_path / folder)
+
+
+def test_messages_speak_python(tmp_path):
+    scene = quad()
+    messages = []
+    for call in [
+        lambda: scene.__setitem__("camera.fow", 3),
+        lambda: scene.__setitem__("camera.sensor.resolution", [0, 1]),
+        lambda: scene.__setitem__("frames[3", 3),
+        lambda: etendue.load(CHECKOUT / "scenes" / "cube.json", {"camera.fow": 3}),
+        lambda: quad(objects=[{"file": "/etc/passwd"}]).render(),
+        lambda: quad(objects=[{"file": "../mesh.ply"}]).render(),
+        lambda: quad(objects=[{"shape": "sphere", "sides": 4096}], memory_limit=1 << 20).render(),
+        lambda: etendue.Sensor("imx183", {"temperatur": 3}),
+    ]:
+        with pytest.raises((ValueError, OSError)) as raised:
+            call()
+        messages.append(str(raised.value))
+    assert "camera.fow=3" in messages[0]
+    assert "allow_outside=True" in messages[4] and "allow_outside=True" in messages[5]
+    assert not [message for message in messages if re.search(r"(^|[\s`(])--[a-z]", message)], messages
+
+
+def test_ctrl_c_ends_a_trace():
+    # Minutes of work: every ray has to look at every triangle.
+    endless = """
+import etendue, threading, os, signal, numpy as np
+accel = etendue.Accel([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], [[0, 1, 2]] * 20000, "exact")
+rays = np.tile([0.0, 0, 1], (1000000, 1))
+threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+try:
+    accel.closest(rays, -rays)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    done = subprocess.run([sys.executable, "-c", endless], capture_output=True, text=True, timeout=60)
+    assert done.stdout.strip() == "interrupted", done.stderr
+
+
 def test_progress_and_ctrl_c():
     stages = []
     quad().render(progress=lambda stage, share: stages.append((stage, share)))
@@ -219,6 +302,28 @@ except KeyboardInterrupt:
 """
     done = subprocess.run([sys.executable, "-c", endless], capture_output=True, text=True, timeout=60)
     assert done.stdout.strip() == "interrupted", done.stderr
+
+
+def test_a_light_field_is_arrays():
+    camera = {
+        "type": "light_field",
+        "focal_length": 20,
+        "f_number": 4,
+        "focus_distance": 0.5,
+        "microlenses": {"pitch": 0.1},
+        "pose": {"from": [0, 0, 0.5], "look_at": [0, 0, 0]},
+        "sensor": {"resolution": [120, 90], "pixel_pitch": 8},
+    }
+    scene = quad(camera=camera, layers=["depth"], tracer={"type": "flat"})
+    field = scene.render(samples=4).light_field()
+    n, rows, cols = (field.geometry[key] for key in ["views", "rows", "cols"])
+    assert field.raw.shape == field.white.shape == (90, 120, 3)
+    assert field.views.shape == field.reference.shape == (n, n, rows, cols, 3)
+    assert field.depth.shape == field.disparity.shape == (rows, cols)
+    camera["microlenses"]["picture_distance"] = 0.5
+    field = quad(camera=camera, layers=["depth"], tracer={"type": "flat"}).render(samples=1).light_field()
+    assert field.views is None and "focused" in field.geometry["no_views"]
+    assert quad().render().light_field() is None
 
 
 def test_a_lens_bends_rays_to_its_focus():

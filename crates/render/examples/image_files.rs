@@ -17,6 +17,7 @@ use std::time::Instant;
 
 use ::exr::prelude as crate_exr;
 use crate_exr::WritableImage;
+use etendue_files::Transaction;
 use etendue_render::output::{Channel, ImageHash, Layer, Look, Picture, Values, exr, npy, png};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -37,16 +38,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         {
             let options = exr::Options { compression, progress: None };
             let path = at("a.exr");
-            report(&format!("exr {name}"), &path, bytes, || exr::write(&path, &picture, &options))?;
+            report(&format!("exr {name}"), &path, bytes, || {
+                exr::write(&Transaction::at_once(), &path, &picture, &options)
+            })?;
         }
         let path = at("b.exr");
         report("exr, the crate's ZIP16", &path, bytes, || the_crates.write().to_file(&path))?;
         let first = picture.layers()[0].name.clone();
         let path = at("a.npy");
-        report(&format!("npy {first}"), &path, bytes, || npy::write(&path, &picture, &first))?;
+        report(&format!("npy {first}"), &path, bytes, || {
+            npy::write(&Transaction::at_once(), &path, &picture, &first)
+        })?;
         for layer in picture.layers() {
             let path = at("a.png");
-            let run = || png::write(&path, &picture, &layer.name, png::Bits::Eight);
+            let run = || {
+                png::write(&Transaction::at_once(), &path, &picture, &layer.name, png::Bits::Eight)
+            };
             report(&format!("png {}", layer.title()), &path, bytes, run)?;
         }
         let begun = Instant::now();

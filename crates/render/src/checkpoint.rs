@@ -4,6 +4,9 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use etendue_files::Transaction;
+use etendue_scene::Scene;
+
 use crate::film::FilmLayer;
 use crate::film_file::{FilmError, FilmFile, Identity, Writing};
 use crate::samples::{Averaging, Sum};
@@ -25,6 +28,7 @@ pub(crate) struct Keeper<'a> {
     pub(crate) identity: &'a Identity,
     pub(crate) shard: Shard,
     pub(crate) resolution: [u32; 2],
+    files: Transaction,
     start: Instant,
     state: Mutex<KeeperState>,
 }
@@ -39,11 +43,13 @@ impl<'a> Keeper<'a> {
         checkpoint: &'a Checkpoint,
         identity: &'a Identity,
         shard: Shard,
-        resolution: [u32; 2],
+        scene: &Scene,
     ) -> Self {
         let start = Instant::now();
         let state = Mutex::new(KeeperState { written: start, fault: None });
-        Self { checkpoint, identity, shard, resolution, start, state }
+        let files = Transaction::at_once().keeping(&scene.inputs);
+        let resolution = scene.camera.resolution();
+        Self { checkpoint, identity, shard, resolution, files, start, state }
     }
 
     /// Why the last checkpoint could not be written, if it could not.
@@ -98,7 +104,7 @@ impl<'a> Keeper<'a> {
         let sums: Vec<&[Sum]> = averaged.iter().map(Averaging::sums).collect();
         // The render is worth more than its checkpoint: what is wrong is told in the end.
         state.fault = writing
-            .write(&self.checkpoint.path, centres, &sums)
+            .write((&self.files, &self.checkpoint.path), centres, &sums)
             .err()
             .map(|error| format!("no checkpoint could be kept: {error}"));
         state.written = Instant::now();

@@ -222,7 +222,7 @@ impl FilmLayer {
             };
             return files.into_iter().zip(self.planes).zip(definitions).map(layer).collect();
         }
-        let look = if self.planes.len() > 4 { Look::Cube } else { look };
+        let look = if self.planes.len() > 3 { Look::Cube } else { look };
         let planes = self.names.into_iter().zip(self.planes);
         let channels = planes.map(|(name, values)| Channel { name, values }).collect();
         let name = if root { String::new() } else { name.into_owned() };

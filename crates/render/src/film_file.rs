@@ -10,7 +10,6 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use etendue_geometry::files;
 use etendue_optics::element::StatusCounts;
 use etendue_tracer::RayStats;
 use serde::{Deserialize, Serialize};
@@ -18,10 +17,12 @@ use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 use crate::adaptive::SampleCounts;
 use crate::film::FilmLayer;
-use crate::output::{OutputError, Values, write_whole};
+use crate::output::{OutputError, Values};
 use crate::samples::Sum;
 use crate::shard::Shard;
+use crate::sparkles::Sparkles;
 use crate::tiles::RayCounts;
+use etendue_files::Transaction;
 
 const MAGIC: &[u8] = b"etendue film 1\n";
 
@@ -43,11 +44,13 @@ struct FilmCounts {
     reflected: Vec<u64>,
     vignetted: Vec<u64>,
     unlit: u64,
+    #[serde(default)]
+    sparkles: Sparkles,
 }
 
 impl FilmCounts {
     fn of(counts: &RayCounts, time: Duration) -> Self {
-        let RayCounts { chief_rays, light, statuses } = counts.clone();
+        let RayCounts { chief_rays, light, statuses, sparkles } = counts.clone();
         let RayStats { rays, shadow_rays, not_finite } = light;
         let StatusCounts { exited, missed, reflected, vignetted, unlit } = statuses;
         Self {
@@ -61,6 +64,7 @@ impl FilmCounts {
             reflected,
             vignetted,
             unlit,
+            sparkles,
         }
     }
 }
@@ -68,11 +72,12 @@ impl FilmCounts {
 impl From<FilmCounts> for RayCounts {
     fn from(counts: FilmCounts) -> Self {
         let FilmCounts { rays, shadow_rays, not_finite, .. } = counts;
-        let FilmCounts { exited, missed, reflected, vignetted, unlit, .. } = counts;
+        let FilmCounts { exited, missed, reflected, vignetted, unlit, sparkles, .. } = counts;
         Self {
             chief_rays: counts.chief_rays,
             light: RayStats { rays, shadow_rays, not_finite },
             statuses: StatusCounts { exited, missed, reflected, vignetted, unlit },
+            sparkles,
         }
     }
 }
@@ -130,7 +135,7 @@ pub(crate) struct Writing<'a> {
 impl Writing<'_> {
     pub(crate) fn write(
         &self,
-        path: &Path,
+        (files, path): (&Transaction, &Path),
         layers: &[&FilmLayer],
         sums: &[&[Sum]],
     ) -> Result<(), OutputError> {
@@ -153,7 +158,7 @@ impl Writing<'_> {
             sections: sections.iter().map(|(name, s)| (name.clone(), kind(s))).collect(),
         };
         // Both, and a hash of them at the end.
-        write_whole(path, |part| {
+        Ok(files.write(path, |part| {
             let mut file = Hashed { hash: Xxh3::new(), file: BufWriter::new(part) };
             let header = serde_json::to_vec(&header)?;
             file.write_all(MAGIC)?;
@@ -165,7 +170,7 @@ impl Writing<'_> {
             let hash = file.hash.digest();
             file.file.write_all(&hash.to_le_bytes())?;
             file.file.flush()
-        })
+        })?)
     }
 
     fn write_section(&self, file: &mut impl Write, section: &FilmSection<'_>) -> io::Result<()> {
@@ -246,7 +251,8 @@ impl FilmFile {
     /// When it cannot be read, is none of these, or is not as it was written.
     pub fn read(path: &Path) -> Result<Self, FilmError> {
         let refused = |why: &str| FilmError { path: path.to_owned(), why: why.to_owned() };
-        let bytes = files::read(path, u64::MAX).map_err(|error| refused(&error.to_string()))?;
+        let bytes =
+            etendue_files::read(path, u64::MAX).map_err(|error| refused(&error.to_string()))?;
         let body = bytes.strip_prefix(MAGIC).ok_or_else(|| {
             refused("is no part of a render; give files that `etendue render --shard` wrote")
         })?;

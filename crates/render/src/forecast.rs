@@ -57,10 +57,8 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
 /// Bytes of the views of a light field behind a raw picture: decoded from it, or rendered as an ideal lens
 /// has them and then taken apart and shown side by side, whichever is more.
 fn views(scene: &Scene, plan: &Plan, outputs: Outputs) -> u64 {
-    let (Some(light_field), true) = (scene.camera.light_field(), scene.camera.lens().is_some())
-    else {
-        return 0;
-    };
+    let raw = scene.camera.lens().is_some() && scene.camera.no_views().is_none();
+    let (Some(light_field), true) = (scene.camera.light_field(), raw) else { return 0 };
     let picture = plan.layers.iter().find(|layer| Some(**layer) == scene.picture);
     let Some(&picture) = picture else { return 0 };
     let grid = &light_field.grid;
@@ -143,7 +141,7 @@ fn images(scene: &Scene, plan: &Plan) -> u64 {
             textures.saturating_add(bytes)
         }
         Some(EnvironmentImage::ClearSky(_)) if plan.layers.contains(&LayerSpec::Radiance) => {
-            textures.saturating_add(ClearSky::MAP_BYTES)
+            textures.saturating_add(ClearSky::map_bytes(plan.bands != Bands::Rgb))
         }
         _ => textures,
     }

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use etendue_geometry::files::Stamp;
+use etendue_files::Stamp;
 use etendue_image::Limits;
 use etendue_scene::Scene;
+use etendue_spectrum::Bands;
 use etendue_tracer::spec::BRIGHTEST;
 use etendue_tracer::texture::{Encoding, Filter, ImageError, Wrap};
 use etendue_tracer::{
@@ -25,8 +26,8 @@ pub struct Images {
     pub environment: Option<Arc<EnvironmentMap>>,
     /// What each texture was decoded from, and what is wrong with it.
     origins: Vec<Option<ImageOrigin>>,
-    /// What the environment was read from, and its file as it was.
-    sky: Option<(EnvironmentImage, Option<Stamp>)>,
+    /// What the environment was read from, its file as it was, and whether it has spectra.
+    sky: Option<(EnvironmentImage, Option<Stamp>, bool)>,
     /// What could not be decoded, in words.
     pub faults: Vec<String>,
 }
@@ -80,7 +81,7 @@ impl Images {
             images.origins.push(origin);
         }
         if plan.layers.contains(&LayerSpec::Radiance) {
-            images.read_environment(scene, limits, self)?;
+            images.read_environment(scene, limits, plan.bands != Bands::Rgb, self)?;
         }
         Ok(images)
     }
@@ -116,6 +117,7 @@ impl Images {
         &mut self,
         scene: &Scene,
         limits: Limits,
+        spectral: bool,
         before: &Self,
     ) -> Result<(), ImageError> {
         let Some(image) = environment(scene) else { return Ok(()) };
@@ -126,13 +128,13 @@ impl Images {
             | EnvironmentImage::ClearSky(_)
             | EnvironmentImage::Constant => None,
         };
-        self.sky = Some((image.clone(), stamp));
+        self.sky = Some((image.clone(), stamp, spectral));
         // The map as it was, or made anew.
         let known = before.environment.as_ref().filter(|_| before.sky == self.sky);
         let map = match (known, image) {
             (Some(known), _) => Arc::clone(known),
             (None, EnvironmentImage::Studio) => Arc::new(EnvironmentMap::studio()),
-            (None, EnvironmentImage::ClearSky(sky)) => Arc::new(sky.map()),
+            (None, EnvironmentImage::ClearSky(sky)) => Arc::new(sky.map(spectral)),
             (None, EnvironmentImage::File(path)) => Arc::new(EnvironmentMap::read(path, limits)?),
             (None, EnvironmentImage::Constant) => return Ok(()),
         };

@@ -15,7 +15,10 @@ use etendue_tracer::{
 
 use crate::error::RenderError;
 use crate::film::{FilmLayer, Precision};
-use crate::output::{Picture, PictureError, Values, luminance};
+use crate::losses::Losses;
+use crate::output::{
+    Development, Layer, LayerFile, Look, Outputs, Picture, PictureError, Values, luminance,
+};
 use crate::radiance::LightPass;
 use crate::samples::Sampling;
 use crate::shard::Shard;
@@ -28,14 +31,20 @@ const SIDE: u32 = 48;
 /// Samples a pixel of the small picture.
 const SAMPLES: u32 = 16;
 
-/// Radiance below which a surface looks black: 6 of 255 in sRGB.
-const BLACK: f64 = 0.002;
+/// Radiance below which a surface looks black: 8 of 255 in sRGB.
+const BLACK: f64 = 8.0 / 255.0 / 12.92;
 
-/// Emitters light a scene when at least this share of what the camera sees is not black.
-const LIT: f64 = 0.25;
+/// The studio lights a scene when more than this share of what the camera sees is black without it.
+const DARK: f64 = 0.5;
 
-/// A picture gets a note when this share of what the camera sees is black, or is clipped.
+/// A picture none of which is quite black is told to be when this share of what the camera sees nearly is.
 const NEARLY_ALL: f64 = 0.9;
+
+/// Of sRGB from 0 to 1, what looks black at first sight: 6 of 255.
+const NEARLY_BLACK: f32 = 0.025;
+
+/// Of sRGB from 0 to 1, what rounds to 0 of 255.
+const ZERO: f32 = 0.5 / 255.0;
 
 /// The lights of a scene as it is rendered.
 #[derive(Debug)]
@@ -48,7 +57,7 @@ pub(crate) struct Lighting {
 }
 
 /// Adds the studio to the lights of a scene that names none, where its own emitters and lamps leave
-/// nearly all that the camera sees in the dark. A lamp, a screen or a few lit windows on a model need
+/// most of what the camera sees in the dark. A lamp, a screen or a few lit windows on a model need
 /// not shine on it.
 ///
 /// # Errors
@@ -75,34 +84,32 @@ pub(crate) fn settle(
         surroundings,
         lights: &lights,
         spectral: &spectral,
-        traits: Traits::of(&scene.geometry, &scene.materials),
+        traits: Traits::of(&scene.geometry, &scene.materials, &placed),
         emitters: None,
         placed: &placed,
         precision: HitPrecision::Single,
     };
-    let lit = lit_share(scene, tracer, stage, progress)?;
-    if lit.is_none_or(|share| share >= LIT) {
+    let dark = dark_share(scene, tracer, stage, progress)?;
+    if dark.share() <= DARK {
         return Ok(lighting);
     }
     // They leave it dark: the studio shines as well.
     lighting.lights.push(Light::STUDIO);
     lighting.map = Some(Arc::new(EnvironmentMap::studio()));
-    lighting.note = Some(
-        "lights: what shines in the scene leaves nearly all of it in the dark, so a grey studio \
-         lights it too; name `lights` in the scene for others, or `\"lights\": []` for none"
-            .to_owned(),
-    );
+    lighting.note = Some(format!(
+        "lights: what shines in the scene leaves {dark} of what the camera sees black, so a grey studio \
+             lights it too; name `lights` in the scene for others, or `\"lights\": []` for none"
+    ));
     Ok(lighting)
 }
 
-/// The share of what the camera sees that is not black under the lights of `stage`; `None` when it
-/// sees nothing.
-fn lit_share(
+/// How much of what the camera sees is black under the lights of `stage`.
+fn dark_share(
     scene: &Scene,
     tracer: Rules,
     stage: LightingContext<'_>,
     progress: &(dyn Fn(f64) -> bool + Sync),
-) -> Result<Option<f64>, RenderError> {
+) -> Result<Losses, RenderError> {
     // A coarse picture of light alone.
     let [width, height] = scene.camera.resolution();
     let camera = scene.camera.coarser(width.max(height).div_ceil(SIDE));
@@ -127,7 +134,7 @@ fn lit_share(
         sampling: Sampling {
             samples: SAMPLES,
             sampler: scene.render.sampler,
-            seed: scene.render.seed,
+            seed: scene.render.frame_seed(),
             shard: Shard::ALL,
             sets: 1,
         },
@@ -150,51 +157,83 @@ fn lit_share(
     let watcher = Watcher::new(&watch, job.rays(&film));
     job.run(&mut film, &watcher)?;
     let [light, coverage] = film.map(|layer| layer.into_planes());
-    // How many of the pixels that see something are lit.
-    let (mut seen, mut lit) = (0_u32, 0_u32);
-    for i in 0..pixels {
-        if coverage[0].at(i) > 0.0 {
-            seen += 1;
-            let rgb = std::array::from_fn(|k| light[k].at(i));
-            lit += u32::from(luminance(rgb) >= BLACK);
-        }
-    }
-    Ok((seen > 0).then(|| f64::from(lit) / f64::from(seen)))
+    let seen = (0..pixels).filter(|&i| coverage[0].at(i) > 0.0);
+    let rgb = |i| std::array::from_fn(|k| light[k].at(i));
+    Ok(Losses::count(seen.map(|i| luminance(rgb(i)) < BLACK)))
 }
 
 /// What is wrong with the light of a finished picture as its PNG shows it, and which key mends it.
-pub(crate) fn verdict((camera, accel): (&Camera, &dyn Accel), picture: &Picture) -> Option<String> {
-    let layer = picture.layer("")?;
+pub(crate) fn verdict(
+    scene: &Scene,
+    accel: &dyn Accel,
+    camera: &Camera,
+    picture: &Picture,
+) -> Vec<String> {
+    let Some(layer) = picture.layer("") else { return Vec::new() };
     let planes: Vec<&Values> = layer.channels.iter().map(|channel| &channel.values).collect();
-    let [r, g, b] = *planes.as_slice() else { return None };
+    let [r, g, b] = *planes.as_slice() else { return Vec::new() };
     let develop = picture.development();
-    // Pixels without light, black ones and clipped ones.
-    let (mut seen, mut dark, mut black, mut clipped) = (0_u32, 0_u32, 0_u32, 0_u32);
-    for i in seen_pixels(camera, accel) {
-        let rgb = [r, g, b].map(|plane| plane.at(i));
-        seen += 1;
-        dark += u32::from(luminance(rgb) <= 0.0);
-        black += u32::from(develop.encode(rgb).iter().all(|c| *c < 0.025));
-        clipped += u32::from(develop.clips(rgb));
-    }
-    let share = |count: u32| f64::from(count) / f64::from(seen.max(1));
-    let percent =
-        |count: u32| format!("picture: {:.0} % of what the camera sees", 100.0 * share(count));
+    let seen = seen_pixels(camera, accel);
+    let losses = |is_lost: &dyn Fn([f64; 3]) -> bool| {
+        Losses::count(seen.iter().map(|&i| is_lost([r, g, b].map(|plane| plane.at(i)))))
+    };
+    let below = |rgb, limit| develop.encode(rgb).iter().all(|c| *c < limit);
+    let unlit = losses(&|rgb| luminance(rgb) <= 0.0);
+    let zero = losses(&|rgb| below(rgb, ZERO));
+    let nearly_black = losses(&|rgb| below(rgb, NEARLY_BLACK));
+    let clipped = losses(&|rgb| develop.clips(rgb));
     let auto = "`--set render.exposure=auto`, or a number of stops, mends picture.png; EXR and NPY \
                 keep the radiance as it is";
-    // The worst that holds of nearly all of them.
-    if share(dark) >= NEARLY_ALL {
-        return Some(format!(
-            "{} sends no light at all: its materials are black, or no light reaches it; name other \
-             `materials` or `lights` in the scene, or leave out the key `lights` for a grey studio",
-            percent(dark)
+    let mut told = Vec::new();
+    if zero.is_black() && 2 * unlit.lost >= zero.lost {
+        // The studio stands around the scene.
+        let mend = match scene.studio_if_dark || scene.lights.contains(&Light::STUDIO) {
+            true => "`lights`, which in a closed room stand within it: the studio is outside",
+            false => "`lights` in the scene, or leave out the key `lights` for a grey studio",
+        };
+        told.push(format!(
+            "picture: {unlit} of what the camera sees sends no light at all: its materials are black, or no \
+             light reaches it; name other `materials` or {mend}"
+        ));
+    } else if zero.is_black() || nearly_black.share() >= NEARLY_ALL {
+        let black = if zero.is_black() { zero } else { nearly_black };
+        told.push(format!("picture: {black} of what the camera sees is black: {auto}"));
+    }
+    if clipped.is_clipped() {
+        told.push(format!(
+            "picture: {clipped} of what the camera sees is clipped to white: {auto}"
         ));
     }
-    if share(black) >= NEARLY_ALL {
-        return Some(format!("{} is black: {auto}", percent(black)));
-    }
-    (share(clipped) >= NEARLY_ALL)
-        .then(|| format!("{} is clipped to white: {auto}", percent(clipped)))
+    told.extend(clipped_previews(picture, &seen));
+    told
+}
+
+/// What the previews of layers of colour beside the picture clip at `seen` pixels.
+fn clipped_previews(picture: &Picture, seen: &[usize]) -> Vec<String> {
+    let beside = picture.layers().iter().filter(|layer| {
+        let is_shown =
+            LayerFile::of(&layer.name, Outputs { png: true, ..Outputs::NONE }).next().is_some();
+        !layer.name.is_empty() && layer.look == Look::Color && is_shown
+    });
+    let development = Development::default();
+    let clipped = |layer: &Layer| {
+        let planes: Vec<&Values> = layer.channels.iter().map(|channel| &channel.values).collect();
+        let color = |i: usize| match *planes.as_slice() {
+            [r, g, b] => [r, g, b].map(|plane| plane.at(i)),
+            _ => [planes[0].at(i); 3],
+        };
+        Losses::count(seen.iter().map(|&i| development.clips(color(i))))
+    };
+    let told = beside.filter_map(|layer| {
+        let clipped = clipped(layer);
+        clipped.is_clipped().then(|| {
+            format!(
+                "{}: {clipped} of what the camera sees is clipped to white; EXR and NPY keep it",
+                LayerFile::Preview.name(&layer.name)
+            )
+        })
+    });
+    told.collect()
 }
 
 /// Of a grid of pixels, those whose chief rays hit something.

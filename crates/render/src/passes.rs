@@ -142,7 +142,7 @@ fn judged(
         adaptive.tell(samples, parts, beside.told);
     }
     watcher.expect(adaptive.to_come(samples) * parts.len() as u64);
-    let counts = adaptive.counts(samples);
+    let counts = adaptive.counts(samples, parts);
     let least = counts.map_or(samples, |counts| counts.least);
     Passed { samples: least, is_complete: !adaptive.goes_on(samples), counts }
 }

@@ -7,6 +7,7 @@ use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightPrecision};
 use etendue_tracer::spawn::roundings;
 
+use crate::gaps::{CrossedSurfaces, Gap, MOST_OF_ABSORPTION, crossed_surfaces};
 use crate::render::accelerators;
 
 /// The largest share of a mesh's mean edge that rays may start off a surface.
@@ -47,8 +48,48 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
             format!("more of a thing of {least:.1e} m than noise hides at {samples} samples");
         return (HitPrecision::Double, words(&than));
     }
-    let than = format!("less of the smallest thing, {least:.1e} m, than noise hides");
+    // Against what light goes through: no ray may skip the next surface, and no medium may take another share.
+    let crossed = crossed_surfaces(scene, farthest(scene));
+    if let Some(why) = too_thin(scene, &crossed) {
+        return (HitPrecision::Double, why);
+    }
+    let cleared = crossed.cleared.map_or_else(String::new, |distance| {
+        format!("; where light goes through, surfaces are over {distance:.1e} m apart")
+    });
+    let than = format!("less of the smallest thing, {least:.1e} m, than noise hides{cleared}");
     (HitPrecision::Single, words(&than))
+}
+
+/// Why f32 does not do for what light goes through; `None` where it does.
+fn too_thin(scene: &Scene, crossed: &CrossedSurfaces) -> Option<String> {
+    let name = |placement: usize| {
+        let placement = &scene.geometry.placements[placement];
+        let material = scene.materials.get(placement.material as usize);
+        material.map_or("", |material| material.name.as_str())
+    };
+    if let Some(Gap { distance, offset, between: [one, other] }) = crossed.gap {
+        let of = match one == other {
+            true => format!("the thickness of \"{}\"", name(one)),
+            false => format!("the gap between \"{}\" and \"{}\"", name(one), name(other)),
+        };
+        return Some(format!(
+            "f32 misplaces rays by up to {offset:.1e} m there, too much for {of}, {distance:.1e} m, which light \
+             goes through"
+        ));
+    }
+    if let Some(([extent, offset], placement)) = crossed.small {
+        return Some(format!(
+            "f32 misplaces rays by up to {offset:.1e} m, too much for \"{}\", {extent:.1e} m across, which light goes \
+             through",
+            name(placement)
+        ));
+    }
+    let (share, placement) = crossed.absorption.filter(|(share, _)| *share > MOST_OF_ABSORPTION)?;
+    let percent = 100.0 * share;
+    let name = name(placement);
+    Some(format!(
+        "f32 misplaces rays so far that \"{name}\" would absorb up to {percent:.1e} % more or less of light"
+    ))
 }
 
 /// How far (m) rays start off surfaces in f32, at most: what tracing reckons for a hit at the edge of the
@@ -64,9 +105,17 @@ fn offset(scene: &Scene) -> f64 {
     roundings(HitPrecision::Single) * (2.0 * farthest + farthest.max(camera))
 }
 
+/// The farthest from the world's origin that rays come from (m).
+fn farthest(scene: &Scene) -> f64 {
+    let bounds = scene.geometry.loose_bounds();
+    let farthest = bounds.min.abs().max(bounds.max.abs()).length();
+    farthest.max(scene.camera.pose().position.length())
+}
+
 /// The extent of the smallest thing and the shortest mean edge of a mesh (m); `None` without any.
 fn smallest(scene: &Scene) -> Option<(f64, f64)> {
-    let sizes = scene.geometry.placements.iter().filter_map(|placement| {
+    let drawn = scene.geometry.placements.iter().filter(|p| scene.geometry.has_area(p));
+    let sizes = drawn.filter_map(|placement| {
         let mesh = scene.geometry.mesh_of(placement);
         let (linear, size) = (&placement.world_from_mesh.linear, mesh.bounds.max - mesh.bounds.min);
         let extent: DVec3 = linear.x_axis.abs() * size.x

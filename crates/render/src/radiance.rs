@@ -39,6 +39,28 @@ impl LightPass<'_> {
         }
     }
 
+    /// Counts what the samples of each pixel bring, that stand side by side.
+    fn count_sparkles(&self, memory: &mut Memory) {
+        let Memory { numbers, values, traffic, .. } = memory;
+        let Some(picture) = self.layers.iter().position(|layer| *layer == LayerSpec::Radiance)
+        else {
+            return;
+        };
+        let [layers, bands] = self.shape();
+        let light = |ray: usize| -> f64 {
+            let start = (ray * layers + picture) * bands;
+            values[start..start + bands].iter().sum()
+        };
+        let pixel = |ray: &usize| numbers.samples[numbers.of_ray[*ray] as usize].0;
+        let rays: Vec<usize> = (0..numbers.of_ray.len()).collect();
+        let mut of_pixel = Vec::new();
+        for run in rays.chunk_by(|a, b| pixel(a) == pixel(b)) {
+            of_pixel.clear();
+            of_pixel.extend(run.iter().map(|&ray| light(ray)));
+            traffic.sparkles.count(&of_pixel);
+        }
+    }
+
     /// Adds up the parts of each ray's light, `[ray][part][band]`, that each layer counts.
     fn gather(&self, parts: &[f64], groups: usize, values: &mut Vec<f64>) {
         let count = self.stage.spectral.count();
@@ -113,6 +135,9 @@ impl Averaged for LightPass<'_> {
         traffic.light += self.tracer.radiance(&self.stage, &beam, scratch, light);
         if parts != Parts::Whole {
             self.gather(light_in_parts, groups, values);
+        }
+        if self.groups.len() == 1 {
+            self.count_sparkles(memory);
         }
     }
 }

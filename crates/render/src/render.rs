@@ -250,7 +250,7 @@ pub fn trace(
             surroundings,
             lights,
             spectral: &spectral,
-            traits: Traits::of(&scene.geometry, &scene.materials),
+            traits: Traits::of(&scene.geometry, &scene.materials, &placed),
             emitters: emitters.as_ref(),
             placed: &placed,
             precision: plan.light_precision,
@@ -280,7 +280,7 @@ pub fn trace(
         sampling: Sampling {
             samples: plan.samples,
             sampler: scene.render.sampler,
-            seed: scene.render.seed,
+            seed: scene.render.frame_seed(),
             shard,
             sets: if rule.is_some() { SETS } else { 1 },
         },
@@ -291,16 +291,22 @@ pub fn trace(
         light,
         picture: &so_far,
         shares: course.shares,
-        keeper: checkpoint.map(|file| Keeper::new(file, &course.identity, shard, resolution)),
+        keeper: checkpoint.map(|file| Keeper::new(file, &course.identity, shard, scene)),
     };
     // What was traced, and what a user should know of it.
     let watcher = Watcher::new(watch, job.rays(&layers));
     let Done { traffic: counts, passed, sums, centres } = job.run(&mut layers, &watcher)?;
-    notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
+    notes.extend(told(&counts, job.keeper.as_ref()));
     let trace_time = start.elapsed() + course.shares.iter().map(FilmFile::trace_time).sum();
     drop(job);
     let camera = Some(camera);
     Ok(Film { layers, resolution, shard, counts, passed, trace_time, sums, centres, notes, camera })
+}
+
+/// What became of samples, and of the file that keeps them.
+fn told(counts: &RayCounts, keeper: Option<&Keeper<'_>>) -> impl Iterator<Item = String> {
+    let sparkles = counts.sparkles.note_in_words().into_iter();
+    sparkles.chain(keeper.and_then(Keeper::fault))
 }
 
 pub(crate) fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, NoMemory> {
@@ -346,7 +352,7 @@ pub fn finish(
     let Film { layers, counts, passed, trace_time, mut notes, camera, .. } = film;
     let Passed { samples, is_complete, counts: sample_counts } = passed;
     let samples_wanted = if is_complete { samples } else { plan.samples };
-    let RayCounts { chief_rays, light, statuses } = counts;
+    let RayCounts { chief_rays, light, statuses, .. } = counts;
     // A lens through which no ray came has no picture.
     if let (true, 0, Some(element)) =
         (statuses.total() > 0, statuses.exited, statuses.farthest_from_sensor())
@@ -362,7 +368,7 @@ pub fn finish(
     if let (Some(camera), Some(accel)) = (&camera, accel)
         && scene.picture == Some(LayerSpec::Radiance)
     {
-        notes.extend(lighting::verdict((camera, accel), &picture));
+        notes.extend(lighting::verdict(scene, accel, camera, &picture));
     }
     notes.extend(names::notes(&picture));
     let rays = chief_rays + light.rays + light.shadow_rays;

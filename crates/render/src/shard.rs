@@ -8,6 +8,7 @@ use std::str::FromStr;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
+use etendue_files::Transaction;
 use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -151,14 +152,14 @@ impl FromStr for Shard {
 }
 
 impl Film {
-    /// Writes it to `path`: which render it is of, and how that was asked for, goes with it.
+    /// Writes it to a file: which render it is of, and how that was asked for, goes with it.
     ///
     /// # Errors
     ///
     /// When the file cannot be written.
     pub fn write(
         &self,
-        path: &Path,
+        to: (&Transaction, &Path),
         identity: &Identity,
         origin: &serde_json::Value,
     ) -> Result<(), OutputError> {
@@ -178,7 +179,7 @@ impl Film {
             trace_time: self.trace_time,
             resolution: self.resolution,
         };
-        writing.write(path, &layers, &sums.iter().map(Vec::as_slice).collect::<Vec<_>>())
+        writing.write(to, &layers, &sums.iter().map(Vec::as_slice).collect::<Vec<_>>())
     }
 
     /// Puts the shares of a render's rows together.

@@ -22,6 +22,7 @@ use crate::passes::{Beside, Passed};
 use crate::radiance::LightPass;
 use crate::samples::{Averaged, Averaging, Memory, Sampling, Sum};
 use crate::shard::put_together;
+use crate::sparkles::Sparkles;
 use crate::watch::{Stopped, Watcher};
 
 /// Side of a tile (pixels): its rays are one batch.
@@ -74,6 +75,8 @@ pub(crate) struct RayCounts {
     pub(crate) light: RayStats,
     /// What became of rays inside the camera's lens.
     pub(crate) statuses: StatusCounts,
+    /// Light that a handful of samples carries, of those that this process traced.
+    pub(crate) sparkles: Sparkles,
 }
 
 impl RayCounts {
@@ -82,6 +85,7 @@ impl RayCounts {
         let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
         all.chief_rays += own.chief_rays;
         all.light += own.light;
+        all.sparkles.merge(&own.sparkles);
         all.statuses.merge(&own.statuses);
         all.statuses.merge(statuses);
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use etendue_camera::SupportFunction;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, Geometry, Placement};
+use etendue_geometry::{AreaTest, Bounds, Geometry, Mesh, Placement};
 use rayon::prelude::*;
 
 /// The tight box around all triangles in world space (m).
@@ -86,9 +86,9 @@ fn farthest(
     const CHUNK: usize = 1 << 15;
     let mesh = geometry.mesh_of(placement);
     let none = || vec![f64::NEG_INFINITY; directions.len()];
-    let chunks = mesh.triangles.par_chunks(CHUNK).map(|triangles| {
+    let chunks = corners_with_area(mesh, placement, CHUNK).map(|corners| {
         let mut most = none();
-        for &corner in triangles.iter().flatten() {
+        for corner in corners {
             let local = mesh.positions.get(corner as usize);
             let point = placement.world_from_mesh.point_from(local, origin);
             for (most, direction) in most.iter_mut().zip(directions) {
@@ -103,15 +103,30 @@ fn farthest(
     })
 }
 
+/// The corners of the triangles that have an area where the mesh is placed, in chunks of so many triangles.
+fn corners_with_area<'a>(
+    mesh: &'a Mesh,
+    placement: &'a Placement,
+    chunk: usize,
+) -> impl ParallelIterator<Item = impl Iterator<Item = u32> + 'a> + 'a {
+    let test = AreaTest::under(mesh, &placement.world_from_mesh.linear);
+    let keeps_all = test.keeps_all();
+    mesh.triangles.par_chunks(chunk).enumerate().map(move |(number, triangles)| {
+        let kept = triangles.iter().enumerate();
+        let kept = kept.filter(move |(k, _)| keeps_all || test.keeps(number * chunk + k));
+        kept.flat_map(|(_, triangle)| *triangle)
+    })
+}
+
 fn exact(geometry: &Geometry, placement: &Placement) -> Bounds {
     const CHUNK: usize = 1 << 16;
     let mesh = geometry.mesh_of(placement);
     if placement.world_from_mesh.is_identity() {
         return mesh.bounds;
     }
-    let boxes = mesh.triangles.par_chunks(CHUNK).map(|triangles| {
+    let boxes = corners_with_area(mesh, placement, CHUNK).map(|corners| {
         let mut bounds = Bounds::EMPTY;
-        for &corner in triangles.iter().flatten() {
+        for corner in corners {
             bounds.include(placement.world_from_mesh.point(mesh.positions.get(corner as usize)));
         }
         bounds
@@ -122,7 +137,7 @@ fn exact(geometry: &Geometry, placement: &Placement) -> Bounds {
 #[cfg(test)]
 mod tests {
     use etendue_geometry::glam::{DMat3, DQuat};
-    use etendue_geometry::{Mesh, Positions, Transform, Vertices};
+    use etendue_geometry::{Positions, Transform, Vertices};
 
     use super::*;
 

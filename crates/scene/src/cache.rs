@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use etendue_camera::Camera;
-use etendue_geometry::files::Stamp;
-use etendue_geometry::{Geometry, Mesh, files};
+use etendue_files::Stamp;
+use etendue_geometry::{Geometry, Mesh};
 use etendue_tracer::Material;
 use xxhash_rust::xxh3::Xxh3Default;
 
@@ -101,6 +101,11 @@ impl Cache {
             ..Import::default()
         };
         self.given.insert(name.to_owned(), Given { import, digest });
+    }
+
+    /// Names and meshes of the models in no file.
+    pub fn meshes(&self) -> impl Iterator<Item = (&str, &Mesh)> {
+        self.given.iter().map(|(name, given)| (name.as_str(), &given.import.meshes[0]))
     }
 
     /// The model in no file that is called so.
@@ -205,7 +210,7 @@ impl Digests {
 /// XXH3-128 of a file, piece by piece: a file that another program cuts meanwhile is none that may be
 /// mapped for it.
 fn read_through(path: &Path) -> io::Result<u128> {
-    let mut file = files::open(path)?;
+    let mut file = etendue_files::open(path)?;
     let mut hash = Xxh3Default::new();
     let mut piece = vec![0; 1 << 20];
     loop {

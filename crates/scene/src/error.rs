@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use etendue_files::FindError;
+
 use crate::ImportError;
 use crate::file::{Origin, OverrideError, Place, nearest};
 use crate::memory::TooMuch;
@@ -134,7 +136,20 @@ pub enum SceneError {
     Stopped,
 }
 
+/// How the reason begins that names a file which is not there.
+pub(crate) const NO_SUCH_FILE: &str = "no such file";
+
 impl SceneError {
+    /// Whether it is for a file that is not there: the scene, or one that the scene names.
+    #[must_use]
+    pub fn is_missing_file(&self) -> bool {
+        match self {
+            Self::Missing { .. } => true,
+            Self::Invalid { reason, .. } => reason.contains(NO_SUCH_FILE),
+            _ => false,
+        }
+    }
+
     /// The error of a file that cannot be opened; with the most similar name when it is missing.
     pub(crate) fn unreadable(file: &Path, source: io::Error) -> Self {
         let file = file.to_owned();
@@ -160,6 +175,15 @@ pub(crate) fn similar_name(file: &Path) -> Option<String> {
         .collect();
     names.sort_unstable();
     nearest(wrong, names.iter().map(String::as_str)).map(str::to_owned)
+}
+
+/// Why a file that a scene names is not opened, with the most similar name when it is missing.
+pub(crate) fn not_found(error: FindError) -> String {
+    let near = match &error {
+        FindError::Missing { path, .. } => similar_name(path),
+        FindError::Refused(_) => None,
+    };
+    format!("{error}{}", did_you_mean(near.as_deref()))
 }
 
 /// `; did you mean …?`

@@ -5,13 +5,14 @@
 
 use std::path::{Path, PathBuf};
 
-use etendue_geometry::{MappedFile, Transform};
+use etendue_files::{InputFolder, MappedFile};
+use etendue_geometry::Transform;
 use rayon::prelude::*;
 
+use crate::error::not_found;
 use crate::file::{InstancesSpec, TransformSpec, join, join_index};
 use crate::memory::has_room;
 use crate::npy;
-use crate::paths::Folder;
 
 /// The copies of an object.
 #[derive(Debug)]
@@ -24,15 +25,18 @@ pub(crate) struct Instances {
 
 impl Instances {
     /// The copies that a scene file asks for. `at` is the JSON path of
-    /// the list; the error is the path of what is wrong, and the reason.
+    /// the list; the error is the path of what is wrong, and the reason. So many copies as `fits` refuses are
+    /// not made.
     pub(crate) fn resolve(
         spec: Option<&InstancesSpec>,
         at: &str,
-        folder: &Folder,
+        folder: &InputFolder,
+        fits: &dyn Fn(u64) -> Result<(), String>,
     ) -> Result<Self, (String, String)> {
         match spec {
             None => Ok(Self { transforms: vec![Transform::IDENTITY], file: None }),
             Some(InstancesSpec::List(list)) => {
+                fits(list.len() as u64).map_err(|why| (at.to_owned(), why))?;
                 let built = list.iter().enumerate().map(|(index, spec)| {
                     spec.build().map_err(|(key, why)| {
                         let at = join_index(at, index);
@@ -43,9 +47,9 @@ impl Instances {
             }
             Some(InstancesSpec::File(written)) => {
                 let fault = |why: String| (at.to_owned(), why);
-                let path = folder.find(written).map_err(fault)?.path;
+                let path = folder.find(written).map_err(|error| fault(not_found(error)))?.path;
                 let transforms =
-                    read(&path).map_err(|why| fault(format!("\"{written}\" {why}")))?;
+                    read(&path, fits).map_err(|why| fault(format!("\"{written}\" {why}")))?;
                 Ok(Self { transforms, file: Some(path) })
             }
         }
@@ -53,13 +57,14 @@ impl Instances {
 }
 
 /// The matrices of an NPY file; the error goes on after the file's name.
-fn read(path: &Path) -> Result<Vec<Transform>, String> {
+fn read(path: &Path, fits: &dyn Fn(u64) -> Result<(), String>) -> Result<Vec<Transform>, String> {
     let map = MappedFile::open(path).map_err(|error| format!("cannot be read: {error}"))?;
     let array = npy::read(map.bytes(), |shape| match shape {
         [_, 3 | 4, 4] => Ok(()),
         other => Err(format!("has the shape {other:?} instead of n × 4 × 4 or n × 3 × 4")),
     })?;
     let [count, rows] = [array.shape[0], array.shape[1]];
+    fits(count as u64)?;
     // They are made side by side with what is wrong with them, and then kept alone.
     if !has_room(2 * count as u64 * size_of::<Transform>() as u64) {
         return Err(format!("holds {count} matrices, and the system has no memory for them"));

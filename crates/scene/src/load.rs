@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::SystemTime;
 
 use etendue_camera::Camera;
+use etendue_files::{InputFolder, Opener};
 use etendue_geometry::{Bounds, Geometry};
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
@@ -20,7 +21,6 @@ use crate::identity::Ingredients;
 use crate::import::{self, Import, ImportedPlacement, Note, NoteKind, Wanted};
 use crate::memory::Budget;
 use crate::parts::{Object, Parts};
-use crate::paths::Folder;
 use crate::scene::{LoadOptions, LoadProgress, Scene};
 use crate::shape::{GoOn, ShapeError, ShapeSpec};
 use crate::{Cache, SceneError, light_notes};
@@ -39,7 +39,7 @@ impl SceneFile {
         let since = SystemTime::now();
         let fresh = Cache::default();
         let kept = options.cache.unwrap_or(&fresh);
-        let folder = Folder::open(self.folder(), options.reach)?;
+        let folder = self.open_folder(&options.opener)?;
         let mut own = self.named_materials(&folder, wanted)?;
         let lights = self.named_lights(&folder, wanted, &mut own.textures)?;
         // What can be checked without the models is; a bad camera need not wait for them.
@@ -50,7 +50,12 @@ impl SceneFile {
             let [width, height] = size;
             self.take(&budget, film, || format!("a picture of {width} x {height} pixels"))?;
         }
-        let mut named = OwnParts { materials: &own.materials, files: Vec::new(), kept };
+        let mut named = OwnParts {
+            materials: &own.materials,
+            files: Vec::new(),
+            kept,
+            budget: options.to_render.then_some(&*budget),
+        };
         let (origins, objects) = self.resolve_objects(&folder, &mut named)?;
         let instance_files = named.files;
         let imports =
@@ -68,7 +73,12 @@ impl SceneFile {
         parts.files = instance_files;
         for (index, object) in objects.iter().enumerate() {
             self.check_overrides(&parts, object, index)?;
-            let bytes = parts.bytes_to_place(object, split_nodes);
+            // The copies are spoken for, as far as each places one mesh.
+            let known = match options.to_render {
+                true => memory::copies(object.world_from_object.len() as u64),
+                false => 0,
+            };
+            let bytes = parts.bytes_to_place(object, split_nodes).saturating_sub(known);
             self.take(&budget, bytes, || format!("placing \"{}\"", object.title))?;
             parts.place(object, split_nodes).map_err(|what| self.too_many(what))?;
         }
@@ -80,9 +90,15 @@ impl SceneFile {
         Ok(scene)
     }
 
+    /// The folder that the scene's paths start at.
+    pub(crate) fn open_folder(&self, opener: &Opener) -> Result<InputFolder, SceneError> {
+        let path = self.folder();
+        opener.folder(path).map_err(|source| SceneError::unreadable(path, source))
+    }
+
     /// The camera as far as it is known without the models: one that frames the scene sees nothing
     /// yet.
-    pub(crate) fn camera_alone(&self, folder: &Folder) -> Result<Camera, SceneError> {
+    pub(crate) fn camera_alone(&self, folder: &InputFolder) -> Result<Camera, SceneError> {
         let files = CameraFiles::new(folder);
         self.camera_spec()
             .build(Bounds::default, &|name| files.find(name))
@@ -111,7 +127,7 @@ impl SceneFile {
         &self,
         origins: &[Origin],
         objects: &[Object],
-        folder: &Folder,
+        folder: &InputFolder,
         wanted: Wanted,
         options: &LoadOptions<'_>,
         (budget, kept): (&Arc<Budget>, &Cache),
@@ -218,7 +234,7 @@ impl SceneFile {
     fn finish(
         &self,
         parts: Parts,
-        folder: &Folder,
+        folder: &InputFolder,
         options: &LoadOptions<'_>,
         kept: &Cache,
         since: SystemTime,
@@ -230,20 +246,16 @@ impl SceneFile {
         let images = parts.textures.iter().filter_map(Texture::file);
         let skies = parts.lights.iter().filter_map(Light::file);
         let others = parts.files.iter();
-        let mut inputs = folder.found();
-        if !self.is_in_memory() {
-            inputs.push(self.path().to_owned());
-        }
         let mut files: Vec<(String, PathBuf)> = opened
             .chain(camera_files.into_iter().map(|(path, _)| path))
-            .chain(images.chain(skies).chain(others).cloned())
+            .chain(images.chain(skies).chain(others).chain(options.also_read).cloned())
             .map(|path| (folder.relative(&path), path))
             .collect();
         files.sort();
         files.dedup();
-        inputs.extend(files.iter().map(|(_, path)| path.clone()));
-        inputs.sort();
-        inputs.dedup();
+        let own = (!self.is_in_memory()).then(|| self.path().to_owned());
+        options.opener.record(own.into_iter().chain(files.iter().map(|(_, path)| path.clone())));
+        let inputs = options.opener.found();
         // What a user should know of it.
         let mut notes = parts.notes;
         notes.extend(self.unused_materials());

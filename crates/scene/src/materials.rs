@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use etendue_files::InputFolder;
 use etendue_optics::glass::GlassSpec;
 use etendue_spectrum::Curve;
 use etendue_tracer::spec::{Fault, Supply};
@@ -10,9 +11,9 @@ use etendue_tracer::{ImageSource, Ior, Light, LightKind, Material, Paint, Textur
 use serde_json::Value;
 
 use crate::SceneError;
+use crate::error::not_found;
 use crate::file::{SceneFile, join, join_index};
 use crate::import::Wanted;
-use crate::paths::Folder;
 use crate::words::plain;
 
 /// The scene's own materials in the order of their names, and the images that they name.
@@ -25,7 +26,7 @@ pub(crate) struct OwnMaterials {
 impl SceneFile {
     pub(crate) fn named_materials(
         &self,
-        folder: &Folder,
+        folder: &InputFolder,
         wanted: Wanted,
     ) -> Result<OwnMaterials, SceneError> {
         let mut own = OwnMaterials::default();
@@ -42,7 +43,7 @@ impl SceneFile {
     /// `textures`.
     pub(crate) fn named_lights(
         &self,
-        folder: &Folder,
+        folder: &InputFolder,
         wanted: Wanted,
         textures: &mut Vec<Texture>,
     ) -> Result<Option<Vec<Light>>, SceneError> {
@@ -70,7 +71,7 @@ fn below(at: &str, key: &str) -> String {
 
 /// The scene's folder and the catalogue of glasses.
 struct Named<'a> {
-    folder: &'a Folder,
+    folder: &'a InputFolder,
     wanted: Wanted,
     textures: &'a mut Vec<Texture>,
 }
@@ -105,7 +106,7 @@ impl Supply for Named<'_> {
     }
 
     fn file(&mut self, written: &str) -> Result<PathBuf, String> {
-        Ok(self.folder.find(written)?.path)
+        Ok(self.folder.find(written).map_err(not_found)?.path)
     }
 
     /// The index of a glass, by the lens files' own words, sampled where bands may be.

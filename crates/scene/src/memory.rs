@@ -158,6 +158,13 @@ impl Budget {
         self.limit.is_some_and(|limit| limit.source == LimitSource::Given)
     }
 
+    /// What is left under the limit (bytes).
+    #[must_use]
+    pub fn left(&self) -> u64 {
+        let limit = self.limit.map_or(u64::MAX, |limit| limit.bytes);
+        limit.saturating_sub(self.taken.load(Ordering::Relaxed))
+    }
+
     /// Speaks for `bytes` before they are taken.
     ///
     /// # Errors

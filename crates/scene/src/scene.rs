@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use etendue_camera::Camera;
+use etendue_files::Opener;
 use etendue_geometry::Geometry;
 use etendue_sensor::Sensor;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
@@ -14,7 +15,6 @@ use crate::file::{PlanSpec, RenderSpec, TracerSpec};
 use crate::identity::Ingredients;
 use crate::ids::{Copies, SceneNode};
 use crate::import::{Note, Strictness};
-use crate::paths::Reach;
 use crate::{CameraOrigin, SceneCamera, SceneError, SceneHash};
 
 /// A scene ready to be rendered.
@@ -73,6 +73,12 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Placements of meshes that are placed twice or more.
+    #[must_use]
+    pub fn placed_copies(&self) -> u64 {
+        self.geometry.uses().into_iter().filter(|&uses| uses > 1).map(u64::from).sum()
+    }
+
     /// The models that have gone, or were cut, written or replaced since loading began: they are used
     /// where they are mapped, so what was rendered may be of their old or their new contents.
     #[must_use]
@@ -115,12 +121,14 @@ pub struct LoadStats {
 }
 
 /// How to load.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Default)]
 pub struct LoadOptions<'a> {
     /// What becomes of defects in the data.
     pub strictness: Strictness,
-    /// Whether files outside the scene's folder may be read.
-    pub reach: Reach,
+    /// Opens what the scene names, where it may be, and records it.
+    pub opener: Opener,
+    /// Files that were read for the scene by other means, such as glass catalogues: its hash sees them.
+    pub also_read: &'a [PathBuf],
     /// A camera of one of the models by name or number, instead of the scene's.
     pub camera: Option<&'a str>,
     /// The most memory that may be taken (bytes); `None` for what the system has free.
@@ -140,7 +148,7 @@ impl std::fmt::Debug for LoadOptions<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("LoadOptions")
             .field("strictness", &self.strictness)
-            .field("reach", &self.reach)
+            .field("opener", &self.opener)
             .field("camera", &self.camera)
             .field("memory_limit", &self.memory_limit)
             .field("to_render", &self.to_render)

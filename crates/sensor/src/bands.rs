@@ -2,17 +2,21 @@
 //!
 //! A render carries a few numbers a ray, and multiplies those of light and surfaces. That loses what
 //! happens within a band: the mean of a product is not the product of the means. How much it loses
-//! can be known beforehand, for light of known spectra, for filters, and for colours: red, green and
-//! blue alone and two of them one behind the other are the worst that can be, and every other colour
-//! is a sum of them. So bands are divided where they lose most until the electrons of every channel
+//! can be known beforehand, for light of known spectra, for filters, for colours and for what bodies
+//! and metals leave of light: red, green and blue alone and two or three of them one behind the other
+//! are the worst that colours can be, and every other colour is a sum of them. So bands are divided where they lose most until the electrons of every channel
 //! agree with an integration in steps of a nanometre at most, and joined again where that does no
 //! harm.
 //!
 //! Electrons count as right within [`TOLERANCE`] of themselves; of colours darker than a tenth of
-//! white, within that of a tenth of white, and behind two pure colours within that of white.
+//! white, within that of a tenth of white, and behind two pure colours within that of white. White is
+//! what bodies and metals on the way leave of it, where that is a fiftieth at least.
 
 mod division;
+mod factor;
 mod nodes;
+
+pub use factor::{Factor, Times};
 
 use etendue_spectrum::{Bands, Curve, Grid, Outside, WeightedBands, rgb};
 
@@ -20,6 +24,7 @@ use crate::response::{Filter, Response, filters, photons_caught, sensitive_range
 use crate::spec::{Radiometry, SensorKind};
 use crate::{Sensor, SensorError};
 use division::Division;
+use factor::{Product, Products};
 use nodes::{Nodes, RunningSums, cell_edges, product};
 
 /// By how much of themselves electrons may differ from an integration in steps of a nanometre.
@@ -30,7 +35,10 @@ const MOST_NUMBERS: usize = 2_000_000;
 
 /// Parts of white: darker light need not be better than this part of it is, behind no colour, one and
 /// two. Two pure colours one behind the other are nearly black, and no surface's.
-const DARK: [f64; 3] = [1.0, 0.1, 1.0];
+const DARK: [f64; 4] = [1.0, 0.1, 1.0, 1.0];
+
+/// The part of white that bodies and metals leave of it, below which their light need not be better.
+const DIM: f64 = 0.02;
 
 /// What the bands of a render have to tell apart.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -40,8 +48,10 @@ pub struct Illumination {
     /// Curves of filters in front of the sensor, each of which may be what light passes.
     pub filters: Vec<Curve>,
     /// How many coloured factors light meets on its way to the sensor: its own colour and those of
-    /// surfaces; more than two count as two.
+    /// surfaces; more than three count as three.
     pub colored: usize,
+    /// Other curves that light may be multiplied by on its way.
+    pub factors: Vec<Factor>,
 }
 
 /// Bands for a sensor, and what they lose.
@@ -52,6 +62,16 @@ pub struct BandChoice {
     /// The worst relative error of any channel's electrons under any light and colour; `None` where
     /// nobody counts photons, or nobody worked it out.
     pub error: Option<f64>,
+    /// Whether all products of the light's curves were tried, or there are too many.
+    pub complete: bool,
+}
+
+impl BandChoice {
+    /// Bands that nobody compared with others.
+    #[must_use]
+    pub fn untried(bands: Bands) -> Self {
+        Self { bands, error: None, complete: true }
+    }
 }
 
 impl Sensor {
@@ -69,7 +89,7 @@ impl Sensor {
         let ideal = matches!(self.response.bands, Bands::Grey | Bands::Rgb);
         let multispectral = spec.kind == SensorKind::Multispectral && spec.bands.is_some();
         if !counts && (ideal || spec.bands.is_some()) {
-            return Ok(BandChoice { bands: self.response.bands.clone(), error: None });
+            return Ok(BandChoice::untried(self.response.bands.clone()));
         }
         // The range in which the sensor sees the light, or the bands that are asked for.
         let filters = filters(spec)?.filters;
@@ -80,13 +100,14 @@ impl Sensor {
         };
         let edges = given.clone().unwrap_or(range.to_vec());
         let Some(table) = BandTable::new(self, &filters, light, range, &edges) else {
-            return Ok(BandChoice { bands: self.response.bands.clone(), error: None });
+            return Ok(BandChoice::untried(self.response.bands.clone()));
         };
         // The bands of ideal filters will do where they count the same electrons.
         if ideal {
             let error = table.error_of(&self.response, &filters, &self.settings.efficiency, light);
             if error <= TOLERANCE {
-                return Ok(BandChoice { bands: self.response.bands.clone(), error: Some(error) });
+                let bands = self.response.bands.clone();
+                return Ok(BandChoice { bands, error: Some(error), complete: table.complete });
             }
         }
         // Otherwise bands are divided until they do.
@@ -94,7 +115,7 @@ impl Sensor {
         let may_divide = given.is_none() || multispectral;
         let division = Division::of(&table);
         let cells = if may_divide { division.divided(&fixed) } else { fixed };
-        let error = Some(division.worst(&cells));
+        let (error, complete) = (Some(division.worst(&cells)), table.complete);
         let edges = cells.iter().map(|&cell| table.edges[cell]).collect();
         let bands = match Grid::from_edges(edges) {
             Ok(grid) => Bands::Weighted(
@@ -102,7 +123,7 @@ impl Sensor {
             ),
             Err(_) => self.response.bands.clone(),
         };
-        Ok(BandChoice { bands, error })
+        Ok(BandChoice { bands, error, complete })
     }
 }
 
@@ -121,12 +142,13 @@ fn lit_range(sensor: Option<[f64; 2]>, light: &Illumination) -> Result<[f64; 2],
     Ok([from, to])
 }
 
-/// A light, a channel, a filter and up to two colours, and the electrons that they really make.
+/// A light, a channel, a filter and a product of colours and other curves, and the electrons that they
+/// really make.
 struct Trial {
     light: usize,
     channel: usize,
     filter: Option<usize>,
-    colors: [Option<usize>; 2],
+    product: Product,
     exact: RunningSums,
     /// What an error is a part of.
     scale: f64,
@@ -146,19 +168,24 @@ struct BandTable {
     primaries: [RunningSums; 3],
     /// Of each filter, likewise.
     filters: Vec<RunningSums>,
+    /// Of each other factor, likewise.
+    factors: Vec<RunningSums>,
     /// Of the mean light by each channel.
     channels: Vec<RunningSums>,
     trials: Vec<Trial>,
+    /// Whether all products are among them.
+    complete: bool,
     sensitivity: Curve,
     mean_light: Curve,
 }
 
-/// Functions at the nodes of a table: of channels, lights, filters and primaries.
-struct Factors<'a> {
+/// Functions at the nodes of a table: of channels, lights, filters, primaries and other factors.
+struct Functions<'a> {
     responses: &'a [Vec<f64>],
     spectra: &'a [Vec<f64>],
     passed: &'a [Vec<f64>],
     primaries: &'a [Vec<f64>; 3],
+    factors: &'a [Vec<f64>],
 }
 
 /// A curve's value, 0 outside of its range.
@@ -178,16 +205,17 @@ impl BandTable {
         let efficiency = &sensor.settings.efficiency;
         let even = [Curve::ONE];
         let spectra = if light.spectra.is_empty() { &even[..] } else { &light.spectra };
+        // A curve that is the same everywhere tells no bands apart.
+        let factors: Vec<&Factor> =
+            light.factors.iter().filter(|factor| factor.curve.as_flat().is_none()).collect();
         let curves: Vec<&Curve> = (spectra.iter().chain(&light.filters))
+            .chain(factors.iter().map(|factor| &factor.curve))
             .chain(filters.iter().filter_map(Filter::curve))
             .chain([efficiency, &rgb::PRIMARIES[0]])
             .collect();
         let edges = cell_edges(&curves, range, fixed);
-        let products = [1, 4, 10][light.colored.min(2)];
-        let trials = spectra.len() * filters.len() * light.filters.len().max(1) * products;
-        if trials * edges.len() > MOST_NUMBERS {
-            return None;
-        }
+        let each = spectra.len() * filters.len() * light.filters.len().max(1);
+        let most = MOST_NUMBERS / (each * edges.len());
         let nodes = Nodes::of(&edges);
         let responses: Vec<Vec<f64>> = filters
             .iter()
@@ -210,33 +238,46 @@ impl BandTable {
         let at_edge = |nm: f64| lights.iter().zip(&scales).map(|(s, k)| k * inside(s, nm)).sum();
         let light_curve = Curve::sampled(edges.iter().map(|&nm| [nm, at_edge(nm)]).collect());
         let weight = product(&[&seen, &mean_light]);
+        let others: Vec<Vec<f64>> =
+            factors.iter().map(|factor| nodes.at(|nm| factor.curve.held(nm))).collect();
+        let left = |factor: usize, power: f64| {
+            let values: Vec<f64> = others[factor].iter().map(|value| value.powf(power)).collect();
+            let total = |sums: RunningSums| sums.last().copied().unwrap_or(0.0);
+            total(nodes.sums(&[&weight, &values])) / total(nodes.sums(&[&weight]))
+        };
+        let times = factors.iter().map(|factor| factor.times).enumerate();
+        let powers: Vec<Vec<f64>> = times.map(|(k, times)| times.powers(|p| left(k, p))).collect();
+        let Products { all: products, complete } = Products::of(light.colored, &powers, most)?;
         let mut table = Self {
             seen: nodes.sums(&[&seen]),
             lights: spectra.iter().map(|s| nodes.sums(&[&seen, s])).collect(),
             weight: nodes.sums(&[&weight]),
             primaries: std::array::from_fn(|k| nodes.sums(&[&weight, &primaries[k]])),
             filters: passed.iter().map(|t| nodes.sums(&[&weight, t])).collect(),
+            factors: others.iter().map(|f| nodes.sums(&[&weight, f])).collect(),
             channels: responses.iter().map(|r| nodes.sums(&[r, &mean_light])).collect(),
             trials: Vec::new(),
+            complete,
             sensitivity: nodes.curve(&seen)?.held_over(range[0], range[1]),
             mean_light: light_curve.ok()?,
             edges,
         };
-        let factors = Factors {
+        let functions = Functions {
             responses: &responses,
             spectra: &spectra,
             passed: &passed,
             primaries: &primaries,
+            factors: &others,
         };
-        table.add_trials(&nodes, factors, light.colored);
+        table.add_trials(&nodes, functions, &products);
         Some(table)
     }
 
     fn add_trials(
         &mut self,
         nodes: &Nodes,
-        Factors { responses, spectra, passed, primaries }: Factors<'_>,
-        colored: usize,
+        Functions { responses, spectra, passed, primaries, factors }: Functions<'_>,
+        products: &[Product],
     ) {
         let filters: Vec<Option<usize>> = match passed.len() {
             0 => vec![None],
@@ -250,20 +291,29 @@ impl BandTable {
                     if let Some(f) = filter {
                         base = product(&[&base, &passed[f]]);
                     }
-                    let white: f64 = nodes.sums(&[&base]).last().copied().unwrap_or(0.0);
-                    // And of surfaces in all products of primary colours; those that are nearly
-                    // black are judged against white.
-                    for colors in products(colored) {
+                    let total = |sums: &RunningSums| sums.last().copied().unwrap_or(0.0);
+                    let white = total(&nodes.sums(&[&base]));
+                    // And of surfaces in all products of curves; those that are nearly black are judged
+                    // against white.
+                    for what in products {
                         let mut values = base.clone();
-                        for k in colors.into_iter().flatten() {
+                        for &(k, power) in &what.factors {
+                            let left = values.iter_mut().zip(&factors[k]);
+                            left.for_each(|(value, factor)| *value *= factor.powf(power));
+                        }
+                        let clear = match what.factors.is_empty() {
+                            true => white,
+                            false => total(&nodes.sums(&[&values])).max(DIM * white),
+                        };
+                        for &k in &what.colors {
                             values = product(&[&values, &primaries[k]]);
                         }
                         let exact = nodes.sums(&[&values]);
-                        let total = exact.last().copied().unwrap_or(0.0);
-                        let pure = colors.into_iter().flatten().count();
-                        let scale = total.max(DARK[pure] * white);
+                        let dark = DARK[what.colors.len()];
+                        let scale = total(&exact).max(dark * clear);
                         if scale > 0.0 {
-                            let trial = Trial { light, channel, filter, colors, exact, scale };
+                            let product = what.clone();
+                            let trial = Trial { light, channel, filter, product, exact, scale };
                             self.trials.push(trial);
                         }
                     }
@@ -285,12 +335,11 @@ impl BandTable {
         let channels: Vec<f64> = self.channels.iter().map(|c| over(c) * seen / weight).collect();
         let lights: Vec<f64> = self.lights.iter().map(share(seen)).collect();
         let filters: Vec<f64> = self.filters.iter().map(share(weight)).collect();
+        let factors: Vec<f64> = self.factors.iter().map(share(weight)).collect();
         let primaries = self.primaries.each_ref().map(share(weight));
         let counted = |trial: &Trial| {
-            let mut counted = channels[trial.channel] * lights[trial.light];
-            for k in trial.colors.into_iter().flatten() {
-                counted *= primaries[k];
-            }
+            let passed = trial.product.of(|k| primaries[k], |k| factors[k]);
+            let counted = channels[trial.channel] * lights[trial.light] * passed;
             counted * trial.filter.map_or(1.0, |filter| filters[filter])
         };
         self.trials.iter().map(|trial| lost(trial, counted(trial))).collect()
@@ -327,34 +376,21 @@ impl BandTable {
         let spectra = if light.spectra.is_empty() { &even[..] } else { &light.spectra };
         let spectra: Vec<_> = spectra.iter().map(|s| in_bands(s, Outside::Zero)).collect();
         let passed: Vec<_> = light.filters.iter().map(|t| in_bands(t, Outside::Held)).collect();
+        let factors = light.factors.iter().filter(|factor| factor.curve.as_flat().is_none());
+        let factors: Vec<_> = factors.map(|f| in_bands(&f.curve, Outside::Held)).collect();
         let colors = bands.from_rgb();
         // The count in these bands against the exact one.
         let off = |trial: &Trial| {
             let counted = |i: usize| {
-                let colors = trial.colors.into_iter().flatten().map(|k| colors[i][k]);
                 let filter = trial.filter.map_or(1.0, |f| passed[f][i]);
-                electrons[trial.channel][i]
-                    * spectra[trial.light][i]
-                    * filter
-                    * colors.product::<f64>()
+                let product = trial.product.of(|k| colors[i][k], |k| factors[k][i]);
+                electrons[trial.channel][i] * spectra[trial.light][i] * filter * product
             };
             let exact = trial.exact.last().copied().unwrap_or(0.0);
             (((0..count).map(counted).sum::<f64>() - exact) / trial.scale).abs()
         };
         self.trials.iter().map(off).fold(0.0, f64::max)
     }
-}
-
-/// The colours that are tried: none, each primary, and each pair of them.
-fn products(colored: usize) -> Vec<[Option<usize>; 2]> {
-    let mut all = vec![[None; 2]];
-    if colored > 0 {
-        all.extend((0..3).map(|k| [Some(k), None]));
-    }
-    if colored > 1 {
-        all.extend((0..3).flat_map(|i| (i..3).map(move |k| [Some(i), Some(k)])));
-    }
-    all
 }
 
 /// The sum of functions times their scales.

@@ -20,7 +20,7 @@
 //! if g counts electrons. With g as a grey value in DN, μₑ = g/K and the variance is K·g, which is what
 //! happens here: the draw is in electrons and K comes after.
 
-use crate::clipping::clipped;
+use crate::moments::PixelLaw;
 use crate::normal::{ln, pair};
 use crate::philox::{PhiloxKey, Site, Stage, unit32, unit52};
 use crate::poisson::{FINISHED_TOGETHER, OpenPixel, PD_FROM, finish, first_try, small_means};
@@ -114,26 +114,33 @@ pub(crate) fn expose(
     convert(chain, mean, out);
 }
 
-/// Mean and variance over frames (DN, DN²) of a block: mean photo-electrons in, mean out. `shared` is
-/// the variance of row and column offsets (e⁻²).
+/// Mean and variance over frames (DN, DN²) of the first `count` pixels of a block: mean photo-electrons
+/// in, mean out. `shared` is the variance of row and column offsets (e⁻²).
 pub(crate) fn moments(
     chain: &Chain,
     shared: f64,
-    place: BlockPlace,
+    (place, count): (BlockPlace, usize),
     mean: &mut BlockValues,
     variance: &mut BlockValues,
 ) {
     let mut offset = [0.0; BLOCK];
-    if chain.has_pattern() {
+    if chain.has_pattern() && chain.noise != NoiseModel::None {
         pattern(chain, place, mean, &mut offset);
     }
     dark_signal(chain.dark, mean);
-    for i in 0..BLOCK {
-        let charge = clipped([mean[i], mean[i]], f64::NEG_INFINITY, chain.full_well);
-        let read = chain.read_noise * chain.read_noise + shared;
-        let level = chain.gain * (charge[0] + offset[i]) + chain.black;
-        let spread = chain.gain * chain.gain * (charge[1] + read) + 1.0 / 12.0;
-        [mean[i], variance[i]] = clipped([level, spread], 0.0, chain.white);
+    let read_noise = (chain.read_noise * chain.read_noise + shared).sqrt();
+    for i in 0..count {
+        let law = PixelLaw {
+            noise: chain.noise,
+            mean: mean[i],
+            full_well: chain.full_well,
+            offset: offset[i],
+            read_noise,
+            gain: chain.gain,
+            black: chain.black,
+            white: chain.white,
+        };
+        [mean[i], variance[i]] = law.moments();
     }
 }
 

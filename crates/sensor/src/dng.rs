@@ -33,7 +33,9 @@ const LINEAR_RAW: u16 = 34_892;
 const D65: u16 = 21;
 
 impl Sensor {
-    /// Writes an image of this sensor, a `raw` one, as DNG. `model` is what the file calls the camera.
+    /// Writes an image of this sensor, a `raw` one, as DNG. `model` is what the file calls the camera,
+    /// `white` what each of [`Self::channels`] makes of a white surface in the scene's light, to any factor
+    /// ([`Self::white_under`], or [`Self::white_response`] for equal energy).
     ///
     /// # Errors
     ///
@@ -42,7 +44,7 @@ impl Sensor {
     pub fn write_dng(
         &self,
         image: &RawImage,
-        model: &str,
+        (model, white): (&str, &[f64]),
         out: impl Write + Seek,
     ) -> Result<(), DngError> {
         if image.depth != 1 {
@@ -89,12 +91,9 @@ impl Sensor {
             directory.write_tag(unknown(33_421), period.as_slice())?;
             directory.write_tag(unknown(33_422), codes)?;
             directory.write_tag(unknown(50_711), 1u16)?;
-            let [matrix, neutral] = self.colour_tags();
+            let matrix = self.colour_matrix();
             directory.write_tag(unknown(50_721), matrix.as_slice())?;
-            let neutral: Vec<Rational> = neutral
-                .iter()
-                .map(|entry| Rational { n: entry.n.unsigned_abs(), d: 10_000 })
-                .collect();
+            let neutral = self.neutral(white);
             directory.write_tag(unknown(50_728), neutral.as_slice())?;
             directory.write_tag(unknown(50_778), D65)?;
         }
@@ -128,21 +127,31 @@ impl Sensor {
         self.saturation_level() as u16
     }
 
-    /// `ColorMatrix1` (XYZ to channels, rows red, green, blue) and `AsShotNeutral`.
-    fn colour_tags(&self) -> [Vec<SRational>; 2] {
-        let names: Vec<&str> = self.channels().collect();
+    /// `ColorMatrix1`: XYZ to channels, rows red, green, blue.
+    fn colour_matrix(&self) -> Vec<SRational> {
         let response = self.response_to_primaries();
-        let of = |name: &str| {
-            let found = names.iter().position(|other| other.eq_ignore_ascii_case(name));
-            found.map_or([0.0; 3], |k| response[k])
-        };
-        let camera: Matrix3 = ["R", "G", "B"].map(of);
+        let camera: Matrix3 = self.of_rgb(|k| response[k]);
         let from_xyz = |row: [f64; 3]| -> [f64; 3] {
             std::array::from_fn(|k| (0..3).map(|i| row[i] * SRGB_FROM_XYZ[i][k]).sum())
         };
-        let matrix = camera.map(from_xyz).into_iter().flatten().map(signed).collect();
-        let neutral = camera.map(|row| signed(row.iter().sum())).into();
-        [matrix, neutral]
+        camera.map(from_xyz).into_iter().flatten().map(signed).collect()
+    }
+
+    /// `AsShotNeutral`: white of each channel, the most of which is 1.
+    fn neutral(&self, white: &[f64]) -> [Rational; 3] {
+        let white = self.of_rgb(|k| white.get(k).copied().unwrap_or(0.0).max(0.0));
+        let most = white.into_iter().fold(0.0, f64::max);
+        // Nothing is divided by a channel that sees none of the light.
+        white.map(|part| rational(if most > 0.0 { (part / most).max(1e-4) } else { 1.0 }))
+    }
+
+    /// What channels red, green and blue have, by the number of each.
+    fn of_rgb<T: Default>(&self, of: impl Fn(usize) -> T) -> [T; 3] {
+        let names: Vec<&str> = self.channels().collect();
+        ["R", "G", "B"].map(|name| {
+            let found = names.iter().position(|other| other.eq_ignore_ascii_case(name));
+            found.map_or_else(T::default, &of)
+        })
     }
 }
 

@@ -59,6 +59,7 @@ pub mod emva;
 mod error;
 mod even_light;
 pub mod film;
+mod moments;
 pub mod noise_floor;
 mod normal;
 mod philox;
@@ -73,7 +74,7 @@ pub mod sensor;
 mod settings;
 pub mod spec;
 
-pub use bands::{BandChoice, Illumination};
+pub use bands::{BandChoice, Factor, Illumination, Times};
 pub use cfa::CfaSpec;
 pub use error::SensorError;
 pub use film::{Exposure, Film, InvalidValues, Moments, RawImage};

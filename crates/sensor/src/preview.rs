@@ -18,6 +18,21 @@ impl Sensor {
         all.into_iter().map(|value| value / most).collect()
     }
 
+    /// What every channel makes of a white surface in light that has these values in the sensor's
+    /// [bands](Self::bands), the most being 1; as [`Self::white_response`] where no channel sees it.
+    #[must_use]
+    pub fn white_under(&self, light: &[f64]) -> Vec<f64> {
+        let seen = |channel: usize| -> f64 {
+            self.electrons_per_unit(channel).iter().zip(light).map(|(e, light)| e * light).sum()
+        };
+        let all: Vec<f64> = (0..self.channels().len()).map(seen).collect();
+        let most = all.iter().copied().fold(0.0, f64::max);
+        match most > 0.0 && most.is_finite() {
+            true => all.into_iter().map(|value| value / most).collect(),
+            false => self.white_response(),
+        }
+    }
+
     /// Factors that make white light equal in all channels, none below 1.
     #[must_use]
     pub fn white_balance(&self) -> Vec<f64> {

@@ -195,33 +195,65 @@ impl Sensor {
     /// counts as 0 (e⁻).
     #[must_use]
     pub fn mean_electrons(&self, film: Film<'_>, exposure: f64) -> f64 {
+        let mean = |channels: &mut dyn ExactSizeIterator<Item = f64>| {
+            let count = channels.len().max(1) as f64;
+            channels.sum::<f64>() / count
+        };
+        let rows = self.rows_of_electrons(film, exposure, mean);
+        let pixels = film.values.len() / self.response.bands.count();
+        rows.map(|row| row.iter().sum::<f64>()).sum::<f64>() / pixels.max(1) as f64
+    }
+
+    /// Photo-electrons that the brightest `share` (0 to 1) of the pixels reach or pass in their brightest
+    /// channel; what of the film is no light counts as 0 (e⁻).
+    #[must_use]
+    pub fn electrons_of_brightest(&self, film: Film<'_>, exposure: f64, share: f64) -> f64 {
+        let most = |channels: &mut dyn ExactSizeIterator<Item = f64>| channels.fold(0.0, f64::max);
+        let rows = self.rows_of_electrons(film, exposure, most);
+        let mut electrons: Vec<f64> = rows.flatten().collect();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share of it"
+        )]
+        let place = (share.clamp(0.0, 1.0) * electrons.len() as f64) as usize;
+        let place = place.min(electrons.len().saturating_sub(1));
+        match electrons.is_empty() {
+            true => 0.0,
+            false => *electrons.select_nth_unstable_by(place, |a, b| b.total_cmp(a)).1,
+        }
+    }
+
+    /// Photo-electrons of the pixels, row by row; `of_pixel` makes one number of its channels.
+    fn rows_of_electrons<'a>(
+        &'a self,
+        film: Film<'a>,
+        exposure: f64,
+        of_pixel: impl Fn(&mut dyn ExactSizeIterator<Item = f64>) -> f64 + Sync + Send + 'a,
+    ) -> impl ParallelIterator<Item = Vec<f64>> + 'a {
         let bands = self.response.bands.count();
         let [width, _] = self.settings.resolution.map(|side| side as usize);
         let factor = match self.settings.radiometry {
             Radiometry::Digital => 1.0,
             Radiometry::Physical => exposure,
         };
-        let rows = film.values.par_chunks(width.max(1) * bands);
-        let row = |(row, values): (usize, &[f32])| -> f64 {
+        let electrons = move |channel: usize, light: &[f32]| -> f64 {
+            let electrons = self.electrons_per_unit(channel).iter().zip(light);
+            let seen = electrons.filter(|(_, value)| **value > 0.0 && value.is_finite());
+            factor * seen.map(|(e, value)| e * f64::from(*value)).sum::<f64>()
+        };
+        let rows = film.values.par_chunks(width.max(1) * bands).enumerate();
+        rows.map(move |(row, values)| {
             let pixels = values.chunks_exact(bands).enumerate();
-            let pixel = |(column, light): (usize, &[f32])| -> f64 {
-                let electrons = |channel: usize| -> f64 {
-                    let electrons = self.electrons_per_unit(channel).iter().zip(light);
-                    let seen = electrons.filter(|(_, value)| **value > 0.0 && value.is_finite());
-                    seen.map(|(e, value)| e * f64::from(*value)).sum()
-                };
-                match &self.response.pattern {
-                    Some(_) => electrons(self.channel_at(row, column)),
-                    None => {
-                        let channels = self.response.channels.len();
-                        (0..channels).map(electrons).sum::<f64>() / channels as f64
-                    }
+            let pixel = |(column, light): (usize, &[f32])| match &self.response.pattern {
+                Some(_) => electrons(self.channel_at(row, column), light),
+                None => {
+                    let channels = 0..self.response.channels.len();
+                    of_pixel(&mut channels.map(|channel| electrons(channel, light)))
                 }
             };
-            pixels.map(pixel).sum()
-        };
-        let pixels = film.values.len() / bands;
-        factor * rows.enumerate().map(row).sum::<f64>() / pixels.max(1) as f64
+            pixels.map(pixel).collect()
+        })
     }
 
     /// Temporal dark noise: of the read-out, and of the dark current in an exposure of `exposure`
@@ -288,8 +320,8 @@ impl Sensor {
     }
 
     /// The expected value and the variance of every pixel over frames of this very sensor, fixed
-    /// pattern included. Clipping by well and converter is that of normal distributions; rounding
-    /// adds 1/12 DN².
+    /// pattern included: of the law that [`Self::expose`] draws from, with the well, the rounding and
+    /// both ends of the converter in it. Row and column offsets count as each pixel's own.
     ///
     /// # Errors
     ///
@@ -390,7 +422,7 @@ impl<'a> Exposing<'a> {
         let shared = s.row_noise * s.row_noise + s.column_noise * s.column_noise;
         let mut variance = [0.0; BLOCK];
         self.blocks(row, |place, start, channel, count, mean| {
-            chain::moments(&self.chain, shared, place, mean, &mut variance);
+            chain::moments(&self.chain, shared, (place, count), mean, &mut variance);
             let at = start * depth + channel;
             #[expect(clippy::cast_possible_truncation, reason = "DN need not more than f32")]
             for i in 0..count {

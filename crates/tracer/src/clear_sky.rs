@@ -4,11 +4,11 @@
 //!
 //! # Sources
 //!
-//! * The dome: Hosek and Wilkie, "An Analytic Model for Full Spectral Sky-Dome Radiance", SIGGRAPH 2012, by the
-//!   crate `hw-skymodel`, in f32. Its red, green and blue are linear sRGB of ∫ L(λ) ȳ(λ) dλ.
-//! * The sun and what passes the air: Preetham, Shirley and Smits, "A Practical Analytic Model for Daylight",
-//!   SIGGRAPH 1999, appendix 1 and table 2: Rayleigh's scattering, Ångström's turbidity and ozone. Water
-//!   vapour and oxygen absorb beyond 689 nm, where hardly anything is seen, and are left out.
+//! * The dome: Hosek and Wilkie, "An Analytic Model for Full Spectral Sky-Dome Radiance", SIGGRAPH 2012: in red,
+//!   green and blue by the crate `hw-skymodel`, in f32, as linear sRGB of ∫ L(λ) ȳ(λ) dλ; in other bands by
+//!   the authors' eleven wavelengths, 320 to 720 nm, between which lie straight lines.
+//! * The sun: the same authors' solar radiance (2013) at the same wavelengths.
+//! * From 720 to 780 nm the light of 720 nm is held; beyond, the model is dark.
 //! * Below the horizon lies the ground: a Lambert plane under that sky and sun.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -17,6 +17,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{Curve, rgb};
 use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
 
+use crate::spectral_sky::{self, SpectralSky, Spectrum};
 use crate::{Color, EnvironmentMap};
 
 /// Angular diameter of the sun (degrees): the mean over the year.
@@ -31,31 +32,11 @@ const EQUAL_ENERGY: Color = [1.2048, 0.9484, 0.9087];
 /// Columns and rows of the tabulated sky.
 const SIZE: [usize; 2] = [1024, 512];
 
-/// Wavelengths of [`SUN`] and [`OZONE`] (nm): the first, and the step to the next.
-const WAVELENGTHS: [u32; 2] = [380, 10];
-
-/// Radiance of the sun outside of the air (100 W/(m² sr nm)).
-const SUN: [f64; 38] = [
-    165.5, 162.3, 211.2, 258.8, 258.2, 242.3, 267.6, 296.6, 305.4, 300.6, 306.6, 288.3, 287.1,
-    278.2, 271.0, 272.3, 263.6, 255.0, 250.6, 253.1, 253.5, 251.3, 246.3, 241.7, 236.8, 232.1,
-    228.2, 223.4, 219.7, 215.3, 211.0, 207.3, 202.4, 198.7, 194.3, 190.7, 186.3, 182.6,
-];
-
-/// What ozone absorbs (1/cm).
-const OZONE: [f64; 38] = [
-    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.003, 0.006, 0.009, 0.014, 0.021, 0.030, 0.040, 0.048,
-    0.063, 0.075, 0.085, 0.103, 0.120, 0.120, 0.115, 0.125, 0.120, 0.105, 0.090, 0.079, 0.067,
-    0.057, 0.048, 0.036, 0.028, 0.023, 0.018, 0.014, 0.011, 0.010, 0.009,
-];
-
-/// Ozone above each place (cm).
-const OZONE_DEPTH: f64 = 0.35;
-
 /// A clear sky whose sun stands over −Z, with +Y up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClearSky {
     dome: SkyState,
-    turbidity: f64,
+    spectra: SpectralSky,
     /// rad.
     elevation: f64,
     ground_albedo: f64,
@@ -78,7 +59,10 @@ impl ClearSky {
         };
         let dome = SkyState::new(&params).ok()?;
         let known = (0.0..=FRAC_PI_2).contains(&elevation);
-        known.then_some(Self { dome, turbidity, elevation, ground_albedo, sunlit })
+        known.then(|| {
+            let spectra = SpectralSky::new(turbidity, elevation, ground_albedo);
+            Self { dome, spectra, elevation, ground_albedo, sunlit }
+        })
     }
 
     /// Whether the sun shines beside the dome.
@@ -110,36 +94,80 @@ impl ClearSky {
     /// Irradiance of the sun on a surface that faces it, W/(m² nm); 0 where it is hidden.
     #[must_use]
     pub fn sun(&self) -> Color {
-        if !self.sunlit {
-            return [0.0; 3];
-        }
-        let solid_angle = TAU * (1.0 - (0.5 * SUN_DIAMETER).to_radians().cos());
-        let arriving = (0..).zip(SUN.iter().zip(&OZONE)).map(|(step, (sun, ozone))| {
-            let nm = f64::from(WAVELENGTHS[0] + step * WAVELENGTHS[1]);
-            [nm, 100.0 * sun * solid_angle * self.passed(nm, *ozone)]
-        });
-        Curve::sampled(arriving.collect())
-            .map_or([0.0; 3], |spectrum| rgb::colour(&spectrum).map(|part| part.max(0.0)))
+        rgb::colour(&self.sun_spectrum()).map(|part| part.max(0.0))
     }
 
-    /// Share of the sun's light of a wavelength (nm) that passes the air, where ozone absorbs that much
-    /// (1/cm).
-    fn passed(&self, nm: f64, ozone: f64) -> f64 {
-        let um = 1e-3 * nm;
-        let beside_zenith = 90.0 - self.elevation.to_degrees();
-        // Of the air straight up.
-        let mass = 1.0 / (self.elevation.sin() + 0.15 * (93.885 - beside_zenith).powf(-1.253));
-        let rayleigh = 0.008_735 * um.powf(-4.08);
-        let aerosols = (0.046_08 * self.turbidity - 0.045_86) * um.powf(-1.3);
-        (-mass * (rayleigh + aerosols + ozone * OZONE_DEPTH)).exp()
-    }
-
-    /// All directions as an image: the dome, and below the horizon the ground as that dome and the sun light it.
+    /// The same as a curve: straight lines between the authors' wavelengths.
     #[must_use]
-    pub fn map(&self) -> EnvironmentMap {
+    pub fn sun_spectrum(&self) -> Curve {
+        spectral_sky::curve(&self.sun_at_wavelengths())
+    }
+
+    fn sun_at_wavelengths(&self) -> Spectrum {
+        match self.sunlit {
+            true => self.spectra.irradiance(spectral_sky::solid_angle(SUN_DIAMETER)),
+            false => [0.0; spectral_sky::COUNT],
+        }
+    }
+
+    /// The spectrum of the dome in a unit direction, W/(m² sr nm); 0 below the horizon.
+    #[must_use]
+    pub fn dome_spectrum(&self, toward: DVec3) -> Curve {
+        spectral_sky::curve(&self.dome_at_wavelengths(toward))
+    }
+
+    fn dome_at_wavelengths(&self, toward: DVec3) -> Spectrum {
+        if toward.y < 0.0 {
+            return [0.0; spectral_sky::COUNT];
+        }
+        let beside_sun = toward.dot(self.toward_sun()).clamp(-1.0, 1.0).acos();
+        self.spectra.dome(toward.y.min(1.0), beside_sun)
+    }
+
+    /// Spectra that stand for all of the sky: of the zenith, over the sun and across from it, at the horizon below
+    /// each, and of the sun itself where it shines.
+    #[must_use]
+    pub fn typical_spectra(&self) -> Vec<Curve> {
+        let places = [
+            [0.0, 1.0, 0.0],
+            [0.0, 1.0, -1.0],
+            [0.0, 1.0, 1.0],
+            [0.0, 0.05, -1.0],
+            [0.0, 0.05, 1.0],
+        ];
+        let dome = places.map(|place| self.dome_spectrum(DVec3::from(place).normalize()));
+        dome.into_iter().chain(self.sunlit.then(|| self.sun_spectrum())).collect()
+    }
+
+    /// Where the authors' wavelengths end (nm).
+    #[must_use]
+    pub fn last_wavelength() -> f64 {
+        spectral_sky::last_wavelength()
+    }
+
+    /// All directions as an image: the dome, and below the horizon the ground as that dome and the sun light it; where
+    /// it is to be `spectral`, at the authors' wavelengths besides.
+    #[must_use]
+    pub fn map(&self, spectral: bool) -> EnvironmentMap {
+        let colors = self.texels(|toward| self.dome(toward), self.sun());
+        let map = EnvironmentMap::new(SIZE, colors);
+        match spectral {
+            true => map.with_spectra(
+                self.texels(|toward| self.dome_at_wavelengths(toward), self.sun_at_wavelengths()),
+            ),
+            false => map,
+        }
+    }
+
+    /// The texels of the map of a dome and of the irradiance of its sun, row by row from the top.
+    fn texels<const N: usize>(
+        &self,
+        dome: impl Fn(DVec3) -> [f64; N],
+        sun: [f64; N],
+    ) -> Vec<[f32; N]> {
         let [width, height] = SIZE;
-        let mut texels = vec![[0.0_f32; 3]; width * height];
-        let mut falling = self.sun().map(|part| part * self.elevation.sin());
+        let mut texels = vec![[0.0_f32; N]; width * height];
+        let mut falling = sun.map(|part| part * self.elevation.sin());
         for (y, row) in texels.chunks_mut(width).take(height / 2).enumerate() {
             let (sin, cos) = (PI * (y as f64 + 0.5) / height as f64).sin_cos();
             // Solid angle of a texel, times the cosine on the ground.
@@ -148,7 +176,7 @@ impl ClearSky {
             for (x, (own, mirrored)) in left.iter_mut().zip(right.iter_mut().rev()).enumerate() {
                 let azimuth = TAU * ((x as f64 + 0.5) / width as f64 - 0.5);
                 let toward = DVec3::new(sin * azimuth.sin(), cos, -sin * azimuth.cos());
-                let radiance = self.dome(toward);
+                let radiance = dome(toward);
                 falling.iter_mut().zip(radiance).for_each(|(sum, l)| *sum += 2.0 * weight * l);
                 *own = single(radiance);
                 *mirrored = *own;
@@ -156,16 +184,19 @@ impl ClearSky {
         }
         let ground = single(falling.map(|part| self.ground_albedo * part / PI));
         texels[width * height / 2..].fill(ground);
-        EnvironmentMap::new(SIZE, texels)
+        texels
     }
 
     /// Bytes of the [`Self::map`], with the table that directions are chosen by.
-    pub const MAP_BYTES: u64 =
-        (SIZE[0] * SIZE[1] * (size_of::<[f32; 3]>() + 2 * size_of::<f64>())) as u64;
+    #[must_use]
+    pub fn map_bytes(spectral: bool) -> u64 {
+        let spectra = if spectral { size_of::<[f32; spectral_sky::COUNT]>() } else { 0 };
+        (SIZE[0] * SIZE[1] * (size_of::<[f32; 3]>() + 2 * size_of::<f64>() + spectra)) as u64
+    }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "radiance is kept as f32")]
-fn single(color: Color) -> [f32; 3] {
+fn single<const N: usize>(color: [f64; N]) -> [f32; N] {
     color.map(|part| part as f32)
 }
 
@@ -205,38 +236,71 @@ mod tests {
         }
     }
 
-    /// Direct normal irradiance at 550 nm by the same source's formulas, worked out by hand for turbidity 2 and the sun
-    /// in the zenith: m = 1/(1 + 0.15 · 93.885^−1.253), optical depths of 0.10013, 0.10072 and 0.02975.
+    /// Radiance of Mitsuba 3.9.1's emitter `sunsky` (`scalar_spectral`, `sun_scale` 0) at 320, 400, 480, 560, 600, 640
+    /// and 680 nm and just below 720 nm, W/(m² sr nm), at angles beside the zenith and azimuths beside the sun.
     #[test]
-    fn the_sun_is_weakened_by_the_air() {
-        let passed = sky(2.0, 90.0, 0.2).passed(550.0, 0.085);
-        assert!((passed - 0.7942).abs() < 2e-4, "{passed}");
+    #[rustfmt::skip]
+    fn the_dome_has_the_authors_spectrum() {
+        let known = [
+            ((3.0, 0.2, 45.0), (0.0, 0.0), [0.0424873, 0.0888217, 0.0709702, 0.0349222, 0.0275997, 0.02083, 0.0160798, 0.0126169]),
+            ((3.0, 0.2, 40.0), (30.0, 0.0), [0.047073, 0.120555, 0.12089, 0.0750203, 0.0639961, 0.0533832, 0.0438048, 0.0362185]),
+            ((2.5, 0.3, 30.0), (80.0, 180.0), [0.0326638, 0.171678, 0.224539, 0.13822, 0.113213, 0.0859318, 0.0658299, 0.0512748]),
+            ((6.5, 0.5, 10.0), (89.0, 45.0), [0.00370256, 0.0390157, 0.114834, 0.138611, 0.152313, 0.150872, 0.148055, 0.140461]),
+            ((1.0, 0.0, 85.0), (60.0, 90.0), [0.0574784, 0.120835, 0.104036, 0.0520721, 0.0379013, 0.0268606, 0.0201439, 0.0151135]),
+        ];
+        let wavelengths = [320.0, 400.0, 480.0, 560.0, 600.0, 640.0, 680.0, 719.99];
+        for ((turbidity, albedo, elevation), (zenith, azimuth), radiance) in known {
+            let [zenith, azimuth]: [f64; 2] = [zenith, azimuth].map(f64::to_radians);
+            let (sin, cos) = f64::sin_cos(zenith);
+            let toward = DVec3::new(sin * azimuth.sin(), cos, -sin * azimuth.cos());
+            let spectrum = sky(turbidity, elevation, albedo).dome_spectrum(toward);
+            for (nm, known) in wavelengths.into_iter().zip(radiance) {
+                let found = spectrum.at(nm).unwrap();
+                // Both have the authors' numbers in f32, Mitsuba also its arithmetic; six digits are given.
+                assert!((found / known - 1.0).abs() < 1e-4, "{turbidity} {nm} nm: {found} {known}");
+            }
+        }
     }
 
-    /// The sun's light outside of the air is 1.83 to 1.87 W/(m² nm) at 550 nm (ASTM E490-00a: 1.863), the source's
-    /// 7 % less. Through clear air (turbidity 3, 40°) Mitsuba 3.9.1's sun, whose radiance in its middle is 17 150 in
-    /// green, gives 1.18 where limbs are as bright as the middle and about 0.95 by their darkening: the
-    /// models differ, so 25 % are allowed.
+    /// Irradiance of Mitsuba 3.9.1's sun (its table `sun_irradiance` at turbidity 1 and 3, 90 degrees, W/(m² nm)) from 320
+    /// to 720 nm, whose disk is 0.5358 degrees across. It was added up over the disk; at its middle's
+    /// elevation the sun is 0.4 % brighter.
     #[test]
-    fn the_sun_is_as_bright_as_another_renderers() {
-        let [red, green, blue] = sky(3.0, 40.0, 0.2).sun();
-        assert!((0.75..1.25).contains(&(green / 1.07)), "{green}");
-        assert!(red > blue && green > blue, "{red} {green} {blue}");
-        // Lower, in haze, it is dimmer and redder.
-        let [low, _, low_blue] = sky(6.0, 10.0, 0.2).sun();
+    #[rustfmt::skip]
+    fn the_sun_is_the_authors() {
+        let known = [
+            (1.0, [0.11464836, 0.30995774, 0.66303444, 1.0072057, 1.301352, 1.2821264, 1.2463815, 1.2848122, 1.226811, 1.1687655, 1.1024727]),
+            (3.0, [0.11247962, 0.30375895, 0.64776254, 0.9817648, 1.2668521, 1.247739, 1.213383, 1.2524931, 1.1969218, 1.1419419, 1.0786877]),
+        ];
+        for (turbidity, known) in known {
+            let found = sky(turbidity, 90.0, 0.2).sun_spectrum();
+            let as_large = (0.5358_f64 / SUN_DIAMETER).powi(2);
+            for (k, known) in known.into_iter().enumerate() {
+                let found = found.at(320.0 + 40.0 * k as f64).unwrap() * as_large;
+                assert!((found / known - 1.0).abs() < 6e-3, "{turbidity} {k}: {found} {known}");
+            }
+        }
+        // Lower, in haze, it is dimmer and redder; hidden it is dark.
+        let ([red, _, blue], [low, _, low_blue]) = (sky(3.0, 40.0, 0.2).sun(), sky(6.0, 10.0, 0.2).sun());
         assert!(low < red && low_blue / low < 0.5 * blue / red);
+        assert_eq!(ClearSky::new(3.0, 40.0, 0.2, false).unwrap().sun(), [0.0; 3]);
     }
 
     #[test]
     fn the_map_has_the_dome_and_the_ground() {
         let sky = sky(3.0, 40.0, 0.3);
-        let map = sky.map();
+        let map = sky.map(true);
         for toward in
             [DVec3::new(0.3, 0.8, -0.5), DVec3::new(-0.7, 0.2, 0.3), DVec3::new(0.1, 0.9, 0.2)]
         {
             let toward = toward.normalize();
             let (found, known) = (map.radiance(toward), sky.dome(toward));
             for k in 0..3 {
+                assert!((found[k] / known[k] - 1.0).abs() < 1e-3, "{found:?} {known:?}");
+            }
+            let found = map.spectrum_at(crate::environment::place(toward)).unwrap();
+            let known = sky.dome_at_wavelengths(toward);
+            for k in 0..spectral_sky::COUNT {
                 assert!((found[k] / known[k] - 1.0).abs() < 1e-3, "{found:?} {known:?}");
             }
         }

@@ -12,6 +12,7 @@ use etendue_image::Limits;
 use crate::Color;
 use crate::sampling::{GridCell, GridDistribution, ONE_BELOW, linear_place};
 use crate::spec::BRIGHTEST;
+use crate::spectral_sky::{self, Spectrum};
 use crate::texture::{ImageError, read_file, read_image};
 
 /// The most cells of the grid that directions are chosen on, across and down.
@@ -24,6 +25,8 @@ pub struct EnvironmentMap {
     height: usize,
     /// Linear RGB, row 0 at the top.
     texels: Vec<[f32; 3]>,
+    /// The same at the wavelengths of a clear sky; empty where the map has colours alone.
+    spectra: Vec<[f32; spectral_sky::COUNT]>,
     /// Texels that were not finite, below zero or above [`BRIGHTEST`], and count as black.
     pub dropped: u64,
 }
@@ -59,7 +62,15 @@ impl EnvironmentMap {
                 dropped += 1;
             }
         }
-        Self { width, height, texels, dropped }
+        Self { width, height, texels, spectra: Vec::new(), dropped }
+    }
+
+    /// The same with the spectra of a clear sky, as many as there are texels.
+    pub(crate) fn with_spectra(mut self, spectra: Vec<[f32; spectral_sky::COUNT]>) -> Self {
+        if spectra.len() == self.texels.len() {
+            self.spectra = spectra;
+        }
+        self
     }
 
     /// What lights a model that brings no light of its own: a bright grey sky, a darker floor, and a
@@ -85,7 +96,7 @@ impl EnvironmentMap {
     /// Bytes of the texels.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        self.texels.len() * size_of::<[f32; 3]>()
+        size_of_val(&*self.texels) + size_of_val(&*self.spectra)
     }
 
     /// Columns and rows.
@@ -101,15 +112,26 @@ impl EnvironmentMap {
     }
 
     /// Radiance at a [`place`].
-    pub(crate) fn radiance_at(&self, [u, v]: [f64; 2]) -> Color {
-        if self.texels.is_empty() {
-            return [0.0; 3];
+    pub(crate) fn radiance_at(&self, at: [f64; 2]) -> Color {
+        self.interpolated(&self.texels, at)
+    }
+
+    /// Radiance at a [`place`] and the wavelengths of a clear sky, where the map has them.
+    pub(crate) fn spectrum_at(&self, at: [f64; 2]) -> Option<Spectrum> {
+        (!self.spectra.is_empty()).then(|| self.interpolated(&self.spectra, at))
+    }
+
+    /// Values of texels at a [`place`].
+    fn interpolated<const N: usize>(&self, texels: &[[f32; N]], [u, v]: [f64; 2]) -> [f64; N] {
+        if texels.is_empty() {
+            return [0.0; N];
         }
         let (x, y) = (u * self.width as f64 - 0.5, v * self.height as f64 - 0.5);
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
-        let [a, b] = [self.texel(x0, y0), self.texel(x0 + 1.0, y0)];
-        let [c, d] = [self.texel(x0, y0 + 1.0), self.texel(x0 + 1.0, y0 + 1.0)];
+        let texel = |x: f64, y: f64| &texels[self.number(x, y)];
+        let [a, b] = [texel(x0, y0), texel(x0 + 1.0, y0)];
+        let [c, d] = [texel(x0, y0 + 1.0), texel(x0 + 1.0, y0 + 1.0)];
         std::array::from_fn(|k| {
             let top = f64::from(a[k]) * (1.0 - fx) + f64::from(b[k]) * fx;
             let bottom = f64::from(c[k]) * (1.0 - fx) + f64::from(d[k]) * fx;
@@ -117,15 +139,15 @@ impl EnvironmentMap {
         })
     }
 
-    /// The texel of a column from −1 to the width, around, and of a row, of which there are no more above
-    /// the first and below the last.
+    /// The number of the texel of a column from −1 to the width, around, and of a row, of which there are no more
+    /// above the first and below the last.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "wrapped, clamped")]
-    fn texel(&self, x: f64, y: f64) -> [f32; 3] {
+    fn number(&self, x: f64, y: f64) -> usize {
         let width = self.width as f64;
         let around = if x < 0.0 { x + width } else { x };
         let column = if around >= width { around - width } else { around } as usize;
         let row = y.clamp(0.0, (self.height - 1) as f64) as usize;
-        self.texels[row * self.width + column.min(self.width - 1)]
+        row * self.width + column.min(self.width - 1)
     }
 }
 

@@ -6,7 +6,6 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::path::{Path, PathBuf};
 
-use etendue_geometry::files;
 use etendue_geometry::glam::{DMat3, DVec3};
 
 use crate::spec::BRIGHTEST;
@@ -64,8 +63,8 @@ impl Photometry {
     ///
     /// A sentence on why it cannot be read.
     pub fn read(path: &Path) -> Result<Self, String> {
-        let bytes =
-            files::read(path, LONGEST).map_err(|error| format!("cannot be read: {error}"))?;
+        let bytes = etendue_files::read(path, LONGEST)
+            .map_err(|error| format!("cannot be read: {error}"))?;
         Self::parse(&String::from_utf8_lossy(&bytes))
     }
 

@@ -22,6 +22,7 @@
 //! | [`transport`] | batches of paths, and the rules of each tracer of light |
 //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
+mod bodies;
 pub mod bsdf;
 pub mod clear_sky;
 pub mod emitters;
@@ -46,6 +47,7 @@ mod sky;
 pub mod spawn;
 pub mod spec;
 pub mod spectral;
+mod spectral_sky;
 mod surface;
 mod target;
 pub mod texture;

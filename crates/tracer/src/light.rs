@@ -1,10 +1,11 @@
 //! A light of the scene, beside its emissive surfaces: where it is, and what it sends.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
 
 use etendue_geometry::Bounds;
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_spectrum::Illuminant;
+use etendue_spectrum::{Curve, Illuminant};
 
 use crate::goniometric::Goniometric;
 use crate::light_tree::Cluster;
@@ -22,6 +23,8 @@ pub struct Light {
     pub color: Color,
     /// The spectrum that the colour multiplies; equal energy when absent.
     pub illuminant: Option<Illuminant>,
+    /// What it sends as a curve, which takes the place of colour and illuminant in bands of wavelengths.
+    pub spectrum: Option<Arc<Curve>>,
     /// The group that it is of, if it names one.
     pub group: Option<LightGroup>,
 }
@@ -36,6 +39,7 @@ impl Light {
         },
         color: [1.0; 3],
         illuminant: None,
+        spectrum: None,
         group: None,
     };
 
@@ -151,6 +155,21 @@ pub enum EnvironmentImage {
     ClearSky(Box<ClearSky>),
     /// A file.
     File(std::path::PathBuf),
+}
+
+impl EnvironmentImage {
+    /// That of a light, of an environment.
+    #[must_use]
+    pub fn of(light: &Light) -> Option<&Self> {
+        match &light.kind {
+            LightKind::Environment { image, .. } => Some(image),
+            LightKind::Point(_)
+            | LightKind::Spot { .. }
+            | LightKind::Directional { .. }
+            | LightKind::Projector(_)
+            | LightKind::Goniometric(_) => None,
+        }
+    }
 }
 
 /// glTF's fall-off between a spot light's cones (`KHR_lights_punctual`): the square of the share.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
-use etendue_spectrum::NoOverlap;
+use etendue_spectrum::{NoOverlap, Outside};
 
 use crate::environment::EnvironmentMap;
 use crate::group::Groups;
@@ -62,8 +62,11 @@ impl Lights {
                 let tint = spectral.illuminant(illuminant)?;
                 bands.iter_mut().zip(&tint).for_each(|(band, tint)| *band *= tint);
             }
+            if let Some(spectrum) = light.spectrum.as_ref().filter(|_| !spectral.is_rgb()) {
+                bands.copy_from_slice(&spectral.bands().from_curve(spectrum, Outside::Zero)?);
+            }
         }
-        let sky = Sky::of(lights, map);
+        let sky = Sky::of(lights, map, spectral)?;
         let candidate = |light: &Light| match light.kind.cluster(light.intensity(), around) {
             Some(cluster) => Candidate::near(power(light, around), cluster),
             None => Candidate::Far { irradiance: irradiance(light, sky.as_ref()) },

@@ -1,9 +1,10 @@
 //! What there is to know of each placement before any ray meets it: worked out once, looked up at each
 //! hit.
 
-use etendue_geometry::Geometry;
 use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{Coplanar, Geometry};
 
+use crate::bodies::{Body, bodies};
 use crate::scattering::Absorption;
 use crate::spawn::magnitudes;
 use crate::{Color, Material, Paint, Scattering};
@@ -13,6 +14,8 @@ use crate::{Color, Material, Paint, Scattering};
 pub struct PlacedSurfaces {
     /// `None` for a placement whose material there is none of.
     all: Vec<Option<PlacedSurface>>,
+    /// The boundaries of bodies that lie over one another.
+    pub(crate) touching: Coplanar,
 }
 
 /// A placement as light meets it.
@@ -34,15 +37,25 @@ pub(crate) struct PlacedSurface {
     pub(crate) is_tilted: bool,
     /// What the body behind its front takes from light.
     pub(crate) absorption: Option<Absorption>,
+    /// The body that it encloses, of glass that is closed.
+    pub(crate) body: Option<Body>,
     /// Its colour, where that is alike all over.
     pub(crate) color: Option<Color>,
+}
+
+impl PlacedSurface {
+    /// Whether rays may pass it as if it were not there.
+    pub(crate) fn may_vanish(&self) -> bool {
+        self.has_alpha || self.body.is_some_and(|body| body.may_vanish)
+    }
 }
 
 impl PlacedSurfaces {
     /// Those of a scene.
     #[must_use]
     pub fn of(geometry: &Geometry, materials: &[Material]) -> Self {
-        let surface = |placement: &etendue_geometry::Placement| {
+        let bodies = bodies(geometry, materials);
+        let surface = |(placement, body): (&etendue_geometry::Placement, Option<Body>)| {
             let material = materials.get(placement.material as usize)?;
             let mesh = geometry.mesh_of(placement);
             let place = &placement.world_from_mesh;
@@ -57,6 +70,7 @@ impl PlacedSurfaces {
                     && !material.is_pane()
                     && !matches!(material.scattering, Scattering::Dielectric(_)),
                 absorption: material.absorption(),
+                body,
                 is_tilted: material.normal_map.is_some() || mesh.normals.is_some(),
                 color: match material.base_color {
                     Paint::Plain(color) if !colored => Some(color.map(|c| c.clamp(0.0, 1.0))),
@@ -64,7 +78,17 @@ impl PlacedSurfaces {
                 },
             })
         };
-        Self { all: geometry.placements.iter().map(surface).collect() }
+        let may_touch = |i: usize| bodies[i].is_some_and(|body: Body| body.may_vanish);
+        let touching = match bodies.iter().flatten().any(|body| body.may_vanish) {
+            true => Coplanar::among(geometry, &may_touch),
+            false => Coplanar::default(),
+        };
+        Self { all: geometry.placements.iter().zip(bodies).map(surface).collect(), touching }
+    }
+
+    /// All bodies.
+    pub(crate) fn bodies(&self) -> impl Iterator<Item = &Body> {
+        self.all.iter().flatten().filter_map(|placed| placed.body.as_ref())
     }
 
     /// That of a placement; `None` for [`MISS`](etendue_geometry::MISS), too.

@@ -8,7 +8,9 @@ use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vert
 
 use crate::footprint::mean_of_squares;
 use crate::material::Alpha;
-use crate::{Color, Footprint, Image, Material, NormalKind, Paint, Pixel, Space, TextureUse};
+use crate::{
+    Color, Footprint, Image, Ior, Material, NormalKind, Paint, Pixel, Scattering, Space, TextureUse,
+};
 
 /// The frame that depths and camera-space vectors refer to.
 #[derive(Debug, Clone, Copy)]
@@ -117,6 +119,20 @@ impl SceneView<'_> {
     #[must_use]
     pub fn material(&self, spot: &SurfacePoint<'_>) -> Option<&Material> {
         self.materials.get(spot.placement.material as usize)
+    }
+
+    /// The index of the glass of a placement; `None` of all else.
+    pub(crate) fn index(&self, placement: u32) -> Option<&Ior> {
+        let placement = self.geometry.placements.get(placement as usize)?;
+        match &self.materials.get(placement.material as usize)?.scattering {
+            Scattering::Dielectric(glass) => Some(&glass.ior),
+            Scattering::Black
+            | Scattering::Matte
+            | Scattering::Unlit
+            | Scattering::Mirror
+            | Scattering::Metal { .. }
+            | Scattering::Gltf(_) => None,
+        }
     }
 
     fn placement(&self, hits: &HitBatch, i: usize) -> Option<&Placement> {

@@ -106,7 +106,7 @@ impl Scattering {
             }
             Self::Dielectric(glass) => Model::Dielectric {
                 alpha: glass.roughness * glass.roughness,
-                eta: met.eta(&glass.ior, wavelength),
+                eta: met.eta(around, wavelength),
             },
             Self::Gltf(surface) => return surface.bsdf(met, around),
         };
@@ -290,6 +290,7 @@ impl GltfSurface {
             along: alpha + (1.0 - alpha) * strength * strength,
             f0: face_on * specular,
             f90: specular,
+            ior: self.ior,
             transmission: (self.transmission * texel(&self.transmission_texture)[0])
                 .clamp(0.0, 1.0),
             sheen: match self.sheen_color {

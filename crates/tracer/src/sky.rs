@@ -5,12 +5,14 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_spectrum::NoOverlap;
 
 use crate::Color;
 use crate::environment::{EnvironmentMap, MapSampler, PlacesOnMap, place};
-use crate::light::{Light, LightKind};
+use crate::light::{EnvironmentImage, Light, LightKind};
 use crate::lights::Lights;
 use crate::spectral::Spectral;
+use crate::spectral_sky::{self, Spectrum};
 use crate::target::{Target, TargetKind};
 
 /// The environment, ready to be asked.
@@ -19,6 +21,8 @@ pub(crate) struct Sky {
     /// Which of the lights it is.
     pub(crate) index: usize,
     map: Option<(Arc<EnvironmentMap>, MapSampler)>,
+    /// What makes bands of its spectra, where it has some and they are wanted.
+    rows: Vec<Spectrum>,
     world_from_map: DMat3,
     /// The camera sees it.
     pub(crate) visible: bool,
@@ -50,17 +54,38 @@ impl Asked {
 
 impl Sky {
     /// That of `lights`; `map` is its decoded image, if it has one.
-    pub(crate) fn of(lights: &[Light], map: Option<Arc<EnvironmentMap>>) -> Option<Self> {
+    ///
+    /// # Errors
+    ///
+    /// When a clear sky is known at no wavelength of the bands.
+    pub(crate) fn of(
+        lights: &[Light],
+        map: Option<Arc<EnvironmentMap>>,
+        spectral: &Spectral,
+    ) -> Result<Option<Self>, NoOverlap> {
+        let has_spectra = |light: &Light| {
+            let image = EnvironmentImage::of(light);
+            matches!(image, Some(EnvironmentImage::ClearSky(_))) && !spectral.is_rgb()
+        };
+        let rows = match lights.iter().any(has_spectra) {
+            true => spectral_sky::rows(spectral.bands())?,
+            false => Vec::new(),
+        };
         let sampled = |map: Arc<EnvironmentMap>| {
             let sampler = MapSampler::new(&map);
             (map, sampler)
         };
-        lights.iter().enumerate().find_map(|(index, light)| match light.kind {
-            LightKind::Environment { turn, visible, .. } => {
-                Some(Self { index, map: map.clone().map(sampled), world_from_map: turn, visible })
-            }
+        let first = lights.iter().enumerate().find_map(|(index, light)| match light.kind {
+            LightKind::Environment { turn, visible, .. } => Some((index, turn, visible)),
             _ => None,
-        })
+        });
+        Ok(first.map(|(index, world_from_map, visible)| Self {
+            index,
+            map: map.map(sampled),
+            rows,
+            world_from_map,
+            visible,
+        }))
     }
 
     /// The mean over all directions of what its image has, or 1.
@@ -69,11 +94,11 @@ impl Sky {
     }
 
     /// Chooses the directions of the lanes that were pushed, by brightness: `each` gets a lane, its
-    /// direction as a target, and the colour there.
+    /// direction as a target, its place on the map, and the colour there.
     pub(crate) fn choose(
         &self,
         asked: &mut Asked,
-        mut each: impl FnMut(usize, Option<Target>, &Color),
+        mut each: impl FnMut(usize, Option<Target>, ([f64; 2], &Color)),
     ) {
         let Some((map, sampler)) = &self.map else { return };
         let Asked { lanes, squares, places, directions, colors } = asked;
@@ -82,12 +107,12 @@ impl Sky {
         sampler.sample(squares.iter().copied(), places, take);
         colors.clear();
         colors.extend(places.chosen.iter().map(|&(at, _)| map.radiance_at(at)));
-        for ((&(lane, chance), &(direction, pdf)), color) in
-            lanes.iter().zip(&*directions).zip(&*colors)
+        let lit = places.chosen.iter().map(|&(at, _)| at).zip(&*colors);
+        for ((&(lane, chance), &(direction, pdf)), there) in lanes.iter().zip(&*directions).zip(lit)
         {
             let bare = Target::bare(TargetKind::Far, direction, pdf * chance);
             let target = Target { light: u32::try_from(self.index).unwrap_or(u32::MAX), ..bare };
-            each(lane, (pdf > 0.0).then_some(target), color);
+            each(lane, (pdf > 0.0).then_some(target), there);
         }
     }
 }
@@ -125,8 +150,9 @@ impl Lights {
         for ((local, chance), &(at, _)) in directions.iter_mut().zip(&places.chosen) {
             *chance *= sampler.pdf_at(*local, at);
         }
-        for (number, (color, &(_, pdf))) in colors.iter().zip(&*directions).enumerate() {
-            self.spread_sky(spectral, color, radiance);
+        let lit = places.chosen.iter().map(|&(at, _)| at).zip(&*colors);
+        for (number, (there, &(_, pdf))) in lit.zip(&*directions).enumerate() {
+            self.spread_sky(spectral, there, radiance);
             each(number, pdf, radiance);
         }
     }
@@ -137,18 +163,33 @@ impl Lights {
         match &sky.map {
             None => radiance.copy_from_slice(self.bands_of(sky.index, radiance.len())),
             Some((map, _)) => {
-                let color = map.radiance(sky.world_from_map.transpose() * direction);
-                self.spread_sky(spectral, &color, radiance);
+                let at = place(sky.world_from_map.transpose() * direction);
+                self.spread_sky(spectral, (at, &map.radiance_at(at)), radiance);
             }
         }
     }
 
-    /// A colour of the environment's image in all bands.
-    pub(crate) fn spread_sky(&self, spectral: &Spectral, color: &Color, radiance: &mut [f64]) {
-        let index = self.sky.as_ref().map_or(0, |sky| sky.index);
-        let own = self.bands_of(index, radiance.len());
+    /// The environment's image at a place where it has this colour, in all bands: by its spectra where it has some.
+    pub(crate) fn spread_sky(
+        &self,
+        spectral: &Spectral,
+        (at, color): ([f64; 2], &Color),
+        radiance: &mut [f64],
+    ) {
+        let Some(sky) = &self.sky else { return };
+        let own = self.bands_of(sky.index, radiance.len());
+        let spectrum = match (&sky.map, sky.rows.is_empty()) {
+            (Some((map, _)), false) => map.spectrum_at(at),
+            _ => None,
+        };
         for (i, (band, own)) in radiance.iter_mut().zip(own).enumerate() {
-            *band = own * spectral.band(color, i);
+            let seen = match &spectrum {
+                Some(values) => {
+                    sky.rows[i].iter().zip(values).map(|(row, value)| row * value).sum()
+                }
+                None => spectral.band(color, i),
+            };
+            *band = own * seen;
         }
     }
 }

@@ -69,7 +69,8 @@ impl Anchor {
 }
 
 /// `|T| + |L p₀|`: what a placement's own numbers add to the rounding of a hit (m).
-pub(crate) fn magnitudes(placement: &Placement, mesh: &Mesh) -> DVec3 {
+#[must_use]
+pub fn magnitudes(placement: &Placement, mesh: &Mesh) -> DVec3 {
     let place = &placement.world_from_mesh;
     let corner = mesh.bounds.min.abs().max(mesh.bounds.max.abs());
     let linear = &place.linear;

@@ -14,6 +14,9 @@ pub struct Spectral {
     bands: Bands,
     from_rgb: Vec<[f64; 3]>,
     is_rgb: bool,
+    /// The [`Bands::wavelength`] of each band (nm): of weighted bands it is an integral, and paths ask for it at
+    /// every surface.
+    wavelengths: Vec<f64>,
     /// The [`Bands::quantiles`] of each band (nm).
     quantiles: Vec<Vec<f64>>,
     /// Of each metal by its number, and band: the reflectance face on, and the dip beside it.
@@ -27,7 +30,15 @@ impl Spectral {
         let from_rgb = bands.from_rgb();
         let quantiles = (0..from_rgb.len()).map(|i| bands.quantiles(i, SHARES)).collect();
         let metals = Metal::ALL.iter().flat_map(|&metal| reflectances(metal, bands)).collect();
-        Self { is_rgb: *bands == Bands::Rgb, from_rgb, quantiles, metals, bands: bands.clone() }
+        let wavelengths = (0..from_rgb.len()).map(|i| bands.wavelength(i)).collect();
+        Self {
+            is_rgb: *bands == Bands::Rgb,
+            from_rgb,
+            wavelengths,
+            quantiles,
+            metals,
+            bands: bands.clone(),
+        }
     }
 
     /// What a metal reflects face on in band `i`, and the dip of its reflectance
@@ -56,7 +67,7 @@ impl Spectral {
     /// The wavelength that stands for band `i` (nm).
     #[must_use]
     pub fn wavelength(&self, i: usize) -> f64 {
-        self.bands.wavelength(i)
+        self.wavelengths[i]
     }
 
     /// The wavelength (nm) of band `i` below which lies the share `u` (0..1) of its light.

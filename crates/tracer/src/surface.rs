@@ -1,7 +1,7 @@
 //! From a hit to a surface that light can be scattered by.
 
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{HitBatch, RayBatch};
+use etendue_geometry::{HitBatch, MISS, RayBatch};
 
 use crate::bsdf::Bsdf;
 use crate::material::{Alpha, NormalMap};
@@ -22,6 +22,8 @@ pub(crate) struct SurfaceInteraction<'a> {
     /// Base colour and alpha.
     pub(crate) base: [f64; 4],
     pub(crate) wo: DVec3,
+    /// The placements whose media are on the ray's side and behind; [`MISS`] is air.
+    pub(crate) media: [u32; 2],
 }
 
 impl<'a> SurfaceInteraction<'a> {
@@ -42,7 +44,9 @@ impl<'a> SurfaceInteraction<'a> {
         let anchor = stage.anchor(origin + direction * hits.t[i], normal, origin, placed);
         let front = normal.dot(direction) <= 0.0;
         let base = around.base_color(material, &spot);
-        Some(Self { spot, placed, material, anchor, front, base, wo: -direction })
+        let own = hits.placement[i];
+        let media = if front { [MISS, own] } else { [own, MISS] };
+        Some(Self { spot, placed, material, anchor, front, base, wo: -direction, media })
     }
 
     /// Share of the surface that is there.
@@ -69,9 +73,16 @@ impl<'a> SurfaceInteraction<'a> {
     }
 
     /// Index behind the surface over the index in front, as seen from its ray, at a wavelength (nm).
-    pub(crate) fn eta(&self, ior: &Ior, wavelength: f64) -> f64 {
-        let n = ior.at(wavelength);
-        if self.front { n } else { 1.0 / n }
+    pub(crate) fn eta(&self, around: &SceneView<'_>, wavelength: f64) -> f64 {
+        let index = |medium| around.index(medium).map_or(1.0, |ior| ior.at(wavelength));
+        let [here, behind] = self.media.map(index);
+        behind / here
+    }
+
+    /// Whether the media on its sides part wavelengths.
+    pub(crate) fn disperses(&self, around: &SceneView<'_>) -> bool {
+        let disperses = |ior: &Ior| matches!(ior, Ior::Dispersive(_));
+        self.media.into_iter().filter_map(|medium| around.index(medium)).any(disperses)
     }
 
     /// The geometric and the shading normal on the viewer's side; the latter is the geometric one where the

@@ -3,7 +3,7 @@
 use std::io::{BufReader, Cursor};
 use std::path::{Path, PathBuf};
 
-use etendue_geometry::{Buffer, files};
+use etendue_geometry::Buffer;
 use etendue_image::{DecodeError, Limits, Raster, Samples};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -188,13 +188,14 @@ impl Texture {
 /// Bytes that an image file takes when it is decoded, by its header; 0 where that cannot be read.
 #[must_use]
 pub fn decoded_bytes(path: &Path) -> u64 {
-    let file = files::open(path).ok().map(BufReader::new);
+    let file = etendue_files::open(path).ok().map(BufReader::new);
     file.and_then(etendue_image::decoded_bytes).unwrap_or(0)
 }
 
 /// The bytes of an image file.
 pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, ImageError> {
-    files::read(path, LONGEST).map_err(|source| ImageError::Read { path: path.to_owned(), source })
+    etendue_files::read(path, LONGEST)
+        .map_err(|source| ImageError::Read { path: path.to_owned(), source })
 }
 
 /// Decodes an image file of any kind that is read.

@@ -12,7 +12,10 @@ use image::{ImageFormat, Rgb, RgbImage};
 pub fn of(target: &str) -> Vec<Vec<u8>> {
     let mut seeds = match target {
         "gltf" => vec![GLTF.into(), INSTANCED.into(), format!("\u{feff}{GLTF}").into_bytes()],
-        "glb" => vec![glb(GLTF), glb(INSTANCED)],
+        "glb" => {
+            let draco = files("crates/scene/tests/scene/data/draco", "glb");
+            [vec![glb(GLTF), glb(INSTANCED)], draco].concat()
+        }
         "obj" => objs(),
         "mtl" => {
             vec![MTL.into(), missing("newmtl m", "\nmap_Kd "), b"\xef\xbb\xbfnewmtl a\r".into()]

@@ -3,13 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use etendue_files::Reach;
 use etendue_geometry::Buffer;
 use etendue_image::Limits;
 use etendue_optics::element::Picture;
 use etendue_optics::train::{Focus, Inquiry, LensFile, LensReport};
 use etendue_scene::file::{SensorFile, read_lens, trace_rays};
 use etendue_scene::import::{Options, import};
-use etendue_scene::{LoadOptions, Reach, SceneFile, Strictness, Wanted, doctor};
+use etendue_scene::{LoadOptions, SceneFile, Strictness, Wanted, doctor};
 use etendue_tracer::texture::{Filter, Wrap};
 use etendue_tracer::{EnvironmentMap, ImageSource, Texture};
 

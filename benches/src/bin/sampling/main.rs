@@ -16,6 +16,7 @@ use anyhow::Context;
 use clap::Parser;
 use etendue_bench::machine;
 use etendue_chart::{Axis, Chart, Series, Theme};
+use etendue_files::Transaction;
 use etendue_render::Plan;
 use etendue_render::output::{Outputs, png};
 use serde_json::json;
@@ -269,7 +270,7 @@ fn map(docs: &Path, study: &Study) -> anyhow::Result<String> {
     let samples = json!({ "until": "sensor-noise", "fraction": FRACTION, "max": 512 });
     let rendered = study.rendered(&Wanted { samples, exposure: SHOWN[1] }, 1);
     let path = docs.join("images/sampling/map.png");
-    png::write(&path, &rendered.picture, "SampleCount", png::Bits::Eight)?;
+    png::write(&Transaction::at_once(), &path, &rendered.picture, "SampleCount", png::Bits::Eight)?;
     let counts = rendered.sample_counts.context("samples are counted")?;
     let [fewest, most] = [counts.least, counts.most];
     Ok(format!(

@@ -166,7 +166,7 @@ impl FrameRays {
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
     pub(super) fn far_one(&self, i: usize, t: f64) -> f32 {
-        let far = (t * self.length[i] - self.skipped[i]) as f32;
+        let far = ((t * self.length[i] - self.skipped[i]) as f32).max(f32::MIN);
         far + (far.abs() * (4.0 * f32::EPSILON) + self.error[i])
     }
 

@@ -36,7 +36,7 @@ pub(super) struct NarrowRay {
 /// (3 ε (1 + `origin`)). Then there is what f64 did before.
 #[inline(always)]
 pub(super) fn box_error(origin: f32, pad: f32) -> f32 {
-    f32::EPSILON / 2.0 * (7.0 * origin + 5.0) + 2.0 * pad
+    (f32::EPSILON / 2.0 * (7.0 * origin + 5.0) + 2.0 * pad).min(MOST_ERROR)
 }
 
 /// In units of [`box_error`], what edge tests and distances of triangles allow for. A coordinate
@@ -51,6 +51,11 @@ pub(super) const SKEW_TRIANGLE_ERROR: f32 = 7.0;
 /// Farther from the frame's origin than this, the ray is moved closer before it is rounded. All
 /// triangles are within √3 of it.
 pub(super) const FAR: f64 = 4.0;
+
+/// The largest error that is reckoned with: beyond the frame's 1 every box is met in any case, and an instance whose
+/// coordinates f64 cannot tell apart (1e-39 m, seen from metres away) must not make sums of infinities, which meet even
+/// boxes that are not there.
+const MOST_ERROR: f32 = 1e12;
 
 /// The least component that a reciprocal is taken of. In place of a smaller one it moves no point
 /// of a ray inside the frame by more than a rounding.
@@ -108,7 +113,7 @@ impl NarrowRay {
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "single precision finds")]
     pub(super) fn far(&self, t: f64) -> f32 {
-        let far = (t * self.length - self.skipped) as f32;
+        let far = ((t * self.length - self.skipped) as f32).max(f32::MIN);
         far + (far.abs() * (4.0 * f32::EPSILON) + self.error)
     }
 }

@@ -132,8 +132,9 @@ impl Scene {
         blocked: &mut [bool],
     ) {
         // Debian 12's Embree keeps the 16 rays of a packet that meets instances in 16 bits and reads
-        // 64 of them: by what lies beside, it never comes back.
-        match (in_packets && !self.has_instances, self.device.width) {
+        // 64 of them: by what lies beside, it never comes back. Nor does it from packets through small
+        // boxes in its compact mode.
+        match (in_packets && !self.has_instances && !self.is_compact, self.device.width) {
             (true, 16) => self.occluded16(rays, arguments, blocked),
             (true, 8) => self.occluded8(rays, arguments, blocked),
             (true, 4) => self.occluded4(rays, arguments, blocked),
@@ -321,20 +322,22 @@ macro_rules! packets {
                 query.0.ray.mask = [u32::MAX; $width];
                 for start in (0..rays.len()).step_by($width) {
                     let count = $width.min(rays.len() - start);
-                    let valid = Aligned(first_lanes::<$width>(count));
+                    let valid = Aligned(live_lanes::<$width>(&rays.t_far[start..start + count]));
                     fill_packet!(query.0.ray, rays, start, count, $width);
                     query.0.hit.geomID = [MISS; $width];
                     query.0.hit.primID = [MISS; $width];
                     query.0.hit.instID[0] = [MISS; $width];
-                    // SAFETY: the scene is committed; packet and mask have the C types' layout and
-                    // are aligned to 64 bytes by `Aligned`; lanes past `count` are masked off.
-                    unsafe {
-                        sys::$intersect(
-                            valid.0.as_ptr(),
-                            self.handle.0.as_ptr(),
-                            &mut query.0,
-                            arguments,
-                        );
+                    if valid.0 != [0; $width] {
+                        // SAFETY: the scene is committed; packet and mask have the C types' layout and
+                        // are aligned to 64 bytes by `Aligned`; lanes without a ray are masked off.
+                        unsafe {
+                            sys::$intersect(
+                                valid.0.as_ptr(),
+                                self.handle.0.as_ptr(),
+                                &mut query.0,
+                                arguments,
+                            );
+                        }
                     }
                     let hit = &query.0.hit;
                     let mut placement = hit.geomID;
@@ -374,7 +377,11 @@ macro_rules! packets {
                         }
                         continue;
                     }
-                    let valid = Aligned(first_lanes::<$width>(count));
+                    let valid = Aligned(live_lanes::<$width>(&rays.t_far[start..start + count]));
+                    if valid.0 == [0; $width] {
+                        blocked[start..start + count].fill(false);
+                        continue;
+                    }
                     fill_packet!(query.0, rays, start, count, $width);
                     // SAFETY: as above.
                     unsafe {
@@ -431,14 +438,15 @@ fn put<T: Copy, const W: usize>(to: &mut [T], start: usize, count: usize, lanes:
     }
 }
 
-/// The mask of the first `count` lanes.
+/// The mask of the lanes whose rays can hit anything, by their ends. From a coherent packet without any, Debian 12's
+/// Embree never comes back.
 #[inline(always)]
-fn first_lanes<const W: usize>(count: usize) -> [i32; W] {
-    let mut valid = [-1; W];
-    if count < W {
-        valid[count..].fill(0);
+fn live_lanes<const W: usize>(t_far: &[f32]) -> [i32; W] {
+    let mut live = [0; W];
+    for (lane, &t_far) in live.iter_mut().zip(t_far) {
+        *lane = -i32::from(t_far > 0.0);
     }
-    valid
+    live
 }
 
 /// The alignment of the widest packet, for all of them.

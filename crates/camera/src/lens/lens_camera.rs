@@ -96,8 +96,9 @@ impl LensCamera {
                 .at(unbent.wavelength())
                 .map_err(|fault| CameraError::new("lens", fault.to_string()))?,
         };
-        // A filter may be dark at the design wavelength and pass others.
-        let train = &without_filters(&unbent);
+        // A filter may be dark at the design wavelength and pass others, and a mask's holes are smaller
+        // than what is looked at.
+        let train = &without_dimming(&unbent);
         let clear = train
             .at(train.wavelength())
             .map_err(|fault| CameraError::new("", fault.to_string()))?;
@@ -106,6 +107,9 @@ impl LensCamera {
         }
         let half = focused.film().half_size();
         let frame = focused.film().frame;
+        if unbent.closed_mask().is_some() {
+            return Err(dark(blocked(&unbent, &design, frame.vertex)));
+        }
         let lit_from =
             |film: DVec2| Window::find(train, &clear, frame.point(film.extend(0.0))).is_some();
         let places = [-1.0, 0.0, 1.0].map(|y| [-1.0, 0.0, 1.0].map(|x| DVec2::new(x, y) * half));
@@ -230,8 +234,13 @@ impl LensCamera {
         }
         let half_size = self.focused.film().half_size().to_array();
         let z = self.focused.sensor_z();
-        let pupil = ExitPupil::new(&without_filters(train), &measured, z, half_size)
+        let clear = without_filters(train);
+        let pupil = ExitPupil::new(&clear, &measured, z, half_size)
             .map_err(|error| fault(error.to_string()))?;
+        let all: Vec<f64> =
+            groups.iter().flat_map(|g| &g.lenses).map(MonochromaticTrain::wavelength).collect();
+        let pupil =
+            if all.len() > measured.len() { pupil.aimed_at_mask(&clear, &all) } else { pupil };
         Ok(Opened { bands: bands.clone(), groups, pupil })
     }
 

@@ -40,6 +40,11 @@ impl LensletChiefs {
         &self.view
     }
 
+    /// z of the sensor (mm).
+    pub(crate) fn sensor_z(&self) -> f64 {
+        self.sensor_z
+    }
+
     /// The slopes of the chief ray of the lens before at a point of the array (mm), to within 10⁻⁹ mm of
     /// the stop's middle.
     #[must_use]

@@ -42,7 +42,7 @@ impl LensCamera {
         out.sample.extend(numbers);
         match pupil.disk() {
             Some(disk) => self.aim_at_disk((pupil, disk), samples, first, out),
-            None => self.aim_at_pupil(pupil, samples, first, out),
+            None => self.aim_at_pupil((pupil, lens), samples, first, out),
         }
         lens.trace(Side::Sensor, Clip::On, &mut out.in_lens);
         out.statuses.add_all(&out.in_lens);
@@ -80,7 +80,7 @@ impl LensCamera {
     /// where no light arrives.
     fn aim_at_pupil(
         &self,
-        pupil: &ExitPupil,
+        (pupil, lens): (&ExitPupil, &MonochromaticTrain),
         samples: &FilmSamples,
         first: usize,
         out: &mut CameraRays,
@@ -92,7 +92,7 @@ impl LensCamera {
             let number = out.sample[k];
             let i = number as usize;
             let place = film.place(samples.columns[i], samples.rows[i]);
-            match pupil.sample(place, samples.pupil[i]) {
+            match pupil.sample(place, samples.pupil[i], lens.wavelength()) {
                 Some(sample) => {
                     let at = pupil.film_point(place);
                     rays.push_weighted(at, sample.direction, sample.weight / self.solid_angle);

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use etendue_geometry::files;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -39,7 +38,7 @@ impl LensSource {
             Self::File(written) => {
                 let error = |why: String| CameraError::new("lens", why);
                 let path = resolve(written).map_err(error)?;
-                let bytes = files::read(&path, LONGEST)
+                let bytes = etendue_files::read(&path, LONGEST)
                     .map_err(|why| error(format!("{written}: cannot be read: {why}")))?;
                 if ZemaxLens::is_named(&path) {
                     let fault = |why: String| error(format!("{written}, {why}"));

@@ -17,6 +17,14 @@ const RIM: f64 = 1.75;
 /// The most views a side.
 const MOST_VIEWS: u32 = 255;
 
+/// Lenslets' images that are narrower than this (pixels) hold no views: cubic sampling looks at four pixels,
+/// which would mix all of the opening.
+const LEAST_IMAGE: f64 = 5.0;
+
+/// Over how many pixels parallel light in front of a lenslet may be spread on the sensor: a view is taken
+/// through one pixel's share of the opening, and twice that is told apart from it at 40 dB.
+const MOST_BLUR: f64 = 1.0;
+
 /// Rows and columns of lenslets, as the picture has them: row 0 at the top, column 0 on the left.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LensletGrid {
@@ -47,9 +55,20 @@ pub struct LightField {
     pub image_diameter: f64,
     /// How the rows of the picture are turned (radians): from right towards down.
     pub rotation: f64,
+    /// Why pixels at one offset behind the lenslets are no views, where they are none.
+    pub no_views: Option<String>,
 }
 
 impl LensletGrid {
+    /// From a row to the next over the distance of lenslets in a row.
+    #[must_use]
+    pub fn row_height(&self) -> f64 {
+        match self.grid {
+            Grid::Square => 1.0,
+            Grid::Hexagonal => 0.75_f64.sqrt(),
+        }
+    }
+
     /// The cell of the array of a row and column.
     #[must_use]
     pub fn cell(&self, row: u32, col: u32) -> [f64; 2] {
@@ -175,8 +194,10 @@ impl LightField {
                 ),
             ));
         }
+        // The middle of an image that no neighbour reaches into.
+        let alone = image_diameter.min(2.0 * image_pitch - image_diameter);
         let views = match views {
-            None => most_views(image_diameter, step),
+            None => most_views(alone, step),
             Some(0) => return Err(fault("views", "is 0; it must be 1 or more".to_owned())),
             Some(views) => views,
         };
@@ -192,7 +213,9 @@ impl LightField {
             ));
         }
         // A view's pixels, and the whole image.
-        let reach = (0.5 * f64::from(views - 1) * step + MARGIN)
+        let [cosine, sine] = lenslets.view().array.lattice.turn;
+        let corner = cosine.abs() + sine.abs();
+        let reach = (0.5 * f64::from(views - 1) * step * corner + MARGIN)
             .max(0.5 * image_diameter.min(image_pitch) + 0.5);
         let size = DVec2::from(resolution.map(f64::from));
         let turn = lens.focused().turn();
@@ -220,17 +243,19 @@ impl LightField {
                            pitch, or fewer views";
                 fault("microlenses", why.to_owned())
             })?;
-        let [cosine, sine] = view.array.lattice.turn;
         let rotation = (-sine).atan2(cosine);
-        Ok(Self { grid, views, step, image_pitch, image_diameter, rotation })
+        let no_views = lenslets.no_views(pixel, alone);
+        Ok(Self { grid, views, step, image_pitch, image_diameter, rotation, no_views })
     }
 
-    /// The offset of a view from the middle of a lenslet's image (pixels right, pixels down): views count
-    /// from the left and from the top.
+    /// The offset of a view from the middle of a lenslet's image (pixels right, pixels down): views step
+    /// along the rows of lenslets and across them, from the left and from the top.
     #[must_use]
     pub fn offset(&self, across: u32, down: u32) -> [f64; 2] {
         let middle = 0.5 * f64::from(self.views - 1);
-        [across, down].map(|k| (f64::from(k) - middle) * self.step)
+        let [along, beyond] = [across, down].map(|k| (f64::from(k) - middle) * self.step);
+        let (sine, cosine) = self.rotation.sin_cos();
+        [cosine * along - sine * beyond, sine * along + cosine * beyond]
     }
 
     /// Where the sensor has the middle of a lenslet's image (pixels from the corner).
@@ -254,6 +279,35 @@ fn most_views(diameter: f64, step: f64) -> u32 {
 }
 
 impl LensletChiefs {
+    /// Why pixels `pixel` (mm) wide at one offset behind the lenslets do not see the same part of the
+    /// opening through all of each lenslet, in images of which `alone` pixels are free of their neighbours.
+    fn no_views(&self, pixel: f64, alone: f64) -> Option<String> {
+        if alone < LEAST_IMAGE {
+            return Some(format!(
+                "only {:.2} pixels of a lenslet's image of the main lens' opening are free of its \
+                 neighbours' light, fewer than {LEAST_IMAGE}: give smaller pixels, or set the f-number of \
+                 the main lens to the lenslets'",
+                alone.max(0.0)
+            ));
+        }
+        // Slopes in front of a lenslet change by Sₐ over its opening, and by Sₚ over the sensor.
+        let view = self.view();
+        let blur = |kind| {
+            let sight = view.sight(kind, self.sensor_z());
+            2.0 * view.array.reach * (sight.slope[0] / sight.slope[1]).abs() / pixel
+        };
+        let blurs = (0..view.array.types.len()).map(blur);
+        let widest = blurs.fold(0.0, f64::max);
+        (widest > MOST_BLUR).then(|| {
+            format!(
+                "the camera is a focused one: its lenslets see a picture of the main lens sharp and not its \
+                 opening, of which every pixel sees {widest:.1} pixels' worth. A pixel of each lenslet makes no \
+                 view of it; for views, leave out `picture_distance`, and stand the sensor in the focus of \
+                 all lenslets"
+            )
+        })
+    }
+
     /// The diameter of the image that a lenslet makes of the main lens' opening, and the distance from one
     /// to the next, on the sensor (mm).
     #[must_use]

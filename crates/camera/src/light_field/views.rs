@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use etendue_geometry::{RayBatch, RaysMut, disk};
-use etendue_optics::element::{LensletShape, MicrolensArray, Opening};
+use etendue_optics::element::{Grid, LensletShape, MicrolensArray, Opening};
 use etendue_optics::train::Part;
 use glam::{DVec2, DVec3};
 
@@ -33,6 +33,8 @@ pub struct ViewGrid {
     turn: f64,
     /// The viewpoint's step from view to view, and over a raw pixel (mm).
     baseline: [f64; 2],
+    /// Along the rows of lenslets and across them, as unit vectors (right, up).
+    axes: [DVec2; 2],
     /// 1/F (1/m): 0 for infinity, negative when the array's plane is imaged to behind the camera.
     vergence: f64,
     /// The slope of the chief ray at the array per distance from the axis (1/mm).
@@ -91,6 +93,9 @@ impl ViewGrid {
             scale: scale.abs(),
             turn: -scale.signum(),
             baseline: [a_pixel * light_field.step, a_pixel],
+            axes: [[1.0, 0.0], [0.0, -1.0]].map(|[right, up]| {
+                DVec2::from_angle(-light_field.rotation).rotate(DVec2::new(right, up))
+            }),
             vergence: 1.0 / focus,
             chief: -(to_array.d - pupil * to_array.c) / scale,
             stop: Stop { opening, magnification },
@@ -147,8 +152,33 @@ impl ViewGrid {
         self.scale / self.array.lattice.pitch
     }
 
-    /// The disparity of what is at a depth (m) along the axis: by how many pixels less of a view it stands
-    /// to the right in the next view on the right. Positive in front of the focus, 0 there.
+    /// The viewpoint of a view that is so many views from the middle, along the rows of lenslets and across
+    /// them (mm right, mm up).
+    fn viewpoint(&self, view: DVec2) -> DVec2 {
+        (self.axes[0] * view.x + self.axes[1] * view.y) * self.baseline[0]
+    }
+
+    /// How far a row of a view is from the next (columns): 1, and √¾ in a hexagonal grid.
+    #[must_use]
+    pub fn row_height(&self) -> f64 {
+        self.grid.row_height()
+    }
+
+    /// How lenslets are packed: how the pixels of a view are.
+    #[must_use]
+    pub fn packing(&self) -> Grid {
+        self.grid.grid
+    }
+
+    /// How the rows of views are turned against the camera (radians): from right towards down.
+    #[must_use]
+    pub fn rotation(&self) -> f64 {
+        -self.axes[0].to_angle()
+    }
+
+    /// The disparity of what is at a depth (m) along the axis: by how many columns less it stands along the
+    /// row in the next view along the rows; in the next view across them it is that over
+    /// [`row_height`](Self::row_height) rows further up. Positive in front of the focus, 0 there.
     #[must_use]
     pub fn disparity(&self, depth: f64) -> f64 {
         self.baseline() * self.focal_length() * (1.0 / depth - self.vergence)
@@ -216,8 +246,7 @@ impl ViewGrid {
             let place = self.place(directions[0][i], directions[1][i]);
             let pitch = self.array.lattice.pitch;
             let a = self.lenslet(place.cell, place.within.map(|share| (share - 0.5) * pitch));
-            let u = DVec2::new(place.view.x, -place.view.y) * self.baseline[0];
-            let (origin, direction) = self.ray(a, u);
+            let (origin, direction) = self.ray(a, self.viewpoint(place.view));
             let origin = pose.position + pose.rotation * origin;
             let direction = pose.rotation * direction;
             for axis in 0..3 {
@@ -234,8 +263,7 @@ impl ViewGrid {
             let place = self.place(samples.columns[i], samples.rows[i]);
             let a = self.lenslet(place.cell, opening_point(&self.array, place.within));
             let [right, below] = samples.pupil[i].map(|share| (share - 0.5) * self.baseline[1]);
-            let middle = place.view * self.baseline[0];
-            let u = DVec2::new(middle.x + right, -(middle.y + below));
+            let u = self.viewpoint(place.view) + DVec2::new(right, -below);
             let weight = self.weight(a, u);
             if weight > 0.0 {
                 let (origin, direction) = self.ray(a, u);

@@ -73,26 +73,86 @@ fn a_pixel_under_a_lenslet_looks_along_the_ray_of_its_view() {
 /// says.
 #[test]
 fn disparity_follows_the_formula_at_five_depths() {
-    let raw = light_field(r#""f_number": 4"#, "").unwrap();
-    let camera = raw.reference_views().unwrap();
-    let Projection::Views(views) = camera.projection() else { panic!() };
-    assert!((views.focus() - 0.5).abs() < 1e-12, "{}", views.focus());
-    assert_eq!(views.disparity(views.focus()), 0.0);
-    let [cols, rows] = views.view_resolution().map(f64::from);
-    let middle = f64::from(views.views() / 2);
-    for depth in [0.3, 0.4, 0.5, 0.8, 3.0] {
-        let (column, row) = ((0.5 * cols).floor(), (0.5 * rows).floor());
-        let point = at(
-            0.5 - depth,
-            ray(&camera, [middle * cols + column + 0.5, middle * rows + row + 0.5]).unwrap(),
-        );
-        let disparity = views.disparity(depth);
-        let next = [(middle + 1.0) * cols + column + 0.5, middle * rows + row + 0.5];
-        // A view's picture is linear in the column: from the ray of one column to the next.
-        let here = at(0.5 - depth, ray(&camera, next).unwrap());
-        let right = at(0.5 - depth, ray(&camera, [next[0] + 1.0, next[1]]).unwrap());
-        let shift = (point - here).x / (right - here).x;
-        assert!((shift + disparity).abs() < 1e-9, "{depth}: {shift} and {disparity}");
+    let grids = [
+        (r#""f_number": 4"#, 1.0),
+        (r#""rotation": 7"#, 1.0),
+        (r#""rotation": 45"#, 1.0),
+        (r#""rotation": -160"#, 1.0),
+        (r#""grid": "hexagonal""#, 0.75_f64.sqrt()),
+        (r#""grid": "hexagonal", "rotation": 11"#, 0.75_f64.sqrt()),
+    ];
+    for (microlenses, height) in grids {
+        let raw = light_field(microlenses, "").unwrap();
+        let camera = raw.reference_views().unwrap();
+        let Projection::Views(views) = camera.projection() else { panic!() };
+        assert!((views.focus() - 0.5).abs() < 1e-12, "{}", views.focus());
+        assert!((views.row_height() - height).abs() < 1e-15, "{microlenses}");
+        assert_eq!(views.disparity(views.focus()), 0.0);
+        let [cols, rows] = views.view_resolution().map(f64::from);
+        let middle = f64::from(views.views() / 2);
+        for depth in [0.3, 0.4, 0.5, 0.8, 3.0] {
+            let (column, row) = ((0.5 * cols).floor(), (0.5 * rows).floor());
+            // Where a column and a row of a view see the plane.
+            let seen = |view: [f64; 2], column: f64, row: f64| {
+                let place = [view[0] * cols + column + 0.5, view[1] * rows + row + 0.5];
+                at(0.5 - depth, ray(&camera, place).unwrap()).truncate()
+            };
+            let point = seen([middle; 2], column, row);
+            let disparity = views.disparity(depth);
+            for (next, expected) in
+                [([1.0, 0.0], [-disparity, 0.0]), ([0.0, 1.0], [0.0, -disparity / height])]
+            {
+                let next = next.map(|step| middle + step);
+                // A view's picture is linear in columns and, two by two in a hexagonal grid, in rows.
+                let here = seen(next, column, row);
+                let along = seen(next, column + 1.0, row) - here;
+                let across = 0.5 * (seen(next, column, row + 2.0) - here);
+                let away = point - here;
+                let area = along.perp_dot(across);
+                let shift = [away.perp_dot(across) / area, along.perp_dot(away) / area];
+                for (found, expected_here) in shift.iter().zip(expected) {
+                    let off = (found - expected_here).abs();
+                    assert!(off < 1e-9, "{microlenses} {depth}: {shift:?} and {expected:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Pixels at one offset behind the lenslets are views where lenslets image the opening, and only there:
+/// b/f − 1 of a lenslet's width is how far parallel light is spread.
+#[test]
+fn only_cameras_whose_lenslets_image_the_opening_have_views() {
+    let why = |microlenses: &str| {
+        let camera = light_field(microlenses, "").unwrap();
+        camera.no_views().map(str::to_owned).unwrap_or_default()
+    };
+    for microlenses in [
+        r#""rotation": 360"#,
+        r#""grid": "hexagonal", "aperture": "round", "rotation": -45"#,
+        r#""radii": [0.3, null], "thickness": 0.4, "glass": "N-BK7""#,
+        // 0.1 mm x 0.09 are 0.9 pixels of 10 um.
+        r#""focal_length": 0.4, "sensor_distance": 0.436"#,
+        r#""types": [{"focal_length": 0.4}, {"focal_length": 0.43}], "pattern": [[0, 1]]"#,
+    ] {
+        assert_eq!(why(microlenses), "", "{microlenses}");
+    }
+    for (microlenses, words) in [
+        (r#""picture_distance": 0.3, "sensor_distance": 0.4"#, "focused"),
+        (r#""picture_distance": -0.9, "sensor_distance": 0.4"#, "focused"),
+        (r#""picture_distance": 2, "focal_length": 0.3"#, "1.8 pixels"),
+        (r#""picture_distance": -1, "focal_length": 0.5"#, "focused"),
+        (r#""focal_length": 0.4, "sensor_distance": 0.444"#, "1.1 pixels"),
+        (
+            r#""types": [{"focal_length": 0.4}, {"focal_length": 0.5}], "pattern": [[0, 1]]"#,
+            "2.0 pixels",
+        ),
+        // 0.15 mm x 5/20.83 are 3.6 pixels.
+        (r#""focal_length": 0.15"#, "3.60 pixels"),
+        (r#""focal_length": 0.7"#, "fewer than 5"),
+    ] {
+        let why = why(microlenses);
+        assert!(why.contains(words), "{microlenses}: {why:?} without {words:?}");
     }
 }
 
@@ -172,6 +232,14 @@ fn the_centroid_of_a_white_image_is_the_lenslets_centre() {
 #[test]
 fn what_is_no_light_field_is_refused_in_words() {
     let error = |microlenses: &str, more: &str| light_field(microlenses, more).unwrap_err();
+    for degrees in ["361", "-400", "1e300"] {
+        let error = error(&format!("\"rotation\": {degrees}"), "");
+        assert!(error.contains("a turn"), "{error}");
+    }
+    // A thick lenslet that spreads light has no image of the opening behind it.
+    let spread = r#""radii": [-0.3, null], "thickness": 0.1, "glass": "N-BK7""#;
+    let spread = error(spread, "");
+    assert!(spread.starts_with("microlenses.sensor_distance"), "{spread}");
     assert!(error("\"fill\": 2", "").contains("fill is 2"), "{}", error("\"fill\": 2", ""));
     let views = error("\"fill\": 1", "\"views\": 20,");
     assert!(views.starts_with("views: 20 views") && views.contains("fewer"), "{views}");

@@ -59,6 +59,9 @@ pub(crate) struct LensArguments {
     /// Wavelengths in nm, the main one first; the lens' own and the F, d and C lines when absent
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) wavelengths: Option<Vec<f64>>,
+    /// The configuration of a Zemax file, from 1; the one that it stands at when absent
+    #[arg(long, value_name = "N")]
+    pub(crate) configuration: Option<usize>,
     /// Put the sensor where a plane at this distance is sharp: "1.2 m", or infinity
     #[arg(long, value_name = "DISTANCE", value_parser = parse_focus, allow_hyphen_values = true)]
     pub(crate) focus: Option<Focus>,

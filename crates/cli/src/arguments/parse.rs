@@ -128,8 +128,8 @@ pub(super) fn resolution(text: &str) -> Result<[u32; 2], String> {
     let sides: Option<Vec<u32>> =
         text.split(['x', 'X', '×', ',']).map(|side| side.trim().parse().ok()).collect();
     match sides.as_deref() {
-        Some(&[columns, rows]) => Ok([columns, rows]),
-        _ => Err("expected columns and rows, such as 1536x1024".to_owned()),
+        Some(&[columns, rows]) if columns > 0 && rows > 0 => Ok([columns, rows]),
+        _ => Err("expected columns and rows of one pixel and more, such as 1536x1024".to_owned()),
     }
 }
 

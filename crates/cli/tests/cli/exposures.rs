@@ -44,7 +44,7 @@ fn without_noise_numbers_are_those_of_the_light() {
     let sidecar = bench.json("out/sensor.json");
     assert_eq!((&sidecar["bits"], &sidecar["shots"][0]["png"]), (&10.into(), &"raw.png".into()));
     assert!(exists(&bench, "raw.dng") && exists(&bench, "raw.preview.png"));
-    assert!(!exists(&bench, "mean.npy"), "nobody asked for moments");
+    assert!(!exists(&bench, "raw_mean.npy"), "nobody asked for moments");
 }
 
 #[test]
@@ -70,8 +70,12 @@ fn frames_share_the_light_and_the_pattern_but_not_the_noise() {
     bench.render(&[]);
     let [a, b, c] = ["raw_000", "raw_001", "raw_002"].map(|name| bench.array(name));
     assert!(a != b && b != c && !exists(&bench, "raw_004.npy"));
-    let (mean, variance) = (bench.array("mean_000"), bench.array("variance_000"));
-    assert_eq!(mean, bench.array("mean_001"), "in digital mode without dark current, one picture");
+    let (mean, variance) = (bench.array("raw_mean_000"), bench.array("raw_variance_000"));
+    assert_eq!(
+        mean,
+        bench.array("raw_mean_001"),
+        "in digital mode without dark current, one picture"
+    );
     // Poisson of 1638 e⁻, 1 e⁻ of read noise, rounding; 4096 pixels: 4 standard errors are 9 %.
     let residual: Vec<f64> = a.iter().zip(&mean).map(|(y, m)| (y - m).powi(2)).collect();
     let expected = variance.iter().sum::<f64>() / 4096.0;

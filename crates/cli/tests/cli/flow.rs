@@ -54,6 +54,82 @@ fn disparity_is_focal_length_times_baseline_over_depth() {
     assert!(!bench.path("out/frames/000000/disparity_back.npy").exists());
 }
 
+/// A pair that moves: the disparity is within the pair at every moment, and flow that of one camera.
+#[test]
+fn disparity_of_a_rig_is_within_the_rig_and_flow_along_time() {
+    const BASELINE: f64 = 0.2;
+    const STEP: [f64; 3] = [0.15, -0.05, -0.5];
+    let rig = json!({
+        "type": "rig",
+        "cameras": [{"name": "left", "at": [-0.5 * BASELINE, 0, 0]},
+                    {"name": "right", "at": [0.5 * BASELINE, 0, 0]}],
+        "path": {"type": "dolly", "count": 3, "to": STEP.map(|x| 2.0 * x)}
+    });
+    let layers = json!(["depth", "position", "disparity", {"type": "disparity", "to": -1}, "flow",
+                        "occlusion", {"type": "occlusion", "to": {"cameras": 1}},
+                        {"type": "flow", "to": {"cameras": 1}}]);
+    let bench = rendered(&wall_and_square(), &rig, &layers);
+    let index = bench.json("out/index.json");
+    assert_eq!(index["frames"].as_array().map(Vec::len), Some(6));
+    assert_eq!(index["frames"][3]["rig_camera"], json!({"number": 1, "name": "right"}));
+    assert_eq!(index["frames"][3]["moment"], 1);
+    let has = |frame: usize, layer: &str| {
+        bench.path(&format!("out/frames/{frame:06}/{layer}.npy")).exists()
+    };
+    for frame in 0..6_usize {
+        let at = |name: &str| bench.array(&format!("frames/{frame:06}/{name}"));
+        let (moment, camera) = (frame / 2, frame % 2);
+        let z = at("depth");
+        let (own, sign) = if camera == 0 { ("disparity", 1.0) } else { ("disparity_back", -1.0) };
+        for (d, z) in at(own).iter().zip(&z) {
+            // A dozen roundings of pixel coordinates up to 40.
+            assert!((d - sign * FOCAL * BASELINE / z).abs() < 1e-12, "frame {frame}: {d} at {z} m");
+        }
+        assert!(!has(frame, if camera == 0 { "disparity_back" } else { "disparity" }), "{frame}");
+        for layer in ["flow_camera", "occlusion_camera_hidden"] {
+            assert_eq!(has(frame, layer), camera == 0, "{frame} {layer}");
+        }
+        if camera == 0 {
+            let pairs = at("flow_camera");
+            for (flow, d) in pairs.chunks(2).zip(at(own)) {
+                assert!((flow[0] + d).abs() < 1e-12 && flow[1].abs() < 1e-12, "{flow:?} {d}");
+            }
+        }
+        assert_eq!(has(frame, "flow"), moment < 2, "{frame}");
+        if moment == 2 {
+            continue;
+        }
+        // The same camera one step on, whose axes are the world's.
+        let here = |k: usize| {
+            let side = if camera == 0 { -0.5 } else { 0.5 };
+            STEP[k] * f64::from(u8::try_from(moment).unwrap())
+                + if k == 0 { side * BASELINE } else { 0.0 }
+        };
+        let seen = |p: &[f64], from: [f64; 3]| {
+            let depth = from[2] - p[2];
+            [FOCAL * (p[0] - from[0]) / depth, -FOCAL * (p[1] - from[1]) / depth]
+        };
+        let now = [here(0), here(1), here(2)];
+        let next = [0, 1, 2].map(|k| now[k] + STEP[k]);
+        for (flow, p) in at("flow").chunks(2).zip(at("position").chunks(3)) {
+            let (a, b) = (seen(p, now), seen(p, next));
+            for k in 0..2 {
+                assert!(
+                    (flow[k] - (b[k] - a[k])).abs() < 1e-12,
+                    "frame {frame}: {flow:?} {a:?} {b:?}"
+                );
+            }
+        }
+    }
+    // None of the cameras has one that is two further on, at any moment.
+    let far = scene(&wall_and_square(), &rig, &json!(["depth", {"type": "disparity", "to": 2}]));
+    let bench = Bench::with_scene(&far.to_string());
+    let output = bench.run(&["render", "scene.json", "-o", "out"]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = text(&output.stderr);
+    assert!(said.contains("the rig's cameras, which are 0..2"), "{said}");
+}
+
 /// Numbers of copies run through all objects: what stands still is followed whatever became of others.
 #[test]
 fn a_copy_that_goes_takes_nothing_else_along() {

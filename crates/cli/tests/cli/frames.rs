@@ -45,6 +45,10 @@ fn each_frame_is_the_picture_of_its_settings() {
     let all = frames.as_array().unwrap();
     for (number, (frame, report)) in all.iter().zip(reports.as_array().unwrap()).enumerate() {
         let mut more = vec!["--report".to_owned(), "report.json".to_owned()];
+        // The first has the number of a scene without frames.
+        if number > 0 {
+            more.extend(["--set".to_owned(), format!("render.frame={number}")]);
+        }
         for (path, value) in frame.as_object().unwrap() {
             more.extend(["--set".to_owned(), format!("{path}={value}")]);
         }

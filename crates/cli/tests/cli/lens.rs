@@ -207,6 +207,34 @@ fn a_zemax_file_is_analysed_with_what_it_leaves_out_and_saved_as_a_lens_file() {
 }
 
 #[test]
+fn a_position_of_a_zoom_lens_is_chosen_and_saved() {
+    let bench = Bench::new();
+    let zoom = format!(
+        "{ZMX}MNUM 2 1\nTHIC 2 1 47 0 0\nTHIC 2 2 60 0 0\nCRVT 1 1 0.02 0\nCRVT 1 2 0.01 0\n"
+    );
+    bench.write("zoom.zmx", zoom.as_bytes());
+    let efl = |arguments: &[&str]| {
+        let output = bench.run(&[&["lens", "--json"], arguments].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        (number(&report["paraxial"]["efl"]), number(&report["sensor_z"]))
+    };
+    assert_eq!(efl(&["zoom.zmx"]), efl(&["zoom.zmx", "--configuration", "1"]));
+    let second = efl(&["zoom.zmx", "--configuration", "2", "--save", "long.json"]);
+    // 1/f = (n - 1) (c1 - c2 + (n - 1) d c1 c2 / n).
+    let (n, [c1, c2], d) = (1.516_80, [0.01, -0.02], 4.0);
+    let expected = 1.0 / ((n - 1.0) * (c1 - c2 + (n - 1.0) * d * c1 * c2 / n));
+    assert!((second.0 - expected).abs() < 1e-3 && second.1 == 64.0, "{second:?} {expected}");
+    assert_eq!(efl(&["long.json"]), second);
+    refused(
+        &bench,
+        &["zoom.zmx", "--configuration", "3"],
+        &["zoom.zmx", "configuration 3", "has 2"],
+    );
+    refused(&bench, &["long.json", "--configuration", "1"], &["long.json", ".zmx"]);
+}
+
+#[test]
 fn drawings_are_written_whole() {
     let bench = Bench::new();
     bench.write("lens.json", LENS.as_bytes());
@@ -231,6 +259,12 @@ fn wavelengths_out_of_range_are_warned_of_once_or_refused() {
     let output = bench.run(&arguments);
     assert!(output.status.success());
     assert_eq!(text(&output.stderr).matches("N-BK7").count(), 1, "{}", text(&output.stderr));
+    // Programs read the version of the keys first.
+    assert!(
+        text(&output.stdout).starts_with(r#"{"version":1,"rays":["#),
+        "{}",
+        text(&output.stdout)
+    );
     refused(&bench, &[&arguments[1..], &["--strict"]].concat(), &["N-BK7", "3000 nm"]);
     // Numbers state no range, and no glass is known there.
     bench.write("lens.json", LENS.replace("\"N-BK7\"", "{\"n\": 1.5}").as_bytes());

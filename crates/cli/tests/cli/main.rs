@@ -17,12 +17,14 @@ mod gltf_textures; // textures of models, likewise
 mod hidden; // meshes of one point, nodes scaled to 0
 mod ids; // numbers of objects, copies, nodes and materials, and their names
 mod images; // textures and environments of every kind and size
+mod inputs; // every key of the schema that names a file: guarded, kept, and in the hash
 mod leniency; // comments, schema addresses, resolutions as words, quiet
 mod lens; // tables, drawings and files of lenses, and what is refused
 mod lens_pictures; // pictures through lenses, with closed-form answers
 mod lens_reference; // lenses against other software
 mod light_fields; // lenslets, arrays of cameras, and the page about them
 mod limits; // what the page on limits lists
+mod losses; // what files clip, saturate or show black
 mod memory; // refused before it is taken
 mod messages; // what is wrong, in plain words
 mod models; // simpler models of a lens, and OpenCV's fitted to it
@@ -37,6 +39,7 @@ mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
 mod sensor; // presets, curves, series of a characterisation
 mod shards; // renders that are divided or killed, and their pictures
+mod stale; // a render of one kind into the folder of another
 mod stopping; // Ctrl-C and what it leaves
 mod tools; // check, plan, schema, version
 mod view; // the window, as far as there is none

@@ -195,6 +195,59 @@ fn forecasts_are_within_half_as_much_again_of_the_peak() {
     }
 }
 
+/// `count` copies of a small sphere, whose places are an array in a file.
+fn copies(count: u32) -> Bench {
+    let bench = Bench::new();
+    let shape = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({count}, 3, 4), }}");
+    let mut array = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    array.extend(format!("{shape:<117}\n").bytes());
+    for i in 0..count {
+        let (x, y) = (f64::from(i % 300), f64::from(i / 300));
+        let rows = [1.0, 0.0, 0.0, 3.0 * x, 0.0, 1.0, 0.0, 3.0 * y, 0.0, 0.0, 1.0, 0.0];
+        array.extend(rows.map(f64::to_le_bytes).as_flattened());
+    }
+    bench.write("places.npy", &array);
+    let scene = json!({"etendue": 1, "layers": ["depth"],
+        "camera": {"type": "pinhole", "sensor": {"resolution": [64, 48]}},
+        "objects": [{"shape": "sphere", "triangles": 80, "instances": "places.npy"}]});
+    bench.write("scene.json", scene.to_string().as_bytes());
+    bench
+}
+
+/// The law of [`forecasts_are_within_half_as_much_again_of_the_peak`] for copies, and of the limit: what may
+/// pass it is refused, and what is not refused does not.
+#[test]
+fn copies_are_in_the_forecast_and_no_render_passes_its_limit() {
+    let bench = copies(40_000);
+    let check = bench.run(&["check", "scene.json", "--json"]);
+    let check: serde_json::Value = serde_json::from_slice(&check.stdout).expect("JSON");
+    let total = check["memory"]["total"].as_f64().expect("a number");
+    for (megabytes, fits) in [(20, false), (50, false), (72, true)] {
+        let limit = format!("{megabytes}M");
+        let _ = std::fs::remove_file(bench.path("report.json"));
+        let output = bench.run(&[
+            "render",
+            "scene.json",
+            "-o",
+            "out",
+            "--report",
+            "report.json",
+            "--memory-limit",
+            &limit,
+        ]);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(if fits { 0 } else { 2 }), "{limit}: {said}");
+        if !fits {
+            assert!(said.contains("40000 copies") && said.contains("--memory-limit"), "{said}");
+            assert!(!bench.path("out").exists(), "{limit} left a folder");
+            continue;
+        }
+        let peak = bench.json("report.json")["peak_memory_bytes"].as_f64().expect("a number");
+        assert!(peak <= f64::from(megabytes) * 1_048_576.0, "{limit}: {peak}");
+        assert!((1.0 / 1.5..=1.5).contains(&(total / peak)), "{total} for {peak}");
+    }
+}
+
 #[test]
 fn plans_and_checks_tell_what_memory_a_render_takes() {
     let bench = Bench::with_scene(BOX);

@@ -35,6 +35,7 @@ fn printed(bench: &Bench, arguments: &[&str]) -> Value {
 fn a_fit_is_written_and_is_a_camera_of_a_scene() {
     let bench = bench();
     let fit = printed(&bench, &["lens", "scene.json", "--fit-opencv", "--json", "-o", "out"]);
+    assert_eq!(fit["version"], 1);
     let written = std::fs::read(bench.path("out/opencv.json")).unwrap();
     assert_eq!(serde_json::from_slice::<Value>(&written).unwrap(), fit);
     assert_eq!(
@@ -59,6 +60,8 @@ fn what_cannot_be_fitted_is_refused() {
         (&["lens", "scene.json", "--fit-opencv", "--f-number", "4"][..], "--f-number"),
         (&["lens", "lens.json", "--fit-opencv", "--tolerance", "0 px"], "above 0"),
         (&["lens", "lens.json", "--fit-opencv", "--resolution", "40"], "1536x1024"),
+        (&["lens", "lens.json", "--fit-opencv", "--resolution", "0x0"], "one pixel and more"),
+        (&["lens", "lens.json", "--fit-opencv", "--resolution", "40x0"], "one pixel and more"),
         (&["lens", "lens.json", "--tolerance", "1 px"], "--fit-opencv"),
         (&["plan", "scene.json", "--models", "--tolerance", "1 m"], "0.5 px"),
         (&["plan", "scene.json", "--models", "--tolerance", "1 px,5"], "0.5 px,5 %"),

@@ -21,6 +21,58 @@ fn camera(bench: &Bench, camera: &str) {
     bench.write("scene.json", scene.as_bytes());
 }
 
+/// A grey PNG of `side`² pixels, white at some.
+fn mask(side: u32, white: &[[u32; 2]]) -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, side, side);
+    encoder.set_color(png::ColorType::Grayscale);
+    let mut pixels = vec![0; (side * side) as usize];
+    for &[x, y] in white {
+        pixels[(y * side + x) as usize] = 255;
+    }
+    let mut writer = encoder.write_header().expect("a header");
+    writer.write_image_data(&pixels).expect("the pixels");
+    drop(writer);
+    file
+}
+
+#[test]
+fn a_mask_of_one_open_pixel_passes_its_share_of_the_light_and_a_black_one_is_refused() {
+    let bench = Bench::new();
+    let scene = r#"{"etendue": 1, "tracer": {"type": "direct"},
+        "camera": {"type": "thin_lens", "focal_length": "50 mm", "focus_distance": "infinity",
+            "aperture": {"shape": "image", "file": "mask.png", "width": "20 mm"},
+            "sensor_height": "0.01 mm", "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]},
+            "sensor": {"resolution": [4, 4]}},
+        "objects": [{"shape": "sphere", "radius": 0.1, "transform": {"translate": [0, 0, 9]}}],
+        "lights": [{"type": "environment", "radiance": [0.5, 0.5, 0.5]}],
+        "render": {"samples": 64}}"#;
+    bench.write("scene.json", scene.as_bytes());
+    // cos^4 / d^2 over the open pixels, out of that over the whole mask, by the middles of 200 x 200 cells.
+    let (f, width) = (50.0, 20.0);
+    let light = |side: u32, [x, y]: [u32; 2]| {
+        let pixel = width / f64::from(side);
+        let at = |i: u32| (f64::from(i) + 0.5) * pixel - 0.5 * width;
+        let d2 = f * f + at(x).powi(2) + at(y).powi(2);
+        f * f / (d2 * d2) * pixel * pixel
+    };
+    let whole: f64 = (0..40_000).map(|i| light(200, [i % 200, i / 200])).sum();
+    for side in [64, 256, 1024] {
+        let white = [side * 5 / 8, side / 3];
+        bench.write("mask.png", &mask(side, &[white]));
+        bench.render(&[]);
+        let picture = bench.array("picture");
+        let mean = picture.iter().sum::<f64>() / picture.len() as f64;
+        let expected = 0.5 * light(side, white) / whole;
+        // One ray in a hundred is aimed anywhere: ten of 1024, give or take three.
+        assert!((mean / expected - 1.0).abs() < 0.01, "{side}: {mean} for {expected}");
+    }
+    bench.write("mask.png", &mask(64, &[]));
+    let output = bench.run(&["render", "scene.json", "-o", "out"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("no light passes"), "{}", text(&output.stderr));
+}
+
 #[test]
 fn an_f_number_wider_than_the_lens_is_refused_with_the_widest() {
     let bench = Bench::new();

@@ -87,6 +87,71 @@ fn links_to_inputs_are_inputs() {
     refuses(&bench, &report, "report");
 }
 
+/// Two poses that look at the box, as nerfstudio has them.
+const TRANSFORMS: &[u8] = br#"{"fl_x": 8, "fl_y": 8, "cx": 4, "cy": 4, "w": 8, "h": 8, "frames": [
+    {"file_path": "a", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]},
+    {"file_path": "b", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}]}"#;
+
+/// The same as COLMAP has them.
+const COLMAP: [(&str, &[u8]); 2] = [
+    ("cameras.txt", b"1 PINHOLE 8 8 8 8 4 4\n"),
+    ("images.txt", b"1 1 0 0 0 0 0 3 1 a\n\n2 1 0 0 0 0 0 4 1 b\n\n"),
+];
+
+fn along(file: &str) -> String {
+    let mut scene: serde_json::Value = serde_json::from_str(BOX).unwrap();
+    scene["frames"] = json!({"type": "trajectory", "file": file});
+    scene.to_string()
+}
+
+#[test]
+#[cfg(unix)]
+fn trajectories_are_inputs() {
+    let bench = Bench::new();
+    bench.write("transforms.json", TRANSFORMS);
+    fs::create_dir(bench.path("colmap")).unwrap();
+    for (name, bytes) in COLMAP {
+        bench.write(&format!("colmap/{name}"), bytes);
+    }
+    bench.write("scene.json", along("transforms.json").as_bytes());
+    std::os::unix::fs::symlink(".", bench.path("linked")).unwrap();
+    refuses(&bench, &["render", "scene.json", "-o", "."], "transforms.json");
+    refuses(&bench, &["render", "scene.json", "-o", "linked"], "linked/transforms.json");
+    let report = ["render", "scene.json", "-o", "o", "--report", "transforms.json"];
+    refuses(&bench, &report, "transforms.json");
+    bench.write("scene.json", along("colmap/images.txt").as_bytes());
+    refuses(&bench, &["render", "scene.json", "-o", "."], "colmap/cameras.txt");
+    let report = ["render", "scene.json", "-o", "o", "--report", "linked/colmap/cameras.txt"];
+    refuses(&bench, &report, "cameras.txt");
+    assert!(!bench.path("o").exists());
+}
+
+#[test]
+fn a_file_of_any_frame_is_refused_before_the_first_is_written() {
+    let mut scene: serde_json::Value = serde_json::from_str(BOX).unwrap();
+    scene["objects"][0]["material"] = json!("paint");
+    scene["tracer"] = json!({"type": "flat"});
+    let image = |file: &str| json!({"type": "matte", "color": {"image": file}});
+    // An image of the scene, and one that a frame alone names.
+    let place = "o/frames/000001/picture.png";
+    let (by_scene, by_frame) = (image(place), json!([{}, {}, {"materials.paint": image(place)}]));
+    for (paint, frames) in [(by_scene, json!([{}, {}])), (image("plain.png"), by_frame)] {
+        let bench = Bench::new();
+        bench.write("plain.png", include_bytes!("../../../etendue/tests/data/paint.png"));
+        fs::create_dir_all(bench.path("o/frames/000001")).unwrap();
+        fs::copy(bench.path("plain.png"), bench.path(place)).unwrap();
+        (scene["materials"], scene["frames"]) = (json!({"paint": paint}), frames);
+        bench.write("scene.json", scene.to_string().as_bytes());
+        refuses(&bench, &["render", "scene.json", "-o", "o"], place);
+    }
+    let bench = Bench::with_scene(&crate::frames::scene(&json!([{}, {}])));
+    let name = "out/frames/000001/depth.npy";
+    let output = bench.run(&["render", "scene.json", "-o", "out", "--report", name]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("a result has this name"), "{}", text(&output.stderr));
+    assert!(!bench.path("out").exists());
+}
+
 #[test]
 fn a_report_does_not_take_the_place_of_a_result() {
     let bench = Bench::with_scene(BOX);

@@ -262,16 +262,17 @@ fn moments_are_written_once_an_exposure_time() {
         .map(|entry| entry.expect("a file").file_name().into_string().expect("a name"))
         .collect();
     let of = |stem: &str| names.iter().filter(|name| name.starts_with(stem)).count();
-    assert_eq!((of("raw_"), of("mean"), of("variance")), (80 * 4, 2, 2), "{names:?}");
+    let counts = [of("raw_0"), of("raw_mean"), of("raw_variance")];
+    assert_eq!(counts, [80 * 4, 2, 2], "{names:?}");
     let shots = bench.json("out/sensor.json")["shots"].clone();
     assert_eq!(
         (&shots[39]["mean"], &shots[40]["mean"]),
-        (&json!("mean_000.npy"), &json!("mean_001.npy"))
+        (&json!("raw_mean_000.npy"), &json!("raw_mean_001.npy"))
     );
     // Of one exposure time there is one, without a number.
     let one = shining(&json!("a"), &json!({ "frames": 3, "moments": true, "noise": "poisson" }));
     one.render(&["--samples", "1"]);
-    assert!(one.path("out/mean.npy").exists() && !one.path("out/mean_000.npy").exists());
+    assert!(one.path("out/raw_mean.npy").exists() && !one.path("out/raw_mean_000.npy").exists());
 }
 
 #[test]
@@ -291,4 +292,41 @@ fn wells_are_filled_before_black_is_added() {
     // 100 e⁻ at 0.5 DN an electron stand on a black level of 200 DN: 250 at most.
     let keys = json!({ "full_well": 100, "black_level": 200 });
     assert_eq!(counted(&shining(&json!("a"), &keys))[0], 500.0);
+}
+
+/// `AsShotNeutral` of a little-endian DNG: tag 50728, three fractions of u32.
+fn neutral(file: &[u8]) -> [f64; 3] {
+    let short = |at: usize| usize::from(u16::from_le_bytes([file[at], file[at + 1]]));
+    let long = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap());
+    let start = long(4) as usize;
+    let entries = (0..short(start)).map(|k| start + 2 + 12 * k);
+    let entry = entries.into_iter().find(|&at| short(at) == 50_728).expect("a neutral");
+    let values = long(entry + 8) as usize;
+    [0, 1, 2].map(|k| f64::from(long(values + 8 * k)) / f64::from(long(values + 8 * k + 4)))
+}
+
+/// The white of a DNG is what the sensor makes of the scene's light, and not of equal energy.
+#[test]
+fn a_raw_file_says_what_white_is_in_the_light_of_the_scene() {
+    let ends = [
+        [[580.0, 0.0], [600.0, 1.0], [700.0, 1.0]],
+        [[500.0, 0.0], [540.0, 1.0], [590.0, 0.0]],
+        [[400.0, 0.0], [450.0, 0.9], [500.0, 0.0]],
+    ];
+    let keys = json!({ "cfa": "rggb", "filters": { "r": ends[0], "g": ends[1], "b": ends[2] } });
+    for (illuminant, light) in [
+        (json!("a"), &illuminant_a as &dyn Fn(f64) -> f64),
+        (json!("equal_energy"), &|_: f64| 1.0),
+        (json!({ "black_body": 9000 }), &black_body(9000.0)),
+    ] {
+        let bench = shining(&illuminant, &keys);
+        bench.render(&["--samples", "1"]);
+        let seen = ends.map(|filter| electrons([380, 780], light, |nm| polygon(&filter, nm)));
+        let most = seen.into_iter().fold(0.0, f64::max);
+        let file = std::fs::read(bench.path("out/raw.dng")).unwrap();
+        for (found, known) in neutral(&file).into_iter().zip(seen.map(|seen| seen / most)) {
+            // What bands are to lose at most, and the four digits of the file.
+            assert!((found - known).abs() < 1e-3 + 1e-4, "{illuminant}: {found}, not {known}");
+        }
+    }
 }

@@ -103,6 +103,18 @@ fn models_with_z_up_are_noticed_and_turned() {
         .write("upright.obj", STANDING.replace(" -0.5 ", " 0 ").replace(" 0.5 ", " 1 ").as_bytes());
     let upright = text(&bench.run(&["check", "upright.obj"]).stdout);
     assert!(!upright.contains("--up z"), "{upright}");
+    // A car's body: built about y = 0, a little above z = 0. With y up it is not, nor one that hangs far away.
+    let body = STANDING.replace(" 0\n", " 0.25\n");
+    bench.write("body.obj", body.as_bytes());
+    let said = text(&bench.run(&["check", "body.obj"]).stdout);
+    assert!(said.contains("half below y = 0") && said.contains("`--up z`"), "{said}");
+    let far = STANDING.replace(" 0\n", " 5\n").replace(" 3\n", " 7\n");
+    let upright = body.replace(" -0.5 ", " 0.2 ").replace(" 0.5 ", " 1 ");
+    for other in [far, upright] {
+        bench.write("other.obj", other.as_bytes());
+        let said = text(&bench.run(&["check", "other.obj"]).stdout);
+        assert!(!said.contains("--up z"), "{said}");
+    }
     // The objects of a scene: by the scene's word, unless they have their own; before `transform`.
     let scene = r#"{"etendue": 1, "up": "z", "objects": [
         {"file": "m.obj", "transform": {"scale": 2}}, {"shape": "box", "size": [1, 1, 9]}]}"#;

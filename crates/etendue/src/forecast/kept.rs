@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use etendue_render::output::{SOFTWARE, write_whole};
+use etendue_files::{SOFTWARE, Transaction};
 use serde::{Deserialize, Serialize};
 
 use super::Calibration;
@@ -72,7 +72,7 @@ fn keep(path: &Path, rates: Calibration) -> Result<(), Error> {
         crate::places::folder(folder)?;
     }
     let json = serde_json::to_string_pretty(&kept).map_err(|e| Error::Refused(e.to_string()))?;
-    Ok(write_whole(path, |file| writeln!(file, "{json}"))?)
+    Ok(Transaction::at_once().write(path, |file| writeln!(file, "{json}"))?)
 }
 
 /// What is kept; nothing when it cannot be read.
@@ -107,6 +107,7 @@ mod tests {
 
     const RATES: Calibration = Calibration {
         build: [1e-7, 2e-7, 3e-7],
+        copy: 1e-7,
         ray: 1e-7,
         exr: 1e-8,
         npy: 1e-8,

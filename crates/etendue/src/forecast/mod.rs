@@ -129,7 +129,8 @@ impl TimeForecast {
 
 /// The time of the build (s).
 fn build_time(scene: &Scene, plan: &Plan, machine: &Calibration) -> f64 {
-    scene.geometry.triangles_unique() as f64 * machine.build_of(plan.quality)
+    let triangles = scene.geometry.triangles_unique() as f64 * machine.build_of(plan.quality);
+    triangles + scene.placed_copies() as f64 * machine.copy
 }
 
 fn pixels(scene: &Scene) -> f64 {

@@ -1,5 +1,6 @@
 //! What a render needs: the scene, the frames that it is compared with, the structures over them, and images.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -9,7 +10,7 @@ use etendue_render::{Plan, denoise, plan};
 use etendue_scene::escape::one_line;
 use etendue_scene::file::SceneFile;
 use etendue_scene::memory::Budget;
-use etendue_scene::{Frame, LoadOptions, Scene, Strictness};
+use etendue_scene::{LoadOptions, Scene, Strictness};
 
 use super::{LoadedScene, Ready, Session};
 use crate::neighbours::{self, Neighbour};
@@ -48,14 +49,16 @@ impl Session {
         let mut scene = self.load_file(self.file(), progress)?;
         neighbours::refuse_views(&scene)?;
         if let Some(frames) = &self.frames {
-            neighbours::refuse_far(&scene, frames.len())?;
+            neighbours::refuse_far(&scene, frames)?;
         }
         let shown = self.shown.as_ref().map(|(number, _)| *number);
         let left = neighbours::leave_out(&mut scene, shown, &neighbours);
         if self.options.outputs.denoised {
             denoise::guide(&mut scene)?;
         }
-        let notes: Vec<String> = scene.notes.iter().map(in_words).chain(left).collect();
+        let of_frames = self.frame_notes.iter().filter(|_| shown.is_some()).cloned();
+        let notes: Vec<String> =
+            scene.notes.iter().map(in_words).chain(of_frames).chain(left).collect();
         notes.iter().for_each(|note| progress.note(note));
         let plan = Plan::new(&scene, self.options.outputs);
         let scene = Arc::new(scene);
@@ -73,7 +76,8 @@ impl Session {
         };
         let options = LoadOptions {
             strictness: self.options.strictness,
-            reach: self.options.reach,
+            opener: self.opener.clone(),
+            also_read: &self.options.inputs,
             camera: self.options.camera.as_deref(),
             memory_limit: self.options.memory_limit,
             to_render: self.options.to_render,
@@ -99,11 +103,18 @@ impl Session {
         let (Some((number, _)), Some(frames)) = (&self.shown, &self.frames) else {
             return Ok(Vec::new());
         };
-        let load = |(step, frame): (_, &Frame)| {
-            let scene = Arc::new(self.load_file(&self.file.at(frame)?, progress)?);
-            Ok(Neighbour { step, scene, accel: None })
-        };
-        neighbours::around(frames, *number, &steps).into_iter().map(load).collect()
+        // Two steps may lead to one frame.
+        let mut loaded: BTreeMap<usize, Arc<Scene>> = BTreeMap::new();
+        let mut neighbours = Vec::new();
+        for (step, frame) in neighbours::around(frames, *number, &steps) {
+            let scene = match loaded.get(&frame.number) {
+                Some(scene) => Arc::clone(scene),
+                None => Arc::new(self.load_file(&self.file.at(frame)?, progress)?),
+            };
+            loaded.insert(frame.number, Arc::clone(&scene));
+            neighbours.push(Neighbour { step, scene, accel: None });
+        }
+        Ok(neighbours)
     }
 
     /// Builds the structures, unless there are such over the same surfaces.
@@ -174,6 +185,9 @@ fn not_built() -> Error {
 /// Small lists, and buffers of files that are written (bytes).
 const BESIDE: u64 = 16 << 20;
 
+/// The part of a forecast by which it may be too low (`benches/memory.py`).
+const SLACK: u64 = 4;
+
 /// The stack of a thread of Embree's, and its small lists (bytes).
 const THREAD: u64 = 6 << 20;
 
@@ -181,7 +195,9 @@ const THREAD: u64 = 6 << 20;
 fn fits(scene: &Scene, plan: &Plan, limit: Option<u64>) -> Result<(), Error> {
     let memory = &plan.memory;
     let bytes = match limit {
-        Some(_) => memory.total - memory.program,
+        // The user's is one of all that the process holds, what it has mapped included, and is not passed
+        // where a forecast is a little low.
+        Some(_) => memory.total.saturating_add(memory.total / SLACK).saturating_add(memory.mapped),
         // What was loaded is no longer free.
         None => memory.to_come(),
     };
@@ -197,6 +213,9 @@ fn fits(scene: &Scene, plan: &Plan, limit: Option<u64>) -> Result<(), Error> {
     let largest = match images.max() {
         Some((bytes, name)) if 2 * bytes > memory.total => {
             format!(" (most of it for the image {})", one_line(name))
+        }
+        _ if 2 * memory.copies > memory.total => {
+            format!(" (most of it for {} copies)", scene.placed_copies())
         }
         _ => String::new(),
     };

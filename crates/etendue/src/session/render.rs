@@ -5,8 +5,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use etendue_accel::Accel;
+use etendue_files::{SOFTWARE, Transaction};
 use etendue_oidn::Denoiser;
-use etendue_render::output::{ImageHash, Layer, SOFTWARE};
+use etendue_render::output::{ImageHash, Layer};
 use etendue_render::report::memory;
 use etendue_render::{
     Checkpoint, Course, Film, FilmFile, FollowedFrame, Identity, Plan, Prepared, RenderError,
@@ -52,7 +53,8 @@ impl Session {
             return Err(RenderError::Stopped.into());
         }
         film.notes().iter().for_each(|note| progress.note(note));
-        Ok(film.write(path, &self.identity(scene, plan)?, origin)?)
+        let files = Transaction::at_once().keeping(&scene.inputs);
+        Ok(film.write((&files, path), &self.identity(scene, plan)?, origin)?)
     }
 
     /// Puts the shares of a render together: the rendering that one machine would have made, to the bit when

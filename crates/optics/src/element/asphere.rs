@@ -54,6 +54,21 @@ impl Profile for Surface {
         let sags = (0..=64).map(|i| self.profile((reach * f64::from(i) / 64.0).powi(2)).0);
         sags.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], s| [l.min(s), h.max(s)])
     }
+
+    /// Each term rises or falls all the way: those that rise are least at the nearer place, those that fall at
+    /// the farther one.
+    fn sag_bounds(&self, squares: [f64; 2]) -> [f64; 2] {
+        let [near, far] = squares.map(|u| {
+            let conic = self.conic_sag(u);
+            let part = |is_part: fn(f64) -> bool| {
+                let terms = self.aspheric.iter().rev();
+                terms.fold(0.0, |sum, &a| sum * u + if is_part(a) { a } else { 0.0 }) * u
+            };
+            let (rising, falling) = (part(|a| a > 0.0), part(|a| a < 0.0));
+            [conic.max(0.0) + rising, conic.min(0.0) + falling]
+        });
+        [near[0] + far[1], far[0] + near[1]]
+    }
 }
 
 #[cfg(test)]

@@ -189,6 +189,11 @@ impl Profile for Biconic {
         let sags = rim.map(|(sine, cosine)| self.profile([reach * cosine, reach * sine]).0);
         sags.fold([0.0; 2], |[low, high], sag| [low.min(sag), high.max(sag)])
     }
+
+    /// It is not told apart by its distance from the axis.
+    fn sag_bounds(&self, _squares: [f64; 2]) -> [f64; 2] {
+        [f64::NEG_INFINITY, f64::INFINITY]
+    }
 }
 
 #[cfg(test)]

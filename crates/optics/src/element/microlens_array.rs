@@ -180,10 +180,12 @@ impl MicrolensArraySpec {
         }
         // The grid, and the openings in it.
         let offset = self.offset.map(|length| length.0);
-        if !(self.rotation.0.is_finite() && offset.iter().all(|x| x.abs() <= 1e6 * pitch)) {
-            return Err("rotation and offset must be finite, and the offset at most a million \
-                        pitches"
-                .to_owned());
+        if !offset.iter().all(|x| x.abs() <= 1e6 * pitch) {
+            return Err("offset must be finite, and at most a million pitches".to_owned());
+        }
+        if !(-360.0..=360.0).contains(&self.rotation.0) {
+            let degrees = self.rotation.0;
+            return Err(format!("rotation is {degrees} degrees; it must be -360 to 360, a turn"));
         }
         if !(self.fill > 0.0 && self.fill <= 1.0) {
             return Err(format!("fill is {}; it must be above 0 and at most 1", self.fill));

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use etendue_chart::significant;
 use etendue_spectrum::Curve;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -244,6 +245,7 @@ impl Part {
             Self::MicrolensArray(array) => {
                 let [width, height] = array.half_size.map(|half| 2.0 * half);
                 let pitch = array.lattice.pitch;
+                let [pitch, width, height] = [pitch, width, height].map(significant);
                 vec![format!("lenslets every {pitch} mm on {width} x {height} mm")]
             }
             Self::ThinLens(_) | Self::Filter(_) => Vec::new(),

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use etendue_geometry::files;
 use etendue_image::{Limits, Samples};
 use glam::DVec2;
 
@@ -111,7 +110,7 @@ impl Picture {
 type Pixels = ([usize; 2], Vec<f64>, f64);
 
 fn read(path: &Path) -> Result<Pixels, String> {
-    let bytes = files::read(path, LONGEST).map_err(|e| format!("cannot be read: {e}"))?;
+    let bytes = etendue_files::read(path, LONGEST).map_err(|e| format!("cannot be read: {e}"))?;
     let limits = Limits::within(Some(MOST_BYTES));
     let raster = etendue_image::decode(&bytes, limits)
         .map_err(|e| format!("is not a picture that can be read: {e}"))?;

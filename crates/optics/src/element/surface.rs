@@ -191,12 +191,23 @@ impl Surface {
         (r.abs() <= self.domain() && sag.is_finite()).then_some(sag)
     }
 
+    #[inline(always)]
+    fn conic_root(&self, u: f64) -> f64 {
+        let c = self.curvature;
+        (1.0 - (1.0 + self.conic) * c * c * u).max(0.0).sqrt()
+    }
+
+    /// The sag of the conic underneath (mm) at u = r²; it rises or falls all the way.
+    pub(super) fn conic_sag(&self, u: f64) -> f64 {
+        self.curvature * u / (1.0 + self.conic_root(u))
+    }
+
     /// The sag and its derivative by u/2, that is (∂z/∂x)/x, at u = r². Beyond the domain the conic
     /// goes on as if at its edge, which keeps an iteration going and is refused in the end.
     #[inline(always)]
     pub(crate) fn profile(&self, u: f64) -> (f64, f64) {
         let c = self.curvature;
-        let root = (1.0 - (1.0 + self.conic) * c * c * u).max(0.0).sqrt();
+        let root = self.conic_root(u);
         let (value, slope) = polynomial(&self.aspheric, u);
         (c * u / (1.0 + root) + value, c / root.max(1e-12) + 2.0 * slope)
     }

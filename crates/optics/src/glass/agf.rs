@@ -9,8 +9,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use etendue_geometry::files;
-
 use super::dispersion::Dispersion;
 use super::{Glass, extinction_of};
 
@@ -48,7 +46,7 @@ impl AgfCatalogue {
     ///
     /// When it is no regular file, is longer than 64 MiB, or is no catalogue.
     pub fn open(path: &Path) -> Result<Self, AgfError> {
-        let bytes = files::read(path, LONGEST)
+        let bytes = etendue_files::read(path, LONGEST)
             .map_err(|error| AgfError::File(format!("cannot be read: {error}")))?;
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
         Self::read(&stem.unwrap_or_default(), &bytes)

@@ -140,6 +140,20 @@ pub(crate) fn slopes_to(
         .or_else(|| follow(shares, DVec2::ZERO, 1.0))
 }
 
+/// As [`slopes_to`], from slopes that are near or not at all.
+pub(crate) fn slopes_near(
+    at: &MonochromaticTrain,
+    film: DVec3,
+    (element, place): (usize, DVec2),
+    start: DVec2,
+) -> Option<DVec2> {
+    let miss = |slopes: DVec2| {
+        let ray = Ray::new(film, towards_lens(slopes))?;
+        at.crossing(Side::Sensor, element, ray).map(|there| DVec2::from(there) - place)
+    };
+    solve(miss, start, 1.0)
+}
+
 /// Steps from the axis outwards, each begun where the last two point.
 fn follow<F: Fn(DVec2) -> Option<DVec2>>(
     at: impl Fn(f64) -> F,

@@ -17,6 +17,10 @@ const RAYS: u32 = 128;
 /// digits, and half a percent changes the light by one.
 const NOMINAL: f64 = 5e-3;
 
+/// How much wider than the beam a stop may be written and still count as filled: two percent of the
+/// light, as rims are often written as wide as the beam, to three digits.
+const FILLED: f64 = 1.01;
+
 /// The widest beam from infinity on the axis that passes a lens when its stop is open.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidestOpening {
@@ -132,14 +136,17 @@ impl OpticalTrain {
         (stop_radius > 0.0).then_some(Edge::At { stop_radius, element })
     }
 
-    /// Refuses a radius of the stop (mm) that no beam on the axis fills.
+    /// Refuses a radius of the stop (mm) that no beam on the axis fills. What the lens itself has, as
+    /// its file writes it, is none that is refused.
     pub(super) fn check_opening(&self, stop_radius: f64) -> Result<(), LensError> {
-        match self.widest_opening() {
-            Some(widest) if stop_radius > widest.stop_radius * (1.0 + NOMINAL) => {
-                Err(LensError::Stop { index: self.stop, why: widest.to_string() })
-            }
-            _ => Ok(()),
+        let Some(widest) = self.widest_opening() else { return Ok(()) };
+        let written = self.stop_radius();
+        let is_filled = written <= widest.stop_radius * FILLED;
+        let most = if is_filled { written.max(widest.stop_radius) } else { widest.stop_radius };
+        if stop_radius > most * (1.0 + NOMINAL) {
+            return Err(LensError::Stop { index: self.stop, why: widest.to_string() });
         }
+        Ok(())
     }
 
     /// A sentence on a stop that is open wider than any beam on the axis; `None` when the beam fills
@@ -147,8 +154,7 @@ impl OpticalTrain {
     pub(super) fn unfilled_stop(&self) -> Option<String> {
         let paper = self.paraxial(self.wavelength).ok()?.f_number?;
         let widest = self.widest_opening()?;
-        // Two percent of the light: rims are often written as wide as the beam, to three digits.
-        (self.stop_radius() > widest.stop_radius * 1.01).then(|| {
+        (self.stop_radius() > widest.stop_radius * FILLED).then(|| {
             format!("the stop is open to f/{paper:.2} on paper, but {widest}: the f-number is that on paper")
         })
     }

@@ -7,6 +7,7 @@ mod microlens_array;
 mod openings;
 mod optics_reference;
 mod reports;
+mod small_openings;
 
 use etendue_optics::train::{LensFile, OpticalTrain};
 

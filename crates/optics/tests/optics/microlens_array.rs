@@ -260,7 +260,7 @@ fn traced(
         places.push([r(0.628_706_721), r(0.538_597_270)]);
     }
     let mut rays = LensRays::default();
-    pupil.push_rays(&film, &places, &mut rays);
+    pupil.push_rays(&film, &places, 587.56, &mut rays);
     at.trace(Side::Sensor, Clip::On, &mut rays);
     (film, rays)
 }

@@ -39,6 +39,26 @@ fn a_lens_opened_as_far_as_it_goes_has_the_light_of_its_f_number() {
 }
 
 #[test]
+fn the_f_number_that_a_lens_reports_can_be_asked_for() {
+    for name in
+        ["achromat", "asphere", "cooke-triplet", "double-gauss", "fisheye", "singlet", "telephoto"]
+    {
+        let train = preset(name);
+        let reported = train.paraxial(train.wavelength()).unwrap().f_number.unwrap();
+        let is_filled = !train.notes().iter().any(|note| note.contains("on paper"));
+        // As tables print it: with two, three and four decimals.
+        for decimals in 2..5 {
+            let written: f64 = format!("{reported:.decimals$}").parse().unwrap();
+            let asked = train.clone().with_f_number(written);
+            assert!(asked.is_ok() || !is_filled, "{name}: f/{written} of f/{reported}: {asked:?}");
+        }
+    }
+    let gauss = preset("double-gauss");
+    assert!(gauss.clone().with_f_number(2.03).is_ok(), "it reports f/2.0302");
+    assert!(gauss.with_f_number(1.9).is_err());
+}
+
+#[test]
 fn a_rim_in_front_limits_the_beam_exactly() {
     // A thin lens of 50 mm behind a hole of radius 5: f/5, whatever the stop behind is.
     let train = build(

@@ -7,7 +7,11 @@
     shot["depth"], shot.raw, shot.K, shot.pose
 
 Lengths are metres in scenes and millimetres in lenses; poses are OpenCV's (x right, y down, z forward).
-What is refused raises ValueError with a sentence that names the place and the remedy; Ctrl-C stops a render.
+What is refused raises ValueError with a sentence that names the place and the remedy, a file that is not there
+FileNotFoundError, one that cannot be read or written OSError; Ctrl-C stops all work.
+
+Scenes, lenses, sensors, accelerators and shots may be pickled, and work in forked processes as in spawned ones.
+`threads` is how many threads work, None for all processors; give workers of a data loader one each.
 """
 
 from __future__ import annotations
@@ -20,9 +24,10 @@ from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Seq
 import numpy as np
 
 from . import _core
+from ._copies import StoredRendering, TemporaryFolder
 
 __version__ = _core.version()
-__all__ = ["load", "Scene", "Shot", "Lens", "Traced", "Sensor", "Accel", "Hits"]
+__all__ = ["load", "Scene", "Shot", "LightField", "Lens", "Traced", "Sensor", "Accel", "Hits"]
 
 _Path = Union[str, "os.PathLike[str]"]
 
@@ -44,6 +49,15 @@ def _rows(name: str, values: Any, dtype: Any) -> np.ndarray:
     return array
 
 
+def _threads(threads: Optional[int]) -> int:
+    """Threads as the core counts them."""
+    if threads is None:
+        return 0
+    if isinstance(threads, bool) or int(threads) != threads or not 1 <= threads <= 4096:
+        raise ValueError(f"threads is {threads!r}; 1 to 4096 are needed, or None for all processors")
+    return int(threads)
+
+
 def _stem(layer: str) -> str:
     """A layer's key: NormalCamera is normal_camera, Id.object id_object, the picture's picture."""
     if not layer:
@@ -61,6 +75,7 @@ def load(
     strict: bool = False,
     allow_outside: bool = False,
     memory_limit: Optional[int] = None,
+    threads: Optional[int] = None,
 ) -> "Scene":
     """Opens a scene (.json), or a model to frame by itself (.gltf, .glb, .obj, .ply); bytes are those of a GLB.
 
@@ -68,30 +83,34 @@ def load(
     strict: refuse defects of the data instead of noting them.
     allow_outside: let the scene name files outside of its folder.
     memory_limit: the most memory that may be taken, in bytes.
+    threads: how many threads work; None for all processors.
     """
     pairs = [(key, json.dumps(value)) for key, value in (settings or {}).items()]
     folder = None
     if isinstance(path, (bytes, bytearray, memoryview)):
         # Kept as long as the scene, which uses the file where it lies.
-        folder = tempfile.TemporaryDirectory()
+        folder = TemporaryFolder()
         model = os.path.join(folder.name, "model.glb")
         with open(model, "wb") as file:
             file.write(path)
         path = model
-    core = _core.Session.open(os.fspath(path), pairs, strict, allow_outside, memory_limit)
-    scene = Scene._of(core)
-    scene._folder = folder
-    return scene
+    options = (strict, allow_outside, memory_limit)
+    core = _core.Session.open(os.fspath(path), pairs, *options)
+    return Scene._of(core, options, threads, folder)
 
 
 class Scene:
     """A scene that is opened once, changed and rendered often.
 
     Models, images and the acceleration structure are made when they are first needed and kept; after a
-    change only what it touches is made anew.
+    change only what it touches is made anew. A copy, or what is unpickled, is a scene of its own with the same
+    values and meshes, from which the same picture is rendered.
     """
 
+    threads: Optional[int]
+    """How many threads work; None for all processors."""
     _core: Any
+    _options: Tuple[bool, bool, Optional[int]]
     _folder: Any = None
 
     def __init__(
@@ -103,6 +122,7 @@ class Scene:
         strict: bool = False,
         allow_outside: bool = False,
         memory_limit: Optional[int] = None,
+        threads: Optional[int] = None,
         **scene: Any,
     ) -> None:
         """A scene of arrays and of the keys of a scene file (camera, objects, lights, tracer, layers, …).
@@ -118,16 +138,40 @@ class Scene:
             raise ValueError("vertices and faces come together")
         if vertices is not None:
             scene.setdefault("objects", [{"file": "mesh"}])
-        self._core = _core.Session.from_json(
-            json.dumps(scene), os.fspath(folder), strict, allow_outside, memory_limit
-        )
+        _threads(threads)
+        self.threads, self._options = threads, (strict, allow_outside, memory_limit)
+        self._core = _core.Session.from_json(json.dumps(scene), os.fspath(folder), *self._options)
         if vertices is not None:
             self.insert_mesh("mesh", vertices, faces)
 
     @classmethod
-    def _of(cls, core: Any) -> "Scene":
+    def _of(cls, core: Any, options: Any, threads: Optional[int], folder: Any) -> "Scene":
+        _threads(threads)
         scene = cls.__new__(cls)
-        scene._core = core
+        scene._core, scene._options, scene.threads, scene._folder = core, options, threads, folder
+        return scene
+
+    def __reduce__(self) -> Any:
+        path, values = self._do("origin")
+        model = None
+        if self._folder is not None:
+            with open(path, "rb") as file:
+                model = file.read()
+        origin = (os.path.abspath(path), values, model)
+        return type(self)._restored, (origin, self._options, self.threads, self._do("meshes"))
+
+    @classmethod
+    def _restored(cls, origin: Any, options: Any, threads: Optional[int], meshes: Any) -> "Scene":
+        path, values, model = origin
+        folder = None
+        if model is not None:
+            folder = TemporaryFolder()
+            path = os.path.join(folder.name, os.path.basename(path))
+            with open(path, "wb") as file:
+                file.write(model)
+        scene = cls._of(_core.Session.restore(path, values, *options), options, threads, folder)
+        for name, vertices, faces in meshes:
+            scene.insert_mesh(name, vertices, faces)
         return scene
 
     def insert_mesh(self, name: str, vertices: Any, faces: Any) -> None:
@@ -170,18 +214,19 @@ class Scene:
 
     def plan(self) -> str:
         """What a render will do, and why."""
-        return self._do("plan")
+        return self._do("plan", _threads(self.threads))
 
     def render(self, samples: Optional[int] = None, progress: Any = False) -> "Shot":
-        """Renders the scene as it is now, on all processors and without Python's lock.
+        """Renders the scene as it is now, on its `threads` and without Python's lock.
 
         samples: samples a pixel from now on.
-        progress: True prints, a function is called with the stage and the share of it that is done.
+        progress: True prints, a function is called with the stage and the share of it that is done; what it
+        raises stops the render and comes out of here.
         """
         if samples is not None:
             self["render.samples"] = int(samples)
         told = _print_progress if progress is True else (progress or None)
-        shot = Shot(self._do("render", told))
+        shot = Shot(self._do("render", told, _threads(self.threads)))
         if progress is True:
             print(flush=True)
         return shot
@@ -190,12 +235,13 @@ class Scene:
         """Renders the frames that the scene's `frames` name, one after the other."""
         if samples is not None:
             self["render.samples"] = int(samples)
-        count = self._do("load_frames")
+        threads = _threads(self.threads)
+        count = self._do("load_frames", threads)
         if count == 0:
             yield self.render()
         for number in range(count):
-            self._do("show", number)
-            yield Shot(self._do("render", None))
+            self._do("show", number, threads)
+            yield Shot(self._do("render", None, threads))
 
 
 def _print_progress(stage: str, share: float) -> None:
@@ -207,6 +253,8 @@ class Shot(Mapping[str, np.ndarray]):
 
     shot["depth"] is (h, w), shot["normal"] (h, w, 3); rows from the top. Data layers are float64, and
     +inf (float), 0 (int) or the zero vector (directions) where nothing is hit.
+
+    A shot that was pickled, such as one that another process returns, has all of this but `write`.
     """
 
     def __init__(self, core: Any) -> None:
@@ -214,6 +262,9 @@ class Shot(Mapping[str, np.ndarray]):
         self._names = {_stem(name): name for name in core.layers()}
         self._arrays: Dict[str, np.ndarray] = {}
         self._camera = json.loads(core.camera())
+
+    def __reduce__(self) -> Any:
+        return Shot, (StoredRendering.of(self._core),)
 
     def __getitem__(self, key: str) -> np.ndarray:
         name = key if key in self._names.values() else self._names.get(key)
@@ -277,10 +328,27 @@ class Shot(Mapping[str, np.ndarray]):
         """Writes the files that the command writes; gives their names."""
         return self._core.write(os.fspath(folder), outputs)
 
+    def light_field(self) -> Optional["LightField"]:
+        """The set of a light-field camera; None of other cameras. Renders its reference views."""
+        with tempfile.TemporaryDirectory() as folder:
+            self._core.write(folder, "npy")
+
+            def array(stem: str) -> Optional[np.ndarray]:
+                path = os.path.join(folder, f"{stem}.npy")
+                return np.load(path) if os.path.exists(path) else None
+
+            path = os.path.join(folder, "geometry.json")
+            if not os.path.exists(path):
+                return None
+            with open(path, encoding="utf-8") as file:
+                geometry = json.load(file)
+            stems = ["picture", "white", "views", "reference", "central_depth", "central_disparity"]
+            return LightField(*map(array, stems), geometry)
+
     def _repr_png_(self) -> Optional[bytes]:
-        """The picture, or else the first layer, for notebooks."""
+        """The picture, or else the first layer, for notebooks; None where it was pickled."""
         name = self._names.get("picture") or next(iter(self._names.values()), None)
-        if name is None:
+        if name is None or isinstance(self._core, StoredRendering):
             return None
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "shot.png")
@@ -290,6 +358,25 @@ class Shot(Mapping[str, np.ndarray]):
 
     def __repr__(self) -> str:
         return f"<etendue.Shot of {', '.join(self._names)}>"
+
+
+class LightField(NamedTuple):
+    """What a light-field camera leaves, as arrays; None for what it has not."""
+
+    raw: Optional[np.ndarray]
+    """(h, w, channels): the picture behind the lenslets; of a light_field_reference its views side by side."""
+    white: Optional[np.ndarray]
+    """(h, w, 3): the same before a radiance of 1 everywhere."""
+    views: Optional[np.ndarray]
+    """(n, n, rows, columns, channels): [down, across]; None where geometry["no_views"] says why."""
+    reference: Optional[np.ndarray]
+    """The same by an ideal lens."""
+    depth: Optional[np.ndarray]
+    """(rows, columns): z of the middle view, metres."""
+    disparity: Optional[np.ndarray]
+    """(rows, columns): of the middle view, columns a view."""
+    geometry: Dict[str, Any]
+    """geometry.json: centres, and the formula of disparities."""
 
 
 class Traced(NamedTuple):
@@ -314,7 +401,11 @@ class Lens:
     def __init__(
         self, path: _Path, f_number: Optional[float] = None, allow_outside: bool = False
     ) -> None:
+        self._arguments = (os.path.abspath(path), f_number, allow_outside)
         self._core = _core.Lens(os.fspath(path), f_number, allow_outside)
+
+    def __reduce__(self) -> Any:
+        return Lens, self._arguments
 
     @property
     def name(self) -> str:
@@ -359,14 +450,16 @@ class Lens:
         *,
         from_sensor: bool = False,
         clip: bool = True,
+        threads: Optional[int] = None,
     ) -> Traced:
         """Takes rays through the lens: (n, 3) origins (mm) and directions, a wavelength (nm).
 
-        clip: end rays at rims and stops."""
+        clip: end rays at rims and stops. threads: how many threads work; None for all processors."""
         wavelength = self.wavelength if wavelength is None else float(wavelength)
         origins = _rows("origins", origins, np.float64)
         directions = _rows("directions", directions, np.float64)
-        return Traced(*self._core.trace(origins, directions, wavelength, from_sensor, clip))
+        manner = (from_sensor, clip, _threads(threads))
+        return Traced(*self._core.trace(origins, directions, wavelength, manner))
 
 
 class Sensor:
@@ -376,6 +469,11 @@ class Sensor:
     def __init__(self, name: _Path, settings: Optional[Mapping[str, Any]] = None) -> None:
         pairs = [(key, json.dumps(value)) for key, value in (settings or {}).items()]
         self._core = _core.Sensor(os.fspath(name), pairs)
+        is_file = os.path.exists(name) or os.fspath(name).endswith(".json")
+        self._arguments = (os.path.abspath(name) if is_file else name, dict(settings or {}))
+
+    def __reduce__(self) -> Any:
+        return Sensor, self._arguments
 
     @property
     def facts(self) -> Dict[str, Any]:
@@ -408,14 +506,24 @@ class Hits(NamedTuple):
     """Unit geometric normal on the triangle's front; zero for a miss."""
 
 
+def _accel(vertices: Any, faces: Any, backend: str, threads: Optional[int]) -> "Accel":
+    return Accel(vertices, faces, backend, threads=threads)
+
+
 class Accel:
     """A ray caster over one mesh: Embree finds, double precision measures."""
 
-    def __init__(self, vertices: Any, faces: Any, backend: str = "embree") -> None:
-        """vertices: (n, 3) float. faces: (m, 3) int. backend: embree, bvh (pure Rust) or exact (slow)."""
-        self._core = _core.Accel(
-            _rows("vertices", vertices, np.float64), _rows("faces", faces, np.uint32), backend
-        )
+    def __init__(
+        self, vertices: Any, faces: Any, backend: str = "embree", *, threads: Optional[int] = None
+    ) -> None:
+        """vertices: (n, 3) float. faces: (m, 3) int. backend: embree, bvh (pure Rust) or exact (slow).
+        threads: how many threads work; None for all processors."""
+        self.threads, self._backend = threads, backend
+        vertices, faces = _rows("vertices", vertices, np.float64), _rows("faces", faces, np.uint32)
+        self._core = _core.Accel(vertices, faces, backend, _threads(threads))
+
+    def __reduce__(self) -> Any:
+        return _accel, (*self._core.mesh(), self._backend, self.threads)
 
     def closest(
         self, origins: Any, directions: Any, t_max: Any = None, *, coherent: bool = False
@@ -423,18 +531,19 @@ class Accel:
         """The closest hit of each ray: (n, 3) origins and directions, of any length but 0. t_max: (n,) or one
         number, in lengths of the directions. coherent: neighbours run close together, as a camera's do.
         A ray that is not finite misses."""
-        origins = _rows("origins", origins, np.float64)
-        directions = _rows("directions", directions, np.float64)
-        found = self._core.closest(origins, directions, _limits(t_max, len(origins)), coherent)
+        found = self._core.closest(*self._rays(origins, directions, t_max), coherent, _threads(self.threads))
         return Hits(found["t"], found["triangle"], found["u"], found["v"], found["normal"])
 
     def occluded(
         self, origins: Any, directions: Any, t_max: Any = None, *, coherent: bool = False
     ) -> np.ndarray:
         """Whether anything is in the way of each ray, up to t_max: (n,) bool."""
+        return self._core.occluded(*self._rays(origins, directions, t_max), coherent, _threads(self.threads))
+
+    @staticmethod
+    def _rays(origins: Any, directions: Any, t_max: Any) -> Tuple[Any, Any, Any]:
         origins = _rows("origins", origins, np.float64)
-        directions = _rows("directions", directions, np.float64)
-        return self._core.occluded(origins, directions, _limits(t_max, len(origins)), coherent)
+        return origins, _rows("directions", directions, np.float64), _limits(t_max, len(origins))
 
     def __repr__(self) -> str:
         return f"<etendue.Accel: {self._core.report()}>"

@@ -45,6 +45,14 @@ const NEAR: f64 = 2.0;
 /// ([`convergence`]).
 const MIDWAY: f64 = 1.5;
 
+/// The error that the samples of half a block may show of themselves when they are done, as a share of what is
+/// allowed. The other half decided, and the variance of 32 pixels is known to a quarter: what is done at 1 is
+/// seldom twice as much by chance.
+const OVER: f64 = 2.0;
+
+/// The share of pixels that may be so without a word.
+const FEW: f64 = 0.01;
+
 /// Rows of blocks in a strip of rows.
 const ROWS_OF_STRIP: usize = (TILE / BLOCK) as usize;
 
@@ -178,6 +186,10 @@ pub struct SampleCounts {
     pub total: u64,
     /// Pixels that were given up at the most samples.
     pub given_up: u64,
+    /// Pixels of blocks that were done by what others found, and by their own samples have more than twice the
+    /// variance that was allowed.
+    #[serde(default)]
+    pub over: u64,
     /// The middle of the worst block of these (column and row, from 0), and its error as a share of what
     /// was allowed (of variances).
     pub worst: Option<([u32; 2], f64)>,
@@ -199,6 +211,7 @@ impl SampleCounts {
             pixels: self.pixels + other.pixels,
             total: self.total + other.total,
             given_up: self.given_up + other.given_up,
+            over: self.over + other.over,
             worst,
         }
     }
@@ -215,16 +228,34 @@ impl SampleCounts {
         format!("{} to {}, {:.1} in the mean", self.least, self.most, self.mean())
     }
 
-    /// What a user should know of pixels that were given up.
+    /// What a user should know of pixels that were given up, or stopped too early.
     #[must_use]
     pub fn note(&self) -> Option<String> {
         let ([column, row], error) = self.worst?;
-        let share = 100.0 * self.given_up as f64 / self.pixels.max(1) as f64;
+        let part = |pixels: u64| pixels as f64 / self.pixels.max(1) as f64;
+        let many = part(self.over) > FEW;
+        let what = match (self.given_up, many) {
+            (0, false) => return None,
+            (0, true) => None,
+            (given_up, _) => Some(format!(
+                "{:.2} % of the pixels still have more error than `render.samples` allows after {} samples",
+                100.0 * part(given_up),
+                self.most
+            )),
+        };
+        let over = many.then(|| {
+            format!(
+                "{:.2} % of the pixels stopped with more than twice the variance that `render.samples` \
+                 allows, by their own samples, of which those beside them saw too little",
+                100.0 * part(self.over)
+            )
+        });
+        let what: Vec<String> = what.into_iter().chain(over).collect();
+        let remedy = if self.given_up > 0 { "`max`" } else { "`min`" };
         Some(format!(
-            "samples: {share:.2} % of the pixels still have more error than `render.samples` allows after \
-             {} samples; the worst are around column {column}, row {row}, with {error:.1} times the \
-             variance; give `max` a larger number, or see what shines so unevenly there",
-            self.most
+            "samples: {}; the worst are around column {column}, row {row}, with {error:.1} times the \
+             variance; give {remedy} a larger number, or see what shines so unevenly there",
+            what.join("; ")
         ))
     }
 }
@@ -399,8 +430,18 @@ impl<'a> Adaptive<'a> {
         self.owned().flat_map(|index| [(index, 0), (index, 1)]).map(more).sum()
     }
 
+    /// The error of half a block by its own samples alone, which had no part in deciding how many they are.
+    fn own_error(&self, (index, half): (usize, usize), number: u32, part: &Averaging<'_>) -> f64 {
+        let pixels = self.blocks.pixels(index).filter(|pixel| half_of(*pixel) == half);
+        let sampled = pixels.map(|pixel| part.sampled(pixel, self.judged.1));
+        let slope = self.blocks.blocks[index].slope[half];
+        let share = convergence::share_of_independent(number, slope);
+        share * self.rule.error(sampled, number).unwrap_or(0.0)
+    }
+
     /// How many samples the pixels got.
-    pub(crate) fn counts(&self, samples: u32) -> Option<SampleCounts> {
+    pub(crate) fn counts(&self, samples: u32, parts: &[Averaging<'_>]) -> Option<SampleCounts> {
+        let part = &parts[self.judged.0];
         let of_half = |(index, half): (usize, usize)| {
             let block = &self.blocks.blocks[index];
             let pixels = self.blocks.pixels(index).filter(|pixel| half_of(*pixel) == half);
@@ -408,13 +449,22 @@ impl<'a> Adaptive<'a> {
             let middle = *pixels.get(pixels.len() / 2)?;
             let (count, number) = (pixels.len() as u64, block.samples(half, samples));
             let gave_up = block.passed[half] == 0 && block.settled[half] > 0;
+            // Of what goes on nobody knows yet.
+            let is_done = !gave_up && (1..=samples).contains(&block.settled[half]);
+            let own = if is_done { self.own_error((index, half), number, part) } else { 0.0 };
+            let is_over = own > OVER;
             Some(SampleCounts {
                 least: number,
                 most: number,
                 pixels: count,
                 total: count * u64::from(number),
                 given_up: if gave_up { count } else { 0 },
-                worst: gave_up.then(|| (middle, block.error[0].max(block.error[1]))),
+                over: if is_over { count } else { 0 },
+                worst: match (gave_up, is_over) {
+                    (true, _) => Some((middle, block.error[0].max(block.error[1]))),
+                    (false, true) => Some((middle, own)),
+                    (false, false) => None,
+                },
             })
         };
         self.owned()

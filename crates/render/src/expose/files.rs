@@ -9,9 +9,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{ExposeError, Exposed, SensorLight, remarks};
-use crate::output::{
-    Channel, Layer, Look, Outputs, Picture, PictureError, SOFTWARE, Values, npy, png, write_whole,
-};
+use crate::output::{Channel, Layer, Look, Outputs, Picture, PictureError, Values, npy, png};
+use etendue_files::{SOFTWARE, Transaction};
 
 /// A name fit for all formats: `452.5nm` becomes `452_5nm`.
 pub(super) fn plain(name: &str) -> String {
@@ -31,6 +30,7 @@ pub(super) fn name(digits: usize, stem: &str, number: u32, ending: &str) -> Stri
 pub(super) struct ExposureWriter<'a> {
     pub(super) sensor: &'a Sensor,
     pub(super) light: &'a SensorLight,
+    pub(super) files: &'a Transaction,
     pub(super) folder: &'a Path,
     pub(super) outputs: Outputs,
     /// Digits of a shot's number in names; 0 for none.
@@ -38,6 +38,8 @@ pub(super) struct ExposureWriter<'a> {
     /// Of each exposure time so far: its moments' files, which all of its frames share.
     pub(super) moments: Vec<(f64, MomentFiles)>,
     pub(super) invalid: InvalidValues,
+    /// The exposure time (s) of the last shot whose losses are told.
+    pub(super) told: Option<f64>,
     pub(super) exposed: Exposed,
 }
 
@@ -61,7 +63,12 @@ impl ExposureWriter<'_> {
         let mut files = ShotFiles::new(shot);
         // Every shot sees the same film, so once is enough.
         self.invalid = image.invalid;
-        self.exposed.notes.extend(remarks::on(self.sensor, self.film(), &image, shot));
+        // Frames of one exposure time differ by their noise alone.
+        if self.told != Some(shot.exposure) {
+            self.told = Some(shot.exposure);
+            let remarks = remarks::on(self.sensor, self.film(), &image, shot);
+            self.exposed.notes.extend(remarks);
+        }
         let preview = self.preview(&image, shot)?;
         if self.outputs.dng && self.sensor.spec().kind == SensorKind::Raw {
             files.dng = self.dng(&image, shot)?;
@@ -71,17 +78,17 @@ impl ExposureWriter<'_> {
         if self.outputs.png {
             if !many {
                 let name = self.name("raw", shot.frame, "png");
-                png::write(&self.place(&name), &raw, "Raw", png::Bits::Sixteen)?;
+                png::write(self.files, &self.place(&name), &raw, "Raw", png::Bits::Sixteen)?;
                 files.png = Some(name);
             }
             let name = self.name("raw", shot.frame, "preview.png");
-            png::write(&self.place(&name), &preview, "", png::Bits::Eight)?;
+            png::write(self.files, &self.place(&name), &preview, "", png::Bits::Eight)?;
             files.preview = Some(name);
         }
         // Without PNG of that many channels, the numbers still have to go somewhere.
         if self.outputs.npy || many {
             let name = self.name("raw", shot.frame, "npy");
-            npy::write(&self.place(&name), &raw, "Raw")?;
+            npy::write(self.files, &self.place(&name), &raw, "Raw")?;
             files.npy = Some(name);
         }
         if self.sensor.spec().moments == Some(true) {
@@ -168,9 +175,9 @@ impl ExposureWriter<'_> {
         let model = self.sensor.spec().model.map_or("etendue", |model| model.preset().name);
         let mut refused = None;
         // An image that no DNG can hold is not written, and that is no fault.
-        let written = write_whole(&path, |part| {
+        let written = self.files.write(&path, |part| {
             let mut out = BufWriter::new(part);
-            match self.sensor.write_dng(image, model, &mut out) {
+            match self.sensor.write_dng(image, (model, &self.light.white), &mut out) {
                 Ok(()) => out.flush(),
                 Err(DngError::NotRaw(why)) => {
                     refused = Some(why);
@@ -202,13 +209,7 @@ impl ExposureWriter<'_> {
     fn moments(&mut self, shot: Exposure) -> Result<MomentFiles, ExposeError> {
         #[expect(clippy::cast_possible_truncation, reason = "fewer than shots")]
         let number = self.moments.len() as u32;
-        // Frames of one exposure have the same moments.
-        let several = self.sensor.shots().any(|other| other.exposure != shot.exposure);
-        let name = |stem: &str| match several {
-            true => self.name(stem, number, "npy"),
-            false => format!("{stem}.npy"),
-        };
-        let names = [name("mean"), name("variance")];
+        let names = moment_names(self.sensor, self.digits, number);
         // Mean and variance, a file each.
         let moments = self.sensor.moments(self.film(), shot)?;
         let depth = moments.depth;
@@ -229,7 +230,7 @@ impl ExposureWriter<'_> {
             };
             let header = self.light.header.clone();
             let picture = Picture::new(moments.width, moments.height, vec![layer], header)?;
-            npy::write(&self.place(name), &picture, stem)?;
+            npy::write(self.files, &self.place(name), &picture, stem)?;
         }
         Ok(names)
     }
@@ -237,6 +238,15 @@ impl ExposureWriter<'_> {
 
 /// Names of the files of expected value and variance.
 pub(super) type MomentFiles = [String; 2];
+
+/// These names for the exposure time `number` of a sensor. Frames of one exposure have the same moments.
+pub(super) fn moment_names(sensor: &Sensor, digits: usize, number: u32) -> MomentFiles {
+    let mut times = sensor.shots().map(|shot| shot.exposure);
+    let first = times.next();
+    let several = times.any(|other| Some(other) != first);
+    let digits = if several { digits } else { 0 };
+    ["raw_mean", "raw_variance"].map(|stem| name(digits, stem, number, "npy"))
+}
 
 /// `sensor.json`.
 #[derive(Debug, Serialize)]

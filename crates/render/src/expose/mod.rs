@@ -7,7 +7,7 @@
 //! | `raw.npy` | the same, `[h, w]` or `[h, w, channels]`, `u2` |
 //! | `raw.dng` | the same for raw converters, with pattern and levels (`raw` sensors of r, g, b or none) |
 //! | `raw.preview.png` | demosaiced, white balanced, sRGB; not data |
-//! | `mean.npy`, `variance.npy` | the expected value and variance of every pixel, once an exposure time, when asked for |
+//! | `raw_mean.npy`, `raw_variance.npy` | the expected value and variance of every pixel, once an exposure time, when asked for |
 //! | `sensor.json` | what the numbers mean, and which file is which exposure |
 //!
 //! Several exposures or frames are numbered: `raw_000.png`, `raw_001.png`, …
@@ -15,11 +15,14 @@
 mod bands;
 mod files;
 mod film;
+mod illumination;
 mod noise;
 mod remarks;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use etendue_files::{Transaction, WriteError};
 use etendue_scene::Scene;
 use etendue_sensor::{
     Exposure, Film, InvalidValues, NoiseModel, RawImage, Sensor, SensorError, SensorKind,
@@ -55,6 +58,12 @@ pub enum ExposeError {
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
+}
+
+impl From<WriteError> for ExposeError {
+    fn from(error: WriteError) -> Self {
+        Self::Output(error.into())
+    }
 }
 
 /// What the sensor will do, and why.
@@ -108,6 +117,8 @@ pub struct SensorLight {
     film: BandFilm,
     /// Of the scene's samples, and of temporal noise.
     seeds: [u64; 2],
+    /// What each channel makes of a white surface in the scene's light, the most being 1.
+    pub(super) white: Vec<f64>,
     header: Vec<(String, String)>,
     notes: Vec<String>,
 }
@@ -148,7 +159,8 @@ impl SensorLight {
         };
         let film = film.on_sensor(scene, &sensor);
         let seeds = [scene.render.seed, noise_seed(scene)];
-        Ok(Ok(Self { sensor, film, seeds, header: picture.header().to_vec(), notes }))
+        let white = sensor.white_under(&illumination::light(scene, sensor.bands()));
+        Ok(Ok(Self { sensor, film, seeds, white, header: picture.header().to_vec(), notes }))
     }
 
     /// The sensor, in the bands of the light.
@@ -179,7 +191,7 @@ impl SensorLight {
 /// When a file cannot be written, or `progress` says stop.
 pub fn write(
     light: &SensorLight,
-    folder: &Path,
+    (files, folder): (&Transaction, &Path),
     outputs: Outputs,
     progress: &dyn Fn(f64) -> bool,
 ) -> Result<Exposed, ExposeError> {
@@ -189,11 +201,13 @@ pub fn write(
     let mut writer = ExposureWriter {
         sensor,
         light,
+        files,
         folder,
         outputs,
         digits,
         moments: Vec::new(),
         invalid: InvalidValues::default(),
+        told: None,
         exposed: Exposed { files: Vec::new(), notes: light.notes.clone() },
     };
     let mut sidecar = Sidecar::new(sensor, light.seeds[0]);
@@ -208,16 +222,16 @@ pub fn write(
     writer.exposed.notes.extend(in_words(sidecar.invalid));
     sidecar.notes.clone_from(&writer.exposed.notes);
     let path = writer.place("sensor.json");
-    sidecar::write_json(&path, &sidecar)?;
+    sidecar::write_json(files, &path, &sidecar)?;
     Ok(writer.exposed)
 }
 
-/// The seed of temporal noise: two cameras of a scene, and two places of one camera, draw noise of
-/// their own.
+/// The seed of temporal noise: two frames or cameras of a scene, and two places of one camera, draw noise
+/// of their own.
 fn noise_seed(scene: &Scene) -> u64 {
     // A camera is made of numbers and words only, which always serialise.
     let camera = serde_json::to_string(&scene.camera.opencv()).unwrap_or_default();
-    etendue_sensor::mixed_seed(scene.render.seed, camera.as_bytes())
+    etendue_sensor::mixed_seed(scene.render.frame_seed(), camera.as_bytes())
 }
 
 /// The names of all files that exposing `scene` may write.
@@ -226,19 +240,16 @@ pub fn file_names(scene: &Scene) -> Vec<String> {
     let Some(sensor) = &scene.sensor else { return Vec::new() };
     let shots: Vec<Exposure> = sensor.shots().collect();
     let digits = digits(shots.len());
-    let kinds = [
-        ("raw", "png"),
-        ("raw", "preview.png"),
-        ("raw", "npy"),
-        ("raw", "dng"),
-        ("mean", "npy"),
-        ("variance", "npy"),
-    ];
-    let shot = |shot: &Exposure| {
-        let frame = shot.frame;
-        kinds.map(|(stem, ending)| files::name(digits, stem, frame, ending))
-    };
-    shots.iter().flat_map(shot).chain(["sensor.json".to_owned()]).collect()
+    let endings = ["png", "preview.png", "npy", "dng"];
+    let shot =
+        |shot: &Exposure| endings.map(|ending| files::name(digits, "raw", shot.frame, ending));
+    let has_moments = sensor.spec().moments == Some(true);
+    // Fewer exposure times than shots, numbered alike.
+    let moments: BTreeSet<String> = (0..)
+        .zip(shots.iter().filter(|_| has_moments))
+        .flat_map(|(number, _)| files::moment_names(sensor, digits, number))
+        .collect();
+    shots.iter().flat_map(shot).chain(moments).chain(["sensor.json".to_owned()]).collect()
 }
 
 /// Digits of a shot's number in names; 0 for none.

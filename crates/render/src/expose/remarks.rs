@@ -1,42 +1,47 @@
-//! What a user should know of an exposure: that nothing can be seen in it, and what would mend it.
+//! What a user should know of an exposure: how much of it is saturated or black, and what would mend it.
 
 use etendue_sensor::{Exposure, Film, Radiometry, RawImage, Sensor};
+
+use crate::losses::{CLIPPED, Losses};
 
 /// Standard deviations of the dark noise within which a pixel tells nothing from black or from
 /// saturation: of 10⁸ pixels less than one is further off by chance.
 const SIGMAS: f64 = 6.0;
 
-/// A sentence on an image that is saturated or black all over.
-pub(super) fn on(
-    sensor: &Sensor,
-    film: Film<'_>,
-    image: &RawImage,
-    shot: Exposure,
-) -> Option<String> {
+/// Sentences on an image much of which is saturated, or black where light falls.
+pub(super) fn on(sensor: &Sensor, film: Film<'_>, image: &RawImage, shot: Exposure) -> Vec<String> {
     let gain = sensor.system_gain();
     let dark = gain * sensor.dark_current() * shot.exposure;
     let [_, dsnu] = sensor.non_uniformity();
     let noise = SIGMAS * gain * sensor.dark_noise(shot.exposure).hypot(dsnu) + 0.5;
     let top = sensor.saturation_level();
     // Behind a full well there is noise of the read-out; at the converter's end there is none.
-    let saturated = if top < sensor.white_level() { top - noise } else { top };
-    let black = sensor.black_level() + dark + noise;
-    let all = |test: &dyn Fn(f64) -> bool| image.values.iter().all(|&y| test(f64::from(y)));
+    let is_saturated =
+        |&y: &u16| f64::from(y) >= if top < sensor.white_level() { top - noise } else { top };
+    let is_black = |&y: &u16| f64::from(y) <= sensor.black_level() + dark + noise;
+    let pixels = || image.values.chunks_exact(image.depth.max(1));
+    let saturated = Losses::count(pixels().map(|channels| channels.iter().any(is_saturated)));
+    // A pixel without light is black as it should be; an image without any light is not.
+    let is_lit = |light: &[f32]| light.iter().any(|&value| value > 0.0 && value.is_finite());
+    let lit = || film.values.chunks_exact(sensor.bands().count()).map(is_lit);
+    let is_any_lit = lit().any(|is_lit| is_lit);
+    let seen = pixels().zip(lit()).filter(|&(_, is_lit)| is_lit || !is_any_lit);
+    let black = Losses::count(seen.map(|(channels, _)| channels.iter().all(is_black)));
     let time = format!("at an exposure of {} s", shot.exposure);
-    if all(&|y| y >= saturated) {
-        return Some(format!(
-            "every pixel is saturated {time} ({top} DN): {}",
-            less(sensor, film, shot)
-        ));
-    }
-    if all(&|y| y <= black) {
-        return Some(format!(
-            "every pixel is black {time} (within noise of {} DN): {}",
-            sensor.black_level(),
-            more(sensor, film, shot)
-        ));
-    }
-    None
+    let which = |losses: Losses, which: &str| match losses.lost == losses.of {
+        true => "every pixel is".to_owned(),
+        false => format!("{losses} of the pixels{which} are"),
+    };
+    let saturated = saturated.is_clipped().then(|| {
+        let which = which(saturated, "");
+        format!("{which} saturated {time} ({top} DN): {}", less(sensor, film, shot))
+    });
+    let black = black.is_black().then(|| {
+        let which = which(black, " that light falls on");
+        let level = sensor.black_level();
+        format!("{which} black {time} (within noise of {level} DN): {}", more(sensor, film, shot))
+    });
+    saturated.into_iter().chain(black).collect()
 }
 
 /// How to get less than saturation.
@@ -56,10 +61,11 @@ fn less(sensor: &Sensor, film: Film<'_>, shot: Exposure) -> String {
                 .to_owned()
         }
         Radiometry::Physical => {
-            let mean = sensor.mean_electrons(film, shot.exposure);
-            let time = shot.exposure * 0.5 * sensor.saturation() / mean;
+            let bright = sensor.electrons_of_brightest(film, shot.exposure, CLIPPED);
+            let time = shot.exposure * 0.5 * sensor.saturation() / bright;
             format!(
-                "set sensor.exposure to {} s for half of it, or use a smaller pupil",
+                "set sensor.exposure to {} s, at which nine pixels of ten have less than half of that, or \
+                 use a smaller pupil",
                 short(time)
             )
         }

@@ -25,13 +25,16 @@ pub(super) struct LightFieldGeometry {
     cols: u32,
     /// Views along each side.
     views: u32,
+    /// Why there are no views, where there are none.
+    no_views: Option<String>,
     /// From a view to the next on the sensor.
     step_px: f64,
     /// The diameter of the image of the main lens' opening.
     lens_image_diameter_px: f64,
     /// The disparity at the middle of the middle view; `null` where it sees nothing.
     expected_disparity: Option<f64>,
-    disparity: Disparity,
+    /// `null` without views.
+    disparity: Option<Disparity>,
     array: Option<ArrayFacts>,
     /// The middles of the lenslets' images by chief ray, `[row][column]`: x, y in pixels.
     centres_px: Option<Vec<Vec<[f64; 2]>>>,
@@ -54,6 +57,13 @@ struct Disparity {
     focal_length_px: f64,
     /// `null` for infinity.
     focus_m: Option<f64>,
+    /// Disparities by the camera's own rays over those of the formula.
+    measured_share: Option<f64>,
+    /// By how many columns to the right and rows down a thing of disparity 1 moves from a view to the next
+    /// one along the rows of lenslets.
+    move_along: [f64; 2],
+    /// The same to the next one across them.
+    move_across: [f64; 2],
     /// Of what the middle view sees: the least, and the greatest.
     range: Option<[f64; 2]>,
 }
@@ -73,8 +83,9 @@ struct ArrayFacts {
 
 const ABOUT: [&str; 5] = [
     "x runs right and y down; the picture is upright, so the sensor behind it is turned by 180 degrees",
-    "view (u, v) takes the pixel at centre + step_px (u - (views - 1)/2, v - (views - 1)/2); u counts from \
-     the left, v from the top, and its viewpoint is that far right and down in the opening",
+    "view (u, v) takes the pixel at centre + step_px (u - (views - 1)/2) (cos, sin) + step_px (v - (views - \
+     1)/2) (-sin, cos) of rotation_rad; u counts from the left, v from the top, and its viewpoint is that far \
+     along rows and down across them in the opening",
     "row r, column c of a view is the lenslet at offset_px + pitch_px c (cos, sin) + row_pitch_px r (-sin, \
      cos) of rotation_rad; in a hex grid odd rows are half a pitch further along the row",
     "the chief ray of the main lens through a lenslet's middle ends in its image's middle: centres_px",
@@ -92,10 +103,7 @@ impl LightFieldGeometry {
         // The grid, and where its lenslets are seen.
         let lenslets = &light_field.grid;
         let lens = camera.lens();
-        let height = match lenslets.grid {
-            Grid::Square => 1.0,
-            Grid::Hexagonal => 0.75_f64.sqrt(),
-        };
+        let height = lenslets.row_height();
         let centres = lens.map(|lens| {
             by_rows(light_field, |row, col| light_field.centre(lens, row, col).map(from_centre))
         });
@@ -119,24 +127,28 @@ impl LightFieldGeometry {
             rows: lenslets.rows,
             cols: lenslets.cols,
             views: light_field.views,
+            no_views: None,
             step_px: light_field.step,
             lens_image_diameter_px: light_field.image_diameter,
             expected_disparity: depth
                 .get(middle)
                 .filter(|z| z.is_finite())
                 .map(|&z| grid.disparity(z)),
-            disparity: Disparity {
+            disparity: Some(Disparity {
                 formula: "baseline_m * focal_length_px * (1 / depth_m - 1 / focus_m)",
-                sign: "positive in front of the focus: what is at column x of a view is at x - disparity \
-                       in the next view on the right, and at row y - disparity (divided by the height of a \
-                       row in columns) in the next one below",
+                sign: "positive in front of the focus: times move_along (columns to the right, rows down) it is \
+                       how things move to the next view along the rows of lenslets, times move_across to \
+                       the next one across them",
                 unit: "columns of a view per step from a view to the next",
                 depth: "along the axis from the entrance pupil, in metres",
                 baseline_m: grid.baseline(),
                 focal_length_px: grid.focal_length(),
                 focus_m: focus.is_finite().then_some(focus),
+                measured_share: None,
+                move_along: [-1.0, 0.0],
+                move_across: [0.0, -1.0 / height],
                 range,
-            },
+            }),
             array: lens.and_then(|lens| ArrayFacts::of(lens, light_field)),
             lenslet_centres_px: lens.and_then(|lens| {
                 let view = lens.lenslets()?.view();
@@ -153,6 +165,17 @@ impl LightFieldGeometry {
             centres_px: centres,
             about: ABOUT,
         }
+    }
+
+    /// Takes back what is said of views that there are not, or says what their disparities are by rays.
+    pub(super) fn judge(&mut self, no_views: Option<String>, measured_share: Option<f64>) {
+        if no_views.is_some() {
+            (self.views, self.disparity, self.expected_disparity) = (0, None, None);
+        }
+        if let Some(disparity) = &mut self.disparity {
+            disparity.measured_share = measured_share;
+        }
+        self.no_views = no_views;
     }
 }
 

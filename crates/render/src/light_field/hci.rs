@@ -8,11 +8,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use etendue_camera::ViewGrid;
+use etendue_geometry::glam::DMat3;
 use etendue_scene::Scene;
 
 use super::LightFieldError;
 use super::views::Views;
-use crate::output::{Picture, pfm, png, write_whole};
+use crate::output::{Picture, pfm, png};
+use etendue_files::Transaction;
 
 /// Its files beside the views.
 pub(super) const FILES: [&str; 3] = ["parameters.cfg", "gt_disp_lowres.pfm", "gt_depth_lowres.pfm"];
@@ -27,7 +29,7 @@ pub(super) fn view_name(k: u32) -> String {
 
 /// Fills the folder.
 pub(super) fn write(
-    folder: &Path,
+    (transaction, folder): (&Transaction, &Path),
     scene: &Scene,
     grid: &ViewGrid,
     views: &Views,
@@ -39,15 +41,15 @@ pub(super) fn write(
     for k in 0..n * n {
         let path = folder.join(view_name(k));
         let view = views.single(k % n, k / n)?.developed(*shown.development());
-        png::write(&path, &view, "", png::Bits::Eight)?;
+        png::write(transaction, &path, &view, "", png::Bits::Eight)?;
         files.push(path);
     }
     let disparity: Vec<f64> = depth.iter().map(|&z| grid.disparity(z)).collect();
     let [parameters, disparities, depths] = FILES.map(|name| folder.join(name));
     let text = parameters_of(scene, grid, &disparity);
-    write_whole(&parameters, |part| part.write_all(text.as_bytes()))?;
-    pfm::write(&disparities, grid.view_resolution(), &disparity)?;
-    pfm::write(&depths, grid.view_resolution(), depth)?;
+    transaction.write(&parameters, |part| part.write_all(text.as_bytes()))?;
+    pfm::write(transaction, &disparities, grid.view_resolution(), &disparity)?;
+    pfm::write(transaction, &depths, grid.view_resolution(), depth)?;
     files.extend([parameters, disparities, depths]);
     Ok(files)
 }
@@ -66,7 +68,9 @@ fn parameters_of(scene: &Scene, grid: &ViewGrid, disparity: &[f64]) -> String {
     let name = name.unwrap_or_default().replace(char::is_control, " ");
     let views = grid.views();
     // About x, then the turned y, then the turned z.
-    let [x, y, z] = [pose.rotation.x_axis, pose.rotation.y_axis, pose.rotation.z_axis];
+    // The rows of views are those of lenslets, turned from right towards down.
+    let turned = pose.rotation * DMat3::from_rotation_z(-grid.rotation());
+    let [x, y, z] = [turned.x_axis, turned.y_axis, turned.z_axis];
     let rotation = ((-z.y).atan2(z.z), z.x.clamp(-1.0, 1.0).asin(), (-y.x).atan2(x.x));
     format!(
         "[intrinsics]\nfocal_length_mm = {focal_length}\nimage_resolution_x_px = {cols}\n\

@@ -7,8 +7,10 @@ use std::sync::Arc;
 
 use etendue_camera::{Projection, ViewGrid};
 use etendue_scene::Scene;
+use etendue_spectrum::Bands;
 
 use super::LightFieldError;
+use super::response::ViewResponse;
 use super::views::Views;
 use crate::RenderError;
 use crate::output::{Development, Picture};
@@ -22,14 +24,17 @@ pub struct LightFieldViews {
 }
 
 impl LightFieldViews {
-    /// The views in `picture` of `scene`; `None` of other cameras, and without a picture.
+    /// The views in `picture` of `scene`; `None` of other cameras, of those that have
+    /// [no views](etendue_camera::Camera::no_views), and without a picture.
     ///
     /// # Errors
     ///
     /// When the views have no places.
     pub fn of(scene: &Scene, picture: &Picture) -> Result<Option<Self>, LightFieldError> {
         let camera = &scene.camera;
-        let (Some(light_field), Some(_)) = (camera.light_field(), picture.layer("")) else {
+        let (Some(light_field), Some(_), None) =
+            (camera.light_field(), picture.layer(""), camera.no_views())
+        else {
             return Ok(None);
         };
         let reference = match camera.projection() {
@@ -38,7 +43,14 @@ impl LightFieldViews {
         };
         let Projection::Views(grid) = reference.projection() else { return Ok(None) };
         let views = match camera.lens() {
-            Some(lens) => Views::decoded(picture, lens, light_field, grid)?,
+            Some(lens) => {
+                let opened = camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
+                let response = ViewResponse::new(&opened, &reference, light_field, grid);
+                if response.fault().is_some() {
+                    return Ok(None);
+                }
+                Views::decoded(picture, lens, light_field, (grid, &response))?
+            }
             None => Views::split(picture, grid),
         };
         Ok(Some(Self { views, grid: Arc::clone(grid), development: *picture.development() }))
@@ -74,7 +86,7 @@ impl LightFieldViews {
     ///
     /// None that a caller can cause.
     pub fn refocused(&self, depth: f64) -> Result<Picture, LightFieldError> {
-        let picture = self.views.averaged(self.grid.disparity(depth))?;
+        let picture = self.views.averaged(self.grid.disparity(depth), self.grid.row_height())?;
         Ok(picture.developed(self.development))
     }
 }

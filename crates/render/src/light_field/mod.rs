@@ -7,6 +7,7 @@
 //! | `geometry` | `geometry.json`: grid, centres, views, and the formula of disparities |
 //! | `white` | the same camera before a uniform light |
 //! | `views` | views as an array of five dimensions, from the raw picture and from a picture of views |
+//! | `response` | what their pixels see, by rays, against an ideal lens |
 //! | `looking` | views one by one, and refocused together |
 //! | `hci` | the folder of the benchmark's layout |
 //!
@@ -16,6 +17,7 @@
 mod geometry;
 mod hci;
 mod looking;
+mod response;
 mod views;
 mod white;
 
@@ -23,6 +25,7 @@ use std::path::{Path, PathBuf};
 
 use etendue_accel::Accel;
 use etendue_camera::{Camera, Projection, ViewGrid};
+use etendue_optics::element::Grid;
 use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
@@ -30,12 +33,14 @@ use etendue_tracer::LayerSpec;
 use crate::expose::SPECTRUM;
 use crate::output::{
     Channel, Layer, Look, OutputError, Outputs, Picture, PictureError, Values, exr, npy, pfm, png,
-    prepare_folder, sidecar,
+    sidecar,
 };
 use crate::{Images, Plan, RenderError, render};
+use etendue_files::{Transaction, WriteError, prepare_folder};
 
 use geometry::LightFieldGeometry;
 pub use looking::LightFieldViews;
+use response::ViewResponse;
 use views::Views;
 pub use white::white_rows;
 
@@ -51,6 +56,12 @@ pub enum LightFieldError {
     Output(#[from] OutputError),
 }
 
+impl From<WriteError> for LightFieldError {
+    fn from(error: WriteError) -> Self {
+        Self::Output(error.into())
+    }
+}
+
 impl From<PictureError> for LightFieldError {
     fn from(error: PictureError) -> Self {
         Self::Render(error.into())
@@ -62,8 +73,6 @@ impl From<PictureError> for LightFieldError {
 pub struct LightFieldSet {
     /// The files, in the order they were written.
     pub files: Vec<PathBuf>,
-    /// The folders that hold some of them, each with a manifest of its own.
-    pub folders: Vec<PathBuf>,
     /// What a user should know.
     pub notes: Vec<String>,
 }
@@ -110,12 +119,12 @@ fn view_name(across: u32, down: u32) -> String {
 pub fn write(
     rendering: Rendering<'_>,
     picture: &Picture,
-    folder: &Path,
+    (files, folder): (&Transaction, &Path),
     outputs: Outputs,
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<LightFieldSet, LightFieldError> {
     let scene = rendering.scene;
-    let mut set = SetWriter { folder, outputs, written: LightFieldSet::default() };
+    let mut set = SetWriter { files, folder, outputs, written: LightFieldSet::default() };
     let Some(light_field) = scene.camera.light_field() else { return Ok(set.written) };
     let reference = match scene.camera.projection() {
         Projection::Views(_) => scene.camera.clone(),
@@ -126,26 +135,46 @@ pub fn write(
     };
     let Projection::Views(grid) = reference.projection() else { return Ok(set.written) };
     let raw = scene.camera.lens();
-    let depth = central_depth(rendering, &reference, outputs, &|share| progress(0.1 * share))?;
     // Without a lens there is nothing to open.
     let camera = scene.camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
-    let geometry = LightFieldGeometry::new(&camera, light_field, grid, &depth);
-    sidecar::write_json(&set.place("geometry.json"), &geometry)?;
-    set.depth(grid, &depth)?;
+    let mut no_views = camera.no_views().map(str::to_owned);
+    let measured = raw.is_some() && no_views.is_none();
+    let response = measured.then(|| ViewResponse::new(&camera, &reference, light_field, grid));
+    no_views = no_views.or_else(|| response.as_ref()?.fault());
+    let depth = match no_views {
+        None => central_depth(rendering, &reference, outputs, &|share| progress(0.1 * share))?,
+        Some(_) => Vec::new(),
+    };
+    let share = response.as_ref().map(|response| response.disparity_share);
+    let mut geometry = LightFieldGeometry::new(&camera, light_field, grid, &depth);
+    geometry.judge(no_views.clone(), share);
+    sidecar::write_json(files, &set.place("geometry.json"), &geometry)?;
     if raw.is_some() {
         let white = white::picture(&camera, &scene.render)?;
         set.picture("white", &white)?;
     }
+    if let Some(why) = no_views {
+        set.written.notes.push(format!("views, depth, disparity and hci are not written: {why}"));
+        return Ok(set.written);
+    }
+    if let Some(share) = share.filter(|share| (share - 1.0).abs() > OFF) {
+        set.written.notes.push(format!(
+            "by its rays things move from view to view by {share:.4} of the formula's disparity: the main lens \
+             or the lenslets image the opening with aberrations (geometry.json: measured_share)"
+        ));
+    }
+    set.depth(grid, &depth)?;
     if picture.layer("").is_none() {
         let why = "there is no picture (no tracer): views are left out of the light field's files";
         set.written.notes.push(why.to_owned());
         return Ok(set.written);
     }
-    let truth = match raw {
+    let truth = match raw.zip(response) {
         None => None,
-        Some(lens) => {
+        Some((lens, response)) => {
             // Gone before the reference is rendered, which takes as much again.
-            set.views("views", &Views::decoded(picture, lens, light_field, grid)?, picture)?;
+            let views = Views::decoded(picture, lens, light_field, (grid, &response))?;
+            set.views("views", &views, picture)?;
             let truth = reference_picture(rendering, &reference, outputs, &|share| {
                 progress(0.1 + 0.9 * share)
             })?;
@@ -155,11 +184,20 @@ pub fn write(
     let truth = truth.as_ref().unwrap_or(picture);
     let views = Views::split(truth, grid);
     set.views(if raw.is_some() { "reference" } else { "views" }, &views, truth)?;
-    if outputs.png {
-        set.hci(scene, grid, &views, truth, &depth)?;
+    match (outputs.png, grid.packing()) {
+        (true, Grid::Square) => set.hci(scene, grid, &views, truth, &depth)?,
+        (true, Grid::Hexagonal) => set.written.notes.push(HEXAGONAL.to_owned()),
+        (false, _) => {}
     }
     Ok(set.written)
 }
+
+/// From which error of the disparity on a note tells of it.
+const OFF: f64 = 0.005;
+
+/// Why a hexagonal array leaves no folder of the benchmark.
+const HEXAGONAL: &str = "hci is not written: the benchmark's pictures have square pixels, and the views of a \
+                         hexagonal array have rows 0.866 columns apart, every other one moved by half a column";
 
 /// A scene that shows `layers` to another camera.
 fn shown_to(scene: &Scene, camera: Camera, layers: Vec<LayerSpec>) -> Scene {
@@ -202,6 +240,7 @@ fn central_depth(
 
 /// Where the set goes.
 struct SetWriter<'a> {
+    files: &'a Transaction,
     folder: &'a Path,
     outputs: Outputs,
     written: LightFieldSet,
@@ -217,13 +256,24 @@ impl SetWriter<'_> {
     /// A picture in all formats that are wanted.
     fn picture(&mut self, stem: &str, picture: &Picture) -> Result<(), LightFieldError> {
         if self.outputs.exr {
-            exr::write(&self.place(&format!("{stem}.exr")), picture, &exr::Options::default())?;
+            exr::write(
+                self.files,
+                &self.place(&format!("{stem}.exr")),
+                picture,
+                &exr::Options::default(),
+            )?;
         }
         if self.outputs.png {
-            png::write(&self.place(&format!("{stem}.png")), picture, "", png::Bits::Eight)?;
+            png::write(
+                self.files,
+                &self.place(&format!("{stem}.png")),
+                picture,
+                "",
+                png::Bits::Eight,
+            )?;
         }
         if self.outputs.npy {
-            npy::write(&self.place(&format!("{stem}.npy")), picture, "")?;
+            npy::write(self.files, &self.place(&format!("{stem}.npy")), picture, "")?;
         }
         Ok(())
     }
@@ -234,24 +284,35 @@ impl SetWriter<'_> {
         // Side by side as one picture, as one array, and view by view.
         if self.outputs.exr {
             let place = self.place(&format!("{stem}.exr"));
-            exr::write(&place, &side_by_side, &exr::Options::default())?;
+            exr::write(self.files, &place, &side_by_side, &exr::Options::default())?;
         }
         if self.outputs.npy {
             let place = self.place(&format!("{stem}.npy"));
-            npy::write_array(&place, &views.shape(&views.colors), &views.colors.values)?;
+            npy::write_array(
+                self.files,
+                &place,
+                &views.shape(&views.colors),
+                &views.colors.values,
+            )?;
             if let Some(spectrum) = &views.spectrum {
                 let place = self.place(&format!("{stem}_spectrum.npy"));
-                npy::write_array(&place, &views.shape(spectrum), &spectrum.values)?;
+                npy::write_array(self.files, &place, &views.shape(spectrum), &spectrum.values)?;
             }
         }
         if self.outputs.png {
-            png::write(&self.place(&format!("{stem}.png")), &side_by_side, "", png::Bits::Eight)?;
+            png::write(
+                self.files,
+                &self.place(&format!("{stem}.png")),
+                &side_by_side,
+                "",
+                png::Bits::Eight,
+            )?;
             self.below(stem, |set, folder| {
                 for down in 0..views.views {
                     for across in 0..views.views {
                         let path = folder.join(view_name(across, down));
                         let view = views.single(across, down)?.developed(*shown.development());
-                        png::write(&path, &view, "", png::Bits::Eight)?;
+                        png::write(set.files, &path, &view, "", png::Bits::Eight)?;
                         set.written.files.push(path);
                     }
                 }
@@ -271,13 +332,13 @@ impl SetWriter<'_> {
         ] {
             let picture = plane(stem, unit, [cols, rows], values)?;
             if self.outputs.npy {
-                npy::write(&self.place(&format!("{stem}.npy")), &picture, NAME)?;
+                npy::write(self.files, &self.place(&format!("{stem}.npy")), &picture, NAME)?;
             }
             if self.outputs.png {
                 let place = self.place(&format!("{stem}.png"));
-                png::write(&place, &picture, NAME, png::Bits::Eight)?;
+                png::write(self.files, &place, &picture, NAME, png::Bits::Eight)?;
             }
-            pfm::write(&self.place(&format!("{stem}.pfm")), [cols, rows], values)?;
+            pfm::write(self.files, &self.place(&format!("{stem}.pfm")), [cols, rows], values)?;
         }
         Ok(())
     }
@@ -292,7 +353,14 @@ impl SetWriter<'_> {
         depth: &[f64],
     ) -> Result<(), LightFieldError> {
         self.below("hci", |set, folder| {
-            set.written.files.extend(hci::write(folder, scene, grid, views, shown, depth)?);
+            set.written.files.extend(hci::write(
+                (set.files, folder),
+                scene,
+                grid,
+                views,
+                shown,
+                depth,
+            )?);
             Ok(())
         })
     }
@@ -306,7 +374,6 @@ impl SetWriter<'_> {
         let folder = self.folder.join(name);
         prepare_folder(&folder)?;
         fill(self, &folder)?;
-        self.written.folders.push(folder);
         Ok(())
     }
 }

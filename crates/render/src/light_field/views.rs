@@ -7,6 +7,7 @@
 use etendue_camera::{LensCamera, LightField, ViewGrid};
 use rayon::prelude::*;
 
+use super::response::ViewResponse;
 use super::{BANDS, planes};
 use crate::output::{Channel, Layer, Look, Picture, PictureError, Values};
 
@@ -32,12 +33,12 @@ pub(super) struct Views {
 }
 
 impl Views {
-    /// The views in a raw picture.
+    /// The views in a raw picture, as bright as an ideal lens has them.
     pub(super) fn decoded(
         picture: &Picture,
         lens: &LensCamera,
         light_field: &LightField,
-        grid: &ViewGrid,
+        (grid, response): (&ViewGrid, &ViewResponse),
     ) -> Result<Self, PictureError> {
         let [cols, rows] = grid.view_resolution();
         let centres: Vec<[f64; 2]> = (0..rows * cols)
@@ -48,10 +49,14 @@ impl Views {
         let decode = |planes: &[&[f32]]| {
             let view = |k: u32| {
                 let [right, below] = light_field.offset(k % n, k / n);
-                let at = centres.iter().map(move |[x, y]| [x + right, y + below]);
                 let size = [picture.width(), picture.height()];
-                at.flat_map(|at| planes.iter().map(move |plane| sampled(plane, size, at)))
-                    .collect::<Vec<f32>>()
+                let pixel = |(i, [x, y]): (u32, &[f64; 2])| {
+                    let at = [x + right, y + below];
+                    #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
+                    let gain = response.gain(k, i / cols, i % cols) as f32;
+                    planes.iter().map(move |plane| gain * sampled(plane, size, at))
+                };
+                (0..).zip(&centres).flat_map(pixel).collect::<Vec<f32>>()
             };
             let views: Vec<Vec<f32>> = (0..n * n).into_par_iter().map(view).collect();
             ViewArray { values: views.concat(), channels: planes.len() }
@@ -107,17 +112,21 @@ impl Views {
     }
 
     /// The mean of all views, each moved by its number from the middle one times `disparity` (pixels of a
-    /// view).
-    pub(super) fn averaged(&self, disparity: f64) -> Result<Picture, PictureError> {
+    /// view), over rows that are `height` columns apart: where that is not 1, odd ones begin half a column
+    /// further right.
+    pub(super) fn averaged(&self, disparity: f64, height: f64) -> Result<Picture, PictureError> {
         let [cols, rows] = self.size.map(|side| side as usize);
         let (n, middle) = (self.views, 0.5 * (f64::from(self.views) - 1.0));
+        let odd = if height < 1.0 { 0.5 } else { 0.0 };
         let view = |k: u32| {
             let [right, below] = [k % n, k / n].map(|at| -disparity * (f64::from(at) - middle));
             let plane = |channel| (0..rows * cols).map(|i| self.color(k, i, channel)).collect();
             let planes: [Vec<f32>; 3] = std::array::from_fn(plane);
             let moved = |plane: &Vec<f32>, i: usize| {
-                let (x, y) = ((i % cols) as f64 + 0.5 + right, (i / cols) as f64 + 0.5 + below);
-                sampled(plane, [cols, rows], [x, y])
+                let (col, row) = (i % cols, i / cols);
+                let x = col as f64 + 0.5 + right + odd * (row % 2) as f64;
+                let y = row as f64 + 0.5 + below / height;
+                sampled_rows(plane, [cols, rows], [x, y], odd)
             };
             planes.map(|plane| (0..rows * cols).map(|i| moved(&plane, i)).collect::<Vec<f32>>())
         };
@@ -167,7 +176,12 @@ fn weights(t: f64) -> [f64; 4] {
 }
 
 /// A plane at a place (pixels from the corner).
-fn sampled(plane: &[f32], [width, height]: [usize; 2], [x, y]: [f64; 2]) -> f32 {
+fn sampled(plane: &[f32], size: [usize; 2], at: [f64; 2]) -> f32 {
+    sampled_rows(plane, size, at, 0.0)
+}
+
+/// The same with odd rows that begin `odd` pixels further right.
+fn sampled_rows(plane: &[f32], [width, height]: [usize; 2], [x, y]: [f64; 2], odd: f64) -> f32 {
     let split = |at: f64| {
         let low = (at - 0.5).floor();
         (low, weights(at - 0.5 - low))
@@ -178,10 +192,12 @@ fn sampled(plane: &[f32], [width, height]: [usize; 2], [x, y]: [f64; 2]) -> f32 
         reason = "clamped to the picture"
     )]
     let clamped = |at: f64, side: usize| at.clamp(0.0, (side - 1) as f64) as usize;
-    let ((left, across), (top, down)) = (split(x), split(y));
+    let (top, down) = split(y);
     let mut sum = 0.0;
     for (j, wy) in (0_u32..).zip(down) {
-        let row = clamped(top - 1.0 + f64::from(j), height) * width;
+        let row = clamped(top - 1.0 + f64::from(j), height);
+        let (left, across) = split(x - odd * (row % 2) as f64);
+        let row = row * width;
         for (i, wx) in (0_u32..).zip(across) {
             let column = clamped(left - 1.0 + f64::from(i), width);
             sum += wx * wy * f64::from(plane[row + column]);
@@ -213,7 +229,7 @@ mod tests {
         }
         let colors = ViewArray { values, channels: 3 };
         let views = Views { views: n, size: [cols, rows], colors, spectrum: None };
-        let sharp = views.averaged(disparity).unwrap();
+        let sharp = views.averaged(disparity, 1.0).unwrap();
         let value = sharp.layer("").unwrap().channels[1].values.at((5 * cols + 6) as usize);
         // f32 has 7 digits of numbers up to 30.
         assert!((value - 16.0).abs() < 1e-5, "{value}");

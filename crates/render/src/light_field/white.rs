@@ -36,7 +36,7 @@ pub(super) fn picture(camera: &Camera, spec: &RenderSpec) -> Result<Picture, Lig
 
 /// The samples of a pixel.
 fn place(film: &mut FilmSamples, spec: &RenderSpec, [column, row]: [u32; 2], samples: u32) {
-    let pixel = spec.sampler.pixel(spec.seed, column, row, samples);
+    let pixel = spec.sampler.pixel(spec.frame_seed(), column, row, samples);
     let numbers = (0..samples).map(|index| (pixel, index));
     let mut squares = [Vec::new(), Vec::new(), Vec::new()];
     for (pair, out) in (0..).zip(&mut squares) {

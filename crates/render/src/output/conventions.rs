@@ -9,8 +9,10 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use super::look::{Bits, Channels, Shown, fill, indices};
-use super::{Layer, OutputError, Picture, png, write_whole};
+use super::{Layer, OutputError, Picture, png};
 use crate::film::NoMemory;
+use crate::losses::Losses;
+use etendue_files::Transaction;
 
 /// Numbers a metre in TUM's depth images.
 pub const TUM_DEPTH: f64 = 5000.0;
@@ -26,28 +28,31 @@ const UNKNOWN: f32 = 1e10;
 
 /// The layer as 16-bit PNG of `factor` a unit.
 pub(super) fn write_scaled(
+    files: &Transaction,
     path: &Path,
     (picture, layer): (&Picture, &Layer),
     (factor, unit): (f64, &str),
 ) -> Result<(), OutputError> {
-    png::write_shown(path, picture, layer, &scaled(layer, factor, unit)?)
+    png::write_shown(files, path, picture, layer, &scaled(layer, factor, unit)?)
 }
 
 /// The layer as KITTI's flow.
 pub(super) fn write_flow(
+    files: &Transaction,
     path: &Path,
     (picture, layer): (&Picture, &Layer),
 ) -> Result<(), OutputError> {
-    png::write_shown(path, picture, layer, &flow(layer)?)
+    png::write_shown(files, path, picture, layer, &flow(layer)?)
 }
 
 /// The numbers of the layer as indices of a palette; `false` where they do not fit.
 pub(super) fn write_indexed(
+    files: &Transaction,
     path: &Path,
     (picture, layer): (&Picture, &Layer),
 ) -> Result<bool, OutputError> {
     let Some(shown) = indices(layer)? else { return Ok(false) };
-    png::write_shown(path, picture, layer, &shown).map(|()| true)
+    png::write_shown(files, path, picture, layer, &shown).map(|()| true)
 }
 
 /// The nearest of `1..=65535`; 0 where it is another number.
@@ -67,13 +72,29 @@ fn scaled(layer: &Layer, factor: f64, unit: &str) -> Result<Shown, NoMemory> {
     Ok(Shown { channels: Channels::Grey, bits: Bits::Sixteen, bytes, note })
 }
 
+/// How many of the layer's hits become 0 in 16 bits of `factor` a unit.
+pub(super) fn lost_by_scaling(layer: &Layer, factor: f64) -> Losses {
+    let plane = &layer.channels[0].values;
+    let hits = (0..plane.len()).map(|i| plane.at(i)).filter(|value| value.is_finite());
+    Losses::count(hits.map(|value| sixteen_bits(value * factor) == 0))
+}
+
+/// How many of the layer's hits KITTI's flow has as unknown.
+pub(super) fn lost_by_flow(layer: &Layer) -> Losses {
+    let [x, y] = [0, 1].map(|k| &layer.channels[k].values);
+    let hits = (0..x.len()).map(|i| [x.at(i), y.at(i)]).filter(|[u, v]| (u + v).is_finite());
+    Losses::count(hits.map(|flow| kitti_flow(flow)[2] == 0))
+}
+
+/// The three numbers of a pixel.
+fn kitti_flow(flow: [f64; 2]) -> [u16; 3] {
+    let [u, v] = flow.map(|part| sixteen_bits(part * KITTI_FLOW + 32768.0));
+    if u == 0 || v == 0 { [0; 3] } else { [u, v, 1] }
+}
+
 fn flow(layer: &Layer) -> Result<Shown, NoMemory> {
     let [x, y] = [0, 1].map(|k| &layer.channels[k].values);
-    let pixel = |i: usize| {
-        let [u, v] = [x, y].map(|plane| sixteen_bits(plane.at(i) * KITTI_FLOW + 32768.0));
-        if u == 0 || v == 0 { [0; 3] } else { [u, v, 1] }
-    };
-    let bytes = fill(&[x], |i| pixel(i).map(u16::to_be_bytes))?;
+    let bytes = fill(&[x], |i| kitti_flow([x.at(i), y.at(i)]).map(u16::to_be_bytes))?;
     let note = format!(
         "data: red and green are 32768 + {KITTI_FLOW} times the flow right and down (pixels), blue is 1 \
          where it is known; flow of 512 pixels and more is not"
@@ -83,6 +104,7 @@ fn flow(layer: &Layer) -> Result<Shown, NoMemory> {
 
 /// `PIEH`, columns and rows, and two little-endian floats a pixel.
 pub(super) fn write_flo(
+    files: &Transaction,
     path: &Path,
     (picture, layer): (&Picture, &Layer),
 ) -> Result<(), OutputError> {
@@ -92,7 +114,7 @@ pub(super) fn write_flo(
             .map_err(|_| OutputError::format(path, "a side is longer than 2147483647"))
     };
     let (width, height) = (side(picture.width())?, side(picture.height())?);
-    write_whole(path, |part| {
+    Ok(files.write(path, |part| {
         let mut file = BufWriter::new(part);
         file.write_all(b"PIEH")?;
         file.write_all(&width.to_le_bytes())?;
@@ -106,7 +128,7 @@ pub(super) fn write_flo(
             }
         }
         file.flush()
-    })
+    })?)
 }
 
 #[cfg(test)]
@@ -124,7 +146,7 @@ mod tests {
     fn read(manner: LayerFile, picture: &Picture, name: &str) -> image::DynamicImage {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        assert!(manner.write(&path, picture, name).unwrap());
+        assert!(manner.write(&Transaction::at_once(), &path, picture, name).unwrap());
         image::open(&path).unwrap()
     }
 
@@ -155,7 +177,7 @@ mod tests {
         assert_eq!(kitti.into_raw(), expected.as_flattened());
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.flo");
-        assert!(LayerFile::Flo.write(&path, &picture, "Flow").unwrap());
+        assert!(LayerFile::Flo.write(&Transaction::at_once(), &path, &picture, "Flow").unwrap());
         let bytes = std::fs::read(&path).unwrap();
         let float = |i: usize| f32::from_le_bytes(bytes[4 * i..4 * i + 4].try_into().unwrap());
         // The sanity check of the benchmark's own reader.
@@ -170,7 +192,11 @@ mod tests {
             |largest| picture("Id.object", Look::Ids, vec![Values::U32(vec![0, 1, 2, largest])]);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        assert!(LayerFile::Indexed.write(&path, &ids(255), "Id.object").unwrap());
+        assert!(
+            LayerFile::Indexed
+                .write(&Transaction::at_once(), &path, &ids(255), "Id.object")
+                .unwrap()
+        );
         let decoder =
             ::png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&path).unwrap()));
         let mut reader = decoder.read_info().unwrap();
@@ -179,6 +205,10 @@ mod tests {
         let mut bytes = [0; 4];
         reader.next_frame(&mut bytes).unwrap();
         assert_eq!(bytes, [0, 1, 2, 255]);
-        assert!(!LayerFile::Indexed.write(&path, &ids(256), "Id.object").unwrap());
+        assert!(
+            !LayerFile::Indexed
+                .write(&Transaction::at_once(), &path, &ids(256), "Id.object")
+                .unwrap()
+        );
     }
 }

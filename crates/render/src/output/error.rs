@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use etendue_files::WriteError;
+
 use crate::film::NoMemory;
 
 /// Why layers do not make a picture.
@@ -98,29 +100,9 @@ pub enum PictureError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutputError {
-    /// The system refused.
-    #[error("cannot write {}: {source}; {remedy}", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's answer.
-        source: io::Error,
-        /// What to do about it.
-        remedy: &'static str,
-    },
-    /// The file is an input.
-    #[error(
-        "{} would be written over, and is read by this command{}; nothing was written: choose \
-         another folder or name",
-        path.display(),
-        also_called(path, input)
-    )]
-    IsInput {
-        /// The file that was to be written.
-        path: PathBuf,
-        /// The name under which it is read.
-        input: PathBuf,
-    },
+    /// The system refused, or the file is an input.
+    #[error(transparent)]
+    File(#[from] WriteError),
     /// The system has less memory than a file takes while it is made.
     #[error(transparent)]
     Memory(#[from] NoMemory),
@@ -163,30 +145,10 @@ pub enum OutputError {
     },
 }
 
-/// The name that an input is read under, where it is another.
-fn also_called(path: &Path, input: &Path) -> String {
-    if path == input { String::new() } else { format!(" as {}", input.display()) }
-}
-
 impl OutputError {
     /// The system's refusal of `path`, with what to do about it.
-    #[must_use]
-    pub fn io(path: &Path, source: io::Error) -> Self {
-        let remedy = match source.kind() {
-            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
-                "make the folder writable or choose another one"
-            }
-            io::ErrorKind::NotFound => "create the folder first or choose another one",
-            io::ErrorKind::AlreadyExists => "it is a file; choose another folder",
-            io::ErrorKind::NotADirectory => "a part of the path is a file; choose another folder",
-            io::ErrorKind::IsADirectory => "a folder has this name; choose another name",
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-                "free some space or choose a folder on another disk"
-            }
-            io::ErrorKind::InvalidFilename => "choose a shorter or simpler name",
-            _ => "check the folder and its disk, or choose another one",
-        };
-        Self::Io { path: path.to_owned(), source, remedy }
+    pub(super) fn io(path: &Path, source: io::Error) -> Self {
+        WriteError::io(path, source).into()
     }
 
     /// What `path`'s format cannot hold.

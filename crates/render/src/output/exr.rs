@@ -34,7 +34,8 @@ use rayon::prelude::*;
 
 use super::picture::put;
 use super::sidecar::Entries;
-use super::{OutputError, PartFile, Picture, SOFTWARE, Values};
+use super::{OutputError, Picture, Values};
+use etendue_files::{SOFTWARE, Transaction};
 
 /// How the pixels are packed. Both keep every bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -69,11 +70,16 @@ impl fmt::Debug for Options<'_> {
 ///
 /// When the file cannot be written, when a finite f64 is beyond f32's range, when the picture is
 /// larger than the format's 2³¹ − 1, and when `options.progress` asks to stop.
-pub fn write(path: &Path, picture: &Picture, options: &Options<'_>) -> Result<(), OutputError> {
+pub fn write(
+    files: &Transaction,
+    path: &Path,
+    picture: &Picture,
+    options: &Options<'_>,
+) -> Result<(), OutputError> {
     let blocks = Blocks::new(picture, options.compression);
     let header = header(path, picture, &blocks)?;
     let head = head_bytes(&header).map_err(|error| OutputError::format(path, error))?;
-    let mut part = PartFile::create(path)?;
+    let mut part = files.create(path)?;
     let mut file = BufWriter::with_capacity(1 << 20, &mut part);
     let io = |source| OutputError::io(path, source);
 
@@ -86,7 +92,7 @@ pub fn write(path: &Path, picture: &Picture, options: &Options<'_>) -> Result<()
     file.seek(SeekFrom::Start(head.len() as u64)).map_err(io)?;
     file.write_all(&table).and_then(|()| file.flush()).map_err(io)?;
     drop(file);
-    part.finish()
+    Ok(part.finish()?)
 }
 
 /// Writes all blocks from byte `offset` on, and returns where each begins. Some are packed at once,
@@ -355,7 +361,8 @@ mod tests {
     fn bytes(picture: &Picture, compression: Compression) -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
-        write(&path, picture, &Options { compression, progress: None }).unwrap();
+        write(&Transaction::at_once(), &path, picture, &Options { compression, progress: None })
+            .unwrap();
         fs::read(path).unwrap()
     }
 
@@ -365,7 +372,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
         for compression in [Compression::None, Compression::Zip] {
-            write(&path, &picture, &Options { compression, progress: None }).unwrap();
+            write(
+                &Transaction::at_once(),
+                &path,
+                &picture,
+                &Options { compression, progress: None },
+            )
+            .unwrap();
             let read = read_first_flat_layer_from_file(&path).unwrap().layer_data;
             assert_eq!((read.size.0, read.size.1), (37, 41));
             for (channel, (name, values)) in
@@ -419,7 +432,7 @@ mod tests {
             let picture = Picture::new(3, 1, vec![layer], Vec::new()).unwrap();
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("a.exr");
-            write(&path, &picture, &Options::default())?;
+            write(&Transaction::at_once(), &path, &picture, &Options::default())?;
             let read = read_first_flat_layer_from_file(&path).unwrap().layer_data.channel_data;
             Ok::<_, OutputError>(read.list[0].sample_data.values_as_f32().collect::<Vec<_>>())
         };
@@ -443,12 +456,18 @@ mod tests {
             last.set(share);
             true
         };
-        write(&path, &picture, &Options { progress: Some(&watch), ..Options::default() }).unwrap();
+        write(
+            &Transaction::at_once(),
+            &path,
+            &picture,
+            &Options { progress: Some(&watch), ..Options::default() },
+        )
+        .unwrap();
         assert_eq!(last.get(), 1.0);
 
         fs::write(&path, "old").unwrap();
         let stop = Options { progress: Some(&|_| false), ..Options::default() };
-        let error = write(&path, &picture, &stop).unwrap_err();
+        let error = write(&Transaction::at_once(), &path, &picture, &stop).unwrap_err();
         assert!(matches!(error, OutputError::Stopped { .. }), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "a part file was left");

@@ -6,6 +6,7 @@ use super::conventions::{self, KITTI_DEPTH, TUM_DEPTH};
 use super::png::Bits;
 use super::{Look, OutputError, Outputs, Picture, npy, png};
 use crate::denoise::DENOISED;
+use etendue_files::Transaction;
 
 /// A file of one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,13 +99,53 @@ impl LayerFile {
         }
     }
 
+    /// A sentence on the hits of the layer called `name` that this file does not hold, where they are so many
+    /// that it is told ([`crate::losses`]); none of a layer that there is not.
+    #[must_use]
+    pub fn note(self, picture: &Picture, name: &str) -> Option<String> {
+        let layer = picture.layer(name)?;
+        let (lost, range) = match self {
+            // They show their range, or are exact.
+            Self::Preview | Self::Mask | Self::Array | Self::Flo | Self::Indexed => return None,
+            Self::TumDepth => {
+                let most = 65535.0 / TUM_DEPTH;
+                let range = format!("0 to {most:.3} m, and are 0 in it");
+                (conventions::lost_by_scaling(layer, TUM_DEPTH), range)
+            }
+            Self::KittiDepth | Self::KittiDisparity => {
+                let most = 65535.0 / KITTI_DEPTH;
+                let unit = if self == Self::KittiDepth { "m" } else { "pixels" };
+                let range = format!("0 to {most:.3} {unit}, and are 0 in it");
+                (conventions::lost_by_scaling(layer, KITTI_DEPTH), range)
+            }
+            Self::KittiFlow => {
+                let range = "-512 to 512 pixels, and are unknown in it".to_owned();
+                (conventions::lost_by_flow(layer), range)
+            }
+        };
+        lost.is_clipped().then(|| {
+            format!(
+                "{}: {lost} of the hits are outside of what it holds, {range}; {}.npy and layers.exr have \
+                 them (`--outputs npy,exr`)",
+                self.name(name),
+                stem(name)
+            )
+        })
+    }
+
     /// Writes the layer called `name` to `path`. `false` when its numbers do not fit into the format, and
     /// nothing is written.
     ///
     /// # Errors
     ///
     /// When there is no such layer, or the file cannot be written.
-    pub fn write(self, path: &Path, picture: &Picture, name: &str) -> Result<bool, OutputError> {
+    pub fn write(
+        self,
+        files: &Transaction,
+        path: &Path,
+        picture: &Picture,
+        name: &str,
+    ) -> Result<bool, OutputError> {
         let layer = picture.require(name)?;
         let of = (picture, layer);
         match self {
@@ -119,16 +160,20 @@ impl LayerFile {
                     | Look::Cube
                     | Look::Counts { .. } => Bits::Eight,
                 };
-                png::write(path, picture, name, bits)?;
+                png::write(files, path, picture, name, bits)?;
             }
-            Self::Mask => return png::write_mask(path, picture, name),
-            Self::Array => npy::write(path, picture, name)?,
-            Self::TumDepth => conventions::write_scaled(path, of, (TUM_DEPTH, "metres"))?,
-            Self::KittiDepth => conventions::write_scaled(path, of, (KITTI_DEPTH, "metres"))?,
-            Self::KittiDisparity => conventions::write_scaled(path, of, (KITTI_DEPTH, "pixels"))?,
-            Self::KittiFlow => conventions::write_flow(path, of)?,
-            Self::Flo => conventions::write_flo(path, of)?,
-            Self::Indexed => return conventions::write_indexed(path, of),
+            Self::Mask => return png::write_mask(files, path, picture, name),
+            Self::Array => npy::write(files, path, picture, name)?,
+            Self::TumDepth => conventions::write_scaled(files, path, of, (TUM_DEPTH, "metres"))?,
+            Self::KittiDepth => {
+                conventions::write_scaled(files, path, of, (KITTI_DEPTH, "metres"))?;
+            }
+            Self::KittiDisparity => {
+                conventions::write_scaled(files, path, of, (KITTI_DEPTH, "pixels"))?;
+            }
+            Self::KittiFlow => conventions::write_flow(files, path, of)?,
+            Self::Flo => conventions::write_flo(files, path, of)?,
+            Self::Indexed => return conventions::write_indexed(files, path, of),
         }
         Ok(true)
     }

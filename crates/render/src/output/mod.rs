@@ -15,9 +15,10 @@
 //! * A miss is `+inf` in a float layer, 0 in an integer layer and the zero vector in a direction.
 //! * A NaN is never written: [`Picture::new`] refuses it, with the layer and the pixel.
 //! * Data passes no colour transform. PNG previews do, and say so in their text.
-//! * A file appears under its name when it is complete, and not before ([`PartFile`]).
+//! * A file appears under its name when it is complete, and not before ([`PartFile`](etendue_files::PartFile)).
 //!
 //! ```
+//! use etendue_files::Transaction;
 //! use etendue_render::output::{Channel, Layer, Look, Picture, Values, exr};
 //!
 //! let depth = Layer {
@@ -28,7 +29,7 @@
 //! };
 //! let picture = Picture::new(2, 1, vec![depth], vec![("seed".into(), "0".into())])?;
 //! let folder = tempfile::tempdir()?;
-//! exr::write(&folder.path().join("picture.exr"), &picture, &exr::Options::default())?;
+//! exr::write(&Transaction::at_once(), &folder.path().join("picture.exr"), &picture, &exr::Options::default())?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -39,37 +40,22 @@ pub mod pfm;
 pub mod png;
 pub mod sidecar;
 
-mod atomic;
 mod develop;
 mod error;
 mod hash;
-mod inputs;
 mod layer_file;
-mod ledger;
 mod look;
 mod outputs;
 mod picture;
 mod screen;
-mod special;
-mod together;
 
-pub use atomic::{
-    PartFile, Temporary, note_finished, open_parts, prepare_folder, remove_open_parts, write_over,
-    write_whole,
-};
 pub use develop::Development;
 pub(crate) use develop::luminance;
 pub use error::{OutputError, PictureError};
 pub use hash::ImageHash;
-pub use inputs::{protect_inputs, refuse_inputs};
 pub use layer_file::LayerFile;
 pub(crate) use layer_file::has_mask;
-pub use ledger::{Ledger, MANIFEST};
 pub use look::Look;
 pub use outputs::Outputs;
 pub use picture::{Channel, Layer, Picture, Values};
 pub use screen::{DistanceScale, Screen};
-pub use together::Together;
-
-/// What wrote a file, for its header.
-pub const SOFTWARE: &str = concat!("etendue ", env!("CARGO_PKG_VERSION"));

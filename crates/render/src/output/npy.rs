@@ -12,21 +12,27 @@ use std::path::Path;
 use npyz::{DType, TypeStr, WriterBuilder};
 
 use super::picture::LE_BAND;
-use super::{Layer, OutputError, Picture, write_whole};
+use super::{Layer, OutputError, Picture};
+use etendue_files::Transaction;
 
 /// Writes the layer called `name` (empty for the picture itself) to `path`.
 ///
 /// # Errors
 ///
 /// When there is no such layer, or the file cannot be written.
-pub fn write(path: &Path, picture: &Picture, name: &str) -> Result<(), OutputError> {
+pub fn write(
+    files: &Transaction,
+    path: &Path,
+    picture: &Picture,
+    name: &str,
+) -> Result<(), OutputError> {
     let layer = picture.require(name)?;
-    write_whole(path, |part| {
+    Ok(files.write(path, |part| {
         let mut file = BufWriter::with_capacity(1 << 20, part);
         write_header(&mut file, picture, layer)?;
         write_values(&mut file, picture.width() * picture.height(), layer)?;
         file.flush()
-    })
+    })?)
 }
 
 /// Writes `values` as an array of any number of dimensions, row-major.
@@ -34,15 +40,20 @@ pub fn write(path: &Path, picture: &Picture, name: &str) -> Result<(), OutputErr
 /// # Errors
 ///
 /// When the file cannot be written.
-pub fn write_array(path: &Path, shape: &[u64], values: &[f32]) -> Result<(), OutputError> {
-    write_whole(path, |part| {
+pub fn write_array(
+    files: &Transaction,
+    path: &Path,
+    shape: &[u64],
+    values: &[f32],
+) -> Result<(), OutputError> {
+    Ok(files.write(path, |part| {
         let mut file = BufWriter::with_capacity(1 << 20, part);
         header(&mut file, "<f4", shape)?;
         for value in values {
             file.write_all(&value.to_le_bytes())?;
         }
         file.flush()
-    })
+    })?)
 }
 
 fn write_header(file: &mut impl Write, picture: &Picture, layer: &Layer) -> io::Result<()> {
@@ -100,7 +111,7 @@ mod tests {
         let picture = Picture::new(pixels / 2, 2, vec![layer], Vec::new()).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p.npy");
-        write(&path, &picture, "P").unwrap();
+        write(&Transaction::at_once(), &path, &picture, "P").unwrap();
         npyz::NpyFile::new(io::Cursor::new(fs::read(path).unwrap())).unwrap()
     }
 
@@ -129,7 +140,9 @@ mod tests {
             Layer { name: "Depth".into(), look: Look::Distance, channels, meaning: Vec::new() };
         let picture = Picture::new(1, 1, vec![layer], Vec::new()).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let error = write(&folder.path().join("a.npy"), &picture, "Normal").unwrap_err();
+        let error =
+            write(&Transaction::at_once(), &folder.path().join("a.npy"), &picture, "Normal")
+                .unwrap_err();
         assert_eq!(error.to_string(), "the picture has no layer \"Normal\"; it has \"Depth\"");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }

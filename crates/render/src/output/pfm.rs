@@ -5,16 +5,22 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use super::{OutputError, write_whole};
+use super::OutputError;
+use etendue_files::Transaction;
 
 /// Writes `values` of columns and rows `size`, row by row from the top.
 ///
 /// # Errors
 ///
 /// When the file cannot be written.
-pub fn write(path: &Path, size: [u32; 2], values: &[f64]) -> Result<(), OutputError> {
+pub fn write(
+    files: &Transaction,
+    path: &Path,
+    size: [u32; 2],
+    values: &[f64],
+) -> Result<(), OutputError> {
     let [width, height] = size;
-    write_whole(path, |part| {
+    Ok(files.write(path, |part| {
         let mut file = BufWriter::new(part);
         write!(file, "Pf\n{width} {height}\n-1.0\n")?;
         for row in values.chunks(width.max(1) as usize).rev() {
@@ -25,7 +31,7 @@ pub fn write(path: &Path, size: [u32; 2], values: &[f64]) -> Result<(), OutputEr
             }
         }
         file.flush()
-    })
+    })?)
 }
 
 #[cfg(test)]
@@ -36,7 +42,7 @@ mod tests {
     fn rows_stand_from_the_bottom_up() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.pfm");
-        write(&path, [2, 2], &[1.0, 2.0, 3.0, f64::INFINITY]).unwrap();
+        write(&Transaction::at_once(), &path, [2, 2], &[1.0, 2.0, 3.0, f64::INFINITY]).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         assert_eq!(&bytes[..12], b"Pf\n2 2\n-1.0\n");
         let numbers: Vec<f32> =

@@ -14,9 +14,10 @@ use ::png::{BitDepth, ColorType, EncodingError, Info, SrgbRenderingIntent};
 
 pub use super::look::Bits;
 use super::look::{Channels, Shown, mask, palette, show};
-use super::{Layer, Look, OutputError, PartFile, Picture, SOFTWARE};
+use super::{Layer, Look, OutputError, Picture};
 use crate::denoise::DENOISED;
 use crate::film::check_room;
+use etendue_files::{PartFile, SOFTWARE, Transaction};
 
 /// Writes the layer called `name` (empty for the picture itself, or for what it is without its noise where
 /// that is there) to `path`. `bits` is the depth of
@@ -26,7 +27,13 @@ use crate::film::check_room;
 ///
 /// When there is no such layer, when a side is longer than PNG's 2³¹ − 1, or when the file cannot
 /// be written.
-pub fn write(path: &Path, picture: &Picture, name: &str, bits: Bits) -> Result<(), OutputError> {
+pub fn write(
+    files: &Transaction,
+    path: &Path,
+    picture: &Picture,
+    name: &str,
+    bits: Bits,
+) -> Result<(), OutputError> {
     let layer = picture.require(name)?;
     let denoised = picture.layer(DENOISED).filter(|_| name.is_empty());
     let layer = denoised.unwrap_or(layer);
@@ -34,7 +41,7 @@ pub fn write(path: &Path, picture: &Picture, name: &str, bits: Bits) -> Result<(
         (Look::Color, "") => picture.development().show(picture, layer, bits)?,
         _ => show(layer, bits)?,
     };
-    write_shown(path, picture, layer, &shown)
+    write_shown(files, path, picture, layer, &shown)
 }
 
 /// Writes the numbers of the layer of ids called `name` to `path`: 16 bits, grey, not scaled. `false`
@@ -43,15 +50,21 @@ pub fn write(path: &Path, picture: &Picture, name: &str, bits: Bits) -> Result<(
 /// # Errors
 ///
 /// As [`write()`].
-pub fn write_mask(path: &Path, picture: &Picture, name: &str) -> Result<bool, OutputError> {
+pub fn write_mask(
+    files: &Transaction,
+    path: &Path,
+    picture: &Picture,
+    name: &str,
+) -> Result<bool, OutputError> {
     let layer = picture.require(name)?;
     match mask(layer)? {
-        Some(shown) => write_shown(path, picture, layer, &shown).map(|()| true),
+        Some(shown) => write_shown(files, path, picture, layer, &shown).map(|()| true),
         None => Ok(false),
     }
 }
 
 pub(super) fn write_shown(
+    files: &Transaction,
     path: &Path,
     picture: &Picture,
     layer: &Layer,
@@ -79,15 +92,15 @@ pub(super) fn write_shown(
 
     // The encoder holds the filtered rows and what it makes of them, which may be no smaller.
     check_room(shown.bytes.len().saturating_mul(2))?;
-    let mut part = PartFile::create(path)?;
+    let mut part = files.create(path)?;
     encode(&mut part, info, &shown.bytes).map_err(|error| match error {
         EncodingError::IoError(source) => OutputError::io(path, source),
         error => OutputError::format(path, error),
     })?;
-    part.finish()
+    Ok(part.finish()?)
 }
 
-fn encode(part: &mut PartFile, info: Info<'_>, bytes: &[u8]) -> Result<(), EncodingError> {
+fn encode(part: &mut PartFile<'_>, info: Info<'_>, bytes: &[u8]) -> Result<(), EncodingError> {
     let mut encoder = ::png::Encoder::with_info(BufWriter::new(part), info)?;
     encoder.set_compression(::png::Compression::Fast);
     let mut writer = encoder.write_header()?;
@@ -167,7 +180,7 @@ mod tests {
     fn a_sensor_image_comes_back_to_the_number() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("raw.png");
-        write(&path, &picture(), "Raw", Bits::Eight).unwrap();
+        write(&Transaction::at_once(), &path, &picture(), "Raw", Bits::Eight).unwrap();
         let read = image::open(&path).unwrap();
         let image::DynamicImage::ImageLuma16(read) = read else { panic!("{:?}", read.color()) };
         assert_eq!(read.dimensions(), (2, 2));
@@ -182,7 +195,7 @@ mod tests {
     fn a_preview_says_that_it_is_one_and_names_its_range() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("depth.png");
-        write(&path, &picture(), "Depth", Bits::Eight).unwrap();
+        write(&Transaction::at_once(), &path, &picture(), "Depth", Bits::Eight).unwrap();
         let read = image::open(&path).unwrap();
         let image::DynamicImage::ImageLuma8(read) = read else { panic!("{:?}", read.color()) };
         assert_eq!(read.into_raw(), [255, 106, 32, 0]);
@@ -199,7 +212,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for (name, tagged) in [("", true), ("Depth", false), ("Raw", false)] {
             let path = folder.path().join("a.png");
-            write(&path, &picture(), name, Bits::Sixteen).unwrap();
+            write(&Transaction::at_once(), &path, &picture(), name, Bits::Sixteen).unwrap();
             let reader = ::png::Decoder::new(BufReader::new(File::open(&path).unwrap()));
             assert_eq!(reader.read_info().unwrap().info().srgb.is_some(), tagged, "{name}");
         }
@@ -209,7 +222,7 @@ mod tests {
     fn sixteen_bit_colour_is_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rgb.png");
-        write(&path, &picture(), "", Bits::Sixteen).unwrap();
+        write(&Transaction::at_once(), &path, &picture(), "", Bits::Sixteen).unwrap();
         let read = image::open(&path).unwrap();
         let image::DynamicImage::ImageRgb16(read) = read else { panic!("{:?}", read.color()) };
         // IEC 61966-2-1: 0.18 → 0.461356, 0.5 → 0.735357 of 65535.
@@ -220,7 +233,13 @@ mod tests {
     #[test]
     fn an_unknown_layer_leaves_no_file() {
         let folder = tempfile::tempdir().unwrap();
-        let error = write(&folder.path().join("a.png"), &picture(), "Id", Bits::Eight);
+        let error = write(
+            &Transaction::at_once(),
+            &folder.path().join("a.png"),
+            &picture(),
+            "Id",
+            Bits::Eight,
+        );
         assert!(matches!(error, Err(OutputError::UnknownLayer { .. })));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }

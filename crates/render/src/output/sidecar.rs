@@ -7,8 +7,9 @@ use etendue_scene::escape::printable_json;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
-use super::{OutputError, Picture, SOFTWARE, write_whole};
+use super::{OutputError, Picture};
 use crate::denoise::DENOISED;
+use etendue_files::{SOFTWARE, Transaction};
 
 /// Names and texts as a JSON object, in their own order; a text that is an object in JSON is that object.
 #[derive(Debug)]
@@ -54,7 +55,7 @@ struct LayerDescription<'a> {
 /// # Errors
 ///
 /// When the file cannot be written.
-pub fn write(path: &Path, picture: &Picture) -> Result<(), OutputError> {
+pub fn write(files: &Transaction, path: &Path, picture: &Picture) -> Result<(), OutputError> {
     let layers = picture.layers().iter().map(|layer| LayerDescription {
         name: layer.title(),
         channels: layer.channels.iter().map(|channel| layer.full_name(channel)).collect(),
@@ -71,7 +72,7 @@ pub fn write(path: &Path, picture: &Picture) -> Result<(), OutputError> {
         picture_png: picture.layer("").map(|_| picture_png(picture)),
         layers: layers.collect(),
     };
-    write_json(path, &description)
+    write_json(files, path, &description)
 }
 
 /// What `picture.png` shows, and how.
@@ -88,10 +89,14 @@ fn picture_png(picture: &Picture) -> Value {
 /// # Errors
 ///
 /// When the file cannot be written, or when `value` has no form in JSON.
-pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), OutputError> {
+pub fn write_json(
+    files: &Transaction,
+    path: &Path,
+    value: &impl Serialize,
+) -> Result<(), OutputError> {
     let json =
         serde_json::to_string_pretty(value).map_err(|error| OutputError::format(path, error))?;
-    write_whole(path, |part| writeln!(part, "{}", printable_json(&json)))
+    Ok(files.write(path, |part| writeln!(part, "{}", printable_json(&json)))?)
 }
 
 #[cfg(test)]
@@ -115,7 +120,7 @@ mod tests {
         let picture = Picture::new(2, 1, vec![depth], header).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("layers.json");
-        write(&path, &picture).unwrap();
+        write(&Transaction::at_once(), &path, &picture).unwrap();
         let read = fs::read_to_string(path).unwrap();
         let json: serde_json::Value = serde_json::from_str(&read).unwrap();
         assert_eq!(json["width"], 2);

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use etendue_files::Transaction;
 use etendue_render::output::Outputs;
 use etendue_render::{
     Course, Film, FilmFile, Plan, Prepared, RenderError, Rendered, Shard, finish, trace,
@@ -96,6 +97,34 @@ fn stopping_does_not_bend_the_picture() {
     }
 }
 
+/// Pixels of one colour of a chessboard are uneven, those of the other are black: each half is decided by the
+/// other, so the uneven ones stop with the fewest samples. The note counts them by their own.
+#[test]
+fn what_stopped_too_early_is_counted_and_said() {
+    let side = 16_u32;
+    let samples = json!({ "relative_error": 0.05, "min": 8, "max": 64 });
+    let mut scene =
+        strips([side, side], 0.3, &json!({ "samples": samples, "sampler": "independent" }));
+    let middle = |k: u32| f64::from(k) + 0.5 - 0.5 * f64::from(side);
+    let places = (0..side * side).map(|k| [k % side, k / side]).filter(|[x, y]| (x ^ y) & 1 == 0);
+    let square = |[x, y]: [u32; 2]| {
+        json!({ "shape": "rectangle", "width": 0.3, "height": 0.9, "material": "white",
+            "transform": { "translate": [middle(x), -middle(y), 0] } })
+    };
+    scene["objects"] = places.map(square).collect();
+    let counts = rendered(&loaded(scene)).sample_counts.unwrap();
+    assert_eq!(counts.pixels, u64::from(side * side));
+    // Of 32 pixels with 8 samples each, the variance is 0.27/0.3²/8, where a four hundredth is allowed.
+    assert_eq!(counts.over, u64::from(side * side / 2), "{counts:?}");
+    let note = counts.note().unwrap();
+    assert!(note.contains("50.00 % of the pixels stopped with more than twice"), "{note}");
+    // An even picture says nothing.
+    let even = json!({ "relative_error": 0.2, "min": 16, "max": 4096 });
+    let scene = strips([32, 32], 0.5, &json!({ "samples": even, "sampler": "independent" }));
+    let counts = rendered(&loaded(scene)).sample_counts.unwrap();
+    assert_eq!(counts.note(), None, "{counts:?}");
+}
+
 /// The variance that the layer tells is that of the pictures: against the known share, over pixels and
 /// seeds. And it is what was asked for.
 #[test]
@@ -183,7 +212,7 @@ fn threads_and_shares_make_one_picture() {
         let course = Course { shard: Shard::new(number, 2), ..Course::default() };
         let film = trace(&scene, &plan, prepared, &[], &course, &|_: f64| true).unwrap();
         let path = folder.path().join(number.to_string());
-        film.write(&path, &Vec::new(), &Value::Null).unwrap();
+        film.write((&Transaction::at_once(), &path), &Vec::new(), &Value::Null).unwrap();
         FilmFile::read(&path).unwrap()
     };
     let film = Film::merged(&scene, &plan, &[share(2), share(1)], &Vec::new()).unwrap();

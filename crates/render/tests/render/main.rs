@@ -12,5 +12,6 @@ mod overruled;
 mod overruled_camera;
 mod passes;
 mod second_readers;
+mod spectra;
 mod steps;
 mod textures;

@@ -5,9 +5,8 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use etendue_render::output::{
-    Channel, ImageHash, Layer, Look, Picture, SOFTWARE, Values, exr, npy,
-};
+use etendue_files::{SOFTWARE, Transaction};
+use etendue_render::output::{Channel, ImageHash, Layer, Look, Picture, Values, exr, npy};
 use serde_json::{Map, Value, json};
 
 // Neither side a multiple of a block's 16 rows, nor of a vector's bands.
@@ -114,7 +113,7 @@ fn write_all(folder: &Path, picture: &Picture) {
     let mut arrays = Map::new();
     for layer in picture.layers() {
         let array = format!("{}.npy", layer.title());
-        npy::write(&folder.join(&array), picture, &layer.name).unwrap();
+        npy::write(&Transaction::at_once(), &folder.join(&array), picture, &layer.name).unwrap();
         let names = layer.channels.iter().map(|channel| layer.full_name(channel));
         arrays.insert(array, names.collect());
         for channel in &layer.channels {
@@ -131,7 +130,8 @@ fn write_all(folder: &Path, picture: &Picture) {
     }
     for (name, compression) in [("none", exr::Compression::None), ("zip", exr::Compression::Zip)] {
         let options = exr::Options { compression, progress: None };
-        exr::write(&folder.join(format!("{name}.exr")), picture, &options).unwrap();
+        exr::write(&Transaction::at_once(), &folder.join(format!("{name}.exr")), picture, &options)
+            .unwrap();
     }
     let expected = json!({
         "width": WIDTH, "height": HEIGHT,
@@ -197,7 +197,7 @@ fn openexr_numpy_and_xxhash_read_every_bit() {
 fn exrheader_shows_channels_and_meaning() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
-    exr::write(&path, &picture(), &exr::Options::default()).unwrap();
+    exr::write(&Transaction::at_once(), &path, &picture(), &exr::Options::default()).unwrap();
     let Ok(output) = Command::new("exrheader").arg(&path).output() else {
         println!("skipped: there is no exrheader (Debian's package openexr)");
         return;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use aho_corasick::AhoCorasick;
-use etendue_geometry::MappedFile;
+use etendue_files::MappedFile;
 
 /// Endings of files that only make sense when something names them.
 const SERVANTS: [&str; 10] =

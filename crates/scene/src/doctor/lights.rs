@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use etendue_geometry::MappedFile;
+use etendue_files::MappedFile;
 use serde_json::Value;
 
 use super::leftovers::naming_part;

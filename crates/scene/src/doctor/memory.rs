@@ -13,17 +13,23 @@ use crate::memory::Size;
 /// `etendue render SCENE --report` with Embree 3.13.5, AVX2, robust.
 const EMBREE_PER_TRIANGLE: u64 = 92;
 
-/// The same per placement of a mesh that is placed twice or more: 132 for 1000, 76 for 20 000.
-const EMBREE_PER_INSTANCE: u64 = 132;
+/// Bytes per placement of a mesh that is placed twice or more, all in all: where it stands in the file, in the
+/// scene and while it is framed, and Embree's instance of it. 548 to 840 were held for 0.3 and 1 million copies,
+/// of two objects and of one, with a pose and without; `benches/memory.py`.
+const PER_COPY: u64 = 750;
 
 /// Bytes of the program itself with its libraries and the threads' working memory: 20 to 23 MiB are the
 /// peak of renders of a few pixels.
 const PROGRAM: u64 = 22 << 20;
 
+/// Bytes of the rays by which the exit pupil of a lens is measured: pictures of a few pixels through lenses
+/// hold 12 to 20 MiB more than others.
+const LENS: u64 = 12 << 20;
+
 /// A forecast (bytes), of counts alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct MemoryForecast {
-    /// The program itself, with its libraries.
+    /// The program itself, with its libraries, and the rays by which a lens is measured.
     pub program: u64,
     /// Vertices and indices on the heap.
     pub geometry: u64,
@@ -31,6 +37,8 @@ pub struct MemoryForecast {
     pub mapped: u64,
     /// Embree's structure, estimated from the number of triangles.
     pub structure: u64,
+    /// Placements of meshes that are placed more than once, in the scene and in the structure.
+    pub copies: u64,
     /// Images of materials and of the environment, decoded.
     pub images: u64,
     /// The planes of the picture and its layers, spectral bands included.
@@ -52,19 +60,20 @@ impl MemoryForecast {
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
         let geometry: u64 = scene.geometry.meshes.iter().map(|mesh| mesh.heap_bytes() as u64).sum();
-        let uses = scene.geometry.uses();
-        let instances: u64 = uses.iter().filter(|&&n| n > 1).map(|&n| u64::from(n)).sum();
-        let structure =
-            structure(scene.geometry.triangles_unique()) + EMBREE_PER_INSTANCE * instances;
+        let structure = structure(scene.geometry.triangles_unique());
+        let copies = copies(scene.placed_copies());
         let film = film(scene.camera.resolution(), &scene.layers);
         let mapped = scene.stats.bytes_mapped;
-        Self { program: PROGRAM, geometry, mapped, structure, film, ..Self::default() }.summed()
+        let is_measured = scene.camera.lens().is_some() && scene.camera.light_field().is_none();
+        let program = PROGRAM + if is_measured { LENS } else { 0 };
+        Self { program, geometry, mapped, structure, copies, film, ..Self::default() }.summed()
     }
 
     /// With the total of its parts.
     #[must_use]
     pub fn summed(mut self) -> Self {
-        let lasting = [self.program, self.geometry, self.structure, self.images, self.film];
+        let lasting =
+            [self.program, self.geometry, self.structure, self.copies, self.images, self.film];
         let passing = self.sums.max(self.sensor).saturating_add(self.files).max(self.views);
         self.total = lasting.into_iter().fold(passing, u64::saturating_add);
         self
@@ -82,6 +91,14 @@ pub(crate) fn structure(triangles: u64) -> u64 {
     EMBREE_PER_TRIANGLE.saturating_mul(triangles)
 }
 
+/// Bytes of so many placements of meshes that are placed more than once, estimated.
+pub(crate) fn copies(placements: u64) -> u64 {
+    match placements {
+        0 | 1 => 0,
+        many => PER_COPY.saturating_mul(many),
+    }
+}
+
 /// The least that `layers` of a picture of so many columns and rows take (bytes): planes of f32.
 pub(crate) fn film([width, height]: [u32; 2], layers: &[LayerSpec]) -> u64 {
     let pixels = u64::from(width) * u64::from(height);
@@ -95,6 +112,7 @@ impl fmt::Display for MemoryForecast {
             ("program", self.program),
             ("geometry", self.geometry),
             ("structure", self.structure),
+            ("copies", self.copies),
             ("images", self.images),
             ("layers", self.film),
             ("sums of passes", self.sums),

@@ -11,7 +11,7 @@ mod text;
 use std::path::{Path, PathBuf};
 
 use etendue_camera::CameraFile;
-use etendue_geometry::Geometry;
+use etendue_geometry::{Coplanar, Geometry};
 use serde::Serialize;
 
 use crate::import::{NoteKind, Wanted};
@@ -111,6 +111,9 @@ pub struct Defects {
     pub collapsed: u64,
     /// With the same three corners as another one of their mesh.
     pub duplicate: u64,
+    /// Pairs of placements of which triangles lie over one another in one plane, facing one side: of them the later
+    /// one is seen.
+    pub coplanar: u64,
     /// With a corner that does not exist. Always 0: such a file is refused.
     pub out_of_range: u64,
 }
@@ -170,6 +173,7 @@ impl Diagnosis {
     pub fn of(scene: &Scene, kind: FileKind) -> Self {
         let geometry = &*scene.geometry;
         let around = bounds::tight(geometry);
+        let coplanar = Coplanar::of(geometry).pairs(geometry);
         let is_extension = |note: &&Note| note.kind == NoteKind::Extension;
         let models: Vec<&Path> = scene.stats.files.iter().map(|(path, _)| path.as_path()).collect();
         Self {
@@ -189,6 +193,7 @@ impl Diagnosis {
                 degenerate: geometry.meshes.iter().map(|mesh| mesh.degenerate).sum(),
                 collapsed: geometry.placements.iter().filter(|p| !p.has_extent()).count() as u64,
                 duplicate: geometry.meshes.iter().map(duplicates::count).sum(),
+                coplanar: coplanar.len() as u64,
                 out_of_range: 0,
             },
             precision: StepSizes::of(geometry, around),
@@ -204,9 +209,50 @@ impl Diagnosis {
             memory: MemoryForecast::of(scene),
             extensions: scene.notes.iter().filter(is_extension).map(Finding::from).collect(),
             unused_files: leftovers::find(&models, &scene.path),
-            findings: scene.notes.iter().filter(|n| !is_extension(n)).map(Finding::from).collect(),
+            findings: scene
+                .notes
+                .iter()
+                .filter(|n| !is_extension(n))
+                .map(Finding::from)
+                .chain(in_one_plane(scene, &coplanar))
+                .collect(),
         }
     }
+}
+
+/// What lies in one plane with something else.
+fn in_one_plane(scene: &Scene, pairs: &[([u32; 2], usize)]) -> Vec<Finding> {
+    /// The most pairs that are named.
+    const NAMED: usize = 8;
+    let name = |placement: u32| {
+        let placement = &scene.geometry.placements[placement as usize];
+        let object = scene.objects.get(placement.object as usize);
+        let mesh = &scene.geometry.mesh_of(placement).name;
+        object.map_or_else(
+            || mesh.clone(),
+            |name| format!("object {} \"{name}\"", placement.object + 1),
+        )
+    };
+    let finding = |&([earlier, later], count): &([u32; 2], usize)| {
+        Finding {
+        kind: NoteKind::Irregular,
+        subject: format!("{} and {}", name(earlier), name(later)),
+        message: "lie over one another in one plane; the later one is seen. Move one of them by a millimetre, or leave \
+                  out what is hidden"
+            .to_owned(),
+        count: count as u64,
+    }
+    };
+    let mut findings: Vec<Finding> = pairs.iter().take(NAMED).map(finding).collect();
+    if let Some(more) = pairs.len().checked_sub(NAMED).filter(|more| *more > 0) {
+        findings.push(Finding {
+            kind: NoteKind::Irregular,
+            subject: format!("{more} more pairs"),
+            message: "lie over one another in one plane, too".to_owned(),
+            count: 1,
+        });
+    }
+    findings
 }
 
 fn cameras(scene: &Scene) -> Vec<CameraReport> {

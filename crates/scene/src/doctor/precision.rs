@@ -52,7 +52,7 @@ fn step(value: f64, epsilon: f64) -> f64 {
 fn input_step(geometry: &Geometry) -> f64 {
     let steps = geometry.placements.iter().map(|placement| {
         let mesh = geometry.mesh_of(placement);
-        if mesh.bounds.is_empty() {
+        if mesh.bounds.is_empty() || !geometry.has_area(placement) {
             return 0.0;
         }
         let epsilon = match mesh.positions {

@@ -91,6 +91,7 @@ impl Diagnosis {
             (self.defects.degenerate, "without area (left out)"),
             (self.defects.collapsed, "placements without extent (left out)"),
             (self.defects.duplicate, "twice there"),
+            (self.defects.coplanar, "pairs of things in one plane"),
         ];
         let found: Vec<String> = named
             .iter()

@@ -88,21 +88,47 @@ pub enum CameraPath {
     },
     /// The cameras that models bring along, one a frame, in the order of their nodes.
     Cameras {},
-    /// Poses of a file: `.npy` of n × 4 × 4 matrices; TUM's `timestamp tx ty tz qx qy qz qw`; COLMAP's
-    /// `images.txt`, with the intrinsics of the `cameras.txt` beside it; nerfstudio's `transforms.json`.
+    /// Several cameras that hold on to each other, such as a pair for stereo, moved as one: a frame for each camera
+    /// at each moment, all cameras of the first moment first. `disparity` compares with the next camera of the rig,
+    /// `flow` and `occlusion` with the same camera at the next moment, unless `to` says otherwise.
+    Rig {
+        /// The cameras.
+        cameras: Vec<RigCameraSpec>,
+        /// Where the rig stands at each moment: any other frames. What these make the camera's pose is the rig's.
+        path: Box<FramesSpec>,
+    },
+    /// Poses of a file: `.npy` of n × 4 × 4 or n × 3 × 4 matrices; TUM's `timestamp tx ty tz qx qy qz qw`;
+    /// KITTI's twelve numbers of `[R | t]` a line; COLMAP's `images.txt` or `images.bin`, with the intrinsics of the
+    /// `cameras.txt` or `cameras.bin` beside it; `transforms.json` of nerfstudio, instant-ngp and NeRF's synthetic
+    /// scenes.
     Trajectory {
         /// The file, relative to the scene file.
         file: String,
-        /// What it is; told by its name when absent.
+        /// What it is; told by its name when absent, and of `.txt` by its first line.
         #[serde(default)]
         format: Option<TrajectoryFormat>,
-        /// Which way the poses map, of NPY and TUM files; camera to world when absent.
+        /// Which way the poses map, of NPY, TUM and KITTI files; camera to world when absent.
         #[serde(default)]
         maps: Option<Maps>,
-        /// The camera's axes, of NPY and TUM files; OpenCV's when absent.
+        /// The camera's axes, of NPY, TUM and KITTI files; OpenCV's when absent.
         #[serde(default)]
         convention: Option<Convention>,
     },
+}
+
+/// A camera of a rig. Without `at` and `pose` it stands where the rig does, and looks that way.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RigCameraSpec {
+    /// What it is called in `index.json`.
+    pub name: Option<String>,
+    /// Its place in the rig: to the right, up and back (m). It looks the rig's way.
+    pub at: Option<[f64; 3]>,
+    /// Its pose in the rig, whose frame takes the world's place: instead of `at`. The rig's axes are the camera's
+    /// of the same `convention`.
+    pub pose: Option<PoseSpec>,
+    /// Settings of its frames, as in a list of frames: `{"camera.fov": 90}`.
+    pub settings: BTreeMap<String, Value>,
 }
 
 /// A format of trajectories.
@@ -113,9 +139,11 @@ pub enum TrajectoryFormat {
     Npy,
     /// The TUM RGB-D benchmark's text.
     Tum,
-    /// COLMAP's text model.
+    /// The text of KITTI's odometry benchmark.
+    Kitti,
+    /// COLMAP's model, as text or binary.
     Colmap,
-    /// Nerfstudio's JSON.
+    /// `transforms.json` of nerfstudio, instant-ngp or NeRF.
     Nerfstudio,
 }
 

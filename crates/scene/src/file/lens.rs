@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use etendue_camera::Camera;
+use etendue_files::{InputFolder, Opener, Reach};
 use etendue_optics::train::{
     Focus, LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays, ZemaxError, ZemaxLens,
 };
@@ -14,7 +15,7 @@ use serde_json::Value;
 
 use super::{SceneFile, WrittenPlaces, check, lenient, read_document};
 use crate::SceneError;
-use crate::paths::{Folder, Reach};
+use crate::error::not_found;
 use crate::words::plain;
 
 /// The keys of a scene that no lens file has.
@@ -73,8 +74,25 @@ pub struct ReadLens {
 ///
 /// When the file is missing, holds no lens, or the lens makes no sense; the message names the place.
 pub fn read_lens(path: &Path, reach: Reach) -> Result<ReadLens, SceneError> {
+    read_lens_at(path, reach, None)
+}
+
+/// As [`read_lens`], at a configuration of a Zemax file, from 1.
+///
+/// # Errors
+///
+/// As [`read_lens`], and when the file has no such configuration.
+pub fn read_lens_at(
+    path: &Path,
+    reach: Reach,
+    configuration: Option<usize>,
+) -> Result<ReadLens, SceneError> {
     if ZemaxLens::is_named(path) {
-        return read_zemax(path);
+        return read_zemax(path, configuration);
+    }
+    if configuration.is_some() {
+        let reason = "has no configurations, which Zemax files (.zmx) have".to_owned();
+        return Err(SceneError::NotALens { file: path.to_owned(), reason });
     }
     let (written, value) = read(path)?;
     if !SCENE_KEYS.iter().any(|key| value.get(key).is_some()) {
@@ -145,21 +163,23 @@ fn read_as<T: DeserializeOwned>(
     })
 }
 
-fn folder(file: &Path, reach: Reach) -> Result<Folder, SceneError> {
+fn folder(file: &Path, reach: Reach) -> Result<InputFolder, SceneError> {
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
-    Folder::open(folder.unwrap_or(Path::new(".")), reach)
+    let folder = folder.unwrap_or(Path::new("."));
+    let opened = Opener::new(reach).folder(folder);
+    opened.map_err(|source| SceneError::unreadable(folder, source))
 }
 
 /// `file` and what was found in its folder.
-fn inputs(file: &Path, folder: &Folder) -> Vec<PathBuf> {
-    [vec![file.to_owned()], folder.found()].concat()
+fn inputs(file: &Path, folder: &InputFolder) -> Vec<PathBuf> {
+    [vec![file.to_owned()], folder.opener().found()].concat()
 }
 
 fn build(written: &WrittenPlaces, value: &Value, reach: Reach) -> Result<ReadLens, SceneError> {
     let file: LensFile = read_as(&LENS, written, value)?;
     let folder = folder(&written.path, reach)?;
     let train = file
-        .build(&|name| folder.find(name).map(|found| found.path))
+        .build(&|name| folder.find(name).map(|found| found.path).map_err(not_found))
         .map_err(|error| fault(written, &error))?;
     Ok(ReadLens {
         train,
@@ -173,11 +193,11 @@ fn build(written: &WrittenPlaces, value: &Value, reach: Reach) -> Result<ReadLen
     })
 }
 
-fn read_zemax(path: &Path) -> Result<ReadLens, SceneError> {
+fn read_zemax(path: &Path, configuration: Option<usize>) -> Result<ReadLens, SceneError> {
     let bytes = super::read_bytes(path).map_err(not_a_lens)?;
     let zemax = |source| SceneError::Zemax { file: path.to_owned(), source };
     let ZemaxLens { file, fields, wavelengths, notes, .. } =
-        ZemaxLens::read(&bytes).map_err(zemax)?;
+        ZemaxLens::read_configuration(&bytes, configuration).map_err(zemax)?;
     let train = file
         .build(&|name| Err(format!("{name}: a Zemax file has no masks")))
         .map_err(|error| zemax(ZemaxError { line: 1, why: error.to_string() }))?;

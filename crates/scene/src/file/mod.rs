@@ -17,13 +17,13 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use etendue_geometry::files;
 use etendue_sensor::Sensor;
+use etendue_tracer::LayerSpec;
 use serde_json::{Value, json};
 
 pub use document::Place;
-pub use frames::{CameraPath, FramesSpec, TrajectoryFormat};
-pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, trace_rays};
+pub use frames::{CameraPath, FramesSpec, RigCameraSpec, TrajectoryFormat};
+pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, read_lens_at, trace_rays};
 pub use object::{AnimationSpec, InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
 pub use overrides::OverrideError;
 pub use samples::{
@@ -133,6 +133,16 @@ impl SceneFile {
         Self::of(written, FileKind::Scene, value, &[])
     }
 
+    /// The scene at `path`, or in memory, whose values with all settings are `value`; the file is not read.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`].
+    pub fn restore(path: &Path, value: Value) -> Result<Self, SceneError> {
+        let kind = if is_model(path) { FileKind::Model } else { FileKind::Scene };
+        Self::of(WrittenPlaces::new(path, None), kind, value, &[])
+    }
+
     /// The scene with settings on top of those that it has, as in [`Self::read`]. The file is not read
     /// again.
     ///
@@ -191,12 +201,14 @@ impl SceneFile {
     /// Whether the scene stands in no file.
     #[must_use]
     pub fn is_in_memory(&self) -> bool {
-        self.kind == FileKind::Scene && self.written.document.is_none()
+        self.written.document.is_none() && self.path().ends_with(IN_MEMORY)
     }
 
     fn check(&self) -> Result<(SceneSpec, Option<Sensor>), SceneError> {
-        check::check(&schema::SCENE, &self.value)
-            .map_err(|problem| self.fault(&problem.path, problem.reason))?;
+        check::check(&schema::SCENE, &self.value).map_err(|problem| {
+            let hint = self.hint(&problem.path).unwrap_or_default();
+            self.fault(&problem.path, problem.reason + &hint)
+        })?;
         let mut value = self.value.clone();
         let sensor = sensor::split(&mut value, &self.written)?;
         let spec = serde_path_to_error::deserialize(&value).map_err(|error| {
@@ -205,6 +217,15 @@ impl SceneFile {
             self.fault(&path, plain(error.inner()))
         })?;
         Ok((spec, sensor))
+    }
+
+    /// What was probably meant by the value at `path`, when that belongs elsewhere.
+    fn hint(&self, path: &str) -> Option<String> {
+        let tracer = self.value.get("tracer").filter(|_| path.starts_with("tracer"))?;
+        let word = tracer.get("type").unwrap_or(tracer).as_str()?;
+        LayerSpec::NAMES.contains(&word).then(|| {
+            format!("; `{word}` is a layer, beside the picture or in its place: \"layers\": [\"{word}\"]")
+        })
     }
 
     /// The error that the value at the JSON path `path` is wrong because of `reason`.
@@ -330,7 +351,7 @@ fn read_document(path: &Path) -> Result<(Document, Value), SceneError> {
 
 /// The bytes of a regular file of sensible size.
 fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
-    files::read(path, LONGEST).map_err(|source| match source.kind() {
+    etendue_files::read(path, LONGEST).map_err(|source| match source.kind() {
         // What the opener itself says: it is there but no file for us.
         io::ErrorKind::Other => {
             SceneError::NotAScene { file: path.to_owned(), reason: source.to_string() }

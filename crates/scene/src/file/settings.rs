@@ -120,6 +120,13 @@ pub struct RenderSpec {
     /// Another seed gives other samples.
     #[serde(default)]
     pub seed: u64,
+    /// The number of the frame, which has random numbers of its own: those of the light's samples and of the
+    /// sensor's noise. Each of a scene's `frames` has its own number; here it stands for a single picture.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub frame: u32,
+    /// Whether all frames have the random numbers of frame 0, so that noise stands still while things move.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub frozen_noise: bool,
     /// What finds the hits; the best that was built in when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accel: Option<AccelName>,
@@ -259,6 +266,22 @@ pub enum ToneMap {
     Aces,
 }
 
+impl RenderSpec {
+    /// The seed of all random numbers of this frame: the seed itself for frame 0 and for frozen noise.
+    #[must_use]
+    pub fn frame_seed(&self) -> u64 {
+        if self.frame == 0 || self.frozen_noise {
+            return self.seed;
+        }
+        let [a, b, c, d] = self.frame.to_le_bytes();
+        etendue_sensor::mixed_seed(self.seed, &[b'f', b'r', b'a', b'm', a, b, c, d])
+    }
+}
+
+fn is_first(frame: &u32) -> bool {
+    *frame == 0
+}
+
 fn one() -> SamplesSpec {
     SamplesSpec::Count(1)
 }
@@ -267,7 +290,19 @@ impl Default for RenderSpec {
     fn default() -> Self {
         let sampler = Sampler::default();
         let (exposure, tone_map) = Default::default();
-        Self { samples: one(), sampler, seed: 0, accel: None, exposure, tone_map, alpha: false }
+        let (seed, frame, frozen_noise) = Default::default();
+        let (accel, alpha) = Default::default();
+        Self {
+            samples: one(),
+            sampler,
+            seed,
+            frame,
+            frozen_noise,
+            accel,
+            exposure,
+            tone_map,
+            alpha,
+        }
     }
 }
 

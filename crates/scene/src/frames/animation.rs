@@ -35,7 +35,12 @@ pub(super) fn frames(
         let value = serde_json::to_value(&moment).unwrap_or_default();
         let setting =
             |object: &usize| (join(&join_index("objects", *object), "animation"), value.clone());
-        Frame { number, time: Some(time), settings: objects.iter().map(setting).collect() }
+        Frame {
+            number,
+            time: Some(time),
+            settings: objects.iter().map(setting).collect(),
+            rig: None,
+        }
     };
     Ok(times.into_iter().enumerate().map(frame).collect())
 }
@@ -101,7 +106,7 @@ pub(super) fn cameras(
         let camera: Value = serde_json::to_value(camera).unwrap_or_else(|_| json!({}));
         let mut settings = vec![("camera".to_owned(), camera)];
         settings.extend(sensor.clone().map(|sensor| ("camera.sensor".to_owned(), sensor)));
-        Frame { number, time: None, settings }
+        Frame { number, time: None, settings, rig: None }
     };
     Ok(cameras.iter().enumerate().map(frame).collect())
 }

@@ -3,24 +3,25 @@
 mod animation;
 mod colmap;
 mod intrinsics;
-mod nerfstudio;
+mod lines;
 mod path;
-mod tum;
+mod rig;
+mod trajectory;
+mod transforms;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 use etendue_camera::{CameraSpec, Convention, Maps, Pose, PoseSpec};
-use etendue_geometry::files;
+use etendue_files::Opener;
 use etendue_geometry::glam::DVec3;
 use serde_json::Value;
 
-use crate::file::{CameraPath, FramesSpec, SceneFile, TrajectoryFormat, join, join_index};
-use crate::paths::Folder;
-use crate::{Reach, Scene, SceneError, npy};
-
-/// The longest trajectory that is read (bytes).
-const LONGEST: u64 = 1 << 30;
+use crate::error::not_found;
+use crate::file::{CameraPath, FramesSpec, SceneFile, join, join_index};
+use crate::import::Note;
+use crate::{Scene, SceneError};
+use trajectory::Trajectory;
+use transforms::ScenePicture;
 
 /// The most frames of a scene. All are made before the first is shown, of a few kilobytes each.
 const MOST_FRAMES: usize = 100_000;
@@ -34,6 +35,30 @@ pub struct Frame {
     pub time: Option<f64>,
     /// What is set for it: paths of the scene and values.
     pub settings: Vec<(String, Value)>,
+    /// Which camera of a rig it is, where there is one.
+    pub rig: Option<RigCamera>,
+}
+
+/// A camera of a rig, at a moment of the rig's path.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RigCamera {
+    /// The number of the moment, from 0.
+    pub moment: usize,
+    /// The number of the camera, from 0.
+    pub camera: usize,
+    /// How many cameras the rig has. The frame's number is `moment × count + camera`.
+    pub count: usize,
+    /// What the scene calls the camera.
+    pub name: Option<String>,
+}
+
+/// The pictures of a scene, in order.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Frames {
+    /// One a picture.
+    pub frames: Vec<Frame>,
+    /// What a user should know of the file that they come from.
+    pub notes: Vec<Note>,
 }
 
 /// What paths of the camera start from.
@@ -72,6 +97,15 @@ impl Station {
     fn new(pose: PoseSpec) -> Self {
         Self { pose, time: None, settings: Vec::new() }
     }
+
+    /// Of a matrix by rows of four numbers; the last of its four rows may be missing.
+    fn of_rows(numbers: &[f64], (maps, convention): (Maps, Convention)) -> Self {
+        let mut matrix = [[0.0, 0.0, 0.0, 1.0]; 4];
+        for (row, numbers) in matrix.iter_mut().zip(numbers.chunks_exact(4)) {
+            row.copy_from_slice(numbers);
+        }
+        Self::new(PoseSpec::Matrix { matrix, maps, convention })
+    }
 }
 
 impl SceneFile {
@@ -84,20 +118,36 @@ impl SceneFile {
     /// broken; the message names the frame.
     pub fn frames(
         &self,
-        reach: Reach,
+        opener: &Opener,
         start: impl FnOnce() -> Result<Start, SceneError>,
-    ) -> Result<Option<Vec<Frame>>, SceneError> {
+    ) -> Result<Option<Frames>, SceneError> {
         let Some(spec) = &self.spec.frames else { return Ok(None) };
+        if self.spec.render.frame != 0 {
+            let why = "each of `frames` has its own number; leave one of the two out";
+            return Err(self.fault("render.frame", why));
+        }
+        let mut notes = Vec::new();
         let frames = match spec {
-            FramesSpec::List(list) => {
-                let frame = |(number, settings): (usize, &BTreeMap<String, Value>)| Frame {
-                    number,
-                    time: None,
-                    settings: settings.iter().map(|(k, v)| (k.clone(), v.clone())).collect(),
+            FramesSpec::List(list) => listed(list),
+            FramesSpec::Path(CameraPath::Rig { cameras, path }) => {
+                let start = start()?;
+                let pose = start.pose;
+                let moments = match &**path {
+                    FramesSpec::List(list) => listed(list),
+                    FramesSpec::Path(CameraPath::Rig { .. }) => {
+                        return Err(self.fault(
+                            "frames.path.type",
+                            "a rig on a rig is one rig; list its cameras",
+                        ));
+                    }
+                    FramesSpec::Path(path) => {
+                        self.along("frames.path", path, (opener, &mut notes), || Ok(start))?
+                    }
                 };
-                list.iter().enumerate().map(frame).collect()
+                rig::frames(self, cameras, &moments, &pose)
+                    .map_err(|(place, why)| self.fault(&place, why))?
             }
-            FramesSpec::Path(path) => self.along(path, reach, start)?,
+            FramesSpec::Path(path) => self.along("frames", path, (opener, &mut notes), start)?,
         };
         if frames.len() > MOST_FRAMES {
             return Err(self.fault("frames", too_many(frames.len())));
@@ -107,9 +157,9 @@ impl SceneFile {
                 self.fault("frames", "there is no frame; leave `frames` out for one picture")
             );
         }
-        if let FramesSpec::List(_) = spec {
+        if let FramesSpec::List(_) | FramesSpec::Path(CameraPath::Rig { .. }) = spec {
             // Known now, and not when it is that frame's turn; but for lenses, which take some milliseconds each.
-            let folder = Folder::open(self.folder(), reach)?;
+            let folder = self.open_folder(opener)?;
             for frame in &frames {
                 let file = self.at(frame)?;
                 if let Some(CameraSpec::Pinhole(_) | CameraSpec::Orthographic(_)) = file.spec.camera
@@ -118,17 +168,21 @@ impl SceneFile {
                 }
             }
         }
-        Ok(Some(frames))
+        Ok(Some(Frames { frames, notes }))
     }
 
-    /// The scene with a frame's settings, and without `frames`: as if each stood in a file of its own.
+    /// The scene with a frame's settings and its number, and without `frames`: as if each stood in a file of
+    /// its own. The number is that among all frames, so that its random numbers do not depend on which of
+    /// them are rendered; a frame may set another.
     ///
     /// # Errors
     ///
     /// When the format does not know what they say; the message names the frame.
     pub fn at(&self, frame: &Frame) -> Result<Self, SceneError> {
+        let number = Some(("render.frame".to_owned(), frame.number.to_string()));
+        let own = frame.settings.iter().map(|(path, value)| (path.clone(), value.to_string()));
         let settings: Vec<(String, String)> =
-            frame.settings.iter().map(|(path, value)| (path.clone(), value.to_string())).collect();
+            number.filter(|_| frame.number > 0).into_iter().chain(own).collect();
         let in_frame = |error: SceneError| {
             let why = match error {
                 // Its place is the frame, which is told here.
@@ -142,11 +196,12 @@ impl SceneFile {
 
     fn along(
         &self,
+        place: &str,
         path: &CameraPath,
-        reach: Reach,
+        (opener, notes): (&Opener, &mut Vec<Note>),
         start: impl FnOnce() -> Result<Start, SceneError>,
     ) -> Result<Vec<Frame>, SceneError> {
-        let fault = |(key, why): (&str, String)| self.fault(&join("frames", key), why);
+        let fault = |(key, why): (&str, String)| self.fault(&join(place, key), why);
         let stations = match path {
             CameraPath::Animation { .. } => return animation::frames(self, path).map_err(fault),
             CameraPath::Cameras {} => {
@@ -167,19 +222,30 @@ impl SceneFile {
                 poses.iter().enumerate().map(station).collect()
             }
             CameraPath::Trajectory { file, format, maps, convention } => {
-                let folder = Folder::open(self.folder(), reach)?;
-                let found = folder.find(file).map_err(|why| fault(("file", why)))?;
+                let folder = self.open_folder(opener)?;
+                let found = folder.find(file).map_err(|error| fault(("file", not_found(error))))?;
                 let maps = maps.unwrap_or(Maps::WorldFromCamera);
                 let convention = convention.unwrap_or(Convention::Opencv);
-                read(&found.path, *format, (maps, convention))
-                    .map_err(|why| fault(("file", format!("\"{file}\" {why}"))))?
+                let trajectory = Trajectory {
+                    folder: &folder,
+                    file,
+                    format: *format,
+                    axes: (maps, convention),
+                    picture: self.picture(),
+                };
+                let (stations, found) = trajectory
+                    .read(&found.path)
+                    .map_err(|why| fault(("file", format!("\"{file}\" {why}"))))?;
+                notes.extend(found);
+                stations
             }
-            CameraPath::Orbit { .. } | CameraPath::Dolly { .. } | CameraPath::Grid { .. } => {
-                path::made(path, &start()?).map_err(fault)?
-            }
+            CameraPath::Orbit { .. }
+            | CameraPath::Dolly { .. }
+            | CameraPath::Grid { .. }
+            | CameraPath::Rig { .. } => path::made(path, &start()?).map_err(fault)?,
         };
         if stations.len() > MOST_FRAMES {
-            return Err(self.fault("frames", too_many(stations.len())));
+            return Err(self.fault(place, too_many(stations.len())));
         }
         let mut frames = Vec::with_capacity(stations.len());
         for (number, station) in stations.into_iter().enumerate() {
@@ -195,81 +261,35 @@ impl SceneFile {
             // A pose is made of numbers and words only, which always serialise.
             let pose = serde_json::to_value(&station.pose).unwrap_or_default();
             settings.push(("camera.pose".to_owned(), pose));
-            frames.push(Frame { number, time: station.time, settings });
+            frames.push(Frame { number, time: station.time, settings, rig: None });
         }
         Ok(frames)
     }
 }
 
+impl SceneFile {
+    /// The pixels of the scene's own camera.
+    fn picture(&self) -> ScenePicture {
+        let camera = self.spec.camera.as_ref();
+        let sensor = camera.map(|camera| camera.sensor().clone()).unwrap_or_default();
+        let is_given = ["resolution", "model"]
+            .iter()
+            .any(|key| self.value().pointer(&format!("/camera/sensor/{key}")).is_some());
+        ScenePicture { resolution: sensor.resolution, is_given }
+    }
+}
+
+/// A frame for each entry of a list.
+fn listed(list: &[BTreeMap<String, Value>]) -> Vec<Frame> {
+    let frame = |(number, settings): (usize, &BTreeMap<String, Value>)| Frame {
+        number,
+        time: None,
+        settings: settings.iter().map(|(k, v)| (k.clone(), v.clone())).collect(),
+        rig: None,
+    };
+    list.iter().enumerate().map(frame).collect()
+}
+
 fn too_many(count: usize) -> String {
     format!("{count} frames; {MOST_FRAMES} are the most")
-}
-
-/// Reads a trajectory; the error goes on after the file's name.
-fn read(
-    path: &Path,
-    format: Option<TrajectoryFormat>,
-    (maps, convention): (Maps, Convention),
-) -> Result<Vec<Station>, String> {
-    let format = match format {
-        Some(format) => format,
-        None => told_by_name(path)?,
-    };
-    let bytes = |path: &PathBuf| {
-        files::read(path, LONGEST).map_err(|error| format!("cannot be read: {error}"))
-    };
-    let path = path.to_owned();
-    let text = |path: &PathBuf| {
-        String::from_utf8(bytes(path)?).map_err(|_| "is not UTF-8 text".to_owned())
-    };
-    // Each format's own reader.
-    match format {
-        TrajectoryFormat::Npy => {
-            let array = npy::read(&bytes(&path)?, |shape| match shape {
-                [_, 3 | 4, 4] => Ok(()),
-                other => Err(format!("has the shape {other:?} instead of n × 4 × 4 or n × 3 × 4")),
-            })?;
-            let rows = array.shape[1];
-            let station = |numbers: &[f64]| {
-                let mut matrix = [[0.0, 0.0, 0.0, 1.0]; 4];
-                for (row, numbers) in matrix.iter_mut().zip(numbers.chunks_exact(4)) {
-                    row.copy_from_slice(numbers);
-                }
-                Station::new(PoseSpec::Matrix { matrix, maps, convention })
-            };
-            Ok(array.numbers.chunks_exact(4 * rows).map(station).collect())
-        }
-        TrajectoryFormat::Tum => tum::read(&text(&path)?, (maps, convention)),
-        TrajectoryFormat::Colmap => {
-            let cameras = path.with_file_name("cameras.txt");
-            let cameras = if cameras.exists() { Some(text(&cameras)?) } else { None };
-            colmap::read(&text(&path)?, cameras.as_deref())
-        }
-        TrajectoryFormat::Nerfstudio => nerfstudio::read(&text(&path)?),
-    }
-}
-
-fn told_by_name(path: &Path) -> Result<TrajectoryFormat, String> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    match name.rsplit_once('.').map_or("", |(_, ending)| ending) {
-        "npy" => Ok(TrajectoryFormat::Npy),
-        "json" => Ok(TrajectoryFormat::Nerfstudio),
-        _ if name == "images.txt" => Ok(TrajectoryFormat::Colmap),
-        "txt" | "tum" => Ok(TrajectoryFormat::Tum),
-        _ => Err(
-            "does not tell its format by its name; set `format` to npy, tum, colmap or nerfstudio"
-                .to_owned(),
-        ),
-    }
-}
-
-/// Numbers of a line of text, all finite.
-fn numbers<const N: usize>(words: &[&str], line: usize) -> Result<[f64; N], String> {
-    let mut numbers = [0.0; N];
-    for (number, word) in numbers.iter_mut().zip(words) {
-        *number = word.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| {
-            format!("has \"{word}\" in line {line}, where a finite number is due")
-        })?;
-    }
-    Ok(numbers)
 }

@@ -67,7 +67,8 @@ pub(super) fn made(
         CameraPath::Poses { .. }
         | CameraPath::Trajectory { .. }
         | CameraPath::Animation { .. }
-        | CameraPath::Cameras {} => Vec::new(),
+        | CameraPath::Cameras {}
+        | CameraPath::Rig { .. } => Vec::new(),
     };
     Ok(poses.into_iter().map(|pose| Station::new(spec_of(&pose))).collect())
 }
@@ -81,7 +82,7 @@ fn some(key: &'static str, count: u32) -> Result<u32, (&'static str, String)> {
 }
 
 /// A pose in the words of a scene file.
-fn spec_of(pose: &Pose) -> PoseSpec {
+pub(super) fn spec_of(pose: &Pose) -> PoseSpec {
     let matrix = pose.world_from_camera(Convention::Opengl).transpose().to_cols_array_2d();
     PoseSpec::Matrix { matrix, maps: Maps::WorldFromCamera, convention: Convention::Opengl }
 }

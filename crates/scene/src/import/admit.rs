@@ -212,6 +212,9 @@ fn survey_chunk(chunk: &[[u32; 3]], position: &impl Fn(u32) -> DVec3) -> Survey 
     // In a loop of its own, which is quicker; the chunk's vertices are at hand still.
     let degenerate = chunk.iter().filter(|t| is_degenerate(t.map(position))).count() as u64;
     if taint == DVec3::ZERO {
+        if degenerate > 0 {
+            bounds = around(chunk.iter().map(|t| t.map(position)));
+        }
         return Survey { bounds, broken: 0, degenerate };
     }
     let broken =
@@ -224,14 +227,19 @@ fn finite_triangles(positions: &Positions, triangles: &[[u32; 3]]) -> Vec<[u32; 
     triangles.par_iter().copied().filter(is_finite).collect()
 }
 
-/// The box of all positions that `triangles`, whose indices exist, use.
+/// The box of those triangles that have an area.
+fn around(triangles: impl Iterator<Item = [DVec3; 3]>) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    for corner in triangles.filter(|&corners| !is_degenerate(corners)).flatten() {
+        bounds.include(corner);
+    }
+    bounds
+}
+
+/// The box of those of `triangles`, whose indices exist, that have an area.
 pub(crate) fn bounds_of(positions: &Positions, triangles: &[[u32; 3]]) -> Bounds {
     let of_chunk = |chunk: &[[u32; 3]]| {
-        let mut bounds = Bounds::EMPTY;
-        for &corner in chunk.as_flattened() {
-            bounds.include(positions.get(corner as usize));
-        }
-        bounds
+        around(chunk.iter().map(|t| t.map(|corner| positions.get(corner as usize))))
     };
     triangles.par_chunks(CHUNK).map(of_chunk).reduce(|| Bounds::EMPTY, Bounds::union)
 }

@@ -6,11 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use etendue_geometry::MappedFile;
+use etendue_files::MappedFile;
 
 use super::{ImportError, Options};
 use crate::memory::{Budget, Size};
-use crate::paths;
 
 /// Bytes that a model may make appear, however small its files are.
 const MADE_OF_NOTHING: u64 = 512 << 20;
@@ -85,6 +84,13 @@ impl Files {
         })
     }
 
+    /// The most that [`take`](Self::take) would still grant (bytes), as of now.
+    pub(super) fn left(&self) -> u64 {
+        let held: u64 = self.opened().iter().map(|(_, size)| size).sum();
+        let most = MADE_OF_NOTHING.saturating_add(held.saturating_mul(MADE_PER_BYTE));
+        most.saturating_sub(self.made.load(Ordering::Relaxed)).min(self.budget.left())
+    }
+
     /// Refuses what the system has no room for while `place` of `file` is read.
     ///
     /// # Errors
@@ -128,7 +134,7 @@ impl Files {
         }
         // All are judged before anything is said of one: a model must not learn which files exist.
         if let Some(root) = &self.root
-            && !spellings.iter().all(|path| paths::is_inside(root, path))
+            && !spellings.iter().all(|path| etendue_files::is_inside(root, path))
         {
             return Err(ImportError::Outside {
                 file: self.model.clone(),

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use etendue_camera::{Camera, CameraError, CameraSpec};
+use etendue_files::InputFolder;
 use etendue_geometry::Geometry;
 use etendue_sensor::Sensor;
 use etendue_spectrum::Bands;
@@ -12,9 +13,9 @@ use etendue_spectrum::Bands;
 use crate::bounds::WorldVertices;
 use crate::cache::{self, KeptCamera};
 use crate::cameras::{self, CameraOrigin, SceneCamera};
+use crate::error::not_found;
 use crate::file::SceneFile;
 use crate::import::{Note, NoteKind, Strictness};
-use crate::paths::Folder;
 use crate::scene::LoadOptions;
 use crate::{Cache, SceneError, facing};
 
@@ -31,7 +32,7 @@ impl SceneFile {
     /// The picture's columns and rows, known without the models.
     pub(super) fn resolution(
         &self,
-        folder: &Folder,
+        folder: &InputFolder,
         options: &LoadOptions<'_>,
         kept: &Cache,
     ) -> Result<[u32; 2], SceneError> {
@@ -52,7 +53,7 @@ impl SceneFile {
         &self,
         geometry: Geometry,
         cameras: &[SceneCamera],
-        (folder, options): (&Folder, &LoadOptions<'_>),
+        (folder, options): (&InputFolder, &LoadOptions<'_>),
         kept: &Cache,
     ) -> Result<KeptCamera, SceneError> {
         let words = self.camera_words(options);
@@ -155,18 +156,18 @@ impl SceneFile {
 
 /// The files that a camera names: lenses and masks.
 pub(super) struct CameraFiles<'a> {
-    folder: &'a Folder,
+    folder: &'a InputFolder,
     /// Those that were asked for and are there.
     found: RefCell<Vec<PathBuf>>,
 }
 
 impl<'a> CameraFiles<'a> {
-    pub(super) fn new(folder: &'a Folder) -> Self {
+    pub(super) fn new(folder: &'a InputFolder) -> Self {
         Self { folder, found: RefCell::default() }
     }
 
     pub(super) fn find(&self, written: &str) -> Result<PathBuf, String> {
-        let path = self.folder.find(written)?.path;
+        let path = self.folder.find(written).map_err(not_found)?.path;
         let mut found = self.found.borrow_mut();
         if !found.contains(&path) {
             found.push(path.clone());

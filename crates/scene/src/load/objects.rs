@@ -4,16 +4,19 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use etendue_files::{FoundFile, InputFolder};
 use etendue_geometry::Bounds;
 use etendue_tracer::Material;
 
+use crate::doctor::memory;
+use crate::error::not_found;
 use crate::file::{
     AnimationSpec, FileKind, ObjectSpec, SceneFile, Source, Up, join, join_index, suggest,
 };
 use crate::import::{Import, Note, NoteKind, Play};
 use crate::instances::Instances;
+use crate::memory::Budget;
 use crate::parts::{Object, Parts};
-use crate::paths::{Folder, FoundFile};
 use crate::shape::ShapeSpec;
 use crate::{Cache, SceneError, cache};
 
@@ -58,7 +61,7 @@ impl OriginKind {
 impl SceneFile {
     pub(super) fn resolve_objects(
         &self,
-        folder: &Folder,
+        folder: &InputFolder,
         own: &mut OwnParts<'_>,
     ) -> Result<(Vec<Origin>, Vec<Object>), SceneError> {
         let mut origins: Vec<Origin> = Vec::new();
@@ -123,7 +126,7 @@ impl SceneFile {
         spec: &ObjectSpec,
         at: &str,
         origin: usize,
-        folder: &Folder,
+        folder: &InputFolder,
         own: &mut OwnParts<'_>,
     ) -> Result<Object, SceneError> {
         let world_from_object = spec.transform.build().map_err(|(key, why)| {
@@ -146,7 +149,13 @@ impl SceneFile {
             overrides.insert(theirs.clone(), named(ours, &at)?);
         }
         // Each copy is turned upright, placed among the copies, and then in the world.
-        let instances = Instances::resolve(spec.instances.as_ref(), &join(at, "instances"), folder)
+        let budget = own.budget;
+        let fits = |count: u64| {
+            let taken = budget.map_or(Ok(()), |budget| budget.take(memory::copies(count)));
+            taken.map_err(|error| format!("{count} copies: {error}"))
+        };
+        let at = join(at, "instances");
+        let instances = Instances::resolve(spec.instances.as_ref(), &at, folder, &fits)
             .map_err(|(at, why)| self.fault(&at, why))?;
         own.files.extend(instances.file);
         let turn = self.up_of(spec).turn();
@@ -167,22 +176,20 @@ impl SceneFile {
         spec.up.unwrap_or(if silent { self.spec.up } else { Up::Y })
     }
 
-    /// That a model seems to lie on its back: a file that does not say which way is up, and whose box
-    /// stands on z = 0 with as much on one side of y = 0 as on the other.
+    /// That a model seems to lie on its back or its side: a file that does not say which way is up, and whose
+    /// box stands on z = 0, or a little above it, with as much on one side of y = 0 as on the other.
     pub(super) fn note_up(&self, spec: &ObjectSpec, import: &Import) -> Option<Note> {
         let Source::File(path) = &spec.source else { return None };
         let said = spec.up.is_some() || self.value().get("up").is_some();
-        if said || !names_no_up(path) || !stands_on_z(import) {
+        if said || !names_no_up(path) {
             return None;
         }
-        let message = "its box stands on z = 0: if it lies on its back, +Z is up in this file; give \
-                       `--up z`, or its object `\"up\": \"z\"` (`\"y\"` for silence)";
-        Some(Note {
-            kind: NoteKind::Assumed,
-            subject: path.clone(),
-            message: message.to_owned(),
-            count: 1,
-        })
+        let how = where_z_is_up(import)?;
+        let message = format!(
+            "{how}: if it lies on its back or its side, +Z is up in this file; give `--up z`, or its object \
+             `\"up\": \"z\"` (`\"y\"` for silence)"
+        );
+        Some(Note { kind: NoteKind::Assumed, subject: path.clone(), message, count: 1 })
     }
 
     /// Materials that an object replaces and its model does not have are refused.
@@ -207,7 +214,7 @@ impl SceneFile {
     /// The file of an object. A model that stands for the scene is where the user said it is.
     pub(super) fn find(
         &self,
-        folder: &Folder,
+        folder: &InputFolder,
         index: usize,
         written: &str,
     ) -> Result<FoundFile, SceneError> {
@@ -219,7 +226,7 @@ impl SceneFile {
             return Ok(FoundFile { path, real });
         }
         let at = join(&join_index("objects", index), "file");
-        folder.find(written).map_err(|why| self.fault(&at, why))
+        folder.find(written).map_err(|error| self.fault(&at, not_found(error)))
     }
 }
 
@@ -229,21 +236,27 @@ fn names_no_up(path: &str) -> bool {
     ["obj", "ply"].iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
-/// Whether the box of a model stands on the plane z = 0, and not on y = 0.
-fn stands_on_z(import: &Import) -> bool {
+/// How the box of a model stands when +Z seems to be up in it; `None` when nothing tells.
+fn where_z_is_up(import: &Import) -> Option<&'static str> {
     /// Shares of the box's own sides.
     const ON_THE_GROUND: f64 = 0.01;
     const OFF_CENTRE: f64 = 0.2;
+    const MIRRORED: f64 = 0.02;
     let boxes = import.meshes.iter().map(|mesh| mesh.bounds);
     let bounds = boxes.fold(Bounds::EMPTY, Bounds::union);
-    if bounds.is_empty() {
-        return false;
-    }
-    let size = bounds.max - bounds.min;
+    let (size, centre) = (bounds.max - bounds.min, bounds.centre());
     // A sheet says nothing.
-    size.min_element() > 0.05 * size.max_element()
-        && bounds.min.z.abs() <= ON_THE_GROUND * size.z
-        && bounds.centre().y.abs() <= OFF_CENTRE * size.y
+    if bounds.is_empty() || size.min_element() <= 0.05 * size.max_element() {
+        return None;
+    }
+    if bounds.min.z.abs() <= ON_THE_GROUND * size.z && centre.y.abs() <= OFF_CENTRE * size.y {
+        return Some("its box stands on z = 0");
+    }
+    // What is built about the plane y = 0, as a car's body is, and is a little way above z = 0; if y were up,
+    // half of it would be in the ground.
+    let is_above = bounds.min.z > 0.0 && bounds.min.z < size.z;
+    let is_mirrored = centre.y.abs() <= MIRRORED * size.y && centre.x.abs() <= OFF_CENTRE * size.x;
+    (is_above && is_mirrored).then_some("its box is half below y = 0 and all above z = 0")
 }
 
 /// What the scene file itself brings, while its objects are resolved.
@@ -252,6 +265,8 @@ pub(super) struct OwnParts<'a> {
     /// Files that objects name beside their models.
     pub(super) files: Vec<PathBuf>,
     pub(super) kept: &'a Cache,
+    /// What copies are spoken for in, where the scene is to be rendered.
+    pub(super) budget: Option<&'a Budget>,
 }
 
 /// That the scene has no material of this name, and which it has.

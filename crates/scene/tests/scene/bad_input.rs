@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use etendue_scene::{LoadOptions, Reach, SceneError, SceneFile, Wanted};
+use etendue_files::{Opener, Reach};
+use etendue_scene::{LoadOptions, SceneError, SceneFile, Wanted};
 use tempfile::TempDir;
 
 /// A folder with `scene.json` in it.
@@ -310,6 +311,15 @@ fn impossible_objects_are_refused_by_path() {
         r#"{"etendue": 1, "materials": {"m": {"type": "matte", "color": [1.5, 0, 0]}}}"#,
         &["materials.m.color", "outside 0 to 1"],
     );
+    // Bytes of sRGB: ((v / 255 + 0.055) / 1.055)^2.4.
+    assert_says(
+        r#"{"etendue": 1, "materials": {"m": {"type": "matte", "color": [200, 100, 50]}}}"#,
+        &["materials.m.color", "of 255 are [0.578, 0.127, 0.032]"],
+    );
+    for tracer in [r#"{"type": "depth"}"#, r#""depth""#] {
+        let text = format!(r#"{{"etendue": 1, "tracer": {tracer}}}"#);
+        assert_says(&text, &["tracer", "`depth` is a layer", r#""layers": ["depth"]"#]);
+    }
     assert_says(
         r#"{"etendue": 1, "materials": {"m": {"type": "checker", "squares": 0}}}"#,
         &["materials.m.squares"],
@@ -347,7 +357,8 @@ fn a_path_may_not_leave_the_folder() {
         let error = load(&path, &[]).unwrap_err().to_string();
         assert!(error.contains("objects[0].file") && error.contains("--allow-outside"), "{error}");
         if file != "a/../../secret.obj" {
-            let options = LoadOptions { reach: Reach::Anywhere, ..LoadOptions::default() };
+            let options =
+                LoadOptions { opener: Opener::new(Reach::Anywhere), ..LoadOptions::default() };
             let scene = SceneFile::read(&path, &[]).unwrap().load(Wanted::NOTHING, &options);
             assert_eq!(scene.unwrap().geometry.triangles(), 1, "{file}: allowed when asked for");
         }

@@ -32,7 +32,8 @@ fn counts_are_of_what_is_placed() {
     assert_eq!(found.objects[0].name, "a");
     assert_eq!(found.objects[1].triangles, 12);
     assert_eq!(found.memory.film, 4 * 64 * 48 * 4, "z and three of the normal");
-    assert_eq!(found.memory.structure, 92 * 12 + 132 * 2, "one mesh, two instances");
+    assert_eq!(found.memory.structure, 92 * 12, "one mesh");
+    assert_eq!(found.memory.copies, 750 * 2, "placed twice");
     assert_eq!(found.findings.len(), 1, "the material that nothing uses: {:?}", found.findings);
     let json = serde_json::to_value(&found).unwrap();
     assert_eq!(json["triangles"], 24);
@@ -67,6 +68,30 @@ fn bad_triangles_are_counted() {
     assert_eq!(defects.not_finite, 1, "{defects:?}");
     assert_eq!(defects.degenerate, 2, "{defects:?}");
     assert_eq!(defects.duplicate, 1, "{defects:?}");
+}
+
+/// What lies in one plane and faces one side is named, the earlier first; a box that stands on the floor is not.
+#[test]
+fn what_lies_in_one_plane_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.json");
+    let text = r#"{"etendue": 1, "objects": [
+        {"shape": "rectangle", "name": "floor", "width": 4, "height": 4, "transform": {"rotate": [1, 0, 0, -90]}},
+        {"shape": "rectangle", "name": "lamp", "width": 1, "height": 1, "transform": {"rotate": [1, 0, 0, -90]}},
+        {"shape": "box", "name": "crate", "size": [0.5, 0.5, 0.5], "transform": {"translate": [1.5, 0.25, 0]}},
+        {"shape": "sphere", "name": "twin", "radius": 0.1, "triangles": 80, "transform": {"translate": [0, 1, 0]}},
+        {"shape": "sphere", "name": "twin 2", "radius": 0.1, "triangles": 80, "transform": {"translate": [0, 1, 0]}}]}"#;
+    fs::write(&path, text).unwrap();
+    let found = check(&path);
+    assert_eq!(found.defects.coplanar, 2, "{found}");
+    let table = found.to_string();
+    for part in [
+        "2 pairs of things in one plane",
+        "object 1 \"floor\" and object 2 \"lamp\": lie over one another in one plane; the later one is seen",
+        "object 4 \"twin\" and object 5 \"twin 2\"",
+    ] {
+        assert!(table.contains(part), "{part} in:\n{table}");
+    }
 }
 
 #[test]

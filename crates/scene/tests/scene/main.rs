@@ -5,7 +5,9 @@ mod bad_input;
 mod doctor;
 mod documents;
 mod models;
+mod rigs;
 mod scenes;
+mod trajectories;
 
 use std::path::{Path, PathBuf};
 

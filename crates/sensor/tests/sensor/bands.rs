@@ -148,6 +148,7 @@ fn check((keys, lights, filter, colored, channels, range): Trial<'_>) {
         spectra: lights.iter().copied().cloned().collect(),
         filters: if *filter == Curve::ONE { vec![] } else { vec![filter.clone()] },
         colored,
+        ..Illumination::default()
     };
     let chosen = own.bands_under(&illumination).unwrap();
     let error = chosen.error.unwrap();
@@ -193,7 +194,8 @@ fn one_light_on_grey_takes_one_band_whatever_the_sensor() {
 #[test]
 fn bands_that_somebody_asked_for_stay_and_their_error_is_told() {
     let bands = json!({ "from": 400, "to": 700, "count": 6 });
-    let light = Illumination { spectra: vec![curve(Illuminant::A)], filters: vec![], colored: 2 };
+    let spectra = vec![curve(Illuminant::A)];
+    let light = Illumination { spectra, colored: 2, ..Illumination::default() };
     let coarse = sensor(&json!({ "bands": bands })).bands_under(&light).unwrap();
     assert_eq!(coarse.bands.count(), 6);
     assert!(coarse.error.unwrap() > TOLERANCE, "{coarse:?}");

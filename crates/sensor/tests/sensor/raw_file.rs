@@ -23,7 +23,7 @@ fn taken(spec: Value) -> (Sensor, RawImage) {
 
 fn written(sensor: &Sensor, image: &RawImage) -> Result<Vec<u8>, DngError> {
     let mut bytes = Cursor::new(Vec::new());
-    sensor.write_dng(image, "imx183", &mut bytes)?;
+    sensor.write_dng(image, ("imx183", &sensor.white_response()), &mut bytes)?;
     Ok(bytes.into_inner())
 }
 

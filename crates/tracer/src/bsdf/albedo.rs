@@ -8,16 +8,14 @@
 //! and both together never return more than falls in (Shirley et al., "A Practitioners' Assessment of
 //! Light Reflection Models", 1997; Kelemen and Szirmay-Kalos 2001).
 //!
-//! Of facets that are rougher along the surface than across it A and B are taken for the larger ones of both
-//! roughnesses, and the albedo for no less than a smooth sheet's, so that what lies beneath gets no more than
-//! there is.
+//! Facets that are rougher along the surface than across it have a table of their own (`brushed`).
 
 use std::sync::LazyLock;
 
 use etendue_geometry::glam::DVec3;
 
-use super::fresnel;
 use super::ggx::{self, Facets};
+use super::{brushed, fresnel};
 
 /// Knots in α, dense where sheets are smooth.
 const ROUGHNESSES: usize = 48;
@@ -36,8 +34,8 @@ const FACETS: u32 = 1024;
 struct AlbedoTable {
     /// (A, B) by roughness, then [`obliquity`].
     entries: Vec<[f64; 2]>,
-    /// Their means over directions, by roughness.
-    means: Vec<[f64; 2]>,
+    /// Their means over directions, and that of what facets of reflectance 1 lack, by roughness.
+    means: Vec<[f64; 3]>,
 }
 
 static TABLE: LazyLock<AlbedoTable> = LazyLock::new(AlbedoTable::new);
@@ -49,7 +47,11 @@ impl AlbedoTable {
         for i in 0..ROUGHNESSES {
             let alpha = knot::<ROUGHNESSES>(i).powi(4).max(SMOOTHEST);
             let row: Vec<[f64; 2]> = (0..OBLIQUITIES)
-                .map(|k| entry(cosine(knot::<OBLIQUITIES>(k), alpha), alpha))
+                .map(|k| {
+                    let mu = cosine(knot::<OBLIQUITIES>(k), alpha);
+                    let wo = DVec3::new((1.0 - mu * mu).sqrt(), 0.0, mu.max(1e-12));
+                    entry(wo, alpha, FACETS)
+                })
                 .collect();
             means.push(mean(&row, alpha));
             entries.extend(row);
@@ -60,13 +62,13 @@ impl AlbedoTable {
 
 /// Where the table has the cosine `mu`, from 0 to 1. A sheet's albedo changes with μ/α at the horizon,
 /// by the masking of its facets, and with μ elsewhere, by Fresnel: half of the knots are for each.
-fn obliquity(mu: f64, alpha: f64) -> f64 {
+pub(super) fn obliquity(mu: f64, alpha: f64) -> f64 {
     let masking = mu / (mu + alpha).max(f64::MIN_POSITIVE) * (1.0 + alpha);
     0.5 * (mu.sqrt() + masking)
 }
 
 /// The cosine at `place` of [`obliquity`], by bisection.
-fn cosine(place: f64, alpha: f64) -> f64 {
+pub(super) fn cosine(place: f64, alpha: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..80 {
         let middle = 0.5 * (low + high);
@@ -76,17 +78,26 @@ fn cosine(place: f64, alpha: f64) -> f64 {
 }
 
 /// ∫ 2 μ E dμ = ∫ 4 x³ E dx, x = √μ, of the interpolation, by the midpoint rule.
-fn mean(row: &[[f64; 2]], alpha: f64) -> [f64; 2] {
+fn mean(row: &[[f64; 2]], alpha: f64) -> [f64; 3] {
     const STEPS: u32 = 512;
-    let mut sum = [0.0; 2];
+    let mut sum = [0.0; 3];
     for step in 0..STEPS {
         let x = (f64::from(step) + 0.5) / f64::from(STEPS);
-        let (k, share) = place::<OBLIQUITIES>(obliquity(x * x, alpha));
-        for (c, sum) in sum.iter_mut().enumerate() {
-            *sum += 4.0 * x.powi(3) * (row[k][c] * (1.0 - share) + row[k + 1][c] * share);
+        let (k, share) = place(obliquity(x * x, alpha), OBLIQUITIES);
+        let [a, b] = [0, 1].map(|c| row[k][c] * (1.0 - share) + row[k + 1][c] * share);
+        for (sum, value) in sum.iter_mut().zip([a, b, lacking(a + b)]) {
+            *sum += 4.0 * x.powi(3) * value;
         }
     }
     sum.map(|sum| sum / f64::from(STEPS))
+}
+
+/// How exact the table is: less is not taken for lacking.
+pub(super) const EXACT: f64 = 1e-3;
+
+/// What facets of reflectance 1 lack that return so much.
+pub(super) fn lacking(returned: f64) -> f64 {
+    (1.0 - EXACT - returned).max(0.0)
 }
 
 /// The place in 0..=1 of knot `k` of `COUNT`.
@@ -97,13 +108,13 @@ fn knot<const COUNT: usize>(k: usize) -> f64 {
 /// The fractional part of the golden ratio.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// A and B by the visible facets: each returns G₂/G₁ times its reflectance.
-fn entry(mu: f64, alpha: f64) -> [f64; 2] {
-    let wo = DVec3::new((1.0 - mu * mu).sqrt(), 0.0, mu.max(1e-12));
+/// A and B for light from `wo`, by so many visible facets: each returns G₂/G₁ times its reflectance.
+pub(super) fn entry(wo: DVec3, alpha: impl Into<Facets>, facets: u32) -> [f64; 2] {
+    let alpha = alpha.into();
     let mut sum = [0.0; 2];
-    for k in 0..FACETS {
-        let u = (f64::from(k) + 0.5) * (GOLDEN);
-        let v = (f64::from(k) + 0.5) / f64::from(FACETS);
+    for k in 0..facets {
+        let u = (f64::from(k) + 0.5) * GOLDEN;
+        let v = (f64::from(k) + 0.5) / f64::from(facets);
         let h = ggx::sample_visible(wo, [u.fract(), v], alpha);
         let wi = 2.0 * wo.dot(h) * h - wo;
         if wi.z <= 0.0 {
@@ -114,47 +125,53 @@ fn entry(mu: f64, alpha: f64) -> [f64; 2] {
         sum[0] += returned * (1.0 - w);
         sum[1] += returned * w;
     }
-    sum.map(|s| s / f64::from(FACETS))
+    sum.map(|s| s / f64::from(facets))
 }
 
 /// The albedo of one roughness, or of two at right angles.
 #[derive(Debug, Clone, Copy)]
 pub struct Albedo {
     rows: AlbedoRows,
-    /// Of the other roughness.
-    across: Option<AlbedoRows>,
     f0: f64,
     f90: f64,
 }
 
-/// Rows of the table, interpolated once.
+/// Rows of a table, interpolated once.
 #[derive(Debug, Clone, Copy)]
-struct AlbedoRows {
-    alpha: f64,
-    row: usize,
-    share: f64,
+enum AlbedoRows {
+    /// Of one roughness.
+    Even { alpha: f64, row: usize, share: f64 },
+    /// Of two.
+    Brushed(brushed::Rows),
 }
 
 impl AlbedoRows {
     fn new(alpha: f64) -> Self {
-        let (row, share) = place::<ROUGHNESSES>(alpha.max(0.0).sqrt().sqrt());
-        Self { alpha, row, share }
+        let (row, share) = place(alpha.max(0.0).sqrt().sqrt(), ROUGHNESSES);
+        Self::Even { alpha, row, share }
     }
 
-    fn terms(&self, mu: f64) -> [f64; 2] {
-        let (k, part) = place::<OBLIQUITIES>(obliquity(mu.max(0.0), self.alpha));
+    fn terms(&self, w: DVec3) -> [f64; 2] {
+        let (alpha, row, share) = match self {
+            Self::Even { alpha, row, share } => (*alpha, *row, *share),
+            Self::Brushed(rows) => return rows.terms(w),
+        };
+        let (k, part) = place(obliquity(w.z.max(0.0), alpha), OBLIQUITIES);
         let at = |row: usize, term: usize| {
             let entry = row * OBLIQUITIES + k;
             TABLE.entries[entry][term] * (1.0 - part) + TABLE.entries[entry + 1][term] * part
         };
-        [0, 1].map(|term| {
-            at(self.row, term) * (1.0 - self.share) + at(self.row + 1, term) * self.share
-        })
+        [0, 1].map(|term| at(row, term) * (1.0 - share) + at(row + 1, term) * share)
     }
 
-    fn mean_terms(&self) -> [f64; 2] {
-        let [own, next] = [self.row, self.row + 1].map(|row| TABLE.means[row]);
-        [0, 1].map(|term| own[term] * (1.0 - self.share) + next[term] * self.share)
+    fn means(&self) -> [f64; 3] {
+        match self {
+            Self::Even { row, share, .. } => {
+                let [own, next] = [*row, row + 1].map(|row| TABLE.means[row]);
+                [0, 1, 2].map(|term| own[term] * (1.0 - share) + next[term] * share)
+            }
+            Self::Brushed(rows) => rows.means(),
+        }
     }
 }
 
@@ -162,21 +179,25 @@ impl Albedo {
     /// Of a sheet with roughness `alpha` (0..=1) and reflectances `f0` face on and `f90` grazing.
     #[must_use]
     pub fn new(alpha: impl Into<Facets>, f0: f64, f90: f64) -> Self {
-        let Facets { x, y } = alpha.into();
-        let across = (x.to_bits() != y.to_bits()).then(|| AlbedoRows::new(x));
-        Self { rows: AlbedoRows::new(y), across, f0, f90 }
+        let facets = alpha.into();
+        let rows = match facets.x.to_bits() == facets.y.to_bits() {
+            true => AlbedoRows::new(facets.y),
+            false => AlbedoRows::Brushed(brushed::Rows::new(facets)),
+        };
+        Self { rows, f0, f90 }
     }
 
-    /// For the cosine `mu` of the direction.
+    /// For a direction in the frame of the facets.
     #[must_use]
-    pub fn at(&self, mu: f64) -> f64 {
-        self.of(self.terms(mu))
+    pub fn at(&self, w: DVec3) -> f64 {
+        self.of(self.terms(w))
     }
 
     /// The mean over directions.
     #[must_use]
     pub fn mean(&self) -> f64 {
-        self.of(self.mean_terms())
+        let [a, b, _] = self.means();
+        self.of([a, b])
     }
 
     /// From A and B of some direction, or their means.
@@ -184,40 +205,21 @@ impl Albedo {
         self.f0 * a + self.f90 * b
     }
 
-    /// The albedo for the cosine `mu` of the direction, whose A and B are known; of facets rougher one way than the
-    /// other no less than that of a smooth sheet, which they may exceed both roughnesses' by at grazing
-    /// angles.
-    pub(super) fn bound(&self, terms: [f64; 2], mu: f64) -> f64 {
-        let own = self.of(terms);
-        if self.across.is_none() {
-            return own;
-        }
-        let w = fresnel::schlick_weight(mu.abs());
-        own.max(self.f0 * (1.0 - w) + self.f90 * w)
+    /// A and B for a direction. Their sum is what facets of reflectance 1 return.
+    pub(super) fn terms(&self, w: DVec3) -> [f64; 2] {
+        self.rows.terms(w)
     }
 
-    /// A and B for the cosine `mu` of the direction. Their sum is what facets of reflectance 1 return.
-    pub(super) fn terms(&self, mu: f64) -> [f64; 2] {
-        self.larger(|rows| rows.terms(mu))
-    }
-
-    /// Their means over directions.
-    pub(super) fn mean_terms(&self) -> [f64; 2] {
-        self.larger(AlbedoRows::mean_terms)
-    }
-
-    fn larger(&self, terms: impl Fn(&AlbedoRows) -> [f64; 2]) -> [f64; 2] {
-        let own = terms(&self.rows);
-        let Some(across) = &self.across else { return own };
-        let [a, b] = terms(across);
-        [own[0].max(a), own[1].max(b)]
+    /// The means over directions of A and B, and of what facets of reflectance 1 [lack](lacking).
+    pub(super) fn means(&self) -> [f64; 3] {
+        self.rows.means()
     }
 }
 
-/// The knot of `COUNT` below `x` in 0..=1 and the share of the next.
-fn place<const COUNT: usize>(x: f64) -> (usize, f64) {
-    let scaled = x.clamp(0.0, 1.0) * (COUNT - 1) as f64;
+/// The knot of `count` below `x` in 0..=1 and the share of the next.
+pub(super) fn place(x: f64, count: usize) -> (usize, f64) {
+    let scaled = x.clamp(0.0, 1.0) * (count - 1) as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
-    let knot = (scaled as usize).min(COUNT - 2);
+    let knot = (scaled as usize).min(count - 2);
     (knot, scaled - knot as f64)
 }

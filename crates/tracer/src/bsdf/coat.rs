@@ -38,7 +38,7 @@ impl Coat {
     pub(super) fn seen(&self, wo: DVec3) -> Option<Seen> {
         let alpha = self.alpha.max(SMOOTHEST);
         let albedo = Albedo::new(alpha, FACE_ON, 1.0);
-        let returned = (self.share * albedo.at(wo.z)).min(1.0);
+        let returned = (self.share * albedo.at(wo)).min(1.0);
         (self.share > 0.0).then_some(Seen { share: self.share, alpha, albedo, returned })
     }
 }
@@ -46,7 +46,7 @@ impl Coat {
 impl Seen {
     /// What it passes of light from `wi` on to the viewer.
     pub(super) fn passes(&self, wi: DVec3) -> f64 {
-        (1.0 - self.returned) * (1.0 - self.share * self.albedo.at(wi.z.abs())).max(0.0)
+        (1.0 - self.returned) * (1.0 - self.share * self.albedo.at(wi.abs())).max(0.0)
     }
 
     /// Value times cosine and density with the coat, from those `below` it.

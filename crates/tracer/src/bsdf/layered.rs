@@ -34,6 +34,8 @@ pub struct Layered {
     pub f0: f64,
     /// Its reflectance at grazing incidence (`specularFactor`).
     pub f90: f64,
+    /// The dielectric's index, by which a smooth pane reflects.
+    pub ior: f64,
     /// Share of the base that is a hole in a thin wall, 0..=1.
     pub transmission: f64,
     /// A sheen over all of it.
@@ -77,6 +79,8 @@ pub(super) struct LayeredView {
     /// Their means over directions.
     dielectric_mean: f64,
     pub(super) mean: f64,
+    /// The mean of what facets of reflectance 1 lack.
+    lacking: f64,
     chances: Chances,
     sheen: Option<sheen::Seen>,
     coat: Option<coat::Seen>,
@@ -100,14 +104,15 @@ impl Layered {
     /// As seen from `wo`.
     pub(super) fn viewed(&self, wo: DVec3, peaks: &Peaks) -> LayeredView {
         let albedo = Albedo::new(self.facets(), (self.f0 * peaks.highlight).min(1.0), self.f90);
-        let ([a, b], means) = (albedo.terms(wo.z), albedo.mean_terms());
+        let ([a, b], [mean_a, mean_b, lacking]) = (albedo.terms(wo), albedo.means());
         let mut viewed = LayeredView {
             peaks: *peaks,
             albedo,
-            dielectric: albedo.bound([a, b], wo.z),
+            dielectric: self.returned(wo, &albedo, [a, b]),
             facets: (a + b).min(1.0),
-            dielectric_mean: albedo.of(means),
-            mean: (means[0] + means[1]).min(1.0),
+            dielectric_mean: self.returned_mean(&albedo, [mean_a, mean_b]),
+            mean: (mean_a + mean_b).min(1.0),
+            lacking,
             chances: Chances { sheet: 0.0, base: 0.0, through: 0.0 },
             sheen: self.sheen.seen(wo),
             coat: self.coat.seen(wo),
@@ -134,20 +139,59 @@ impl Layered {
         }
     }
 
+    /// Whether the dielectric is a smooth pane, which reflects by Fresnel.
+    fn is_pane(&self) -> bool {
+        self.alpha == 0.0 && self.transmission > 0.0 && fresnel::normal_reflectance(self.ior) < 1.0
+    }
+
+    /// What the dielectric returns of light from a direction, for A and B of its albedo.
+    fn returned(&self, w: DVec3, albedo: &Albedo, terms: [f64; 2]) -> f64 {
+        if !self.is_pane() {
+            return albedo.of(terms);
+        }
+        let share = self.obliqueness(w.z.abs());
+        albedo.of([1.0 - share, share])
+    }
+
+    /// Its mean over directions: ∫ 2 μ E dμ, by the midpoint rule for panes, which counts where they have a base.
+    fn returned_mean(&self, albedo: &Albedo, means: [f64; 2]) -> f64 {
+        const STEPS: u32 = 32;
+        if !self.is_pane() || self.transmission == 1.0 {
+            return albedo.of(means);
+        }
+        let sum = (0..STEPS).map(|step| {
+            let mu = (f64::from(step) + 0.5) / f64::from(STEPS);
+            2.0 * mu * self.returned(DVec3::new(0.0, 0.0, mu), albedo, means)
+        });
+        sum.sum::<f64>() / f64::from(STEPS)
+    }
+
+    /// Share of the dielectric's reflectance between that face on and that at grazing incidence: by Fresnel for smooth
+    /// panes, else by Schlick as glTF has it.
+    fn obliqueness(&self, cosine: f64) -> f64 {
+        let face_on = fresnel::normal_reflectance(self.ior);
+        if !self.is_pane() {
+            return fresnel::schlick_weight(cosine);
+        }
+        let (reflected, _) = fresnel::dielectric(cosine.clamp(0.0, 1.0), self.ior);
+        (reflected - face_on) / (1.0 - face_on)
+    }
+
     /// Reflectance of the sheet for the cosine on its facets.
     fn sheet(&self, cosine: f64) -> Weights {
         let (m, w) = (self.metallic, fresnel::schlick_weight(cosine));
+        let v = self.obliqueness(cosine);
         Weights {
-            white: m * w + (1.0 - m) * self.f90 * w,
+            white: m * w + (1.0 - m) * self.f90 * v,
             base: m * (1.0 - w),
-            highlight: (1.0 - m) * self.f0 * (1.0 - w),
+            highlight: (1.0 - m) * self.f0 * (1.0 - v),
             ..Weights::default()
         }
     }
 
     /// What the dielectric's facets let pass.
     fn passed(&self, cosine: f64, peaks: &Peaks) -> f64 {
-        let w = fresnel::schlick_weight(cosine);
+        let w = self.obliqueness(cosine);
         let f0 = (self.f0 * peaks.highlight).min(1.0);
         (1.0 - (f0 * (1.0 - w) + self.f90 * w)).max(0.0)
     }
@@ -160,12 +204,12 @@ impl Layered {
         if share == 0.0 && !rough {
             return Weights::default();
         }
-        let [a, b] = viewed.albedo.terms(wi.z);
-        let dielectric = viewed.albedo.bound([a, b], wi.z);
+        let [a, b] = viewed.albedo.terms(wi);
+        let dielectric = self.returned(wi, &viewed.albedo, [a, b]);
         let below = 1.0 - viewed.dielectric_mean;
         let passed = (1.0 - viewed.dielectric).max(0.0) * (1.0 - dielectric).max(0.0);
         let base = if below > 0.0 { share * passed / below * wi.z / PI } else { 0.0 };
-        let metal = deep(viewed.facets, (a + b).min(1.0), viewed.mean) * wi.z / PI;
+        let metal = deep(viewed.facets, (a + b).min(1.0), viewed.lacking) * wi.z / PI;
         let deep = if rough { self.metallic * metal } else { 0.0 };
         Weights { base, deep, ..Weights::default() }
     }

@@ -19,7 +19,7 @@ use std::f64::consts::PI;
 
 use etendue_geometry::glam::DVec3;
 
-use super::albedo::Albedo;
+use super::albedo::{Albedo, lacking};
 use super::{Weights, fresnel, ggx};
 
 /// The cosine at which a metal's reflectance is met beside that face on.
@@ -54,16 +54,17 @@ pub(super) fn facets(cosine: f64) -> Weights {
 pub(super) struct Rough {
     alpha: f64,
     albedo: Albedo,
-    /// `E` for the direction of the viewer, and its mean.
+    /// `E` for the direction of the viewer, its mean, and the mean of what it lacks.
     seen: f64,
     pub(super) mean: f64,
+    lacking: f64,
 }
 
 impl Rough {
     pub(super) fn new(alpha: f64, wo: DVec3) -> Self {
         let albedo = Albedo::new(alpha, 1.0, 1.0);
-        let (seen, mean) = (albedo.at(wo.z).min(1.0), albedo.mean().min(1.0));
-        Self { alpha, albedo, seen, mean }
+        let ([a, b, lacking], seen) = (albedo.means(), albedo.at(wo).min(1.0));
+        Self { alpha, albedo, seen, mean: (a + b).min(1.0), lacking }
     }
 
     /// Value times cosine, and the density of [`Self::sample`].
@@ -71,13 +72,13 @@ impl Rough {
         let (value, density) = ggx::reflection(wo, wi, self.alpha);
         let cosine = (wo + wi).try_normalize().map_or(0.0, |h| wo.dot(h));
         let mut weights = facets(cosine).times(value);
-        weights.deep = self.deep(self.albedo.at(wi.z)) * wi.z / PI;
+        weights.deep = self.deep(self.albedo.at(wi)) * wi.z / PI;
         (weights, self.seen * density + (1.0 - self.seen) * wi.z / PI)
     }
 
     /// The matte lobe's value times π, for `E` of the direction of the light.
     fn deep(&self, lit: f64) -> f64 {
-        deep(self.seen, lit, self.mean)
+        deep(self.seen, lit, self.lacking)
     }
 
     /// A direction: of the facets by their share `E`, or of the matte lobe.
@@ -90,12 +91,8 @@ impl Rough {
     }
 }
 
-/// How exact the table of albedos is: less is not taken for lacking.
-const EXACT: f64 = 1e-3;
-
-/// π times the matte lobe of reflectance 1, from `E` for both directions and its mean.
+/// π times the matte lobe of reflectance 1, from `E` for both directions and the mean of what it lacks: also where that
+/// is little, as smooth metal lacks light at grazing angles alone.
 pub(super) fn deep(seen: f64, lit: f64, mean: f64) -> f64 {
-    let [seen, lit] = [seen, lit].map(|albedo| (1.0 - EXACT - albedo).max(0.0));
-    let lacking = 1.0 - mean;
-    if lacking <= EXACT { 0.0 } else { seen * lit / lacking }
+    if mean <= 0.0 { 0.0 } else { lacking(seen) * lacking(lit) / mean }
 }

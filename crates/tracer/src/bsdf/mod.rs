@@ -11,6 +11,7 @@
 
 pub mod albedo;
 mod boundary;
+mod brushed;
 mod coat;
 pub mod fresnel;
 pub mod ggx;

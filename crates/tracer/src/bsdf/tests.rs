@@ -12,8 +12,8 @@ fn bsdf(model: Model, cos_theta: f64) -> Bsdf {
 fn layered(metallic: f64, roughness: f64, transmission: f64) -> Model {
     let alpha = roughness * roughness;
     let (sheen, coat) = (Sheen::default(), Coat::default());
-    let (along, f0, f90) = (alpha, 0.04, 1.0);
-    Model::Layered(Layered { metallic, alpha, along, f0, f90, transmission, sheen, coat })
+    let (along, f0, f90, ior) = (alpha, 0.04, 1.0, 1.5);
+    Model::Layered(Layered { metallic, alpha, along, f0, f90, ior, transmission, sheen, coat })
 }
 
 fn all() -> Vec<(&'static str, Model)> {

@@ -16,7 +16,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
 pub use self::look::Look;
-pub use self::pair::{FrameStep, OtherFrame, Sight};
+pub use self::pair::{Along, FrameStep, OtherFrame, Sight, WrittenStep};
 pub use self::table::LayerSpec;
 use crate::{LightingContext, Needs, SceneView, Traced};
 
@@ -163,7 +163,8 @@ impl LayerSpec {
     #[must_use]
     pub fn step(self) -> Option<FrameStep> {
         match self {
-            Self::Flow { to } | Self::Disparity { to } | Self::Occlusion { to } => Some(to),
+            Self::Flow { to } | Self::Occlusion { to } => Some(to),
+            Self::Disparity { to } => Some(to.across()),
             _ => None,
         }
     }
@@ -240,7 +241,11 @@ mod tests {
         let mut layers: Vec<LayerSpec> = plain.chain(normals).chain(positions).collect();
         layers.extend([LayerSpec::Backdrop, LayerSpec::Radiance]);
         for step in [-12, -1, 2] {
-            let to = FrameStep::try_from(step).unwrap();
+            let to = FrameStep::try_from(WrittenStep::Frames(step)).unwrap();
+            let pair =
+                [LayerSpec::Flow { to }, LayerSpec::Disparity { to }, LayerSpec::Occlusion { to }];
+            layers.extend(pair);
+            let to = to.across();
             let pair =
                 [LayerSpec::Flow { to }, LayerSpec::Disparity { to }, LayerSpec::Occlusion { to }];
             layers.extend(pair);

@@ -8,74 +8,132 @@ use serde::{Deserialize, Serialize};
 
 use super::{Columns, Seen};
 
-/// How many frames on the other frame is: 1 for the next, −1 for the one before.
+/// The way from a frame to the other one: 1 for the next, −1 for the one before.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
-#[serde(try_from = "i32", into = "i32")]
-pub struct FrameStep(i32);
+#[serde(try_from = "WrittenStep", into = "WrittenStep")]
+pub struct FrameStep {
+    count: i32,
+    along: Along,
+}
+
+/// What the frames of a step are counted along.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Along {
+    /// Time: the same camera of a rig, where there is one.
+    Frames,
+    /// The cameras of a rig at one moment; frames where there is no rig.
+    Cameras,
+}
+
+/// A step as files write it: a number, or `{"cameras": 1}`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum WrittenStep {
+    /// So many frames on; of `disparity` so many cameras on, where there is a rig.
+    Frames(i32),
+    /// So many cameras of the rig on.
+    Cameras {
+        /// 1 for the next camera, −1 for the one before.
+        cameras: i32,
+    },
+}
 
 impl FrameStep {
-    /// Frames from this one to the other; not 0.
+    /// Steps from this frame to the other; not 0.
     #[must_use]
-    pub fn frames(self) -> i32 {
-        self.0
+    pub fn count(self) -> i32 {
+        self.count
     }
 
-    /// The number of the other frame, as seen from frame `number`; `None` before the first.
+    /// What they are counted along.
+    #[must_use]
+    pub fn along(self) -> Along {
+        self.along
+    }
+
+    /// As many steps along the cameras of a rig.
+    #[must_use]
+    pub fn across(self) -> Self {
+        Self { along: Along::Cameras, ..self }
+    }
+
+    /// The number that is this many steps on from `number`; `None` below 0.
     #[must_use]
     pub fn from(self, number: usize) -> Option<usize> {
-        number.checked_add_signed(isize::try_from(self.0).ok()?)
+        number.checked_add_signed(isize::try_from(self.count).ok()?)
     }
 
     /// Which frame it is, as headers say it.
     pub(super) fn meaning(self) -> (&'static str, &'static str) {
-        let which = match self.0 {
-            1 => "the next one",
-            -1 => "the one before",
-            step if step > 0 => "as many on as the layer's name says",
-            _ => "as many back as the layer's name says",
+        let which = match (self.along, self.count) {
+            (Along::Frames, 1) => "the next one",
+            (Along::Frames, -1) => "the one before",
+            (Along::Frames, 1..) => "as many on as the layer's name says",
+            (Along::Frames, _) => "as many back as the layer's name says",
+            (Along::Cameras, 1) => "that of the rig's next camera; without a rig the next one",
+            (Along::Cameras, -1) => "that of the rig's camera before; without a rig the one before",
+            (Along::Cameras, 1..) => {
+                "that of the rig's camera as many on as the layer's name says; without a rig as many frames on"
+            }
+            (Along::Cameras, _) => {
+                "that of the rig's camera as many back as the layer's name says; without a rig as many frames \
+                 back"
+            }
         };
         ("other frame", which)
     }
 
-    /// `name` with the step: `Flow`, `FlowBack`, `Flow2`, `FlowBack2`.
+    /// `name` with the step: `Flow`, `FlowBack`, `Flow2`, `FlowBack2`; `FlowCamera` and so on along cameras.
     pub(super) fn name(self, name: &'static str) -> Cow<'static, str> {
-        match self.0 {
-            1 => name.into(),
-            -1 => format!("{name}Back").into(),
-            step if step > 0 => format!("{name}{step}").into(),
-            step => format!("{name}Back{}", step.unsigned_abs()).into(),
+        let along = match self.along {
+            Along::Frames => "",
+            Along::Cameras => "Camera",
+        };
+        match self.count {
+            1 if along.is_empty() => name.into(),
+            1 => format!("{name}{along}").into(),
+            -1 => format!("{name}{along}Back").into(),
+            step if step > 0 => format!("{name}{along}{step}").into(),
+            step => format!("{name}{along}Back{}", step.unsigned_abs()).into(),
         }
     }
 }
 
 impl Default for FrameStep {
     fn default() -> Self {
-        Self(1)
+        Self { count: 1, along: Along::Frames }
     }
 }
 
-impl From<FrameStep> for i32 {
+impl From<FrameStep> for WrittenStep {
     fn from(step: FrameStep) -> Self {
-        step.0
+        match step.along {
+            Along::Frames => Self::Frames(step.count),
+            Along::Cameras => Self::Cameras { cameras: step.count },
+        }
     }
 }
 
-impl TryFrom<i32> for FrameStep {
+impl TryFrom<WrittenStep> for FrameStep {
     type Error = &'static str;
 
-    fn try_from(frames: i32) -> Result<Self, Self::Error> {
-        match frames {
+    fn try_from(written: WrittenStep) -> Result<Self, Self::Error> {
+        let (count, along) = match written {
+            WrittenStep::Frames(count) => (count, Along::Frames),
+            WrittenStep::Cameras { cameras } => (cameras, Along::Cameras),
+        };
+        match count {
             0 => Err("`to` is 0: a frame does not move against itself; 1 is the next frame"),
-            frames => Ok(Self(frames)),
+            count => Ok(Self { count, along }),
         }
     }
 }
 
 /// Another frame of the scene, whose camera and objects may be elsewhere.
 pub trait OtherFrame: Debug + Sync {
-    /// How many frames on it is.
+    /// The way to it.
     fn step(&self) -> FrameStep;
 
     /// Where the other camera sees each point that was hit (pixels from the corner of the top left one),

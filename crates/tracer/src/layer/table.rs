@@ -261,7 +261,7 @@ layers! {
                 ("miss", "+inf, also for what is behind the other camera"),
             ],
             ..measured("", &["X"], Look::Extent)
-        }, |seen, out| seen.disparities(to, out);
+        }, |seen, out| seen.disparities(to.across(), out);
 
         /// `Occlusion.hidden.X` and `Occlusion.outside.X`: 1 where another frame does not see a pixel's
         /// point, because something is before it, or because its picture ends.

@@ -1,5 +1,7 @@
 //! Lights as the scene file writes them, and those that are traced.
 
+use std::sync::Arc;
+
 use etendue_geometry::glam::{DMat3, DQuat, DVec3};
 use etendue_spectrum::Illuminant;
 use schemars::JsonSchema;
@@ -266,6 +268,7 @@ impl LightSpec {
             kind,
             color: *color,
             illuminant: checked(*illuminant)?,
+            spectrum: None,
             group: self.group(),
         }])
     }
@@ -316,12 +319,14 @@ fn shining(
         },
         color: sky.sun().map(|part| part * scale),
         illuminant: None,
+        spectrum: sky.sun_spectrum().scaled(scale).ok().map(Arc::new),
         group: None,
     };
     let shines = sky.is_sunlit();
     let image = EnvironmentImage::ClearSky(Box::new(sky));
     let kind = LightKind::Environment { image, turn, visible };
-    let dome = Light { kind, color: [scale; 3], illuminant: None, group: None };
+    let color = [scale; 3];
+    let dome = Light { kind, color, illuminant: None, spectrum: None, group: None };
     Ok(if shines { vec![dome, sun] } else { vec![dome] })
 }
 

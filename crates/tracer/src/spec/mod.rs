@@ -6,6 +6,7 @@ mod material;
 
 use std::path::PathBuf;
 
+use etendue_image::linear_from_srgb;
 use etendue_spectrum::Illuminant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -135,7 +136,16 @@ fn in_bounds(key: &str, color: &Color, bound: Bound) -> Result<(), Fault> {
         return fault(format!("{color:?} is above {BRIGHTEST:e}; pictures hold no more"));
     }
     if bound == Bound::One && !color.iter().all(|c| *c <= 1.0) {
-        return fault(format!("{color:?} is outside 0 to 1; a surface reflects no more"));
+        // Three bytes of an image, probably.
+        let is_bytes = color.iter().all(|c| *c <= 255.0 && c.fract() == 0.0);
+        let decoded = color.map(|c| (linear_from_srgb(c / 255.0) * 1e3).round() / 1e3);
+        let hint = match is_bytes && color.iter().any(|c| *c > 2.0) {
+            true => format!(
+                "; numbers run from 0 to 1 in linear light, where sRGB's {color:?} of 255 are {decoded:?}"
+            ),
+            false => String::new(),
+        };
+        return fault(format!("{color:?} is outside 0 to 1; a surface reflects no more{hint}"));
     }
     Ok(())
 }

@@ -7,10 +7,10 @@
 
 use etendue_geometry::glam::DVec3;
 
+use super::media::{Coincident, Crossing};
 use super::numbers::Draw;
 use super::paths::State;
 use super::{Scratch, Tracing};
-use crate::Ior;
 use crate::bsdf::{Bsdf, BsdfSample};
 use crate::spectral::Spectral;
 use crate::surface::SurfaceInteraction;
@@ -32,7 +32,8 @@ struct TransmittedBand {
 pub(super) struct Boundary<'a> {
     pub(super) path: (usize, usize),
     pub(super) met: &'a SurfaceInteraction<'a>,
-    pub(super) ior: &'a Ior,
+    /// The media on its sides, where they count.
+    pub(super) crossing: Option<Crossing>,
     pub(super) bsdf: Bsdf,
 }
 
@@ -80,7 +81,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let live = |&band: &usize| scratch.now.throughput[start + band] > 0.0;
         let passage = |band| {
             let wavelength = self.stage.spectral.wavelength_at(band, place);
-            let eta = boundary.met.eta(boundary.ior, wavelength);
+            let eta = boundary.met.eta(&self.stage.surroundings, wavelength);
             TransmittedBand { band, wavelength, eta, reflectance: boundary.bsdf.reflectance(eta) }
         };
         (0..self.count()).filter(live).map(passage).collect()
@@ -96,7 +97,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         scratch: &mut Scratch,
     ) {
         let (i, k) = boundary.path;
-        let Scratch { now, next, hits, numbers, .. } = scratch;
+        let Scratch { now, next, hits, coincident, numbers, .. } = scratch;
         let state = now.states[i];
         let bounces = state.bounces + 1;
         let most = throughput.iter().copied().fold(0.0, f64::max);
@@ -120,13 +121,20 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             pdf: f64::INFINITY,
             vertex: anchor.point,
             wavelength: wavelength.or(state.wavelength),
-            inside: self.body_behind(hits.placement[i], way.direction, hits.normal(i)),
+            media: boundary
+                .crossing
+                .map_or(state.media, |crossing| crossing.after(way.direction, hits.normal(i))),
             is_last,
             cone: state.cone.map(|cone| cone.after(hits.t[i])),
             ..state
         };
         let left = [hits.placement[i], hits.triangle[i]];
-        next.push((start, way.direction), left, state);
+        let beside = coincident.get(i).copied().unwrap_or(Coincident::NONE);
+        next.push_beside(
+            (start, way.direction),
+            [left, [beside.placement, beside.triangle]],
+            state,
+        );
         next.throughput.extend_from_slice(throughput);
     }
 }

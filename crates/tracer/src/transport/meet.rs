@@ -33,7 +33,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 self.add(radiance, self.parts.row(state.ray, state.bounces, group), out);
             }
             // A last ray goes on only where the surface that it met may not be there.
-            if placed.is_some_and(|placed| !state.is_last || placed.has_alpha)
+            if placed.is_some_and(|placed| !state.is_last || placed.may_vanish())
                 && state.steps < MOST_STEPS
             {
                 alive.push(u32::try_from(i).unwrap_or(u32::MAX));

@@ -12,9 +12,9 @@
 //! * Many wavelengths on one path: Wilkie et al., "Hero Wavelength Spectral Sampling", 2014. Theirs keeps
 //!   one of them where a smooth boundary parts them; here all go on, each its way.
 
-mod body;
 mod dispersion;
 mod kernels;
+mod media;
 mod meet;
 mod numbers;
 mod patch;
@@ -28,8 +28,9 @@ use std::ops::{AddAssign, Range};
 
 use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch};
+use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, RayBatch};
 
+use self::media::{Coincident, Media};
 use self::numbers::{Draw, Numbers};
 use self::patch::Patch;
 use self::paths::{Paths, State};
@@ -43,7 +44,7 @@ use crate::reference::SceneView;
 use crate::sky::Asked;
 use crate::spawn::{self, Anchor};
 use crate::spectral::Spectral;
-use crate::{Color, Material};
+use crate::{Color, Material, Scattering};
 
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
@@ -93,22 +94,33 @@ pub struct Traits {
     pub has_panes: bool,
     /// Some surface scatters light in several ways, among which is chosen.
     pub has_choice: bool,
-    /// Some body absorbs light on its way through.
-    pub has_bodies: bool,
+    /// Media are told apart: some body absorbs light on its way through, or bodies may be in one another.
+    pub has_media: bool,
+    /// Some boundaries between bodies may not be there.
+    pub has_nested: bool,
 }
 
 impl Traits {
     /// Those of all placed surfaces.
     #[must_use]
-    pub fn of(geometry: &Geometry, materials: &[Material]) -> Self {
+    pub fn of(geometry: &Geometry, materials: &[Material], surfaces: &PlacedSurfaces) -> Self {
         let mut traits = Self::default();
-        let placed = geometry.placements.iter().filter_map(|p| materials.get(p.material as usize));
-        for material in placed {
+        let (mut has_sheets, mut has_bodies) = (false, false);
+        for (i, placement) in (0..).zip(&geometry.placements) {
+            let Some(material) = materials.get(placement.material as usize) else { continue };
             traits.has_alpha |= material.has_alpha();
             traits.has_panes |= material.is_pane();
             traits.has_choice |= material.scattering.has_parts();
-            traits.has_bodies |= material.absorption().is_some();
+            traits.has_media |= material.absorption().is_some();
+            match surfaces.get(i).and_then(|surface| surface.body) {
+                Some(body) => {
+                    has_bodies = true;
+                    traits.has_nested |= body.may_vanish;
+                }
+                None => has_sheets |= matches!(material.scattering, Scattering::Dielectric(_)),
+            }
         }
+        traits.has_media |= traits.has_nested || (has_sheets && has_bodies);
         traits
     }
 }
@@ -193,6 +205,8 @@ pub struct Scratch {
     /// Paths that only look for light.
     last: Paths,
     hits: HitBatch,
+    /// Of each hit; empty where bodies do not touch.
+    coincident: Vec<Coincident>,
     alive: Vec<u32>,
     numbers: Numbers,
     shadows: Shadows,
@@ -237,9 +251,10 @@ fn trace_bands<const RGB: bool>(
     while !scratch.now.states.is_empty() {
         stage.accel.closest(&scratch.now.rays, &mut scratch.hits);
         tracing.tally.rays += scratch.now.states.len() as u64;
-        if stage.traits.has_bodies {
+        if stage.traits.has_media {
             tracing.absorb(scratch);
         }
+        tracing.coincident(&scratch.now.rays, &scratch.hits, &mut scratch.coincident);
         tracing.meet(scratch, out);
         let needs = tracing.needs(&scratch.now.states);
         let paths = (&scratch.now.states[..], &scratch.alive[..]);
@@ -288,6 +303,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         paths.rays.copy_from(beam.rays);
         paths.rays.from_surface = false;
         paths.rays.precision = self.stage.precision;
+        let media = self.media_at_origins(beam.rays);
         for i in 0..beam.rays.len() {
             paths.states.push(State {
                 ray: u32::try_from(i).unwrap_or(u32::MAX),
@@ -296,7 +312,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 pdf: f64::INFINITY,
                 vertex: beam.rays.origin(i),
                 wavelength: None,
-                inside: MISS,
+                media: media.get(i).copied().unwrap_or(Media::NONE),
                 is_last: false,
                 cone: self.stage.surroundings.view.cone(beam.rays.direction(i)),
             });

@@ -3,6 +3,7 @@
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, HitPrecision, MISS};
 
+use super::media::Crossing;
 use super::paths::Paths;
 use crate::Color;
 use crate::bsdf::Bsdf;
@@ -33,6 +34,8 @@ pub(super) struct Patch {
     pub(super) colors: Vec<Color>,
     /// The surfaces that are not matte.
     pub(super) bsdfs: Vec<Bsdf>,
+    /// The media on their sides, where they part any.
+    pub(super) crossings: Vec<Option<Crossing>>,
     /// What each light that was chosen gives off: `[lane][band]`.
     pub(super) radiance: Vec<f64>,
     /// Lanes of which something goes on.
@@ -148,6 +151,7 @@ impl Patch {
         self.path.clear();
         self.colors.clear();
         self.bsdfs.clear();
+        self.crossings.clear();
     }
 
     /// Adds hit `i` of the `k`-th path that goes on, on a placement, and returns its lane.

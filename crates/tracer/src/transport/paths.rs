@@ -3,6 +3,7 @@
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, HitPrecision, MISS, RayBatch};
 
+use super::media::Media;
 use crate::footprint::{Cone, Footprint};
 use crate::sampling::power_heuristic;
 
@@ -32,8 +33,8 @@ pub(super) struct State {
     pub(super) vertex: DVec3,
     /// The wavelength (nm) of the one band left, after a glass has parted them.
     pub(super) wavelength: Option<f64>,
-    /// The placement within whose body it is, of those that absorb; else [`MISS`].
-    pub(super) inside: u32,
+    /// The media that it is in, where they count.
+    pub(super) media: Media,
     /// Looks for light and goes no farther.
     pub(super) is_last: bool,
     /// What the path stands for, as long as it only met mirrors and clear boundaries; as wide as at
@@ -80,8 +81,13 @@ impl Paths {
 
     /// Adds a path that leaves a placement's triangle: where it starts, and its direction.
     pub(super) fn push(&mut self, ray: (DVec3, DVec3), left: [u32; 2], state: State) {
+        self.push_beside(ray, [left, [MISS; 2]], state);
+    }
+
+    /// Adds a path that leaves two triangles in one place.
+    pub(super) fn push_beside(&mut self, ray: (DVec3, DVec3), left: [[u32; 2]; 2], state: State) {
         let limits = [0.0, f64::INFINITY];
-        self.rays.push_between_triangles(ray.0, ray.1, limits, [left, [MISS; 2]]);
+        self.rays.push_between_triangles(ray.0, ray.1, limits, left);
         self.states.push(state);
     }
 }

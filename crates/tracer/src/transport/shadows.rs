@@ -3,7 +3,8 @@
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, MISS, PlacedTriangle, RayBatch};
 
-use super::paths::Paths;
+use super::media::{Coincident, Media};
+use super::paths::{Paths, State};
 use super::{LightingContext, Scratch, Tracing, Traits};
 use crate::emitters::Emitters;
 use crate::surface::SurfaceInteraction;
@@ -18,8 +19,11 @@ pub(super) struct Shadows {
     pub(super) contribution: Vec<f64>,
     /// Their light can be met by no path that panes let through.
     pub(super) is_delta: Vec<bool>,
+    /// The media that each starts in; empty where they do not count.
+    pub(super) media: Vec<Media>,
     pub(super) blocked: Vec<bool>,
     pub(super) hits: HitBatch,
+    coincident: Vec<Coincident>,
     pub(super) again: RayBatch,
     pub(super) open: Vec<u32>,
     order: Vec<u64>,
@@ -33,6 +37,7 @@ struct Sorted {
     row: Vec<u32>,
     contribution: Vec<f64>,
     is_delta: Vec<bool>,
+    media: Vec<Media>,
 }
 
 impl Shadows {
@@ -41,6 +46,7 @@ impl Shadows {
         self.row.clear();
         self.contribution.clear();
         self.is_delta.clear();
+        self.media.clear();
     }
 
     /// Notes what a ray brings: `light` times what its path carries and its weight.
@@ -53,14 +59,15 @@ impl Shadows {
     /// Puts rays side by side that run in about the same direction, `count` bands each, so that they
     /// are worth tracing as packets: those to a lamp of some size go all over it.
     pub(super) fn sort(&mut self, count: usize) {
-        let Self { rays, row, contribution, is_delta, order, sorted, .. } = self;
+        let Self { rays, row, contribution, is_delta, media, order, sorted, .. } = self;
         order.clear();
         order.extend((0_u32..).zip(0..row.len()).map(|(number, i)| {
             u64::from(octant_cell(rays.direction(i))) << 32 | u64::from(number)
         }));
         order.sort_unstable();
         let order = || order.iter().map(|&key| (key & 0xffff_ffff) as usize);
-        let Sorted { rays: to, row: number, contribution: light, is_delta: delta } = sorted;
+        let Sorted { rays: to, row: number, contribution: light, is_delta: delta, media: around } =
+            sorted;
         to.gather(rays, order());
         number.clear();
         number.extend(order().map(|i| row[i]));
@@ -68,6 +75,11 @@ impl Shadows {
         light.extend(order().flat_map(|i| &contribution[i * count..(i + 1) * count]));
         delta.clear();
         delta.extend(order().map(|i| is_delta[i]));
+        if !media.is_empty() {
+            around.clear();
+            around.extend(order().map(|i| media[i]));
+            std::mem::swap(media, around);
+        }
         std::mem::swap(is_delta, delta);
         std::mem::swap(rays, to);
         std::mem::swap(row, number);
@@ -82,7 +94,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// Whether paths that only look for light ask what shines before they ask the scene. Through
     /// surfaces that are partly there they have to be followed.
     pub(super) fn traces_emitters(&self) -> bool {
-        self.stage.emitters.is_some() && !self.stage.traits.has_alpha
+        let Traits { has_alpha, has_nested, .. } = self.stage.traits;
+        self.stage.emitters.is_some() && !has_alpha && !has_nested
     }
 
     /// Whether there may be light along a ray that asks what shines.
@@ -116,6 +129,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let group = || lights.group_of_placement(around, hits.placement[i]);
             let row = self.parts.row(state.ray, state.bounces, group);
             shadows.note(row, radiance, last.throughput_of(i, self.count()), weight);
+            self.note_media(shadows, state);
         }
         let (lights, spectral) = (self.stage.lights, self.stage.spectral);
         let wanted = missed.iter().map(|&i| i as usize);
@@ -130,8 +144,16 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let row = self.parts.row(state.ray, state.bounces, || lights.group_of_sky());
             let weight = state.weight_against(pdf);
             shadows.note(row, light, last.throughput_of(i, self.count()), weight);
+            self.note_media(shadows, state);
         });
         self.light(shadows, out);
+    }
+
+    /// Notes the media of a path whose light was noted.
+    fn note_media(&self, shadows: &mut Shadows, state: &State) {
+        if self.stage.traits.has_media {
+            shadows.media.push(state.media);
+        }
     }
 
     /// Adds what lights bring along rays that nothing blocks.
@@ -141,11 +163,18 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         shadows.rays.from_surface = true;
         self.tally.shadow_rays += shadows.rays.len() as u64;
-        let Traits { has_alpha, has_panes, .. } = self.stage.traits;
-        if has_alpha || (has_panes && shadows.is_delta.contains(&true)) {
+        let Traits { has_alpha, has_nested, has_panes, .. } = self.stage.traits;
+        if has_alpha || has_nested || (has_panes && shadows.is_delta.contains(&true)) {
             self.transmittance(shadows);
         } else {
             self.stage.accel.occluded(&shadows.rays, &mut shadows.blocked);
+            let Shadows { rays, contribution, media, blocked, .. } = &mut *shadows;
+            let lights = contribution.chunks_exact_mut(self.count());
+            for (k, (media, light)) in media.iter().zip(lights).enumerate() {
+                if !blocked[k] {
+                    self.dim_along(media, rays.t_max()[k], light);
+                }
+            }
         }
         for (k, &row) in shadows.row.iter().enumerate() {
             if !shadows.blocked[k] {
@@ -155,10 +184,21 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     }
 
     /// Dims what each shadow ray brings by the surfaces on its way: by those that are only partly
-    /// there, and by panes where the light is a point or parallel. A light of some size is met through
-    /// panes by the paths themselves.
+    /// there, by the media that they go through, and by panes where the light is a point or parallel. A light
+    /// of some size is met through panes by the paths themselves.
     fn transmittance(&mut self, shadows: &mut Shadows) {
-        let Shadows { rays, contribution, is_delta, blocked, hits, again, open, .. } = shadows;
+        let Shadows {
+            rays,
+            contribution,
+            is_delta,
+            media,
+            blocked,
+            hits,
+            coincident,
+            again,
+            open,
+            ..
+        } = shadows;
         blocked.clear();
         blocked.resize(rays.len(), true);
         open.clear();
@@ -166,6 +206,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         again.copy_from(rays);
         for layer in 0..MOST_LAYERS {
             self.stage.accel.closest(again, hits);
+            self.coincident(again, hits, coincident);
             if layer > 0 {
                 self.tally.shadow_rays += again.len() as u64;
             }
@@ -173,16 +214,42 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             onward.precision = again.precision;
             let mut still = Vec::new();
             for (k, &i) in open.iter().enumerate() {
-                let Some(met) = SurfaceInteraction::new(self.stage, again, hits, k, None) else {
+                let beside = coincident.get(k).copied().unwrap_or(Coincident::NONE);
+                let own = i as usize * self.count()..(i as usize + 1) * self.count();
+                let light = &mut contribution[own];
+                let hit = SurfaceInteraction::new(self.stage, again, hits, k, None);
+                if let Some(media) = media.get(i as usize) {
+                    let length = if hit.is_some() { hits.t[k] } else { again.t_max()[k] };
+                    self.dim_along(media, length, light);
+                }
+                let Some(mut met) = hit else {
                     blocked[i as usize] = false;
                     continue;
                 };
-                let own = i as usize * self.count()..(i as usize + 1) * self.count();
-                if self.dim(&met, is_delta[i as usize], &mut contribution[own]) {
-                    let direction = again.direction(k);
+                let direction = again.direction(k);
+                if let Some(media) = media.get_mut(i as usize)
+                    && let Some(crossing) =
+                        self.cross(*media, (hits.placement[k], beside), &mut met)
+                {
+                    *media = crossing.after(direction, hits.normal(k));
+                }
+                let pass = Pass { is_delta: is_delta[i as usize], placement: hits.placement[k] };
+                if self.dim(&met, pass, light) {
                     let origin = met.anchor.leave(direction);
                     let left = again.t_max()[k] - (origin - again.origin(k)).length();
-                    onward.push_between(origin, direction, 0.0, left.max(0.0));
+                    let triangles = match beside.placement {
+                        MISS => [[MISS; 2]; 2],
+                        placement => {
+                            let own = [hits.placement[k], hits.triangle[k]];
+                            [own, [placement, beside.triangle]]
+                        }
+                    };
+                    onward.push_between_triangles(
+                        origin,
+                        direction,
+                        [0.0, left.max(0.0)],
+                        triangles,
+                    );
                     still.push(i);
                 }
             }
@@ -195,10 +262,18 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     }
 
     /// Dims light by what lets it pass a surface; whether any is left.
-    fn dim(&self, met: &SurfaceInteraction<'_>, is_delta: bool, light: &mut [f64]) -> bool {
+    fn dim(&self, met: &SurfaceInteraction<'_>, pass: Pass, light: &mut [f64]) -> bool {
         let LightingContext { surroundings: around, spectral, traits, .. } = self.stage;
         let opacity = met.opacity();
-        let pane = (is_delta && traits.has_panes).then(|| met.bsdf(around, spectral.wavelength(0)));
+        if let Some(vanished) = self.vanishes(pass.placement, met) {
+            let tint = met.color();
+            for (k, band) in light.iter_mut().enumerate().filter(|_| vanished.is_tinted) {
+                *band *= 1.0 - opacity + opacity * self.band(&tint, k);
+            }
+            return light.iter().any(|band| *band > 0.0);
+        }
+        let pane =
+            (pass.is_delta && traits.has_panes).then(|| met.bsdf(around, spectral.wavelength(0)));
         let passed = pane.as_ref().and_then(|pane| Some((pane, pane.straight_through()?)));
         for (k, band) in light.iter_mut().enumerate() {
             let pane = passed.map_or(0.0, |(pane, weights)| self.in_band(pane, weights, k));
@@ -206,6 +281,15 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         light.iter().any(|band| *band > 0.0)
     }
+}
+
+/// What passes a surface on its way to a light.
+#[derive(Debug, Clone, Copy)]
+struct Pass {
+    /// No path that panes let through can meet the light.
+    is_delta: bool,
+    /// The surface's placement.
+    placement: u32,
 }
 
 /// The triangle that a path left.

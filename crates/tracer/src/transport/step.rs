@@ -2,21 +2,22 @@
 //! direction is followed. Matte surfaces are worked out in loops that vectorise, whatever they are of;
 //! what scatters in other ways shares with them all but its own formula.
 
+use etendue_geometry::HitPrecision;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitPrecision, MISS};
 
 use super::dispersion::{Boundary, keep_one};
+use super::media::Coincident;
 use super::numbers::Draw;
 use super::patch::{LANES, Patch, at, put};
 use super::paths::State;
 use super::{Follow, Scratch, Tracing, kernels};
+use crate::Scattering;
 use crate::bsdf::Weights;
 use crate::placed::PlacedSurface;
 use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
 use crate::surface::SurfaceInteraction;
 use crate::target::Chosen;
-use crate::{Ior, Scattering};
 
 impl<const RGB: bool> Tracing<'_, RGB> {
     /// The step of all paths that go on.
@@ -107,9 +108,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         (i, k): (usize, usize),
         placed: &PlacedSurface,
     ) {
-        let Scratch { now, next, hits, numbers, .. } = scratch;
+        let Scratch { now, next, hits, coincident, numbers, .. } = scratch;
         let footprint = now.footprint(hits, i);
-        let Some(met) = SurfaceInteraction::new(self.stage, &now.rays, hits, i, footprint) else {
+        let Some(mut met) = SurfaceInteraction::new(self.stage, &now.rays, hits, i, footprint)
+        else {
             return;
         };
         let bands = i * self.count()..(i + 1) * self.count();
@@ -123,6 +125,24 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             next.throughput.extend_from_slice(&now.throughput[bands]);
             return;
         }
+        let beside = coincident.get(i).copied().unwrap_or(Coincident::NONE);
+        let crossing = self.cross(now.states[i].media, (hits.placement[i], beside), &mut met);
+        if let Some(vanished) = self.vanishes(hits.placement[i], &met) {
+            let direction = now.rays.direction(i);
+            let mut state = now.states[i];
+            state.steps += 1;
+            state.cone = state.cone.map(|cone| cone.after(hits.t[i]));
+            let after = crossing.map(|crossing| crossing.after(direction, hits.normal(i)));
+            state.media = after.unwrap_or(state.media);
+            let left = [hits.placement[i], hits.triangle[i]];
+            let ray = (met.anchor.leave(direction), direction);
+            next.push_beside(ray, [left, [beside.placement, beside.triangle]], state);
+            let tint = vanished.is_tinted.then(|| met.color());
+            let carried = now.throughput[bands].iter().enumerate();
+            let share = |k| tint.as_ref().map_or(1.0, |tint| self.band(tint, k));
+            next.throughput.extend(carried.map(|(k, band)| band * share(k)));
+            return;
+        }
         let state = &mut now.states[i];
         if state.is_last || state.bounces >= self.rules.bounces {
             return;
@@ -130,11 +150,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let middle = || self.stage.spectral.wavelength(0);
         let mut bsdf = met.bsdf(&self.stage.surroundings, state.wavelength.unwrap_or_else(middle));
         if let Scattering::Dielectric(glass) = &met.material.scattering
-            && let Ior::Dispersive(_) = glass.ior
             && state.wavelength.is_none()
+            && met.disperses(&self.stage.surroundings)
         {
             if glass.roughness == 0.0 {
-                let boundary = Boundary { path: (i, k), met: &met, ior: &glass.ior, bsdf };
+                let boundary = Boundary { path: (i, k), met: &met, crossing, bsdf };
                 return self.disperse(&boundary, scratch);
             }
             let throughput = &mut now.throughput[bands];
@@ -144,6 +164,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         patch.push((now, hits), (i, k), placed);
         patch.bsdfs.push(bsdf);
+        patch.crossings.push(crossing);
     }
 
     /// Chooses a light for each hit, and a place on it.
@@ -169,10 +190,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
         }
         let Some(sky) = &lights.sky else { return };
-        sky.choose(asked, |lane, target, color| {
+        sky.choose(asked, |lane, target, there| {
             patch.targets.set(lane, target.as_ref());
             let radiance = &mut patch.radiance[lane * count..(lane + 1) * count];
-            lights.spread_sky(spectral, color, radiance);
+            lights.spread_sky(spectral, there, radiance);
         });
     }
 
@@ -184,7 +205,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         } else {
             weigh(patch);
         }
-        let Patch { count, path, away, targets, colors, bsdfs, radiance, picked, .. } = patch;
+        let Patch {
+            count, path, away, targets, colors, bsdfs, crossings, radiance, picked, ..
+        } = patch;
         picked.clear();
         picked.extend((0..*count).filter(|&lane| away.value[lane] > 0.0));
         shadows.rays.extend_picked(&away.start, &away.along, &away.reach, picked);
@@ -201,6 +224,15 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             self.parts.row(state.ray, state.bounces + 1, group)
         }));
         shadows.is_delta.extend(picked.iter().map(|&lane| targets.is_delta[lane] > 0.0));
+        if self.stage.traits.has_media {
+            let after = |&lane: &usize| {
+                let (i, _) = path[lane];
+                let crossing = crossings.get(lane).copied().flatten();
+                let media = now.states[i].media;
+                crossing.map_or(media, |c| c.after(at(&away.along, lane), hits.normal(i)))
+            };
+            shadows.media.extend(picked.iter().map(after));
+        }
         for &lane in picked.iter() {
             let start = path[lane].0 * self.count();
             let throughput = &now.throughput[start..start + self.count()];
@@ -295,14 +327,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             // Seen by chance from one point, a surface is a point.
             state.cone = state.cone.filter(|_| single).map(|cone| cone.after(hits.t[i]));
             state.pdf = scattered.pdf;
-            if self.stage.traits.has_bodies {
-                let front = hits.normal(i);
-                let body = self.body_behind(hits.placement[i], scattered.direction, front);
-                // What leaves another surface within a body is still in it.
-                let placed = self.stage.placed.get(hits.placement[i]);
-                if placed.is_some_and(|placed| placed.absorption.is_some()) {
-                    state.inside = body;
-                }
+            // What leaves another surface within a body is still in it.
+            if let Some(crossing) = &patch.crossings[lane] {
+                state.media = crossing.after(scattered.direction, hits.normal(i));
             }
             let start = patch.leave(lane, scattered.direction);
             patch.send(lane, (start, scattered.direction));
@@ -314,7 +341,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// Notes the paths along the rays that leave the picked lanes, but for those that carry nothing or
     /// end by chance.
     fn follow(&self, scratch: &mut Scratch, patch: &mut Patch) {
-        let Scratch { now, next, last, hits, numbers, .. } = scratch;
+        let Scratch { now, next, last, hits, coincident, numbers, .. } = scratch;
         let traces_emitters = self.traces_emitters();
         for is_last in [false, true] {
             let paths = if is_last { &mut *last } else { &mut *next };
@@ -353,7 +380,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             if self.stage.precision == HitPrecision::Double {
                 paths.rays.end_on_triangles(kept.iter().map(|&lane| {
                     let (i, _) = patch.path[lane];
-                    [[hits.placement[i], hits.triangle[i]], [MISS; 2]]
+                    let beside = coincident.get(i).copied().unwrap_or(Coincident::NONE);
+                    [[hits.placement[i], hits.triangle[i]], [beside.placement, beside.triangle]]
                 }));
             }
             debug_assert_eq!(paths.states.len() - first, kept.len());

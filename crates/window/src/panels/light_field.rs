@@ -58,6 +58,11 @@ impl LightField {
 }
 
 pub(crate) fn show(app: &mut App, ui: &mut Ui) {
+    let scene = app.inspector.as_ref().map(|inspector| inspector.scene());
+    if let Some(why) = scene.and_then(|scene| scene.camera.no_views()) {
+        ui.weak(format!("no views: {why}"));
+        return;
+    }
     let preview = app.picture.as_ref().filter(|picture| picture.is_final);
     if let Err(error) = app.light_field.find(preview.and_then(|of| of.preview.as_deref())) {
         app.error = Some(error.to_string());

@@ -1,6 +1,7 @@
 //! Light transport.
 
 mod lights;
+mod media;
 mod paths;
 mod precision;
 mod surfaces;
@@ -22,5 +23,7 @@ pub const METHOD: Method = Method {
         paths::ROULETTE,
         precision::DARK_BOX,
         precision::CORNER,
+        media::THIN,
+        media::NESTED,
     ],
 };

@@ -107,7 +107,7 @@ fn sampled(train: &OpticalTrain, pupil: &ExitPupil, film: DVec2, count: u32) -> 
         };
         let squares: Vec<[f64; 2]> = (start..(start + 10_000).min(count)).map(place).collect();
         let mut rays = LensRays::default();
-        pupil.push_rays(&vec![film; squares.len()], &squares, &mut rays);
+        pupil.push_rays(&vec![film; squares.len()], &squares, YELLOW, &mut rays);
         at.trace(Side::Sensor, Clip::On, &mut rays);
         passed += rays.exited();
         light += rays.passed_throughput();

@@ -75,7 +75,7 @@ fn f_0_5(scale: Scale) -> Result<Outcome> {
     let side = scale.pick(200_u32, 2_000);
     let place = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
     let samples = (0..side * side)
-        .filter_map(|i| pupil.sample(DVec2::ZERO, [place(i % side), place(i / side)]));
+        .filter_map(|i| pupil.sample(DVec2::ZERO, [place(i % side), place(i / side)], YELLOW));
     // A cone of 45 degrees.
     let within = |s: &PupilSample| -s.direction.z >= 0.5_f64.sqrt();
     let sum: f64 = samples.filter(within).map(|s| s.weight).sum();
@@ -127,7 +127,7 @@ fn one_pixel(scale: Scale) -> Result<Outcome> {
     let squares: Vec<[f64; 2]> =
         (0..side * side).map(|i| [place(i % side), place(i / side)]).collect();
     let mut rays = LensRays::default();
-    pupil.push_rays(&vec![DVec2::ZERO; squares.len()], &squares, &mut rays);
+    pupil.push_rays(&vec![DVec2::ZERO; squares.len()], &squares, YELLOW, &mut rays);
     train.at(YELLOW)?.trace(Side::Sensor, Clip::On, &mut rays);
     let white = rays.passed_throughput() / f64::from(side * side);
     // A square of 4 mm at 48 mm, on the axis: ∫ cos θ dΩ over a rectangle (Howell, B-3, four corners).

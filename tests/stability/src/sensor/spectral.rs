@@ -60,7 +60,8 @@ fn worst(
 ) -> Result<(f64, usize)> {
     let own = counting(keys)?;
     let spectra = vec![light.clone()];
-    let bands = own.bands_under(&Illumination { spectra, filters: vec![], colored: 2 })?.bands;
+    let bands =
+        own.bands_under(&Illumination { spectra, colored: 2, ..Illumination::default() })?.bands;
     let count = bands.count();
     let sensor = own.in_bands(bands)?;
     // Fine beside a line of 10 nm: in steps of 0.5 nm the sum itself is 0.03 % off.

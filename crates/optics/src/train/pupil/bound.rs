@@ -1,9 +1,10 @@
 //! The bound around the passing directions from one point of the sensor, joined from those of the nodes
-//! around it: samples of it and their density.
+//! around it: samples of it.
 
 use glam::DVec2;
 
 use super::Outline;
+use super::coded::Anywhere;
 use super::place::{NodePlace, between};
 
 /// The outline from one point of the sensor.
@@ -29,8 +30,13 @@ impl PupilBound<'_> {
         self.place.as_ref().map_or(slopes, |place| place.turned(slopes))
     }
 
-    pub(super) fn centre(&self) -> DVec2 {
-        self.turned(self.frame[0])
+    /// A rectangle around the bound.
+    pub(super) fn rectangle(&self) -> Anywhere {
+        let widest = self.place.as_ref().map_or(1.0, |place| {
+            place.nodes.iter().map(|&(node, weight)| self.nodes[node].widest * weight).sum()
+        });
+        let axis = self.place.as_ref().map_or(DVec2::X, |place| place.axis);
+        Anywhere { centre: self.frame[0], half: self.frame[1] * widest, axis }
     }
 
     /// Slopes for a place in the unit square, uniform in area at each angle, and the area of slopes that
@@ -42,19 +48,6 @@ impl PupilBound<'_> {
         let angle = DVec2::from_angle(turn * std::f64::consts::TAU);
         let area = std::f64::consts::PI * half.x * half.y * reach * reach;
         (reach > 0.0).then(|| (self.turned(centre + angle * half * (reach * disc_radius)), area))
-    }
-
-    /// The density of [`Self::draw`] per area of slopes; 0 outside.
-    pub(super) fn density(&self, slopes: DVec2) -> f64 {
-        let [centre, half] = self.frame;
-        let unturned = self.place.as_ref().map_or(slopes, |place| place.unturned(slopes));
-        let inside = (unturned - centre) / half;
-        let turn = (inside.to_angle() / std::f64::consts::TAU).rem_euclid(1.0);
-        let reach = self.reach(turn);
-        if !(reach > 0.0 && inside.length() <= reach) {
-            return 0.0;
-        }
-        1.0 / (std::f64::consts::PI * half.x * half.y * reach * reach)
     }
 }
 

@@ -16,6 +16,17 @@ pub(super) fn without_masks(train: &OpticalTrain) -> OpticalTrain {
     train
 }
 
+impl OpticalTrain {
+    /// The first mask that lets nothing through.
+    #[must_use]
+    pub fn closed_mask(&self) -> Option<usize> {
+        self.elements.iter().position(|element| match element.part.opening() {
+            Some(Opening::Image(mask)) => mask.values.iter().all(|value| *value <= 0.0),
+            Some(Opening::Circle { .. } | Opening::Polygon { .. }) | None => false,
+        })
+    }
+}
+
 /// The same lens with filters clear: what is left does not depend on the wavelength but for glass.
 pub fn without_filters(train: &OpticalTrain) -> OpticalTrain {
     let mut train = train.clone();

@@ -29,9 +29,10 @@ mod bound;
 mod clear;
 mod coded;
 mod disk;
-mod histogram;
 mod lenslets;
-mod mask;
+mod mask_cells;
+mod mask_map;
+mod mask_region;
 mod measure;
 mod outline_table;
 mod place;
@@ -148,13 +149,20 @@ struct Outline {
     half: DVec2,
     /// Radii in the frame by angle; the first again at the end.
     reach: [f64; ANGLES + 1],
+    /// The greatest of them.
+    widest: f64,
     /// The slopes of the chief ray.
     chief: Option<DVec2>,
 }
 
 impl Outline {
-    const DARK: Self =
-        Self { centre: DVec2::ZERO, half: DVec2::ZERO, reach: [0.0; ANGLES + 1], chief: None };
+    const DARK: Self = Self {
+        centre: DVec2::ZERO,
+        half: DVec2::ZERO,
+        reach: [0.0; ANGLES + 1],
+        widest: 0.0,
+        chief: None,
+    };
 
     fn is_dark(&self) -> bool {
         self.half == DVec2::ZERO
@@ -207,6 +215,10 @@ impl ExitPupil {
             return Self::of_rear(train, first, wavelengths, sensor_z, half_size.to_array());
         }
         // Masks are left out of what is measured: what they pass is drawn from within it.
+        if train.closed_mask().is_some() {
+            let lens = train.at(wavelengths[0])?;
+            return Err(blocked(train, &lens, pupil.sensor.vertex));
+        }
         let masked = train;
         let train = &without_masks(masked);
         let lenses = wavelengths.iter().map(|&nm| train.at(nm)).collect::<Result<Vec<_>, _>>()?;
@@ -223,8 +235,20 @@ impl ExitPupil {
             return Err(blocked(train, first, pupil.sensor.vertex));
         }
         pupil.widen_until_tight(&lenses);
-        pupil.coded = Coded::new(masked, train, &lenses, &pupil.sensor, half_size);
-        Ok(pupil)
+        for node in &mut pupil.nodes {
+            node.widest = node.reach.into_iter().fold(0.0, f64::max);
+        }
+        Ok(pupil.aimed_at_mask(masked, wavelengths))
+    }
+
+    /// The same pupil with its first mask aimed at by rays of `wavelengths` (nm), which run apart where
+    /// the lens of `train` is dispersive: those that samples will be traced at.
+    #[must_use]
+    pub fn aimed_at_mask(mut self, train: &OpticalTrain, wavelengths: &[f64]) -> Self {
+        if self.lenslets.is_none() && train.first_array().is_none() {
+            self.coded = Coded::new(train, wavelengths, &self.sensor, self.half_size);
+        }
+        self
     }
 
     /// As [`Self::new`], with rays aimed at all of element `first` of the lens from behind, wherever they
@@ -273,25 +297,27 @@ impl ExitPupil {
         self.sensor.point(film.extend(0.0))
     }
 
-    /// The direction for the point `u` of the unit square, as seen from `film` on the sensor (mm):
-    /// uniform in area over the bound, or towards what a mask passes, in proportion to it. `None` where
-    /// no light arrives.
+    /// The direction for the point `u` of the unit square, as seen from `film` on the sensor (mm), for a
+    /// ray of `wavelength` (nm): uniform in area over the bound, or towards what a mask passes, in proportion
+    /// to it. `None` where no light arrives.
     ///
     /// Neighbouring points of the square give neighbouring directions.
     #[must_use]
-    pub fn sample(&self, film: DVec2, u: [f64; 2]) -> Option<PupilSample> {
+    pub fn sample(&self, film: DVec2, u: [f64; 2], wavelength: f64) -> Option<PupilSample> {
         if let Some(lenslets) = &self.lenslets {
             let (slopes, area) = lenslets.draw(self.film_point(film), u)?;
             return Some(self.weigh(slopes, area));
         }
         let bound = self.bound(film)?;
-        let Some(seen) = self.coded.as_ref().and_then(|coded| coded.seen_from(film)) else {
-            let (slopes, area) = bound.draw(u)?;
-            return Some(self.weigh(slopes, area));
-        };
-        let anywhere = |u| bound.draw(u).map_or(bound.centre(), |drawn| drawn.0);
-        let aimed = seen.aim(u, anywhere, |slopes| bound.density(slopes));
-        (aimed.density > 0.0).then(|| self.weigh(aimed.slopes, 1.0 / aimed.density))
+        if let Some(coded) = &self.coded
+            && let Ok(aimed) = coded.aim(wavelength, film, u, &bound.rectangle())
+        {
+            return aimed.map(|aimed| self.weigh(aimed.slopes, 1.0 / aimed.density));
+        }
+        let wide =
+            self.disk.and_then(|disk| disk.draw_wide(&self.sensor, self.film_point(film), u));
+        let (slopes, area) = wide.or_else(|| bound.draw(u))?;
+        Some(self.weigh(slopes, area))
     }
 
     /// The sample along slopes that stands for an area of slopes.
@@ -321,12 +347,12 @@ impl ExitPupil {
     }
 
     /// Appends one ray for each point of the sensor (mm) and point of the unit square, ready to be
-    /// traced from [`Side::Sensor`]; its throughput is its weight. Where no light arrives the ray
-    /// has ended and weighs 0.
-    pub fn push_rays(&self, film: &[DVec2], u: &[[f64; 2]], rays: &mut LensRays) {
+    /// traced at `wavelength` (nm) from [`Side::Sensor`]; its throughput is its weight. Where no light
+    /// arrives the ray has ended and weighs 0.
+    pub fn push_rays(&self, film: &[DVec2], u: &[[f64; 2]], wavelength: f64, rays: &mut LensRays) {
         for (&film, &u) in film.iter().zip(u) {
             let at = self.film_point(film);
-            match self.sample(film, u) {
+            match self.sample(film, u, wavelength) {
                 Some(sample) => rays.push_weighted(at, sample.direction, sample.weight),
                 None => {
                     rays.push_weighted(at, DVec3::NEG_Z, 0.0);

@@ -55,10 +55,6 @@ impl NodePlace {
     pub(super) fn turned(&self, slopes: DVec2) -> DVec2 {
         self.axis.rotate(slopes)
     }
-
-    pub(super) fn unturned(&self, slopes: DVec2) -> DVec2 {
-        DVec2::new(self.axis.x, -self.axis.y).rotate(slopes)
-    }
 }
 
 /// The interval that holds `at`, and the share of it that is passed; `None` beyond the last.

@@ -2,6 +2,8 @@
 
 use std::fmt::{self, Display, Formatter};
 
+use etendue_chart::significant;
+
 use super::{LensReport, Paraxial};
 
 /// What stands where there is no number.
@@ -156,25 +158,6 @@ impl LensReport {
         }
         writeln!(f, "\nColour against {} nm: longitudinal, and lateral by field", self.wavelength)?;
         write!(f, "{table}")
-    }
-}
-
-/// Six significant digits, without zeros at the end.
-fn significant(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let size = value.abs().log10().floor();
-    if !(-5.0..7.0).contains(&size) {
-        return format!("{value:.4e}");
-    }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 10")]
-    let decimals = (5.0 - size).max(0.0) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
     }
 }
 

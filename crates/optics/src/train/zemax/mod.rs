@@ -5,6 +5,7 @@
 //! | `text` | bytes to lines: UTF-8 and UTF-16 |
 //! | `sheet` | lines to the rows of the lens data sheet |
 //! | `place` | coordinate breaks to tilts and decentrings |
+//! | `configuration` | the values of one position of a zoom lens |
 //! | `fields` | field points to field angles |
 //! | here | rows to the elements of a lens file |
 //!
@@ -16,6 +17,7 @@
 //! The format has no public specification. What the lines mean is taken from files in the wild and
 //! from OpticStudio's knowledge base ("Rotation Matrix and Tilt About X/Y/Z in OpticStudio", 2021).
 
+mod configuration;
 mod fields;
 mod place;
 mod sheet;
@@ -79,9 +81,24 @@ impl ZemaxLens {
     /// When it is no such file, or has a surface, glass or number that has no counterpart here; the
     /// error names the line.
     pub fn read(bytes: &[u8]) -> Result<Self, ZemaxError> {
+        Self::read_configuration(bytes, None)
+    }
+
+    /// As [`Self::read`], with the values of a configuration, from 1; those that the file stands at without.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`], and when there is no such configuration or it changes what has no counterpart here.
+    pub fn read_configuration(
+        bytes: &[u8],
+        configuration: Option<usize>,
+    ) -> Result<Self, ZemaxError> {
         let text = text::decode(bytes)?;
         // The lines of the file, and the elements that they describe.
-        let sheet = ZemaxSheet::read(&text)?;
+        let mut sheet = ZemaxSheet::read(&text)?;
+        if let Some(configuration) = configuration {
+            sheet.choose(configuration)?;
+        }
         let mut importer =
             Importer { sheet: &sheet, elements: Vec::new(), notes: Vec::new(), object_z: None };
         let sensor = importer.convert()?;
@@ -309,7 +326,9 @@ fn open_stop(
             .map_err(|error| ZemaxError::new(sheet.last_line, error.to_string()))
     };
     let train = build(file)?;
-    let Some((line, aperture)) = sheet.aperture else { return Ok(train) };
+    let Some((line, aperture)) = sheet.aperture else {
+        return float_stop(file, train, sheet, notes, build);
+    };
     let index = train.stop();
     let written = train.stop_radius();
     let error = |error: LensError| ZemaxError::new(line, error.to_string());
@@ -348,6 +367,38 @@ fn open_stop(
         PartSpec::Biconic(surface) => surface.semi_diameter = Some(Millimetres(radius)),
         part => *part = PartSpec::circular(radius),
     }
+    build(file)
+}
+
+/// The lens whose stop is as large as its own surface says, and, where it says nothing, as the widest beam
+/// that the other rims let through.
+fn float_stop(
+    file: &mut LensFile,
+    train: OpticalTrain,
+    sheet: &ZemaxSheet,
+    notes: &mut Vec<String>,
+    build: impl Fn(&LensFile) -> Result<OpticalTrain, ZemaxError>,
+) -> Result<OpticalTrain, ZemaxError> {
+    let index = train.stop();
+    let is_closed = |part: &PartSpec| *part == PartSpec::circular(0.0);
+    if !file.elements[index].mount.stop || !is_closed(&file.elements[index].part) {
+        return Ok(train);
+    }
+    let row = sheet.rows.iter().find(|row| row.stop);
+    let line = row.map_or(sheet.last_line, |row| row.line);
+    let widest = train.widest_opening().ok_or_else(|| {
+        ZemaxError::new(
+            line,
+            "the stop has no DIAM, and no other surface limits the beam: write the stop's DIAM, or the \
+             system's aperture as ENPD or FNUM",
+        )
+    })?;
+    notes.push(format!(
+        "line {line}: the stop has no DIAM; its radius is {:.5} mm, that of the widest beam on the axis that \
+         the other surfaces let through",
+        widest.stop_radius
+    ));
+    file.elements[index].part = PartSpec::circular(widest.stop_radius);
     build(file)
 }
 

@@ -1,10 +1,12 @@
 //! Lines to the rows of the lens data sheet.
 //!
-//! A line is a command and its values; indented lines belong to the `SURF` above them.
+//! A line is a command and its values. Commands of surfaces belong to the `SURF` above them, however lines
+//! are indented: what a command is about is in its name.
 
 use std::collections::BTreeMap;
 
 use super::ZemaxError;
+use super::configuration::ConfigurationValue;
 use super::fields::Fields;
 use super::place::Break;
 
@@ -31,7 +33,10 @@ pub(super) struct ZemaxSheet {
     wavelengths: Vec<f64>,
     primary: usize,
     pub(super) fields: Fields,
-    configurations: usize,
+    /// How many there are, the one in place from 1, and the values of all.
+    pub(super) configurations: usize,
+    pub(super) configuration: usize,
+    pub(super) values: Vec<ConfigurationValue>,
     ignored: BTreeMap<String, Ignored>,
 }
 
@@ -57,7 +62,7 @@ pub(super) struct SheetRow {
     pub(super) stop: bool,
     pub(super) parameters: BTreeMap<usize, Parameter>,
     pub(super) extra: BTreeMap<usize, Parameter>,
-    semi_diameter: Option<f64>,
+    pub(super) semi_diameter: Option<f64>,
     fixed: bool,
     clear: Option<f64>,
 }
@@ -95,13 +100,13 @@ struct Ignored {
 
 /// One line, taken apart.
 pub(super) struct SheetLine<'a> {
-    number: usize,
-    command: &'a str,
+    pub(super) number: usize,
+    pub(super) command: &'a str,
     rest: &'a str,
 }
 
 impl SheetLine<'_> {
-    fn error(&self, why: impl std::fmt::Display) -> ZemaxError {
+    pub(super) fn error(&self, why: impl std::fmt::Display) -> ZemaxError {
         ZemaxError::new(self.number, format!("{}: {why}", self.command))
     }
 
@@ -138,7 +143,7 @@ impl SheetLine<'_> {
 
 impl ZemaxSheet {
     pub(super) fn read(text: &str) -> Result<Self, ZemaxError> {
-        let mut sheet = Self { unit: 1.0, configurations: 1, ..Self::default() };
+        let mut sheet = Self { unit: 1.0, configurations: 1, configuration: 1, ..Self::default() };
         let mut in_surface = false;
         for (number, written) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
             // A command, and what it is given.
@@ -146,8 +151,6 @@ impl ZemaxSheet {
             let (command, rest) = trimmed.split_once(char::is_whitespace).unwrap_or((trimmed, ""));
             let line = SheetLine { number, command, rest: rest.trim() };
             sheet.last_line = number;
-            let indented = written.starts_with(char::is_whitespace);
-            // Indented lines after a SURF are about that surface, all others about the lens.
             let known = match command {
                 "" => true,
                 "SURF" => {
@@ -155,13 +158,20 @@ impl ZemaxSheet {
                     in_surface = true;
                     true
                 }
-                _ => {
-                    in_surface &= indented;
-                    match sheet.rows.last_mut() {
-                        Some(row) if in_surface => row.read(&line)?,
-                        _ => sheet.read_header(&line)?,
-                    }
+                _ if sheet.read_header(&line)? => {
+                    in_surface = false;
+                    true
                 }
+                _ => match sheet.rows.last_mut() {
+                    Some(row) if in_surface => row.read(&line)?,
+                    // What would change the light's way is not dropped.
+                    _ if SheetRow::default().read(&line)? => {
+                        return Err(line.error(
+                            "it belongs to a surface, and none is begun here: write it below its SURF",
+                        ));
+                    }
+                    _ => false,
+                },
             };
             if !known {
                 sheet.ignore(&line);
@@ -202,14 +212,18 @@ impl ZemaxSheet {
             "XFLN" => self.fields.x = line.numbers()?,
             "YFLN" => self.fields.y = line.numbers()?,
             "MNUM" => {
-                self.configurations = line.index(0)?;
+                self.configurations = line.index(0)?.max(1);
+                self.configuration = line.index(1).unwrap_or(1);
             }
             "EFFL" => self.state_focal_length(line)?,
             "NOTE" => {
                 self.stated_efl = self.stated_efl.or_else(|| focal_length_in_words(line.rest));
                 return Ok(false);
             }
-            _ => return Ok(false),
+            _ => match ConfigurationValue::read(line)? {
+                Some(value) if self.configurations > 1 => self.values.push(value),
+                Some(_) | None => return Ok(false),
+            },
         }
         if line.command == "NAME" {
             self.stated_efl = self.stated_efl.or_else(|| focal_length_in_words(line.rest));
@@ -304,8 +318,8 @@ impl ZemaxSheet {
         let mut notes = Vec::new();
         if self.configurations > 1 {
             notes.push(format!(
-                "of {} configurations, the one that the file stands at is taken",
-                self.configurations
+                "of {} configurations, number {} is taken",
+                self.configurations, self.configuration
             ));
         }
         if self.wavelengths.iter().any(|&micrometres| micrometres <= 0.0) {

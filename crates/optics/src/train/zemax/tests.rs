@@ -217,6 +217,95 @@ fn the_systems_aperture_sets_the_stop() {
 }
 
 #[test]
+fn indentation_changes_nothing() {
+    let header = ["NAME Singlet", "ENPD 6.5", "WAVM 1 0.55 1", "PWAV 1"];
+    let text = file(&header, &SINGLET);
+    let indented = read(&text);
+    let efl = |lens: &ZemaxLens| train(&lens.file).paraxial(550.0).unwrap().efl.unwrap();
+    let flush: String = text.lines().map(|line| format!("{}\r\n", line.trim())).collect();
+    let deep: String = text.lines().map(|line| format!(" \t  {line}\r\n")).collect();
+    let one = text.replace("  CURV -2.0E-2", "CURV -2.0E-2");
+    for other in [flush, deep, one].map(|text| read(&text)) {
+        assert_eq!(other, indented);
+        assert!((efl(&other) - 49.0).abs() < 1.0, "{}", efl(&other));
+    }
+    // Below a line about the lens, nobody can tell to which surface one belongs.
+    for command in ["CURV 0.1", "DISZ 3", "GLAS N-BK7 0 0", "STOP", "DIAM 3", "PARM 1 2", "CONI -1"]
+    {
+        let refused = refused(&format!("{text}PWAV 1\r\n{command}\r\n"));
+        let name = command.split(' ').next().unwrap();
+        assert!(refused.contains(name) && refused.contains("SURF"), "{refused}");
+        let before = ZemaxLens::read(format!("{command}\r\n{text}").as_bytes()).unwrap_err();
+        assert_eq!(before.line, 1, "{before}");
+    }
+}
+
+#[test]
+fn a_floating_stop_without_a_size_is_as_wide_as_the_beam() {
+    let stop: &[&str] = &["STOP", "TYPE STANDARD", "CURV 0.0", "DISZ 2"];
+    let front = &SINGLET[0][1..];
+    let lens = read(&file(&["FLOA"], &[front, SINGLET[1], stop]));
+    let train = train(&lens.file);
+    let widest = train.widest_opening().unwrap();
+    assert!((train.stop_radius() / widest.stop_radius - 1.0).abs() < 1e-9);
+    assert!(lens.notes.iter().any(|note| note.contains("no DIAM")), "{:?}", lens.notes);
+    let ideal: &[&str] = &["TYPE PARAXIAL", "PARM 1 50", "DISZ 5"];
+    let unlimited = refused(&file(&["FLOA"], &[ideal, stop]));
+    assert!(unlimited.contains("DIAM") && unlimited.contains("ENPD"), "{unlimited}");
+}
+
+#[test]
+fn a_configuration_has_its_own_thicknesses_curvatures_and_apertures() {
+    let of = |thickness: f64, curvature: f64, pupil: f64| {
+        let first = SINGLET[0].map_line("CURV", &format!("CURV {curvature}"));
+        let second = SINGLET[1].map_line("DISZ", &format!("DISZ {thickness}"));
+        let [first, second] = [&first, &second].map(|row| row.iter().map(String::as_str).collect());
+        let rows: [Vec<&str>; 2] = [first, second];
+        file(&[&format!("ENPD {pupil}")], &[&rows[0], &rows[1]])
+    };
+    let values = "MNUM 3 1\r\nTHIC   2   1  47 0 0 0 1 1 1 0 0 \"\" 0\r\nTHIC 2 2 60.5 0 0\r\n\
+                  THIC 2 3 71 0 0\r\nCRVT 1 1 0.02 0\r\nCRVT 1 2 0.015 0\r\nCRVT 1 3 0.01 0\r\n\
+                  APER 0 1 6 0\r\nAPER 0 2 7 0\r\nAPER 0 3 8 0\r\n";
+    let zoom = of(47.0, 0.02, 6.0) + values;
+    let chosen = |i| ZemaxLens::read_configuration(zoom.as_bytes(), Some(i));
+    for (i, [thickness, curvature, pupil]) in
+        [[47.0, 0.02, 6.0], [60.5, 0.015, 7.0], [71.0, 0.01, 8.0]].into_iter().enumerate()
+    {
+        let lens = chosen(i + 1).unwrap();
+        assert_eq!(lens.file, read(&of(thickness, curvature, pupil)).file);
+        let note = format!("of 3 configurations, number {} is taken", i + 1);
+        assert!(lens.notes.contains(&note), "{:?}", lens.notes);
+    }
+    assert_eq!(read(&zoom).file, chosen(1).unwrap().file);
+    let error = chosen(4).unwrap_err().to_string();
+    assert!(error.contains("no configuration 4") && error.contains("has 3"), "{error}");
+    // What has no counterpart is named, unless it stays as it is.
+    let glass = |second: &str| {
+        let text = format!("{zoom}GLSS 1 1 N-BK7 0\r\nGLSS 1 2 {second} 0\r\n");
+        ZemaxLens::read_configuration(text.as_bytes(), Some(2))
+    };
+    assert!(glass("N-BK7").is_ok());
+    let error = glass("F2").unwrap_err().to_string();
+    assert!(error.contains("GLSS") && error.contains("OpticStudio"), "{error}");
+    let beyond = format!("{zoom}THIC 9 2 1 0\r\n");
+    let error = ZemaxLens::read_configuration(beyond.as_bytes(), Some(2)).unwrap_err().to_string();
+    assert!(error.contains("no surface 9"), "{error}");
+}
+
+/// Rows with one line changed.
+trait Lines {
+    fn map_line(&self, from: &str, to: &str) -> Vec<String>;
+}
+
+impl Lines for &[&str] {
+    fn map_line(&self, from: &str, to: &str) -> Vec<String> {
+        let change =
+            |line: &&str| if line.starts_with(from) { to.to_owned() } else { (*line).to_owned() };
+        self.iter().map(change).collect()
+    }
+}
+
+#[test]
 fn wavelengths_and_fields_in_use_are_taken_the_primary_first() {
     let header = [
         "FTYP 0 0 3 3 0 0 0",

@@ -5,7 +5,7 @@ use etendue_scene::Scene;
 use etendue_tracer::{ClearSky, Paint};
 
 use super::{TRACERS, assert_shows, check, patch, picture, ways};
-use crate::steps::load_in;
+use crate::steps::{self, load, load_in};
 
 /// A Lambert plane under a point light, ρ I cos θ / (π d²), and under the sun, ρ E cos θ / π: without
 /// noise.
@@ -272,4 +272,38 @@ fn a_tilted_and_hidden_sky() {
     assert!(facing.iter().all(|&p| (p - 1.0).abs() < 0.01), "looking to +X: red");
     let hidden = scene([-3.0, 0.1, 0.2], false);
     assert!(hidden.iter().all(|&p| p == 0.0));
+}
+
+/// A small lamp through a ball of glass comes by a few paths, which is said with their share; an even sky does not.
+#[test]
+fn sparkles_are_told() {
+    let notes = |light: &str| {
+        let scene = load(&format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "path"}},
+            "camera": {{"type": "pinhole", "pose": {{"from": [0, 2, 3], "look_at": [0, 0.2, 0]}},
+                "sensor": {{"resolution": [48, 48]}}}},
+            "lights": [{light}], "objects": [
+                {{"shape": "rectangle", "width": 9, "height": 9, "material": "floor", "transform": {{"rotate": [1, 0, 0, -90]}}}},
+                {{"shape": "sphere", "radius": 0.5, "triangles": 2000, "material": "glass",
+                  "transform": {{"translate": [0, 0.7, 0]}}}},
+                {{"shape": "sphere", "radius": 0.1, "triangles": 80, "material": "lamp",
+                  "transform": {{"translate": [0, 4, 0]}}}}],
+            "materials": {{"floor": {{"type": "matte", "color": [0.5, 0.5, 0.5]}}, "glass": {{"type": "dielectric"}},
+                "lamp": {{"type": "emissive", "radiance": [300, 300, 300]}}}},
+            "render": {{"samples": 64}}}}"#
+        ));
+        let plan = etendue_render::Plan::new(
+            &scene,
+            etendue_render::output::Outputs::from_list("exr").unwrap(),
+        );
+        steps::rendered(&scene, &plan).notes
+    };
+    let told = notes("");
+    let is_told = |note: &String| {
+        note.starts_with("sparkles: ") && note.contains(" of 147456 samples carry ")
+    };
+    assert!(told.iter().any(is_told), "{told:?}");
+    // The same lamp, lost in the light of a sky.
+    let even = notes(r#"{"type": "environment", "radiance": [1000, 1000, 1000]}"#);
+    assert!(!even.iter().any(|note| note.starts_with("sparkles")), "{even:?}");
 }

@@ -7,7 +7,10 @@
 
 mod bounds;
 mod lights;
+mod media;
+mod one_plane;
 mod surfaces;
+mod thin;
 
 use etendue_render::accelerators;
 use etendue_scene::Scene;

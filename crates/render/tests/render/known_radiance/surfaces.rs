@@ -129,3 +129,55 @@ fn a_ball_of_rough_glass_in_a_furnace() {
         }
     }
 }
+
+/// White metal returns all light at every roughness, anisotropy and angle: brushed, polished and seen at 88°.
+#[test]
+fn white_brushed_metal_in_a_furnace() {
+    for (roughness, anisotropy) in
+        [(0.1, 0.0), (0.1, 1.0), (0.1, 0.5), (0.4, 0.7), (0.8, 1.0), (0.3, 0.2)]
+    {
+        for (degrees, azimuth) in
+            [(0.0_f64, 0.0_f64), (60.0, 20.0), (80.0, 90.0), (80.0, 0.0), (88.0, 45.0)]
+        {
+            let rest = format!(
+                r#""lights": [{{"type": "environment"}}],
+                "objects": [{{"shape": "rectangle", "width": 900, "height": 900, "material": "m"}}],
+                "materials": {{"m": {{"type": "gltf", "color": [1, 1, 1], "metallic": 1,
+                    "roughness": {roughness}, "anisotropy": {anisotropy}}}}}"#
+            );
+            let ((sin, cos), (y, x)) =
+                (degrees.to_radians().sin_cos(), azimuth.to_radians().sin_cos());
+            let from = [3.0 * sin * x, 3.0 * sin * y, 3.0 * cos];
+            let pixels = picture(load(&patch("path", 256, from, [0.0; 3], &rest)), ways()[0]);
+            let name =
+                format!("roughness {roughness}, anisotropy {anisotropy}, {degrees}° at {azimuth}°");
+            // The table of brushed facets is taken for a hundredth more than it is, which is as exact as it may be.
+            assert_shows(&name, &pixels, 1.0, 1.5e-2);
+        }
+    }
+}
+
+/// Sunlight that passes a coloured pane without thickness: E cos θ (1 − F) of the pane's colour, on a white wall.
+#[test]
+fn the_sun_through_a_pane() {
+    for degrees in [0.0_f64, 30.0, 60.0, 75.0] {
+        for ior in [1.33, 1.5, 2.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let rest = format!(
+                r#""lights": [{{"type": "directional", "direction": [{sin}, 0, {}], "irradiance": [1, 1, 1]}}],
+                "objects": [{{"shape": "rectangle", "width": 1, "height": 1, "material": "wall"}},
+                    {{"shape": "rectangle", "width": 90, "height": 90, "material": "pane",
+                      "transform": {{"translate": [0, 0, 1]}}}}],
+                "materials": {{"wall": {{"type": "matte", "color": [1, 1, 1]}},
+                    "pane": {{"type": "gltf", "color": [0.4, 0.6, 0.8], "transmission": 1, "roughness": 0,
+                        "ior": {ior}}}}}"#,
+                -cos
+            );
+            let (reflected, _) = etendue_tracer::bsdf::fresnel::dielectric(cos, ior);
+            let known = 0.4 * (1.0 - reflected) * cos / std::f64::consts::PI;
+            let pixels =
+                picture(load(&patch("direct", 4, [0.0, 0.2, 0.5], [0.0; 3], &rest)), ways()[0]);
+            assert_shows(&format!("{degrees}° {ior}"), &pixels, known, 1e-6);
+        }
+    }
+}

@@ -10,7 +10,7 @@ use json::validation::Checked;
 use rayon::prelude::*;
 
 use super::Reader;
-use super::buffers::{View, size};
+use super::buffers::{Bytes, View, size};
 use crate::import::ImportError;
 
 /// Floats that Embree reads from the start of the last vertex on.
@@ -177,6 +177,28 @@ impl<'a> Reader<'a> {
             ));
         }
         Ok(Sparse { indices: Box::new(indices), values: Box::new(values) })
+    }
+}
+
+impl<'a> Accessor<'a> {
+    /// `count` elements that lie behind each other in `bytes`.
+    pub(super) fn of_packed(
+        bytes: &'a Bytes,
+        (component, components): (ComponentType, usize),
+        count: usize,
+        normalized: bool,
+    ) -> Self {
+        let len = bytes.as_slice().len();
+        Self {
+            view: Some(View { bytes, start: 0, len, stride: None }),
+            start: 0,
+            stride: components * component.size(),
+            count,
+            component,
+            components,
+            normalized,
+            sparse: None,
+        }
     }
 }
 

@@ -8,10 +8,12 @@ use base64::Engine as _;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use bytemuck::AnyBitPattern;
-use etendue_geometry::{Buffer, MappedFile};
+use etendue_files::MappedFile;
+use etendue_geometry::Buffer;
 use gltf::json;
 
 use super::document::Document;
+use super::draco::Decoded;
 use super::meshopt::Compressed;
 use super::{Reader, damaged};
 use crate::import::ImportError;
@@ -64,6 +66,8 @@ pub(super) struct Buffers {
     buffers: Vec<Result<Bytes, Unread>>,
     /// The bytes of compressed views, once somebody needs them.
     decoded: Vec<OnceLock<Bytes>>,
+    /// The meshes of views that Draco compressed, once somebody needs them.
+    pub(super) draco: Vec<OnceLock<Decoded>>,
 }
 
 /// A buffer without bytes of its own: another extension's placeholder.
@@ -96,7 +100,9 @@ impl Buffers {
         }
         let mut decoded = Vec::new();
         decoded.resize_with(document.root.buffer_views.len(), OnceLock::new);
-        Ok(Self { buffers, decoded })
+        let mut draco = Vec::new();
+        draco.resize_with(document.root.buffer_views.len(), OnceLock::new);
+        Ok(Self { buffers, decoded, draco })
     }
 }
 

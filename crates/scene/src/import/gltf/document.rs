@@ -133,21 +133,24 @@ pub(super) fn parse(path: &Path, json: &[u8], in_glb: bool) -> Result<Document, 
 
 fn require_version_2(path: &Path, document: &Map<String, Value>) -> Result<(), ImportError> {
     let asset = document.get("asset");
-    let text = |key| asset.and_then(|a| a.get(key)).and_then(Value::as_str);
-    let version = text("minVersion").or(text("version"));
-    match version {
-        Some("2.0") => Ok(()),
-        Some(other) => Err(super::damaged(
-            path,
-            "asset.version",
-            format!("glTF {other} is not supported; export it as glTF 2.0"),
-        )),
-        None => Err(super::damaged(
-            path,
-            "asset.version",
-            "missing; this is not a glTF 2.0 file, or it is damaged",
-        )),
-    }
+    let written = |key| asset.and_then(|asset| asset.get(key));
+    // glTF 1.0 keeps its parts by name, and some of its files have a number here, or no version.
+    let is_named = |key| document.get(key).is_some_and(Value::is_object);
+    let is_first = ["nodes", "meshes", "accessors"].into_iter().any(is_named);
+    let why = match written("minVersion").or(written("version")) {
+        Some(Value::String(version)) if version == "2.0" => return Ok(()),
+        Some(Value::String(version)) if version.starts_with("1.") => super::first_version(),
+        Some(Value::Number(version)) if version.as_f64() == Some(1.0) => super::first_version(),
+        None if is_first => super::first_version(),
+        Some(Value::String(other)) => {
+            format!("glTF {other} is not supported; export it as glTF 2.0")
+        }
+        Some(other) => {
+            format!("{other} is no version; it must be the text \"2.0\" of a glTF 2.0 file")
+        }
+        None => "missing; this is not a glTF 2.0 file, or it is damaged".to_owned(),
+    };
+    Err(super::damaged(path, "asset.version", why))
 }
 
 /// `value` as a `T`, or where in the document it is not one.

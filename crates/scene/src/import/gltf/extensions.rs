@@ -23,7 +23,6 @@ enum Support {
     Encoded(&'static str),
 }
 
-const DECOMPRESS: &str = "decompress it: npx @gltf-transform/cli copy IN decompressed.glb";
 const TO_PNG: &str = "convert its textures: npx @gltf-transform/cli ktxdecompress IN converted.glb (needs KTX-Software)";
 const FROM_AVIF: &str =
     "convert its textures: npx @gltf-transform/cli png IN converted.glb --formats '*'";
@@ -45,9 +44,9 @@ fn support(name: &str) -> Option<Support> {
         | "KHR_materials_sheen"
         | "EXT_meshopt_compression"
         | "KHR_meshopt_compression"
+        | "KHR_draco_mesh_compression"
         | "KHR_node_visibility"
         | "EXT_texture_webp" => Support::Full,
-        "KHR_draco_mesh_compression" => Support::Encoded(DECOMPRESS),
         "KHR_texture_basisu" => Support::Encoded(TO_PNG),
         "EXT_texture_avif" => Support::Encoded(FROM_AVIF),
         "KHR_materials_variants" => Support::Without("the default variant is shown"),
@@ -90,7 +89,6 @@ pub(super) fn check(
             // A required look (a thin film, say) changes no geometry.
             Some(Support::Look) if !wanted.light => None,
             Some(Support::Look) => Some(refused(path, name, UNKNOWN)),
-            // Draco's users often keep a plain copy that the primitives name.
             Some(Support::Encoded(command)) => Some(refused(path, name, command)),
             None => Some(refused(path, name, UNKNOWN)),
         }
@@ -117,18 +115,6 @@ pub(super) fn check(
         note::push(notes, Note::new(NoteKind::Extension, name, message));
     }
     Ok(())
-}
-
-/// Refuses a primitive whose vertices exist in compressed form only.
-pub(super) fn refuse_compressed_primitive(
-    path: &Path,
-    primitive: &json::mesh::Primitive,
-) -> Result<(), ImportError> {
-    let name = "KHR_draco_mesh_compression";
-    match primitive.extensions.as_ref().is_some_and(|e| e.others.contains_key(name)) {
-        true => Err(refused(path, name, DECOMPRESS)),
-        false => Ok(()),
-    }
 }
 
 /// The image that a texture has as `WebP`.

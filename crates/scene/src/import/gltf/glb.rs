@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use etendue_geometry::MappedFile;
+use etendue_files::MappedFile;
 
 use super::buffers::Bytes;
 use super::damaged;
@@ -36,6 +36,9 @@ pub(super) fn open<'a>(
     let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
         return Err(broken("the file ends inside its header; copy or export it again".into()));
     };
+    if version == 1 {
+        return Err(broken(super::first_version()));
+    }
     if version != 2 {
         return Err(broken(format!("version {version} instead of 2; export it as glTF 2.0")));
     }

@@ -13,6 +13,7 @@ mod animation;
 mod buffers;
 mod deform;
 mod document;
+mod draco;
 mod extensions;
 mod glb;
 mod glossiness;
@@ -63,6 +64,13 @@ impl Reader<'_> {
     ) -> ImportError {
         absent(self.file, from, what, index, count)
     }
+}
+
+/// What to do about a file of glTF's first version.
+fn first_version() -> String {
+    "this is glTF 1.0, which is not supported; convert it: npx gltf-pipeline -i OLD.gltf -o NEW.glb, or \
+     export it as glTF 2.0"
+        .to_owned()
 }
 
 fn absent(

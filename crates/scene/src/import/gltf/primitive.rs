@@ -9,11 +9,12 @@ use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::Checked;
 use rayon::prelude::*;
 
+use super::Reader;
 use super::accessor::Accessor;
 use super::deform::Corners;
+use super::draco::{Compressed, Decoded};
 use super::hierarchy::{Scene, Shape};
 use super::skin::Skin;
-use super::{Reader, extensions};
 use crate::import::admit::{Admitted, Candidate, admit, cost};
 use crate::import::note::{self, Note, NoteKind};
 use crate::import::{Import, ImportError, Strictness};
@@ -176,9 +177,9 @@ fn read(
     if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
         return Ok(None);
     }
-    let mut part = Part { reader, primitive, place, notes: Vec::new() };
+    let draco = reader.draco(primitive, &place)?;
+    let mut part = Part { reader, primitive, draco, place, notes: Vec::new() };
     let Some(positions) = part.attribute::<3>(&Semantic::Positions, 0.0)? else {
-        extensions::refuse_compressed_primitive(reader.file, primitive)?;
         part.note(NoteKind::Irregular, "a primitive without positions is left out");
         return Ok(Some(part.empty(name)));
     };
@@ -214,6 +215,8 @@ fn read(
 pub(super) struct Part<'a> {
     pub reader: &'a Reader<'a>,
     pub primitive: &'a Primitive,
+    /// Where its vertices and triangles are, when they are compressed.
+    draco: Option<(Compressed, &'a Decoded)>,
     pub place: String,
     notes: Vec<Note>,
 }
@@ -278,30 +281,30 @@ impl<'a> Part<'a> {
             Checked::Valid(known) => known.to_string() == wanted,
             Checked::Invalid => false,
         });
-        let Some((_, index)) = found else { return Ok(None) };
-        self.refuse_without_data(index.value())?;
         let place = format!("{}, {wanted}", self.place);
+        if let Some((compressed, decoded)) = &self.draco {
+            let accessors = &self.reader.document.root.accessors;
+            let own = found.and_then(|(_, index)| accessors.get(index.value()));
+            let normalized = own.is_some_and(|accessor| accessor.normalized);
+            if let Some(accessor) = decoded.accessor(compressed, &wanted, normalized) {
+                let accessor = accessor.map_err(|why| self.reader.damaged(&*place, why))?;
+                return Ok(Some((accessor, place)));
+            }
+        }
+        let Some((_, index)) = found else { return Ok(None) };
         let accessor = self.reader.accessor(index.value(), &place)?;
         Ok(Some((accessor, place)))
     }
 
-    /// Draco leaves the accessors without bytes, unless the file keeps a plain copy too.
-    fn refuse_without_data(&self, accessor: usize) -> Result<(), ImportError> {
-        match self.reader.document.root.accessors.get(accessor) {
-            Some(accessor) if accessor.buffer_view.is_none() && accessor.sparse.is_none() => {
-                extensions::refuse_compressed_primitive(self.reader.file, self.primitive)
-            }
-            _ => Ok(()),
-        }
-    }
-
     fn triangles(&mut self, mode: Mode, vertices: usize) -> Result<Buffer<[u32; 3]>, ImportError> {
+        if let Some((_, decoded)) = &self.draco {
+            return Ok(decoded.triangles.clone().into());
+        }
         let Some(index) = self.primitive.indices else {
             let count = u32::try_from(vertices).unwrap_or(u32::MAX);
             self.whole_triangles(mode, vertices)?;
             return Ok(assemble(mode, vertices, |i| u32::try_from(i).unwrap_or(count)).into());
         };
-        self.refuse_without_data(index.value())?;
         let place = format!("{}, indices", self.place);
         let accessor = self.reader.accessor(index.value(), &place)?;
         self.reader.files.take(12 * accessor.count as u64 / 3, || place.clone())?;

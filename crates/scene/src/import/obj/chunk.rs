@@ -7,6 +7,17 @@ use crate::import::text::{Fault, Words, number, whole};
 /// The index of a corner that has none.
 pub(super) const NONE: u32 = u32::MAX;
 
+/// What lines of an OBJ model begin with (Wavefront Technologies, appendix B1).
+const STATEMENTS: [&[u8]; 14] = [
+    b"s", b"v", b"vt", b"vn", b"vp", b"f", b"fo", b"l", b"p", b"o", b"g", b"usemtl", b"mtllib",
+    b"cstype",
+];
+
+/// Whether a line that begins with `word` is neither one that is looked at nor a comment.
+fn is_foreign(word: &[u8]) -> bool {
+    !word.starts_with(b"#") && !STATEMENTS.contains(&word)
+}
+
 /// What corners index: positions, texture coordinates, normals.
 pub(super) const KINDS: usize = 3;
 pub(super) const V: usize = 0;
@@ -45,6 +56,10 @@ pub(super) struct Chunk {
     pub free_form: u64,
     /// Faces of fewer than three corners.
     pub too_small: u64,
+    /// Where the first line begins that no statement of OBJ begins like, and how it begins.
+    pub foreign: Option<(usize, String)>,
+    /// Some line is one of OBJ.
+    pub is_obj: bool,
 }
 
 /// A face with other than three corners.
@@ -72,7 +87,9 @@ impl Chunk {
         let mut chunk = Self::default();
         let mut words = Words::new(text);
         while !words.is_done() {
-            match words.word() {
+            let word = words.word();
+            chunk.is_obj |= word.is_some_and(|word| STATEMENTS.contains(&word));
+            match word {
                 Some(b"v") => chunk.vertex(&mut words, wish)?,
                 Some(b"f" | b"fo") => chunk.face(&mut words, wish)?,
                 Some(b"vt") => chunk.uv(&mut words, wish)?,
@@ -94,6 +111,9 @@ impl Chunk {
                 }
                 Some(b"l" | b"p") => chunk.without_surface += 1,
                 Some(b"curv" | b"curv2" | b"surf") => chunk.free_form += 1,
+                Some(other) if chunk.foreign.is_none() && is_foreign(other) => {
+                    chunk.foreign = Some((words.at() - other.len(), string(other)));
+                }
                 // Comments, smoothing groups, display attributes, blank lines.
                 _ => {}
             }

@@ -66,6 +66,7 @@ pub(super) fn import(
         })
         .collect::<Result<_, _>>()
         .map_err(fault)?;
+    refuse_foreign(&chunks, &pieces).map_err(fault)?;
     let missing = pool::settle(&mut chunks, options.strictness)
         .map_err(|chunk| pool::find_bad_index(&pieces, chunk, &chunks, options.strictness))
         .map_err(fault)?;
@@ -98,6 +99,28 @@ fn refuse_zero_bytes(text: &[u8]) -> Result<(), Fault> {
     }
     let at = text.iter().position(|&byte| byte == 0).unwrap_or_default();
     Err(Fault::new(at, "a zero byte: this is no text, hence no OBJ; export the model again"))
+}
+
+/// Refuses text of another format: no line of it is one of OBJ, and some line is no comment.
+fn refuse_foreign(chunks: &[Chunk], pieces: &[(usize, &[u8])]) -> Result<(), Fault> {
+    if chunks.iter().any(|chunk| chunk.is_obj) {
+        return Ok(());
+    }
+    let first = pieces
+        .iter()
+        .zip(chunks)
+        .find_map(|(piece, chunk)| chunk.foreign.as_ref().map(|(at, word)| (piece.0 + at, word)));
+    let Some((at, word)) = first else { return Ok(()) };
+    let what = match word.as_str() {
+        // The letter says what it holds, numbers of its surface follow (MNI's BIC-obj, `bicobj.c`).
+        "P" | "L" | "M" => "this looks like a surface of the MNI's tools",
+        _ => "this is another format",
+    };
+    let why = format!(
+        "no line is one of Wavefront's OBJ, such as `v 0 0 0` or `f 1 2 3`: {what}; convert it to OBJ, PLY or \
+         glTF"
+    );
+    Err(Fault::new(at, why))
 }
 
 /// Adds a mesh where the file has it.

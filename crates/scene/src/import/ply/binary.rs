@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use etendue_geometry::{Buffer, MappedFile, Vertices};
+use etendue_files::MappedFile;
+use etendue_geometry::{Buffer, Vertices};
 use rayon::prelude::*;
 
 use super::faces::{Faces, Lists};

@@ -1,6 +1,6 @@
 //! Data as text, one row a line.
 
-use etendue_geometry::MappedFile;
+use etendue_files::MappedFile;
 use rayon::prelude::*;
 
 use super::faces::{Faces, Lists};

@@ -4,6 +4,7 @@ mod animations;
 mod broken;
 mod build;
 mod damaged;
+mod draco;
 mod gltf;
 mod obj;
 mod packed;

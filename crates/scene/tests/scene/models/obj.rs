@@ -86,6 +86,27 @@ fn broken_obj_is_refused_with_its_line() {
 
 /// Each rule of `docs/light.md`: glass, mirrors, a coat over a matte base, thin surfaces, lamps.
 #[test]
+fn text_of_another_format_is_refused_as_such() {
+    let folder = folder();
+    let mni = "P 0.3 0.3 0.4 10 1 3\n 0 0 0\n 1 0 0\n 0 1 0\n\n 0 0 1\n 0 0 1\n 0 0 1\n\n 1\n 0 1 1 1 1\n\n 3\n\n 0 1 2\n";
+    let stl = "# exported\n\n  solid cube\nfacet normal 0 0 1\n";
+    for (text, words) in [
+        (mni, ["line 1, column 1", "Wavefront", "the MNI's tools"]),
+        (stl, ["line 3, column 3", "Wavefront", "another format"]),
+    ] {
+        let message = error(&write(&folder, "brain.obj", text));
+        for word in [&["brain.obj"], &words[..]].concat() {
+            assert!(message.contains(word), "{message}");
+        }
+    }
+    // What has one line of OBJ, or comments alone, is one.
+    for text in ["# nothing\n", "\n", "hello\nv 0 0 0\n", "s off\n"] {
+        let import = load(&write(&folder, "odd.obj", text));
+        assert!(import.meshes.iter().all(|mesh| mesh.triangles.is_empty()), "{text:?}");
+    }
+}
+
+#[test]
 fn mtl_materials_become_the_nearest_of_ours() {
     let folder = folder();
     write(

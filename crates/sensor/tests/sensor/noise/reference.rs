@@ -34,6 +34,40 @@ pub(crate) fn poisson_gauss(mean: f64, sigma: f64, gain: f64, black: f64, white:
     probabilities
 }
 
+/// Mean and variance of min(Poisson(mean), well)·K + N(black, (K·σ)²), rounded and clipped, from the
+/// probability of every digital number.
+pub(crate) fn exact_moments(
+    mean: f64,
+    [sigma, gain, black]: [f64; 3],
+    well: f64,
+    white: u32,
+) -> [f64; 2] {
+    let mut probabilities = vec![0.0; white as usize + 1];
+    let reach = 9.0 * mean.sqrt() + 45.0;
+    // Two counts above the well are one.
+    for n in (mean - reach).max(0.0) as u32..=(mean + reach) as u32 {
+        let weight = if mean > 0.0 { poisson(n, mean) } else { f64::from(u8::from(n == 0)) };
+        let level = gain * f64::from(n).min(well) + black;
+        let at = |y: f64| y.clamp(0.0, f64::from(white)).round_ties_even() as u32;
+        let [first, last] = [-9.0, 9.0].map(|z| at(level + z * gain * sigma));
+        let mut previous = 0.0;
+        for y in first..=last {
+            let next = if y == last {
+                1.0
+            } else {
+                normal_cdf((f64::from(y) + 0.5 - level) / (gain * sigma))
+            };
+            probabilities[y as usize] += weight * (next - previous);
+            previous = next;
+        }
+    }
+    let sum = |value: &dyn Fn(f64) -> f64| -> f64 {
+        (0..=white).zip(&probabilities).map(|(y, p)| p * value(f64::from(y))).sum()
+    };
+    let centre = sum(&|y| y);
+    [centre, sum(&|y| (y - centre) * (y - centre))]
+}
+
 /// Pearson's χ² of counts against probabilities in standard deviations of its distribution. Bins
 /// that expect fewer than ten are joined to their neighbours.
 pub(crate) fn chi_square(counts: &[u64], probabilities: &[f64]) -> f64 {

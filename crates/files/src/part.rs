@@ -8,7 +8,7 @@
 //! finish wins. The rename is atomic for everyone who looks at the folder; data may still be on its
 //! way to the disk when it happens, so a power cut within seconds can lose it.
 //!
-//! Files of one set ([`Together`](super::Together)) take their names when all of them are complete.
+//! Files of one [`Transaction`] take their names when all of them are complete.
 //!
 //! Part files are locked by the process that writes them. One that is not is left from a process that
 //! was killed, and the next one that writes into the folder removes it.
@@ -22,31 +22,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{Builder, NamedTempFile};
 
-use super::special::Special;
-use super::{OutputError, refuse_inputs, together};
+use crate::special::Special;
+use crate::{Transaction, WriteError};
 
 /// The part files of this process, for a signal handler: what a signal ends is not dropped.
 static OPEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-/// The files that this process finished, until somebody asks.
-static FINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-/// Notes that `path` was written whole, by other means than a [`PartFile`].
-pub fn note_finished(path: PathBuf) {
-    FINISHED.lock().unwrap_or_else(PoisonError::into_inner).insert(path);
-}
-
-/// The files of `folder` that were finished since this was last asked, without those that go with the work.
-pub(super) fn take_finished(folder: &Path) -> Vec<PathBuf> {
-    let temporary = open_parts();
-    let mut finished = FINISHED.lock().unwrap_or_else(PoisonError::into_inner);
-    let here: Vec<PathBuf> =
-        finished.iter().filter(|path| path.parent() == Some(folder)).cloned().collect();
-    here.iter().for_each(|path| {
-        finished.remove(path);
-    });
-    here.into_iter().filter(|path| !temporary.contains(path)).collect()
-}
 
 fn open_set() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     OPEN.lock().unwrap_or_else(PoisonError::into_inner)
@@ -72,11 +52,11 @@ pub fn remove_open_parts() {
 ///
 /// # Errors
 ///
-/// [`OutputError::Io`] when it cannot be made or written to.
-pub fn prepare_folder(folder: &Path) -> Result<(), OutputError> {
-    fs::create_dir_all(folder).map_err(|source| OutputError::io(folder, source))?;
+/// [`WriteError::Io`] when it cannot be made or written to.
+pub fn prepare_folder(folder: &Path) -> Result<(), WriteError> {
+    fs::create_dir_all(folder).map_err(|source| WriteError::io(folder, source))?;
     let probe = open_beside(&folder.join("etendue"));
-    probe.map(drop).map_err(|source| OutputError::io(folder, source))?;
+    probe.map(drop).map_err(|source| WriteError::io(folder, source))?;
     remove_leftovers(folder, |target| ENDINGS.iter().any(|ending| target.ends_with(ending)));
     Ok(())
 }
@@ -91,7 +71,7 @@ fn remove_leftovers(folder: &Path, is_ours: impl Fn(&str) -> bool) {
     for entry in entries.flatten() {
         let name = entry.file_name();
         let Some(target) = name.to_str().and_then(target_of_part) else { continue };
-        if open_set().contains(&entry.path()) {
+        if open_set().contains(&absolute(&entry.path())) {
             continue;
         }
         let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
@@ -111,43 +91,12 @@ fn target_of_part(name: &str) -> Option<&str> {
     is_random.then_some(target)
 }
 
-/// Writes `target` with `write`; nothing changes there unless that and all else succeeds.
-///
-/// # Errors
-///
-/// [`OutputError::Io`] when the file cannot be made, written or renamed.
-pub fn write_whole(
-    target: &Path,
-    write: impl FnOnce(&mut PartFile) -> io::Result<()>,
-) -> Result<(), OutputError> {
-    filled(PartFile::create(target)?, write)
-}
-
-/// As [`write_whole`], where `target` may be an input: what its user has changed takes its place.
-///
-/// # Errors
-///
-/// As [`write_whole`].
-pub fn write_over(
-    target: &Path,
-    write: impl FnOnce(&mut PartFile) -> io::Result<()>,
-) -> Result<(), OutputError> {
-    filled(PartFile::over(target)?, write)
-}
-
-fn filled(
-    mut part: PartFile,
-    write: impl FnOnce(&mut PartFile) -> io::Result<()>,
-) -> Result<(), OutputError> {
-    write(&mut part).map_err(|source| OutputError::io(&part.target, source))?;
-    part.finish()
-}
-
 /// A file on its way. Dropped without [`Self::finish`], it leaves nothing behind.
 #[derive(Debug)]
-pub struct PartFile {
+pub struct PartFile<'t> {
     content: Content,
     target: PathBuf,
+    transaction: &'t Transaction,
 }
 
 /// Where the content of a file is until it is complete.
@@ -158,34 +107,23 @@ enum Content {
         file: NamedTempFile,
         // After the file, so that the entry outlives it: a signal in between finds a path too many
         // rather than a file too many.
-        _entry: Entry,
+        entry: Entry,
     },
     /// In a file without a name, to be copied to where it goes.
     Apart { file: File, to: Special },
 }
 
-impl PartFile {
-    /// Opens a part file beside `target`. Its permissions are those of any new file.
-    ///
-    /// # Errors
-    ///
-    /// [`OutputError::Io`] when the folder does not exist or cannot be written to, or when a
-    /// folder already has that name.
-    pub fn create(target: &Path) -> Result<Self, OutputError> {
-        refuse_inputs([target])?;
-        Self::over(target)
-    }
-
-    /// As [`Self::create`], of an input, too.
-    fn over(target: &Path) -> Result<Self, OutputError> {
-        let refuse = |source| OutputError::io(target, source);
+impl<'t> PartFile<'t> {
+    /// A part file beside `target`, for [`Transaction::create`].
+    pub(crate) fn beside(transaction: &'t Transaction, target: &Path) -> Result<Self, WriteError> {
+        let refuse = |source| WriteError::io(target, source);
         if target.is_dir() || target.file_name().is_none() {
             return Err(refuse(io::ErrorKind::IsADirectory.into()));
         }
         let target = target.to_owned();
         if let Some(to) = Special::of(&target) {
             let file = tempfile::tempfile().map_err(refuse)?;
-            return Ok(Self { content: Content::Apart { file, to }, target });
+            return Ok(Self { content: Content::Apart { file, to }, target, transaction });
         }
         if let (Some(name), Some(folder)) = (target.file_name(), folder_of(&target)) {
             remove_leftovers(folder, |left| name == left);
@@ -193,10 +131,10 @@ impl PartFile {
         // The set is locked until the new file is in it: a handler that reads it misses none.
         let mut open = open_set();
         let file = open_beside(&target).map_err(refuse)?;
-        open.insert(file.path().to_owned());
+        let path = absolute(file.path());
+        open.insert(path.clone());
         drop(open);
-        let _entry = Entry(file.path().to_owned());
-        Ok(Self { content: Content::Beside { file, _entry }, target })
+        Ok(Self { content: Content::Beside { file, entry: Entry(path) }, target, transaction })
     }
 
     fn file(&mut self) -> &mut File {
@@ -206,28 +144,27 @@ impl PartFile {
         }
     }
 
-    /// Gives the file its name, in place of what had it before; of a set ([`Together`](super::Together))
-    /// when all its files are complete.
+    /// Says that the file is complete: it takes its name, in place of what had it before, now or with the
+    /// others of its transaction.
     ///
     /// # Errors
     ///
-    /// [`OutputError::Io`] when it cannot be renamed; the part file is removed then.
-    pub fn finish(self) -> Result<(), OutputError> {
-        let Self { content, target } = self;
-        let done = match content {
-            Content::Beside { file, _entry } => {
-                let Some(file) = together::wait(file, &target, _entry) else { return Ok(()) };
-                file.persist(&target).map(drop).map_err(|failed| failed.error)
+    /// [`WriteError`] when it cannot be renamed, or an input has the name by now; the part file is removed
+    /// then.
+    pub fn finish(self) -> Result<(), WriteError> {
+        let Self { content, target, transaction } = self;
+        match content {
+            Content::Beside { file, entry } => transaction.take(file, target, entry),
+            Content::Apart { mut file, to } => {
+                to.fill(&target, &mut file).map_err(|source| WriteError::io(&target, source))?;
+                transaction.note_finished(target);
+                Ok(())
             }
-            Content::Apart { mut file, to } => to.fill(&target, &mut file),
-        };
-        done.map_err(|source| OutputError::io(&target, source))?;
-        note_finished(target);
-        Ok(())
+        }
     }
 }
 
-impl Write for PartFile {
+impl Write for PartFile<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.file().write(bytes)
     }
@@ -237,7 +174,7 @@ impl Write for PartFile {
     }
 }
 
-impl Seek for PartFile {
+impl Seek for PartFile<'_> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.file().seek(to)
     }
@@ -251,7 +188,8 @@ pub struct Temporary(Entry);
 impl Temporary {
     /// Of the file that is or will be at `path`.
     #[must_use]
-    pub fn new(path: PathBuf) -> Self {
+    pub fn new(path: &Path) -> Self {
+        let path = absolute(path);
         open_set().insert(path.clone());
         Self(Entry(path))
     }
@@ -266,12 +204,17 @@ impl Drop for Temporary {
 
 /// A path in [`OPEN`], for as long as this lives.
 #[derive(Debug)]
-pub(super) struct Entry(PathBuf);
+pub(crate) struct Entry(PathBuf);
 
 impl Drop for Entry {
     fn drop(&mut self) {
         open_set().remove(&self.0);
     }
+}
+
+/// `path` as it is found from any folder: another thread or a signal handler may have another one.
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 /// The folder of `target`.
@@ -320,7 +263,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("depth.exr");
         fs::write(&target, "old").unwrap();
-        let mut part = PartFile::create(&target).unwrap();
+        let files = Transaction::at_once();
+        let mut part = files.create(&target).unwrap();
         part.write_all(b"new").unwrap();
         assert_eq!(fs::read(&target).unwrap(), b"old");
         let ours: Vec<PathBuf> =
@@ -339,11 +283,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("depth.exr");
         fs::write(&target, "old").unwrap();
-        let error = write_whole(&target, |part| {
-            part.write_all(b"half of the n")?;
-            Err(io::ErrorKind::StorageFull.into())
-        })
-        .unwrap_err();
+        let error = Transaction::at_once()
+            .write(&target, |part| {
+                part.write_all(b"half of the n")?;
+                Err(io::ErrorKind::StorageFull.into())
+            })
+            .unwrap_err();
         assert!(error.to_string().contains("free some space"), "{error}");
         assert_eq!(fs::read(&target).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["depth.exr"]);
@@ -360,7 +305,8 @@ mod tests {
         for left in [".depth.exr.abcdef.part", ".picture.preview.png.X1y2Z3.part"] {
             put(left);
         }
-        let living = PartFile::create(&folder.path().join("depth.exr")).unwrap();
+        let files = Transaction::at_once();
+        let living = files.create(&folder.path().join("depth.exr")).unwrap();
         assert!(!names(folder.path()).contains(&".depth.exr.abcdef.part".to_owned()));
         prepare_folder(folder.path()).unwrap();
         let mut expected: Vec<String> = others.map(str::to_owned).into();
@@ -376,7 +322,9 @@ mod tests {
     fn a_panic_leaves_nothing_behind() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("depth.exr");
-        let panicked = std::panic::catch_unwind(|| write_whole(&target, |_| panic!("on purpose")));
+        let panicked = std::panic::catch_unwind(|| {
+            Transaction::at_once().write(&target, |_| panic!("on purpose"))
+        });
         assert!(panicked.is_err());
         assert!(names(folder.path()).is_empty());
     }
@@ -384,7 +332,8 @@ mod tests {
     #[test]
     fn a_signal_handler_finds_and_removes_what_is_open() {
         let folder = tempfile::tempdir().unwrap();
-        let part = PartFile::create(&folder.path().join("a.exr")).unwrap();
+        let files = Transaction::at_once();
+        let part = files.create(&folder.path().join("a.exr")).unwrap();
         // As `remove_open_parts` does, but only here: other tests have files open too.
         for path in open_parts().into_iter().filter(|path| path.starts_with(folder.path())) {
             fs::remove_file(path).unwrap();
@@ -404,13 +353,14 @@ mod tests {
             let pipe = pipe.clone();
             move || fs::read(pipe).unwrap()
         });
-        write_whole(&pipe, |part| {
-            // Out of order, as the writer of EXR files does.
-            part.write_all(b"a c")?;
-            part.seek(SeekFrom::Start(1))?;
-            part.write_all(b"b")
-        })
-        .unwrap();
+        Transaction::at_once()
+            .write(&pipe, |part| {
+                // Out of order, as the writer of EXR files does.
+                part.write_all(b"a c")?;
+                part.seek(SeekFrom::Start(1))?;
+                part.write_all(b"b")
+            })
+            .unwrap();
         assert_eq!(reader.join().unwrap(), b"abc");
         assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo());
         assert_eq!(names(folder.path()), ["pipe"]);
@@ -420,18 +370,18 @@ mod tests {
     fn a_folder_that_refuses_is_named_with_a_remedy() {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("missing").join("a.exr");
-        let message = PartFile::create(&missing).unwrap_err().to_string();
+        let message = Transaction::at_once().create(&missing).unwrap_err().to_string();
         assert!(message.contains("missing/a.exr"), "{message}");
         assert!(message.contains("create the folder first"), "{message}");
 
         let file = folder.path().join("file");
         fs::write(&file, "").unwrap();
-        let message = PartFile::create(&file.join("a.exr")).unwrap_err().to_string();
+        let message = Transaction::at_once().create(&file.join("a.exr")).unwrap_err().to_string();
         assert!(message.contains("file/a.exr"), "{message}");
         assert!(message.contains("a part of the path is a file"), "{message}");
         assert!(prepare_folder(&file).is_err(), "a file is no folder");
 
-        let message = PartFile::create(folder.path()).unwrap_err().to_string();
+        let message = Transaction::at_once().create(folder.path()).unwrap_err().to_string();
         assert!(message.contains("a folder has this name"), "{message}");
         assert_eq!(names(folder.path()), ["file"], "no attempt may leave anything");
     }
@@ -450,7 +400,7 @@ mod tests {
             return;
         }
         for error in [
-            PartFile::create(&refusing.join("a.exr")).unwrap_err(),
+            Transaction::at_once().create(&refusing.join("a.exr")).unwrap_err(),
             prepare_folder(refusing).unwrap_err(),
         ] {
             let message = error.to_string();
@@ -466,7 +416,7 @@ mod tests {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("plain"), "").unwrap();
-        write_whole(&folder.path().join("ours"), |_| Ok(())).unwrap();
+        Transaction::at_once().write(&folder.path().join("ours"), |_| Ok(())).unwrap();
         let mode = |name| fs::metadata(folder.path().join(name)).unwrap().permissions().mode();
         assert_eq!(mode("ours"), mode("plain"));
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// A target that is no regular file to be replaced.
 #[derive(Debug)]
-pub(super) enum Special {
+pub(crate) enum Special {
     /// A device, a pipe or a socket.
     Device,
     /// What this process writes to as its standard output or error.
@@ -16,7 +16,7 @@ pub(super) enum Special {
 
 impl Special {
     /// What `target` is when it is no regular file to be replaced.
-    pub(super) fn of(target: &Path) -> Option<Self> {
+    pub(crate) fn of(target: &Path) -> Option<Self> {
         let found = fs::metadata(target).ok()?;
         match own_stream(&found) {
             Some(stream) => Some(Self::Stream(stream)),
@@ -25,7 +25,7 @@ impl Special {
     }
 
     /// Writes all of `content`.
-    pub(super) fn fill(self, target: &Path, content: &mut File) -> io::Result<()> {
+    pub(crate) fn fill(self, target: &Path, content: &mut File) -> io::Result<()> {
         content.rewind()?;
         let mut to = match self {
             Self::Stream(stream) => stream,

@@ -27,7 +27,7 @@ impl MappedFile {
     /// When the file cannot be opened or mapped (an empty file maps to no bytes), or is no regular
     /// file.
     pub fn open(path: &Path) -> io::Result<Self> {
-        let file = crate::files::open(path)?;
+        let file = crate::regular::open(path)?;
         #[expect(unsafe_code, reason = "mapping a file is unsafe: another process may change it")]
         // SAFETY: the map is read-only and private, and is only ever read as plain bytes or as
         // numbers, for which every bit pattern is valid. Bytes that change under us can give a
@@ -43,7 +43,7 @@ impl MappedFile {
     ///
     /// When the file cannot be opened or read, is no regular file, or there is no memory for it.
     pub fn copy(path: &Path) -> io::Result<Self> {
-        let bytes = crate::files::read(path, u64::MAX)?;
+        let bytes = crate::regular::read(path, u64::MAX)?;
         Ok(Self { path: path.to_owned(), contents: Contents::Copied(bytes) })
     }
 

@@ -1,0 +1,460 @@
+//! From points of a mask to the directions in which points of the sensor see them.
+//!
+//! Directions are solved by Newton's method at points of the mask from nodes over the sensor, and joined
+//! by Chebyshev polynomials over the mask (least squares) and by Lagrange's cubics over the sensor. A lens
+//! that is round about its axis has its nodes on a radius: the mask is turned with the point of the
+//! sensor. The degree is the least that lands rays as near as the mask's pixels ask for; behind a thin
+//! lens the map is linear.
+//!
+//! The map is not the true one, but its Jacobian is known exactly, which is all that an unbiased estimate
+//! needs; how far rays land from where they are aimed is measured where a map is made.
+
+#![expect(clippy::cast_precision_loss, reason = "grids of a few hundred points")]
+
+use glam::{DMat3, DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::element::{Clip, Frame, Ray, RayStatus};
+use crate::train::aim::{slopes_near, slopes_to, towards_lens};
+use crate::train::{MonochromaticTrain, OpticalTrain, Part, Side};
+
+/// Intervals between nodes over a radius of the sensor, and over each of its sides.
+const RADIAL: usize = 24;
+const PLANAR: usize = 12;
+
+/// Points of the mask over each side of its square, at which directions are solved.
+const POINTS: usize = 12;
+
+/// The highest degree of the polynomials, and the number of their terms.
+const MOST_DEGREE: usize = 9;
+const MOST_TERMS: usize = terms(MOST_DEGREE);
+
+/// The weight of points that other rims hide.
+const HIDDEN: f64 = 1e-4;
+
+const fn terms(degree: usize) -> usize {
+    (degree + 1) * (degree + 2) / 2
+}
+
+/// What a map is made of: a lens with its masks clear, at a wavelength, before a sensor.
+#[derive(Clone, Copy)]
+pub(super) struct MaskScene<'a> {
+    pub(super) clear: &'a OpticalTrain,
+    pub(super) lens: &'a MonochromaticTrain,
+    /// The mask's element.
+    pub(super) element: usize,
+    pub(super) sensor: &'a Frame,
+    /// Half width and half height of the sensor (mm).
+    pub(super) half_size: DVec2,
+}
+
+impl MaskScene<'_> {
+    /// Where a ray along slopes crosses the mask's plane, in the mask's frame (mm).
+    pub(super) fn crossing(&self, film: DVec3, slopes: DVec2) -> Option<DVec2> {
+        let ray = Ray::new(film, towards_lens(slopes))?;
+        self.lens.crossing(Side::Sensor, self.element, ray).map(DVec2::from)
+    }
+
+    fn passes(&self, film: DVec3, slopes: DVec2) -> bool {
+        Ray::new(film, towards_lens(slopes)).is_some_and(|ray| {
+            self.lens.run(Side::Sensor, Clip::On, ray).status == RayStatus::Exited
+        })
+    }
+
+    /// Whether a turn about the axis turns the directions towards the mask's plane: all that bends rays is
+    /// round and centred, and the mask and the sensor stand square to the axis.
+    fn is_round(&self) -> bool {
+        let bends_round = |(i, element): (usize, &crate::train::Element)| match &element.part {
+            Part::Aperture(_) | Part::Filter(_) => {
+                i != self.element || element.frame.rotation == DMat3::IDENTITY
+            }
+            part => part.is_round() && element.frame.is_axial(),
+        };
+        self.sensor.rotation == DMat3::IDENTITY
+            && self.clear.elements().iter().enumerate().all(bends_round)
+    }
+}
+
+/// The map at one wavelength.
+#[derive(Debug, Clone)]
+pub(super) struct MaskMap {
+    round: bool,
+    sensor: Frame,
+    half_size: DVec2,
+    /// The distance of the outermost node of a round lens from the axis (mm).
+    radius: f64,
+    /// What is added to a point of the mask before it is turned (mm).
+    offset: DVec2,
+    /// The square of the mask that the polynomials are made for: centre and half sides (mm).
+    centre: DVec2,
+    half: DVec2,
+    degree: usize,
+    /// By nodes, [`terms`] of each; none where directions could not be solved.
+    terms: Vec<Option<Vec<DVec2>>>,
+}
+
+/// The map from one point of the sensor.
+pub(super) struct LocalMap<'a> {
+    map: &'a MaskMap,
+    terms: [DVec2; MOST_TERMS],
+    /// The direction on the sensor that is the nodes' +x.
+    axis: DVec2,
+}
+
+/// Directions solved from one node.
+struct Solved {
+    /// Point of the mask in −1..1, slopes, weight.
+    points: Vec<(DVec2, DVec2, f64)>,
+}
+
+impl MaskMap {
+    /// The map for points of the mask between `low` and `high` (mm), landing within `goal` (mm) where
+    /// polynomials of at least the degree `least` can, and how far from that it lands (mm); `None` where no
+    /// direction is found at all.
+    pub(super) fn new(
+        scene: &MaskScene<'_>,
+        [low, high]: [DVec2; 2],
+        goal: DVec2,
+        least: usize,
+    ) -> Option<(Self, DVec2)> {
+        let frame = &scene.clear.elements()[scene.element].frame;
+        let round = scene.is_round();
+        let corner = |x: f64, y: f64| {
+            scene.sensor.point((DVec2::new(x, y) * scene.half_size).extend(0.0)).truncate().length()
+        };
+        let radius = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)]
+            .into_iter()
+            .fold(0.0, |most: f64, (x, y)| most.max(corner(x, y)));
+        let (mut centre, mut half) = (0.5 * (low + high), 0.5 * (high - low));
+        let offset = if round { frame.vertex.truncate() } else { DVec2::ZERO };
+        if round {
+            // The circle about the axis that holds all of it.
+            let reach = (centre + offset).abs() + half;
+            (centre, half) = (DVec2::ZERO, DVec2::splat(reach.length()));
+        }
+        let mut map = Self {
+            round,
+            sensor: *scene.sensor,
+            half_size: scene.half_size,
+            radius,
+            offset,
+            centre,
+            half,
+            degree: 1,
+            terms: Vec::new(),
+        };
+        let count = if round { RADIAL + 1 } else { (PLANAR + 1) * (PLANAR + 1) };
+        let solved: Vec<Option<Solved>> =
+            (0..count).into_par_iter().map(|node| map.solve(scene, node)).collect();
+        // The least degree that is as good as wanted, or the best one.
+        let mut best: Option<(f64, Self, DVec2)> = None;
+        for degree in (least..=MOST_DEGREE).step_by(2) {
+            map.degree = degree;
+            map.terms = solved.iter().map(|node| fit(node.as_ref()?, degree)).collect();
+            if map.terms.iter().all(Option::is_none) {
+                break;
+            }
+            let Some(miss) = map.greatest_miss(scene, [low, high]) else { continue };
+            let share = (miss / goal).max_element();
+            if best.as_ref().is_none_or(|(least, ..)| share < *least) {
+                best = Some((share, map.clone(), miss));
+            }
+            if share <= 1.0 {
+                break;
+            }
+        }
+        best.map(|(_, map, miss)| (map, miss))
+    }
+
+    pub(super) fn degree(&self) -> usize {
+        self.degree
+    }
+
+    /// The place of a node on the sensor, as [`Self::slopes`] has it: turned, for a round lens (mm).
+    fn node_film(&self, node: usize) -> DVec3 {
+        if self.round {
+            let r = self.radius * node as f64 / RADIAL as f64;
+            return DVec3::new(r, 0.0, self.sensor.vertex.z);
+        }
+        let at = DVec2::new((node % (PLANAR + 1)) as f64, (node / (PLANAR + 1)) as f64);
+        self.sensor.point(((2.0 * at / PLANAR as f64 - 1.0) * self.half_size).extend(0.0))
+    }
+
+    /// Solves the directions from a node towards points of the mask; `None` when there are too few.
+    fn solve(&self, scene: &MaskScene<'_>, node: usize) -> Option<Solved> {
+        let film = self.node_film(node);
+        // In the mask's frame, for the node as it stands.
+        let target = |place: DVec2| self.centre + place * self.half - self.offset;
+        let solve = |place: DVec2, guess: Option<DVec2>| {
+            let aim = (scene.element, target(place));
+            match guess {
+                Some(guess) => slopes_near(scene.lens, film, aim, guess),
+                None => slopes_to(scene.clear, scene.lens, film, aim, None),
+            }
+        };
+        let middle = solve(DVec2::ZERO, None)?;
+        // The derivative in the middle guides the first points, a plane through what is solved the next.
+        const STEP: f64 = 1e-3;
+        let by = |step: DVec2| Some((solve(step, Some(middle))? - middle) / STEP);
+        let (by_x, by_y) = (by(DVec2::X * STEP)?, by(DVec2::Y * STEP)?);
+        let mut points = Vec::with_capacity(POINTS * POINTS);
+        for place in self.places() {
+            let guess = middle + by_x * place.x + by_y * place.y;
+            let Some(slopes) = solve(place, Some(guess)) else { continue };
+            let weight = if scene.passes(film, slopes) { 1.0 } else { HIDDEN };
+            points.push((place, slopes, weight));
+        }
+        (points.len() >= POINTS * POINTS / 4).then_some(Solved { points })
+    }
+
+    /// Points of the mask in −1..1: Chebyshev's in a square, and the same mapped to the disk of a round
+    /// lens.
+    fn places(&self) -> Vec<DVec2> {
+        let node = |i: usize| (std::f64::consts::PI * (i as f64 + 0.5) / POINTS as f64).cos();
+        let place = |i: usize| {
+            let [x, y] = [node(i % POINTS), node(i / POINTS)];
+            if self.round {
+                DVec2::new(x * (1.0 - 0.5 * y * y).sqrt(), y * (1.0 - 0.5 * x * x).sqrt())
+            } else {
+                DVec2::new(x, y)
+            }
+        };
+        (0..POINTS * POINTS).map(place).collect()
+    }
+
+    /// How far from where they are aimed rays land that leave the lens, between the nodes and between
+    /// the points (mm on the mask, x and y); `None` when none leaves.
+    fn greatest_miss(&self, scene: &MaskScene<'_>, [low, high]: [DVec2; 2]) -> Option<DVec2> {
+        /// Places of the sensor, and of the mask over each of its sides.
+        const FILMS: u32 = 64;
+        const ACROSS: u32 = 7;
+        let miss = |i: u32| {
+            let film = (2.0 * roberts(i) - 1.0) * scene.half_size;
+            let local = self.at(film)?;
+            let start = scene.sensor.point(film.extend(0.0));
+            let mut greatest: Option<DVec2> = None;
+            for k in 0..ACROSS * ACROSS {
+                let share = DVec2::new(f64::from(k % ACROSS), f64::from(k / ACROSS));
+                let aim = low + share / f64::from(ACROSS - 1) * (high - low);
+                let (slopes, _) = local.slopes(aim);
+                if !scene.passes(start, slopes) {
+                    continue;
+                }
+                let Some(landed) = scene.crossing(start, slopes) else { continue };
+                greatest = Some(greatest.unwrap_or_default().max((landed - aim).abs()));
+            }
+            greatest
+        };
+        let all: Vec<Option<DVec2>> = (0..FILMS).into_par_iter().map(miss).collect();
+        all.into_iter().flatten().reduce(DVec2::max)
+    }
+
+    /// The map from a point of the sensor (mm, on the sensor); `None` where it is not known.
+    pub(super) fn at(&self, film: DVec2) -> Option<LocalMap<'_>> {
+        let mut local = LocalMap { map: self, terms: [DVec2::ZERO; MOST_TERMS], axis: DVec2::X };
+        let count = terms(self.degree);
+        let mut add = |node: usize, weight: f64| {
+            let from = self.terms[node].as_ref()?;
+            for (sum, term) in local.terms[..count].iter_mut().zip(&from[..count]) {
+                *sum += *term * weight;
+            }
+            Some(())
+        };
+        if self.round {
+            let across = self.sensor.vertex.truncate() + film;
+            let r = across.length();
+            let at = if self.radius > 0.0 { r / self.radius * RADIAL as f64 } else { 0.0 };
+            // The outermost nodes may see nothing of the mask: the last ones that do go on a little.
+            let known = self.terms.iter().take_while(|node| node.is_some()).count();
+            if known < 4 || at > known as f64 {
+                return None;
+            }
+            let first = first_of_four(at, known - 1);
+            for (i, weight) in cubics(at - first as f64).into_iter().enumerate() {
+                add(first + i, weight)?;
+            }
+            if r > 0.0 {
+                local.axis = across / r;
+            }
+            return Some(local);
+        }
+        let along = |x: f64, half: f64| {
+            let at = if half > 0.0 { 0.5 * (x / half + 1.0) * PLANAR as f64 } else { 0.0 };
+            let held = (-1e-9..=PLANAR as f64 + 1e-9).contains(&at);
+            held.then(|| {
+                let first = first_of_four(at, PLANAR);
+                (first, cubics(at - first as f64))
+            })
+        };
+        let (column, across) = along(film.x, self.half_size.x)?;
+        let (row, down) = along(film.y, self.half_size.y)?;
+        for (j, down) in down.into_iter().enumerate() {
+            for (i, across) in across.into_iter().enumerate() {
+                add((row + j) * (PLANAR + 1) + column + i, across * down)?;
+            }
+        }
+        Some(local)
+    }
+}
+
+impl LocalMap<'_> {
+    /// Slopes towards a point of the mask (mm, in its frame), and the area of slopes that an area of the
+    /// mask takes (1/mm²).
+    pub(super) fn slopes(&self, at: DVec2) -> (DVec2, f64) {
+        let (slopes, by_x, by_y) = self.value(self.inside(at));
+        let area = by_x.perp_dot(by_y).abs() / (self.map.half.x * self.map.half.y);
+        (self.axis.rotate(slopes), area)
+    }
+
+    /// The point of the mask (mm) towards which slopes lead, and the area as [`Self::slopes`] gives it:
+    /// the map inverted by Newton's method.
+    pub(super) fn point(&self, slopes: DVec2) -> Option<(DVec2, f64)> {
+        let back = DVec2::new(self.axis.x, -self.axis.y);
+        let wanted = back.rotate(slopes);
+        let mut x = DVec2::ZERO;
+        for _ in 0..40 {
+            let (here, by_x, by_y) = self.value(x);
+            let miss = wanted - here;
+            let determinant = by_x.perp_dot(by_y);
+            if miss.length() <= 1e-14 * (by_x.length() + by_y.length()) {
+                let turned = self.map.centre + x * self.map.half;
+                let at = self.axis.rotate(turned) - self.map.offset;
+                return Some((at, determinant.abs() / (self.map.half.x * self.map.half.y)));
+            }
+            let step = DVec2::new(miss.perp_dot(by_y), by_x.perp_dot(miss)) / determinant;
+            if !step.is_finite() {
+                return None;
+            }
+            x += step.clamp_length_max(1.0);
+            if x.abs().max_element() > 3.0 {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// From a point of the mask to −1..1.
+    fn inside(&self, at: DVec2) -> DVec2 {
+        let back = DVec2::new(self.axis.x, -self.axis.y);
+        (back.rotate(at + self.map.offset) - self.map.centre) / self.map.half
+    }
+
+    /// The polynomial and its derivatives.
+    fn value(&self, at: DVec2) -> (DVec2, DVec2, DVec2) {
+        let degree = self.map.degree;
+        let ([x, by_x], [y, by_y]) = (chebyshev(at.x, degree), chebyshev(at.y, degree));
+        let mut sums = [DVec2::ZERO; 3];
+        let mut k = 0;
+        for total in 0..=degree {
+            for j in 0..=total {
+                let (i, term) = (total - j, self.terms[k]);
+                sums[0] += term * product(&x, &y, i, j);
+                sums[1] += term * product(&by_x, &y, i, j);
+                sums[2] += term * product(&x, &by_y, i, j);
+                k += 1;
+            }
+        }
+        (sums[0], sums[1], sums[2])
+    }
+}
+
+#[inline(always)]
+fn product(x: &[f64], y: &[f64], i: usize, j: usize) -> f64 {
+    x[i] * y[j]
+}
+
+/// Chebyshev's polynomials up to a degree and their derivatives.
+fn chebyshev(x: f64, degree: usize) -> [[f64; MOST_DEGREE + 1]; 2] {
+    let mut value = [0.0; MOST_DEGREE + 1];
+    let mut slope = [0.0; MOST_DEGREE + 1];
+    (value[0], value[1], slope[1]) = (1.0, x, 1.0);
+    for i in 2..=degree {
+        value[i] = 2.0 * x * value[i - 1] - value[i - 2];
+        slope[i] = 2.0 * (value[i - 1] + x * slope[i - 1]) - slope[i - 2];
+    }
+    [value, slope]
+}
+
+/// The polynomial of a degree nearest to what was solved, by the normal equations.
+fn fit(solved: &Solved, degree: usize) -> Option<Vec<DVec2>> {
+    let count = terms(degree);
+    if solved.points.len() < count {
+        return None;
+    }
+    let mut matrix = vec![0.0; count * count];
+    let mut right = vec![DVec2::ZERO; count];
+    let mut row = vec![0.0; count];
+    for &(place, slopes, weight) in &solved.points {
+        let ([x, _], [y, _]) = (chebyshev(place.x, degree), chebyshev(place.y, degree));
+        let mut k = 0;
+        for total in 0..=degree {
+            for j in 0..=total {
+                row[k] = product(&x, &y, total - j, j);
+                k += 1;
+            }
+        }
+        for (i, (sum, a)) in right.iter_mut().zip(&row).enumerate() {
+            *sum += slopes * (weight * a);
+            for (cell, b) in matrix[i * count..=i * count + i].iter_mut().zip(&row) {
+                *cell += weight * a * b;
+            }
+        }
+    }
+    cholesky(&mut matrix, &mut right, count).then_some(right)
+}
+
+/// Solves a symmetric positive system in place (A.-L. Cholesky); `false` when it is not positive.
+fn cholesky(matrix: &mut [f64], right: &mut [DVec2], count: usize) -> bool {
+    for i in 0..count {
+        for j in 0..=i {
+            let mut sum = matrix[i * count + j];
+            for k in 0..j {
+                sum -= matrix[i * count + k] * matrix[j * count + k];
+            }
+            if i == j {
+                if sum <= 0.0 || !sum.is_finite() {
+                    return false;
+                }
+                matrix[i * count + i] = sum.sqrt();
+            } else {
+                matrix[i * count + j] = sum / matrix[j * count + j];
+            }
+        }
+    }
+    for i in 0..count {
+        for k in 0..i {
+            let known = right[k] * matrix[i * count + k];
+            right[i] -= known;
+        }
+        right[i] /= matrix[i * count + i];
+    }
+    for i in (0..count).rev() {
+        for k in i + 1..count {
+            let known = right[k] * matrix[k * count + i];
+            right[i] -= known;
+        }
+        right[i] /= matrix[i * count + i];
+    }
+    true
+}
+
+/// The first of the four nodes around a place among the nodes 0 to `last`.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen nodes")]
+fn first_of_four(at: f64, last: usize) -> usize {
+    (at.max(0.0) as usize).saturating_sub(1).min(last - 3)
+}
+
+/// Lagrange's cubics of the nodes 0 to 3 at `x`.
+fn cubics(x: f64) -> [f64; 4] {
+    let [a, b, c, d] = [x, x - 1.0, x - 2.0, x - 3.0];
+    [-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0]
+}
+
+/// The R2 sequence (M. Roberts, 2018), corners of the square first.
+pub(super) fn roberts(i: u32) -> DVec2 {
+    if i < 4 {
+        return DVec2::new(f64::from(i & 1), f64::from(i >> 1));
+    }
+    let along = |step: f64| (0.5 + step * f64::from(i)).fract();
+    DVec2::new(along(0.754_877_666_246_693), along(0.569_840_290_998_053))
+}

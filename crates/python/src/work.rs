@@ -1,0 +1,140 @@
+//! Work without Python's lock: its threads, how Ctrl-C stops it, and the exceptions of its callbacks.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use etendue::Progress;
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::arrays::refused;
+
+/// How often Python is asked whether Ctrl-C was pressed, and shown progress (ms).
+const LOOK: u64 = 50;
+
+/// The pools of this process by their number of threads; 0 for all processors.
+#[derive(Default)]
+struct Pools {
+    process: u32,
+    by_threads: BTreeMap<usize, Arc<ThreadPool>>,
+}
+
+/// Locked by whoever holds Python's lock alone, as does whoever forks: a child never finds it locked.
+static POOLS: Mutex<Option<Pools>> = Mutex::new(None);
+
+/// The pool of `threads` threads. Threads do not survive a fork: a child makes its own.
+fn pool(_py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
+    let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = std::process::id();
+    if let Some(inherited) = pools.take_if(|pools| pools.process != process) {
+        // To drop them is to wait for threads that only the parent has.
+        std::mem::forget(inherited);
+    }
+    let pools = pools.get_or_insert_with(|| Pools { process, ..Pools::default() });
+    if let Some(pool) = pools.by_threads.get(&threads) {
+        return Ok(Arc::clone(pool));
+    }
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = Arc::new(pool.map_err(|error| refused(format!("threads = {threads}: {error}")))?);
+    pools.by_threads.insert(threads, Arc::clone(&pool));
+    Ok(pool)
+}
+
+/// What stops work, and the exception that did.
+#[derive(Clone, Default)]
+pub(crate) struct Stop {
+    stopped: Arc<AtomicBool>,
+    raised: Arc<Mutex<Option<PyErr>>>,
+}
+
+impl Stop {
+    pub(crate) fn is_asked_for(&self) -> bool {
+        self.stopped.load(Ordering::Relaxed)
+    }
+
+    /// Stops the work because of an exception; the first one counts.
+    fn raise(&self, error: PyErr) {
+        self.raised.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+        self.stopped.store(true, Ordering::Relaxed);
+    }
+
+    fn raised(&self) -> Option<PyErr> {
+        self.raised.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    /// A build's progress function that ends when this stops.
+    pub(crate) fn heeded(&self) -> Arc<dyn Fn(f64) -> bool + Send + Sync> {
+        let stop = self.clone();
+        Arc::new(move |_| !stop.is_asked_for())
+    }
+
+    /// Progress that shows itself to `callback` now and then, and ends when this stops.
+    pub(crate) fn progress(&self, callback: Option<Py<PyAny>>) -> Progress {
+        let (stop, start, next) = (self.clone(), Instant::now(), AtomicU64::new(0));
+        Progress::new(move |phase, share| {
+            let now = u64::try_from(start.elapsed().as_millis()).unwrap_or(u64::MAX);
+            let due = next.load(Ordering::Relaxed);
+            let later = now + LOOK;
+            let is_mine = now >= due
+                && next.compare_exchange(due, later, Ordering::Relaxed, Ordering::Relaxed).is_ok();
+            if let (true, false, Some(callback)) = (is_mine, stop.is_asked_for(), &callback)
+                && let Err(error) = Python::attach(|py| callback.call1(py, (phase.name(), share)))
+            {
+                stop.raise(error);
+            }
+            !stop.is_asked_for()
+        })
+    }
+}
+
+/// Does `work` on `threads` threads (0 for all processors) without Python's lock, while this thread asks
+/// whether Ctrl-C was pressed: Python tells no other one. The exception that stopped it comes out.
+pub(crate) fn interruptible<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    stop: &Stop,
+    work: impl FnOnce() -> T + Send,
+) -> PyResult<T> {
+    let pool = pool(py, threads)?;
+    let done = py.detach(|| watched(stop, || pool.install(work)));
+    match (stop.raised(), done) {
+        (Some(raised), _) => Err(raised),
+        (None, Ok(Some(done))) => Ok(done),
+        (None, Ok(None)) => {
+            Err(PyRuntimeError::new_err("a fault of etendue; see the message above"))
+        }
+        (None, Err(error)) => {
+            Err(PyRuntimeError::new_err(format!("no thread to work in: {error}")))
+        }
+    }
+}
+
+/// The result of `work`, done in a thread of its own; `None` when it panicked, which was told.
+fn watched<T: Send>(stop: &Stop, work: impl FnOnce() -> T + Send) -> std::io::Result<Option<T>> {
+    std::thread::scope(|scope| {
+        let (sender, receiver) = mpsc::channel();
+        let worker = std::thread::Builder::new().spawn_scoped(scope, move || {
+            // The other end is there until this one is gone.
+            let _ = sender.send(work());
+        })?;
+        loop {
+            match receiver.recv_timeout(Duration::from_millis(LOOK)) {
+                Ok(done) => return Ok(Some(done)),
+                Err(RecvTimeoutError::Disconnected) => {
+                    // Joined here, its panic does not go on.
+                    let _ = worker.join();
+                    return Ok(None);
+                }
+                Err(RecvTimeoutError::Timeout) => {
+                    if let Err(error) = Python::attach(|py| py.check_signals()) {
+                        stop.raise(error);
+                    }
+                }
+            }
+        }
+    })
+}

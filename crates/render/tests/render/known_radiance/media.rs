@@ -1,0 +1,123 @@
+//! Bodies in bodies, bodies that touch, and cameras and lamps in them.
+
+use etendue_tracer::bsdf::fresnel;
+
+use super::{assert_shows, check, patch, picture, ways};
+use crate::steps::{load, mean};
+
+/// A wall of radiance 1 behind everything.
+const LAMP: &str = r#"{"shape": "rectangle", "width": 90, "height": 90, "material": "lamp",
+    "transform": {"translate": [0, 0, -2]}}"#;
+
+fn block(size: [f64; 3], z: f64, material: &str) -> String {
+    format!(
+        r#"{{"shape": "box", "size": {size:?}, "material": "{material}", "transform": {{"translate": [0, 0, {z}]}}}}"#
+    )
+}
+
+/// What a stack of parallel layers lets pass whose indices follow one another, from air to air, of light that comes in
+/// at a cosine: of boundaries without loss of reflectances Rᵢ, (1 − T)/T = Σ Rᵢ/(1 − Rᵢ) (Stokes 1862).
+fn passes(indices: &[f64], cosine: f64) -> f64 {
+    let sine = (1.0 - cosine * cosine).sqrt();
+    let mut sum = 0.0;
+    let mut before = 1.0;
+    for &index in indices.iter().chain(&[1.0]) {
+        let inside = (1.0 - (sine / before) * (sine / before)).sqrt();
+        let (reflectance, _) = fresnel::dielectric(inside, index / before);
+        sum += reflectance / (1.0 - reflectance);
+        before = index;
+    }
+    1.0 / (1.0 + sum)
+}
+
+/// Stacks of bodies: in one another, overlapping, and face to face, before a wall of radiance 1.
+#[test]
+fn bodies_in_bodies_refract_by_both_media() {
+    let materials = r#""lamp": {"type": "emissive", "radiance": [1, 1, 1]},
+        "glass": {"type": "dielectric", "ior": 1.5}, "same": {"type": "dielectric", "ior": 1.5},
+        "water": {"type": "dielectric", "ior": 1.33}, "air": {"type": "dielectric", "ior": 1.0}"#;
+    let outer = block([40.0, 40.0, 1.0], 0.0, "glass");
+    let within = |inner: &str| format!("{outer}, {}", block([30.0, 30.0, 0.4], 0.1, inner));
+    let beside = |z: f64, other: &str| format!("{outer}, {}", block([40.0, 40.0, 0.5], z, other));
+    let stacks: [(&str, String, &[f64]); 8] = [
+        ("glass", outer.clone(), &[1.5]),
+        ("the same glass within glass", within("same"), &[1.5]),
+        ("water in glass", within("water"), &[1.5, 1.33, 1.5]),
+        ("an air bubble in glass", within("air"), &[1.5, 1.0, 1.5]),
+        ("water that overlaps glass", beside(0.7, "water"), &[1.33, 1.5]),
+        ("water on glass", beside(0.75, "water"), &[1.33, 1.5]),
+        ("glass on glass", beside(0.75, "same"), &[1.5]),
+        (
+            "water that shares a face with its glass",
+            format!("{outer}, {}", block([30.0, 30.0, 0.5], 0.25, "water")),
+            &[1.33, 1.5],
+        ),
+    ];
+    for from in [[0.0, 0.0, 3.0], [2.0, 1.0, 3.0], [5.0, 0.3, 3.0]] {
+        let cosine = 3.0 / (from[0] * from[0] + from[1] * from[1] + 9.0_f64).sqrt();
+        for (name, objects, indices) in &stacks {
+            let rest = format!(
+                r#""lights": [], "objects": [{objects}, {LAMP}], "materials": {{{materials}}}"#
+            );
+            let known = passes(indices, cosine);
+            // Every way face on, and one of them from the side.
+            let count = if cosine == 1.0 { usize::MAX } else { 1 };
+            for way in ways().into_iter().take(count) {
+                let scene = load(&patch("path", 256, from, [0.0, 0.0, 0.5], &rest));
+                let shown = mean(&picture(scene, way));
+                // Of 16 384 paths, each of which comes through or does not.
+                let noise = 4.0 * (known * (1.0 - known) / 16384.0).sqrt();
+                assert!((shown - known).abs() <= noise, "{name}, {way:?}: {shown}, not {known}");
+            }
+        }
+    }
+}
+
+/// The medium that the camera is in takes from its first segment: one metre at 0.5 per metre, and half of it at 0.25.
+#[test]
+fn a_camera_within_a_body_sees_through_it() {
+    let materials = r#""half": {"type": "dielectric", "ior": 1.0,
+            "absorption": {"color": [0.5, 0.5, 0.5], "distance": 1}},
+        "quarter": {"type": "dielectric", "ior": 1.0,
+            "absorption": {"color": [0.25, 0.25, 0.25], "distance": 1}}"#;
+    let outer = block([2.0, 2.0, 2.0], 0.0, "half");
+    let inner = block([1.0, 1.0, 1.0], 0.0, "quarter");
+    for (name, objects, known) in [
+        ("one", outer.clone(), 0.5),
+        ("two", format!("{outer}, {inner}"), 0.5_f64.sqrt() * 0.5),
+        ("two the other way", format!("{inner}, {outer}"), 0.5_f64.sqrt() * 0.5),
+    ] {
+        let rest = format!(
+            r#""lights": [{{"type": "environment"}}], "objects": [{objects}], "materials": {{{materials}}}"#
+        );
+        // In f32 each start of a ray takes 10⁻⁶ of a metre off its way.
+        check(name, 1, [[0.0; 3], [0.0, 0.0, -3.0]], &rest, |_| (), 2e-6, |_| known);
+    }
+}
+
+/// A lamp, the wall that it lights and the camera in one absorbing medium: I/(π d²) of the wall's colour, by what the
+/// medium leaves over the ways to the wall and from it.
+#[test]
+fn light_within_a_body_is_absorbed_on_its_way_to_the_wall() {
+    let at = |light: &str| {
+        format!(
+            r#""lights": [{light}],
+            "objects": [{}, {}, {{"shape": "rectangle", "width": 1, "height": 1, "material": "wall"}}],
+            "materials": {{"wall": {{"type": "matte", "color": [1, 1, 1]}},
+                "half": {{"type": "dielectric", "ior": 1.33,
+                    "absorption": {{"color": [0.5, 0.5, 0.5], "distance": 1}}}},
+                "clear": {{"type": "dielectric", "ior": 1.33}}}}"#,
+            block([6.0, 6.0, 6.0], 0.0, "half"),
+            block([2.0, 2.0, 0.5], 1.0, "clear"),
+        )
+    };
+    let rest = at(r#"{"type": "point", "at": [0, 0, 2], "intensity": [1, 1, 1]}"#);
+    // Two metres down and half a metre up; of both half a metre is in the clear body, but none of the camera's way.
+    let known = 1.0 / 4.0 / std::f64::consts::PI * 0.5_f64.powf(1.5 + 0.5);
+    for tracer in ["direct", "whitted"] {
+        for way in ways() {
+            let scene = load(&patch(tracer, 4, [0.0, 0.0, 0.5], [0.0; 3], &rest));
+            assert_shows(&format!("{tracer} {way:?}"), &picture(scene, way), known, 2e-6);
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Bodies of glass and liquids: which placements enclose a medium, and which medium wins where several do.
+//!
+//! A path keeps the set of bodies that it is in, by what surfaces it crossed, and the medium around it is the body of
+//! highest rank: the interfaces of the others are not there (Schmidt and Budge, "Simple Nested Dielectrics in Ray
+//! Traced Images", JGT 2002). Their priorities are given by hand; here the body of the smaller volume ranks higher,
+//! which is the inner one wherever one holds another, and the vessel's thin wall before what is filled into it. Rank
+//! does not depend on the way a path goes, so light sees the same media in both directions.
+
+use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{Bounds, Geometry, Mesh};
+
+use crate::{Ior, Material, Scattering};
+
+/// The largest share of a mesh's area that its oriented triangles may lack of a closed surface's, of which they cancel:
+/// what the rounding of coordinates to f32 leaves, and far less than a face that is missing.
+const LEAST_OPENING: f64 = 1e-4;
+
+/// Bodies up to which each is held against each; more are taken to touch one another.
+const MOST_COMPARED: usize = 4096;
+
+/// A placement that encloses a medium.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Body {
+    /// Where several bodies are, the medium is that of the highest rank.
+    pub(crate) rank: u32,
+    /// Some of its boundary may not be there: its box meets that of another body, or its index is that of air.
+    pub(crate) may_vanish: bool,
+    /// The box around it (m).
+    pub(crate) bounds: Bounds,
+}
+
+/// The bodies among the placements of a scene.
+pub(crate) fn bodies(geometry: &Geometry, materials: &[Material]) -> Vec<Option<Body>> {
+    let mut enclosed: Vec<Option<Option<f64>>> = vec![None; geometry.meshes.len()];
+    // Those that enclose something, the largest first.
+    let mut found: Vec<(f64, usize, Bounds)> = Vec::new();
+    for (i, placement) in geometry.placements.iter().enumerate() {
+        let material = materials.get(placement.material as usize);
+        if !material.is_some_and(|m| matches!(m.scattering, Scattering::Dielectric(_))) {
+            continue;
+        }
+        let volume = enclosed[placement.mesh as usize]
+            .get_or_insert_with(|| volume(geometry.mesh_of(placement)));
+        let Some(volume) = *volume else { continue };
+        let linear: &DMat3 = &placement.world_from_mesh.linear;
+        let bounds = geometry.loose_bounds_of(placement);
+        found.push((volume * linear.determinant().abs(), i, bounds));
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let nested = nested(&found);
+    let mut bodies = vec![None; geometry.placements.len()];
+    let is_air = |placement: usize| {
+        let material = materials.get(geometry.placements[placement].material as usize);
+        material.is_some_and(|material| match &material.scattering {
+            Scattering::Dielectric(glass) => glass.ior == Ior::Constant(1.0),
+            Scattering::Black
+            | Scattering::Matte
+            | Scattering::Unlit
+            | Scattering::Mirror
+            | Scattering::Metal { .. }
+            | Scattering::Gltf(_) => false,
+        })
+    };
+    for ((rank, &(_, placement, bounds)), is_nested) in (0..).zip(&found).zip(nested) {
+        let may_vanish = is_nested || is_air(placement);
+        bodies[placement] = Some(Body { rank, may_vanish, bounds });
+    }
+    bodies
+}
+
+/// Whether the box of each meets that of another.
+fn nested(found: &[(f64, usize, Bounds)]) -> Vec<bool> {
+    if found.len() > MOST_COMPARED {
+        return vec![true; found.len()];
+    }
+    let meets = |a: &Bounds, b: &Bounds| a.min.cmple(b.max).all() && b.min.cmple(a.max).all();
+    let mut nested = vec![false; found.len()];
+    for i in 0..found.len() {
+        for k in i + 1..found.len() {
+            if meets(&found[i].2, &found[k].2) {
+                (nested[i], nested[k]) = (true, true);
+            }
+        }
+    }
+    nested
+}
+
+/// The volume (m³) that a mesh encloses; `None` for one that is open. Of a closed surface the oriented areas cancel.
+fn volume(mesh: &Mesh) -> Option<f64> {
+    let centre = mesh.bounds.centre();
+    let (mut oriented, mut area, mut volume) = (DVec3::ZERO, 0.0, 0.0);
+    for i in 0..mesh.triangles.len() {
+        let [a, b, c] = mesh.corners(i).map(|corner| corner - centre);
+        let twice = (b - a).cross(c - a);
+        oriented += twice;
+        area += twice.length();
+        volume += a.dot(twice);
+    }
+    let volume = volume.abs() / 6.0;
+    (oriented.length() <= LEAST_OPENING * area && volume > 0.0).then_some(volume)
+}

@@ -1,0 +1,295 @@
+//! The media that paths go through, and what those take from light, by Beer and Lambert
+//! (`KHR_materials_volume`).
+
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Detail, HitBatch, HitPrecision, MISS, RayBatch};
+
+use super::{Scratch, Tracing};
+use crate::placed::PlacedSurfaces;
+use crate::surface::SurfaceInteraction;
+use crate::{Ior, Scattering};
+
+/// The most bodies that a path can be in at once; of more the last entered are not noted.
+const DEPTH: usize = 6;
+
+/// The bodies that a path is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Media {
+    /// Placements of closed bodies, [`MISS`] behind the last.
+    bodies: [u32; DEPTH],
+    /// The placement of an open sheet that the path passed to its back: the medium as far as the next hit.
+    sheet: u32,
+}
+
+impl Media {
+    /// In the open.
+    pub(super) const NONE: Self = Self { bodies: [MISS; DEPTH], sheet: MISS };
+
+    fn with(mut self, body: u32) -> Self {
+        if !self.bodies.contains(&body)
+            && let Some(place) = self.bodies.iter_mut().find(|place| **place == MISS)
+        {
+            *place = body;
+        }
+        self
+    }
+
+    fn without(mut self, body: u32) -> Self {
+        if let Some(place) = self.bodies.iter().position(|&own| own == body) {
+            self.bodies[place..].rotate_left(1);
+            self.bodies[DEPTH - 1] = MISS;
+        }
+        self
+    }
+
+    /// The placement whose medium is around; [`MISS`] in the open.
+    pub(super) fn medium(&self, placed: &PlacedSurfaces) -> u32 {
+        if self.sheet != MISS {
+            return self.sheet;
+        }
+        let ranked = self.bodies.iter().take_while(|&&body| body != MISS);
+        let rank = |body: u32| Some(placed.get(body)?.body?.rank);
+        ranked.copied().max_by_key(|&body| rank(body)).unwrap_or(MISS)
+    }
+}
+
+/// The boundary of another body in the very place of a hit, of a lens cemented to another or a liquid in its glass.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Coincident {
+    /// [`MISS`] where there is none.
+    pub(super) placement: u32,
+    pub(super) triangle: u32,
+    /// The ray came from its front.
+    front: bool,
+}
+
+impl Coincident {
+    pub(super) const NONE: Self = Self { placement: MISS, triangle: MISS, front: false };
+}
+
+/// The media on both sides of a surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing {
+    /// Before the front of its triangles.
+    outside: Media,
+    /// Behind it.
+    inside: Media,
+}
+
+impl Crossing {
+    /// Those that a path which was in `media` finds at a boundary. That it met the front of a body says that it was not
+    /// in it, and the back that it was, whatever it crossed before.
+    fn of(media: Media, hit: (u32, Coincident), front: bool, placed: &PlacedSurfaces) -> Self {
+        let open = Media { sheet: MISS, ..media };
+        let (placement, second) = hit;
+        if second.placement != MISS {
+            // Both at once, as the ray meets them.
+            let sides = [(placement, front), (second.placement, second.front)];
+            let side = |behind: bool| {
+                sides.into_iter().fold(open, |media, (body, front)| match front == behind {
+                    true => media.with(body),
+                    false => media.without(body),
+                })
+            };
+            let [here, behind] = [side(false), side(true)];
+            let [outside, inside] = if front { [here, behind] } else { [behind, here] };
+            return Self { outside, inside };
+        }
+        if placed.get(placement).is_some_and(|placed| placed.body.is_some()) {
+            let outside = open.without(placement);
+            return Self { outside, inside: outside.with(placement) };
+        }
+        Self { outside: open, inside: Media { sheet: placement, ..open } }
+    }
+
+    /// The medium of a path that leaves along `direction`; `front` is the side of the triangle's normal.
+    pub(super) fn after(&self, direction: DVec3, front: DVec3) -> Media {
+        if direction.dot(front) < 0.0 { self.inside } else { self.outside }
+    }
+}
+
+impl<const RGB: bool> Tracing<'_, RGB> {
+    /// The media on both sides of a boundary that a path in `media` met, which is told of them; `None` where it parts
+    /// none, or where nothing asks for them.
+    pub(super) fn cross(
+        &self,
+        media: Media,
+        hit: (u32, Coincident),
+        met: &mut SurfaceInteraction<'_>,
+    ) -> Option<Crossing> {
+        let Scattering::Dielectric(_) = met.material.scattering else { return None };
+        if !self.stage.traits.has_media {
+            return None;
+        }
+        let placed = self.stage.placed;
+        let crossing = Crossing::of(media, hit, met.front, placed);
+        let [outside, inside] = [crossing.outside, crossing.inside].map(|m| m.medium(placed));
+        met.media = if met.front { [outside, inside] } else { [inside, outside] };
+        Some(crossing)
+    }
+
+    /// What there is of a boundary whose media on both sides are the same; `None` of one that is there.
+    pub(super) fn vanishes(
+        &self,
+        placement: u32,
+        met: &SurfaceInteraction<'_>,
+    ) -> Option<Vanished> {
+        let body = self.stage.placed.get(placement)?.body?;
+        let [here, behind] = met.media;
+        if !body.may_vanish {
+            return None;
+        }
+        if here == behind {
+            return Some(Vanished { is_tinted: false });
+        }
+        let around = &self.stage.surroundings;
+        let index = |medium| around.index(medium);
+        let air = Ior::Constant(1.0);
+        let [here, behind] = [here, behind].map(|medium| index(medium).unwrap_or(&air));
+        (here == behind).then_some(Vanished { is_tinted: true })
+    }
+
+    /// The boundaries of other bodies in the place of each hit of one: `found` is refilled, or emptied where bodies do not
+    /// touch.
+    pub(super) fn coincident(&self, rays: &RayBatch, hits: &HitBatch, found: &mut Vec<Coincident>) {
+        found.clear();
+        if self.stage.placed.touching.is_empty() {
+            return;
+        }
+        found.extend((0..rays.len()).map(|i| {
+            let (direction, own) = (rays.direction(i), [hits.placement[i], hits.triangle[i]]);
+            if own[0] == MISS {
+                return Coincident::NONE;
+            }
+            self.beside(rays.origin(i) + direction * hits.t[i], direction, own)
+        }));
+    }
+
+    /// The other boundary at a point of one that a ray along `direction` met.
+    fn beside(&self, point: DVec3, direction: DVec3, own: [u32; 2]) -> Coincident {
+        /// Shares of a triangle beyond its edges, as the point is known to no more.
+        const BEYOND: f64 = 1e-6;
+        let geometry = self.stage.surroundings.geometry;
+        for &[placement, triangle] in self.stage.placed.touching.others(own) {
+            let placed = &geometry.placements[placement as usize];
+            let corners = geometry.mesh_of(placed).corners(triangle as usize);
+            let [a, b, c] = corners.map(|corner| placed.world_from_mesh.point(corner));
+            let normal = (b - a).cross(c - a);
+            // Planes that single precision cannot tell apart may be.
+            let other = self.stage.placed.get(placement).map_or(DVec3::ZERO, |p| p.magnitudes);
+            let error = self.stage.roundings() * (point.abs() + other).element_sum();
+            if normal.dot(point - a).abs() > error * normal.length() {
+                continue;
+            }
+            let share = |from: DVec3, to: DVec3| {
+                (to - from).cross(point - from).dot(normal) / normal.length_squared()
+            };
+            if [(a, b), (b, c), (c, a)].into_iter().all(|(from, to)| share(from, to) >= -BEYOND) {
+                let turned = normal * placed.world_from_mesh.handedness();
+                return Coincident { placement, triangle, front: turned.dot(direction) <= 0.0 };
+            }
+        }
+        Coincident::NONE
+    }
+
+    /// Takes from each path what the medium that it went through absorbs. A path that leaves into the open
+    /// without having met the body's other side (a surface that is not closed) loses nothing.
+    pub(super) fn absorb(&self, scratch: &mut Scratch) {
+        let Scratch { now, hits, .. } = scratch;
+        for (i, state) in now.states.iter().enumerate() {
+            if hits.is_hit(i) {
+                let throughput = &mut now.throughput[i * self.count()..(i + 1) * self.count()];
+                self.dim_along(&state.media, hits.t[i], throughput);
+            }
+        }
+    }
+
+    /// Takes from light what a medium absorbs over a way (m); nothing over one without end.
+    pub(super) fn dim_along(&self, media: &Media, length: f64, light: &mut [f64]) {
+        let (placed, spectral) = (self.stage.placed, self.stage.spectral);
+        let medium = placed.get(media.medium(placed)).and_then(|placed| placed.absorption);
+        let Some(absorption) = medium.filter(|_| length.is_finite()) else { return };
+        let ways = length / absorption.distance;
+        for (k, band) in light.iter_mut().enumerate() {
+            *band *= spectral.band(&absorption.color, k).max(0.0).powf(ways);
+        }
+    }
+
+    /// The bodies that hold the origin of each ray: those whose back is the side that is met along a line, both ways.
+    /// Empty where none can.
+    pub(super) fn media_at_origins(&self, rays: &RayBatch) -> Vec<Media> {
+        let placed = self.stage.placed;
+        if !self.stage.traits.has_media || placed.bodies().next().is_none() {
+            return Vec::new();
+        }
+        let holds = |i: usize| {
+            let origin = rays.origin(i);
+            placed.bodies().any(|body| {
+                body.bounds.min.cmple(origin).all() && origin.cmple(body.bounds.max).all()
+            })
+        };
+        let mut media: Vec<Media> = Vec::with_capacity(rays.len());
+        let mut last: Option<DVec3> = None;
+        for i in 0..rays.len() {
+            let origin = rays.origin(i);
+            media.push(match (last, media.last()) {
+                (Some(same), Some(&media)) if same == origin => media,
+                _ if holds(i) => self.media_at(origin),
+                _ => Media::NONE,
+            });
+            last = Some(origin);
+        }
+        media
+    }
+
+    fn media_at(&self, origin: DVec3) -> Media {
+        /// A line that no model is likely to have a face or an edge along.
+        const LINE: DVec3 = DVec3::new(0.529_1, 0.694_7, 0.487_3);
+        let [one, other] =
+            [1.0, -1.0].map(|sign| self.backs_along(origin, LINE.normalize() * sign));
+        let both = one.iter().filter(|body| other.contains(body));
+        both.fold(Media::NONE, |media, &body| media.with(body))
+    }
+
+    /// The bodies of which a ray meets the back more often than the front.
+    fn backs_along(&self, origin: DVec3, direction: DVec3) -> Vec<u32> {
+        /// By how much of its distance the next surface lies behind one.
+        const BEHIND: f64 = 1e-13;
+        /// The most surfaces on the way.
+        const MOST: u32 = 1024;
+        let mut backs: Vec<(u32, i32)> = Vec::new();
+        let (mut rays, mut hits) = (RayBatch::default(), HitBatch::new(Detail::Surface));
+        let mut start = 0.0;
+        for _ in 0..MOST {
+            rays.clear();
+            rays.precision = HitPrecision::Double;
+            rays.push_between(origin, direction, start, f64::INFINITY);
+            self.stage.accel.closest(&rays, &mut hits);
+            if !hits.is_hit(0) {
+                break;
+            }
+            let own = [hits.placement[0], hits.triangle[0]];
+            let beside = self.beside(origin + direction * hits.t[0], direction, own);
+            let front = hits.normal(0).dot(direction) <= 0.0;
+            for (body, front) in [(own[0], front), (beside.placement, beside.front)] {
+                if self.stage.placed.get(body).is_none_or(|placed| placed.body.is_none()) {
+                    continue;
+                }
+                let turn = if front { -1 } else { 1 };
+                match backs.iter_mut().find(|(own, _)| *own == body) {
+                    Some((_, count)) => *count += turn,
+                    None => backs.push((body, turn)),
+                }
+            }
+            start = hits.t[0] * (1.0 + BEHIND);
+        }
+        backs.iter().filter(|(_, count)| *count > 0).map(|&(body, _)| body).collect()
+    }
+}
+
+/// A boundary that is not there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Vanished {
+    /// It parts two bodies of one index, and tints what passes; else it lies in a body of higher rank.
+    pub(super) is_tinted: bool,
+}
