@@ -55,11 +55,16 @@ pub fn remove_open_parts() {
 /// [`WriteError::Io`] when it cannot be made or written to.
 pub fn prepare_folder(folder: &Path) -> Result<(), WriteError> {
     fs::create_dir_all(folder).map_err(|source| WriteError::io(folder, source))?;
-    let probe = open_beside(&folder.join("etendue"));
+    let probe = open_beside(&folder.join(PROBE));
     probe.map(drop).map_err(|source| WriteError::io(folder, source))?;
-    remove_leftovers(folder, |target| ENDINGS.iter().any(|ending| target.ends_with(ending)));
+    let is_ours =
+        |target: &str| target == PROBE || ENDINGS.iter().any(|ending| target.ends_with(ending));
+    remove_leftovers(folder, is_ours);
     Ok(())
 }
+
+/// The name of the file that is written to see whether a folder can be written to.
+const PROBE: &str = "etendue";
 
 /// The endings of the files that commands write into folders.
 const ENDINGS: [&str; 8] = [".exr", ".npy", ".png", ".dng", ".json", ".svg", ".csv", ".txt"];
@@ -302,9 +307,9 @@ mod tests {
         let others =
             [".depth.exr.abcdef.bak", ".depth.exr.abc.part", ".notes.abcdef.part", "a.part"];
         others.iter().for_each(|name| put(name));
-        for left in [".depth.exr.abcdef.part", ".picture.preview.png.X1y2Z3.part"] {
-            put(left);
-        }
+        let left =
+            [".depth.exr.abcdef.part", ".picture.preview.png.X1y2Z3.part", ".etendue.a1B2c3.part"];
+        left.iter().for_each(|name| put(name));
         let files = Transaction::at_once();
         let living = files.create(&folder.path().join("depth.exr")).unwrap();
         assert!(!names(folder.path()).contains(&".depth.exr.abcdef.part".to_owned()));

@@ -296,17 +296,11 @@ pub fn trace(
     // What was traced, and what a user should know of it.
     let watcher = Watcher::new(watch, job.rays(&layers));
     let Done { traffic: counts, passed, sums, centres } = job.run(&mut layers, &watcher)?;
-    notes.extend(told(&counts, job.keeper.as_ref()));
+    notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
     let trace_time = start.elapsed() + course.shares.iter().map(FilmFile::trace_time).sum();
     drop(job);
     let camera = Some(camera);
     Ok(Film { layers, resolution, shard, counts, passed, trace_time, sums, centres, notes, camera })
-}
-
-/// What became of samples, and of the file that keeps them.
-fn told(counts: &RayCounts, keeper: Option<&Keeper<'_>>) -> impl Iterator<Item = String> {
-    let sparkles = counts.sparkles.note_in_words().into_iter();
-    sparkles.chain(keeper.and_then(Keeper::fault))
 }
 
 pub(crate) fn empty_film(scene: &Scene, plan: &Plan) -> Result<Vec<FilmLayer>, NoMemory> {
@@ -352,13 +346,14 @@ pub fn finish(
     let Film { layers, counts, passed, trace_time, mut notes, camera, .. } = film;
     let Passed { samples, is_complete, counts: sample_counts } = passed;
     let samples_wanted = if is_complete { samples } else { plan.samples };
-    let RayCounts { chief_rays, light, statuses, .. } = counts;
+    let RayCounts { chief_rays, light, statuses, sparkles } = counts;
     // A lens through which no ray came has no picture.
     if let (true, 0, Some(element)) =
         (statuses.total() > 0, statuses.exited, statuses.farthest_from_sensor())
     {
         return Err(RenderError::Dark { element, losses: statuses.losses() });
     }
+    notes.extend(sparkles.note_in_words());
     notes.extend(plan.stopping_note.clone());
     notes.extend(sample_counts.filter(|_| is_complete).and_then(|counts| counts.note()));
     let words = sample_counts.map_or_else(|| samples.to_string(), |counts| counts.words());

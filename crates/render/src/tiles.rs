@@ -75,7 +75,7 @@ pub(crate) struct RayCounts {
     pub(crate) light: RayStats,
     /// What became of rays inside the camera's lens.
     pub(crate) statuses: StatusCounts,
-    /// Light that a handful of samples carries, of those that this process traced.
+    /// Light that a handful of samples carries.
     pub(crate) sparkles: Sparkles,
 }
 

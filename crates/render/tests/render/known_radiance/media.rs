@@ -54,7 +54,8 @@ fn bodies_in_bodies_refract_by_both_media() {
         ),
     ];
     for from in [[0.0, 0.0, 3.0], [2.0, 1.0, 3.0], [5.0, 0.3, 3.0]] {
-        let cosine = 3.0 / (from[0] * from[0] + from[1] * from[1] + 9.0_f64).sqrt();
+        let [x, y, z] = [from[0], from[1], from[2] - 0.5];
+        let cosine = z / (x * x + y * y + z * z).sqrt();
         for (name, objects, indices) in &stacks {
             let rest = format!(
                 r#""lights": [], "objects": [{objects}, {LAMP}], "materials": {{{materials}}}"#
