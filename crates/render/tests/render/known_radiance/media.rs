@@ -54,7 +54,7 @@ fn bodies_in_bodies_refract_by_both_media() {
         ),
     ];
     for from in [[0.0, 0.0, 3.0], [2.0, 1.0, 3.0], [5.0, 0.3, 3.0]] {
-        let [x, y, z] = [from[0], from[1], from[2] - 0.5];
+        let [x, y, z]: [f64; 3] = [from[0], from[1], from[2] - 0.5];
         let cosine = z / (x * x + y * y + z * z).sqrt();
         for (name, objects, indices) in &stacks {
             let rest = format!(
