@@ -123,3 +123,28 @@ fn the_map_of_the_tree_names_files_that_are_there() {
         assert!(found, "docs/architecture.md: no {path}");
     }
 }
+
+/// What the table "To add a …" names in brackets behind a file stands in that file.
+#[test]
+fn the_table_of_additions_names_what_its_files_have() {
+    let Some(documents) = documents() else { return };
+    let (_, map) = documents.iter().find(|(path, _)| path.ends_with("architecture.md")).unwrap();
+    let table = map.split("## To add a").nth(1).unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let is_name = |word: &str| word.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | ':'));
+    let mut names = 0;
+    for file in table.split('`').skip(1).step_by(2).filter(|code| code.ends_with(".rs")) {
+        let path = [root.join("crates").join(file), root.join(file)];
+        let Some(path) = path.iter().find(|path| path.exists()) else { continue };
+        let text = fs::read_to_string(path).unwrap();
+        for behind in table.split(&format!("`{file}` (")).skip(1) {
+            let brackets = behind.split(')').next().unwrap_or_default();
+            for name in brackets.split('`').skip(1).step_by(2).filter(|name| is_name(name)) {
+                let last = name.rsplit("::").next().unwrap_or_default();
+                assert!(text.contains(last), "docs/architecture.md: no {name} in {file}");
+                names += 1;
+            }
+        }
+    }
+    assert!(names >= 50, "only {names} names were found");
+}
