@@ -162,7 +162,7 @@ mod tests {
             rays.push([x, 1.0, -20.0].into(), [0.02, -0.01 * x, 1.0].into());
         }
         let before = rays.blocks[0].clone();
-        cross_block(&s.surface, s.media, &mut rays.blocks[0], 0, 0.0, 1e9);
+        cross_block(&s.surface, s.media, &mut rays.blocks[0], 0, 0.0, [1e9, 0.0]);
         for lane in 0..LANES {
             let single = at_asphere(&s, before.ray(lane), 1e9);
             let batch = rays.blocks[0].ray(lane);

@@ -5,6 +5,7 @@
 pub(crate) mod aperture;
 mod asphere;
 mod biconic;
+mod crossings;
 mod filter;
 mod frame;
 mod lattice;

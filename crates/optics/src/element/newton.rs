@@ -54,7 +54,7 @@ pub(super) trait Profile {
 }
 
 /// Takes a block through a surface at `z` (mm), as [`super::refract::each_lane`] does for conics; says
-/// whether rays are left for [`cross`] to decide.
+/// whether rays are left to decide one by one, as all are whose squared cosine to the axis is below `least`.
 #[inline(always)]
 pub(super) fn cross_block<P: Profile>(
     surface: &P,
@@ -62,7 +62,7 @@ pub(super) fn cross_block<P: Profile>(
     block: &mut Block,
     element: usize,
     z: f64,
-    clip2: f64,
+    [clip2, least]: [f64; 2],
 ) -> bool {
     let newton = Newton::<LANES, P>::run(
         surface,
@@ -78,7 +78,11 @@ pub(super) fn cross_block<P: Profile>(
         element,
         z,
         #[inline(always)]
-        |lane, _| newton.refracted(surface, media, clip2, lane),
+        |lane, ray| {
+            let found = newton.refracted(surface, media, clip2, lane);
+            let w = ray.direction[2];
+            Refracted { hit: found.hit & (w * w >= least), ..found }
+        },
     )
 }
 
@@ -207,19 +211,25 @@ fn search<P: Profile>(surface: &P, ray: Ray, clip2: f64) -> Option<Ray> {
 }
 
 /// Whether the ray is on one side of the surface all along a part of it, as its bounds have it.
-fn keeps_off<P: Profile>(surface: &P, ray: Ray, [from, to]: [f64; 2]) -> bool {
-    let Ray { position: [x, y, z], direction: [u, v, w] } = ray;
-    let square = |t: f64| (x + t * u).powi(2) + (y + t * v).powi(2);
-    // Nearest to the axis, which it may pass between the two.
-    let nearest = -(x * u + y * v) / (u * u + v * v);
-    let ends = [square(from), square(to)];
-    let least = if nearest > from && nearest < to { square(nearest) } else { ends[0].min(ends[1]) };
-    let [low, high] = surface.sag_bounds([least, ends[0].max(ends[1])]);
+pub(super) fn keeps_off<P: Profile>(surface: &P, ray: Ray, part @ [from, to]: [f64; 2]) -> bool {
+    let (z, w) = (ray.position[2], ray.direction[2]);
+    let [low, high] = surface.sag_bounds(squares_along(ray, part));
     let depths = [z + from * w, z + to * w];
     let [near, far] = [depths[0].min(depths[1]), depths[0].max(depths[1])];
     // Far more than sums of a few dozen roundings are off.
     let margin = 1e-9 + 1e-12 * (low.abs() + high.abs() + near.abs() + far.abs());
     near - high > margin || low - far > margin
+}
+
+/// The least and the greatest squared distance from the axis along a part of a ray (mm²).
+pub(super) fn squares_along(ray: Ray, [from, to]: [f64; 2]) -> [f64; 2] {
+    let Ray { position: [x, y, _], direction: [u, v, _] } = ray;
+    let square = |t: f64| (x + t * u).powi(2) + (y + t * v).powi(2);
+    // Nearest to the axis, which it may pass between the two.
+    let nearest = -(x * u + y * v) / (u * u + v * v);
+    let ends = [square(from), square(to)];
+    let least = if nearest > from && nearest < to { square(nearest) } else { ends[0].min(ends[1]) };
+    [least, ends[0].max(ends[1])]
 }
 
 /// From where to where the ray is both near the surface's depths and no farther from the axis than the
@@ -250,14 +260,18 @@ fn first_root(
     has_none: impl Fn([f64; 2]) -> bool,
 ) -> Option<f64> {
     let place = |i: u32| from + (to - from) * f64::from(i) / f64::from(PIECES);
-    let [mut low, mut high] = first_change([0, PIECES], &place, &at, &has_none)?;
+    Some(halved(first_change([0, PIECES], &place, &at, &has_none)?, at))
+}
+
+/// The root of `at` between two places of different signs.
+pub(super) fn halved([mut low, mut high]: [f64; 2], at: impl Fn(f64) -> f64) -> f64 {
     let before = at(low) <= 0.0;
     // 2⁻⁶⁰ of a stretch of metres is less than the last bit of a millimetre.
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         if (at(middle) <= 0.0) == before { low = middle } else { high = middle }
     }
-    Some(0.5 * (low + high))
+    0.5 * (low + high)
 }
 
 /// The first two neighbouring places of `first` to `last` between which the sign of `at` changes. Halves are
@@ -281,7 +295,7 @@ fn first_change(
 }
 
 /// Where a t² + 2b t + c ≤ 0.
-fn interval(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
+pub(super) fn interval(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
     if a <= 0.0 {
         return (c <= 0.0).then_some([f64::NEG_INFINITY, f64::INFINITY]);
     }

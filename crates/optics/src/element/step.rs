@@ -148,11 +148,12 @@ impl Step {
             }
             Action::Asphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
-                cross_block(&refraction.surface, refraction.media, block, self.element, z, clip2)
+                let Refraction { surface, media, least_single } = refraction;
+                cross_block(surface, *media, block, self.element, z, [clip2, *least_single])
             }
             Action::Biconic { surface, media } => {
                 let clip2 = limit(surface.semi_diameter, clip);
-                cross_block(surface, *media, block, self.element, z, clip2)
+                cross_block(surface, *media, block, self.element, z, [clip2, 0.0])
             }
             Action::ThinLens { power, semi_diameter } => {
                 let clip2 = limit(*semi_diameter, clip);
@@ -299,7 +300,7 @@ impl Step {
             }
             Action::Asphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
-                self.crossed(cross(&refraction.surface, refraction.media, ray, clip2))
+                self.crossed(refraction.at_asphere(ray, clip2))
             }
             Action::Biconic { surface, media } => {
                 let clip2 = limit(surface.semi_diameter, clip);

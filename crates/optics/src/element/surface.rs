@@ -202,6 +202,39 @@ impl Surface {
         self.curvature * u / (1.0 + self.conic_root(u))
     }
 
+    /// What (∂z/∂x)/x is not below and not above between two squared distances from the axis (mm²), the nearer
+    /// first (1/mm).
+    pub(super) fn slope_bounds(&self, squares: [f64; 2]) -> [f64; 2] {
+        let conic = |root: f64| self.curvature / root.max(1e-12);
+        self.derivative_bounds(squares, conic, |power| power)
+    }
+
+    /// The same of the second derivative of the sag by the distance from the axis (1/mm).
+    pub(super) fn bend_bounds(&self, squares: [f64; 2]) -> [f64; 2] {
+        let conic = |root: f64| self.curvature / root.max(1e-12).powi(3);
+        self.derivative_bounds(squares, conic, |power| power * (power - 1.0))
+    }
+
+    /// Bounds of what the conic underneath gives by its root, and Σ `factor`(p) Aₚ rᵖ⁻²: each term rises or falls
+    /// all the way.
+    fn derivative_bounds(
+        &self,
+        squares: [f64; 2],
+        conic: impl Fn(f64) -> f64,
+        factor: impl Fn(f64) -> f64,
+    ) -> [f64; 2] {
+        let [near, far] = squares.map(|u| {
+            let mut terms = [0.0; 2];
+            for (i, &a) in self.aspheric.iter().enumerate().rev() {
+                let a = factor(2.0 * (i as f64 + 1.0)) * a;
+                terms = [terms[0] * u + a.max(0.0), terms[1] * u + a.min(0.0)];
+            }
+            (conic(self.conic_root(u)), terms)
+        });
+        let (least, most) = (near.0.min(far.0), near.0.max(far.0));
+        [least + near.1[0] + far.1[1], most + far.1[0] + near.1[1]]
+    }
+
     /// The sag and its derivative by u/2, that is (∂z/∂x)/x, at u = r². Beyond the domain the conic
     /// goes on as if at its edge, which keeps an iteration going and is refused in the end.
     #[inline(always)]

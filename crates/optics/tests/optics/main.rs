@@ -1,5 +1,6 @@
 //! Lenses and what they are made of, against closed forms, references and each other.
 
+mod asphere_crossings;
 mod exit_pupil;
 mod lens_limits;
 mod lens_properties;
