@@ -10,7 +10,7 @@
 //!
 //! Electrons count as right within [`TOLERANCE`] of themselves; of colours darker than a tenth of
 //! white, within that of a tenth of white, and behind two pure colours within that of white. White is
-//! what bodies and metals on the way leave of it, where that is a fiftieth at least.
+//! what bodies and metals on the way leave of it, where that is a two-hundredth at least.
 
 mod division;
 mod factor;
@@ -38,7 +38,10 @@ const MOST_NUMBERS: usize = 2_000_000;
 const DARK: [f64; 4] = [1.0, 0.1, 1.0, 1.0];
 
 /// The part of white that bodies and metals leave of it, below which their light need not be better.
-const DIM: f64 = 0.02;
+const DIM: f64 = 0.004;
+
+/// The part of an error that bodies may show after the ways that are tried: it is largest between two of them.
+const BETWEEN: f64 = 0.94;
 
 /// What the bands of a render have to tell apart.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -243,7 +246,12 @@ impl BandTable {
         let left = |factor: usize, power: f64| {
             let values: Vec<f64> = others[factor].iter().map(|value| value.powf(power)).collect();
             let total = |sums: RunningSums| sums.last().copied().unwrap_or(0.0);
-            total(nodes.sums(&[&weight, &values])) / total(nodes.sums(&[&weight]))
+            let of_channel = |response: &Vec<f64>| {
+                let white = total(nodes.sums(&[response, &mean_light]));
+                total(nodes.sums(&[response, &mean_light, &values])) / white
+            };
+            let shares = responses.iter().map(of_channel).filter(|share| share.is_finite());
+            shares.fold([1.0, 0.0], |[l, m]: [f64; 2], share| [l.min(share), m.max(share)])
         };
         let times = factors.iter().map(|factor| factor.times).enumerate();
         let powers: Vec<Vec<f64>> = times.map(|(k, times)| times.powers(|p| left(k, p))).collect();
@@ -310,7 +318,8 @@ impl BandTable {
                         }
                         let exact = nodes.sums(&[&values]);
                         let dark = DARK[what.colors.len()];
-                        let scale = total(&exact).max(dark * clear);
+                        let margin = if what.factors.is_empty() { 1.0 } else { BETWEEN };
+                        let scale = margin * total(&exact).max(dark * clear);
                         if scale > 0.0 {
                             let product = what.clone();
                             let trial = Trial { light, channel, filter, product, exact, scale };

@@ -201,9 +201,8 @@ fn electrons_of_thirty_scenes_are_those_of_bands_of_a_nanometre() {
     for (number, scene) in scenes.iter().enumerate() {
         let (worst, bands) = worst(scene);
         println!("scene {number}: {:.4} % in {bands} bands", 100.0 * worst);
-        // What is promised for the lengths of way that are tried; between them, and where a body leaves less
-        // than a fiftieth of a channel's light, up to a quarter more was found.
-        if worst > 1.25e-3 {
+        // What is promised.
+        if worst > 1e-3 {
             off.push((number, worst, bands));
         }
     }

@@ -5,13 +5,13 @@ use etendue_spectrum::Curve;
 use super::DIM;
 
 /// Steps between the lengths of way that are tried.
-const STEP: f64 = 1.6;
+const STEP: f64 = 1.4;
 
 /// What the shortest way that is tried leaves of light.
 const NEARLY_CLEAR: f64 = 0.98;
 
 /// The most lengths of way that are tried.
-const MOST_LENGTHS: usize = 24;
+const MOST_LENGTHS: usize = 32;
 
 /// A curve that light may be multiplied by, beside lights, filters and colours.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,26 +32,27 @@ pub enum Times {
 }
 
 impl Times {
-    /// The powers that are tried; `left` tells what one leaves of white light.
-    pub(super) fn powers(self, left: impl Fn(f64) -> f64) -> Vec<f64> {
+    /// The powers that are tried; `left` tells what one leaves of white light in the channels that it leaves least
+    /// and most of.
+    pub(super) fn powers(self, left: impl Fn(f64) -> [f64; 2]) -> Vec<f64> {
         let most = match self {
             Self::UpTo(times) => return (1..=times).map(f64::from).collect(),
             Self::AnyPower => MOST_LENGTHS,
         };
         let mut power = 1.0;
         let mut steps = 0;
-        while left(power) < NEARLY_CLEAR && steps < 200 {
+        while left(power)[0] < NEARLY_CLEAR && steps < 200 {
             power /= STEP;
             steps += 1;
         }
-        while left(power * STEP) > NEARLY_CLEAR && steps < 200 {
+        while left(power * STEP)[0] > NEARLY_CLEAR && steps < 200 {
             power *= STEP;
             steps += 1;
         }
         let mut powers = Vec::new();
         while powers.len() < most {
             powers.push(power);
-            if left(power) < DIM {
+            if left(power)[1] < DIM {
                 break;
             }
             power *= STEP;
@@ -154,9 +155,9 @@ mod tests {
 
     #[test]
     fn lengths_of_way_go_from_nearly_clear_to_dim() {
-        let powers = Times::AnyPower.powers(|p| (-0.001 * p).exp());
+        let powers = Times::AnyPower.powers(|p| [(-0.001 * p).exp(); 2]);
         assert!((-0.001 * powers[0]).exp() >= 0.98 && powers.len() < MOST_LENGTHS);
         assert!((-0.001 * powers[powers.len() - 1]).exp() < DIM);
-        assert_eq!(Times::UpTo(2).powers(|_| 1.0), [1.0, 2.0]);
+        assert_eq!(Times::UpTo(2).powers(|_| [1.0; 2]), [1.0, 2.0]);
     }
 }

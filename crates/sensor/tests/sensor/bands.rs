@@ -2,7 +2,7 @@
 //! does, which is done here by a plain sum.
 
 use etendue_sensor::bands::TOLERANCE;
-use etendue_sensor::{Illumination, Sensor, SensorSpec};
+use etendue_sensor::{Factor, Illumination, Sensor, SensorSpec, Times};
 use etendue_spectrum::{Bands, Curve, Illuminant, Outside, rgb};
 use serde_json::{Value, json};
 
@@ -158,7 +158,7 @@ fn check((keys, lights, filter, colored, channels, range): Trial<'_>) {
         chosen.bands.count()
     );
     assert!(error <= TOLERANCE, "{keys}: {error}");
-    let lit = own.in_bands(chosen.bands).unwrap();
+    let lit = own.clone().in_bands(chosen.bands).unwrap();
     for (c, channel) in channels.iter().enumerate() {
         for light in &lights {
             let white = summed([light, filter], &[], *channel, range);
@@ -206,7 +206,7 @@ fn bands_that_somebody_asked_for_stay_and_their_error_is_told() {
     assert!(edges.len() > 7 && (0..=6).all(|i| edges.contains(&(400.0 + 50.0 * f64::from(i)))));
     let error = chosen.error.unwrap();
     assert!(error <= TOLERANCE, "{error} in {} bands", edges.len() - 1);
-    let lit = own.in_bands(chosen.bands).unwrap();
+    let lit = own.clone().in_bands(chosen.bands).unwrap();
     assert_eq!(
         lit.channels().collect::<Vec<_>>(),
         ["425nm", "475nm", "525nm", "575nm", "625nm", "675nm"]
@@ -235,4 +235,79 @@ fn infrared_alone_is_seen_and_where_it_cannot_be_the_remedy_is_named() {
     let error = Sensor::new(&serde_json::from_value(spec).unwrap()).unwrap_err().to_string();
     assert!(error.contains("ideal r, g and b pass visible light alone"), "{error}");
     assert!(matches!(own.bands(), Bands::Spectral(_)));
+}
+
+/// What bodies leave of light after ways of any length, in every channel of a sensor: within what is promised down to
+/// a fiftieth of the light, and a little more down to a two-hundredth.
+#[test]
+fn bodies_of_any_length_take_what_an_integration_says() {
+    let silicon =
+        json!([[380, 0.3], [450, 0.6], [530, 0.72], [600, 0.66], [700, 0.45], [780, 0.3]]);
+    let efficiency: Curve = serde_json::from_value(silicon.clone()).unwrap();
+    let primary = |k: usize| move |nm: f64| rgb::PRIMARIES[k].at(nm).unwrap_or(0.0);
+    let (red, green, blue) = (primary(0), primary(1), primary(2));
+    let all = |_: f64| 1.0;
+    let channels: [Channel<'_>; 4] = [&red, &green, &blue, &all];
+    // Simpson's rule in steps of half a nanometre, at whose ends are the knots of all curves.
+    let nodes: Vec<f64> = (0..=1600).map(|k| 380.0 + 0.25 * f64::from(k)).collect();
+    let weights = (0..=1600).map(|k| match k {
+        0 | 1600 => 0.25 / 3.0,
+        k if k % 2 == 1 => 1.0 / 3.0,
+        _ => 0.5 / 3.0,
+    });
+    let weights: Vec<f64> = weights.collect();
+    let sensors = [
+        (json!({ "quantum_efficiency": silicon }), Illuminant::A, &channels[3..]),
+        (json!({ "quantum_efficiency": silicon, "cfa": "rgbw" }), Illuminant::D65, &channels[..]),
+    ];
+    for (keys, light, channels) in sensors {
+        let (own, light) = (sensor(&keys), curve(light));
+        for color in [[0.9, 0.5, 0.3], [0.2, 0.6, 0.95], [0.97, 0.99, 0.9], [0.6, 0.9, 0.7]] {
+            let body = rgb::spectrum(color);
+            let factor = Factor { curve: body.clone(), times: Times::AnyPower };
+            let illumination = Illumination {
+                spectra: vec![light.clone()],
+                factors: vec![factor],
+                ..Illumination::default()
+            };
+            let chosen = own.bands_under(&illumination).unwrap();
+            let count = chosen.bands.count();
+            let lit = own.clone().in_bands(chosen.bands).unwrap();
+            let passed: Vec<f64> = nodes.iter().map(|&nm| body.held(nm)).collect();
+            // Down to a fiftieth of the light, and to a two-hundredth.
+            let mut worst = [0.0_f64; 2];
+            for (c, channel) in channels.iter().enumerate() {
+                let seen =
+                    |nm: f64| light.at(nm).unwrap_or(0.0) * channel(nm) * efficiency.held(nm);
+                let electrons =
+                    nodes.iter().zip(&weights).map(|(&nm, weight)| weight * seen(nm) * nm);
+                let electrons: Vec<f64> = electrons.collect();
+                let exact = |power: f64| -> f64 {
+                    electrons.iter().zip(&passed).map(|(e, left)| e * left.powf(power)).sum()
+                };
+                let counted = |power: f64| counted(&lit, c, &light, &body, power);
+                // The counts' unit is that of what no body takes from.
+                let [white, unit] = [exact(0.0), counted(0.0)];
+                let powers = (0..200).map(|k| 1e-3 * 1.1_f64.powi(k));
+                for power in powers {
+                    let left = exact(power) / white;
+                    let off = (counted(power) / unit / left - 1.0).abs();
+                    for (worst, least) in worst.iter_mut().zip([0.02, 0.005]) {
+                        *worst = if left >= least { worst.max(off) } else { *worst };
+                    }
+                }
+            }
+            println!("{keys} {color:?}: {count} bands, {worst:?}");
+            assert!(worst[0] <= TOLERANCE, "{keys} {color:?}: {worst:?}");
+            assert!(worst[1] <= 1.5 * TOLERANCE, "{keys} {color:?}: {worst:?}");
+        }
+    }
+}
+
+/// The electrons of a channel as a render would count what a body leaves after a way.
+fn counted(lit: &Sensor, channel: usize, light: &Curve, body: &Curve, power: f64) -> f64 {
+    let light = lit.bands().from_curve(light, Outside::Zero).unwrap();
+    let body = lit.bands().from_curve(body, Outside::Held).unwrap();
+    let electrons = lit.electrons_per_unit(channel).iter();
+    electrons.zip(light).zip(body).map(|((e, light), body)| e * light * body.powf(power)).sum()
 }
