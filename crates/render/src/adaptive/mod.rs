@@ -26,6 +26,7 @@ mod rule;
 
 use rayon::prelude::*;
 
+use rule::by_chance;
 pub(crate) use rule::{Rule, variance_of_mean};
 
 use crate::film::FilmLayer;
@@ -44,11 +45,6 @@ const NEAR: f64 = 2.0;
 /// What the error may be for half as many samples again to do: they leave two thirds of a variance at most
 /// ([`convergence`]).
 const MIDWAY: f64 = 1.5;
-
-/// The error that the samples of half a block may show of themselves when they are done, as a share of what is
-/// allowed. The other half decided, and the variance of 32 pixels is known to a quarter: what is done at 1 is
-/// seldom twice as much by chance.
-const OVER: f64 = 2.0;
 
 /// The share of pixels that may be so without a word.
 const FEW: f64 = 0.01;
@@ -186,8 +182,8 @@ pub struct SampleCounts {
     pub total: u64,
     /// Pixels that were given up at the most samples.
     pub given_up: u64,
-    /// Pixels of blocks that were done by what others found, and by their own samples have more than twice the
-    /// variance that was allowed.
+    /// Pixels of blocks that were done by what others found, and by their own samples have more variance than was
+    /// allowed: more than what is allowed shows by chance once in a thousand blocks.
     #[serde(default)]
     pub over: u64,
     /// The middle of the worst block of these (column and row, from 0), and its error as a share of what
@@ -245,8 +241,8 @@ impl SampleCounts {
         };
         let over = many.then(|| {
             format!(
-                "{:.2} % of the pixels stopped with more than twice the variance that `render.samples` \
-                 allows, by their own samples, of which those beside them saw too little",
+                "{:.2} % of the pixels stopped with more variance than `render.samples` allows, by their own \
+                 samples (of what is allowed, chance shows 0.1 % so), of which those beside them saw too little",
                 100.0 * part(self.over)
             )
         });
@@ -452,7 +448,7 @@ impl<'a> Adaptive<'a> {
             // Of what goes on nobody knows yet.
             let is_done = !gave_up && (1..=samples).contains(&block.settled[half]);
             let own = if is_done { self.own_error((index, half), number, part) } else { 0.0 };
-            let is_over = own > OVER;
+            let is_over = own > by_chance(pixels.len());
             Some(SampleCounts {
                 least: number,
                 most: number,

@@ -7,6 +7,9 @@ use crate::samples::of_first_set;
 use crate::stopping::Stopping;
 use etendue_scene::Scene;
 
+/// The normal deviate that one of a thousand exceeds.
+const ONE_IN_A_THOUSAND: f64 = 3.0902;
+
 /// When samples are enough.
 pub(crate) struct Rule {
     /// Not before there are so many of each pixel.
@@ -87,4 +90,33 @@ pub(super) fn sizes(samples: u32) -> [f64; 2] {
 /// of its square.
 pub(crate) fn variance_of_mean(difference: f64) -> f64 {
     0.25 * difference * difference
+}
+
+/// The mean of so many squares of independent normal differences, over its expected value, that chance exceeds once
+/// in a thousand: of χ² of as many degrees of freedom, by E. B. Wilson and M. M. Hilferty, "The distribution of
+/// chi-square", 1931. It is 1.96 of half a block's 32 pixels, and more of the few in a block that the edge of the
+/// picture cuts.
+pub(super) fn by_chance(pixels: usize) -> f64 {
+    let spread = 2.0 / (9.0 * pixels.max(1) as f64);
+    (1.0 - spread + ONE_IN_A_THOUSAND * spread.sqrt()).powi(3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quantiles of χ² at 0.999 (M. Abramowitz and I. A. Stegun, *Handbook of Mathematical Functions*, table 26.8).
+    #[test]
+    fn chance_is_that_of_chi_square() {
+        for (degrees, quantile) in
+            [(1, 10.828), (4, 18.467), (8, 26.125), (16, 39.252), (32, 62.487)]
+        {
+            let found = by_chance(degrees) * degrees as f64;
+            // The cube root is nearly normal: to 3 % of one square, and far less of many.
+            assert!(
+                (found / quantile - 1.0).abs() < 0.04 / (degrees as f64).sqrt(),
+                "{degrees}: {found}"
+            );
+        }
+    }
 }
