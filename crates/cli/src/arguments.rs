@@ -381,6 +381,9 @@ pub(crate) struct SensorArguments {
         help = "Set any value of the file, e.g. read_noise=3, or camera.sensor.read_noise=3 of a scene"
     )]
     pub(crate) settings: Vec<(String, String)>,
+    /// Let a scene name a camera file outside its own folder
+    #[arg(long, requires = "sensor")]
+    pub(crate) allow_outside: bool,
     /// Also write the curves into this folder, as curves.svg and curves.json
     #[arg(short, long, value_name = "DIR", requires = "sensor")]
     pub(crate) output: Option<PathBuf>,

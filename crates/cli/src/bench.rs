@@ -14,7 +14,7 @@ use etendue_bench::rays::Rays;
 use etendue_bench::samplers;
 use etendue_bench::{drawing, machine};
 use etendue_chart::Theme;
-use etendue_files::{Ledger, MANIFEST, Transaction};
+use etendue_files::{Ledger, MANIFEST, Opener, Transaction};
 use etendue_render::Plan;
 use etendue_render::output::{Outputs, sidecar};
 use etendue_scene::Scene;
@@ -151,7 +151,11 @@ fn with_picture(
     notes: &mut Vec<String>,
 ) -> Result<SceneArguments, Fault> {
     let mut arguments = arguments.clone();
-    let file = SceneFile::read(&arguments.scene, &arguments.overrides())?;
+    let file = SceneFile::read_with(
+        &Opener::new(arguments.reach()),
+        &arguments.scene,
+        &arguments.overrides(),
+    )?;
     if file.spec.tracer.is_none() {
         arguments.settings.push(("tracer".to_owned(), r#"{"type": "facing"}"#.to_owned()));
         notes.push("the scene names no `tracer`; its pictures are of `facing`".to_owned());

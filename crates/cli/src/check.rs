@@ -17,15 +17,16 @@ use crate::fault::{Fault, Versioned, print_json, print_text};
 pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
     let options = &arguments.scene;
     let start = Instant::now();
-    let file = SceneFile::read(&options.scene, &options.overrides())?;
-    let scene = file.load(Wanted::EVERYTHING, &options.load_options())?;
+    let loading = options.load_options();
+    let file = SceneFile::read_with(&loading.opener, &options.scene, &options.overrides())?;
+    let scene = file.load(Wanted::EVERYTHING, &loading)?;
     if options.strict
         && let Some(fault) = Images::first_fault(&scene)
     {
         return Err(Fault::refused(fault));
     }
     let load = start.elapsed().as_secs_f64();
-    let frames = file.frames(&options.load_options().opener, || Ok(Start::of(&scene)))?;
+    let frames = file.frames(&loading.opener, || Ok(Start::of(&scene)))?;
     let plan = Plan::new(&scene, Outputs::ALL);
     let prospect = Prospect { scene: &scene, plan: &plan, outputs: Outputs::ALL, load };
     let time = TimeForecast::new(&prospect, &Calibration::of_this_machine()?);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use etendue::places;
-use etendue_files::{Ledger, Transaction};
+use etendue_files::{Ledger, Opener, Reach, Transaction};
 use etendue_render::output::sidecar;
 use etendue_scene::file::SensorFile;
 use etendue_sensor::emva::{DESCRIPTOR, EmvaError, MANIFEST, Options, Series};
@@ -26,11 +26,14 @@ pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
     let Some(name) = &arguments.sensor else {
         return list(arguments.json);
     };
-    let file = find(name, &arguments.settings)?;
+    let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
+    let opener = Opener::new(reach);
+    let file = find(&opener, name, &arguments.settings)?;
     if !arguments.quiet {
         file.sensor.notes().iter().for_each(|note| say(&format!("note: {note}")));
     }
-    let inputs: Vec<PathBuf> = Path::new(name).exists().then(|| name.into()).into_iter().collect();
+    opener.record(Path::new(name).exists().then(|| name.into()));
+    let inputs = opener.found();
     let drawn = arguments.output.iter().flat_map(|folder| CURVES.map(|name| folder.join(name)));
     places::keep_apart(&inputs, &drawn.collect::<Vec<_>>())?;
     match &arguments.emva {
@@ -40,10 +43,10 @@ pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
 }
 
 /// A file when there is one, else a preset.
-fn find(name: &str, settings: &[(String, String)]) -> Result<SensorFile, Fault> {
+fn find(opener: &Opener, name: &str, settings: &[(String, String)]) -> Result<SensorFile, Fault> {
     let path = Path::new(name);
     if path.exists() || path.extension().is_some_and(|ending| ending == "json") {
-        return Ok(SensorFile::read(path, settings)?);
+        return Ok(SensorFile::read(opener, path, settings)?);
     }
     let Some(model) = Model::from_name(name) else {
         let known: Vec<&str> = Model::ALL.iter().map(|model| model.preset().name).collect();

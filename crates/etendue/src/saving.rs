@@ -5,22 +5,12 @@ use std::path::Path;
 
 use etendue_files::Transaction;
 use etendue_geometry::Mesh;
-use etendue_scene::file::{FileKind, SceneFile};
+use etendue_scene::file::FileKind;
 use serde_json::Value;
 
-use crate::{Error, Options, Progress, Session, places};
+use crate::{Error, Progress, Session, places};
 
 impl Session {
-    /// A session of what [`origin`](Self::origin) gave of another one, be it in another process. With its
-    /// options and [`meshes`](Self::meshes) its pictures are the same to the bit.
-    ///
-    /// # Errors
-    ///
-    /// When the scene says something that the format does not know.
-    pub fn restore(path: impl AsRef<Path>, scene: Value, options: Options) -> Result<Self, Error> {
-        Ok(Self::of(SceneFile::restore(path.as_ref(), scene)?, options))
-    }
-
     /// The path of the scene, or where it would stand, and the values of the whole scene, whichever frame is
     /// shown.
     #[must_use]

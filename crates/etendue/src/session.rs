@@ -1,5 +1,6 @@
 //! A scene that is opened once and rendered often.
 
+mod opening;
 mod prepare;
 mod render;
 
@@ -13,7 +14,7 @@ use etendue_geometry::Mesh;
 use etendue_oidn::Denoiser;
 use etendue_render::output::{LayerFile, Outputs};
 use etendue_render::{Checkpoint, Images, Plan, Seconds, denoise};
-use etendue_scene::file::{FileKind, FramesSpec, SceneFile};
+use etendue_scene::file::{FramesSpec, SceneFile};
 use etendue_scene::{Cache, Frame, Frames, Scene, SceneError, Start};
 use etendue_tracer::LayerSpec;
 use serde_json::Value;
@@ -82,82 +83,6 @@ impl fmt::Debug for Session {
 }
 
 impl Session {
-    /// Opens a scene (`.json`), or a model to frame by itself (`.gltf`, `.glb`, `.obj`, `.ply`). The text
-    /// is read and checked; nothing that it names is opened yet.
-    ///
-    /// # Errors
-    ///
-    /// When it cannot be read or says something that the format does not know.
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
-        Self::open_with(path, Options::default())
-    }
-
-    /// As [`Self::open`], with options.
-    ///
-    /// # Errors
-    ///
-    /// As [`Self::open`].
-    pub fn open_with(path: impl AsRef<Path>, options: Options) -> Result<Self, Error> {
-        let path = path.as_ref();
-        let mut file = SceneFile::read(path, &options.settings)?;
-        let says_nothing = file.spec.layers.is_empty() && file.spec.tracer.is_none();
-        if file.kind() == FileKind::Model && says_nothing {
-            // A bare model gets a picture and the two layers that most people come for.
-            let mut settings = options.settings.clone();
-            settings.push(("tracer".to_owned(), r#"{"type": "facing"}"#.to_owned()));
-            settings.push(("layers".to_owned(), r#"["depth", "normal"]"#.to_owned()));
-            file = SceneFile::read(path, &settings)?;
-        }
-        Ok(Self::of(file, options))
-    }
-
-    /// A scene that stands in no file: `scene` in the words of the scene format, in which the file of an
-    /// object may be the name of a mesh that [`insert_mesh`](Self::insert_mesh) brings. Other files that it
-    /// names lie in `folder`.
-    ///
-    /// # Errors
-    ///
-    /// When the scene says something that the format does not know.
-    pub fn from_json(folder: impl AsRef<Path>, scene: Value) -> Result<Self, Error> {
-        Self::from_json_with(folder, scene, Options::default())
-    }
-
-    /// As [`Self::from_json`], with options.
-    ///
-    /// # Errors
-    ///
-    /// As [`Self::from_json`].
-    pub fn from_json_with(
-        folder: impl AsRef<Path>,
-        scene: Value,
-        options: Options,
-    ) -> Result<Self, Error> {
-        let file = SceneFile::from_json(folder.as_ref(), scene)?;
-        let file = if options.settings.is_empty() { file } else { file.with(&options.settings)? };
-        Ok(Self::of(file, options))
-    }
-
-    pub(crate) fn of(file: SceneFile, options: Options) -> Self {
-        let opener = Opener::new(options.reach);
-        opener.record(options.inputs.iter().cloned());
-        Self {
-            file,
-            shown: None,
-            frames: None,
-            frame_notes: Vec::new(),
-            opener,
-            options,
-            cache: Cache::default(),
-            loaded: None,
-            structures: Structures::default(),
-            images: Arc::default(),
-            settings: Vec::new(),
-            seconds: Seconds::default(),
-            checkpoint: None,
-            denoiser: None,
-        }
-    }
-
     /// Adds a mesh, or replaces it: objects whose `file` is `name` are made of it. Three coordinates a
     /// vertex (m) and three vertices a triangle, counter-clockwise from its front.
     ///
@@ -229,24 +154,6 @@ impl Session {
             true => Ok(()),
             false => self.set_all(changes.iter().map(|(path, value)| (&**path, value.clone()))),
         }
-    }
-
-    /// Reads the scene's file again, with all that was set since, and at the next render the models and
-    /// images that have changed on disk. When it is refused, the session is as it was.
-    ///
-    /// # Errors
-    ///
-    /// As [`Self::open`]; a scene that stands in no file is as it was.
-    pub fn reload(&mut self) -> Result<(), Error> {
-        if !self.file.is_in_memory() {
-            let mut again = Self::open_with(self.file.path(), self.options.clone())?.file;
-            if !self.settings.is_empty() {
-                again = again.with(&self.settings)?;
-            }
-            self.file = again;
-        }
-        self.leave_frame();
-        Ok(())
     }
 
     /// All values of the scene as they are now, in the words of the scene format.

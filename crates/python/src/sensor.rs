@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use etendue_files::Opener;
 use etendue_scene::file::SensorFile;
 use etendue_sensor::{Exposure, Model};
 use numpy::{IntoPyArray, PyReadonlyArray2};
@@ -24,7 +25,7 @@ impl Sensor {
     fn new(name: &str, settings: Vec<(String, String)>) -> PyResult<Self> {
         let path = Path::new(name);
         let file = if path.exists() || name.ends_with(".json") {
-            SensorFile::read(path, &settings)
+            SensorFile::read(&Opener::default(), path, &settings)
         } else {
             let model = Model::from_name(name).ok_or_else(|| {
                 let known: Vec<&str> = Model::ALL.iter().map(|m| m.preset().name).collect();

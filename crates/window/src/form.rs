@@ -62,6 +62,16 @@ impl Form {
         schema
     }
 
+    /// What a schema says of objects, where the name of a file that holds one would do as well.
+    fn of_objects<'a>(&'a self, schema: &'a Value) -> &'a Value {
+        let choices = schema["anyOf"].as_array();
+        let mut others = choices.into_iter().flatten().filter(|one| one["type"] != "string");
+        match (others.next(), others.next()) {
+            (Some(one), None) => self.resolved(one),
+            _ => schema,
+        }
+    }
+
     /// A labelled value: a line, or a heading with what is below it.
     fn field(&self, ui: &mut Ui, key: &str, field: Field<'_>, edits: &mut Vec<Edit>) {
         let schema = self.resolved(field.schema);
@@ -93,7 +103,10 @@ impl Form {
     }
 
     fn inner(&self, ui: &mut Ui, field: Field<'_>, edits: &mut Vec<Edit>) {
-        let schema = self.resolved(field.schema);
+        let schema = match self.resolved(field.schema) {
+            schema if field.value.is_object() => self.of_objects(schema),
+            schema => schema,
+        };
         let field = Field { schema, ..field };
         if let Some(variants) = variants(schema) {
             return self.tagged(ui, field, &variants, edits);

@@ -186,6 +186,16 @@ fn inputs() -> Vec<Input> {
         &json!({"glass_catalogs": ["own.agf"]}),
     );
     add(&["LensFile.glass_catalogs"], scene(&camera(&own)), &[("own.agf", AGF)], vec![longer(AGF)]);
+    // The camera itself.
+    let pinhole = |fov: u32| {
+        json!({"type": "pinhole", "fov": fov, "sensor": {"resolution": [4, 4]},
+               "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]}})
+        .to_string()
+        .into_bytes()
+    };
+    let (narrow, wide) = (pinhole(30), pinhole(60));
+    let in_file = scene(&json!({"camera": "camera.json"}));
+    add(&["CameraSource"], in_file, &[("camera.json", &narrow)], vec![wide]);
     // Poses.
     let path_keys: &[&str] = &["CameraPath.file"];
     let (near, far) = (nerfstudio(3.0), nerfstudio(4.0));

@@ -161,7 +161,7 @@ pub fn check(
     overrides: &[(String, String)],
     options: &LoadOptions<'_>,
 ) -> Result<Diagnosis, SceneError> {
-    let file = SceneFile::read(path, overrides)?;
+    let file = SceneFile::read_with(&options.opener, path, overrides)?;
     let scene = file.load(Wanted::EVERYTHING, options)?;
     Ok(Diagnosis::of(&scene, file.kind()))
 }

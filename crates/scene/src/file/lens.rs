@@ -19,7 +19,7 @@ use crate::error::not_found;
 use crate::words::plain;
 
 /// The keys of a scene that no lens file has.
-const SCENE_KEYS: [&str; 3] = ["etendue", "camera", "objects"];
+pub(super) const SCENE_KEYS: [&str; 3] = ["etendue", "camera", "objects"];
 
 /// The schemas of lens files and of files of rays, made once.
 static LENS: LazyLock<Value> = LazyLock::new(lens_schema);
@@ -99,11 +99,13 @@ pub fn read_lens_at(
         return build(&written, &value, reach);
     }
     let folder = folder(path, reach)?;
-    let camera = SceneFile::read(path, &[])?.camera_alone(&folder)?;
+    let scene = SceneFile::read_with(folder.opener(), path, &[])?;
+    let camera = scene.camera_alone(&folder)?;
     let Some(lens) = camera.lens() else {
-        let kind = value.pointer("/camera/type").and_then(Value::as_str).unwrap_or("pinhole");
+        let kind = scene.value().pointer("/camera/type");
+        let kind = kind.and_then(Value::as_str).unwrap_or("pinhole");
         let why = format!("a \"{kind}\" has no lens to look at; give a scene whose camera has");
-        return Err(written.fault("camera.type", why));
+        return Err(scene.fault("camera.type", why));
     };
     let focused = lens.focused();
     let distance = focused.sensor_z() - focused.train().last_vertex();
@@ -147,7 +149,7 @@ pub fn trace_rays(lens: &OpticalTrain, path: &Path) -> Result<TracedRays, SceneE
 fn read(path: &Path) -> Result<(WrittenPlaces, Value), SceneError> {
     let (document, mut value) = read_document(path).map_err(not_a_lens)?;
     lenient::tidy(&mut value);
-    Ok((WrittenPlaces::new(path, Some(document)), value))
+    Ok((WrittenPlaces::new(&Opener::default(), path, Some(document)), value))
 }
 
 fn read_as<T: DeserializeOwned>(
@@ -179,7 +181,7 @@ fn build(written: &WrittenPlaces, value: &Value, reach: Reach) -> Result<ReadLen
     let file: LensFile = read_as(&LENS, written, value)?;
     let folder = folder(&written.path, reach)?;
     let train = file
-        .build(&|name| folder.find(name).map(|found| found.path).map_err(not_found))
+        .build(&|name: &str| folder.find(name).map(|found| found.path).map_err(not_found))
         .map_err(|error| fault(written, &error))?;
     Ok(ReadLens {
         train,
@@ -199,7 +201,7 @@ fn read_zemax(path: &Path, configuration: Option<usize>) -> Result<ReadLens, Sce
     let ZemaxLens { file, fields, wavelengths, notes, .. } =
         ZemaxLens::read_configuration(&bytes, configuration).map_err(zemax)?;
     let train = file
-        .build(&|name| Err(format!("{name}: a Zemax file has no masks")))
+        .build(&|name: &str| Err(format!("{name}: a Zemax file has no masks")))
         .map_err(|error| zemax(ZemaxError { line: 1, why: error.to_string() }))?;
     let focus = Focus::AsWritten;
     let inputs = vec![path.to_owned()];

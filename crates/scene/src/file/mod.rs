@@ -1,5 +1,6 @@
 //! The JSON scene format, version 1: read, changed by settings from the command line, checked.
 
+mod camera;
 mod check;
 mod document;
 mod frames;
@@ -17,6 +18,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use etendue_files::Opener;
 use etendue_sensor::Sensor;
 use etendue_tracer::LayerSpec;
 use serde_json::{Value, json};
@@ -44,6 +46,7 @@ use crate::SceneError;
 use crate::memory::{has_room, of_json};
 use crate::sniff::what_it_is;
 use crate::words::plain;
+use camera::CameraFile;
 use document::{Document, excerpt};
 
 /// The endings of models that may stand in for a scene file.
@@ -75,6 +78,10 @@ struct WrittenPlaces {
     path: PathBuf,
     /// The text; none for a model.
     document: Option<Document>,
+    /// Opens the camera's file, where the scene names one.
+    opener: Opener,
+    /// That file, once it is read.
+    camera: Option<CameraFile>,
     /// Which paths the command line set, and how it was written there.
     settings: BTreeMap<String, String>,
     /// Of which frame they are; none for the command line's.
@@ -93,13 +100,26 @@ pub enum FileKind {
 impl SceneFile {
     /// Reads the scene at `path`, or makes a scene of the model there (`.gltf`, `.glb`, `.obj`,
     /// `.ply`), and applies `overrides`: pairs such as (`camera.fov`, `30`), whose second part is
-    /// JSON or else a plain string.
+    /// JSON or else a plain string. The camera's file, where the scene names one, is in the scene's folder.
     ///
     /// # Errors
     ///
     /// When the file is missing, not JSON, or says something that the format does not know; the
     /// message names the place.
     pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, SceneError> {
+        Self::read_with(&Opener::default(), path, overrides)
+    }
+
+    /// As [`Self::read`], with the camera's file where `opener` reaches.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`].
+    pub fn read_with(
+        opener: &Opener,
+        path: &Path,
+        overrides: &[(String, String)],
+    ) -> Result<Self, SceneError> {
         let kind = if is_model(path) { FileKind::Model } else { FileKind::Scene };
         let (document, mut value) = match kind {
             FileKind::Model => {
@@ -116,20 +136,21 @@ impl SceneFile {
         if let Value::Object(members) = &mut value {
             members.entry("camera").or_insert_with(|| json!({ "type": "pinhole" }));
         }
-        Self::of(WrittenPlaces::new(path, document), kind, value, overrides)
+        Self::of(WrittenPlaces::new(opener, path, document), kind, value, overrides)
     }
 
-    /// The scene that `value` describes, which stands in no file. What it names lies in `folder`.
+    /// The scene that `value` describes, which stands in no file. What it names lies in `folder`, or where
+    /// `opener` reaches.
     ///
     /// # Errors
     ///
     /// As [`Self::read`].
-    pub fn from_json(folder: &Path, mut value: Value) -> Result<Self, SceneError> {
+    pub fn from_json(opener: &Opener, folder: &Path, mut value: Value) -> Result<Self, SceneError> {
         if let Value::Object(members) = &mut value {
             members.entry("etendue").or_insert_with(|| json!(1));
             members.entry("camera").or_insert_with(|| json!({ "type": "pinhole" }));
         }
-        let written = WrittenPlaces::new(&folder.join(IN_MEMORY), None);
+        let written = WrittenPlaces::new(opener, &folder.join(IN_MEMORY), None);
         Self::of(written, FileKind::Scene, value, &[])
     }
 
@@ -138,9 +159,9 @@ impl SceneFile {
     /// # Errors
     ///
     /// As [`Self::read`].
-    pub fn restore(path: &Path, value: Value) -> Result<Self, SceneError> {
+    pub fn restore(opener: &Opener, path: &Path, value: Value) -> Result<Self, SceneError> {
         let kind = if is_model(path) { FileKind::Model } else { FileKind::Scene };
-        Self::of(WrittenPlaces::new(path, None), kind, value, &[])
+        Self::of(WrittenPlaces::new(opener, path, None), kind, value, &[])
     }
 
     /// The scene with settings on top of those that it has, as in [`Self::read`]. The file is not read
@@ -159,6 +180,7 @@ impl SceneFile {
         mut value: Value,
         overrides: &[(String, String)],
     ) -> Result<Self, SceneError> {
+        written.read_camera(&mut value)?;
         written.set(&mut value, overrides)?;
         if let Value::Object(members) = &mut value {
             // A key of the scene that was set to null is as if it were not written.
@@ -242,10 +264,7 @@ impl SceneFile {
     /// The folder that the file's own paths start at.
     #[must_use]
     pub fn folder(&self) -> &Path {
-        match self.written.path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        }
+        self.written.folder()
     }
 
     /// Whether it is a JSON scene or a model.
@@ -262,8 +281,38 @@ impl SceneFile {
 }
 
 impl WrittenPlaces {
-    fn new(path: &Path, document: Option<Document>) -> Self {
-        Self { path: path.to_owned(), document, settings: BTreeMap::new(), frame: None }
+    fn new(opener: &Opener, path: &Path, document: Option<Document>) -> Self {
+        Self {
+            path: path.to_owned(),
+            document,
+            opener: opener.clone(),
+            camera: None,
+            settings: BTreeMap::new(),
+            frame: None,
+        }
+    }
+
+    fn folder(&self) -> &Path {
+        match self.path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        }
+    }
+
+    /// Puts the camera in the place of the name of its file.
+    fn read_camera(&mut self, scene: &mut Value) -> Result<(), SceneError> {
+        let Some(place) = scene.get_mut("camera") else { return Ok(()) };
+        let Value::String(written) = &*place else { return Ok(()) };
+        let folder = self.folder();
+        let folder =
+            self.opener.folder(folder).map_err(|why| SceneError::unreadable(folder, why))?;
+        let (file, camera) =
+            CameraFile::read(&folder, written)?.map_err(|why| self.fault("camera", why))?;
+        *place = camera;
+        // What it says stands there, not where it is named.
+        self.settings.remove("camera");
+        self.camera = Some(file);
+        Ok(())
     }
 
     /// Applies settings of the command line to the file's values, the later the stronger.
@@ -272,29 +321,43 @@ impl WrittenPlaces {
             let setting = format!("{key}={text}");
             let applied = overrides::apply(value, key, text)
                 .map_err(|source| SceneError::Override { setting: setting.clone(), source })?;
+            let is_camera = applied == "camera";
             self.settings.insert(applied, setting);
+            if is_camera {
+                self.camera = None;
+                self.read_camera(value)?;
+            }
         }
         Ok(())
     }
 
     /// The error that the value at the JSON path `path` is wrong because of `reason`.
     fn fault(&self, path: &str, reason: impl Into<String>) -> SceneError {
+        let place = self.place(path);
+        let file = self.camera.as_ref().zip(CameraFile::own_path(path));
+        // A setting is told as it was written, from the scene's top.
+        let file = file.filter(|_| !matches!(place, Origin::Setting(_)));
+        let (file, path) = file.map_or((&self.path, path), |(file, own)| (&file.path, own));
         SceneError::Invalid {
-            file: self.path.clone(),
+            file: file.clone(),
             path: path.to_owned(),
-            place: self.place(path),
+            place,
             reason: reason.into(),
         }
     }
 
     /// Where the value at `path`, or the nearest that holds it, was written.
     fn place(&self, path: &str) -> Origin {
-        let holders = || {
-            std::iter::successors(Some(path), |path| path.rfind(['.', '[']).map(|end| &path[..end]))
-        };
+        let holders = || std::iter::successors(Some(path), |path| holder(path));
         // A setting replaces all that the text has below it.
         let setting = holders().find_map(|path| self.settings.get(path));
-        let place = holders().find_map(|path| self.document.as_ref()?.place(path));
+        let camera = self.camera.as_ref().zip(CameraFile::own_path(path));
+        let place = match camera {
+            Some((file, path)) => std::iter::successors(Some(path), |path| holder(path))
+                .chain([""])
+                .find_map(|path| file.document.place(path)),
+            None => holders().find_map(|path| self.document.as_ref()?.place(path)),
+        };
         match (setting, place) {
             (Some(setting), _) => Origin::Setting(match self.frame {
                 Some(number) => format!("frames[{number}]: {setting}"),
@@ -304,6 +367,11 @@ impl WrittenPlaces {
             (None, None) => Origin::Nowhere,
         }
     }
+}
+
+/// The path of the value that holds the one at `path`.
+fn holder(path: &str) -> Option<&str> {
+    path.rfind(['.', '[']).map(|end| &path[..end])
 }
 
 /// Where a value was written.

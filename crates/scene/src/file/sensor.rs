@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use etendue_files::Opener;
 use etendue_sensor::{Sensor, SensorError, SensorSpec};
 use serde_json::{Value, json};
 
@@ -28,15 +29,20 @@ pub struct SensorFile {
 impl SensorFile {
     /// Reads the sensor at `path`. A file with a key `etendue` or `camera` is taken for a scene, of
     /// which nothing but the sensor is looked at. `overrides` are paths from the file's top and
-    /// values, as in [`SceneFile::read`](super::SceneFile::read).
+    /// values, as in [`SceneFile::read`](super::SceneFile::read); `opener` opens the file of the
+    /// scene's camera, where it has one.
     ///
     /// # Errors
     ///
     /// When the file is missing or not JSON, has no sensor, or its sensor is refused; the message
     /// names the file, the place and the remedy.
-    pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, SceneError> {
+    pub fn read(
+        opener: &Opener,
+        path: &Path,
+        overrides: &[(String, String)],
+    ) -> Result<Self, SceneError> {
         let (document, value) = read_document(path)?;
-        Self::of(WrittenPlaces::new(path, Some(document)), value, overrides)
+        Self::of(WrittenPlaces::new(opener, path, Some(document)), value, overrides)
     }
 
     /// A sensor given by its values, such as those of a preset; `name` stands for the file.
@@ -49,7 +55,7 @@ impl SensorFile {
         value: Value,
         overrides: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        Self::of(WrittenPlaces::new(name, None), value, overrides)
+        Self::of(WrittenPlaces::new(&Opener::default(), name, None), value, overrides)
     }
 
     fn of(
@@ -57,6 +63,7 @@ impl SensorFile {
         mut value: Value,
         overrides: &[(String, String)],
     ) -> Result<Self, SceneError> {
+        written.read_camera(&mut value)?;
         written.set(&mut value, overrides)?;
         lenient::tidy(&mut value);
         let in_scene = value.get("etendue").is_some() || value.get("camera").is_some();

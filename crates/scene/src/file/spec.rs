@@ -9,6 +9,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::camera::CameraSource;
 use super::{FramesSpec, ObjectSpec, PlanSpec, RenderSpec, TracerSpec, Up};
 
 /// A scene as the file writes it.
@@ -19,6 +20,7 @@ pub struct SceneSpec {
     pub etendue: FormatVersion,
     /// The camera; a pinhole that frames the scene when absent.
     #[serde(default)]
+    #[schemars(with = "Option<CameraSource>")]
     pub camera: Option<CameraSpec>,
     /// What the picture shows. When absent there is one only if there are no `layers` either, and
     /// it shows `facing`.

@@ -2,6 +2,7 @@
 
 mod assets;
 mod bad_input;
+mod camera_files;
 mod doctor;
 mod documents;
 mod models;
