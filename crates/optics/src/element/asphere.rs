@@ -5,6 +5,21 @@ use super::rays::Ray;
 use super::refract::{Media, Root, meet_conic};
 use super::surface::Surface;
 
+/// The slope of a wall: no lens that was built has one as steep (72°) within its clear aperture.
+const WALL: f64 = 3.0;
+
+impl Surface {
+    /// Whether an asphere is a wall somewhere within its clear aperture, at which rays take long to be traced.
+    pub(super) fn has_wall(&self) -> bool {
+        let reach = self.semi_diameter.min(self.extent().into_iter().fold(f64::INFINITY, f64::min));
+        let slope = |i: u32| {
+            let r = reach * f64::from(i) / 64.0;
+            self.profile(r * r).1 * r
+        };
+        !self.aspheric.is_empty() && (1..64).any(|i| slope(i).abs() > WALL)
+    }
+}
+
 impl Profile for Surface {
     /// (∂z/∂x)/x.
     type Slope = f64;
@@ -51,22 +66,28 @@ impl Profile for Surface {
     }
 
     fn sags(&self, reach: f64) -> [f64; 2] {
-        let sags = (0..=64).map(|i| self.profile((reach * f64::from(i) / 64.0).powi(2)).0);
+        // Terms that all rise, or all fall, are farthest apart at the ends.
+        let terms = || self.aspheric.iter().chain([&self.curvature]);
+        let is_monotone = terms().all(|&a| a >= 0.0) || terms().all(|&a| a <= 0.0);
+        let places = if is_monotone { 1 } else { 64 };
+        let sags = (0..=places)
+            .map(|i| self.profile((reach * f64::from(i) / f64::from(places)).powi(2)).0);
         sags.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], s| [l.min(s), h.max(s)])
     }
 
     /// Each term rises or falls all the way: those that rise are least at the nearer place, those that fall at
     /// the farther one.
     fn sag_bounds(&self, squares: [f64; 2]) -> [f64; 2] {
-        let [near, far] = squares.map(|u| {
+        let part = |u: f64| {
             let conic = self.conic_sag(u);
-            let part = |is_part: fn(f64) -> bool| {
-                let terms = self.aspheric.iter().rev();
-                terms.fold(0.0, |sum, &a| sum * u + if is_part(a) { a } else { 0.0 }) * u
-            };
-            let (rising, falling) = (part(|a| a > 0.0), part(|a| a < 0.0));
-            [conic.max(0.0) + rising, conic.min(0.0) + falling]
-        });
+            let (mut rising, mut falling) = (0.0, 0.0);
+            for &a in self.aspheric.iter().rev() {
+                rising = rising * u + a.max(0.0);
+                falling = falling * u + a.min(0.0);
+            }
+            [conic.max(0.0) + rising * u, conic.min(0.0) + falling * u]
+        };
+        let [near, far] = [part(squares[0]), part(squares[1])];
         [near[0] + far[1], far[0] + near[1]]
     }
 }

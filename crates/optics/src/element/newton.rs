@@ -260,16 +260,34 @@ fn first_root(
     has_none: impl Fn([f64; 2]) -> bool,
 ) -> Option<f64> {
     let place = |i: u32| from + (to - from) * f64::from(i) / f64::from(PIECES);
-    Some(halved(first_change([0, PIECES], &place, &at, &has_none)?, at))
+    Some(root_between(first_change([0, PIECES], &place, &at, &has_none)?, at))
 }
 
-/// The root of `at` between two places of different signs.
-pub(super) fn halved([mut low, mut high]: [f64; 2], at: impl Fn(f64) -> f64) -> f64 {
-    let before = at(low) <= 0.0;
-    // 2⁻⁶⁰ of a stretch of metres is less than the last bit of a millimetre.
-    for _ in 0..60 {
+/// The root between two places of unlike sign: by false position, each end that stays for a second time at half its
+/// weight (the Illinois algorithm; Dowell and Jarratt 1971), and every third step by halving.
+pub(super) fn root_between([mut low, mut high]: [f64; 2], at: impl Fn(f64) -> f64) -> f64 {
+    let (mut below, mut above) = (at(low), at(high));
+    let before = below <= 0.0;
+    let mut stayed = 0_i32;
+    // Of the halvings alone 2⁻⁶⁰ of a stretch of metres would be left, less than the last bit of a millimetre.
+    for step in 0..180 {
         let middle = 0.5 * (low + high);
-        if (at(middle) <= 0.0) == before { low = middle } else { high = middle }
+        let secant = (low * above - high * below) / (above - below);
+        let is_between = secant > low && secant < high && step % 3 != 2;
+        let next = if is_between { secant } else { middle };
+        if !(next > low && next < high) {
+            break;
+        }
+        let value = at(next);
+        if (value <= 0.0) == before {
+            (low, below) = (next, value);
+            above *= if stayed < 0 { 0.5 } else { 1.0 };
+            stayed = -1;
+        } else {
+            (high, above) = (next, value);
+            below *= if stayed > 0 { 0.5 } else { 1.0 };
+            stayed = 1;
+        }
     }
     0.5 * (low + high)
 }

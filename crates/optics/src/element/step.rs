@@ -228,6 +228,11 @@ impl Step {
         }
     }
 
+    /// Whether rays take long to be traced at it: an asphere with a wall.
+    pub(crate) fn has_wall(&self) -> bool {
+        matches!(&self.action, Action::Asphere(refraction) if refraction.surface.has_wall())
+    }
+
     /// Decides the rays that a vector kernel has marked.
     #[cold]
     #[inline(never)]

@@ -30,6 +30,8 @@ pub struct MonochromaticTrain {
     indices: Vec<f64>,
     forward: Vec<Step>,
     backward: Vec<Step>,
+    /// Whether rays take long to be traced through it.
+    is_costly: bool,
 }
 
 /// One ray's way through a lens.
@@ -86,7 +88,8 @@ impl OpticalTrain {
             add(&mut backward, towards_object, loss([behind, before], element + 1));
         }
         backward.reverse();
-        Ok(MonochromaticTrain { wavelength, indices, forward, backward })
+        let is_costly = forward.len() > LONG || forward.iter().any(Step::has_wall);
+        Ok(MonochromaticTrain { wavelength, indices, forward, backward, is_costly })
     }
 
     /// The index of each medium at `wavelength` (nm), from the object's to the sensor's.
@@ -102,9 +105,10 @@ impl MonochromaticTrain {
         self.wavelength
     }
 
-    /// Whether it has more elements than lenses have that somebody built.
-    pub(crate) fn is_long(&self) -> bool {
-        self.forward.len() > LONG
+    /// Whether it has more elements than lenses have that somebody built, or a surface as steep as none has:
+    /// rays take long to be traced through it.
+    pub(crate) fn is_costly(&self) -> bool {
+        self.is_costly
     }
 
     /// The index of the medium between the last element and the sensor.

@@ -208,9 +208,10 @@ impl ExitPupil {
 
     /// Random rays outside of the bound that pass.
     pub(super) fn strays(&self, lens: &MonochromaticTrain, first: u32) -> Vec<Stray> {
-        let mut rays = LensRays::with_capacity(CHECKS as usize);
-        let mut strays = Vec::with_capacity(CHECKS as usize);
-        for i in first..first + CHECKS {
+        let checks = if lens.is_costly() { CHECKS / 4 } else { CHECKS };
+        let mut rays = LensRays::with_capacity(checks as usize);
+        let mut strays = Vec::with_capacity(checks as usize);
+        for i in first..first + checks {
             let u = ROBERTS.map(|alpha| (0.5 + alpha * f64::from(i)).fract());
             let film = match self.layout {
                 NodeLayout::Radial => DVec2::new(self.radius * u[0].sqrt(), 0.0),
@@ -322,8 +323,8 @@ fn widen(
     film: DVec3,
     [centre, half]: [DVec2; 2],
 ) {
-    // Long trains are measured more coarsely: to 0.003 of the radius, which [`MARGIN`] covers.
-    let (scanned, halvings) = if lens.is_long() { (16, 5) } else { (32, 12) };
+    // Costly trains are measured more coarsely: to 0.003 of the radius, which [`MARGIN`] covers.
+    let (scanned, halvings) = if lens.is_costly() { (16, 5) } else { (32, 12) };
     // The frame's corners are √2 from its centre.
     const OUTERMOST: f64 = 1.6;
     let angle = |i: usize| DVec2::from_angle(0.5 * turn_of(i) * std::f64::consts::TAU) * half;

@@ -10,8 +10,15 @@ use crate::train::{MonochromaticTrain, OpticalTrain, Side};
 /// Cells a side of a search grid.
 const GRID: u32 = 48;
 
+/// The same for trains through which rays take long to be traced.
+const COARSE_GRID: u32 = 16;
+
 /// Cells a side of the last resort, which finds what is 1/36 000 of the widest window.
 const FINE_GRID: u32 = 192;
+
+fn grid(at: &MonochromaticTrain) -> u32 {
+    if at.is_costly() { COARSE_GRID } else { GRID }
+}
 
 /// A rectangle of slopes x/−z, y/−z.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +41,7 @@ impl Window {
     }
 
     /// The window of all directions from `film` (mm) in which rays leave the lens, wider than
-    /// needed by at most a cell of 1/48 on each side; `None` when there are none.
+    /// needed by at most a cell of 1/48 on each side, of 1/16 for a train that is costly; `None` when there are none.
     pub fn find(train: &OpticalTrain, at: &MonochromaticTrain, film: DVec3) -> Option<Self> {
         Self::first_guesses(train, at, film)
             .into_iter()
@@ -89,14 +96,14 @@ impl Window {
     /// The passing part of the window, looked for in wider windows as long as it touches the edge.
     fn grown(self, at: &MonochromaticTrain, film: DVec3) -> Option<Self> {
         let mut outer = self;
-        let mut found = outer.passing(at, film, GRID)?;
+        let mut found = outer.passing(at, film, grid(at))?;
         for _ in 0..12 {
             let touches = found.min.cmple(outer.min).any() || found.max.cmpge(outer.max).any();
             if !touches {
                 break;
             }
             outer = Self::around(found.centre(), 2.0 * found.half());
-            found = outer.passing(at, film, GRID)?;
+            found = outer.passing(at, film, grid(at))?;
         }
         Some(found)
     }
@@ -105,7 +112,7 @@ impl Window {
     fn tightened(self, at: &MonochromaticTrain, film: DVec3) -> Self {
         let mut window = self;
         for _ in 0..6 {
-            let Some(next) = window.passing(at, film, GRID) else { break };
+            let Some(next) = window.passing(at, film, grid(at)) else { break };
             let shrunk = next.half().cmplt(0.9 * window.half()).any();
             window = next;
             if !shrunk {
