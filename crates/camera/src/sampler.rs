@@ -54,6 +54,17 @@ impl Sampler {
 }
 
 impl Sampler {
+    /// How many samples make up the set that `count` of them are taken from; `None` of a sequence. The first
+    /// samples of a larger count are those of a smaller one where both are of one set, or of a sequence.
+    #[must_use]
+    pub fn set_size(self, count: u32) -> Option<u32> {
+        match self {
+            Self::Sobol | Self::Independent => None,
+            Self::BlueNoise => Some(count.next_power_of_two()),
+            Self::Stratified | Self::Hammersley => Some(count),
+        }
+    }
+
     /// Whether points are those of [`sobol`].
     fn is_sobol(self) -> bool {
         matches!(self, Self::Sobol | Self::BlueNoise)

@@ -1,5 +1,7 @@
 //! One session, many pictures.
 
+#[path = "session/checkpoints.rs"]
+mod checkpoints;
 #[path = "session/frame_noise.rs"]
 mod frame_noise;
 #[path = "session/outputs.rs"]

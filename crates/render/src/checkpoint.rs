@@ -27,6 +27,8 @@ pub(crate) struct Keeper<'a> {
     pub(crate) checkpoint: &'a Checkpoint,
     pub(crate) identity: &'a Identity,
     pub(crate) shard: Shard,
+    /// Samples of each pixel that are wanted.
+    samples: u32,
     pub(crate) resolution: [u32; 2],
     files: Transaction,
     start: Instant,
@@ -42,14 +44,14 @@ impl<'a> Keeper<'a> {
     pub(crate) fn new(
         checkpoint: &'a Checkpoint,
         identity: &'a Identity,
-        shard: Shard,
+        (shard, samples): (Shard, u32),
         scene: &Scene,
     ) -> Self {
         let start = Instant::now();
         let state = Mutex::new(KeeperState { written: start, fault: None });
         let files = Transaction::at_once().keeping(&scene.inputs);
         let resolution = scene.camera.resolution();
-        Self { checkpoint, identity, shard, resolution, files, start, state }
+        Self { checkpoint, identity, shard, samples, resolution, files, start, state }
     }
 
     /// Why the last checkpoint could not be written, if it could not.
@@ -73,6 +75,11 @@ impl<'a> Keeper<'a> {
         if file.header.shard != self.shard {
             let why = format!("is of share {}, and this is {}", file.header.shard, self.shard);
             return Err(remedy(file.error(why)));
+        }
+        let kept = file.header.samples;
+        if kept > self.samples {
+            let why = format!("has {kept} samples a pixel, and {} are asked for", self.samples);
+            return Err(file.error(why).with_remedy("ask for as many or more, or remove it"));
         }
         let mut sums: Vec<&mut [Sum]> = averaged.iter_mut().map(Averaging::sums_mut).collect();
         file.fill(centres, &mut sums, self.resolution)?;

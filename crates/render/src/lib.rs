@@ -52,7 +52,8 @@ pub use images::Images;
 pub use other_frame::FollowedFrame;
 pub use plan::{Decision, Plan};
 pub use render::{
-    Course, Film, Prepared, Progress, Rendered, accelerators, build, finish, rebuild, render, trace,
+    Course, Film, Prepared, Progress, Rendered, accelerators, build, finish, rebuild, render,
+    sample_set, trace,
 };
 pub use report::{Report, Seconds};
 pub use shard::{Shard, ShardBy};

@@ -47,7 +47,7 @@ impl Job<'_> {
         if parts.is_empty() {
             return Ok(Passed { samples: all, is_complete: true, counts: None });
         }
-        if !self.shares.is_empty() {
+        if !self.shares.is_empty() || samples >= all {
             parts.iter_mut().for_each(|part| part.show(samples));
         }
         let mut adaptive = self.adaptive(parts);

@@ -291,7 +291,8 @@ pub fn trace(
         light,
         picture: &so_far,
         shares: course.shares,
-        keeper: checkpoint.map(|file| Keeper::new(file, &course.identity, shard, scene)),
+        keeper: checkpoint
+            .map(|file| Keeper::new(file, &course.identity, (shard, plan.samples), scene)),
     };
     // What was traced, and what a user should know of it.
     let watcher = Watcher::new(watch, job.rays(&layers));
@@ -444,6 +445,18 @@ fn so_far(
     let picture = Picture::new(width, height, layers, header)?;
     let development = Development::new(&scene.render, &picture);
     Ok(picture.developed(development))
+}
+
+/// How many samples make up the set that those of the picture are taken from; `None` where the first of them
+/// are the same however many follow, so that a render may go on from fewer.
+#[must_use]
+pub fn sample_set(scene: &Scene, plan: &Plan) -> Option<u32> {
+    // Patterns are looked up over what a sample covers, which is less where there are more of them.
+    let has_patterns = scene.materials.iter().any(Material::is_patterned);
+    match has_patterns && scene.camera.pixel_extent().is_some() {
+        true => Some(plan.samples),
+        false => scene.render.sampler.set_size(plan.samples),
+    }
 }
 
 fn surroundings<'a>(scene: &'a Scene, images: &'a Images, samples: u32) -> SceneView<'a> {

@@ -119,9 +119,10 @@ impl Job<'_> {
             seen.into_iter().partition(|layer| self.is_averaged(layer.spec));
         let colors = Colors { job: self, layers: mean.iter().map(|layer| layer.spec).collect() };
         let mut averaged = Vec::new();
-        // Shares of the samples keep sums, whatever the passes are.
+        // Shares of the samples and what was kept on disk are sums, whatever the passes are.
         let is_shared = self.sampling.shard.is_of_samples() || !self.shares.is_empty();
-        let passes = if is_shared { usize::MAX } else { self.passes.len() };
+        let has_sums = is_shared || self.keeper.is_some();
+        let passes = if has_sums { usize::MAX } else { self.passes.len() };
         if !mean.is_empty() {
             let layers = std::mem::take(&mut mean);
             averaged.push(Averaging::new(&colors, self.sampling, layers, passes)?);

@@ -1,11 +1,12 @@
 //! A number that tells whether two renders were of the same scene.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use serde_json::Value;
-use xxhash_rust::xxh3::Xxh3Default;
+use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 
 use crate::SceneError;
 use crate::cache::Digests;
@@ -33,6 +34,8 @@ impl fmt::Display for SceneHash {
 pub(crate) struct Ingredients {
     /// The scene's JSON with sorted keys and no blanks.
     json: String,
+    /// XXH3-128 of the same without `render.samples`.
+    of_any_samples: u128,
     /// Files by the name that the scene's folder gives them, sorted.
     files: Vec<(String, PathBuf)>,
     /// Fingerprints of meshes that are in no file, by their names.
@@ -50,12 +53,22 @@ impl Ingredients {
         files.sort();
         let mut json = String::new();
         canonical(value, &mut json);
-        Self { json, files, meshes, digests }
+        let of_any_samples = xxh3_128(without_samples(value).as_bytes());
+        Self { json, of_any_samples, files, meshes, digests }
     }
 
     pub(crate) fn hash(&self, camera: &str) -> Result<SceneHash, SceneError> {
+        self.hash_with(self.json.as_bytes(), camera)
+    }
+
+    /// The identity of the scene with any number of samples.
+    pub(crate) fn hash_of_any_samples(&self, camera: &str) -> Result<SceneHash, SceneError> {
+        self.hash_with(&self.of_any_samples.to_le_bytes(), camera)
+    }
+
+    fn hash_with(&self, values: &[u8], camera: &str) -> Result<SceneHash, SceneError> {
         let mut hash = Xxh3Default::new();
-        add(&mut hash, self.json.as_bytes());
+        add(&mut hash, values);
         add(&mut hash, camera.as_bytes());
         for (name, path) in &self.files {
             add(&mut hash, name.as_bytes());
@@ -73,6 +86,31 @@ impl Ingredients {
 fn add(hash: &mut Xxh3Default, part: &[u8]) {
     hash.update(&(part.len() as u64).to_le_bytes());
     hash.update(part);
+}
+
+/// [`canonical`] JSON of a scene that says nothing of its samples.
+fn without_samples(scene: &Value) -> String {
+    let mut text = String::new();
+    let Value::Object(members) = scene else { return text };
+    let mut members: Vec<_> = members.iter().collect();
+    members.sort_by_key(|(key, _)| key.as_str());
+    for (key, member) in members {
+        let mut member = Cow::Borrowed(member);
+        if key == "render"
+            && let Value::Object(render) = member.to_mut()
+        {
+            render.remove("samples");
+            // One that says nothing else might as well be absent.
+            if render.is_empty() {
+                continue;
+            }
+        }
+        text.push_str(&Value::from(key.as_str()).to_string());
+        text.push(':');
+        canonical(&member, &mut text);
+        text.push(',');
+    }
+    text
 }
 
 /// JSON with sorted keys, whatever order the map keeps.

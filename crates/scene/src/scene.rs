@@ -105,6 +105,16 @@ impl Scene {
         let camera = serde_json::to_string(&self.camera.opencv()).unwrap_or_default();
         self.ingredients.hash(&camera)
     }
+
+    /// The identity of the scene whatever its `render.samples` are.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::hash`].
+    pub fn hash_of_any_samples(&self) -> Result<SceneHash, SceneError> {
+        let camera = serde_json::to_string(&self.camera.opencv()).unwrap_or_default();
+        self.ingredients.hash_of_any_samples(&camera)
+    }
 }
 
 /// What loading a scene found and cost.

@@ -11,7 +11,7 @@ use etendue_render::output::{ImageHash, Layer};
 use etendue_render::report::memory;
 use etendue_render::{
     Checkpoint, Course, Film, FilmFile, FollowedFrame, Identity, Plan, Prepared, RenderError,
-    Rendered, Report, Seconds, Shard,
+    Rendered, Report, Seconds, Shard, sample_set,
 };
 use etendue_scene::Scene;
 use serde_json::Value;
@@ -98,6 +98,7 @@ impl Session {
         let LoadedScene { scene, plan, neighbours, .. } = self.loaded()?;
         let identity = match (&shard, &self.checkpoint) {
             (None, None) if shares.is_empty() => Identity::new(),
+            (None, Some(_)) if shares.is_empty() => self.kept_identity(scene, plan)?,
             _ => self.identity(scene, plan)?,
         };
         let course = Course { shard, shares, checkpoint: self.checkpoint.clone(), identity };
@@ -113,19 +114,45 @@ impl Session {
 
     /// What films must agree in to be of one picture.
     fn identity(&self, scene: &Scene, plan: &Plan) -> Result<Identity, Error> {
+        let prints = fingerprints(scene, &self.loaded()?.neighbours)?;
+        self.identity_by(scene, plan, (plan.samples.to_string(), prints))
+    }
+
+    /// What a film must agree in for a render to go on from it: where more samples follow the same ones, any
+    /// number of them.
+    fn kept_identity(&self, scene: &Scene, plan: &Plan) -> Result<Identity, Error> {
+        let neighbours = &self.loaded()?.neighbours;
+        if !neighbours.is_empty() {
+            return self.identity(scene, plan);
+        }
+        let samples = match sample_set(scene, plan) {
+            None => "any".to_owned(),
+            Some(size) if size == plan.samples => return self.identity(scene, plan),
+            Some(size) => format!("any of a set of {size}"),
+        };
+        let print = ("scene_hash".to_owned(), scene.hash_of_any_samples()?.to_string());
+        self.identity_by(scene, plan, (samples, vec![print]))
+    }
+
+    fn identity_by(
+        &self,
+        scene: &Scene,
+        plan: &Plan,
+        (samples, prints): (String, Vec<(String, String)>),
+    ) -> Result<Identity, Error> {
         let [width, height] = scene.camera.resolution();
         let layers: Vec<_> = plan.layers.iter().map(|layer| layer.row().name).collect();
         let own = [
             ("version", SOFTWARE.to_owned()),
             ("accelerator", self.built()?.report().backend),
             ("resolution", format!("{width} x {height}")),
-            ("number of samples", plan.samples.to_string()),
+            ("number of samples", samples),
             ("seed", scene.render.seed.to_string()),
             ("list of layers", layers.join(", ")),
             ("precision", format!("{:?}", plan.precision).to_lowercase()),
+            ("precision of light", format!("{:?}", plan.light_precision).to_lowercase()),
         ];
         let own = own.map(|(key, value)| (key.to_owned(), value));
-        let prints = fingerprints(scene, &self.loaded()?.neighbours)?;
         let prints = prints.into_iter().map(|(key, value)| (key.replace('_', " "), value));
         Ok(own.into_iter().chain(prints).collect())
     }
