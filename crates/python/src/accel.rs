@@ -11,9 +11,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 
-use crate::arrays::{of_mesh, of_triples, refused, triples};
-use crate::words::in_python;
-use crate::work::{Stop, interruptible};
+use crate::arrays::{in_python, of_mesh, of_triples, refused, triples};
+use crate::work::{Stop, interruptible, threads_for};
 
 /// Rays in a batch: as many as stay in a core's cache.
 const BATCH: usize = 1024;
@@ -90,6 +89,7 @@ impl Accel {
     ) -> PyResult<Bound<'py, PyDict>> {
         let rays = Rays::new(&origins, &directions, t_max.as_ref())?;
         let stop = Stop::default();
+        let threads = threads_for(rays.len().div_ceil(BATCH), threads);
         let found = interruptible(py, threads, &stop, || self.found(&rays, coherent, &stop))?;
         let all = PyDict::new(py);
         all.set_item("t", found.t.into_pyarray(py))?;
@@ -113,6 +113,7 @@ impl Accel {
         let rays = Rays::new(&origins, &directions, t_max.as_ref())?;
         let mut all = vec![false; rays.len()];
         let stop = Stop::default();
+        let threads = threads_for(rays.len().div_ceil(BATCH), threads);
         interruptible(py, threads, &stop, || {
             all.par_chunks_mut(BATCH).enumerate().for_each_init(
                 || (RayBatch::with_capacity(BATCH), Vec::with_capacity(BATCH), Vec::new()),

@@ -11,8 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 
-use crate::arrays::{of_triples, raised, refused, triples};
-use crate::words::in_python;
+use crate::arrays::{in_python, of_triples, raised, refused, triples};
 use crate::work::{Stop, interruptible};
 
 /// A lens of a lens file, a Zemax file or a scene.

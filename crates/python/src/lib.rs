@@ -9,7 +9,6 @@ mod arrays;
 mod lens;
 mod scene;
 mod sensor;
-mod words;
 mod work;
 
 use pyo3::prelude::*;

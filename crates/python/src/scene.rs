@@ -8,8 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::Value;
 
-use crate::arrays::{of_layer, of_mesh, raised, refused, shaped, triples};
-use crate::words::in_python;
+use crate::arrays::{in_python, of_layer, of_mesh, raised, refused, shaped, triples};
 use crate::work::{Stop, interruptible};
 
 /// Name, vertices and faces.
@@ -25,6 +24,15 @@ pub struct Session {
 impl Session {
     fn of(session: etendue::Session) -> Self {
         Self { session, frames: Vec::new() }
+    }
+
+    /// The session that `begin` makes of a scene's JSON.
+    fn of_json(
+        scene: &str,
+        begin: impl FnOnce(Value) -> Result<etendue::Session, Error>,
+    ) -> PyResult<Self> {
+        let scene = serde_json::from_str(scene).map_err(refused)?;
+        Ok(Self::of(begin(scene).map_err(raised)?))
     }
 
     /// Work on the session that tells `callback` how far it is.
@@ -62,10 +70,9 @@ impl Session {
         allow_outside: bool,
         memory_limit: Option<u64>,
     ) -> PyResult<Self> {
-        let scene: Value = serde_json::from_str(scene).map_err(refused)?;
         let options = options(Vec::new(), strict, allow_outside, memory_limit);
-        let session = etendue::Session::from_json_with(folder, scene, options).map_err(raised)?;
-        Ok(Self::of(session))
+        let begin = |scene| etendue::Session::from_json_with(folder, scene, options);
+        Self::of_json(scene, begin)
     }
 
     /// A session that `origin` and `insert_mesh` describe.
@@ -77,9 +84,8 @@ impl Session {
         allow_outside: bool,
         memory_limit: Option<u64>,
     ) -> PyResult<Self> {
-        let scene: Value = serde_json::from_str(scene).map_err(refused)?;
         let options = options(Vec::new(), strict, allow_outside, memory_limit);
-        Ok(Self::of(etendue::Session::restore(path, scene, options).map_err(raised)?))
+        Self::of_json(scene, |scene| etendue::Session::restore(path, scene, options))
     }
 
     /// The scene's path, and the values of the whole scene as JSON.

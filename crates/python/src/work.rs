@@ -1,6 +1,5 @@
 //! Work without Python's lock: its threads, how Ctrl-C stops it, and the exceptions of its callbacks.
 
-use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,32 +15,16 @@ use crate::arrays::refused;
 /// How often Python is asked whether Ctrl-C was pressed, and shown progress (ms).
 const LOOK: u64 = 50;
 
-/// The pools of this process by their number of threads; 0 for all processors.
-#[derive(Default)]
-struct Pools {
-    process: u32,
-    by_threads: BTreeMap<usize, Arc<ThreadPool>>,
+/// A pool of `threads` threads (0 for all processors) for one piece of work. Threads do not survive a fork, so none
+/// are kept.
+fn pool(threads: usize) -> PyResult<ThreadPool> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| refused(format!("threads = {threads}: {error}")))
 }
 
-/// Locked by whoever holds Python's lock alone, as does whoever forks: a child never finds it locked.
-static POOLS: Mutex<Option<Pools>> = Mutex::new(None);
-
-/// The pool of `threads` threads. Threads do not survive a fork: a child makes its own.
-fn pool(_py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
-    let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
-    let process = std::process::id();
-    if let Some(inherited) = pools.take_if(|pools| pools.process != process) {
-        // To drop them is to wait for threads that only the parent has.
-        std::mem::forget(inherited);
-    }
-    let pools = pools.get_or_insert_with(|| Pools { process, ..Pools::default() });
-    if let Some(pool) = pools.by_threads.get(&threads) {
-        return Ok(Arc::clone(pool));
-    }
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = Arc::new(pool.map_err(|error| refused(format!("threads = {threads}: {error}")))?);
-    pools.by_threads.insert(threads, Arc::clone(&pool));
-    Ok(pool)
+/// How many threads, of the number that is asked for, work that is done in `pieces` is worth.
+pub(crate) fn threads_for(pieces: usize, threads: usize) -> usize {
+    if pieces > 1 { threads } else { 1 }
 }
 
 /// What stops work, and the exception that did.
@@ -99,7 +82,7 @@ pub(crate) fn interruptible<T: Send>(
     stop: &Stop,
     work: impl FnOnce() -> T + Send,
 ) -> PyResult<T> {
-    let pool = pool(py, threads)?;
+    let pool = pool(threads)?;
     let done = py.detach(|| watched(stop, || pool.install(work)));
     match (stop.raised(), done) {
         (Some(raised), _) => Err(raised),
