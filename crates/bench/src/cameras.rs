@@ -114,7 +114,7 @@ pub fn models(full: &Camera) -> Result<(Vec<LensModel>, Vec<String>), BenchError
     ];
     for (name, spec) in specs {
         let build = |spec: CameraSpec| {
-            let camera = spec.build(|| Bounds::EMPTY, &|name| Err(name.to_owned()));
+            let camera = spec.build(|| Bounds::EMPTY, &|name: &str| Err(name.to_owned()));
             opened(&camera.map_err(|e| e.to_string())?).map_err(|e| e.to_string())
         };
         match spec.map_err(str::to_owned).and_then(build) {

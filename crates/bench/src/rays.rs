@@ -145,7 +145,7 @@ mod tests {
 
     fn build(spec: &CameraSpec) -> Camera {
         let frame = || -> etendue_geometry::Bounds { unreachable!("the pose is given") };
-        spec.build(frame, &|_| unreachable!()).unwrap()
+        spec.build(frame, &|_: &str| unreachable!()).unwrap()
     }
 
     #[test]

@@ -20,7 +20,7 @@ fn compared(camera: &Value, tolerance: Tolerance) -> Result<Comparison, BenchErr
         "objects": [{ "shape": "rectangle", "width": 40, "height": 40 }],
     });
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-    let file = SceneFile::from_json(&scenes, scene).unwrap();
+    let file = SceneFile::from_json(&LoadOptions::default().opener, &scenes, scene).unwrap();
     let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default()).unwrap();
     let own = Plan::new(&scene, Outputs::ALL);
     let accel = build(&scene, &own, &BuildOptions::default()).unwrap();

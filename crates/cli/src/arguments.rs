@@ -407,21 +407,6 @@ pub(crate) struct SensorArguments {
     pub(crate) quiet: bool,
 }
 
-impl Command {
-    /// Catalogues of glasses of the user's.
-    pub(crate) fn glass_catalogs(&self) -> &[PathBuf] {
-        match self {
-            Self::Render(arguments) => &arguments.scene.glass_catalogs,
-            Self::Check(arguments) => &arguments.scene.glass_catalogs,
-            Self::Plan(arguments) => &arguments.scene.glass_catalogs,
-            Self::Bench(arguments) => &arguments.scene.glass_catalogs,
-            Self::Lens(arguments) => &arguments.glass_catalogs,
-            // A merge opens those of the shares.
-            Self::Merge(_) | Self::View(_) | Self::Sensor(_) | Self::Schema { .. } => &[],
-        }
-    }
-}
-
 impl SceneArguments {
     /// Where the scene's files may be.
     pub(crate) fn reach(&self) -> Reach {

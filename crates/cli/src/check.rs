@@ -2,12 +2,12 @@
 
 use std::time::Instant;
 
-use etendue::{Calibration, Prospect, TimeForecast};
+use etendue::{Calibration, Prospect, TimeForecast, read_glasses};
 use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan};
 use etendue_scene::doctor::{Diagnosis, Finding};
 use etendue_scene::file::SceneFile;
-use etendue_scene::{Start, Wanted};
+use etendue_scene::{LoadOptions, Start, Wanted};
 
 use serde::Serialize;
 
@@ -17,7 +17,8 @@ use crate::fault::{Fault, Versioned, print_json, print_text};
 pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
     let options = &arguments.scene;
     let start = Instant::now();
-    let loading = options.load_options();
+    let glasses = read_glasses(&options.glass_catalogs)?;
+    let loading = LoadOptions { glasses: &glasses, ..options.load_options() };
     let file = SceneFile::read_with(&loading.opener, &options.scene, &options.overrides())?;
     let scene = file.load(Wanted::EVERYTHING, &loading)?;
     if options.strict

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use etendue::places;
+use etendue::{places, read_glasses};
 use etendue_files::{Reach, Transaction};
 use etendue_geometry::units::Dimension;
 use etendue_optics::train::{Focus, Inquiry, LensReport, OpticalTrain, drawing};
@@ -18,7 +18,8 @@ use crate::progress::say;
 
 pub(crate) fn run(arguments: &LensArguments) -> Result<(), Fault> {
     let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
-    let mut lens = read_lens_at(&arguments.lens, reach, arguments.configuration)?;
+    let glasses = read_glasses(&arguments.glass_catalogs)?;
+    let mut lens = read_lens_at(&arguments.lens, reach, arguments.configuration, &glasses)?;
     let files: &[&str] = if arguments.fit_opencv { &[opencv::FILE] } else { &DRAWINGS };
     let drawn = arguments.output.iter().flat_map(|dir| files.iter().map(|name| dir.join(name)));
     let results: Vec<_> = drawn.chain(arguments.save.clone()).collect();

@@ -5,7 +5,6 @@ mod arguments;
 mod bench;
 mod check;
 mod fault;
-mod glasses;
 mod lens;
 mod merge;
 mod opencv;
@@ -36,9 +35,7 @@ fn main() -> ExitCode {
         Some(Command::Render(arguments)) => arguments.threads,
         _ => 0,
     };
-    let ready =
-        room::secure(threads).and_then(|()| cli.command.as_ref().map_or(Ok(()), glasses::open));
-    if let Err(fault) = ready {
+    if let Err(fault) = room::secure(threads) {
         fault.print();
         return fault.exit_code();
     }

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::arguments::{Cli, Command, MergeArguments, RenderArguments};
 use crate::fault::{Fault, print_text};
 use crate::progress::Phases;
-use crate::{glasses, render};
+use crate::render;
 
 /// Renders a share of the picture into its file in the folder.
 pub(crate) fn render_shard(
@@ -90,8 +90,5 @@ fn as_asked(arguments: &MergeArguments, shares: &Shares) -> Result<RenderArgumen
         };
         return Err(Fault::refused(format!("{scene}: {why}")));
     }
-    let command = Command::Render(asked);
-    glasses::open(&command)?;
-    let Command::Render(asked) = command else { return Err(unknown()) };
     Ok(asked)
 }

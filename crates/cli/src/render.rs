@@ -54,7 +54,7 @@ pub(crate) fn options(arguments: &SceneArguments) -> Options {
         settings: arguments.overrides(),
         strictness: options.strictness,
         reach: arguments.reach(),
-        inputs: arguments.glass_catalogs.clone(),
+        glass_catalogs: arguments.glass_catalogs.clone(),
         camera: arguments.camera.clone(),
         ..Options::default()
     }

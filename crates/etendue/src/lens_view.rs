@@ -8,7 +8,7 @@ use etendue_optics::train::{Focus, Inquiry, LensReport};
 use etendue_scene::file::read_lens;
 use serde_json::{Value, json};
 
-use crate::{Error, Inspector, Options, Session};
+use crate::{Error, Inspector, Options, Session, read_glasses};
 
 /// A lens by itself looks at a board so many focal lengths away.
 const BOARD_DISTANCE: f64 = 40.0;
@@ -57,7 +57,7 @@ impl Inspector {
 /// of three to two in the lens' image circle.
 pub(crate) fn through(path: &Path, options: Options) -> Result<Session, Error> {
     let refused = |why: String| Error::Refused(format!("{}: {why}", path.display()));
-    let lens = read_lens(path, options.reach)?;
+    let lens = read_lens(path, options.reach, &read_glasses(&options.glass_catalogs)?)?;
     let inquiry = Inquiry { focus: lens.focus, ..Inquiry::default() };
     let report =
         LensReport::new(&lens.train, &inquiry).map_err(|error| refused(error.to_string()))?;
@@ -111,7 +111,7 @@ fn short(value: f64) -> f64 {
 ///
 /// When it cannot be read.
 pub fn lens_values(path: &Path) -> Result<Value, Error> {
-    let lens = read_lens(path, Reach::Anywhere)?;
+    let lens = read_lens(path, Reach::Anywhere, &[])?;
     let file =
         lens.file.ok_or_else(|| Error::Refused(format!("{}: is no lens file", path.display())))?;
     serde_json::to_value(file).map_err(|error| Error::Refused(error.to_string()))

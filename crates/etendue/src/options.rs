@@ -15,8 +15,10 @@ pub struct Options {
     pub strictness: Strictness,
     /// Whether files outside of the scene's folder may be read.
     pub reach: Reach,
-    /// Files that the caller has read for the scene, such as glass catalogues: they are not written over, and
-    /// the scene's hash sees them.
+    /// Catalogues of glasses in Zemax' AGF format, looked through before the built-in one, the last first. They
+    /// are inputs like what the scene names.
+    pub glass_catalogs: Vec<PathBuf>,
+    /// Files that the caller has read for the scene: they are not written over, and the scene's hash sees them.
     pub inputs: Vec<PathBuf>,
     /// A camera of one of the models by name or number, in place of the scene's.
     pub camera: Option<String>,
@@ -42,6 +44,7 @@ impl Default for Options {
             settings: Vec::new(),
             strictness: Strictness::default(),
             reach: Reach::default(),
+            glass_catalogs: Vec::new(),
             inputs: Vec::new(),
             camera: None,
             memory_limit: None,

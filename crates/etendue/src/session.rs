@@ -12,12 +12,15 @@ use etendue_accel::Accel;
 use etendue_files::Opener;
 use etendue_geometry::Mesh;
 use etendue_oidn::Denoiser;
+use etendue_optics::glass::AgfCatalogue;
 use etendue_render::output::{LayerFile, Outputs};
 use etendue_render::{Checkpoint, Images, Plan, Seconds, denoise};
 use etendue_scene::file::{FramesSpec, SceneFile};
 use etendue_scene::{Cache, Frame, Frames, Scene, SceneError, Start};
 use etendue_tracer::LayerSpec;
 use serde_json::Value;
+
+pub use opening::read_glasses;
 
 use crate::changes;
 use crate::neighbours::{self, Neighbour};
@@ -44,6 +47,8 @@ pub struct Session {
     /// What a user should know of the file that the frames come from.
     frame_notes: Vec<String>,
     options: Options,
+    /// The user's catalogues of glasses.
+    glasses: Vec<AgfCatalogue>,
     /// Opens what the scene and its frames name, and knows what that was.
     opener: Opener,
     cache: Cache,

@@ -4,6 +4,8 @@
 mod checkpoints;
 #[path = "session/frame_noise.rs"]
 mod frame_noise;
+#[path = "session/glasses.rs"]
+mod glasses;
 #[path = "session/outputs.rs"]
 mod outputs;
 

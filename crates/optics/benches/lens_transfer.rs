@@ -18,7 +18,8 @@ const RAYS: u32 = 512;
 
 fn lens(text: &str) -> OpticalTrain {
     let file = LensFile::from_json(text).expect("a preset reads");
-    file.build(&|name| Err(format!("{name}: presets have no files"))).expect("a preset builds")
+    file.build(&|name: &str| Err(format!("{name}: presets have no files")))
+        .expect("a preset builds")
 }
 
 /// Parallel rays over the entrance pupil, 1° off the axis: all of them pass.

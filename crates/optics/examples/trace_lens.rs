@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [lens, rounds] = arguments.as_slice() else { return Err("expected LENS ROUNDS".into()) };
     let file = LensFile::from_json(&std::fs::read_to_string(lens)?)?;
-    let train = file.build(&|name| Err(format!("{name}: a lens of its own file alone")))?;
+    let train = file.build(&|name: &str| Err(format!("{name}: a lens of its own file alone")))?;
     let at = train.at(train.wavelength())?;
     let surfaces = train.elements().iter().filter(|e| matches!(e.part, Part::Surface(_))).count();
     let rays = beam();

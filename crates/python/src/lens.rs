@@ -31,7 +31,7 @@ impl Lens {
         allow_outside: bool,
     ) -> PyResult<Self> {
         let reach = if allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
-        let read = read_lens(Path::new(path), reach).map_err(|error| raised(error.into()))?;
+        let read = read_lens(Path::new(path), reach, &[]).map_err(|error| raised(error.into()))?;
         let train = match f_number {
             // Measured again, on all processors.
             Some(f_number) => {

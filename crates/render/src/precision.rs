@@ -150,7 +150,9 @@ mod tests {
                 { "shape": "box", "size": [size, size, size], "transform": shift(2.0) },
             ],
         });
-        let file = SceneFile::from_json(std::path::Path::new("."), scene).unwrap();
+        let file =
+            SceneFile::from_json(&LoadOptions::default().opener, std::path::Path::new("."), scene)
+                .unwrap();
         let layers = file.spec.all_layers();
         let scene = file.load(wanted(&layers), &LoadOptions::default()).unwrap();
         light_precision(&scene, samples).0

@@ -11,6 +11,7 @@ use std::time::SystemTime;
 use etendue_camera::Camera;
 use etendue_files::{InputFolder, Opener};
 use etendue_geometry::{Bounds, Geometry};
+use etendue_optics::glass::AgfCatalogue;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
 
@@ -24,7 +25,7 @@ use crate::parts::{Object, Parts};
 use crate::scene::{LoadOptions, LoadProgress, Scene};
 use crate::shape::{GoOn, ShapeError, ShapeSpec};
 use crate::{Cache, SceneError, light_notes};
-use camera::CameraFiles;
+pub(crate) use camera::CameraFiles;
 use objects::{Origin, OriginKind, OwnParts};
 
 impl SceneFile {
@@ -40,8 +41,8 @@ impl SceneFile {
         let fresh = Cache::default();
         let kept = options.cache.unwrap_or(&fresh);
         let folder = self.open_folder(&options.opener)?;
-        let mut own = self.named_materials(&folder, wanted)?;
-        let lights = self.named_lights(&folder, wanted, &mut own.textures)?;
+        let mut own = self.named_materials((&folder, options.glasses), wanted)?;
+        let lights = self.named_lights((&folder, options.glasses), wanted, &mut own.textures)?;
         // What can be checked without the models is; a bad camera need not wait for them.
         let size = self.resolution(&folder, options, kept)?;
         let budget = Arc::new(Budget::new(options.memory_limit));
@@ -98,11 +99,13 @@ impl SceneFile {
 
     /// The camera as far as it is known without the models: one that frames the scene sees nothing
     /// yet.
-    pub(crate) fn camera_alone(&self, folder: &InputFolder) -> Result<Camera, SceneError> {
-        let files = CameraFiles::new(folder);
-        self.camera_spec()
-            .build(Bounds::default, &|name| files.find(name))
-            .map_err(|error| self.camera_fault(&error))
+    pub(crate) fn camera_alone(
+        &self,
+        folder: &InputFolder,
+        glasses: &[AgfCatalogue],
+    ) -> Result<Camera, SceneError> {
+        let files = CameraFiles::new(folder, glasses);
+        self.camera_spec().build(Bounds::default, &files).map_err(|error| self.camera_fault(&error))
     }
 
     /// Speaks for memory that `what` is about to take.

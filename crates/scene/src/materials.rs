@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use etendue_files::InputFolder;
-use etendue_optics::glass::GlassSpec;
+use etendue_optics::glass::{AgfCatalogue, GlassSpec};
 use etendue_spectrum::Curve;
 use etendue_tracer::spec::{Fault, Supply};
 use etendue_tracer::spec::{ImageSpec, IorSpec};
@@ -26,12 +26,12 @@ pub(crate) struct OwnMaterials {
 impl SceneFile {
     pub(crate) fn named_materials(
         &self,
-        folder: &InputFolder,
+        (folder, glasses): (&InputFolder, &[AgfCatalogue]),
         wanted: Wanted,
     ) -> Result<OwnMaterials, SceneError> {
         let mut own = OwnMaterials::default();
         for (name, spec) in &self.spec.materials {
-            let mut supply = Named { folder, wanted, textures: &mut own.textures };
+            let mut supply = Named { folder, glasses, wanted, textures: &mut own.textures };
             let fault =
                 |Fault { key, why }| self.fault(&below(&join("materials", name), &key), why);
             own.materials.push(spec.build(name, &mut supply).map_err(fault)?);
@@ -43,7 +43,7 @@ impl SceneFile {
     /// `textures`.
     pub(crate) fn named_lights(
         &self,
-        folder: &InputFolder,
+        (folder, glasses): (&InputFolder, &[AgfCatalogue]),
         wanted: Wanted,
         textures: &mut Vec<Texture>,
     ) -> Result<Option<Vec<Light>>, SceneError> {
@@ -51,7 +51,7 @@ impl SceneFile {
         let mut lights: Vec<Light> = Vec::new();
         for (index, spec) in specs.iter().enumerate() {
             let at = join_index("lights", index);
-            let mut supply = Named { folder, wanted, textures };
+            let mut supply = Named { folder, glasses, wanted, textures };
             let fault = |Fault { key, why }| self.fault(&below(&at, &key), why);
             let built = spec.build(&mut supply).map_err(fault)?;
             let is_sky = |l: &Light| matches!(l.kind, LightKind::Environment { .. });
@@ -72,6 +72,7 @@ fn below(at: &str, key: &str) -> String {
 /// The scene's folder and the catalogue of glasses.
 struct Named<'a> {
     folder: &'a InputFolder,
+    glasses: &'a [AgfCatalogue],
     wanted: Wanted,
     textures: &'a mut Vec<Texture>,
 }
@@ -120,7 +121,7 @@ impl Supply for Named<'_> {
             IorSpec::Abbe(abbe) => serde_json::json!({ "nd": abbe.nd, "vd": abbe.vd }),
         };
         let spec: GlassSpec = serde_json::from_value(words).map_err(|e| plain(&e))?;
-        let glass = spec.resolve().map_err(|e| e.to_string())?;
+        let glass = spec.resolve_in(self.glasses).map_err(|e| e.to_string())?;
         let step = 5.0;
         let samples: Vec<[f64; 2]> = (50..=500)
             .map(|k| f64::from(k) * step)

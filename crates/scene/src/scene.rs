@@ -7,6 +7,7 @@ use std::time::SystemTime;
 use etendue_camera::Camera;
 use etendue_files::Opener;
 use etendue_geometry::Geometry;
+use etendue_optics::glass::AgfCatalogue;
 use etendue_sensor::Sensor;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 
@@ -139,6 +140,8 @@ pub struct LoadOptions<'a> {
     pub opener: Opener,
     /// Files that were read for the scene by other means, such as glass catalogues: its hash sees them.
     pub also_read: &'a [PathBuf],
+    /// Catalogues of glasses of the user's, looked through before the built-in one, the last first.
+    pub glasses: &'a [AgfCatalogue],
     /// A camera of one of the models by name or number, instead of the scene's.
     pub camera: Option<&'a str>,
     /// The most memory that may be taken (bytes); `None` for what the system has free.

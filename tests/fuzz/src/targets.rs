@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use etendue_files::Reach;
+use etendue_files::{Opener, Reach};
 use etendue_geometry::Buffer;
 use etendue_image::Limits;
 use etendue_optics::element::Picture;
@@ -132,20 +132,20 @@ fn set(bytes: &[u8], folder: &Path) {
 }
 
 fn sensor(bytes: &[u8], folder: &Path) {
-    let _ = SensorFile::read(&write(folder, "sensor.json", bytes), &[]);
+    let _ = SensorFile::read(&Opener::default(), &write(folder, "sensor.json", bytes), &[]);
 }
 
 fn lens(bytes: &[u8], folder: &Path) {
-    let _ = read_lens(&write(folder, "lens.json", bytes), Reach::OwnFolder);
+    let _ = read_lens(&write(folder, "lens.json", bytes), Reach::OwnFolder, &[]);
 }
 
 fn zmx(bytes: &[u8], folder: &Path) {
-    let _ = read_lens(&write(folder, "lens.zmx", bytes), Reach::OwnFolder);
+    let _ = read_lens(&write(folder, "lens.zmx", bytes), Reach::OwnFolder, &[]);
 }
 
 /// What `etendue lens` does, which takes a thousand times as long as reading the file.
 fn report(path: &Path) {
-    let Ok(lens) = read_lens(path, Reach::OwnFolder) else { return };
+    let Ok(lens) = read_lens(path, Reach::OwnFolder, &[]) else { return };
     let named = |list: Vec<f64>| (!list.is_empty()).then_some(list);
     let inquiry = Inquiry {
         wavelengths: named(lens.wavelengths),
@@ -168,7 +168,8 @@ fn zmx_report(bytes: &[u8], folder: &Path) {
 fn rays(bytes: &[u8], folder: &Path) {
     let elements = r#"{"elements": [{"type": "surface", "radius": 50, "thickness": 4,
         "glass": "N-BK7", "semi_diameter": 9}, {"type": "surface", "radius": -50}]}"#;
-    let lens = LensFile::from_json(elements).and_then(|file| file.build(&|name| Err(name.into())));
+    let lens =
+        LensFile::from_json(elements).and_then(|file| file.build(&|name: &str| Err(name.into())));
     if let Ok(lens) = lens {
         let _ = trace_rays(&lens, &write(folder, "rays.json", bytes));
         let _ = lens.sensor_z(Focus::AsWritten);
@@ -177,7 +178,7 @@ fn rays(bytes: &[u8], folder: &Path) {
 
 fn mask(bytes: &[u8], folder: &Path, name: &str) {
     write(folder, name, bytes);
-    let _ = Picture::read(name, 10.0, None, &|name| Ok(folder.join(name)));
+    let _ = Picture::read(name, 10.0, None, &|name: &str| Ok(folder.join(name)));
 }
 
 fn mask_png(bytes: &[u8], folder: &Path) {

@@ -104,7 +104,7 @@ fn errors(
     let pose = Pose::look_at(view.from + shift, view.look_at + shift, DVec3::Y);
     let pose = pose.context("a view upright")?;
     let camera = CameraSpec::perspective(pose, view.fov.to_radians(), 1.0)
-        .build(|| Bounds::EMPTY, &|name| Err(name.to_owned()))?;
+        .build(|| Bounds::EMPTY, &|name: &str| Err(name.to_owned()))?;
     let rays = Rays::primary(&camera, crate::rays(effort) / 2);
     let effort = accelerators::Effort {
         methods: vec![method],

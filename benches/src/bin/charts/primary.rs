@@ -177,7 +177,7 @@ fn rows(findings: &[Finding]) -> Vec<Vec<String>> {
 fn camera(view: View) -> anyhow::Result<Camera> {
     let pose = Pose::look_at(view.from, view.look_at, DVec3::Y).context("a view upright")?;
     let spec = CameraSpec::perspective(pose, view.fov.to_radians(), 1.0);
-    Ok(spec.build(|| Bounds::EMPTY, &|name| Err(name.to_owned()))?)
+    Ok(spec.build(|| Bounds::EMPTY, &|name: &str| Err(name.to_owned()))?)
 }
 
 /// 1000000 is "1 million triangles".

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use etendue_accel::{Accel, BuildOptions};
+use etendue_files::Opener;
 use etendue_render::output::{Outputs, Values};
 use etendue_render::{Images, Plan, Rendered, build, plan, render};
 use etendue_scene::file::SceneFile;
@@ -95,7 +96,7 @@ impl Study {
     }
 
     fn prepared(folder: &Path, value: Value, width: usize) -> anyhow::Result<Self> {
-        let file = SceneFile::from_json(folder, value)?;
+        let file = SceneFile::from_json(&Opener::default(), folder, value)?;
         let scene = loaded(&file);
         let plan = Plan::new(&scene, Outputs::ALL);
         let accel = build(&scene, &plan, &BuildOptions::default())?;

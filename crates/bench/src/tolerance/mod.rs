@@ -188,7 +188,7 @@ fn models(
 ) -> Result<(Vec<LensModel>, Vec<String>), BenchError> {
     let (mut models, mut notes) = cameras::models(&scene.camera)?;
     match OpencvFit::new(&scene.camera, tolerance.pixels)
-        .and_then(|fit| fit.camera.build(|| Bounds::EMPTY, &|name| Err(name.to_owned())))
+        .and_then(|fit| fit.camera.build(|| Bounds::EMPTY, &|name: &str| Err(name.to_owned())))
     {
         Ok(camera) => {
             let after = models.iter().take_while(|(name, _)| *name == "pinhole").count();

@@ -1,7 +1,7 @@
 //! A lens as a camera names it: a file or the lens itself; and parts put on a lens' axis.
 
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::Error as _;
@@ -10,7 +10,8 @@ use serde_json::{Map, Value};
 
 use crate::CameraError;
 use etendue_geometry::units::Millimetres;
-use etendue_optics::element::{ElementSpec, Resolve, element_schema};
+use etendue_optics::element::{ElementSpec, LensResources, Resolve, element_schema};
+use etendue_optics::glass::AgfCatalogue;
 use etendue_optics::train::{LensError, LensFile, OpticalTrain, ZemaxLens};
 
 /// The longest text that is read as a lens (bytes).
@@ -37,28 +38,43 @@ impl LensSource {
             Self::Inline(file) => file.build(resolve).map_err(|error| in_camera("lens", &error)),
             Self::File(written) => {
                 let error = |why: String| CameraError::new("lens", why);
-                let path = resolve(written).map_err(error)?;
+                let path = resolve.path(written).map_err(error)?;
                 let bytes = etendue_files::read(&path, LONGEST)
                     .map_err(|why| error(format!("{written}: cannot be read: {why}")))?;
                 if ZemaxLens::is_named(&path) {
                     let fault = |why: String| error(format!("{written}, {why}"));
-                    let lens = ZemaxLens::read(&bytes).map_err(|e| fault(e.to_string()))?;
+                    let lens = ZemaxLens::read(&bytes, resolve.glasses())
+                        .map_err(|e| fault(e.to_string()))?;
                     return lens.file.build(resolve).map_err(|e| fault(e.to_string()));
                 }
                 let text = String::from_utf8(bytes)
                     .map_err(|_| error(format!("{written}: is not UTF-8 text")))?;
                 let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-                // The lens file's own paths start at its own folder.
                 let folder = Path::new(written).parent().unwrap_or(Path::new(""));
-                let beside = |name: &str| match Path::new(name).is_absolute() {
-                    true => resolve(name),
-                    false => resolve(&folder.join(name).to_string_lossy()),
-                };
                 LensFile::from_json(text)
-                    .and_then(|file| file.build(&beside))
+                    .and_then(|file| file.build(&LensFolder { folder, scene: resolve }))
                     .map_err(|fault| error(format!("{written}: {fault}")))
             }
         }
+    }
+}
+
+/// What a lens file names: its own paths start at its own folder.
+struct LensFolder<'a> {
+    folder: &'a Path,
+    scene: Resolve<'a>,
+}
+
+impl LensResources for LensFolder<'_> {
+    fn path(&self, name: &str) -> Result<PathBuf, String> {
+        match Path::new(name).is_absolute() {
+            true => self.scene.path(name),
+            false => self.scene.path(&self.folder.join(name).to_string_lossy()),
+        }
+    }
+
+    fn glasses(&self) -> &[AgfCatalogue] {
+        self.scene.glasses()
     }
 }
 

@@ -380,7 +380,8 @@ impl ChromaticRealLensCameraSpec {
     }
 
     fn train(&self, resolve: Resolve<'_>) -> Result<OpticalTrain, CameraError> {
-        self.glass.resolve().map_err(|fault| CameraError::new("glass", fault.to_string()))?;
+        let glass = self.glass.resolve_in(resolve.glasses());
+        glass.map_err(|fault| CameraError::new("glass", fault.to_string()))?;
         let shape = Thick {
             radii: [self.front_radius, self.rear_radius],
             thickness: self.thickness,

@@ -288,7 +288,7 @@ impl MicrolensesSpec {
         let elements = self.elements(main, sensor)?;
         let file = LensFile::new(elements);
         let rear = file
-            .build(&|name| Err(format!("{name}: lenslets have no files")))
+            .build(&|name: &str| Err(format!("{name}: lenslets have no files")))
             .map_err(|error| in_camera("microlenses", &error))?;
         let gap = main.picture_z + picture - main.train.last_vertex();
         if gap <= 0.0 {

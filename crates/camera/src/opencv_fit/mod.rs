@@ -205,7 +205,8 @@ fn as_spec(camera: &Camera, (intrinsics, distortion): &OpencvModel) -> CameraSpe
 
 /// The distortion of a model, as the scene's camera has it.
 fn build(camera: &Camera, model: &OpencvModel) -> Result<Distortion, CameraError> {
-    let built = as_spec(camera, model).build(|| Bounds::EMPTY, &|name| Err(name.to_owned()))?;
+    let built =
+        as_spec(camera, model).build(|| Bounds::EMPTY, &|name: &str| Err(name.to_owned()))?;
     match built.projection() {
         crate::Projection::Pinhole(pinhole) => pinhole.distortion().cloned(),
         _ => None,

@@ -122,7 +122,7 @@ mod tests {
         for (words, fit) in models {
             let json = format!(r#"{{"type": "pinhole", "distortion": {words}, {place}}}"#);
             let spec: CameraSpec = serde_json::from_str(&json).unwrap();
-            let camera = spec.build(|| Bounds::EMPTY, &|name| Err(name.to_owned())).unwrap();
+            let camera = spec.build(|| Bounds::EMPTY, &|name: &str| Err(name.to_owned())).unwrap();
             let Projection::Pinhole(pinhole) = camera.projection() else { panic!("a pinhole") };
             let (k, found) = fit(&sights(&camera), f64::INFINITY, &start).unwrap();
             let own = pinhole.intrinsics();

@@ -7,7 +7,7 @@ use etendue_geometry::{Bounds, RayBatch};
 fn camera(json: &str) -> Camera {
     let spec: CameraSpec = serde_json::from_str(json).unwrap_or_else(|e| panic!("{e}: {json}"));
     let bounds = Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) };
-    spec.build(|| bounds, &|name| Err(format!("{name}: no files here"))).unwrap()
+    spec.build(|| bounds, &|name: &str| Err(format!("{name}: no files here"))).unwrap()
 }
 
 #[test]

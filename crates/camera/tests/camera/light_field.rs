@@ -9,7 +9,7 @@ fn camera(json: &str) -> Result<Camera, String> {
     let spec: CameraSpec = serde_json::from_str(json).map_err(|e| e.to_string())?;
     let text = serde_json::to_string(&spec).unwrap();
     assert_eq!(spec, serde_json::from_str(&text).unwrap(), "{text}");
-    spec.build(|| Bounds::EMPTY, &|name| Err(format!("{name}: no files")))
+    spec.build(|| Bounds::EMPTY, &|name: &str| Err(format!("{name}: no files")))
         .map_err(|e| e.to_string())
 }
 

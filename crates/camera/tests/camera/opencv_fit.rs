@@ -17,7 +17,7 @@ fn camera(json: &str) -> Camera {
 fn fitted(fit: &OpencvFit) -> Camera {
     let spec = serde_json::to_string(&fit.camera).unwrap();
     let spec: CameraSpec = serde_json::from_str(&spec).unwrap();
-    spec.build(|| Bounds::EMPTY, &|name| Err(name.to_owned())).unwrap()
+    spec.build(|| Bounds::EMPTY, &|name: &str| Err(name.to_owned())).unwrap()
 }
 
 fn lens(file: &str, more: &str) -> Camera {

@@ -10,7 +10,7 @@ const PIXELS: f64 = 1e-9;
 
 fn camera(json: &str) -> Camera {
     let spec: CameraSpec = serde_json::from_str(json).unwrap_or_else(|e| panic!("{e}: {json}"));
-    spec.build(|| Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) }, &|name| {
+    spec.build(|| Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) }, &|name: &str| {
         Err(format!("{name}: no files here"))
     })
     .unwrap()
@@ -300,7 +300,7 @@ fn bad_cameras_are_refused_by_key() {
     for (json, at) in cases {
         let spec: CameraSpec = serde_json::from_str(&json).unwrap();
         let error = spec
-            .build(|| Bounds::EMPTY, &|name| Err(format!("{name}: no files here")))
+            .build(|| Bounds::EMPTY, &|name: &str| Err(format!("{name}: no files here")))
             .unwrap_err();
         assert_eq!(error.at, at, "{json}: {error}");
     }

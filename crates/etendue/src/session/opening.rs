@@ -1,9 +1,10 @@
 //! How a session begins: from a file, from values, and again from its file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use etendue_files::Opener;
+use etendue_optics::glass::AgfCatalogue;
 use etendue_render::Seconds;
 use etendue_scene::file::{FileKind, SceneFile};
 use etendue_scene::{Cache, SceneError};
@@ -32,7 +33,7 @@ impl Session {
     pub fn open_with(path: impl AsRef<Path>, options: Options) -> Result<Self, Error> {
         let opener = opener_of(&options);
         let file = read(&opener, path.as_ref(), &options)?;
-        Ok(Self::of(file, opener, options))
+        Self::of(file, opener, options)
     }
 
     /// A scene that stands in no file: `scene` in the words of the scene format, in which the file of an
@@ -59,7 +60,7 @@ impl Session {
         let opener = opener_of(&options);
         let file = SceneFile::from_json(&opener, folder.as_ref(), scene)?;
         let file = if options.settings.is_empty() { file } else { file.with(&options.settings)? };
-        Ok(Self::of(file, opener, options))
+        Self::of(file, opener, options)
     }
 
     /// A session of what [`origin`](Self::origin) gave of another one, be it in another process. With its
@@ -70,15 +71,18 @@ impl Session {
     /// When the scene says something that the format does not know.
     pub fn restore(path: impl AsRef<Path>, scene: Value, options: Options) -> Result<Self, Error> {
         let opener = opener_of(&options);
-        Ok(Self::of(SceneFile::restore(&opener, path.as_ref(), scene)?, opener, options))
+        Self::of(SceneFile::restore(&opener, path.as_ref(), scene)?, opener, options)
     }
 
-    fn of(file: SceneFile, opener: Opener, options: Options) -> Self {
-        Self {
+    fn of(file: SceneFile, opener: Opener, mut options: Options) -> Result<Self, Error> {
+        let glasses = read_glasses(&options.glass_catalogs)?;
+        options.inputs.extend(options.glass_catalogs.iter().cloned());
+        Ok(Self {
             file,
             shown: None,
             frames: None,
             frame_notes: Vec::new(),
+            glasses,
             opener,
             options,
             cache: Cache::default(),
@@ -89,7 +93,7 @@ impl Session {
             seconds: Seconds::default(),
             checkpoint: None,
             denoiser: None,
-        }
+        })
     }
 
     /// Reads the scene's file again, with all that was set since, and at the next render the models and
@@ -114,7 +118,7 @@ impl Session {
 /// What opens all that a scene names, with what the caller has read for it.
 fn opener_of(options: &Options) -> Opener {
     let opener = Opener::new(options.reach);
-    opener.record(options.inputs.iter().cloned());
+    opener.record(options.inputs.iter().chain(&options.glass_catalogs).cloned());
     opener
 }
 
@@ -129,4 +133,18 @@ fn read(opener: &Opener, path: &Path, options: &Options) -> Result<SceneFile, Sc
         ("tracer".to_owned(), r#"{"type": "facing"}"#.to_owned()),
         ("layers".to_owned(), r#"["depth", "normal"]"#.to_owned()),
     ])
+}
+
+/// Opens catalogues of glasses.
+///
+/// # Errors
+///
+/// When one cannot be read, or is none; the error names it.
+pub fn read_glasses(paths: &[PathBuf]) -> Result<Vec<AgfCatalogue>, Error> {
+    let open = |path: &PathBuf| {
+        AgfCatalogue::open(path).map_err(|error| {
+            Error::Refused(format!("the glass catalogue {}: {error}", path.display()))
+        })
+    };
+    paths.iter().map(open).collect()
 }

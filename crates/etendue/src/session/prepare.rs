@@ -78,6 +78,7 @@ impl Session {
             strictness: self.options.strictness,
             opener: self.opener.clone(),
             also_read: &self.options.inputs,
+            glasses: &self.glasses,
             camera: self.options.camera.as_deref(),
             memory_limit: self.options.memory_limit,
             to_render: self.options.to_render,

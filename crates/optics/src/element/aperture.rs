@@ -7,7 +7,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::picture::{Picture, Resolve};
+use super::picture::Picture;
+use super::resources::Resolve;
 use etendue_geometry::units::{Degrees, Millimetres};
 
 /// An aperture as a lens file writes it.
@@ -202,7 +203,7 @@ mod tests {
 
     fn build(json: &str) -> Result<Opening, String> {
         let spec: ApertureSpec = serde_json::from_str(json).map_err(|e| e.to_string())?;
-        spec.build(&|name| Err(format!("{name}: no files here")))
+        spec.build(&|name: &str| Err(format!("{name}: no files here")))
     }
 
     #[test]

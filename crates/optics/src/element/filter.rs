@@ -9,7 +9,8 @@ use etendue_spectrum::Curve;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::picture::{Picture, Resolve};
+use super::picture::Picture;
+use super::resources::Resolve;
 use super::surface::checked_semi_diameter;
 use etendue_geometry::units::Millimetres;
 
@@ -167,7 +168,8 @@ mod tests {
 
     #[test]
     fn what_is_no_filter_is_refused_in_words() {
-        let error = |json| build(json, &|name| Err(format!("{name} is not here"))).unwrap_err();
+        let error =
+            |json| build(json, &|name: &str| Err(format!("{name} is not here"))).unwrap_err();
         assert!(error("{}").contains("give either transmission"));
         assert!(error(r#"{"transmission": 1.5}"#).contains("0..=1"), "{}", error("{}"));
         assert!(error(r#"{"image": "a.png", "width": 1}"#).contains("a.png is not here"));

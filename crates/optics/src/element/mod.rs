@@ -17,6 +17,7 @@ mod part;
 mod picture;
 mod rays;
 mod refract;
+mod resources;
 mod step;
 mod surface;
 mod thin_lens;
@@ -40,8 +41,9 @@ pub use microlens_array::{
     Gaps, Lenslet, LensletShape, LensletSpec, MicrolensArray, MicrolensArraySpec, clipped,
 };
 pub use part::{Part, PartSpec, Symbol};
-pub use picture::{Picture, Resolve};
+pub use picture::Picture;
 pub use rays::{LensRays, RayStatus, StatusCounts};
+pub use resources::{GlassesAlone, LensResources, Resolve};
 pub use step::Clip;
 pub use surface::{Surface, SurfaceSpec};
 pub use thin_lens::{ThinLens, ThinLensSpec};

@@ -1,13 +1,11 @@
 //! Grey pictures of a stated physical size: coded apertures and filter maps.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use etendue_image::{Limits, Samples};
 use glam::DVec2;
 
-/// Where a lens file's own files are: from the name in the file to a path, or a sentence on why it
-/// may not be read.
-pub type Resolve<'a> = &'a dyn Fn(&str) -> Result<PathBuf, String>;
+use super::resources::Resolve;
 
 /// The most bytes that a picture may take when it is decoded: a coded aperture has thousands of
 /// pixels, and this is 8192 × 8192 in 16-bit RGBA.
@@ -47,7 +45,7 @@ impl Picture {
         height: Option<f64>,
         resolve: Resolve<'_>,
     ) -> Result<Self, String> {
-        let path = resolve(file)?;
+        let path = resolve.path(file)?;
         let (pixels, values, levels) = read(&path).map_err(|why| format!("{file}: {why}"))?;
         #[expect(clippy::cast_precision_loss, reason = "far fewer pixels than 2⁵³")]
         let height = height.unwrap_or(width * pixels[1] as f64 / pixels[0] as f64);
@@ -183,7 +181,8 @@ pub(crate) mod tests {
             (grey, grey, grey)
         })
         .unwrap();
-        let picture = Picture::read("mask.exr", 2.0, Some(1.0), &|_| Ok(path.clone())).unwrap();
+        let picture =
+            Picture::read("mask.exr", 2.0, Some(1.0), &|_: &str| Ok(path.clone())).unwrap();
         assert_eq!((picture.value(-0.5, 0.0), picture.value(0.5, 0.0)), (0.25, 0.75));
     }
 
@@ -191,7 +190,8 @@ pub(crate) mod tests {
     fn what_is_no_mask_is_refused_by_name() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        let read = |width| Picture::read("a.png", width, None, &|_| Ok(path.clone())).unwrap_err();
+        let read =
+            |width| Picture::read("a.png", width, None, &|_: &str| Ok(path.clone())).unwrap_err();
         assert!(read(1.0).contains("a.png: cannot be read"), "{}", read(1.0));
         std::fs::write(&path, b"no picture").unwrap();
         assert!(read(1.0).contains("not a picture"), "{}", read(1.0));

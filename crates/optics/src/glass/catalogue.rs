@@ -1,7 +1,7 @@
 //! The catalogue of glasses: tables, read when a name is asked for.
 
 use std::collections::BTreeMap;
-use std::sync::{LazyLock, OnceLock};
+use std::sync::LazyLock;
 
 use super::agf::AgfCatalogue;
 use super::dispersion::Dispersion;
@@ -16,23 +16,6 @@ static CATALOGUE: LazyLock<Catalogue> = LazyLock::new(|| Catalogue::index(&TABLE
 
 /// The catalogues in which Zemax has what no maker stands for: crystals, plastics, water.
 const SUBSTANCES: [&str; 3] = ["MISC", "INFRARED", "BIREFRINGENT"];
-
-/// The user's own catalogues, for the whole process.
-static ADDED: OnceLock<Vec<AgfCatalogue>> = OnceLock::new();
-
-/// Lets glasses be looked for in catalogues of the user's before the built-in one, the last before the
-/// others, for the rest of the process. To be called once, before any lens is read.
-///
-/// # Errors
-///
-/// The catalogues, when some were added before.
-pub fn add_catalogues(catalogues: Vec<AgfCatalogue>) -> Result<(), Vec<AgfCatalogue>> {
-    ADDED.set(catalogues)
-}
-
-fn added() -> &'static [AgfCatalogue] {
-    ADDED.get().map_or(&[], Vec::as_slice)
-}
 
 /// The glass `NAME` or `CATALOGUE:NAME` of some catalogues.
 pub(super) fn find_in<'a>(catalogues: &'a [AgfCatalogue], name: &str) -> Option<&'a Glass> {
@@ -103,9 +86,6 @@ impl Catalogue {
     ///
     /// When there is none; the error names those that are meant most likely.
     pub fn find(&self, name: &str, makers: Makers<'_>) -> Result<Glass, GlassError> {
-        if let Some(own) = find_in(added(), name) {
-            return Ok(own.clone());
-        }
         let (maker, plain) = match name.split_once(':') {
             Some((maker, plain)) => (Some(maker), plain),
             None => (None, name),
@@ -114,7 +94,7 @@ impl Catalogue {
         let found: Vec<Entry> = self.entries(plain).iter().filter(of_maker).copied().collect();
         let rank = |entry: &Entry| makers.0.iter().position(|m| entry.is_made_by(m));
         let Some(&chosen) = found.iter().min_by_key(|e| rank(e).unwrap_or(usize::MAX)) else {
-            return names::coded(name).ok_or_else(|| self.unknown(name, plain));
+            return names::coded(name).ok_or_else(|| self.unknown(name, &[]));
         };
         let mut glass = chosen.glass(plain)?;
         let others = found.iter().filter(|entry| entry.maker() != chosen.maker());
@@ -122,8 +102,11 @@ impl Catalogue {
         Ok(glass)
     }
 
-    fn unknown(&self, name: &str, plain: &str) -> GlassError {
-        let all = self.names().chain(added().iter().flat_map(AgfCatalogue::names));
+    /// That no glass here or in `own` catalogues is called so, with those that are meant most likely.
+    pub(super) fn unknown(&self, name: &str, own: &[AgfCatalogue]) -> GlassError {
+        let plain = name.split_once(':').map_or(name, |(_, plain)| plain);
+        let known: &BTreeMap<&str, Vec<Entry>> = &self.lines;
+        let all = known.keys().copied().chain(own.iter().flat_map(AgfCatalogue::names));
         GlassError::Unknown { name: name.to_owned(), nearest: names::similar(plain, all) }
     }
 }

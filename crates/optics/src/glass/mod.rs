@@ -16,7 +16,7 @@ use serde::de::{self, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 pub use agf::{AgfCatalogue, AgfError};
-pub use catalogue::{Entry, Makers, add_catalogues, catalogue};
+pub use catalogue::{Entry, Makers, catalogue};
 pub use dispersion::{Dispersion, FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F};
 
 /// Why there is no index.
@@ -194,7 +194,7 @@ impl GlassSpec {
     ///
     /// When the name is unknown or the numbers describe no glass.
     pub fn resolve(&self) -> Result<Glass, GlassError> {
-        self.resolve_from(Makers::default())
+        self.resolve_among(&[], Makers::default())
     }
 
     /// Looks the glass up in `own` catalogues first, the last one before the others.
@@ -203,27 +203,32 @@ impl GlassSpec {
     ///
     /// As [`Self::resolve`].
     pub fn resolve_in(&self, own: &[AgfCatalogue]) -> Result<Glass, GlassError> {
-        let found = match self {
-            Self::Named(name) => catalogue::find_in(own, name),
-            Self::Constant(_)
-            | Self::Abbe { .. }
-            | Self::Sellmeier { .. }
-            | Self::Power(_)
-            | Self::Cauchy(_) => None,
-        };
-        found.map_or_else(|| self.resolve(), |glass| Ok(glass.clone()))
+        self.resolve_among(own, Makers::default())
     }
 
-    /// Looks the glass up, with the order in which makers are asked for a plain name.
+    /// As [`Self::resolve_in`], with the order in which makers are asked for a plain name of the built-in
+    /// catalogue.
     ///
     /// # Errors
     ///
     /// As [`Self::resolve`].
-    pub fn resolve_from(&self, makers: Makers<'_>) -> Result<Glass, GlassError> {
+    pub fn resolve_among(
+        &self,
+        own: &[AgfCatalogue],
+        makers: Makers<'_>,
+    ) -> Result<Glass, GlassError> {
         let inline = |law, why| Err(GlassError::Inline { law, why });
         let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
         let dispersion = match self {
-            Self::Named(name) => return catalogue().find(name, makers),
+            Self::Named(name) => {
+                return match catalogue::find_in(own, name) {
+                    Some(glass) => Ok(glass.clone()),
+                    None => catalogue().find(name, makers).map_err(|error| match error {
+                        GlassError::Unknown { name, .. } => catalogue().unknown(&name, own),
+                        error => error,
+                    }),
+                };
+            }
             Self::Constant(n) if *n >= 1.0 && n.is_finite() => Dispersion::Constant(*n),
             Self::Constant(_) => return inline("constant", "n must be a number from 1 on"),
             Self::Abbe { nd, vd } if *nd > 1.0 && *vd > 0.0 && finite(&[*nd, *vd]) => {

@@ -48,7 +48,8 @@ fn kind(name: &str) -> String {
 /// The end of the sentence on an unknown glass.
 pub(super) fn offer(nearest: &[String]) -> String {
     format!(
-        "the nearest names known are {}; a catalogue of your own is added with --glass-catalog FILE.agf",
+        "the nearest names known are {}; a catalogue of your own is added with --glass-catalog FILE.agf, or by \
+         `glass_catalogs` of a lens file",
         nearest.join(", ")
     )
 }

@@ -1,5 +1,7 @@
 //! The lens file: elements from the object side to the sensor, in millimetres.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -77,7 +79,12 @@ impl LensFile {
             return Err(LensError::Wavelength(wavelength));
         }
         // Elements one after the other, each with the medium behind it.
-        let catalogues = self.catalogues(resolve)?;
+        // The lens file's own catalogues before those of its user.
+        let own = self.catalogues(resolve)?;
+        let catalogues = match own.is_empty() {
+            true => Cow::Borrowed(resolve.glasses()),
+            false => Cow::Owned([resolve.glasses(), &own].concat()),
+        };
         let mut media = vec![Glass::air()];
         let mut elements = Vec::with_capacity(self.elements.len());
         let mut z = 0.0;
@@ -104,7 +111,8 @@ impl LensFile {
 
     fn catalogues(&self, resolve: Resolve<'_>) -> Result<Vec<AgfCatalogue>, LensError> {
         let read = |(index, name): (usize, &String)| {
-            resolve(name)
+            resolve
+                .path(name)
                 .and_then(|path| {
                     AgfCatalogue::open(&path).map_err(|error| format!("{name}: {error}"))
                 })

@@ -206,7 +206,7 @@ mod tests {
                  "semi_diameter": 8},
                 {"type": "surface"}]}"#,
         );
-        file.unwrap().build(&|name| Err(name.to_owned())).unwrap()
+        file.unwrap().build(&|name: &str| Err(name.to_owned())).unwrap()
     }
 
     fn rays(json: &str) -> RaysFile {

@@ -208,7 +208,7 @@ fn mask(folder: &tempfile::TempDir, pixels: u32, grey: impl Fn(u32, u32) -> u8) 
 
 fn build_beside(folder: &tempfile::TempDir, json: &str) -> OpticalTrain {
     let file = LensFile::from_json(json).unwrap();
-    file.build(&|name| Ok(folder.path().join(name))).unwrap()
+    file.build(&|name: &str| Ok(folder.path().join(name))).unwrap()
 }
 
 /// Coded apertures of the literature's kinds, with the sides of their pictures: 13 x 13 cells, a ring,

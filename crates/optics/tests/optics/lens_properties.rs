@@ -18,7 +18,7 @@ proptest! {
                 {{"type": "surface", "radius": -90, "aspheric": {{"4": 1e-5}}, "thickness": 7}},
                 {{"type": "thin_lens", "focal_length": -120}}]}}"#
         );
-        let train = LensFile::from_json(&file).unwrap().build(&|_| Err(String::new())).unwrap();
+        let train = LensFile::from_json(&file).unwrap().build(&|_: &str| Err(String::new())).unwrap();
         let at = train.at(550.0).unwrap();
         let start = DVec3::new(0.3, height, -12.0);
         let direction = DVec3::new(0.01, slope, 1.0).normalize();

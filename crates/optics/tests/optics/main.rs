@@ -9,13 +9,14 @@ mod openings;
 mod optics_reference;
 mod reports;
 mod small_openings;
+mod zemax_commands;
 
 use etendue_optics::train::{LensFile, OpticalTrain};
 
 /// A lens from the text of its file; the message when it is refused. Other files are not there.
 fn try_build(json: &str) -> Result<OpticalTrain, String> {
     let file = LensFile::from_json(json).map_err(|e| e.to_string())?;
-    file.build(&|name| Err(format!("{name}: no files"))).map_err(|e| e.to_string())
+    file.build(&|name: &str| Err(format!("{name}: no files"))).map_err(|e| e.to_string())
 }
 
 fn build(json: &str) -> OpticalTrain {

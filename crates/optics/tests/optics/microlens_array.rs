@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 
 fn lens(json: &str) -> OpticalTrain {
     let file = LensFile::from_json(json).unwrap();
-    file.build(&|name| Err(format!("{name}: no files here"))).unwrap()
+    file.build(&|name: &str| Err(format!("{name}: no files here"))).unwrap()
 }
 
 fn array(keys: &str) -> OpticalTrain {
@@ -23,7 +23,7 @@ fn fault(keys: &str) -> String {
         Ok(file) => file,
         Err(error) => return error.to_string(),
     };
-    file.build(&|name| Err(name.to_owned())).unwrap_err().to_string()
+    file.build(&|name: &str| Err(name.to_owned())).unwrap_err().to_string()
 }
 
 /// Where a ray through (x, y) of the array's plane is 3 mm behind it, coming with slopes (0.01, −0.02).
@@ -207,7 +207,7 @@ fn plenoptic(array: &str, behind: f64) -> OpticalTrain {
 fn real() -> OpticalTrain {
     let path = format!("{}/../../scenes/lenses/double-gauss.json", env!("CARGO_MANIFEST_DIR"));
     let mut file = LensFile::from_json(&std::fs::read_to_string(path).unwrap()).unwrap();
-    let plain = file.build(&|_| Err(String::new())).unwrap();
+    let plain = file.build(&|_: &str| Err(String::new())).unwrap();
     let gap = plain.sensor_z(Focus::Infinity).unwrap() - plain.last_vertex();
     file.elements.last_mut().unwrap().mount.thickness.0 = gap;
     let more = r#"{"elements": [
@@ -216,7 +216,7 @@ fn real() -> OpticalTrain {
         {"type": "surface", "thickness": 1.73}]}"#;
     file.elements.extend(LensFile::from_json(more).unwrap().elements);
     // As fast as the lenslets: f/7.7.
-    file.build(&|_| Err(String::new())).unwrap().with_f_number(7.7).unwrap()
+    file.build(&|_: &str| Err(String::new())).unwrap().with_f_number(7.7).unwrap()
 }
 
 /// The share of rays that get through of those that start in the image of a lenslet: where the ray through

@@ -70,7 +70,7 @@ fn read(path: &std::path::Path) -> System {
     file.wavelength = Some(etendue_geometry::units::Nanometres(587.56));
     // Through the text, so that the format is tested too.
     let file = LensFile::from_json(&serde_json::to_string(&file).unwrap()).unwrap();
-    let train = file.build(&|name| Err(format!("{name}: no files"))).unwrap();
+    let train = file.build(&|name: &str| Err(format!("{name}: no files"))).unwrap();
     System { name: json["id"].as_str().unwrap().to_owned(), json, train }
 }
 

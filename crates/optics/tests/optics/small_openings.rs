@@ -18,7 +18,7 @@ fn lens_with_mask(json: &str, side: u32, white: &[[u32; 2]]) -> OpticalTrain {
     }
     picture.save(folder.path().join("mask.png")).unwrap();
     let file = LensFile::from_json(json).unwrap();
-    file.build(&|name| Ok(folder.path().join(name))).unwrap()
+    file.build(&|name: &str| Ok(folder.path().join(name))).unwrap()
 }
 
 /// The share of rays that leave, and the irradiance for radiance 1, from a point of the sensor.

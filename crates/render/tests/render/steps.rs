@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use etendue_accel::{Accel, BuildOptions};
+use etendue_files::Opener;
 use etendue_render::output::{Outputs, Picture};
 use etendue_render::{Images, Plan, Rendered, build, plan, render};
 use etendue_scene::file::SceneFile;
@@ -31,7 +32,7 @@ pub(crate) fn load(text: &str) -> Scene {
 }
 
 pub(crate) fn load_json(folder: &Path, scene: Value) -> Scene {
-    loaded(&SceneFile::from_json(folder, scene).unwrap())
+    loaded(&SceneFile::from_json(&Opener::default(), folder, scene).unwrap())
 }
 
 /// A surface that shines by 1 on both sides.

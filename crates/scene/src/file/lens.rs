@@ -5,6 +5,8 @@ use std::sync::LazyLock;
 
 use etendue_camera::Camera;
 use etendue_files::{InputFolder, Opener, Reach};
+use etendue_optics::element::GlassesAlone;
+use etendue_optics::glass::AgfCatalogue;
 use etendue_optics::train::{
     Focus, LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays, ZemaxError, ZemaxLens,
 };
@@ -15,7 +17,7 @@ use serde_json::Value;
 
 use super::{SceneFile, WrittenPlaces, check, lenient, read_document};
 use crate::SceneError;
-use crate::error::not_found;
+use crate::load::CameraFiles;
 use crate::words::plain;
 
 /// The keys of a scene that no lens file has.
@@ -68,13 +70,18 @@ pub struct ReadLens {
 
 /// Reads the lens of a lens file (`.json`), of a Zemax file (`.zmx`), or that of the camera of a
 /// scene. The lens' own files (masks) must lie in its folder, and the scene's lens in the scene's,
-/// unless `reach` says otherwise.
+/// unless `reach` says otherwise. Glasses are looked up in `glasses` first, the last one before the
+/// others.
 ///
 /// # Errors
 ///
 /// When the file is missing, holds no lens, or the lens makes no sense; the message names the place.
-pub fn read_lens(path: &Path, reach: Reach) -> Result<ReadLens, SceneError> {
-    read_lens_at(path, reach, None)
+pub fn read_lens(
+    path: &Path,
+    reach: Reach,
+    glasses: &[AgfCatalogue],
+) -> Result<ReadLens, SceneError> {
+    read_lens_at(path, reach, None, glasses)
 }
 
 /// As [`read_lens`], at a configuration of a Zemax file, from 1.
@@ -86,9 +93,10 @@ pub fn read_lens_at(
     path: &Path,
     reach: Reach,
     configuration: Option<usize>,
+    glasses: &[AgfCatalogue],
 ) -> Result<ReadLens, SceneError> {
     if ZemaxLens::is_named(path) {
-        return read_zemax(path, configuration);
+        return read_zemax(path, configuration, glasses);
     }
     if configuration.is_some() {
         let reason = "has no configurations, which Zemax files (.zmx) have".to_owned();
@@ -96,11 +104,11 @@ pub fn read_lens_at(
     }
     let (written, value) = read(path)?;
     if !SCENE_KEYS.iter().any(|key| value.get(key).is_some()) {
-        return build(&written, &value, reach);
+        return build(&written, &value, reach, glasses);
     }
     let folder = folder(path, reach)?;
     let scene = SceneFile::read_with(folder.opener(), path, &[])?;
-    let camera = scene.camera_alone(&folder)?;
+    let camera = scene.camera_alone(&folder, glasses)?;
     let Some(lens) = camera.lens() else {
         let kind = scene.value().pointer("/camera/type");
         let kind = kind.and_then(Value::as_str).unwrap_or("pinhole");
@@ -177,12 +185,16 @@ fn inputs(file: &Path, folder: &InputFolder) -> Vec<PathBuf> {
     [vec![file.to_owned()], folder.opener().found()].concat()
 }
 
-fn build(written: &WrittenPlaces, value: &Value, reach: Reach) -> Result<ReadLens, SceneError> {
+fn build(
+    written: &WrittenPlaces,
+    value: &Value,
+    reach: Reach,
+    glasses: &[AgfCatalogue],
+) -> Result<ReadLens, SceneError> {
     let file: LensFile = read_as(&LENS, written, value)?;
     let folder = folder(&written.path, reach)?;
-    let train = file
-        .build(&|name: &str| folder.find(name).map(|found| found.path).map_err(not_found))
-        .map_err(|error| fault(written, &error))?;
+    let files = CameraFiles::new(&folder, glasses);
+    let train = file.build(&files).map_err(|error| fault(written, &error))?;
     Ok(ReadLens {
         train,
         file: Some(file),
@@ -195,13 +207,17 @@ fn build(written: &WrittenPlaces, value: &Value, reach: Reach) -> Result<ReadLen
     })
 }
 
-fn read_zemax(path: &Path, configuration: Option<usize>) -> Result<ReadLens, SceneError> {
+fn read_zemax(
+    path: &Path,
+    configuration: Option<usize>,
+    glasses: &[AgfCatalogue],
+) -> Result<ReadLens, SceneError> {
     let bytes = super::read_bytes(path).map_err(not_a_lens)?;
     let zemax = |source| SceneError::Zemax { file: path.to_owned(), source };
     let ZemaxLens { file, fields, wavelengths, notes, .. } =
-        ZemaxLens::read_configuration(&bytes, configuration).map_err(zemax)?;
+        ZemaxLens::read_configuration(&bytes, configuration, glasses).map_err(zemax)?;
     let train = file
-        .build(&|name: &str| Err(format!("{name}: a Zemax file has no masks")))
+        .build(&GlassesAlone(glasses))
         .map_err(|error| zemax(ZemaxError { line: 1, why: error.to_string() }))?;
     let focus = Focus::AsWritten;
     let inputs = vec![path.to_owned()];

@@ -164,7 +164,7 @@ impl SceneFile {
                 let file = self.at(frame)?;
                 if let Some(CameraSpec::Pinhole(_) | CameraSpec::Orthographic(_)) = file.spec.camera
                 {
-                    file.camera_alone(&folder)?;
+                    file.camera_alone(&folder, &[])?;
                 }
             }
         }

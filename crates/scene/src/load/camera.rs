@@ -7,6 +7,8 @@ use std::sync::Arc;
 use etendue_camera::{Camera, CameraError, CameraSpec};
 use etendue_files::InputFolder;
 use etendue_geometry::Geometry;
+use etendue_optics::element::LensResources;
+use etendue_optics::glass::AgfCatalogue;
 use etendue_sensor::Sensor;
 use etendue_spectrum::Bands;
 
@@ -38,7 +40,7 @@ impl SceneFile {
     ) -> Result<[u32; 2], SceneError> {
         match kept.camera(&self.camera_words(options)) {
             Some(known) => Ok(known.camera.resolution()),
-            None => Ok(self.camera_alone(folder)?.resolution()),
+            None => Ok(self.camera_alone(folder, options.glasses)?.resolution()),
         }
     }
 
@@ -70,7 +72,7 @@ impl SceneFile {
             kept.keep_camera(same.clone());
             return Ok(same);
         }
-        let files = CameraFiles::new(folder);
+        let files = CameraFiles::new(folder, options.glasses);
         let (camera, origin) = self.camera(&geometry, cameras, &files, options)?;
         let files = cache::stamps(&files.found.into_inner());
         let built = KeptCamera { words, geometry, camera, origin, files };
@@ -109,7 +111,7 @@ impl SceneFile {
         // Without a pose it frames what is there.
         let vertices = WorldVertices(geometry);
         let camera = spec
-            .build(|| facing::subject(&vertices), &|name| files.find(name))
+            .build(|| facing::subject(&vertices), files)
             .map_err(|error| self.camera_fault(&error))?;
         let camera = match self.spec.plan.dispersion {
             Some(false) => camera.without_dispersion(),
@@ -154,24 +156,31 @@ impl SceneFile {
     }
 }
 
-/// The files that a camera names: lenses and masks.
-pub(super) struct CameraFiles<'a> {
+/// The files that a camera names, lenses and masks, and the user's glasses.
+pub(crate) struct CameraFiles<'a> {
     folder: &'a InputFolder,
+    glasses: &'a [AgfCatalogue],
     /// Those that were asked for and are there.
     found: RefCell<Vec<PathBuf>>,
 }
 
 impl<'a> CameraFiles<'a> {
-    pub(super) fn new(folder: &'a InputFolder) -> Self {
-        Self { folder, found: RefCell::default() }
+    pub(crate) fn new(folder: &'a InputFolder, glasses: &'a [AgfCatalogue]) -> Self {
+        Self { folder, glasses, found: RefCell::default() }
     }
+}
 
-    pub(super) fn find(&self, written: &str) -> Result<PathBuf, String> {
+impl LensResources for CameraFiles<'_> {
+    fn path(&self, written: &str) -> Result<PathBuf, String> {
         let path = self.folder.find(written).map_err(not_found)?.path;
         let mut found = self.found.borrow_mut();
         if !found.contains(&path) {
             found.push(path.clone());
         }
         Ok(path)
+    }
+
+    fn glasses(&self) -> &[AgfCatalogue] {
+        self.glasses
     }
 }

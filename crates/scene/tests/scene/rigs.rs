@@ -17,7 +17,7 @@ fn poses(frames: &Value) -> Result<Vec<Vec<DMat4>>, SceneError> {
                    "sensor": {"resolution": [8, 6]}},
         "layers": ["depth"], "objects": [{"shape": "sphere"}], "frames": frames
     });
-    let file = SceneFile::from_json(folder.path(), scene)?;
+    let file = SceneFile::from_json(&Opener::default(), folder.path(), scene)?;
     let load = |file: &SceneFile| file.load(Wanted::NOTHING, &LoadOptions::default());
     let opener = Opener::new(Reach::OwnFolder);
     let frames = file.frames(&opener, || load(&file).map(|scene| Start::of(&scene)))?;

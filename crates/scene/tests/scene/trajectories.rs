@@ -421,7 +421,7 @@ fn read(set: &DataSet) -> Result<(Vec<CameraFile>, Vec<String>), SceneError> {
     }
     let scene = json!({"camera": camera, "layers": ["depth"], "objects": [{"shape": "rectangle"}],
                        "frames": frames});
-    let file = SceneFile::from_json(folder.path(), scene).unwrap();
+    let file = SceneFile::from_json(&Opener::default(), folder.path(), scene).unwrap();
     let opener = Opener::new(Reach::OwnFolder);
     let frames = file.frames(&opener, || panic!("a trajectory starts nowhere"))?.unwrap();
     let camera = |frame| {

@@ -11,7 +11,7 @@ pub(super) const YELLOW: f64 = 587.56;
 /// The lens whose elements are written in `json`.
 pub(super) fn lens(json: &str) -> Result<OpticalTrain> {
     let file = LensFile::from_json(&format!(r#"{{"elements": [{json}]}}"#))?;
-    Ok(file.build(&|name| Err(format!("{name}: no files")))?)
+    Ok(file.build(&|name: &str| Err(format!("{name}: no files")))?)
 }
 
 /// What becomes of a ray from the object side. A batch of one has to end as the single ray does, and

@@ -198,7 +198,7 @@ fn flat(_: Scale) -> Result<Outcome> {
             conic: 0.0,
             aspheric: std::collections::BTreeMap::new(),
         });
-        LensFile::new(vec![ElementSpec::new(surface, 0.0)]).build(&|_| Err(String::new()))
+        LensFile::new(vec![ElementSpec::new(surface, 0.0)]).build(&|_: &str| Err(String::new()))
     };
     let trace = |radius| -> Result<LensRays> {
         let mut rays = LensRays::default();

@@ -77,7 +77,7 @@ fn little_open(scale: Scale) -> Result<Outcome> {
             r#"{"elements": [{"type": "thin_lens", "focal_length": 50}, {"type": "aperture",
                 "shape": "image", "file": "mask.png", "width": 20, "stop": true}]}"#,
         )?
-        .build(&|name| Ok(folder.path().join(name)))?;
+        .build(&|name: &str| Ok(folder.path().join(name)))?;
         let z = train.sensor_z(Focus::Infinity)?;
         let pupil = ExitPupil::new(&train, &[YELLOW], z, [18.0, 12.0])?;
         let (mut least, mut worst) = (1.0_f64, 0.0_f64);

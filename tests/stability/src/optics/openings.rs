@@ -117,7 +117,7 @@ fn one_pixel(scale: Scale) -> Result<Outcome> {
     let masked = |grey| -> Result<OpticalTrain> {
         write_mask(folder.path(), grey)?;
         let file = LensFile::from_json(MASKED)?;
-        Ok(file.build(&|name| Ok(folder.path().join(name)))?)
+        Ok(file.build(&|name: &str| Ok(folder.path().join(name)))?)
     };
     let train = masked(255)?;
     let z = train.sensor_z(Focus::Infinity)?;

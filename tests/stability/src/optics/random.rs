@@ -81,7 +81,9 @@ fn element() -> impl Strategy<Value = ElementSpec> {
 
 fn train() -> impl Strategy<Value = OpticalTrain> {
     prop::collection::vec(element(), 1..8).prop_map(|elements| {
-        LensFile::new(elements).build(&|_| Err(String::new())).expect("all of these are lenses")
+        LensFile::new(elements)
+            .build(&|_: &str| Err(String::new()))
+            .expect("all of these are lenses")
     })
 }
 

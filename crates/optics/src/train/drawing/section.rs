@@ -104,7 +104,8 @@ mod tests {
         let lens = r#"{"elements": [
             {"type": "surface", "radius": 50, "thickness": 4, "glass": {"n": 1.5}, "semi_diameter": 10, "stop": true},
             {"type": "surface", "radius": -50, "semi_diameter": 10}]}"#;
-        let train = LensFile::from_json(lens).unwrap().build(&|path| Ok(path.into())).unwrap();
+        let train =
+            LensFile::from_json(lens).unwrap().build(&|path: &str| Ok(path.into())).unwrap();
         let focus = Focus::Infinity;
         let report = LensReport::new(&train, &Inquiry { focus, ..Inquiry::default() }).unwrap();
         let section = Section::new(&train, &report).unwrap();

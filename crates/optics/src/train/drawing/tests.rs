@@ -6,7 +6,7 @@ use crate::train::{Inquiry, LensFile, LensReport, OpticalTrain};
 fn preset(name: &str) -> (OpticalTrain, LensReport) {
     let path = format!("{}/../../scenes/lenses/{name}.json", env!("CARGO_MANIFEST_DIR"));
     let file = LensFile::from_json(&std::fs::read_to_string(path).unwrap()).unwrap();
-    let train = file.build(&|name| Err(name.to_owned())).unwrap();
+    let train = file.build(&|name: &str| Err(name.to_owned())).unwrap();
     let report = LensReport::new(&train, &Inquiry::default()).unwrap();
     (train, report)
 }
@@ -110,7 +110,8 @@ fn lenses_without_an_image_or_a_rim_are_drawn_as_far_as_they_go() {
         r#"{"elements": [{"type": "aperture", "shape": "circular", "radius": 0}]}"#,
         r#"{"elements": [{"type": "thin_lens", "focal_length": 50}]}"#,
     ] {
-        let train = LensFile::from_json(json).unwrap().build(&|name| Err(name.to_owned())).unwrap();
+        let train =
+            LensFile::from_json(json).unwrap().build(&|name: &str| Err(name.to_owned())).unwrap();
         let report = LensReport::new(&train, &Inquiry::default()).unwrap();
         for drawing in all(&train, &report) {
             assert!(!drawing.contains("NaN") && !drawing.contains("inf"), "{json}");

@@ -436,7 +436,7 @@ mod tests {
     fn preset(name: &str) -> OpticalTrain {
         let path = format!("{}/../../scenes/lenses/{name}.json", env!("CARGO_MANIFEST_DIR"));
         let file = LensFile::from_json(&std::fs::read_to_string(path).unwrap()).unwrap();
-        file.build(&|name| Err(format!("{name}: presets have no files"))).unwrap()
+        file.build(&|name: &str| Err(format!("{name}: presets have no files"))).unwrap()
     }
 
     /// The proof of the margin: the bound was closed with rays of the first rounds, and of the
@@ -481,7 +481,7 @@ mod tests {
         assert!(error.to_string().contains("vignetted at element 5"), "{error}");
         let open =
             LensFile::from_json(r#"{"elements": [{"type": "thin_lens", "focal_length": 9}]}"#);
-        let open = open.unwrap().build(&|_| Err(String::new())).unwrap();
+        let open = open.unwrap().build(&|_: &str| Err(String::new())).unwrap();
         let error = ExitPupil::new(&open, &[587.56], 9.0, [1.0, 1.0]).unwrap_err();
         assert_eq!(error, ExitPupilError::Unbounded);
     }

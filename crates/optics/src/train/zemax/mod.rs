@@ -27,8 +27,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::{LensError, LensFile, OpticalTrain, SensorMount};
-use crate::element::{ElementSpec, PartSpec, SurfaceSpec, ThinLensSpec};
-use crate::glass::{GlassSpec, Makers};
+use crate::element::{ElementSpec, GlassesAlone, PartSpec, SurfaceSpec, ThinLensSpec};
+use crate::glass::{AgfCatalogue, GlassSpec, Makers};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
 use place::{Axes, SheetPlace};
 use sheet::{Aperture, Parameter, SheetRow, SurfaceShape, ZemaxSheet};
@@ -80,8 +80,8 @@ impl ZemaxLens {
     ///
     /// When it is no such file, or has a surface, glass or number that has no counterpart here; the
     /// error names the line.
-    pub fn read(bytes: &[u8]) -> Result<Self, ZemaxError> {
-        Self::read_configuration(bytes, None)
+    pub fn read(bytes: &[u8], glasses: &[AgfCatalogue]) -> Result<Self, ZemaxError> {
+        Self::read_configuration(bytes, None, glasses)
     }
 
     /// As [`Self::read`], with the values of a configuration, from 1; those that the file stands at without.
@@ -92,6 +92,7 @@ impl ZemaxLens {
     pub fn read_configuration(
         bytes: &[u8],
         configuration: Option<usize>,
+        glasses: &[AgfCatalogue],
     ) -> Result<Self, ZemaxError> {
         let text = text::decode(bytes)?;
         // The lines of the file, and the elements that they describe.
@@ -99,8 +100,13 @@ impl ZemaxLens {
         if let Some(configuration) = configuration {
             sheet.choose(configuration)?;
         }
-        let mut importer =
-            Importer { sheet: &sheet, elements: Vec::new(), notes: Vec::new(), object_z: None };
+        let mut importer = Importer {
+            sheet: &sheet,
+            glasses,
+            elements: Vec::new(),
+            notes: Vec::new(),
+            object_z: None,
+        };
         let sensor = importer.convert()?;
         let Importer { elements, mut notes, object_z, .. } = importer;
         if elements.is_empty() {
@@ -117,7 +123,7 @@ impl ZemaxLens {
         file.wavelength = wavelengths.first().copied().map(Nanometres);
         // What only the built train tells: the stop, field angles, and whether the focal length is
         // as stated.
-        let train = open_stop(&mut file, &sheet, object_z, &mut notes)?;
+        let train = open_stop(&mut file, (&sheet, glasses), object_z, &mut notes)?;
         let (fields, left_out) = sheet.fields.angles(sheet.unit, &train, object_z);
         notes.extend(left_out);
         let mut lens = Self {
@@ -153,6 +159,8 @@ impl ZemaxLens {
 /// Rows on their way to elements.
 struct Importer<'a> {
     sheet: &'a ZemaxSheet,
+    /// Catalogues of the user's.
+    glasses: &'a [AgfCatalogue],
     elements: Vec<ElementSpec>,
     notes: Vec<String>,
     /// z of an object at a finite distance in lens coordinates (mm).
@@ -205,7 +213,8 @@ impl Importer<'_> {
 
     fn look_at_ends(&mut self, object: &SheetRow, image: &SheetRow) -> Result<(), ZemaxError> {
         if let Some(glass) = &object.glass {
-            let why = "the object stands in a glass; lenses here begin in air";
+            let why = "the object stands in a glass, and lenses here begin in air: take the line out, or put \
+                       the glass and its surface behind SURF 0";
             return Err(ZemaxError::new(glass.line, why));
         }
         if object.thickness.is_finite() {
@@ -266,7 +275,7 @@ impl Importer<'_> {
             Some([nd, vd]) => GlassSpec::Abbe { nd, vd },
         };
         let makers: Vec<&str> = self.sheet.makers.iter().map(String::as_str).collect();
-        let found = spec.resolve_from(Makers(&makers)).map_err(|error| {
+        let found = spec.resolve_among(self.glasses, Makers(&makers)).map_err(|error| {
             let remedy = match glass.model {
                 None => "; write its index into the file as GLAS ___BLANK 1 0 nd vd",
                 Some(_) => "",
@@ -317,12 +326,12 @@ fn with_entrance_pupil(
 /// Sets the stop by the system's aperture, and gives the lens.
 fn open_stop(
     file: &mut LensFile,
-    sheet: &ZemaxSheet,
+    (sheet, glasses): (&ZemaxSheet, &[AgfCatalogue]),
     object_z: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<OpticalTrain, ZemaxError> {
     let build = |file: &LensFile| {
-        file.build(&|name| Err(format!("{name}: no files here")))
+        file.build(&GlassesAlone(glasses))
             .map_err(|error| ZemaxError::new(sheet.last_line, error.to_string()))
     };
     let train = build(file)?;

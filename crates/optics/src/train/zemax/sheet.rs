@@ -384,10 +384,19 @@ impl SheetRow {
                 }
                 self.clear = Some(line.number(1)?).filter(|length| *length > 0.0);
             }
-            "SQAP" | "ELAP" | "OBSC" | "SQOB" | "ELOB" | "UDAP" => {
+            // One that covers nothing.
+            "OBSC" if line.number_or(1, 0.0)? == 0.0 => {}
+            "OBSC" | "SQOB" | "ELOB" => {
                 return Err(line.error(
-                    "only round clear apertures (CLAP) can be imported; take the line out to go by \
-                     the semi-diameter",
+                    "a disk in the way of the light has no counterpart here; take the line out for the \
+                     lens without it, and add its shadow to the lens file that --save writes, as an \
+                     `aperture` with a mask (\"shape\": \"image\")",
+                ));
+            }
+            "SQAP" | "ELAP" | "UDAP" => {
+                return Err(line.error(
+                    "only round clear apertures can be imported; write CLAP 0 and the radius that the \
+                     light is to go by, or take the line out to go by the semi-diameter",
                 ));
             }
             // The substrate of a mirror, of which every surface has one; a mirror is GLAS MIRROR.

@@ -34,15 +34,15 @@ fn file(header: &[&str], surfaces: &[&[&str]]) -> String {
 }
 
 fn read(text: &str) -> ZemaxLens {
-    ZemaxLens::read(text.as_bytes()).unwrap_or_else(|error| panic!("{error}\n{text}"))
+    ZemaxLens::read(text.as_bytes(), &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
 fn refused(text: &str) -> String {
-    ZemaxLens::read(text.as_bytes()).unwrap_err().to_string()
+    ZemaxLens::read(text.as_bytes(), &[]).unwrap_err().to_string()
 }
 
 fn train(file: &LensFile) -> OpticalTrain {
-    file.build(&|name| Err(name.to_owned())).unwrap()
+    file.build(&|name: &str| Err(name.to_owned())).unwrap()
 }
 
 const SINGLET: [&[&str]; 2] = [
@@ -85,7 +85,7 @@ fn a_singlet_is_the_same_lens_in_every_encoding() {
         big,
     ];
     for bytes in files {
-        let lens = ZemaxLens::read(&bytes).unwrap();
+        let lens = ZemaxLens::read(&bytes, &[]).unwrap();
         assert_eq!(lens.file.name, "Singlet");
         let ours = train(&lens.file);
         assert_eq!(ours.elements(), singlet("").elements());
@@ -95,7 +95,7 @@ fn a_singlet_is_the_same_lens_in_every_encoding() {
     // An old file's degree sign is one byte.
     let mut latin = b"NOTE 0 20\xb0 off axis\r\n".to_vec();
     latin.extend(text.as_bytes());
-    assert!(ZemaxLens::read(&latin).is_ok());
+    assert!(ZemaxLens::read(&latin, &[]).is_ok());
 }
 
 #[test]
@@ -235,7 +235,7 @@ fn indentation_changes_nothing() {
         let refused = refused(&format!("{text}PWAV 1\r\n{command}\r\n"));
         let name = command.split(' ').next().unwrap();
         assert!(refused.contains(name) && refused.contains("SURF"), "{refused}");
-        let before = ZemaxLens::read(format!("{command}\r\n{text}").as_bytes()).unwrap_err();
+        let before = ZemaxLens::read(format!("{command}\r\n{text}").as_bytes(), &[]).unwrap_err();
         assert_eq!(before.line, 1, "{before}");
     }
 }
@@ -267,7 +267,7 @@ fn a_configuration_has_its_own_thicknesses_curvatures_and_apertures() {
                   THIC 2 3 71 0 0\r\nCRVT 1 1 0.02 0\r\nCRVT 1 2 0.015 0\r\nCRVT 1 3 0.01 0\r\n\
                   APER 0 1 6 0\r\nAPER 0 2 7 0\r\nAPER 0 3 8 0\r\n";
     let zoom = of(47.0, 0.02, 6.0) + values;
-    let chosen = |i| ZemaxLens::read_configuration(zoom.as_bytes(), Some(i));
+    let chosen = |i| ZemaxLens::read_configuration(zoom.as_bytes(), Some(i), &[]);
     for (i, [thickness, curvature, pupil]) in
         [[47.0, 0.02, 6.0], [60.5, 0.015, 7.0], [71.0, 0.01, 8.0]].into_iter().enumerate()
     {
@@ -282,13 +282,14 @@ fn a_configuration_has_its_own_thicknesses_curvatures_and_apertures() {
     // What has no counterpart is named, unless it stays as it is.
     let glass = |second: &str| {
         let text = format!("{zoom}GLSS 1 1 N-BK7 0\r\nGLSS 1 2 {second} 0\r\n");
-        ZemaxLens::read_configuration(text.as_bytes(), Some(2))
+        ZemaxLens::read_configuration(text.as_bytes(), Some(2), &[])
     };
     assert!(glass("N-BK7").is_ok());
     let error = glass("F2").unwrap_err().to_string();
     assert!(error.contains("GLSS") && error.contains("OpticStudio"), "{error}");
     let beyond = format!("{zoom}THIC 9 2 1 0\r\n");
-    let error = ZemaxLens::read_configuration(beyond.as_bytes(), Some(2)).unwrap_err().to_string();
+    let error =
+        ZemaxLens::read_configuration(beyond.as_bytes(), Some(2), &[]).unwrap_err().to_string();
     assert!(error.contains("no surface 9"), "{error}");
 }
 
@@ -453,8 +454,8 @@ fn what_has_no_counterpart_is_refused_by_name_and_line() {
     says(refused(&file(&[], &[])), &["2 surfaces"]);
     says(refused("SURF 0\nSURF 2\n"), &["line 2", "expected surface 1"]);
     says(refused(&String::from_utf8_lossy(&[b'S', b'U', 0xff]).replace("SU", "")), &["SURF"]);
-    assert!(ZemaxLens::read(&[0xff, 0xfe, 0x00, 0xd8]).is_err(), "half a surrogate");
-    assert!(ZemaxLens::read(&[0xff, 0xfe, 0x41]).is_err(), "half a character");
+    assert!(ZemaxLens::read(&[0xff, 0xfe, 0x00, 0xd8], &[]).is_err(), "half a surrogate");
+    assert!(ZemaxLens::read(&[0xff, 0xfe, 0x41], &[]).is_err(), "half a character");
 }
 
 /// A lens file as OpticStudio would write it.
