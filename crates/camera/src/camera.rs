@@ -265,6 +265,12 @@ impl Camera {
         Ok(self.looking(grid))
     }
 
+    /// The same light-field camera with other views.
+    #[must_use]
+    pub fn with_light_field(&self, light_field: LightField) -> Self {
+        Self { light_field: Some(Arc::new(light_field)), ..self.clone() }
+    }
+
     /// The middle view of a reference camera.
     #[must_use]
     pub fn central_view(&self) -> Option<Self> {
@@ -382,6 +388,19 @@ impl Camera {
             | Projection::Views(_)) => other.clone(),
         };
         Ok(Self { projection, ..self.clone() })
+    }
+
+    /// The same as [`opened`](Self::opened) with the filters of lens and lenslets clear.
+    ///
+    /// # Errors
+    ///
+    /// When no light gets through: the error names what blocks it.
+    pub fn opened_clear(&self, bands: &Bands) -> Result<Self, CameraError> {
+        let mut opened = self.clone();
+        if let Projection::Lens(lens) = &self.projection {
+            opened.projection = Projection::Lens(Arc::new(lens.opened_clear(bands)?));
+        }
+        Ok(opened)
     }
 
     /// The same view on pixels `factor` times as large. Columns and rows that do not fill a pixel are

@@ -207,12 +207,18 @@ impl LensCamera {
         if self.opened.as_ref().is_some_and(|opened| opened.bands == *bands) {
             return Ok(self.clone());
         }
-        Ok(Self { opened: Some(Arc::new(self.open(bands)?)), ..self.clone() })
+        Ok(Self { opened: Some(Arc::new(self.open(bands, self.focused.train())?)), ..self.clone() })
     }
 
-    fn open(&self, bands: &Bands) -> Result<Opened, CameraError> {
+    /// The same with filters clear.
+    pub(crate) fn opened_clear(&self, bands: &Bands) -> Result<Self, CameraError> {
+        let clear = without_filters(self.focused.train());
+        Ok(Self { opened: Some(Arc::new(self.open(bands, &clear)?)), ..self.clone() })
+    }
+
+    /// The lens opened, of which `train` is as much as light of `bands` is to meet.
+    fn open(&self, bands: &Bands, train: &OpticalTrain) -> Result<Opened, CameraError> {
         let fault = |why: String| CameraError::new("", why);
-        let train = self.focused.train();
         for (i, element) in train.elements().iter().enumerate() {
             for curve in element.part.curves() {
                 bands

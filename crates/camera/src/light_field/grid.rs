@@ -47,8 +47,13 @@ pub struct LightField {
     pub grid: LensletGrid,
     /// Views along each side.
     pub views: u32,
+    /// The fewest views a side that will do: as many as were asked for, else 1.
+    pub least_views: u32,
     /// From one view to the next on the sensor (pixels).
     pub step: f64,
+    /// Of the distance of viewpoints that the paraxial lens has, how much they are apart: 1 until rays
+    /// through the whole opening are asked.
+    pub pupil_share: f64,
     /// From the middle of a lenslet's image to the next one's (pixels).
     pub image_pitch: f64,
     /// The diameter of a lenslet's image of the main lens' opening (pixels), were it round.
@@ -196,6 +201,7 @@ impl LightField {
         }
         // The middle of an image that no neighbour reaches into.
         let alone = image_diameter.min(2.0 * image_pitch - image_diameter);
+        let least_views = views.unwrap_or(1);
         let views = match views {
             None => most_views(alone, step),
             Some(0) => return Err(fault("views", "is 0; it must be 1 or more".to_owned())),
@@ -245,7 +251,17 @@ impl LightField {
             })?;
         let rotation = (-sine).atan2(cosine);
         let no_views = lenslets.no_views(pixel, alone);
-        Ok(Self { grid, views, step, image_pitch, image_diameter, rotation, no_views })
+        Ok(Self {
+            grid,
+            views,
+            least_views,
+            step,
+            pupil_share: 1.0,
+            image_pitch,
+            image_diameter,
+            rotation,
+            no_views,
+        })
     }
 
     /// The offset of a view from the middle of a lenslet's image (pixels right, pixels down): views step
@@ -256,6 +272,13 @@ impl LightField {
         let [along, beyond] = [across, down].map(|k| (f64::from(k) - middle) * self.step);
         let (sine, cosine) = self.rotation.sin_cos();
         [cosine * along - sine * beyond, sine * along + cosine * beyond]
+    }
+
+    /// The middle ones of its views, `views` a side, with viewpoints `pupil_share` times as far apart as
+    /// those of the paraxial lens.
+    #[must_use]
+    pub fn narrowed(&self, views: u32, pupil_share: f64) -> Self {
+        Self { views, pupil_share, ..self.clone() }
     }
 
     /// Where the sensor has the middle of a lenslet's image (pixels from the corner).

@@ -79,7 +79,7 @@ impl ViewGrid {
         }
         // A view is seen through as much of the opening as one pixel behind a lenslet sees.
         let [slope, _] = lenslets.central();
-        let a_pixel = scale.abs() * slope * 1e-3 * focused.pixel_pitch();
+        let a_pixel = light_field.pupil_share * scale.abs() * slope * 1e-3 * focused.pixel_pitch();
         let stop = &view.main.elements()[view.main.stop()];
         let opening = match &stop.part {
             Part::Aperture(opening) => Arc::clone(opening),

@@ -5,6 +5,8 @@ use etendue_camera::{Camera, LensCamera, LightField, PixelOrigin, ViewGrid};
 use etendue_optics::element::Grid;
 use serde::Serialize;
 
+use super::response::ViewResponse;
+
 /// What a decoder needs, and what it may be scored against.
 #[derive(Debug, Serialize)]
 pub(super) struct LightFieldGeometry {
@@ -43,7 +45,11 @@ pub(super) struct LightFieldGeometry {
     centroids_px: Option<Vec<Vec<[f64; 2]>>>,
     /// The lenslets' own centres, seen square to the sensor, in pixels.
     lenslet_centres_px: Option<Vec<Vec<[f64; 2]>>>,
-    about: [&'static str; 5],
+    /// The least that the views have, by their rays, of an ideal lens' before waves of 7 columns (dB).
+    psnr_by_rays: Option<f64>,
+    /// Of each view, `[down][across]`: by which parabola over its columns and rows its light is multiplied.
+    gains: Option<Vec<Vec<[f64; 6]>>>,
+    about: [&'static str; 6],
 }
 
 /// How disparity follows from depth.
@@ -57,8 +63,8 @@ struct Disparity {
     focal_length_px: f64,
     /// `null` for infinity.
     focus_m: Option<f64>,
-    /// Disparities by the camera's own rays over those of the formula.
-    measured_share: Option<f64>,
+    /// `baseline_m`, which is that of the camera's own rays, over that of the paraxial lens.
+    baseline_share: f64,
     /// By how many columns to the right and rows down a thing of disparity 1 moves from a view to the next
     /// one along the rows of lenslets.
     move_along: [f64; 2],
@@ -81,7 +87,7 @@ struct ArrayFacts {
     first_lenslet_mm: [f64; 2],
 }
 
-const ABOUT: [&str; 5] = [
+const ABOUT: [&str; 6] = [
     "x runs right and y down; the picture is upright, so the sensor behind it is turned by 180 degrees",
     "view (u, v) takes the pixel at centre + step_px (u - (views - 1)/2) (cos, sin) + step_px (v - (views - \
      1)/2) (-sin, cos) of rotation_rad; u counts from the left, v from the top, and its viewpoint is that far \
@@ -91,6 +97,8 @@ const ABOUT: [&str; 5] = [
     "the chief ray of the main lens through a lenslet's middle ends in its image's middle: centres_px",
     "the light of that image in the white picture has its centroid at centroids_px: cos^4 and vignetting move \
      it",
+    "gains: what is sampled is multiplied by the sum of these six and 1, x, y, x^2, x y, y^2, with x from -1 in \
+     the first column to 1 in the last one, y so in rows, and 0 where there is but one",
 ];
 
 impl LightFieldGeometry {
@@ -144,7 +152,7 @@ impl LightFieldGeometry {
                 baseline_m: grid.baseline(),
                 focal_length_px: grid.focal_length(),
                 focus_m: focus.is_finite().then_some(focus),
-                measured_share: None,
+                baseline_share: light_field.pupil_share,
                 move_along: [-1.0, 0.0],
                 move_across: [0.0, -1.0 / height],
                 range,
@@ -163,18 +171,23 @@ impl LightFieldGeometry {
                 })
             }),
             centres_px: centres,
+            psnr_by_rays: None,
+            gains: None,
             about: ABOUT,
         }
     }
 
-    /// Takes back what is said of views that there are not, or says what their disparities are by rays.
-    pub(super) fn judge(&mut self, no_views: Option<String>, measured_share: Option<f64>) {
+    /// Takes back what is said of views that there are not, or says how bright they are made.
+    pub(super) fn judge(&mut self, no_views: Option<String>, response: Option<&ViewResponse>) {
         if no_views.is_some() {
             (self.views, self.disparity, self.expected_disparity) = (0, None, None);
         }
-        if let Some(disparity) = &mut self.disparity {
-            disparity.measured_share = measured_share;
-        }
+        self.psnr_by_rays = response.map(|response| response.worst(self.views));
+        let n = self.views as usize;
+        self.gains = response.filter(|_| n > 0).map(|response| {
+            let factors: Vec<[f64; 6]> = response.gains.iter().map(|gain| gain.factors).collect();
+            factors.chunks(n).map(<[_]>::to_vec).collect()
+        });
         self.no_views = no_views;
     }
 }

@@ -5,12 +5,11 @@
 
 use std::sync::Arc;
 
-use etendue_camera::{Projection, ViewGrid};
+use etendue_camera::ViewGrid;
 use etendue_scene::Scene;
-use etendue_spectrum::Bands;
 
 use super::LightFieldError;
-use super::response::ViewResponse;
+use super::choice::ChosenViews;
 use super::views::Views;
 use crate::RenderError;
 use crate::output::{Development, Picture};
@@ -31,29 +30,19 @@ impl LightFieldViews {
     ///
     /// When the views have no places.
     pub fn of(scene: &Scene, picture: &Picture) -> Result<Option<Self>, LightFieldError> {
-        let camera = &scene.camera;
-        let (Some(light_field), Some(_), None) =
-            (camera.light_field(), picture.layer(""), camera.no_views())
-        else {
+        let (Some(_), None) = (picture.layer(""), scene.camera.no_views()) else { return Ok(None) };
+        let chosen = ChosenViews::of(&scene.camera)
+            .map_err(|error| RenderError::Camera(error.to_string()))?;
+        let Some(ChosenViews { grid, response, no_views: None, light_field, .. }) = chosen else {
             return Ok(None);
         };
-        let reference = match camera.projection() {
-            Projection::Views(_) => camera.clone(),
-            _ => camera.reference_views().map_err(|e| RenderError::Camera(e.to_string()))?,
-        };
-        let Projection::Views(grid) = reference.projection() else { return Ok(None) };
-        let views = match camera.lens() {
-            Some(lens) => {
-                let opened = camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
-                let response = ViewResponse::new(&opened, &reference, light_field, grid);
-                if response.fault().is_some() {
-                    return Ok(None);
-                }
-                Views::decoded(picture, lens, light_field, (grid, &response))?
+        let views = match scene.camera.lens().zip(response) {
+            Some((lens, response)) => {
+                Views::decoded(picture, lens, &light_field, (&grid, &response))?
             }
-            None => Views::split(picture, grid),
+            None => Views::split(picture, &grid),
         };
-        Ok(Some(Self { views, grid: Arc::clone(grid), development: *picture.development() }))
+        Ok(Some(Self { views, grid, development: *picture.development() }))
     }
 
     /// Views along each side.

@@ -8,12 +8,16 @@
 //! | `white` | the same camera before a uniform light |
 //! | `views` | views as an array of five dimensions, from the raw picture and from a picture of views |
 //! | `response` | what their pixels see, by rays, against an ideal lens |
+//! | `gain` | what makes them as bright as it has them |
+//! | `choice` | how many of them are those of an ideal lens |
 //! | `looking` | views one by one, and refocused together |
 //! | `hci` | the folder of the benchmark's layout |
 //!
 //! The layout: K. Honauer, O. Johannsen, D. Kondermann, B. Goldluecke, "A dataset and evaluation
 //! methodology for depth estimation on 4D light fields", 2016.
 
+mod choice;
+mod gain;
 mod geometry;
 mod hci;
 mod looking;
@@ -24,7 +28,7 @@ mod white;
 use std::path::{Path, PathBuf};
 
 use etendue_accel::Accel;
-use etendue_camera::{Camera, Projection, ViewGrid};
+use etendue_camera::{Camera, CameraError, ViewGrid};
 use etendue_optics::element::Grid;
 use etendue_scene::Scene;
 use etendue_spectrum::Bands;
@@ -38,9 +42,9 @@ use crate::output::{
 use crate::{Images, Plan, RenderError, render};
 use etendue_files::{Transaction, WriteError, prepare_folder};
 
+use choice::ChosenViews;
 use geometry::LightFieldGeometry;
 pub use looking::LightFieldViews;
-use response::ViewResponse;
 use views::Views;
 pub use white::white_rows;
 
@@ -125,29 +129,20 @@ pub fn write(
 ) -> Result<LightFieldSet, LightFieldError> {
     let scene = rendering.scene;
     let mut set = SetWriter { files, folder, outputs, written: LightFieldSet::default() };
-    let Some(light_field) = scene.camera.light_field() else { return Ok(set.written) };
-    let reference = match scene.camera.projection() {
-        Projection::Views(_) => scene.camera.clone(),
-        _ => scene
-            .camera
-            .reference_views()
-            .map_err(|error| RenderError::Camera(error.to_string()))?,
+    let fault = |error: CameraError| RenderError::Camera(error.to_string());
+    let Some(chosen) = ChosenViews::of(&scene.camera).map_err(fault)? else {
+        return Ok(set.written);
     };
-    let Projection::Views(grid) = reference.projection() else { return Ok(set.written) };
+    let ChosenViews { light_field, reference, grid, response, no_views } = &chosen;
     let raw = scene.camera.lens();
-    // Without a lens there is nothing to open.
-    let camera = scene.camera.opened(&Bands::Rgb).map_err(|e| RenderError::Camera(e.why))?;
-    let mut no_views = camera.no_views().map(str::to_owned);
-    let measured = raw.is_some() && no_views.is_none();
-    let response = measured.then(|| ViewResponse::new(&camera, &reference, light_field, grid));
-    no_views = no_views.or_else(|| response.as_ref()?.fault());
     let depth = match no_views {
-        None => central_depth(rendering, &reference, outputs, &|share| progress(0.1 * share))?,
+        None => central_depth(rendering, reference, outputs, &|share| progress(0.1 * share))?,
         Some(_) => Vec::new(),
     };
-    let share = response.as_ref().map(|response| response.disparity_share);
+    // Without a lens there is nothing to open.
+    let camera = scene.camera.opened(&Bands::Rgb).map_err(fault)?;
     let mut geometry = LightFieldGeometry::new(&camera, light_field, grid, &depth);
-    geometry.judge(no_views.clone(), share);
+    geometry.judge(no_views.clone(), response.as_ref());
     sidecar::write_json(files, &set.place("geometry.json"), &geometry)?;
     if raw.is_some() {
         let white = white::picture(&camera, &scene.render)?;
@@ -157,25 +152,20 @@ pub fn write(
         set.written.notes.push(format!("views, depth, disparity and hci are not written: {why}"));
         return Ok(set.written);
     }
-    if let Some(share) = share.filter(|share| (share - 1.0).abs() > OFF) {
-        set.written.notes.push(format!(
-            "by its rays things move from view to view by {share:.4} of the formula's disparity: the main lens \
-             or the lenslets image the opening with aberrations (geometry.json: measured_share)"
-        ));
-    }
+    set.written.notes.extend(chosen.notes(&scene.camera));
     set.depth(grid, &depth)?;
     if picture.layer("").is_none() {
         let why = "there is no picture (no tracer): views are left out of the light field's files";
         set.written.notes.push(why.to_owned());
         return Ok(set.written);
     }
-    let truth = match raw.zip(response) {
+    let truth = match raw.zip(response.as_ref()) {
         None => None,
         Some((lens, response)) => {
             // Gone before the reference is rendered, which takes as much again.
-            let views = Views::decoded(picture, lens, light_field, (grid, &response))?;
+            let views = Views::decoded(picture, lens, light_field, (grid, response))?;
             set.views("views", &views, picture)?;
-            let truth = reference_picture(rendering, &reference, outputs, &|share| {
+            let truth = reference_picture(rendering, reference, outputs, &|share| {
                 progress(0.1 + 0.9 * share)
             })?;
             Some(truth)
@@ -191,9 +181,6 @@ pub fn write(
     }
     Ok(set.written)
 }
-
-/// From which error of the disparity on a note tells of it.
-const OFF: f64 = 0.005;
 
 /// Why a hexagonal array leaves no folder of the benchmark.
 const HEXAGONAL: &str = "hci is not written: the benchmark's pictures have square pixels, and the views of a \

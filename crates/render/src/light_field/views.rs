@@ -53,7 +53,7 @@ impl Views {
                 let pixel = |(i, [x, y]): (u32, &[f64; 2])| {
                     let at = [x + right, y + below];
                     #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
-                    let gain = response.gain(k, i / cols, i % cols) as f32;
+                    let gain = response.gains[k as usize].at([i / cols, i % cols]) as f32;
                     planes.iter().map(move |plane| gain * sampled(plane, size, at))
                 };
                 (0..).zip(&centres).flat_map(pixel).collect::<Vec<f32>>()
@@ -169,7 +169,7 @@ fn picture(
 }
 
 /// The weights of four neighbours for a place between the middle two, `t` in 0..=1.
-fn weights(t: f64) -> [f64; 4] {
+pub(super) fn weights(t: f64) -> [f64; 4] {
     let near = |x: f64| (1.5 * x - 2.5) * x * x + 1.0;
     let far = |x: f64| ((-0.5 * x + 2.5) * x - 4.0) * x + 2.0;
     [far(1.0 + t), near(t), near(1.0 - t), far(2.0 - t)]
