@@ -6,7 +6,7 @@
 //!
 //! Along a unit direction of cosine w to the axis, z − sag changes at w − ∇sag·(u, v) a millimetre, and ∇sag is
 //! S at most within the clear aperture. So where w² > S² (1 − w²) that never changes its sign, and a ray crosses
-//! once. Only for what is steeper are parts of the ray bounded and root_between until each is known to cross once or
+//! once. Only for what is steeper are parts of the ray bounded and halved until each is known to cross once or
 //! not at all (interval bisection: R. E. Moore, *Methods and Applications of Interval Analysis*, 1979, chapter 5).
 
 use super::newton::{Profile, cross, interval, keeps_off, root_between, squares_along};
@@ -17,7 +17,7 @@ use super::surface::Surface;
 /// Rings of the clear aperture whose slopes are bounded one by one.
 const RINGS: u32 = 64;
 
-/// How often a part of a ray is root_between. After so many halves no part of a lens is longer than a micrometre.
+/// How often a part of a ray is halved. After so many halves no part of a lens is longer than a micrometre.
 const HALVINGS: u32 = 20;
 
 /// The squared cosine to the axis from which on no ray crosses a surface twice from front to back within its clear
