@@ -22,6 +22,10 @@ const NODES: u32 = 5;
 /// Rays a pixel in each of two sets: its light is right to a thousandth where nothing cuts it.
 const RAYS: u32 = 256;
 
+/// The same through cubic convolution, some of whose rays count less than nothing: the light of one is right to a
+/// percent, and the squares of errors in the mean over 25 lenslets to 47 dB.
+const CUBIC_RAYS: u32 = 1024;
+
 /// Sets of rays. Their errors have nothing to do with each other, so that the product of what both say of an
 /// error has its square in the mean, and not that of their own.
 const SETS: [u64; 2] = [0, 1];
@@ -265,12 +269,16 @@ fn seen(
     (number, unit): ([u32; 2], &ViewGrid),
 ) -> Seen {
     let mut film = FilmSamples { group, ..FilmSamples::default() };
-    let mut counts = Vec::with_capacity(SETS.len() * RAYS as usize);
+    let count_of_set = match sampling {
+        Sampling::Pixel(_) => RAYS,
+        Sampling::Cubic(_) => CUBIC_RAYS,
+    };
+    let mut counts = Vec::with_capacity(SETS.len() * count_of_set as usize);
     let mut squares = [Vec::new(), Vec::new(), Vec::new()];
     for set in SETS {
-        let pixel = Sampler::Sobol.pixel(set, number[0], number[1], RAYS);
+        let pixel = Sampler::Sobol.pixel(set, number[0], number[1], count_of_set);
         for (pair, out) in (0..).zip(&mut squares) {
-            squares_of_pair((0..RAYS).map(|index| (pixel, index)), pair, out);
+            squares_of_pair((0..count_of_set).map(|index| (pixel, index)), pair, out);
         }
         let [places, pupil, spectrum] = &squares;
         for ((place, pupil), spectrum) in places.iter().zip(pupil).zip(spectrum) {
@@ -282,7 +290,7 @@ fn seen(
                 }
             };
             film.push(place, *pupil, spectrum[0]);
-            counts.push(count / f64::from(RAYS));
+            counts.push(count / f64::from(count_of_set));
         }
     }
     let mut rays = CameraRays::default();
@@ -295,7 +303,7 @@ fn seen(
         let weight = weight * counts[sample as usize];
         let (viewpoint, place) = crossing(camera.pose(), &rays, i, unit);
         let (viewpoint, place) = (along_rows(viewpoint), along_rows(place));
-        let set = &mut seen.sets[usize::from(sample >= RAYS)];
+        let set = &mut seen.sets[usize::from(sample >= count_of_set)];
         set.light += weight;
         for axis in 0..2 {
             seen.viewpoint[axis] += weight * viewpoint[axis];
