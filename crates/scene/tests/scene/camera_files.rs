@@ -115,7 +115,6 @@ fn what_is_no_camera_file_is_refused_with_a_remedy() {
         (r#"{"objects": []}"#, "is a whole scene"),
         (r#"["pinhole"]"#, "holds an array, not an object"),
         ("3", "holds a number, not an object"),
-        ("\u{89}PNG\r\n\u{1a}\n", "not JSON"),
     ] {
         let folder = folder("mine.json", text);
         let error = message(folder.path(), &[]);
