@@ -4,5 +4,4 @@ mod coarser;
 mod lens_camera;
 mod light_field;
 mod opencv_fit;
-mod steep_aspheres;
 mod unprojection;
