@@ -216,7 +216,6 @@ pub fn trace(
     watch: &dyn Watch,
 ) -> Result<Film, RenderError> {
     course.allows(plan.stopping)?;
-    let resolution = scene.camera.resolution();
     let mut layers = empty_film(scene, plan)?;
     let start = Instant::now();
     // Cameras opened for the wavelengths of data and of light.
@@ -300,7 +299,7 @@ pub fn trace(
     notes.extend(job.keeper.as_ref().and_then(Keeper::fault));
     let trace_time = start.elapsed() + course.shares.iter().map(FilmFile::trace_time).sum();
     drop(job);
-    let camera = Some(camera);
+    let (camera, resolution) = (Some(camera), scene.camera.resolution());
     Ok(Film { layers, resolution, shard, counts, passed, trace_time, sums, centres, notes, camera })
 }
 

@@ -162,6 +162,31 @@ fn count(from: f64, to: f64) -> u32 {
     (to - from).max(0.0) as u32
 }
 
+/// Refuses images of lenslets, of a diameter at distances (pixels), that pixels do not sample.
+fn images_must_be_sampled([image_diameter, image_pitch]: [f64; 2]) -> Result<(), CameraError> {
+    let fault = |key: &str, why: String| CameraError::new(key, why);
+    if image_pitch < 2.0 {
+        return Err(fault(
+            "microlenses.pitch",
+            format!(
+                "the images of the lenslets are {image_pitch:.2} pixels apart: a light field needs 2 or \
+                 more; give smaller pixels or a larger pitch"
+            ),
+        ));
+    }
+    if image_diameter < 1.0 {
+        return Err(fault(
+            "f_number",
+            format!(
+                "the images that lenslets make of the main lens' opening are {image_diameter:.2} pixels \
+                 wide, smaller than a pixel: no pixel sees a part of the opening; open the lens, or give \
+                 smaller pixels or lenslets of a longer focal length"
+            ),
+        ));
+    }
+    Ok(())
+}
+
 impl LightField {
     /// The views of a lens with lenslets: as many as asked for, or as the opening holds.
     pub(crate) fn new(
@@ -180,25 +205,7 @@ impl LightField {
         if !(step > 0.0 && step.is_finite()) {
             return Err(fault("view_step", format!("{step} is not above zero")));
         }
-        if image_pitch < 2.0 {
-            return Err(fault(
-                "microlenses.pitch",
-                format!(
-                    "the images of the lenslets are {image_pitch:.2} pixels apart: a light field needs 2 or \
-                     more; give smaller pixels or a larger pitch"
-                ),
-            ));
-        }
-        if image_diameter < 1.0 {
-            return Err(fault(
-                "f_number",
-                format!(
-                    "the images that lenslets make of the main lens' opening are {image_diameter:.2} pixels \
-                     wide, smaller than a pixel: no pixel sees a part of the opening; open the lens, or give \
-                     smaller pixels or lenslets of a longer focal length"
-                ),
-            ));
-        }
+        images_must_be_sampled([image_diameter, image_pitch])?;
         // The middle of an image that no neighbour reaches into.
         let alone = image_diameter.min(2.0 * image_pitch - image_diameter);
         let least_views = views.unwrap_or(1);

@@ -157,9 +157,9 @@ impl ViewRays {
             let nominal = [k % views, k / views].map(|at| f64::from(at) - middle);
             let lit = view.iter().filter(|seen| seen.light > 0.0);
             for seen in lit {
-                for axis in 0..2 {
-                    sums[0] += seen.viewpoint[axis] * nominal[axis];
-                    sums[1] += nominal[axis].powi(2);
+                for (found, nominal) in seen.viewpoint.into_iter().zip(nominal) {
+                    sums[0] += found * nominal;
+                    sums[1] += nominal.powi(2);
                 }
             }
         }
@@ -179,8 +179,9 @@ impl ViewResponse {
         let mut bent = vec![[0.0; 2]; rows.len() * cols.len()];
         for (ours, ideal) in ours.middle(n).zip(&ideal.seen) {
             for (bent, (ours, ideal)) in bent.iter_mut().zip(ours.iter().zip(ideal)) {
-                for axis in 0..2 {
-                    bent[axis] += (ours.place[axis] - ideal.place[axis]) / f64::from(n * n);
+                let moves = ours.place.into_iter().zip(ideal.place);
+                for (bent, (ours, ideal)) in bent.iter_mut().zip(moves) {
+                    *bent += (ours - ideal) / f64::from(n * n);
                 }
             }
         }
