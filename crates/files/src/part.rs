@@ -120,7 +120,7 @@ enum Content {
 
 impl<'t> PartFile<'t> {
     /// A part file beside `target`, for [`Transaction::create`].
-    pub(crate) fn beside(transaction: &'t Transaction, target: &Path) -> Result<Self, WriteError> {
+    pub(crate) fn create(transaction: &'t Transaction, target: &Path) -> Result<Self, WriteError> {
         let refuse = |source| WriteError::io(target, source);
         if target.is_dir() || target.file_name().is_none() {
             return Err(refuse(io::ErrorKind::IsADirectory.into()));

@@ -97,7 +97,7 @@ impl Transaction {
     /// name, or it is an input.
     pub fn create(&self, target: &Path) -> Result<PartFile<'_>, WriteError> {
         self.refuse_inputs([target])?;
-        PartFile::beside(self, target)
+        PartFile::create(self, target)
     }
 
     /// Writes `target` with `write`; nothing changes there unless that and all else succeeds.

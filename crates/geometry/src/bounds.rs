@@ -15,6 +15,14 @@ impl Bounds {
     /// The box of nothing: `+inf` to `−inf`, neutral in [`Self::union`].
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
+    /// The box of some points (m).
+    #[must_use]
+    pub fn of_points(points: impl IntoIterator<Item = DVec3>) -> Self {
+        let mut bounds = Self::EMPTY;
+        points.into_iter().for_each(|point| bounds.include(point));
+        bounds
+    }
+
     /// Whether the box holds no point.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -79,7 +79,7 @@ impl Coplanar {
             visits = fewer;
             for triangle in (0..).take(mesh.triangles.len()) {
                 let corners = corners(geometry, [placement, triangle]);
-                if !meet(shared, &around(corners)) {
+                if !meet(shared, &Bounds::of_points(corners)) {
                     continue;
                 }
                 let Some(key) = key(corners, all.centre()) else { continue };
@@ -121,7 +121,7 @@ impl Coplanar {
         left: &mut usize,
     ) {
         let (few, many) = if one.len() < other.len() { (one, other) } else { (other, one) };
-        let boxed = |own: &Candidate| (around(corners(geometry, own.id)), own.id);
+        let boxed = |own: &Candidate| (Bounds::of_points(corners(geometry, own.id)), own.id);
         let mut few: Vec<(Bounds, PlacedTriangle)> = few.iter().map(boxed).collect();
         let whole = few.iter().fold(Bounds::EMPTY, |all, (own, _)| all.union(*own));
         let axis = (whole.max - whole.min).max_position();
@@ -253,12 +253,6 @@ fn corners(geometry: &Geometry, [placement, triangle]: PlacedTriangle) -> [DVec3
     let placement = &geometry.placements[placement as usize];
     let mesh = geometry.mesh_of(placement);
     mesh.corners(triangle as usize).map(|corner| placement.world_from_mesh.point(corner))
-}
-
-fn around(corners: [DVec3; 3]) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    corners.into_iter().for_each(|corner| bounds.include(corner));
-    bounds
 }
 
 fn meet(a: &Bounds, b: &Bounds) -> bool {

@@ -165,12 +165,6 @@ fn corners(scene: &Scene, placement: &Placement, triangle: usize) -> [DVec3; 3] 
     mesh.corners(triangle).map(|corner| placement.world_from_mesh.point(corner))
 }
 
-fn around(corners: [DVec3; 3]) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    corners.into_iter().for_each(|corner| bounds.include(corner));
-    bounds
-}
-
 fn probes(
     scene: &Scene,
     near: &[Near<'_>],
@@ -198,7 +192,7 @@ fn probes(
             let [a, b, c] = corners(scene, near.placement, triangle);
             let twice = (b - a).cross(c - a);
             let Some(normal) = twice.try_normalize() else { continue };
-            if !near.is_crossed && !is_near(&around([a, b, c])) {
+            if !near.is_crossed && !is_near(&Bounds::of_points([a, b, c])) {
                 continue;
             }
             for [x, y, z] in places {
@@ -239,7 +233,7 @@ fn probe(scene: &Scene, near: &[Near<'_>], probes: &mut [Probe]) {
     for near in near {
         for triangle in 0..scene.geometry.mesh_of(near.placement).triangles.len() {
             let corners = corners(scene, near.placement, triangle);
-            let own = around(corners);
+            let own = Bounds::of_points(corners);
             let grown = Bounds { min: own.min - most, max: own.max + most };
             if !meet(&grown, &bounds) {
                 continue;

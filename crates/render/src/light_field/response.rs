@@ -51,7 +51,7 @@ type Complex = [f64; 2];
 /// What a pixel sees: its light, the means of the viewpoints (views, along the rows) and of the places in the
 /// plane of disparity 0 (columns) that its rays come from, and what both sets of rays say of waves.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Seen {
+pub(super) struct PixelView {
     light: f64,
     viewpoint: [f64; 2],
     place: [f64; 2],
@@ -81,7 +81,7 @@ pub(super) struct ViewRays {
     nodes: [Vec<u32>; 2],
     views: u32,
     /// Of each view, at each node.
-    seen: Vec<Vec<Seen>>,
+    seen: Vec<Vec<PixelView>>,
 }
 
 /// How a camera's views differ from an ideal lens'.
@@ -103,14 +103,14 @@ impl ViewRays {
         Self::traced(light_field.views, unit, |number, [across, down], [row, col]| {
             let [right, below] = light_field.offset(across, down);
             let centre = camera.lens().and_then(|lens| light_field.centre(lens, row, col));
-            centre.map_or_else(Seen::default, |[x, y]| {
+            centre.map_or_else(PixelView::default, |[x, y]| {
                 let at = [x + right, y + below];
                 let corner = at.map(|x| x - 0.5);
                 let waves = seen(camera, group, Sampling::Cubic(at), (number, unit));
                 // The pixel at the place has the same light wherever that is even about it, and rays that
                 // do not count less than nothing tell it with less noise.
                 let pixel = seen(camera, group, Sampling::Pixel(corner), (number, unit));
-                Seen { sets: waves.sets, ..pixel }
+                PixelView { sets: waves.sets, ..pixel }
             })
         })
     }
@@ -127,7 +127,7 @@ impl ViewRays {
     fn traced(
         views: u32,
         unit: &ViewGrid,
-        trace: impl Fn([u32; 2], [u32; 2], [u32; 2]) -> Seen + Sync,
+        trace: impl Fn([u32; 2], [u32; 2], [u32; 2]) -> PixelView + Sync,
     ) -> Self {
         let [cols, rows] = unit.view_resolution();
         let nodes = [rows, cols].map(spread);
@@ -142,7 +142,7 @@ impl ViewRays {
     }
 
     /// The middle `views` a side of them.
-    fn middle(&self, views: u32) -> impl Iterator<Item = &Vec<Seen>> {
+    fn middle(&self, views: u32) -> impl Iterator<Item = &Vec<PixelView>> {
         let (first, n) = ((self.views - views) / 2, self.views);
         (0..views * views)
             .map(move |k| &self.seen[((k / views + first) * n + k % views + first) as usize])
@@ -222,7 +222,7 @@ impl ViewResponse {
 
 /// The mean square of the difference between what a pixel makes of waves and what an ideal lens makes of
 /// them, the mean over their phases: of each wave.
-fn errors(ours: &Seen, ideal: &Seen, gain: f64, bent: [f64; 2]) -> [f64; WAVES] {
+fn errors(ours: &PixelView, ideal: &PixelView, gain: f64, bent: [f64; 2]) -> [f64; WAVES] {
     let means = [0, 1].map(|set| MEAN * (gain * ours.sets[set].light - ideal.sets[set].light));
     std::array::from_fn(|wave| {
         let (disparity, axis) = (wave / 2, wave % 2);
@@ -268,7 +268,7 @@ fn seen(
     group: usize,
     sampling: Sampling,
     (number, unit): ([u32; 2], &ViewGrid),
-) -> Seen {
+) -> PixelView {
     let mut film = FilmSamples { group, ..FilmSamples::default() };
     let count_of_set = match sampling {
         Sampling::Pixel(_) => RAYS,
@@ -296,7 +296,7 @@ fn seen(
     }
     let mut rays = CameraRays::default();
     camera.sample_rays(&film, &mut rays);
-    let mut seen = Seen::default();
+    let mut seen = PixelView::default();
     let (sine, cosine) = unit.rotation().sin_cos();
     let along_rows =
         |[right, up]: [f64; 2]| [cosine * right - sine * up, -sine * right - cosine * up];

@@ -59,7 +59,7 @@ impl Trajectory<'_> {
                     false => colmap::text_images(&text(path)?)?,
                 };
                 let name = if is_binary { "cameras.bin" } else { "cameras.txt" };
-                let cameras = self.beside(path, name)?.map(|path| match is_binary {
+                let cameras = self.sibling(path, name)?.map(|path| match is_binary {
                     true => colmap::binary_cameras(&bytes(&path)?),
                     false => colmap::text_cameras(&text(&path)?),
                 });
@@ -84,7 +84,7 @@ impl Trajectory<'_> {
     }
 
     /// The file called `name` beside `path`, if there is one. It, too, lies in the scene's folder.
-    fn beside(&self, path: &Path, name: &str) -> Result<Option<PathBuf>, String> {
+    fn sibling(&self, path: &Path, name: &str) -> Result<Option<PathBuf>, String> {
         if path.with_file_name(name).symlink_metadata().is_err() {
             return Ok(None);
         }

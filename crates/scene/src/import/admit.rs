@@ -213,7 +213,7 @@ fn survey_chunk(chunk: &[[u32; 3]], position: &impl Fn(u32) -> DVec3) -> Survey 
     let degenerate = chunk.iter().filter(|t| is_degenerate(t.map(position))).count() as u64;
     if taint == DVec3::ZERO {
         if degenerate > 0 {
-            bounds = around(chunk.iter().map(|t| t.map(position)));
+            bounds = bounds_of_areas(chunk.iter().map(|t| t.map(position)));
         }
         return Survey { bounds, broken: 0, degenerate };
     }
@@ -228,18 +228,14 @@ fn finite_triangles(positions: &Positions, triangles: &[[u32; 3]]) -> Vec<[u32; 
 }
 
 /// The box of those triangles that have an area.
-fn around(triangles: impl Iterator<Item = [DVec3; 3]>) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    for corner in triangles.filter(|&corners| !is_degenerate(corners)).flatten() {
-        bounds.include(corner);
-    }
-    bounds
+fn bounds_of_areas(triangles: impl Iterator<Item = [DVec3; 3]>) -> Bounds {
+    Bounds::of_points(triangles.filter(|&corners| !is_degenerate(corners)).flatten())
 }
 
 /// The box of those of `triangles`, whose indices exist, that have an area.
 pub(crate) fn bounds_of(positions: &Positions, triangles: &[[u32; 3]]) -> Bounds {
     let of_chunk = |chunk: &[[u32; 3]]| {
-        around(chunk.iter().map(|t| t.map(|corner| positions.get(corner as usize))))
+        bounds_of_areas(chunk.iter().map(|t| t.map(|corner| positions.get(corner as usize))))
     };
     triangles.par_chunks(CHUNK).map(of_chunk).reduce(|| Bounds::EMPTY, Bounds::union)
 }

@@ -129,10 +129,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             ..state
         };
         let left = [hits.placement[i], hits.triangle[i]];
-        let beside = coincident.get(i).copied().unwrap_or(Coincident::NONE);
+        let coplanar = coincident.get(i).copied().unwrap_or(Coincident::NONE);
         next.push_beside(
             (start, way.direction),
-            [left, [beside.placement, beside.triangle]],
+            [left, [coplanar.placement, coplanar.triangle]],
             state,
         );
         next.throughput.extend_from_slice(throughput);

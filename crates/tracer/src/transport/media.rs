@@ -161,12 +161,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             if own[0] == MISS {
                 return Coincident::NONE;
             }
-            self.beside(rays.origin(i) + direction * hits.t[i], direction, own)
+            self.coincident_at(rays.origin(i) + direction * hits.t[i], direction, own)
         }));
     }
 
     /// The other boundary at a point of one that a ray along `direction` met.
-    fn beside(&self, point: DVec3, direction: DVec3, own: [u32; 2]) -> Coincident {
+    fn coincident_at(&self, point: DVec3, direction: DVec3, own: [u32; 2]) -> Coincident {
         /// Shares of a triangle beyond its edges, as the point is known to no more.
         const BEYOND: f64 = 1e-6;
         let geometry = self.stage.surroundings.geometry;
@@ -269,9 +269,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 break;
             }
             let own = [hits.placement[0], hits.triangle[0]];
-            let beside = self.beside(origin + direction * hits.t[0], direction, own);
+            let coplanar = self.coincident_at(origin + direction * hits.t[0], direction, own);
             let front = hits.normal(0).dot(direction) <= 0.0;
-            for (body, front) in [(own[0], front), (beside.placement, beside.front)] {
+            for (body, front) in [(own[0], front), (coplanar.placement, coplanar.front)] {
                 if self.stage.placed.get(body).is_none_or(|placed| placed.body.is_none()) {
                     continue;
                 }

@@ -214,7 +214,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             onward.precision = again.precision;
             let mut still = Vec::new();
             for (k, &i) in open.iter().enumerate() {
-                let beside = coincident.get(k).copied().unwrap_or(Coincident::NONE);
+                let coplanar = coincident.get(k).copied().unwrap_or(Coincident::NONE);
                 let own = i as usize * self.count()..(i as usize + 1) * self.count();
                 let light = &mut contribution[own];
                 let hit = SurfaceInteraction::new(self.stage, again, hits, k, None);
@@ -229,7 +229,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 let direction = again.direction(k);
                 if let Some(media) = media.get_mut(i as usize)
                     && let Some(crossing) =
-                        self.cross(*media, (hits.placement[k], beside), &mut met)
+                        self.cross(*media, (hits.placement[k], coplanar), &mut met)
                 {
                     *media = crossing.after(direction, hits.normal(k));
                 }
@@ -237,11 +237,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 if self.dim(&met, pass, light) {
                     let origin = met.anchor.leave(direction);
                     let left = again.t_max()[k] - (origin - again.origin(k)).length();
-                    let triangles = match beside.placement {
+                    let triangles = match coplanar.placement {
                         MISS => [[MISS; 2]; 2],
                         placement => {
                             let own = [hits.placement[k], hits.triangle[k]];
-                            [own, [placement, beside.triangle]]
+                            [own, [placement, coplanar.triangle]]
                         }
                     };
                     onward.push_between_triangles(

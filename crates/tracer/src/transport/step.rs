@@ -125,8 +125,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             next.throughput.extend_from_slice(&now.throughput[bands]);
             return;
         }
-        let beside = coincident.get(i).copied().unwrap_or(Coincident::NONE);
-        let crossing = self.cross(now.states[i].media, (hits.placement[i], beside), &mut met);
+        let coplanar = coincident.get(i).copied().unwrap_or(Coincident::NONE);
+        let crossing = self.cross(now.states[i].media, (hits.placement[i], coplanar), &mut met);
         if let Some(vanished) = self.vanishes(hits.placement[i], &met) {
             let direction = now.rays.direction(i);
             let mut state = now.states[i];
@@ -136,7 +136,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             state.media = after.unwrap_or(state.media);
             let left = [hits.placement[i], hits.triangle[i]];
             let ray = (met.anchor.leave(direction), direction);
-            next.push_beside(ray, [left, [beside.placement, beside.triangle]], state);
+            next.push_beside(ray, [left, [coplanar.placement, coplanar.triangle]], state);
             let tint = vanished.is_tinted.then(|| met.color());
             let carried = now.throughput[bands].iter().enumerate();
             let share = |k| tint.as_ref().map_or(1.0, |tint| self.band(tint, k));
@@ -380,8 +380,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             if self.stage.precision == HitPrecision::Double {
                 paths.rays.end_on_triangles(kept.iter().map(|&lane| {
                     let (i, _) = patch.path[lane];
-                    let beside = coincident.get(i).copied().unwrap_or(Coincident::NONE);
-                    [[hits.placement[i], hits.triangle[i]], [beside.placement, beside.triangle]]
+                    let coplanar = coincident.get(i).copied().unwrap_or(Coincident::NONE);
+                    [[hits.placement[i], hits.triangle[i]], [coplanar.placement, coplanar.triangle]]
                 }));
             }
             debug_assert_eq!(paths.states.len() - first, kept.len());

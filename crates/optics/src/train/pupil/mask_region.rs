@@ -46,13 +46,13 @@ const CHECKS: u32 = 1 << 14;
 pub(super) struct MaskRegion {
     half_size: DVec2,
     margin: f64,
-    nodes: Vec<Seen>,
+    nodes: Vec<Visibility>,
     intervals: Vec<Option<Interval>>,
 }
 
 /// What is visible from one node.
 #[derive(Debug, Clone)]
-enum Seen {
+enum Visibility {
     Nothing,
     /// No rim is in the way.
     All,
@@ -144,7 +144,7 @@ impl MaskRegion {
     fn joined(&self, view: &View) -> Option<Chords> {
         let mut joined = Chords { heights: [0.0; 2], ends: [[0.0; 2]; LINES + 1] };
         for (node, weight) in view.corners.into_iter().zip(view.weights) {
-            let Seen::Part(chords) = &self.nodes[node] else { return None };
+            let Visibility::Part(chords) = &self.nodes[node] else { return None };
             for i in 0..2 {
                 joined.heights[i] += weight * chords.heights[i];
                 for (sum, own) in joined.ends.iter_mut().zip(&chords.ends) {
@@ -161,7 +161,7 @@ impl MaskRegion {
         let [low, high] = cells.bounds();
         let [column, row] = [part % (FILM * PARTS), part / (FILM * PARTS)];
         let corners = Self::corners(row / PARTS * FILM + column / PARTS);
-        if corners.iter().all(|node| matches!(self.nodes[*node], Seen::Nothing)) {
+        if corners.iter().all(|node| matches!(self.nodes[*node], Visibility::Nothing)) {
             return None;
         }
         let place = |i: usize| (i % PARTS) as f64 / PARTS as f64;
@@ -280,8 +280,8 @@ impl MaskRegion {
     /// The ends (mm) of the line at a height; `None` above and below what is visible.
     fn ends(&self, view: &View, y: f64, [low, high]: [DVec2; 2]) -> Option<[f64; 2]> {
         let chords = view.corners.map(|node| match &self.nodes[node] {
-            Seen::Part(chords) => Some(&**chords),
-            Seen::All | Seen::Nothing => None,
+            Visibility::Part(chords) => Some(&**chords),
+            Visibility::All | Visibility::Nothing => None,
         });
         let mut heights = [0.0; 2];
         for (chords, weight) in chords.iter().zip(view.weights) {
@@ -329,7 +329,8 @@ impl MaskRegion {
     /// Whether a point of the mask is one that may be drawn where it is open.
     fn holds(&self, film: DVec2, at: DVec2, bounds: [DVec2; 2]) -> bool {
         let Some((_, view)) = self.view(film) else { return true };
-        let is_cut = view.corners.iter().all(|node| matches!(self.nodes[*node], Seen::Part(_)));
+        let is_cut =
+            view.corners.iter().all(|node| matches!(self.nodes[*node], Visibility::Part(_)));
         let ends = || self.ends(&view, at.y, bounds);
         !is_cut || ends().is_some_and(|[left, right]| at.x >= left && at.x <= right)
     }
@@ -404,20 +405,20 @@ impl Sight<'_> {
     }
 
     /// What is visible; all, where nobody knows.
-    fn seen(&self) -> Seen {
+    fn seen(&self) -> Visibility {
         if self.scenes.iter().all(|(_, map)| map.at(self.film).is_none()) {
-            return Seen::All;
+            return Visibility::All;
         }
         let grid: Vec<DVec2> = (0..(GRID + 1) * (GRID + 1))
             .map(|i| self.place((i % (GRID + 1)) as f64, (i / (GRID + 1)) as f64))
             .collect();
         let passed = self.passes(&grid);
         if passed.iter().all(|passed| *passed) {
-            return Seen::All;
+            return Visibility::All;
         }
         let mut lit =
             passed.chunks_exact(GRID + 1).enumerate().filter(|(_, row)| row.contains(&true));
-        let Some((first, bottom_row)) = lit.next() else { return Seen::Nothing };
+        let Some((first, bottom_row)) = lit.next() else { return Visibility::Nothing };
         let (last, top_row) = lit.next_back().unwrap_or((first, bottom_row));
         // The lowest and the highest place are looked for below and above the middle of the outermost rows
         // that are visible.
@@ -431,8 +432,10 @@ impl Sight<'_> {
         };
         let heights = [from_row(first, bottom_row, -1.0), from_row(last, top_row, 1.0)];
         match self.ends(heights) {
-            Some(ends) if heights[1] > heights[0] => Seen::Part(Box::new(Chords { heights, ends })),
-            Some(_) | None => Seen::All,
+            Some(ends) if heights[1] > heights[0] => {
+                Visibility::Part(Box::new(Chords { heights, ends }))
+            }
+            Some(_) | None => Visibility::All,
         }
     }
 
