@@ -37,11 +37,12 @@ use self::lanes::{Lanes, Portable};
 use self::single::{AnyHit, Batch, Sink};
 use self::wide::{LeafUnits, MOST_IN_LEAF, WideTree};
 use crate::coplanar::settle;
+use crate::few::FewTriangles;
 use crate::nearest::Nearest;
 use crate::parts::{Baking, Blas, Instance, Layout, Members, outward};
 use crate::tree::{LeafSize, Ref, Tree};
 use crate::watch::{BuildWatch, with_threads};
-use crate::{Accel, BuildError, BuildOptions, BuildReport, Quality};
+use crate::{Accel, BlockAccel, BuildError, BuildOptions, BuildReport, Quality};
 
 /// The pure-Rust bounding volume hierarchy.
 pub struct Bvh {
@@ -51,6 +52,7 @@ pub struct Bvh {
     /// Over the instances; empty when there is only one.
     top: WideTree,
     coplanar: Coplanar,
+    few: Option<FewTriangles>,
     isa: Isa,
     time: Duration,
 }
@@ -146,7 +148,8 @@ impl Bvh {
             Ok((parts, top))
         })?;
         let (coplanar, isa) = (Coplanar::of(&geometry), Isa::detect());
-        Ok(Self { geometry, layout, parts, top, coplanar, isa, time: start.elapsed() })
+        let few = FewTriangles::of(&geometry);
+        Ok(Self { geometry, layout, parts, top, coplanar, few, isa, time: start.elapsed() })
     }
 
     /// A number that differs when the trees do.
@@ -236,6 +239,11 @@ impl Accel for Bvh {
         hits.reset(rays.len());
         self.dispatch(rays, |i, nearest: Nearest| nearest.write(&self.geometry, hits, i));
         settle(&self.coplanar, &self.geometry, rays, hits);
+    }
+
+    fn blocks(&self) -> Option<&dyn BlockAccel> {
+        let few = self.few.as_ref().filter(|_| self.coplanar.is_empty())?;
+        Some(few)
     }
 
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {

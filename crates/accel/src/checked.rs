@@ -5,18 +5,22 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
+use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Coplanar, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch};
+use etendue_geometry::{
+    Coplanar, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch, RayBlock, RayBlocks,
+};
 
 use crate::coplanar::settle;
 use crate::embree::{ExactFilter, FoundHits, NearestSearch, Scene, version};
 use crate::end_triangles::EndTriangles;
+use crate::few::FewTriangles;
 use crate::nearest::{Nearest, Query};
 use crate::parts::check_scale;
 use crate::recheck;
-use crate::single::{F32Frame, Rays32};
+use crate::single::{F32Frame, Rays32, round};
 use crate::solve::{self, ChunkTriangles, Solved};
-use crate::{Accel, BuildError, BuildOptions, BuildReport, Counts};
+use crate::{Accel, BlockAccel, BuildError, BuildOptions, BuildReport, Counts};
 
 /// Bundles around a ray before it is believed to miss.
 const TURNS: u32 = 4;
@@ -27,6 +31,7 @@ pub struct Embree {
     scene: Scene,
     frame: F32Frame,
     coplanar: Coplanar,
+    few: Option<FewTriangles>,
     robust: bool,
     refine: bool,
     report: BuildReport,
@@ -75,6 +80,7 @@ impl Embree {
         let scene =
             Scene::build(geometry, frame.origin, options, before.map(|before| &before.scene))?;
         let coplanar = Coplanar::of(scene.geometry());
+        let few = FewTriangles::of(scene.geometry());
         // What was built, in words and numbers.
         let mode = match (options.robust, options.refine) {
             (true, true) => "robust + f64",
@@ -93,6 +99,7 @@ impl Embree {
             scene,
             frame,
             coplanar,
+            few,
             robust: options.robust,
             refine: options.refine,
             report,
@@ -444,6 +451,16 @@ impl Accel for Embree {
         });
     }
 
+    fn blocks(&self) -> Option<&dyn BlockAccel> {
+        if !self.coplanar.is_empty() {
+            return None;
+        }
+        match &self.few {
+            Some(few) => Some(few),
+            None => self.scene.takes_blocks().then_some(self),
+        }
+    }
+
     fn rebuilt(
         &self,
         geometry: Arc<Geometry>,
@@ -462,5 +479,37 @@ impl Accel for Embree {
             rechecked: self.rechecked.load(Ordering::Relaxed),
             corrected: self.corrected.load(Ordering::Relaxed),
         }
+    }
+}
+
+impl BlockAccel for Embree {
+    fn origin(&self) -> DVec3 {
+        self.frame.origin
+    }
+
+    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
+        SCRATCH.with_borrow_mut(|scratch| {
+            let rays32 = &mut scratch.rays;
+            rays32.convert(rays, &self.frame);
+            rays32.put_in_blocks(blocks);
+        });
+    }
+
+    fn closest_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
+        self.scene.closest_of_blocks(blocks, coherent);
+        let Some(turns) = self.scene.turns() else { return };
+        for block in blocks {
+            for lane in (0..LANES).filter(|&lane| block.placement[lane] != MISS) {
+                let own = DVec3::from(block.normal.map(|axis| f64::from(axis[lane])));
+                let turned = turns[block.placement[lane] as usize] * own;
+                for axis in 0..3 {
+                    block.normal[axis][lane] = round(turned[axis]);
+                }
+            }
+        }
+    }
+
+    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
+        self.scene.occluded_of_blocks(blocks, coherent);
     }
 }

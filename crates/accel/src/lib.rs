@@ -22,11 +22,15 @@ mod embree;
 #[cfg(feature = "embree")]
 mod end_triangles;
 mod exact;
+mod few;
 mod nearest;
 mod parts;
 #[cfg(feature = "embree")]
 mod recheck;
-#[cfg(feature = "embree")]
+#[cfg_attr(
+    not(feature = "embree"),
+    expect(dead_code, reason = "few triangles need its conversion alone")
+)]
 mod single;
 #[cfg(feature = "embree")]
 mod solve;
@@ -39,7 +43,8 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use etendue_geometry::{Geometry, HitBatch, RayBatch};
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Geometry, HitBatch, RayBatch, RayBlock, RayBlocks};
 
 pub use bvh::Bvh;
 #[cfg(feature = "embree")]
@@ -49,6 +54,7 @@ pub use embree::limit;
 #[cfg(feature = "embree")]
 pub use embree::{Version, version as embree_version};
 pub use exact::Exact;
+pub use few::FewTriangles;
 
 /// Answers nearest-hit and visibility queries about one scene. Built once, then only read.
 pub trait Accel: Send + Sync + fmt::Debug {
@@ -61,6 +67,11 @@ pub trait Accel: Send + Sync + fmt::Debug {
 
     /// Whether anything lies between each ray's `t_min` and `t_max`. `blocked` is resized.
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>);
+
+    /// This structure as one that traces rays in blocks; `None` where it does not, or not in this scene.
+    fn blocks(&self) -> Option<&dyn BlockAccel> {
+        None
+    }
 
     /// The structure over `geometry`, some of whose placements were moved, added or replaced since this
     /// one was built, with all of this one that has not changed; `None` for backends that build anew.
@@ -79,6 +90,23 @@ pub trait Accel: Send + Sync + fmt::Debug {
     fn counts(&self) -> Counts {
         Counts::default()
     }
+}
+
+/// Hits of single precision for rays in blocks: as [`Accel`] finds them for batches of
+/// [`HitPrecision::Single`](etendue_geometry::HitPrecision), without arrays on the way.
+pub trait BlockAccel: Send + Sync + fmt::Debug {
+    /// What origins of blocks are relative to (m, world).
+    fn origin(&self) -> DVec3;
+
+    /// The rays of a batch as blocks, which are refilled. A ray from afar starts nearer to the scene.
+    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks);
+
+    /// The closest hit of each ray: its distance goes to `t_max`, with placement, triangle, weights and normal.
+    /// Rays of one block that run close together are faster as `coherent`.
+    fn closest_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool);
+
+    /// Whether anything is between the ends of each ray ([`RayBlock::is_blocked`]).
+    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool);
 }
 
 /// How a structure was built.

@@ -2,7 +2,7 @@
 //! started where they enter its box, so that f32's 24 bits are spent on the scene alone.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Bounds, HitPrecision, RayBatch};
+use etendue_geometry::{Bounds, HitPrecision, RayBatch, RayBlocks};
 
 /// The box of a scene and the origin that single-precision coordinates are relative to.
 #[derive(Debug, Clone, Copy)]
@@ -178,6 +178,17 @@ impl Rays32 {
             if let Some(last) = self.direction[axis].last_mut() {
                 *last = round(rays.directions()[axis][i]);
             }
+        }
+    }
+
+    /// Refills blocks with these rays.
+    pub(crate) fn put_in_blocks(&self, blocks: &mut RayBlocks) {
+        blocks.clear();
+        for i in 0..self.len() {
+            let [origin, direction] =
+                [&self.origin, &self.direction].map(|axes| axes.each_ref().map(|axis| axis[i]));
+            blocks.push(origin, direction, self.t_far[i]);
+            blocks.start_at(self.t_near[i]);
         }
     }
 

@@ -16,6 +16,7 @@
 //! |---|---|
 //! | [`area`] | which triangles have an area |
 //! | [`batch`] | [`RayBatch`] and [`HitBatch`], structures of arrays |
+//! | [`block`] | [`RayBlock`], sixteen rays in single precision |
 //! | [`bounds`] | axis-aligned boxes |
 //! | [`buffer`] | plain values owned by a `Vec` or by a mapped file |
 //! | [`disk`] | the unit square on the unit disk |
@@ -26,6 +27,7 @@
 
 pub mod area;
 pub mod batch;
+pub mod block;
 pub mod bounds;
 pub mod buffer;
 pub mod coplanar;
@@ -37,6 +39,7 @@ pub mod world;
 
 pub use area::{AreaTest, is_degenerate};
 pub use batch::{Detail, HitBatch, HitPrecision, MISS, PlacedTriangle, RayBatch, RaysMut};
+pub use block::{RayBlock, RayBlocks};
 pub use bounds::Bounds;
 pub use buffer::Buffer;
 pub use coplanar::Coplanar;

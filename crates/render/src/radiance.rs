@@ -106,6 +106,11 @@ impl Samples for SampleNumbers {
         });
         squares(&numbered.collect::<Vec<_>>(), out);
     }
+
+    fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
+        let samples = rays.iter().map(|&ray| self.samples[self.of_ray[ray as usize] as usize]);
+        squares_of_pair(samples, CAMERA_PAIRS + pair, out);
+    }
 }
 
 impl Averaged for LightPass<'_> {

@@ -18,6 +18,9 @@ use crate::sampling::{DiscreteDistribution, ONE_BELOW};
 /// The least chance of a light near by, and of one far away, where there are both.
 const LEAST_SHARE: f64 = 0.25;
 
+/// So many lights are few.
+const FEW: usize = 8;
+
 /// A light that may be chosen.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Candidate {
@@ -76,6 +79,13 @@ impl LightSampler {
             false => DiscreteDistribution::default(),
         };
         Self { others, far, tree }
+    }
+
+    /// The sum of the chances of all lights before each and 1 at the end, where they are few and alike from
+    /// everywhere.
+    pub(crate) fn few(&self) -> Option<&[f64]> {
+        let is_few = self.tree.is_none() && (1..=FEW).contains(&self.others.len());
+        is_few.then(|| self.others.below())
     }
 
     /// Whether there is nothing to choose from.

@@ -121,6 +121,37 @@ impl Lights {
         Ok(all)
     }
 
+    /// A light for the point `from` (m) by `u` in 0..1: its number, what is left of `u`, and its chance.
+    #[inline(always)]
+    pub(crate) fn pick(&self, from: DVec3, u: f64) -> Option<(usize, f64, f64)> {
+        self.sampler.pick(from, u)
+    }
+
+    /// What [`Self::pick`] picks by, where that is a short list: the sum of the chances of all lights before
+    /// each, and 1 at the end.
+    pub(crate) fn few(&self) -> Option<&[f64]> {
+        self.sampler.few()
+    }
+
+    /// Light `index` and its bands, if it is a triangle that is kept ready and shines alike all over.
+    #[inline(always)]
+    pub(crate) fn plain_triangle(
+        &self,
+        index: usize,
+        count: usize,
+    ) -> Option<(&AreaLight, &[f64])> {
+        let number = index.checked_sub(self.lights.len())?;
+        let lamp = self.lamps.get(number)?.as_ref().filter(|lamp| lamp.is_plain)?;
+        Some((lamp, &self.lamp_bands[number * count..(number + 1) * count]))
+    }
+
+    /// The number among all lights of a triangle that shines.
+    #[inline]
+    pub(crate) fn index_of(&self, [placement, triangle]: [u32; 2]) -> Option<usize> {
+        let first = (*self.first.get(placement as usize)?)?;
+        Some(first as usize + triangle as usize)
+    }
+
     /// The chance with which [`Self::choose`] chooses light `index` for the point `from` (m).
     pub(crate) fn chance(&self, from: DVec3, index: usize) -> f64 {
         self.sampler.chance(from, index)
@@ -235,13 +266,24 @@ impl Lights {
         radiance: &mut [f64],
     ) -> Chosen {
         // What is left of the number that chose the light chooses the place: both stay even.
-        let Some((index, rest, chance)) = self.sampler.pick(from, choice) else {
-            return Chosen::Dark;
-        };
-        let (one, square) = ((index, chance), [rest, v]);
+        let Some((index, rest, chance)) = self.pick(from, choice) else { return Chosen::Dark };
+        self.place(around, spectral, from, ((index, chance), [rest, v]), radiance)
+    }
+
+    /// A place on a light that was picked with a chance, by a square; its radiance (of a point its
+    /// intensity) goes to `radiance`.
+    #[inline(always)]
+    pub(crate) fn place(
+        &self,
+        around: &SceneView<'_>,
+        spectral: &Spectral,
+        from: DVec3,
+        (one, square): ((usize, f64), [f64; 2]),
+        radiance: &mut [f64],
+    ) -> Chosen {
         let mut chosen = self.place_on(around, spectral, from, one, square, radiance);
         if let Chosen::Place(target) = &mut chosen {
-            target.light = u32::try_from(index).unwrap_or(MISS);
+            target.light = u32::try_from(one.0).unwrap_or(MISS);
         }
         chosen
     }

@@ -31,6 +31,8 @@ pub(crate) struct PlacedSurface {
     pub(crate) has_alpha: bool,
     /// It is Lambert's, and wholly there.
     pub(crate) is_matte: bool,
+    /// It scatters nothing, and is wholly there.
+    pub(crate) is_black: bool,
     /// No light passes it.
     pub(crate) is_opaque: bool,
     /// Its shading normal is not that of its triangles.
@@ -66,6 +68,7 @@ impl PlacedSurfaces {
                 is_seen: material.emission.is_some() || material.scattering == Scattering::Unlit,
                 has_alpha: material.has_alpha(),
                 is_matte: material.scattering == Scattering::Matte && !material.has_alpha(),
+                is_black: material.scattering == Scattering::Black && !material.has_alpha(),
                 is_opaque: !material.has_alpha()
                     && !material.is_pane()
                     && !matches!(material.scattering, Scattering::Dielectric(_)),
@@ -84,6 +87,11 @@ impl PlacedSurfaces {
             false => Coplanar::default(),
         };
         Self { all: geometry.placements.iter().zip(bodies).map(surface).collect(), touching }
+    }
+
+    /// Whether all scatter light as Lambert's law has it, or not at all.
+    pub(crate) fn are_matte(&self) -> bool {
+        self.all.iter().flatten().all(|surface| surface.is_matte || surface.is_black)
     }
 
     /// All bodies.

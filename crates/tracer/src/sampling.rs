@@ -146,6 +146,12 @@ impl DiscreteDistribution {
         Self { below, guide }
     }
 
+    /// The sum of all probabilities before each index, and 1 at the end.
+    #[must_use]
+    pub fn below(&self) -> &[f64] {
+        &self.below
+    }
+
     /// How many indices there are.
     #[must_use]
     pub fn len(&self) -> usize {

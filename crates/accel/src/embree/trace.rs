@@ -1,11 +1,33 @@
 //! Tracing a committed scene: one by one, or in packets of the width that the processor has.
 
+use std::mem::offset_of;
+
 use embree4_sys as sys;
-use etendue_geometry::{Geometry, MISS, Mesh, Positions};
+use etendue_geometry::block::LANES;
+use etendue_geometry::{Geometry, MISS, Mesh, Positions, RayBlock};
 
 use super::Scene;
 use super::filter::{self, ExactFilter, NearestSearch};
 use crate::single::Rays32;
+
+/// Whether a [`RayBlock`] is a packet of the installed Embree as it stands: same rows, and room for all of them.
+const BLOCKS_ARE_PACKETS: bool = size_of::<sys::RTCRayHit16>() <= size_of::<RayBlock>()
+    && align_of::<sys::RTCRayHit16>() <= align_of::<RayBlock>()
+    && offset_of!(sys::RTCRayHit16, ray) == 0
+    && offset_of!(sys::RTCRay16, org_x) == offset_of!(RayBlock, origin)
+    && offset_of!(sys::RTCRay16, tnear) == offset_of!(RayBlock, t_min)
+    && offset_of!(sys::RTCRay16, dir_x) == offset_of!(RayBlock, direction)
+    && offset_of!(sys::RTCRay16, time) == offset_of!(RayBlock, time)
+    && offset_of!(sys::RTCRay16, tfar) == offset_of!(RayBlock, t_max)
+    && offset_of!(sys::RTCRay16, mask) == offset_of!(RayBlock, mask)
+    && offset_of!(sys::RTCRay16, id) == offset_of!(RayBlock, id)
+    && offset_of!(sys::RTCRay16, flags) == offset_of!(RayBlock, flags)
+    && offset_of!(sys::RTCRayHit16, hit.Ng_x) == offset_of!(RayBlock, normal)
+    && offset_of!(sys::RTCRayHit16, hit.u) == offset_of!(RayBlock, u)
+    && offset_of!(sys::RTCRayHit16, hit.v) == offset_of!(RayBlock, v)
+    && offset_of!(sys::RTCRayHit16, hit.primID) == offset_of!(RayBlock, triangle)
+    && offset_of!(sys::RTCRayHit16, hit.geomID) == offset_of!(RayBlock, placement)
+    && offset_of!(sys::RTCRayHit16, hit.instID) == offset_of!(RayBlock, instance);
 
 /// What single precision found for a batch of rays.
 #[derive(Debug, Default)]
@@ -81,6 +103,52 @@ impl Scene {
         let in_packets = coherent || !self.has_instances;
         self.intersect(rays, in_packets, &mut intersect_arguments(coherent), found);
         found.has_surface = false;
+    }
+
+    /// Whether rays in blocks can be traced: where blocks are packets, and packets come back.
+    pub(crate) fn takes_blocks(&self) -> bool {
+        BLOCKS_ARE_PACKETS && !self.has_instances && !self.is_compact
+    }
+
+    /// The closest hits of blocks. Only for scenes that [take blocks](Self::takes_blocks).
+    pub(crate) fn closest_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
+        debug_assert!(self.takes_blocks(), "checked by the caller");
+        let mut arguments = intersect_arguments(coherent);
+        for block in blocks {
+            block.clear_hits();
+            let valid = Aligned(live_lanes::<LANES>(&block.t_max));
+            if !BLOCKS_ARE_PACKETS || valid.0 == [0; LANES] {
+                continue;
+            }
+            let packet: *mut sys::RTCRayHit16 = std::ptr::from_mut(block).cast();
+            // SAFETY: the scene is committed; `BLOCKS_ARE_PACKETS` has that the block is a packet, aligned as
+            // one; lanes without a ray are masked off; Embree keeps no pointer.
+            unsafe {
+                let scene = self.handle.0.as_ptr();
+                sys::rtcIntersect16(valid.0.as_ptr(), scene, packet, &mut arguments);
+            }
+        }
+    }
+
+    /// Occlusion of blocks. Only for scenes that [take blocks](Self::takes_blocks).
+    pub(crate) fn occluded_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
+        debug_assert!(self.takes_blocks(), "checked by the caller");
+        let mut arguments = occluded_arguments(coherent);
+        let mut spread = occluded_arguments(false);
+        for block in blocks {
+            let valid = Aligned(live_lanes::<LANES>(&block.t_max));
+            if !BLOCKS_ARE_PACKETS || valid.0 == [0; LANES] {
+                continue;
+            }
+            let apart = coherent && spread_out(&block.direction, |lane| valid.0[lane] != 0);
+            let arguments = if apart { &mut spread } else { &mut arguments };
+            let packet: *mut sys::RTCRay16 = std::ptr::from_mut(block).cast();
+            // SAFETY: as above; rays are the first part of a packet of rays and hits.
+            unsafe {
+                let scene = self.handle.0.as_ptr();
+                sys::rtcOccluded16(valid.0.as_ptr(), scene, packet, arguments);
+            }
+        }
     }
 
     /// As [`Self::occluded`], in packets whether coherent or not.
@@ -253,12 +321,24 @@ fn is_coherent(flags: sys::RTCRayQueryFlags) -> bool {
 /// hundred times as long for rays aimed at all corners of a mesh (`corners_and_edges_occlusion` of the
 /// stability suite). Told that they are not coherent, it follows each ray of the packet by itself.
 fn run_apart(rays: &Rays32, start: usize, count: usize) -> bool {
-    const MOST: f32 = 0.25;
     rays.direction.iter().any(|axis| {
         let directions = &axis[start..start + count];
         let least = directions.iter().copied().fold(f32::INFINITY, f32::min);
         let most = directions.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        most - least > MOST
+        most - least > MOST_SPREAD
+    })
+}
+
+/// The widest range of a component of directions that run together.
+const MOST_SPREAD: f32 = 0.25;
+
+/// The same as [`run_apart`] of the lanes of a block that are live.
+fn spread_out(direction: &[[f32; LANES]; 3], is_live: impl Fn(usize) -> bool) -> bool {
+    direction.iter().any(|axis| {
+        let pick = |lane: usize, other: f32| if is_live(lane) { axis[lane] } else { other };
+        let least = (0..LANES).map(|k| pick(k, f32::INFINITY)).fold(f32::INFINITY, f32::min);
+        let most = (0..LANES).map(|k| pick(k, f32::NEG_INFINITY));
+        most.fold(f32::NEG_INFINITY, f32::max) - least > MOST_SPREAD
     })
 }
 

@@ -1,6 +1,7 @@
 //! Whole renders: from the text of a scene to the values of its layers.
 
 mod adaptive;
+mod blocks;
 mod dispersion;
 mod known_radiance;
 mod layers;

@@ -4,11 +4,50 @@
 
 use std::f64::consts::PI;
 
-use etendue_geometry::disk;
+use etendue_geometry::block::LANES as BLOCK;
 use etendue_geometry::glam::DVec3;
+use etendue_geometry::{RayBlock, disk};
 
-use super::patch::{LANES, Patch};
+use super::patch::{BESIDE, LANES, Patch, Picks};
+use crate::sampling::ONE_BELOW;
 use crate::surface::facing;
+
+/// Rays and hits of blocks, whose coordinates are relative to `origin` (m), in the world.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn unpack(patch: &mut Patch, blocks: &[RayBlock], origin: [f64; 3]) {
+    let seen = &mut patch.seen;
+    for (number, block) in blocks.iter().enumerate() {
+        let lanes = number * BLOCK..(number + 1) * BLOCK;
+        let row = |to: &mut [f64; LANES], from: &[f32; BLOCK], offset: f64| {
+            for (to, &from) in to[lanes.clone()].iter_mut().zip(from) {
+                *to = f64::from(from) + offset;
+            }
+        };
+        for axis in 0..3 {
+            row(&mut seen.origin[axis], &block.origin[axis], origin[axis]);
+            row(&mut seen.direction[axis], &block.direction[axis], 0.0);
+        }
+        row(&mut seen.t, &block.t_max, 0.0);
+        let [x, y, z] = block.normal.map(|axis| axis.map(f64::from));
+        let mut scale = [0.0; BLOCK];
+        for i in 0..BLOCK {
+            scale[i] = 1.0 / (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt();
+        }
+        for (axis, own) in [x, y, z].into_iter().enumerate() {
+            for i in 0..BLOCK {
+                let unit = own[i] * scale[i];
+                seen.normal[axis][lanes.start + i] = unit;
+                seen.shading[axis][lanes.start + i] = unit;
+            }
+        }
+        for i in 0..BLOCK {
+            let (u, v) = (f64::from(block.u[i]), f64::from(block.v[i]));
+            let (rest, least) = (1.0 - u - v, if u < v { u } else { v });
+            let least = if rest < least { rest } else { least };
+            seen.is_beside[lanes.start + i] = if least < BESIDE { 1.0 } else { 0.0 };
+        }
+    }
+}
 
 /// Points, their errors of so many `roundings`, and normals on the viewer's side.
 #[multiversion::multiversion(targets = "simd")]
@@ -77,6 +116,48 @@ pub(super) fn bend(patch: &mut Patch) {
         seen.shading[0][i] = shading.x;
         seen.shading[1][i] = shading.y;
         seen.shading[2][i] = shading.z;
+    }
+}
+
+/// Picks one of few lights for each hit by the first numbers of the squares, as
+/// [`crate::sampling::DiscreteDistribution::pick`] does.
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn pick(picks: &mut Picks, below: &[f64]) {
+    let Picks { index, square: [place, _], chance } = picks;
+    if let [_, _] = below {
+        *index = [0; LANES];
+        *chance = [1.0; LANES];
+        return;
+    }
+    let (mut start, mut end) = ([0.0; LANES], [1.0; LANES]);
+    *index = [0; LANES];
+    for k in 0..below.len() - 1 {
+        for i in 0..LANES {
+            let is_in = (below[k] <= place[i]) & (below[k] < below[k + 1]);
+            start[i] = if is_in { below[k] } else { start[i] };
+            end[i] = if is_in { below[k + 1] } else { end[i] };
+            #[expect(clippy::cast_possible_truncation, reason = "few")]
+            let number = k as u32;
+            index[i] = if is_in { number } else { index[i] };
+        }
+    }
+    for i in 0..LANES {
+        let rest = (place[i] - start[i]) / (end[i] - start[i]);
+        let rest = if rest > 0.0 { rest } else { 0.0 };
+        place[i] = if rest < ONE_BELOW { rest } else { ONE_BELOW };
+        chance[i] = end[i] - start[i];
+    }
+}
+
+/// Weights of the second and third corner by squares, uniform over triangles
+/// ([`crate::sampling::triangle_point`]).
+#[multiversion::multiversion(targets = "simd")]
+pub(super) fn spread_over_triangles(picks: &mut Picks) {
+    let [u, v] = &mut picks.square;
+    for i in 0..LANES {
+        let root = u[i].sqrt();
+        u[i] = root * (1.0 - v[i]);
+        v[i] *= root;
     }
 }
 

@@ -14,6 +14,7 @@
 
 mod dispersion;
 mod kernels;
+mod lanes;
 mod media;
 mod meet;
 mod numbers;
@@ -30,6 +31,7 @@ use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, RayBatch};
 
+use self::lanes::LaneScratch;
 use self::media::{Coincident, Media};
 use self::numbers::{Draw, Numbers};
 use self::patch::Patch;
@@ -98,13 +100,15 @@ pub struct Traits {
     pub has_media: bool,
     /// Some boundaries between bodies may not be there.
     pub has_nested: bool,
+    /// All surfaces scatter light as Lambert's law has it, or not at all.
+    pub is_matte: bool,
 }
 
 impl Traits {
     /// Those of all placed surfaces.
     #[must_use]
     pub fn of(geometry: &Geometry, materials: &[Material], surfaces: &PlacedSurfaces) -> Self {
-        let mut traits = Self::default();
+        let mut traits = Self { is_matte: surfaces.are_matte(), ..Self::default() };
         let (mut has_sheets, mut has_bodies) = (false, false);
         for (i, placement) in (0..).zip(&geometry.placements) {
             let Some(material) = materials.get(placement.material as usize) else { continue };
@@ -176,6 +180,12 @@ pub trait Samples: Debug {
     /// A point of the unit square for each of `wanted`, ray and pair: `out` is refilled. Pairs are
     /// counted from 0, which no ray has used before.
     fn squares(&self, wanted: &[(u32, u32)], out: &mut Vec<[f64; 2]>);
+
+    /// The same of one pair for each of `rays`.
+    fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
+        let wanted: Vec<(u32, u32)> = rays.iter().map(|&ray| (ray, pair)).collect();
+        self.squares(&wanted, out);
+    }
 }
 
 /// What became of a batch.
@@ -215,6 +225,7 @@ pub struct Scratch {
     missed: Vec<u32>,
     asked: Asked,
     patch: Box<Patch>,
+    lanes: LaneScratch,
 }
 
 /// Traces `beam` by `rules`.
@@ -246,6 +257,10 @@ fn trace_bands<const RGB: bool>(
     scratch.hits.detail = Detail::Surface;
     scratch.shadows.hits.detail = Detail::Surface;
     scratch.radiance.resize(count, 0.0);
+    if let Some(blocks) = lanes::block_accel(stage) {
+        tracing.trace_blocks(blocks, beam, scratch, out);
+        return tracing.tally;
+    }
     let precision = stage.precision;
     tracing.start(beam, &mut scratch.now);
     while !scratch.now.states.is_empty() {

@@ -17,10 +17,11 @@ pub(super) enum Draw {
 }
 
 /// How many uses there are.
-const DRAWS: u32 = 4;
+pub(super) const DRAWS: u32 = 4;
 
 impl Draw {
-    const ALL: [Self; DRAWS as usize] = [Self::Choice, Self::Light, Self::Direction, Self::Chance];
+    pub(super) const ALL: [Self; DRAWS as usize] =
+        [Self::Choice, Self::Light, Self::Direction, Self::Chance];
 }
 
 /// The numbers of the paths that go on.

@@ -7,6 +7,7 @@ use super::media::Crossing;
 use super::paths::Paths;
 use crate::Color;
 use crate::bsdf::Bsdf;
+use crate::lamps::AreaLight;
 use crate::placed::PlacedSurface;
 use crate::spawn::Anchor;
 use crate::target::{Target, TargetKind};
@@ -17,7 +18,7 @@ pub(super) const LANES: usize = 64;
 /// Hits of f32 are beside an edge of their triangle where their least barycentric weight is below this: only
 /// triangles that are less than some hundred of the bounds of [`spawn`](crate::spawn) high have others as near
 /// to one, and a mesh of those has no sharp corners that it can resolve.
-const BESIDE: f64 = 1.0 / 256.0;
+pub(super) const BESIDE: f64 = 1.0 / 256.0;
 
 pub(super) type Row = [f64; LANES];
 
@@ -29,6 +30,7 @@ pub(super) struct Patch {
     pub(super) path: Vec<(usize, usize)>,
     pub(super) seen: Seen,
     pub(super) away: Away,
+    pub(super) picks: Picks,
     pub(super) targets: Targets,
     /// The colours of matte surfaces.
     pub(super) colors: Vec<Color>,
@@ -77,6 +79,17 @@ pub(super) struct Targets {
     pub(super) two_sided: Row,
     /// 1 where no direction meets it by chance.
     pub(super) is_delta: Row,
+}
+
+/// Which light each hit asks.
+#[derive(Debug)]
+pub(super) struct Picks {
+    /// The number of the light.
+    pub(super) index: [u32; LANES],
+    /// Of the number that picked it what is left, and the other of the pair: a place on the light.
+    pub(super) square: [Row; 2],
+    /// With which it was picked; 0 where none was.
+    pub(super) chance: Row,
 }
 
 /// Rays that leave the hits.
@@ -128,6 +141,12 @@ impl Default for Targets {
             two_sided: ZERO,
             is_delta: ZERO,
         }
+    }
+}
+
+impl Default for Picks {
+    fn default() -> Self {
+        Self { index: [MISS; LANES], square: [ZERO; 2], chance: ZERO }
     }
 }
 
@@ -203,6 +222,27 @@ impl Patch {
 }
 
 impl Targets {
+    /// Sets what a lane aims at: the place on a triangle with these weights of its second and third corner.
+    #[inline(always)]
+    pub(super) fn set_triangle(
+        &mut self,
+        lane: usize,
+        triangle: &AreaLight,
+        weights: [f64; 2],
+        chance: f64,
+    ) {
+        self.id[lane] = triangle.id;
+        let [corner, rest] = triangle.corner;
+        for (rows, part) in self.place.iter_mut().zip([corner, rest, triangle.across(weights)]) {
+            put(rows, lane, part);
+        }
+        put(&mut self.normal, lane, triangle.shape.normal);
+        put(&mut self.magnitudes, lane, triangle.magnitudes);
+        self.density[lane] = chance / triangle.shape.area;
+        (self.is_far[lane], self.is_delta[lane], self.is_triangle[lane]) = (0.0, 0.0, 1.0);
+        self.two_sided[lane] = f64::from(u8::from(triangle.two_sided));
+    }
+
     /// Sets what a lane aims at; at nothing when there is no light.
     #[inline]
     pub(super) fn set(&mut self, lane: usize, target: Option<&Target>) {

@@ -1,0 +1,174 @@
+//! Rays in blocks of sixteen in single precision, as Embree's packets have them: light is traced in these.
+
+use crate::batch::MISS;
+
+/// Rays of a block.
+pub const LANES: usize = 16;
+
+/// One single-precision number of each ray of a block.
+pub type Floats = [f32; LANES];
+
+/// One index of each ray of a block.
+pub type Indices = [u32; LANES];
+
+/// Sixteen rays and what they hit, in the order of Embree's `RTCRayHit16`, so that they can be handed over as
+/// they are. Origins are relative to what the accelerator says (m), directions are unit vectors.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub struct RayBlock {
+    /// Origins (m), one array an axis.
+    pub origin: [Floats; 3],
+    /// Nearest distances that count (m).
+    pub t_min: Floats,
+    /// Unit directions, one array an axis.
+    pub direction: [Floats; 3],
+    /// Embree's time of each ray: 0.
+    pub time: Floats,
+    /// Farthest distances that count (m): nothing is traced where this is not above 0. A closest hit puts its
+    /// distance here, occlusion puts −∞.
+    pub t_max: Floats,
+    /// Embree's mask of each ray: all bits.
+    pub mask: Indices,
+    /// Embree's number of each ray, which nothing reads.
+    pub id: Indices,
+    /// Embree's flags of each ray: 0.
+    pub flags: Indices,
+    /// Normals of the triangles that were hit, of any length, on their front; one array an axis.
+    pub normal: [Floats; 3],
+    /// Barycentric weights of their second corners.
+    pub u: Floats,
+    /// Barycentric weights of their third corners.
+    pub v: Floats,
+    /// Triangles in their meshes, or [`MISS`].
+    pub triangle: Indices,
+    /// Placements, or [`MISS`].
+    pub placement: Indices,
+    /// Embree's instances.
+    pub instance: Indices,
+    /// Embree's numbers of primitives of instances, which not every version has.
+    pub instance_primitive: Indices,
+}
+
+impl RayBlock {
+    /// A block of which no ray is traced.
+    pub const EMPTY: Self = Self {
+        origin: [[0.0; LANES]; 3],
+        t_min: [0.0; LANES],
+        direction: [[0.0; LANES]; 3],
+        time: [0.0; LANES],
+        t_max: [-1.0; LANES],
+        mask: [u32::MAX; LANES],
+        id: [0; LANES],
+        flags: [0; LANES],
+        normal: [[0.0; LANES]; 3],
+        u: [0.0; LANES],
+        v: [0.0; LANES],
+        triangle: [MISS; LANES],
+        placement: [MISS; LANES],
+        instance: [MISS; LANES],
+        instance_primitive: [MISS; LANES],
+    };
+
+    /// Forgets what was hit.
+    #[inline]
+    pub fn clear_hits(&mut self) {
+        self.triangle = [MISS; LANES];
+        self.placement = [MISS; LANES];
+        self.instance = [MISS; LANES];
+    }
+
+    /// Whether anything is between the ends of a ray, once occlusion was asked for.
+    #[must_use]
+    #[inline]
+    pub fn is_blocked(&self, lane: usize) -> bool {
+        self.t_max[lane] == f32::NEG_INFINITY
+    }
+}
+
+/// Rays side by side in blocks, without gaps. Memory is kept.
+#[derive(Debug, Clone, Default)]
+pub struct RayBlocks {
+    blocks: Vec<RayBlock>,
+    len: usize,
+}
+
+impl RayBlocks {
+    /// Removes all rays.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// How many rays there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The blocks that have rays.
+    #[must_use]
+    pub fn blocks(&self) -> &[RayBlock] {
+        &self.blocks[..self.len.div_ceil(LANES)]
+    }
+
+    /// The blocks that have rays, to be traced.
+    pub fn blocks_mut(&mut self) -> &mut [RayBlock] {
+        &mut self.blocks[..self.len.div_ceil(LANES)]
+    }
+
+    /// Appends a ray from `origin` (m) along the unit `direction` that counts hits from 0 to `t_max` (m).
+    #[inline]
+    pub fn push(&mut self, origin: [f32; 3], direction: [f32; 3], t_max: f32) {
+        let (number, lane) = (self.len / LANES, self.len % LANES);
+        if lane == 0 {
+            if number == self.blocks.len() {
+                self.blocks.push(RayBlock::EMPTY);
+            }
+            let block = &mut self.blocks[number];
+            block.t_min = [0.0; LANES];
+            block.t_max = [-1.0; LANES];
+        }
+        let block = &mut self.blocks[number];
+        for axis in 0..3 {
+            block.origin[axis][lane] = origin[axis];
+            block.direction[axis][lane] = direction[axis];
+        }
+        block.t_max[lane] = t_max;
+        self.len += 1;
+    }
+
+    /// The nearest distance that counts of the ray that was pushed last (m).
+    pub fn start_at(&mut self, t_min: f32) {
+        if let Some(last) = self.len.checked_sub(1) {
+            self.blocks[last / LANES].t_min[last % LANES] = t_min;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_that_no_ray_has_are_not_traced() {
+        let mut rays = RayBlocks::default();
+        for _ in 0..2 {
+            rays.clear();
+            for k in 0..LANES + 3 {
+                rays.push([0.5; 3], [0.0, 0.0, 1.0], 1.0 + k as f32);
+            }
+            rays.start_at(0.25);
+            let [whole, rest] = rays.blocks() else { panic!("two blocks") };
+            assert!(whole.t_max.iter().all(|&t_max| t_max > 0.0));
+            assert_eq!(rest.t_max.iter().filter(|&&t_max| t_max > 0.0).count(), 3);
+            assert_eq!((rest.t_min[2], rest.t_max[2]), (0.25, 19.0));
+            assert_eq!(rays.len(), 19);
+        }
+        assert!(!rays.is_empty() && !rays.blocks()[0].is_blocked(0));
+    }
+}
