@@ -12,6 +12,7 @@ mod files; // what is no file, what costs without end, what real programs write
 mod flow; // layers that compare two frames
 mod frames; // many pictures of one scene, and trajectories of others
 mod gallery; // the page of pictures, its commands and its scenes
+mod generated; // schemas and pages that the program writes
 mod gltf_looks; // materials and lights of models, with closed-form answers
 mod gltf_textures; // textures of models, likewise
 mod hidden; // meshes of one point, nodes scaled to 0
@@ -37,6 +38,7 @@ mod pictures; // exposure, tone maps, transparency, and which light there is
 mod printing; // what names in files do to a terminal
 mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
+mod schema; // the schema by another validator
 mod sensor; // presets, curves, series of a characterisation
 mod shards; // renders that are divided or killed, and their pictures
 mod stale; // a render of one kind into the folder of another
