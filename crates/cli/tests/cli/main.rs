@@ -44,5 +44,6 @@ mod shards; // renders that are divided or killed, and their pictures
 mod stale; // a render of one kind into the folder of another
 mod stopping; // Ctrl-C and what it leaves
 mod tools; // check, plan, schema, version
+mod validation; // the page of effects, their sources and their tests
 mod view; // the window, as far as there is none
 mod views; // where a camera without a pose stands, and which way is up
