@@ -7,7 +7,7 @@ export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
 .PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-decisions bench-window docs-figures docs-charts \
-	docs-stability gallery light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
+	docs-stability generated gallery light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
 	@echo "make render        install what is missing, build, render scenes/first-light.json"
@@ -33,6 +33,7 @@ help:
 	@echo "make bench-memory   the same for the forecast of memory, and for copies, large shapes and frames"
 	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/window.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model"
+	@echo "make generated     schemas, tables of keys and the page of the command line, as the program writes them"
 	@echo "make gallery       render the pictures of docs/gallery.md, and write there what they took"
 	@echo "make docs-figures  render the pictures of the documents anew, into docs/images"
 	@echo "make light-fields  the walk of docs/light-fields.md in a venv, its pictures, and another decoder's opinion"
@@ -77,6 +78,7 @@ PREFIX ?= /usr/local
 install: setup
 	cargo build --release --locked -p etendue-cli
 	install -D -s -m 755 target/release/etendue "$(DESTDIR)$(PREFIX)/bin/etendue"
+	scripts/share.sh target/release/etendue "$(DESTDIR)$(PREFIX)/share"
 
 dist: setup
 	@scripts/dist.sh
@@ -158,6 +160,11 @@ docs-figures: setup docs-charts docs-stability light-fields gallery
 	install -D -m 644 out/docs-figures/sampling/raw.preview.png docs/images/sampling/sensor-noise.png
 	install -D -m 644 out/docs-figures/sampling/sample_count.preview.png docs/images/sampling/sensor-noise-map.png
 	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
+
+# What the program writes into the repository, which the tests hold against it: schema/, docs/keys.md,
+# docs/command-line.md.
+generated: setup
+	ETENDUE_GENERATE=1 cargo test -p etendue-cli --test cli generated::
 
 # The commands of docs/gallery.md, their pictures and their times. ARGS="prism burst" takes some sections.
 gallery: setup

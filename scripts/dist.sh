@@ -28,7 +28,7 @@ build_tarball() {
     install -D -s -m 755 "$program" "$dist/$name/bin/etendue"
     install -D -m 644 -t "$dist/$name/lib/etendue" "$dist"/lib/*
     install -D -m 644 -t "$dist/$name" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE
-    cp -R scenes "$dist/$name/scenes"
+    cp -R scenes schema "$dist/share" "$dist/$name/"
     tar -C "$dist" -czf "$dist/$name.tar.gz" "$name"
     rm -rf "${dist:?}/$name"
 }
@@ -47,10 +47,11 @@ build() {
     cargo build --profile "$profile" --locked -p etendue-cli
     rm -rf "$dist"
     bundle_libraries
+    scripts/share.sh "$program" "$dist/share"
     build_tarball
     build_package
     build_wheel
-    rm -rf "${dist:?}/lib"
+    rm -rf "${dist:?}/lib" "${dist:?}/share"
     ls -lh "$dist"
 }
 

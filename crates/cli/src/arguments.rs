@@ -7,6 +7,7 @@ mod parse;
 use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 use etendue::{Shard, ShardBy};
 use etendue_bench::tolerance::Tolerance;
 use etendue_files::{Opener, Reach};
@@ -69,6 +70,21 @@ pub(crate) enum Command {
         /// The kind of file
         #[arg(value_enum, default_value_t = SchemaArgument::Scene)]
         of: SchemaArgument,
+    },
+    /// Print what completes the command line in a shell
+    #[command(after_help = "Example:\n  etendue completions bash > \
+                            ~/.local/share/bash-completion/completions/etendue")]
+    Completions {
+        /// The shell
+        #[arg(value_enum)]
+        shell: Shell,
+    },
+    /// Write man pages of the program and its commands
+    #[command(after_help = "Example:\n  etendue man ~/.local/share/man/man1")]
+    Man {
+        /// The folder to write into; made when it is not there
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
     },
 }
 

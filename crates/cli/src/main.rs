@@ -6,6 +6,7 @@ mod bench;
 mod check;
 mod fault;
 mod lens;
+mod manual;
 mod merge;
 mod opencv;
 mod plan;
@@ -49,6 +50,8 @@ fn main() -> ExitCode {
         Some(Command::View(arguments)) => view::run(&arguments),
         Some(Command::Lens(arguments)) => lens::run(&arguments),
         Some(Command::Schema { of }) => print_schema(of),
+        Some(Command::Completions { shell }) => manual::print_completions(shell),
+        Some(Command::Man { folder }) => manual::write_pages(&folder),
         None => {
             // Nothing was asked for: say what can be.
             let _ = Cli::command().print_help();

@@ -146,7 +146,7 @@ pub enum NoiseModel {
     Poisson,
     /// By a normal distribution of the same mean and variance, the paper's approximation (its Eqs. 5
     /// and 6; the variance K²·g that Eq. 5 prints holds for g in electrons, for g in DN it is K·g).
-    /// [`approximation`](crate::approximation) tells where it fails.
+    /// The module `approximation` tells where it fails.
     Normal,
     /// Not at all: every pixel has its expected value, fixed patterns are left out.
     None,

@@ -12,6 +12,7 @@ mod files; // what is no file, what costs without end, what real programs write
 mod flow; // layers that compare two frames
 mod frames; // many pictures of one scene, and trajectories of others
 mod gallery; // the page of pictures, its commands and its scenes
+mod generated; // schemas and pages that the program writes
 mod gltf_looks; // materials and lights of models, with closed-form answers
 mod gltf_textures; // textures of models, likewise
 mod hidden; // meshes of one point, nodes scaled to 0
@@ -37,10 +38,12 @@ mod pictures; // exposure, tone maps, transparency, and which light there is
 mod printing; // what names in files do to a terminal
 mod render; // pictures with a closed-form answer
 mod run; // running the command and reading what it left
+mod schema; // the schema by another validator
 mod sensor; // presets, curves, series of a characterisation
 mod shards; // renders that are divided or killed, and their pictures
 mod stale; // a render of one kind into the folder of another
 mod stopping; // Ctrl-C and what it leaves
 mod tools; // check, plan, schema, version
+mod validation; // the page of effects, their sources and their tests
 mod view; // the window, as far as there is none
 mod views; // where a camera without a pose stands, and which way is up

@@ -13,7 +13,9 @@ fn version_names_the_program_and_what_traces() {
 #[test]
 fn help_exists_for_every_command_and_shows_an_example() {
     let bench = Bench::new();
-    for command in ["render", "check", "plan", "lens", "sensor", "bench", "schema"] {
+    for command in
+        ["render", "check", "plan", "lens", "sensor", "bench", "schema", "completions", "man"]
+    {
         let output = bench.run(&[command, "--help"]);
         assert!(output.status.success());
         assert!(text(&output.stdout).contains("Example"), "{command}");
@@ -67,4 +69,32 @@ fn nothing_but_results_goes_to_standard_output() {
     assert!(out.lines().all(|line| bench.path(line).is_file()), "{out}");
     let quiet = bench.run(&["render", "scene.json", "-o", "out", "--quiet"]);
     assert!(quiet.stderr.is_empty(), "{}", text(&quiet.stderr));
+}
+
+#[test]
+fn man_pages_exist_for_the_program_and_every_command() {
+    let bench = Bench::new();
+    let output = bench.run(&["man", "man1"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    for name in ["etendue", "etendue-render", "etendue-lens", "etendue-man"] {
+        let page = std::fs::read_to_string(bench.path("man1").join(format!("{name}.1")));
+        let page = page.unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(page.contains(&format!(".TH {name} 1")), "{name}: {page}");
+    }
+    let page = std::fs::read_to_string(bench.path("man1/etendue-render.1")).unwrap();
+    assert!(page.contains("checkpoint"), "{page}");
+}
+
+#[test]
+fn completions_know_the_commands_and_their_options() {
+    let bench = Bench::new();
+    for shell in ["bash", "zsh", "fish"] {
+        let output = bench.run(&["completions", shell]);
+        assert!(output.status.success(), "{shell}: {}", text(&output.stderr));
+        let script = text(&output.stdout);
+        for word in ["render", "merge", "checkpoint", "opencv"] {
+            assert!(script.contains(word), "{shell}: {word}");
+        }
+    }
+    assert_eq!(bench.run(&["completions", "tcl"]).status.code(), Some(2));
 }

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Element, LensError, MOST_ELEMENTS, OpticalTrain};
+use super::{Element, LensError, MOST_ELEMENTS, OpticalTrain, remove_notes};
 use crate::element::{ElementSpec, Frame, LossesSpec, PartSpec, Resolve};
 use crate::glass::{AgfCatalogue, FRAUNHOFER_D, Glass};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
@@ -56,9 +56,18 @@ impl LensFile {
     ///
     /// # Errors
     ///
-    /// [`LensError::Json`] with line and column.
+    /// [`LensError::Json`], with line and column of a file without notes.
     pub fn from_json(text: &str) -> Result<Self, LensError> {
-        serde_json::from_str(text).map_err(|e| LensError::Json(e.to_string()))
+        let json = |error: serde_json::Error| LensError::Json(error.to_string());
+        // As it stands, so that an error has its line, unless notes are to be left out.
+        serde_json::from_str(text).or_else(|error| {
+            let mut value = serde_json::from_str(text).map_err(json)?;
+            let file = match remove_notes(&mut value) {
+                true => serde_json::from_value(value),
+                false => Err(error),
+            };
+            file.map_err(json)
+        })
     }
 
     /// The lens, ready to be traced. `resolve` turns the names of the lens file's own files (masks)

@@ -9,10 +9,10 @@ mod allowed;
 mod choice;
 
 use etendue_geometry::units::Dimension;
+use etendue_optics::train::NOTES;
 use serde_json::{Map, Value};
 
 use super::document::{join, join_index};
-use super::lenient::NOTES;
 
 /// What is wrong, and where.
 #[derive(Debug, Clone, PartialEq)]

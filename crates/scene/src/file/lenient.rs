@@ -1,42 +1,8 @@
-//! What people and editors write beside the format: comments, the schema's address, and a resolution
-//! as screens have it.
+//! What people and editors may write beside the format: comments, the schema's address, and a resolution as
+//! screens have it.
 
+use etendue_optics::train::NOTES;
 use serde_json::{Map, Value, json};
-
-/// Keys that mean nothing, anywhere: what an editor completes by, and what a person remarks.
-pub(super) const NOTES: [&str; 2] = ["$schema", "comment"];
-
-/// The one object of the format whose keys are other people's words and whose values are strings: the
-/// materials of a model that an object replaces.
-const FOREIGN: &str = "materials";
-
-/// Takes the keys of [`NOTES`] out of all objects, where their values are text or lists of text.
-pub(super) fn tidy(value: &mut Value) {
-    match value {
-        Value::Object(members) => {
-            members.retain(|key, member| !(NOTES.contains(&key.as_str()) && is_text(member)));
-            for (key, member) in members {
-                if !(key == FOREIGN && has_only_text(member)) {
-                    tidy(member);
-                }
-            }
-        }
-        Value::Array(elements) => elements.iter_mut().for_each(tidy),
-        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
-    }
-}
-
-fn is_text(value: &Value) -> bool {
-    match value {
-        Value::String(_) => true,
-        Value::Array(lines) => lines.iter().all(Value::is_string),
-        Value::Null | Value::Bool(_) | Value::Number(_) | Value::Object(_) => false,
-    }
-}
-
-fn has_only_text(value: &Value) -> bool {
-    value.as_object().is_some_and(|members| members.values().all(Value::is_string))
-}
 
 /// Makes `[640, 480]` of a resolution written `"640x480"` at the dotted path `at`. The error says how
 /// it is written.
@@ -83,29 +49,5 @@ pub(super) fn allow_notes(schema: &mut Value) {
         }
         Value::Array(elements) => elements.iter_mut().for_each(allow_notes),
         Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn remarks_go_and_names_stay() {
-        let mut value = json!({
-            "$schema": "scene.schema.json", "comment": ["two", "lines"],
-            "camera": {"comment": "mine", "fov": 3},
-            "objects": [{"comment": "x", "materials": {"comment": "clay"}}],
-            "materials": {"comment": {"type": "matte"}, "clay": {"comment": "y", "type": "matte"}}
-        });
-        tidy(&mut value);
-        assert_eq!(
-            value,
-            json!({
-                "camera": {"fov": 3},
-                "objects": [{"materials": {"comment": "clay"}}],
-                "materials": {"comment": {"type": "matte"}, "clay": {"type": "matte"}}
-            })
-        );
     }
 }

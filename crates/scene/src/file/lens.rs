@@ -8,7 +8,8 @@ use etendue_files::{InputFolder, Opener, Reach};
 use etendue_optics::element::GlassesAlone;
 use etendue_optics::glass::AgfCatalogue;
 use etendue_optics::train::{
-    Focus, LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays, ZemaxError, ZemaxLens,
+    Focus, LensError, LensFile, OpticalTrain, RayError, RaysFile, TracedRays, ZemaxError,
+    ZemaxLens, remove_notes,
 };
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
@@ -156,7 +157,7 @@ pub fn trace_rays(lens: &OpticalTrain, path: &Path) -> Result<TracedRays, SceneE
 
 fn read(path: &Path) -> Result<(WrittenPlaces, Value), SceneError> {
     let (document, mut value) = read_document(path).map_err(not_a_lens)?;
-    lenient::tidy(&mut value);
+    remove_notes(&mut value);
     Ok((WrittenPlaces::new(&Opener::default(), path, Some(document)), value))
 }
 

@@ -19,6 +19,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use etendue_files::Opener;
+use etendue_optics::train::remove_notes;
 use etendue_sensor::Sensor;
 use etendue_tracer::LayerSpec;
 use serde_json::{Value, json};
@@ -187,7 +188,7 @@ impl SceneFile {
             let is_unset = |key: &str| overrides.iter().any(|(path, _)| path == key);
             members.retain(|key, value| !(value.is_null() && is_unset(key)));
         }
-        lenient::tidy(&mut value);
+        remove_notes(&mut value);
         lenient::read_resolution(&mut value, "camera.sensor.resolution")
             .map_err(|why| written.fault("camera.sensor.resolution", why))?;
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };

@@ -8,8 +8,9 @@ use etendue_geometry::units::Seconds;
 use glam::{DMat3, DQuat, DVec3};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize};
-use serde_json::{Map, Value};
+use serde::ser::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Map, Value, json};
 
 use crate::shape::ShapeSpec;
 
@@ -91,7 +92,7 @@ pub enum Source {
 }
 
 /// The keys that every object may have.
-#[derive(Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct Common {
     /// What the outputs call this object.
     #[serde(default)]
@@ -162,6 +163,25 @@ impl<'de> Deserialize<'de> for ObjectSpec {
             }
         };
         Ok(Self { source, name, material, materials, up, animation, transform, instances })
+    }
+}
+
+impl Serialize for ObjectSpec {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let source = match &self.source {
+            Source::File(path) => Ok(json!({ "file": path })),
+            Source::Shape(shape) => serde_json::to_value(shape),
+        };
+        let Self { name, material, materials, up, animation, transform, instances, .. } =
+            self.clone();
+        let common = Common { name, material, materials, up, animation, transform, instances };
+        let mut keys = Map::new();
+        for part in [source, serde_json::to_value(common)] {
+            if let Value::Object(part) = part.map_err(S::Error::custom)? {
+                keys.extend(part.into_iter().filter(|(_, value)| !value.is_null()));
+            }
+        }
+        keys.serialize(serializer)
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use etendue_files::Opener;
+use etendue_optics::train::remove_notes;
 use etendue_sensor::{Sensor, SensorError, SensorSpec};
 use serde_json::{Value, json};
 
@@ -65,7 +66,7 @@ impl SensorFile {
     ) -> Result<Self, SceneError> {
         written.read_camera(&mut value)?;
         written.set(&mut value, overrides)?;
-        lenient::tidy(&mut value);
+        remove_notes(&mut value);
         let in_scene = value.get("etendue").is_some() || value.get("camera").is_some();
         let place = if in_scene { IN_SCENE } else { "" };
         let resolution = inside(place, "resolution");

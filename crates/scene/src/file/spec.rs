@@ -13,7 +13,7 @@ use super::camera::CameraSource;
 use super::{FramesSpec, ObjectSpec, PlanSpec, RenderSpec, TracerSpec, Up};
 
 /// A scene as the file writes it.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
     /// The version of the format.

@@ -8,6 +8,7 @@ mod documents;
 mod models;
 mod rigs;
 mod scenes;
+mod specs;
 mod trajectories;
 
 use std::path::{Path, PathBuf};

@@ -1,0 +1,88 @@
+//! The committed JSON Schema, by a validator that is not ours: an editor that knows it marks what the program
+//! refuses, and nothing else.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use boon::{Compiler, SchemaIndex, Schemas};
+use serde_json::Value;
+
+use crate::generated::root;
+use crate::run::{Bench, text};
+
+struct Validator {
+    schemas: Schemas,
+    index: SchemaIndex,
+}
+
+impl Validator {
+    fn of(kind: &str) -> Self {
+        let path = root().join(format!("schema/{kind}.schema.json"));
+        let (mut schemas, mut compiler) = (Schemas::new(), Compiler::new());
+        let index = compiler.compile(path.to_str().expect("UTF-8"), &mut schemas);
+        Self { index: index.unwrap_or_else(|error| panic!("{kind}: {error}")), schemas }
+    }
+
+    fn validate(&self, value: &Value) -> Result<(), String> {
+        self.schemas.validate(value, self.index).map_err(|error| format!("{error:#}"))
+    }
+}
+
+/// The JSON files below `folder`.
+fn files(folder: &Path, into: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            files(&path, into);
+        } else if path.extension().is_some_and(|end| end == "json") {
+            into.push(path);
+        }
+    }
+}
+
+#[test]
+fn example_files_name_their_schema_and_satisfy_it() {
+    let kinds = ["scene", "lens"].map(|kind| (kind, Validator::of(kind)));
+    let mut paths = Vec::new();
+    files(&root().join("scenes"), &mut paths);
+    assert!(paths.len() > 30, "{} files", paths.len());
+    for path in paths {
+        let value: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        let (kind, validator) = &kinds[usize::from(value["etendue"].is_null())];
+        validator.validate(&value).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let named = value["$schema"].as_str().unwrap_or_default();
+        let named = path.parent().unwrap().join(named).canonicalize().ok();
+        let wanted = root().join(format!("schema/{kind}.schema.json")).canonicalize().ok();
+        assert_eq!(named, wanted, "{}", path.display());
+    }
+}
+
+#[test]
+fn what_the_schema_forbids_the_program_refuses_and_the_reverse() {
+    let validator = Validator::of("scene");
+    let objects = r#""objects": [{"shape": "box"}]"#;
+    for (is_valid, rest) in [
+        (true, r#""etendue": 1"#),
+        (true, r#""etendue": 1, "camera": {"type": "pinhole", "fov": "0.5 rad"}"#),
+        (true, r#""etendue": 1, "camera": {"type": "pinhole", "sensor": {"resolution": "8x6"}}"#),
+        (true, r#""etendue": 1, "render": {"exposure": "auto", "comment": ["a", "b"]}"#),
+        (true, r#""etendue": 1, "layers": ["depth", "ids"], "tracer": {"type": "path"}"#),
+        (false, ""),
+        (false, r#""etendue": 2"#),
+        (false, r#""etendue": 1, "colour": "red""#),
+        (false, r#""etendue": 1, "camera": {"fov": 30}"#),
+        (false, r#""etendue": 1, "camera": {"type": "pinhole", "fow": 30}"#),
+        (false, r#""etendue": 1, "camera": {"type": "pinhole", "sensor": {"resolution": [8]}}"#),
+        (false, r#""etendue": 1, "layers": ["dept"]"#),
+        (false, r#""etendue": 1, "render": {"samples": -1}"#),
+        (false, r#""etendue": 1, "render": {"exposure": "bright"}"#),
+        (false, r#""etendue": 1, "materials": {"m": {"type": "matte", "color": "red"}}"#),
+    ] {
+        let comma = if rest.is_empty() { "" } else { ", " };
+        let scene = format!("{{{rest}{comma}{objects}}}");
+        let found = validator.validate(&serde_json::from_str(&scene).expect("JSON"));
+        assert_eq!(found.is_ok(), is_valid, "the schema of {scene}: {found:?}");
+        let output = Bench::with_scene(&scene).run(&["check", "scene.json"]);
+        assert_eq!(output.status.success(), is_valid, "{scene}: {}", text(&output.stderr));
+    }
+}
