@@ -153,6 +153,20 @@ impl LensCamera {
         Some(self.focused.pixel_of(at))
     }
 
+    /// The lenslets that the sensor looks through as light of each band has them, one for each of
+    /// [`Self::band_groups`]; empty where glass does not tell wavelengths apart, or there are none.
+    ///
+    /// # Errors
+    ///
+    /// When a glass has no index at a band's wavelength.
+    pub fn lenslets_by_band(&self, bands: &Bands) -> Result<Vec<LensletChiefs>, CameraError> {
+        if self.lenslets.is_none() || self.one_wavelength || !self.focused.train().is_dispersive() {
+            return Ok(Vec::new());
+        }
+        let wavelengths = self.band_groups(bands).into_iter().filter_map(|group| group.wavelength);
+        wavelengths.filter_map(|nm| LensletChiefs::at(&self.focused, nm).transpose()).collect()
+    }
+
     /// The lenslets that the sensor looks through, if it does.
     #[must_use]
     pub fn lenslets(&self) -> Option<&LensletChiefs> {

@@ -6,7 +6,7 @@ use super::chief::ChiefTable;
 use super::focused::Focused;
 use crate::CameraError;
 use etendue_optics::element::{Clip, Frame, Ray, RayStatus};
-use etendue_optics::train::{BehindLenslets, MonochromaticTrain, Side};
+use etendue_optics::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
 
 /// The lenslets before a sensor, and the chief rays of the lens before them.
 #[derive(Debug, Clone)]
@@ -22,7 +22,11 @@ pub struct LensletChiefs {
 impl LensletChiefs {
     /// Solves chief rays over the array; `None` when the camera does not look through lenslets.
     pub(crate) fn new(focused: &Focused) -> Result<Option<Self>, CameraError> {
-        let Some(view) = focused.train().behind_lenslets() else { return Ok(None) };
+        Self::in_train(focused, focused.train())
+    }
+
+    fn in_train(focused: &Focused, train: &OpticalTrain) -> Result<Option<Self>, CameraError> {
+        let Some(view) = train.behind_lenslets() else { return Ok(None) };
         let fault =
             |error: etendue_optics::glass::GlassError| CameraError::new("lens", error.to_string());
         let main = view.main.at(view.main.wavelength()).map_err(fault)?;
@@ -32,6 +36,14 @@ impl LensletChiefs {
         let half = DVec2::splat(array.min(sensor));
         let table = ChiefTable::new(&view.main, &plane, half, &main);
         Ok(Some(Self { view, sensor_z: focused.sensor_z(), plane, table, main }))
+    }
+
+    /// The same as light of a wavelength (nm) has it, of a lens that stands where it is.
+    pub(crate) fn at(focused: &Focused, wavelength: f64) -> Result<Option<Self>, CameraError> {
+        let fault =
+            |error: etendue_optics::train::LensError| CameraError::new("lens", error.to_string());
+        let train = focused.train().clone().with_wavelength(wavelength).map_err(fault)?;
+        Self::in_train(focused, &train)
     }
 
     /// The lens before the array and the lenslets, to first order.

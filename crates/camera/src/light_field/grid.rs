@@ -291,7 +291,18 @@ impl LightField {
     /// Where the sensor has the middle of a lenslet's image (pixels from the corner).
     #[must_use]
     pub fn centre(&self, lens: &LensCamera, row: u32, col: u32) -> Option<[f64; 2]> {
-        let lenslets = lens.lenslets()?;
+        self.centre_by(lens, lens.lenslets()?, row, col)
+    }
+
+    /// The same by lenslets of their own, as light of another wavelength has them.
+    #[must_use]
+    pub fn centre_by(
+        &self,
+        lens: &LensCamera,
+        lenslets: &LensletChiefs,
+        row: u32,
+        col: u32,
+    ) -> Option<[f64; 2]> {
         lenslets.image_centre(self.grid.cell(row, col)).map(|at| lens.focused().pixel_of(at))
     }
 }

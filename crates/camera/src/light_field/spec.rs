@@ -279,6 +279,14 @@ impl MicrolensesSpec {
             let why = format!("{picture} mm puts the array before the main lens' exit pupil");
             return Err(fault("picture_distance", why));
         }
+        // Light from the picture to a lenslet's rim would run at more than 45 degrees.
+        if picture != 0.0 && 2.0 * picture.abs() < pitch {
+            let why = format!(
+                "{picture} mm is less than half the pitch of {pitch} mm: no lenslet images a picture so near; \
+                 give a picture farther away, or 0 for an unfocused camera"
+            );
+            return Err(fault("picture_distance", why));
+        }
         if let Some(Millimetres(b)) = self.sensor_distance
             && !(b > 0.0 && b.is_finite())
         {
@@ -310,7 +318,8 @@ impl MicrolensesSpec {
         if !(distance > 0.0 && distance.is_finite()) {
             let why = format!(
                 "is {distance:.4} mm by the lenslets' focal length of {:.4} mm and a picture {picture} mm \
-                 in front of them: it must be above zero",
+                 in front of them: it must be above zero; give a picture farther away than the focal length, or \
+                 lenslets that gather light and are thinner than their focal length",
                 view.focal_length(0)
             );
             return Err(fault("sensor_distance", why));
@@ -355,7 +364,12 @@ impl MicrolensesSpec {
         let thickness = self.thickness.ok_or_else(|| lacks("thickness"))?.0;
         let glass = self.glass.clone().ok_or_else(|| lacks("glass"))?;
         if self.focal_length.is_some() || self.f_number.is_some() || !self.types.is_empty() {
-            let why = "gives thick lenslets, which have no `focal_length`, `f_number` or `types`";
+            let why = "gives thick lenslets, which have no `focal_length`, `f_number` or `types`; remove \
+                       those, or `radii`";
+            return Err(CameraError::new("microlenses.radii", why));
+        }
+        if front.is_none() && rear.is_none() {
+            let why = "are both flat: such lenslets bend no light; give one face a radius";
             return Err(CameraError::new("microlenses.radii", why));
         }
         let face = |radius: Option<Millimetres>, glass: Option<GlassSpec>, first: bool| match radius

@@ -150,6 +150,8 @@ fn only_cameras_whose_lenslets_image_the_opening_have_views() {
         // 0.15 mm x 5/20.83 are 3.6 pixels.
         (r#""focal_length": 0.15"#, "3.60 pixels"),
         (r#""focal_length": 0.7"#, "fewer than 5"),
+        // Images are 28 times as wide as they are apart.
+        (r#""picture_distance": 0.41, "focal_length": 0.4"#, "fewer than 5"),
     ] {
         let why = why(microlenses);
         assert!(why.contains(words), "{microlenses}: {why:?} without {words:?}");
@@ -192,6 +194,74 @@ fn thick_lenslets_stand_where_they_see_the_picture_sharp() {
     let in_air = (n * 0.3 / (n - 1.0) - 0.4) / n;
     let b = focused.sensor_z() - focused.train().last_vertex();
     assert!((b - in_air).abs() < 1e-4, "{b} {in_air}: the index is that to 5 digits");
+}
+
+/// A camera with planoconvex lenslets of a radius and thickness (mm), on pixels of 5 um.
+fn planoconvex(radius: f64, thickness: f64) -> Camera {
+    camera(&format!(
+        r#"{{"type": "light_field", "focal_length": 20, "f_number": 4, "focus_distance": 0.5,
+            "microlenses": {{"pitch": 0.1, "radii": [{radius}, null], "thickness": {thickness},
+                "glass": "N-BK7"}},
+            "pose": {{"from": [0, 0, 0.5], "look_at": [0, 0, 0]}},
+            "sensor": {{"resolution": [480, 400], "pixel_pitch": 5}}}}"#
+    ))
+    .unwrap()
+}
+
+/// Thick lenslets of focal length R/(n − 1) image the opening of 5 mm at 20.83 mm: as wide as that is, so many
+/// views there are, all of whose pixels are within a round image.
+#[test]
+fn views_are_as_many_as_images_are_wide() {
+    for (radius, views) in [(0.215, 11), (0.13, 7), (0.1, 5)] {
+        let camera = planoconvex(radius, 0.05);
+        let light_field = camera.light_field().unwrap();
+        // The index is that to 5 digits; the pupil is seen from the principal plane, nearer by up to 0.1 mm.
+        let width = radius / 0.516_80 * 5.0 / (1.0 / (1.0 / 20.0 - 1.0 / 500.0)) / 5e-3;
+        let found = light_field.image_diameter;
+        assert!((found / width - 1.0).abs() < 0.005, "{radius}: {found} {width}");
+        assert_eq!((light_field.views, light_field.step), (views, 1.0), "{radius}: {found} px");
+        let [right, below] = light_field.offset(views - 1, views - 1);
+        assert!(right.hypot(below) < 0.5 * found - 1.5, "{radius}: {right} of {found} px");
+    }
+}
+
+/// Behind a front face that bends, glass of thickness t and a flat one, the ray of slope s through the vertex gets
+/// to the sensor at s (t/n + b): n is that of each colour, by Sellmeier's formula of N-BK7.
+#[test]
+fn images_in_each_colour_have_their_own_middles() {
+    let index = |nm: f64| {
+        let l2 = (nm * 1e-3).powi(2);
+        let term = |b: f64, c: f64| b * l2 / (l2 - c);
+        let sum = term(1.039_612_12, 0.006_000_698_67)
+            + term(0.231_792_344, 0.020_017_914_4)
+            + term(1.010_469_45, 103.560_653);
+        (1.0 + sum).sqrt()
+    };
+    let thickness = 0.3;
+    let raw = planoconvex(0.3, thickness);
+    let (lens, light_field) = (raw.lens().unwrap(), raw.light_field().unwrap());
+    let bands = lens.lenslets_by_band(&Bands::Rgb).unwrap();
+    assert_eq!(bands.len(), 3);
+    let b = lens.focused().sensor_z() - lens.focused().train().last_vertex();
+    let middle = lens
+        .focused()
+        .pixel_of(lens.lenslets().unwrap().view().centre(light_field.grid.cell(0, 0)));
+    let away = |of| light_field.centre_by(lens, of, 0, 0).unwrap()[0] - middle[0];
+    let by_design = light_field.centre(lens, 0, 0).unwrap()[0] - middle[0];
+    let [red, green, blue] = [609.5, 547.6, 455.5].map(|nm| thickness / index(nm) + b);
+    for (k, expected) in [red, green, blue].into_iter().enumerate() {
+        let share = away(&bands[k]) / by_design;
+        let expected = expected / (thickness / index(587.6) + b);
+        // Chief rays are solved to 1e-9 mm, and design wavelengths differ by 0.04 nm.
+        assert!((share - expected).abs() < 1e-6, "{k}: {share} {expected}");
+    }
+    assert!(away(&bands[0]) / away(&bands[2]) > 1.001, "red and blue are apart");
+    let thin = light_field_of_thin();
+    assert!(thin.lens().unwrap().lenslets_by_band(&Bands::Rgb).unwrap().is_empty());
+}
+
+fn light_field_of_thin() -> Camera {
+    light_field("\"fill\": 1", "").unwrap()
 }
 
 /// The light of a lenslet's image, by its middle: the sum over samples of all pixels around it.
@@ -246,6 +316,30 @@ fn what_is_no_light_field_is_refused_in_words() {
     assert!(error("\"focal_length\": 1, \"f_number\": 2", "").contains("remove one"));
     assert!(error("\"picture_distance\": -30", "").starts_with("microlenses.picture_distance"));
     assert!(error("\"picture_distance\": 1, \"focal_length\": 2", "").contains("sensor_distance"));
+    // Pictures that lenslets do not image, images that vanish, faces that gather nothing or too soon, and types.
+    for (microlenses, words) in [
+        (r#""picture_distance": 0.3, "focal_length": 0.4"#, "farther away than the focal length"),
+        (r#""picture_distance": 0.01"#, "half the pitch of 0.1 mm"),
+        (r#""picture_distance": -0.01"#, "half the pitch of 0.1 mm"),
+        (r#""picture_distance": -20.5"#, "smaller than a pixel"),
+        (r#""radii": [null, null], "thickness": 0.1, "glass": "N-BK7""#, "give one face a radius"),
+        (r#""radii": [0.1, null], "thickness": 0.4, "glass": "N-BK7""#, "thinner"),
+        (
+            r#""radii": [0.2, null], "thickness": 0.1, "glass": "N-BK7", "types": [{}, {}]"#,
+            "remove those, or `radii`",
+        ),
+        (
+            r#""types": [{"focal_length": 0.4}], "pattern": [[0, 1]]"#,
+            "names type 1; there are 0 to 0",
+        ),
+        (
+            r#""types": [{"focal_length": 0.4}, {"focal_length": 0}]"#,
+            "types[1]: focal_length is 0 mm",
+        ),
+    ] {
+        let error = error(microlenses, "");
+        assert!(error.contains(words), "{microlenses}: {error} without {words:?}");
+    }
     assert!(error("\"size\": [0.05, 0.05]", "").contains("not one lenslet"));
     assert!(error("\"radii\": [0.3, null]", "").contains("missing beside `radii`"));
     let base = |keys: &str| camera(&format!(r#"{{"type": "light_field", {keys}}}"#)).unwrap_err();

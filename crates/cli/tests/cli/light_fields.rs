@@ -52,6 +52,78 @@ fn cameras_that_have_no_light_field_are_refused_with_a_way_out() {
     }
 }
 
+/// What each kind of camera leaves, which is what Python and the window show: all have a raw picture, a white one and
+/// centres; views, their reference, depth and disparity those that have views; `hci/` those of square pixels.
+#[test]
+fn each_kind_of_light_field_leaves_what_it_has() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let types = json!([{"focal_length": 0.425}, {"focal_length": 0.432}, {"focal_length": 0.418}]);
+    let thick = json!({"pitch": 0.1, "radii": [0.215, null], "thickness": 0.1, "glass": "N-BK7"});
+    let cases = [
+        ("square", json!({"pitch": 0.1}), Ok(true)),
+        ("hexagonal", json!({"pitch": 0.1, "grid": "hexagonal"}), Ok(false)),
+        ("rotated", json!({"pitch": 0.1, "rotation": 30}), Ok(true)),
+        ("multi-focus", json!({"pitch": 0.1, "grid": "hexagonal", "types": types}), Ok(false)),
+        ("thick", thick, Ok(true)),
+        ("real main lens", json!({"pitch": 0.1}), Ok(true)),
+        ("focused", json!({"pitch": 0.1, "picture_distance": 0.3}), Err("a focused one")),
+        ("focused, virtual", json!({"pitch": 0.1, "picture_distance": -0.9}), Err("a focused one")),
+        ("narrow images", json!({"pitch": 0.1, "focal_length": 0.15}), Err("fewer than 5")),
+    ];
+    for (kind, microlenses, has) in cases {
+        let mut scene = scene();
+        scene["render"]["samples"] = json!(1);
+        let camera = &mut scene["camera"];
+        (camera["microlenses"], camera["views"]) = (microlenses, json!(3));
+        if kind == "real main lens" {
+            let lens = root.join("scenes/lenses/double-gauss.json");
+            (camera["lens"], camera["focal_length"]) = (json!(lens.to_string_lossy()), Value::Null);
+            camera.as_object_mut().unwrap().remove("focal_length");
+        }
+        let bench = Bench::with_scene(&scene.to_string());
+        let output = bench.run(&["render", "scene.json", "-o", "out", "--allow-outside"]);
+        let said = text(&output.stdout) + &text(&output.stderr);
+        assert!(output.status.success(), "{kind}: {said}");
+        let exists = |name: &str| bench.path("out").join(name).exists();
+        let geometry = bench.json("out/geometry.json");
+        let [n, rows, cols] = ["views", "rows", "cols"].map(|key| geometry[key].as_u64().unwrap());
+        assert_eq!(bench.array("picture").len(), 120 * 90 * 3, "{kind}");
+        assert_eq!(bench.array("white").len(), 120 * 90 * 3, "{kind}");
+        assert_eq!(geometry["centres_px"].as_array().unwrap().len() as u64, rows, "{kind}");
+        let pieces = [
+            "views.npy",
+            "views",
+            "reference.npy",
+            "reference",
+            "central_depth.npy",
+            "central_disparity.pfm",
+        ];
+        for name in pieces {
+            assert_eq!(exists(name), has.is_ok(), "{kind}: {name}: {said}");
+        }
+        assert_eq!(exists("hci/parameters.cfg"), has == Ok(true), "{kind}: {said}");
+        match has {
+            Ok(_) => {
+                assert_eq!(n, 3, "{kind}");
+                for name in ["views", "reference"] {
+                    assert_eq!(
+                        bench.array(name).len() as u64,
+                        n * n * rows * cols * 3,
+                        "{kind} {name}"
+                    );
+                }
+                assert_eq!(bench.array("central_disparity").len() as u64, rows * cols, "{kind}");
+            }
+            Err(why) => {
+                let told = geometry["no_views"].as_str().unwrap();
+                assert!(n == 0 && told.contains(why), "{kind}: {told}");
+                assert!(said.contains("are not written") && said.contains(why), "{kind}: {said}");
+                assert!(geometry["disparity"].is_null() && geometry["gains"].is_null(), "{kind}");
+            }
+        }
+    }
+}
+
 /// An array that stands beside the light of the lens before it: an error that says so.
 #[test]
 fn an_array_beside_the_light_is_refused() {

@@ -5,6 +5,7 @@ use etendue_camera::{Camera, LensCamera, LightField, PixelOrigin, ViewGrid};
 use etendue_optics::element::Grid;
 use serde::Serialize;
 
+use super::centres::{Centres, Places};
 use super::response::ViewResponse;
 
 /// What a decoder needs, and what it may be scored against.
@@ -40,6 +41,12 @@ pub(super) struct LightFieldGeometry {
     array: Option<ArrayFacts>,
     /// The middles of the lenslets' images by chief ray, `[row][column]`: x, y in pixels.
     centres_px: Option<Vec<Vec<[f64; 2]>>>,
+    /// The same of red, green and blue light behind glass that tells wavelengths apart; `null` elsewhere.
+    centres_by_color_px: Option<[Vec<Vec<[f64; 2]>>; 3]>,
+    /// How far these are from `centres_px` at most.
+    color_centres_apart_px: f64,
+    /// Whether red, green and blue views are sampled each at its own centres.
+    views_by_color: bool,
     /// The centroids of the light of the same images before a uniform light, which cos⁴ and vignetting
     /// move away from the chief rays.
     centroids_px: Option<Vec<Vec<[f64; 2]>>>,
@@ -171,10 +178,29 @@ impl LightFieldGeometry {
                 })
             }),
             centres_px: centres,
+            centres_by_color_px: None,
+            color_centres_apart_px: 0.0,
+            views_by_color: false,
             psnr_by_rays: None,
             gains: None,
             about: ABOUT,
         }
+    }
+
+    /// Says where the images of light of other wavelengths are.
+    pub(super) fn bands(&mut self, centres: &Centres, light_field: &LightField) {
+        let cols = light_field.grid.cols as usize;
+        let rows = |places: &Places| {
+            let row = |row: &[Option<[f64; 2]>]| {
+                row.iter().map(|at| from_centre(at.unwrap_or_default())).collect()
+            };
+            places.chunks(cols).map(row).collect()
+        };
+        if let [red, green, blue] = centres.by_band() {
+            self.centres_by_color_px = Some([red, green, blue].map(rows));
+        }
+        self.color_centres_apart_px = centres.apart();
+        self.views_by_color = centres.are_apart();
     }
 
     /// Takes back what is said of views that there are not, or says how bright they are made.

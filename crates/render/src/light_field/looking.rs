@@ -9,6 +9,7 @@ use etendue_camera::ViewGrid;
 use etendue_scene::Scene;
 
 use super::LightFieldError;
+use super::by_layer;
 use super::choice::ChosenViews;
 use super::views::Views;
 use crate::RenderError;
@@ -38,7 +39,9 @@ impl LightFieldViews {
         };
         let views = match scene.camera.lens().zip(response) {
             Some((lens, response)) => {
-                Views::decoded(picture, lens, &light_field, (&grid, &response))?
+                let centres = by_layer(scene, lens, &light_field)
+                    .map_err(|error| RenderError::Camera(error.to_string()))?;
+                Views::decoded(picture, &centres, &light_field, (&grid, &response))?
             }
             None => Views::split(picture, &grid),
         };

@@ -9,6 +9,7 @@
 //! | `views` | views as an array of five dimensions, from the raw picture and from a picture of views |
 //! | `response` | what their pixels see, by rays, against an ideal lens |
 //! | `gain` | what makes them as bright as it has them |
+//! | `centres` | where they are sampled, and where light of other wavelengths has that |
 //! | `choice` | how many of them are those of an ideal lens |
 //! | `looking` | views one by one, and refocused together |
 //! | `hci` | the folder of the benchmark's layout |
@@ -16,6 +17,7 @@
 //! The layout: K. Honauer, O. Johannsen, D. Kondermann, B. Goldluecke, "A dataset and evaluation
 //! methodology for depth estimation on 4D light fields", 2016.
 
+mod centres;
 mod choice;
 mod gain;
 mod geometry;
@@ -28,7 +30,7 @@ mod white;
 use std::path::{Path, PathBuf};
 
 use etendue_accel::Accel;
-use etendue_camera::{Camera, CameraError, ViewGrid};
+use etendue_camera::{Camera, CameraError, LensCamera, LightField, ViewGrid};
 use etendue_optics::element::Grid;
 use etendue_scene::Scene;
 use etendue_spectrum::Bands;
@@ -42,6 +44,7 @@ use crate::output::{
 use crate::{Images, Plan, RenderError, render};
 use etendue_files::{Transaction, WriteError, prepare_folder};
 
+use centres::Centres;
 use choice::ChosenViews;
 use geometry::LightFieldGeometry;
 pub use looking::LightFieldViews;
@@ -143,6 +146,9 @@ pub fn write(
     let camera = scene.camera.opened(&Bands::Rgb).map_err(fault)?;
     let mut geometry = LightFieldGeometry::new(&camera, light_field, grid, &depth);
     geometry.judge(no_views.clone(), response.as_ref());
+    if let Some(lens) = raw {
+        geometry.bands(&Centres::new(lens, light_field, &Bands::Rgb).map_err(fault)?, light_field);
+    }
     sidecar::write_json(files, &set.place("geometry.json"), &geometry)?;
     if raw.is_some() {
         let white = white::picture(&camera, &scene.render)?;
@@ -163,7 +169,8 @@ pub fn write(
         None => None,
         Some((lens, response)) => {
             // Gone before the reference is rendered, which takes as much again.
-            let views = Views::decoded(picture, lens, light_field, (grid, response))?;
+            let centres = by_layer(scene, lens, light_field).map_err(fault)?;
+            let views = Views::decoded(picture, &centres, light_field, (grid, response))?;
             set.views("views", &views, picture)?;
             let truth = reference_picture(rendering, reference, outputs, &|share| {
                 progress(0.1 + 0.9 * share)
@@ -180,6 +187,21 @@ pub fn write(
         (false, _) => {}
     }
     Ok(set.written)
+}
+
+/// The centres at which colours are sampled, and those of the bands of a spectrum.
+fn by_layer(
+    scene: &Scene,
+    lens: &LensCamera,
+    light_field: &LightField,
+) -> Result<[Centres; 2], CameraError> {
+    let grid = scene.sensor.as_ref().and_then(|sensor| sensor.spec().bands.clone());
+    let colors = Centres::new(lens, light_field, &Bands::Rgb)?;
+    let spectrum = match grid {
+        Some(grid) => Centres::new(lens, light_field, &Bands::Spectral(grid))?,
+        None => colors.clone(),
+    };
+    Ok([colors, spectrum])
 }
 
 /// Why a hexagonal array leaves no folder of the benchmark.

@@ -13,6 +13,7 @@ use etendue_camera::{
 use etendue_spectrum::Bands;
 use rayon::prelude::*;
 
+use super::centres::Centres;
 use super::gain::{Gain, Node};
 use super::views::weights;
 
@@ -23,7 +24,7 @@ const NODES: u32 = 5;
 const RAYS: u32 = 256;
 
 /// The same through cubic convolution, some of whose rays count less than nothing: the light of one is right to a
-/// percent, and the squares of errors in the mean over 25 lenslets to 47 dB.
+/// percent, and the squares of errors in the mean over 25 lenslets to 47 dB. Colours share them.
 const CUBIC_RAYS: u32 = 1024;
 
 /// Sets of rays. Their errors have nothing to do with each other, so that the product of what both say of an
@@ -49,13 +50,14 @@ const WAVES: usize = 2 * DISPARITIES.len();
 type Complex = [f64; 2];
 
 /// What a pixel sees: its light, the means of the viewpoints (views, along the rows) and of the places in the
-/// plane of disparity 0 (columns) that its rays come from, and what both sets of rays say of waves.
-#[derive(Debug, Clone, Copy, Default)]
+/// plane of disparity 0 (columns) that its rays come from, and what both sets of rays say of waves in each colour
+/// that is looked at.
+#[derive(Debug, Clone, Default)]
 pub(super) struct PixelView {
     light: f64,
     viewpoint: [f64; 2],
     place: [f64; 2],
-    sets: [Waves; SETS.len()],
+    colors: Vec<[Waves; SETS.len()]>,
 }
 
 /// Light, and the light of waves at each of [`DISPARITIES`] along the rows and across them.
@@ -97,21 +99,36 @@ pub(super) struct ViewResponse {
 }
 
 impl ViewRays {
-    /// Traces the rays of a camera that is opened for red, green and blue, in green.
-    pub(super) fn of_raw(camera: &Camera, light_field: &LightField, unit: &ViewGrid) -> Self {
-        let group = camera.band_groups(&Bands::Rgb).len() / 2;
+    /// Traces the rays of a camera that is opened for red, green and blue: waves in these `colors`, light in
+    /// green.
+    pub(super) fn of_raw(
+        camera: &Camera,
+        light_field: &LightField,
+        (unit, centres): (&ViewGrid, &Centres),
+        colors: &[usize],
+    ) -> Self {
+        let green = camera.band_groups(&Bands::Rgb).len() / 2;
+        let [cols, _] = unit.view_resolution();
+        #[expect(clippy::cast_possible_truncation, reason = "three colours at most")]
+        let count = CUBIC_RAYS / colors.len() as u32;
         Self::traced(light_field.views, unit, |number, [across, down], [row, col]| {
             let [right, below] = light_field.offset(across, down);
-            let centre = camera.lens().and_then(|lens| light_field.centre(lens, row, col));
-            centre.map_or_else(PixelView::default, |[x, y]| {
-                let at = [x + right, y + below];
-                let corner = at.map(|x| x - 0.5);
-                let waves = seen(camera, group, Sampling::Cubic(at), (number, unit));
-                // The pixel at the place has the same light wherever that is even about it, and rays that
-                // do not count less than nothing tell it with less noise.
-                let pixel = seen(camera, group, Sampling::Pixel(corner), (number, unit));
-                PixelView { sets: waves.sets, ..pixel }
-            })
+            let place = |color| {
+                let centre = centres.sampled(color)[(row * cols + col) as usize];
+                centre.map(|[x, y]| [x + right, y + below])
+            };
+            let waves = |&color: &usize| {
+                let of = Asked { group: color, count, number, first_set: SETS.len() * color };
+                let at = place(color);
+                at.map_or_else(Vec::new, |at| seen(camera, &of, Sampling::Cubic(at), unit).colors)
+            };
+            // The pixel at the place has the same light wherever that is even about it, and rays that
+            // do not count less than nothing tell it with less noise.
+            let of = Asked { group: green, count: RAYS, number, first_set: 0 };
+            let pixel = place(green).map_or_else(PixelView::default, |at| {
+                seen(camera, &of, Sampling::Pixel(at.map(|x| x - 0.5)), unit)
+            });
+            PixelView { colors: colors.iter().flat_map(waves).collect(), ..pixel }
         })
     }
 
@@ -120,7 +137,8 @@ impl ViewRays {
         let [cols, rows] = unit.view_resolution();
         Self::traced(views, unit, |number, [across, down], [row, col]| {
             let corner = [across * cols + col, down * rows + row].map(f64::from);
-            seen(reference, 0, Sampling::Pixel(corner), (number, unit))
+            let of = Asked { group: 0, count: RAYS, number, first_set: 0 };
+            seen(reference, &of, Sampling::Pixel(corner), unit)
         })
     }
 
@@ -221,16 +239,32 @@ impl ViewResponse {
 }
 
 /// The mean square of the difference between what a pixel makes of waves and what an ideal lens makes of
-/// them, the mean over their phases: of each wave.
+/// them, the mean over their phases and over colours: of each wave.
 fn errors(ours: &PixelView, ideal: &PixelView, gain: f64, bent: [f64; 2]) -> [f64; WAVES] {
-    let means = [0, 1].map(|set| MEAN * (gain * ours.sets[set].light - ideal.sets[set].light));
+    let dark = [[Waves::default(); SETS.len()]];
+    let ideal = ideal.colors.first().unwrap_or(&dark[0]);
+    let colors = if ours.colors.is_empty() { &dark[..] } else { &ours.colors };
+    colors.iter().fold([0.0; WAVES], |sums, ours| {
+        let errors = errors_of(ours, ideal, gain, bent);
+        std::array::from_fn(|wave| sums[wave] + errors[wave] / colors.len() as f64)
+    })
+}
+
+/// The same in one colour.
+fn errors_of(
+    ours: &[Waves; SETS.len()],
+    ideal: &[Waves; SETS.len()],
+    gain: f64,
+    bent: [f64; 2],
+) -> [f64; WAVES] {
+    let means = [0, 1].map(|set| MEAN * (gain * ours[set].light - ideal[set].light));
     std::array::from_fn(|wave| {
         let (disparity, axis) = (wave / 2, wave % 2);
         let (sine, cosine) = (-TAU / PERIOD * bent[axis]).sin_cos();
         let [first, second] = [0, 1].map(|set| {
-            let [re, im] = ours.sets[set].waves[disparity][axis];
+            let [re, im] = ours[set].waves[disparity][axis];
             let moved = [re * cosine - im * sine, re * sine + im * cosine];
-            let expected = ideal.sets[set].waves[disparity][axis];
+            let expected = ideal[set].waves[disparity][axis];
             [gain * moved[0] - expected[0], gain * moved[1] - expected[1]]
         });
         let square = first[0] * second[0] + first[1] * second[1];
@@ -262,22 +296,26 @@ fn cubic(at: f64, number: f64) -> (f64, f64) {
     (low - 1.0 + pixel as f64 + within.clamp(0.0, 1.0), total * weights[pixel].signum())
 }
 
-/// What a pixel of a camera sees, by rays of its own `number`.
-fn seen(
-    camera: &Camera,
+/// The rays that are asked for.
+struct Asked {
+    /// Of the camera's bands.
     group: usize,
-    sampling: Sampling,
-    (number, unit): ([u32; 2], &ViewGrid),
-) -> PixelView {
+    /// In each set.
+    count: u32,
+    /// What makes them those of one pixel alone, and of one colour.
+    number: [u32; 2],
+    first_set: usize,
+}
+
+/// What a pixel of a camera sees, by rays of its own.
+fn seen(camera: &Camera, asked: &Asked, sampling: Sampling, unit: &ViewGrid) -> PixelView {
+    let Asked { group, count: count_of_set, number, first_set } = *asked;
     let mut film = FilmSamples { group, ..FilmSamples::default() };
-    let count_of_set = match sampling {
-        Sampling::Pixel(_) => RAYS,
-        Sampling::Cubic(_) => CUBIC_RAYS,
-    };
     let mut counts = Vec::with_capacity(SETS.len() * count_of_set as usize);
     let mut squares = [Vec::new(), Vec::new(), Vec::new()];
     for set in SETS {
-        let pixel = Sampler::Sobol.pixel(set, number[0], number[1], count_of_set);
+        let pixel =
+            Sampler::Sobol.pixel(first_set as u64 + set, number[0], number[1], count_of_set);
         for (pair, out) in (0..).zip(&mut squares) {
             squares_of_pair((0..count_of_set).map(|index| (pixel, index)), pair, out);
         }
@@ -297,6 +335,7 @@ fn seen(
     let mut rays = CameraRays::default();
     camera.sample_rays(&film, &mut rays);
     let mut seen = PixelView::default();
+    let mut sets = [Waves::default(); SETS.len()];
     let (sine, cosine) = unit.rotation().sin_cos();
     let along_rows =
         |[right, up]: [f64; 2]| [cosine * right - sine * up, -sine * right - cosine * up];
@@ -304,7 +343,7 @@ fn seen(
         let weight = weight * counts[sample as usize];
         let (viewpoint, place) = crossing(camera.pose(), &rays, i, unit);
         let (viewpoint, place) = (along_rows(viewpoint), along_rows(place));
-        let set = &mut seen.sets[usize::from(sample >= count_of_set)];
+        let set = &mut sets[usize::from(sample >= count_of_set)];
         set.light += weight;
         for axis in 0..2 {
             seen.viewpoint[axis] += weight * viewpoint[axis];
@@ -317,12 +356,13 @@ fn seen(
             }
         }
     }
-    let light: f64 = seen.sets.iter().map(|set| set.light).sum();
+    let light: f64 = sets.iter().map(|set| set.light).sum();
     seen.light = light / SETS.len() as f64;
     if light.abs() > 0.0 {
         seen.viewpoint = seen.viewpoint.map(|x| x / light);
         seen.place = seen.place.map(|x| x / light);
     }
+    seen.colors = vec![sets];
     seen
 }
 

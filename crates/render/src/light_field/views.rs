@@ -4,9 +4,10 @@
 //! Cubic sampling: R. Keys, "Cubic convolution interpolation for digital image processing", 1981, with
 //! a = −1/2.
 
-use etendue_camera::{LensCamera, LightField, ViewGrid};
+use etendue_camera::{LightField, ViewGrid};
 use rayon::prelude::*;
 
+use super::centres::Centres;
 use super::response::ViewResponse;
 use super::{BANDS, planes};
 use crate::output::{Channel, Layer, Look, Picture, PictureError, Values};
@@ -36,34 +37,32 @@ impl Views {
     /// The views in a raw picture, as bright as an ideal lens has them.
     pub(super) fn decoded(
         picture: &Picture,
-        lens: &LensCamera,
+        [in_colors, in_bands]: &[Centres; 2],
         light_field: &LightField,
         (grid, response): (&ViewGrid, &ViewResponse),
     ) -> Result<Self, PictureError> {
         let [cols, rows] = grid.view_resolution();
-        let centres: Vec<[f64; 2]> = (0..rows * cols)
-            .into_par_iter()
-            .map(|k| light_field.centre(lens, k / cols, k % cols).unwrap_or([0.0; 2]))
-            .collect();
         let n = light_field.views;
-        let decode = |planes: &[&[f32]]| {
+        let decode = |planes: &[&[f32]], centres: &Centres| {
             let view = |k: u32| {
                 let [right, below] = light_field.offset(k % n, k / n);
                 let size = [picture.width(), picture.height()];
-                let pixel = |(i, [x, y]): (u32, &[f64; 2])| {
-                    let at = [x + right, y + below];
+                let pixel = |i: u32| {
                     #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
                     let gain = response.gains[k as usize].at([i / cols, i % cols]) as f32;
-                    planes.iter().map(move |plane| gain * sampled(plane, size, at))
+                    (0..).zip(planes).map(move |(band, plane)| {
+                        let [x, y] = centres.sampled(band)[i as usize].unwrap_or_default();
+                        gain * sampled(plane, size, [x + right, y + below])
+                    })
                 };
-                (0..).zip(&centres).flat_map(pixel).collect::<Vec<f32>>()
+                (0..rows * cols).flat_map(pixel).collect::<Vec<f32>>()
             };
             let views: Vec<Vec<f32>> = (0..n * n).into_par_iter().map(view).collect();
             ViewArray { values: views.concat(), channels: planes.len() }
         };
         let empty = || PictureError::Empty { what: "the raw picture".to_owned() };
-        let colors = decode(&planes(picture, "").ok_or_else(empty)?);
-        let spectrum = planes(picture, BANDS).map(|planes| decode(&planes));
+        let colors = decode(&planes(picture, "").ok_or_else(empty)?, in_colors);
+        let spectrum = planes(picture, BANDS).map(|planes| decode(&planes, in_bands));
         Ok(Self { views: n, size: [cols, rows], colors, spectrum })
     }
 
