@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-decisions bench-window docs-figures docs-charts \
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-gaps bench-decisions bench-window docs-figures docs-charts \
 	docs-stability generated gallery light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
@@ -31,6 +31,8 @@ help:
 	@echo "make bench-sampling  what samples that stop save; writes the measured part of docs/sampling.md"
 	@echo "make bench-forecast  render the example scenes, and hold the forecast of time against it"
 	@echo "make bench-memory   the same for the forecast of memory, and for copies, large shapes and frames"
+	@echo "make bench-masks   what a ray through a mask of small openings costs; writes a part of docs/cameras.md"
+	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/light.md"
 	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/window.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model"
 	@echo "make generated     schemas, tables of keys and the page of the command line, as the program writes them"
@@ -137,6 +139,14 @@ bench-forecast: setup
 bench-memory: setup
 	cargo build --release -p etendue-cli
 	python3 benches/memory.py $(ARGS)
+
+bench-masks: setup
+	cargo build --release -p etendue-cli
+	python3 benches/masks.py $(ARGS)
+
+bench-gaps: setup
+	cargo build --release -p etendue-cli -p etendue-benches
+	python3 benches/gap_probes.py $(ARGS)
 
 bench-decisions: setup
 	cargo build --release -p etendue-cli

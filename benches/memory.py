@@ -46,6 +46,12 @@ def copies(folder, count):
     return {"objects": [{"shape": "sphere", "triangles": 80, "instances": "places.npy"}]}
 
 
+def takes_samples(scene):
+    """Whether `--samples` may stand in for the scene's own: there is light, and samples do not go on to an error."""
+    told = json.loads(scene.read_text())
+    return told.get("tracer") is not None and not isinstance(told.get("render", {}).get("samples"), dict)
+
+
 def made(folder):
     """Scenes that are made here, by name: what each of the parts of a forecast is the most of."""
     camera = {"type": "pinhole", "sensor": {"resolution": [64, 48]}}
@@ -85,7 +91,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "limits.md")
     parser.add_argument("--command", type=Path, default=COMMAND)
-    parser.add_argument("--samples", type=int, help="of the example scenes with light, instead of their own")
+    parser.add_argument("--samples", type=int, help="of the example scenes with light and a count of samples, instead of their own")
     parser.add_argument("--made-only", action="store_true", help="without the example scenes")
     parser.add_argument("--print-only", action="store_true", help="write no page")
     parser.add_argument("scenes", nargs="*", type=Path)
@@ -104,8 +110,7 @@ def main():
         rows.append((name, off, row))
 
     for scene in scenes:
-        is_lit = json.loads(scene.read_text()).get("tracer") is not None
-        more = ["--samples", arguments.samples] if arguments.samples and is_lit else []
+        more = ["--samples", arguments.samples] if arguments.samples and takes_samples(scene) else []
         with tempfile.TemporaryDirectory() as folder:
             add(f"`{scene.relative_to(examples) if scene.is_relative_to(examples) else scene}`", scene, Path(folder), more)
     if not arguments.scenes:
@@ -115,7 +120,8 @@ def main():
                 scene.write_text(json.dumps(value))
                 add(name, scene, Path(folder))
     missed = [f"{name} by {off:.2f}" for name, off, _ in rows if off > GOAL]
-    text = f"{section.machine()}. {len(rows) - len(missed)} of {len(rows)} forecasts are within a factor {GOAL} of the most that was held"
+    samples = f"; `--samples {arguments.samples}`" if arguments.samples else ""
+    text = f"{section.machine()}{samples}. {len(rows) - len(missed)} of {len(rows)} forecasts are within a factor {GOAL} of the most that was held"
     text += f"; missed: {', '.join(missed)}." if missed else "."
     head = ["| scene | forecast (MiB) | in mapped files (MiB) | held (MiB) | factor |", "|---|---|---|---|---|"]
     if arguments.print_only:

@@ -1,7 +1,7 @@
 //! A changed scene as a file, or as values that another process takes.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use etendue_files::Transaction;
 use etendue_geometry::Mesh;
@@ -11,12 +11,12 @@ use serde_json::Value;
 use crate::{Error, Progress, Session, places};
 
 impl Session {
-    /// The path of the scene, or where it would stand, and the values of the whole scene, whichever frame is
-    /// shown.
+    /// The path of the scene, or where it would stand, the values of the whole scene, whichever frame is
+    /// shown, and the [`inputs`](Self::inputs) so far: some, as the camera's file, are named by no value.
     #[must_use]
-    pub fn origin(&self) -> (&Path, &Value) {
+    pub fn origin(&self) -> (&Path, &Value, Vec<PathBuf>) {
         let file = self.whole();
-        (file.path(), file.value())
+        (file.path(), file.value(), self.inputs())
     }
 
     /// Names and meshes that [`insert_mesh`](Self::insert_mesh) brought.

@@ -1,5 +1,7 @@
 //! Scenes and their pictures.
 
+use std::path::PathBuf;
+
 use etendue::{Error, Options, Outputs, Progress, Reach, Strictness};
 use etendue_files::Transaction;
 use etendue_render::output::{png, sidecar};
@@ -80,18 +82,19 @@ impl Session {
     fn restore(
         path: &str,
         scene: &str,
+        inputs: Vec<PathBuf>,
         strict: bool,
         allow_outside: bool,
         memory_limit: Option<u64>,
     ) -> PyResult<Self> {
         let options = options(Vec::new(), strict, allow_outside, memory_limit);
-        Self::of_json(scene, |scene| etendue::Session::restore(path, scene, options))
+        Self::of_json(scene, |scene| etendue::Session::restore(path, scene, inputs, options))
     }
 
-    /// The scene's path, and the values of the whole scene as JSON.
-    fn origin(&self) -> (String, String) {
-        let (path, values) = self.session.origin();
-        (path.display().to_string(), values.to_string())
+    /// The scene's path, the values of the whole scene as JSON, and the files that were read for it.
+    fn origin(&self) -> (String, String, Vec<PathBuf>) {
+        let (path, values, inputs) = self.session.origin();
+        (path.display().to_string(), values.to_string(), inputs)
     }
 
     /// Names, vertices and faces of the meshes that `insert_mesh` brought.

@@ -1,6 +1,7 @@
 """Scenes and what they are made of in other processes: forked, spawned, pickled."""
 
 import copy
+import json
 import multiprocessing
 import os
 import pickle
@@ -122,6 +123,18 @@ def test_copies_are_the_same_scene(tmp_path):
     assert os.path.exists(path)
     del scene
     assert not os.path.exists(path) and os.path.exists(other._folder.name)
+
+
+def test_copies_guard_the_files_that_the_scene_was_read_from(tmp_path):
+    # The camera's file has the name of a file of the results, and no value of the scene names it any more.
+    (tmp_path / "camera.json").write_text(json.dumps(quad()["camera"]))
+    scene = {"etendue": 1, "camera": "camera.json", "layers": ["depth"], "objects": [{"shape": "sphere"}]}
+    (tmp_path / "scene.json").write_text(json.dumps(scene))
+    scene = etendue.load(tmp_path / "scene.json")
+    for other in [scene, *copies(scene), pickle.loads(pickle.dumps(copy.copy(scene)))]:
+        with pytest.raises((ValueError, OSError), match="camera.json"):
+            other.render().write(tmp_path)
+    assert json.loads((tmp_path / "camera.json").read_text()) == quad()["camera"]
 
 
 def test_a_sensor_is_pickled():

@@ -1,5 +1,7 @@
 //! The sensor, from no electron to more than it holds.
 
+mod absorbing;
+mod moments;
 mod spectral;
 
 use anyhow::Result;
@@ -103,6 +105,8 @@ pub const METHOD: Method = Method {
             limit: None,
             run: two_cameras,
         },
+        moments::MOMENTS,
+        absorbing::ABSORBING,
     ],
 };
 

@@ -64,13 +64,20 @@ impl Session {
     }
 
     /// A session of what [`origin`](Self::origin) gave of another one, be it in another process. With its
-    /// options and [`meshes`](Self::meshes) its pictures are the same to the bit.
+    /// options and [`meshes`](Self::meshes) its pictures are the same to the bit, and it writes over no file
+    /// that the other one had read.
     ///
     /// # Errors
     ///
     /// When the scene says something that the format does not know.
-    pub fn restore(path: impl AsRef<Path>, scene: Value, options: Options) -> Result<Self, Error> {
+    pub fn restore(
+        path: impl AsRef<Path>,
+        scene: Value,
+        inputs: Vec<PathBuf>,
+        options: Options,
+    ) -> Result<Self, Error> {
         let opener = opener_of(&options);
+        opener.record(inputs);
         Self::of(SceneFile::restore(&opener, path.as_ref(), scene)?, opener, options)
     }
 

@@ -187,3 +187,29 @@ fn no_two_files_share_a_name() {
         assert!(written.iter().all(|name| name.is_file()), "{camera}");
     }
 }
+
+/// The camera's file is named by no value of the scene any more, and has the name of a file of the results: it is
+/// written over by neither the session that read it nor one that is made of what that gave, again and again.
+#[test]
+fn a_restored_session_writes_over_no_file_that_the_first_had_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = json!({"type": "pinhole", "sensor": {"resolution": [4, 3]}}).to_string();
+    std::fs::write(folder.path().join("camera.json"), &camera).unwrap();
+    let text = json!({
+        "etendue": 1, "camera": "camera.json", "layers": ["depth"], "objects": [{"shape": "sphere"}]
+    });
+    let path = folder.path().join("scene.json");
+    std::fs::write(&path, text.to_string()).unwrap();
+    let mut session = Session::open(&path).unwrap();
+    for _ in 0..3 {
+        let written = session.check_place(folder.path(), &[], &Progress::none());
+        let error = written.unwrap_err().to_string();
+        assert!(error.contains("camera.json"), "{error}");
+        let (path, scene, inputs) = session.origin();
+        let restored = Session::restore(path, scene.clone(), inputs, Options::default()).unwrap();
+        session = restored;
+    }
+    let other = folder.path().join("out");
+    session.check_place(&other, &[], &Progress::none()).unwrap();
+    assert_eq!(std::fs::read_to_string(folder.path().join("camera.json")).unwrap(), camera);
+}

@@ -1,6 +1,6 @@
 //! Even aspheres, met by [Newton's method](super::newton) from where the ray meets the conic underneath.
 
-use super::newton::Profile;
+use super::newton::{Profile, squares_along};
 use super::rays::Ray;
 use super::refract::{Media, Root, meet_conic};
 use super::surface::Surface;
@@ -18,6 +18,25 @@ impl Surface {
         };
         !self.aspheric.is_empty() && (1..64).any(|i| slope(i).abs() > WALL)
     }
+
+    /// What no sag is below and what none is above between two squared distances from the axis (mm²), the
+    /// nearer first (mm).
+    ///
+    /// Each term rises or falls all the way: those that rise are least at the nearer place, those that fall at
+    /// the farther one.
+    pub(super) fn sag_bounds_between(&self, squares: [f64; 2]) -> [f64; 2] {
+        let part = |u: f64| {
+            let conic = self.conic_sag(u);
+            let (mut rising, mut falling) = (0.0, 0.0);
+            for &a in self.aspheric.iter().rev() {
+                rising = rising * u + a.max(0.0);
+                falling = falling * u + a.min(0.0);
+            }
+            [conic.max(0.0) + rising * u, conic.min(0.0) + falling * u]
+        };
+        let [near, far] = [part(squares[0]), part(squares[1])];
+        [near[0] + far[1], far[0] + near[1]]
+    }
 }
 
 impl Profile for Surface {
@@ -34,6 +53,27 @@ impl Profile for Surface {
     fn sag_and_slope(&self, at: Ray) -> (f64, f64) {
         let [x, y, _] = at.position;
         self.profile(x * x + y * y)
+    }
+
+    #[inline(always)]
+    fn sags_and_slopes<const N: usize>(&self, [x, y, _]: &[[f64; N]; 3]) -> ([f64; N], [f64; N]) {
+        // As [`super::surface::polynomial`], term by term, so that a term of all is one instruction.
+        let (mut values, mut slopes, mut squares) = ([0.0; N], [0.0; N], [0.0; N]);
+        for lane in 0..N {
+            squares[lane] = x[lane] * x[lane] + y[lane] * y[lane];
+        }
+        for &a in self.aspheric.iter().rev() {
+            for lane in 0..N {
+                slopes[lane] = slopes[lane] * squares[lane] + values[lane];
+                values[lane] = values[lane] * squares[lane] + a;
+            }
+        }
+        for lane in 0..N {
+            let u = squares[lane];
+            let terms = (values[lane] * u, values[lane] + slopes[lane] * u);
+            (values[lane], slopes[lane]) = self.with_conic(u, terms);
+        }
+        (values, slopes)
     }
 
     #[inline(always)]
@@ -65,30 +105,24 @@ impl Profile for Surface {
         [self.domain(), if c == 0.0 { 10.0 } else { (2.0 / c).abs() }]
     }
 
-    fn sags(&self, reach: f64) -> [f64; 2] {
-        // Terms that all rise, or all fall, are farthest apart at the ends.
-        let terms = || self.aspheric.iter().chain([&self.curvature]);
-        let is_monotone = terms().all(|&a| a >= 0.0) || terms().all(|&a| a <= 0.0);
-        let places = if is_monotone { 1 } else { 64 };
-        let sags = (0..=places)
-            .map(|i| self.profile((reach * f64::from(i) / f64::from(places)).powi(2)).0);
-        sags.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], s| [l.min(s), h.max(s)])
+    fn clear_radius(&self) -> f64 {
+        self.semi_diameter
     }
 
-    /// Each term rises or falls all the way: those that rise are least at the nearer place, those that fall at
-    /// the farther one.
-    fn sag_bounds(&self, squares: [f64; 2]) -> [f64; 2] {
-        let part = |u: f64| {
-            let conic = self.conic_sag(u);
-            let (mut rising, mut falling) = (0.0, 0.0);
-            for &a in self.aspheric.iter().rev() {
-                rising = rising * u + a.max(0.0);
-                falling = falling * u + a.min(0.0);
-            }
-            [conic.max(0.0) + rising * u, conic.min(0.0) + falling * u]
-        };
-        let [near, far] = [part(squares[0]), part(squares[1])];
-        [near[0] + far[1], far[0] + near[1]]
+    fn sag_range(&self, reach: f64) -> [f64; 2] {
+        self.sag_bounds_between([0.0, reach * reach])
+    }
+
+    fn sag_bounds(&self, ray: Ray, part: [f64; 2]) -> [f64; 2] {
+        self.sag_bounds_between(squares_along(ray, part))
+    }
+
+    fn along_bounds(&self, ray: Ray, part: [f64; 2]) -> [f64; 2] {
+        let Ray { position: [x, y, _], direction: [u, v, w] } = ray;
+        let slopes = self.slope_bounds(squares_along(ray, part));
+        let across = part.map(|t| (x + t * u) * u + (y + t * v) * v);
+        let changes = slopes.into_iter().flat_map(|slope| across.map(|across| w - slope * across));
+        changes.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], c| [l.min(c), h.max(c)])
     }
 }
 
@@ -183,7 +217,8 @@ mod tests {
             rays.push([x, 1.0, -20.0].into(), [0.02, -0.01 * x, 1.0].into());
         }
         let before = rays.blocks[0].clone();
-        cross_block(&s.surface, s.media, &mut rays.blocks[0], 0, 0.0, [1e9, 0.0]);
+        let with = (s.media, &s.slopes);
+        cross_block(&s.surface, with, &mut rays.blocks[0], (0, 0.0), 1e9, |_, _, _| ());
         for lane in 0..LANES {
             let single = at_asphere(&s, before.ray(lane), 1e9);
             let batch = rays.blocks[0].ray(lane);

@@ -7,8 +7,6 @@
 //!
 //! Rays are met by [Newton's method](super::newton) from where they meet the vertex' plane.
 
-use std::f64::consts::TAU;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -135,6 +133,43 @@ impl Biconic {
     }
 }
 
+impl Biconic {
+    /// What no slope is above within a squared distance from the axis (mm²).
+    pub(super) fn steepest(&self, square: f64) -> f64 {
+        let [a, b] = self.limits();
+        let root = (1.0 - a.max(b).max(0.0) * square).max(0.0).sqrt();
+        let bent = self.curvature.into_iter().fold(0.0, |most: f64, c| most.max(c.abs()));
+        let below = 1.0 + root;
+        let bend = bent * square / (below * below * root.max(1e-12));
+        square.sqrt() * (2.0 * bent / below + a.abs().max(b.abs()) * bend)
+    }
+
+    /// Bounds of [`Self::profile`] over a rectangle of places, from where to where along x and along y.
+    fn bounds(&self, places: [[f64; 2]; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
+        let limits = self.limits();
+        let squares = places.map(square);
+        let weighted = |weights: [f64; 2]| {
+            let [along_x, along_y] = [0, 1].map(|i| product(squares[i], [weights[i], weights[i]]));
+            add(along_x, along_y)
+        };
+        let rise = weighted(self.curvature);
+        // The root falls as the weighted squares rise.
+        let [high, low] = weighted(limits).map(|share| (1.0 - share).max(0.0).sqrt());
+        let root = [low, high];
+        let below = root.map(|root| 1.0 + root);
+        let divided = below.map(f64::recip);
+        let sag = product(rise, [divided[1], divided[0]]);
+        let steepness = [1, 0].map(|i| 1.0 / (below[i] * below[i] * root[i].max(1e-12)));
+        let bend = product(rise, steepness);
+        let slopes = [0, 1].map(|i| {
+            let (twice, limit) = (2.0 * self.curvature[i], limits[i]);
+            let straight = product([twice; 2], [divided[1], divided[0]]);
+            product(places[i], add(straight, product([limit; 2], bend)))
+        });
+        (sag, slopes)
+    }
+}
+
 impl Profile for Biconic {
     /// ∂z/∂x and ∂z/∂y.
     type Slope = [f64; 2];
@@ -183,17 +218,50 @@ impl Profile for Biconic {
         [if end > 0.0 { end } else { f64::INFINITY }, radii.fold(0.0, f64::max).max(10.0)]
     }
 
-    fn sags(&self, reach: f64) -> [f64; 2] {
-        // Sections through the axis are monotonous, so the extremes are at the vertex and the rim.
-        let rim = (0..64).map(|i| (TAU * f64::from(i) / 64.0).sin_cos());
-        let sags = rim.map(|(sine, cosine)| self.profile([reach * cosine, reach * sine]).0);
-        sags.fold([0.0; 2], |[low, high], sag| [low.min(sag), high.max(sag)])
+    fn clear_radius(&self) -> f64 {
+        self.semi_diameter
     }
 
-    /// It is not told apart by its distance from the axis.
-    fn sag_bounds(&self, _squares: [f64; 2]) -> [f64; 2] {
-        [f64::NEG_INFINITY, f64::INFINITY]
+    fn sag_range(&self, reach: f64) -> [f64; 2] {
+        self.bounds([[-reach, reach]; 2]).0
     }
+
+    fn sag_bounds(&self, ray: Ray, part: [f64; 2]) -> [f64; 2] {
+        self.bounds(places_along(ray, part)).0
+    }
+
+    fn along_bounds(&self, ray: Ray, part: [f64; 2]) -> [f64; 2] {
+        let [u, v, w] = ray.direction;
+        let (_, [along_x, along_y]) = self.bounds(places_along(ray, part));
+        let across = add(product(along_x, [u, u]), product(along_y, [v, v]));
+        [w - across[1], w - across[0]]
+    }
+}
+
+/// From where to where a part of a ray runs along x and along y.
+fn places_along(ray: Ray, part: [f64; 2]) -> [[f64; 2]; 2] {
+    std::array::from_fn(|axis| {
+        let ends = part.map(|t| ray.position[axis] + t * ray.direction[axis]);
+        [ends[0].min(ends[1]), ends[0].max(ends[1])]
+    })
+}
+
+/// The least and the greatest of a sum of two intervals.
+fn add(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+/// The same of a product.
+fn product(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    let ends = [a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]];
+    ends.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], e| [l.min(e), h.max(e)])
+}
+
+/// The same of a square.
+fn square([low, high]: [f64; 2]) -> [f64; 2] {
+    let most = low.abs().max(high.abs()).powi(2);
+    let least = if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()).powi(2) };
+    [least, most]
 }
 
 #[cfg(test)]

@@ -6,7 +6,8 @@
 //! that Newton does not find, is looked for again by bisection of the part of the ray that runs near the
 //! surface, from its start on.
 
-use super::rays::{Block, LANES, Ray, at_lane};
+use super::crossings::Slopes;
+use super::rays::{Block, LANES, PENDING, Ray, at_lane};
 use super::refract::{Media, Refracted, TOUCH, each_numbered_lane};
 
 /// The step (mm) at which the method has arrived.
@@ -29,6 +30,20 @@ pub(super) trait Profile {
     /// the edge, which keeps an iteration going and is refused in the end.
     fn sag_and_slope(&self, at: Ray) -> (f64, Self::Slope);
 
+    /// The same at `N` places at once, to the same bits.
+    #[inline(always)]
+    fn sags_and_slopes<const N: usize>(
+        &self,
+        position: &[[f64; N]; 3],
+    ) -> ([f64; N], [Self::Slope; N]) {
+        let (mut sags, mut slopes) = ([0.0; N], [Self::Slope::default(); N]);
+        for lane in 0..N {
+            let at = Ray { position: at_lane(position, lane), direction: [0.0; 3] };
+            (sags[lane], slopes[lane]) = self.sag_and_slope(at);
+        }
+        (sags, slopes)
+    }
+
     /// The slope at the root, where the last step began with `slope`, within [`SETTLED`] of it.
     fn slope_at(&self, root: Ray, slope: Self::Slope) -> Self::Slope;
 
@@ -45,25 +60,31 @@ pub(super) trait Profile {
     /// of curvature (mm).
     fn extent(&self) -> [f64; 2];
 
-    /// The least and the greatest sag up to `reach` from the axis (mm).
-    fn sags(&self, reach: f64) -> [f64; 2];
+    /// Half the clear diameter (mm); infinite where it is not limited.
+    fn clear_radius(&self) -> f64;
 
-    /// What no sag is below and what none is above between two squared distances from the axis (mm²), the
-    /// nearer first (mm).
-    fn sag_bounds(&self, squares: [f64; 2]) -> [f64; 2];
+    /// What no sag is below and what none is above up to `reach` from the axis (mm).
+    fn sag_range(&self, reach: f64) -> [f64; 2];
+
+    /// What no sag is below and what none is above along a part of a ray (mm).
+    fn sag_bounds(&self, ray: Ray, part: [f64; 2]) -> [f64; 2];
+
+    /// What dF/dt is at least and at most along a part of a ray.
+    fn along_bounds(&self, ray: Ray, part: [f64; 2]) -> [f64; 2];
 }
 
-/// Takes a block through a surface at `z` (mm), as [`super::refract::each_lane`] does for conics; says
-/// whether rays are left to decide one by one, as all are whose squared cosine to the axis is below `least`.
+/// Takes a block through a surface at `z` (mm), as [`super::refract::each_lane`] does for conics. Rays that the
+/// method does not bring to it, and those that may cross elsewhere first by `slopes`, are left to `decide`, one by
+/// one with what the method has found.
 #[inline(always)]
 pub(super) fn cross_block<P: Profile>(
     surface: &P,
-    media: Media,
+    (media, slopes): (Media, &Slopes),
     block: &mut Block,
-    element: usize,
-    z: f64,
-    [clip2, least]: [f64; 2],
-) -> bool {
+    (element, z): (usize, f64),
+    clip2: f64,
+    decide: impl Fn(&mut Block, usize, Refracted),
+) {
     let newton = Newton::<LANES, P>::run(
         surface,
         #[inline(always)]
@@ -73,25 +94,56 @@ pub(super) fn cross_block<P: Profile>(
             (ray, block.outcome[lane] == 0)
         },
     );
-    each_numbered_lane(
+    let mut is_first = [true; LANES];
+    if !slopes.are_convex() {
+        for (lane, is_first) in is_first.iter_mut().enumerate() {
+            *is_first = slopes.forbid_another(block.ray(lane), newton.ray(lane));
+        }
+    }
+    let pending = each_numbered_lane(
         block,
         element,
         z,
         #[inline(always)]
-        |lane, ray| {
+        |lane, _| {
             let found = newton.refracted(surface, media, clip2, lane);
-            let w = ray.direction[2];
-            Refracted { hit: found.hit & (w * w >= least), ..found }
+            Refracted { hit: found.hit & is_first[lane], ..found }
         },
-    )
+    );
+    if pending {
+        for lane in 0..LANES {
+            if block.outcome[lane] == PENDING {
+                decide(block, lane, newton.refracted(surface, media, clip2, lane));
+            }
+        }
+    }
 }
 
-/// A ray in the surface's frame: Newton first, then the search.
+/// A ray in the surface's frame: Newton first, then the search, wherever it crosses first.
+#[cfg(test)]
 pub(super) fn cross<P: Profile>(surface: &P, media: Media, ray: Ray, clip2: f64) -> Refracted {
-    let met = Newton::<1, P>::run(surface, |_| (ray, true)).refracted(surface, media, clip2, 0);
-    if met.hit {
-        return met;
-    }
+    let met = cross_by_newton(surface, media, ray, clip2);
+    if met.hit { met } else { cross_by_search(surface, media, ray, clip2) }
+}
+
+/// A ray in the surface's frame by Newton's method alone.
+#[inline(always)]
+pub(super) fn cross_by_newton<P: Profile>(
+    surface: &P,
+    media: Media,
+    ray: Ray,
+    clip2: f64,
+) -> Refracted {
+    Newton::<1, P>::run(surface, |_| (ray, true)).refracted(surface, media, clip2, 0)
+}
+
+/// A ray in the surface's frame that Newton's method does not bring to it.
+pub(super) fn cross_by_search<P: Profile>(
+    surface: &P,
+    media: Media,
+    ray: Ray,
+    clip2: f64,
+) -> Refracted {
     let Some(root) = search(surface, ray, clip2) else {
         return Refracted { ray, t: 0.0, hit: false, clear: false, through: false };
     };
@@ -155,9 +207,10 @@ impl<const N: usize, P: Profile> Newton<N, P> {
     #[inline(always)]
     fn step(&mut self, surface: &P) -> bool {
         let mut moving = 0;
+        let (sags, slopes) = surface.sags_and_slopes(&self.position);
         for lane in 0..N {
             let ray = self.ray(lane);
-            let (sag, slope) = surface.sag_and_slope(ray);
+            let (sag, slope) = (sags[lane], slopes[lane]);
             let active = self.active[lane] != 0;
             let step = (sag - ray.position[2]) / surface.along(ray, slope);
             let next = ray.advanced(step);
@@ -213,7 +266,7 @@ fn search<P: Profile>(surface: &P, ray: Ray, clip2: f64) -> Option<Ray> {
 /// Whether the ray is on one side of the surface all along a part of it, as its bounds have it.
 pub(super) fn keeps_off<P: Profile>(surface: &P, ray: Ray, part @ [from, to]: [f64; 2]) -> bool {
     let (z, w) = (ray.position[2], ray.direction[2]);
-    let [low, high] = surface.sag_bounds(squares_along(ray, part));
+    let [low, high] = surface.sag_bounds(ray, part);
     let depths = [z + from * w, z + to * w];
     let [near, far] = [depths[0].min(depths[1]), depths[0].max(depths[1])];
     // Far more than sums of a few dozen roundings are off.
@@ -237,12 +290,10 @@ pub(super) fn squares_along(ray: Ray, [from, to]: [f64; 2]) -> [f64; 2] {
 fn near_surface<P: Profile>(surface: &P, ray: Ray, clip2: f64) -> Option<[f64; 2]> {
     let Ray { position: [x, y, z], direction: [u, v, w] } = ray;
     let foot = ray.advanced(-(x * u + y * v + z * w));
-    let height = foot.position[0].hypot(foot.position[1]);
     let clear = if clip2.is_finite() { 2.0 * clip2.sqrt() } else { f64::INFINITY };
-    let [end, own] = surface.extent();
-    let reach = end.min(clear).min(4.0 * height + own);
+    let reach = reach_around(surface, foot, clear);
     let across = interval(u * u + v * v, x * u + y * v, x * x + y * y - reach * reach)?;
-    let [low, high] = surface.sags(reach);
+    let [low, high] = surface.sag_range(reach);
     let slack = 0.1 * (high - low) + 1e-6;
     let mut range = [across[0].max(-TOUCH), across[1]];
     if w != 0.0 {
@@ -250,6 +301,14 @@ fn near_surface<P: Profile>(surface: &P, ray: Ray, clip2: f64) -> Option<[f64; 2
         range = [range[0].max(ends[0].min(ends[1])), range[1].min(ends[0].max(ends[1]))];
     }
     (range[0] < range[1] && range[0].is_finite() && range[1].is_finite()).then_some(range)
+}
+
+/// How far from the axis a ray's crossing is looked for, up to `limit` (mm); `foot` is where the ray is next to
+/// the vertex.
+pub(super) fn reach_around<P: Profile>(surface: &P, foot: Ray, limit: f64) -> f64 {
+    let height = foot.position[0].hypot(foot.position[1]);
+    let [end, own] = surface.extent();
+    end.min(limit).min(4.0 * height + own)
 }
 
 /// The first root of `at` from `from` to `to`, among changes of sign between [`PIECES`] places. No place is
@@ -375,7 +434,7 @@ mod tests {
             for i in 0..40 {
                 for j in i..40 {
                     let [from, to] = [i, j].map(|k| f64::from(k).powi(2) * 0.25);
-                    let [low, high] = surface.sag_bounds([from, to]);
+                    let [low, high] = surface.sag_bounds_between([from, to]);
                     for k in 0..=8 {
                         let sag = surface.profile(from + (to - from) * f64::from(k) / 8.0).0;
                         // Sums of seven terms, in another order.

@@ -8,6 +8,7 @@ use etendue_spectrum::Curve;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::crossings::Slopes;
 use super::lenslets::Lenslets;
 use super::refract::Media;
 use super::step::Action;
@@ -333,7 +334,8 @@ impl Part {
             Self::Biconic(surface) => {
                 [[before, behind], [behind, before]].map(|[before, behind]| {
                     let (surface, media) = (surface.clone(), Media::new(before, behind));
-                    Action::Biconic { surface, media }
+                    let slopes = Slopes::of_biconic(&surface);
+                    Action::Biconic { surface, media, slopes }
                 })
             }
             Self::ThinLens(lens) => [lens.power, -lens.power]

@@ -19,7 +19,7 @@
 //! direction is made a unit vector again. Equal indices leave every direction as it is, to the last
 //! bit.
 
-use super::crossings;
+use super::crossings::Slopes;
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
 use super::surface::Surface;
 
@@ -31,8 +31,8 @@ pub(crate) const TOUCH: f64 = 1e-9;
 pub(crate) struct Refraction {
     pub(crate) surface: Surface,
     pub(crate) media: Media,
-    /// The squared cosine to the axis from which on a ray crosses an asphere but once ([`super::crossings`]).
-    pub(super) least_single: f64,
+    /// What tells which rays cross an asphere but once.
+    pub(super) slopes: Slopes,
 }
 
 /// The media on both sides of a surface at one wavelength, met from one side.
@@ -100,8 +100,8 @@ impl Media {
 impl Refraction {
     /// From a medium of index `before` into one of index `behind`.
     pub(crate) fn new(surface: Surface, before: f64, behind: f64) -> Self {
-        let least_single = crossings::least_single(&surface);
-        Self { surface, media: Media::new(before, behind), least_single }
+        let slopes = Slopes::of_surface(&surface);
+        Self { surface, media: Media::new(before, behind), slopes }
     }
 
     /// A ray in the surface's frame at a plane.

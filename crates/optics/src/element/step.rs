@@ -8,11 +8,12 @@ use std::sync::Arc;
 
 use super::aperture::{Opening, in_circle, in_polygon};
 use super::biconic::Biconic;
+use super::crossings::{Slopes, cross_first, cross_first_after};
 use super::filter::Filter;
 use super::frame::Frame;
 use super::lenslets::Lenslets;
 use super::losses::Loss;
-use super::newton::{cross, cross_block};
+use super::newton::{Profile, cross_block};
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
 use super::refract::{Media, Refracted, Refraction, each_lane};
 use super::thin_lens::at_thin_lens;
@@ -46,7 +47,7 @@ pub(crate) enum Action {
     Sphere(Refraction),
     Conic(Refraction),
     Asphere(Refraction),
-    Biconic { surface: Biconic, media: Media },
+    Biconic { surface: Biconic, media: Media, slopes: Slopes },
     ThinLens { power: f64, semi_diameter: f64 },
     Opening(Arc<Opening>),
     Filter { filter: Arc<Filter>, transmissions: Vec<f64> },
@@ -84,6 +85,18 @@ pub(crate) struct Traversal {
     pub(crate) point: Option<[f64; 3]>,
     /// The share of light that goes on.
     pub(crate) transmission: f64,
+}
+
+impl Traversal {
+    /// The same along the axis by `z` (mm).
+    #[inline(always)]
+    fn raised(mut self, z: f64) -> Self {
+        self.ray.position[2] += z;
+        if let Some(point) = &mut self.point {
+            point[2] += z;
+        }
+        self
+    }
 }
 
 #[inline(always)]
@@ -148,12 +161,14 @@ impl Step {
             }
             Action::Asphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
-                let Refraction { surface, media, least_single } = refraction;
-                cross_block(surface, *media, block, self.element, z, [clip2, *least_single])
+                let Refraction { surface, media, slopes } = refraction;
+                self.cross_block(surface, (*media, slopes), block, z, clip2);
+                false
             }
-            Action::Biconic { surface, media } => {
+            Action::Biconic { surface, media, slopes } => {
                 let clip2 = limit(surface.semi_diameter, clip);
-                cross_block(surface, *media, block, self.element, z, [clip2, 0.0])
+                self.cross_block(surface, (*media, slopes), block, z, clip2);
+                false
             }
             Action::ThinLens { power, semi_diameter } => {
                 let clip2 = limit(*semi_diameter, clip);
@@ -183,6 +198,47 @@ impl Step {
         if pending {
             self.decide(block, clip);
         }
+    }
+
+    /// An asphere or a biconic, on the axis.
+    #[inline(always)]
+    fn cross_block<P: Profile>(
+        &self,
+        surface: &P,
+        (media, slopes): (Media, &Slopes),
+        block: &mut Block,
+        z: f64,
+        clip2: f64,
+    ) {
+        cross_block(
+            surface,
+            (media, slopes),
+            block,
+            (self.element, z),
+            clip2,
+            |block, lane, newton| {
+                self.cross_lane(surface, (media, slopes), (block, lane), (z, clip2), newton);
+            },
+        );
+    }
+
+    /// Decides a ray of a block that Newton's method has not brought to its first crossing.
+    #[cold]
+    #[inline(never)]
+    fn cross_lane<P: Profile>(
+        &self,
+        surface: &P,
+        (media, slopes): (Media, &Slopes),
+        (block, lane): (&mut Block, usize),
+        (z, clip2): (f64, f64),
+        newton: Refracted,
+    ) {
+        let ray = block.ray(lane);
+        let mut local = ray;
+        local.position[2] -= z;
+        let crossing = cross_first_after(surface, (media, slopes), local, clip2, newton);
+        let traversal = self.settle(ray, self.crossed(crossing).raised(z));
+        self.set_lane(block, lane, traversal);
     }
 
     /// A sheet with an opening, on the axis.
@@ -240,18 +296,22 @@ impl Step {
         for lane in 0..LANES {
             if block.outcome[lane] == PENDING {
                 let traversal = self.pass_one(block.ray(lane), clip);
-                let mut ray = traversal.ray;
-                if let (RayStatus::Vignetted { .. }, Some(point)) =
-                    (traversal.status, traversal.point)
-                    && self.moves()
-                {
-                    ray.position = point;
-                }
-                block.set_ray(lane, ray);
-                block.throughput[lane] *= traversal.transmission;
-                block.outcome[lane] = traversal.status.code();
+                self.set_lane(block, lane, traversal);
             }
         }
+    }
+
+    /// A ray of a block as it goes on; one that is vignetted ends where it met the element.
+    fn set_lane(&self, block: &mut Block, lane: usize, traversal: Traversal) {
+        let mut ray = traversal.ray;
+        if let (RayStatus::Vignetted { .. }, Some(point)) = (traversal.status, traversal.point)
+            && self.moves()
+        {
+            ray.position = point;
+        }
+        block.set_ray(lane, ray);
+        block.throughput[lane] *= traversal.transmission;
+        block.outcome[lane] = traversal.status.code();
     }
 
     /// Whether the element moves rays to itself; sheets only look at them.
@@ -275,12 +335,7 @@ impl Step {
             let z = self.frame.vertex.z;
             let mut local = ray;
             local.position[2] -= z;
-            let mut traversal = self.local(local, clip);
-            traversal.ray.position[2] += z;
-            if let Some(point) = &mut traversal.point {
-                point[2] += z;
-            }
-            return self.settle(ray, traversal);
+            return self.settle(ray, self.local(local, clip).raised(z));
         }
         let mut traversal = self.local(self.frame.enter(ray), clip);
         traversal.ray = self.frame.leave(traversal.ray);
@@ -305,11 +360,12 @@ impl Step {
             }
             Action::Asphere(refraction) => {
                 let clip2 = limit(refraction.surface.semi_diameter, clip);
-                self.crossed(refraction.at_asphere(ray, clip2))
+                let Refraction { surface, media, slopes } = refraction;
+                self.crossed(cross_first(surface, (*media, slopes), ray, clip2))
             }
-            Action::Biconic { surface, media } => {
+            Action::Biconic { surface, media, slopes } => {
                 let clip2 = limit(surface.semi_diameter, clip);
-                self.crossed(cross(surface, *media, ray, clip2))
+                self.crossed(cross_first(surface, (*media, slopes), ray, clip2))
             }
             Action::ThinLens { power, semi_diameter } => {
                 self.crossed(at_thin_lens(*power, ray, limit(*semi_diameter, clip)))

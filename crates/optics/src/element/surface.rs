@@ -239,9 +239,14 @@ impl Surface {
     /// goes on as if at its edge, which keeps an iteration going and is refused in the end.
     #[inline(always)]
     pub(crate) fn profile(&self, u: f64) -> (f64, f64) {
+        self.with_conic(u, polynomial(&self.aspheric, u))
+    }
+
+    /// [`Self::profile`] by what [`polynomial`] has at u.
+    #[inline(always)]
+    pub(super) fn with_conic(&self, u: f64, (value, slope): (f64, f64)) -> (f64, f64) {
         let c = self.curvature;
         let root = self.conic_root(u);
-        let (value, slope) = polynomial(&self.aspheric, u);
         (c * u / (1.0 + root) + value, c / root.max(1e-12) + 2.0 * slope)
     }
 }

@@ -152,24 +152,25 @@ class Scene:
         return scene
 
     def __reduce__(self) -> Any:
-        path, values = self._do("origin")
+        path, values, inputs = self._do("origin")
         model = None
         if self._folder is not None:
             with open(path, "rb") as file:
                 model = file.read()
-        origin = (os.path.abspath(path), values, model)
+        # Some are named by no value any more, as the camera's file; all stay guarded.
+        origin = (os.path.abspath(path), values, [os.path.abspath(one) for one in inputs], model)
         return type(self)._restored, (origin, self._options, self.threads, self._do("meshes"))
 
     @classmethod
     def _restored(cls, origin: Any, options: Any, threads: Optional[int], meshes: Any) -> "Scene":
-        path, values, model = origin
+        path, values, inputs, model = origin
         folder = None
         if model is not None:
             folder = TemporaryFolder()
             path = os.path.join(folder.name, os.path.basename(path))
             with open(path, "wb") as file:
                 file.write(model)
-        scene = cls._of(_core.Session.restore(path, values, *options), options, threads, folder)
+        scene = cls._of(_core.Session.restore(path, values, inputs, *options), options, threads, folder)
         for name, vertices, faces in meshes:
             scene.insert_mesh(name, vertices, faces)
         return scene

@@ -1,6 +1,7 @@
 //! Lenses.
 
 mod bench;
+mod crossings;
 mod fates;
 mod focus;
 mod masks;
@@ -17,6 +18,7 @@ pub const METHOD: Method = Method {
         fates::MISSED,
         fates::WRONG_ROOT,
         fates::STEEP_ASPHERE,
+        crossings::CROSSINGS,
         fates::RIM_BEYOND_THE_RADIUS,
         fates::FLAT,
         fates::EQUAL_INDICES,
