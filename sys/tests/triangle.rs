@@ -40,6 +40,23 @@ impl Triangle {
     }
 }
 
+impl Triangle {
+    /// Whether lanes that are masked off are left alone: where the processor has no packets of 16, Embree 3.13 traces
+    /// them as a stream, which goes by the ends of rays and not by the mask.
+    fn heeds_masks(&self) -> bool {
+        // SAFETY: the device is live.
+        unsafe {
+            rtcGetDeviceProperty(self.device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0
+        }
+    }
+}
+
+/// Whether two numbers are the same but for the processor's reciprocal, which Embree refines by one step of
+/// Newton's method: within two units in the last place.
+fn is_close(found: f32, known: f32) -> bool {
+    found == known || (found - known).abs() <= 2.0 * f32::EPSILON * known.abs()
+}
+
 impl Drop for Triangle {
     fn drop(&mut self) {
         // SAFETY: both are handles of ours, released once.
@@ -127,8 +144,10 @@ fn one_ray_hits_and_misses() {
         rtcIntersect1(triangle.scene, &raw mut miss, ptr::null_mut());
     }
     assert_eq!((hit.hit.geomID, hit.hit.primID, hit.hit.instID[0]), (0, 0, u32::MAX));
-    // Powers of two throughout, so f32 is exact.
-    assert_eq!((hit.ray.tfar, hit.hit.u, hit.hit.v), (2.0, 0.25, 0.5));
+    // Powers of two throughout, so that f32 is exact but for reciprocals.
+    for (found, known) in [(hit.ray.tfar, 2.0), (hit.hit.u, 0.25), (hit.hit.v, 0.5)] {
+        assert!(is_close(found, known), "{found} is not {known}");
+    }
     assert_eq!(miss.hit.geomID, RTC_INVALID_GEOMETRY_ID);
     assert_eq!(miss.ray.tfar, f32::INFINITY);
 }
@@ -148,10 +167,11 @@ fn sixteen_rays_are_sixteen_rays() {
         unsafe {
             rtcIntersect16(VALID.0.as_ptr(), triangle.scene, &raw mut packet, &raw mut args);
         }
-        for lane in 0..16 {
+        for lane in usize::from(!triangle.heeds_masks())..16 {
             let (id, distance) =
                 if lane_hits(lane) { (0, 2.0) } else { (RTC_INVALID_GEOMETRY_ID, f32::INFINITY) };
-            assert_eq!((packet.hit.geomID[lane], packet.ray.tfar[lane]), (id, distance), "{lane}");
+            let found = (packet.hit.geomID[lane], packet.ray.tfar[lane]);
+            assert!(found.0 == id && is_close(found.1, distance), "{lane}: {found:?}");
         }
     }
 }
@@ -169,7 +189,7 @@ fn occlusion_writes_minus_infinity() {
         rtcOccluded16(VALID.0.as_ptr(), triangle.scene, &raw mut packet, &raw mut args);
     }
     assert_eq!((blocked.tfar, free.tfar), (f32::NEG_INFINITY, 1.5));
-    for lane in 0..16 {
+    for lane in usize::from(!triangle.heeds_masks())..16 {
         let expected = if lane_hits(lane) { f32::NEG_INFINITY } else { f32::INFINITY };
         assert_eq!(packet.tfar[lane], expected, "{lane}");
     }
