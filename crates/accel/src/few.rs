@@ -1,12 +1,14 @@
 //! Scenes of few triangles: each ray against each of their edges, sixteen rays at a time. Below some dozens of
 //! triangles that takes less time than going down a tree.
 //!
+//! Rays are those of single precision, and what they meet is worked out in double precision.
+//!
 //! A ray passes an edge on the side that the sign of their Plücker product tells. Triangles that share an edge
 //! share its sign, whatever rounding did to it, so no ray slips between them along the edge (R. Jones, "Intersecting
 //! a ray and a triangle with Plücker coordinates", Ray Tracing News 13.1, 2000; K. Shoemake, "Plücker coordinate
 //! tutorial", Ray Tracing News 11.1, 1998).
 
-use etendue_geometry::block::{Floats, LANES};
+use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, MISS, RayBatch, RayBlock, RayBlocks, is_degenerate};
 
@@ -22,19 +24,19 @@ const MOST_EDGES: usize = 3 * MOST_TRIANGLES;
 /// An edge, by its Plücker coordinates in the frame.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
-    along: [f32; 3],
-    moment: [f32; 3],
+    along: [f64; 3],
+    moment: [f64; 3],
 }
 
 /// A triangle in the frame.
 #[derive(Debug, Clone, Copy)]
 struct FewTriangle {
     /// Numbers of the edges opposite to its corners, and the sign with which each is one of its own.
-    edges: [(usize, f32); 3],
+    edges: [(usize, f64); 3],
     /// Normal on the front where the corners run counter-clockwise, as long as twice the area.
-    normal: [f32; 3],
+    normal: [f64; 3],
     /// The normal times any corner.
-    offset: f32,
+    offset: f64,
     /// The normal as hits tell it: of the placement's front.
     front: [f32; 3],
     placement: u32,
@@ -58,16 +60,15 @@ impl FewTriangles {
         }
         let frame = F32Frame::of(geometry.loose_bounds());
         let mut few = Self { frame, edges: Vec::new(), triangles: Vec::new() };
-        let mut ends: Vec<[[f32; 3]; 2]> = Vec::new();
+        let mut ends: Vec<[[f64; 3]; 2]> = Vec::new();
         for (number, placement) in (0_u32..).zip(&geometry.placements) {
             let mesh = geometry.mesh_of(placement);
             let place = &placement.world_from_mesh;
             // Of hits in one place the last one wins: of a placement the lowest triangle.
             for triangle in (0..mesh.triangles.len()).rev() {
                 let own = mesh.corners(triangle);
-                let corners =
-                    own.map(|corner| place.point_from(corner, frame.origin).to_array().map(round));
-                let wide = corners.map(|corner| DVec3::from(corner.map(f64::from)));
+                let wide = own.map(|corner| place.point_from(corner, frame.origin));
+                let corners = wide.map(|corner| corner.to_array());
                 let normal = (wide[1] - wide[0]).cross(wide[2] - wide[0]);
                 if is_degenerate(wide) || normal.length_squared() == 0.0 {
                     continue;
@@ -84,8 +85,8 @@ impl FewTriangles {
                 };
                 few.triangles.push(FewTriangle {
                     edges: [edge(0), edge(1), edge(2)],
-                    normal: normal.to_array().map(round),
-                    offset: round(normal.dot(wide[0])),
+                    normal: normal.to_array(),
+                    offset: normal.dot(wide[0]),
                     front: (normal * place.handedness()).to_array().map(round),
                     placement: number,
                     triangle: u32::try_from(triangle).unwrap_or(MISS),
@@ -97,28 +98,29 @@ impl FewTriangles {
 }
 
 impl Edge {
-    fn between(a: [f32; 3], b: [f32; 3]) -> Self {
-        let [from, to] = [a, b].map(|end| DVec3::from(end.map(f64::from)));
-        Self {
-            along: (to - from).to_array().map(round),
-            moment: from.cross(to).to_array().map(round),
-        }
+    fn between(a: [f64; 3], b: [f64; 3]) -> Self {
+        let [from, to] = [a, b].map(DVec3::from);
+        Self { along: (to - from).to_array(), moment: from.cross(to).to_array() }
     }
 }
 
+/// One number of each ray of a block.
+type Doubles = [f64; LANES];
+
 /// What of a block's rays is nearest so far.
 struct Best {
-    t: Floats,
-    u: Floats,
-    v: Floats,
+    t: Doubles,
+    u: Doubles,
+    v: Doubles,
     /// Number of the triangle in the list, or [`MISS`].
     number: [u32; LANES],
 }
 
 /// On which side each ray passes each edge: the sign of what is found here.
 #[inline(always)]
-fn sides(edges: &[Edge], block: &RayBlock, sides: &mut [Floats; MOST_EDGES]) {
-    let ([ox, oy, oz], [dx, dy, dz]) = (&block.origin, &block.direction);
+fn sides(edges: &[Edge], block: &RayBlock, sides: &mut [Doubles; MOST_EDGES]) {
+    let [ox, oy, oz] = block.origin.map(|axis| axis.map(f64::from));
+    let [dx, dy, dz] = block.direction.map(|axis| axis.map(f64::from));
     let (mut mx, mut my, mut mz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
         mx[i] = oy[i] * dz[i] - oz[i] * dy[i];
@@ -135,7 +137,7 @@ fn sides(edges: &[Edge], block: &RayBlock, sides: &mut [Floats; MOST_EDGES]) {
 
 /// Whether any ray passes all three edges on one side.
 #[inline(always)]
-fn is_inside(lowest: &Floats, highest: &Floats) -> bool {
+fn is_inside(lowest: &Doubles, highest: &Doubles) -> bool {
     let mut any = 0_u32;
     for i in 0..LANES {
         any |= u32::from((lowest[i] >= 0.0) | (highest[i] <= 0.0));
@@ -145,6 +147,8 @@ fn is_inside(lowest: &Floats, highest: &Floats) -> bool {
 
 #[multiversion::multiversion(targets = "simd")]
 fn closest(few: &FewTriangles, block: &RayBlock, best: &mut Best) {
+    let origin = block.origin.map(|axis| axis.map(f64::from));
+    let t_min = block.t_min.map(f64::from);
     let mut of_edges = [[0.0; LANES]; MOST_EDGES];
     sides(&few.edges, block, &mut of_edges);
     for (number, triangle) in (0_u32..).zip(&few.triangles) {
@@ -160,7 +164,6 @@ fn closest(few: &FewTriangles, block: &RayBlock, best: &mut Best) {
             continue;
         }
         let [nx, ny, nz] = triangle.normal;
-        let (origin, t_min) = (&block.origin, &block.t_min);
         for i in 0..LANES {
             let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
             let sum = a + b + c;
@@ -180,6 +183,8 @@ fn closest(few: &FewTriangles, block: &RayBlock, best: &mut Best) {
 
 #[multiversion::multiversion(targets = "simd")]
 fn occluded(few: &FewTriangles, block: &RayBlock, blocked: &mut [u32; LANES]) {
+    let origin = block.origin.map(|axis| axis.map(f64::from));
+    let [t_min, t_max] = [block.t_min, block.t_max].map(|limits| limits.map(f64::from));
     let mut of_edges = [[0.0; LANES]; MOST_EDGES];
     sides(&few.edges, block, &mut of_edges);
     for triangle in &few.triangles {
@@ -196,7 +201,6 @@ fn occluded(few: &FewTriangles, block: &RayBlock, blocked: &mut [u32; LANES]) {
             continue;
         }
         let [nx, ny, nz] = triangle.normal;
-        let (origin, t_min, t_max) = (&block.origin, &block.t_min, &block.t_max);
         for i in 0..LANES {
             let height =
                 triangle.offset - (origin[0][i] * nx + origin[1][i] * ny + origin[2][i] * nz);
@@ -221,11 +225,15 @@ impl BlockAccel for FewTriangles {
 
     fn closest_of_blocks(&self, blocks: &mut [RayBlock], _coherent: bool) {
         for block in blocks {
-            let mut best =
-                Best { t: block.t_max, u: [0.0; LANES], v: [0.0; LANES], number: [MISS; LANES] };
+            let mut best = Best {
+                t: block.t_max.map(f64::from),
+                u: [0.0; LANES],
+                v: [0.0; LANES],
+                number: [MISS; LANES],
+            };
             closest(self, block, &mut best);
             block.clear_hits();
-            (block.t_max, block.u, block.v) = (best.t, best.u, best.v);
+            [block.t_max, block.u, block.v] = [best.t, best.u, best.v].map(|row| row.map(round));
             for (lane, &number) in best.number.iter().enumerate() {
                 let Some(hit) = self.triangles.get(number as usize) else { continue };
                 (block.placement[lane], block.triangle[lane]) = (hit.placement, hit.triangle);
