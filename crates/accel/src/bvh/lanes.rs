@@ -39,7 +39,7 @@ pub(super) trait Arithmetic: Copy {
     fn select(self, mask: u32, a: Self::F, b: Self::F) -> Self::F;
     /// The least of all lanes. None may be NaN.
     fn least(self, a: Self::F) -> f32;
-    /// The greatest of all lanes. None may be NaN.
+    /// The greatest of all lanes, which keeps the sign of a 0 that they all are. None may be NaN.
     fn greatest(self, a: Self::F) -> f32;
 }
 
@@ -154,4 +154,38 @@ fn least(a: [f32; 8]) -> f32 {
 #[inline(always)]
 fn halves(values: &[f32; 16]) -> [[f32; 8]; 2] {
     bytemuck::cast(*values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check<L: Lanes>(lanes: L) {
+        let name = L::NAME;
+        let bits = |value: f32| value.to_bits();
+        for zero in [0.0, -0.0_f32] {
+            // Which way a ray of no slope runs is told by the sign of its zero.
+            let eight = lanes.splat(zero);
+            assert_eq!(bits(lanes.least(eight)), bits(zero), "{name}: {zero:?}");
+            assert_eq!(bits(lanes.greatest(eight)), bits(zero), "{name}: {zero:?}");
+            let sixteen = lanes.load_sixteen(&[zero; 16]);
+            assert_eq!(bits(lanes.sixteen().least(sixteen)), bits(zero), "{name}: {zero:?}");
+            assert_eq!(bits(lanes.sixteen().greatest(sixteen)), bits(zero), "{name}: {zero:?}");
+        }
+        let values: [f32; 16] =
+            std::array::from_fn(|k| [2.5, -7.0, 1e-38, 0.0][k % 4] * (k as f32));
+        let sixteen = lanes.load_sixteen(&values);
+        assert_eq!(lanes.sixteen().least(sixteen), -91.0, "{name}");
+        assert_eq!(lanes.sixteen().greatest(sixteen), 30.0, "{name}");
+    }
+
+    #[test]
+    fn least_and_greatest_are_exact_with_every_instruction_set() {
+        check(Portable);
+        #[cfg(target_arch = "x86_64")]
+        {
+            pulp::x86::V3::try_new().into_iter().for_each(check);
+            pulp::x86::V4::try_new().into_iter().for_each(check);
+        }
+    }
 }

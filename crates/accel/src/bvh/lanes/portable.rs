@@ -83,7 +83,8 @@ impl Arithmetic for Portable {
 
     #[inline(always)]
     fn greatest(self, a: [f32; 8]) -> f32 {
-        -least(self.sub([0.0; 8], a))
+        // From −0: 0 − 0 is 0, whose opposite is −0.
+        -least(self.sub([-0.0; 8], a))
     }
 }
 

@@ -84,7 +84,8 @@ macro_rules! eight_lanes {
 
             #[inline(always)]
             fn greatest(self, a: __m256) -> f32 {
-                -least(cast(self.sub(self.splat(0.0), a)))
+                // From −0: 0 − 0 is 0, whose opposite is −0.
+                -least(cast(self.sub(self.splat(-0.0), a)))
             }
         }
     };
