@@ -489,9 +489,7 @@ impl BlockAccel for Embree {
 
     fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
         SCRATCH.with_borrow_mut(|scratch| {
-            let rays32 = &mut scratch.rays;
-            rays32.convert(rays, &self.frame);
-            rays32.put_in_blocks(blocks);
+            scratch.rays.convert_to_blocks(rays, &self.frame, blocks);
         });
     }
 

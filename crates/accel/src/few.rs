@@ -218,9 +218,7 @@ impl BlockAccel for FewTriangles {
     }
 
     fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
-        let mut rays32 = Rays32::default();
-        rays32.convert(rays, &self.frame);
-        rays32.put_in_blocks(blocks);
+        Rays32::default().convert_to_blocks(rays, &self.frame, blocks);
     }
 
     fn closest_of_blocks(&self, blocks: &mut [RayBlock], _coherent: bool) {
@@ -339,7 +337,6 @@ mod tests {
             assert!(few.edges.len() < 3 * few.triangles.len(), "edges are shared");
             let exact = Exact::build(Arc::clone(&geometry), &BuildOptions::default()).unwrap();
             let mut rays = RayBatch::default();
-            rays.precision = HitPrecision::Single;
             for k in 0..4096 {
                 let start = [0.377, 0.913, 0.151].map(|step| 1.2 * spread(k, step));
                 let end = if k % 3 == 0 { 0.7 } else { f64::INFINITY };
@@ -348,8 +345,15 @@ mod tests {
             }
             let mut hits = HitBatch::new(Detail::Surface);
             exact.closest(&rays, &mut hits);
-            let mut blocks = RayBlocks::default();
+            // Whatever precision the batch asks for, blocks have its rays as they are.
+            let [mut blocks, mut single] = [RayBlocks::default(), RayBlocks::default()];
             few.convert(&rays, &mut blocks);
+            rays.precision = HitPrecision::Single;
+            few.convert(&rays, &mut single);
+            for (block, single) in blocks.blocks().iter().zip(single.blocks()) {
+                assert_eq!(block.origin, single.origin);
+                assert_eq!(block.direction, single.direction);
+            }
             let mut shadows = blocks.clone();
             few.closest_of_blocks(blocks.blocks_mut(), false);
             few.occluded_of_blocks(shadows.blocks_mut(), false);

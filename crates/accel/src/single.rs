@@ -152,12 +152,30 @@ impl Rays32 {
     /// Converts `rays` for a scene in `frame`, turned aside a little where their hits are to be decided
     /// in f64.
     pub(crate) fn convert(&mut self, rays: &RayBatch, frame: &F32Frame) {
-        self.resize(rays.len());
         let nudge = match rays.precision {
             HitPrecision::Double => NUDGE,
             HitPrecision::Single => 0.0,
         };
+        self.resize(rays.len());
         convert(self, rays, frame, nudge);
+    }
+
+    /// Refills `blocks` with `rays` as they are: what single precision hits there is not decided again.
+    pub(crate) fn convert_to_blocks(
+        &mut self,
+        rays: &RayBatch,
+        frame: &F32Frame,
+        blocks: &mut RayBlocks,
+    ) {
+        self.resize(rays.len());
+        convert(self, rays, frame, 0.0);
+        blocks.clear();
+        for i in 0..self.len() {
+            let [origin, direction] =
+                [&self.origin, &self.direction].map(|axes| axes.each_ref().map(|axis| axis[i]));
+            blocks.push(origin, direction, self.t_far[i]);
+            blocks.start_at(self.t_near[i]);
+        }
     }
 
     /// Appends ray `i` of `from`, moved sideways by `shift` (m).
@@ -178,17 +196,6 @@ impl Rays32 {
             if let Some(last) = self.direction[axis].last_mut() {
                 *last = round(rays.directions()[axis][i]);
             }
-        }
-    }
-
-    /// Refills blocks with these rays.
-    pub(crate) fn put_in_blocks(&self, blocks: &mut RayBlocks) {
-        blocks.clear();
-        for i in 0..self.len() {
-            let [origin, direction] =
-                [&self.origin, &self.direction].map(|axes| axes.each_ref().map(|axis| axis[i]));
-            blocks.push(origin, direction, self.t_far[i]);
-            blocks.start_at(self.t_near[i]);
         }
     }
 

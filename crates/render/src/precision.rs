@@ -1,8 +1,8 @@
 //! How precisely paths of light hit: in f32 where what that misplaces is lost in the picture's noise and
 //! under its smallest things, in f64 where it is not.
 
-use etendue_geometry::HitPrecision;
 use etendue_geometry::glam::DVec3;
+use etendue_geometry::{HitPrecision, RayBatch};
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightPrecision};
 use etendue_tracer::spawn::roundings;
@@ -16,6 +16,10 @@ const MOST_OF_AN_EDGE: f64 = 0.125;
 /// The noise of a pixel of one sample that f32's error is held against: pictures of good samplers have
 /// less than their mean.
 const NOISE_OF_A_SAMPLE: f64 = 0.25;
+
+/// A pixel must be so many times as wide as f32 rounds the camera's rays by, or its rays fall beside it: a
+/// start and a direction, along two axes each, are rounded by half a unit in the last place.
+const ROUNDINGS_A_PIXEL: f64 = 4.0;
 
 /// The precision of a scene's light paths for so many samples a pixel, and why.
 pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, String) {
@@ -48,8 +52,19 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
             format!("more of a thing of {least:.1e} m than noise hides at {samples} samples");
         return (HitPrecision::Double, words(&than));
     }
+    // Against what a pixel sees.
+    let farthest = farthest(scene);
+    let pixel = pixel_width(scene, farthest);
+    let rounding = f64::from(f32::EPSILON) * farthest;
+    if pixel.is_some_and(|pixel| pixel < ROUNDINGS_A_PIXEL * rounding) {
+        let pixel = pixel.unwrap_or_default();
+        let why = format!(
+            "f32 rounds camera rays by {rounding:.1e} m, too much for pixels of {pixel:.1e} m"
+        );
+        return (HitPrecision::Double, why);
+    }
     // Against what light goes through: no ray may skip the next surface, and no medium may take another share.
-    let crossed = crossed_surfaces(scene, farthest(scene));
+    let crossed = crossed_surfaces(scene, farthest);
     if let Some(why) = too_thin(scene, &crossed) {
         return (HitPrecision::Double, why);
     }
@@ -112,6 +127,17 @@ fn farthest(scene: &Scene) -> f64 {
     farthest.max(scene.camera.pose().position.length())
 }
 
+/// How far apart (m) the chief rays of two pixels in the middle of the picture are at `distance` (m) from the
+/// camera; `None` where they have none.
+fn pixel_width(scene: &Scene, distance: f64) -> Option<f64> {
+    let mut rays = RayBatch::default();
+    let [column, row] = scene.camera.resolution().map(|pixels| f64::from(pixels) / 2.0);
+    scene.camera.rays_through(&[column, column + 1.0], &[row, row], &mut rays);
+    let [one, next] = [0, 1].map(|i| rays.origin(i) + distance * rays.direction(i));
+    let width = one.distance(next);
+    (width > 0.0 && width.is_finite()).then_some(width)
+}
+
 /// The extent of the smallest thing and the shortest mean edge of a mesh (m); `None` without any.
 fn smallest(scene: &Scene) -> Option<(f64, f64)> {
     let drawn = scene.geometry.placements.iter().filter(|p| scene.geometry.has_area(p));
@@ -140,11 +166,24 @@ mod tests {
 
     /// A sphere of 2000 triangles, and a cube of some size (m) at some place (m).
     fn decided(size: f64, place: f64, samples: u32, plan: &serde_json::Value) -> HitPrecision {
+        let camera = json!({ "type": "pinhole" });
+        decided_for(camera, size, place, samples, plan)
+    }
+
+    /// The same, seen by a camera 4 m away.
+    fn decided_for(
+        mut camera: serde_json::Value,
+        size: f64,
+        place: f64,
+        samples: u32,
+        plan: &serde_json::Value,
+    ) -> HitPrecision {
+        camera["pose"] =
+            json!({ "from": [place, place, place + 4.0], "look_at": [place, place, place] });
         let shift = |x: f64| json!({ "translate": [place + x, place, place] });
         let scene = json!({
             "tracer": { "type": "path" }, "plan": plan, "render": { "accel": "embree" },
-            "camera": { "type": "pinhole",
-                "pose": { "from": [place, place, place + 4.0], "look_at": [place, place, place] } },
+            "camera": camera,
             "objects": [
                 { "shape": "sphere", "triangles": 2000, "transform": shift(0.0) },
                 { "shape": "box", "size": [size, size, size], "transform": shift(2.0) },
@@ -168,6 +207,14 @@ mod tests {
         assert_eq!(decided(1e-5, 0.0, 64, &auto), Double);
         assert_eq!(decided(0.5, 1e6, 64, &auto), Double);
         assert_eq!(decided(0.01, 0.0, 1 << 20, &auto), Double);
+        // Pixels that f32 cannot tell apart: rows of some 10⁻⁵ and 10⁻¹⁰ m, and of 10⁻⁴ and 10⁻⁹ of a degree.
+        let seen = |camera| decided_for(camera, 0.5, 0.0, 64, &auto);
+        let pinhole = |fov: f64| json!({ "type": "pinhole", "fov": fov });
+        let orthographic = |height: f64| json!({ "type": "orthographic", "height": height });
+        assert_eq!(seen(orthographic(4.8e-3)), Single);
+        assert_eq!(seen(orthographic(4.8e-8)), Double);
+        assert_eq!(seen(pinhole(0.1)), Single);
+        assert_eq!(seen(pinhole(4.8e-7)), Double);
         // The file's word goes before.
         assert_eq!(decided(0.5, 0.0, 64, &json!({ "light_precision": "double" })), Double);
         assert_eq!(decided(1e-5, 0.0, 64, &json!({ "light_precision": "single" })), Single);
