@@ -1,6 +1,6 @@
 //! Who is timed, on which clock, and in which order.
 //!
-//! * Contestants take turns ([`etendue_bench::rounds`]).
+//! * Contestants take turns ([`etendue_bench::timing`]).
 //! * Tracing is timed on the processor clock of the thread that traces, which other processes on the
 //!   machine disturb less than they do the wall's.
 //! * Rays are in the cache when their turn comes, as they are when a camera has just made them: each

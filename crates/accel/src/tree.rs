@@ -8,18 +8,14 @@
 //! only, so the tree is the same for any number of threads.
 
 mod bins;
-mod extent;
-mod partition;
 
 use bytemuck::{Pod, Zeroable};
 use etendue_geometry::glam::Vec4;
 use rayon::prelude::*;
 
 use self::bins::{BinGrid, Bins};
-use self::extent::{RefBounds, half_area};
-use self::partition::{SplitSide, halve, partition, partition_wide};
-use crate::BuildError;
-use crate::watch::BuildWatch;
+use crate::{BuildError, BuildWatch};
+use bins::{RefBounds, SplitSide, half_area, halve, partition, partition_wide};
 
 /// The box of one thing, with two numbers by which its owner knows it.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use etendue_chart::{Axis, Chart, GREY, Series, Stroke, Theme, side_by_side};
 use serde::Serialize;
 
-use crate::clipping::{normal_cdf, normal_density};
+use crate::normal::{normal_cdf, normal_density};
 use crate::poisson::probability;
 
 /// How far the approximation is from the truth, in electrons, before the converter.

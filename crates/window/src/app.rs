@@ -1,8 +1,6 @@
 //! The window's state, and how news and input change it.
 
-mod input;
-mod looking;
-mod still;
+mod actions;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,14 +10,11 @@ use etendue::{Inspector, LensView, Options, Preview, Probe, Screen, Still, Viewp
 use serde_json::Value;
 
 use crate::canvas::Canvas;
-use crate::document::{Document, Edit};
+use crate::document::{Document, Edit, View};
 use crate::form::Form;
-use crate::panels::{
-    self,
-    light_field::{LightField, Shows},
-    listing::Listing,
-};
-use crate::view::View;
+use crate::panels;
+use crate::panels::asking::Listing;
+use crate::panels::light_field::{LightField, Shows};
 use crate::worker::{Kind, News, Shown, Task, Wake, Wish, Worker};
 
 /// What a click on the picture does.
@@ -171,11 +166,11 @@ impl App {
         self.take_news(ctx);
         self.take_drops(ctx);
         self.take_shortcuts(ctx);
-        panels::bar::show(self, ctx);
-        panels::status::show(self, ctx);
+        panels::bar::show_bar(self, ctx);
+        panels::bar::show_status(self, ctx);
         panels::lens::show(self, ctx);
-        panels::scene::show(self, ctx);
-        panels::inspect::show(self, ctx);
+        panels::inspect::show_scene(self, ctx);
+        panels::inspect::show_inspect(self, ctx);
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ctx, |ui| {
             crate::canvas::show(self, ui);
         });

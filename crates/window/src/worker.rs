@@ -15,7 +15,7 @@ use std::time::Duration;
 use etendue::{Error, Inspector, Options, Preview, Progress, Screen, Still};
 use serde_json::Value;
 
-use crate::view::View;
+use crate::document::View;
 use studio::Studio;
 
 /// How often files are looked at for changes when there is nothing else to do.

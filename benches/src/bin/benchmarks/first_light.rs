@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use etendue_accel::limit::{BareScene, Mode, Packet};
 use etendue_accel::{Accel, BuildOptions};
-use etendue_bench::rounds::{Turn, take_turns, wall};
+use etendue_bench::timing::{Turn, take_turns, wall};
 use etendue_benches::effort::Effort;
 use etendue_camera::{Camera, PixelBlock};
 use etendue_geometry::{

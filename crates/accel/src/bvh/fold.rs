@@ -6,10 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use etendue_geometry::Geometry;
 use rayon::prelude::*;
 
-use super::arena::Arena;
 use super::wide::{
-    Cell, Child, INSTANCE_NUMBERS, LEAF_CELLS, LeafNumbers, LeafUnits, MOST_CELLS, MOST_IN_LEAF,
-    NO_CHILDREN, WideTree,
+    Arena, Cell, Child, INSTANCE_NUMBERS, LEAF_CELLS, LeafNumbers, LeafUnits, MOST_CELLS,
+    MOST_IN_LEAF, NO_CHILDREN, WideTree,
 };
 use crate::parts::{Blas, MeshTriangles};
 use crate::tree::{Ref, Tree};

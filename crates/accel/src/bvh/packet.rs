@@ -14,13 +14,12 @@ use etendue_geometry::glam::DVec3;
 use pulp::NullaryFnOnce;
 
 use self::triangles::PacketTriangles;
-use super::Bvh;
 use super::bundle::{Bundle, EachRay, FEWEST, FrameRays, PACKET, bits};
 use super::lanes::{Arithmetic, Lanes};
-use super::placed::PlacedTriangles;
 use super::single::{Search, Sink, Stacks, Visit};
 use super::traverse::{Leaves, Stack, traverse};
 use super::wide::{Cell, Child, instances_of};
+use super::{Bvh, PlacedTriangles};
 use crate::nearest::Query;
 use crate::parts::Instance;
 

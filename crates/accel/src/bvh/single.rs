@@ -5,14 +5,13 @@ use std::marker::PhantomData;
 use etendue_geometry::RayBatch;
 use pulp::NullaryFnOnce;
 
-use super::Bvh;
 use super::bundle::PACKET;
 use super::lanes::Lanes;
 use super::packet::Packet;
-use super::placed::PlacedTriangles;
 use super::ray::{BoxTest, NarrowRay, TriangleTest};
 use super::traverse::{Leaves, Stack, traverse};
 use super::wide::{Cell, Child, instances_of, leaf_numbers};
+use super::{Bvh, PlacedTriangles};
 use crate::nearest::{Nearest, Query, Triangle};
 use crate::parts::Instance;
 use crate::watertight;

@@ -3,10 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::focus_distance::FocusDistance;
 use super::focused::{Focused, View, positive};
 use super::lens_camera::LensCamera;
-use super::source::{LensSource, PlacedSpec, in_camera};
+use super::source::{FocusDistance, LensSource, PlacedSpec, in_camera};
 use crate::framing::{self, Reach, Subject};
 use crate::{CameraError, Pose, PoseSpec, SensorSpec};
 use etendue_geometry::units::{Degrees, Millimetres};

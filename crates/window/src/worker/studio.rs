@@ -10,7 +10,7 @@ use etendue::{
 use serde_json::Value;
 
 use super::{Kind, News, Shared, Shown, Task, Teller, WATCH, Wish};
-use crate::view::View;
+use crate::document::View;
 
 /// How long a first picture may take, so that it is on the screen within a tenth of a second, twenty in each: the
 /// window is drawn twice meanwhile, by the same processor where there is no other.
