@@ -30,9 +30,10 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use self::fold::{Instances, Triangles, fold};
+use self::fold::{InstanceLeafWriter, Triangles, fold};
 use self::lanes::{Lanes, Portable};
-use self::single::{AnyHit, Batch, Sink};
+use self::packet::Batch;
+use self::single::{AnyHit, Sink};
 use self::wide::{MOST_IN_LEAF, WideTree};
 use crate::few::FewTriangles;
 use crate::nearest::{Nearest, PlacementView, Triangle, settle};
@@ -63,14 +64,14 @@ pub struct Bvh {
 struct PartTree {
     tree: WideTree,
     /// Whose triangles these are.
-    owner: Owner,
+    owner: TriangleOwner,
     /// How the meshes' own coordinates follow from those in the leaves, when they do to the bit:
     /// then a hit needs nothing but the leaf.
     units: Option<LeafUnits>,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Owner {
+enum TriangleOwner {
     /// Of this placement, all of them.
     Placement(u32),
     /// Of the placement that the instance names.
@@ -166,17 +167,19 @@ impl PartTree {
     fn new(part: &Blas, geometry: &Geometry, watch: &BuildWatch<'_>) -> Result<Self, BuildError> {
         let tree = Tree::build(part.refs(geometry), LEAF, watch)?;
         let owner = match &part.members {
-            Members::Mesh(_) => Owner::Instance,
-            Members::Baked(placements) if placements.len() == 1 => Owner::Placement(placements[0]),
-            Members::Baked(_) => Owner::Leaf,
+            Members::Mesh(_) => TriangleOwner::Instance,
+            Members::Baked(placements) if placements.len() == 1 => {
+                TriangleOwner::Placement(placements[0])
+            }
+            Members::Baked(_) => TriangleOwner::Leaf,
         };
         let leaf = Triangles {
             part,
             geometry,
             only: match owner {
-                Owner::Placement(placement) => Some(part.source(geometry, placement)),
-                Owner::Instance => Some(part.source(geometry, MISS)),
-                Owner::Leaf => None,
+                TriangleOwner::Placement(placement) => Some(part.source(geometry, placement)),
+                TriangleOwner::Instance => Some(part.source(geometry, MISS)),
+                TriangleOwner::Leaf => None,
             },
             units: LeafUnits::of(part.frame),
             is_exact: part.is_unturned(geometry).into(),
@@ -211,7 +214,7 @@ fn top_tree(
         Ref { lo, first: i, hi, second: i }
     });
     let tree = Tree::build(refs.collect(), INSTANCE_LEAF, watch)?;
-    fold(&tree, &Instances).ok_or_else(|| BuildError::TooLarge {
+    fold(&tree, &InstanceLeafWriter).ok_or_else(|| BuildError::TooLarge {
         mesh: "all".to_owned(),
         what: format!("the number of instances, {count},"),
         backend: "bvh",
@@ -306,9 +309,9 @@ impl<'a> PlacedTriangles<'a> {
     fn new(bvh: &'a Bvh, instance: &Instance) -> Self {
         let shape = &bvh.parts[instance.part as usize];
         let only = match shape.owner {
-            Owner::Placement(placement) => Some(Placed::new(bvh, placement)),
-            Owner::Instance => Some(Placed::new(bvh, instance.placement)),
-            Owner::Leaf => None,
+            TriangleOwner::Placement(placement) => Some(Placed::new(bvh, placement)),
+            TriangleOwner::Instance => Some(Placed::new(bvh, instance.placement)),
+            TriangleOwner::Leaf => None,
         };
         Self { bvh, only, units: shape.units }
     }

@@ -12,8 +12,6 @@
 
 mod device;
 mod filter;
-#[cfg(feature = "limit")]
-pub mod limit;
 mod shape;
 mod trace;
 

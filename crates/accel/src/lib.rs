@@ -46,8 +46,6 @@ use etendue_geometry::{Geometry, HitBatch, RayBatch, RayBlock, RayBlocks};
 pub use bvh::Bvh;
 #[cfg(feature = "embree")]
 pub use checked::Embree;
-#[cfg(feature = "limit")]
-pub use embree::limit;
 #[cfg(feature = "embree")]
 pub use embree::{Version, version as embree_version};
 pub use exact::Exact;
@@ -256,9 +254,6 @@ pub enum BuildError {
         message: String,
     },
 }
-
-/// The geometry that a backend was built on; backends keep it alive while they share its buffers.
-pub type SharedGeometry = Arc<Geometry>;
 
 /// Counts triangles as they are put in place, tells the caller, and hears whether to go on.
 pub(crate) struct BuildWatch<'a> {

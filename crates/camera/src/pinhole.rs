@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::distortion::{Distortion, DistortionSpec};
-use crate::framing::{self, Reach, Subject};
+use crate::framing::{self, FieldExtent, Subject};
 use crate::{CameraError, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec, SensorSpec};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::units::{Degrees, Metres};
@@ -143,7 +143,7 @@ impl Pinhole {
 
     /// The tangents up to which a framed scene may reach: of the picture's edges, or of what is
     /// seen at their middles and corners, at most 60° from the axis.
-    fn reach(&self, [width, height]: [u32; 2]) -> Reach {
+    fn reach(&self, [width, height]: [u32; 2]) -> FieldExtent {
         let (width, height) = (f64::from(width), f64::from(height));
         let tangents = |u: f64, v: f64| {
             let seen = self.intrinsics.tangents(u, v);
@@ -154,7 +154,7 @@ impl Pinhole {
             }
         };
         let widest = if self.distortion.is_some() { 3_f64.sqrt() } else { f64::INFINITY };
-        Reach::of_picture([width, height], self.intrinsics.centre, widest, tangents)
+        FieldExtent::of_picture([width, height], self.intrinsics.centre, widest, tangents)
     }
 
     /// Turns places on the sensor (pixels from the corner), which stand in the first two arrays of

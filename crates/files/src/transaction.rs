@@ -24,11 +24,11 @@ pub struct Transaction {
     inputs: BTreeSet<PathBuf>,
     /// Complete files do not wait for the others.
     is_at_once: bool,
-    state: Mutex<State>,
+    state: Mutex<TransactionState>,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct TransactionState {
     waiting: Vec<Waiting>,
     /// The files that have their names, in the order in which they took them.
     finished: Vec<PathBuf>,
@@ -164,7 +164,7 @@ impl Transaction {
         Ok(())
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, TransactionState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -292,11 +292,11 @@ impl Mesh {
 /// changes while a clone lives, so a C library may keep a pointer beside one.
 #[derive(Clone)]
 pub struct Buffer<T> {
-    owner: Owner<T>,
+    owner: Storage<T>,
 }
 
 #[derive(Clone)]
-enum Owner<T> {
+enum Storage<T> {
     Heap(Arc<Vec<T>>),
     Mapped { file: Arc<MappedFile>, offset: usize, len: usize },
 }
@@ -310,7 +310,7 @@ impl<T: AnyBitPattern> Buffer<T> {
         let bytes = len.checked_mul(size_of::<T>())?;
         let slice = file.bytes().get(offset..offset.checked_add(bytes)?)?;
         bytemuck::try_cast_slice::<u8, T>(slice).ok()?;
-        Some(Self { owner: Owner::Mapped { file: Arc::clone(file), offset, len } })
+        Some(Self { owner: Storage::Mapped { file: Arc::clone(file), offset, len } })
     }
 
     /// Whether both are the same values in the same place.
@@ -322,15 +322,15 @@ impl<T: AnyBitPattern> Buffer<T> {
     /// Whether the values are part of a mapped file.
     #[must_use]
     pub fn is_mapped(&self) -> bool {
-        matches!(self.owner, Owner::Mapped { .. })
+        matches!(self.owner, Storage::Mapped { .. })
     }
 
     /// Bytes on this process' heap: 0 when mapped.
     #[must_use]
     pub fn heap_bytes(&self) -> usize {
         match &self.owner {
-            Owner::Heap(values) => values.capacity() * size_of::<T>(),
-            Owner::Mapped { .. } => 0,
+            Storage::Heap(values) => values.capacity() * size_of::<T>(),
+            Storage::Mapped { .. } => 0,
         }
     }
 }
@@ -340,8 +340,8 @@ impl<T: AnyBitPattern> Deref for Buffer<T> {
 
     fn deref(&self) -> &[T] {
         match &self.owner {
-            Owner::Heap(values) => values,
-            Owner::Mapped { file, offset, len } => {
+            Storage::Heap(values) => values,
+            Storage::Mapped { file, offset, len } => {
                 bytemuck::cast_slice(&file.bytes()[*offset..offset + len * size_of::<T>()])
             }
         }
@@ -350,7 +350,7 @@ impl<T: AnyBitPattern> Deref for Buffer<T> {
 
 impl<T> From<Vec<T>> for Buffer<T> {
     fn from(values: Vec<T>) -> Self {
-        Self { owner: Owner::Heap(Arc::new(values)) }
+        Self { owner: Storage::Heap(Arc::new(values)) }
     }
 }
 

@@ -86,13 +86,6 @@ impl WeightedBands {
         }
     }
 
-    /// Whether bands reach beyond the wavelengths at which colours are known.
-    #[must_use]
-    pub fn leaves_visible(&self) -> bool {
-        let [from, to] = self.grid.range();
-        from < VISIBLE[0] || to > VISIBLE[1]
-    }
-
     fn edges(&self, i: usize) -> [f64; 2] {
         [self.grid.edges()[i], self.grid.edges()[i + 1]]
     }

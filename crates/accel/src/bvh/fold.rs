@@ -241,9 +241,9 @@ impl WriteLeaf for Triangles<'_> {
 }
 
 /// Leaves of instances.
-pub(super) struct Instances;
+pub(super) struct InstanceLeafWriter;
 
-impl WriteLeaf for Instances {
+impl WriteLeaf for InstanceLeafWriter {
     fn write(&self, refs: &[Ref], numbers: &mut LeafNumbers) -> usize {
         let (leaves, _) = numbers.as_chunks_mut::<INSTANCE_NUMBERS>();
         for (leaf, r) in leaves.iter_mut().zip(refs) {

@@ -1,6 +1,5 @@
-//! A lens as a camera names it: a file or the lens itself; and parts put on a lens' axis.
-//!
-//! Distances in focus as files write them.
+//! A lens as a camera names it: a file or the lens itself; parts put on a lens' axis; distances in focus; and
+//! what all cameras with a lens set up around it.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -10,11 +9,11 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
-use crate::CameraError;
-use etendue_geometry::units::{Metres, Millimetres};
-use etendue_optics::element::{ElementSpec, LensResources, Resolve, element_schema};
+use crate::{CameraError, PoseSpec, SensorSpec};
+use etendue_geometry::units::{Degrees, Metres, Millimetres};
+use etendue_optics::element::{ElementSpec, LensResources, LossesSpec, Resolve, element_schema};
 use etendue_optics::glass::AgfCatalogue;
-use etendue_optics::train::{LensError, LensFile, OpticalTrain, ZemaxLens};
+use etendue_optics::train::{Focus, LensError, LensFile, OpticalTrain, ZemaxLens};
 
 /// The longest text that is read as a lens (bytes).
 const LONGEST: u64 = 16 << 20;
@@ -170,5 +169,28 @@ impl JsonSchema for FocusDistance {
         schema.insert("description".to_owned(), about.into());
         schema.insert("x-also".to_owned(), INFINITY.as_slice().into());
         schema
+    }
+}
+
+/// What the cameras with a lens have in common.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Setup<'a> {
+    pub(crate) f_number: Option<f64>,
+    pub(crate) focus: Option<Focus>,
+    pub(crate) fov: Option<f64>,
+    pub(crate) sensor_height: Option<f64>,
+    pub(crate) sensor_tilt: [Degrees; 2],
+    pub(crate) sensor_decentre: [Millimetres; 2],
+    pub(crate) losses: LossesSpec,
+    pub(crate) pose: Option<&'a PoseSpec>,
+    pub(crate) sensor: &'a SensorSpec,
+}
+
+impl Setup<'_> {
+    /// Counts `sensor_distance` from a vertex that is `reach` (mm) in front of the last element's.
+    pub(super) fn measure_past(&mut self, reach: f64) {
+        if let Some(Focus::Sensor(distance)) = &mut self.focus {
+            *distance -= reach;
+        }
     }
 }

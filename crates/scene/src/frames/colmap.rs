@@ -73,7 +73,7 @@ const POINT_BYTES: u64 = 24;
 
 /// The images. The error goes on after the file's name.
 pub(in crate::frames) fn images_in_binary(bytes: &[u8]) -> Result<Vec<Image>, String> {
-    let mut rest = Rest { bytes, at: 0 };
+    let mut rest = ByteCursor { bytes, at: 0 };
     let mut images = Vec::new();
     for _ in 0..rest.long()? {
         let place = format!("at byte {}", rest.at);
@@ -92,7 +92,7 @@ pub(in crate::frames) fn images_in_binary(bytes: &[u8]) -> Result<Vec<Image>, St
 
 /// The cameras. The error goes on after the file's name.
 pub(in crate::frames) fn cameras_in_binary(bytes: &[u8]) -> Result<Cameras, String> {
-    let mut rest = Rest { bytes, at: 0 };
+    let mut rest = ByteCursor { bytes, at: 0 };
     let mut cameras = Cameras::new();
     for _ in 0..rest.long()? {
         let at = rest.at;
@@ -117,12 +117,12 @@ pub(in crate::frames) fn cameras_in_binary(bytes: &[u8]) -> Result<Cameras, Stri
 }
 
 /// What is still to be read.
-struct Rest<'a> {
+struct ByteCursor<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
-impl Rest<'_> {
+impl ByteCursor<'_> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
         let taken = self.bytes[self.at..].first_chunk().copied().ok_or_else(|| self.cut_off())?;
         self.at += N;

@@ -9,11 +9,11 @@ use std::sync::Arc;
 
 use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers};
 
-use super::{App, Asked, Asking};
-use crate::canvas::Canvas;
+use super::{App, Asking, PixelQuery};
+use crate::canvas::PictureCanvas;
 use crate::document::Edit;
 use crate::panels;
-use crate::panels::light_field::LightField;
+use crate::panels::light_field::LightFieldPanel;
 use crate::worker::Shown;
 use etendue::Still;
 
@@ -68,7 +68,7 @@ impl App {
     /// Asks what is seen at a place of the picture.
     pub(crate) fn ask(&mut self, place: [f64; 2]) {
         let probe = self.inspector.as_ref().and_then(|inspector| inspector.probe(place));
-        self.asked = Some(Asked { place, probe });
+        self.asked = Some(PixelQuery { place, probe });
     }
 
     /// Opens or closes the panel of the lens.
@@ -120,12 +120,12 @@ impl App {
     pub(super) fn looked(&mut self, ctx: &Context, path: PathBuf, still: Arc<Still>) {
         let is_same = self.still.as_ref().is_some_and(|(before, _)| *before == path);
         if !is_same {
-            self.canvas = Canvas::default();
+            self.canvas = PictureCanvas::default();
             (self.asked, self.part, self.error) = (None, None, None);
         }
         (self.document, self.accepted, self.inspector) = (None, None, None);
         (self.frames, self.frame, self.lens) = (None, None, None);
-        self.light_field = LightField::default();
+        self.light_field = LightFieldPanel::default();
         self.still = Some((path, still));
         self.show_still(ctx);
     }

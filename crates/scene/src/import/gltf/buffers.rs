@@ -13,7 +13,7 @@ use gltf::json;
 
 use super::document::Document;
 use super::draco::Decoded;
-use super::meshopt::Compressed;
+use super::meshopt::MeshoptView;
 use super::{Reader, damaged};
 use crate::import::files::Files;
 use crate::import::text::without_mark;
@@ -86,7 +86,7 @@ impl Buffers {
         let mut used = vec![false; document.root.buffers.len()];
         for view in &document.root.buffer_views {
             // The buffer of a compressed view itself is a placeholder, or holds it in plain.
-            let buffer = Compressed::of(view).and_then(|packed| packed.buffer());
+            let buffer = MeshoptView::of(view).and_then(|packed| packed.buffer());
             if let Some(used) = used.get_mut(buffer.unwrap_or(view.buffer.value())) {
                 *used = true;
             }
@@ -135,7 +135,7 @@ impl Reader<'_> {
             return Err(self.absent(from, "buffer view", index, views.len()));
         };
         let stride = view.byte_stride.map(|stride| stride.0).filter(|&stride| stride > 0);
-        if let Some(compressed) = Compressed::of(view) {
+        if let Some(compressed) = MeshoptView::of(view) {
             let bytes = self.decompressed(index, &compressed)?;
             return Ok(View { bytes, start: 0, len: bytes.as_slice().len(), stride });
         }
@@ -162,7 +162,7 @@ impl Reader<'_> {
     fn decompressed(
         &self,
         index: usize,
-        compressed: &Compressed<'_>,
+        compressed: &MeshoptView<'_>,
     ) -> Result<&Bytes, ImportError> {
         let known = &self.buffers.decoded[index];
         if let Some(bytes) = known.get() {

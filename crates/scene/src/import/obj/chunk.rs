@@ -34,7 +34,7 @@ pub(super) const VN: usize = 2;
 
 /// What is to be read beside positions and faces.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Wish {
+pub(super) struct WantedColumns {
     pub uvs: bool,
     pub normals: bool,
     pub colors: bool,
@@ -91,7 +91,7 @@ pub(super) enum Statement {
 
 impl Chunk {
     /// Reads `text`, which starts and ends with whole lines.
-    pub(super) fn parse(text: &[u8], wish: Wish) -> Result<Self, Fault> {
+    pub(super) fn parse(text: &[u8], wish: WantedColumns) -> Result<Self, Fault> {
         let mut chunk = Self::default();
         let mut words = Words::new(text);
         while !words.is_done() {
@@ -130,7 +130,7 @@ impl Chunk {
         Ok(chunk)
     }
 
-    fn vertex(&mut self, words: &mut Words<'_>, wish: Wish) -> Result<(), Fault> {
+    fn vertex(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
         let position = floats::<3>(words, 3)?;
         self.positions.push(position);
         self.defined[V] += 1;
@@ -152,7 +152,7 @@ impl Chunk {
         self.colors.push(color);
     }
 
-    fn uv(&mut self, words: &mut Words<'_>, wish: Wish) -> Result<(), Fault> {
+    fn uv(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
         self.defined[VT] += 1;
         if wish.uvs {
             let [u, v] = floats::<2>(words, 1)?;
@@ -162,7 +162,7 @@ impl Chunk {
         Ok(())
     }
 
-    fn normal(&mut self, words: &mut Words<'_>, wish: Wish) -> Result<(), Fault> {
+    fn normal(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
         self.defined[VN] += 1;
         if wish.normals {
             self.normals.push(floats::<3>(words, 3)?.map(single));
@@ -170,7 +170,7 @@ impl Chunk {
         Ok(())
     }
 
-    fn face(&mut self, words: &mut Words<'_>, wish: Wish) -> Result<(), Fault> {
+    fn face(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
         let first = self.corners[V].len();
         while let Some(word) = words.word() {
             let at = words.at() - word.len();

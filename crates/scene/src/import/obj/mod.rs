@@ -32,7 +32,7 @@ use super::error::{self, Note, NoteKind};
 use super::files::Files;
 use super::text::{Fault, pieces, with_newlines, without_mark};
 use super::{Import, ImportError, ImportedPlacement, Options, Wanted};
-use chunk::{Chunk, Segment, Wish};
+use chunk::{Chunk, Segment, WantedColumns};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Mesh, Transform};
 use weld::Pool;
@@ -55,7 +55,7 @@ pub(super) fn import(
     let text = with_newlines(without_mark(map.bytes()));
     let text: &[u8] = &text;
     let fault = |fault: Fault| fault.locate(path, text);
-    let wish = Wish { uvs: wanted.uvs, normals: wanted.normals, colors: wanted.colors };
+    let wish = WantedColumns { uvs: wanted.uvs, normals: wanted.normals, colors: wanted.colors };
     let bytes = PARSED_PER_BYTE * text.len() as u64;
     files.take(bytes, || "the numbers of the text".to_owned())?;
     let pieces = pieces(text, PIECE);

@@ -50,7 +50,7 @@ pub(super) fn load(
         }
     }
     let mut known: HashMap<Option<&str>, u32> = HashMap::new();
-    let mut maps = Maps { files, strictness, numbers: HashMap::new() };
+    let mut maps = MtlMaps { files, strictness, numbers: HashMap::new() };
     let mut numbers = Vec::with_capacity(segments.len());
     for segment in segments {
         let name = segment.material.as_deref();
@@ -192,7 +192,7 @@ fn undefined(name: Option<&str>, notes: &mut Vec<Note>) -> Material {
 
 fn resolve(
     defined: &Defined,
-    maps: &mut Maps<'_>,
+    maps: &mut MtlMaps<'_>,
     wanted: Wanted,
     import: &mut Import,
 ) -> Result<Material, ImportError> {
@@ -294,13 +294,13 @@ fn nearest(material: &tobj::Material, plain: Material) -> Material {
 }
 
 /// The images that maps name, each once.
-struct Maps<'a> {
+struct MtlMaps<'a> {
     files: &'a Files,
     strictness: Strictness,
     numbers: HashMap<(PathBuf, bool), u32>,
 }
 
-impl Maps<'_> {
+impl MtlMaps<'_> {
     fn use_of(
         &mut self,
         written: &str,
