@@ -1,6 +1,6 @@
 //! Who is timed, on which clock, and in which order.
 //!
-//! * Contestants take turns ([`etendue_bench::rounds`]).
+//! * Contestants take turns ([`etendue_bench::timing`]).
 //! * Tracing is timed on the processor clock of the thread that traces, which other processes on the
 //!   machine disturb less than they do the wall's.
 //! * Rays are in the cache when their turn comes, as they are when a camera has just made them: each
@@ -13,8 +13,8 @@ use etendue_accel::Accel;
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use rustix::time::{ClockId, clock_gettime};
 
+use crate::limit::{BareScene, Packet, Single, WIDTH};
 use crate::rays::BATCH;
-use etendue_accel::limit::{BareScene, Packet, Single, WIDTH};
 
 /// Batches a chunk: its rays stay in the second-level cache.
 const CHUNK: usize = 16;

@@ -9,15 +9,15 @@
 //!   through the exact f64 test that [`exact`](crate::exact) uses.
 //!
 //! So its answers are those of `exact`, and as watertight.
+//!
+//! From a place in a leaf to a triangle's corners in its mesh's frame, for the exact test.
 
 #![forbid(unsafe_code)]
 
-mod arena;
 mod bundle;
 mod fold;
 mod lanes;
 mod packet;
-mod placed;
 mod ray;
 mod single;
 mod traverse;
@@ -28,21 +28,23 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use etendue_geometry::glam::Vec3;
-use etendue_geometry::{Bounds, Coplanar, Geometry, HitBatch, MISS, RayBatch};
 use rayon::prelude::*;
 
-use self::fold::{Instances, Triangles, fold};
+use self::fold::{InstanceLeafWriter, Triangles, fold};
 use self::lanes::{Lanes, Portable};
-use self::single::{AnyHit, Batch, Sink};
-use self::wide::{LeafUnits, MOST_IN_LEAF, WideTree};
-use crate::coplanar::settle;
+use self::packet::Batch;
+use self::single::{AnyHit, Sink};
+use self::wide::{MOST_IN_LEAF, WideTree};
 use crate::few::FewTriangles;
-use crate::nearest::Nearest;
+use crate::nearest::{Nearest, PlacementView, Triangle, settle};
 use crate::parts::{Baking, Blas, Instance, Layout, Members, outward};
 use crate::tree::{LeafSize, Ref, Tree};
-use crate::watch::{BuildWatch, with_threads};
-use crate::{Accel, BlockAccel, BuildError, BuildOptions, BuildReport, Quality};
+use crate::{
+    Accel, BlockAccel, BuildError, BuildOptions, BuildReport, BuildWatch, Quality, with_threads,
+};
+use etendue_geometry::glam::Vec3;
+use etendue_geometry::{Bounds, Coplanar, Geometry, HitBatch, MISS, Mesh, RayBatch};
+use wide::{LeafNumbers, LeafUnits};
 
 /// The pure-Rust bounding volume hierarchy.
 pub struct Bvh {
@@ -62,14 +64,14 @@ pub struct Bvh {
 struct PartTree {
     tree: WideTree,
     /// Whose triangles these are.
-    owner: Owner,
+    owner: TriangleOwner,
     /// How the meshes' own coordinates follow from those in the leaves, when they do to the bit:
     /// then a hit needs nothing but the leaf.
     units: Option<LeafUnits>,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Owner {
+enum TriangleOwner {
     /// Of this placement, all of them.
     Placement(u32),
     /// Of the placement that the instance names.
@@ -165,17 +167,19 @@ impl PartTree {
     fn new(part: &Blas, geometry: &Geometry, watch: &BuildWatch<'_>) -> Result<Self, BuildError> {
         let tree = Tree::build(part.refs(geometry), LEAF, watch)?;
         let owner = match &part.members {
-            Members::Mesh(_) => Owner::Instance,
-            Members::Baked(placements) if placements.len() == 1 => Owner::Placement(placements[0]),
-            Members::Baked(_) => Owner::Leaf,
+            Members::Mesh(_) => TriangleOwner::Instance,
+            Members::Baked(placements) if placements.len() == 1 => {
+                TriangleOwner::Placement(placements[0])
+            }
+            Members::Baked(_) => TriangleOwner::Leaf,
         };
         let leaf = Triangles {
             part,
             geometry,
             only: match owner {
-                Owner::Placement(placement) => Some(part.source(geometry, placement)),
-                Owner::Instance => Some(part.source(geometry, MISS)),
-                Owner::Leaf => None,
+                TriangleOwner::Placement(placement) => Some(part.source(geometry, placement)),
+                TriangleOwner::Instance => Some(part.source(geometry, MISS)),
+                TriangleOwner::Leaf => None,
             },
             units: LeafUnits::of(part.frame),
             is_exact: part.is_unturned(geometry).into(),
@@ -210,7 +214,7 @@ fn top_tree(
         Ref { lo, first: i, hi, second: i }
     });
     let tree = Tree::build(refs.collect(), INSTANCE_LEAF, watch)?;
-    fold(&tree, &Instances).ok_or_else(|| BuildError::TooLarge {
+    fold(&tree, &InstanceLeafWriter).ok_or_else(|| BuildError::TooLarge {
         mesh: "all".to_owned(),
         what: format!("the number of instances, {count},"),
         backend: "bvh",
@@ -272,5 +276,58 @@ impl fmt::Debug for Bvh {
             .field("parts", &self.parts.len())
             .field("instances", &self.layout.instances.len())
             .finish_non_exhaustive()
+    }
+}
+
+/// A placement with what the exact test needs of it.
+#[derive(Clone, Copy)]
+struct Placed<'a> {
+    placement: u32,
+    view: PlacementView<'a>,
+    mesh: &'a Mesh,
+}
+
+impl<'a> Placed<'a> {
+    #[inline(always)]
+    fn new(bvh: &'a Bvh, placement: u32) -> Self {
+        let place = &bvh.geometry.placements[placement as usize];
+        let view = PlacementView::new(&place.world_from_mesh);
+        Self { placement, view, mesh: bvh.geometry.mesh_of(place) }
+    }
+}
+
+/// The triangles of an instance.
+struct PlacedTriangles<'a> {
+    bvh: &'a Bvh,
+    /// The placement, where there is but one.
+    only: Option<Placed<'a>>,
+    units: Option<LeafUnits>,
+}
+
+impl<'a> PlacedTriangles<'a> {
+    #[inline(always)]
+    fn new(bvh: &'a Bvh, instance: &Instance) -> Self {
+        let shape = &bvh.parts[instance.part as usize];
+        let only = match shape.owner {
+            TriangleOwner::Placement(placement) => Some(Placed::new(bvh, placement)),
+            TriangleOwner::Instance => Some(Placed::new(bvh, instance.placement)),
+            TriangleOwner::Leaf => None,
+        };
+        Self { bvh, only, units: shape.units }
+    }
+
+    /// Triangle `i` of the `n` in a leaf with these numbers, and its placement.
+    #[inline(always)]
+    fn get(&self, numbers: &LeafNumbers, n: usize, i: usize) -> Option<(Placed<'a>, Triangle)> {
+        let number = numbers.get(9 * n + i)?.to_bits();
+        let placed = match self.only {
+            Some(placed) => placed,
+            None => Placed::new(self.bvh, numbers.get(10 * n + i)?.to_bits()),
+        };
+        let corners = match self.units {
+            Some(units) => units.corners(numbers, n, i),
+            None => placed.mesh.corners(number as usize),
+        };
+        Some((placed, Triangle { placement: placed.placement, number, corners }))
     }
 }

@@ -11,16 +11,14 @@ use etendue_geometry::{
     Coplanar, Detail, Geometry, HitBatch, HitPrecision, MISS, RayBatch, RayBlock, RayBlocks,
 };
 
-use crate::coplanar::settle;
 use crate::embree::{ExactFilter, FoundHits, NearestSearch, Scene, version};
-use crate::end_triangles::EndTriangles;
 use crate::few::FewTriangles;
-use crate::nearest::{Nearest, Query};
+use crate::nearest::{Nearest, Query, settle};
 use crate::parts::check_scale;
-use crate::recheck;
+use crate::recheck::EndTriangles;
 use crate::single::{F32Frame, Rays32, round};
 use crate::solve::{self, ChunkTriangles, Solved};
-use crate::{Accel, BlockAccel, BuildError, BuildOptions, BuildReport, Counts};
+use crate::{Accel, BlockAccel, BuildError, BuildOptions, BuildReport, Counts, recheck};
 
 /// Bundles around a ray before it is believed to miss.
 const TURNS: u32 = 4;

@@ -12,9 +12,6 @@
 
 mod device;
 mod filter;
-mod instanced;
-#[cfg(feature = "limit")]
-pub mod limit;
 mod shape;
 mod trace;
 
@@ -28,10 +25,9 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Geometry, Mesh, Placement, Transform};
 
 use self::device::Device;
-use self::instanced::{InstanceKind, Instanced};
 use self::shape::EmbreeGeometry;
-use crate::single;
-use crate::{BuildError, BuildOptions, Quality};
+use crate::{BuildError, BuildOptions, Quality, single};
+use shape::{InstanceKind, Instanced};
 
 pub use self::device::{Version, version};
 pub(crate) use self::filter::{ExactFilter, NearestSearch};

@@ -17,12 +17,10 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Coplanar, Geometry, HitBatch, MISS, RayBatch};
 use rayon::prelude::*;
 
-use crate::coplanar::settle;
-use crate::nearest::{Nearest, PlacementView, Query, Triangle};
+use crate::nearest::{Nearest, PlacementView, Query, Triangle, settle};
 use crate::parts::{Baking, Blas, Instance, Layout, LocalRay, outward};
 use crate::tree::{LeafSize, MAX_DEPTH, Node, Ref, Tree};
-use crate::watch::{BuildWatch, with_threads};
-use crate::{Accel, BuildError, BuildOptions, BuildReport, Quality};
+use crate::{Accel, BuildError, BuildOptions, BuildReport, BuildWatch, Quality, with_threads};
 
 /// The exact f64 backend.
 pub struct Exact {

@@ -23,7 +23,7 @@ const MOST_EDGES: usize = 3 * MOST_TRIANGLES;
 
 /// An edge, by its Plücker coordinates in the frame.
 #[derive(Debug, Clone, Copy)]
-struct Edge {
+struct PluckerEdge {
     along: [f64; 3],
     moment: [f64; 3],
 }
@@ -47,7 +47,7 @@ struct FewTriangle {
 #[derive(Debug)]
 pub struct FewTriangles {
     frame: F32Frame,
-    edges: Vec<Edge>,
+    edges: Vec<PluckerEdge>,
     triangles: Vec<FewTriangle>,
 }
 
@@ -78,7 +78,7 @@ impl FewTriangles {
                     let found = ends.iter().position(|ends| *ends == [a, b] || *ends == [b, a]);
                     let at = found.unwrap_or_else(|| {
                         ends.push([a, b]);
-                        few.edges.push(Edge::between(a, b));
+                        few.edges.push(PluckerEdge::between(a, b));
                         ends.len() - 1
                     });
                     (at, if ends[at] == [a, b] { 1.0 } else { -1.0 })
@@ -97,7 +97,7 @@ impl FewTriangles {
     }
 }
 
-impl Edge {
+impl PluckerEdge {
     fn between(a: [f64; 3], b: [f64; 3]) -> Self {
         let [from, to] = [a, b].map(DVec3::from);
         Self { along: (to - from).to_array(), moment: from.cross(to).to_array() }
@@ -118,7 +118,7 @@ struct Best {
 
 /// On which side each ray passes each edge: the sign of what is found here.
 #[inline(always)]
-fn sides(edges: &[Edge], block: &RayBlock, sides: &mut [Doubles; MOST_EDGES]) {
+fn sides(edges: &[PluckerEdge], block: &RayBlock, sides: &mut [Doubles; MOST_EDGES]) {
     let [ox, oy, oz] = block.origin.map(|axis| axis.map(f64::from));
     let [dx, dy, dz] = block.direction.map(|axis| axis.map(f64::from));
     let (mut mx, mut my, mut mz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
@@ -127,7 +127,7 @@ fn sides(edges: &[Edge], block: &RayBlock, sides: &mut [Doubles; MOST_EDGES]) {
         my[i] = oz[i] * dx[i] - ox[i] * dz[i];
         mz[i] = ox[i] * dy[i] - oy[i] * dx[i];
     }
-    for (Edge { along, moment }, side) in edges.iter().zip(sides) {
+    for (PluckerEdge { along, moment }, side) in edges.iter().zip(sides) {
         for i in 0..LANES {
             let of_moment = dx[i] * moment[0] + dy[i] * moment[1] + dz[i] * moment[2];
             side[i] = of_moment + (mx[i] * along[0] + my[i] * along[1] + mz[i] * along[2]);

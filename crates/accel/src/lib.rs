@@ -16,11 +16,8 @@
 mod bvh;
 #[cfg(feature = "embree")]
 mod checked;
-mod coplanar;
 #[cfg(feature = "embree")]
 mod embree;
-#[cfg(feature = "embree")]
-mod end_triangles;
 mod exact;
 mod few;
 mod nearest;
@@ -36,11 +33,11 @@ mod single;
 mod solve;
 mod tree;
 mod triangle;
-mod watch;
 pub mod watertight;
 
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use etendue_geometry::glam::DVec3;
@@ -49,8 +46,6 @@ use etendue_geometry::{Geometry, HitBatch, RayBatch, RayBlock, RayBlocks};
 pub use bvh::Bvh;
 #[cfg(feature = "embree")]
 pub use checked::Embree;
-#[cfg(feature = "limit")]
-pub use embree::limit;
 #[cfg(feature = "embree")]
 pub use embree::{Version, version as embree_version};
 pub use exact::Exact;
@@ -260,5 +255,54 @@ pub enum BuildError {
     },
 }
 
-/// The geometry that a backend was built on; backends keep it alive while they share its buffers.
-pub type SharedGeometry = Arc<Geometry>;
+/// Counts triangles as they are put in place, tells the caller, and hears whether to go on.
+pub(crate) struct BuildWatch<'a> {
+    options: &'a BuildOptions,
+    total: u64,
+    done: AtomicU64,
+    stopped: AtomicBool,
+}
+
+impl<'a> BuildWatch<'a> {
+    pub(crate) fn new(options: &'a BuildOptions, total: u64) -> Self {
+        Self { options, total, done: AtomicU64::new(0), stopped: AtomicBool::new(false) }
+    }
+
+    /// Counts `triangles` more.
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError::Stopped`] once the caller's progress function has answered `false`.
+    pub(crate) fn advance(&self, triangles: u64) -> Result<(), BuildError> {
+        let done = self.done.fetch_add(triangles, Ordering::Relaxed) + triangles;
+        if let Some(progress) = &self.options.progress {
+            let share = (done as f64 / self.total.max(1) as f64).min(1.0);
+            if !self.stopped.load(Ordering::Relaxed) && !progress(share) {
+                self.stopped.store(true, Ordering::Relaxed);
+            }
+        }
+        if self.stopped.load(Ordering::Relaxed) { Err(BuildError::Stopped) } else { Ok(()) }
+    }
+}
+
+/// Runs `build` with as many threads as the options ask for.
+///
+/// # Errors
+///
+/// Those of `build`, and [`BuildError::Library`] when threads cannot be had.
+pub(crate) fn with_threads<T: Send>(
+    options: &BuildOptions,
+    build: impl FnOnce() -> Result<T, BuildError> + Send,
+) -> Result<T, BuildError> {
+    if options.threads == 0 {
+        return build();
+    }
+    let pool =
+        rayon::ThreadPoolBuilder::new().num_threads(options.threads).build().map_err(|error| {
+            BuildError::Library {
+                call: "rayon::ThreadPoolBuilder::build",
+                message: error.to_string(),
+            }
+        })?;
+    pool.install(build)
+}

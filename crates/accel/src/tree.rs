@@ -8,18 +8,14 @@
 //! only, so the tree is the same for any number of threads.
 
 mod bins;
-mod extent;
-mod partition;
 
 use bytemuck::{Pod, Zeroable};
 use etendue_geometry::glam::Vec4;
 use rayon::prelude::*;
 
 use self::bins::{BinGrid, Bins};
-use self::extent::{RefBounds, half_area};
-use self::partition::{SplitSide, halve, partition, partition_wide};
-use crate::BuildError;
-use crate::watch::BuildWatch;
+use crate::{BuildError, BuildWatch};
+use bins::{RefBounds, SplitSide, half_area, halve, partition, partition_wide};
 
 /// The box of one thing, with two numbers by which its owner knows it.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -126,12 +122,12 @@ impl Tree {
 }
 
 /// A finished part of the tree. Parts built in parallel are joined once, at the end.
-enum Grown {
+enum BuiltSubtree {
     Nodes(Vec<Node>),
     Split(Node, Box<(Self, Self)>),
 }
 
-impl Grown {
+impl BuiltSubtree {
     fn len(&self) -> usize {
         match self {
             Self::Nodes(nodes) => nodes.len(),
@@ -173,13 +169,13 @@ impl BuildTask<'_> {
         first: usize,
         depth: usize,
         extent: RefBounds,
-    ) -> Result<Grown, BuildError> {
+    ) -> Result<BuiltSubtree, BuildError> {
         if refs.len() < PARALLEL_NODE {
             let mut nodes = Vec::with_capacity(refs.len());
             let mut bins = Bins::EMPTY;
             self.grow_alone(refs, first, depth, extent, &mut (&mut nodes, &mut bins));
             self.watch.advance(refs.len() as u64)?;
-            return Ok(Grown::Nodes(nodes));
+            return Ok(BuiltSubtree::Nodes(nodes));
         }
         let mut bins = Bins::EMPTY;
         let sides = self.divide(refs, spare, depth, &extent, &mut bins);
@@ -191,7 +187,7 @@ impl BuildTask<'_> {
             || self.grow(a, spare_a, first, depth + 1, left.extent),
             || self.grow(b, spare_b, first + left.len, depth + 1, right.extent),
         );
-        Ok(Grown::Split(extent.node(0, 0), Box::new((a?, b?))))
+        Ok(BuiltSubtree::Split(extent.node(0, 0), Box::new((a?, b?))))
     }
 
     /// As [`Self::grow`], on one thread.

@@ -10,9 +10,8 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 
-use crate::hits::{HitErrors, Hits, trace};
-use crate::rays::Rays;
-use crate::rounds::{Series, TimeSpread, order};
+use crate::hits::{HitErrors, Hits, Rays, trace};
+use crate::timing::{Series, TimeSpread, order};
 use crate::{BenchError, Progress};
 
 /// The width of a batch in a render: the pixels of a tile.

@@ -25,8 +25,8 @@ use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 
 use crate::pictures::{Studio, opened};
-use crate::rounds::TimeSpread;
 use crate::samplers::{Converged, Effort, Entry, take_pictures};
+use crate::timing::TimeSpread;
 use crate::{BenchError, Progress};
 
 /// What was measured of one scene.

@@ -1,7 +1,6 @@
 //! All that was measured on a scene: as text, CSV and charts.
 
-mod accelerator_charts;
-mod picture_charts;
+mod charts;
 mod table;
 
 use etendue_chart::Chart;
@@ -67,13 +66,13 @@ impl Findings {
     pub fn charts(&self) -> Vec<(&'static str, Chart)> {
         let mut charts = Vec::new();
         if !self.accelerators.is_empty() {
-            charts.extend(accelerator_charts::charts(&self.accelerators));
+            charts.extend(charts::accelerators(&self.accelerators));
         }
         if let Some(samplers) = &self.samplers {
-            charts.extend(picture_charts::samplers(samplers));
+            charts.extend(charts::samplers(samplers));
         }
         if let Some(cameras) = &self.cameras {
-            charts.extend(picture_charts::cameras(cameras));
+            charts.extend(charts::cameras(cameras));
         }
         charts
     }

@@ -8,10 +8,8 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`rounds`] | who is timed when, and medians |
-//! | [`machine`] | what it was measured on, and the memory of a process |
-//! | [`rays`] | a camera's chief rays and what they scatter into, in batches of any width |
-//! | [`hits`] | how far hits are from the reference's |
+//! | [`timing`] | turns and medians of timed work; the machine that it ran on, and the memory of a process |
+//! | [`hits`] | a camera's chief rays and what they scatter into, in batches of any width; how far hits are from the reference's |
 //! | [`accelerators`] | each accelerator × batch width × threads |
 //! | [`pictures`] | a scene's picture at any number of samples |
 //! | [`samplers`] | each sampler × number of samples |
@@ -25,11 +23,9 @@ pub mod cameras;
 pub mod drawing;
 pub mod findings;
 pub mod hits;
-pub mod machine;
 pub mod pictures;
-pub mod rays;
-pub mod rounds;
 pub mod samplers;
+pub mod timing;
 pub mod tolerance;
 
 use etendue_accel::BuildError;

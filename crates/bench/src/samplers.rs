@@ -7,7 +7,7 @@ use etendue_scene::file::LightPrecision;
 use serde::Serialize;
 
 use crate::pictures::{Sampling, Studio, mean, mean_square};
-use crate::rounds::{Series, TimeSpread, order};
+use crate::timing::{Series, TimeSpread, order};
 use crate::{BenchError, Progress};
 
 /// How much is measured.

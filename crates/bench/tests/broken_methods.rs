@@ -7,7 +7,7 @@ use std::sync::Arc;
 use etendue_accel::Quality;
 use etendue_bench::accelerators::{Effort, Finding, Method, RENDER_WIDTH, measure};
 use etendue_bench::findings::Findings;
-use etendue_bench::rays::Rays;
+use etendue_bench::hits::Rays;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::units::Metres;
 use etendue_geometry::{Geometry, RayBatch, Transform};

@@ -101,14 +101,14 @@ impl Subject<'_> {
 
 /// How far a picture reaches to each side of the axis: tangents for a perspective picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Reach {
+pub(crate) struct FieldExtent {
     pub(crate) left: f64,
     pub(crate) right: f64,
     pub(crate) down: f64,
     pub(crate) up: f64,
 }
 
-impl Reach {
+impl FieldExtent {
     /// What a picture of `size` (pixels) reaches to: the least of what is seen at the middles and
     /// corners of each edge, by `tangents` of a place (right, down), and `widest`. The middles are
     /// across from `centre`.
@@ -175,7 +175,7 @@ fn upright(towards: DVec3) -> DVec3 {
 /// the camera's place: two planes give the least distance and the middle. Along the axis that leaves room
 /// at that distance, the planes are brought in by one angle's share on both sides until they touch.
 /// An empty box is looked at from 3 m.
-pub(crate) fn perspective(subject: Subject<'_>, reach: Reach) -> Pose {
+pub(crate) fn perspective(subject: Subject<'_>, reach: FieldExtent) -> Pose {
     let (bounds, view) = (subject.bounds, subject.view());
     if let Viewpoint::Within(position) = subject.viewpoint {
         return Pose { position, ..view };
@@ -303,7 +303,7 @@ fn usable(bounds: Bounds) -> Option<()> {
 mod tests {
     use super::*;
 
-    const REACH: Reach = Reach { left: 0.5, right: 0.5, down: 0.4, up: 0.4 };
+    const REACH: FieldExtent = FieldExtent { left: 0.5, right: 0.5, down: 0.4, up: 0.4 };
 
     fn boxes() -> [Bounds; 5] {
         let from = |min: [f64; 3], max: [f64; 3]| Bounds { min: min.into(), max: max.into() };
@@ -319,7 +319,7 @@ mod tests {
     #[test]
     fn the_whole_box_is_inside_and_touches_the_margin() {
         for bounds in boxes() {
-            for reach in [REACH, Reach { left: 0.1, right: 0.9, ..REACH }] {
+            for reach in [REACH, FieldExtent { left: 0.1, right: 0.9, ..REACH }] {
                 let pose = perspective(bounds.into(), reach);
                 let mut fullest = 0.0_f64;
                 for corner in bounds.corners() {
@@ -357,7 +357,7 @@ mod tests {
             let points = Points(corners.iter().chain([&apex]).map(|p| DVec3::from(*p)).collect());
             let mut bounds = Bounds::EMPTY;
             points.0.iter().for_each(|p| bounds.include(*p));
-            for reach in [REACH, Reach { left: 0.1, right: 0.9, ..REACH }] {
+            for reach in [REACH, FieldExtent { left: 0.1, right: 0.9, ..REACH }] {
                 let subject = Subject { points: Some(&points), ..bounds.into() };
                 let pose = perspective(subject, reach);
                 let shares = |low: f64, high: f64, axis: usize| {

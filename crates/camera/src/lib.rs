@@ -1,4 +1,3 @@
-#![forbid(unsafe_code)]
 //! The camera kit: from a place on the sensor to a ray in the world.
 //!
 //! # Conventions
@@ -9,41 +8,55 @@
 //! * Inside a lens [`etendue_optics`]' conventions hold: millimetres, +z from the object to the sensor.
 //! * Row 0 of an image is the top, column 0 the left; pictures are upright.
 
+#![forbid(unsafe_code)]
+
 pub mod camera;
 pub mod camera_file;
 pub mod distortion;
-pub mod error;
 pub mod framing;
 pub mod intrinsics;
 pub mod lens;
 pub mod light_field;
 pub mod opencv_fit;
-pub mod orthographic;
 pub mod pinhole;
 pub mod pixel_block;
 mod place;
 pub mod pose;
 pub mod sampler;
 pub mod samples;
-pub mod sensor;
 mod sobol;
 
 pub use camera::{Camera, CameraSpec, PixelExtent, Projection};
 pub use camera_file::{CameraFile, ProjectionName};
 pub use distortion::{Distortion, DistortionSpec};
-pub use error::CameraError;
 pub use framing::{Subject, SupportFunction, Viewpoint};
-pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin};
+pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin, SensorSpec};
 pub use lens::{
     BandGroup, ChromaticRealLensCameraSpec, LensCamera, LensCameraSpec, RealLensCameraSpec,
     ThinLensCameraSpec,
 };
 pub use light_field::{LightField, LightFieldSpec, ViewGrid};
 pub use opencv_fit::OpencvFit;
-pub use orthographic::{Orthographic, OrthographicSpec};
-pub use pinhole::{Pinhole, PinholeSpec};
+pub use pinhole::{Orthographic, OrthographicSpec, Pinhole, PinholeSpec};
 pub use pixel_block::PixelBlock;
 pub use pose::{Convention, Maps, Pose, PoseSpec};
 pub use sampler::{PixelSamples, Sampler, squares, squares_of_pair};
 pub use samples::{CameraRays, FilmSamples};
-pub use sensor::SensorSpec;
+
+/// A camera's description that makes no camera: where in it, and why.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{at}: {why}")]
+pub struct CameraError {
+    /// The key inside the camera, with dots and indices (`sensor.resolution`, `pose.up`).
+    pub at: String,
+    /// What is wrong and what would do.
+    pub why: String,
+}
+
+impl CameraError {
+    /// At the key `at`, because of `why`.
+    #[must_use]
+    pub fn new(at: impl Into<String>, why: impl Into<String>) -> Self {
+        Self { at: at.into(), why: why.into() }
+    }
+}

@@ -1,14 +1,16 @@
 //! The pinhole: every ray of the picture passes through one point.
+//!
+//! The orthographic camera: all rays are parallel to the axis.
 
-use etendue_geometry::glam::DVec3;
-use etendue_geometry::{RayBatch, RaysMut};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::distortion::{Distortion, DistortionSpec};
-use crate::framing::{self, Reach, Subject};
+use crate::framing::{self, FieldExtent, Subject};
 use crate::{CameraError, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec, SensorSpec};
-use etendue_geometry::units::Degrees;
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::units::{Degrees, Metres};
+use etendue_geometry::{RayBatch, RaysMut};
 
 /// The vertical field of view of a pinhole that says nothing about it.
 const DEFAULT_FOV: Degrees = Degrees(40.0);
@@ -141,7 +143,7 @@ impl Pinhole {
 
     /// The tangents up to which a framed scene may reach: of the picture's edges, or of what is
     /// seen at their middles and corners, at most 60° from the axis.
-    fn reach(&self, [width, height]: [u32; 2]) -> Reach {
+    fn reach(&self, [width, height]: [u32; 2]) -> FieldExtent {
         let (width, height) = (f64::from(width), f64::from(height));
         let tangents = |u: f64, v: f64| {
             let seen = self.intrinsics.tangents(u, v);
@@ -152,7 +154,7 @@ impl Pinhole {
             }
         };
         let widest = if self.distortion.is_some() { 3_f64.sqrt() } else { f64::INFINITY };
-        Reach::of_picture([width, height], self.intrinsics.centre, widest, tangents)
+        FieldExtent::of_picture([width, height], self.intrinsics.centre, widest, tangents)
     }
 
     /// Turns places on the sensor (pixels from the corner), which stand in the first two arrays of
@@ -206,5 +208,94 @@ fn aim_straight(
         *dx = right.x * x + down.x * y + forward.x * z;
         *dy = right.y * x + down.y * y + forward.y * z;
         *dz = right.z * x + down.z * y + forward.z * z;
+    }
+}
+
+/// An orthographic camera as the scene file writes it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OrthographicSpec {
+    /// How much of the world the picture is high (m); the pixels are square. When absent, the whole
+    /// scene fits in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height: Option<Metres>,
+    /// Where the camera stands: rays start in the plane through it across its axis. When absent,
+    /// the whole scene is framed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<PoseSpec>,
+    /// The grid of pixels.
+    #[serde(default)]
+    pub sensor: SensorSpec,
+}
+
+/// An orthographic projection.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Orthographic {
+    /// A pixel's side in the world (m).
+    pixel: f64,
+    /// Half the picture's columns and rows (pixels).
+    centre: [f64; 2],
+}
+
+impl OrthographicSpec {
+    /// The pose and projection. `subject` is asked for only when something is to be chosen.
+    pub(crate) fn build<'a>(
+        &self,
+        subject: impl FnOnce() -> Subject<'a>,
+    ) -> Result<(Pose, Orthographic), CameraError> {
+        if let Some(Metres(height)) = self.height
+            && !(height > 0.0 && height.is_finite())
+        {
+            let why = format!("{height} m is not above zero");
+            return Err(CameraError::new("height", why));
+        }
+        let aspect = self.sensor.aspect();
+        let given = self.pose.as_ref().map(PoseSpec::build).transpose()?;
+        let (pose, height) = match (given, self.height) {
+            (Some(pose), Some(Metres(height))) => (pose, height),
+            (Some(pose), None) => (pose, framing::orthographic_height(subject(), &pose, aspect)),
+            (None, height) => {
+                let (pose, fitting) = framing::orthographic(subject(), aspect);
+                (pose, height.map_or(fitting, |Metres(height)| height))
+            }
+        };
+        let [width, rows] = self.sensor.resolution.map(f64::from);
+        Ok((pose, Orthographic { pixel: height / rows, centre: [0.5 * width, 0.5 * rows] }))
+    }
+}
+
+impl Orthographic {
+    /// A pixel's side in the world (m).
+    #[must_use]
+    pub fn metres_per_pixel(&self) -> f64 {
+        self.pixel
+    }
+
+    /// The same on pixels `factor` times as large.
+    pub(crate) fn coarser(&self, factor: f64) -> Self {
+        Self { pixel: self.pixel * factor, centre: self.centre.map(|c| c / factor) }
+    }
+
+    /// The place of the axis on the sensor (pixels from the corner).
+    #[must_use]
+    pub fn centre(&self) -> [f64; 2] {
+        self.centre
+    }
+
+    /// Turns places on the sensor (pixels from the corner), which stand in the first two arrays of
+    /// the directions, into parallel rays. All arrays have the same length.
+    pub(crate) fn aim(&self, pose: &Pose, rays: &mut RayBatch) {
+        let (right, down, forward) = (pose.right(), -pose.up(), pose.forward());
+        let RaysMut { origins, directions: [dx, dy, dz], .. } = rays.arrays_mut();
+        for (axis, origins) in origins.into_iter().enumerate() {
+            let (start, right, down) = (pose.position[axis], right[axis], down[axis]);
+            for ((origin, u), v) in origins.iter_mut().zip(&*dx).zip(&*dy) {
+                let (x, y) = ((u - self.centre[0]) * self.pixel, (v - self.centre[1]) * self.pixel);
+                *origin = start + (right * x + down * y);
+            }
+        }
+        dx.fill(forward.x);
+        dy.fill(forward.y);
+        dz.fill(forward.z);
     }
 }

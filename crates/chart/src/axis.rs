@@ -1,7 +1,5 @@
-//! An axis in pixels.
-
-use crate::chart::Axis;
-use crate::numbers::short;
+//! Axes, from values to pixels with ticks and the place of zero; the Pareto front of points; numbers as
+//! people write them.
 
 /// Room for zeros at the low end of an axis (pixels).
 const ZERO: f64 = 36.0;
@@ -155,6 +153,106 @@ fn power(decade: i32) -> String {
     format!("10{}", decade.to_string().chars().map(raised).collect::<String>())
 }
 
+/// 1, 2 or 5 times a power of ten, not above `most`: the length of a scale's bar, or a tick's step.
+#[must_use]
+pub fn round_length(most: f64) -> f64 {
+    if !(most > 0.0 && most.is_finite()) {
+        return 1.0;
+    }
+    let decade = 10_f64.powf(most.log10().floor());
+    [5.0, 2.0, 1.0]
+        .into_iter()
+        .map(|step| step * decade)
+        .find(|step| *step <= most)
+        .unwrap_or(decade)
+}
+
+/// A number with at most four significant digits.
+#[must_use]
+pub fn short(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let text = format!("{value:.3e}");
+    text.parse::<f64>().map_or(text, |rounded| rounded.to_string())
+}
+
+/// Six significant digits, without zeros at the end.
+#[must_use]
+pub fn significant(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let size = value.abs().log10().floor();
+    if !(-5.0..7.0).contains(&size) {
+        return format!("{value:.4e}");
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 10")]
+    let decimals = (5.0 - size).max(0.0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+/// The `points` for which none other is at most as large on both axes and smaller on one, from left
+/// to right. Points that are not finite take no part.
+#[must_use]
+pub fn front(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let finite = |point: &[f64; 2]| point.iter().all(|value| value.is_finite());
+    let mut sorted: Vec<[f64; 2]> = points.iter().copied().filter(finite).collect();
+    sorted.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    let mut front: Vec<[f64; 2]> = Vec::new();
+    for point in sorted {
+        if front.last().is_none_or(|last| point[1] < last[1]) {
+            front.push(point);
+        }
+    }
+    front
+}
+
+/// An axis, logarithmic unless it is said to be linear.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Axis {
+    /// What is measured, with its unit.
+    pub label: String,
+    /// What a value of exactly zero is called. With it, zeros have a place of their own below all
+    /// other values; without it, they are left out.
+    pub zero: Option<String>,
+    /// Whether it ends where the values do, and not at the next power of ten.
+    pub fits: bool,
+    /// Whether it is linear, from 0 on.
+    pub linear: bool,
+}
+
+impl Axis {
+    /// A logarithmic axis whose zeros are left out.
+    #[must_use]
+    pub fn new(label: impl Into<String>) -> Self {
+        Self { label: label.into(), ..Self::default() }
+    }
+
+    /// A linear axis from 0 on.
+    #[must_use]
+    pub fn linear(label: impl Into<String>) -> Self {
+        Self { linear: true, ..Self::new(label) }
+    }
+
+    /// The same, ending where the values do.
+    #[must_use]
+    pub fn fitted(self) -> Self {
+        Self { fits: true, ..self }
+    }
+
+    /// The same with a place for zeros, called `name`.
+    #[must_use]
+    pub fn with_zero(self, name: impl Into<String>) -> Self {
+        Self { zero: Some(name.into()), ..self }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -205,5 +303,33 @@ mod tests {
             [written(2.0, -3), written(5.0, 1), written(1.0, -12)],
             ["0.002", "50", "10⁻¹²"]
         );
+    }
+
+    #[test]
+    fn lengths_of_scales_are_round() {
+        assert_eq!(round_length(140.0), 100.0);
+        assert_eq!(round_length(0.0049), 0.002);
+        assert_eq!(round_length(5.0), 5.0);
+        assert_eq!(round_length(0.0), 1.0);
+        assert_eq!(short(0.123_456), "0.1235");
+        assert_eq!(short(-20.0), "-20");
+        // Twice half of 6.942.
+        assert_eq!(significant(6.941_999_999_999_999), "6.942");
+        assert_eq!(significant(-1500.0), "-1500");
+    }
+
+    #[test]
+    fn the_front_is_what_nothing_beats() {
+        let points = [[3.0, 0.0], [1.0, 5.0], [2.0, 5.0], [2.0, 1.0], [4.0, 0.0], [0.5, f64::NAN]];
+        assert_eq!(front(&points), [[1.0, 5.0], [2.0, 1.0], [3.0, 0.0]]);
+        assert_eq!(front(&[]), Vec::<[f64; 2]>::new());
+        // By the definition, on points of a small grid.
+        let many: Vec<[f64; 2]> =
+            (0..60).map(|i| [f64::from(i * 37 % 11), f64::from(i * 53 % 13)]).collect();
+        let found = front(&many);
+        for a in &many {
+            let beaten = many.iter().any(|b| b[0] <= a[0] && b[1] <= a[1] && b != a);
+            assert_eq!(found.contains(a), !beaten, "{a:?}");
+        }
     }
 }

@@ -7,26 +7,16 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`chart`](mod@chart) | what is shown |
-//! | `axis` | from values to pixels, ticks, and the place of zero |
-//! | `canvas` | a page for drawings that are no charts |
-//! | `numbers` | numbers as people write them |
+//! | [`chart`](mod@chart) | a chart: what it shows, and all of it as SVG |
+//! | `axis` | from values to pixels, ticks, the place of zero, the points that no other beats, numbers as people write them |
+//! | `canvas` | lines and letters in the colours of a theme, and a page for drawings that are no charts |
 //! | `names` | where names go, so that none covers another |
-//! | `front` | the points that no other beats on both axes |
-//! | `draw` | all of it as SVG |
-//! | `ink` | lines and letters in the colours of a theme |
 
 mod axis;
 mod canvas;
 pub mod chart;
-mod draw;
-mod front;
-mod ink;
 mod names;
-mod numbers;
 
-pub use canvas::Canvas;
-pub use chart::{Axis, Chart, GREY, Mark, Point, Series, Stroke, Theme, side_by_side};
-pub use front::front;
-pub use ink::TextAnchor;
-pub use numbers::{round_length, short, significant};
+pub use axis::{Axis, front, round_length, short, significant};
+pub use canvas::{Canvas, Stroke, TextAnchor, Theme};
+pub use chart::{Chart, GREY, Mark, Point, Series, side_by_side};

@@ -1,8 +1,7 @@
 //! What can be asked for on the command line.
 
-mod bench;
-mod lens;
 mod parse;
+mod tools;
 
 use std::path::PathBuf;
 
@@ -15,8 +14,7 @@ use etendue_scene::LoadOptions;
 use etendue_scene::import::Strictness;
 use etendue_tracer::LayerSpec;
 
-pub(crate) use bench::{BenchArguments, PartArgument};
-pub(crate) use lens::LensArguments;
+pub(crate) use tools::{BenchArguments, LensArguments, PartArgument};
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
 /// it.
@@ -58,10 +56,10 @@ pub(crate) enum Command {
     #[command(after_help = VIEW_HELP)]
     View(ViewArguments),
     /// Analyse a lens, or trace given rays through it
-    #[command(after_help = lens::HELP)]
+    #[command(after_help = tools::LENS_HELP)]
     Lens(LensArguments),
     /// Measure speed against accuracy on a scene: every accelerator, on this machine
-    #[command(after_help = bench::HELP)]
+    #[command(after_help = tools::BENCH_HELP)]
     Bench(BenchArguments),
     /// Print the JSON Schema of scene files, lens files, or files of rays
     #[command(after_help = "Example:\n  etendue schema > scene.schema.json\n  \

@@ -5,14 +5,12 @@ use std::path::PathBuf;
 
 use etendue::{Options, Session, places};
 use etendue_accel::{Accel, BuildOptions, Quality};
-use etendue_bench::BenchError;
 use etendue_bench::accelerators::{self, Method};
-use etendue_bench::cameras;
 use etendue_bench::findings::Findings;
+use etendue_bench::hits::Rays;
 use etendue_bench::pictures::{Studio, is_sampled};
-use etendue_bench::rays::Rays;
-use etendue_bench::samplers;
-use etendue_bench::{drawing, machine};
+use etendue_bench::timing;
+use etendue_bench::{BenchError, cameras, drawing, samplers};
 use etendue_chart::Theme;
 use etendue_files::{Ledger, MANIFEST, Opener, Transaction};
 use etendue_render::Plan;
@@ -66,7 +64,7 @@ fn bench(arguments: &BenchArguments) -> Result<(), Fault> {
     let results = file_names().map(|name| arguments.output.join(name)).collect::<Vec<_>>();
     places::keep_apart(&scene.inputs, &results)?;
     let mut findings = Findings {
-        machine: machine::describe(),
+        machine: timing::describe(),
         scene: about(scene),
         rounds: arguments.rounds.unwrap_or(ROUNDS[usize::from(arguments.quick)]),
         accelerators: Vec::new(),

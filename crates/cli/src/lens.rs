@@ -5,8 +5,7 @@ use std::path::Path;
 
 use etendue::{places, read_glasses};
 use etendue_files::{Reach, Transaction};
-use etendue_geometry::units::Dimension;
-use etendue_optics::train::{Focus, Inquiry, LensReport, OpticalTrain, drawing};
+use etendue_optics::train::{Inquiry, LensReport, OpticalTrain, drawing};
 use etendue_render::output::sidecar;
 use etendue_scene::escape::one_line;
 use etendue_scene::file::{ReadLens, read_lens_at, trace_rays};
@@ -135,21 +134,4 @@ fn warn(out_of_range: &[String], arguments: &LensArguments) -> Result<(), Fault>
         say(&format!("warning: {}", one_line(note)));
     }
     Ok(())
-}
-
-/// `1.2 m`, a plain number of metres, or `infinity`.
-pub(crate) fn parse_focus(text: &str) -> Result<Focus, String> {
-    let text = text.trim();
-    if ["infinity", "inf"].contains(&text) {
-        return Ok(Focus::Infinity);
-    }
-    let metres = match text.parse::<f64>() {
-        Ok(number) => number,
-        Err(_) => Dimension::Length.parse(text, "m").map_err(|error| error.to_string())?,
-    };
-    if metres > 0.0 && metres.is_finite() {
-        Ok(Focus::Distance(metres))
-    } else {
-        Err("expected a distance above 0, such as \"1.2 m\", or infinity".to_owned())
-    }
 }

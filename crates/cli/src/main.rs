@@ -1,4 +1,5 @@
-//! The `etendue` command.
+//! The `etendue` command; here also what is short: its version, man pages for `man`, completions for
+//! shells, and the window.
 #![forbid(unsafe_code)]
 
 mod arguments;
@@ -6,7 +7,6 @@ mod bench;
 mod check;
 mod fault;
 mod lens;
-mod manual;
 mod merge;
 mod opencv;
 mod plan;
@@ -16,20 +16,24 @@ mod room;
 mod sensor;
 mod sequence;
 mod stop;
-mod version;
-mod view;
 
+use std::io::Write as _;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::CommandFactory;
+use clap_complete::Shell;
+use clap_mangen::Man;
 
-use arguments::{Cli, Command, SchemaArgument};
-use fault::Fault;
+use arguments::{Cli, Command, SchemaArgument, ViewArguments};
+use etendue_files::Transaction;
+use fault::{Fault, print_text};
+use progress::say;
 
 fn main() -> ExitCode {
     let cli = arguments::parse();
     if cli.version {
-        version::print();
+        print_version();
         return ExitCode::SUCCESS;
     }
     let threads = match &cli.command {
@@ -47,11 +51,11 @@ fn main() -> ExitCode {
         Some(Command::Plan(arguments)) => plan::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Sensor(arguments)) => sensor::run(&arguments),
-        Some(Command::View(arguments)) => view::run(&arguments),
+        Some(Command::View(arguments)) => view(&arguments),
         Some(Command::Lens(arguments)) => lens::run(&arguments),
         Some(Command::Schema { of }) => print_schema(of),
-        Some(Command::Completions { shell }) => manual::print_completions(shell),
-        Some(Command::Man { folder }) => manual::write_pages(&folder),
+        Some(Command::Completions { shell }) => print_completions(shell),
+        Some(Command::Man { folder }) => write_pages(&folder),
         None => {
             // Nothing was asked for: say what can be.
             let _ = Cli::command().print_help();
@@ -73,4 +77,69 @@ fn print_schema(of: SchemaArgument) -> Result<(), Fault> {
         SchemaArgument::Lens => etendue_scene::file::lens_schema(),
         SchemaArgument::Rays => etendue_scene::file::rays_schema(),
     })
+}
+
+/// Prints the program's version and what traces its rays.
+pub(crate) fn print_version() {
+    #[cfg(feature = "embree")]
+    let accel = match etendue_accel::embree_version() {
+        Ok(version) => version.to_string(),
+        Err(error) => format!("Embree: {error}"),
+    };
+    #[cfg(not(feature = "embree"))]
+    let accel = "without Embree (pure Rust)";
+    let _ = print_text(&format!("etendue {}\n{accel}", env!("CARGO_PKG_VERSION")));
+}
+
+/// Writes a man page of the program and of each command into `folder`.
+pub(crate) fn write_pages(folder: &Path) -> Result<(), Fault> {
+    etendue::places::folder(folder)?;
+    let to = Transaction::at_once();
+    let mut program = Cli::command().disable_help_subcommand(true);
+    program.build();
+    for command in std::iter::once(&program).chain(program.get_subcommands()) {
+        let page = Man::new(command.clone());
+        let path = folder.join(page.get_filename());
+        let mut text = Vec::new();
+        page.render(&mut text).map_err(|error| Fault::Failed(error.into()))?;
+        to.write(&path, |file| file.write_all(&text))?;
+        say(&format!("wrote {}", path.display()));
+    }
+    Ok(())
+}
+
+/// Prints the script by which `shell` completes the command line.
+pub(crate) fn print_completions(shell: Shell) -> Result<(), Fault> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "etendue", &mut script);
+    print_text(&String::from_utf8_lossy(&script))
+}
+
+#[cfg(feature = "window")]
+pub(crate) fn view(arguments: &ViewArguments) -> Result<(), Fault> {
+    use etendue_window::WindowError;
+
+    let options = etendue::Options {
+        settings: arguments.settings.clone(),
+        reach: match arguments.allow_outside {
+            true => etendue::Reach::Anywhere,
+            false => etendue::Reach::OwnFolder,
+        },
+        ..etendue::Options::default()
+    };
+    if let Some(path) = &arguments.scene {
+        // What cannot be opened at all is told where the command was given.
+        etendue::Viewed::open(path, options.clone())?;
+    }
+    etendue_window::run(arguments.scene.clone(), options)
+        .map_err(|error: WindowError| Fault::refused(error.to_string()))
+}
+
+#[cfg(not(feature = "window"))]
+pub(crate) fn view(_: &ViewArguments) -> Result<(), Fault> {
+    Err(Fault::refused(
+        "this etendue was built without the window: build it with \
+         `cargo build --release -p etendue-cli --features window`, or run `make view`; without a window \
+         there is `etendue render`",
+    ))
 }

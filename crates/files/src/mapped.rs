@@ -1,8 +1,7 @@
 //! The one place that maps files into memory.
 
-use std::fmt;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fmt, io};
 
 /// A whole file mapped read-only, or a copy of it. Of a mapped one nothing is read until it is touched,
 /// and the pages are the system's cache, not this process' heap.
@@ -27,7 +26,7 @@ impl MappedFile {
     /// When the file cannot be opened or mapped (an empty file maps to no bytes), or is no regular
     /// file.
     pub fn open(path: &Path) -> io::Result<Self> {
-        let file = crate::regular::open(path)?;
+        let file = crate::opener::open(path)?;
         #[expect(unsafe_code, reason = "mapping a file is unsafe: another process may change it")]
         // SAFETY: the map is read-only and private, and is only ever read as plain bytes or as
         // numbers, for which every bit pattern is valid. Bytes that change under us can give a
@@ -43,7 +42,7 @@ impl MappedFile {
     ///
     /// When the file cannot be opened or read, is no regular file, or there is no memory for it.
     pub fn copy(path: &Path) -> io::Result<Self> {
-        let bytes = crate::regular::read(path, u64::MAX)?;
+        let bytes = crate::opener::read(path, u64::MAX)?;
         Ok(Self { path: path.to_owned(), contents: Contents::Copied(bytes) })
     }
 

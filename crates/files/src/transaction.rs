@@ -11,7 +11,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::WriteError;
 use crate::part::{Entry, PartFile};
 
 /// Files that are kept open while they wait: a process may not have many more.
@@ -25,11 +24,11 @@ pub struct Transaction {
     inputs: BTreeSet<PathBuf>,
     /// Complete files do not wait for the others.
     is_at_once: bool,
-    state: Mutex<State>,
+    state: Mutex<TransactionState>,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct TransactionState {
     waiting: Vec<Waiting>,
     /// The files that have their names, in the order in which they took them.
     finished: Vec<PathBuf>,
@@ -165,7 +164,7 @@ impl Transaction {
         Ok(())
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, TransactionState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -187,6 +186,62 @@ fn identity(path: &Path) -> Option<FileIdentity> {
 #[cfg(not(unix))]
 fn identity(path: &Path) -> Option<FileIdentity> {
     fs::canonicalize(path).ok()
+}
+
+/// Why a file was not written. What stood under its name before still does.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// The system refused.
+    #[error("cannot write {}: {source}; {remedy}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+        /// What to do about it.
+        remedy: &'static str,
+    },
+    /// The file is an input.
+    #[error(
+        "{} would be written over, and is read by this command{}; nothing was written: choose \
+         another folder or name",
+        path.display(),
+        also_called(path, input)
+    )]
+    IsInput {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// The name under which it is read.
+        input: PathBuf,
+    },
+}
+
+/// The name that an input is read under, where it is another.
+fn also_called(path: &Path, input: &Path) -> String {
+    if path == input { String::new() } else { format!(" as {}", input.display()) }
+}
+
+impl WriteError {
+    /// The system's refusal of `path`, with what to do about it.
+    #[must_use]
+    pub fn io(path: &Path, source: io::Error) -> Self {
+        let remedy = match source.kind() {
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+                "make the folder writable or choose another one"
+            }
+            io::ErrorKind::NotFound => "create the folder first or choose another one",
+            io::ErrorKind::AlreadyExists => "it is a file; choose another folder",
+            io::ErrorKind::NotADirectory => "a part of the path is a file; choose another folder",
+            io::ErrorKind::IsADirectory => "a folder has this name; choose another name",
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+                "free some space or choose a folder on another disk"
+            }
+            io::ErrorKind::InvalidFilename => "choose a shorter or simpler name",
+            _ => "check the folder and its disk, or choose another one",
+        };
+        Self::Io { path: path.to_owned(), source, remedy }
+    }
 }
 
 #[cfg(test)]

@@ -14,22 +14,16 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`area`] | which triangles have an area |
 //! | [`batch`] | [`RayBatch`] and [`HitBatch`], structures of arrays |
 //! | [`block`] | [`RayBlock`], sixteen rays in single precision |
-//! | [`bounds`] | axis-aligned boxes |
-//! | [`buffer`] | plain values owned by a `Vec` or by a mapped file |
 //! | [`disk`] | the unit square on the unit disk |
-//! | [`mesh`] | a triangle mesh and its vertex attributes |
+//! | [`mesh`] | a triangle mesh and its vertex attributes, owned by a `Vec` or by a mapped file |
 //! | [`transform`] | affine maps whose translation keeps 106 bits |
 //! | [`units`] | lengths, angles and times with their units, as files write them |
-//! | [`world`] | meshes and their placements |
+//! | [`world`] | meshes and their placements, axis-aligned boxes, and which triangles have an area |
 
-pub mod area;
 pub mod batch;
 pub mod block;
-pub mod bounds;
-pub mod buffer;
 pub mod coplanar;
 pub mod disk;
 pub mod mesh;
@@ -37,14 +31,11 @@ pub mod transform;
 pub mod units;
 pub mod world;
 
-pub use area::{AreaTest, is_degenerate};
 pub use batch::{Detail, HitBatch, HitPrecision, MISS, PlacedTriangle, RayBatch, RaysMut};
 pub use block::{RayBlock, RayBlocks};
-pub use bounds::Bounds;
-pub use buffer::Buffer;
 pub use coplanar::Coplanar;
-pub use mesh::{Mesh, Positions, Vertices};
+pub use mesh::{Buffer, Mesh, Positions, Vertices};
 pub use transform::Transform;
-pub use world::{Geometry, Placement};
+pub use world::{AreaTest, Bounds, Geometry, Placement, is_degenerate};
 
 pub use glam;

@@ -5,8 +5,7 @@
 //! ([`Limits`]), memory is asked for in a way that may be refused, and a decoder that panics is an
 //! error of its file. Values stay as the file has them: 8 or 16 bits, half or single precision.
 
-mod openexr;
-mod radiance;
+mod formats;
 mod raster;
 
 use std::collections::BTreeMap;
@@ -206,7 +205,7 @@ pub struct ExrChannels {
 /// Whether `bytes` begin as an EXR file does.
 #[must_use]
 pub fn is_exr(bytes: &[u8]) -> bool {
-    bytes.starts_with(openexr::SIGNATURE)
+    bytes.starts_with(formats::EXR_SIGNATURE)
 }
 
 /// Reads all channels of an EXR file's first layer that is not deep, but for those with fewer values than
@@ -216,7 +215,7 @@ pub fn is_exr(bytes: &[u8]) -> bool {
 ///
 /// When it is over `limits`, no EXR file, or broken.
 pub fn exr_channels(bytes: &[u8], limits: Limits) -> Result<ExrChannels, DecodeError> {
-    let read = catch_unwind(AssertUnwindSafe(|| openexr::channels(bytes, limits.of(bytes))));
+    let read = catch_unwind(AssertUnwindSafe(|| formats::exr_channels(bytes, limits.of(bytes))));
     read.unwrap_or(Err(DecodeError::Panic))
 }
 
@@ -228,11 +227,11 @@ pub fn decoded_bytes(file: impl BufRead + Seek) -> Option<u64> {
 
 fn bytes_by_header(mut file: impl BufRead + Seek) -> Option<u64> {
     let start = file.fill_buf().ok()?;
-    if start.starts_with(openexr::SIGNATURE) {
-        return openexr::decoded_bytes(file);
+    if start.starts_with(formats::EXR_SIGNATURE) {
+        return formats::exr_bytes(file);
     }
-    if start.starts_with(radiance::SIGNATURE) {
-        return radiance::decoded_bytes(file);
+    if start.starts_with(formats::RADIANCE_SIGNATURE) {
+        return formats::radiance_bytes(file);
     }
     let mut reader = ImageReader::new(file).with_guessed_format().ok()?;
     let mut limits = image::Limits::no_limits();
@@ -249,11 +248,11 @@ fn bytes_of(decoder: &impl ImageDecoder) -> u64 {
 }
 
 fn decode_unguarded(bytes: &[u8], limits: Limits) -> Result<Raster, DecodeError> {
-    if bytes.starts_with(openexr::SIGNATURE) {
-        return openexr::decode(bytes, limits);
+    if bytes.starts_with(formats::EXR_SIGNATURE) {
+        return formats::decode_exr(bytes, limits);
     }
-    if bytes.starts_with(radiance::SIGNATURE) {
-        return radiance::decode(bytes, limits);
+    if bytes.starts_with(formats::RADIANCE_SIGNATURE) {
+        return formats::decode_radiance(bytes, limits);
     }
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()

@@ -8,7 +8,7 @@ use etendue_camera::{Pose, Subject, Viewpoint};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Geometry, Placement, Transform};
 
-use crate::bounds::{self, WorldVertices};
+use crate::scene::{self, WorldVertices};
 
 /// Columns and rows of a coarse picture.
 const CELLS: usize = 48;
@@ -31,7 +31,7 @@ const INSIDE: f64 = 0.1;
 /// What a camera without a pose has to frame, and from where.
 pub(crate) fn subject<'a>(vertices: &'a WorldVertices<'a>) -> Subject<'a> {
     let geometry = vertices.0;
-    let subject = Subject { points: Some(vertices), ..Subject::from(bounds::tight(geometry)) };
+    let subject = Subject { points: Some(vertices), ..Subject::from(scene::tight(geometry)) };
     let bounds = subject.bounds;
     let is_box = !bounds.is_empty() && (bounds.max - bounds.min).is_finite();
     if !is_box || bounds.diagonal() == 0.0 || geometry.triangles() > MOST_TRIANGLES {

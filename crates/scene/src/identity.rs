@@ -1,15 +1,19 @@
 //! A number that tells whether two renders were of the same scene.
+//!
+//! What the numbers of the layers `ids` and `material_id` name: objects, nodes of models, copies and
+//! materials, all counted from 1 through the whole scene.
 
 use std::borrow::Cow;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use serde::Serialize;
 use serde_json::Value;
 use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 
-use crate::SceneError;
 use crate::cache::Digests;
+use crate::{Scene, SceneError};
 
 /// The identity of a scene: XXH3-128 (Collet, *xxHash fast digest algorithm*, 2020) of
 ///
@@ -137,5 +141,172 @@ fn canonical(value: &Value, text: &mut String) {
             text.push(']');
         }
         leaf => text.push_str(&leaf.to_string()),
+    }
+}
+
+/// The most copies of one object that are named one by one.
+const NAMED_ONE_BY_ONE: u32 = 10_000;
+
+/// A number of a layer of ids, and what it stands for.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct IdName {
+    /// The number, from 1.
+    pub id: u32,
+    /// The last number of a run of copies that are not named one by one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last: Option<u32>,
+    /// The name; may be empty.
+    pub name: String,
+    /// The number of the object that it belongs to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub object: Option<u32>,
+}
+
+/// A node of a model in the scene, or the whole of a model or shape without nodes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneNode {
+    /// Its name, else that of its object.
+    pub name: String,
+    /// Index of its object.
+    pub object: u32,
+}
+
+/// Copies of an object, or of one node of it, whose numbers follow each other.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Copies {
+    /// Index of the first.
+    pub first: u32,
+    /// How many they are, at least 1.
+    pub count: u32,
+    /// The name of what is copied.
+    pub name: String,
+    /// Index of the object.
+    pub object: u32,
+}
+
+impl Copies {
+    fn names(&self) -> Vec<IdName> {
+        let Self { first, count, ref name, object } = *self;
+        let entry = |id, last, name| IdName { id, last, name, object: Some(object + 1) };
+        match count {
+            1 => vec![entry(first + 1, None, name.clone())],
+            2..=NAMED_ONE_BY_ONE => {
+                (0..count).map(|k| entry(first + k + 1, None, format!("{name}[{k}]"))).collect()
+            }
+            _ => vec![entry(first + 1, Some(first + count), name.clone())],
+        }
+    }
+}
+
+impl Scene {
+    /// The objects by the numbers of `Id.object`.
+    #[must_use]
+    pub fn object_names(&self) -> Vec<IdName> {
+        named(&self.objects)
+    }
+
+    /// The copies by the numbers of `Id.instance`: every object has one at least. Of more than 10,000
+    /// copies of one thing, the first and the last number are given.
+    #[must_use]
+    pub fn instance_names(&self) -> Vec<IdName> {
+        self.copies.iter().flat_map(Copies::names).collect()
+    }
+
+    /// The nodes of models by the numbers of `Id.node`.
+    #[must_use]
+    pub fn node_names(&self) -> Vec<IdName> {
+        let entry = |(id, node): (u32, &SceneNode)| IdName {
+            id,
+            last: None,
+            name: node.name.clone(),
+            object: Some(node.object + 1),
+        };
+        (1..).zip(&self.nodes).map(entry).collect()
+    }
+
+    /// The materials by the numbers of `MaterialId.X`.
+    #[must_use]
+    pub fn material_names(&self) -> Vec<IdName> {
+        named(self.materials.iter().map(|material| &material.name))
+    }
+}
+
+fn named<'a>(names: impl IntoIterator<Item = &'a String>) -> Vec<IdName> {
+    let entry =
+        |(id, name): (u32, &String)| IdName { id, last: None, name: name.clone(), object: None };
+    (1..).zip(names).map(entry).collect()
+}
+
+/// Objects, nodes and copies while a scene is put together. Numbers are given in the order asked for;
+/// each error says what there is too much of.
+#[derive(Debug, Default)]
+pub(crate) struct Register {
+    pub(crate) objects: Vec<String>,
+    pub(crate) nodes: Vec<SceneNode>,
+    pub(crate) copies: Vec<Copies>,
+}
+
+impl Register {
+    /// Adds an object and returns its index.
+    pub(crate) fn object(&mut self, name: &str) -> Result<u32, &'static str> {
+        let index = next(self.objects.len(), 1).ok_or("objects")?;
+        self.objects.push(name.to_owned());
+        Ok(index)
+    }
+
+    /// Adds a node of an object and returns its index.
+    pub(crate) fn node(&mut self, name: &str, object: u32) -> Result<u32, &'static str> {
+        let index = next(self.nodes.len(), 1).ok_or("nodes")?;
+        self.nodes.push(SceneNode { name: name.to_owned(), object });
+        Ok(index)
+    }
+
+    /// Adds copies of an object and returns the index of the first.
+    pub(crate) fn copies(
+        &mut self,
+        name: &str,
+        object: u32,
+        count: usize,
+    ) -> Result<u32, &'static str> {
+        let before = self.copies.last().map_or(0, |last| last.first + last.count);
+        let first = next(before as usize, count).ok_or("instances")?;
+        // A scene may ask for no copies of an object at all.
+        if let Ok(count @ 1..) = u32::try_from(count) {
+            self.copies.push(Copies { first, count, name: name.to_owned(), object });
+        }
+        Ok(first)
+    }
+}
+
+/// `before` as an index, when `count` more after it can be counted from 1 in 32 bits.
+fn next(before: usize, count: usize) -> Option<u32> {
+    u32::try_from(before.checked_add(count)?).ok()?;
+    u32::try_from(before).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_are_counted_through_all_objects() {
+        let mut register = Register::default();
+        assert_eq!(register.copies("a", 0, 1), Ok(0));
+        assert_eq!(register.copies("b", 1, 3), Ok(1));
+        assert_eq!(register.copies("none", 2, 0), Ok(4));
+        assert_eq!(register.copies("forest", 3, 20_000), Ok(4));
+        assert_eq!(register.copies("too many", 4, u32::MAX as usize), Err("instances"));
+        let names: Vec<IdName> = register.copies.iter().flat_map(Copies::names).collect();
+        let short: Vec<_> = names.iter().map(|n| (n.id, &*n.name, n.last, n.object)).collect();
+        assert_eq!(
+            short,
+            [
+                (1, "a", None, Some(1)),
+                (2, "b[0]", None, Some(2)),
+                (3, "b[1]", None, Some(2)),
+                (4, "b[2]", None, Some(2)),
+                (5, "forest", Some(20_004), Some(4)),
+            ]
+        );
     }
 }

@@ -23,9 +23,7 @@
 //! | [`memory`] | how much memory there may be, and an account of it |
 //! | [`doctor`] | what a scene holds and what is wrong with it, without rendering |
 
-mod bounds;
 mod cache;
-pub mod cameras;
 pub mod doctor;
 pub mod error;
 pub mod escape;
@@ -33,10 +31,7 @@ mod facing;
 pub mod file;
 mod frames;
 mod identity;
-mod ids;
 pub mod import;
-mod instances;
-mod light_notes;
 mod load;
 mod materials;
 pub mod memory;
@@ -48,12 +43,11 @@ mod sniff;
 mod words;
 
 pub use cache::Cache;
-pub use cameras::{CameraOrigin, SceneCamera};
 pub use doctor::{Diagnosis, MemoryForecast};
 pub use error::SceneError;
 pub use file::{FileKind, SceneFile, SceneSpec, scene_schema};
 pub use frames::{Frame, Frames, RigCamera, Start};
-pub use identity::SceneHash;
-pub use ids::{Copies, IdName, SceneNode};
+pub use identity::{Copies, IdName, SceneHash, SceneNode};
 pub use import::{Import, ImportError, Note, NoteKind, Strictness, Wanted};
+pub use load::camera::{CameraOrigin, SceneCamera};
 pub use scene::{LoadOptions, LoadProgress, LoadStats, Scene};

@@ -1,6 +1,6 @@
 //! From a scene file to a scene: each model once, in parallel, then put together.
 
-mod camera;
+pub(crate) mod camera;
 mod objects;
 
 use std::path::PathBuf;
@@ -24,7 +24,7 @@ use crate::memory::Budget;
 use crate::parts::{Object, Parts};
 use crate::scene::{LoadOptions, LoadProgress, Scene};
 use crate::shape::{GoOn, ShapeError, ShapeSpec};
-use crate::{Cache, SceneError, light_notes};
+use crate::{Cache, SceneError};
 pub(crate) use camera::CameraFiles;
 use objects::{Origin, OriginKind, OwnParts};
 
@@ -264,7 +264,7 @@ impl SceneFile {
         notes.extend(self.unused_materials());
         notes.extend(nothing_to_draw(&geometry));
         if self.spec.picture() == Some(LayerSpec::Radiance) {
-            notes.extend(light_notes::of(&geometry, &parts.materials, &parts.lights));
+            notes.extend(objects::of(&geometry, &parts.materials, &parts.lights));
         }
         let sensor = self.sensor_behind(&camera)?;
         notes.extend(self.lens_notes(&camera, options.strictness)?);

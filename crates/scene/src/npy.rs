@@ -145,7 +145,7 @@ struct NpyHeader<'a> {
 impl<'a> NpyHeader<'a> {
     /// Reads `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4, 4), }`, keys in any order.
     fn parse(text: &'a str) -> Result<Self, String> {
-        let mut rest = Rest(text);
+        let mut rest = HeaderText(text);
         let (mut kind, mut fortran_order, mut shape) = (None, None, None);
         rest.expect('{')?;
         // A dictionary of Python's with three keys, each once.
@@ -179,9 +179,9 @@ impl<'a> NpyHeader<'a> {
 }
 
 /// The text that is still to be read.
-struct Rest<'a>(&'a str);
+struct HeaderText<'a>(&'a str);
 
-impl<'a> Rest<'a> {
+impl<'a> HeaderText<'a> {
     /// Passes over blanks and `sign`, when it comes next.
     fn takes(&mut self, sign: char) -> bool {
         self.0 = self.0.trim_ascii_start();

@@ -14,7 +14,6 @@
 
 mod division;
 mod factor;
-mod nodes;
 
 pub use factor::{Factor, Times};
 
@@ -23,9 +22,8 @@ use etendue_spectrum::{Bands, Curve, Grid, Outside, WeightedBands, rgb};
 use crate::response::{Filter, Response, filters, photons_caught, sensitive_range};
 use crate::spec::{Radiometry, SensorKind};
 use crate::{Sensor, SensorError};
-use division::Division;
+use division::{Division, Nodes, RunningSums, cell_edges, product};
 use factor::{Product, Products};
-use nodes::{Nodes, RunningSums, cell_edges, product};
 
 /// By how much of themselves electrons may differ from an integration in steps of a nanometre.
 pub const TOLERANCE: f64 = 1e-3;

@@ -39,9 +39,8 @@
 //! | [`preset`] | sensors of the trade |
 //! | [`cfa`] | colour filter arrays |
 //! | [`bands`] | the fewest spectral bands that count electrons right |
-//! | [`film`] | what a sensor is given and gives back |
+//! | [`film`] | what a sensor is given and gives back; what a sensor's own noise hides |
 //! | [`sensor`] | a sensor ready to expose, and pictures of what it saw |
-//! | [`noise_floor`] | what a sensor's own noise hides |
 //! | [`demosaic`] | missing colours |
 //! | [`dng`] | raw files |
 //! | [`emva`] | the image series of a characterisation |
@@ -52,24 +51,19 @@ pub mod approximation;
 pub mod bands;
 pub mod cfa;
 mod chain;
-mod clipping;
 pub mod demosaic;
 pub mod dng;
 pub mod emva;
 mod error;
-mod even_light;
 pub mod film;
 mod moments;
-pub mod noise_floor;
 mod normal;
 mod philox;
 pub mod photon_transfer;
 mod poisson;
 pub mod preset;
 mod presets;
-mod preview;
 mod response;
-mod responsivity;
 pub mod sensor;
 mod settings;
 pub mod spec;
@@ -77,8 +71,7 @@ pub mod spec;
 pub use bands::{BandChoice, Factor, Illumination, Times};
 pub use cfa::CfaSpec;
 pub use error::SensorError;
-pub use film::{Exposure, Film, InvalidValues, Moments, RawImage};
-pub use noise_floor::NoiseFloor;
+pub use film::{Exposure, Film, InvalidValues, Moments, NoiseFloor, RawImage};
 pub use philox::mixed_seed;
 pub use preset::{Model, Preset};
 pub use sensor::Sensor;

@@ -12,7 +12,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::clipping::{clipped, normal_cdf, normal_density};
+use crate::normal::{clipped, normal_cdf, normal_density};
 use crate::poisson::probability;
 use crate::spec::NoiseModel;
 

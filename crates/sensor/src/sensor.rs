@@ -4,12 +4,11 @@ use etendue_geometry::units::Micrometres;
 use etendue_spectrum::{Bands, Curve};
 use rayon::prelude::*;
 
-use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain};
+use crate::chain::{self, BLOCK, BlockPlace, BlockValues, Chain, Responsivity};
 use crate::film::{Exposure, Film, InvalidValues, Moments, RawImage};
 use crate::normal::pair;
 use crate::philox::{PhiloxKey, Site, Stage};
 use crate::response::Response;
-use crate::responsivity::Responsivity;
 use crate::settings::SensorSettings;
 use crate::spec::{HotPixels, NoiseModel, Radiometry, SensorSpec};
 use crate::{CfaSpec, SensorError};

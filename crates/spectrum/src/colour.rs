@@ -19,10 +19,6 @@ pub static OBSERVER: LazyLock<[Curve; 3]> = LazyLock::new(|| {
     })
 });
 
-/// Lumens in a watt of light at 555 nm: times Y of a spectrum in W·m⁻²·sr⁻¹·nm⁻¹ this is its
-/// luminance (cd·m⁻²).
-pub const LUMINOUS_EFFICACY: f64 = 683.0;
-
 /// Chromaticities (x, y) of sRGB's red, green and blue.
 pub const SRGB_PRIMARIES: [[f64; 2]; 3] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]];
 

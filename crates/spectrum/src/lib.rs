@@ -36,8 +36,7 @@
 //! | [`metal`] | metals by name
 //! | [`rgb`] | from a colour to a spectrum and back |
 //! | [`bands`] | the numbers that a ray of a render carries |
-//! | [`spread`] | wavelengths that stand for a wide band |
-//! | [`weighted`] | bands for a given light and sensor |
+//! | [`weighted`] | bands for a given light and sensor; wavelengths that stand for a wide band |
 
 pub mod bands;
 mod cie;
@@ -45,10 +44,8 @@ pub mod colour;
 pub mod curve;
 pub mod grid;
 pub mod illuminant;
-mod mallett_yuksel;
 pub mod metal;
 pub mod rgb;
-pub mod spread;
 pub mod weighted;
 
 pub use bands::{Bands, NoOverlap, Outside, VISIBLE};
@@ -56,8 +53,7 @@ pub use curve::{Curve, CurveError, integral};
 pub use grid::{Band, Grid, GridError};
 pub use illuminant::{Illuminant, IlluminantError};
 pub use metal::Metal;
-pub use spread::Spread;
-pub use weighted::WeightedBands;
+pub use weighted::{Spread, WeightedBands};
 
 /// Planck's constant (J·s), exact in the SI.
 pub const PLANCK: f64 = 6.626_070_15e-34;

@@ -1,8 +1,6 @@
 //! The window's state, and how news and input change it.
 
-mod input;
-mod looking;
-mod still;
+mod actions;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,15 +9,12 @@ use eframe::egui::{self, Context};
 use etendue::{Inspector, LensView, Options, Preview, Probe, Screen, Still, Viewpoint};
 use serde_json::Value;
 
-use crate::canvas::Canvas;
-use crate::document::{Document, Edit};
+use crate::canvas::PictureCanvas;
+use crate::document::{Document, Edit, View};
 use crate::form::Form;
-use crate::panels::{
-    self,
-    light_field::{LightField, Shows},
-    listing::Listing,
-};
-use crate::view::View;
+use crate::panels;
+use crate::panels::asking::Listing;
+use crate::panels::light_field::{LightFieldPanel, Shows};
 use crate::worker::{Kind, News, Shown, Task, Wake, Wish, Worker};
 
 /// What a click on the picture does.
@@ -33,7 +28,7 @@ pub(crate) enum Tool {
 }
 
 /// The picture that is shown.
-pub(crate) struct Picture {
+pub(crate) struct ShownPicture {
     pub(crate) screen: Screen,
     pub(crate) factor: u32,
     pub(crate) samples: Option<[u32; 2]>,
@@ -49,7 +44,7 @@ pub(crate) struct Picture {
 
 /// What was asked of a pixel.
 #[derive(Debug, Clone)]
-pub(crate) struct Asked {
+pub(crate) struct PixelQuery {
     /// Column and row coordinates (pixels from the picture's corner).
     pub(crate) place: [f64; 2],
     pub(crate) probe: Option<Probe>,
@@ -73,16 +68,16 @@ pub(crate) struct App {
     pub(crate) view: View,
     pub(crate) part: Option<String>,
     pub(crate) tool: Tool,
-    pub(crate) canvas: Canvas,
-    pub(crate) picture: Option<Picture>,
+    pub(crate) canvas: PictureCanvas,
+    pub(crate) picture: Option<ShownPicture>,
     pub(crate) inspector: Option<Inspector>,
-    pub(crate) asked: Option<Asked>,
+    pub(crate) asked: Option<PixelQuery>,
     /// The camera's lens, while its panel is open.
     pub(crate) lens: Option<Result<LensView, String>>,
     pub(crate) shows_lens: bool,
     /// The lens as the scene or its file has it, and whether that is a file's.
     pub(crate) written_lens: Option<(Value, bool)>,
-    pub(crate) light_field: LightField,
+    pub(crate) light_field: LightFieldPanel,
     /// Frames of the scene, and the one that is shown.
     pub(crate) frames: Option<usize>,
     pub(crate) frame: Option<usize>,
@@ -130,14 +125,14 @@ impl App {
             view: View::default(),
             part: None,
             tool: Tool::default(),
-            canvas: Canvas::default(),
+            canvas: PictureCanvas::default(),
             picture: None,
             inspector: None,
             asked: None,
             lens: None,
             shows_lens: false,
             written_lens: None,
-            light_field: LightField::default(),
+            light_field: LightFieldPanel::default(),
             frames: None,
             frame: None,
             error: None,
@@ -171,11 +166,11 @@ impl App {
         self.take_news(ctx);
         self.take_drops(ctx);
         self.take_shortcuts(ctx);
-        panels::bar::show(self, ctx);
-        panels::status::show(self, ctx);
+        panels::bar::show_bar(self, ctx);
+        panels::bar::show_status(self, ctx);
         panels::lens::show(self, ctx);
-        panels::scene::show(self, ctx);
-        panels::inspect::show(self, ctx);
+        panels::inspect::show_scene(self, ctx);
+        panels::inspect::show_inspect(self, ctx);
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ctx, |ui| {
             crate::canvas::show(self, ui);
         });
@@ -247,8 +242,8 @@ impl App {
             self.shows_lens |= kind == Kind::Lens;
             (self.asked, self.frame, self.part, self.error) = (None, None, None, None);
             (self.view, self.accepted) = (View::default(), None);
-            self.light_field = LightField::default();
-            self.canvas = Canvas::default();
+            self.light_field = LightFieldPanel::default();
+            self.canvas = PictureCanvas::default();
         }
         self.wish();
     }
@@ -293,7 +288,7 @@ impl App {
             }
             None => ctx.load_texture("picture", image, PIXELS),
         };
-        self.picture = Some(Picture {
+        self.picture = Some(ShownPicture {
             screen,
             factor,
             samples,

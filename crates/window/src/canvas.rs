@@ -19,7 +19,7 @@ const GESTURE: f64 = 0.5;
 
 /// How the picture is shown, and the hand on it.
 #[derive(Default)]
-pub(crate) struct Canvas {
+pub(crate) struct PictureCanvas {
     /// Points per pixel of the screen's fit; 1 shows all of the picture.
     zoom: Option<f32>,
     /// How far the picture's middle is from the canvas' (points).
@@ -34,7 +34,7 @@ pub(crate) struct Canvas {
     pub(crate) split: f32,
 }
 
-impl Canvas {
+impl PictureCanvas {
     /// Lets go of the camera.
     pub(crate) fn release(&mut self) {
         self.hand = None;
@@ -310,7 +310,7 @@ mod tests {
     #[test]
     fn a_picture_fits_into_the_canvas() {
         let canvas = Rect::from_min_size(Pos2::new(100.0, 50.0), Vec2::new(400.0, 400.0));
-        let place = Canvas::default().place(canvas, [200.0, 100.0]);
+        let place = PictureCanvas::default().place(canvas, [200.0, 100.0]);
         assert_eq!(place.center(), canvas.center());
         assert_eq!(place.size(), Vec2::new(400.0, 200.0));
     }

@@ -17,9 +17,8 @@ use etendue::{Options, Progress, Session};
 use serde_json::{Value, json};
 
 use crate::app::{App, Tool};
-use crate::document::Edit;
+use crate::document::{Edit, View};
 use crate::form::marked;
-use crate::view::View;
 
 /// How long anything may take before a test gives up.
 const PATIENCE: Duration = Duration::from_secs(60);

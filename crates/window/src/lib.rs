@@ -20,8 +20,15 @@ mod document;
 #[cfg(test)]
 mod driven;
 mod form;
-mod panels;
-mod view;
+mod panels {
+    //! What stands around the picture.
+
+    pub(crate) mod asking;
+    pub(crate) mod bar;
+    pub(crate) mod inspect;
+    pub(crate) mod lens;
+    pub(crate) mod light_field;
+}
 mod worker;
 
 use std::path::PathBuf;

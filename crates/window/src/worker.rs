@@ -15,8 +15,8 @@ use std::time::Duration;
 use etendue::{Error, Inspector, Options, Preview, Progress, Screen, Still};
 use serde_json::Value;
 
-use crate::view::View;
-use studio::Studio;
+use crate::document::View;
+use studio::PreviewRenderer;
 
 /// How often files are looked at for changes when there is nothing else to do.
 const WATCH: Duration = Duration::from_secs(1);
@@ -140,7 +140,7 @@ impl Worker {
         let shared = Arc::new(Shared::default());
         let (to, news) = channel();
         let teller = Teller { to, wake };
-        let mut studio = Studio::new(options, teller, Arc::clone(&shared));
+        let mut studio = PreviewRenderer::new(options, teller, Arc::clone(&shared));
         let thread = std::thread::Builder::new()
             .name("render".to_owned())
             // Scenes are read by recursion.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use etendue_bench::rounds::Series;
+use etendue_bench::timing::Series;
 
 /// One contestant at one question.
 #[derive(Debug, Clone)]

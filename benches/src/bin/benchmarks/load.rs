@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use etendue_bench::rounds::{Turn, take_turns, wall};
+use etendue_bench::timing::{Turn, take_turns, wall};
 use etendue_benches::effort::Effort;
 use etendue_benches::files::Format;
 use etendue_benches::meshes;

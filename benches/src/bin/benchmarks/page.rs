@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Context;
-use etendue_bench::machine;
-use etendue_bench::rounds::Series;
+use etendue_bench::timing;
+use etendue_bench::timing::Series;
 use etendue_benches::effort::Effort;
 use etendue_benches::field::names;
 
@@ -37,7 +37,7 @@ fn kept(old: &str) -> String {
 
 fn compose(effort: Effort, findings: &Findings, peers: &str) -> String {
     let mut text = String::from(HEAD);
-    for line in machine::describe().into_iter().chain([machine::checkout()]) {
+    for line in timing::describe().into_iter().chain([timing::checkout()]) {
         push(&mut text, &format!("- {line}"));
     }
     push(&mut text, &format!("- Rounds: {}, after one that is not counted", effort.rounds()));

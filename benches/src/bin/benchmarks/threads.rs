@@ -1,6 +1,6 @@
 //! Tracing on one thread and on two.
 
-use etendue_bench::rounds::{Turn, take_turns, wall};
+use etendue_bench::timing::{Turn, take_turns, wall};
 use etendue_benches::contest::time;
 use etendue_benches::effort::Effort;
 use etendue_benches::field::{Field, Rays, contestants, names};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use etendue_bench::rounds::{Turn, take_turns};
+use etendue_bench::timing::{Turn, take_turns};
 use etendue_benches::contest::{Query, time};
 use etendue_benches::effort::{Effort, in_short};
 use etendue_benches::field::{Field, Rays, Reference, contestants, names};

@@ -6,7 +6,7 @@ use anyhow::Context;
 use etendue_accel::Quality;
 use etendue_bench::accelerators::{self, Method, RENDER_WIDTH};
 use etendue_bench::hits::HitErrors;
-use etendue_bench::rays::Rays;
+use etendue_bench::hits::Rays;
 use etendue_benches::effort::Effort;
 use etendue_benches::meshes;
 use etendue_benches::rays::View;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use etendue_bench::machine;
+use etendue_bench::timing;
 use etendue_chart::{Chart, Theme};
 
 /// The folder of the charts, below that of the page.
@@ -23,7 +23,7 @@ impl Page {
         let images = folder.join(IMAGES);
         std::fs::create_dir_all(&images).with_context(|| format!("{}", images.display()))?;
         let mut text = HEAD.to_owned();
-        for line in machine::describe().into_iter().chain([machine::checkout()]) {
+        for line in timing::describe().into_iter().chain([timing::checkout()]) {
             let _ = writeln!(text, "- {line}");
         }
         let _ = writeln!(text, "- Rounds: {rounds}, unless a section says otherwise");

@@ -6,7 +6,7 @@ use anyhow::{Context, anyhow};
 use etendue_accel::Quality;
 use etendue_bench::accelerators::{self, Finding, Method, RENDER_WIDTH};
 use etendue_bench::findings::Findings;
-use etendue_bench::rays::Rays;
+use etendue_bench::hits::Rays;
 use etendue_benches::effort::Effort;
 use etendue_benches::meshes;
 use etendue_benches::rays::View;

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use etendue_bench::rounds::{Turn, take_turns, wall};
+use etendue_bench::timing::{Turn, take_turns, wall};
 use etendue_benches::effort::Effort;
 use etendue_chart::{Axis, Chart, Mark, Point, Series};
 use etendue_sensor::approximation::Deviation;

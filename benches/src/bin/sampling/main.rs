@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use clap::Parser;
-use etendue_bench::machine;
+use etendue_bench::timing;
 use etendue_chart::{Axis, Chart, Series, Theme};
 use etendue_files::Transaction;
 use etendue_render::Plan;
@@ -93,7 +93,7 @@ fn main() -> anyhow::Result<()> {
         arguments.width,
         if arguments.quick { ", at the quick scale" } else { "" }
     );
-    for line in machine::describe().into_iter().chain([machine::checkout()]) {
+    for line in timing::describe().into_iter().chain([timing::checkout()]) {
         let _ = writeln!(text, "- {line}");
     }
     let names = ["paper/fig3.json", "double-gauss.json", "sensor-noise.json"];

@@ -17,13 +17,13 @@ const WIDEST: f32 = 0.1;
 
 /// The numbers of the set bits of `mask`, which are below [`PACKET`].
 #[inline(always)]
-pub(super) fn bits(mask: u32) -> Bits {
-    Bits(mask)
+pub(super) fn bits(mask: u32) -> SetBits {
+    SetBits(mask)
 }
 
-pub(super) struct Bits(u32);
+pub(super) struct SetBits(u32);
 
-impl Iterator for Bits {
+impl Iterator for SetBits {
     type Item = usize;
 
     #[inline(always)]

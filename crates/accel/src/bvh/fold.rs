@@ -6,10 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use etendue_geometry::Geometry;
 use rayon::prelude::*;
 
-use super::arena::Arena;
 use super::wide::{
-    Cell, Child, INSTANCE_NUMBERS, LEAF_CELLS, LeafNumbers, LeafUnits, MOST_CELLS, MOST_IN_LEAF,
-    NO_CHILDREN, WideTree,
+    Arena, Cell, Child, INSTANCE_NUMBERS, LEAF_CELLS, LeafNumbers, LeafUnits, MOST_CELLS,
+    MOST_IN_LEAF, NO_CHILDREN, WideTree,
 };
 use crate::parts::{Blas, MeshTriangles};
 use crate::tree::{Ref, Tree};
@@ -242,9 +241,9 @@ impl WriteLeaf for Triangles<'_> {
 }
 
 /// Leaves of instances.
-pub(super) struct Instances;
+pub(super) struct InstanceLeafWriter;
 
-impl WriteLeaf for Instances {
+impl WriteLeaf for InstanceLeafWriter {
     fn write(&self, refs: &[Ref], numbers: &mut LeafNumbers) -> usize {
         let (leaves, _) = numbers.as_chunks_mut::<INSTANCE_NUMBERS>();
         for (leaf, r) in leaves.iter_mut().zip(refs) {

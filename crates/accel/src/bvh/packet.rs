@@ -9,18 +9,19 @@
 
 mod triangles;
 
+use std::marker::PhantomData;
+
 use etendue_geometry::RayBatch;
 use etendue_geometry::glam::DVec3;
 use pulp::NullaryFnOnce;
 
 use self::triangles::PacketTriangles;
-use super::Bvh;
 use super::bundle::{Bundle, EachRay, FEWEST, FrameRays, PACKET, bits};
 use super::lanes::{Arithmetic, Lanes};
-use super::placed::PlacedTriangles;
 use super::single::{Search, Sink, Stacks, Visit};
 use super::traverse::{Leaves, Stack, traverse};
 use super::wide::{Cell, Child, instances_of};
+use super::{Bvh, PlacedTriangles};
 use crate::nearest::Query;
 use crate::parts::Instance;
 
@@ -272,5 +273,57 @@ impl<L: Lanes, S: Sink> NullaryFnOnce for VisitTogether<'_, '_, L, S> {
             }
             packet.visit_alone(lanes, bvh, instance, together, stack);
         }
+    }
+}
+
+/// A batch of rays, with the instruction set to trace it by.
+pub(super) struct Batch<'a, L, S, F> {
+    pub(super) lanes: L,
+    pub(super) bvh: &'a Bvh,
+    pub(super) rays: &'a RayBatch,
+    /// Called with the number and the answer of every ray that can hit at all.
+    pub(super) sink: F,
+    pub(super) seen: PhantomData<S>,
+}
+
+impl<L: Lanes, S: Sink, F: FnMut(usize, S)> NullaryFnOnce for Batch<'_, L, S, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(mut self) {
+        let mut stacks = Stacks::new();
+        // A packet goes on until its last ray has found something; rays for which any hit will do are
+        // done sooner alone.
+        let together = self.rays.coherent && !S::ANY_WILL_DO;
+        let alone = if together { self.packets(&mut stacks) } else { 0 };
+        for i in alone..self.rays.len() {
+            if let Some(query) = Query::of(self.rays, i) {
+                let mut sink = S::new(query.t_max);
+                let mut search = Search {
+                    lanes: self.lanes,
+                    bvh: self.bvh,
+                    query: &query,
+                    t_max: query.t_max,
+                    sink: &mut sink,
+                    stack: &mut stacks.inner,
+                };
+                search.run(&mut stacks.outer);
+                (self.sink)(i, sink);
+            }
+        }
+    }
+}
+
+impl<L: Lanes, S: Sink, F: FnMut(usize, S)> Batch<'_, L, S, F> {
+    /// Traces as many whole packets as there are; answers how many rays that were.
+    #[inline(always)]
+    fn packets(&mut self, stacks: &mut Stacks) -> usize {
+        let mut first = 0;
+        while let Some(mut packet) = Packet::<S>::of(self.rays, first) {
+            packet.trace(self.lanes, self.bvh, stacks);
+            packet.finish(|lane, sink| (self.sink)(first + lane, sink));
+            first += PACKET;
+        }
+        first
     }
 }

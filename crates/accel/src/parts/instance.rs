@@ -3,8 +3,7 @@
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{Bounds, Geometry, MISS, Placement};
 
-use super::Layout;
-use super::frame::{Frame, reciprocal_power};
+use super::{Frame, Layout, reciprocal_power};
 
 /// A part at a place.
 #[derive(Debug, Clone)]

@@ -4,8 +4,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{AreaTest, Geometry, MISS, Positions, Transform};
 use rayon::prelude::*;
 
-use super::frame::{Frame, outward};
-use super::index;
+use super::{Frame, index, outward};
 use crate::BuildError;
 use crate::tree::Ref;
 

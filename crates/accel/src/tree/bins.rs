@@ -1,9 +1,13 @@
 //! Where a node is split: bins of centroids, and the cheapest border between them.
+//!
+//! Boxes around many things and around their centroids.
+//!
+//! Refs moved to the sides of a split.
 
+use rayon::prelude::*;
+
+use super::{CHUNK, Node, Ref, WIDE_NODE};
 use etendue_geometry::glam::Vec4;
-
-use super::Ref;
-use super::extent::{RefBounds, half_area};
 
 /// Where bins begin.
 pub(super) struct BinGrid {
@@ -144,4 +148,162 @@ impl Bins {
 #[inline]
 fn cost(edges: Vec4, count: u32, block: usize) -> f32 {
     if count == 0 { 0.0 } else { half_area(edges) * (count as usize).div_ceil(block) as f32 }
+}
+
+/// The boxes of a set of refs: around all of them, and around their centroids (times two).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RefBounds {
+    pub(super) lo: Vec4,
+    pub(super) hi: Vec4,
+    pub(super) centroid_lo: Vec4,
+    pub(super) centroid_hi: Vec4,
+}
+
+impl RefBounds {
+    pub(super) const EMPTY: Self = Self {
+        lo: Vec4::INFINITY,
+        hi: Vec4::NEG_INFINITY,
+        centroid_lo: Vec4::INFINITY,
+        centroid_hi: Vec4::NEG_INFINITY,
+    };
+
+    pub(super) fn of(refs: &[Ref]) -> Self {
+        if refs.len() >= WIDE_NODE {
+            refs.par_chunks(CHUNK).map(Self::of_chunk).reduce(|| Self::EMPTY, Self::union)
+        } else {
+            Self::of_chunk(refs)
+        }
+    }
+
+    fn of_chunk(refs: &[Ref]) -> Self {
+        let mut extent = Self::EMPTY;
+        for r in refs {
+            extent.include(r.corners());
+        }
+        extent
+    }
+
+    #[inline]
+    pub(super) fn include(&mut self, [lo, hi]: [Vec4; 2]) {
+        let centroid = lo + hi;
+        self.lo = self.lo.min(lo);
+        self.hi = self.hi.max(hi);
+        self.centroid_lo = self.centroid_lo.min(centroid);
+        self.centroid_hi = self.centroid_hi.max(centroid);
+    }
+
+    pub(super) fn include_centroids(&mut self, refs: &[Ref]) {
+        for r in refs {
+            let [lo, hi] = r.corners();
+            self.centroid_lo = self.centroid_lo.min(lo + hi);
+            self.centroid_hi = self.centroid_hi.max(lo + hi);
+        }
+    }
+
+    pub(super) fn union(self, other: Self) -> Self {
+        Self {
+            lo: self.lo.min(other.lo),
+            hi: self.hi.max(other.hi),
+            centroid_lo: self.centroid_lo.min(other.centroid_lo),
+            centroid_hi: self.centroid_hi.max(other.centroid_hi),
+        }
+    }
+
+    pub(super) fn node(&self, link: u32, count: u32) -> Node {
+        let three = |v: Vec4| v.truncate().to_array();
+        Node { lo: three(self.lo), hi: three(self.hi), link, count }
+    }
+}
+
+/// Half the surface of a box with edges `e`; the fourth component is passed over.
+#[inline]
+pub(super) fn half_area(e: Vec4) -> f32 {
+    e.x * e.y + e.y * e.z + e.z * e.x
+}
+
+/// One side of a split.
+pub(super) struct SplitSide {
+    pub(super) len: usize,
+    pub(super) extent: RefBounds,
+}
+
+/// The first and the second half of `refs`, as they stand.
+pub(super) fn halve(refs: &[Ref]) -> [SplitSide; 2] {
+    let (a, b) = refs.split_at(refs.len() / 2);
+    [a, b].map(|half| SplitSide { len: half.len(), extent: RefBounds::of(half) })
+}
+
+/// Brings the left refs to the front, in place.
+pub(super) fn partition(
+    refs: &mut [Ref],
+    grid: &BinGrid,
+    split: Split,
+    bins: &Bins,
+) -> [SplitSide; 2] {
+    let mut len = 0;
+    // Swaps whether it must or not: which side a ref goes to cannot be predicted.
+    for i in 0..refs.len() {
+        let is_left = grid.is_left(refs[i].corners(), split);
+        refs.swap(len, i);
+        len += usize::from(is_left);
+    }
+    let [mut left, mut right] = bins.sides(grid, split);
+    let (left_refs, right_refs) = refs.split_at(len);
+    left.include_centroids(left_refs);
+    right.include_centroids(right_refs);
+    [SplitSide { len, extent: left }, SplitSide { len: right_refs.len(), extent: right }]
+}
+
+/// As [`partition`], in parallel: every chunk is told where its left and right refs go.
+pub(super) fn partition_wide(
+    refs: &mut [Ref],
+    spare: &mut [Ref],
+    grid: &BinGrid,
+    split: Split,
+) -> [SplitSide; 2] {
+    // How much of each chunk goes to which side.
+    let chunks: Vec<[SplitSide; 2]> = refs
+        .par_chunks(CHUNK)
+        .map(|chunk| {
+            let mut sides =
+                [RefBounds::EMPTY, RefBounds::EMPTY].map(|extent| SplitSide { len: 0, extent });
+            for r in chunk {
+                let corners = r.corners();
+                let side = &mut sides[usize::from(!grid.is_left(corners, split))];
+                side.len += 1;
+                side.extent.include(corners);
+            }
+            sides
+        })
+        .collect();
+    let mut sides = [RefBounds::EMPTY, RefBounds::EMPTY].map(|extent| SplitSide { len: 0, extent });
+    for chunk in &chunks {
+        for (side, part) in sides.iter_mut().zip(chunk) {
+            side.len += part.len;
+            side.extent = side.extent.union(part.extent);
+        }
+    }
+    // Each chunk has a part of both sides to itself.
+    let (mut lefts, mut rights) = spare[..refs.len()].split_at_mut(sides[0].len);
+    let mut targets = Vec::with_capacity(chunks.len());
+    for [left, right] in &chunks {
+        let (mine, rest) = lefts.split_at_mut(left.len);
+        lefts = rest;
+        let (mine_right, rest) = rights.split_at_mut(right.len);
+        rights = rest;
+        targets.push((mine, mine_right));
+    }
+    refs.par_chunks(CHUNK).zip(targets).for_each(|(chunk, (left, right))| {
+        let (mut left, mut right) = (left.iter_mut(), right.iter_mut());
+        for r in chunk {
+            let side = if grid.is_left(r.corners(), split) { &mut left } else { &mut right };
+            if let Some(place) = side.next() {
+                *place = *r;
+            }
+        }
+    });
+    refs.par_chunks_mut(CHUNK).zip(spare.par_chunks(CHUNK)).for_each(|(to, from)| {
+        to.copy_from_slice(&from[..to.len()]);
+    });
+    sides
 }

@@ -3,8 +3,8 @@
 use crate::accelerators;
 use crate::cameras::Cameras;
 use crate::hits::Quantiles;
-use crate::rounds::TimeSpread;
 use crate::samplers::Samplers;
+use crate::timing::TimeSpread;
 
 /// A value in both its forms.
 #[derive(Debug, Clone, PartialEq)]

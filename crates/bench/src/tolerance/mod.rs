@@ -5,9 +5,7 @@
 //! Models are compared at places all over the picture, and at each of them at the depths that the scene
 //! itself has there.
 
-mod cost;
-mod depths;
-mod seen;
+mod pixel_views;
 mod words;
 
 use etendue_accel::Accel;
@@ -19,7 +17,7 @@ use etendue_scene::Scene;
 use etendue_spectrum::Bands;
 use serde::Serialize;
 
-use self::seen::{PlaceView, seen};
+use self::pixel_views::{PlaceView, seen};
 use crate::cameras::{self, LensModel};
 use crate::pictures::Studio;
 use crate::{BenchError, Progress};
@@ -133,7 +131,7 @@ pub fn compare(
     // The models, and the places and depths at which they are compared.
     let bands = Plan::new(scene, Outputs::ALL).bands;
     let (models, mut notes) = models(scene, &bands, tolerance)?;
-    let mut places = depths::places(scene, accel);
+    let mut places = pixel_views::places(scene, accel);
     let in_focus = scene.camera.lens().map_or(f64::INFINITY, |l| l.focused().object_distance());
     if places.iter().all(|place| place.depths.is_empty()) {
         notes.push("the camera sees no surface: compared at the distance in focus".to_owned());
@@ -154,7 +152,7 @@ pub fn compare(
     // What each costs, where there is a picture to time.
     match Studio::with_sensor(scene, accel) {
         Ok(mut studio) => {
-            let times = cost::seconds_a_sample(&mut studio, &models, progress)?;
+            let times = pixel_views::seconds_a_sample(&mut studio, &models, progress)?;
             let full = times.last().copied().unwrap_or(f64::NAN);
             for (finding, time) in findings.iter_mut().zip(times) {
                 finding.seconds_a_sample = Some(time);

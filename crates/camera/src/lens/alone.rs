@@ -4,7 +4,7 @@ use etendue_optics::train::{Focus, OpticalTrain};
 
 use super::focused::Focused;
 use super::lens_camera::LensCamera;
-use super::spec::Setup;
+use super::source::Setup;
 use crate::{CameraError, Pose, SensorSpec};
 
 /// The lens focused onto `sensor`, whose pixels have a pitch, at the world's origin.

@@ -2,11 +2,19 @@
 //!
 //! Between nodes a straight line gives slopes that are right to a millionth; Newton's method then
 //! needs a step or two to pass the stop's centre to within 10⁻⁹ mm.
+//!
+//! A camera's lenslets: which of them a place on the sensor belongs to, and the ray through its middle.
+//!
+//! The part of the sensor that light reaches: the image circle, which is no circle behind a lens
+//! without rotational symmetry.
 
 use glam::{DVec2, DVec3};
 
-use etendue_optics::element::Frame;
-use etendue_optics::train::{MonochromaticTrain, OpticalTrain};
+use super::focused::Focused;
+use crate::CameraError;
+use etendue_optics::element::{Clip, Frame, Ray, RayStatus};
+use etendue_optics::train::pupil::{Window, lit_radius};
+use etendue_optics::train::{BehindLenslets, MonochromaticTrain, OpticalTrain, Side};
 
 /// Nodes over the half diagonal, for lenses with rotational symmetry.
 const RADIAL_NODES: u32 = 257;
@@ -138,4 +146,196 @@ fn interval(share: f64, nodes: u32) -> (usize, f64) {
     )]
     let index = low as usize;
     (index, at - low)
+}
+
+/// The lenslets before a sensor, and the chief rays of the lens before them.
+#[derive(Debug, Clone)]
+pub struct LensletChiefs {
+    view: BehindLenslets,
+    sensor_z: f64,
+    /// The plane of the array's front.
+    plane: Frame,
+    table: ChiefTable,
+    main: MonochromaticTrain,
+}
+
+impl LensletChiefs {
+    /// Solves chief rays over the array; `None` when the camera does not look through lenslets.
+    pub(crate) fn new(focused: &Focused) -> Result<Option<Self>, CameraError> {
+        Self::in_train(focused, focused.train())
+    }
+
+    fn in_train(focused: &Focused, train: &OpticalTrain) -> Result<Option<Self>, CameraError> {
+        let Some(view) = train.behind_lenslets() else { return Ok(None) };
+        let fault =
+            |error: etendue_optics::glass::GlassError| CameraError::new("lens", error.to_string());
+        let main = view.main.at(view.main.wavelength()).map_err(fault)?;
+        let plane = Frame::on_axis(view.front_z);
+        let array = view.array.radius() + view.decentre.length();
+        let sensor = focused.film().half_size().length() * 1.5 + view.array.lattice.pitch;
+        let half = DVec2::splat(array.min(sensor));
+        let table = ChiefTable::new(&view.main, &plane, half, &main);
+        Ok(Some(Self { view, sensor_z: focused.sensor_z(), plane, table, main }))
+    }
+
+    /// The same as light of a wavelength (nm) has it, of a lens that stands where it is.
+    pub(crate) fn at(focused: &Focused, wavelength: f64) -> Result<Option<Self>, CameraError> {
+        let fault =
+            |error: etendue_optics::train::LensError| CameraError::new("lens", error.to_string());
+        let train = focused.train().clone().with_wavelength(wavelength).map_err(fault)?;
+        Self::in_train(focused, &train)
+    }
+
+    /// The lens before the array and the lenslets, to first order.
+    #[must_use]
+    pub fn view(&self) -> &BehindLenslets {
+        &self.view
+    }
+
+    /// z of the sensor (mm).
+    pub(crate) fn sensor_z(&self) -> f64 {
+        self.sensor_z
+    }
+
+    /// The slopes of the chief ray of the lens before at a point of the array (mm), to within 10⁻⁹ mm of
+    /// the stop's middle.
+    #[must_use]
+    pub fn chief_slopes(&self, at: DVec2) -> Option<DVec2> {
+        let direction = self.table.direction((&self.view.main, &self.plane), &self.main, at)?;
+        Some(-direction.truncate() / direction.z)
+    }
+
+    /// Where the chief ray of the lens before through a lenslet's middle meets the sensor (mm across the
+    /// axis): the middle of the image that the lenslet makes of the opening.
+    #[must_use]
+    pub fn image_centre(&self, cell: [f64; 2]) -> Option<DVec2> {
+        self.view.image_centre(cell, self.sensor_z, |at| self.chief_slopes(at))
+    }
+
+    /// The same to about a millionth of the way from pupil to array.
+    #[must_use]
+    pub fn image_centre_nearly(&self, cell: [f64; 2]) -> Option<DVec2> {
+        self.view.image_centre(cell, self.sensor_z, |at| self.table.nearly(at))
+    }
+
+    /// The slope in front of a lenslet of the ray through its middle, per distance from there to the
+    /// sensor's point (1/mm), and where it meets the rearmost array.
+    #[must_use]
+    pub fn central(&self) -> [f64; 2] {
+        self.view.sight(0, self.sensor_z).central(self.view.principal_distance(0))
+    }
+
+    /// The cell of the lenslet that a point of the sensor (mm, in lens coordinates) belongs to.
+    #[must_use]
+    pub fn own_cell(&self, film: DVec3) -> Option<[f64; 2]> {
+        self.view.own_cell(film, |at| self.table.nearly(at))
+    }
+
+    /// The direction from a point of the sensor (mm) through the middle of its own lenslet.
+    #[must_use]
+    pub(crate) fn direction(&self, film: DVec3) -> Option<DVec3> {
+        let slopes = self.view.central_slopes(film, self.own_cell(film)?);
+        Some(slopes.extend(-1.0).normalize())
+    }
+
+    /// The chief ray of the lens before through the middle of the lenslet that a point of the sensor (mm)
+    /// belongs to, on the object's side: where the picture as a whole looks there.
+    pub(crate) fn seen_from(&self, film: DVec3) -> Option<(DVec3, DVec3)> {
+        let at = self.view.centre(self.own_cell(film)?);
+        let direction = self.chief_slopes(at)?.extend(-1.0).normalize();
+        let start = Ray::new(at.extend(self.view.front_z), direction)?;
+        let end = self.main.run(Side::Sensor, Clip::Off, start);
+        (end.status == RayStatus::Exited)
+            .then(|| (end.ray.position.into(), end.ray.direction.into()))
+    }
+}
+
+/// Directions from the sensor's centre in which its edge is looked for.
+const DIRECTIONS: usize = 32;
+
+/// How far beyond the sensor's border the edge is looked for, in its distances: a line from an edge
+/// on the sensor to one far outside of it cuts nothing off.
+const BEYOND: f64 = 2.0;
+
+/// How near to the edge of the light a search comes, as a share of its distance.
+const CLOSE: f64 = 5e-3;
+
+/// How far from the sensor's centre light arrives (mm).
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum ImageCircle {
+    /// The same in all directions.
+    Circle(f64),
+    /// By direction, evenly over a full turn from +x; straight lines join them.
+    Outline(Vec<LightReach>),
+    /// Nothing is known: the centre is dark.
+    Unknown,
+}
+
+/// How far light arrives in one direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LightReach {
+    /// To its edge, or as far as was looked (mm).
+    distance: f64,
+    /// Whether it is dark behind.
+    ends: bool,
+}
+
+impl ImageCircle {
+    /// Measures it on a sensor of half width and height `half` (mm) that stands at `frame`.
+    pub(crate) fn measure(
+        train: &OpticalTrain,
+        lens: &MonochromaticTrain,
+        frame: Frame,
+        half: DVec2,
+    ) -> Self {
+        if train.is_rotationally_symmetric() {
+            let lenses = std::slice::from_ref(lens);
+            return Self::Circle(lit_radius(train, lenses, frame.vertex.z, half.length()));
+        }
+        let lit = |film: DVec2| Window::find(train, lens, frame.point(film.extend(0.0))).is_some();
+        if !lit(DVec2::ZERO) {
+            return Self::Unknown;
+        }
+        let edge = |i: usize| {
+            let axis = direction(i);
+            let border = BEYOND * (half / axis.abs()).min_element();
+            if lit(axis * border) {
+                return LightReach { distance: border, ends: false };
+            }
+            let (mut low, mut high) = (0.0, border);
+            while high - low > CLOSE * high {
+                let middle = 0.5 * (low + high);
+                if lit(axis * middle) { low = middle } else { high = middle }
+            }
+            LightReach { distance: high, ends: true }
+        };
+        Self::Outline((0..DIRECTIONS).map(edge).collect())
+    }
+
+    /// Whether light arrives at a place on the sensor (mm from its centre).
+    pub(crate) fn contains(&self, film: DVec2) -> bool {
+        match self {
+            Self::Circle(radius) => film.length() <= *radius,
+            Self::Unknown => true,
+            Self::Outline(reaches) => {
+                let turn = film.to_angle().rem_euclid(std::f64::consts::TAU);
+                let at = turn / std::f64::consts::TAU * DIRECTIONS as f64;
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "0 to the number of directions"
+                )]
+                let low = (at as usize).min(DIRECTIONS - 1);
+                let ends = [low, (low + 1) % DIRECTIONS];
+                // A place before the chord between the two edges is lit. Where both directions are
+                // lit beyond the sensor's border, so is its corner between them.
+                let [a, b] = ends.map(|i| direction(i) * reaches[i].distance);
+                !ends.iter().any(|&i| reaches[i].ends) || (b - a).perp_dot(film - a) >= 0.0
+            }
+        }
+    }
+}
+
+fn direction(i: usize) -> DVec2 {
+    DVec2::from_angle(std::f64::consts::TAU * i as f64 / DIRECTIONS as f64)
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::spec::Setup;
+use super::source::Setup;
 use crate::{CameraError, Intrinsics};
 use etendue_optics::element::Frame;
 use etendue_optics::train::analysis::chief_height;

@@ -16,10 +16,8 @@ use etendue_geometry::{RayBatch, RaysMut};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 use glam::{DVec2, DVec3};
 
-use super::chief::ChiefTable;
+use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
 use super::focused::{Focused, View};
-use super::image_circle::ImageCircle;
-use super::lenslets::LensletChiefs;
 
 use crate::{CameraError, Pose};
 use etendue_optics::element::{Clip, Ray, RayStatus, Reflection};

@@ -8,9 +8,7 @@
 //! | [`spec`] | the cameras of the scene file, and the lens files that they stand for |
 //! | [`source`] | a lens by its file or in place, and parts put on its axis |
 //! | [`focused`] | a lens and its sensor: where pixels lie, and the paraxial camera of both |
-//! | [`chief`] | the chief rays of a whole sensor |
-//! | `image_circle` | the part of the sensor that light reaches |
-//! | [`lenslets`] | which lenslet a place on the sensor belongs to |
+//! | [`chief`] | the chief rays of a whole sensor; which lenslet a place on the sensor belongs to; the part of the sensor that light reaches |
 //! | [`lens_camera`] | chief rays for data, and what is measured for pictures |
 //! | `paths` | rays of a pixel on their way through the lens |
 //! | `alone` | a lens by itself as a camera |
@@ -18,20 +16,17 @@
 
 mod alone;
 pub mod chief;
-pub mod focus_distance;
 pub mod focused;
-mod image_circle;
 pub mod lens_camera;
-pub mod lenslets;
 mod paths;
 mod rays;
 pub mod source;
 pub mod spec;
 
 pub(crate) use alone::alone;
+pub use chief::LensletChiefs;
 pub use focused::Focused;
 pub use lens_camera::{BandGroup, LensCamera};
-pub use lenslets::LensletChiefs;
 pub use source::{LensSource, PlacedSpec};
 pub use spec::{
     ChromaticRealLensCameraSpec, LensCameraSpec, RealLensCameraSpec, ThinLensCameraSpec,

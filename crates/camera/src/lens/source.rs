@@ -1,18 +1,19 @@
-//! A lens as a camera names it: a file or the lens itself; and parts put on a lens' axis.
+//! A lens as a camera names it: a file or the lens itself; parts put on a lens' axis; distances in focus; and
+//! what all cameras with a lens set up around it.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
-use crate::CameraError;
-use etendue_geometry::units::Millimetres;
-use etendue_optics::element::{ElementSpec, LensResources, Resolve, element_schema};
+use crate::{CameraError, PoseSpec, SensorSpec};
+use etendue_geometry::units::{Degrees, Metres, Millimetres};
+use etendue_optics::element::{ElementSpec, LensResources, LossesSpec, Resolve, element_schema};
 use etendue_optics::glass::AgfCatalogue;
-use etendue_optics::train::{LensError, LensFile, OpticalTrain, ZemaxLens};
+use etendue_optics::train::{Focus, LensError, LensFile, OpticalTrain, ZemaxLens};
 
 /// The longest text that is read as a lens (bytes).
 const LONGEST: u64 = 16 << 20;
@@ -128,5 +129,68 @@ impl JsonSchema for PlacedSpec {
         at.insert("description".to_owned(), about.into());
         let keys = Map::from_iter([("at".to_owned(), at.to_value())]);
         element_schema(generator, keys, &["thickness"])
+    }
+}
+
+/// The distance of what is in focus (m); a file may write "infinity".
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FocusDistance(pub f64);
+
+/// How files write an object at infinity.
+const INFINITY: [&str; 2] = ["infinity", "inf"];
+
+impl Serialize for FocusDistance {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0 == f64::INFINITY {
+            true => serializer.serialize_str(INFINITY[0]),
+            false => Metres(self.0).serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for FocusDistance {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = serde_json::Value::deserialize(deserializer)?;
+        if value.as_str().is_some_and(|text| INFINITY.contains(&text.trim())) {
+            return Ok(Self(f64::INFINITY));
+        }
+        Metres::deserialize(value).map(|metres| Self(metres.0)).map_err(D::Error::custom)
+    }
+}
+
+impl JsonSchema for FocusDistance {
+    fn schema_name() -> Cow<'static, str> {
+        "FocusDistance".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut schema = Metres::json_schema(generator);
+        let about = "A number in m, a string with a unit, or \"infinity\".";
+        schema.insert("description".to_owned(), about.into());
+        schema.insert("x-also".to_owned(), INFINITY.as_slice().into());
+        schema
+    }
+}
+
+/// What the cameras with a lens have in common.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Setup<'a> {
+    pub(crate) f_number: Option<f64>,
+    pub(crate) focus: Option<Focus>,
+    pub(crate) fov: Option<f64>,
+    pub(crate) sensor_height: Option<f64>,
+    pub(crate) sensor_tilt: [Degrees; 2],
+    pub(crate) sensor_decentre: [Millimetres; 2],
+    pub(crate) losses: LossesSpec,
+    pub(crate) pose: Option<&'a PoseSpec>,
+    pub(crate) sensor: &'a SensorSpec,
+}
+
+impl Setup<'_> {
+    /// Counts `sensor_distance` from a vertex that is `reach` (mm) in front of the last element's.
+    pub(super) fn measure_past(&mut self, reach: f64) {
+        if let Some(Focus::Sensor(distance)) = &mut self.focus {
+            *distance -= reach;
+        }
     }
 }

@@ -3,11 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::focus_distance::FocusDistance;
 use super::focused::{Focused, View, positive};
 use super::lens_camera::LensCamera;
-use super::source::{LensSource, PlacedSpec, in_camera};
-use crate::framing::{self, Reach, Subject};
+use super::source::{FocusDistance, LensSource, PlacedSpec, Setup, in_camera};
+use crate::framing::{self, FieldExtent, Subject};
 use crate::{CameraError, Pose, PoseSpec, SensorSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_optics::element::{
@@ -15,29 +14,6 @@ use etendue_optics::element::{
 };
 use etendue_optics::glass::GlassSpec;
 use etendue_optics::train::{Focus, LensFile, OpticalTrain};
-
-/// What the cameras with a lens have in common.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Setup<'a> {
-    pub(crate) f_number: Option<f64>,
-    pub(crate) focus: Option<Focus>,
-    pub(crate) fov: Option<f64>,
-    pub(crate) sensor_height: Option<f64>,
-    pub(crate) sensor_tilt: [Degrees; 2],
-    pub(crate) sensor_decentre: [Millimetres; 2],
-    pub(crate) losses: LossesSpec,
-    pub(crate) pose: Option<&'a PoseSpec>,
-    pub(crate) sensor: &'a SensorSpec,
-}
-
-impl Setup<'_> {
-    /// Counts `sensor_distance` from a vertex that is `reach` (mm) in front of the last element's.
-    fn measure_past(&mut self, reach: f64) {
-        if let Some(Focus::Sensor(distance)) = &mut self.focus {
-            *distance -= reach;
-        }
-    }
-}
 
 /// How far (mm) parts on the axis reach behind the lens' last vertex at z = `rear`.
 fn reach_behind(elements: &[PlacedSpec], rear: f64) -> f64 {
@@ -249,7 +225,7 @@ fn frame(subject: Subject<'_>, lens: &LensCamera, setup: &Setup<'_>) -> Pose {
             // 60° off the axis, as for distorted pinholes.
             let widest = 3_f64.sqrt();
             let size = setup.sensor.resolution.map(f64::from);
-            let reach = Reach::of_picture(size, k.centre, widest, |u, v| lens.tangents(u, v));
+            let reach = FieldExtent::of_picture(size, k.centre, widest, |u, v| lens.tangents(u, v));
             framing::perspective(subject, reach)
         }
         View::Parallel { .. } => framing::orthographic(subject, setup.sensor.aspect()).0,

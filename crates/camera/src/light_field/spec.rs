@@ -10,9 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::LightField;
 use crate::framing::Subject;
-use crate::lens::focus_distance::FocusDistance;
-use crate::lens::source::{PlacedSpec, in_camera};
-use crate::lens::spec::{Setup, ThinLensCameraSpec, place};
+use crate::lens::source::{FocusDistance, PlacedSpec, Setup, in_camera};
+use crate::lens::spec::{ThinLensCameraSpec, place};
 use crate::lens::{LensCamera, LensSource};
 use crate::{CameraError, Pose, PoseSpec, SensorSpec};
 use etendue_geometry::units::{Degrees, Millimetres};

@@ -11,14 +11,11 @@
 //! stays within its tolerance.
 
 mod models;
-mod sights;
-mod solve;
 mod words;
 
 use serde::Serialize;
 
 use self::models::OpencvModel;
-use self::sights::{COUNT, PixelSight, sights};
 use crate::distortion::Distortion;
 use crate::lens::focused::View;
 use crate::{
@@ -27,6 +24,7 @@ use crate::{
 };
 use etendue_geometry::Bounds;
 use etendue_geometry::units::Micrometres;
+use models::{COUNT, PixelSight, sights};
 
 /// Rings of the picture for which the residuals are told.
 const RINGS: u32 = 8;

@@ -3,6 +3,7 @@
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use etendue_bench::tolerance::Tolerance;
 use etendue_geometry::units::Dimension;
+use etendue_optics::train::Focus;
 use etendue_scene::file::AccelName;
 use etendue_tracer::LayerSpec;
 
@@ -158,4 +159,21 @@ pub(super) fn tolerance(text: &str) -> Result<Tolerance, String> {
     let light = light.trim().strip_suffix('%').ok_or_else(wrong)?;
     let percent = positive(light.trim()).ok_or_else(wrong)?;
     Ok(Tolerance { pixels: pixels(places)?, light: Some(percent / 100.0) })
+}
+
+/// `1.2 m`, a plain number of metres, or `infinity`.
+pub(super) fn focus(text: &str) -> Result<Focus, String> {
+    let text = text.trim();
+    if ["infinity", "inf"].contains(&text) {
+        return Ok(Focus::Infinity);
+    }
+    let metres = match text.parse::<f64>() {
+        Ok(number) => number,
+        Err(_) => Dimension::Length.parse(text, "m").map_err(|error| error.to_string())?,
+    };
+    if metres > 0.0 && metres.is_finite() {
+        Ok(Focus::Distance(metres))
+    } else {
+        Err("expected a distance above 0, such as \"1.2 m\", or infinity".to_owned())
+    }
 }

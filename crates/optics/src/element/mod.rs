@@ -1,57 +1,52 @@
 //! The parts of a lens. Each file holds one part: how a lens file writes it, and what it does.
 //!
 //! To add a part: its own file, and a variant of [`Part`] and [`PartSpec`] in `part.rs`.
+//!
+//! Where an element stands: on the axis, or tilted and decentred.
+//!
+//! What a lens takes from outside its own text.
 
 pub(crate) mod aperture;
-mod asphere;
 mod biconic;
 mod crossings;
-mod filter;
-mod frame;
 mod lattice;
 mod lenslets;
 mod losses;
 mod microlens_array;
 mod newton;
 mod part;
-mod picture;
 mod rays;
 mod refract;
-mod resources;
 mod step;
 mod surface;
-mod thin_lens;
 
 use std::borrow::Cow;
+use std::path::PathBuf;
 
+use glam::{DMat3, DVec3};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
+use crate::glass::AgfCatalogue;
 use etendue_geometry::units::{Degrees, Millimetres};
 
-pub use aperture::{ApertureSpec, CircularSpec, MaskSpec, Opening, PolygonSpec};
+pub use aperture::{ApertureSpec, CircularSpec, MaskSpec, Opening, Picture, PolygonSpec};
 pub use biconic::{Biconic, BiconicSpec};
-pub use filter::{Filter, FilterSpec};
-pub use frame::Frame;
 pub use lattice::{Grid, Lattice, LatticeCell};
-pub use losses::{Coating, LossesSpec, Plain, Reflection};
+pub(crate) use losses::Loss;
+pub use losses::{Coating, Filter, FilterSpec, LossesSpec, Plain, Reflection};
 pub use microlens_array::{
     Gaps, Lenslet, LensletShape, LensletSpec, MicrolensArray, MicrolensArraySpec, clipped,
 };
 pub use part::{Part, PartSpec, Symbol};
-pub use picture::Picture;
-pub use rays::{LensRays, RayStatus, StatusCounts};
-pub use resources::{GlassesAlone, LensResources, Resolve};
-pub use step::Clip;
-pub use surface::{Surface, SurfaceSpec};
-pub use thin_lens::{ThinLens, ThinLensSpec};
-
-pub(crate) use losses::Loss;
-pub use rays::{Block, LANES, Ray};
+pub use rays::{Block, LANES, LensRays, Ray, RayStatus, StatusCounts};
 pub(crate) use refract::Refraction;
+pub use refract::{ThinLens, ThinLensSpec};
+pub use step::Clip;
 pub(crate) use step::{Action, Step};
+pub use surface::{Surface, SurfaceSpec};
 
 /// An element of a lens file: a part, and how it is mounted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -188,6 +183,101 @@ fn mount_on(schema: &mut Value, keys: &Map<String, Value>, required: &[Value]) {
     schema.insert("additionalProperties".to_owned(), Value::Bool(false));
 }
 
+/// An element's place in lens coordinates (mm). The element is moved across the axis first and then
+/// turned about its own vertex.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// The vertex.
+    pub vertex: DVec3,
+    /// From the element's frame to lens coordinates: about x first, then about the element's y.
+    pub rotation: DMat3,
+}
+
+impl Frame {
+    /// On the axis at `z`.
+    #[must_use]
+    pub fn on_axis(z: f64) -> Self {
+        Self { vertex: DVec3::new(0.0, 0.0, z), rotation: DMat3::IDENTITY }
+    }
+
+    /// Moved by `decentre` (mm) across the axis and turned by `tilt` (degrees) about the x and y
+    /// axes, right-handed.
+    #[must_use]
+    pub fn placed(z: f64, decentre: [f64; 2], tilt: [f64; 2]) -> Self {
+        let [about_x, about_y] = tilt.map(f64::to_radians);
+        Self {
+            vertex: DVec3::new(decentre[0], decentre[1], z),
+            rotation: DMat3::from_rotation_x(about_x) * DMat3::from_rotation_y(about_y),
+        }
+    }
+
+    /// Whether the element is centred on the axis and square to it.
+    #[must_use]
+    pub fn is_axial(&self) -> bool {
+        self.rotation == DMat3::IDENTITY && self.vertex.x == 0.0 && self.vertex.y == 0.0
+    }
+
+    /// A point of the element's frame in lens coordinates.
+    #[must_use]
+    pub fn point(&self, local: DVec3) -> DVec3 {
+        self.vertex + self.rotation * local
+    }
+
+    pub(crate) fn enter(&self, ray: Ray) -> Ray {
+        let turned = self.rotation.transpose();
+        Ray {
+            position: (turned * (DVec3::from(ray.position) - self.vertex)).to_array(),
+            direction: (turned * DVec3::from(ray.direction)).to_array(),
+        }
+    }
+
+    pub(crate) fn leave(&self, ray: Ray) -> Ray {
+        Ray {
+            position: self.point(ray.position.into()).to_array(),
+            direction: (self.rotation * DVec3::from(ray.direction)).to_array(),
+        }
+    }
+}
+
+/// The files that a lens names, and catalogues of glasses that its user adds. A function from a file's name to
+/// its path stands for files alone.
+pub trait LensResources {
+    /// Where a file is that the lens names.
+    ///
+    /// # Errors
+    ///
+    /// A sentence on why it may not be read.
+    fn path(&self, name: &str) -> Result<PathBuf, String>;
+
+    /// Catalogues in which glasses are looked up before the built-in one, the last before the others.
+    fn glasses(&self) -> &[AgfCatalogue] {
+        &[]
+    }
+}
+
+impl<F: Fn(&str) -> Result<PathBuf, String>> LensResources for F {
+    fn path(&self, name: &str) -> Result<PathBuf, String> {
+        self(name)
+    }
+}
+
+/// Catalogues of glasses for lenses that name no files.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct GlassesAlone<'a>(pub &'a [AgfCatalogue]);
+
+impl LensResources for GlassesAlone<'_> {
+    fn path(&self, name: &str) -> Result<PathBuf, String> {
+        Err(format!("{name}: a lens of this kind has no files"))
+    }
+
+    fn glasses(&self) -> &[AgfCatalogue] {
+        self.0
+    }
+}
+
+/// How lenses that are built get at what is outside of their text.
+pub type Resolve<'a> = &'a dyn LensResources;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -204,7 +294,7 @@ mod tests {
     fn elements_read_as_the_design_writes_them() {
         let surface = read(
             r#"{ "type": "surface", "radius": 84.83, "thickness": 0.12, "semi_diameter": 12.6,
-                 "conic": -0.5, "aspheric": { "4": 1e-6 }, "tilt": [1, "30 arcmin"] }"#,
+             "conic": -0.5, "aspheric": { "4": 1e-6 }, "tilt": [1, "30 arcmin"] }"#,
         )
         .unwrap();
         assert_eq!(surface.mount.thickness, Millimetres(0.12));
@@ -213,7 +303,7 @@ mod tests {
         assert_eq!(spec.aspheric["4"], 1e-6);
         let stop = read(
             r#"{ "type": "aperture", "shape": "circular", "radius": 8.55, "thickness": 4.5,
-                 "stop": true }"#,
+             "stop": true }"#,
         );
         assert_eq!(stop.unwrap(), ElementSpec::new(PartSpec::circular(8.55), 4.5).as_stop());
         assert!(read(r#"{"type": "thin_lens", "focal_length": "50 mm"}"#).is_ok());
@@ -250,5 +340,21 @@ mod tests {
         assert!(error(stop).contains("invalid type: string \"yes\""), "{}", error(stop));
         let thick = r#"{"type": "surface", "thickness": "3 mn"}"#;
         assert!(error(thick).contains("unknown unit `mn`"), "{}", error(thick));
+    }
+
+    #[test]
+    fn tilts_turn_about_the_vertex_and_come_back() {
+        let frame = Frame::placed(10.0, [1.0, 2.0], [30.0, -10.0]);
+        assert_eq!(frame.point(DVec3::ZERO), DVec3::new(1.0, 2.0, 10.0));
+        // A turn about x by a right angle takes +z to −y.
+        let quarter = Frame::placed(0.0, [0.0; 2], [90.0, 0.0]);
+        assert!((quarter.point(DVec3::Z) + DVec3::Y).length() < 1e-15);
+        let ray = Ray { position: [3.0, -1.0, 4.0], direction: [0.6, 0.0, 0.8] };
+        let back = frame.leave(frame.enter(ray));
+        for axis in 0..3 {
+            assert!((back.position[axis] - ray.position[axis]).abs() < 1e-14);
+            assert!((back.direction[axis] - ray.direction[axis]).abs() < 1e-15);
+        }
+        assert!(!frame.is_axial() && Frame::on_axis(3.0).is_axial());
     }
 }

@@ -6,17 +6,15 @@
 
 use std::sync::Arc;
 
+use super::Frame;
 use super::aperture::{Opening, in_circle, in_polygon};
 use super::biconic::Biconic;
 use super::crossings::{Slopes, cross_first, cross_first_after};
-use super::filter::Filter;
-use super::frame::Frame;
 use super::lenslets::Lenslets;
-use super::losses::Loss;
+use super::losses::{Filter, Loss};
 use super::newton::{Profile, cross_block};
 use super::rays::{Block, LANES, PENDING, Ray, RayStatus};
-use super::refract::{Media, Refracted, Refraction, each_lane};
-use super::thin_lens::at_thin_lens;
+use super::refract::{Media, Refracted, Refraction, at_thin_lens, each_lane};
 
 /// Whether clear apertures stop rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -5,8 +5,7 @@ use std::sync::LazyLock;
 
 use super::agf::AgfCatalogue;
 use super::dispersion::Dispersion;
-use super::names;
-use super::{Glass, GlassError};
+use super::{Glass, GlassError, agf};
 
 /// Glasses of today, of yesterday and of other makers, and what is no glass.
 static TABLES: [&str; 3] =
@@ -94,7 +93,7 @@ impl Catalogue {
         let found: Vec<Entry> = self.entries(plain).iter().filter(of_maker).copied().collect();
         let rank = |entry: &Entry| makers.0.iter().position(|m| entry.is_made_by(m));
         let Some(&chosen) = found.iter().min_by_key(|e| rank(e).unwrap_or(usize::MAX)) else {
-            return names::coded(name).ok_or_else(|| self.unknown(name, &[]));
+            return agf::coded(name).ok_or_else(|| self.unknown(name, &[]));
         };
         let mut glass = chosen.glass(plain)?;
         let others = found.iter().filter(|entry| entry.maker() != chosen.maker());
@@ -107,7 +106,7 @@ impl Catalogue {
         let plain = name.split_once(':').map_or(name, |(_, plain)| plain);
         let known: &BTreeMap<&str, Vec<Entry>> = &self.lines;
         let all = known.keys().copied().chain(own.iter().flat_map(AgfCatalogue::names));
-        GlassError::Unknown { name: name.to_owned(), nearest: names::similar(plain, all) }
+        GlassError::Unknown { name: name.to_owned(), nearest: agf::similar(plain, all) }
     }
 }
 

@@ -5,7 +5,6 @@
 mod agf;
 mod catalogue;
 mod dispersion;
-mod names;
 
 use std::borrow::Cow;
 use std::fmt;
@@ -24,7 +23,7 @@ pub use dispersion::{Dispersion, FRAUNHOFER_C, FRAUNHOFER_D, FRAUNHOFER_F};
 #[non_exhaustive]
 pub enum GlassError {
     /// A name that no catalogue has.
-    #[error("unknown glass \"{name}\"; {}", names::offer(nearest))]
+    #[error("unknown glass \"{name}\"; {}", agf::offer(nearest))]
     Unknown {
         /// The name.
         name: String,

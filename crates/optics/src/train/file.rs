@@ -1,13 +1,21 @@
 //! The lens file: elements from the object side to the sensor, in millimetres.
+//!
+//! Rays given one by one, and their way through a lens point by point: what is compared with other
+//! optical software.
 
 use std::borrow::Cow;
+use std::fmt;
 
+use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Element, LensError, MOST_ELEMENTS, OpticalTrain, remove_notes};
-use crate::element::{ElementSpec, Frame, LossesSpec, PartSpec, Resolve};
-use crate::glass::{AgfCatalogue, FRAUNHOFER_D, Glass};
+use super::{
+    Element, LensError, MOST_ELEMENTS, MonochromaticTrain, OpticalTrain, RayPath, Side,
+    remove_notes,
+};
+use crate::element::{Clip, ElementSpec, Frame, LossesSpec, PartSpec, RayStatus, Resolve};
+use crate::glass::{AgfCatalogue, FRAUNHOFER_D, Glass, GlassError};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
 
 /// A lens as its file writes it.
@@ -170,5 +178,251 @@ fn behind(
         }
         Some(None) => Ok(Glass::air()),
         None => Ok(media[index].clone()),
+    }
+}
+
+/// The farthest that a ray may start (mm). A double's steps are a tenth of a millimetre there.
+const FARTHEST: f64 = 1e15;
+
+/// The most sentences on wavelengths out of range.
+const MOST_TOLD: usize = 20;
+
+/// Rays as their file writes them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RaysFile {
+    /// The side of the lens that the rays come from.
+    pub from: Side,
+    /// Whether semi-diameters, apertures and opaque filters stop rays.
+    pub clip: bool,
+    /// The rays.
+    pub rays: Vec<GivenRay>,
+}
+
+/// One ray.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GivenRay {
+    /// Where it starts, in lens coordinates (mm).
+    pub origin: [f64; 3],
+    /// Where it goes, of any length but 0.
+    pub direction: [f64; 3],
+    /// Its wavelength in air (nm).
+    pub wavelength: f64,
+}
+
+/// What became of the rays, in their order.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TracedRays {
+    /// One for each ray.
+    pub rays: Vec<TracedRay>,
+    /// Glasses and filters that are not stated for one of the rays' wavelengths, in sentences.
+    #[serde(skip)]
+    pub out_of_range: Vec<String>,
+}
+
+/// What became of one ray.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TracedRay {
+    /// How it ended.
+    pub status: StatusName,
+    /// The element at which it ended, from 0 on the object side; `null` when it exited.
+    pub element: Option<usize>,
+    /// Where it met each element that it reached (mm), in the order in which it met them.
+    pub points: Vec<[f64; 3]>,
+    /// Its unit direction behind the last element; `null` unless it exited.
+    pub direction: Option<[f64; 3]>,
+}
+
+/// A status without its element.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StatusName {
+    /// It left the lens.
+    Exited,
+    /// It does not meet the element.
+    Missed,
+    /// It met the element from the denser side at too small an angle.
+    TotalInternalReflection,
+    /// It met the element where that is opaque.
+    Vignetted,
+}
+
+/// A ray that cannot be traced.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("rays[{index}].{key}: {why}")]
+pub struct RayError {
+    /// Which ray, from 0.
+    pub index: usize,
+    /// Its key.
+    pub key: &'static str,
+    /// What is wrong with it, and what would do.
+    pub why: String,
+}
+
+impl OpticalTrain {
+    /// Traces each ray of a file.
+    ///
+    /// # Errors
+    ///
+    /// When a ray has no direction, no finite place or no wavelength, or a glass has no index at its
+    /// wavelength.
+    pub fn trace_file(&self, file: &RaysFile) -> Result<TracedRays, RayError> {
+        let clip = if file.clip { Clip::On } else { Clip::Off };
+        let mut rays = Vec::with_capacity(file.rays.len());
+        let mut lens: Option<MonochromaticTrain> = None;
+        let mut wavelengths: Vec<f64> = Vec::new();
+        for (index, ray) in file.rays.iter().enumerate() {
+            let error = |(key, why)| RayError { index, key, why };
+            let [origin, direction] = ray.checked().map_err(error)?;
+            // Files are mostly sorted by wavelength.
+            let known = lens.take().filter(|at| at.wavelength() == ray.wavelength);
+            let at = match known {
+                Some(at) => at,
+                None => {
+                    if wavelengths.len() < MOST_TOLD && !wavelengths.contains(&ray.wavelength) {
+                        wavelengths.push(ray.wavelength);
+                    }
+                    self.at(ray.wavelength)
+                        .map_err(|why: GlassError| error(("wavelength", why.to_string())))?
+                }
+            };
+            rays.push(at.path(file.from, clip, origin, direction).into());
+            lens = Some(at);
+        }
+        Ok(TracedRays { rays, out_of_range: self.outside_of_range(&wavelengths) })
+    }
+}
+
+impl GivenRay {
+    /// Its origin and direction, or its key that is wrong and why.
+    fn checked(&self) -> Result<[DVec3; 2], (&'static str, String)> {
+        let [origin, direction] = [self.origin, self.direction].map(DVec3::from);
+        if !origin.abs().cmple(DVec3::splat(FARTHEST)).all() {
+            let why = format!(
+                "{:?} is farther than {FARTHEST:e} mm; start the ray nearer to the lens",
+                self.origin
+            );
+            return Err(("origin", why));
+        }
+        if !direction.is_finite() || direction == DVec3::ZERO {
+            let why = format!("{:?} is no direction; it must be finite and not 0", self.direction);
+            return Err(("direction", why));
+        }
+        if !(self.wavelength > 0.0 && self.wavelength.is_finite()) {
+            let why = format!("{} nm is no wavelength; it must be positive", self.wavelength);
+            return Err(("wavelength", why));
+        }
+        Ok([origin, direction])
+    }
+}
+
+impl From<RayPath> for TracedRay {
+    fn from(path: RayPath) -> Self {
+        let status = match path.status {
+            RayStatus::Exited => StatusName::Exited,
+            RayStatus::Missed { .. } => StatusName::Missed,
+            RayStatus::TotalInternalReflection { .. } => StatusName::TotalInternalReflection,
+            RayStatus::Vignetted { .. } => StatusName::Vignetted,
+        };
+        Self {
+            status,
+            element: path.status.element(),
+            points: path.points.iter().map(DVec3::to_array).collect(),
+            direction: path.direction.map(|d| d.to_array()),
+        }
+    }
+}
+
+impl fmt::Display for TracedRays {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let place = |[x, y, z]: [f64; 3]| format!("({x}, {y}, {z})");
+        for (i, ray) in self.rays.iter().enumerate() {
+            match ray.element {
+                None => writeln!(f, "ray {i}: {}", ray.status)?,
+                Some(element) => writeln!(f, "ray {i}: {} element {element}", ray.status)?,
+            }
+            for point in &ray.points {
+                writeln!(f, "  at {}", place(*point))?;
+            }
+            if let Some(direction) = ray.direction {
+                writeln!(f, "  towards {}", place(direction))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for StatusName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Exited => "exited",
+            Self::Missed => "missed",
+            Self::TotalInternalReflection => "totally reflected at",
+            Self::Vignetted => "vignetted at",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::LensFile;
+
+    fn lens() -> OpticalTrain {
+        let file = LensFile::from_json(
+            r#"{"elements": [
+            {"type": "surface", "radius": 20, "thickness": 4, "glass": "N-BK7",
+             "semi_diameter": 8},
+            {"type": "surface"}]}"#,
+        );
+        file.unwrap().build(&|name: &str| Err(name.to_owned())).unwrap()
+    }
+
+    fn rays(json: &str) -> RaysFile {
+        serde_json::from_str(json).unwrap()
+    }
+
+    #[test]
+    fn fates_points_and_directions_are_those_of_the_format() {
+        let file = rays(
+            r#"{"from": "object", "clip": true, "rays": [
+            {"origin": [0, 0, -5], "direction": [0, 0, 9], "wavelength": 587.56},
+            {"origin": [0, 9, -5], "direction": [0, 0, 1], "wavelength": 486.13},
+            {"origin": [0, 25, -5], "direction": [0, 0, 1], "wavelength": 486.13}]}"#,
+        );
+        let traced = serde_json::to_value(lens().trace_file(&file).unwrap()).unwrap();
+        let sag = 20.0 - 319.0_f64.sqrt();
+        assert_eq!(traced["rays"][0]["status"], "exited");
+        assert_eq!(traced["rays"][0]["element"], serde_json::Value::Null);
+        assert_eq!(
+            traced["rays"][0]["points"],
+            serde_json::json!([[0.0, 0.0, 0.0], [0.0, 0.0, 4.0]])
+        );
+        assert_eq!(traced["rays"][0]["direction"], serde_json::json!([0.0, 0.0, 1.0]));
+        assert_eq!(traced["rays"][1]["status"], "vignetted");
+        assert_eq!(traced["rays"][1]["element"], 0);
+        let z = traced["rays"][1]["points"][0][2].as_f64().unwrap();
+        assert!((z - sag).abs() < 1e-14, "two roundings of a number near 20: {z}");
+        assert_eq!(traced["rays"][1]["direction"], serde_json::Value::Null);
+        assert_eq!(traced["rays"][2]["status"], "missed");
+        assert_eq!(traced["rays"][2]["points"], serde_json::json!([]));
+    }
+
+    #[test]
+    fn what_is_no_ray_is_refused_by_its_index_and_key() {
+        let error = |origin: [f64; 3], direction: [f64; 3], wavelength: f64| {
+            let ray = GivenRay { origin, direction, wavelength };
+            let file = RaysFile { from: Side::Sensor, clip: false, rays: vec![ray] };
+            lens().trace_file(&file).unwrap_err().to_string()
+        };
+        let (start, along) = ([0.0, 0.0, 9.0], [0.0, 0.0, -1.0]);
+        assert!(error([0.0, f64::NAN, 0.0], along, 500.0).starts_with("rays[0].origin"));
+        assert!(error([0.0, 1e16, 0.0], along, 500.0).contains("nearer"));
+        assert!(error(start, [0.0; 3], 500.0).starts_with("rays[0].direction"));
+        assert!(error(start, [0.0, f64::INFINITY, 1.0], 500.0).contains("finite"));
+        assert!(error(start, along, 0.0).starts_with("rays[0].wavelength"));
+        // On N-BK7's resonance in the infrared.
+        assert!(error(start, along, 10_170.0).contains("N-BK7"));
     }
 }

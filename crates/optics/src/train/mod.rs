@@ -2,7 +2,7 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | [`file`](mod@file) | the lens file |
+//! | [`file`](mod@file) | the lens file; given rays, point by point |
 //! | [`trace`] | rays through the train, in batches or one by one |
 //! | [`lenslets`] | arrays of lenslets: the lens without them, and the lens as each lenslet sees it |
 //! | [`paraxial`] | focal lengths, principal planes and pupils |
@@ -13,7 +13,6 @@
 //! | [`pupil`] | the exit pupil as seen from the sensor, and samples of it |
 //! | [`report`] | all of it in one piece |
 //! | [`drawing`] | pictures of it |
-//! | [`rays_file`] | given rays, point by point |
 //! | [`zemax`] | lenses from Zemax files |
 
 pub mod aim;
@@ -22,11 +21,9 @@ pub mod drawing;
 pub mod file;
 pub mod focus;
 pub mod lenslets;
-pub mod notes;
 pub mod opening;
 pub mod paraxial;
 pub mod pupil;
-pub mod rays_file;
 pub mod report;
 pub mod trace;
 pub mod zemax;
@@ -40,15 +37,13 @@ pub const MOST_ELEMENTS: usize = 1000;
 
 pub use crate::element::Part;
 pub use aim::ChiefRay;
-pub use file::{LensFile, SensorMount};
+pub use file::{GivenRay, LensFile, RayError, RaysFile, SensorMount, TracedRays};
 pub use focus::{Focus, FocusError};
 pub use lenslets::BehindLenslets;
-pub use notes::{NOTES, remove_notes};
 pub use opening::WidestOpening;
 pub use paraxial::{Paraxial, Pupil};
 pub use pupil::{ExitPupil, ExitPupilError, PupilSample};
-pub use rays_file::{GivenRay, RayError, RaysFile, TracedRays};
-pub use report::{Inquiry, LensReport, ReportError};
+pub use report::{Inquiry, LensReport, NOTES, ReportError, remove_notes};
 pub use trace::{MonochromaticTrain, RayPath, Registers, Side};
 pub use zemax::{ZemaxError, ZemaxLens};
 

@@ -34,7 +34,7 @@ pub struct WidestOpening {
 
 /// Where a beam ends.
 #[derive(Debug, Clone, Copy)]
-enum Edge {
+enum RimEdge {
     /// Not before the last ray that was looked at.
     Open,
     /// At a place of the stop.
@@ -86,10 +86,10 @@ impl OpticalTrain {
             let widest = 1.5 * self.lateral_scale() / depth;
             self.edge_of_rays(&at, Side::Sensor, converging, widest)
         });
-        let edges = [from_object, from_sensor.unwrap_or(Edge::Open)].into_iter();
+        let edges = [from_object, from_sensor.unwrap_or(RimEdge::Open)].into_iter();
         let ended = edges.filter_map(|edge| match edge {
-            Edge::Open => None,
-            Edge::At { stop_radius, element } => Some((stop_radius, element)),
+            RimEdge::Open => None,
+            RimEdge::At { stop_radius, element } => Some((stop_radius, element)),
         });
         ended.min_by(|a, b| a.0.total_cmp(&b.0))
     }
@@ -101,7 +101,7 @@ impl OpticalTrain {
         from: Side,
         ray: impl Fn(f64) -> (DVec3, DVec3),
         limit: f64,
-    ) -> Option<Edge> {
+    ) -> Option<RimEdge> {
         let ended = |i: f64| {
             let (position, direction) = ray(i);
             match at.path(from, Clip::On, position, direction).status {
@@ -118,7 +118,7 @@ impl OpticalTrain {
         let step = limit / f64::from(RAYS);
         let Some(first) = (1..=RAYS).map(|i| step * f64::from(i)).find(|&i| ended(i).is_some())
         else {
-            return Some(Edge::Open);
+            return Some(RimEdge::Open);
         };
         let (mut low, mut high) = (first - step, first);
         let mut element = ended(high)?;
@@ -133,7 +133,7 @@ impl OpticalTrain {
         let (position, direction) = ray(low);
         let [x, y] = at.crossing(from, self.stop, Ray::new(position, direction)?)?;
         let stop_radius = x.hypot(y);
-        (stop_radius > 0.0).then_some(Edge::At { stop_radius, element })
+        (stop_radius > 0.0).then_some(RimEdge::At { stop_radius, element })
     }
 
     /// Refuses a radius of the stop (mm) that no beam on the axis fills. What the lens itself has, as

@@ -1,11 +1,8 @@
 //! The scene doctor: what a scene or model holds, what is wrong with it, what it will cost; without
 //! rendering.
 
-mod duplicates;
-mod leftovers;
-mod lights;
+mod checks;
 pub(crate) mod memory;
-mod precision;
 mod text;
 
 use std::path::{Path, PathBuf};
@@ -16,11 +13,11 @@ use serde::Serialize;
 
 use crate::import::{NoteKind, Wanted};
 use crate::{
-    CameraOrigin, FileKind, IdName, LoadOptions, Note, Scene, SceneError, SceneFile, bounds,
+    CameraOrigin, FileKind, IdName, LoadOptions, Note, Scene, SceneError, SceneFile, scene,
 };
 
+pub use checks::StepSizes;
 pub use memory::MemoryForecast;
-pub use precision::StepSizes;
 
 /// What `etendue check` tells of a scene or model. Serialises to what `--json` prints.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -172,7 +169,7 @@ impl Diagnosis {
     #[must_use]
     pub fn of(scene: &Scene, kind: FileKind) -> Self {
         let geometry = &*scene.geometry;
-        let around = bounds::tight(geometry);
+        let around = scene::tight(geometry);
         let coplanar = Coplanar::of(geometry).pairs(geometry);
         let is_extension = |note: &&Note| note.kind == NoteKind::Extension;
         let models: Vec<&Path> = scene.stats.files.iter().map(|(path, _)| path.as_path()).collect();
@@ -192,7 +189,7 @@ impl Diagnosis {
                 not_finite: scene.stats.dropped,
                 degenerate: geometry.meshes.iter().map(|mesh| mesh.degenerate).sum(),
                 collapsed: geometry.placements.iter().filter(|p| !p.has_extent()).count() as u64,
-                duplicate: geometry.meshes.iter().map(duplicates::count).sum(),
+                duplicate: geometry.meshes.iter().map(checks::count_duplicates).sum(),
                 coplanar: coplanar.len() as u64,
                 out_of_range: 0,
             },
@@ -204,11 +201,11 @@ impl Diagnosis {
                 CameraOrigin::Model(name) => format!("the model's camera {name}"),
             },
             cameras: cameras(scene),
-            lights: models.iter().map(|path| lights::count(path)).sum(),
+            lights: models.iter().map(|path| checks::count_lights(path)).sum(),
             frames: None,
             memory: MemoryForecast::of(scene),
             extensions: scene.notes.iter().filter(is_extension).map(Finding::from).collect(),
-            unused_files: leftovers::find(&models, &scene.path),
+            unused_files: checks::find_leftovers(&models, &scene.path),
             findings: scene
                 .notes
                 .iter()

@@ -16,7 +16,7 @@ use schemars::generate::SchemaSettings;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::{SceneFile, WrittenPlaces, check, lenient, read_document};
+use super::{SceneFile, WrittenPlaces, check, read_document, spec};
 use crate::SceneError;
 use crate::load::CameraFiles;
 use crate::words::plain;
@@ -44,7 +44,7 @@ fn schema_of<T: JsonSchema>(title: &str) -> Value {
     let mut schema = SchemaSettings::draft2020_12().into_generator().into_root_schema_for::<T>();
     schema.insert("title".to_owned(), title.into());
     let mut schema = schema.to_value();
-    lenient::allow_notes(&mut schema);
+    spec::allow_notes(&mut schema);
     schema
 }
 

@@ -4,13 +4,9 @@ mod camera;
 mod check;
 mod document;
 mod frames;
-mod lenient;
 mod lens;
 mod object;
-mod overrides;
 mod samples;
-mod schema;
-mod sensor;
 mod settings;
 mod spec;
 
@@ -24,21 +20,19 @@ use etendue_sensor::Sensor;
 use etendue_tracer::LayerSpec;
 use serde_json::{Value, json};
 
-pub use document::Place;
+pub use camera::SensorFile;
+pub use document::{OverrideError, Place};
 pub use frames::{CameraPath, FramesSpec, RigCameraSpec, TrajectoryFormat};
 pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, read_lens_at, trace_rays};
 pub use object::{AnimationSpec, InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
-pub use overrides::OverrideError;
 pub use samples::{
     LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
 };
-pub use schema::scene_schema;
-pub use sensor::SensorFile;
 pub use settings::{
     AccelName, Auto, BuildQuality, Exposure, LightPrecision, LightRow, PlanSpec, RenderSpec,
     ToneMap, TracerRow, TracerSpec,
 };
-pub use spec::{FormatVersion, SceneSpec};
+pub use spec::{FormatVersion, SceneSpec, scene_schema};
 
 pub(crate) use check::{kind_of, nearest, suggest};
 pub(crate) use document::{join, join_index};
@@ -189,7 +183,7 @@ impl SceneFile {
             members.retain(|key, value| !(value.is_null() && is_unset(key)));
         }
         remove_notes(&mut value);
-        lenient::read_resolution(&mut value, "camera.sensor.resolution")
+        spec::read_resolution(&mut value, "camera.sensor.resolution")
             .map_err(|why| written.fault("camera.sensor.resolution", why))?;
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };
         (file.spec, file.sensor) = file.check()?;
@@ -228,12 +222,12 @@ impl SceneFile {
     }
 
     fn check(&self) -> Result<(SceneSpec, Option<Sensor>), SceneError> {
-        check::check(&schema::SCENE, &self.value).map_err(|problem| {
+        check::check(&spec::SCENE, &self.value).map_err(|problem| {
             let hint = self.hint(&problem.path).unwrap_or_default();
             self.fault(&problem.path, problem.reason + &hint)
         })?;
         let mut value = self.value.clone();
-        let sensor = sensor::split(&mut value, &self.written)?;
+        let sensor = camera::split(&mut value, &self.written)?;
         let spec = serde_path_to_error::deserialize(&value).map_err(|error| {
             let path = error.path().to_string();
             let path = if path == "." { String::new() } else { path };
@@ -320,7 +314,7 @@ impl WrittenPlaces {
     fn set(&mut self, value: &mut Value, all: &[(String, String)]) -> Result<(), SceneError> {
         for (key, text) in all {
             let setting = format!("{key}={text}");
-            let applied = overrides::apply(value, key, text)
+            let applied = document::apply(value, key, text)
                 .map_err(|source| SceneError::Override { setting: setting.clone(), source })?;
             let is_camera = applied == "camera";
             self.settings.insert(applied, setting);

@@ -1,16 +1,26 @@
 //! A scene file's top level.
+//!
+//! What people and editors may write beside the format: comments, the schema's address, and a resolution as
+//! screens have it.
+//!
+//! The scene format as a JSON Schema, made from the types that read it.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::LazyLock;
 
-use etendue_camera::CameraSpec;
-use etendue_tracer::{LayerSpec, LightGroup, LightSpec, MaterialSpec};
+use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Map, Value, json};
 
 use super::camera::CameraSource;
 use super::{FramesSpec, ObjectSpec, PlanSpec, RenderSpec, TracerSpec, Up};
+use etendue_camera::CameraSpec;
+use etendue_optics::train::NOTES;
+use etendue_sensor::SensorSpec;
+use etendue_tracer::{LayerSpec, LightGroup, LightSpec, MaterialSpec};
 
 /// A scene as the file writes it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -159,3 +169,91 @@ impl JsonSchema for FormatVersion {
         })
     }
 }
+
+/// Makes `[640, 480]` of a resolution written `"640x480"` at the dotted path `at`. The error says how
+/// it is written.
+pub(super) fn read_resolution(value: &mut Value, at: &str) -> Result<(), String> {
+    let pointer = format!("/{}", at.replace('.', "/"));
+    let Some(place) = value.pointer_mut(&pointer) else { return Ok(()) };
+    let Value::String(text) = &*place else { return Ok(()) };
+    let sides: Vec<Option<u32>> =
+        text.split(['x', 'X', '×']).map(|side| side.trim().parse().ok()).collect();
+    let [Some(width), Some(height)] = sides[..] else {
+        return Err(format!("\"{text}\" is no resolution; write [640, 480] or \"640x480\""));
+    };
+    *place = json!([width, height]);
+    Ok(())
+}
+
+/// Lets the schema of a resolution take `"640x480"`, too.
+pub(super) fn allow_resolution_words(schema: &mut Value) {
+    let Value::Object(members) = schema else { return };
+    let about = members.remove("description");
+    let numbers = Value::Object(std::mem::take(members));
+    members.extend(about.map(|about| ("description".to_owned(), about)));
+    let words = json!({ "type": "string", "pattern": "^\\s*\\d+\\s*[xX×]\\s*\\d+\\s*$" });
+    members.insert("anyOf".to_owned(), json!([numbers, words]));
+}
+
+/// Adds the keys of [`NOTES`] to every object of a schema that refuses keys it does not know.
+pub(super) fn allow_notes(schema: &mut Value) {
+    match schema {
+        Value::Object(members) => {
+            members.values_mut().for_each(allow_notes);
+            let closed = members.get("additionalProperties") == Some(&Value::Bool(false));
+            if closed || members.get("unevaluatedProperties") == Some(&Value::Bool(false)) {
+                let known = members.entry("properties").or_insert_with(|| Map::new().into());
+                if let Value::Object(known) = known {
+                    known.entry(NOTES[0]).or_insert_with(|| json!({ "type": "string" }));
+                    known.entry(NOTES[1]).or_insert_with(|| {
+                        let lines = json!({ "type": "array", "items": { "type": "string" } });
+                        json!({ "description": "A remark; means nothing.",
+                                "anyOf": [{ "type": "string" }, lines] })
+                    });
+                }
+            }
+        }
+        Value::Array(elements) => elements.iter_mut().for_each(allow_notes),
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
+    }
+}
+
+/// The JSON Schema (2020-12) of a scene file.
+///
+/// Editors that know it complete keys and mark errors. Beside the standard's words it carries
+/// `x-quantity` and `x-unit` on numbers that may also be strings with a unit.
+#[must_use]
+pub fn scene_schema() -> Value {
+    let mut schema =
+        SchemaSettings::draft2020_12().into_generator().into_root_schema_for::<SceneSpec>();
+    schema.insert("title".to_owned(), "etendue scene, version 1".into());
+    let mut schema = schema.to_value();
+    // The camera knows of its sensor no more than the grid of pixels; a scene says all of it.
+    if let Some(definitions) = schema.get_mut("$defs").and_then(Value::as_object_mut)
+        && let Value::Object(mut sensor) = SENSOR.clone()
+    {
+        sensor.remove("$schema");
+        if let Some(Value::Object(more)) = sensor.remove("$defs") {
+            more.into_iter().for_each(|(name, schema)| {
+                definitions.entry(name).or_insert(schema);
+            });
+        }
+        definitions.insert("SensorSpec".to_owned(), Value::Object(sensor));
+    }
+    allow_notes(&mut schema);
+    schema
+}
+
+/// The same, made once.
+pub(crate) static SCENE: LazyLock<Value> = LazyLock::new(scene_schema);
+
+/// The schema of a scene's `sensor`, made once.
+pub(crate) static SENSOR: LazyLock<Value> = LazyLock::new(|| {
+    let generator = SchemaSettings::draft2020_12().into_generator();
+    let mut schema = generator.into_root_schema_for::<SensorSpec>().to_value();
+    if let Some(member) = schema.pointer_mut("/properties/resolution") {
+        allow_resolution_words(member);
+    }
+    allow_notes(&mut schema);
+    schema
+});

@@ -1,11 +1,7 @@
 //! The frames of a scene: what is set for each of its pictures.
 
-mod animation;
 mod colmap;
-mod intrinsics;
-mod lines;
 mod path;
-mod rig;
 mod trajectory;
 mod transforms;
 
@@ -144,7 +140,7 @@ impl SceneFile {
                         self.along("frames.path", path, (opener, &mut notes), || Ok(start))?
                     }
                 };
-                rig::frames(self, cameras, &moments, &pose)
+                path::rig_frames(self, cameras, &moments, &pose)
                     .map_err(|(place, why)| self.fault(&place, why))?
             }
             FramesSpec::Path(path) => self.along("frames", path, (opener, &mut notes), start)?,
@@ -203,9 +199,11 @@ impl SceneFile {
     ) -> Result<Vec<Frame>, SceneError> {
         let fault = |(key, why): (&str, String)| self.fault(&join(place, key), why);
         let stations = match path {
-            CameraPath::Animation { .. } => return animation::frames(self, path).map_err(fault),
+            CameraPath::Animation { .. } => {
+                return path::animation_frames(self, path).map_err(fault);
+            }
             CameraPath::Cameras {} => {
-                return animation::cameras(self, &start()?.cameras).map_err(fault);
+                return path::cameras(self, &start()?.cameras).map_err(fault);
             }
             CameraPath::Poses { poses, times } => {
                 if let Some(times) = times

@@ -1,16 +1,19 @@
 //! Trajectories: poses of a file, with the intrinsics that it brings along.
+//!
+//! Trajectories of a pose a line: those of the TUM RGB-D benchmark, `timestamp tx ty tz qx qy qz qw` (Sturm et al.,
+//! "A Benchmark for the Evaluation of RGB-D SLAM Systems", 2012), and those of KITTI's odometry benchmark, the twelve
+//! numbers of `[R | t]` by rows (Geiger et al., "Are we ready for Autonomous Driving?", 2012). Lines of `#` are comments.
 
 use std::path::{Path, PathBuf};
 
-use etendue_camera::{Convention, Maps};
-use etendue_files::InputFolder;
-
-use super::transforms::ScenePicture;
-use super::{Station, colmap, lines, transforms};
+use super::transforms::{self, ScenePicture};
+use super::{Station, colmap};
 use crate::error::not_found;
 use crate::file::TrajectoryFormat;
 use crate::import::{Note, NoteKind};
 use crate::npy;
+use etendue_camera::{Convention, Maps, PoseSpec};
+use etendue_files::InputFolder;
 
 /// The longest trajectory that is read (bytes).
 const LONGEST: u64 = 1 << 30;
@@ -46,12 +49,12 @@ impl Trajectory<'_> {
             TrajectoryFormat::Tum => {
                 let text = text(path)?;
                 // Files of both are called .txt.
-                match self.format.is_none() && lines::are_kittis(&text) {
-                    true => lines::read_kitti(&text, self.axes)?,
-                    false => lines::read_tum(&text, self.axes)?,
+                match self.format.is_none() && are_kittis(&text) {
+                    true => read_kitti(&text, self.axes)?,
+                    false => read_tum(&text, self.axes)?,
                 }
             }
-            TrajectoryFormat::Kitti => lines::read_kitti(&text(path)?, self.axes)?,
+            TrajectoryFormat::Kitti => read_kitti(&text(path)?, self.axes)?,
             TrajectoryFormat::Colmap => {
                 let is_binary = path.extension().is_some_and(|ending| ending == "bin");
                 let images = match is_binary {
@@ -136,4 +139,62 @@ pub(super) fn numbers<const N: usize>(words: &[&str], line: usize) -> Result<[f6
         })?;
     }
     Ok(numbers)
+}
+
+/// Words of a line of KITTI's.
+const KITTI_WORDS: usize = 12;
+
+/// The lines that say something, with their numbers from 1, in words.
+fn lines(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
+    let words = |line| str::split(line, [' ', '\t', ',']).filter(|word| !word.is_empty()).collect();
+    let lines = (1..).zip(text.lines()).map(move |(number, line)| (number, words(line)));
+    lines.filter(|(_, words): &(_, Vec<&str>)| !words.first().is_none_or(|w| w.starts_with('#')))
+}
+
+/// Whether the first line that says something has as many words as KITTI's.
+pub(super) fn are_kittis(text: &str) -> bool {
+    lines(text).next().is_some_and(|(_, words)| words.len() == KITTI_WORDS)
+}
+
+pub(super) fn read_tum(text: &str, axes: (Maps, Convention)) -> Result<Vec<Station>, String> {
+    let mut stations = Vec::new();
+    for (number, words) in lines(text) {
+        if words.len() != 8 {
+            let count = words.len();
+            return Err(format!(
+                "has {count} words in line {number}; TUM's are timestamp tx ty tz qx qy qz qw, and KITTI's, \
+                 with `format` kitti, the 12 numbers of [R | t] by rows"
+            ));
+        }
+        let [time, x, y, z, a, b, c, d] = numbers(&words, number)?;
+        if let Some(before) = stations.last().and_then(|last: &Station| last.time)
+            && time < before
+        {
+            return Err(format!(
+                "has the time {time} in line {number}, after {before}: sort the lines by their times"
+            ));
+        }
+        let pose = PoseSpec::Quaternion {
+            quaternion: [a, b, c, d],
+            translation: [x, y, z],
+            maps: axes.0,
+            convention: axes.1,
+        };
+        stations.push(Station { time: Some(time), ..Station::new(pose) });
+    }
+    Ok(stations)
+}
+
+pub(super) fn read_kitti(text: &str, axes: (Maps, Convention)) -> Result<Vec<Station>, String> {
+    let station = |(number, words): (usize, Vec<&str>)| {
+        if words.len() != KITTI_WORDS {
+            let count = words.len();
+            return Err(format!(
+                "has {count} words in line {number}; KITTI's are the 12 numbers of [R | t] by rows"
+            ));
+        }
+        let all: [f64; KITTI_WORDS] = numbers(&words, number)?;
+        Ok(Station::of_rows(&all, axes))
+    };
+    lines(text).map(station).collect()
 }

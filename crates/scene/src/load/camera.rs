@@ -1,25 +1,24 @@
 //! The camera of a scene: its files, its default view, and what is odd about its lens.
+//!
+//! The cameras that models bring along, and which one is used.
 
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use etendue_camera::{Camera, CameraError, CameraSpec};
+use crate::cache::{self, KeptCamera};
+use crate::error::not_found;
+use crate::file::SceneFile;
+use crate::import::{ImportedCamera, Note, NoteKind, Projection, Strictness};
+use crate::scene::{LoadOptions, WorldVertices};
+use crate::{Cache, SceneError, facing};
+use etendue_camera::{Camera, CameraError, CameraSpec, Pose};
 use etendue_files::InputFolder;
-use etendue_geometry::Geometry;
+use etendue_geometry::{Geometry, Transform};
 use etendue_optics::element::LensResources;
 use etendue_optics::glass::AgfCatalogue;
 use etendue_sensor::Sensor;
 use etendue_spectrum::Bands;
-
-use crate::bounds::WorldVertices;
-use crate::cache::{self, KeptCamera};
-use crate::cameras::{self, CameraOrigin, SceneCamera};
-use crate::error::not_found;
-use crate::file::SceneFile;
-use crate::import::{Note, NoteKind, Strictness};
-use crate::scene::LoadOptions;
-use crate::{Cache, SceneError, facing};
 
 impl SceneFile {
     pub(super) fn camera_spec(&self) -> CameraSpec {
@@ -91,7 +90,7 @@ impl SceneFile {
         // A camera of the model, with the scene's own sensor when it has one; else the scene's.
         let (spec, origin) = match options.camera {
             Some(wanted) => {
-                let (index, camera) = cameras::pick(cameras, wanted).map_err(|reason| {
+                let (index, camera) = pick(cameras, wanted).map_err(|reason| {
                     SceneError::NoSuchCamera { wanted: wanted.to_owned(), reason }
                 })?;
                 let mut spec = camera.spec.clone();
@@ -182,5 +181,79 @@ impl LensResources for CameraFiles<'_> {
 
     fn glasses(&self) -> &[AgfCatalogue] {
         self.glasses
+    }
+}
+
+/// A camera of a model in the scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneCamera {
+    /// Its name in the model; may be empty.
+    pub name: String,
+    /// Index of the object whose model it came with.
+    pub object: u32,
+    /// The camera: the model's vertical field of view (or height) is kept, and unless the scene
+    /// says otherwise the picture has 1024 rows and as many columns as the model's aspect ratio
+    /// asks for.
+    pub spec: CameraSpec,
+}
+
+/// Where the camera of a scene came from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum CameraOrigin {
+    /// The scene file gives a camera and its pose.
+    Scene,
+    /// It was placed so that the whole scene is in the picture.
+    Framed,
+    /// A model's, by its name or number.
+    Model(String),
+}
+
+impl SceneCamera {
+    /// The camera of a model placed by `world_from_model`; `None` when its numbers make no camera.
+    pub(crate) fn new(
+        camera: &ImportedCamera,
+        object: u32,
+        world_from_model: &Transform,
+    ) -> Option<Self> {
+        let world = world_from_model.then_inner(&camera.model_from_camera);
+        let pose = Pose::from_node(world.linear, world.translation + world.translation_low)?;
+        let spec = match camera.projection {
+            Projection::Perspective { yfov, aspect_ratio } => {
+                let aspect = aspect_ratio.unwrap_or(1.0);
+                let usable = yfov > 0.0 && yfov < std::f64::consts::PI && is_size(aspect);
+                usable.then(|| CameraSpec::perspective(pose, yfov, aspect))
+            }
+            Projection::Orthographic { xmag, ymag } => {
+                let (xmag, ymag) = (xmag.abs(), ymag.abs());
+                // Nodes above may scale the view's extent along up.
+                let height = 2.0 * ymag * world.linear.y_axis.length();
+                let usable = is_size(xmag) && is_size(ymag) && is_size(height);
+                usable.then(|| CameraSpec::orthographic(pose, height, xmag / ymag))
+            }
+        }?;
+        Some(Self { name: camera.name.clone(), object, spec })
+    }
+}
+
+fn is_size(number: f64) -> bool {
+    number > 0.0 && number.is_finite()
+}
+
+/// The camera called `wanted`, or the one of that number; the error lists what there is.
+pub(crate) fn pick<'a>(
+    cameras: &'a [SceneCamera],
+    wanted: &str,
+) -> Result<(usize, &'a SceneCamera), String> {
+    let named = cameras.iter().position(|camera| camera.name == wanted && !wanted.is_empty());
+    let index = named.or_else(|| wanted.parse().ok());
+    match index.and_then(|index| Some((index, cameras.get(index)?))) {
+        Some(found) => Ok(found),
+        None if cameras.is_empty() => Err("no model of the scene has a camera".to_owned()),
+        None => {
+            let all = cameras.iter().enumerate();
+            let all: Vec<String> =
+                all.map(|(index, camera)| format!("{index} \"{}\"", camera.name)).collect();
+            Err(format!("no such camera; there are {}", all.join(", ")))
+        }
     }
 }

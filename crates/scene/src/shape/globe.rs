@@ -8,9 +8,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, Mesh, Positions, Vertices};
 use rayon::prelude::*;
 
-use super::GoOn;
-use super::relief::Relief;
-use super::turn::sin_cos_turns;
+use super::{GoOn, Relief, sin_cos_turns};
 use crate::import::{Wanted, count_degenerate};
 
 /// Vertices that one task makes.

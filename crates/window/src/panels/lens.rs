@@ -23,13 +23,13 @@ const COLORS: [[Color32; 2]; 3] = [
 ];
 
 /// From millimetres to points on the screen.
-struct Scale {
+struct DrawingScale {
     middle: Pos2,
     centre: [f64; 2],
     points_per_mm: f64,
 }
 
-impl Scale {
+impl DrawingScale {
     fn of(view: &LensView, place: Rect) -> Self {
         let ([left, bottom], [right, top]) = (view.section.low, view.section.high);
         let (width, height) = ((right - left).max(1e-9), (top - bottom).max(1e-9));
@@ -94,7 +94,7 @@ fn figures(view: &LensView) -> String {
 
 fn layout(app: &App, ui: &Ui, view: &LensView, place: Rect, edits: &mut Vec<Edit>) {
     let painter = ui.painter().with_clip_rect(place);
-    let (scale, dark) = (Scale::of(view, place), ui.visuals().dark_mode);
+    let (scale, dark) = (DrawingScale::of(view, place), ui.visuals().dark_mode);
     let ink = Stroke::new(1.2, ui.visuals().text_color());
     let glass =
         if dark { Color32::from_rgb(47, 111, 159) } else { Color32::from_rgb(182, 215, 242) };
@@ -149,7 +149,7 @@ fn fill(painter: &egui::Painter, outline: &[Pos2], color: Color32) {
 }
 
 /// Handles at the vertices: across the axis they bend a surface, along it they move the gap before it.
-fn handles(app: &App, ui: &Ui, view: &LensView, scale: &Scale, edits: &mut Vec<Edit>) {
+fn handles(app: &App, ui: &Ui, view: &LensView, scale: &DrawingScale, edits: &mut Vec<Edit>) {
     // What is not written as a list of elements has nothing to be dragged.
     let Some((lens, is_file)) = &app.written_lens else { return };
     for (i, drawn) in view.section.elements.iter().enumerate() {

@@ -21,12 +21,12 @@ pub(crate) enum Shows {
 
 /// The light field of the picture that is shown.
 #[derive(Debug, Default)]
-pub(crate) struct LightField {
+pub(crate) struct LightFieldPanel {
     pub(crate) shows: Shows,
     views: Option<LightFieldViews>,
 }
 
-impl LightField {
+impl LightFieldPanel {
     /// Forgets the views of an earlier picture.
     pub(crate) fn renew(&mut self) {
         self.views = None;

@@ -10,7 +10,7 @@ use etendue::{
 use serde_json::Value;
 
 use super::{Kind, News, Shared, Shown, Task, Teller, WATCH, Wish};
-use crate::view::View;
+use crate::document::View;
 
 /// How long a first picture may take, so that it is on the screen within a tenth of a second, twenty in each: the
 /// window is drawn twice meanwhile, by the same processor where there is no other.
@@ -25,7 +25,7 @@ const TELL: Duration = Duration::from_millis(60);
 /// What a file was when it was looked at last.
 type Stamp = Option<(u64, SystemTime)>;
 
-pub(super) struct Studio {
+pub(super) struct PreviewRenderer {
     options: Options,
     teller: Teller,
     shared: Arc<Shared>,
@@ -51,14 +51,14 @@ struct Open {
 }
 
 /// What there is to do next.
-enum Job {
+enum WorkerJob {
     Task(Task),
     Wish(Wish),
     Watch,
     Close,
 }
 
-impl Studio {
+impl PreviewRenderer {
     pub(super) fn new(options: Options, teller: Teller, shared: Arc<Shared>) -> Self {
         Self { options, teller, shared, open: None, image: None }
     }
@@ -66,27 +66,27 @@ impl Studio {
     pub(super) fn work(&mut self) {
         loop {
             match self.next() {
-                Job::Close => return,
-                Job::Watch => self.look_for_changes(),
-                Job::Task(task) => self.carry_out(task),
-                Job::Wish(wish) => self.follow(wish),
+                WorkerJob::Close => return,
+                WorkerJob::Watch => self.look_for_changes(),
+                WorkerJob::Task(task) => self.carry_out(task),
+                WorkerJob::Wish(wish) => self.follow(wish),
             }
         }
     }
 
-    fn next(&self) -> Job {
+    fn next(&self) -> WorkerJob {
         let mut desk = self.shared.desk();
         (desk.refining, desk.working) = (None, None);
         let mut is_idle = false;
         loop {
             if desk.closes {
-                return Job::Close;
+                return WorkerJob::Close;
             }
             if let Some(task) = desk.tasks.pop_front() {
-                return Job::Task(task);
+                return WorkerJob::Task(task);
             }
             if let Some(wish) = desk.wish.take() {
-                return Job::Wish(wish);
+                return WorkerJob::Wish(wish);
             }
             if !is_idle {
                 self.teller.tell(News::Idle);
@@ -96,7 +96,7 @@ impl Studio {
             let (back, timeout) = waited.unwrap_or_else(std::sync::PoisonError::into_inner);
             desk = back;
             if timeout.timed_out() && self.has_changes() {
-                return Job::Watch;
+                return WorkerJob::Watch;
             }
         }
     }

@@ -7,9 +7,9 @@
 use etendue_geometry::glam::DVec3;
 
 use super::Packet;
+use crate::bvh::PlacedTriangles;
 use crate::bvh::bundle::{Bundle, FrameRays, PACKET, bits};
 use crate::bvh::lanes::{Arithmetic, Lanes};
-use crate::bvh::placed::PlacedTriangles;
 use crate::bvh::ray::{BoxTest, Runs, TriangleTest, meet_triangles};
 use crate::bvh::single::Sink;
 use crate::bvh::traverse::Leaves;

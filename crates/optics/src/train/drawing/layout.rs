@@ -263,7 +263,7 @@ fn section(element: &Element, height: f64) -> Vec<[f64; 2]> {
 }
 
 /// A body of glass between two surfaces.
-pub(super) struct Body {
+pub(super) struct GlassBody {
     /// All around, from the lower end of its front.
     pub(super) outline: Vec<[f64; 2]>,
     /// Points of its front; 0 where its rim is not drawn.
@@ -271,7 +271,11 @@ pub(super) struct Body {
 }
 
 /// The bodies of glass between surfaces.
-pub(super) fn bodies(train: &OpticalTrain, at: &MonochromaticTrain, heights: &[f64]) -> Vec<Body> {
+pub(super) fn bodies(
+    train: &OpticalTrain,
+    at: &MonochromaticTrain,
+    heights: &[f64],
+) -> Vec<GlassBody> {
     let surfaces: Vec<usize> = (0..heights.len())
         .filter(|&i| train.elements()[i].part.symbol() == Symbol::Surface)
         .collect();
@@ -280,7 +284,7 @@ pub(super) fn bodies(train: &OpticalTrain, at: &MonochromaticTrain, heights: &[f
     of_glass.map(|pair| body(train, heights, pair)).collect()
 }
 
-fn body(train: &OpticalTrain, heights: &[f64], [front, back]: [usize; 2]) -> Body {
+fn body(train: &OpticalTrain, heights: &[f64], [front, back]: [usize; 2]) -> GlassBody {
     let side = |i: usize| section(&train.elements()[i], heights[i]);
     let (first, second) = (side(front), side(back));
     // The thicker of the two rims is the glass'.
@@ -302,11 +306,11 @@ fn body(train: &OpticalTrain, heights: &[f64], [front, back]: [usize; 2]) -> Bod
         outline.extend(edge(&second, false));
         outline.extend(edge(&first, false));
     }
-    Body { outline, front: if tilted { 0 } else { first.len() } }
+    GlassBody { outline, front: if tilted { 0 } else { first.len() } }
 }
 
-fn glasses(canvas: &mut Canvas, view: &DrawingView, bodies: &[Body]) {
-    for Body { outline, front } in bodies {
+fn glasses(canvas: &mut Canvas, view: &DrawingView, bodies: &[GlassBody]) {
+    for GlassBody { outline, front } in bodies {
         let outline: Vec<[f64; 2]> = outline.iter().map(|&point| view.pixel(point)).collect();
         canvas.glass(&outline);
         let count = *front;

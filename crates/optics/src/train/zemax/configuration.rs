@@ -2,9 +2,24 @@
 //!
 //! `MNUM` has their number and the one that the file stands at, whose values the surfaces have. Each value
 //! of each is a line of its own: the operand, its surface or field, the configuration from 1, the value.
+//!
+//! Field points, given as angles or heights, to field angles.
+//!
+//! Coordinate breaks: the axes that they turn and move, and where a surface stands in them.
+//!
+//! OpticStudio turns right-handed, by R = Rx Ry Rz from a surface's axes to those before. Our
+//! surfaces are round about their own axis, so only where that axis points matters, and two tilts
+//! say that.
+//!
+//! Bytes to text. OpticStudio writes UTF-16 with a byte order mark, older versions one byte a
+//! character.
+
+use glam::{DMat3, DVec3};
 
 use super::ZemaxError;
 use super::sheet::{Aperture, SheetLine, ZemaxSheet};
+use crate::train::analysis::chief_height;
+use crate::train::{Focus, OpticalTrain};
 
 /// Thicknesses from here on are infinite, as OpticStudio has it.
 const INFINITE: f64 = 1e10;
@@ -115,5 +130,248 @@ impl ZemaxSheet {
             _ => row.semi_diameter = Some(number).filter(|length| *length > 0.0),
         }
         Ok(())
+    }
+}
+
+/// The most field points that are taken; designs have a dozen, and each is looked at with many rays.
+const MOST_FIELDS: usize = 100;
+
+/// Elements times fields that are taken in the most, and fields that are taken in any case.
+const MOST_WORK: usize = 10_000;
+const FEWEST_FIELDS: usize = 10;
+
+/// The field points of a file.
+#[derive(Debug, Default)]
+pub(super) struct Fields {
+    kind: usize,
+    count: Option<usize>,
+    /// How many wavelengths are in use, which stands in the same line.
+    pub(super) wavelengths: Option<usize>,
+    pub(super) x: Vec<f64>,
+    pub(super) y: Vec<f64>,
+}
+
+impl Fields {
+    /// Kind, normalisation, number of fields, number of wavelengths.
+    pub(super) fn set_kind(&mut self, line: &SheetLine<'_>) -> Result<(), ZemaxError> {
+        self.kind = line.index(0)?;
+        self.count = line.word(2).map(|_| line.index(2)).transpose()?;
+        self.wavelengths = line.word(3).map(|_| line.index(3)).transpose()?;
+        Ok(())
+    }
+
+    /// The angles (degrees) of the chief rays of the fields, without those that repeat, and sentences
+    /// on fields that have none. `unit` is the file's length in millimetres; `object_z` is where the
+    /// object stands in lens coordinates (mm).
+    pub(super) fn angles(
+        &self,
+        unit: f64,
+        train: &OpticalTrain,
+        object_z: Option<f64>,
+    ) -> (Vec<f64>, Vec<String>) {
+        let affordable = MOST_WORK / train.elements().len().max(1);
+        let most = affordable.clamp(FEWEST_FIELDS, MOST_FIELDS);
+        let (mut angles, mut notes): (Vec<f64>, Vec<String>) = (Vec::new(), Vec::new());
+        for [x, y] in self.points().take(most) {
+            let height = unit * if x == 0.0 { y } else { x.hypot(y) };
+            // FTYP: angles, heights of the object, or heights of the paraxial or real image.
+            let found = match self.kind {
+                0 if x == 0.0 => Ok(y),
+                0 => Ok(x.to_radians().tan().hypot(y.to_radians().tan()).atan().to_degrees()),
+                1 => angle_of_object(train, object_z, height),
+                2 | 3 => angle_of_image(train, height, self.kind == 3),
+                kind => Err(format!("fields of kind {kind} are neither angles nor heights")),
+            };
+            match found {
+                Ok(angle) if angle.abs() < 180.0 && !angles.contains(&angle) => angles.push(angle),
+                Ok(_) => {}
+                Err(why) if notes.contains(&why) => {}
+                Err(why) => notes.push(why),
+            }
+        }
+        let mut notes: Vec<String> =
+            notes.into_iter().map(|why| format!("fields left out: {why}")).collect();
+        let count = self.points().count();
+        if count > most {
+            notes.push(format!("of {count} fields the first {most} are taken"));
+        }
+        (angles, notes)
+    }
+
+    fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        let longest = self.x.len().max(self.y.len());
+        let count = self.count.unwrap_or(self.y.len()).min(longest);
+        let at = |list: &[f64], i: usize| list.get(i).copied().unwrap_or(0.0);
+        (0..count).map(move |i| [at(&self.x, i), at(&self.y, i)])
+    }
+}
+
+/// The angle (degrees) at which the entrance pupil sees a point of the object `height` (mm) off the
+/// axis; rays from above come down.
+fn angle_of_object(
+    train: &OpticalTrain,
+    object_z: Option<f64>,
+    height: f64,
+) -> Result<f64, String> {
+    let object = object_z.ok_or("heights of an object at infinity are none")?;
+    let pupil = train.paraxial(train.wavelength()).ok().and_then(|p| p.entrance_pupil.z);
+    let pupil = pupil.ok_or("heights seen from an entrance pupil at infinity have no angle")?;
+    Ok((-height / (pupil - object)).atan().to_degrees())
+}
+
+/// The angle (degrees) whose chief ray lands at `height` (mm) on the sensor, through the whole lens
+/// or as it does near the axis.
+fn angle_of_image(train: &OpticalTrain, height: f64, real: bool) -> Result<f64, String> {
+    const NEAR: f64 = 1e-6;
+    let dark = || format!("no chief ray arrives at an image height of {height} mm");
+    let sensor = train.sensor_z(Focus::AsWritten).map_err(|error| error.to_string())?;
+    let lens = train.at(train.wavelength()).map_err(|error| error.to_string())?;
+    let lands = |slope: f64| chief_height(train, &lens, slope.atan().to_degrees(), sensor);
+    let scale = lands(NEAR).filter(|scale| *scale != 0.0).ok_or_else(dark)? / NEAR;
+    let mut slope = height / scale;
+    if !real || height == 0.0 {
+        return Ok(slope.atan().to_degrees());
+    }
+    let (mut before, mut missed_before) = (0.0, -height);
+    for _ in 0..50 {
+        let missed = lands(slope).ok_or_else(dark)? - height;
+        if missed.abs() <= 1e-10 * height.abs() {
+            return Ok(slope.atan().to_degrees());
+        }
+        let next = slope - missed * (slope - before) / (missed - missed_before);
+        (before, missed_before) = (slope, missed);
+        slope = next;
+    }
+    Err(dark())
+}
+
+/// Tilts this small are the rounding of turns to and back (degrees).
+const NO_TILT: f64 = 1e-12;
+
+/// Lengths this small are the same (mm).
+const NO_LENGTH: f64 = 1e-12;
+
+/// A coordinate break, in mm and degrees.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Break {
+    pub(super) decentre: [f64; 2],
+    pub(super) tilt: [f64; 3],
+    /// Turned first, in the order z, y, x, and moved then.
+    pub(super) turned_first: bool,
+}
+
+/// The axes of the next surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Axes {
+    origin: DVec3,
+    rotation: DMat3,
+}
+
+/// Where a surface stands, as a lens file says it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SheetPlace {
+    pub(super) z: f64,
+    pub(super) decentre: [f64; 2],
+    pub(super) tilt: [f64; 2],
+}
+
+impl Default for Axes {
+    fn default() -> Self {
+        Self { origin: DVec3::ZERO, rotation: DMat3::IDENTITY }
+    }
+}
+
+impl Axes {
+    pub(super) fn broken(self, by: &Break) -> Self {
+        let [x, y, z] = by.tilt.map(f64::to_radians);
+        let [x, y, z] =
+            [DMat3::from_rotation_x(x), DMat3::from_rotation_y(y), DMat3::from_rotation_z(z)];
+        let offset = DVec3::new(by.decentre[0], by.decentre[1], 0.0);
+        if by.turned_first {
+            let rotation = self.rotation * z * y * x;
+            Self { origin: self.origin + rotation * offset, rotation }
+        } else {
+            Self {
+                origin: self.origin + self.rotation * offset,
+                rotation: self.rotation * x * y * z,
+            }
+        }
+    }
+
+    pub(super) fn advanced(self, thickness: f64) -> Self {
+        Self { origin: self.origin + self.rotation.z_axis * thickness, ..self }
+    }
+
+    pub(super) fn placed(&self) -> SheetPlace {
+        // Rx(a) Ry(b) takes z to (sin b, -sin a cos b, cos a cos b).
+        let axis = self.rotation.z_axis;
+        let about_x = (-axis.y).atan2(axis.z).to_degrees();
+        let about_y = axis.x.atan2(axis.y.hypot(axis.z)).to_degrees();
+        let clean = |value: f64, small: f64| if value.abs() <= small { 0.0 } else { value };
+        SheetPlace {
+            z: self.origin.z,
+            decentre: [self.origin.x, self.origin.y].map(|length| clean(length, NO_LENGTH)),
+            tilt: [about_x, about_y].map(|angle| clean(angle, NO_TILT)),
+        }
+    }
+}
+
+/// The text of a file in UTF-8 or UTF-16 of either order, by its byte order mark or, without one, by
+/// where its zero bytes are. What is no UTF-8 is taken for Latin-1, as old versions write it.
+pub(super) fn decode(bytes: &[u8]) -> Result<String, ZemaxError> {
+    match bytes {
+        [] => Err(ZemaxError::new(1, "the file is empty")),
+        [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes),
+        [0xef, 0xbb, 0xbf, rest @ ..] => utf8(rest),
+        [first, 0, ..] if *first != 0 => utf16(bytes, u16::from_le_bytes),
+        [0, second, ..] if *second != 0 => utf16(bytes, u16::from_be_bytes),
+        _ => utf8(bytes),
+    }
+}
+
+fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<String, ZemaxError> {
+    let (pairs, odd) = bytes.as_chunks::<2>();
+    let text: Result<String, _> =
+        char::decode_utf16(pairs.iter().map(|&pair| unit(pair))).collect();
+    match text {
+        Ok(text) if odd.is_empty() => Ok(text),
+        _ => Err(ZemaxError::new(1, "the file is broken UTF-16; save it again")),
+    }
+}
+
+fn utf8(bytes: &[u8]) -> Result<String, ZemaxError> {
+    if bytes.contains(&0) {
+        return Err(ZemaxError::new(1, "the file is no text"));
+    }
+    Ok(match std::str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::Frame;
+
+    #[test]
+    fn an_axis_is_where_two_tilts_put_it() {
+        let by = Break { decentre: [1.0, -2.0], tilt: [20.0, -35.0, 70.0], turned_first: false };
+        let placed = Axes::default().advanced(5.0).broken(&by).placed();
+        let frame = Frame::placed(placed.z, placed.decentre, placed.tilt);
+        let direct = DMat3::from_rotation_x(20_f64.to_radians())
+            * DMat3::from_rotation_y(-35_f64.to_radians());
+        assert_eq!(frame.vertex, DVec3::new(1.0, -2.0, 5.0));
+        assert!((frame.rotation.z_axis - direct.z_axis).length() < 1e-15);
+    }
+
+    #[test]
+    fn a_break_and_its_reverse_leave_no_trace() {
+        let there = Break { decentre: [0.3, 0.7], tilt: [3.0, 4.0, 5.0], turned_first: false };
+        let back = Break { decentre: [-0.3, -0.7], tilt: [-3.0, -4.0, -5.0], turned_first: true };
+        let placed = Axes::default().broken(&there).broken(&back).placed();
+        assert_eq!((placed.decentre, placed.tilt), ([0.0; 2], [0.0; 2]));
+        assert!(placed.z.abs() < 1e-15);
     }
 }

@@ -2,11 +2,8 @@
 //!
 //! | module | idea |
 //! |---|---|
-//! | `text` | bytes to lines: UTF-8 and UTF-16 |
 //! | `sheet` | lines to the rows of the lens data sheet |
-//! | `place` | coordinate breaks to tilts and decentrings |
-//! | `configuration` | the values of one position of a zoom lens |
-//! | `fields` | field points to field angles |
+//! | `configuration` | the values of one position of a zoom lens; field points to field angles; coordinate breaks to tilts and decentrings; bytes to lines: UTF-8 and UTF-16 |
 //! | here | rows to the elements of a lens file |
 //!
 //! What has no counterpart here and would change the light's way is an error that names its line;
@@ -18,10 +15,7 @@
 //! from OpticStudio's knowledge base ("Rotation Matrix and Tilt About X/Y/Z in OpticStudio", 2021).
 
 mod configuration;
-mod fields;
-mod place;
 mod sheet;
-mod text;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,8 +23,8 @@ use std::path::Path;
 use super::{LensError, LensFile, OpticalTrain, SensorMount};
 use crate::element::{ElementSpec, GlassesAlone, PartSpec, SurfaceSpec, ThinLensSpec};
 use crate::glass::{AgfCatalogue, GlassSpec, Makers};
+use configuration::{Axes, SheetPlace};
 use etendue_geometry::units::{Degrees, Millimetres, Nanometres};
-use place::{Axes, SheetPlace};
 use sheet::{Aperture, Parameter, SheetRow, SurfaceShape, ZemaxSheet};
 
 /// A difference of focal lengths that is more than rounding (share).
@@ -94,7 +88,7 @@ impl ZemaxLens {
         configuration: Option<usize>,
         glasses: &[AgfCatalogue],
     ) -> Result<Self, ZemaxError> {
-        let text = text::decode(bytes)?;
+        let text = configuration::decode(bytes)?;
         // The lines of the file, and the elements that they describe.
         let mut sheet = ZemaxSheet::read(&text)?;
         if let Some(configuration) = configuration {

@@ -6,9 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::ZemaxError;
-use super::configuration::ConfigurationValue;
-use super::fields::Fields;
-use super::place::Break;
+use super::configuration::{Break, ConfigurationValue, Fields};
 
 /// The most surfaces.
 const MOST_SURFACES: usize = crate::train::MOST_ELEMENTS;

@@ -2,8 +2,7 @@
 
 use serde_json::{Map, Value};
 
-use super::allowed::wrong_kind;
-use super::{Checker, Outcome, Problem, join, nearest, problem, show, suggest};
+use super::{Checker, Outcome, Problem, join, nearest, problem, show, suggest, wrong_kind};
 
 impl<'a> Checker<'a> {
     /// Goes on in the branch that was meant: by tag, by the kind of value, or by the keys.

@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use super::document::Node;
 use super::{Reader, damaged};
-use crate::import::note::{Note, NoteKind};
+use crate::import::error::{Note, NoteKind};
 use crate::import::{Import, ImportError, Play};
 
 /// An animation.
@@ -106,7 +106,7 @@ pub(super) fn moved(
             let message =
                 format!("it moves \"{}\", which is left as it is", channel.target.words());
             let note = Note::new(NoteKind::Unsupported, &place, &message);
-            crate::import::note::push(&mut import.notes, note);
+            crate::import::error::push(&mut import.notes, note);
             continue;
         };
         super::pose::exists(reader.file, node, reader.document.nodes.len(), || {

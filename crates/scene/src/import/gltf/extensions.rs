@@ -6,7 +6,7 @@ use std::path::Path;
 use gltf::json;
 
 use super::document::Document;
-use crate::import::note::{self, Note, NoteKind};
+use crate::import::error::{self, Note, NoteKind};
 use crate::import::{ImportError, Wanted};
 
 /// How far an extension is supported.
@@ -112,7 +112,7 @@ pub(super) fn check(
             }
             None => "not supported: it is ignored".to_owned(),
         };
-        note::push(notes, Note::new(NoteKind::Extension, name, message));
+        error::push(notes, Note::new(NoteKind::Extension, name, message));
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use json::validation::Checked;
 
 use super::buffers::{Bytes, data_uri, percent_decoded};
 use super::{Reader, extensions};
-use crate::import::{Import, ImportError, Strictness, note};
+use crate::import::{Import, ImportError, Strictness, error};
 
 /// What crate `gltf` puts for an image that a texture does not name.
 const NO_IMAGE: usize = u32::MAX as usize;
@@ -73,7 +73,7 @@ impl<'a> Images<'a> {
         let plain = Some(texture.source.value()).filter(|&source| source != NO_IMAGE);
         let Some(source) = plain.or_else(|| extensions::webp_image(texture)) else {
             if let Some(note) = extensions::encoded_texture(reader.file, texture, reader.wanted)? {
-                note::push(&mut import.notes, note);
+                error::push(&mut import.notes, note);
                 return Ok(None);
             }
             return Err(reader.damaged(place(), "it has no image; export the file again"));
@@ -139,7 +139,7 @@ impl<'a> Images<'a> {
                 Err(reader.damaged(place(), format!("\"{written}\" does not exist")))
             }
             None => {
-                note::push(&mut import.notes, note::missing_image(written));
+                error::push(&mut import.notes, error::missing_image(written));
                 Ok(Some(ImageSource::Missing))
             }
         }

@@ -16,7 +16,7 @@ use super::damaged;
 use super::document::{Document, Node};
 use crate::file::kind_of;
 use crate::import::ImportError;
-use crate::import::note::{self, Note, NoteKind};
+use crate::import::error::{self, Note, NoteKind};
 use crate::words::plain;
 
 const NAME: &str = "KHR_lights_punctual";
@@ -98,12 +98,12 @@ pub(super) fn placed(
     if !color.iter().all(|c| (0.0..=BRIGHTEST).contains(c)) {
         let message =
             "its colour or intensity is below zero, not finite or above 1e30; it is left out";
-        note::push(notes, Note::new(NoteKind::NotFinite, named, message));
+        error::push(notes, Note::new(NoteKind::NotFinite, named, message));
         return Ok(None);
     }
     if color == [0.0; 3] {
         let message = "the light has no power; it is left out";
-        note::push(notes, Note::new(NoteKind::Unused, named, message));
+        error::push(notes, Note::new(NoteKind::Unused, named, message));
         return Ok(None);
     }
     let kind = match (written.kind.as_str(), written.spot) {

@@ -1,14 +1,23 @@
 //! What lies over a metallic-roughness surface or shapes its highlights: sheen and anisotropy.
+//!
+//! `KHR_materials_pbrSpecularGlossiness`: a diffuse colour beside a reflectance of any colour.
+//!
+//! It is carried over to `KHR_materials_specular` with `ior` 0, as that extension's text converts
+//! it (Khronos, "Specular-glossiness materials"): a dielectric with the reflectance as its colour
+//! face on, over the diffuse colour. Roughness is 1 − glossiness.
+//!
+//! Bodies of glass (`KHR_materials_volume`): closed surfaces that refract, and absorb on the way through.
 
-use etendue_tracer::TextureUse;
-use etendue_tracer::scattering::GltfSurface;
-use etendue_tracer::texture::Encoding;
 use gltf::json;
 use serde::Deserialize;
+use serde_json::Value;
 
 use super::images::Images;
-use super::material::Judge;
+use super::material::{Judge, MIRROR};
 use crate::import::{Import, ImportError};
+use etendue_tracer::scattering::{Absorption, Glass, GltfSurface};
+use etendue_tracer::texture::Encoding;
+use etendue_tracer::{Ior, Scattering, TextureUse};
 
 const SHEEN: &str = "KHR_materials_sheen";
 const ANISOTROPY: &str = "KHR_materials_anisotropy";
@@ -57,4 +66,122 @@ pub(super) fn add(
             texture(ANISOTROPY, "anisotropyTexture", Encoding::Linear, import)?;
     }
     Ok(())
+}
+
+const GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
+
+/// What the extension says of a material.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Glossiness {
+    /// Linear, with alpha.
+    pub diffuse_factor: [f64; 4],
+    pub diffuse_texture: Option<json::texture::Info>,
+    specular_factor: [f64; 3],
+    glossiness_factor: f64,
+    /// Reflectance by the sRGB curve, glossiness in alpha.
+    specular_glossiness_texture: Option<json::texture::Info>,
+}
+
+impl Default for Glossiness {
+    fn default() -> Self {
+        Self {
+            diffuse_factor: [1.0; 4],
+            diffuse_texture: None,
+            specular_factor: [1.0; 3],
+            glossiness_factor: 1.0,
+            specular_glossiness_texture: None,
+        }
+    }
+}
+
+impl Glossiness {
+    /// What `material` says; `None`, with a note where it is damaged, when nothing.
+    pub(super) fn of(
+        judge: &Judge<'_>,
+        material: &json::Material,
+        import: &mut Import,
+    ) -> Result<Option<Self>, ImportError> {
+        let written: Option<&Value> =
+            material.extensions.as_ref().and_then(|extensions| extensions.others.get(GLOSSINESS));
+        let Some(written) = written else { return Ok(None) };
+        let read = written.is_object().then(|| Self::deserialize(written).ok()).flatten();
+        if read.is_none() {
+            judge.say(&format!("{GLOSSINESS} is damaged"), "it is left out", import)?;
+        }
+        Ok(read)
+    }
+
+    /// The surface that reflects as much.
+    pub(super) fn surface(
+        &self,
+        images: &mut Images<'_>,
+        judge: &Judge<'_>,
+        import: &mut Import,
+    ) -> Result<GltfSurface, ImportError> {
+        const SHARE: [f64; 2] = [0.0, 1.0];
+        let glossiness = judge.factor("glossinessFactor", self.glossiness_factor, SHARE, import)?;
+        let mut specular_color = self.specular_factor;
+        for value in &mut specular_color {
+            *value = judge.factor("specularFactor", *value, SHARE, import)?;
+        }
+        let image = match &self.specular_glossiness_texture {
+            Some(info) => {
+                let from = judge.place("specularGlossinessTexture");
+                images.use_of(&from, info, Encoding::Srgb, import)?
+            }
+            None => None,
+        };
+        Ok(GltfSurface {
+            metallic: 0.0,
+            roughness: 1.0 - glossiness,
+            glossiness_texture: image.clone(),
+            ior: MIRROR,
+            specular_color,
+            specular_color_texture: image,
+            ..GltfSurface::default()
+        })
+    }
+}
+
+const VOLUME: &str = "KHR_materials_volume";
+
+/// What `read` is when it has a thickness: glass where it is clear all over, else still a thin wall.
+pub(super) fn body(
+    judge: &Judge<'_>,
+    material: &json::Material,
+    read: GltfSurface,
+    import: &mut Import,
+) -> Result<Scattering, ImportError> {
+    let extension = material.extensions.as_ref().and_then(|e| e.others.get(VOLUME));
+    let thickness = judge.number(material, VOLUME, "thicknessFactor", import)?.unwrap_or(0.0);
+    let thin = |read| Ok(Scattering::Gltf(Box::new(read)));
+    let Some(extension) = extension.filter(|_| thickness > 0.0) else { return thin(read) };
+    let textured = read.metallic_roughness.is_some() || read.transmission_texture.is_some();
+    let varies = textured || extension.get("thicknessTexture").is_some();
+    if read.transmission < 1.0 || read.metallic > 0.0 || varies {
+        return thin(read);
+    }
+    let distance = judge.number(material, VOLUME, "attenuationDistance", import)?;
+    let absorption = match distance.filter(|d| *d > 0.0 && d.is_finite()) {
+        Some(distance) => Some(Absorption { color: left(judge, extension, import)?, distance }),
+        None => None,
+    };
+    let ior = Ior::Constant(read.ior);
+    Ok(Scattering::Dielectric(Glass { ior, roughness: read.roughness, absorption }))
+}
+
+/// The share of light that is left after the distance.
+fn left(
+    judge: &Judge<'_>,
+    extension: &Value,
+    import: &mut Import,
+) -> Result<[f64; 3], ImportError> {
+    let Some(written) = extension.get("attenuationColor") else { return Ok([1.0; 3]) };
+    let color = <[f64; 3]>::deserialize(written).ok();
+    let color = color.filter(|color| color.iter().all(|c| (0.0..=1.0).contains(c)));
+    if color.is_none() {
+        judge.say("attenuationColor is not three numbers in 0 to 1", "it is left out", import)?;
+    }
+    Ok(color.unwrap_or([1.0; 3]))
 }

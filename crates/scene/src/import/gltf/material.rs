@@ -15,10 +15,10 @@ use json::validation::Checked;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::glossiness::Glossiness;
 use super::images::Images;
-use super::{Reader, lobes, volume};
-use crate::import::note::{self, Note, NoteKind};
+use super::lobes::Glossiness;
+use super::{Reader, lobes};
+use crate::import::error::{self, Note, NoteKind};
 use crate::import::{Import, ImportError, Strictness};
 
 /// The number of the material of `primitive`, which messages call `place`.
@@ -68,7 +68,7 @@ impl Judge<'_> {
             return Err(self.reader.damaged(place, format!("its {what}; export it again")));
         }
         let message = format!("its {what}; {remedy}");
-        note::push(&mut import.notes, Note::new(NoteKind::Irregular, &self.subject, message));
+        error::push(&mut import.notes, Note::new(NoteKind::Irregular, &self.subject, message));
         Ok(())
     }
 
@@ -299,7 +299,7 @@ fn scattering(
         *use_of = placed(key, texture(CLEARCOAT, key).as_ref(), Encoding::Linear)?;
     }
     lobes::add(images, judge, material, &mut read, import)?;
-    volume::body(judge, material, read, import)
+    lobes::body(judge, material, read, import)
 }
 
 /// The tint of the reflection face on: anything from 0.

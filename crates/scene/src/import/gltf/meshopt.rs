@@ -19,7 +19,7 @@ const MOST_GROWTH: usize = 1024;
 const AROUND: usize = 512;
 
 /// A compressed buffer view.
-pub(super) struct Compressed<'a> {
+pub(super) struct MeshoptView<'a> {
     pub name: &'static str,
     written: &'a Value,
 }
@@ -37,7 +37,7 @@ pub(super) struct Stream {
     count: usize,
     mode: Mode,
     #[serde(default)]
-    filter: Filter,
+    filter: MeshoptFilter,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -50,7 +50,7 @@ enum Mode {
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(rename_all = "SCREAMING_SNAKE_CASE")]
-enum Filter {
+enum MeshoptFilter {
     #[default]
     None,
     Octahedral,
@@ -59,7 +59,7 @@ enum Filter {
     Color,
 }
 
-impl<'a> Compressed<'a> {
+impl<'a> MeshoptView<'a> {
     /// The compression of `view`; `None` for a plain one.
     pub(super) fn of(view: &'a json::buffer::View) -> Option<Self> {
         let extensions = &view.extensions.as_ref()?.others;
@@ -92,13 +92,17 @@ impl Stream {
     fn check(&self) -> Result<(), String> {
         let (stride, count) = (self.byte_stride, self.count);
         let fits = match (self.mode, self.filter) {
-            (Mode::Attributes, Filter::None | Filter::Exponential) => {
+            (Mode::Attributes, MeshoptFilter::None | MeshoptFilter::Exponential) => {
                 stride.is_multiple_of(4) && (4..=256).contains(&stride)
             }
-            (Mode::Attributes, Filter::Octahedral | Filter::Color) => matches!(stride, 4 | 8),
-            (Mode::Attributes, Filter::Quaternion) => stride == 8,
-            (Mode::Triangles, Filter::None) => matches!(stride, 2 | 4) && count.is_multiple_of(3),
-            (Mode::Indices, Filter::None) => matches!(stride, 2 | 4),
+            (Mode::Attributes, MeshoptFilter::Octahedral | MeshoptFilter::Color) => {
+                matches!(stride, 4 | 8)
+            }
+            (Mode::Attributes, MeshoptFilter::Quaternion) => stride == 8,
+            (Mode::Triangles, MeshoptFilter::None) => {
+                matches!(stride, 2 | 4) && count.is_multiple_of(3)
+            }
+            (Mode::Indices, MeshoptFilter::None) => matches!(stride, 2 | 4),
             (Mode::Triangles | Mode::Indices, _) => false,
         };
         if !fits {
@@ -143,13 +147,17 @@ impl Stream {
 
     fn undo_filter(&self, bytes: &mut [u8]) {
         match (self.filter, self.byte_stride) {
-            (Filter::None, _) => {}
-            (Filter::Octahedral, 4) => in_place::<i8, 4>(bytes, meshopt::decode_filter_oct),
-            (Filter::Octahedral, _) => in_place::<i16, 4>(bytes, meshopt::decode_filter_oct),
-            (Filter::Color, 4) => in_place::<u8, 4>(bytes, meshopt::decode_filter_color),
-            (Filter::Color, _) => in_place::<u16, 4>(bytes, meshopt::decode_filter_color),
-            (Filter::Quaternion, _) => in_place::<i16, 4>(bytes, meshopt::decode_filter_quat),
-            (Filter::Exponential, _) => in_place::<u32, 1>(bytes, meshopt::decode_filter_exp),
+            (MeshoptFilter::None, _) => {}
+            (MeshoptFilter::Octahedral, 4) => in_place::<i8, 4>(bytes, meshopt::decode_filter_oct),
+            (MeshoptFilter::Octahedral, _) => in_place::<i16, 4>(bytes, meshopt::decode_filter_oct),
+            (MeshoptFilter::Color, 4) => in_place::<u8, 4>(bytes, meshopt::decode_filter_color),
+            (MeshoptFilter::Color, _) => in_place::<u16, 4>(bytes, meshopt::decode_filter_color),
+            (MeshoptFilter::Quaternion, _) => {
+                in_place::<i16, 4>(bytes, meshopt::decode_filter_quat)
+            }
+            (MeshoptFilter::Exponential, _) => {
+                in_place::<u32, 1>(bytes, meshopt::decode_filter_exp)
+            }
         }
     }
 }

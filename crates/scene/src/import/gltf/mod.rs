@@ -15,24 +15,19 @@ mod deform;
 mod document;
 mod draco;
 mod extensions;
-mod glb;
-mod glossiness;
 mod hierarchy;
 mod images;
-mod instancing;
 mod lights;
 mod lobes;
 mod material;
 mod meshopt;
 mod pose;
 mod primitive;
-mod skin;
-mod volume;
 
 use std::path::Path;
 
 use super::files::Files;
-use super::{Import, ImportError, Options, Wanted, note};
+use super::{Import, ImportError, Options, Wanted, error};
 use crate::memory::of_json;
 use buffers::Buffers;
 use document::Document;
@@ -96,7 +91,7 @@ pub(super) fn import(
     options: &Options,
 ) -> Result<Import, ImportError> {
     let map = files.map_model(path)?;
-    let container = glb::open(path, &map)?;
+    let container = buffers::open(path, &map)?;
     files.require_room(path, "its JSON", of_json(container.json))?;
     let mut document = document::parse(path, container.json, container.in_glb)?;
     let mut import = Import::default();
@@ -121,10 +116,10 @@ pub(super) fn import(
         import.lights = scene.lights;
     }
     if options.animation.is_none() && !document.animations.is_empty() {
-        note::push(
+        error::push(
             &mut import.notes,
-            note::Note::new(
-                note::NoteKind::Unsupported,
+            error::Note::new(
+                error::NoteKind::Unsupported,
                 "animations",
                 "nodes stand as the file has them at rest; the object's `animation`, or `frames` of the type \
                  `animation`, play one",

@@ -11,12 +11,11 @@ use rayon::prelude::*;
 
 use super::Reader;
 use super::accessor::Accessor;
-use super::deform::Corners;
+use super::deform::{Corners, Skin};
 use super::draco::{Compressed, Decoded};
 use super::hierarchy::{Scene, Shape};
-use super::skin::Skin;
 use crate::import::admit::{Admitted, Candidate, admit, cost};
-use crate::import::note::{self, Note, NoteKind};
+use crate::import::error::{self, Note, NoteKind};
 use crate::import::{Import, ImportError, Strictness};
 
 /// A primitive that became a mesh.
@@ -130,7 +129,7 @@ fn take(read: Read, import: &mut Import, reader: &Reader<'_>) -> Result<u32, Imp
     import.stats.bytes_mapped += read.mapped;
     import.stats.dropped += read.admitted.dropped;
     for note in read.notes.into_iter().chain(read.admitted.notes) {
-        note::push(&mut import.notes, note);
+        error::push(&mut import.notes, note);
     }
     import.meshes.push(read.admitted.mesh);
     Ok(index)
@@ -140,13 +139,13 @@ fn note_unused(shown: &[bool], notes: &mut Vec<Note>) {
     let unused = shown.iter().filter(|&&shown| !shown).count() as u64;
     if unused > 0 {
         let message = "meshes that no node of the default scene shows are not read";
-        note::push(notes, Note::new(NoteKind::Unused, "meshes", message).counted(unused));
+        error::push(notes, Note::new(NoteKind::Unused, "meshes", message).counted(unused));
     }
 }
 
 fn note_no_triangles(notes: &mut Vec<Note>) {
     let message = "points and lines have no surface and are left out";
-    note::push(notes, Note::new(NoteKind::Unsupported, "primitives", message));
+    error::push(notes, Note::new(NoteKind::Unsupported, "primitives", message));
 }
 
 /// What messages call a primitive.

@@ -1,8 +1,16 @@
 //! One piece of an OBJ file: its vertices, faces and statements, with indices that are absolute
 //! already or still relative to the piece.
+//!
+//! What an MTL material says that cannot be so, or that is not looked at.
+//!
+//! Which faces belong together: those of one group or object with one material.
 
-use crate::import::precision::single;
+use std::collections::HashMap;
+use std::ops::Range;
+
+use crate::import::single;
 use crate::import::text::{Fault, Words, number, whole};
+use etendue_tracer::spec::BRIGHTEST;
 
 /// The index of a corner that has none.
 pub(super) const NONE: u32 = u32::MAX;
@@ -26,7 +34,7 @@ pub(super) const VN: usize = 2;
 
 /// What is to be read beside positions and faces.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Wish {
+pub(super) struct WantedColumns {
     pub uvs: bool,
     pub normals: bool,
     pub colors: bool,
@@ -83,7 +91,7 @@ pub(super) enum Statement {
 
 impl Chunk {
     /// Reads `text`, which starts and ends with whole lines.
-    pub(super) fn parse(text: &[u8], wish: Wish) -> Result<Self, Fault> {
+    pub(super) fn parse(text: &[u8], wish: WantedColumns) -> Result<Self, Fault> {
         let mut chunk = Self::default();
         let mut words = Words::new(text);
         while !words.is_done() {
@@ -122,7 +130,7 @@ impl Chunk {
         Ok(chunk)
     }
 
-    fn vertex(&mut self, words: &mut Words<'_>, wish: Wish) -> Result<(), Fault> {
+    fn vertex(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
         let position = floats::<3>(words, 3)?;
         self.positions.push(position);
         self.defined[V] += 1;
@@ -144,7 +152,7 @@ impl Chunk {
         self.colors.push(color);
     }
 
-    fn uv(&mut self, words: &mut Words<'_>, wish: Wish) -> Result<(), Fault> {
+    fn uv(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
         self.defined[VT] += 1;
         if wish.uvs {
             let [u, v] = floats::<2>(words, 1)?;
@@ -154,7 +162,7 @@ impl Chunk {
         Ok(())
     }
 
-    fn normal(&mut self, words: &mut Words<'_>, wish: Wish) -> Result<(), Fault> {
+    fn normal(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
         self.defined[VN] += 1;
         if wish.normals {
             self.normals.push(floats::<3>(words, 3)?.map(single));
@@ -162,7 +170,7 @@ impl Chunk {
         Ok(())
     }
 
-    fn face(&mut self, words: &mut Words<'_>, wish: Wish) -> Result<(), Fault> {
+    fn face(&mut self, words: &mut Words<'_>, wish: WantedColumns) -> Result<(), Fault> {
         let first = self.corners[V].len();
         while let Some(word) = words.word() {
             let at = words.at() - word.len();
@@ -263,4 +271,110 @@ fn floats<const N: usize>(words: &mut Words<'_>, needed: usize) -> Result<[f64; 
 /// Text as UTF-8; what is not (older files are Latin-1) is replaced by signs that show it.
 fn string(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// The values that no surface can have, each with what becomes of it.
+pub(super) fn impossible(material: &tobj::Material) -> Vec<String> {
+    let outside = |color: Option<[f64; 3]>| {
+        color.is_some_and(|color| !color.iter().all(|value| (0.0..=1.0).contains(value)))
+    };
+    let mut found = Vec::new();
+    for (key, color) in [("Kd", material.diffuse), ("Ks", material.specular)] {
+        if outside(color) {
+            found.push(format!("{key} is outside 0 to 1; it is brought there"));
+        }
+    }
+    if outside(material.dissolve.map(|d| [d; 3])) {
+        found.push("d is outside 0 to 1; it is brought there".to_owned());
+    }
+    if material.shininess.is_some_and(|ns| !(0.0..f64::INFINITY).contains(&ns)) {
+        found.push("Ns is below zero or not finite; 0 is taken".to_owned());
+    }
+    let is_glass = matches!(material.illumination_model, Some(4 | 6 | 7 | 9));
+    if is_glass && material.optical_density.is_some_and(|n| !(1.0..f64::INFINITY).contains(&n)) {
+        found.push("Ni is below 1 or not finite; it is no glass".to_owned());
+    }
+    for (key, color) in [("Ke", material.emissive), ("Ka", material.ambient)] {
+        let is_sound =
+            |color: [f64; 3]| color.iter().all(|value| (0.0..=BRIGHTEST).contains(value));
+        if color.is_some_and(|color| !is_sound(color)) {
+            found.push(format!(
+                "{key} is below zero, not finite or above {BRIGHTEST:e}; it does not shine"
+            ));
+        }
+    }
+    found
+}
+
+/// The keys that change how a surface looks and are passed over.
+pub(super) fn passed_over(material: &tobj::Material) -> Vec<String> {
+    let maps = [
+        ("map_Ks", &material.specular_texture),
+        ("map_Ns", &material.shininess_texture),
+        ("map_d", &material.dissolve_texture),
+        ("map_bump", &material.normal_texture),
+    ];
+    let maps = maps.into_iter().filter(|(_, map)| map.is_some()).map(|(key, _)| key.to_owned());
+    let is_look = |key: &str| {
+        key.starts_with("map_")
+            || ["norm", "disp", "decal", "refl", "Pr", "Pm", "Ps", "Pc", "Pcr", "aniso", "anisor"]
+                .contains(&key)
+    };
+    let mut others: Vec<String> =
+        material.unknown_param.keys().filter(|key| is_look(key)).cloned().collect();
+    others.sort();
+    maps.chain(others).collect()
+}
+
+/// Faces of one name and one material, in the order of the file.
+#[derive(Debug, Default)]
+pub(super) struct Segment {
+    /// The last `o` or `g` before; may be empty.
+    pub name: String,
+    /// The last `usemtl` before.
+    pub material: Option<String>,
+    /// Corners, by chunk.
+    pub runs: Vec<(usize, Range<usize>)>,
+}
+
+/// Divides the faces of all `chunks`. A file without faces is one empty segment.
+pub(super) fn divide(chunks: &[Chunk]) -> Vec<Segment> {
+    let mut segments: Vec<Segment> = Vec::new();
+    let mut known: HashMap<(String, Option<String>), usize> = HashMap::new();
+    let mut current: (String, Option<String>) = Default::default();
+    for (number, chunk) in chunks.iter().enumerate() {
+        let mut from = 0;
+        let ends = chunk.statements.iter().map(|(at, statement)| (*at, Some(statement)));
+        for (end, statement) in ends.chain([(chunk.corners[V].len(), None)]) {
+            if end > from {
+                let at = *known.entry(current.clone()).or_insert(segments.len());
+                if at == segments.len() {
+                    let (name, material) = current.clone();
+                    segments.push(Segment { name, material, runs: Vec::new() });
+                }
+                segments[at].runs.push((number, from..end));
+                from = end;
+            }
+            match statement {
+                Some(Statement::Name(name)) => current.0.clone_from(name),
+                Some(Statement::Material(name)) => current.1 = Some(name.clone()),
+                Some(Statement::Library(_)) | None => {}
+            }
+        }
+    }
+    if segments.is_empty() {
+        segments.push(Segment::default());
+    }
+    segments
+}
+
+/// The `mtllib` lines of all chunks, in the order of the file.
+pub(super) fn libraries(chunks: &[Chunk]) -> Vec<&str> {
+    let statements = chunks.iter().flat_map(|chunk| &chunk.statements);
+    statements
+        .filter_map(|(_, statement)| match statement {
+            Statement::Library(files) => Some(files.as_str()),
+            _ => None,
+        })
+        .collect()
 }

@@ -11,29 +11,31 @@
 //! # Sources
 //!
 //! Wavefront Technologies, *Object Files (.obj)*, appendix B1 of the Advanced Visualizer manual.
+//!
+//! Flat lamps at the rim of a model shine into it alone.
+//!
+//! MTL has no word for the side on which a surface shines, so `Ke` shines from both. A flat lamp right
+//! under the ceiling then lights the slit behind it: the light goes to and fro there, comes out by a
+//! gap that few paths find, and those few are white specks. Who draws such a lamp means its front.
 
 mod chunk;
-mod lamps;
 mod mtl;
-mod oddities;
-mod pool;
-mod segment;
 mod weld;
 
 use std::collections::HashMap;
 use std::path::Path;
 
-use etendue_geometry::Transform;
 use rayon::prelude::*;
 
 use super::admit::{self, Admitted};
+use super::error::{self, Note, NoteKind};
 use super::files::Files;
-use super::note::{self, Note, NoteKind};
 use super::text::{Fault, pieces, with_newlines, without_mark};
 use super::{Import, ImportError, ImportedPlacement, Options, Wanted};
-use chunk::{Chunk, Wish};
-use pool::Pool;
-use segment::Segment;
+use chunk::{Chunk, Segment, WantedColumns};
+use etendue_geometry::glam::DVec3;
+use etendue_geometry::{Bounds, Mesh, Transform};
+use weld::Pool;
 
 /// Bytes that a byte of text becomes: a line `v 0 0 0` three f64, a corner of a face an index or three.
 const PARSED_PER_BYTE: u64 = 3;
@@ -53,7 +55,7 @@ pub(super) fn import(
     let text = with_newlines(without_mark(map.bytes()));
     let text: &[u8] = &text;
     let fault = |fault: Fault| fault.locate(path, text);
-    let wish = Wish { uvs: wanted.uvs, normals: wanted.normals, colors: wanted.colors };
+    let wish = WantedColumns { uvs: wanted.uvs, normals: wanted.normals, colors: wanted.colors };
     let bytes = PARSED_PER_BYTE * text.len() as u64;
     files.take(bytes, || "the numbers of the text".to_owned())?;
     let pieces = pieces(text, PIECE);
@@ -67,16 +69,16 @@ pub(super) fn import(
         .collect::<Result<_, _>>()
         .map_err(fault)?;
     refuse_foreign(&chunks, &pieces).map_err(fault)?;
-    let missing = pool::settle(&mut chunks, options.strictness)
-        .map_err(|chunk| pool::find_bad_index(&pieces, chunk, &chunks, options.strictness))
+    let missing = weld::settle(&mut chunks, options.strictness)
+        .map_err(|chunk| weld::find_bad_index(&pieces, chunk, &chunks, options.strictness))
         .map_err(fault)?;
     let mut import = Import::default();
     note_leftovers(&chunks, missing, &mut import.notes);
-    let segments = segment::divide(&chunks);
+    let segments = chunk::divide(&chunks);
     let names = segments.iter().map(|s| s.name.len() + s.material.as_ref().map_or(0, String::len));
     files.take(4 * names.sum::<usize>() as u64, || "names of objects".to_owned())?;
     let pool = Pool::gather(&mut chunks);
-    let libraries = segment::libraries(&chunks);
+    let libraries = chunk::libraries(&chunks);
     let numbers = mtl::load(&libraries, &segments, files, wanted, options.strictness, &mut import)?;
     let mut welder = weld::Welder::new(&pool, &chunks);
     let single = segments.len() == 1;
@@ -88,7 +90,7 @@ pub(super) fn import(
         let admitted = admit::admit(candidate, path, options)?;
         place(admitted, segment, [material, node], &mut import)?;
     }
-    lamps::darken_backs(&mut import);
+    darken_backs(&mut import);
     Ok(import)
 }
 
@@ -133,7 +135,7 @@ fn place(
     import.stats.bytes_copied += admitted.mesh.heap_bytes() as u64;
     import.stats.dropped += admitted.dropped;
     for note in admitted.notes {
-        note::push(&mut import.notes, note);
+        error::push(&mut import.notes, note);
     }
     import.placements.push(ImportedPlacement {
         // Fewer meshes than corners, and those are counted in 32 bits.
@@ -151,17 +153,17 @@ fn place(
 fn note_leftovers(chunks: &[Chunk], missing: u64, notes: &mut Vec<Note>) {
     if missing > 0 {
         let message = "texture coordinates and normals that do not exist are left out";
-        note::push(notes, Note::new(NoteKind::Irregular, "f", message).counted(missing));
+        error::push(notes, Note::new(NoteKind::Irregular, "f", message).counted(missing));
     }
     let lines: u64 = chunks.iter().map(|chunk| chunk.without_surface).sum();
     if lines > 0 {
         let message = "points and lines have no surface and are left out";
-        note::push(notes, Note::new(NoteKind::Unsupported, "l, p", message).counted(lines));
+        error::push(notes, Note::new(NoteKind::Unsupported, "l, p", message).counted(lines));
     }
     let free_form: u64 = chunks.iter().map(|chunk| chunk.free_form).sum();
     if free_form > 0 {
         let message = "free-form curves and surfaces are left out; export the model as polygons";
-        note::push(
+        error::push(
             notes,
             Note::new(NoteKind::Unsupported, "curv, surf", message).counted(free_form),
         );
@@ -169,6 +171,90 @@ fn note_leftovers(chunks: &[Chunk], missing: u64, notes: &mut Vec<Note>) {
     let small: u64 = chunks.iter().map(|chunk| chunk.too_small).sum();
     if small > 0 {
         let message = "faces of fewer than three corners are left out";
-        note::push(notes, Note::new(NoteKind::Irregular, "f", message).counted(small));
+        error::push(notes, Note::new(NoteKind::Irregular, "f", message).counted(small));
+    }
+}
+
+/// How much less of the model lies behind a lamp than before it (as a share) when it shines to the
+/// front alone.
+const BEHIND: f64 = 0.02;
+
+/// How far a model reaches before a lamp, as a share of the lamp's size, when the lamp is there to light
+/// it.
+const LEAST_BEFORE: f64 = 0.1;
+
+/// How far from a plane its corners may lie, as a share of the size of what they span: files have six
+/// digits.
+const FLAT: f64 = 1e-5;
+
+/// Leaves the backs of flat lamps dark that have next to nothing behind them.
+fn darken_backs(import: &mut Import) {
+    if import.materials.iter().all(|material| material.emission.is_none()) {
+        return;
+    }
+    let model = bounds(import.meshes.iter());
+    for (number, material) in (0_u32..).zip(&mut import.materials) {
+        let Some(emission) = &mut material.emission else { continue };
+        let own = import.placements.iter().filter(|placement| placement.material == number);
+        let meshes: Vec<&Mesh> = own.map(|own| &import.meshes[own.mesh as usize]).collect();
+        if let Some(Sheet { normal, at, size }) = Sheet::of(&meshes) {
+            let [behind, before] = extent(model, normal, at);
+            // A lamp by itself has nothing before it, and shines wherever it is put.
+            let lights_model = before > LEAST_BEFORE * size;
+            emission.two_sided = !lights_model || behind > BEHIND * before;
+        }
+    }
+}
+
+fn bounds<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> Bounds {
+    let mut bounds = Bounds::default();
+    for mesh in meshes {
+        (0..mesh.triangles.len()).flat_map(|t| mesh.corners(t)).for_each(|at| bounds.include(at));
+    }
+    bounds
+}
+
+/// Triangles in one plane with their fronts to the same side.
+struct Sheet {
+    /// Unit normal of the fronts.
+    normal: DVec3,
+    /// How far along it they lie.
+    at: f64,
+    /// The diagonal of their box.
+    size: f64,
+}
+
+impl Sheet {
+    /// `None` where the triangles lie in no plane.
+    fn of(meshes: &[&Mesh]) -> Option<Self> {
+        let triangles = || meshes.iter().flat_map(|m| (0..m.triangles.len()).map(|t| m.corners(t)));
+        let cross = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+        let normal = triangles().find_map(|corners| cross(corners).try_normalize())?;
+        let at = normal.dot(triangles().next()?[0]);
+        let size = bounds(meshes.iter().copied()).diagonal();
+        let lies_in = |corners: [DVec3; 3]| {
+            let near = |corner: DVec3| (normal.dot(corner) - at).abs() <= FLAT * size;
+            corners.into_iter().all(near) && normal.dot(cross(corners)) >= 0.0
+        };
+        triangles().all(lies_in).then_some(Self { normal, at, size })
+    }
+}
+
+/// How far `bounds` reach behind a plane and before it.
+fn extent(bounds: Bounds, normal: DVec3, at: f64) -> [f64; 2] {
+    let middle = normal.dot(bounds.centre()) - at;
+    let reach = normal.abs().dot(0.5 * (bounds.max - bounds.min));
+    [(reach - middle).max(0.0), (reach + middle).max(0.0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_reaches_as_far_as_its_corners() {
+        let bounds = Bounds { min: DVec3::ZERO, max: DVec3::new(1.0, 2.0, 4.0) };
+        assert_eq!(extent(bounds, DVec3::NEG_Y, -1.5), [0.5, 1.5]);
+        assert_eq!(extent(bounds, DVec3::Z, 5.0), [5.0, 0.0], "all is behind");
     }
 }

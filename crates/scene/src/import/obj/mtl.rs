@@ -17,10 +17,10 @@ use etendue_tracer::{
     Emission, Glass, ImageSource, Ior, Material, Paint, Scattering, Texture, TextureUse,
 };
 
-use super::oddities;
-use super::segment::Segment;
+use super::chunk;
+use super::chunk::Segment;
+use crate::import::error::{self, Note, NoteKind};
 use crate::import::files::Files;
-use crate::import::note::{self, Note, NoteKind};
 use crate::import::text::with_newlines;
 use crate::import::{Import, ImportError, Strictness, Wanted};
 
@@ -50,7 +50,7 @@ pub(super) fn load(
         }
     }
     let mut known: HashMap<Option<&str>, u32> = HashMap::new();
-    let mut maps = Maps { files, strictness, numbers: HashMap::new() };
+    let mut maps = MtlMaps { files, strictness, numbers: HashMap::new() };
     let mut numbers = Vec::with_capacity(segments.len());
     for segment in segments {
         let name = segment.material.as_deref();
@@ -90,7 +90,7 @@ fn find(
             looked_for += 1;
             if looked_for > MOST_LIBRARIES {
                 let message = format!("only the first {MOST_LIBRARIES} material files are read");
-                note::push(notes, Note::new(NoteKind::Irregular, "mtllib", message));
+                error::push(notes, Note::new(NoteKind::Irregular, "mtllib", message));
                 return Ok(found);
             }
             match files.locate(&name)? {
@@ -98,7 +98,7 @@ fn find(
                 Some(_) => {}
                 None => {
                     let message = "the material file does not exist; its materials are light grey";
-                    note::push(notes, Note::new(NoteKind::MissingFile, name, message));
+                    error::push(notes, Note::new(NoteKind::MissingFile, name, message));
                 }
             }
         }
@@ -143,7 +143,7 @@ fn read(
             None => {
                 let message = format!("line {}, \"{}\", is left out", number + 1, line.trim());
                 let subject = file.display().to_string();
-                note::push(notes, Note::new(NoteKind::Irregular, subject, message));
+                error::push(notes, Note::new(NoteKind::Irregular, subject, message));
             }
         }
     }
@@ -186,13 +186,13 @@ fn fit(line: &str) -> Option<String> {
 fn undefined(name: Option<&str>, notes: &mut Vec<Note>) -> Material {
     let Some(name) = name else { return Material::unnamed() };
     let message = "no material file defines it; it is light grey";
-    note::push(notes, Note::new(NoteKind::Irregular, format!("usemtl {name}"), message));
+    error::push(notes, Note::new(NoteKind::Irregular, format!("usemtl {name}"), message));
     Material { name: name.to_owned(), ..Material::unnamed() }
 }
 
 fn resolve(
     defined: &Defined,
-    maps: &mut Maps<'_>,
+    maps: &mut MtlMaps<'_>,
     wanted: Wanted,
     import: &mut Import,
 ) -> Result<Material, ImportError> {
@@ -201,7 +201,7 @@ fn resolve(
         Some(map) if wanted.textures => maps.use_of(map, &defined.file, import)?,
         _ => None,
     };
-    for what in oddities::impossible(material) {
+    for what in chunk::impossible(material) {
         if maps.strictness == Strictness::Strict {
             return Err(ImportError::Damaged {
                 file: defined.file.clone(),
@@ -210,12 +210,12 @@ fn resolve(
             });
         }
         let note = Note::new(NoteKind::Irregular, material.name.clone(), what);
-        note::push(&mut import.notes, note);
+        error::push(&mut import.notes, note);
     }
     if wanted.light {
-        for key in oddities::passed_over(material) {
+        for key in chunk::passed_over(material) {
             let message = "not supported: surfaces are shown without it";
-            note::push(&mut import.notes, Note::new(NoteKind::Unsupported, key, message));
+            error::push(&mut import.notes, Note::new(NoteKind::Unsupported, key, message));
         }
     }
     let diffuse = material.diffuse.filter(|color| !color.iter().any(|value| value.is_nan()));
@@ -294,13 +294,13 @@ fn nearest(material: &tobj::Material, plain: Material) -> Material {
 }
 
 /// The images that maps name, each once.
-struct Maps<'a> {
+struct MtlMaps<'a> {
     files: &'a Files,
     strictness: Strictness,
     numbers: HashMap<(PathBuf, bool), u32>,
 }
 
-impl Maps<'_> {
+impl MtlMaps<'_> {
     fn use_of(
         &mut self,
         written: &str,
@@ -318,7 +318,7 @@ impl Maps<'_> {
                 });
             }
             None => {
-                note::push(&mut import.notes, note::missing_image(map.name.clone()));
+                error::push(&mut import.notes, error::missing_image(map.name.clone()));
                 (PathBuf::from(&map.name), ImageSource::Missing)
             }
         };

@@ -126,7 +126,7 @@ impl Header {
     }
 
     pub(super) fn parse(file: &[u8]) -> Result<Self, Fault> {
-        let mut lines = Lines::new(file)?;
+        let mut lines = HeaderLines::new(file)?;
         let (mut format, mut elements, mut properties) = (None, Vec::new(), 0);
         while let Some((start, line)) = lines.next() {
             let mut words = Words::new(line);
@@ -169,13 +169,13 @@ const MOST_PROPERTIES: usize = 1000;
 const LONGEST: usize = 1 << 20;
 
 /// The lines of a header.
-struct Lines<'a> {
+struct HeaderLines<'a> {
     file: &'a [u8],
     at: usize,
     end: u8,
 }
 
-impl<'a> Lines<'a> {
+impl<'a> HeaderLines<'a> {
     /// From behind the word `ply`, which is all of the first line.
     fn new(file: &'a [u8]) -> Result<Self, Fault> {
         let text = without_mark(file);

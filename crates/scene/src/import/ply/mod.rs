@@ -10,8 +10,6 @@
 //!
 //! Greg Turk, *The PLY polygon file format* (1994).
 
-mod binary;
-mod faces;
 mod header;
 mod text;
 mod vertices;
@@ -48,8 +46,10 @@ pub(super) fn import(
     let bytes = header.bytes_to_make(map.bytes().len());
     files.take(bytes, || "vertices and faces".to_owned())?;
     let (vertices, faces) = match header.format {
-        Format::Text => text::read(&map, &header, wanted).map_err(fault)?,
-        Format::Binary(order) => binary::read(&map, &header, order, wanted).map_err(damaged)?,
+        Format::Text => text::read_text(&map, &header, wanted).map_err(fault)?,
+        Format::Binary(order) => {
+            text::read_binary(&map, &header, order, wanted).map_err(damaged)?
+        }
     };
     files.take(faces.bytes_to_cut(), || "faces cut into triangles".to_owned())?;
     let triangles = faces.triangles(&vertices.positions);

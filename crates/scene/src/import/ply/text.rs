@@ -1,19 +1,23 @@
 //! Data as text, one row a line.
+//!
+//! Binary data of either byte order.
 
-use etendue_files::MappedFile;
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
-use super::faces::{Faces, Lists};
-use super::header::{Element, Header};
-use super::vertices::{Columns, Table, VertexData};
+use super::header::{Element, Header, Order, Property, Type};
+use super::vertices::{Columns, Faces, Lists, Table, VertexData};
 use crate::import::Wanted;
 use crate::import::text::{Fault, Words, number, pieces, with_newlines};
+use etendue_files::MappedFile;
+use etendue_geometry::{Buffer, Vertices};
 
 /// Bytes that one task reads.
 const PIECE: usize = 1 << 20;
 
 /// Reads vertices and faces.
-pub(super) fn read(
+pub(super) fn read_text(
     map: &MappedFile,
     header: &Header,
     wanted: Wanted,
@@ -172,5 +176,214 @@ fn next_index(words: &mut Words<'_>) -> Result<u32, Fault> {
         Ok(value as i64 as u32)
     } else {
         Err(Fault::new(start, format!("{value} is not the number of a vertex")))
+    }
+}
+
+/// Reads vertices and faces.
+pub(super) fn read_binary(
+    map: &Arc<MappedFile>,
+    header: &Header,
+    order: Order,
+    wanted: Wanted,
+) -> Result<(VertexData, Faces), String> {
+    let mut at = header.data;
+    let (mut vertices, mut faces) = (None, Faces::default());
+    for element in &header.elements {
+        let cut_off = || {
+            format!(
+                "the file ends inside its {} {} rows; copy or export it again",
+                element.count, element.name
+            )
+        };
+        let bytes = map.bytes().get(at..).ok_or_else(cut_off)?;
+        let size = match (element.fixed_size(), Lists::of(element)) {
+            (Some(row), _) => {
+                let size = row.checked_mul(element.count).ok_or_else(cut_off)?;
+                let data = bytes.get(..size).ok_or_else(cut_off)?;
+                if element.name == "vertex" {
+                    let columns = Columns::of(element, wanted, false)?;
+                    let table = Rows { map, start: at, data, row, element, order };
+                    vertices = Some(columns.read(&table));
+                }
+                size
+            }
+            (None, Some((lists, column))) => {
+                let walk = Walk { element, bytes, order };
+                match walk.triangles_only(lists, column) {
+                    Some((triangles, size)) => {
+                        faces.append(Faces::from_triangles(triangles));
+                        size
+                    }
+                    None => walk.lists(lists, column, &mut faces).ok_or_else(cut_off)?,
+                }
+            }
+            (None, None) if element.name == "vertex" => {
+                return Err("vertices with lists are not supported; export without them".into());
+            }
+            (None, None) => Walk { element, bytes, order }.skip().ok_or_else(cut_off)?,
+        };
+        at += size;
+    }
+    let vertices = vertices.ok_or("there is no vertex element; export the file again")?;
+    Ok((vertices, faces))
+}
+
+/// One number at the start of `bytes`; 0 where they are too few.
+#[inline]
+fn value(kind: Type, order: Order, bytes: &[u8]) -> f64 {
+    macro_rules! read {
+        ($type:ty) => {{
+            let bytes = bytes.first_chunk().copied().unwrap_or_default();
+            match order {
+                Order::Little => <$type>::from_le_bytes(bytes).into(),
+                Order::Big => <$type>::from_be_bytes(bytes).into(),
+            }
+        }};
+    }
+    match kind {
+        Type::I8 => read!(i8),
+        Type::U8 => read!(u8),
+        Type::I16 => read!(i16),
+        Type::U16 => read!(u16),
+        Type::I32 => read!(i32),
+        Type::U32 => read!(u32),
+        Type::F32 => read!(f32),
+        Type::F64 => read!(f64),
+    }
+}
+
+/// A whole number at the start of `bytes`, below zero as its two's complement; what is not whole or
+/// too large becomes an index that no vertex has.
+#[inline]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be whole")]
+fn index(kind: Type, order: Order, bytes: &[u8]) -> u32 {
+    let value = value(kind, order, bytes);
+    if value.fract() == 0.0 && value.abs() <= f64::from(u32::MAX) {
+        value as i64 as u32
+    } else {
+        u32::MAX
+    }
+}
+
+/// Rows of one size.
+struct Rows<'a> {
+    map: &'a Arc<MappedFile>,
+    /// Where the rows start in the file.
+    start: usize,
+    data: &'a [u8],
+    row: usize,
+    element: &'a Element,
+    order: Order,
+}
+
+impl Rows<'_> {
+    /// Where a property is in its row.
+    fn offset(&self, property: usize) -> usize {
+        self.element.properties[..property].iter().map(|p| p.kind.size()).sum()
+    }
+}
+
+impl Table for Rows<'_> {
+    fn rows(&self) -> usize {
+        self.element.count
+    }
+
+    #[inline]
+    fn get(&self, row: usize, property: usize) -> f64 {
+        let kind = self.element.properties[property].kind;
+        value(kind, self.order, &self.data[row * self.row + self.offset(property)..])
+    }
+
+    fn mapped_positions(&self, xyz: [usize; 3]) -> Option<Vertices<3>> {
+        let is_f32 = xyz.iter().all(|&p| self.element.properties[p].kind == Type::F32);
+        let first = self.offset(xyz[0]);
+        let in_a_row = xyz.map(|property| self.offset(property)) == [first, first + 4, first + 8];
+        let native = self.order == Order::Little && cfg!(target_endian = "little");
+        if !(is_f32 && in_a_row && native && self.row.is_multiple_of(4)) || self.rows() == 0 {
+            return None;
+        }
+        let start = self.start + first;
+        let last = (self.rows() - 1) * self.row / 4;
+        let available = (self.map.bytes().len() - start) / 4;
+        let floats = Buffer::from_file(self.map, start, (last + 4).min(available).max(last + 3))?;
+        Vertices::new(floats, self.row / 4, self.rows())
+    }
+}
+
+/// Rows with lists.
+struct Walk<'a> {
+    element: &'a Element,
+    bytes: &'a [u8],
+    order: Order,
+}
+
+impl Walk<'_> {
+    /// The triangles and the size of rows whose one list always has three entries: then all rows
+    /// are of one size. `None` otherwise.
+    fn triangles_only(&self, lists: Lists, column: usize) -> Option<(Vec<[u32; 3]>, usize)> {
+        let properties = &self.element.properties;
+        let others_fixed =
+            properties.iter().enumerate().all(|(i, p)| i == column || p.list.is_none());
+        let (length, item) = (properties[column].list?, properties[column].kind);
+        if lists != Lists::Polygons || !others_fixed || self.element.count == 0 {
+            return None;
+        }
+        let size = |properties: &[Property]| properties.iter().map(|p| p.kind.size()).sum();
+        let before: usize = size(&properties[..column]);
+        let behind: usize = size(&properties[column + 1..]);
+        let first = before + length.size();
+        let row = first + 3 * item.size() + behind;
+        let total = row.checked_mul(self.element.count)?;
+        let triangles: Option<Vec<[u32; 3]>> = self
+            .bytes
+            .get(..total)?
+            .par_chunks_exact(row)
+            .map(|bytes| {
+                let corner = |k: usize| index(item, self.order, &bytes[first + k * item.size()..]);
+                (index(length, self.order, &bytes[before..]) == 3)
+                    .then(|| [corner(0), corner(1), corner(2)])
+            })
+            .collect();
+        Some((triangles?, total))
+    }
+
+    /// Adds all lists to `faces`; the size of the rows, `None` where the file ends too soon.
+    fn lists(&self, lists: Lists, column: usize, faces: &mut Faces) -> Option<usize> {
+        let mut corners = Vec::new();
+        self.each(|number, property, bytes| {
+            if number == column {
+                let items = bytes.chunks_exact(property.kind.size());
+                corners.clear();
+                corners.extend(items.map(|bytes| index(property.kind, self.order, bytes)));
+                faces.push(lists, &corners);
+            }
+        })
+    }
+
+    /// The size of the rows.
+    fn skip(&self) -> Option<usize> {
+        self.each(|_, _, _| {})
+    }
+
+    /// Visits the bytes of each property of each row.
+    fn each(&self, mut visit: impl FnMut(usize, &Property, &[u8])) -> Option<usize> {
+        let mut at = 0_usize;
+        for _ in 0..self.element.count {
+            for (number, property) in self.element.properties.iter().enumerate() {
+                let count = match property.list {
+                    Some(length) => {
+                        let bytes = self.bytes.get(at..at.checked_add(length.size())?)?;
+                        at += length.size();
+                        // A length below zero becomes one that no file can hold.
+                        index(length, self.order, bytes) as usize
+                    }
+                    None => 1,
+                };
+                let size = count.checked_mul(property.kind.size())?;
+                visit(number, property, self.bytes.get(at..at.checked_add(size)?)?);
+                at += size;
+            }
+        }
+        Some(at)
     }
 }

@@ -42,8 +42,8 @@ pub(super) fn clip(polygon: &[Coord<f64>], triangles: &mut Vec<[u32; 3]>) -> u64
     let ring = Ring::new(polygon);
     let turns: Vec<f64> = (0..n).map(|i| ring.turn(i)).collect();
     let reflex: Vec<usize> = (0..n).filter(|&i| turns[i] <= 0.0).collect();
-    let mut clipper = Clipper {
-        tree: Tree::new(polygon, reflex),
+    let mut clipper = LargeClipper {
+        tree: BoxTree::new(polygon, reflex),
         in_the_way: turns.iter().map(|turn| *turn <= 0.0).collect(),
         queue: (0..n).map(|i| (i, 0)).collect(),
         stamps: vec![0; n],
@@ -58,9 +58,9 @@ pub(super) fn clip(polygon: &[Coord<f64>], triangles: &mut Vec<[u32; 3]>) -> u64
     clipper.effort
 }
 
-struct Clipper<'a> {
+struct LargeClipper<'a> {
     ring: Ring<'a>,
-    tree: Tree,
+    tree: BoxTree,
     /// Whether a corner is there and does not turn left.
     in_the_way: Vec<bool>,
     /// Corners to be looked at, with the stamp that they had then; the first comes next.
@@ -76,7 +76,7 @@ struct Clipper<'a> {
     most: u64,
 }
 
-impl Clipper<'_> {
+impl LargeClipper<'_> {
     fn run(&mut self, triangles: &mut Vec<[u32; 3]>) {
         let mut last = 0;
         while self.ring.left > 3 {
@@ -160,30 +160,30 @@ fn latest(known: &mut Vec<(usize, u32)>, stamps: &[u32]) -> Option<usize> {
 }
 
 /// Corners in a tree of boxes, each in one leaf.
-struct Tree {
+struct BoxTree {
     places: Vec<Coord<f64>>,
     /// Leaves have parts of this.
     order: Vec<usize>,
-    nodes: Vec<Node>,
+    nodes: Vec<BoxNode>,
     /// For each corner of the polygon its leaf.
     leaf: Vec<usize>,
 }
 
-struct Node {
+struct BoxNode {
     around: Area,
     parent: usize,
-    content: Content,
+    content: BoxContent,
     /// Corners below that are not forgotten.
     count: usize,
 }
 
-enum Content {
+enum BoxContent {
     Leaf(Range<usize>),
     /// The nodes of the two halves.
     Halves([usize; 2]),
 }
 
-impl Tree {
+impl BoxTree {
     fn new(polygon: &[Coord<f64>], order: Vec<usize>) -> Self {
         let leaf = vec![NOBODY; polygon.len()];
         let mut tree = Self { places: polygon.to_vec(), order, nodes: Vec::new(), leaf };
@@ -196,8 +196,8 @@ impl Tree {
         let places = &self.places;
         let around = Area::around(self.order[part.clone()].iter().map(|&corner| places[corner]));
         let number = self.nodes.len();
-        let content = Content::Leaf(part.clone());
-        self.nodes.push(Node { around, parent, content, count: part.len() });
+        let content = BoxContent::Leaf(part.clone());
+        self.nodes.push(BoxNode { around, parent, content, count: part.len() });
         if part.len() <= LEAF {
             for &corner in &self.order[part] {
                 self.leaf[corner] = number;
@@ -211,7 +211,7 @@ impl Tree {
         let middle = part.start + middle;
         let first = self.grow(part.start..middle, number);
         let second = self.grow(middle..part.end, number);
-        self.nodes[number].content = Content::Halves([first, second]);
+        self.nodes[number].content = BoxContent::Halves([first, second]);
         number
     }
 
@@ -245,8 +245,8 @@ impl Tree {
                 continue;
             }
             match &node.content {
-                Content::Halves(halves) => open.extend(halves),
-                Content::Leaf(part) => {
+                BoxContent::Halves(halves) => open.extend(halves),
+                BoxContent::Leaf(part) => {
                     for &corner in &self.order[part.clone()] {
                         *effort += 1;
                         if !around.contains(self.places[corner]) {

@@ -1,0 +1,265 @@
+//! What a camera sees from places of its picture: where their rays run, in pixels, at any depth.
+//!
+//! A ray is a straight line, so where it meets the plane at the depth z is, in tangents from the entrance
+//! pupil, a + b/z: its slope, and its offset in the pupil's plane over the depth. The mean and the variance
+//! of a pixel's rays at every depth follow from their moments, and nothing is traced twice.
+//!
+//! Beside it the two other measurements of a comparison: the depths of the scene where the camera looks, and
+//! the cost of each model, which is the time of the scene's own picture through it on this machine.
+
+use super::super::cameras::LensModel;
+use super::{FIELD, Place};
+use crate::pictures::{Sampling, Studio};
+use crate::timing::{Series, order};
+use crate::{BenchError, Progress};
+use etendue_accel::Accel;
+use etendue_camera::{Camera, CameraRays, FilmSamples, Pose, Sampler};
+use etendue_geometry::glam::{DVec2, DVec3};
+use etendue_geometry::{Detail, HitBatch, RayBatch};
+use etendue_scene::Scene;
+use etendue_scene::file::LightPrecision;
+use etendue_spectrum::Bands;
+use etendue_tracer::LightKind;
+use etendue_tracer::light::EnvironmentImage;
+
+/// What is seen from one place.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PlaceView {
+    /// The chief ray; `None` where the camera sees nothing.
+    pub(super) chief: Option<Line>,
+    /// The light of each band.
+    pub(super) bands: Vec<BandRays>,
+}
+
+/// A straight line: its slope, and its offset (m) in the entrance pupil's plane. x right, y down.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Line {
+    slope: DVec2,
+    offset: DVec2,
+}
+
+/// The rays of a band that arrive.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct BandRays {
+    /// What the picture has for a radiance of 1.
+    pub(super) light: f64,
+    /// Their mean.
+    middle: Line,
+    /// The variances of slope and offset, and their covariance, over both axes together.
+    spread: [f64; 3],
+}
+
+impl Line {
+    /// Where it runs at a depth whose inverse (1/m) is given, in tangents.
+    pub(super) fn at(&self, nearness: f64) -> DVec2 {
+        self.slope + self.offset * nearness
+    }
+
+    /// A ray of the world in the camera's frame; `None` for one that does not run forwards.
+    fn of(pose: &Pose, origin: DVec3, direction: DVec3) -> Option<Self> {
+        let turn = pose.rotation.transpose();
+        let (o, d) = (turn * (origin - pose.position), turn * direction);
+        if d.z >= 0.0 {
+            return None;
+        }
+        let slope = DVec2::new(d.x, -d.y) / -d.z;
+        let offset = DVec2::new(o.x, -o.y) + slope * o.z;
+        Some(Self { slope, offset })
+    }
+}
+
+impl BandRays {
+    /// Of weighted lines, `count` rays having been sent.
+    fn of(lines: &[(Line, f64)], count: usize) -> Self {
+        let sum: f64 = lines.iter().map(|(_, weight)| weight).sum();
+        if sum <= 0.0 {
+            return Self::default();
+        }
+        let mean = |of: &dyn Fn(&Line) -> DVec2| {
+            lines.iter().map(|(line, weight)| of(line) * *weight).sum::<DVec2>() / sum
+        };
+        let middle = Line { slope: mean(&|line| line.slope), offset: mean(&|line| line.offset) };
+        let spread = lines.iter().fold([0.0; 3], |[a, b, c], (line, weight)| {
+            let (slope, offset) = (line.slope - middle.slope, line.offset - middle.offset);
+            [
+                a + weight * slope.length_squared() / sum,
+                b + weight * offset.length_squared() / sum,
+                c + weight * slope.dot(offset) / sum,
+            ]
+        });
+        Self { light: sum / count as f64, middle, spread }
+    }
+
+    /// The middle of its light at a nearness (1/m), in tangents; `None` in the dark.
+    pub(super) fn centroid(&self, nearness: f64) -> Option<DVec2> {
+        (self.light > 0.0).then(|| self.middle.at(nearness))
+    }
+
+    /// The root of the mean squared distance from there, in tangents.
+    pub(super) fn blur(&self, nearness: f64) -> f64 {
+        let [slope, offset, both] = self.spread;
+        (slope + nearness * (2.0 * both + nearness * offset)).max(0.0).sqrt()
+    }
+}
+
+impl PlaceView {
+    /// The middle of the light of all bands together, each counted alike.
+    pub(super) fn centroid(&self, nearness: f64) -> Option<DVec2> {
+        let lit: Vec<DVec2> =
+            self.bands.iter().filter_map(|band| band.centroid(nearness)).collect();
+        (!lit.is_empty()).then(|| lit.iter().sum::<DVec2>() / lit.len() as f64)
+    }
+}
+
+/// What `camera`, opened for `bands`, sees from each of `places`, by `rays` of each band or group of
+/// bands.
+pub(super) fn seen(camera: &Camera, bands: &Bands, places: &[Place], rays: u32) -> Vec<PlaceView> {
+    let (columns, rows): (Vec<f64>, Vec<f64>) =
+        places.iter().map(|place| (place.column, place.row)).unzip();
+    let mut chief = RayBatch::default();
+    camera.rays_through(&columns, &rows, &mut chief);
+    let groups = camera.band_groups(bands);
+    let mut samples = FilmSamples::default();
+    let mut out = CameraRays::default();
+    let mut all = Vec::with_capacity(places.len());
+    for (i, place) in places.iter().enumerate() {
+        let sees = chief.t_max()[i] >= 0.0;
+        let line = Line::of(camera.pose(), chief.origin(i), chief.direction(i));
+        let mut seen = PlaceView { chief: line.filter(|_| sees), bands: Vec::new() };
+        // The same places of the pupil for every camera, and everywhere.
+        let points = Sampler::Sobol.pixel(0, 0, 0, rays);
+        for (number, group) in groups.iter().enumerate() {
+            samples.clear();
+            samples.group = number;
+            for k in 0..rays {
+                let [spectrum, _] = points.square(k, 2);
+                samples.push([place.column, place.row], points.square(k, 1), spectrum);
+            }
+            camera.sample_rays(&samples, &mut out);
+            let lines: Vec<(Line, f64)> = (0..out.rays.len())
+                .filter_map(|k| {
+                    let line = Line::of(camera.pose(), out.rays.origin(k), out.rays.direction(k));
+                    Some((line?, out.weight[k]))
+                })
+                .collect();
+            let band = BandRays::of(&lines, rays as usize);
+            seen.bands.extend(group.bands.clone().map(|_| band));
+        }
+        all.push(seen);
+    }
+    all
+}
+
+/// Chief rays across each cell of the field.
+const ACROSS: u32 = 8;
+
+/// Places of the picture, each with the depths (m) that its neighbourhood shows: the nearest, the middle one
+/// and the farthest; infinity where an environment's image is seen. A place whose neighbourhood shows nothing
+/// has none.
+pub(super) fn places(scene: &Scene, accel: &dyn Accel) -> Vec<Place> {
+    let [width, height] = scene.camera.resolution().map(f64::from);
+    let [columns, rows] = FIELD;
+    let share = |i: u32, count: u32| f64::from(i) / f64::from(count - 1);
+    let is_pictured = |kind: &LightKind| matches!(kind, LightKind::Environment { image, .. } if *image != EnvironmentImage::Constant);
+    let sees_infinity = scene.lights.iter().any(|light| is_pictured(&light.kind));
+    let mut places = Vec::new();
+    for row in 0..rows {
+        for column in 0..columns {
+            let at = [share(column, columns) * width, share(row, rows) * height];
+            let size = [width / f64::from(columns - 1), height / f64::from(rows - 1)];
+            let depths = around(&scene.camera, accel, (at, size), sees_infinity);
+            places.push(Place { column: at[0], row: at[1], depths });
+        }
+    }
+    places
+}
+
+/// The depths (m) in a cell of the picture of a middle and a size (pixels).
+fn around(
+    camera: &Camera,
+    accel: &dyn Accel,
+    (middle, size): ([f64; 2], [f64; 2]),
+    sees_infinity: bool,
+) -> Vec<f64> {
+    let picture = camera.resolution().map(f64::from);
+    let (mut columns, mut rows) = (Vec::new(), Vec::new());
+    // Chief rays through even places around the middle, as far as the picture goes.
+    for y in 0..ACROSS {
+        for x in 0..ACROSS {
+            let share = |i: u32| (f64::from(i) + 0.5) / f64::from(ACROSS) - 0.5;
+            let at = [middle[0] + share(x) * size[0], middle[1] + share(y) * size[1]];
+            if (0..2).all(|axis| at[axis] > 0.0 && at[axis] < picture[axis]) {
+                columns.push(at[0]);
+                rows.push(at[1]);
+            }
+        }
+    }
+    let mut rays = RayBatch::default();
+    camera.rays_through(&columns, &rows, &mut rays);
+    let mut hits = HitBatch::new(Detail::Distance);
+    accel.closest(&rays, &mut hits);
+    // Depths along the axis; misses count as infinity where the camera sees so far.
+    let pose = camera.pose();
+    let depth = |i: usize| match hits.is_hit(i) {
+        true => {
+            let point = rays.origin(i) + rays.direction(i) * hits.t[i];
+            Some((point - pose.position).dot(pose.forward()))
+        }
+        false => (sees_infinity && rays.t_max()[i] >= 0.0).then_some(f64::INFINITY),
+    };
+    let mut depths: Vec<f64> = (0..rays.len()).filter_map(depth).filter(|z| *z > 0.0).collect();
+    depths.sort_by(f64::total_cmp);
+    let Some(last) = depths.len().checked_sub(1) else { return depths };
+    // The nearest, the median and the farthest.
+    let mut few = vec![depths[0], depths[last / 2], depths[last]];
+    few.dedup();
+    few
+}
+
+/// Samples a pixel of the shorter and the longer picture: their difference has none of what is done once.
+const SAMPLES: [u32; 2] = [2, 8];
+
+/// Rounds in which every model takes its turn.
+const ROUNDS: usize = 3;
+
+/// Pixels that a model is timed on, at least.
+const PIXELS: u64 = 20_000;
+
+/// The time of one sample of one pixel through each of `models` (s): of tracing the scene's picture on all
+/// threads, the median of the rounds.
+pub(super) fn seconds_a_sample(
+    studio: &mut Studio<'_>,
+    models: &[LensModel],
+    progress: Progress<'_>,
+) -> Result<Vec<f64>, BenchError> {
+    let mut series = vec![Series::default(); models.len()];
+    let [few, many] = SAMPLES;
+    for round in 0..ROUNDS {
+        for who in order(round, models.len()) {
+            if !progress((round * models.len() + who) as f64 / (ROUNDS * models.len()) as f64) {
+                return Err(BenchError::Stopped);
+            }
+            let [width, height] = models[who].1.resolution().map(u64::from);
+            #[expect(clippy::cast_possible_truncation, reason = "a share of a side")]
+            let factor = (width * height / PIXELS).isqrt().max(1) as u32;
+            let camera = models[who].1.coarser(factor);
+            let [width, height] = camera.resolution().map(f64::from);
+            let mut take = |samples| {
+                let sampling = Sampling {
+                    samples,
+                    sampler: Sampler::Sobol,
+                    seed: round as u64,
+                    precision: LightPrecision::Auto,
+                };
+                studio.take(&camera, sampling).map(|taken| taken.seconds)
+            };
+            if round == 0 {
+                // Caches and threads wake.
+                take(few)?;
+            }
+            let (short, long) = (take(few)?, take(many)?);
+            series[who].0.push((long - short).max(0.0) / (width * height * f64::from(many - few)));
+        }
+    }
+    Ok(series.iter().map(Series::median).collect())
+}

@@ -1,0 +1,156 @@
+//! Arguments of `etendue lens` and `etendue bench`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::{SceneArguments, parse};
+use etendue_optics::train::Focus;
+
+pub(super) const LENS_HELP: &str = "\
+All lengths are millimetres; z = 0 is the first element's vertex, +z runs from the object to the
+sensor, and elements count from 0 on the object side.
+
+RAYS.json: {\"from\": \"object\" or \"sensor\", \"clip\": true or false, \"rays\": [
+  {\"origin\": [x, y, z], \"direction\": [x, y, z], \"wavelength\": 587.56}]}
+
+Examples:
+  etendue lens scenes/lenses/double-gauss.json
+  etendue lens scenes/lenses/achromat.json --json --fields 0,5,10
+  etendue lens scenes/lenses/double-gauss.json --rays rays.json --json
+  etendue lens scenes/lenses/double-gauss.json -o out/double-gauss
+  etendue lens bought.zmx --save bought.json
+  etendue lens scenes/double-gauss.json --fit-opencv";
+
+#[derive(Debug, Args)]
+pub(crate) struct LensArguments {
+    /// A lens file (.json), a Zemax file (.zmx), or a scene whose camera is a lens
+    #[arg(value_name = "LENS|ZMX|SCENE")]
+    pub(crate) lens: PathBuf,
+    /// Print JSON for machines, with all digits
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Trace the rays of a file instead, and print every intersection and how each ray ends
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rays: Option<PathBuf>,
+    /// Draw layout.svg, spots.svg and illumination.svg into this folder, made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write the lens as a lens file, such as an imported one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) save: Option<PathBuf>,
+    /// Fit OpenCV's camera (K, k1, k2, p1, p2, k3, or its fisheye) to the lens' chief rays, and print it
+    /// with its residuals, where it holds, and as the camera of a scene; with -o, into opencv.json there
+    #[arg(long, conflicts_with = "rays")]
+    pub(crate) fit_opencv: bool,
+    /// The tolerance of the fit: "0.5 px", which is the default
+    #[arg(long, value_name = "PIXELS", value_parser = parse::pixels, requires = "fit_opencv")]
+    pub(crate) tolerance: Option<f64>,
+    /// Columns and rows of the picture that is fitted, 1536x1024 when absent
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = parse::resolution, requires = "fit_opencv")]
+    pub(crate) resolution: Option<[u32; 2]>,
+    /// From one pixel to the next, such as "4 um"; as wide as fills the image circle when absent
+    #[arg(long, value_name = "PITCH", value_parser = parse::pitch, requires = "fit_opencv")]
+    pub(crate) pixel_pitch: Option<f64>,
+    /// Field angles in degrees; the file's own or shares of the field of view when absent
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) fields: Option<Vec<f64>>,
+    /// Wavelengths in nm, the main one first; the lens' own and the F, d and C lines when absent
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) wavelengths: Option<Vec<f64>>,
+    /// The configuration of a Zemax file, from 1; the one that it stands at when absent
+    #[arg(long, value_name = "N")]
+    pub(crate) configuration: Option<usize>,
+    /// Put the sensor where a plane at this distance is sharp: "1.2 m", or infinity
+    #[arg(long, value_name = "DISTANCE", value_parser = parse::focus, allow_hyphen_values = true)]
+    pub(crate) focus: Option<Focus>,
+    /// Open or close the stop to this f-number
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) f_number: Option<f64>,
+    /// A glass catalogue in Zemax' AGF format, searched before the built-in one; the last one given is
+    /// searched first
+    #[arg(long = "glass-catalog", value_name = "FILE")]
+    pub(crate) glass_catalogs: Vec<PathBuf>,
+    /// Refuse wavelengths outside of what the glasses are stated for instead of warning
+    #[arg(long)]
+    pub(crate) strict: bool,
+    /// Let the file name files outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+    /// Say nothing on standard error but errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+pub(super) const BENCH_HELP: &str = "\
+Prints a table, and writes into the folder:
+  bench.json                 all that was measured, with the machine
+  accelerators.csv           each accelerator x batch width x threads: build, memory, speed, errors
+  accelerators-hits.svg      rays with a wrong answer against time (.png too)
+  accelerators-depth.svg     error of the distance against time
+  accelerators-batch.svg     time against batch width
+  samplers.csv               each sampler x number of samples: time, and error of the picture
+  samplers-time.svg, samplers-samples.svg
+  cameras.csv, cameras-time.svg
+                             each model of the camera's lens, from a pinhole to the full train
+
+Errors of hits are against `exact`, the f64 reference, which is built and traced too; errors of
+pictures against one of sixteen times the samples. Run it on a machine that does nothing else.
+
+Examples:
+  etendue bench scenes/first-light.json -o out/bench --quick
+  etendue bench model.glb -o out/bench --batches 64,256 --threads 1,8 --rays 1000000
+  etendue bench scenes/first-light.json -o out/bench --only accelerators --scattered";
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PartArgument {
+    /// Each accelerator x batch width x threads
+    Accelerators,
+    /// Each sampler x number of samples
+    Samplers,
+    /// Each model of the camera's lens x number of samples
+    Cameras,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+    /// The folder to write into; made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Fewer rays, rounds and batch widths: under a minute for a million triangles
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Measure these alone
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    pub(crate) only: Vec<PartArgument>,
+    /// Times that everything is built and timed [default: 5, quick 3]
+    #[arg(long, value_name = "N", value_parser = parse::rounds)]
+    pub(crate) rounds: Option<usize>,
+    /// The most rays to trace, in whole tiles of the picture [default: 524288, quick 65536]
+    #[arg(long, value_name = "N", value_parser = parse::rays)]
+    pub(crate) rays: Option<usize>,
+    /// Trace rays that scatter from what the camera sees, as paths go on, instead of the camera's own
+    #[arg(long)]
+    pub(crate) scattered: bool,
+    /// Batch widths in rays [default: 16,64,256,1024, quick 64,256]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::batch)]
+    pub(crate) batches: Option<Vec<usize>>,
+    /// Numbers of threads [default: 1, 2, 4 … all, quick 1 and all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::some_threads)]
+    pub(crate) threads: Option<Vec<usize>>,
+    /// Samples a pixel to compare [default: 1,4,16,64,256, quick 1,4,16,64]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::samples)]
+    pub(crate) sample_counts: Option<Vec<u32>>,
+    /// About how long samplers and cameras may take, each; pixels are made larger until they do
+    /// [default: 60, quick 10]
+    #[arg(long, value_name = "S", value_parser = parse::seconds)]
+    pub(crate) seconds: Option<f64>,
+    /// Stop when a structure would need more than this, e.g. 800M or 4G (bytes, 1024-based)
+    #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
+    pub(crate) memory_limit: Option<u64>,
+    /// Show no progress and no list of files; the table and errors remain
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
