@@ -178,3 +178,57 @@ fn pinholes_in_a_double_gauss_and_before_and_behind_a_lens_are_reached() {
     }
     assert!(fewest >= 0.95 && most_off < 4e-3, "{fewest} {most_off}");
 }
+
+/// The share of rays that leave from places all over a sensor of 36 mm x 24 mm from which any do.
+fn share_over_sensor(train: &OpticalTrain) -> f64 {
+    let half = DVec2::new(18.0, 12.0);
+    let z = train.sensor_z(Focus::Infinity).unwrap();
+    let at = train.at(train.wavelength()).unwrap();
+    let pupil = ExitPupil::new(train, &[train.wavelength()], z, half.to_array()).unwrap();
+    let r2 = |i: u32| {
+        [0.754_877_666_246_693, 0.569_840_290_998_053]
+            .map(|a: f64| (0.5 + a * f64::from(i)).fract())
+    };
+    let squares: Vec<[f64; 2]> = (0..400).map(r2).collect();
+    let (mut left, mut aimed) = (0, 0);
+    for place in 0..150 {
+        let film = (2.0 * DVec2::from(r2(place)) - 1.0) * half;
+        let mut rays = LensRays::with_capacity(squares.len());
+        pupil.push_rays(&vec![film; squares.len()], &squares, train.wavelength(), &mut rays);
+        at.trace(Side::Sensor, Clip::On, &mut rays);
+        if rays.exited() > 0 {
+            left += rays.exited();
+            aimed += squares.len();
+        }
+    }
+    left as f64 / aimed as f64
+}
+
+/// A mask in the stop of the double Gauss, over a whole sensor: its rims cut pupils at every place in another way.
+#[test]
+fn nine_rays_in_ten_get_through_coded_masks_rings_and_pinholes_in_a_double_gauss() {
+    let gauss = std::fs::read_to_string(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../scenes/lenses/double-gauss.json"
+    ))
+    .unwrap();
+    let stop = r#"{ "type": "aperture", "shape": "circular", "radius": 8.55, "thickness": 4.5, "stop": true }"#;
+    assert!(gauss.contains(stop));
+    let mask = r#"{"type": "aperture", "shape": "image", "file": "mask.png", "width": 17.1, "thickness": 4.5,
+        "stop": true}"#;
+    let all = |side: u32| (0..side * side).map(move |i| [i % side, i / side]);
+    // A quadratic residue pattern, whose cells have open neighbours about as often as closed ones.
+    let coded = all(13).filter(|[x, y]| (x * x + 3 * y * y + x * y) % 13 < 6).collect::<Vec<_>>();
+    let ring = all(256).filter(|at| {
+        let r2 = at.map(|i| (f64::from(i) - 127.5).powi(2)).iter().sum::<f64>();
+        (0.36..0.41).contains(&(r2.sqrt() / 256.0))
+    });
+    for (name, side, white) in
+        [("coded", 13, coded), ("ring", 256, ring.collect()), ("pinhole", 1024, vec![[640, 341]])]
+    {
+        let train = lens_with_mask(&gauss.replace(stop, mask), side, &white);
+        let share = share_over_sensor(&train);
+        println!("{name}: {share:.4}");
+        assert!(share >= 0.9, "{name}: {share}");
+    }
+}

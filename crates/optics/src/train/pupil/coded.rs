@@ -15,8 +15,8 @@
 
 use glam::DVec2;
 
-use super::mask_cells::{MaskCells, first_mask, open_bounds};
-use super::mask_map::{MaskMap, MaskScene};
+use super::mask_cells::{MaskCells, first_mask, open_bounds, open_reach};
+use super::mask_map::{MaskMap, MaskScene, NO_TERMS};
 use super::mask_region::MaskRegion;
 use crate::element::{Frame, Opening};
 use crate::train::{MonochromaticTrain, OpticalTrain, Part};
@@ -25,7 +25,7 @@ use crate::train::{MonochromaticTrain, OpticalTrain, Part};
 const ANYWHERE: f64 = 0.01;
 
 /// How near a ray lands to where it is aimed, as a share of a pixel, when polynomials can do it.
-const GOAL: f64 = 0.01;
+const GOAL: f64 = 0.004;
 
 /// What misses are multiplied by: what may be greater between the places where they are measured.
 const SAFETY: f64 = 1.5;
@@ -94,11 +94,12 @@ impl Coded {
         let scene = |lens| MaskScene { clear: &clear, lens, element, sensor, half_size };
         #[expect(clippy::cast_precision_loss, reason = "far fewer pixels than 2⁵³")]
         let pixel = DVec2::from(mask.size) / DVec2::from(mask.pixels.map(|n| n as f64));
+        let reach = open_reach(mask, -clear.elements[element].frame.vertex.truncate());
         let mut maps = Vec::with_capacity(lenses.len());
         let mut miss = DVec2::ZERO;
         let mut degree = 1;
         for lens in &lenses {
-            let (map, missed) = MaskMap::new(&scene(lens), bounds, GOAL * pixel, degree)?;
+            let (map, missed) = MaskMap::new(&scene(lens), bounds, reach, GOAL * pixel, degree)?;
             degree = map.degree();
             miss = miss.max(missed);
             maps.push((lens.wavelength(), map));
@@ -133,7 +134,8 @@ impl Coded {
         [u, v]: [f64; 2],
         anywhere: &Anywhere,
     ) -> Result<Option<Aimed>, Unknown> {
-        let local = self.map(wavelength).at(film).ok_or(Unknown)?;
+        let mut room = NO_TERMS;
+        let local = self.map(wavelength).at(film, &mut room).ok_or(Unknown)?;
         let both = |slopes: DVec2, own: f64| {
             let density = (1.0 - ANYWHERE) * own + ANYWHERE * anywhere.density(slopes);
             (density > 0.0).then_some(Aimed { slopes, density })

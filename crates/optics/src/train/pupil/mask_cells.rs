@@ -45,6 +45,16 @@ pub(super) fn open_bounds(mask: &Picture) -> Option<[DVec2; 2]> {
     (size.min_element() > 0.0 && size.is_finite()).then_some([min, max])
 }
 
+/// How far the open pixels reach from a point of the mask (mm).
+pub(super) fn open_reach(mask: &Picture, from: DVec2) -> f64 {
+    let open = mask.values.iter().enumerate().filter(|(_, value)| **value > 0.0);
+    let farthest = open.map(|(i, _)| {
+        let [low, high] = mask.bounds_of(i);
+        (low - from).abs().max((high - from).abs()).length_squared()
+    });
+    farthest.fold(0.0, f64::max).sqrt()
+}
+
 /// The density.
 #[derive(Debug, Clone)]
 pub(super) struct MaskCells {

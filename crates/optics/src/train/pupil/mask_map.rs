@@ -23,7 +23,12 @@ const RADIAL: usize = 24;
 const PLANAR: usize = 12;
 
 /// Points of the mask over each side of its square, at which directions are solved.
-const POINTS: usize = 12;
+const POINTS: usize = 16;
+
+/// What is added around the points that any node sees, as a share of the square, and how often the square is
+/// drawn in to them: polynomials of a high degree are for places that are seen.
+const AROUND: f64 = 0.12;
+const DRAWN_IN: u32 = 2;
 
 /// The highest degree of the polynomials, and the number of their terms.
 const MOST_DEGREE: usize = 9;
@@ -32,8 +37,29 @@ const MOST_TERMS: usize = terms(MOST_DEGREE);
 /// The weight of points that other rims hide.
 const HIDDEN: f64 = 1e-4;
 
+/// Chebyshev's polynomials and their derivatives.
+type Powers = [[f64; MOST_DEGREE + 1]; 2];
+
 const fn terms(degree: usize) -> usize {
     (degree + 1) * (degree + 2) / 2
+}
+
+/// Room for the terms of a map from one point of the sensor, which [`MaskMap::at`] fills.
+pub(super) type Terms = [DVec2; MOST_TERMS];
+
+pub(super) const NO_TERMS: Terms = [DVec2::ZERO; MOST_TERMS];
+
+/// Calls a function for a degree, known when it is compiled: loops over terms then have no ends to guess.
+macro_rules! of_degree {
+    ($degree:expr, $function:ident($($argument:expr),*)) => {
+        match $degree {
+            1 => $function::<1>($($argument),*),
+            3 => $function::<3>($($argument),*),
+            5 => $function::<5>($($argument),*),
+            7 => $function::<7>($($argument),*),
+            _ => $function::<MOST_DEGREE>($($argument),*),
+        }
+    };
 }
 
 /// What a map is made of: a lens with its masks clear, at a wavelength, before a sensor.
@@ -91,12 +117,14 @@ pub(super) struct MaskMap {
     degree: usize,
     /// By nodes, [`terms`] of each; none where directions could not be solved.
     terms: Vec<Option<Vec<DVec2>>>,
+    /// How many nodes from the first on have terms.
+    known: usize,
 }
 
 /// The map from one point of the sensor.
 pub(super) struct LocalMap<'a> {
     map: &'a MaskMap,
-    terms: [DVec2; MOST_TERMS],
+    terms: &'a Terms,
     /// The direction on the sensor that is the nodes' +x.
     axis: DVec2,
 }
@@ -105,15 +133,27 @@ pub(super) struct LocalMap<'a> {
 struct Solved {
     /// Point of the mask in −1..1, slopes, weight.
     points: Vec<(DVec2, DVec2, f64)>,
+    is_round: bool,
+}
+
+impl Solved {
+    /// How far from the middle points are seen, in −1..1; along x and y, or from the middle of a round map.
+    fn reach(&self) -> DVec2 {
+        let seen = self.points.iter().filter(|(.., weight)| *weight > HIDDEN);
+        seen.fold(DVec2::ZERO, |most, (place, ..)| {
+            most.max(if self.is_round { DVec2::splat(place.length()) } else { place.abs() })
+        })
+    }
 }
 
 impl MaskMap {
-    /// The map for points of the mask between `low` and `high` (mm), landing within `goal` (mm) where
-    /// polynomials of at least the degree `least` can, and how far from that it lands (mm); `None` where no
+    /// The map for points of the mask between `low` and `high` (mm), of which open ones are at most `reach`
+    /// (mm) from the axis, landing within `goal` (mm) where polynomials of at least the degree `least` can, and how far from that it lands (mm); `None` where no
     /// direction is found at all.
     pub(super) fn new(
         scene: &MaskScene<'_>,
         [low, high]: [DVec2; 2],
+        reach: f64,
         goal: DVec2,
         least: usize,
     ) -> Option<(Self, DVec2)> {
@@ -129,8 +169,7 @@ impl MaskMap {
         let offset = if round { frame.vertex.truncate() } else { DVec2::ZERO };
         if round {
             // The circle about the axis that holds all of it.
-            let reach = (centre + offset).abs() + half;
-            (centre, half) = (DVec2::ZERO, DVec2::splat(reach.length()));
+            (centre, half) = (DVec2::ZERO, DVec2::splat(reach));
         }
         let mut map = Self {
             round,
@@ -142,19 +181,38 @@ impl MaskMap {
             half,
             degree: 1,
             terms: Vec::new(),
+            known: 0,
         };
         let count = if round { RADIAL + 1 } else { (PLANAR + 1) * (PLANAR + 1) };
-        let solved: Vec<Option<Solved>> =
-            (0..count).into_par_iter().map(|node| map.solve(scene, node)).collect();
+        let solve = |map: &Self| -> Vec<Option<Solved>> {
+            (0..count).into_par_iter().map(|node| map.solve(scene, node)).collect()
+        };
+        let mut solved = solve(&map);
+        for _ in 0..DRAWN_IN {
+            let seen = solved.iter().flatten().map(Solved::reach).reduce(DVec2::max);
+            let Some(mut reach) = seen.map(|reach| reach + AROUND) else { break };
+            if reach.min_element() <= AROUND {
+                break;
+            }
+            if round {
+                reach = DVec2::splat(reach.max_element());
+            }
+            if reach.min_element() >= 1.0 {
+                break;
+            }
+            map.half *= reach.min(DVec2::ONE);
+            solved = solve(&map);
+        }
         // The least degree that is as good as wanted, or the best one.
         let mut best: Option<(f64, Self, DVec2)> = None;
         for degree in (least..=MOST_DEGREE).step_by(2) {
             map.degree = degree;
             map.terms = solved.iter().map(|node| fit(node.as_ref()?, degree)).collect();
+            map.known = map.terms.iter().take_while(|node| node.is_some()).count();
             if map.terms.iter().all(Option::is_none) {
                 break;
             }
-            let Some(miss) = map.greatest_miss(scene, [low, high]) else { continue };
+            let Some(miss) = map.greatest_miss(scene, [low, high], reach) else { continue };
             let share = (miss / goal).max_element();
             if best.as_ref().is_none_or(|(least, ..)| share < *least) {
                 best = Some((share, map.clone(), miss));
@@ -204,7 +262,7 @@ impl MaskMap {
             let weight = if scene.passes(film, slopes) { 1.0 } else { HIDDEN };
             points.push((place, slopes, weight));
         }
-        (points.len() >= POINTS * POINTS / 4).then_some(Solved { points })
+        (points.len() >= POINTS * POINTS / 4).then_some(Solved { points, is_round: self.round })
     }
 
     /// Points of the mask in −1..1: Chebyshev's in a square, and the same mapped to the disk of a round
@@ -223,19 +281,29 @@ impl MaskMap {
     }
 
     /// How far from where they are aimed rays land that leave the lens, between the nodes and between
-    /// the points (mm on the mask, x and y); `None` when none leaves.
-    fn greatest_miss(&self, scene: &MaskScene<'_>, [low, high]: [DVec2; 2]) -> Option<DVec2> {
+    /// the points (mm on the mask, x and y), of which those beyond `reach` (mm) from the axis are closed; `None`
+    /// when none leaves.
+    fn greatest_miss(
+        &self,
+        scene: &MaskScene<'_>,
+        [low, high]: [DVec2; 2],
+        reach: f64,
+    ) -> Option<DVec2> {
         /// Places of the sensor, and of the mask over each of its sides.
         const FILMS: u32 = 64;
         const ACROSS: u32 = 7;
         let miss = |i: u32| {
             let film = (2.0 * roberts(i) - 1.0) * scene.half_size;
-            let local = self.at(film)?;
+            let mut room = NO_TERMS;
+            let local = self.at(film, &mut room)?;
             let start = scene.sensor.point(film.extend(0.0));
             let mut greatest: Option<DVec2> = None;
             for k in 0..ACROSS * ACROSS {
                 let share = DVec2::new(f64::from(k % ACROSS), f64::from(k / ACROSS));
                 let aim = low + share / f64::from(ACROSS - 1) * (high - low);
+                if self.round && (aim + self.offset).length() > reach {
+                    continue;
+                }
                 let (slopes, _) = local.slopes(aim);
                 if !scene.passes(start, slopes) {
                     continue;
@@ -250,33 +318,27 @@ impl MaskMap {
     }
 
     /// The map from a point of the sensor (mm, on the sensor); `None` where it is not known.
-    pub(super) fn at(&self, film: DVec2) -> Option<LocalMap<'_>> {
-        let mut local = LocalMap { map: self, terms: [DVec2::ZERO; MOST_TERMS], axis: DVec2::X };
-        let count = terms(self.degree);
-        let mut add = |node: usize, weight: f64| {
-            let from = self.terms[node].as_ref()?;
-            for (sum, term) in local.terms[..count].iter_mut().zip(&from[..count]) {
-                *sum += *term * weight;
-            }
-            Some(())
+    pub(super) fn at<'a>(&'a self, film: DVec2, room: &'a mut Terms) -> Option<LocalMap<'a>> {
+        // Four nodes from one on, at weights.
+        let four = |node: usize| -> Option<[&[DVec2]; 4]> {
+            let [Some(a), Some(b), Some(c), Some(d)] = self.terms.get(node..node + 4)? else {
+                return None;
+            };
+            Some([a, b, c, d])
         };
         if self.round {
             let across = self.sensor.vertex.truncate() + film;
             let r = across.length();
             let at = if self.radius > 0.0 { r / self.radius * RADIAL as f64 } else { 0.0 };
             // The outermost nodes may see nothing of the mask: the last ones that do go on a little.
-            let known = self.terms.iter().take_while(|node| node.is_some()).count();
-            if known < 4 || at > known as f64 {
+            if self.known < 4 || at > self.known as f64 {
                 return None;
             }
-            let first = first_of_four(at, known - 1);
-            for (i, weight) in cubics(at - first as f64).into_iter().enumerate() {
-                add(first + i, weight)?;
-            }
-            if r > 0.0 {
-                local.axis = across / r;
-            }
-            return Some(local);
+            let first = first_of_four(at, self.known - 1);
+            let weights = cubics(at - first as f64);
+            of_degree!(self.degree, add_four(room, four(first)?, weights));
+            let axis = if r > 0.0 { across / r } else { DVec2::X };
+            return Some(LocalMap { map: self, terms: room, axis });
         }
         let along = |x: f64, half: f64| {
             let at = if half > 0.0 { 0.5 * (x / half + 1.0) * PLANAR as f64 } else { 0.0 };
@@ -289,11 +351,20 @@ impl MaskMap {
         let (column, across) = along(film.x, self.half_size.x)?;
         let (row, down) = along(film.y, self.half_size.y)?;
         for (j, down) in down.into_iter().enumerate() {
-            for (i, across) in across.into_iter().enumerate() {
-                add((row + j) * (PLANAR + 1) + column + i, across * down)?;
-            }
+            let nodes = four((row + j) * (PLANAR + 1) + column)?;
+            of_degree!(self.degree, add_four(room, nodes, across.map(|weight| weight * down)));
         }
-        Some(local)
+        Some(LocalMap { map: self, terms: room, axis: DVec2::X })
+    }
+}
+
+/// Adds the terms of four nodes at their weights.
+fn add_four<const DEGREE: usize>(sums: &mut Terms, nodes: [&[DVec2]; 4], weights: [f64; 4]) {
+    let count = terms(DEGREE);
+    let [a, b, c, d] = nodes;
+    let [u, v, w, x] = weights;
+    for ((((sum, a), b), c), d) in sums[..count].iter_mut().zip(a).zip(b).zip(c).zip(d) {
+        *sum += (*a * u + *b * v) + (*c * w + *d * x);
     }
 }
 
@@ -301,7 +372,7 @@ impl LocalMap<'_> {
     /// Slopes towards a point of the mask (mm, in its frame), and the area of slopes that an area of the
     /// mask takes (1/mm²).
     pub(super) fn slopes(&self, at: DVec2) -> (DVec2, f64) {
-        let (slopes, by_x, by_y) = self.value(self.inside(at));
+        let [slopes, by_x, by_y] = self.value(self.inside(at));
         let area = by_x.perp_dot(by_y).abs() / (self.map.half.x * self.map.half.y);
         (self.axis.rotate(slopes), area)
     }
@@ -313,7 +384,7 @@ impl LocalMap<'_> {
         let wanted = back.rotate(slopes);
         let mut x = DVec2::ZERO;
         for _ in 0..40 {
-            let (here, by_x, by_y) = self.value(x);
+            let [here, by_x, by_y] = self.value(x);
             let miss = wanted - here;
             let determinant = by_x.perp_dot(by_y);
             if miss.length() <= 1e-14 * (by_x.length() + by_y.length()) {
@@ -340,31 +411,54 @@ impl LocalMap<'_> {
     }
 
     /// The polynomial and its derivatives.
-    fn value(&self, at: DVec2) -> (DVec2, DVec2, DVec2) {
-        let degree = self.map.degree;
-        let ([x, by_x], [y, by_y]) = (chebyshev(at.x, degree), chebyshev(at.y, degree));
-        let mut sums = [DVec2::ZERO; 3];
-        let mut k = 0;
-        for total in 0..=degree {
-            for j in 0..=total {
-                let (i, term) = (total - j, self.terms[k]);
-                sums[0] += term * product(&x, &y, i, j);
-                sums[1] += term * product(&by_x, &y, i, j);
-                sums[2] += term * product(&x, &by_y, i, j);
-                k += 1;
-            }
-        }
-        (sums[0], sums[1], sums[2])
+    fn value(&self, at: DVec2) -> [DVec2; 3] {
+        of_degree!(self.map.degree, polynomial(self.terms, at))
     }
 }
 
+/// A polynomial and its derivatives.
+fn polynomial<const DEGREE: usize>(terms: &Terms, at: DVec2) -> [DVec2; 3] {
+    let [x, y] = [chebyshev(at.x, DEGREE), chebyshev(at.y, DEGREE)];
+    let mut sums = [DVec2::ZERO; 3];
+    power::<DEGREE, 0>(terms, &x, &y, &mut sums);
+    power::<DEGREE, 1>(terms, &x, &y, &mut sums);
+    power::<DEGREE, 2>(terms, &x, &y, &mut sums);
+    power::<DEGREE, 3>(terms, &x, &y, &mut sums);
+    power::<DEGREE, 4>(terms, &x, &y, &mut sums);
+    power::<DEGREE, 5>(terms, &x, &y, &mut sums);
+    power::<DEGREE, 6>(terms, &x, &y, &mut sums);
+    power::<DEGREE, 7>(terms, &x, &y, &mut sums);
+    power::<DEGREE, 8>(terms, &x, &y, &mut sums);
+    power::<DEGREE, 9>(terms, &x, &y, &mut sums);
+    sums
+}
+
+/// Adds the terms of a power of x, which stand one after another by the power of y: as many as is known when
+/// this is compiled, as loops whose ends vary cost more than what is in them.
 #[inline(always)]
-fn product(x: &[f64], y: &[f64], i: usize, j: usize) -> f64 {
-    x[i] * y[j]
+fn power<const DEGREE: usize, const POWER: usize>(
+    terms: &Terms,
+    [x, by_x]: &Powers,
+    [y, by_y]: &Powers,
+    sums: &mut [DVec2; 3],
+) {
+    if POWER > DEGREE {
+        return;
+    }
+    let first = (0..POWER).map(|before| DEGREE + 1 - before).sum::<usize>();
+    let (mut line, mut slope) = (DVec2::ZERO, DVec2::ZERO);
+    for (j, term) in terms[first..][..DEGREE + 1 - POWER].iter().enumerate() {
+        line += *term * y[j];
+        slope += *term * by_y[j];
+    }
+    sums[0] += line * x[POWER];
+    sums[1] += line * by_x[POWER];
+    sums[2] += slope * x[POWER];
 }
 
 /// Chebyshev's polynomials up to a degree and their derivatives.
-fn chebyshev(x: f64, degree: usize) -> [[f64; MOST_DEGREE + 1]; 2] {
+#[inline(always)]
+fn chebyshev(x: f64, degree: usize) -> Powers {
     let mut value = [0.0; MOST_DEGREE + 1];
     let mut slope = [0.0; MOST_DEGREE + 1];
     (value[0], value[1], slope[1]) = (1.0, x, 1.0);
@@ -387,9 +481,9 @@ fn fit(solved: &Solved, degree: usize) -> Option<Vec<DVec2>> {
     for &(place, slopes, weight) in &solved.points {
         let ([x, _], [y, _]) = (chebyshev(place.x, degree), chebyshev(place.y, degree));
         let mut k = 0;
-        for total in 0..=degree {
-            for j in 0..=total {
-                row[k] = product(&x, &y, total - j, j);
+        for i in 0..=degree {
+            for j in 0..=degree - i {
+                row[k] = x[i] * y[j];
                 k += 1;
             }
         }

@@ -8,13 +8,14 @@
 
 #![expect(clippy::cast_precision_loss, reason = "grids of a few dozen places")]
 
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 use glam::DVec2;
 use rayon::prelude::*;
 
 use super::mask_cells::{MaskCells, Rows};
-use super::mask_map::{MaskMap, MaskScene, roberts};
+use super::mask_map::{MaskMap, MaskScene, NO_TERMS, roberts};
 use crate::element::{Clip, LensRays, RayStatus};
 use crate::train::Side;
 use crate::train::aim::towards_lens;
@@ -33,19 +34,18 @@ const BANDS: usize = 24;
 const GRID: usize = 24;
 const HALVINGS: usize = 7;
 
-/// Added around what is visible, as a share of the mask's size, to begin with; it grows by a half while
-/// random rays find more, so many times at most.
+/// Added around what is visible, as a share of the mask's size, to begin with; it grows by a half at the
+/// nodes around random rays that find more, so many times at most.
 const MARGIN: f64 = 0.002;
 const ROUNDS: u32 = 9;
 
 /// Random rays that look for more.
-const CHECKS: u32 = 1 << 14;
+const CHECKS: u32 = 1 << 15;
 
 /// What is visible from everywhere.
 #[derive(Debug, Clone)]
 pub(super) struct MaskRegion {
     half_size: DVec2,
-    margin: f64,
     nodes: Vec<Visibility>,
     intervals: Vec<Option<Interval>>,
 }
@@ -65,6 +65,8 @@ struct Chords {
     /// The lowest and the highest line.
     heights: [f64; 2],
     ends: [[f64; 2]; LINES + 1],
+    /// What is added around them, as a share of the mask's size.
+    margin: f64,
 }
 
 /// How points are drawn from an interval of the sensor.
@@ -106,12 +108,8 @@ impl MaskRegion {
     /// What is visible of a mask's cells by rays of any of the maps.
     pub(super) fn new(scenes: &[(MaskScene<'_>, &MaskMap)], cells: &MaskCells) -> Option<Self> {
         let (scene, _) = scenes.first()?;
-        let mut region = Self {
-            half_size: scene.half_size,
-            margin: MARGIN,
-            nodes: Vec::new(),
-            intervals: Vec::new(),
-        };
+        let mut region =
+            Self { half_size: scene.half_size, nodes: Vec::new(), intervals: Vec::new() };
         let bounds = cells.bounds();
         region.nodes = (0..(FILM + 1) * (FILM + 1))
             .into_par_iter()
@@ -123,10 +121,15 @@ impl MaskRegion {
             })
             .collect();
         for _ in 0..ROUNDS {
-            if !region.misses_any(scenes, bounds) {
+            let missed = region.missed(scenes, bounds);
+            if missed.is_empty() {
                 break;
             }
-            region.margin *= 1.5;
+            for node in missed {
+                if let Visibility::Part(chords) = &mut region.nodes[node] {
+                    chords.margin *= 1.5;
+                }
+            }
         }
         let side = FILM * PARTS;
         region.intervals =
@@ -142,9 +145,10 @@ impl MaskRegion {
     /// What is visible between nodes, joined by straight lines; `None` unless all four have ends. Where they
     /// have none, all of the mask is aimed at.
     fn joined(&self, view: &View) -> Option<Chords> {
-        let mut joined = Chords { heights: [0.0; 2], ends: [[0.0; 2]; LINES + 1] };
+        let mut joined = Chords { heights: [0.0; 2], ends: [[0.0; 2]; LINES + 1], margin: 0.0 };
         for (node, weight) in view.corners.into_iter().zip(view.weights) {
             let Visibility::Part(chords) = &self.nodes[node] else { return None };
+            joined.margin += weight * chords.margin;
             for i in 0..2 {
                 joined.heights[i] += weight * chords.heights[i];
                 for (sum, own) in joined.ends.iter_mut().zip(&chords.ends) {
@@ -172,7 +176,7 @@ impl MaskRegion {
         let is_cut = parts.len() == ends.len();
         let least = |of: &dyn Fn(&Chords) -> f64| parts.iter().map(of).fold(f64::MAX, f64::min);
         let most = |of: &dyn Fn(&Chords) -> f64| parts.iter().map(of).fold(f64::MIN, f64::max);
-        let margin = self.margin * (high - low);
+        let margin = most(&|c| c.margin).max(0.0) * (high - low);
         let (bottom, top) = match is_cut {
             true => (least(&|c| c.heights[0]) - margin.y, most(&|c| c.heights[1]) + margin.y),
             false => (low.y, high.y),
@@ -283,12 +287,13 @@ impl MaskRegion {
             Visibility::Part(chords) => Some(&**chords),
             Visibility::All | Visibility::Nothing => None,
         });
-        let mut heights = [0.0; 2];
+        let (mut heights, mut margin) = ([0.0; 2], 0.0);
         for (chords, weight) in chords.iter().zip(view.weights) {
-            let own = (*chords)?.heights;
-            heights = [heights[0] + own[0] * weight, heights[1] + own[1] * weight];
+            let own = (*chords)?;
+            heights = [heights[0] + own.heights[0] * weight, heights[1] + own.heights[1] * weight];
+            margin += own.margin * weight;
         }
-        let margin = self.margin * (high - low);
+        let margin = margin * (high - low);
         let [bottom, top] = [heights[0] - margin.y, heights[1] + margin.y];
         if y < bottom || y > top {
             return None;
@@ -306,9 +311,14 @@ impl MaskRegion {
         Some([ends[0] - margin.x, ends[1] + margin.x])
     }
 
-    /// Whether any of many random rays passes the lens and is not drawn.
-    fn misses_any(&self, scenes: &[(MaskScene<'_>, &MaskMap)], [low, high]: [DVec2; 2]) -> bool {
-        scenes.iter().any(|(scene, map)| {
+    /// The nodes around those of many random rays that pass the lens and are not drawn.
+    fn missed(
+        &self,
+        scenes: &[(MaskScene<'_>, &MaskMap)],
+        [low, high]: [DVec2; 2],
+    ) -> BTreeSet<usize> {
+        let mut nodes = BTreeSet::new();
+        for (scene, map) in scenes {
             let mut rays = LensRays::with_capacity(CHECKS as usize);
             let mut places = Vec::with_capacity(CHECKS as usize);
             for i in 0..CHECKS {
@@ -316,14 +326,20 @@ impl MaskRegion {
                 let share = |step: f64| (0.5 + step * f64::from(i)).fract();
                 let share = DVec2::new(share(0.628_706_721_037_806), share(0.538_597_270_645_735));
                 let at = low + share * (high - low);
-                let Some(local) = map.at(film) else { continue };
+                let mut room = NO_TERMS;
+                let Some(local) = map.at(film, &mut room) else { continue };
                 rays.push(scene.sensor.point(film.extend(0.0)), towards_lens(local.slopes(at).0));
                 places.push((film, at));
             }
             scene.lens.trace(Side::Sensor, Clip::On, &mut rays);
             let passed = (0..rays.len()).filter(|i| rays.status(*i) == RayStatus::Exited);
-            passed.map(|i| places[i]).any(|(film, at)| !self.holds(film, at, [low, high]))
-        })
+            for (film, at) in passed.map(|i| places[i]) {
+                if !self.holds(film, at, [low, high]) {
+                    nodes.extend(self.view(film).map_or([0; 4], |(_, view)| view.corners));
+                }
+            }
+        }
+        nodes
     }
 
     /// Whether a point of the mask is one that may be drawn where it is open.
@@ -377,7 +393,8 @@ impl Sight<'_> {
     fn passes(&self, places: &[DVec2]) -> Vec<bool> {
         let mut passed = vec![false; places.len()];
         for (scene, map) in self.scenes {
-            let Some(local) = map.at(self.film) else { continue };
+            let mut room = NO_TERMS;
+            let Some(local) = map.at(self.film, &mut room) else { continue };
             let start = scene.sensor.point(self.film.extend(0.0));
             let mut rays = LensRays::with_capacity(places.len());
             for &place in places {
@@ -406,7 +423,8 @@ impl Sight<'_> {
 
     /// What is visible; all, where nobody knows.
     fn seen(&self) -> Visibility {
-        if self.scenes.iter().all(|(_, map)| map.at(self.film).is_none()) {
+        let mut room = NO_TERMS;
+        if self.scenes.iter().all(|(_, map)| map.at(self.film, &mut room).is_none()) {
             return Visibility::All;
         }
         let grid: Vec<DVec2> = (0..(GRID + 1) * (GRID + 1))
@@ -433,7 +451,7 @@ impl Sight<'_> {
         let heights = [from_row(first, bottom_row, -1.0), from_row(last, top_row, 1.0)];
         match self.ends(heights) {
             Some(ends) if heights[1] > heights[0] => {
-                Visibility::Part(Box::new(Chords { heights, ends }))
+                Visibility::Part(Box::new(Chords { heights, ends, margin: MARGIN }))
             }
             Some(_) | None => Visibility::All,
         }
