@@ -5,12 +5,12 @@ mod picture_charts;
 mod table;
 
 use etendue_chart::Chart;
+use etendue_report::Table;
 use serde::Serialize;
 
 use crate::accelerators;
 use crate::cameras::Cameras;
 use crate::samplers::{Converged, Samplers};
-use table::Table;
 
 /// What was measured, and on what.
 #[derive(Debug, Clone, PartialEq, Serialize)]

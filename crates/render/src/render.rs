@@ -354,7 +354,7 @@ pub fn finish(
         return Err(RenderError::Dark { element, losses: statuses.losses() });
     }
     notes.extend(sparkles.note_in_words());
-    notes.extend(plan.stopping_note.clone());
+    notes.extend(plan.not_as_asked.as_ref().map(|why| format!("samples: {why}")));
     notes.extend(sample_counts.filter(|_| is_complete).and_then(|counts| counts.note()));
     let words = sample_counts.map_or_else(|| samples.to_string(), |counts| counts.words());
     let header = marked(header, words, [samples, samples_wanted]);

@@ -59,6 +59,12 @@ fn a_plan_says_what_is_off_and_why() {
     let decisions: Vec<serde_json::Value> = serde_json::from_slice(&json.stdout).expect("JSON");
     let surface = decisions.iter().find(|d| d["what"] == "surface").expect("a decision");
     assert_eq!(surface["choice"], "off", "depth needs no normals");
+    assert_eq!(surface["value"], false);
+    let memory = decisions.iter().find(|d| d["what"] == "memory").expect("a decision");
+    assert!(memory["value"].as_u64().is_some_and(|bytes| bytes > 1 << 20), "{memory}");
+    let table = text(&bench.run(&["plan", "scene.json", "--markdown"]).stdout);
+    assert!(table.starts_with("| what | choice | because | saves | key |\n|---|"), "{table}");
+    assert_eq!(table.lines().count(), 2 + decisions.len(), "{table}");
 }
 
 #[test]

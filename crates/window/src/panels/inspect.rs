@@ -2,6 +2,8 @@
 
 use eframe::egui::{self, Color32, Context, Pos2, Rect, Sense, Ui, Vec2};
 
+use etendue::Inspector;
+
 use crate::app::App;
 use crate::canvas::short;
 
@@ -17,6 +19,7 @@ pub(crate) fn show(app: &mut App, ctx: &Context) {
             }
             section(ui, "Histogram", |ui| histogram(app, ui));
             section(ui, "Notes", |ui| notes(app, ui));
+            egui::CollapsingHeader::new("Decisions").show(ui, |ui| decisions(app, ui));
         });
     });
 }
@@ -104,6 +107,20 @@ fn histogram(app: &App, ui: &mut Ui) {
         }
     }
     response.on_hover_text("Pixels by their value from black to white (root of the counts)");
+}
+
+/// The plan's decisions; the reason and the key of each beside the mouse.
+fn decisions(app: &App, ui: &mut Ui) {
+    let decisions = app.inspector.as_ref().map_or(&[][..], Inspector::decisions);
+    egui::Grid::new("decisions").num_columns(2).striped(true).show(ui, |ui| {
+        for decision in decisions {
+            let key = decision.key.map_or_else(String::new, |key| format!(" [{key}]"));
+            let why = format!("{}{key}", decision.reason);
+            ui.weak(decision.kind.name()).on_hover_text(&why);
+            ui.label(decision.value.to_string()).on_hover_text(&why);
+            ui.end_row();
+        }
+    });
 }
 
 fn notes(app: &App, ui: &mut Ui) {
