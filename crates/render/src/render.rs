@@ -11,7 +11,7 @@ use etendue_scene::file::{AccelName, LightRow, SETS};
 use etendue_spectrum::Bands;
 use etendue_tracer::layer::OtherFrame;
 use etendue_tracer::{
-    Emitters, LayerSpec, LightingContext, Lights, Material, Pixel, PlacedSurfaces, RayStats,
+    Emitters, LayerSpec, LightingContext, Lights, Material, Pixel, PlacedSurfaces, RayStats, Rules,
     SceneView, Spectral, Traits, View,
 };
 
@@ -231,6 +231,8 @@ pub fn trace(
     let mut notes = Vec::new();
     let lit = match scene.tracer.and_then(|tracer| tracer.row().light) {
         Some(LightRow { rules, .. }) if plan.layers.contains(&LayerSpec::Radiance) => {
+            let roulette = rules.roulette.map(|_| scene.accuracy.roulette_after);
+            let rules = Rules { roulette, ..rules };
             let (map, seen) = (images.environment.clone(), (accel, surroundings));
             let found = lighting::settle(scene, map, rules, seen, &|share| watch.goes_on(share))?;
             notes.extend(found.note);

@@ -7,9 +7,6 @@ use etendue_scene::Scene;
 use etendue_scene::file::SamplesSpec;
 use etendue_sensor::NoiseModel;
 
-/// The relative error that stands in for a sensor's noise where there is none.
-const WITHOUT_NOISE: f64 = 0.02;
-
 /// When the samples of a pixel are enough.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stopping {
@@ -39,12 +36,13 @@ impl Stopping {
                     Some(sensor) if sensor.noise() == NoiseModel::None => "the sensor has no noise",
                     Some(_) => return (Self::SensorNoise(spec.fraction), None),
                 };
+                let error = scene.accuracy.sample_error;
                 let why = format!(
                     "{why}, so there is nothing to stop at; they stop at a relative error of \
-                     {} % instead, as `\"samples\": {{\"relative_error\": {WITHOUT_NOISE}}}` says",
-                    100.0 * WITHOUT_NOISE
+                     {} % instead, as `\"samples\": {{\"relative_error\": {error}}}` says",
+                    100.0 * error
                 );
-                (Self::RelativeError(WITHOUT_NOISE), Some(why))
+                (Self::RelativeError(error), Some(why))
             }
         }
     }

@@ -12,7 +12,7 @@ use etendue_sensor::Sensor;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 
 use crate::cache::Cache;
-use crate::file::{PlanSpec, RenderSpec, TracerSpec};
+use crate::file::{AccuracySpec, PlanSpec, RenderSpec, TracerSpec};
 use crate::identity::Ingredients;
 use crate::ids::{Copies, SceneNode};
 use crate::import::{Note, Strictness};
@@ -59,6 +59,8 @@ pub struct Scene {
     pub render: RenderSpec,
     /// What the plan is told instead of deciding it.
     pub plan: PlanSpec,
+    /// Numbers that trade accuracy for speed.
+    pub accuracy: AccuracySpec,
     /// What was dropped, ignored or missing on the way.
     pub notes: Vec<Note>,
     /// What loading cost.

@@ -57,6 +57,7 @@ impl Plan {
         decisions.extend(self.explain_textures(scene, needs));
         decisions.push(self.explain_quality(scene, grounds.triangles));
         decisions.extend(self.explain_precision(grounds));
+        decisions.extend(scene.accuracy.decisions());
         decisions.push(self.memory.decision());
         decisions
     }

@@ -10,7 +10,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::camera::CameraSource;
-use super::{FramesSpec, ObjectSpec, PlanSpec, RenderSpec, TracerSpec, Up};
+use super::{AccuracySpec, FramesSpec, ObjectSpec, PlanSpec, RenderSpec, TracerSpec, Up};
 
 /// A scene as the file writes it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -51,6 +51,9 @@ pub struct SceneSpec {
     /// What the plan is told instead of deciding it.
     #[serde(default)]
     pub plan: PlanSpec,
+    /// Numbers that trade accuracy for speed.
+    #[serde(default, skip_serializing_if = "AccuracySpec::is_default")]
+    pub accuracy: AccuracySpec,
     /// The pictures to be made of it; one when absent.
     #[serde(default)]
     pub frames: Option<FramesSpec>,

@@ -8,7 +8,7 @@ use crate::document::Edit;
 use crate::form::mark;
 
 /// The parts of a scene with what they are called, and whether they are open at first.
-const PARTS: [(&str, &str, bool); 8] = [
+const PARTS: [(&str, &str, bool); 9] = [
     ("camera", "Camera", true),
     ("tracer", "Tracer", true),
     ("render", "Render", false),
@@ -17,6 +17,7 @@ const PARTS: [(&str, &str, bool); 8] = [
     ("materials", "Materials", false),
     ("layers", "Layers to write", false),
     ("plan", "Plan", false),
+    ("accuracy", "Accuracy", false),
 ];
 
 pub(crate) fn show(app: &mut App, ctx: &Context) {
