@@ -4,12 +4,12 @@ mod charts;
 mod table;
 
 use etendue_chart::Chart;
+use etendue_report::Table;
 use serde::Serialize;
 
 use crate::accelerators;
 use crate::cameras::Cameras;
 use crate::samplers::{Converged, Samplers};
-use table::Table;
 
 /// What was measured, and on what.
 #[derive(Debug, Clone, PartialEq, Serialize)]

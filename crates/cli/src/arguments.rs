@@ -381,6 +381,9 @@ pub(crate) struct PlanArguments {
     /// Print JSON for machines
     #[arg(long)]
     pub(crate) json: bool,
+    /// Print a table of GitHub's Markdown
+    #[arg(long, conflicts_with_all = ["json", "models"])]
+    pub(crate) markdown: bool,
 }
 
 #[derive(Debug, Args)]

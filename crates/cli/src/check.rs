@@ -5,6 +5,7 @@ use std::time::Instant;
 use etendue::{Calibration, Prospect, TimeForecast, read_glasses};
 use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan};
+use etendue_report::Span;
 use etendue_scene::doctor::{Diagnosis, Finding};
 use etendue_scene::file::SceneFile;
 use etendue_scene::{LoadOptions, Start, Wanted};
@@ -38,7 +39,11 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<(), Fault> {
     }
     match arguments.json {
         true => print_json(&Versioned::new(&Checked { diagnosis, time })),
-        false => print_text(&format!("{diagnosis}{:<13} {time}", "time")),
+        false => {
+            let mut list = diagnosis.table();
+            list.put("time", format!("{} ({})", Span(time.total), time.stages()));
+            print_text(&list.text())
+        }
     }
 }
 

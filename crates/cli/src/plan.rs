@@ -2,7 +2,7 @@
 
 use etendue::{Calibration, Options, Session, TimeForecast};
 use etendue_bench::tolerance;
-use etendue_render::Decision;
+use etendue_report::{Decision, DecisionKind, DecisionValue, Tabled};
 
 use crate::arguments::PlanArguments;
 use crate::fault::{Fault, Versioned, print_json, print_text};
@@ -23,17 +23,15 @@ pub(crate) fn run(arguments: &PlanArguments) -> Result<(), Fault> {
     let time = TimeForecast::new(&session.prospect(&progress)?, &machine);
     plan.decisions.push(time.decision());
     plan.decisions.extend(frames.map(|frames| {
-        Decision {
-            what: "frames",
-            choice: frames.len().to_string(),
-            because: "each is a picture of its own; all above is of one, of the scene as it stands"
-                .to_owned(),
-            saves: None,
-            key: None,
-            forced: false,
-        }
+        let because =
+            "each is a picture of its own; all above is of one, of the scene as it stands";
+        Decision::new(DecisionKind::Frames, DecisionValue::Count(frames.len() as u64), because)
     }));
-    if arguments.json { print_json(&plan.decisions) } else { print_text(&plan.to_string()) }
+    match (arguments.json, arguments.markdown) {
+        (true, _) => print_json(&plan.decisions),
+        (false, true) => print_text(&Tabled(&plan.decisions).markdown()),
+        (false, false) => print_text(&plan.to_string()),
+    }
 }
 
 /// `--models`: what simpler models of the lens miss, and what they cost.

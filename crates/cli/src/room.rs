@@ -6,7 +6,8 @@
 use std::os::unix::process::CommandExt;
 use std::process::Command;
 
-use etendue_scene::memory::{Size, addresses};
+use etendue_report::Size;
+use etendue_scene::memory::addresses;
 
 use crate::fault::Fault;
 

@@ -6,6 +6,7 @@ use etendue_accel::Accel;
 use etendue_camera::PixelExtent;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, HitBatch, RayBatch};
+use etendue_report::Decision;
 use etendue_scene::Scene;
 
 use crate::{Error, Progress, Session, Viewpoint};
@@ -15,6 +16,7 @@ use crate::{Error, Progress, Session, Viewpoint};
 pub struct Inspector {
     scene: Arc<Scene>,
     accel: Arc<dyn Accel>,
+    decisions: Arc<[Decision]>,
 }
 
 /// What the chief ray of a place of the picture hits.
@@ -47,7 +49,8 @@ impl Session {
     pub fn inspector(&mut self, progress: &Progress) -> Result<Inspector, Error> {
         self.prepare(progress)?;
         let (scene, accel, _) = self.prepared()?;
-        Ok(Inspector { scene, accel })
+        let decisions = Arc::from(&*self.plan(progress)?.decisions);
+        Ok(Inspector { scene, accel, decisions })
     }
 }
 
@@ -56,6 +59,12 @@ impl Inspector {
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// What the plan decides for it, and why.
+    #[must_use]
+    pub fn decisions(&self) -> &[Decision] {
+        &self.decisions
     }
 
     /// Where the camera stands, to be moved about what `probe` hit; without one, about what stands in the

@@ -2,7 +2,8 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use etendue_scene::memory::{Size, has_room};
+use etendue_report::Size;
+use etendue_scene::memory::has_room;
 use etendue_spectrum::Bands;
 use etendue_tracer::LayerSpec;
 use etendue_tracer::layer::{self, Kept, Look, Taken};

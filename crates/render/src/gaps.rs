@@ -14,21 +14,8 @@ use etendue_tracer::material::Alpha;
 use etendue_tracer::spawn::{magnitudes, roundings};
 use etendue_tracer::{Material, Scattering};
 
-/// The least distance to the next surface over how far rays start off one: less could skip it.
-pub(crate) const LEAST_CLEARANCE: f64 = 8.0;
-
-/// The most that f32 may change of what a medium takes from light between two surfaces, as a share.
-pub(crate) const MOST_OF_ABSORPTION: f64 = 2.5e-4;
-
-/// The most that rays may start off what light crosses, as a share of its extent: how it shades what is beside it
-/// changes by about as much.
-const MOST_OF_EXTENT: f64 = 1e-3;
-
 /// The share of a placement's probed area up to which thin places are contacts.
 const CONTACT: f64 = 1e-3;
-
-/// The most triangles that are probed.
-const MOST_PROBED: usize = 32_768;
 
 /// Triangles up to which each is probed in four places.
 const FEW: usize = 4096;
@@ -120,9 +107,9 @@ pub(crate) fn crossed_surfaces(scene: &Scene, farthest: f64) -> CrossedSurfaces 
         }
         let corner = bounds.min.abs().max(bounds.max.abs());
         let offset = offsets.at(corner, own(placement));
-        let reach = LEAST_CLEARANCE * offset;
+        let reach = scene.accuracy.path_clearance * offset;
         let extent = (bounds.max - bounds.min).max_element();
-        if offset > MOST_OF_EXTENT * extent && found.small.is_none() {
+        if offset > scene.accuracy.path_offset_of_extent * extent && found.small.is_none() {
             found.small = Some(([extent, offset], index));
         }
         boxes.push(Bounds { min: bounds.min - reach, max: bounds.max + reach });
@@ -180,7 +167,7 @@ fn probes(
     ];
     let count = |near: &Near<'_>| scene.geometry.mesh_of(near.placement).triangles.len();
     let all: usize = near.iter().map(count).sum();
-    let step = all.div_ceil(MOST_PROBED).max(1);
+    let step = all.div_ceil(scene.accuracy.path_probes as usize).max(1);
     let places = if all <= FEW { &PLACES[..] } else { &PLACES[..1] };
     let mut probes = Vec::new();
     let mut number = 0;
@@ -202,7 +189,7 @@ fn probes(
                 probes.push(Probe {
                     point,
                     normal,
-                    reach: LEAST_CLEARANCE * offset,
+                    reach: scene.accuracy.path_clearance * offset,
                     least: offset * same,
                     area: twice.length(),
                     placement: near.index,

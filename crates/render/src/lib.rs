@@ -50,7 +50,7 @@ pub use film::{NoMemory, Precision};
 pub use film_file::{FilmError, FilmFile, FilmHeader, Identity};
 pub use images::Images;
 pub use other_frame::FollowedFrame;
-pub use plan::{Decision, Plan};
+pub use plan::Plan;
 pub use render::{
     Course, Film, Prepared, Progress, Rendered, accelerators, build, finish, rebuild, render,
     sample_set, trace,

@@ -7,15 +7,8 @@ use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightPrecision};
 use etendue_tracer::spawn::roundings;
 
-use crate::gaps::{CrossedSurfaces, Gap, MOST_OF_ABSORPTION, crossed_surfaces};
+use crate::gaps::{CrossedSurfaces, Gap, crossed_surfaces};
 use crate::render::accelerators;
-
-/// The largest share of a mesh's mean edge that rays may start off a surface.
-const MOST_OF_AN_EDGE: f64 = 0.125;
-
-/// The noise of a pixel of one sample that f32's error is held against: pictures of good samplers have
-/// less than their mean.
-const NOISE_OF_A_SAMPLE: f64 = 0.25;
 
 /// A pixel must be so many times as wide as f32 rounds the camera's rays by, or its rays fall beside it: a
 /// start and a direction, along two axes each, are rounded by half a unit in the last place.
@@ -38,12 +31,12 @@ pub(crate) fn light_precision(scene: &Scene, samples: u32) -> (HitPrecision, Str
     }
     // By how much f32 misplaces rays, against the smallest triangle and what noise hides.
     let offset = offset(scene);
-    let noise = NOISE_OF_A_SAMPLE / f64::from(samples).sqrt();
+    let noise = scene.accuracy.path_noise / f64::from(samples).sqrt();
     let Some((least, edge)) = smallest(scene) else {
         return (HitPrecision::Single, "there is nothing to hit".to_owned());
     };
     let words = |than: &str| format!("f32 misplaces rays by up to {offset:.1e} m, {than}");
-    if offset > MOST_OF_AN_EDGE * edge {
+    if offset > scene.accuracy.path_offset_of_edge * edge {
         let why = words(&format!("too much for triangles with edges of {edge:.1e} m"));
         return (HitPrecision::Double, why);
     }
@@ -99,7 +92,8 @@ fn too_thin(scene: &Scene, crossed: &CrossedSurfaces) -> Option<String> {
             name(placement)
         ));
     }
-    let (share, placement) = crossed.absorption.filter(|(share, _)| *share > MOST_OF_ABSORPTION)?;
+    let (share, placement) =
+        crossed.absorption.filter(|(share, _)| *share > scene.accuracy.path_absorption)?;
     let percent = 100.0 * share;
     let name = name(placement);
     Some(format!(
@@ -167,22 +161,21 @@ mod tests {
     /// A sphere of 2000 triangles, and a cube of some size (m) at some place (m).
     fn decided(size: f64, place: f64, samples: u32, plan: &serde_json::Value) -> HitPrecision {
         let camera = json!({ "type": "pinhole" });
-        decided_for(camera, size, place, samples, plan)
+        held_to(&json!({}), camera, (size, place, samples), plan)
     }
 
-    /// The same, seen by a camera 4 m away.
-    fn decided_for(
+    /// The same, held to other numbers, by a camera 4 m away.
+    fn held_to(
+        accuracy: &serde_json::Value,
         mut camera: serde_json::Value,
-        size: f64,
-        place: f64,
-        samples: u32,
+        (size, place, samples): (f64, f64, u32),
         plan: &serde_json::Value,
     ) -> HitPrecision {
         camera["pose"] =
             json!({ "from": [place, place, place + 4.0], "look_at": [place, place, place] });
         let shift = |x: f64| json!({ "translate": [place + x, place, place] });
         let scene = json!({
-            "tracer": { "type": "path" }, "plan": plan, "render": { "accel": "embree" },
+            "tracer": { "type": "path" }, "plan": plan, "accuracy": accuracy, "render": { "accel": "embree" },
             "camera": camera,
             "objects": [
                 { "shape": "sphere", "triangles": 2000, "transform": shift(0.0) },
@@ -207,14 +200,23 @@ mod tests {
         assert_eq!(decided(1e-5, 0.0, 64, &auto), Double);
         assert_eq!(decided(0.5, 1e6, 64, &auto), Double);
         assert_eq!(decided(0.01, 0.0, 1 << 20, &auto), Double);
+        // Held to less, and to more.
+        let pinhole = || json!({ "type": "pinhole" });
+        let held = |key: &str, value: f64, size| {
+            held_to(&json!({ key: value }), pinhole(), (size, 0.0, 64), &auto)
+        };
+        assert_eq!(held("path_noise", 1e-6, 0.5), Double);
+        assert_eq!(held("path_offset_of_edge", 1e-6, 0.5), Double);
+        assert_eq!(held("path_noise", 1e3, 1e-3), Single);
+        assert_eq!(decided(1e-4, 0.0, 64, &auto), Double);
         // Pixels that f32 cannot tell apart: rows of some 10⁻⁵ and 10⁻¹⁰ m, and of 10⁻⁴ and 10⁻⁹ of a degree.
-        let seen = |camera| decided_for(camera, 0.5, 0.0, 64, &auto);
-        let pinhole = |fov: f64| json!({ "type": "pinhole", "fov": fov });
+        let seen = |camera| held_to(&json!({}), camera, (0.5, 0.0, 64), &auto);
+        let narrow = |fov: f64| json!({ "type": "pinhole", "fov": fov });
         let orthographic = |height: f64| json!({ "type": "orthographic", "height": height });
         assert_eq!(seen(orthographic(4.8e-3)), Single);
         assert_eq!(seen(orthographic(4.8e-8)), Double);
-        assert_eq!(seen(pinhole(0.1)), Single);
-        assert_eq!(seen(pinhole(4.8e-7)), Double);
+        assert_eq!(seen(narrow(0.1)), Single);
+        assert_eq!(seen(narrow(4.8e-7)), Double);
         // The file's word goes before.
         assert_eq!(decided(0.5, 0.0, 64, &json!({ "light_precision": "double" })), Double);
         assert_eq!(decided(1e-5, 0.0, 64, &json!({ "light_precision": "single" })), Single);

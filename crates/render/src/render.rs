@@ -11,7 +11,7 @@ use etendue_scene::file::{AccelName, LightRow, SETS};
 use etendue_spectrum::Bands;
 use etendue_tracer::layer::OtherFrame;
 use etendue_tracer::{
-    Emitters, LayerSpec, LightingContext, Lights, Material, Pixel, PlacedSurfaces, RayStats,
+    Emitters, LayerSpec, LightingContext, Lights, Material, Pixel, PlacedSurfaces, RayStats, Rules,
     SceneView, Spectral, Traits, View,
 };
 
@@ -231,6 +231,8 @@ pub fn trace(
     let mut notes = Vec::new();
     let lit = match scene.tracer.and_then(|tracer| tracer.row().light) {
         Some(LightRow { rules, .. }) if plan.layers.contains(&LayerSpec::Radiance) => {
+            let roulette = rules.roulette.map(|_| scene.accuracy.roulette_after);
+            let rules = Rules { roulette, ..rules };
             let (map, seen) = (images.environment.clone(), (accel, surroundings));
             let found = lighting::settle(scene, map, rules, seen, &|share| watch.goes_on(share))?;
             notes.extend(found.note);
@@ -354,7 +356,7 @@ pub fn finish(
         return Err(RenderError::Dark { element, losses: statuses.losses() });
     }
     notes.extend(sparkles.note_in_words());
-    notes.extend(plan.stopping_note.clone());
+    notes.extend(plan.not_as_asked.as_ref().map(|why| format!("samples: {why}")));
     notes.extend(sample_counts.filter(|_| is_complete).and_then(|counts| counts.note()));
     let words = sample_counts.map_or_else(|| samples.to_string(), |counts| counts.words());
     let header = marked(header, words, [samples, samples_wanted]);

@@ -7,9 +7,6 @@ use etendue_scene::Scene;
 use etendue_scene::file::SamplesSpec;
 use etendue_sensor::NoiseModel;
 
-/// The relative error that stands in for a sensor's noise where there is none.
-const WITHOUT_NOISE: f64 = 0.02;
-
 /// When the samples of a pixel are enough.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stopping {
@@ -39,12 +36,13 @@ impl Stopping {
                     Some(sensor) if sensor.noise() == NoiseModel::None => "the sensor has no noise",
                     Some(_) => return (Self::SensorNoise(spec.fraction), None),
                 };
-                let note = format!(
-                    "samples: {why}, so there is nothing to stop at; they stop at a relative error of \
-                     {} % instead, as `\"samples\": {{\"relative_error\": {WITHOUT_NOISE}}}` says",
-                    100.0 * WITHOUT_NOISE
+                let error = scene.accuracy.sample_error;
+                let why = format!(
+                    "{why}, so there is nothing to stop at; they stop at a relative error of \
+                     {} % instead, as `\"samples\": {{\"relative_error\": {error}}}` says",
+                    100.0 * error
                 );
-                (Self::RelativeError(WITHOUT_NOISE), Some(note))
+                (Self::RelativeError(error), Some(why))
             }
         }
     }
@@ -65,7 +63,7 @@ impl Stopping {
     }
 
     /// The choice and the reason, in words.
-    pub(crate) fn words(self, samples: SamplesSpec, note: Option<&String>) -> (String, String) {
+    pub(crate) fn words(self, samples: SamplesSpec, instead: Option<&String>) -> (String, String) {
         let [least, most] = [samples.least(), samples.most()];
         let choice = match self {
             Self::Count => return (format!("{most} a pixel"), "render.samples says so".to_owned()),
@@ -76,8 +74,8 @@ impl Stopping {
             Self::SensorNoise(share) => format!("until {share} of the sensor's noise"),
             Self::RelativeError(share) => format!("until an error of {share}"),
         };
-        let because = match (self, note) {
-            (_, Some(note)) => note.trim_start_matches("samples: ").to_owned(),
+        let because = match (self, instead) {
+            (_, Some(why)) => why.clone(),
             (Self::SensorNoise(_), _) => format!(
                 "{least} to {most} a pixel, block by block: more would be lost in the variance that \
                  shot, read-out, dark current and quantisation have at the pixel's signal"

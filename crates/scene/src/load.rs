@@ -287,6 +287,7 @@ impl SceneFile {
             layers: self.spec.all_layers(),
             render: self.spec.render.clone(),
             plan: self.spec.plan,
+            accuracy: self.spec.accuracy,
             notes,
             stats: parts.stats,
             inputs,

@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use etendue_report::Size;
 use rayon::prelude::*;
 
 /// The most memory that may be taken (bytes), and who says so.
@@ -210,29 +211,6 @@ fn beside(before: u64) -> String {
         String::new()
     } else {
         format!(" of memory beside {} before it", Size(before))
-    }
-}
-
-/// Bytes as people read them.
-#[derive(Debug, Clone, Copy)]
-pub struct Size(
-    /// Bytes.
-    pub u64,
-);
-
-impl fmt::Display for Size {
-    #[expect(clippy::cast_precision_loss, reason = "three digits are shown")]
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut value = self.0 as f64;
-        let mut unit = "B";
-        for next in ["KiB", "MiB", "GiB", "TiB"] {
-            if value < 1024.0 {
-                break;
-            }
-            value /= 1024.0;
-            unit = next;
-        }
-        if unit == "B" { write!(f, "{value} B") } else { write!(f, "{value:.1} {unit}") }
     }
 }
 

@@ -10,7 +10,7 @@ use std::time::SystemTime;
 use rayon::prelude::*;
 
 use crate::cache::Cache;
-use crate::file::{PlanSpec, RenderSpec, TracerSpec};
+use crate::file::{AccuracySpec, PlanSpec, RenderSpec, TracerSpec};
 use crate::identity::{Copies, Ingredients, SceneNode};
 use crate::import::{Note, Strictness};
 use crate::{CameraOrigin, SceneCamera, SceneError, SceneHash};
@@ -63,6 +63,8 @@ pub struct Scene {
     pub render: RenderSpec,
     /// What the plan is told instead of deciding it.
     pub plan: PlanSpec,
+    /// Numbers that trade accuracy for speed.
+    pub accuracy: AccuracySpec,
     /// What was dropped, ignored or missing on the way.
     pub notes: Vec<Note>,
     /// What loading cost.

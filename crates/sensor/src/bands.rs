@@ -8,7 +8,7 @@
 //! agree with an integration in steps of a nanometre at most, and joined again where that does no
 //! harm.
 //!
-//! Electrons count as right within [`TOLERANCE`] of themselves; of colours darker than a tenth of
+//! Electrons count as right within a tolerance ([`TOLERANCE`] by itself) of themselves; of colours darker than a tenth of
 //! white, within that of a tenth of white, and behind two pure colours within that of white. White is
 //! what bodies and metals on the way leave of it, where that is a two-hundredth at least.
 
@@ -76,7 +76,8 @@ impl BandChoice {
 }
 
 impl Sensor {
-    /// The fewest bands in which a render counts this sensor's electrons right, or its own `bands`.
+    /// The fewest bands in which a render counts this sensor's electrons right within `tolerance` of themselves,
+    /// or its own `bands`.
     ///
     /// In digital mode a sensor without curves keeps the three colours, or the one, that it tells
     /// apart: its light is a picture's.
@@ -84,7 +85,11 @@ impl Sensor {
     /// # Errors
     ///
     /// When the sensor sees nothing of the light.
-    pub fn bands_under(&self, light: &Illumination) -> Result<BandChoice, SensorError> {
+    pub fn bands_under(
+        &self,
+        light: &Illumination,
+        tolerance: f64,
+    ) -> Result<BandChoice, SensorError> {
         let spec = self.spec();
         let counts = self.settings.radiometry == Radiometry::Physical;
         let ideal = matches!(self.response.bands, Bands::Grey | Bands::Rgb);
@@ -106,7 +111,7 @@ impl Sensor {
         // The bands of ideal filters will do where they count the same electrons.
         if ideal {
             let error = table.error_of(&self.response, &filters, &self.settings.efficiency, light);
-            if error <= TOLERANCE {
+            if error <= tolerance {
                 let bands = self.response.bands.clone();
                 return Ok(BandChoice { bands, error: Some(error), complete: table.complete });
             }
@@ -115,7 +120,7 @@ impl Sensor {
         let fixed = table.cells_at(&edges);
         let may_divide = given.is_none() || multispectral;
         let division = Division::of(&table);
-        let cells = if may_divide { division.divided(&fixed) } else { fixed };
+        let cells = if may_divide { division.divided(&fixed, tolerance) } else { fixed };
         let (error, complete) = (Some(division.worst(&cells)), table.complete);
         let edges = cells.iter().map(|&cell| table.edges[cell]).collect();
         let bands = match Grid::from_edges(edges) {

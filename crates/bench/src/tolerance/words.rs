@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use etendue_report::{Cell, Table};
+
 use super::{Comparison, Finding, Worst};
 
 impl fmt::Display for Comparison {
@@ -13,14 +15,7 @@ impl fmt::Display for Comparison {
             self.places.len(),
             self.range()
         )?;
-        writeln!(
-            f,
-            "model        chief ray (px)  centroid (px)  blur (px)  colour (px)  light (%)  \
-             ns a sample  times as fast"
-        )?;
-        for finding in &self.models {
-            line(f, finding)?;
-        }
+        write!(f, "{}", Table::of_rows(self.models.iter().map(cells).collect()))?;
         for finding in self.models.iter().filter(|finding| finding.model != "full") {
             writeln!(f, "\n{}: {}", finding.model, where_it_misses(finding))?;
         }
@@ -64,22 +59,24 @@ impl Comparison {
     }
 }
 
-fn line(f: &mut fmt::Formatter<'_>, finding: &Finding) -> fmt::Result {
+fn cells(finding: &Finding) -> Vec<(&'static str, Cell)> {
     let Finding { model, chief_ray, centroid, blur, colour, light, .. } = finding;
-    write!(
-        f,
-        "{model:11}  {:14.3}  {:13.3}  {:9.3}  {:11.3}  {:9.2}",
-        chief_ray.value,
-        centroid.value,
-        blur.value,
-        colour.value,
-        100.0 * light.value
-    )?;
-    match (finding.seconds_a_sample, finding.speed) {
-        (Some(seconds), Some(speed)) => write!(f, "  {:11.0}  {speed:13.2}", 1e9 * seconds)?,
-        _ => write!(f, "  {:>11}  {:>13}", "-", "-")?,
-    }
-    writeln!(f, "{}", if finding.is_within { "  within" } else { "" })
+    let pixels = |worst: &Worst| Cell::number(worst.value, format!("{:.3}", worst.value));
+    let percent = 100.0 * light.value;
+    let number = |value: Option<f64>, decimals: usize| {
+        value.map_or_else(Cell::none, |value| Cell::number(value, format!("{value:.decimals$}")))
+    };
+    vec![
+        ("model", Cell::word(*model)),
+        ("chief ray (px)", pixels(chief_ray)),
+        ("centroid (px)", pixels(centroid)),
+        ("blur (px)", pixels(blur)),
+        ("colour (px)", pixels(colour)),
+        ("light (%)", Cell::number(percent, format!("{percent:.2}"))),
+        ("ns a sample", number(finding.seconds_a_sample.map(|seconds| 1e9 * seconds), 0)),
+        ("times as fast", number(finding.speed, 2)),
+        ("", Cell::word(if finding.is_within { "within" } else { "" })),
+    ]
 }
 
 /// Where the greatest differences of a model are.

@@ -59,6 +59,29 @@ fn a_plan_says_what_is_off_and_why() {
     let decisions: Vec<serde_json::Value> = serde_json::from_slice(&json.stdout).expect("JSON");
     let surface = decisions.iter().find(|d| d["what"] == "surface").expect("a decision");
     assert_eq!(surface["choice"], "off", "depth needs no normals");
+    assert_eq!(surface["value"], false);
+    let memory = decisions.iter().find(|d| d["what"] == "memory").expect("a decision");
+    assert!(memory["value"].as_u64().is_some_and(|bytes| bytes > 1 << 20), "{memory}");
+    let table = text(&bench.run(&["plan", "scene.json", "--markdown"]).stdout);
+    assert!(table.starts_with("| what | choice | because | saves | key |\n|---|"), "{table}");
+    assert_eq!(table.lines().count(), 2 + decisions.len(), "{table}");
+}
+
+#[test]
+fn a_plan_lists_the_accuracy_that_a_scene_sets() {
+    let bench =
+        Bench::with_scene(r#"{"etendue": 1, "layers": ["depth"], "objects": [{"shape": "box"}]}"#);
+    let plan = |set: &str| bench.run(&["plan", "scene.json", "--json", "--set", set]);
+    let decisions: Vec<serde_json::Value> =
+        serde_json::from_slice(&plan("accuracy.view_psnr=40").stdout).expect("JSON");
+    let rows: Vec<_> = decisions.iter().filter(|d| d["what"] == "accuracy").collect();
+    assert_eq!(rows.len(), 1, "{decisions:?}");
+    assert_eq!((&rows[0]["key"], &rows[0]["forced"]), (&"accuracy.view_psnr".into(), &true.into()));
+    // What is out of range is refused by name.
+    let refused = plan("accuracy.view_psnr=400");
+    let why = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{why}");
+    assert!(why.contains("accuracy.view_psnr") && why.contains("60"), "{why}");
 }
 
 #[test]

@@ -8,13 +8,13 @@
 mod calibration;
 mod kept;
 mod pilot;
-mod words;
 
 use std::time::{Duration, Instant};
 
 use etendue_accel::BuildOptions;
 use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan, Stopping, build};
+use etendue_report::{Decision, DecisionKind, DecisionValue, Span, listed};
 use etendue_scene::Scene;
 use etendue_sensor::SensorKind;
 use etendue_tracer::LayerSpec;
@@ -119,6 +119,27 @@ impl TimeForecast {
             _ => 0.0,
         };
         Ok(Self { load, build, trace, views, is_piloted: true, ..counted }.summed())
+    }
+
+    /// The stages in words.
+    #[must_use]
+    pub fn stages(&self) -> String {
+        let Self { load, build, trace, sensor, views, output, .. } = *self;
+        let always = [("load", load), ("build", build), ("trace", trace)].map(Some);
+        let some = [("sensor", sensor), ("views", views)].map(|of| (of.1 > 0.0).then_some(of));
+        let stages = always.into_iter().chain(some).chain([Some(("output", output))]);
+        listed(stages.flatten().map(|(name, time)| format!("{name} {}", Span(time))))
+    }
+
+    /// As an entry of the plan's list.
+    #[must_use]
+    pub fn decision(&self) -> Decision {
+        let by = match self.is_piloted {
+            true => "by this machine's rates and strips of the picture",
+            false => "by this machine's rates and the plan's counts",
+        };
+        let total = DecisionValue::Seconds(self.total);
+        Decision::new(DecisionKind::Time, total, format!("{}; {by}", self.stages()))
     }
 
     fn summed(self) -> Self {

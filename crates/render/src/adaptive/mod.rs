@@ -38,14 +38,6 @@ use halves::{HALVES, half_of};
 /// Side of a block (pixels).
 const BLOCK: u32 = 8;
 
-/// The error of blocks around that a block does not wait for, as a share of what is allowed: they will
-/// get about so many times its samples.
-const NEAR: f64 = 2.0;
-
-/// What the error may be for half as many samples again to do: they leave two thirds of a variance at most
-/// ([`convergence`]).
-const MIDWAY: f64 = 1.5;
-
 /// The share of pixels that may be so without a word.
 const FEW: f64 = 0.01;
 
@@ -96,11 +88,11 @@ impl SampleBlock {
         }
     }
 
-    /// Whether the number of each half is decided, or soon will be.
-    fn is_near(&self) -> [bool; HALVES] {
+    /// Whether the number of each half is decided, or soon will be, as its error is `wait` at most.
+    fn is_near(&self, wait: f64) -> [bool; HALVES] {
         let [a, b] = self.error;
         // The first half is judged by the second, and the second by the first.
-        [self.passed[0] > 0 || b <= NEAR, self.passed[1] > 0 || a <= NEAR]
+        [self.passed[0] > 0 || b <= wait, self.passed[1] > 0 || a <= wait]
     }
 }
 
@@ -369,20 +361,21 @@ impl<'a> Adaptive<'a> {
     /// most.
     fn decide(&mut self, samples: u32) {
         let [_, most] = self.limits;
+        let Rule { wait, half_step, .. } = *self.rule;
         let strip = ROWS_OF_STRIP * self.blocks.across;
         let later = samples.saturating_add(samples / 2);
         // How many samples do, by the other half of the block.
         for block in &mut self.blocks.blocks {
             for half in 0..HALVES {
                 let error = block.error[HALVES - 1 - half];
-                let will_do = error <= MIDWAY && samples.is_power_of_two() && later <= most;
+                let will_do = error <= half_step && samples.is_power_of_two() && later <= most;
                 if block.passed[half] == 0 && (error <= 1.0 || will_do) {
                     block.passed[half] = if error <= 1.0 { samples } else { later };
                 }
             }
         }
         let near: Vec<[bool; HALVES]> =
-            self.blocks.blocks.iter().map(SampleBlock::is_near).collect();
+            self.blocks.blocks.iter().map(|block| block.is_near(wait)).collect();
         for index in 0..near.len() {
             if !self.shard.owns(index / strip) {
                 continue;

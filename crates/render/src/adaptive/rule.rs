@@ -6,6 +6,7 @@ use crate::expose::NoiseOfPixels;
 use crate::samples::of_first_set;
 use crate::stopping::Stopping;
 use etendue_scene::Scene;
+use etendue_scene::file::AccuracySpec;
 
 /// The normal deviate that one of a thousand exceeds.
 const ONE_IN_A_THOUSAND: f64 = 3.0902;
@@ -14,6 +15,12 @@ const ONE_IN_A_THOUSAND: f64 = 3.0902;
 pub(crate) struct Rule {
     /// Not before there are so many of each pixel.
     pub(crate) least: u32,
+    /// The error of blocks around that a block does not wait for, as a share of what is allowed: they will
+    /// get about so many times its samples.
+    pub(super) wait: f64,
+    /// What the error may be for half as many samples again to do: they leave two thirds of a variance at most
+    /// ([`super::convergence`]).
+    pub(super) half_step: f64,
     allowed: Allowed,
 }
 
@@ -36,7 +43,8 @@ impl Rule {
                 Allowed::SensorNoise(Box::new(noise), share)
             }
         };
-        Some(Self { least: scene.render.samples.least(), allowed })
+        let AccuracySpec { sample_wait: wait, sample_half_step: half_step, .. } = scene.accuracy;
+        Some(Self { least: scene.render.samples.least(), wait, half_step, allowed })
     }
 
     /// The variance of the mean of two sets of some pixels' samples as a share of what is allowed, as if

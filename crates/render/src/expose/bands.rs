@@ -2,7 +2,6 @@
 //! colours of the scene.
 
 use etendue_scene::Scene;
-use etendue_sensor::bands::TOLERANCE;
 use etendue_sensor::{BandChoice, Radiometry};
 use etendue_spectrum::{Bands, VISIBLE};
 use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec};
@@ -15,10 +14,12 @@ pub(crate) fn bands(scene: &Scene) -> BandChoice {
     let rgb = || BandChoice::untried(Bands::Rgb);
     match (&scene.sensor, scene.picture) {
         (Some(sensor), Some(LayerSpec::Radiance)) => {
-            sensor.bands_under(&illumination(scene)).unwrap_or_else(|_| {
-                // The render refuses the light, and says which one.
-                BandChoice::untried(sensor.bands().clone())
-            })
+            sensor.bands_under(&illumination(scene), scene.accuracy.band_error).unwrap_or_else(
+                |_| {
+                    // The render refuses the light, and says which one.
+                    BandChoice::untried(sensor.bands().clone())
+                },
+            )
         }
         _ => rgb(),
     }
@@ -56,9 +57,15 @@ fn in_words(error: f64, chosen: &BandChoice, scene: &Scene) -> String {
         Some(_) => "; beyond visible light, colours are taken as they end there",
         None => "",
     };
-    let verdict = match error <= TOLERANCE {
-        true => "the fewest that keep electrons within 0.1 % of an integration by 1 nm",
-        false => "sensor.bands says so; leave it out for fewer errors: electrons are off",
+    let within = scene.accuracy.band_error;
+    let verdict = match error <= within {
+        true => {
+            let within = 100.0 * within;
+            format!("the fewest that keep electrons within {within} % of an integration by 1 nm")
+        }
+        false => {
+            "sensor.bands says so; leave it out for fewer errors: electrons are off".to_owned()
+        }
     };
     let unbounded = match (chosen.complete, illumination(scene).colored > 3) {
         (false, _) => {

@@ -23,6 +23,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use etendue_files::{Transaction, WriteError};
+use etendue_report::{Decision, DecisionKind, DecisionValue};
 use etendue_scene::Scene;
 use etendue_sensor::{
     Exposure, Film, InvalidValues, NoiseModel, RawImage, Sensor, SensorError, SensorKind,
@@ -67,10 +68,11 @@ impl From<WriteError> for ExposeError {
 }
 
 /// What the sensor will do, and why.
-pub(crate) fn explain_sensor(scene: &Scene) -> Option<(String, String)> {
+pub(crate) fn explain_sensor(scene: &Scene) -> Option<Decision> {
     let sensor = scene.sensor.as_ref()?;
     if scene.picture.is_none() {
-        return Some(("off".into(), NOTHING_TO_EXPOSE.into()));
+        let off = DecisionValue::Switch(false);
+        return Some(Decision::new(DecisionKind::Sensor, off, NOTHING_TO_EXPOSE));
     }
     let noise = match sensor.noise() {
         NoiseModel::Poisson => "exact Poisson noise",
@@ -83,7 +85,8 @@ pub(crate) fn explain_sensor(scene: &Scene) -> Option<(String, String)> {
          {shots} time{}",
         if shots == 1 { "" } else { "s" }
     );
-    Some((format!("{}, {} bit, {noise}", name(sensor), sensor.bit_depth()), because))
+    let choice = format!("{}, {} bit, {noise}", name(sensor), sensor.bit_depth());
+    Some(Decision::new(DecisionKind::Sensor, choice, because))
 }
 
 const NOTHING_TO_EXPOSE: &str =

@@ -5,10 +5,6 @@ use etendue_camera::{CameraError, LensCamera, LightField};
 use etendue_spectrum::Bands;
 use rayon::prelude::*;
 
-/// From how far apart (pixels) centres of bands are sampled each at its own place. A disparity of 0.2 moves the
-/// waves of views by 0.004 columns over it, which is an error of 60 dB.
-const APART: f64 = 0.02;
-
 /// The middles of the images of a view's lenslets, row by row (pixels from the corner); `None` where no chief ray
 /// gets to.
 pub(super) type Places = Vec<Option<[f64; 2]>>;
@@ -21,14 +17,19 @@ pub(super) struct Centres {
     by_band: Vec<Places>,
     /// How far those of a band are from those of the design wavelength at most (pixels).
     apart: f64,
+    /// From how far apart (pixels) on each band is sampled at its own. By itself 0.02: a disparity of 0.2 moves the
+    /// waves of views by 0.004 columns over it, which is an error of 60 dB.
+    most: f64,
 }
 
 impl Centres {
-    /// The centres behind a lens for light in `bands`.
+    /// The centres behind a lens for light in `bands`, which are sampled each at its own where they are more than
+    /// `most` pixels apart.
     pub(super) fn new(
         lens: &LensCamera,
         light_field: &LightField,
         bands: &Bands,
+        most: f64,
     ) -> Result<Self, CameraError> {
         let (rows, cols) = (light_field.grid.rows, light_field.grid.cols);
         let cells = || (0..rows * cols).into_par_iter().map(|k| (k / cols, k % cols));
@@ -41,7 +42,7 @@ impl Centres {
         let pairs = by_band.iter().flat_map(|places| places.iter().zip(&design));
         let away = pairs.filter_map(|(own, design)| own.as_ref().zip(design.as_ref()));
         let apart = away.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
-        Ok(Self { design, by_band, apart })
+        Ok(Self { design, by_band, apart, most })
     }
 
     /// Those at which views of band `band` are sampled.
@@ -61,6 +62,6 @@ impl Centres {
 
     /// Whether bands are sampled each at its own centres.
     pub(super) fn are_apart(&self) -> bool {
-        self.apart > APART
+        self.apart > self.most
     }
 }

@@ -1,15 +1,12 @@
 //! Which views a raw picture holds: as many about the middle one as are those of an ideal lens.
 
 use etendue_camera::{Camera, CameraError, LensCamera, LightField, Projection, ViewGrid};
+use etendue_scene::file::AccuracySpec;
 use etendue_spectrum::Bands;
 use std::sync::Arc;
 
 use super::centres::Centres;
 use super::response::{ViewRays, ViewResponse};
-
-/// By its rays the least that a view has (dB) of an ideal lens' waves. Views are to have 40 dB, a mean square of 1e-4:
-/// half of it is left to the noise of the raw picture and to how well rays tell errors (2e-5).
-const LEAST_PSNR: f64 = 43.0;
 
 /// The views of a camera.
 #[derive(Debug)]
@@ -26,7 +23,14 @@ pub(super) struct ChosenViews {
 
 impl ChosenViews {
     /// The views of a light-field camera; `None` of other cameras.
-    pub(super) fn of(camera: &Camera) -> Result<Option<Self>, CameraError> {
+    ///
+    /// Views are to have 40 dB of an ideal lens' waves, a mean square of 1e-4. Half of it is left to the noise of
+    /// the raw picture and to how well rays tell errors (2e-5), so by their rays they are held to 43 dB, where
+    /// `accuracy` does not say otherwise.
+    pub(super) fn of(
+        camera: &Camera,
+        accuracy: &AccuracySpec,
+    ) -> Result<Option<Self>, CameraError> {
         let Some(light_field) = camera.light_field() else { return Ok(None) };
         let Some((reference, unit)) = reference_of(camera)? else { return Ok(None) };
         let mut chosen = Self {
@@ -45,7 +49,7 @@ impl ChosenViews {
             true => camera.opened_clear(&Bands::Rgb)?,
             false => camera.opened(&Bands::Rgb)?,
         };
-        let centres = Centres::new(lens, light_field, &Bands::Rgb)?;
+        let centres = Centres::new(lens, light_field, &Bands::Rgb, accuracy.view_color_shift)?;
         let colors = if centres.by_band().is_empty() || !is_mosaic && is_coloured(lens) {
             vec![opened.band_groups(&Bands::Rgb).len() / 2]
         } else {
@@ -63,7 +67,7 @@ impl ChosenViews {
             let response = ViewResponse::new(&rays, &ideal);
             // The middle ones stay in their places when two rows and columns fewer are taken.
             let sides = (0..=views.saturating_sub(1) / 2).map(|less| views - 2 * less);
-            let good = sides.clone().find(|&side| response.worst(side) >= LEAST_PSNR);
+            let good = sides.clone().find(|&side| response.worst(side) >= accuracy.view_psnr);
             match good {
                 Some(side) if side == views => {
                     (chosen.light_field, chosen.reference, chosen.grid) =
@@ -73,7 +77,7 @@ impl ChosenViews {
                 }
                 Some(side) if side >= light_field.least_views.max(3) => views = side,
                 Some(_) | None => {
-                    chosen.no_views = Some(too_far_off(response.worst(views)));
+                    chosen.no_views = Some(too_far_off(response.worst(views), accuracy.view_psnr));
                     break;
                 }
             }
@@ -136,9 +140,9 @@ fn reference_of(camera: &Camera) -> Result<Option<(Camera, Arc<ViewGrid>)>, Came
     })
 }
 
-fn too_far_off(worst: f64) -> String {
+fn too_far_off(worst: f64, least: f64) -> String {
     format!(
-        "by its rays the worst view would have {worst:.1} dB of an ideal lens', less than {LEAST_PSNR}, as \
+        "by its rays the worst view would have {worst:.1} dB of an ideal lens', less than {least}, as \
          the main lens or the lenslets lose or bend part of the light: close the main lens, ask for fewer \
          views, or give lenslets that are thinner or of a longer focal length"
     )

@@ -32,7 +32,7 @@ impl LightFieldViews {
     /// When the views have no places.
     pub fn of(scene: &Scene, picture: &Picture) -> Result<Option<Self>, LightFieldError> {
         let (Some(_), None) = (picture.layer(""), scene.camera.no_views()) else { return Ok(None) };
-        let chosen = ChosenViews::of(&scene.camera)
+        let chosen = ChosenViews::of(&scene.camera, &scene.accuracy)
             .map_err(|error| RenderError::Camera(error.to_string()))?;
         let Some(ChosenViews { grid, response, no_views: None, light_field, .. }) = chosen else {
             return Ok(None);

@@ -133,7 +133,7 @@ pub fn write(
     let scene = rendering.scene;
     let mut set = SetWriter { files, folder, outputs, written: LightFieldSet::default() };
     let fault = |error: CameraError| RenderError::Camera(error.to_string());
-    let Some(chosen) = ChosenViews::of(&scene.camera).map_err(fault)? else {
+    let Some(chosen) = ChosenViews::of(&scene.camera, &scene.accuracy).map_err(fault)? else {
         return Ok(set.written);
     };
     let ChosenViews { light_field, reference, grid, response, no_views } = &chosen;
@@ -147,7 +147,9 @@ pub fn write(
     let mut geometry = LightFieldGeometry::new(&camera, light_field, grid, &depth);
     geometry.judge(no_views.clone(), response.as_ref());
     if let Some(lens) = raw {
-        geometry.bands(&Centres::new(lens, light_field, &Bands::Rgb).map_err(fault)?, light_field);
+        let shift = scene.accuracy.view_color_shift;
+        let centres = Centres::new(lens, light_field, &Bands::Rgb, shift).map_err(fault)?;
+        geometry.bands(&centres, light_field);
     }
     sidecar::write_json(files, &set.place("geometry.json"), &geometry)?;
     if raw.is_some() {
@@ -196,9 +198,10 @@ fn by_layer(
     light_field: &LightField,
 ) -> Result<[Centres; 2], CameraError> {
     let grid = scene.sensor.as_ref().and_then(|sensor| sensor.spec().bands.clone());
-    let colors = Centres::new(lens, light_field, &Bands::Rgb)?;
+    let shift = scene.accuracy.view_color_shift;
+    let colors = Centres::new(lens, light_field, &Bands::Rgb, shift)?;
     let spectrum = match grid {
-        Some(grid) => Centres::new(lens, light_field, &Bands::Spectral(grid))?,
+        Some(grid) => Centres::new(lens, light_field, &Bands::Spectral(grid), shift)?,
         None => colors.clone(),
     };
     Ok([colors, spectrum])

@@ -7,13 +7,14 @@ use std::ops::Range;
 
 use etendue_accel::Quality;
 use etendue_geometry::{Detail, HitPrecision};
+use etendue_report::Decision;
 use etendue_scene::file::BuildQuality;
 use etendue_scene::import::Wanted;
 use etendue_scene::{MemoryForecast, Scene};
 use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Needs, TextureScope};
 
-pub use self::words::Decision;
+use self::words::Grounds;
 use crate::denoise::DENOISED;
 use crate::expose;
 use crate::film::Precision;
@@ -57,7 +58,7 @@ pub struct Plan {
     /// When they are enough.
     pub stopping: Stopping,
     /// Why that is not what the scene asks for, where it is not.
-    pub stopping_note: Option<String>,
+    pub not_as_asked: Option<String>,
     /// Which of these are taken of every pixel before the next are taken of any. The picture does
     /// not depend on it.
     pub passes: Vec<Range<u32>>,
@@ -79,7 +80,7 @@ pub struct Plan {
     pub bands: Bands,
     /// What it will take, by counts and headers alone: within 1.5 of the peak of the example scenes.
     pub memory: MemoryForecast,
-    /// The decisions, in words.
+    /// The decisions, with their reasons.
     pub decisions: Vec<Decision>,
 }
 
@@ -132,7 +133,7 @@ impl Plan {
         let needs = needs(&layers);
         let lens = scene.camera.has_pupil();
         let spec = scene.render.samples;
-        let (stopping, stopping_note) = Stopping::of(scene);
+        let (stopping, not_as_asked) = Stopping::of(scene);
         let passes = Passes::of(&layers, spec.most(), lens);
         let [width, height] = scene.camera.resolution();
         let pixels = u64::from(width) * u64::from(height);
@@ -163,7 +164,7 @@ impl Plan {
                 && scene.plan.texture_filter != Some(false),
             samples,
             stopping,
-            stopping_note,
+            not_as_asked,
             passes: sample_passes(scene, passes, chosen.bands.count(), stopping),
             pupil: lens && (passes.mean || passes.light),
             rays,
@@ -178,7 +179,9 @@ impl Plan {
         };
         // Memory and reasons follow from all other decisions.
         plan.memory = forecast(scene, &plan, outputs);
-        plan.decisions = plan.explain(scene, &chosen, (needs, passes), (triangles, why_precision));
+        let bands = &chosen;
+        let grounds = Grounds { scene, bands, needs, passes, triangles, why_precision };
+        plan.decisions = plan.explain(&grounds);
         plan
     }
 

@@ -1,17 +1,16 @@
-//! The plan's decisions in words: what, how, why, what it saves, and by which key it is made otherwise.
+//! The plan's decisions, each with its reason.
 
 use std::fmt;
 
 use etendue_accel::Quality;
 use etendue_camera::{LensCamera, Projection};
 use etendue_geometry::{HitPrecision, Placement};
+use etendue_report::{Decision, DecisionKind as Kind, DecisionValue, Saving, Tabled};
 use etendue_scene::Scene;
 use etendue_scene::file::{LightPrecision, TracerRow, TracerSpec};
-use etendue_scene::memory::Size;
 use etendue_sensor::BandChoice;
 use etendue_tracer::layer::Kept;
 use etendue_tracer::{LayerSpec, Needs};
-use serde::Serialize;
 
 use super::{
     MOST_BYTES_OF_SUMS, Passes, Plan, RAYS_A_SAMPLE_OF_LIGHT, RAYS_PER_TRIANGLE, quality_for,
@@ -19,33 +18,52 @@ use super::{
 use crate::film::Precision;
 use crate::{expose, samples};
 
-/// A decision: one value, its reason, and how to overrule it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Decision {
-    /// What is decided.
-    pub what: &'static str,
-    /// How.
-    pub choice: String,
-    /// Why.
-    pub because: String,
-    /// What it saves beside the fullest choice, counted; `None` where that has no number before the render.
-    pub saves: Option<String>,
-    /// The path in the scene file that decides it otherwise.
-    pub key: Option<&'static str>,
-    /// Whether the scene has decided it.
-    pub forced: bool,
-}
-
-/// The key of a decision, whether the scene gives it, and what the decision saves.
-struct Overruling {
-    key: &'static str,
-    forced: bool,
-    saves: Option<String>,
+/// What decisions are made by, beside the plan.
+pub(super) struct Grounds<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) bands: &'a BandChoice,
+    pub(super) needs: Needs,
+    pub(super) passes: Passes,
+    /// Triangles, each stored one once.
+    pub(super) triangles: u64,
+    /// Why light hits as precisely as it does.
+    pub(super) why_precision: String,
 }
 
 impl Plan {
+    /// The decisions: rays, samples, wavelengths, sensor and lens; surfaces and lights; how exactly, and in how
+    /// much memory.
+    pub(super) fn explain(&self, grounds: &Grounds<'_>) -> Vec<Decision> {
+        let Grounds { scene, needs, passes, .. } = *grounds;
+        let mut decisions = vec![Decision::new(
+            Kind::Rays,
+            DecisionValue::Count(self.rays),
+            self.explain_rays(passes),
+        )];
+        if passes.mean || passes.light {
+            let (choice, because) =
+                self.stopping.words(scene.render.samples, self.not_as_asked.as_ref());
+            decisions.push(Decision::new(Kind::Samples, choice, because));
+            decisions.push(self.explain_passes());
+        }
+        let (bands, because) = expose::explain_bands(scene, grounds.bands);
+        decisions.push(Decision::new(Kind::Wavelengths, bands, because));
+        decisions.extend(expose::explain_sensor(scene));
+        decisions.extend(self.explain_denoising());
+        decisions.extend(self.explain_lens(scene));
+        decisions.push(explain_bounces(scene, needs));
+        decisions.extend(explain_surfaces(needs));
+        decisions.extend(needs.light.then(|| explain_lights(scene)));
+        decisions.extend(self.explain_textures(scene, needs));
+        decisions.push(self.explain_quality(scene, grounds.triangles));
+        decisions.extend(self.explain_precision(grounds));
+        decisions.extend(scene.accuracy.decisions());
+        decisions.push(self.memory.decision());
+        decisions
+    }
+
     /// What the rays are for.
-    fn ray_words(&self, passes: Passes) -> String {
+    fn explain_rays(&self, passes: Passes) -> String {
         let seen = match (passes.centre, passes.mean) {
             (true, true) => Some(format!(
                 "the chief ray of each pixel for data layers, {} samples a pixel for colours",
@@ -70,142 +88,8 @@ impl Plan {
         parts.join("; ")
     }
 
-    pub(super) fn explain(
-        &self,
-        scene: &Scene,
-        chosen: &BandChoice,
-        (needs, passes): (Needs, Passes),
-        (triangles, why_precision): (u64, String),
-    ) -> Vec<Decision> {
-        let mut decisions = Vec::new();
-        let mut decide = |what, choice: &str, because: String| {
-            let choice = choice.to_owned();
-            decisions.push(Decision {
-                what,
-                choice,
-                because,
-                saves: None,
-                key: None,
-                forced: false,
-            });
-        };
-        let on = |yes| if yes { "on" } else { "off" };
-        // What is traced: rays, samples, passes, wavelengths, the sensor, the lens.
-        decide("rays", &self.rays.to_string(), self.ray_words(passes));
-        if passes.mean || passes.light {
-            let note = self.stopping_note.as_ref();
-            let (choice, because) = self.stopping.words(scene.render.samples, note);
-            decide("samples", &choice, because);
-        }
-        if let Some((choice, because)) = self.explain_passes(passes) {
-            decide("passes", &choice, because);
-        }
-        let (bands, because) = expose::explain_bands(scene, chosen);
-        decide("wavelengths", &bands, because);
-        if let Some((choice, because)) = expose::explain_sensor(scene) {
-            decide("sensor", &choice, because);
-        }
-        for (what, choice, because) in
-            self.explain_denoising().into_iter().chain(self.explain_lens(scene))
-        {
-            decide(what, choice, because);
-        }
-        // What is asked of surfaces and lights.
-        let (choice, because) = light_words(scene, needs);
-        decide("shadows and bounces", &choice, because);
-        for (what, choice, because) in surface_words(needs) {
-            decide(what, on(choice), because);
-        }
-        if needs.light {
-            let (choice, because) = source_words(scene);
-            decide("lights", &choice, because);
-        }
-        for (what, choice, because) in self.explain_textures(scene, needs) {
-            decide(what, choice, because);
-        }
-        // How exactly, and in how much memory.
-        let (choice, because) = self.explain_quality(scene, triangles);
-        decide("build quality", choice, because);
-        decide(
-            "refinement",
-            on(self.refine),
-            either(
-                self.refine,
-                "hits found in f32 are solved again in f64: data are as exact as the file's numbers",
-                "the scene takes f32's hits as they are",
-            ),
-        );
-        decide(
-            "data layers",
-            if self.precision == Precision::Single { "32 bits" } else { "64 bits" },
-            either(
-                self.precision == Precision::Single,
-                "an EXR holds no more",
-                "NPY files hold what was computed",
-            ),
-        );
-        if needs.light || self.averages_colors() {
-            let choice = match self.light_precision {
-                HitPrecision::Single => "32 bits",
-                HitPrecision::Double => "64 bits",
-            };
-            decide(if needs.light { "light paths" } else { "sampled hits" }, choice, why_precision);
-        }
-        let memory = self.memory.to_string();
-        let (total, parts) = memory.split_once(" (").unwrap_or((&memory, ""));
-        decide("memory", total, parts.replacen(')', "", 1));
-        // Which of these a key of the scene overrules.
-        for decision in &mut decisions {
-            if let Some(Overruling { key, forced, saves }) = self.overruling(scene, decision.what) {
-                (decision.key, decision.forced, decision.saves) = (Some(key), forced, saves);
-            }
-        }
-        decisions
-    }
-
-    /// Whether colours of surfaces are averaged over samples.
-    fn averages_colors(&self) -> bool {
-        let is_color = |layer: &LayerSpec| layer.is_averaged() && !layer.is_light();
-        self.samples > 1 && self.layers.iter().any(is_color)
-    }
-
-    /// How a decision is overruled, and what it saves.
-    fn overruling(&self, scene: &Scene, what: &str) -> Option<Overruling> {
-        let spec = &scene.plan;
-        let by = |key, forced, saves| Some(Overruling { key, forced, saves });
-        match what {
-            "samples" => by("render.samples", false, None),
-            "materials and textures" => {
-                let bytes = scene.textures.iter().map(|texture| texture.decoded_bytes()).sum();
-                let saved = (self.images.is_none() && bytes > 0)
-                    .then(|| format!("{} of {} images", Size(bytes), scene.textures.len()));
-                by("plan.textures", spec.textures.is_some(), saved)
-            }
-            "rays of a wavelength" => by("plan.dispersion", spec.dispersion.is_some(), None),
-            "texture filter" => by("plan.texture_filter", spec.texture_filter.is_some(), None),
-            "build quality" => by("plan.build_quality", spec.build_quality.is_some(), None),
-            "refinement" => by("plan.refine", spec.refine.is_some(), None),
-            "light paths" | "sampled hits" => {
-                let forced = spec.light_precision != LightPrecision::Auto;
-                by("plan.light_precision", forced, None)
-            }
-            "data layers" => {
-                let [width, height] = scene.camera.resolution().map(u64::from);
-                let planes = self.layers.iter().filter(|layer| layer.row().kept == Kept::Measured);
-                let planes: u64 = planes.map(|layer| layer.row().channels.len() as u64).sum();
-                let is_single = self.precision == Precision::Single && planes > 0;
-                let saved = is_single.then(|| Size(4 * planes * width * height).to_string());
-                by("--outputs", false, saved)
-            }
-            _ => None,
-        }
-    }
-
-    /// How often the film is gone over, where samples are averaged.
-    fn explain_passes(&self, passes: Passes) -> Option<(String, String)> {
-        if !passes.mean && !passes.light {
-            return None;
-        }
+    /// How often the film is gone over.
+    fn explain_passes(&self) -> Decision {
         let because = match &self.passes[..] {
             [first, ..] if self.stopping.is_adaptive() => format!(
                 "at most: the picture can be seen after {} samples a pixel, and is judged where they are \
@@ -222,10 +106,10 @@ impl Plan {
             }
             _ => "too few samples to look at some of them".to_owned(),
         };
-        Some((self.passes.len().to_string(), because))
+        Decision::new(Kind::Passes, DecisionValue::Count(self.passes.len() as u64), because)
     }
 
-    fn explain_quality(&self, scene: &Scene, triangles: u64) -> (&'static str, String) {
+    fn explain_quality(&self, scene: &Scene, triangles: u64) -> Decision {
         let what = format!("{} rays over {triangles} triangles:", self.rays);
         let pays = format!("{RAYS_PER_TRIANGLE} a triangle or more pay for a better structure");
         let own = quality_for(self.rays, triangles);
@@ -236,98 +120,144 @@ impl Plan {
             }
             Quality::Medium | Quality::High => format!("{what} {pays}"),
         };
-        match scene.plan.build_quality {
-            Some(_) => {
-                let own = quality_name(own);
-                (quality_name(self.quality), format!("it would be {own} by itself: {because}"))
-            }
-            None => (quality_name(self.quality), because),
-        }
+        let is_forced = scene.plan.build_quality.is_some();
+        let because = match is_forced {
+            true => format!("it would be {} by itself: {because}", quality_name(own)),
+            false => because,
+        };
+        Decision::new(Kind::BuildQuality, quality_name(self.quality), because).forced(is_forced)
     }
 
     /// What is read of materials, and how images are looked up.
-    fn explain_textures(
-        &self,
-        scene: &Scene,
-        needs: Needs,
-    ) -> Vec<(&'static str, &'static str, String)> {
+    fn explain_textures(&self, scene: &Scene, needs: Needs) -> Vec<Decision> {
+        let n = scene.textures.len();
         // Whether materials are looked at, and their images with them.
-        let because = match (needs.materials, scene.textures.len()) {
-            (true, n) if needs.light => format!("light is scattered by them; {n} images named"),
-            (true, n) => format!("a layer shows base colour; {n} images named"),
-            (false, _) => "no layer shows colour; no image is decoded".to_owned(),
+        let (choice, because): (DecisionValue, _) = match (needs.materials, scene.plan.textures) {
+            (true, Some(false)) => (
+                "without images".into(),
+                format!("surfaces have their factors alone; {n} images named"),
+            ),
+            (true, _) if needs.light => (
+                DecisionValue::Switch(true),
+                format!("light is scattered by them; {n} images named"),
+            ),
+            (true, _) => (
+                DecisionValue::Switch(true),
+                format!("a layer shows base colour; {n} images named"),
+            ),
+            (false, _) => (
+                DecisionValue::Switch(false),
+                "no layer shows colour; no image is decoded".to_owned(),
+            ),
         };
-        let (on, because) = match (needs.materials, scene.plan.textures) {
-            (true, Some(false)) => {
-                let n = scene.textures.len();
-                ("without images", format!("surfaces have their factors alone; {n} images named"))
-            }
-            (needed, _) => (if needed { "on" } else { "off" }, because),
-        };
-        let mut decisions = vec![("materials and textures", on, because)];
+        let bytes = scene.textures.iter().map(|texture| texture.decoded_bytes()).sum();
+        let saving =
+            (self.images.is_none() && bytes > 0).then_some(Saving { bytes, images: Some(n) });
+        let read = Decision::new(Kind::Textures, choice, because)
+            .forced(scene.plan.textures.is_some())
+            .saving(saving);
         // How images are filtered.
-        if self.images.is_some() {
-            let reason = match (self.footprint, scene.plan.texture_filter) {
+        let filter = self.images.map(|_| {
+            let because = match (self.footprint, scene.plan.texture_filter) {
                 (true, _) => "the camera tells what a sample covers",
                 (false, Some(false)) => "the scene takes images at the very points that were hit",
                 (false, _) => "the camera does not tell what a pixel covers",
             };
-            let reason = reason.to_owned();
             let choice = if self.footprint { "footprint" } else { "none" };
-            decisions.push(("texture filter", choice, reason));
-        }
-        decisions
+            let is_forced = scene.plan.texture_filter.is_some();
+            Decision::new(Kind::TextureFilter, choice, because).forced(is_forced)
+        });
+        std::iter::once(read).chain(filter).collect()
+    }
+
+    /// How exactly data and light are traced and kept.
+    fn explain_precision(&self, grounds: &Grounds<'_>) -> impl Iterator<Item = Decision> {
+        let Grounds { scene, needs, .. } = *grounds;
+        let because = match self.refine {
+            true => {
+                "hits found in f32 are solved again in f64: data are as exact as the file's numbers"
+            }
+            false => "the scene takes f32's hits as they are",
+        };
+        let refined = Decision::new(Kind::Refinement, DecisionValue::Switch(self.refine), because)
+            .forced(scene.plan.refine.is_some());
+        // What of data layers f32 saves.
+        let (bits, because, saving) = match self.precision {
+            Precision::Single => {
+                let [width, height] = scene.camera.resolution().map(u64::from);
+                let planes = self.layers.iter().filter(|layer| layer.row().kept == Kept::Measured);
+                let planes: u64 = planes.map(|layer| layer.row().channels.len() as u64).sum();
+                let saving = Saving { bytes: 4 * planes * width * height, images: None };
+                (32, "an EXR holds no more", (planes > 0).then_some(saving))
+            }
+            Precision::Double => (64, "NPY files hold what was computed", None),
+        };
+        let data =
+            Decision::new(Kind::DataLayers, DecisionValue::Bits(bits), because).saving(saving);
+        // What light and samples of colours hit.
+        let is_color = |layer: &LayerSpec| layer.is_averaged() && !layer.is_light();
+        let averages_colors = self.samples > 1 && self.layers.iter().any(is_color);
+        let kind = if needs.light { Kind::LightPaths } else { Kind::SampledHits };
+        let bits = match self.light_precision {
+            HitPrecision::Single => 32,
+            HitPrecision::Double => 64,
+        };
+        let light = (needs.light || averages_colors).then(|| {
+            Decision::new(kind, DecisionValue::Bits(bits), grounds.why_precision.clone())
+                .forced(scene.plan.light_precision != LightPrecision::Auto)
+        });
+        [refined, data].into_iter().chain(light)
     }
 
     /// What becomes of the picture's noise, where something does.
-    fn explain_denoising(&self) -> Option<(&'static str, &'static str, String)> {
+    fn explain_denoising(&self) -> Option<Decision> {
         let because = "--denoise: by Open Image Denoise, which is guided by the layers MeanAlbedo and \
                        MeanNormal; the picture and the sensor's images keep their noise";
-        self.denoised.then(|| ("denoising", "a layer beside the picture", because.to_owned()))
+        let choice = "a layer beside the picture";
+        self.denoised.then(|| Decision::new(Kind::Denoising, choice, because))
     }
 
     /// How wavelengths and the pupil of the camera's lens are sampled.
-    fn explain_lens(&self, scene: &Scene) -> [(&'static str, &'static str, String); 2] {
+    fn explain_lens(&self, scene: &Scene) -> [Decision; 2] {
         let lens = scene.camera.lens();
         let groups = scene.camera.band_groups(&self.bands).len();
         let each = lens.map_or(1, |lens| lens.wavelengths_a_group(&self.bands));
         let apart = groups > 1 || each > 1;
         let rays = if apart && self.pupil { "their own" } else { "shared" };
         let disperses = lens.is_some_and(|lens| lens.focused().train().is_dispersive());
-        let is_forced = scene.plan.dispersion == Some(false) && disperses && !apart;
-        let because_apart = match is_forced {
+        let because_apart = match scene.plan.dispersion == Some(false) && disperses && !apart {
             true => "the scene takes the lens as at its design wavelength; else each would run its own way"
                 .to_owned(),
             false => wavelengths(apart, self.pupil, each),
         };
-        let (pupil, because) = match scene.camera.projection() {
+        let (is_on, because) = match scene.camera.projection() {
             Projection::Views(_) if self.pupil => {
-                ("on", "each view is averaged over its own part of the opening".to_owned())
+                (true, "each view is averaged over its own part of the opening".to_owned())
             }
             _ => pupil(lens, self.pupil, self.samples),
         };
-        [("rays of a wavelength", rays, because_apart), ("pupil", pupil, because)]
+        [
+            Decision::new(Kind::RaysOfBands, rays, because_apart)
+                .forced(scene.plan.dispersion.is_some()),
+            Decision::new(Kind::Pupil, DecisionValue::Switch(is_on), because),
+        ]
     }
 }
 
-/// One of two reasons.
-fn either(yes: bool, reason: &str, other: &str) -> String {
-    if yes { reason } else { other }.to_owned()
-}
-
-/// What is worked out of surfaces, and why.
-fn surface_words(needs: Needs) -> [(&'static str, bool, String); 2] {
-    let surface = either(
-        needs.surface,
-        "a layer needs normals or barycentric coordinates",
-        "no layer needs more than distance and ids",
-    );
-    let normals = either(
-        needs.normals,
-        "a layer needs shading normals",
-        "no layer needs shading normals; they are not read",
-    );
-    [("surface", needs.surface, surface), ("vertex normals", needs.normals, normals)]
+/// What is worked out of surfaces.
+fn explain_surfaces(needs: Needs) -> [Decision; 2] {
+    let surface = match needs.surface {
+        true => "a layer needs normals or barycentric coordinates",
+        false => "no layer needs more than distance and ids",
+    };
+    let normals = match needs.normals {
+        true => "a layer needs shading normals",
+        false => "no layer needs shading normals; they are not read",
+    };
+    [
+        Decision::new(Kind::Surface, DecisionValue::Switch(needs.surface), surface),
+        Decision::new(Kind::VertexNormals, DecisionValue::Switch(needs.normals), normals),
+    ]
 }
 
 fn quality_name(quality: Quality) -> &'static str {
@@ -338,20 +268,22 @@ fn quality_name(quality: Quality) -> &'static str {
     }
 }
 
-/// What becomes of light, and why.
-fn light_words(scene: &Scene, needs: Needs) -> (String, String) {
+/// How far light is followed.
+fn explain_bounces(scene: &Scene, needs: Needs) -> Decision {
     match scene.tracer.filter(|_| needs.light).map(TracerSpec::row) {
         Some(TracerRow { name, light: Some(light), .. }) => {
-            (light.reach, format!("the tracer is `{name}`: {}", light.shows))
+            let because = format!("the tracer is `{name}`: {}", light.shows);
+            Decision::new(Kind::Bounces, light.reach, because)
         }
         Some(TracerRow { light: None, .. }) | None => {
-            ("off".to_owned(), "no layer looks at light".to_owned())
+            let off = DecisionValue::Switch(false);
+            Decision::new(Kind::Bounces, off, "no layer looks at light")
         }
     }
 }
 
 /// Where light comes from.
-fn source_words(scene: &Scene) -> (String, String) {
+fn explain_lights(scene: &Scene) -> Decision {
     let shines = |placement: &&Placement| {
         let material = scene.materials.get(placement.material as usize);
         material.is_some_and(|material| material.emission.is_some())
@@ -364,9 +296,12 @@ fn source_words(scene: &Scene) -> (String, String) {
         (_, 0) => "named by the scene or its models, or chosen in their place".to_owned(),
         _ => format!("lights are chosen by power; {triangles} triangles shine too"),
     };
-    let more = "; a grey studio, too, where they leave what the camera sees in the dark";
-    let words = if scene.studio_if_dark { words + more } else { words };
-    ((lights + triangles).to_string(), words)
+    let more = match scene.studio_if_dark {
+        true => "; a grey studio, too, where they leave what the camera sees in the dark",
+        false => "",
+    };
+    let count = DecisionValue::Count((lights + triangles) as u64);
+    Decision::new(Kind::Lights, count, words + more)
 }
 
 /// Why wavelengths are traced together or apart, `each` of them a band.
@@ -383,12 +318,12 @@ fn wavelengths(apart: bool, pupil: bool, each: usize) -> String {
 }
 
 /// Whether rays are spread over a pupil, and why.
-fn pupil(lens: Option<&LensCamera>, spread: bool, samples: u32) -> (&'static str, String) {
+fn pupil(lens: Option<&LensCamera>, spread: bool, samples: u32) -> (bool, String) {
     let Some(lens) = lens else {
-        return ("off", "the camera has no aperture: every ray is a chief ray".to_owned());
+        return (false, "the camera has no aperture: every ray is a chief ray".to_owned());
     };
     if !spread {
-        return ("off", "no layer is a picture: data are taken along chief rays".to_owned());
+        return (false, "no layer is a picture: data are taken along chief rays".to_owned());
     }
     let f_number = match lens.focused().paraxial().f_number {
         Some(f_number) => format!(" (f/{f_number:.2})"),
@@ -409,24 +344,11 @@ fn pupil(lens: Option<&LensCamera>, spread: bool, samples: u32) -> (&'static str
         _ => "",
     };
     let because = format!("colours are averaged over the lens' exit pupil{f_number}, {bound}");
-    ("on", because + noise)
+    (true, because + noise)
 }
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = self.decisions.iter().map(|d| d.what.len()).max().unwrap_or(0);
-        let choice = self.decisions.iter().map(|d| d.choice.len()).max().unwrap_or(0);
-        for Decision { what, choice: chosen, because, saves, key, forced } in &self.decisions {
-            write!(f, "{what:width$}  {chosen:choice$}  {because}")?;
-            if let Some(saves) = saves {
-                write!(f, "; saves {saves}")?;
-            }
-            match (key, forced) {
-                (Some(key), true) => writeln!(f, " [forced by {key}]")?,
-                (Some(key), false) => writeln!(f, " [{key}]")?,
-                (None, _) => writeln!(f)?,
-            }
-        }
-        Ok(())
+        f.write_str(&Tabled(&self.decisions).text())
     }
 }

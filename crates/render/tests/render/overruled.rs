@@ -5,6 +5,7 @@ use std::path::Path;
 
 use etendue_render::output::Outputs;
 use etendue_render::{Plan, Rendered};
+use etendue_report::{Decision, DecisionKind, DecisionValue};
 use etendue_scene::Scene;
 use serde_json::{Value, json};
 
@@ -31,17 +32,15 @@ fn scene(folder: &Path, plan: &Value) -> Scene {
     load_json(folder, scene)
 }
 
-/// The picture with what the plan says of the decision `what`.
-fn rendered(plan: &Value, what: &str) -> (Rendered, String) {
+/// The picture with the plan's decision of a kind.
+fn rendered(plan: &Value, kind: DecisionKind) -> (Rendered, Decision) {
     let folder = tempfile::tempdir().unwrap();
     let scene = scene(folder.path(), plan);
     let plan = Plan::new(&scene, Outputs::ALL);
     let (accel, images) = prepare(&scene, &plan);
     assert_eq!(accel.report().quality, plan.quality);
     let done = trace(&scene, &plan, &*accel, &images);
-    let words = plan.to_string();
-    let line = words.lines().find(|line| line.starts_with(what)).unwrap_or_default();
-    (done, line.to_owned())
+    (done, plan.decisions.into_iter().find(|decision| decision.kind == kind).unwrap())
 }
 
 fn bits(done: &Rendered) -> Vec<Vec<u64>> {
@@ -66,17 +65,19 @@ fn differ(a: &[f64], b: &[f64]) -> [f64; 2] {
 #[test]
 fn the_quality_of_the_build_leaves_the_picture_in_f64_as_it_is() {
     let of = |quality: &str| {
-        rendered(&json!({ "light_precision": "double", "build_quality": quality }), "build quality")
+        rendered(
+            &json!({ "light_precision": "double", "build_quality": quality }),
+            DecisionKind::BuildQuality,
+        )
     };
-    let (own, words) = rendered(&json!({ "light_precision": "double" }), "build quality");
-    assert!(words.contains("[plan.build_quality]"), "{words}");
+    let (own, decision) =
+        rendered(&json!({ "light_precision": "double" }), DecisionKind::BuildQuality);
+    assert_eq!((decision.key, decision.is_forced), (Some("plan.build_quality"), false));
     for quality in ["low", "medium", "high"] {
-        let (forced, words) = of(quality);
+        let (forced, decision) = of(quality);
         assert_eq!(bits(&own), bits(&forced), "{quality}");
-        assert!(
-            words.contains("by itself") && words.ends_with("[forced by plan.build_quality]"),
-            "{words}"
-        );
+        assert!(decision.is_forced && decision.reason.contains("by itself"), "{decision:?}");
+        assert_eq!(decision.value, quality.to_owned().into());
     }
 }
 
@@ -85,11 +86,11 @@ fn the_quality_of_the_build_leaves_the_picture_in_f64_as_it_is() {
 #[test]
 #[cfg(feature = "embree")]
 fn refinement_is_what_the_plan_takes_and_f32_is_as_near_as_it_may_be() {
-    let (own, _) = rendered(&json!({}), "refinement");
-    let (refined, _) = rendered(&json!({ "refine": true }), "refinement");
+    let (own, _) = rendered(&json!({}), DecisionKind::Refinement);
+    let (refined, _) = rendered(&json!({ "refine": true }), DecisionKind::Refinement);
     assert_eq!(bits(&own), bits(&refined));
-    let (coarse, words) = rendered(&json!({ "refine": false }), "refinement");
-    assert!(words.contains("off") && words.contains("forced by plan.refine"), "{words}");
+    let (coarse, decision) = rendered(&json!({ "refine": false }), DecisionKind::Refinement);
+    assert_eq!((decision.value, decision.is_forced), (DecisionValue::Switch(false), true));
     let [worst, _] = differ(&layer(&own.picture, "Distance"), &layer(&coarse.picture, "Distance"));
     assert!(worst > 1e-9 && worst < 1e-5, "{worst}");
 }
@@ -99,10 +100,11 @@ fn refinement_is_what_the_plan_takes_and_f32_is_as_near_as_it_may_be() {
 #[test]
 #[cfg(feature = "embree")]
 fn light_in_f32_is_within_the_noise_of_light_in_f64() {
-    let (own, words) = rendered(&json!({}), "light paths");
-    assert!(words.contains("32 bits") && words.contains("[plan.light_precision]"), "{words}");
-    let (double, words) = rendered(&json!({ "light_precision": "double" }), "light paths");
-    assert!(words.contains("forced"), "{words}");
+    let (own, decision) = rendered(&json!({}), DecisionKind::LightPaths);
+    assert_eq!((decision.value, decision.is_forced), (DecisionValue::Bits(32), false));
+    let (double, decision) =
+        rendered(&json!({ "light_precision": "double" }), DecisionKind::LightPaths);
+    assert_eq!((decision.value, decision.is_forced), (DecisionValue::Bits(64), true));
     let [_, difference] = differ(&layer(&own.picture, ""), &layer(&double.picture, ""));
     // 64 samples of light with a standard deviation of about its mean: 12 %; a Sobol set has less.
     assert!(difference < 0.03, "{difference}");
@@ -110,11 +112,12 @@ fn light_in_f32_is_within_the_noise_of_light_in_f64() {
 
 #[test]
 fn without_images_surfaces_have_their_factors() {
-    let (own, _) = rendered(&json!({}), "materials");
-    let (full, _) = rendered(&json!({ "textures": true }), "materials");
+    let (own, _) = rendered(&json!({}), DecisionKind::Textures);
+    let (full, _) = rendered(&json!({ "textures": true }), DecisionKind::Textures);
     assert_eq!(bits(&own), bits(&full));
-    let (plain, words) = rendered(&json!({ "textures": false }), "materials");
-    assert!(words.contains("without images") && words.contains("saves 12"), "{words}");
+    let (plain, decision) = rendered(&json!({ "textures": false }), DecisionKind::Textures);
+    assert_eq!(decision.value, DecisionValue::from("without images"));
+    assert_eq!(decision.saving.map(|saving| saving.images), Some(Some(1)), "{decision:?}");
     assert_eq!(layer(&own.picture, "Distance"), layer(&plain.picture, "Distance"));
     // The ground's factor is white: its light is at least that of the image everywhere.
     let (own, plain) = (layer(&own.picture, ""), layer(&plain.picture, ""));
@@ -126,10 +129,11 @@ fn without_images_surfaces_have_their_factors() {
 /// samples a pixel, over 1920 of them.
 #[test]
 fn filtered_images_have_the_mean_of_samples() {
-    let (own, words) = rendered(&json!({}), "texture filter");
-    assert!(words.contains("footprint"), "{words}");
-    let (points, words) = rendered(&json!({ "texture_filter": false }), "texture filter");
-    assert!(words.contains("very points"), "{words}");
+    let (own, decision) = rendered(&json!({}), DecisionKind::TextureFilter);
+    assert_eq!((decision.value, decision.is_forced), ("footprint".into(), false));
+    let (points, decision) =
+        rendered(&json!({ "texture_filter": false }), DecisionKind::TextureFilter);
+    assert_eq!((decision.value, decision.is_forced), ("none".into(), true));
     let mean = |done: &Rendered| layer(&done.picture, "").iter().sum::<f64>();
     assert!((mean(&points) / mean(&own) - 1.0).abs() < 0.01, "{} {}", mean(&points), mean(&own));
     assert_ne!(bits(&own), bits(&points));

@@ -6,6 +6,7 @@ use std::path::Path;
 use etendue_geometry::Detail;
 use etendue_render::output::Outputs;
 use etendue_render::{Plan, Precision, Rendered};
+use etendue_report::{DecisionKind, DecisionValue};
 use etendue_scene::Scene;
 use etendue_spectrum::{Bands, Grid};
 use serde_json::{Value, json};
@@ -37,9 +38,9 @@ fn rendered(scene: &Scene, forced: impl FnOnce(&mut Plan)) -> Rendered {
     steps::rendered(scene, &plan)
 }
 
-fn choice(scene: &Scene, what: &str) -> String {
+fn choice(scene: &Scene, kind: DecisionKind) -> DecisionValue {
     let decisions = Plan::new(scene, Outputs::ALL).decisions;
-    decisions.into_iter().find(|decision| decision.what == what).unwrap().choice
+    decisions.into_iter().find(|decision| decision.kind == kind).unwrap().value
 }
 
 fn bits(done: &Rendered, name: &str) -> Vec<u64> {
@@ -63,7 +64,7 @@ fn double_gauss() -> Value {
 #[test]
 fn data_do_not_depend_on_the_pupil() {
     let scene = scene(&double_gauss(), &json!({ "layers": ["distance", "normal"] }));
-    assert_eq!(choice(&scene, "pupil"), "off");
+    assert_eq!(choice(&scene, DecisionKind::Pupil), DecisionValue::Switch(false));
     let own = rendered(&scene, |plan| assert!(!plan.pupil));
     let full = rendered(&scene, |plan| plan.pupil = true);
     for name in ["Distance", "Normal"] {
@@ -80,7 +81,10 @@ fn a_pinhole_without_a_pupil_is_a_closed_lens() {
     let lens = json!({ "type": "thin_lens", "focal_length": 50, "fov": 7, "f_number": 5000,
                        "focus_distance": 4 });
     let closed = scene(&lens, &more);
-    assert_eq!((choice(&pinhole, "pupil"), choice(&closed, "pupil")), ("off".into(), "on".into()));
+    assert_eq!(
+        [&pinhole, &closed].map(|of| choice(of, DecisionKind::Pupil)),
+        [false, true].map(DecisionValue::Switch)
+    );
     let [own, full] = [pinhole, closed].map(|scene| layer(&rendered(&scene, |_| {}).picture, ""));
     let off = difference(&own, &full);
     assert!(off > 0.0 && off < 0.012, "{off}");
@@ -99,7 +103,7 @@ fn bands_share_rays_where_nothing_parts_them() {
                        "lights": [{ "type": "environment", "radiance": [1, 1, 1] }] });
     let shared = scene(&lens(json!({ "n": 1.5 })), &more);
     let apart = scene(&lens(json!({ "power": [[2.25, 0], [1e-7, -2]] })), &more);
-    let what = "rays of a wavelength";
+    let what = DecisionKind::RaysOfBands;
     assert_eq!(
         (choice(&shared, what), choice(&apart, what)),
         ("shared".into(), "their own".into())
@@ -119,7 +123,7 @@ fn a_lens_without_dispersion_takes_one_ray_for_all_bands() {
     };
     let own = scene(&double_gauss(), &more(json!({})));
     let shared = scene(&double_gauss(), &more(json!({ "dispersion": false })));
-    let what = "rays of a wavelength";
+    let what = DecisionKind::RaysOfBands;
     assert_eq!((choice(&own, what), choice(&shared, what)), ("their own".into(), "shared".into()));
     let [own, shared] = [own, shared].map(|scene| rendered(&scene, |_| {}));
     let is_grey = |done: &Rendered| {
@@ -163,7 +167,7 @@ fn three_bands_are_enough_of_what_is_grey() {
 #[test]
 fn what_is_not_asked_of_hits_changes_nothing() {
     let scene = scene(&json!({ "type": "pinhole", "fov": 40 }), &json!({ "layers": ["distance"] }));
-    assert_eq!(choice(&scene, "surface"), "off");
+    assert_eq!(choice(&scene, DecisionKind::Surface), DecisionValue::Switch(false));
     let own = rendered(&scene, |plan| assert_eq!(plan.detail, Detail::Distance));
     let full = rendered(&scene, |plan| plan.detail = Detail::Surface);
     assert_eq!(bits(&own, "Distance"), bits(&full, "Distance"));

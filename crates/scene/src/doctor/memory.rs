@@ -1,12 +1,10 @@
 //! What a render will need, from counts alone.
 
-use std::fmt;
-
+use etendue_report::{Decision, DecisionKind, DecisionValue, Size, listed};
 use etendue_tracer::LayerSpec;
 use serde::Serialize;
 
 use crate::Scene;
-use crate::memory::Size;
 
 /// Bytes of Embree's structure per triangle: 92, 90 and 88 for blobs of 0.1, 1 and 4 million at low
 /// quality, 63 and 70 for 0.1 and 0.3 million at medium. As `bvh_bytes` in the report of
@@ -106,8 +104,9 @@ pub(crate) fn film([width, height]: [u32; 2], layers: &[LayerSpec]) -> u64 {
     pixels.saturating_mul(values).saturating_mul(size_of::<f32>() as u64)
 }
 
-impl fmt::Display for MemoryForecast {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl MemoryForecast {
+    /// Its parts (bytes) by name, those that are not 0.
+    pub fn parts(&self) -> impl Iterator<Item = (&'static str, u64)> {
         let parts = [
             ("program", self.program),
             ("geometry", self.geometry),
@@ -120,13 +119,18 @@ impl fmt::Display for MemoryForecast {
             ("files", self.files),
             ("views", self.views),
         ];
-        let parts = parts.iter().filter(|(_, bytes)| *bytes > 0);
-        let parts: Vec<String> =
-            parts.map(|(name, bytes)| format!("{} {name}", Size(*bytes))).collect();
-        write!(f, "about {} ({})", Size(self.total), parts.join(", "))?;
-        match self.mapped {
-            0 => Ok(()),
-            mapped => write!(f, "; {} more stay in the files", Size(mapped)),
-        }
+        parts.into_iter().filter(|(_, bytes)| *bytes > 0)
+    }
+
+    /// The total as a decision of the plan, because of its parts.
+    #[must_use]
+    pub fn decision(&self) -> Decision {
+        let parts = listed(self.parts().map(|(name, bytes)| format!("{} {name}", Size(bytes))));
+        let mapped = match self.mapped {
+            0 => String::new(),
+            mapped => format!("; {} more stay in the files", Size(mapped)),
+        };
+        let total = DecisionValue::Bytes(self.total);
+        Decision::new(DecisionKind::Memory, total, parts + &mapped)
     }
 }

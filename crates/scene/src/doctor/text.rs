@@ -2,51 +2,53 @@
 
 use std::fmt;
 
+use etendue_report::Table;
+
 use super::{Diagnosis, Finding};
 use crate::escape::one_line;
 
 /// The most objects and files that are listed by name.
 const LISTED: usize = 20;
 
-impl fmt::Display for Diagnosis {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let row = |f: &mut fmt::Formatter<'_>, name: &str, value: &dyn fmt::Display| {
-            writeln!(f, "{name:<13} {value}")
-        };
+impl Diagnosis {
+    /// A list of names and values.
+    #[must_use]
+    pub fn table(&self) -> Table {
+        let mut list = Table::list(14);
         // What is in the file.
-        row(f, "file", &self.file.display())?;
-        row(f, "triangles", &self.count())?;
+        list.put("file", self.file.display());
+        list.put("triangles", self.count());
         match &self.bounds {
             Some(extent) => {
-                row(f, "bounds", &format!("{} to {} m", point(extent.min), point(extent.max)))?;
+                list.put("bounds", format!("{} to {} m", point(extent.min), point(extent.max)));
                 let size: [f64; 3] = std::array::from_fn(|k| extent.max[k] - extent.min[k]);
-                row(f, "size", &format!("{} m", point(size)))?;
+                list.put("size", format!("{} m", point(size)));
             }
-            None => row(f, "bounds", &"none")?,
+            None => list.put("bounds", "none"),
         }
-        row(f, "units", &self.units.remark)?;
-        self.list_objects(f)?;
+        list.put("units", &self.units.remark);
+        self.list_objects(&mut list);
         // What is wrong with it, and how exact it is.
-        row(f, "defects", &self.defects_in_words())?;
+        list.put("defects", self.defects_in_words());
         if let Some(p) = &self.precision {
             let text = format!(
                 "files {:.1e} m; f32 {:.1e} m in the world, {:.1e} m from the scene's centre; \
                  f64 {:.1e} m",
                 p.input_step, p.f32_step_in_world, p.f32_step_from_centre, p.f64_step
             );
-            row(f, "precision", &text)?;
+            list.put("precision", text);
         }
         // What looks at it, and what lights it.
         let [width, height] = self.camera.resolution;
-        row(f, "camera", &format!("{width} × {height}, {}", self.camera_origin))?;
+        list.put("camera", format!("{width} × {height}, {}", self.camera_origin));
         if let Some(frames) = self.frames {
-            row(f, "frames", &format!("{frames}; all below is of one"))?;
+            list.put("frames", format!("{frames}; all below is of one"));
         }
         if let Some(k) = self.camera.k {
             let [fx, fy, cx, cy] = [k[0][0], k[1][1], k[0][2], k[1][2]];
             let text =
                 format!("fx {fx:.4} fy {fy:.4} cx {cx:.4} cy {cy:.4} skew {:.4} px", k[0][1]);
-            row(f, "", &text)?;
+            list.put("", text);
         }
         for camera in &self.cameras {
             let text = format!(
@@ -55,24 +57,23 @@ impl fmt::Display for Diagnosis {
                 one_line(&camera.name),
                 camera.kind
             );
-            row(f, "", &text)?;
+            list.put("", text);
         }
         if self.lights > 0 {
-            row(f, "lights", &format!("{} in the models", self.lights))?;
+            list.put("lights", format!("{} in the models", self.lights));
         }
         // What it needs, what is left over, and what was found.
-        row(f, "memory", &self.memory)?;
+        let memory = self.memory.decision();
+        list.put("memory", format!("{} ({})", memory.value, memory.reason));
         for path in self.unused_files.iter().take(LISTED) {
-            row(f, "unused file", &one_line(&path.to_string_lossy()))?;
+            list.put("unused file", one_line(&path.to_string_lossy()));
         }
         for finding in self.extensions.iter().chain(&self.findings) {
-            row(f, finding.word(), finding)?;
+            list.put(finding.word(), finding);
         }
-        Ok(())
+        list
     }
-}
 
-impl Diagnosis {
     fn count(&self) -> String {
         let Self { triangles, triangles_unique, meshes, placements, .. } = self;
         if triangles == triangles_unique {
@@ -101,15 +102,14 @@ impl Diagnosis {
         if found.is_empty() { "none".to_owned() } else { found.join(", ") }
     }
 
-    fn list_objects(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn list_objects(&self, list: &mut Table) {
         for (index, object) in self.objects.iter().take(LISTED).enumerate() {
             let label = if index == 0 { "objects" } else { "" };
             let (id, name) = (object.id, one_line(&object.name));
-            writeln!(f, "{label:<13} {id} \"{name}\": {} triangles", object.triangles)?;
+            list.put(label, format!("{id} \"{name}\": {} triangles", object.triangles));
         }
-        match self.objects.len().checked_sub(LISTED) {
-            Some(more) if more > 0 => writeln!(f, "{:<13} … and {more} more", ""),
-            _ => Ok(()),
+        if let Some(more) = self.objects.len().checked_sub(LISTED).filter(|more| *more > 0) {
+            list.put("", format!("… and {more} more"));
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The JSON scene format, version 1: read, changed by settings from the command line, checked.
 
+mod accuracy;
 mod camera;
 mod check;
 mod document;
@@ -16,10 +17,11 @@ use std::path::{Path, PathBuf};
 
 use etendue_files::Opener;
 use etendue_optics::train::remove_notes;
-use etendue_sensor::Sensor;
+use etendue_sensor::{Sensor, SensorKind};
 use etendue_tracer::LayerSpec;
 use serde_json::{Value, json};
 
+pub use accuracy::{AccuracySetting, AccuracySpec, AccuracyUse};
 pub use camera::SensorFile;
 pub use document::{OverrideError, Place};
 pub use frames::{CameraPath, FramesSpec, RigCameraSpec, TrajectoryFormat};
@@ -193,11 +195,22 @@ impl SceneFile {
             .or_else(|| {
                 let (key, why) = spec.plan.contradiction(spec.render.accel)?;
                 Some((format!("plan.{key}"), why))
+            })
+            .or_else(|| {
+                let (path, why) =
+                    spec.accuracy.contradiction(&spec.plan, file.has_given_bands())?;
+                Some((path.to_owned(), why))
             });
         match fault {
             Some((path, why)) => Err(file.fault(&path, why)),
             None => Ok(file),
         }
+    }
+
+    /// Whether the sensor's bands are given as they are to be taken.
+    fn has_given_bands(&self) -> bool {
+        let spec = self.sensor.as_ref().map(Sensor::spec);
+        spec.is_some_and(|spec| spec.bands.is_some() && spec.kind != SensorKind::Multispectral)
     }
 
     /// The scene without its `frames`.

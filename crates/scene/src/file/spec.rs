@@ -16,7 +16,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::camera::CameraSource;
-use super::{FramesSpec, ObjectSpec, PlanSpec, RenderSpec, TracerSpec, Up};
+use super::{AccuracySpec, FramesSpec, ObjectSpec, PlanSpec, RenderSpec, TracerSpec, Up};
 use etendue_camera::CameraSpec;
 use etendue_optics::train::NOTES;
 use etendue_sensor::SensorSpec;
@@ -61,6 +61,9 @@ pub struct SceneSpec {
     /// What the plan is told instead of deciding it.
     #[serde(default)]
     pub plan: PlanSpec,
+    /// Numbers that trade accuracy for speed.
+    #[serde(default, skip_serializing_if = "AccuracySpec::is_default")]
+    pub accuracy: AccuracySpec,
     /// The pictures to be made of it; one when absent.
     #[serde(default)]
     pub frames: Option<FramesSpec>,

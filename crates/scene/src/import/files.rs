@@ -7,9 +7,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use etendue_files::MappedFile;
+use etendue_report::Size;
 
 use super::{ImportError, Options};
-use crate::memory::{Budget, Size};
+use crate::memory::Budget;
 
 /// Bytes that a model may make appear, however small its files are.
 const MADE_OF_NOTHING: u64 = 512 << 20;

@@ -39,7 +39,7 @@ fn counts_are_of_what_is_placed() {
     assert_eq!(json["triangles"], 24);
     assert_eq!(json["bounds"]["min"][0], -1.0);
     assert_eq!(json["camera"]["resolution"], serde_json::json!([64, 48]));
-    let table = found.to_string();
+    let table = found.table().text();
     for part in
         ["24 in 2 placements; 12 unique", "[-1, -1, -1.41421] to [11.4142, 1, 1.41421]", "64 × 48"]
     {
@@ -54,7 +54,7 @@ fn an_empty_scene_is_well() {
     fs::write(&path, r#"{"etendue": 1}"#).unwrap();
     let found = check(&path);
     assert_eq!((found.triangles, found.bounds, found.precision), (0, None, None));
-    assert!(found.to_string().contains("nothing to draw"));
+    assert!(found.table().text().contains("nothing to draw"));
 }
 
 #[test]
@@ -83,8 +83,8 @@ fn what_lies_in_one_plane_is_named() {
         {"shape": "sphere", "name": "twin 2", "radius": 0.1, "triangles": 80, "transform": {"translate": [0, 1, 0]}}]}"#;
     fs::write(&path, text).unwrap();
     let found = check(&path);
-    assert_eq!(found.defects.coplanar, 2, "{found}");
-    let table = found.to_string();
+    assert_eq!(found.defects.coplanar, 2, "{found:?}");
+    let table = found.table().text();
     for part in [
         "2 pairs of things in one plane",
         "object 1 \"floor\" and object 2 \"lamp\": lie over one another in one plane; the later one is seen",

@@ -1,5 +1,6 @@
 //! Scenes and models from files: what is read, what is mended, what is refused.
 
+mod accuracy;
 mod assets;
 mod bad_input;
 mod camera_files;

@@ -6,7 +6,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use super::{BandTable, TOLERANCE};
+use super::BandTable;
 use etendue_spectrum::Curve;
 
 /// Bands beyond which nobody divides.
@@ -49,9 +49,9 @@ impl<'a> Division<'a> {
     }
 
     /// Bands divided until they are good, and joined where they stay so; `fixed` edges stay.
-    pub(super) fn divided(&self, fixed: &[usize]) -> Vec<usize> {
+    pub(super) fn divided(&self, fixed: &[usize], tolerance: f64) -> Vec<usize> {
         let mut cells = fixed.to_vec();
-        while cells.len() <= MOST_BANDS && self.worst(&cells) > TOLERANCE {
+        while cells.len() <= MOST_BANDS && self.worst(&cells) > tolerance {
             let pairs = cells.windows(2).filter(|ends| ends[1] - ends[0] > 1);
             let bands = pairs.map(|ends| [ends[0], ends[1]]);
             let lossy = bands.map(|band| (most(self.losses(band).iter().copied()), band));
@@ -59,7 +59,7 @@ impl<'a> Division<'a> {
             let cut = self.best_cut(band);
             cells.insert(cells.partition_point(|cell| *cell < cut), cut);
         }
-        let limit = self.worst(&cells).max(TOLERANCE);
+        let limit = self.worst(&cells).max(tolerance);
         self.joined(cells, fixed, limit)
     }
 

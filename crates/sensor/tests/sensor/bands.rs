@@ -150,7 +150,7 @@ fn check((keys, lights, filter, colored, channels, range): Trial<'_>) {
         colored,
         ..Illumination::default()
     };
-    let chosen = own.bands_under(&illumination).unwrap();
+    let chosen = own.bands_under(&illumination, TOLERANCE).unwrap();
     let error = chosen.error.unwrap();
     println!(
         "{keys} {} lights, {colored} colours: {} bands, {error:.1e}",
@@ -182,13 +182,30 @@ fn one_light_on_grey_takes_one_band_whatever_the_sensor() {
     let silicon = json!([[350, 0.1], [530, 0.8], [1000, 0.05]]);
     let own = sensor(&json!({ "quantum_efficiency": silicon }));
     let lit = |spectra: Vec<Curve>| Illumination { spectra, ..Illumination::default() };
-    let chosen = own.bands_under(&lit(vec![curve(Illuminant::BlackBody(3200.0))])).unwrap();
+    let chosen =
+        own.bands_under(&lit(vec![curve(Illuminant::BlackBody(3200.0))]), TOLERANCE).unwrap();
     assert_eq!(chosen.bands.count(), 1);
     assert!(chosen.error.unwrap() < 1e-12);
     assert_eq!(chosen.bands.range(), [350.0, 1000.0]);
     // Daylight is known up to 830 nm.
-    let chosen = own.bands_under(&lit(vec![curve(Illuminant::D65)])).unwrap();
+    let chosen = own.bands_under(&lit(vec![curve(Illuminant::D65)]), TOLERANCE).unwrap();
     assert_eq!(chosen.bands.range(), [350.0, 830.0]);
+}
+
+#[test]
+fn a_greater_tolerance_takes_fewer_bands_and_keeps_to_it() {
+    let light = Illumination {
+        spectra: vec![curve(Illuminant::D65)],
+        colored: 1,
+        ..Illumination::default()
+    };
+    let own = sensor(&json!({ "quantum_efficiency": [[400, 0.3], [550, 0.8], [700, 0.2]] }));
+    let counts = [1e-4, TOLERANCE, 1e-2].map(|tolerance| {
+        let chosen = own.bands_under(&light, tolerance).unwrap();
+        assert!(chosen.error.unwrap() <= tolerance, "{chosen:?}");
+        chosen.bands.count()
+    });
+    assert!(counts[0] > counts[1] && counts[1] > counts[2], "{counts:?}");
 }
 
 #[test]
@@ -196,12 +213,12 @@ fn bands_that_somebody_asked_for_stay_and_their_error_is_told() {
     let bands = json!({ "from": 400, "to": 700, "count": 6 });
     let spectra = vec![curve(Illuminant::A)];
     let light = Illumination { spectra, colored: 2, ..Illumination::default() };
-    let coarse = sensor(&json!({ "bands": bands })).bands_under(&light).unwrap();
+    let coarse = sensor(&json!({ "bands": bands })).bands_under(&light, TOLERANCE).unwrap();
     assert_eq!(coarse.bands.count(), 6);
     assert!(coarse.error.unwrap() > TOLERANCE, "{coarse:?}");
     // The channels of a multispectral sensor are divided, and end where they are to end.
     let own = sensor(&json!({ "type": "multispectral", "bands": bands }));
-    let chosen = own.bands_under(&light).unwrap();
+    let chosen = own.bands_under(&light, TOLERANCE).unwrap();
     let edges = chosen.bands.grid().unwrap().edges().to_vec();
     assert!(edges.len() > 7 && (0..=6).all(|i| edges.contains(&(400.0 + 50.0 * f64::from(i)))));
     let error = chosen.error.unwrap();
@@ -225,8 +242,11 @@ fn infrared_alone_is_seen_and_where_it_cannot_be_the_remedy_is_named() {
     let own = sensor(&json!({ "quantum_efficiency": [[900, 0.5], [1000, 0.5]] }));
     let lit =
         |illuminant| Illumination { spectra: vec![curve(illuminant)], ..Illumination::default() };
-    assert_eq!(own.bands_under(&lit(Illuminant::A)).unwrap().bands.range(), [900.0, 1000.0]);
-    let error = own.bands_under(&lit(Illuminant::D65)).unwrap_err().to_string();
+    assert_eq!(
+        own.bands_under(&lit(Illuminant::A), TOLERANCE).unwrap().bands.range(),
+        [900.0, 1000.0]
+    );
+    let error = own.bands_under(&lit(Illuminant::D65), TOLERANCE).unwrap_err().to_string();
     for word in ["900..=1000 nm", "300..=830 nm", "black_body"] {
         assert!(error.contains(word), "{error}");
     }
@@ -270,7 +290,7 @@ fn bodies_of_any_length_take_what_an_integration_says() {
                 factors: vec![factor],
                 ..Illumination::default()
             };
-            let chosen = own.bands_under(&illumination).unwrap();
+            let chosen = own.bands_under(&illumination, TOLERANCE).unwrap();
             let count = chosen.bands.count();
             let lit = own.clone().in_bands(chosen.bands).unwrap();
             let passed: Vec<f64> = nodes.iter().map(|&nm| body.held(nm)).collect();

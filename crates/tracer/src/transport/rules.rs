@@ -2,9 +2,6 @@
 
 use super::{LightingContext, RaySamples, RayStats, Scratch, trace};
 
-/// Surfaces after which dim paths of [`Rules::path`] end by chance.
-const ROULETTE_AFTER: u32 = 5;
-
 /// A tracer of light: where its paths end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rules {
@@ -26,6 +23,9 @@ pub enum Follow {
 }
 
 impl Rules {
+    /// Surfaces after which dim paths of [`Rules::path`] end by chance.
+    pub const ROULETTE_AFTER: u32 = 5;
+
     /// Direct light: what lights send to the first surface, with shadows, and what it shows of them
     /// as a mirror.
     #[must_use]
@@ -46,7 +46,7 @@ impl Rules {
     /// directions that meet them by themselves.
     #[must_use]
     pub fn path(bounces: u32) -> Self {
-        Self { bounces, follow: Follow::All, roulette: Some(ROULETTE_AFTER) }
+        Self { bounces, follow: Follow::All, roulette: Some(Self::ROULETTE_AFTER) }
     }
 
     /// The radiance that arrives along each ray against its direction, in `beam.bands`: `out` is

@@ -5,6 +5,8 @@
 use eframe::egui::{self, Color32, Context, Pos2, Rect, Sense, Ui, Vec2};
 use serde_json::{Value, json};
 
+use etendue::Inspector;
+
 use crate::app::App;
 use crate::canvas::short;
 use crate::document::Edit;
@@ -22,6 +24,7 @@ pub(crate) fn show_inspect(app: &mut App, ctx: &Context) {
             }
             section(ui, "Histogram", |ui| histogram(app, ui));
             section(ui, "Notes", |ui| notes(app, ui));
+            egui::CollapsingHeader::new("Decisions").show(ui, |ui| decisions(app, ui));
         });
     });
 }
@@ -111,6 +114,20 @@ fn histogram(app: &App, ui: &mut Ui) {
     response.on_hover_text("Pixels by their value from black to white (root of the counts)");
 }
 
+/// The plan's decisions; the reason and the key of each beside the mouse.
+fn decisions(app: &App, ui: &mut Ui) {
+    let decisions = app.inspector.as_ref().map_or(&[][..], Inspector::decisions);
+    egui::Grid::new("decisions").num_columns(2).striped(true).show(ui, |ui| {
+        for decision in decisions {
+            let key = decision.key.map_or_else(String::new, |key| format!(" [{key}]"));
+            let why = format!("{}{key}", decision.reason);
+            ui.weak(decision.kind.name()).on_hover_text(&why);
+            ui.label(decision.value.to_string()).on_hover_text(&why);
+            ui.end_row();
+        }
+    });
+}
+
 fn notes(app: &App, ui: &mut Ui) {
     if let Some(picture) = &app.picture {
         ui.weak(&picture.screen.note);
@@ -123,7 +140,7 @@ fn notes(app: &App, ui: &mut Ui) {
 }
 
 /// The parts of a scene with what they are called, and whether they are open at first.
-const PARTS: [(&str, &str, bool); 8] = [
+const PARTS: [(&str, &str, bool); 9] = [
     ("camera", "Camera", true),
     ("tracer", "Tracer", true),
     ("render", "Render", false),
@@ -132,6 +149,7 @@ const PARTS: [(&str, &str, bool); 8] = [
     ("materials", "Materials", false),
     ("layers", "Layers to write", false),
     ("plan", "Plan", false),
+    ("accuracy", "Accuracy", false),
 ];
 
 pub(crate) fn show_scene(app: &mut App, ctx: &Context) {

@@ -3,6 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 
 use etendue_chart::significant;
+use etendue_report::{Cell, Table};
 
 use super::{LensReport, Paraxial};
 
@@ -31,10 +32,18 @@ impl Display for LensReport {
 
 impl LensReport {
     fn write_elements(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let mut table = TextTable::new(
-            &["#", "element", "radius", "thickness", "semi-diameter", "behind it", "index", ""],
-            &["", "", "mm", "mm", "mm", "", "", ""],
-        );
+        let mut table = Table::new(&[
+            "#",
+            "element",
+            "radius",
+            "thickness",
+            "semi-diameter",
+            "behind it",
+            "index",
+            "",
+        ])
+        .with_units(&["", "", "mm", "mm", "mm", "", "", ""])
+        .indented(2);
         for (i, row) in self.elements.iter().enumerate() {
             let mut remarks = Vec::new();
             if i == self.stop {
@@ -45,14 +54,14 @@ impl LensReport {
             }
             let flat = if row.kind == "surface" { "flat" } else { NONE };
             table.push([
-                i.to_string(),
-                row.kind.replace('_', " "),
-                row.radius.map_or(flat.to_owned(), significant),
-                or_none(row.thickness, significant),
-                or_none(row.semi_diameter, significant),
-                row.medium.clone(),
-                format!("{:.6}", row.index),
-                remarks.join(", "),
+                Cell::count(i as u64),
+                Cell::word(row.kind.replace('_', " ")),
+                row.radius.map_or(Cell::number(flat, flat), digits),
+                number(row.thickness, significant),
+                number(row.semi_diameter, significant),
+                Cell::word(row.medium.clone()),
+                Cell::number(row.index, format!("{:.6}", row.index)),
+                Cell::word(remarks.join(", ")),
             ]);
         }
         write!(f, "{table}")
@@ -86,45 +95,44 @@ impl LensReport {
             ("image circle, diameter", mm(self.image_circle)),
             ("field of view, full angle", degrees(self.field_of_view)),
         ];
-        lines.iter().try_for_each(|(what, value)| writeln!(f, "  {what:<30} {value}"))
+        let mut list = Table::list(31).indented(2);
+        lines.into_iter().for_each(|(what, value)| list.put(what, value));
+        write!(f, "{list}")
     }
 
     fn write_fields(&self, f: &mut Formatter<'_>) -> fmt::Result {
         if self.sensor_z.is_none() {
             return Ok(());
         }
-        let mut table = TextTable::new(
-            &[
-                "field",
-                "height",
-                "distortion",
-                "RMS spot",
-                "largest",
-                "best RMS",
-                "best focus",
-                "rays passed",
-                "illumination",
-            ],
-            &["deg", "mm", "%", "um", "um", "um", "mm", "%", "%"],
-        );
+        let mut table = Table::new(&[
+            "field",
+            "height",
+            "distortion",
+            "RMS spot",
+            "largest",
+            "best RMS",
+            "best focus",
+            "rays passed",
+            "illumination",
+        ])
+        .with_units(&["deg", "mm", "%", "um", "um", "um", "mm", "%", "%"])
+        .indented(2);
         // A row for each field, with a dash for what there is none of.
         for &field in &self.fields {
             let spot = self.spots.iter().find(|s| s.field == field);
             let distortion = self.distortion.iter().find(|d| d.field == field);
             let light = self.relative_illumination.iter().find(|l| l.field == field);
-            let of_spot = |value: fn(&super::Spot) -> f64| {
-                spot.map_or(NONE.to_owned(), |s| significant(value(s)))
-            };
+            let of_spot = |value: fn(&super::Spot) -> f64| number(spot.map(value), significant);
             table.push([
-                significant(field),
-                or_none(light.map(|l| l.image_y), significant),
-                or_none(distortion.map(|d| d.percent), |v| format!("{v:.4}")),
+                digits(field),
+                number(light.map(|l| l.image_y), significant),
+                number(distortion.map(|d| d.percent), |v| format!("{v:.4}")),
                 of_spot(|s| 1e3 * s.rms),
                 of_spot(|s| 1e3 * s.geometric),
                 of_spot(|s| 1e3 * s.best_rms),
                 of_spot(|s| s.best_focus),
                 of_spot(|s| 100.0 * share(s.rays_passed, s.rays_launched)),
-                or_none(light.map(|l| 100.0 * l.relative), |v| format!("{v:.2}")),
+                number(light.map(|l| 100.0 * l.relative), |v| format!("{v:.2}")),
             ]);
         }
         writeln!(f, "\nOn the sensor, for points at infinity")?;
@@ -145,20 +153,29 @@ impl LensReport {
         head.extend(shown.iter().map(String::as_str));
         let mut units = vec!["nm", "mm", "mm", "mm"];
         units.resize(head.len(), "um");
-        let mut table = TextTable::new(&head, &units);
+        let mut table = Table::new(&head).with_units(&units).indented(2);
         for row in &self.colour {
             let mut cells = vec![
-                row.wavelength.to_string(),
-                or_none(row.paraxial.efl, significant),
-                or_none(row.paraxial.bfl, significant),
-                or_none(row.longitudinal, significant),
+                Cell::number(row.wavelength, row.wavelength.to_string()),
+                number(row.paraxial.efl, significant),
+                number(row.paraxial.bfl, significant),
+                number(row.longitudinal, significant),
             ];
-            cells.extend(row.lateral.iter().map(|shift| or_none(*shift, |v| significant(1e3 * v))));
+            cells.extend(row.lateral.iter().map(|shift| number(*shift, |v| significant(1e3 * v))));
             table.push(cells);
         }
         writeln!(f, "\nColour against {} nm: longitudinal, and lateral by field", self.wavelength)?;
         write!(f, "{table}")
     }
+}
+
+/// A number as `show` rounds it, or a dash.
+fn number(value: Option<f64>, show: impl Fn(f64) -> String) -> Cell {
+    value.map_or_else(Cell::none, |value| Cell::number(value, show(value)))
+}
+
+fn digits(value: f64) -> Cell {
+    Cell::number(value, significant(value))
 }
 
 fn or_none(value: Option<f64>, show: impl Fn(f64) -> String) -> String {
@@ -168,50 +185,6 @@ fn or_none(value: Option<f64>, show: impl Fn(f64) -> String) -> String {
 #[expect(clippy::cast_precision_loss, reason = "counts of some hundred rays")]
 fn share(part: usize, whole: usize) -> f64 {
     part as f64 / whole.max(1) as f64
-}
-
-/// Cells in columns: numbers to the right, words to the left.
-struct TextTable {
-    rows: Vec<Vec<String>>,
-}
-
-impl TextTable {
-    fn new(head: &[&str], units: &[&str]) -> Self {
-        let row = |cells: &[&str]| cells.iter().map(|&cell| cell.to_owned()).collect();
-        Self { rows: vec![row(head), row(units)] }
-    }
-
-    fn push(&mut self, cells: impl IntoIterator<Item = String>) {
-        self.rows.push(cells.into_iter().collect());
-    }
-}
-
-impl Display for TextTable {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let cells = |column: usize| self.rows.iter().filter_map(move |row| row.get(column));
-        let is_number =
-            |cell: &String| cell.parse::<f64>().is_ok() || cell == NONE || cell == "flat";
-        let shape: Vec<(usize, bool)> = (0..columns)
-            .map(|column| {
-                let width = cells(column).map(|cell| cell.chars().count()).max().unwrap_or(0);
-                (width, cells(column).skip(2).all(is_number))
-            })
-            .collect();
-        for row in &self.rows {
-            let mut line = String::new();
-            for (cell, &(width, number)) in row.iter().zip(&shape) {
-                line.push_str("  ");
-                let padding = " ".repeat(width - cell.chars().count());
-                match number {
-                    true => line.extend([padding.as_str(), cell]),
-                    false => line.extend([cell, padding.as_str()]),
-                }
-            }
-            writeln!(f, "{}", line.trim_end())?;
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use draco_core::{
     DataType, DecodeLimits, DecoderBuffer, ErrorKind, Mesh, MeshDecoder, PointAttribute, PointIndex,
 };
+use etendue_report::Size;
 use gltf::json;
 use json::accessor::ComponentType;
 use json::mesh::Primitive;
@@ -18,7 +19,6 @@ use super::Reader;
 use super::accessor::Accessor;
 use super::buffers::{Bytes, View};
 use crate::import::ImportError;
-use crate::memory::Size;
 use crate::words::plain;
 
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";
