@@ -15,8 +15,10 @@
 //! | `paths` | rays of a pixel on their way through the lens |
 //! | `alone` | a lens by itself as a camera |
 //! | `rays` | weighted rays of the pupil for pictures |
+//! | `band_paths` | one ray of the scene for all bands, and where each band's light of it lands |
 
 mod alone;
+mod band_paths;
 pub mod chief;
 pub mod focus_distance;
 pub mod focused;
@@ -29,6 +31,7 @@ pub mod source;
 pub mod spec;
 
 pub(crate) use alone::alone;
+pub use band_paths::{BandLandings, SharedPaths};
 pub use focused::Focused;
 pub use lens_camera::{BandGroup, LensCamera};
 pub use lenslets::LensletChiefs;

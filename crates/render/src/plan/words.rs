@@ -105,9 +105,8 @@ impl Plan {
         if let Some((choice, because)) = expose::explain_sensor(scene) {
             decide("sensor", &choice, because);
         }
-        for (what, choice, because) in
-            self.explain_denoising().into_iter().chain(self.explain_lens(scene))
-        {
+        let lens = self.explain_lens(scene).into_iter().chain(self.band_paths.words());
+        for (what, choice, because) in self.explain_denoising().into_iter().chain(lens) {
             decide(what, choice, because);
         }
         // What is asked of surfaces and lights.
@@ -182,6 +181,7 @@ impl Plan {
                 by("plan.textures", spec.textures.is_some(), saved)
             }
             "rays of a wavelength" => by("plan.dispersion", spec.dispersion.is_some(), None),
+            "paths of a band" => by("plan.shared_paths", spec.shared_paths.is_some(), None),
             "texture filter" => by("plan.texture_filter", spec.texture_filter.is_some(), None),
             "build quality" => by("plan.build_quality", spec.build_quality.is_some(), None),
             "refinement" => by("plan.refine", spec.refine.is_some(), None),
