@@ -6,7 +6,7 @@ ifneq ($(ASSETS),)
 export ETENDUE_ASSETS ?= $(ASSETS)
 endif
 
-.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-aspheres bench-gaps bench-decisions bench-window docs-figures docs-charts \
+.PHONY: help setup render install view dist test test-embree4 test-window test-slurm test-denoise python bench bench-peers bench-python bench-light bench-cycles bench-lens bench-sensor bench-limits bench-sampling bench-forecast bench-memory bench-masks bench-aspheres bench-bands bench-gaps bench-decisions bench-window docs-figures docs-charts \
 	docs-stability generated gallery light-fields fingerprints fuzz fuzz-smoke fuzz-seeds sanitize clean
 
 help:
@@ -33,6 +33,7 @@ help:
 	@echo "make bench-memory   the same for the forecast of memory, and for copies, large shapes and frames"
 	@echo "make bench-masks   what a ray through a mask of small openings costs; writes a part of docs/cameras.md"
 	@echo "make bench-aspheres  what setting a camera up behind steep aspheres takes; writes a part of docs/limits.md"
+	@echo "make bench-bands   how long a lens that disperses takes beside a pinhole; writes a part of docs/cameras.md"
 	@echo "make bench-gaps    what finding the thinnest gap of a million triangles takes; writes a part of docs/light.md"
 	@echo "make bench-window  how soon and how often the window shows pictures; writes a part of docs/window.md"
 	@echo "make bench-decisions  what decisions of the plan save, each against the fuller model"
@@ -148,6 +149,10 @@ bench-masks: setup
 bench-aspheres: setup
 	cargo build --release -p etendue-cli
 	python3 benches/aspheres.py $(ARGS)
+
+bench-bands: setup
+	cargo build --release -p etendue-cli
+	python3 benches/bands.py $(ARGS)
 
 bench-gaps: setup
 	cargo build --release -p etendue-cli -p etendue-benches

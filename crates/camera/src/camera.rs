@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 use crate::framing::Subject;
 use crate::lens::{self, focused::View};
 use crate::{
-    BandGroup, CameraError, CameraRays, ChromaticRealLensCameraSpec, Distortion, DistortionSpec,
-    FilmSamples, Intrinsics, LensCamera, LensCameraSpec, LightField, LightFieldSpec, Orthographic,
-    OrthographicSpec, Pinhole, PinholeSpec, PixelBlock, Pose, PoseSpec, RealLensCameraSpec,
-    SensorSpec, ThinLensCameraSpec, ViewGrid,
+    BandGroup, BandLandings, CameraError, CameraRays, ChromaticRealLensCameraSpec, Distortion,
+    DistortionSpec, FilmSamples, Intrinsics, LensCamera, LensCameraSpec, LightField,
+    LightFieldSpec, Orthographic, OrthographicSpec, Pinhole, PinholeSpec, PixelBlock, Pose,
+    PoseSpec, RealLensCameraSpec, SensorSpec, ThinLensCameraSpec, ViewGrid,
 };
 use etendue_geometry::units::{Degrees, Metres, Micrometres};
 use etendue_optics::element::Resolve;
@@ -483,6 +483,23 @@ impl Camera {
         out.drop_unseen();
         out.weight.clear();
         out.weight.resize(out.rays.len(), 1.0);
+    }
+
+    /// The rays of `samples` that all bands share behind a lens that tells wavelengths apart, and where the
+    /// light of each band lands: both are refilled.
+    ///
+    /// # Panics
+    ///
+    /// When the camera has no lens, or one whose bands do not share rays as it was
+    /// [opened](LensCamera::opened_paths).
+    pub fn sample_band_rays(
+        &self,
+        samples: &FilmSamples,
+        out: &mut CameraRays,
+        landings: &mut BandLandings,
+    ) {
+        let lens = self.lens().expect("bands share rays behind lenses");
+        lens.sample_band_rays((&self.pose, self.resolution()), samples, out, landings);
     }
 
     fn aim(&self, rays: &mut RayBatch) {

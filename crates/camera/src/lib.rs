@@ -32,8 +32,8 @@ pub use distortion::{Distortion, DistortionSpec};
 pub use framing::{Subject, SupportFunction, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin, SensorSpec};
 pub use lens::{
-    BandGroup, ChromaticRealLensCameraSpec, LensCamera, LensCameraSpec, RealLensCameraSpec,
-    ThinLensCameraSpec,
+    BandGroup, BandLandings, ChromaticRealLensCameraSpec, LensCamera, LensCameraSpec,
+    RealLensCameraSpec, SharedPaths, ThinLensCameraSpec,
 };
 pub use light_field::{LightField, LightFieldSpec, ViewGrid};
 pub use opencv_fit::OpencvFit;

@@ -17,6 +17,9 @@ pub struct FilmSamples {
     /// Places in 0..1 of the light that the rays stand for, from its shortest wavelength to its
     /// longest; cameras whose lenses do not disperse do not look.
     pub spectrum: Vec<f64>,
+    /// Places in 0..1 by which the wavelength is chosen at which a ray that all bands share is traced into
+    /// the scene; rays of single bands do not look.
+    pub leading: Vec<f64>,
     /// Which of the camera's [`band_groups`](crate::Camera::band_groups), for the bands that it was
     /// opened for, the rays are for.
     pub group: usize,
@@ -63,14 +66,16 @@ impl FilmSamples {
         self.rows.clear();
         self.pupil.clear();
         self.spectrum.clear();
+        self.leading.clear();
     }
 
-    /// Appends a sample: column and row, place in the pupil, place in the spectrum.
+    /// Appends a sample of single bands: column and row, place in the pupil, place in the spectrum.
     pub fn push(&mut self, [column, row]: [f64; 2], pupil: [f64; 2], spectrum: f64) {
         self.columns.push(column);
         self.rows.push(row);
         self.pupil.push(pupil);
         self.spectrum.push(spectrum);
+        self.leading.push(0.5);
     }
 }
 

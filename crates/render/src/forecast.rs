@@ -77,6 +77,10 @@ fn bytes_of_sums(plan: &Plan) -> u64 {
         true => u64::from(SETS),
         false => u64::from(plan.passes.len() > 1),
     };
+    if sets == 0 && plan.band_paths.are_shared() {
+        let lit = plan.layers.iter().filter(|layer| layer.is_light()).count();
+        return BYTES_OF_SUM * (lit * plan.bands.count()) as u64;
+    }
     BYTES_OF_SUM * sets * averaged(plan)
 }
 

@@ -15,6 +15,7 @@
 //! | [`Watch`] | who is told how far a render is, and may stop it |
 
 mod adaptive;
+mod band_paths;
 mod checkpoint;
 pub mod denoise;
 mod error;
@@ -44,6 +45,7 @@ mod tiles;
 mod watch;
 
 pub use adaptive::SampleCounts;
+pub use band_paths::BandPaths;
 pub use checkpoint::Checkpoint;
 pub use error::RenderError;
 pub use film::{NoMemory, Precision};

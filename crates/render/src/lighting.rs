@@ -148,6 +148,7 @@ fn dark_share(
             tracer,
             camera: &camera,
             groups,
+            rows: None,
             layers: vec![LayerSpec::Radiance],
         }),
         passes: &pass,

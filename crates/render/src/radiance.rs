@@ -21,6 +21,8 @@ pub(crate) struct LightPass<'a> {
     pub(crate) camera: &'a Camera,
     /// The bands that the camera sends separate ways.
     pub(crate) groups: Vec<BandGroup>,
+    /// Where the bands share rays all the same: how many rows from its own each lands, at most.
+    pub(crate) rows: Option<u32>,
     /// The picture, and the parts of its light that have layers of their own.
     pub(crate) layers: Vec<LayerSpec>,
 }
@@ -120,6 +122,10 @@ impl Averaged for LightPass<'_> {
 
     fn groups(&self) -> &[BandGroup] {
         &self.groups
+    }
+
+    fn shared_rows(&self) -> Option<u32> {
+        self.rows
     }
 
     fn shape(&self) -> [usize; 2] {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use etendue_accel::{Accel, BuildOptions};
-use etendue_camera::{Camera, PixelExtent};
+use etendue_camera::{Camera, LensCamera, PixelExtent};
 use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
 use etendue_scene::file::{AccelName, LightRow, SETS};
@@ -225,6 +225,8 @@ pub fn trace(
     };
     let camera = open(&Bands::Rgb)?;
     let light_camera = if plan.bands == Bands::Rgb { camera.clone() } else { open(&plan.bands)? };
+    let shared = light_camera.lens().filter(|_| plan.band_paths.are_shared());
+    let shared = shared.and_then(LensCamera::opened_paths);
     // Lights, the studio among them where all else leaves the scene dark.
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
     let spectral = Spectral::new(&plan.bands);
@@ -259,6 +261,7 @@ pub fn trace(
         tracer: *rules,
         camera: &light_camera,
         groups: light_camera.band_groups(&plan.bands),
+        rows: shared.map(|shared| shared.rows),
         layers: plan.layers.iter().copied().filter(|layer| layer.is_light()).collect(),
     });
     // The passes, kept shorter where a checkpoint is written after each.

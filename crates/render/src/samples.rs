@@ -11,7 +11,8 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use etendue_camera::{
-    BandGroup, Camera, CameraRays, FilmSamples, LensCamera, PixelSamples, Sampler, squares_of_pair,
+    BandGroup, BandLandings, Camera, CameraRays, FilmSamples, LensCamera, PixelSamples, Sampler,
+    squares_of_pair,
 };
 use etendue_geometry::HitBatch;
 use etendue_tracer::Scratch;
@@ -102,6 +103,11 @@ pub(crate) trait Averaged: Sync {
     fn camera(&self) -> &Camera;
     /// The bands that the camera sends separate ways.
     fn groups(&self) -> &[BandGroup];
+    /// Where the groups share rays, whose light lands beside the pixel that it starts from: how many rows from
+    /// it, at most.
+    fn shared_rows(&self) -> Option<u32> {
+        None
+    }
     /// Layers, and the bands of each.
     fn shape(&self) -> [usize; 2];
     /// Samples that are traced together.
@@ -123,6 +129,7 @@ pub(crate) struct Memory {
     pub(crate) columns: Columns,
     pub(crate) scratch: Scratch,
     pub(crate) traffic: RayCounts,
+    landings: BandLandings,
     film: FilmSamples,
     /// `[pixel of the tile][set][layer][band]`.
     sums: Vec<Sum>,
@@ -202,6 +209,9 @@ impl<'a> Averaging<'a> {
         watcher: &Watcher<'_>,
         traffic: &Mutex<RayCounts>,
     ) -> Result<(), Stopped> {
+        if let Some(rows) = self.what.shared_rows() {
+            return self.add_shared(rows, pass, watcher, traffic);
+        }
         let sets = self.sampling.sets as usize;
         let Self { what, sampling, layers, sums, spare } = self;
         let spare = &*spare;
@@ -221,6 +231,52 @@ impl<'a> Averaging<'a> {
             spare().push(memory);
             done
         })
+    }
+
+    /// As [`Self::add`], of rays whose light lands up to `rows` rows from where they start.
+    ///
+    /// Strips so far apart that they land on no common pixel are traced side by side, and each other set of
+    /// them after that: every pixel gets its light in the same order, whatever the number of threads. A share
+    /// of the rows takes the samples of those beside it, too, from which light lands on its own.
+    fn add_shared(
+        &mut self,
+        rows: u32,
+        pass: &Range<u32>,
+        watcher: &Watcher<'_>,
+        traffic: &Mutex<RayCounts>,
+    ) -> Result<(), Stopped> {
+        let Self { what, sampling, sums, spare, .. } = self;
+        let (spare, sampling) = (&*spare, *sampling);
+        let [width, height] = what.camera().resolution();
+        let [count, bands] = what.shape();
+        let a_row = width as usize * count * bands;
+        let adding = Adding { what: *what, sampling, pass, blocks: None, watcher };
+        let sets = 1 + (2 * rows).div_ceil(TILE);
+        for set in 0..sets {
+            // The rows on which each strip of the set lands.
+            let (mut left, mut top_left) = (&mut sums[..], 0);
+            let mut strips = Vec::new();
+            for top in (set * TILE..height).step_by((sets * TILE) as usize) {
+                let strip = [top, TILE.min(height - top)];
+                let first = top.saturating_sub(rows);
+                let end = height.min(top + TILE + rows);
+                let (_, after) = left.split_at_mut((first - top_left) as usize * a_row);
+                let (window, after) = after.split_at_mut((end - first) as usize * a_row);
+                (left, top_left) = (after, end);
+                strips.push(Mutex::new(Some((strip, Window { first, rows, sums: window }))));
+            }
+            strips.par_iter().try_for_each(|strip| {
+                let Some((strip, mut window)) = take(strip) else { return Ok(()) };
+                let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut memory = spare().pop().unwrap_or_default();
+                let done = adding.fill_window(strip, &mut window, &mut memory);
+                let statuses = std::mem::take(&mut memory.rays.statuses);
+                RayCounts::add(traffic, std::mem::take(&mut memory.traffic), &statuses);
+                spare().push(memory);
+                done
+            })?;
+        }
+        Ok(())
     }
 
     /// The sums between passes; none when there is one pass alone.
@@ -248,8 +304,14 @@ impl<'a> Averaging<'a> {
         let resolution = what.camera().resolution();
         let [count, bands] = what.shape();
         let kept = split(sums, *what, 1, resolution);
-        strips(layers, resolution, TILE).par_iter().zip(&kept).for_each(|(strip, kept)| {
+        let shard = sampling.shard;
+        let strips = strips(layers, resolution, TILE);
+        strips.par_iter().zip(&kept).enumerate().for_each(|(k, (strip, kept))| {
             let (Some(mut strip), Some(sums)) = (take(strip), take(kept)) else { return };
+            // Of rows beside a share's there is only the light that landed from its own.
+            if !shard.owns(k) {
+                return;
+            }
             for (index, sums) in sums.chunks(count * bands).enumerate() {
                 put(&mut strip, index, sums, bands, samples);
             }
@@ -303,6 +365,15 @@ pub(crate) fn put(strip: &mut Strip<'_>, index: usize, sums: &[Sum], bands: usiz
     }
 }
 
+/// Sums of the pixels of some rows, on which light of a strip lands.
+struct Window<'a> {
+    /// The topmost row.
+    first: u32,
+    /// How many rows from where it starts light lands, at most.
+    rows: u32,
+    sums: &'a mut [Sum],
+}
+
 /// One pass of a strip.
 struct Adding<'a> {
     what: &'a dyn Averaged,
@@ -325,7 +396,7 @@ impl Adding<'_> {
         let count = layers * bands * self.sampling.sets as usize;
         let Range { start, end } = *self.pass;
         let starts_set = self.sampling.sets > 1 && start > 0 && of_first_set(end) == start;
-        for tile in Tile::across(width, strip) {
+        for tile in Tile::across(width, [strip.top, strip.height]) {
             let wants = |&(x, y): &(u32, u32)| {
                 self.blocks.is_none_or(|blocks| blocks.wants([tile.left + x, tile.top + y], start))
             };
@@ -385,6 +456,44 @@ impl Adding<'_> {
         Ok(())
     }
 
+    /// Adds the light of a strip's samples where it lands.
+    fn fill_window(
+        &self,
+        strip: [u32; 2],
+        window: &mut Window<'_>,
+        memory: &mut Memory,
+    ) -> Result<(), Stopped> {
+        let [width, height] = self.what.camera().resolution();
+        let [_, bands] = self.what.shape();
+        let shard = self.sampling.shard;
+        let owns = |row: u32| shard.owns((row / TILE) as usize);
+        // Rows from which light lands on rows of the share.
+        let rows = window.rows;
+        let lands = |row: u32| {
+            let last = (row + rows).min(height - 1);
+            (row.saturating_sub(rows) / TILE..=last / TILE).any(|strip| owns(strip * TILE))
+        };
+        for tile in Tile::across(width, strip) {
+            let pixels: Vec<(u32, u32)> =
+                tile.pixels().filter(|&(_, y)| lands(tile.top + y)).collect();
+            let at_once = (self.pass.end - self.pass.start).clamp(1, self.what.batch());
+            for pixels in pixels.chunks((self.what.batch() / at_once) as usize) {
+                for first in self.pass.clone().step_by(at_once as usize) {
+                    let range = first..self.pass.end.min(first + at_once);
+                    let a_pixel = range.end - range.start;
+                    self.place(tile, (pixels, range), memory);
+                    let Memory { film, rays, landings, .. } = memory;
+                    self.what.camera().sample_band_rays(film, rays, landings);
+                    self.what.trace(&(0..bands), memory);
+                    memory.add_where_it_lands(window, self.what.shape(), width as usize);
+                    let own = pixels.iter().filter(|&&(_, y)| owns(tile.top + y)).count();
+                    self.watcher.did(own as u64 * u64::from(a_pixel))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Refills the batch with samples `range` of each of `pixels`, those of one pixel side by side.
     /// A camera without a lens looks at places alone.
     fn place(&self, tile: Tile, (pixels, range): (&[(u32, u32)], Range<u32>), memory: &mut Memory) {
@@ -411,11 +520,14 @@ impl Adding<'_> {
             true => draw(1, &mut film.pupil),
             false => film.pupil.resize(count, [0.5; 2]),
         }
-        if lens.is_some_and(LensCamera::draws_wavelengths) {
+        let is_shared = self.what.shared_rows().is_some();
+        if is_shared || lens.is_some_and(LensCamera::draws_wavelengths) {
             draw(2, &mut places);
             film.spectrum.extend(places.iter().map(|place| place[0]));
+            film.leading.extend(places.iter().map(|place| place[1]));
         } else {
             film.spectrum.resize(count, 0.5);
+            film.leading.resize(count, 0.5);
         }
     }
 }
@@ -440,15 +552,57 @@ impl Memory {
                 sums[group.clone()].iter_mut().zip(values).for_each(|(sum, v)| sum.add(v * weight));
             }
         };
-        if sample.is_sorted() {
-            return (0..sample.len()).for_each(add);
-        }
-        // A lens that disperses sorts its rays by wavelength.
-        order.clear();
-        order.extend(0..u32::try_from(sample.len()).unwrap_or(u32::MAX));
-        order.sort_unstable_by_key(|&ray| sample[ray as usize]);
-        order.iter().for_each(|&ray| add(ray as usize));
+        in_order(sample, order, &mut add);
     }
+
+    /// Adds the values of the batch's rays, sample by sample, to the sums of the pixels on which each band of
+    /// them lands.
+    fn add_where_it_lands(
+        &mut self,
+        window: &mut Window<'_>,
+        [layers, bands]: [usize; 2],
+        width: usize,
+    ) {
+        let Self { rays, values, landings, film, order, .. } = self;
+        let count = layers * bands;
+        let Window { first, rows, sums } = window;
+        let mut add = |ray: usize| {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "a row of a picture"
+            )]
+            let start = film.rows[rays.sample[ray] as usize] as u32;
+            let nearest = start.saturating_sub(*rows) as usize * width;
+            let farthest = (start + *rows + 1) as usize * width;
+            let first = *first as usize * width;
+            for band in 0..bands {
+                let pixel = landings.pixel[ray * bands + band] as usize;
+                // Nowhere is beyond every row.
+                if pixel < nearest || pixel >= farthest {
+                    continue;
+                }
+                let weight = landings.weight[ray * bands + band];
+                for layer in 0..layers {
+                    let value = values[ray * count + layer * bands + band];
+                    sums[(pixel - first) * count + layer * bands + band].add(value * weight);
+                }
+            }
+        };
+        in_order(&rays.sample, order, &mut add);
+    }
+}
+
+/// Adds rays in the order of their samples.
+fn in_order(sample: &[u32], order: &mut Vec<u32>, add: &mut dyn FnMut(usize)) {
+    if sample.is_sorted() {
+        return (0..sample.len()).for_each(add);
+    }
+    // A lens that disperses sorts its rays by wavelength.
+    order.clear();
+    order.extend(0..u32::try_from(sample.len()).unwrap_or(u32::MAX));
+    order.sort_unstable_by_key(|&ray| sample[ray as usize]);
+    order.iter().for_each(|&ray| add(ray as usize));
 }
 
 #[cfg(test)]

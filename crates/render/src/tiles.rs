@@ -128,6 +128,8 @@ impl Job<'_> {
             averaged.push(Averaging::new(&colors, self.sampling, layers, passes)?);
         }
         if let (Some(light), false) = (&self.light, lit.is_empty()) {
+            // Where light lands on pixels beside its own there are sums, too.
+            let passes = if light.rows.is_some() { usize::MAX } else { passes };
             averaged.push(Averaging::new(light, self.sampling, lit, passes)?);
         }
         let shard = self.sampling.shard;
@@ -225,7 +227,7 @@ impl Job<'_> {
         batch: &mut RayBuffers,
         watcher: &Watcher<'_>,
     ) -> Result<(), Stopped> {
-        for tile in Tile::across(width, strip) {
+        for tile in Tile::across(width, [strip.top, strip.height]) {
             batch.aim_at_centres(self.camera, tile);
             self.accel.closest(&batch.rays, &mut batch.hits);
             batch.traced += batch.rays.len() as u64;
@@ -301,9 +303,8 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
-    /// The tiles of a strip, from left to right.
-    pub(crate) fn across(width: u32, strip: &Strip<'_>) -> impl Iterator<Item = Self> + use<> {
-        let (top, height) = (strip.top, strip.height);
+    /// The tiles of a strip of that top and height, from left to right.
+    pub(crate) fn across(width: u32, [top, height]: [u32; 2]) -> impl Iterator<Item = Self> {
         let lefts = (0..width).step_by(TILE as usize);
         lefts.map(move |left| Self { left, top, width: TILE.min(width - left), height })
     }

@@ -25,6 +25,8 @@ pub enum DecisionKind {
     Denoising,
     /// Rays of each band's own.
     RaysOfBands,
+    /// Paths through the scene that bands of a lens share.
+    PathsOfBands,
     /// Rays spread over a pupil.
     Pupil,
     /// The surfaces up to which light is followed.
@@ -70,6 +72,7 @@ impl DecisionKind {
             Self::Sensor => ("sensor", None),
             Self::Denoising => ("denoising", None),
             Self::RaysOfBands => ("rays of a wavelength", Some("plan.dispersion")),
+            Self::PathsOfBands => ("paths of a band", Some("plan.shared_paths")),
             Self::Pupil => ("pupil", None),
             Self::Bounces => ("shadows and bounces", None),
             Self::Surface => ("surface", None),

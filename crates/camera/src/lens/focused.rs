@@ -62,6 +62,21 @@ impl FilmGrid {
         DVec2::new((column - self.centre.x) * scale, -(row - self.centre.y) * scale)
     }
 
+    /// Where a ray from the lens (mm, in lens coordinates) meets the sensor's plane, in the picture (pixels
+    /// from the corner): the inverse of [`Self::place`]. Not finite for a ray along the plane.
+    #[inline]
+    pub(crate) fn pixel(&self, position: DVec3, direction: DVec3) -> [f64; 2] {
+        let Frame { vertex, rotation } = self.frame;
+        let from = position - vertex;
+        let distance = -from.dot(rotation.z_axis) / direction.dot(rotation.z_axis);
+        let at = from + direction * distance;
+        let scale = 1.0 / (self.turn * self.pitch);
+        [
+            self.centre.x + at.dot(rotation.x_axis) * scale,
+            self.centre.y - at.dot(rotation.y_axis) * scale,
+        ]
+    }
+
     /// Where the axis meets the sensor, were it not tilted (pixels from the corner).
     fn principal_point(&self) -> [f64; 2] {
         let scale = self.turn * self.pitch;

@@ -16,6 +16,7 @@ use etendue_geometry::{RayBatch, RaysMut};
 use etendue_spectrum::{Bands, Curve, Outside, Spread};
 use glam::{DVec2, DVec3};
 
+use super::band_paths::BandPaths;
 use super::chief::{ChiefTable, ImageCircle, LensletChiefs};
 use super::focused::{Focused, View};
 
@@ -65,6 +66,8 @@ pub(super) struct Opened {
     /// In the order of [`LensCamera::band_groups`].
     pub(super) groups: Vec<OpenedGroup>,
     pub(super) pupil: ExitPupil,
+    /// How all bands share a ray; `None` where they do not.
+    pub(super) paths: Option<BandPaths>,
 }
 
 /// The lens as it is for a group of bands.
@@ -192,7 +195,7 @@ impl LensCamera {
     }
 
     /// Whether glass, or what it loses, makes another lens of each wavelength.
-    fn runs_apart(&self) -> bool {
+    pub(super) fn runs_apart(&self) -> bool {
         let train = self.focused.train();
         let losses = train.losses();
         let coated = matches!(losses.reflection, Some(Reflection::Coated(_)));
@@ -219,7 +222,9 @@ impl LensCamera {
         if self.opened.as_ref().is_some_and(|opened| opened.bands == *bands) {
             return Ok(self.clone());
         }
-        Ok(Self { opened: Some(Arc::new(self.open(bands, self.focused.train())?)), ..self.clone() })
+        let mut opened = self.open(bands, self.focused.train())?;
+        opened.paths = self.band_paths(bands).ok();
+        Ok(Self { opened: Some(Arc::new(opened)), ..self.clone() })
     }
 
     /// The same with filters clear.
@@ -259,12 +264,12 @@ impl LensCamera {
             groups.iter().flat_map(|g| &g.lenses).map(MonochromaticTrain::wavelength).collect();
         let pupil =
             if all.len() > measured.len() { pupil.aimed_at_mask(&clear, &all) } else { pupil };
-        Ok(Opened { bands: bands.clone(), groups, pupil })
+        Ok(Opened { bands: bands.clone(), groups, pupil, paths: None })
     }
 
     /// The wavelengths at which the rays of a group run: several for wide bands where the lens bends
     /// or dims each in its own way.
-    fn spread(&self, bands: &Bands, group: &BandGroup) -> Spread {
+    pub(super) fn spread(&self, bands: &Bands, group: &BandGroup) -> Spread {
         let train = self.focused.train();
         let spread = bands.spread(group.bands.start, &uniform_filters(train));
         let one = |nm| Spread { wavelengths: vec![nm], overlap: spread.overlap };
@@ -444,14 +449,19 @@ impl LensCamera {
 
 impl OpenedGroup {
     /// Which lens serves a place of the spectrum in 0..1.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "at most a few dozen lenses"
-    )]
     pub(super) fn lens_at(&self, u: f64) -> usize {
-        ((u * self.lenses.len() as f64) as usize).min(self.lenses.len() - 1)
+        place_of(u, self.lenses.len())
     }
+}
+
+/// In which of `count` equal parts of 0..1 a number lies.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "at most a few dozen lenses"
+)]
+pub(super) fn place_of(u: f64, count: usize) -> usize {
+    ((u * count as f64) as usize).min(count - 1)
 }
 
 /// Curves of filters that are the same all over and pass some wavelengths better than others.
@@ -473,20 +483,40 @@ fn through_filters(
     overlap: f64,
 ) -> Result<Vec<MonochromaticTrain>, GlassError> {
     let uniform = uniform_filters(train);
-    let each = overlap.powf(1.0 / uniform.len().max(1) as f64);
-    let lens = |&nm: &f64| {
-        let passes = |curve: &Curve| {
-            let mean = bands.from_curve(curve, Outside::Held).map_or(0.0, |means| means[band]);
-            if uniform.contains(&curve) {
-                return mean * each;
-            }
-            let all: f64 = wavelengths.iter().map(|&nm| curve.held(nm)).sum();
-            let share = curve.held(nm) * wavelengths.len() as f64 / all;
-            if all > 0.0 { mean * share } else { mean }
-        };
-        train.at_with(nm, &passes)
-    };
+    let passes =
+        |curve: &Curve, nm| passed(bands, (band, wavelengths, overlap), &uniform, curve, nm);
+    let lens = |&nm: &f64| train.at_with(nm, &|curve| passes(curve, nm));
     wavelengths.iter().map(lens).collect()
+}
+
+/// What filters that are the same all over pass together of a band at each of its wavelengths.
+pub(super) fn filtered(
+    train: &OpticalTrain,
+    bands: &Bands,
+    band: usize,
+    Spread { wavelengths, overlap }: &Spread,
+) -> Vec<f64> {
+    let uniform = uniform_filters(train);
+    let all = || train.elements().iter().filter_map(|element| element.part.uniform_curve());
+    let passes = |curve, nm| passed(bands, (band, wavelengths, *overlap), &uniform, curve, nm);
+    wavelengths.iter().map(|&nm| all().map(|curve| passes(curve, nm)).product()).collect()
+}
+
+/// What a curve of a filter passes of a band at one of its wavelengths (nm): see [`through_filters`].
+fn passed(
+    bands: &Bands,
+    (band, wavelengths, overlap): (usize, &[f64], f64),
+    uniform: &[&Curve],
+    curve: &Curve,
+    nm: f64,
+) -> f64 {
+    let mean = bands.from_curve(curve, Outside::Held).map_or(0.0, |means| means[band]);
+    if uniform.contains(&curve) {
+        return mean * overlap.powf(1.0 / uniform.len().max(1) as f64);
+    }
+    let all: f64 = wavelengths.iter().map(|&nm| curve.held(nm)).sum();
+    let share = curve.held(nm) * wavelengths.len() as f64 / all;
+    if all > 0.0 { mean * share } else { mean }
 }
 
 /// The pupil as seen from the axis with all filters and masks clear; from elsewhere when the axis is

@@ -13,8 +13,10 @@
 //! | `paths` | rays of a pixel on their way through the lens |
 //! | `alone` | a lens by itself as a camera |
 //! | `rays` | weighted rays of the pupil for pictures |
+//! | `band_paths` | one ray of the scene for all bands, and where each band's light of it lands |
 
 mod alone;
+mod band_paths;
 pub mod chief;
 pub mod focused;
 pub mod lens_camera;
@@ -24,6 +26,7 @@ pub mod source;
 pub mod spec;
 
 pub(crate) use alone::alone;
+pub use band_paths::{BandLandings, SharedPaths};
 pub use chief::LensletChiefs;
 pub use focused::Focused;
 pub use lens_camera::{BandGroup, LensCamera};

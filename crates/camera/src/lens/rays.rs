@@ -38,15 +38,27 @@ impl LensCamera {
         numbers: impl Iterator<Item = u32>,
         out: &mut CameraRays,
     ) {
+        let first = self.aim_samples((pupil, lens), samples, numbers, out);
+        lens.trace(Side::Sensor, Clip::On, &mut out.in_lens);
+        out.statuses.add_all(&out.in_lens);
+        self.leave(pose, first, out);
+    }
+
+    /// Starts rays for some of `samples`, which `out` names from the number on that is returned.
+    pub(super) fn aim_samples(
+        &self,
+        (pupil, lens): (&ExitPupil, &MonochromaticTrain),
+        samples: &FilmSamples,
+        numbers: impl Iterator<Item = u32>,
+        out: &mut CameraRays,
+    ) -> usize {
         let first = out.sample.len();
         out.sample.extend(numbers);
         match pupil.disk() {
             Some(disk) => self.aim_at_disk((pupil, disk), samples, first, out),
             None => self.aim_at_pupil((pupil, lens), samples, first, out),
         }
-        lens.trace(Side::Sensor, Clip::On, &mut out.in_lens);
-        out.statuses.add_all(&out.in_lens);
-        self.leave(pose, first, out);
+        first
     }
 
     /// Starts rays for the samples that `out` names from `first` on, towards a pupil known in closed
@@ -106,7 +118,7 @@ impl LensCamera {
     }
 
     /// Brings the rays that left the lens into the world; `out` names their samples from `first` on.
-    fn leave(&self, pose: &Pose, first: usize, out: &mut CameraRays) {
+    pub(super) fn leave(&self, pose: &Pose, first: usize, out: &mut CameraRays) {
         let to_world =
             ToWorld { position: pose.position, turn: pose.rotation, origin: self.focused.origin() };
         let mut kept = first;

@@ -99,7 +99,8 @@ impl OpticalTrain {
     }
 
     /// A distance from `z` (mm) that is in front of every part of the lens from any direction.
-    pub(crate) fn far_in_front(&self, z: f64) -> f64 {
+    #[must_use]
+    pub fn far_in_front(&self, z: f64) -> f64 {
         2.0 * (self.last_vertex().abs() + self.lateral_scale() + z.abs()) + 10.0
     }
 

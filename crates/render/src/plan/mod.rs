@@ -15,6 +15,7 @@ use etendue_spectrum::Bands;
 use etendue_tracer::{LayerSpec, Needs, TextureScope};
 
 use self::words::Grounds;
+use crate::band_paths::BandPaths;
 use crate::denoise::DENOISED;
 use crate::expose;
 use crate::film::Precision;
@@ -64,6 +65,8 @@ pub struct Plan {
     pub passes: Vec<Range<u32>>,
     /// Whether rays are spread over a pupil.
     pub pupil: bool,
+    /// How the bands of light go through the camera's lens.
+    pub band_paths: BandPaths,
     /// Rays in all.
     pub rays: u64,
     /// Build time against traversal speed.
@@ -139,12 +142,16 @@ impl Plan {
         let pixels = u64::from(width) * u64::from(height);
         let samples = spec.most();
         let chosen = expose::bands(scene);
+        let band_paths = BandPaths::of(scene, &chosen.bands, stopping, lens && passes.light);
         let apart = scene.camera.band_groups(&chosen.bands).len() as u64;
         let sampled = |yes| if yes { u64::from(spec.typical()) * apart } else { 0 };
+        let lit = if band_paths.are_shared() {
+            sampled(passes.light) / apart
+        } else {
+            sampled(passes.light)
+        };
         let rays = pixels
-            * (u64::from(passes.centre)
-                + sampled(passes.mean)
-                + sampled(passes.light) * RAYS_A_SAMPLE_OF_LIGHT);
+            * (u64::from(passes.centre) + sampled(passes.mean) + lit * RAYS_A_SAMPLE_OF_LIGHT);
         // How well to build for so many rays, and how exactly to trace.
         let triangles = scene.geometry.triangles_unique();
         let quality = forced_quality(scene).unwrap_or_else(|| quality_for(rays, triangles));
@@ -167,6 +174,7 @@ impl Plan {
             not_as_asked,
             passes: sample_passes(scene, passes, chosen.bands.count(), stopping),
             pupil: lens && (passes.mean || passes.light),
+            band_paths,
             rays,
             quality,
             refine: scene.plan.refine != Some(false),

@@ -51,6 +51,7 @@ impl Plan {
         decisions.extend(expose::explain_sensor(scene));
         decisions.extend(self.explain_denoising());
         decisions.extend(self.explain_lens(scene));
+        decisions.extend(self.band_paths.decision(scene));
         decisions.push(explain_bounces(scene, needs));
         decisions.extend(explain_surfaces(needs));
         decisions.extend(needs.light.then(|| explain_lights(scene)));

@@ -1,6 +1,7 @@
 //! Whole renders: from the text of a scene to the values of its layers.
 
 mod adaptive;
+mod band_paths;
 mod blocks;
 mod dispersion;
 mod known_radiance;

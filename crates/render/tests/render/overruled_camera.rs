@@ -114,14 +114,14 @@ fn bands_share_rays_where_nothing_parts_them() {
 }
 
 /// A lens taken as at its design wavelength shows a grey scene grey to the bit, with a third of the rays; with
-/// each band on its own way edges are coloured, by the tenth of a pixel that the lens displaces them.
+/// each band on its own way, its paths included, edges are coloured, by the tenth of a pixel that the lens displaces them.
 #[test]
 fn a_lens_without_dispersion_takes_one_ray_for_all_bands() {
     let more = |plan: Value| {
         json!({ "tracer": { "type": "direct" }, "render": { "samples": 64 }, "plan": plan,
                 "lights": [{ "type": "environment", "radiance": [1, 1, 1] }] })
     };
-    let own = scene(&double_gauss(), &more(json!({})));
+    let own = scene(&double_gauss(), &more(json!({ "shared_paths": false })));
     let shared = scene(&double_gauss(), &more(json!({ "dispersion": false })));
     let what = DecisionKind::RaysOfBands;
     assert_eq!((choice(&own, what), choice(&shared, what)), ("their own".into(), "shared".into()));

@@ -165,6 +165,10 @@ pub struct PlanSpec {
     /// together, as at the design wavelength, so that the lens shows no colour errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dispersion: Option<bool>,
+    /// Whether the bands of a picture share the paths of the scene behind a lens that sends each its own way
+    /// (true, where they can), or the scene is traced for each band.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shared_paths: Option<bool>,
     /// Whether images are averaged over what a sample covers; where the camera tells that when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub texture_filter: Option<bool>,

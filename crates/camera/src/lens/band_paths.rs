@@ -1,0 +1,558 @@
+//! One ray of the scene for all bands: it is traced into the scene at one wavelength, and back into the
+//! camera at others, to where each band's light of it lands on the film.
+//!
+//! # Measure
+//!
+//! A band's value at a pixel is the mean of T L over the étendue dG = n² cos θ dA dΩ of the pixel's area and
+//! the pupil, T being what the lens passes and L the radiance of the scene along the ray that leaves the lens.
+//! Refraction keeps étendue (Clausius' theorem; W. T. Welford and R. Winston, *High Collection Nonimaging
+//! Optics*, 1989, appendix A), at every wavelength, so the map from rays at the film to rays in the scene has
+//! a Jacobian of 1 in G, and so has that from the film at one wavelength, by way of the scene, to the film at
+//! another: a ray of the scene stands for as much étendue in all bands, wherever it lands. In front of the lens
+//! and behind it n must be the same for all, which is asked for.
+//!
+//! # Estimator
+//!
+//! A sample has a place x on the film, a direction ω with the weight w = 1/p(x, ω) of single bands, and one of
+//! `H` *leading* wavelengths, each as likely. Its ray is traced into the scene at that wavelength. A ray r of
+//! the scene may come from each of the leading wavelengths j by which it lands on the film and passes the lens:
+//! of `m` of them. The contribution to band b at the place where b lands is
+//!
+//! L(r) T_b(r) w H/m.
+//!
+//! As the shares 1/m that the leading wavelengths take of r add up to 1 (the condition of E. Veach,
+//! *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, eq. 9.5), the mean is that of each band
+//! traced by itself, whatever the weights are; where w is the same for all, as it nearly is, this is his balance
+//! heuristic. Rays that one wavelength loses at a rim come by another: the share of 1/m counts those that can.
+//!
+//! # Interpolation
+//!
+//! Leading wavelengths are the nodes of a polynomial in the mean index of the lens' dispersive media, by which
+//! places move nearly in proportion. As many nodes are taken as bring the places of all wavelengths that are
+//! drawn within [`FINEST`] of where rays land that are traced, over film and pupil. A ray that ends at some node is
+//! traced at every band's wavelength by itself.
+
+use etendue_optics::element::{Clip, LensRays, Opening, Ray, RayStatus};
+use etendue_optics::train::pupil::without_filters;
+use etendue_optics::train::{Element, MonochromaticTrain, Side};
+use etendue_spectrum::{Bands, Spread};
+use glam::{DVec2, DVec3};
+
+use super::lens_camera::{LensCamera, filtered, place_of};
+use crate::{CameraRays, FilmSamples, Pose};
+
+/// The most wavelengths that a ray is traced at.
+const MOST_NODES: usize = 8;
+
+/// How near an interpolated place is to the traced one, at most (pixels).
+const FINEST: f64 = 0.01;
+
+/// The same of what the lens passes, where glass takes light.
+const FINEST_SHARE: f64 = 1e-4;
+
+/// Wavelengths at which interpolation is checked, at most.
+const CHECKS: usize = 16;
+
+/// Places on each side of the film, and in the pupil, from which rays are taken to measure it.
+const PLACES: u32 = 11;
+const DIRECTIONS: u32 = 64;
+
+/// Fewer rays measure nothing.
+const FEWEST: usize = 32;
+
+/// The farthest that the places of one ray may part (rows of pixels): the sums of so many more are
+/// kept from other threads.
+const FARTHEST: f64 = 32.0;
+
+/// What the measured parting of places is multiplied by: what may be greater in between.
+const SAFETY: f64 = 1.25;
+
+/// How bands share rays, as measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SharedPaths {
+    /// Wavelengths that each ray is traced at.
+    pub traced: usize,
+    /// How far places that are interpolated are from those that are traced, at most (pixels).
+    pub error: f64,
+    /// How many rows of pixels from where a ray starts its light lands, at most.
+    pub rows: u32,
+}
+
+/// How bands share rays.
+#[derive(Debug)]
+pub(super) struct BandPaths {
+    /// The lens at its leading wavelengths, with filters clear.
+    nodes: Vec<MonochromaticTrain>,
+    /// By band and by wavelength that it is drawn from.
+    bands: Vec<Vec<Interpolation>>,
+    /// Whether glass takes light.
+    has_losses: bool,
+    /// From where a ray leaves the lens to where one starts that comes back (mm).
+    lead: f64,
+    /// How far places of a ray part, at most: rows of pixels and their size (mm).
+    reach: f64,
+    error: f64,
+}
+
+/// A wavelength between nodes.
+#[derive(Debug, Clone, Copy)]
+struct Interpolation {
+    /// What each node counts.
+    weights: [f64; MOST_NODES],
+    /// What filters pass.
+    filters: f64,
+}
+
+/// Where the light of each band lands that comes along rays which all bands share, `[ray][band]`.
+#[derive(Debug, Clone, Default)]
+pub struct BandLandings {
+    /// The pixel, counted row by row; [`Self::NOWHERE`] where the band's light does not arrive.
+    pub pixel: Vec<u32>,
+    /// What the ray's radiance in the band counts in the mean over the samples of that pixel.
+    pub weight: Vec<f64>,
+    /// Of each ray where it leaves the lens (mm), its direction, its weight before the lens, and its node.
+    points: Vec<DVec3>,
+    directions: Vec<DVec3>,
+    weights: Vec<f64>,
+    leading: Vec<usize>,
+    /// Before the lens is passed: the weights of a batch.
+    before: Vec<f64>,
+    /// `[node][ray]`: the place (pixels), and the share that the lens passes, 0 where it ends.
+    places: Vec<[f64; 2]>,
+    shares: Vec<f64>,
+}
+
+impl BandLandings {
+    /// No pixel.
+    pub const NOWHERE: u32 = u32::MAX;
+}
+
+impl LensCamera {
+    /// How the rays of `bands` are shared, or why each has rays of its own.
+    ///
+    /// # Errors
+    ///
+    /// When they cannot be shared, in words.
+    pub fn shared_paths(&self, bands: &Bands) -> Result<SharedPaths, String> {
+        self.band_paths(bands).map(|paths| self.shared(&paths))
+    }
+
+    /// The same as the camera was opened for; `None` where bands have rays of their own.
+    #[must_use]
+    pub fn opened_paths(&self) -> Option<SharedPaths> {
+        let paths = self.opened.as_ref()?.paths.as_ref()?;
+        Some(self.shared(paths))
+    }
+
+    fn shared(&self, paths: &BandPaths) -> SharedPaths {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen")]
+        let rows = (paths.reach / self.focused.film().pitch).ceil() as u32 + 1;
+        SharedPaths { traced: paths.nodes.len(), error: paths.error, rows }
+    }
+
+    /// Why rays of different bands differ by more than where they land, if they do.
+    fn parted(&self) -> Option<&'static str> {
+        let train = self.focused.train();
+        let is_mask = |element: &Element| matches!(element.part.opening(), Some(Opening::Image(_)));
+        let is_patterned = |element: &Element| {
+            !element.part.curves().is_empty() && element.part.uniform_curve().is_none()
+        };
+        let media = train.media();
+        if train.first_array().is_some() {
+            return Some("a lenslet that a ray of one wavelength meets may be another's neighbour");
+        }
+        if train.elements().iter().any(is_mask) {
+            return Some("a mask's edges cut each wavelength's light at another place");
+        }
+        if train.elements().iter().any(is_patterned) {
+            return Some("a filter that differs from place to place is met elsewhere by each");
+        }
+        (media[0].is_dispersive() || media[media.len() - 1].is_dispersive()).then_some(
+            "the medium at an end of the lens is dispersive, so that radiance differs, too",
+        )
+    }
+
+    /// Chooses the nodes, and measures how well they do.
+    pub(super) fn band_paths(&self, bands: &Bands) -> Result<BandPaths, String> {
+        if let Some(why) = self.parted() {
+            return Err(why.to_owned());
+        }
+        let train = self.focused.train();
+        let spreads: Vec<Spread> =
+            self.band_groups(bands).iter().map(|group| self.spread(bands, group)).collect();
+        let clear = without_filters(train);
+        let at = |nm: f64| clear.at(nm).map_err(|error| error.to_string());
+        let index = Variable::of(self);
+        let mut wavelengths: Vec<f64> = match self.runs_apart() {
+            true => spreads.iter().flat_map(|spread| spread.wavelengths.clone()).collect(),
+            false => vec![train.wavelength()],
+        };
+        wavelengths.sort_by(f64::total_cmp);
+        wavelengths.dedup();
+        // Rays over film and pupil, and where they land at wavelengths that are drawn.
+        let middle = at(wavelengths[wavelengths.len() / 2])?;
+        let lead = train.far_in_front(0.0);
+        let rays = self.rays_to_measure(&middle);
+        if rays.len() < FEWEST {
+            return Err("too few rays get through the lens to measure where they part".to_owned());
+        }
+        let step = wavelengths.len().div_ceil(CHECKS);
+        let mut checks: Vec<f64> = wavelengths.iter().copied().step_by(step).collect();
+        checks.extend(wavelengths.last());
+        checks.dedup();
+        let land = |nm: &f64| Ok::<_, String>(self.landings(&at(*nm)?, &rays, lead));
+        let checked = checks.iter().map(land).collect::<Result<Vec<_>, _>>()?;
+        let reach = SAFETY * parting(&checked);
+        let rows = reach / self.focused.film().pitch;
+        if rows > FARTHEST {
+            return Err(format!(
+                "the light of one ray lands up to {rows:.0} rows apart, and {FARTHEST} are the most"
+            ));
+        }
+        // As few nodes as will do.
+        let has_losses = !train.losses().is_none();
+        let mut least = (f64::INFINITY, f64::INFINITY);
+        for count in 1..=MOST_NODES.min(wavelengths.len()) {
+            let chosen = index.nodes(&wavelengths, count);
+            let landed = chosen.iter().map(land).collect::<Result<Vec<_>, _>>()?;
+            let errors = |(nm, found): (&f64, &Landed)| {
+                let weights = index.weights(&chosen, *nm);
+                error_of(&weights, &landed, found)
+            };
+            let errors = checks.iter().zip(&checked).map(errors);
+            let [error, share] = errors.fold([0.0_f64; 2], |[a, b], [c, d]| [a.max(c), b.max(d)]);
+            least = (least.0.min(error), least.1.min(share));
+            if error > FINEST || (has_losses && share > FINEST_SHARE) {
+                continue;
+            }
+            let nodes = chosen.iter().map(|&nm| at(nm)).collect::<Result<Vec<_>, _>>()?;
+            let of_band = |(band, spread): (usize, &Spread)| {
+                let filters = filtered(train, bands, band, spread);
+                let places = spread.wavelengths.iter().zip(filters).map(|(&nm, filters)| {
+                    let nm = if self.runs_apart() { nm } else { train.wavelength() };
+                    Interpolation { weights: index.weights(&chosen, nm), filters }
+                });
+                places.collect()
+            };
+            let bands = spreads.iter().enumerate().map(of_band).collect();
+            return Ok(BandPaths { nodes, bands, has_losses, lead, reach, error });
+        }
+        Err(format!(
+            "places between {MOST_NODES} wavelengths are {:.2} pixels off, {FINEST} being the most, and \
+             what passes {:.1e}",
+            least.0, least.1
+        ))
+    }
+
+    /// Rays that leave the lens at one wavelength (point and direction, mm), from all over the film and the
+    /// pupil.
+    fn rays_to_measure(&self, lens: &MonochromaticTrain) -> Vec<(DVec3, DVec3)> {
+        let film = self.focused.film();
+        let train = self.focused.train();
+        let rim = train.elements().last().map_or(f64::INFINITY, |e| e.clear_radius());
+        // A little more than the paraxial exit pupil, or the last element.
+        let exit = self.focused.paraxial().exit_pupil;
+        let (z, radius) = match (exit.z, exit.diameter) {
+            (Some(z), Some(diameter)) if (z - film.frame.vertex.z).abs() > 1e-6 => {
+                (z, 0.6 * diameter)
+            }
+            _ if rim.is_finite() => (train.last_vertex(), rim),
+            _ => (train.last_vertex(), 0.5 * film.half_size().length()),
+        };
+        let mut rays = LensRays::default();
+        for k in 0..PLACES * PLACES {
+            let side = |i: u32| 2.0 * f64::from(i) / f64::from(PLACES - 1) - 1.0;
+            let place = DVec2::new(side(k % PLACES), side(k / PLACES)) * film.half_size();
+            let start = film.frame.point(place.extend(0.0));
+            for i in 0..DIRECTIONS {
+                // Even over the disk (H. Vogel, "A better way to construct the sunflower head", 1979).
+                let share = (f64::from(i) + 0.5) / f64::from(DIRECTIONS);
+                let turn = f64::from(i) * 2.399_963_229_728_653;
+                let at = DVec2::from_angle(turn) * (radius * share.sqrt());
+                let way = at.extend(z) - start;
+                rays.push(start, if way.z > 0.0 { -way } else { way });
+            }
+        }
+        lens.trace(Side::Sensor, Clip::On, &mut rays);
+        let left = (0..rays.len()).filter(|&i| rays.status(i) == RayStatus::Exited);
+        left.map(|i| (rays.position(i), rays.direction(i))).collect()
+    }
+
+    /// Where rays of the scene land at the wavelength of a lens.
+    fn landings(&self, lens: &MonochromaticTrain, rays: &[(DVec3, DVec3)], lead: f64) -> Landed {
+        let mut back = LensRays::with_capacity(rays.len());
+        for &(point, direction) in rays {
+            back.push(point + direction * lead, -direction);
+        }
+        lens.trace(Side::Object, Clip::On, &mut back);
+        let film = self.focused.film();
+        let landed = (0..back.len()).map(|i| {
+            let pixel = film.pixel(back.position(i), back.direction(i));
+            let lands = back.status(i) == RayStatus::Exited && pixel[0].is_finite();
+            lands.then(|| (DVec2::from(pixel), back.throughput(i)))
+        });
+        Landed { places: landed.collect(), pitch: film.pitch }
+    }
+
+    /// The rays of `samples` that all bands share, and where the light of each band lands.
+    ///
+    /// # Panics
+    ///
+    /// When the camera was not opened, or its bands do not share rays ([`Self::opened_paths`]).
+    pub(crate) fn sample_band_rays(
+        &self,
+        (pose, resolution): (&Pose, [u32; 2]),
+        samples: &FilmSamples,
+        out: &mut CameraRays,
+        landings: &mut BandLandings,
+    ) {
+        out.clear();
+        let opened = self.opened.as_ref().expect("the camera is opened before it is sampled");
+        let paths = opened.paths.as_ref().expect("bands share rays");
+        landings.clear();
+        // Out of the camera, each at its leading wavelength.
+        for (node, lens) in paths.nodes.iter().enumerate() {
+            let is_of_node = |u: f64| place_of(u, paths.nodes.len()) == node;
+            let numbered = samples.leading.iter().zip(0..);
+            let numbers = numbered.filter(|&(&u, _)| is_of_node(u)).map(|(_, i)| i);
+            let first = self.aim_samples((&opened.pupil, lens), samples, numbers, out);
+            let before = &mut landings.before;
+            before.clear();
+            before.extend((0..out.in_lens.len()).map(|i| out.in_lens.throughput(i)));
+            lens.trace(Side::Sensor, Clip::On, &mut out.in_lens);
+            out.statuses.add_all(&out.in_lens);
+            landings.keep(&out.in_lens, node);
+            self.leave(pose, first, out);
+        }
+        out.rays.coherent = true;
+        // Back into it at the others.
+        let count = out.sample.len();
+        landings.places.resize(paths.nodes.len() * count, [f64::NAN; 2]);
+        landings.shares.resize(paths.nodes.len() * count, 0.0);
+        for (node, lens) in paths.nodes.iter().enumerate() {
+            self.bring_back((node, lens), paths.lead, samples, out, landings);
+        }
+        self.land((paths, resolution), samples, out, landings);
+    }
+
+    /// Takes the rays of other leading wavelengths back through the lens, to where they land.
+    fn bring_back(
+        &self,
+        (node, lens): (usize, &MonochromaticTrain),
+        lead: f64,
+        samples: &FilmSamples,
+        out: &mut CameraRays,
+        landings: &mut BandLandings,
+    ) {
+        let BandLandings { points, directions, weights, leading, places, shares, .. } = landings;
+        let count = out.sample.len();
+        let (places, shares) =
+            (&mut places[node * count..][..count], &mut shares[node * count..][..count]);
+        let back = &mut out.in_lens;
+        back.clear();
+        for ray in 0..count {
+            if leading[ray] == node {
+                let i = out.sample[ray] as usize;
+                places[ray] = [samples.columns[i], samples.rows[i]];
+                shares[ray] = out.weight[ray] / weights[ray];
+            } else {
+                back.push(points[ray] + directions[ray] * lead, -directions[ray]);
+            }
+        }
+        lens.trace(Side::Object, Clip::On, back);
+        let film = self.focused.film();
+        let others = (0..count).filter(|&ray| leading[ray] != node);
+        for (ray, i) in others.zip(0..) {
+            if back.status(i) == RayStatus::Exited {
+                places[ray] = film.pixel(back.position(i), back.direction(i));
+                shares[ray] = back.throughput(i);
+            }
+        }
+    }
+
+    /// Where each band's light of each ray lands, and what it counts.
+    fn land(
+        &self,
+        (paths, resolution): (&BandPaths, [u32; 2]),
+        samples: &FilmSamples,
+        out: &CameraRays,
+        landings: &mut BandLandings,
+    ) {
+        let opened = self.opened.as_ref().expect("the camera is opened before it is sampled");
+        let BandLandings { pixel, weight, points, directions, weights, places, shares, .. } =
+            landings;
+        let film = self.focused.film();
+        let size = resolution.map(f64::from);
+        let is_seen = |[x, y]: [f64; 2]| x >= 0.0 && y >= 0.0 && x < size[0] && y < size[1];
+        let (count, nodes) = (out.sample.len(), paths.nodes.len());
+        for ray in 0..count {
+            let (mut at, mut share) = ([[0.0; 2]; MOST_NODES], [0.0; MOST_NODES]);
+            let (mut passes, mut makes) = (true, 0_u32);
+            for node in 0..nodes {
+                (at[node], share[node]) = (places[node * count + ray], shares[node * count + ray]);
+                passes &= share[node] > 0.0;
+                makes += u32::from(share[node] > 0.0 && is_seen(at[node]));
+            }
+            let scale = weights[ray] * nodes as f64 / f64::from(makes.max(1));
+            let u = samples.spectrum[out.sample[ray] as usize];
+            for (band, wavelengths) in paths.bands.iter().enumerate() {
+                let number = place_of(u, wavelengths.len());
+                let Interpolation { weights, filters } = &wavelengths[number];
+                let (place, passed) = if passes {
+                    let (mut place, mut passed) = ([0.0; 2], 0.0);
+                    for node in 0..nodes {
+                        place[0] += weights[node] * at[node][0];
+                        place[1] += weights[node] * at[node][1];
+                        passed += weights[node] * share[node];
+                    }
+                    (place, if paths.has_losses { passed * filters } else { *filters })
+                } else {
+                    let lens = &opened.groups[band].lenses[number];
+                    let start = points[ray] + directions[ray] * paths.lead;
+                    match Ray::new(start, -directions[ray]) {
+                        Some(ray) => {
+                            let end = lens.run(Side::Object, Clip::On, ray);
+                            let left = end.status == RayStatus::Exited;
+                            let Ray { position, direction } = end.ray;
+                            let place = film.pixel(position.into(), direction.into());
+                            (place, if left { end.throughput } else { 0.0 })
+                        }
+                        None => ([f64::NAN; 2], 0.0),
+                    }
+                };
+                let lands = passed > 0.0 && is_seen(place);
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a pixel of a picture"
+                )]
+                let at = place[1] as u32 * resolution[0] + place[0] as u32;
+                pixel.push(if lands { at } else { BandLandings::NOWHERE });
+                weight.push(if lands { scale * passed } else { 0.0 });
+            }
+        }
+    }
+}
+
+impl BandLandings {
+    fn clear(&mut self) {
+        let Self { pixel, weight, points, directions, weights, leading, before, places, shares } =
+            self;
+        pixel.clear();
+        weight.clear();
+        points.clear();
+        directions.clear();
+        weights.clear();
+        leading.clear();
+        before.clear();
+        places.clear();
+        shares.clear();
+    }
+
+    /// Appends the rays that left the lens at a node's wavelength.
+    fn keep(&mut self, rays: &LensRays, node: usize) {
+        let left = |&i: &usize| rays.status(i) == RayStatus::Exited && rays.throughput(i) > 0.0;
+        for i in (0..rays.len()).filter(left) {
+            self.points.push(rays.position(i));
+            self.directions.push(rays.direction(i));
+            self.weights.push(self.before[i]);
+            self.leading.push(node);
+        }
+    }
+}
+
+/// Where rays landed (pixels), and the share of each that passed; `None` for those that ended.
+struct Landed {
+    places: Vec<Option<(DVec2, f64)>>,
+    pitch: f64,
+}
+
+/// How far the places of a ray part in rows or columns, at most (mm).
+fn parting(landed: &[Landed]) -> f64 {
+    let Some(first) = landed.first() else { return 0.0 };
+    let part = |ray: usize| {
+        let places = landed.iter().filter_map(|at| at.places[ray].map(|(place, _)| place));
+        let (low, high) = places
+            .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), place| {
+                (low.min(place), high.max(place))
+            });
+        (high - low).max_element().max(0.0)
+    };
+    (0..first.places.len()).map(part).fold(0.0, f64::max) * first.pitch
+}
+
+/// How far interpolated places (pixels) and shares are from those found, at most.
+fn error_of(weights: &[f64; MOST_NODES], nodes: &[Landed], found: &Landed) -> [f64; 2] {
+    let mut errors = [0.0_f64; 2];
+    for (ray, found) in found.places.iter().enumerate() {
+        let at = nodes.iter().map(|node| node.places[ray]).collect::<Option<Vec<_>>>();
+        let (Some(at), Some((place, share))) = (at, found) else { continue };
+        let sum = at.iter().zip(weights).fold((DVec2::ZERO, 0.0), |sum, (at, weight)| {
+            (sum.0 + at.0 * *weight, sum.1 + at.1 * *weight)
+        });
+        errors[0] = errors[0].max(sum.0.distance(*place));
+        errors[1] = errors[1].max((sum.1 - share).abs() / share);
+    }
+    errors
+}
+
+/// What places are polynomials in.
+struct Variable<'a> {
+    camera: &'a LensCamera,
+}
+
+impl<'a> Variable<'a> {
+    fn of(camera: &'a LensCamera) -> Self {
+        Self { camera }
+    }
+
+    /// The mean index of the dispersive media at a wavelength (nm); by the wavelength itself where there are
+    /// none.
+    fn at(&self, nm: f64) -> f64 {
+        let media = self.camera.focused.train().media().iter();
+        let indices = media.filter(|glass| glass.is_dispersive());
+        let indices: Vec<f64> = indices.filter_map(|glass| glass.index(nm).ok()).collect();
+        match indices.len() {
+            0 => 1e-3 * nm,
+            count => indices.iter().sum::<f64>() / count as f64,
+        }
+    }
+
+    /// `count` nodes among ascending wavelengths and between them: those of Chebyshev with both ends.
+    fn nodes(&self, wavelengths: &[f64], count: usize) -> Vec<f64> {
+        let last = wavelengths.len() - 1;
+        let (from, to) = (wavelengths[0], wavelengths[last]);
+        if count > last {
+            return wavelengths.to_vec();
+        }
+        if count == 1 {
+            return vec![wavelengths[last / 2]];
+        }
+        let fine = |k: u32| from + (to - from) * f64::from(k) / 256.0;
+        let ends = [self.at(from), self.at(to)];
+        let node = |k: usize| {
+            let cosine = (std::f64::consts::PI * k as f64 / (count - 1) as f64).cos();
+            let wanted = 0.5 * (ends[0] + ends[1]) + 0.5 * cosine * (ends[0] - ends[1]);
+            let off = |nm: &f64| (self.at(*nm) - wanted).abs();
+            let inner = (1..256).map(fine).min_by(|a, b| off(a).total_cmp(&off(b)));
+            match k {
+                0 => from,
+                _ if k == count - 1 => to,
+                _ => inner.unwrap_or(from),
+            }
+        };
+        (0..count).map(node).collect()
+    }
+
+    /// What each node counts at a wavelength (nm): Lagrange's polynomials.
+    fn weights(&self, nodes: &[f64], nm: f64) -> [f64; MOST_NODES] {
+        let x = self.at(nm);
+        let at: Vec<f64> = nodes.iter().map(|&node| self.at(node)).collect();
+        let mut weights = [0.0; MOST_NODES];
+        for (j, weight) in weights.iter_mut().enumerate().take(nodes.len()) {
+            let others = (0..nodes.len()).filter(|&k| k != j);
+            *weight = others.map(|k| (x - at[k]) / (at[j] - at[k])).product();
+        }
+        weights
+    }
+}

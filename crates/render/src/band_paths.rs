@@ -1,0 +1,79 @@
+//! Whether the bands of a picture's light share the paths of the scene behind a lens that sends each its own
+//! way: what it is decided by, and in words.
+
+use etendue_camera::SharedPaths;
+use etendue_report::{Decision, DecisionKind, Size};
+use etendue_scene::Scene;
+use etendue_spectrum::Bands;
+
+use crate::samples::BYTES_OF_SUM;
+use crate::stopping::Stopping;
+
+/// The most memory that the sums of bands may take which share paths: they are kept for the whole film.
+const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
+
+/// How the bands of a picture's light go through the camera's lens.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BandPaths {
+    /// All alike: no lens tells them apart.
+    Alike,
+    /// The scene is traced once, and each band's light lands at its own place on the film.
+    Shared(SharedPaths),
+    /// The scene is traced for each band; and why.
+    Apart(String),
+}
+
+impl BandPaths {
+    /// The choice for `scene`, whose picture is of light in `bands` where it `is_lit`.
+    pub(crate) fn of(scene: &Scene, bands: &Bands, stopping: Stopping, is_lit: bool) -> Self {
+        let lens = scene.camera.lens().filter(|_| is_lit);
+        let Some(lens) = lens.filter(|lens| lens.band_groups(bands).len() > 1) else {
+            return Self::Alike;
+        };
+        if scene.plan.shared_paths == Some(false) {
+            return Self::Apart("the scene has each traced by itself".to_owned());
+        }
+        if stopping.is_adaptive() {
+            let why =
+                "pixels differ in their samples, and light lands beside the pixel it starts from";
+            return Self::Apart(why.to_owned());
+        }
+        let [width, height] = scene.camera.resolution().map(u64::from);
+        let lit = scene.layers.iter().filter(|layer| layer.is_light()).count();
+        let values = (width * height).saturating_mul((lit * bands.count()) as u64);
+        if values.saturating_mul(BYTES_OF_SUM) > MOST_BYTES_OF_SUMS {
+            return Self::Apart(format!(
+                "sums of them would take more than {}",
+                Size(MOST_BYTES_OF_SUMS)
+            ));
+        }
+        lens.shared_paths(bands).map_or_else(Self::Apart, Self::Shared)
+    }
+
+    /// Whether the scene is traced once for all bands of a lens that tells them apart.
+    #[must_use]
+    pub fn are_shared(&self) -> bool {
+        matches!(self, Self::Shared(_))
+    }
+
+    /// The row of the plan; none where there is nothing to decide.
+    pub(crate) fn decision(&self, scene: &Scene) -> Option<Decision> {
+        let (choice, because) = match self {
+            Self::Alike => return None,
+            Self::Shared(SharedPaths { traced, error, rows }) => {
+                let how = match traced {
+                    1 => "filters alone tell the bands apart".to_owned(),
+                    _ => format!(
+                        "a path is traced into the scene at one of {traced} wavelengths and back through the \
+                         lens at all of them; between them the places where bands land are interpolated, to \
+                         {error:.4} px, within {rows} rows"
+                    ),
+                };
+                ("shared", how)
+            }
+            Self::Apart(why) => ("their own", why.clone()),
+        };
+        let is_forced = scene.plan.shared_paths.is_some();
+        Some(Decision::new(DecisionKind::PathsOfBands, choice, because).forced(is_forced))
+    }
+}
