@@ -387,7 +387,7 @@ mod tests {
             let share = |step: f64| (0.3 + k as f64 * step).fract();
             let alpha = [1e-4, 0.01, 0.2, 0.7, 1.0][k % 5];
             let base = [share(0.37), share(0.73), share(0.19)];
-            let is_metal = k % 3 == 0;
+            let is_metal = k.is_multiple_of(3);
             let metallic = if is_metal { 1.0 } else { [0.0, 0.3, 1.0][k / 3 % 3] };
             let (f0, f90) = if is_metal { (0.0, 0.0) } else { (0.04, [1.0, 0.6][k % 2]) };
             let highlight = if is_metal { [1.0; 3] } else { [1.0, 2.0, 0.5] };
@@ -425,7 +425,7 @@ mod tests {
     }
 
     fn shading_normal(k: usize) -> DVec3 {
-        upward(k, [0.618, 0.755]) * if k % 2 == 0 { 1.0 } else { -1.0 }
+        upward(k, [0.618, 0.755]) * if k.is_multiple_of(2) { 1.0 } else { -1.0 }
     }
 
     /// Side by side as one by one: values, densities and directions, of metals and glTF's surfaces of all
@@ -438,10 +438,10 @@ mod tests {
         let (mut choices, mut squares) = (ZERO, [[0.0; 2]; LANES]);
         for k in 0..LANES {
             let share = |step: f64| (0.3 + k as f64 * step).fract();
-            let side = if k % 7 == 0 { -1.0 } else { 1.0 };
+            let side = if k.is_multiple_of(7) { -1.0 } else { 1.0 };
             let frame = Frame::around(shading_normal(k));
             put(&mut toward, k, frame.world(upward(k, [0.57, 0.83])) * side);
-            is_delta[k] = if k % 4 == 0 { 1.0 } else { 0.0 };
+            is_delta[k] = if k.is_multiple_of(4) { 1.0 } else { 0.0 };
             (choices[k], squares[k]) = (share(0.07), [share(0.53), share(0.21)]);
         }
         // Some hundred roundings, magnified by what is lacking of 1 in highlights of α 10⁻⁴.
