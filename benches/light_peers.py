@@ -2,6 +2,9 @@
 """Light in etendue and in Mitsuba 3, in one run, taking turns.
 
     python3 benches/light_peers.py [--rounds N] [--output docs/benchmarks-light.md]
+    python3 benches/light_peers.py --against ETENDUE [--rounds N] [--jobs JOB ...]
+
+The second form times another build of the command in place of Mitsuba, and prints what it finds.
 
 The jobs: a matte blob of a million triangles through a thin lens, 512 x 512 pixels of 64 samples,
 under a point light and under a square lamp, by direct light, and under the lamp by paths of five
@@ -192,8 +195,8 @@ def serve(peer, folder):
 class Etendue:
     """The `etendue` command, one process a run."""
 
-    def __init__(self, folder):
-        self.program, self.folder = program.built("etendue"), Path(folder)
+    def __init__(self, folder, command=None):
+        self.program, self.folder = command or program.built("etendue"), Path(folder)
 
     def trace(self, job, seed):
         import numpy as np
@@ -239,6 +242,23 @@ def bound(folder):
     limit = json.loads(done.stdout)
     # It tells what the busiest of all cores took.
     return limit | {key: limit[key] * (os.cpu_count() or 1) for key in ["camera", "shadow"]}
+
+
+def against(arguments, folder):
+    """Two builds of etendue in turns: a line a job."""
+    import numpy as np
+
+    both = [Etendue(folder), Etendue(folder, arguments.against)]
+    for job in arguments.jobs:
+        seconds, means = [[], []], [[], []]
+        for seed in range(arguments.rounds):
+            for which, build in enumerate(both):
+                taken, picture, _ = build.trace(job, seed)
+                seconds[which].append(taken)
+                means[which].append(float(np.mean(picture)))
+        own, other = map(statistics.median, seconds)
+        print(f"{job}: {own:.2f} s, the other {other:.2f} s, {other / own:.2f} times as long; "
+              f"means {np.mean(means[0]):.5f}, {np.mean(means[1]):.5f}", flush=True)
 
 
 def measure(arguments, folder):
@@ -352,8 +372,8 @@ def page(results, remarks, arguments):
 
 REASONS = (
     "Both programs have Embree find the hits in f32. Mitsuba's LLVM variant compiles each scene into one loop over a whole "
-    "vector of samples in f32; etendue works on patches of 64 hits in f64, matte surfaces in loops that vectorise, and asks "
-    "other surfaces and images one by one. A direction that is followed for its light alone is first traced through the emissive surfaces alone.")
+    "vector of samples in f32; etendue works on patches of 64 hits in f64, matte surfaces, rough metals and plain glTF surfaces in loops that "
+    "vectorise, and asks other surfaces and images one by one. A direction that is followed for its light alone is first traced through the emissive surfaces alone.")
 
 
 def known(number):
@@ -390,10 +410,13 @@ def goals(results):
 def main():
     parser = program.arguments(__doc__, "benchmarks-light.md", rounds=5)
     parser.add_argument("--jobs", nargs="+", choices=ALL, default=ALL)
+    parser.add_argument("--against", type=Path, help="another build of etendue, in place of Mitsuba")
     arguments = parser.parse_args()
     program.enter("peers", ["numpy"])
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([program.built("benchmarks"), "models", folder, "--triangles", "1000000"], check=True)
+        if arguments.against:
+            return against(arguments, folder)
         text = page(*measure(arguments, folder), arguments)
     arguments.output.write_text(text)
     print(text)

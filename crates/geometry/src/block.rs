@@ -77,6 +77,19 @@ impl RayBlock {
         self.instance = [MISS; LANES];
     }
 
+    /// Sets the ray of a lane, and what it hit, to those of lane `of` of another block.
+    #[inline]
+    pub fn copy_hit(&mut self, lane: usize, other: &Self, of: usize) {
+        for axis in 0..3 {
+            self.origin[axis][lane] = other.origin[axis][of];
+            self.direction[axis][lane] = other.direction[axis][of];
+            self.normal[axis][lane] = other.normal[axis][of];
+        }
+        self.t_max[lane] = other.t_max[of];
+        (self.u[lane], self.v[lane]) = (other.u[of], other.v[of]);
+        (self.triangle[lane], self.placement[lane]) = (other.triangle[of], other.placement[of]);
+    }
+
     /// Whether anything is between the ends of a ray, once occlusion was asked for.
     #[must_use]
     #[inline]

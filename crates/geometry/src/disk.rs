@@ -1,6 +1,6 @@
-//! The unit square on the unit disk, without calls, so that loops over many points vectorise.
+//! The unit square on the unit disk, and shares of a full turn, without calls, so that loops over many points vectorise.
 
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 /// A point of the unit square on the unit disk, equal areas staying equal (P. Shirley and K. Chiu, "A
 /// low distortion map between disk and square", 1997).
@@ -13,6 +13,21 @@ pub fn point([u, v]: [f64; 2]) -> [f64; 2] {
     let ratio = if radius == 0.0 { 0.0 } else { other / radius };
     let (sine, cosine) = small_sine_cosine(FRAC_PI_4 * ratio);
     if flat { [radius * cosine, radius * sine] } else { [radius * sine, radius * cosine] }
+}
+
+/// Sine and cosine of a share of a full turn, 0..=1.
+#[must_use]
+#[inline(always)]
+pub fn turn(share: f64) -> (f64, f64) {
+    // The nearest quarter, and the rest to it.
+    let quarter = |from: f64| if share >= from { 1.0 } else { 0.0 };
+    let quarters = quarter(0.125) + quarter(0.375) + quarter(0.625) + quarter(0.875);
+    let (sine, cosine) = small_sine_cosine(FRAC_PI_2 * (4.0 * share - quarters));
+    let is_odd = (quarters == 1.0) | (quarters == 3.0);
+    let (a, b) = if is_odd { (cosine, sine) } else { (sine, cosine) };
+    let a_falls = (quarters == 2.0) | (quarters == 3.0);
+    let b_falls = (quarters == 1.0) | (quarters == 2.0);
+    (if a_falls { -a } else { a }, if b_falls { -b } else { b })
 }
 
 /// Sine and cosine of an angle of at most π/4 by their series: what is left out is below 10⁻¹⁶.
@@ -61,6 +76,19 @@ mod tests {
             assert!((x - cosine).abs() + (y - sine).abs() < 1e-15, "{square:?}: {x} {y}");
         }
         assert_eq!(point([0.5, 0.5]), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn shares_of_a_turn_have_their_sine_and_cosine() {
+        for i in 0..=1000 {
+            let share = f64::from(i) / 1000.0;
+            let (sine, cosine) = turn(share);
+            let (own, other) = (std::f64::consts::TAU * share).sin_cos();
+            // The library's angle is rounded: up to half a spacing of 2π.
+            assert!((sine - own).abs() < 1e-15, "{share}: {sine}");
+            assert!((cosine - other).abs() < 1e-15, "{share}: {cosine}");
+        }
+        assert_eq!(turn(0.5), (0.0, -1.0));
     }
 
     #[test]

@@ -18,6 +18,39 @@ pub struct PlacedSurfaces {
     pub(crate) touching: Coplanar,
 }
 
+/// As what hits are worked on, where a surface is wholly there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SurfaceKind {
+    /// It scatters nothing.
+    Black,
+    /// Lambert's.
+    Matte,
+    /// A sheet of facets over a matte base ([`crate::bsdf::sheets`]): rough metal, and glTF's surfaces without
+    /// more over them.
+    Sheet,
+    /// A mirror, or a smooth boundary of glass.
+    Smooth,
+    /// Of any other kind, or partly not there.
+    Other,
+}
+
+impl SurfaceKind {
+    fn of(material: &Material) -> Self {
+        if material.has_alpha() {
+            return Self::Other;
+        }
+        match &material.scattering {
+            Scattering::Black | Scattering::Unlit => Self::Black,
+            Scattering::Matte => Self::Matte,
+            Scattering::Metal { roughness, .. } if *roughness > 0.0 => Self::Sheet,
+            Scattering::Gltf(surface) if surface.is_bare_sheet() => Self::Sheet,
+            Scattering::Mirror | Scattering::Metal { .. } => Self::Smooth,
+            Scattering::Dielectric(glass) if glass.roughness == 0.0 => Self::Smooth,
+            Scattering::Dielectric(_) | Scattering::Gltf(_) => Self::Other,
+        }
+    }
+}
+
 /// A placement as light meets it.
 #[derive(Debug, Clone)]
 pub(crate) struct PlacedSurface {
@@ -29,10 +62,8 @@ pub(crate) struct PlacedSurface {
     pub(crate) is_seen: bool,
     /// It is partly not there.
     pub(crate) has_alpha: bool,
-    /// It is Lambert's, and wholly there.
-    pub(crate) is_matte: bool,
-    /// It scatters nothing, and is wholly there.
-    pub(crate) is_black: bool,
+    /// As what its hits are worked on.
+    pub(crate) kind: SurfaceKind,
     /// No light passes it.
     pub(crate) is_opaque: bool,
     /// Its shading normal is not that of its triangles.
@@ -67,8 +98,7 @@ impl PlacedSurfaces {
                 turn: (place.linear != DMat3::IDENTITY).then(|| place.normal_matrix()),
                 is_seen: material.emission.is_some() || material.scattering == Scattering::Unlit,
                 has_alpha: material.has_alpha(),
-                is_matte: material.scattering == Scattering::Matte && !material.has_alpha(),
-                is_black: material.scattering == Scattering::Black && !material.has_alpha(),
+                kind: SurfaceKind::of(material),
                 is_opaque: !material.has_alpha()
                     && !material.is_pane()
                     && !matches!(material.scattering, Scattering::Dielectric(_)),
@@ -91,7 +121,8 @@ impl PlacedSurfaces {
 
     /// Whether all scatter light as Lambert's law has it, or not at all.
     pub(crate) fn are_matte(&self) -> bool {
-        self.all.iter().flatten().all(|surface| surface.is_matte || surface.is_black)
+        let is_taken = |kind| matches!(kind, SurfaceKind::Matte | SurfaceKind::Black);
+        self.all.iter().flatten().all(|surface| is_taken(surface.kind))
     }
 
     /// All bodies.

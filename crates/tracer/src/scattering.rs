@@ -4,7 +4,7 @@ use etendue_geometry::glam::DVec3;
 use etendue_spectrum::{Curve, Metal};
 
 use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen, fresnel};
-use crate::reference::SceneView;
+use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::Frame;
 use crate::surface::SurfaceInteraction;
 use crate::{Color, TextureUse};
@@ -230,6 +230,20 @@ pub struct GltfSurface {
     pub anisotropy_texture: Option<TextureUse>,
 }
 
+/// A sheet of facets over a matte or metallic base, at one point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SheetSurface {
+    /// Share of metal, 0..=1.
+    pub(crate) metallic: f64,
+    /// The square of the roughness, 0..=1.
+    pub(crate) alpha: f64,
+    /// The dielectric's reflectance face on, before the highlights' colour, and at grazing incidence.
+    pub(crate) f0: f64,
+    pub(crate) f90: f64,
+    /// The colour of its highlights.
+    pub(crate) highlight: Color,
+}
+
 impl Default for GltfSurface {
     fn default() -> Self {
         Self {
@@ -260,10 +274,18 @@ impl Default for GltfSurface {
 }
 
 impl GltfSurface {
-    /// Its layers where it was met.
-    fn bsdf(&self, met: &SurfaceInteraction<'_>, around: &SceneView<'_>) -> Bsdf {
+    /// Whether there is nothing but a sheet of facets over a base that lets no light through, which may be smooth
+    /// here and there by a texture alone.
+    pub(crate) fn is_bare_sheet(&self) -> bool {
+        let is_rough = self.roughness > 0.0 || self.glossiness_texture.is_some();
+        let is_covered = self.clearcoat > 0.0 || self.sheen_color != [0.0; 3];
+        is_rough && !is_covered && self.anisotropy == 0.0 && self.transmission == 0.0
+    }
+
+    /// Its sheet of facets at a point.
+    pub(crate) fn sheet(&self, spot: &SurfacePoint<'_>, around: &SceneView<'_>) -> SheetSurface {
         let texel = |image: &Option<_>| match image {
-            Some(image) => around.texel(image, &met.spot),
+            Some(image) => around.texel(image, spot),
             None => [1.0; 4],
         };
         let rough = texel(&self.metallic_roughness);
@@ -275,21 +297,35 @@ impl GltfSurface {
         let specular = (self.specular * texel(&self.specular_texture)[3]).clamp(0.0, 1.0);
         let face_on = fresnel::normal_reflectance(self.ior);
         let tint = self.specular_color_texture.as_ref();
-        let tint = tint.map_or([1.0; 4], |image| around.tint(image, &met.spot));
+        let tint = tint.map_or([1.0; 4], |image| around.tint(image, spot));
         // The extension caps the reflectance face on at 1.
         let most = if face_on > 0.0 { 1.0 / face_on } else { f64::INFINITY };
-        let highlight = std::array::from_fn(|k| (self.specular_color[k] * tint[k]).min(most));
+        SheetSurface {
+            metallic: (self.metallic * rough[2]).clamp(0.0, 1.0),
+            alpha: roughness * roughness,
+            f0: face_on * specular,
+            f90: specular,
+            highlight: std::array::from_fn(|k| (self.specular_color[k] * tint[k]).min(most)),
+        }
+    }
+
+    /// Its layers where it was met.
+    fn bsdf(&self, met: &SurfaceInteraction<'_>, around: &SceneView<'_>) -> Bsdf {
+        let texel = |image: &Option<_>| match image {
+            Some(image) => around.texel(image, &met.spot),
+            None => [1.0; 4],
+        };
+        let SheetSurface { metallic, alpha, f0, f90, highlight } = self.sheet(&met.spot, around);
         let (geometric, shading) = met.normals(around);
-        let alpha = roughness * roughness;
         let grain = self.grain(met, around, shading);
         let strength = grain.map_or(0.0, |(_, strength)| strength);
         let model = Model::Layered(Layered {
-            metallic: (self.metallic * rough[2]).clamp(0.0, 1.0),
+            metallic,
             // A grain has no single directions, however smooth it is across.
             alpha: if strength > 0.0 { alpha.max(SMOOTHEST_GRAIN) } else { alpha },
             along: alpha + (1.0 - alpha) * strength * strength,
-            f0: face_on * specular,
-            f90: specular,
+            f0,
+            f90,
             ior: self.ior,
             transmission: (self.transmission * texel(&self.transmission_texture)[0])
                 .clamp(0.0, 1.0),

@@ -35,16 +35,25 @@ impl<'a> SurfaceInteraction<'a> {
         i: usize,
         footprint: Option<Footprint>,
     ) -> Option<Self> {
+        let spot = SurfacePoint { footprint, ..stage.surroundings.spot(hits, i)? };
+        let ray = (rays.origin(i), rays.direction(i));
+        Self::at(stage, (hits.placement[i], spot), ray, (hits.t[i], hits.normal(i)))
+    }
+
+    /// The hit on a placement at a point, of a ray from `origin` (m) after the way `t` (m), where the triangle has
+    /// this unit normal on its front.
+    pub(crate) fn at(
+        stage: &'a LightingContext<'a>,
+        (own, spot): (u32, SurfacePoint<'a>),
+        (origin, direction): (DVec3, DVec3),
+        (t, normal): (f64, DVec3),
+    ) -> Option<Self> {
         let around = &stage.surroundings;
-        let placed = stage.placed.get(hits.placement[i])?;
-        let spot = SurfacePoint { footprint, ..around.spot(hits, i)? };
+        let placed = stage.placed.get(own)?;
         let material = around.material(&spot)?;
-        let (origin, direction) = (rays.origin(i), rays.direction(i));
-        let normal = hits.normal(i);
-        let anchor = stage.anchor(origin + direction * hits.t[i], normal, origin, placed);
+        let anchor = stage.anchor(origin + direction * t, normal, origin, placed);
         let front = normal.dot(direction) <= 0.0;
         let base = around.base_color(material, &spot);
-        let own = hits.placement[i];
         let media = if front { [MISS, own] } else { [own, MISS] };
         Some(Self { spot, placed, material, anchor, front, base, wo: -direction, media })
     }

@@ -1,13 +1,19 @@
 //! Light in blocks of rays against light in batches: the same paths by two ways, whose random numbers are the same.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use etendue_accel::{Accel, BuildOptions, BuildReport, Bvh};
 use etendue_geometry::{HitBatch, RayBatch};
 use etendue_render::Plan;
 use etendue_render::output::Outputs;
+use etendue_scene::Scene;
+use etendue_spectrum::{Bands, Grid};
+use etendue_tracer::material::NormalMap;
+use etendue_tracer::texture::Encoding;
+use etendue_tracer::{Scattering, TextureUse};
 
-use crate::steps::{channels, load, prepare, trace};
+use crate::steps::{channels, load_in, prepare, trace};
 
 /// A structure that traces batches alone.
 #[derive(Debug)]
@@ -29,6 +35,11 @@ impl Accel for Batches<'_> {
 
 /// A room with a lamp, boxes and a ball, by what is put into it.
 fn room(tracer: &str, lights: &str, more: &str, ball: &str) -> String {
+    room_of(["red", "green"], [tracer, lights, more, ball])
+}
+
+/// The same by the materials of box and ball.
+fn room_of([of_box, of_ball]: [&str; 2], [tracer, lights, more, ball]: [&str; 4]) -> String {
     format!(
         r#"{{"etendue": 1, "tracer": {tracer}, "lights": [{lights}],
         "layers": ["direct", "indirect"],
@@ -38,14 +49,26 @@ fn room(tracer: &str, lights: &str, more: &str, ball: &str) -> String {
         "objects": [
             {{"shape": "rectangle", "width": 4, "height": 4, "material": "floor",
                 "transform": {{"rotate": [1, 0, 0, -90]}}}},
-            {{"shape": "box", "material": "red", "transform": {{"translate": [-0.5, 0.3, 0], "scale": 0.6}}}},
-            {{"shape": "{ball}", "material": "green",
+            {{"shape": "box", "material": "{of_box}", "transform": {{"translate": [-0.5, 0.32, 0], "scale": 0.6}}}},
+            {{"shape": "{ball}", "material": "{of_ball}",
                 "transform": {{"translate": [0.6, 0.5, 0.2], "scale": 0.5}}}}
             {more}],
         "materials": {{
             "floor": {{"type": "checker", "colors": [[0.8, 0.8, 0.7], [0.2, 0.3, 0.4]], "squares": 8}},
             "red": {{"type": "matte", "color": [0.7, 0.1, 0.1]}},
             "green": {{"type": "matte", "color": [0.1, 0.5, 0.2]}},
+            "gold": {{"type": "metal", "color": [0.9, 0.7, 0.3], "roughness": 0.35}},
+            "polished": {{"type": "metal", "metal": "copper", "roughness": 0}},
+            "copper": {{"type": "metal", "metal": "copper", "roughness": 0.3}},
+            "mirror": {{"type": "mirror"}},
+            "glass": {{"type": "dielectric", "ior": 1.5}},
+            "frosted": {{"type": "dielectric", "ior": 1.5, "roughness": 0.4}},
+            "plastic": {{"type": "gltf", "color": [0.2, 0.4, 0.8], "metallic": 0.3, "roughness": 0.4}},
+            "smooth": {{"type": "gltf", "color": [0.2, 0.4, 0.8], "roughness": 0}},
+            "coated": {{"type": "gltf", "color": [0.8, 0.4, 0.1], "clearcoat": 0.8, "clearcoat_roughness": 0.1,
+                "sheen": [0.3, 0.3, 0.5]}},
+            "brushed": {{"type": "gltf", "color": [0.9, 0.8, 0.7], "metallic": 1, "anisotropy": 0.6}},
+            "printed": {{"type": "gltf", "color": {{"image": "waves.png"}}, "metallic": 0.2}},
             "lamp": {{"type": "emissive", "radiance": [9, 8, 6]}}}},
         "render": {{"samples": 16}}, "plan": {{"light_precision": "single"}}}}"#
     )
@@ -58,12 +81,67 @@ const POINTS: &str = r#"{"type": "point", "at": [1, 2, 1], "intensity": [1, 2, 3
     {"type": "directional", "direction": [0.2, -1, -0.3], "irradiance": [0.5, 0.5, 0.5]},
     {"type": "spot", "at": [-1, 2, 1], "look_at": [0, 0, 0], "cone": 50, "intensity": [2, 2, 1]}"#;
 
+/// Red, green, blue and alpha that change across: as a colour, as roughness and metal, and as a normal.
+fn save_waves(folder: &Path) {
+    let wave = |x: u32, step: u32| u8::try_from(x * step % 256).unwrap();
+    let texels = image::RgbImage::from_fn(32, 32, |x, y| {
+        // Where green is 0 the surface is smooth.
+        let green = if (x / 4 + y / 4) % 5 == 0 { 0 } else { 60 + wave(y, 5) / 2 };
+        image::Rgb([110 + wave(x, 8) / 8, green, 150 + wave(x + y, 3) / 3])
+    });
+    texels.save(folder.join("waves.png")).unwrap();
+}
+
+/// Gives the printed surface roughness, metal and a normal by its image, which scene files cannot name.
+fn print(scene: &mut Scene) {
+    let printed = scene.materials.iter_mut().find(|material| material.name == "printed").unwrap();
+    let image = printed.base_color.image().unwrap();
+    let data = TextureUse { encoding: Encoding::Linear, ..image.clone() };
+    printed.normal_map = Some(NormalMap { image: data.clone(), scale: 0.4 });
+    let Scattering::Gltf(surface) = &mut printed.scattering else { panic!("a glTF surface") };
+    surface.metallic_roughness = Some(data);
+}
+
+/// That the scene's picture is the same by both ways, where there are two; how many structures have both.
+fn compare(name: &str, scene: &Scene, plan: &Plan) -> usize {
+    let (accel, images) = prepare(scene, plan);
+    let bvh = Bvh::build(Arc::clone(&scene.geometry), &BuildOptions::default()).unwrap();
+    let structures: [&dyn Accel; 2] = [&*accel, &bvh];
+    let mut compared = 0;
+    for accel in structures {
+        let name = format!("{name}, {}", accel.report().backend);
+        if accel.blocks().is_none() {
+            continue;
+        }
+        compared += 1;
+        let blocks = trace(scene, plan, accel, &images);
+        let batches = trace(scene, plan, &Batches(accel), &images);
+        for layer in ["", "Direct", "Indirect"] {
+            let [own, other] =
+                [&blocks, &batches].map(|done| channels(&done.picture, layer).concat());
+            let total: f64 = other.iter().sum();
+            assert!(layer == "Indirect" || total > 0.0, "{name}: {layer} is dark");
+            let apart = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-4 * (1e-3 + b.abs());
+            let differ = own.iter().zip(&other).filter(|&pair| apart(pair)).count();
+            // Hits within f32's rounding of an edge or of a shadow's: one sample in some thousands.
+            assert!(differ * 50 <= own.len(), "{name}: {differ} of {} in {layer:?}", own.len());
+            let sum: f64 = own.iter().sum();
+            assert!((sum - total).abs() <= 1e-3 * total.abs(), "{name}: {sum} {total}");
+        }
+        let rays = [&blocks, &batches].map(|done| done.light.rays as f64);
+        assert!((rays[0] / rays[1] - 1.0).abs() < 1e-3, "{name}: {rays:?}");
+    }
+    compared
+}
+
 #[test]
 fn blocks_and_batches_follow_the_same_paths() {
     let path = r#"{"type": "path", "max_bounces": 7}"#;
     let direct = r#"{"type": "direct"}"#;
+    let whitted = r#"{"type": "whitted", "max_bounces": 4}"#;
     let sky = r#"{"type": "environment", "radiance": [0.6, 0.7, 0.9]}"#;
     let both = format!("{sky}, {POINTS}");
+    let all = |materials, tracer| room_of(materials, [tracer, &both, LAMP, "sphere"]);
     let scenes = [
         ("lamp, path", room(path, "", LAMP, "sphere")),
         ("lamp, direct", room(direct, "", LAMP, "box")),
@@ -71,34 +149,32 @@ fn blocks_and_batches_follow_the_same_paths() {
         ("sky", room(path, sky, "", "sphere")),
         ("sky, direct", room(direct, sky, "", "box")),
         ("all", room(path, &both, LAMP, "sphere")),
+        ("metals", all(["copper", "gold"], path)),
+        ("metals, direct", all(["polished", "gold"], direct)),
+        ("mirrors", all(["mirror", "polished"], path)),
+        ("mirrors, whitted", all(["mirror", "mirror"], whitted)),
+        ("points and a mirror", room_of(["red", "mirror"], [direct, POINTS, "", "sphere"])),
+        ("glass", all(["red", "glass"], path)),
+        ("glass, whitted", all(["plastic", "glass"], whitted)),
+        ("frosted glass", all(["frosted", "mirror"], path)),
+        ("glTF", all(["smooth", "plastic"], path)),
+        ("glTF, points", room_of(["coated", "plastic"], [path, POINTS, "", "sphere"])),
+        ("coats", all(["coated", "brushed"], path)),
+        ("textures", all(["printed", "printed"], path)),
+        ("textures, direct", all(["mirror", "printed"], direct)),
     ];
+    let folder = tempfile::tempdir().unwrap();
+    save_waves(folder.path());
     for (name, text) in scenes {
-        let scene = load(&text);
-        let plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
-        let (accel, images) = prepare(&scene, &plan);
-        let bvh = Bvh::build(Arc::clone(&scene.geometry), &BuildOptions::default()).unwrap();
-        let structures: [&dyn Accel; 2] = [&*accel, &bvh];
-        for accel in structures {
-            let name = format!("{name}, {}", accel.report().backend);
-            if accel.blocks().is_none() {
-                continue;
-            }
-            let blocks = trace(&scene, &plan, accel, &images);
-            let batches = trace(&scene, &plan, &Batches(accel), &images);
-            for layer in ["", "direct", "indirect"] {
-                let [own, other] =
-                    [&blocks, &batches].map(|done| channels(&done.picture, layer).concat());
-                let total: f64 = other.iter().sum();
-                assert!(layer == "indirect" || total > 0.0, "{name}: {layer} is dark");
-                let apart = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-4 * (1e-3 + b.abs());
-                let differ = own.iter().zip(&other).filter(|&pair| apart(pair)).count();
-                // Hits within f32's rounding of an edge or of a shadow's: one sample in some thousands.
-                assert!(differ * 50 <= own.len(), "{name}: {differ} of {} in {layer:?}", own.len());
-                let sum: f64 = own.iter().sum();
-                assert!((sum - total).abs() <= 1e-3 * total.abs(), "{name}: {sum} {total}");
-            }
-            let rays = [&blocks, &batches].map(|done| done.light.rays as f64);
-            assert!((rays[0] / rays[1] - 1.0).abs() < 1e-3, "{name}: {rays:?}");
+        let mut scene = load_in(folder.path(), &text);
+        if text.matches(r#""printed""#).count() > 1 {
+            print(&mut scene);
+        }
+        let mut plan = Plan::new(&scene, Outputs::from_list("exr").unwrap());
+        assert!(compare(name, &scene, &plan) > 0, "{name} is traced in batches alone");
+        if name == "metals" {
+            plan.bands = Bands::Spectral(Grid::of_width(400.0, 700.0, 60.0).unwrap());
+            compare("metals in bands", &scene, &plan);
         }
     }
 }

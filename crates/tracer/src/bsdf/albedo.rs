@@ -18,10 +18,10 @@ use super::ggx::{self, Facets};
 use super::{brushed, fresnel};
 
 /// Knots in α, dense where sheets are smooth.
-const ROUGHNESSES: usize = 48;
+pub(super) const ROUGHNESSES: usize = 48;
 
 /// Knots in [`obliquity`].
-const OBLIQUITIES: usize = 96;
+pub(super) const OBLIQUITIES: usize = 96;
 
 /// The least roughness of the table; smoother sheets differ at μ < 10⁻⁴ alone.
 const SMOOTHEST: f64 = 1e-6;
@@ -31,14 +31,14 @@ const SMOOTHEST: f64 = 1e-6;
 const FACETS: u32 = 1024;
 
 #[derive(Debug)]
-struct AlbedoTable {
+pub(super) struct AlbedoTable {
     /// (A, B) by roughness, then [`obliquity`].
-    entries: Vec<[f64; 2]>,
+    pub(super) entries: Vec<[f64; 2]>,
     /// Their means over directions, and that of what facets of reflectance 1 lack, by roughness.
-    means: Vec<[f64; 3]>,
+    pub(super) means: Vec<[f64; 3]>,
 }
 
-static TABLE: LazyLock<AlbedoTable> = LazyLock::new(AlbedoTable::new);
+pub(super) static TABLE: LazyLock<AlbedoTable> = LazyLock::new(AlbedoTable::new);
 
 impl AlbedoTable {
     fn new() -> Self {
@@ -62,6 +62,7 @@ impl AlbedoTable {
 
 /// Where the table has the cosine `mu`, from 0 to 1. A sheet's albedo changes with μ/α at the horizon,
 /// by the masking of its facets, and with μ elsewhere, by Fresnel: half of the knots are for each.
+#[inline(always)]
 pub(super) fn obliquity(mu: f64, alpha: f64) -> f64 {
     let masking = mu / (mu + alpha).max(f64::MIN_POSITIVE) * (1.0 + alpha);
     0.5 * (mu.sqrt() + masking)
@@ -96,6 +97,7 @@ fn mean(row: &[[f64; 2]], alpha: f64) -> [f64; 3] {
 pub(super) const EXACT: f64 = 1e-3;
 
 /// What facets of reflectance 1 lack that return so much.
+#[inline(always)]
 pub(super) fn lacking(returned: f64) -> f64 {
     (1.0 - EXACT - returned).max(0.0)
 }

@@ -18,6 +18,7 @@ pub fn dielectric(cos_in: f64, eta: f64) -> (f64, Option<f64>) {
 /// Schlick's weight (1 − cos θ)⁵ between the reflectance face on and that at grazing incidence
 /// (Schlick 1994, equation 15).
 #[must_use]
+#[inline(always)]
 pub fn schlick_weight(cosine: f64) -> f64 {
     let c = (1.0 - cosine).clamp(0.0, 1.0);
     let c2 = c * c;

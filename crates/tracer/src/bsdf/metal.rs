@@ -33,11 +33,13 @@ pub(crate) fn dip(face_on: f64, second: f64) -> f64 {
 }
 
 /// The mean reflectance of facets, from their reflectance face on and the fit's `dip`.
+#[inline(always)]
 pub(crate) fn mean_reflectance(face_on: f64, dip: f64) -> f64 {
     face_on + (1.0 - face_on) / 21.0 - dip / 126.0
 }
 
 /// `Fₘ`: what comes out after several facets of the mean reflectance, where `mean` is `Ē`.
+#[inline(always)]
 pub(crate) fn multiple(reflectance: f64, mean: f64) -> f64 {
     reflectance * reflectance * mean / (1.0 - reflectance * (1.0 - mean))
 }
@@ -93,6 +95,7 @@ impl Rough {
 
 /// π times the matte lobe of reflectance 1, from `E` for both directions and the mean of what it lacks: also where that
 /// is little, as smooth metal lacks light at grazing angles alone.
+#[inline(always)]
 pub(super) fn deep(seen: f64, lit: f64, mean: f64) -> f64 {
     if mean <= 0.0 { 0.0 } else { lacking(seen) * lacking(lit) / mean }
 }

@@ -19,6 +19,7 @@ mod layered;
 mod losses;
 pub(crate) mod metal;
 mod sheen;
+pub(crate) mod sheets;
 
 use std::f64::consts::PI;
 

@@ -1,24 +1,31 @@
-//! Scenes of matte surfaces alone, hit in single precision: paths in blocks of sixteen rays, as the accelerator
-//! takes them, from the camera to the last light. All paths of a batch have met equally many surfaces, so what
-//! a path remembers is three rows: its ray, the density of its direction and what it carries.
+//! Scenes hit in single precision: paths in blocks of sixteen rays, as the accelerator takes them, from the camera
+//! to the last light. All paths of a batch have met equally many surfaces, so what a path remembers is little: its
+//! ray, the density of its direction and what it carries.
 //!
-//! The stages are loops over blocks: what is looked up for a hit is gathered first, arithmetic is done by the
-//! [`kernels`] on local arrays, and what goes on is put side by side in new blocks.
+//! The stages are loops over blocks: what is looked up for a hit is gathered first, arithmetic is done on local
+//! arrays by the [`kernels`] and, for sheets of facets, by [`crate::bsdf::sheets`], and what goes on is put side by
+//! side in new blocks. Where surfaces are of several kinds, hits of one kind are put side by side first. Those of
+//! other kinds than matte and sheets are worked out one by one, by [`crate::bsdf::Bsdf`], within the same stages.
 
 use etendue_accel::BlockAccel;
 use etendue_geometry::block::LANES as BLOCK;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, HitPrecision, RayBatch, RayBlocks};
+use etendue_geometry::{HitBatch, HitPrecision, RayBatch, RayBlock, RayBlocks};
 
 use super::numbers::{DRAWS, Draw};
-use super::patch::{LANES, Patch, Seen, at, put};
-use super::{Follow, LightingContext, RaySamples, Samples, Scratch, Tracing, Traits, kernels};
-use crate::Scattering;
+use super::patch::{LANES, Patch, SheetColors, at, put};
+use super::step::weigh;
+use super::{Follow, LightingContext, RaySamples, Scratch, Tracing, Traits, kernels, metal};
+use crate::bsdf::{Bsdf, Model, Weights};
 use crate::footprint::{Cone, Footprint};
+use crate::placed::{PlacedSurface, SurfaceKind};
 use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
+use crate::scattering::SheetSurface;
 use crate::sky::Asked;
+use crate::surface::SurfaceInteraction;
 use crate::target::Chosen;
+use crate::{Color, Scattering};
 
 /// Paths under way that have met equally many surfaces.
 #[derive(Debug, Default)]
@@ -32,16 +39,40 @@ struct Paths {
 struct Carried {
     /// The camera's ray; or the [row](super::Parts::row) that its light is added to.
     ray: Vec<u32>,
-    /// Density (1/sr) of its direction; unused before the first surface.
-    pdf: Vec<f64>,
+    /// Of paths alone.
+    ways: Vec<Way>,
+    /// What each path stands for, as long as it only met mirrors and clear boundaries; as wide as where its ray
+    /// starts. Empty before the first surface, and where all surfaces are matte.
+    cones: Vec<Option<Cone>>,
     /// `[path][band]`.
     throughput: Vec<f64>,
+}
+
+/// How a path came to its direction.
+#[derive(Debug, Clone, Copy)]
+struct Way {
+    /// Density (1/sr) of the direction; unused where it is specular.
+    pdf: f64,
+    /// No light was asked in its stead: it is the camera's, a mirror's or a smooth boundary's.
+    is_specular: bool,
+    /// It looks for light and goes no farther.
+    is_last: bool,
+}
+
+impl Way {
+    const CAMERA: Self = Self { pdf: 0.0, is_specular: true, is_last: false };
+
+    /// The weight of light that was met against having asked for it with density `pdf` (1/sr).
+    fn weight_against(self, pdf: f64) -> f64 {
+        if self.is_specular { 1.0 } else { power_heuristic(self.pdf, pdf) }
+    }
 }
 
 impl Carried {
     fn clear(&mut self) {
         self.ray.clear();
-        self.pdf.clear();
+        self.ways.clear();
+        self.cones.clear();
         self.throughput.clear();
     }
 }
@@ -53,22 +84,47 @@ impl Paths {
     }
 }
 
+/// The kinds of surfaces that paths go on from, in the order in which they are worked on.
+const KINDS: [SurfaceKind; 4] =
+    [SurfaceKind::Matte, SurfaceKind::Sheet, SurfaceKind::Smooth, SurfaceKind::Other];
+
+/// Where paths go on.
+#[derive(Debug, Default)]
+struct Onward {
+    next: Paths,
+    /// Last directions, which ask only what shines.
+    last: RayBatch,
+    of_last: Carried,
+}
+
 /// Memory of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub(super) struct LaneScratch {
     now: Paths,
-    next: Paths,
+    onward: Onward,
     shadows: Paths,
-    /// Last directions, which ask only what shines.
-    last: RayBatch,
-    of_last: Carried,
     hits: HitBatch,
-    /// The camera's rays of the paths that go on, and their random numbers by use.
+    /// Paths that go on by the kind of surface that they met, in the order of [`KINDS`]; of them one after the
+    /// other the camera's rays, and their random numbers by use.
+    kinds: [Vec<u32>; KINDS.len()],
     alive: Vec<u32>,
     drawn: [Vec<[f64; 2]>; DRAWS as usize],
+    /// Hits of one kind put side by side, and those of sheets that turned out to be smooth: their paths, and which
+    /// of those that go on they are.
+    side_by_side: Vec<RayBlock>,
+    smooth: Vec<(usize, usize)>,
     /// Paths that met nothing.
     missed: Vec<u32>,
+    /// Lanes of a patch that are worked on.
     picked: Vec<usize>,
+}
+
+impl LaneScratch {
+    /// The numbers of the `k`-th path that goes on, for one use.
+    #[inline(always)]
+    fn number(&self, draw: Draw, k: usize) -> [f64; 2] {
+        self.drawn[draw as usize].get(k).copied().unwrap_or([0.5; 2])
+    }
 }
 
 /// What a patch of hits is worked on with.
@@ -76,20 +132,23 @@ struct Stage<'a> {
     blocks: &'a dyn BlockAccel,
     /// What coordinates of blocks are relative to (m).
     origin: DVec3,
+    beam: &'a RaySamples<'a>,
     /// Surfaces that have scattered the paths.
     bounces: u32,
-    /// The paths look for light after this surface and go no farther.
+    /// The paths look for light after this surface and go no farther; or do so unless it is specular.
     ends: bool,
-    /// Those ask only what shines.
+    ends_unless_specular: bool,
+    /// Those ask only what shines, but for specular ones.
     asks_emitters: bool,
+    /// Hits may be of several kinds.
+    is_mixed: bool,
 }
 
 /// What traces the scene in blocks, where all that it asks for is here.
 pub(super) fn block_accel<'a>(stage: &LightingContext<'a>) -> Option<&'a dyn BlockAccel> {
-    let Traits { has_alpha, has_panes, has_choice, has_media, has_nested, is_matte } = stage.traits;
-    let is_plain = !(has_alpha || has_panes || has_choice || has_media || has_nested);
-    let is_taken = is_matte && is_plain && stage.precision == HitPrecision::Single;
-    stage.accel.blocks().filter(|_| is_taken)
+    let Traits { has_alpha, has_panes, has_media, has_nested, has_dispersion, .. } = stage.traits;
+    let is_plain = !(has_alpha || has_panes || has_media || has_nested || has_dispersion);
+    stage.accel.blocks().filter(|_| is_plain && stage.precision == HitPrecision::Single)
 }
 
 impl<const RGB: bool> Tracing<'_, RGB> {
@@ -105,35 +164,37 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let count = self.count();
         self.start_blocks(blocks, beam, &mut lanes.now);
         let (mut bounces, mut coherent) = (0, beam.rays.coherent);
-        let follows_none = self.rules.follow == Follow::Single;
         while !lanes.now.rays.is_empty() {
             blocks.closest_of_blocks(lanes.now.rays.blocks_mut(), coherent);
             self.tally.rays += lanes.now.rays.len() as u64;
+            let ends = bounces + 1 >= self.rules.bounces;
             let stage = Stage {
                 blocks,
                 origin: blocks.origin(),
+                beam,
                 bounces,
-                ends: bounces + 1 >= self.rules.bounces || follows_none,
+                ends,
+                ends_unless_specular: ends || self.rules.follow == Follow::Single,
                 asks_emitters: self.traces_emitters(),
+                is_mixed: !self.stage.traits.is_matte,
             };
-            self.met_by_blocks((&stage, beam), lanes, (asked, radiance), out);
-            if bounces >= self.rules.bounces || (bounces > 0 && follows_none) {
+            self.met_by_blocks(&stage, lanes, (asked, radiance), out);
+            if bounces >= self.rules.bounces || lanes.alive.is_empty() {
                 break;
             }
-            self.draw_for_blocks(beam.samples, &stage, lanes);
-            lanes.next.clear();
+            self.draw_for_blocks(&stage, lanes);
+            lanes.onward.next.clear();
+            lanes.onward.last.clear();
+            lanes.onward.of_last.clear();
             lanes.shadows.clear();
-            lanes.last.clear();
-            lanes.of_last.clear();
-            let mut k = 0;
-            for first in (0..lanes.now.rays.len()).step_by(LANES) {
-                self.step_blocks(&stage, lanes, patch, (first, &mut k), asked, beam);
+            if stage.is_mixed {
+                self.step_kinds(&stage, lanes, patch, asked);
+            } else {
+                self.step_matte(&stage, lanes, patch, asked);
             }
             self.shadows_of_blocks(blocks, &mut lanes.shadows, coherent, count, out);
-            if stage.ends && stage.asks_emitters {
-                self.ask_emitters(&stage, lanes, (asked, radiance), out);
-            }
-            std::mem::swap(&mut lanes.now, &mut lanes.next);
+            self.ask_emitters(&stage, lanes, (asked, radiance), out);
+            std::mem::swap(&mut lanes.now, &mut lanes.onward.next);
             (bounces, coherent) = (bounces + 1, false);
         }
     }
@@ -141,10 +202,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     fn start_blocks(&self, blocks: &dyn BlockAccel, beam: &RaySamples<'_>, paths: &mut Paths) {
         paths.clear();
         blocks.convert(beam.rays, &mut paths.rays);
-        let Carried { ray, pdf, throughput } = &mut paths.carried;
+        let Carried { ray, ways, throughput, .. } = &mut paths.carried;
         for i in 0..beam.rays.len() {
             ray.push(u32::try_from(i).unwrap_or(u32::MAX));
-            pdf.push(f64::INFINITY);
+            ways.push(Way::CAMERA);
             let bands = 0..self.count();
             throughput.extend(bands.map(|k| f64::from(u8::from(beam.bands.contains(&k)))));
         }
@@ -153,18 +214,19 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// Adds the light that paths met by themselves, and lists those that go on.
     fn met_by_blocks(
         &mut self,
-        (stage, beam): (&Stage<'_>, &RaySamples<'_>),
+        stage: &Stage<'_>,
         lanes: &mut LaneScratch,
         (asked, radiance): (&mut Asked, &mut Vec<f64>),
         out: &mut [f64],
     ) {
-        let LaneScratch { now, alive, missed, .. } = lanes;
+        let LaneScratch { now, kinds, alive, missed, .. } = lanes;
         let LightingContext { lights, spectral, surroundings: around, .. } = self.stage;
         let (count, bounces) = (self.count(), stage.bounces);
         alive.clear();
+        kinds.iter_mut().for_each(Vec::clear);
         missed.clear();
         let lit = lights.sky.as_ref().is_some_and(|sky| sky.visible || bounces > 0);
-        let Carried { ray, pdf, throughput } = &now.carried;
+        let Carried { ray, ways, throughput, .. } = &now.carried;
         let carried = |i: usize| &throughput[i * count..(i + 1) * count];
         for (number, block) in now.rays.blocks().iter().enumerate() {
             for lane in 0..BLOCK.min(now.rays.len() - number * BLOCK) {
@@ -175,8 +237,14 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                     }
                     continue;
                 };
-                if placed.is_matte {
-                    alive.push(ray[i]);
+                if !ways[i].is_last {
+                    match KINDS.iter().position(|&kind| kind == placed.kind) {
+                        Some(kind) if stage.is_mixed => {
+                            kinds[kind].push(u32::try_from(i).unwrap_or(u32::MAX));
+                        }
+                        Some(_) => alive.push(ray[i]),
+                        None => {}
+                    }
                 }
                 if !placed.is_seen {
                     continue;
@@ -192,8 +260,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                     direction,
                     is_front: normal.dot(direction) <= 0.0,
                 };
-                let own = if bounces == 0 { f64::INFINITY } else { pdf[i] };
-                let Some(weight) = self.light_of_hit(&hit, own, radiance) else { continue };
+                let footprint = || self.footprint(stage, now, i);
+                let Some(weight) = self.light_of_hit(&hit, ways[i], footprint, radiance) else {
+                    continue;
+                };
                 radiance.iter_mut().zip(carried(i)).for_each(|(r, t)| *r *= t * weight);
                 let group = || lights.group_of_placement(around, hit.id[0]);
                 self.add(radiance, self.parts.row(ray[i], bounces, group), out);
@@ -204,27 +274,59 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let (i, block, lane) = (i as usize, &blocks[i as usize / BLOCK], i as usize % BLOCK);
             // The camera's rays are not all traced: those that cannot hit anything are other ones in blocks.
             if bounces == 0 {
-                return (beam.rays.origin(i), beam.rays.direction(i));
+                return (stage.beam.rays.origin(i), stage.beam.rays.direction(i));
             }
             let vector = |axes: &[[f32; BLOCK]; 3]| DVec3::from(axes.map(|a| f64::from(a[lane])));
             (stage.origin + vector(&block.origin), vector(&block.direction))
         });
         lights.environment(spectral, wanted, asked, radiance, |number, of_sky, light| {
             let i = missed[number] as usize;
-            let weight = if bounces == 0 { 1.0 } else { power_heuristic(pdf[i], of_sky) };
+            let weight = ways[i].weight_against(of_sky);
             light.iter_mut().zip(carried(i)).for_each(|(r, t)| *r *= t * weight);
             self.add(light, self.parts.row(ray[i], bounces, || lights.group_of_sky()), out);
         });
+        if stage.is_mixed {
+            alive.extend(kinds.iter().flatten().map(|&i| ray[i as usize]));
+        }
     }
 
-    /// The light of a surface that was met, and its weight against having asked for it; `own` is the density
-    /// (1/sr) of the direction, `+inf` of the camera's.
-    fn light_of_hit(&self, hit: &LightHit, own: f64, radiance: &mut [f64]) -> Option<f64> {
-        let LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
-        let weight = |pdf: f64| match own {
-            f64::INFINITY => 1.0,
-            own => power_heuristic(own, if pdf.is_finite() { pdf } else { 0.0 }),
+    /// What path `i` stands for where it hit, which is a point where it was scattered by chance: a cone as wide as
+    /// there.
+    fn cone_at_hit(&self, stage: &Stage<'_>, now: &Paths, i: usize) -> Option<Cone> {
+        let (block, lane) = (&now.rays.blocks()[i / BLOCK], i % BLOCK);
+        let t = f64::from(block.t_max[lane]);
+        if stage.bounces > 0 {
+            return Some((*now.carried.cones.get(i)?)?.after(t));
+        }
+        let vector = |axes: &[[f32; BLOCK]; 3]| DVec3::from(axes.map(|a| f64::from(a[lane])));
+        let hit = stage.origin + vector(&block.origin) + vector(&block.direction) * t;
+        // A block's ray may start nearer.
+        let (origin, direction) = (stage.beam.rays.origin(i), stage.beam.rays.direction(i));
+        let cone = self.stage.surroundings.view.cone(direction)?;
+        Some(cone.after((hit - origin).dot(direction)))
+    }
+
+    /// How much path `i` covers where it hit.
+    fn footprint(&self, stage: &Stage<'_>, now: &Paths, i: usize) -> Option<Footprint> {
+        let Cone { width, .. } = self.cone_at_hit(stage, now, i)?;
+        let (block, lane) = (&now.rays.blocks()[i / BLOCK], i % BLOCK);
+        let direction = match stage.bounces {
+            0 => stage.beam.rays.direction(i),
+            _ => DVec3::from(block.direction.map(|axis| f64::from(axis[lane]))),
         };
+        Some(Footprint { direction, width })
+    }
+
+    /// The light of a surface that was met, and its weight against having asked for it.
+    fn light_of_hit(
+        &self,
+        hit: &LightHit,
+        way: Way,
+        footprint: impl Fn() -> Option<Footprint>,
+        radiance: &mut [f64],
+    ) -> Option<f64> {
+        let LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
+        let weight = |pdf: f64| way.weight_against(if pdf.is_finite() { pdf } else { 0.0 });
         let index = lights.index_of(hit.id);
         if let Some(index) = index
             && let Some((lamp, bands)) = lights.plain_triangle(index, self.count())
@@ -233,7 +335,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 return None;
             }
             radiance.copy_from_slice(bands);
-            if own == f64::INFINITY {
+            if way.is_specular {
                 return Some(1.0);
             }
             let cosine = hit.direction.dot(lamp.shape.normal).abs();
@@ -243,12 +345,13 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let placement = around.geometry.placements.get(hit.id[0] as usize)?;
         let [u, v] = hit.weights;
         let corner = SurfacePoint::corner(around.geometry, placement, hit.id[1] as usize);
-        let spot = SurfacePoint { weights: [1.0 - u - v, u, v], ..corner };
+        let weights = [1.0 - u - v, u, v];
+        let spot = SurfacePoint { weights, footprint: footprint(), ..corner };
         let material = around.material(&spot)?;
         if material.scattering == Scattering::Unlit {
             let [r, g, b, _] = around.base_color(material, &spot);
             spectral.spread(&[r, g, b], radiance);
-            return (own == f64::INFINITY).then_some(1.0);
+            return way.is_specular.then_some(1.0);
         }
         if !lights.emitted(around, spectral, &spot, hit.is_front, radiance) {
             return None;
@@ -258,13 +361,13 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     }
 
     /// Draws what this step needs for all paths that go on.
-    fn draw_for_blocks(&self, samples: &dyn Samples, stage: &Stage<'_>, lanes: &mut LaneScratch) {
-        let lights = self.stage.lights;
-        let follows = !stage.ends || lights.is_hittable();
+    fn draw_for_blocks(&self, stage: &Stage<'_>, lanes: &mut LaneScratch) {
+        let LightingContext { lights, traits, .. } = self.stage;
+        let follows = !stage.ends_unless_specular || lights.is_hittable() || traits.has_choice;
         let roulette = self.rules.roulette.is_some_and(|after| stage.bounces + 1 >= after);
         for draw in Draw::ALL {
             let needs = match draw {
-                Draw::Choice => false,
+                Draw::Choice => traits.has_choice,
                 Draw::Light => lights.are_several() || lights.are_extended(),
                 Draw::Direction => follows,
                 Draw::Chance => roulette && !stage.ends,
@@ -272,121 +375,334 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let drawn = &mut lanes.drawn[draw as usize];
             drawn.clear();
             if needs {
-                samples.squares_of_pair(&lanes.alive, stage.bounces * DRAWS + draw as u32, drawn);
+                let pair = stage.bounces * DRAWS + draw as u32;
+                stage.beam.samples.squares_of_pair(&lanes.alive, pair, drawn);
             }
         }
     }
 
-    /// The step of the hits of one patch, from path `first` on; `alive` counts the paths that go on.
+    /// The step of all paths where all surfaces are matte: hits stay where they are, among those of paths that end.
+    fn step_matte(
+        &self,
+        stage: &Stage<'_>,
+        lanes: &mut LaneScratch,
+        patch: &mut Patch,
+        asked: &mut Asked,
+    ) {
+        let mut alive = 0;
+        for first in (0..lanes.now.rays.len()).step_by(LANES) {
+            let count = LANES.min(lanes.now.rays.len() - first);
+            let blocks = &lanes.now.rays.blocks()[first / BLOCK..];
+            self.unpack(stage, patch, (blocks, count));
+            lanes.picked.clear();
+            for lane in 0..count {
+                let placed = self.stage.placed.get(blocks[lane / BLOCK].placement[lane % BLOCK]);
+                let is_matte = |placed: &&PlacedSurface| placed.kind == SurfaceKind::Matte;
+                let Some(placed) = placed.filter(is_matte) else { continue };
+                if lanes.now.carried.ways[first + lane].is_last {
+                    continue;
+                }
+                self.look_up_matte(stage, &lanes.now, patch, (first + lane, lane), placed);
+                patch.path.push((first + lane, alive));
+                lanes.picked.push(lane);
+                alive += 1;
+            }
+            self.step_blocks(stage, lanes, patch, SurfaceKind::Matte, asked);
+        }
+    }
+
+    /// The step of all paths where surfaces are of several kinds: those of one side by side.
+    fn step_kinds(
+        &self,
+        stage: &Stage<'_>,
+        lanes: &mut LaneScratch,
+        patch: &mut Patch,
+        asked: &mut Asked,
+    ) {
+        lanes.smooth.clear();
+        let mut alive = 0;
+        for (number, kind) in KINDS.into_iter().enumerate() {
+            let paths = std::mem::take(&mut lanes.kinds[number]);
+            for chunk in paths.chunks(LANES) {
+                let numbered = (alive..).zip(chunk).map(|(k, &i)| (i as usize, k));
+                alive += chunk.len();
+                self.step_side_by_side(stage, lanes, patch, (kind, numbered), asked);
+            }
+            lanes.kinds[number] = paths;
+        }
+        let smooth = std::mem::take(&mut lanes.smooth);
+        for chunk in smooth.chunks(LANES) {
+            let own = (SurfaceKind::Other, chunk.iter().copied());
+            self.step_side_by_side(stage, lanes, patch, own, asked);
+        }
+        lanes.smooth = smooth;
+    }
+
+    /// The step of paths that met surfaces of one kind, at most as many as a patch has lanes: their numbers, and
+    /// which of those that go on they are.
+    fn step_side_by_side(
+        &self,
+        stage: &Stage<'_>,
+        lanes: &mut LaneScratch,
+        patch: &mut Patch,
+        (kind, paths): (SurfaceKind, impl Iterator<Item = (usize, usize)> + Clone),
+        asked: &mut Asked,
+    ) {
+        let LaneScratch { now, side_by_side, smooth, picked, .. } = lanes;
+        side_by_side.resize(LANES / BLOCK, RayBlock::EMPTY);
+        let mut count = 0;
+        for (i, _) in paths.clone() {
+            let from = &now.rays.blocks()[i / BLOCK];
+            side_by_side[count / BLOCK].copy_hit(count % BLOCK, from, i % BLOCK);
+            count += 1;
+        }
+        self.unpack(stage, patch, (side_by_side, count));
+        picked.clear();
+        for (lane, (i, k)) in paths.enumerate() {
+            let placement = side_by_side[lane / BLOCK].placement[lane % BLOCK];
+            let Some(placed) = self.stage.placed.get(placement) else { continue };
+            match kind {
+                SurfaceKind::Black => continue,
+                SurfaceKind::Matte => self.look_up_matte(stage, now, patch, (i, lane), placed),
+                SurfaceKind::Sheet => {
+                    if !self.look_up_sheet(stage, now, patch, (i, lane), placed) {
+                        smooth.push((i, k));
+                        continue;
+                    }
+                }
+                SurfaceKind::Smooth => self.look_up_smooth(stage, now, patch, (i, lane), placed),
+                SurfaceKind::Other => self.look_up_other(stage, now, patch, (i, lane), placed),
+            }
+            patch.path.push((i, k));
+            picked.push(lane);
+        }
+        self.step_blocks(stage, lanes, patch, kind, asked);
+    }
+
+    /// Begins a patch with the rays and hits of blocks.
+    fn unpack(&self, stage: &Stage<'_>, patch: &mut Patch, (blocks, count): (&[RayBlock], usize)) {
+        patch.clear();
+        patch.count = count;
+        kernels::unpack(patch, &blocks[..count.div_ceil(BLOCK)], stage.origin.to_array());
+        patch.colors.resize(count, [0.0; 3]);
+    }
+
+    /// The step of the hits that were picked of a patch, all of one kind.
     fn step_blocks(
         &self,
         stage: &Stage<'_>,
         lanes: &mut LaneScratch,
         patch: &mut Patch,
-        (first, alive): (usize, &mut usize),
+        kind: SurfaceKind,
         asked: &mut Asked,
-        beam: &RaySamples<'_>,
     ) {
-        let count = LANES.min(lanes.now.rays.len() - first);
-        let from = *alive;
-        patch.clear();
-        patch.count = count;
-        let blocks = &lanes.now.rays.blocks()[first / BLOCK..];
-        kernels::unpack(patch, &blocks[..count.div_ceil(BLOCK)], stage.origin.to_array());
-        // What is known of each hit beforehand.
-        let picked = &mut lanes.picked;
-        picked.clear();
-        patch.colors.resize(count, [0.0; 3]);
-        let mut is_tilted = false;
-        for lane in 0..count {
-            let (block, k) = (&blocks[lane / BLOCK], lane % BLOCK);
-            let placed = self.stage.placed.get(block.placement[k]);
-            let Some(placed) = placed.filter(|placed| placed.is_matte) else { continue };
-            put(&mut patch.seen.magnitudes, lane, placed.magnitudes);
-            if let (Some(color), false) = (placed.color, placed.is_tilted) {
-                patch.colors[lane] = color;
-            } else {
-                is_tilted |= placed.is_tilted;
-                self.look_up(stage, patch, (first + lane, lane), lanes_hit(block, k), beam);
-            }
-            patch.path.push((first + lane, *alive));
-            picked.push(lane);
-            *alive += 1;
+        if lanes.picked.is_empty() {
+            return;
         }
         let roundings = self.stage.roundings();
         kernels::measure(patch, roundings);
-        if is_tilted {
+        if patch.is_tilted {
             kernels::bend(patch);
         }
-        if !self.stage.lights.is_dark() {
-            self.choose_for_blocks(lanes, patch, from, asked);
-            kernels::aim(patch, roundings);
-            self.ask_for_blocks(stage, lanes, patch);
+        if kind == SurfaceKind::Sheet {
+            patch.sheets.view(&patch.seen.shading, &patch.seen.direction);
+            for &lane in &lanes.picked {
+                let mean = patch.sheets.mean[lane];
+                let deep = |c| metal::multiple(metal::mean_reflectance(c, 0.0), mean);
+                if patch.sheets.metallic[lane] > 0.0 {
+                    patch.sheet_colors[lane].deep = patch.colors[lane].map(deep);
+                }
+            }
         }
-        if !stage.ends || self.stage.lights.is_hittable() {
-            self.scatter_blocks(stage, lanes, patch, from);
+        let is_delta = |bsdf: &Bsdf| bsdf.is_delta();
+        // What scatters light of single directions asks none.
+        let asks = match kind {
+            SurfaceKind::Matte | SurfaceKind::Sheet => true,
+            SurfaceKind::Black | SurfaceKind::Smooth => false,
+            SurfaceKind::Other => !patch.bsdfs.iter().all(is_delta),
+        };
+        if asks && !self.stage.lights.is_dark() {
+            self.choose_for_blocks(lanes, patch, asked);
+            kernels::aim(patch, roundings);
+            self.ask_for_blocks(stage, lanes, patch, kind);
+        }
+        self.scatter_blocks(stage, lanes, patch, kind);
+    }
+
+    /// Where a hit is on its mesh, as path `i` sees it.
+    fn point_of(
+        &self,
+        stage: &Stage<'_>,
+        now: &Paths,
+        i: usize,
+    ) -> Option<(u32, SurfacePoint<'_>)> {
+        let geometry = self.stage.surroundings.geometry;
+        let (block, lane) = (&now.rays.blocks()[i / BLOCK], i % BLOCK);
+        let id = block.placement[lane];
+        let placement = geometry.placements.get(id as usize)?;
+        let corner = SurfacePoint::corner(geometry, placement, block.triangle[lane] as usize);
+        let [u, v] = [block.u[lane], block.v[lane]].map(|w| f64::from(w.clamp(0.0, 1.0)));
+        let footprint = self.footprint(stage, now, i);
+        Some((id, SurfacePoint { weights: [1.0 - u - v, u, v], footprint, ..corner }))
+    }
+
+    /// What is known of a hit on a matte surface: its colour, and its shading normal where that is not the
+    /// triangle's.
+    #[inline(always)]
+    fn look_up_matte(
+        &self,
+        stage: &Stage<'_>,
+        now: &Paths,
+        patch: &mut Patch,
+        (i, lane): (usize, usize),
+        placed: &PlacedSurface,
+    ) {
+        put(&mut patch.seen.magnitudes, lane, placed.magnitudes);
+        if let (Some(color), false) = (placed.color, placed.is_tilted) {
+            patch.colors[lane] = color;
+        } else if let Some((_, spot)) = self.point_of(stage, now, i) {
+            self.look_up(patch, lane, placed, &spot);
         }
     }
 
     /// Colour and shading normal of a hit where they are not alike all over.
     fn look_up(
         &self,
-        stage: &Stage<'_>,
         patch: &mut Patch,
-        (path, lane): (usize, usize),
-        (id, [u, v]): ([u32; 2], [f64; 2]),
-        beam: &RaySamples<'_>,
+        lane: usize,
+        placed: &PlacedSurface,
+        spot: &SurfacePoint<'_>,
     ) {
         let around = &self.stage.surroundings;
-        let Some(placement) = around.geometry.placements.get(id[0] as usize) else { return };
-        let Some(placed) = self.stage.placed.get(id[0]) else { return };
-        let corner = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
-        // Seen by chance from one point, a surface is a point: the camera's rays alone cover some of it.
-        let footprint = (stage.bounces == 0).then(|| {
-            let direction = beam.rays.direction(path);
-            let Seen { origin, direction: along, t, .. } = &patch.seen;
-            let point = at(origin, lane) + at(along, lane) * t[lane];
-            let t = (point - beam.rays.origin(path)).dot(direction);
-            let cone: Option<Cone> = around.view.cone(direction);
-            cone.map(|cone| Footprint { direction, width: cone.after(t).width })
-        });
-        let weights = [1.0 - u - v, u, v];
-        let spot = SurfacePoint { weights, footprint: footprint.flatten(), ..corner };
-        let Some(material) = around.material(&spot) else { return };
+        let Some(material) = around.material(spot) else { return };
         if placed.is_tilted {
+            patch.is_tilted = true;
             let front = at(&patch.seen.normal, lane);
             let tilted = spot.tilted_normal(around, material, placed.turn.as_ref(), front);
             put(&mut patch.seen.shading, lane, tilted);
         }
         patch.colors[lane] = placed.color.unwrap_or_else(|| {
-            let [r, g, b, _] = around.base_color(material, &spot);
+            let [r, g, b, _] = around.base_color(material, spot);
             [r, g, b].map(|c| c.clamp(0.0, 1.0))
         });
     }
 
-    /// Chooses a light for each hit, and a place on it.
-    fn choose_for_blocks(
+    /// What is known of a hit on a sheet of facets; whether it is rough.
+    fn look_up_sheet(
         &self,
-        lanes: &LaneScratch,
+        stage: &Stage<'_>,
+        now: &Paths,
         patch: &mut Patch,
-        from: usize,
-        asked: &mut Asked,
+        (i, lane): (usize, usize),
+        placed: &PlacedSurface,
+    ) -> bool {
+        let around = &self.stage.surroundings;
+        let Some((_, spot)) = self.point_of(stage, now, i) else { return false };
+        let Some(material) = around.material(&spot) else { return false };
+        let (surface, named, is_metal) = match &material.scattering {
+            Scattering::Metal { roughness, named } => {
+                let (alpha, highlight) = (roughness * roughness, [1.0; 3]);
+                let metal = SheetSurface { metallic: 1.0, alpha, f0: 0.0, f90: 0.0, highlight };
+                (metal, *named, 1.0)
+            }
+            Scattering::Gltf(surface) => (surface.sheet(&spot, around), None, 0.0),
+            Scattering::Black
+            | Scattering::Matte
+            | Scattering::Unlit
+            | Scattering::Mirror
+            | Scattering::Dielectric(_) => return false,
+        };
+        if surface.alpha <= 0.0 {
+            return false;
+        }
+        put(&mut patch.seen.magnitudes, lane, placed.magnitudes);
+        self.look_up(patch, lane, placed, &spot);
+        let SheetSurface { metallic, alpha, f0, f90, highlight } = surface;
+        let peak = |color: &Color| color[0].max(color[1]).max(color[2]);
+        let sheets = &mut *patch.sheets;
+        (sheets.alpha[lane], sheets.metallic[lane]) = (alpha, metallic);
+        (sheets.f0[lane], sheets.f90[lane]) = (f0, f90);
+        sheets.base_peak[lane] = peak(&patch.colors[lane]);
+        sheets.f0_peak[lane] = (f0 * peak(&highlight)).min(1.0);
+        sheets.is_metal[lane] = is_metal;
+        patch.sheet_colors.resize(LANES, SheetColors::default());
+        patch.sheet_colors[lane] = SheetColors { highlight, deep: [0.0; 3], named };
+        true
+    }
+
+    /// What is known of a hit on a smooth surface.
+    fn look_up_smooth(
+        &self,
+        stage: &Stage<'_>,
+        now: &Paths,
+        patch: &mut Patch,
+        (i, lane): (usize, usize),
+        placed: &PlacedSurface,
     ) {
+        self.look_up_matte(stage, now, patch, (i, lane), placed);
+        let around = &self.stage.surroundings;
+        let placement = now.rays.blocks()[i / BLOCK].placement[i % BLOCK];
+        let material = around.geometry.placements.get(placement as usize);
+        let material = material.and_then(|p| around.materials.get(p.material as usize));
+        let scattering = material.map_or(&Scattering::Black, |material| &material.scattering);
+        let named = if let Scattering::Metal { named, .. } = scattering { *named } else { None };
+        let smooth = &mut patch.smooth;
+        smooth.is_metal[lane] = f64::from(matches!(scattering, Scattering::Metal { .. }));
+        smooth.eta[lane] = 0.0;
+        if let Scattering::Dielectric(glass) = scattering {
+            // Rays that pass a surface leave it on the other side.
+            patch.seen.is_beside[lane] = 0.0;
+            let index = glass.ior.at(self.stage.spectral.wavelength(0));
+            let seen = &patch.seen;
+            let is_front = at(&seen.normal, lane).dot(at(&seen.direction, lane)) <= 0.0;
+            smooth.eta[lane] = if is_front { index } else { 1.0 / index };
+        }
+        patch.sheet_colors.resize(LANES, SheetColors::default());
+        patch.sheet_colors[lane] = SheetColors { named, ..SheetColors::default() };
+    }
+
+    /// How a surface of any other kind scatters light.
+    fn look_up_other(
+        &self,
+        stage: &Stage<'_>,
+        now: &Paths,
+        patch: &mut Patch,
+        (i, lane): (usize, usize),
+        placed: &PlacedSurface,
+    ) {
+        let around = &self.stage.surroundings;
+        put(&mut patch.seen.magnitudes, lane, placed.magnitudes);
+        if !placed.is_opaque {
+            // Rays that pass a surface leave it on the other side.
+            patch.seen.is_beside[lane] = 0.0;
+        }
+        let seen = &patch.seen;
+        let ray = (at(&seen.origin, lane), at(&seen.direction, lane));
+        let hit = (seen.t[lane], at(&seen.normal, lane));
+        let found = self.point_of(stage, now, i);
+        let found = found.and_then(|spot| SurfaceInteraction::at(self.stage, spot, ray, hit));
+        let black = || Bsdf::new(Model::Black, [hit.1; 2], -ray.1, [[0.0; 3]; 2]);
+        let bsdf = found.map(|met| met.bsdf(around, self.stage.spectral.wavelength(0)));
+        patch.bsdfs.push(bsdf.unwrap_or_else(black));
+    }
+
+    /// Chooses a light for each hit, and a place on it.
+    fn choose_for_blocks(&self, lanes: &LaneScratch, patch: &mut Patch, asked: &mut Asked) {
         let LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
         let count = self.count();
-        let numbers = lanes.drawn[Draw::Light as usize].get(from..);
         patch.radiance.resize(LANES * count, 0.0);
         asked.clear();
         let picks = &mut patch.picks;
-        for (k, &lane) in lanes.picked.iter().enumerate() {
-            let square = numbers.and_then(|all| all.get(k)).copied().unwrap_or([0.5; 2]);
-            [picks.square[0][lane], picks.square[1][lane]] = square;
+        for (&lane, &(_, k)) in lanes.picked.iter().zip(&patch.path) {
+            [picks.square[0][lane], picks.square[1][lane]] = lanes.number(Draw::Light, k);
         }
         // Which light.
         if let Some(below) = lights.few() {
             kernels::pick(picks, below);
         } else {
-            for &lane in &lanes.picked {
+            // What scatters light of single directions asks none.
+            let asks = |lane: &&usize| patch.bsdfs.get(**lane).is_none_or(|b| !b.is_delta());
+            for &lane in lanes.picked.iter().filter(asks) {
                 let u = &mut picks.square[0][lane];
                 match lights.pick(at(&patch.seen.point, lane), *u) {
                     Some((index, rest, chance)) => {
@@ -395,6 +711,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                     }
                     None => picks.chance[lane] = 0.0,
                 }
+            }
+        }
+        for (lane, bsdf) in patch.bsdfs.iter().enumerate() {
+            if bsdf.is_delta() {
+                picks.chance[lane] = 0.0;
             }
         }
         let squares = picks.square;
@@ -430,13 +751,29 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     }
 
     /// Notes the rays to the lights that were chosen, and what each brings.
-    fn ask_for_blocks(&self, stage: &Stage<'_>, lanes: &mut LaneScratch, patch: &mut Patch) {
+    fn ask_for_blocks(
+        &self,
+        stage: &Stage<'_>,
+        lanes: &mut LaneScratch,
+        patch: &mut Patch,
+        kind: SurfaceKind,
+    ) {
+        match kind {
+            SurfaceKind::Black | SurfaceKind::Smooth => return,
+            SurfaceKind::Matte => kernels::reflect(patch),
+            SurfaceKind::Sheet => {
+                let Patch { sheets, seen, away, targets, .. } = patch;
+                let normals = [&seen.normal, &seen.shading];
+                let asked = (&away.toward, &away.pdf, &targets.is_delta);
+                sheets.reflect(normals, asked, &mut away.value);
+            }
+            SurfaceKind::Other => weigh(patch),
+        }
         let LaneScratch { now, shadows, picked, .. } = lanes;
         let count = self.count();
-        kernels::reflect(patch);
-        let Patch { away, targets, colors, radiance, path, .. } = patch;
         let (lights, around) = (self.stage.lights, &self.stage.surroundings);
-        for (&lane, &(i, _)) in picked.iter().zip(path.iter()) {
+        for (&lane, &(i, _)) in picked.iter().zip(patch.path.iter()) {
+            let Patch { away, targets, radiance, .. } = &*patch;
             let value = away.value[lane];
             // Any comparison with NaN is false.
             let counts = value > 0.0;
@@ -450,10 +787,37 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let light = radiance[lane * count..(lane + 1) * count].iter();
             let throughput = &now.carried.throughput[i * count..(i + 1) * count];
             let bands = light.zip(throughput).enumerate();
-            let color = &colors[lane];
-            let brought = bands.map(|(k, (l, t))| l * t * value * self.band(color, k));
-            shadows.carried.throughput.extend(brought);
+            let all = &mut shadows.carried.throughput;
+            match kind {
+                SurfaceKind::Black | SurfaceKind::Smooth => {}
+                SurfaceKind::Matte => {
+                    let color = &patch.colors[lane];
+                    all.extend(bands.map(|(k, (l, t))| l * t * value * self.band(color, k)));
+                }
+                SurfaceKind::Sheet => {
+                    let weights = patch.sheets.weights(lane);
+                    let share = |k| self.in_band_of_sheet(patch, lane, weights, k);
+                    all.extend(bands.map(|(k, (l, t))| l * t * value * share(k)));
+                }
+                SurfaceKind::Other => {
+                    let share = |k| self.in_band(&patch.bsdfs[lane], patch.weights[lane], k);
+                    all.extend(bands.map(|(k, (l, t))| l * t * value * share(k)));
+                }
+            }
         }
+    }
+
+    /// What a sheet of facets has of light in band `k`.
+    #[inline(always)]
+    fn in_band_of_sheet(&self, patch: &Patch, lane: usize, value: Weights, k: usize) -> f64 {
+        let SheetColors { highlight, deep, named } = &patch.sheet_colors[lane];
+        if let Some(named) = named {
+            return self.in_band_of_metal(*named, patch.sheets.mean[lane], value, k);
+        }
+        value.white
+            + value.base * self.band(&patch.colors[lane], k)
+            + value.highlight * self.band(highlight, k)
+            + value.deep * self.band(deep, k)
     }
 
     /// Chooses a direction for each hit, and notes the path along it, but for those that carry nothing or end
@@ -463,56 +827,159 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         stage: &Stage<'_>,
         lanes: &mut LaneScratch,
         patch: &mut Patch,
-        from: usize,
+        kind: SurfaceKind,
     ) {
-        let LaneScratch { now, next, last, of_last, drawn, picked, .. } = lanes;
-        let count = self.count();
-        let of =
-            |draw: Draw, k: usize| drawn[draw as usize].get(from + k).copied().unwrap_or([0.5; 2]);
-        let mut squares = [[0.5; 2]; LANES];
-        for (k, &lane) in picked.iter().enumerate() {
-            squares[lane] = of(Draw::Direction, k);
+        let hittable = self.stage.lights.is_hittable();
+        let ends = stage.ends_unless_specular;
+        if ends && !hittable && matches!(kind, SurfaceKind::Matte | SurfaceKind::Sheet) {
+            return;
         }
-        kernels::scatter(patch, &squares);
-        let asks_emitters = stage.ends && stage.asks_emitters;
-        let roulette = self.rules.roulette.filter(|&after| stage.bounces + 1 >= after);
-        let Patch { away, colors, path, .. } = patch;
-        for ((k, &lane), &(i, _)) in picked.iter().enumerate().zip(path.iter()) {
-            let pdf = away.value[lane];
+        let squares = || {
+            let mut squares = [[0.5; 2]; LANES];
+            for (&lane, &(_, k)) in lanes.picked.iter().zip(&patch.path) {
+                squares[lane] = lanes.number(Draw::Direction, k);
+            }
+            squares
+        };
+        let choices = || {
+            let mut choices = [0.5; LANES];
+            for (&lane, &(_, k)) in lanes.picked.iter().zip(&patch.path) {
+                choices[lane] = lanes.number(Draw::Choice, k)[1];
+            }
+            choices
+        };
+        match kind {
+            SurfaceKind::Black => return,
+            SurfaceKind::Matte => {
+                let squares = squares();
+                kernels::scatter(patch, &squares);
+            }
+            SurfaceKind::Sheet => {
+                let (squares, choices) = (squares(), choices());
+                let Patch { sheets, seen, away, .. } = patch;
+                let normals = [&seen.normal, &seen.shading];
+                let found = (&mut away.along, &mut away.value);
+                sheets.scatter(normals, (&choices, &squares), found);
+                kernels::leave(patch);
+            }
+            SurfaceKind::Smooth => {
+                let choices = choices();
+                kernels::mirror_or_refract(patch, &choices);
+            }
+            SurfaceKind::Other => return self.scatter_one_by_one(stage, lanes, patch),
+        }
+        let count = self.count();
+        for n in 0..lanes.picked.len() {
+            let (lane, (i, k)) = (lanes.picked[n], patch.path[n]);
+            let pdf = patch.away.value[lane];
             let goes_on = pdf > 0.0;
             if !goes_on {
                 continue;
             }
-            let throughput = &mut now.carried.throughput[i * count..(i + 1) * count];
-            let mut most = 0.0_f64;
-            for (k, band) in throughput.iter_mut().enumerate() {
-                *band *= self.band(&colors[lane], k);
-                most = most.max(*band);
+            let throughput = &mut lanes.now.carried.throughput[i * count..(i + 1) * count];
+            let bands = throughput.iter_mut().enumerate();
+            match kind {
+                SurfaceKind::Black | SurfaceKind::Other => {}
+                SurfaceKind::Matte => {
+                    bands.for_each(|(k, band)| *band *= self.band(&patch.colors[lane], k));
+                }
+                SurfaceKind::Sheet => {
+                    let weights = patch.sheets.weights(lane);
+                    bands.for_each(|(k, band)| {
+                        *band *= self.in_band_of_sheet(patch, lane, weights, k);
+                    });
+                }
+                SurfaceKind::Smooth => {
+                    let (white, base) = (patch.smooth.white[lane], patch.smooth.base[lane]);
+                    let weights =
+                        Weights { white, base, dip: patch.smooth.dip[lane], ..Weights::default() };
+                    bands.for_each(|(k, band)| {
+                        *band *= self.in_band_of_sheet(patch, lane, weights, k);
+                    });
+                }
             }
-            let ray = || (at(&away.start, lane), at(&away.along, lane));
-            if most <= 0.0 || (asks_emitters && !self.may_shine(ray())) {
+            let is_specular = kind == SurfaceKind::Smooth;
+            let is_last = if is_specular { stage.ends } else { ends };
+            let cone = if is_specular { self.cone_at_hit(stage, &lanes.now, i) } else { None };
+            let way = Way { pdf, is_specular, is_last };
+            self.follow_blocks(stage, lanes, patch, (lane, (i, k)), (way, cone));
+        }
+    }
+
+    /// The same of surfaces that are worked out one by one.
+    fn scatter_one_by_one(&self, stage: &Stage<'_>, lanes: &mut LaneScratch, patch: &mut Patch) {
+        let hittable = self.stage.lights.is_hittable();
+        let count = self.count();
+        for n in 0..lanes.picked.len() {
+            let (lane, (i, k)) = (lanes.picked[n], patch.path[n]);
+            let bsdf = &patch.bsdfs[lane];
+            if stage.ends_unless_specular && !hittable && !bsdf.has_single() {
                 continue;
             }
-            if roulette.is_some() && !stage.ends {
-                // Its root: where few paths come this far, ending them saves little and leaves noise.
-                let survival = most.sqrt().min(1.0);
-                if of(Draw::Chance, k)[1] >= survival {
-                    continue;
-                }
-                throughput.iter_mut().for_each(|band| *band /= survival);
-            }
-            let carried = if asks_emitters {
-                let (start, along) = ray();
-                last.push(start, along);
-                &mut *of_last
-            } else {
-                push(&mut next.rays, stage, [&away.start, &away.along], lane, f64::INFINITY);
-                &mut next.carried
+            let choice = lanes.number(Draw::Choice, k)[1];
+            let Some(scattered) = bsdf.sample(choice, lanes.number(Draw::Direction, k)) else {
+                continue;
             };
-            carried.ray.push(now.carried.ray[i]);
-            carried.pdf.push(pdf);
-            carried.throughput.extend_from_slice(throughput);
+            let is_specular = scattered.pdf == f64::INFINITY;
+            let is_last = if is_specular { stage.ends } else { stage.ends_unless_specular };
+            if is_last && !is_specular && !hittable {
+                continue;
+            }
+            let throughput = &mut lanes.now.carried.throughput[i * count..(i + 1) * count];
+            for (k, band) in throughput.iter_mut().enumerate() {
+                *band *= self.in_band(bsdf, scattered.weights, k);
+            }
+            let start = patch.leave(lane, scattered.direction);
+            patch.send(lane, (start, scattered.direction));
+            let cone = if is_specular { self.cone_at_hit(stage, &lanes.now, i) } else { None };
+            let way = Way { pdf: scattered.pdf, is_specular, is_last };
+            self.follow_blocks(stage, lanes, patch, (lane, (i, k)), (way, cone));
         }
+    }
+
+    /// Notes the path along the ray that leaves a lane, unless it carries nothing or ends by chance.
+    #[inline(always)]
+    fn follow_blocks(
+        &self,
+        stage: &Stage<'_>,
+        lanes: &mut LaneScratch,
+        patch: &Patch,
+        (lane, (i, k)): (usize, (usize, usize)),
+        (way, cone): (Way, Option<Cone>),
+    ) {
+        let count = self.count();
+        let [_, chance] = lanes.number(Draw::Chance, k);
+        let LaneScratch { now, onward, .. } = lanes;
+        let throughput = &mut now.carried.throughput[i * count..(i + 1) * count];
+        let most = throughput.iter().copied().fold(0.0, f64::max);
+        let ray = || (at(&patch.away.start, lane), at(&patch.away.along, lane));
+        let asks = way.is_last && !way.is_specular && stage.asks_emitters;
+        if most <= 0.0 || (asks && !self.may_shine(ray())) {
+            return;
+        }
+        if self.rules.roulette.is_some_and(|after| stage.bounces + 1 >= after) && !way.is_last {
+            // Its root: where few paths come this far, ending them saves little and leaves noise.
+            let survival = most.sqrt().min(1.0);
+            if chance >= survival {
+                return;
+            }
+            throughput.iter_mut().for_each(|band| *band /= survival);
+        }
+        let carried = if asks {
+            let (start, along) = ray();
+            onward.last.push(start, along);
+            &mut onward.of_last
+        } else {
+            let [start, along] = [&patch.away.start, &patch.away.along];
+            push(&mut onward.next.rays, stage, [start, along], lane, f64::INFINITY);
+            if stage.is_mixed {
+                onward.next.carried.cones.push(cone);
+            }
+            &mut onward.next.carried
+        };
+        carried.ray.push(now.carried.ray[i]);
+        carried.ways.push(way);
+        carried.throughput.extend_from_slice(throughput);
     }
 
     /// Adds what lights bring along rays that nothing blocks.
@@ -545,7 +1012,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         (asked, radiance): (&mut Asked, &mut Vec<f64>),
         out: &mut [f64],
     ) {
-        let LaneScratch { last, of_last, hits, shadows, missed, .. } = lanes;
+        let LaneScratch { onward: Onward { last, of_last, .. }, hits, shadows, missed, .. } = lanes;
         let Some(emitters) = self.stage.emitters.filter(|_| !last.is_empty()) else { return };
         let LightingContext { lights, spectral, surroundings: around, .. } = self.stage;
         let (count, scatterings) = (self.count(), stage.bounces + 1);
@@ -556,7 +1023,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         emitters.closest(last, hits);
         shadows.clear();
         missed.clear();
-        let Carried { ray, pdf, throughput } = of_last;
+        let Carried { ray, ways, throughput, .. } = of_last;
         let carried = |i: usize| &throughput[i * count..(i + 1) * count];
         let note = |shadows: &mut Paths, row: u32, light: &[f64], (i, weight): (usize, f64)| {
             shadows.carried.ray.push(row);
@@ -578,7 +1045,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 direction,
                 is_front: normal.dot(direction) <= 0.0,
             };
-            let Some(weight) = self.light_of_hit(&hit, pdf[i], radiance) else { continue };
+            let Some(weight) = self.light_of_hit(&hit, ways[i], || None, radiance) else {
+                continue;
+            };
             let end = self.stage.anchor(from + direction * hit.t, normal, from, placed);
             let offset = end.leave(-direction) - from;
             let distance = offset.length();
@@ -594,7 +1063,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let ends = [last.origin(i), last.direction(i)];
             push_ray(&mut shadows.rays, stage, ends, f64::INFINITY);
             let row = self.parts.row(ray[i], scatterings, || lights.group_of_sky());
-            note(shadows, row, light, (i, power_heuristic(pdf[i], of_sky)));
+            note(shadows, row, light, (i, ways[i].weight_against(of_sky)));
         });
         self.shadows_of_blocks(stage.blocks, shadows, false, count, out);
     }
@@ -612,12 +1081,6 @@ struct LightHit {
     from: DVec3,
     direction: DVec3,
     is_front: bool,
-}
-
-/// What a lane of a block hit.
-fn lanes_hit(block: &etendue_geometry::RayBlock, lane: usize) -> ([u32; 2], [f64; 2]) {
-    let weights = [block.u[lane], block.v[lane]].map(|w| f64::from(w.clamp(0.0, 1.0)));
-    ([block.placement[lane], block.triangle[lane]], weights)
 }
 
 /// Appends the ray of a lane, from its start along its direction.

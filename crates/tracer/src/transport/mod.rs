@@ -30,11 +30,13 @@ use std::ops::{AddAssign, Range};
 use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, RayBatch};
+use etendue_spectrum::Metal;
 
 use self::lanes::LaneScratch;
 use self::media::{Coincident, Media};
 use self::numbers::{Draw, Numbers};
 use self::patch::Patch;
+pub(crate) use self::patch::{LANES, Row};
 use self::paths::{Paths, State};
 pub use self::rules::{Follow, Rules};
 use self::shadows::Shadows;
@@ -46,7 +48,7 @@ use crate::reference::SceneView;
 use crate::sky::Asked;
 use crate::spawn::{self, Anchor};
 use crate::spectral::Spectral;
-use crate::{Color, Material, Scattering};
+use crate::{Color, Glass, Ior, Material, Scattering};
 
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
@@ -100,6 +102,8 @@ pub struct Traits {
     pub has_media: bool,
     /// Some boundaries between bodies may not be there.
     pub has_nested: bool,
+    /// Some glass parts wavelengths.
+    pub has_dispersion: bool,
     /// All surfaces scatter light as Lambert's law has it, or not at all.
     pub is_matte: bool,
 }
@@ -116,6 +120,10 @@ impl Traits {
             traits.has_panes |= material.is_pane();
             traits.has_choice |= material.scattering.has_parts();
             traits.has_media |= material.absorption().is_some();
+            traits.has_dispersion |= matches!(
+                &material.scattering,
+                Scattering::Dielectric(Glass { ior: Ior::Dispersive(_), .. })
+            );
             match surfaces.get(i).and_then(|surface| surface.body) {
                 Some(body) => {
                     has_bodies = true;
@@ -374,13 +382,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// What a surface has of light in band `k`.
     #[inline]
     fn in_band(&self, bsdf: &Bsdf, value: Weights, k: usize) -> f64 {
-        let mut sum = value.white;
         if let Some(named) = bsdf.named() {
-            let [face_on, dip] = self.stage.spectral.metal(named, k);
-            let mean = metal::mean_reflectance(face_on, dip);
-            let deep = metal::multiple(mean, bsdf.mean_albedo());
-            return (sum + value.base * face_on + value.dip * dip + value.deep * deep).max(0.0);
+            return self.in_band_of_metal(named, bsdf.mean_albedo(), value, k);
         }
+        let mut sum = value.white;
         if value.base != 0.0 {
             sum += value.base * self.band(&bsdf.base, k);
         }
@@ -394,5 +399,13 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             sum += value.sheen * self.band(&bsdf.sheen(), k);
         }
         sum
+    }
+
+    /// The same of a metal of measured index, whose facets of reflectance 1 return `mean` of all light.
+    fn in_band_of_metal(&self, named: Metal, mean: f64, value: Weights, k: usize) -> f64 {
+        let [face_on, dip] = self.stage.spectral.metal(named, k);
+        let deep = metal::multiple(metal::mean_reflectance(face_on, dip), mean);
+        let sum = value.white + value.base * face_on + value.dip * dip + value.deep * deep;
+        sum.max(0.0)
     }
 }

@@ -2,30 +2,34 @@
 
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, HitPrecision, MISS};
+use etendue_spectrum::Metal;
 
 use super::media::Crossing;
 use super::paths::Paths;
 use crate::Color;
-use crate::bsdf::Bsdf;
+use crate::bsdf::sheets::Sheets;
+use crate::bsdf::{Bsdf, Weights};
 use crate::lamps::AreaLight;
 use crate::placed::PlacedSurface;
 use crate::spawn::Anchor;
 use crate::target::{Target, TargetKind};
 
 /// Hits worked on side by side.
-pub(super) const LANES: usize = 64;
+pub(crate) const LANES: usize = 64;
 
 /// Hits of f32 are beside an edge of their triangle where their least barycentric weight is below this: only
 /// triangles that are less than some hundred of the bounds of [`spawn`](crate::spawn) high have others as near
 /// to one, and a mesh of those has no sharp corners that it can resolve.
 pub(super) const BESIDE: f64 = 1.0 / 256.0;
 
-pub(super) type Row = [f64; LANES];
+pub(crate) type Row = [f64; LANES];
 
 /// Hits and what leaves them.
 #[derive(Debug, Default)]
 pub(super) struct Patch {
     pub(super) count: usize,
+    /// Some shading normal is not that of its triangle.
+    pub(super) is_tilted: bool,
     /// Of each path: its number, and which of those that go on it is.
     pub(super) path: Vec<(usize, usize)>,
     pub(super) seen: Seen,
@@ -34,14 +38,30 @@ pub(super) struct Patch {
     pub(super) targets: Targets,
     /// The colours of matte surfaces.
     pub(super) colors: Vec<Color>,
-    /// The surfaces that are not matte.
+    /// The surfaces that are not matte, and what each turns to the viewer of the light that it asks.
     pub(super) bsdfs: Vec<Bsdf>,
+    pub(super) weights: Vec<Weights>,
+    /// The surfaces that are smooth.
+    pub(super) smooth: Smooth,
+    /// The surfaces that are sheets of facets over a matte base, and their colours.
+    pub(super) sheets: Box<Sheets>,
+    pub(super) sheet_colors: Vec<SheetColors>,
     /// The media on their sides, where they part any.
     pub(super) crossings: Vec<Option<Crossing>>,
     /// What each light that was chosen gives off: `[lane][band]`.
     pub(super) radiance: Vec<f64>,
     /// Lanes of which something goes on.
     pub(super) picked: Vec<usize>,
+}
+
+/// The colours of a sheet of facets over a matte base.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct SheetColors {
+    pub(super) highlight: Color,
+    /// Of light that met several facets.
+    pub(super) deep: Color,
+    /// The metal by whose measured index it reflects.
+    pub(super) named: Option<Metal>,
 }
 
 /// The hits.
@@ -61,6 +81,20 @@ pub(super) struct Seen {
     /// 1 where it is beside an edge, and what rays that leave start behind by (m).
     pub(super) is_beside: Row,
     pub(super) back: [Row; 3],
+}
+
+/// Mirrors and smooth boundaries.
+#[derive(Debug)]
+pub(super) struct Smooth {
+    /// Index behind a boundary over the index in front; 0 of mirrors.
+    pub(super) eta: Row,
+    /// 1 for metal, which is white at grazing incidence.
+    pub(super) is_metal: Row,
+    /// What goes the way that was chosen, as multiples of white, of the surface's colour, and of what a measured
+    /// metal's reflectance lacks of Schlick's.
+    pub(super) white: Row,
+    pub(super) base: Row,
+    pub(super) dip: Row,
 }
 
 /// The places on lights that the hits ask, as [`Target`] has them.
@@ -127,6 +161,12 @@ impl Default for Seen {
     }
 }
 
+impl Default for Smooth {
+    fn default() -> Self {
+        Self { eta: ZERO, is_metal: ZERO, white: ZERO, base: ZERO, dip: ZERO }
+    }
+}
+
 impl Default for Targets {
     fn default() -> Self {
         Self {
@@ -167,9 +207,11 @@ impl Patch {
     /// Empties it.
     pub(super) fn clear(&mut self) {
         self.count = 0;
+        self.is_tilted = false;
         self.path.clear();
         self.colors.clear();
         self.bsdfs.clear();
+        self.weights.clear();
         self.crossings.clear();
     }
 

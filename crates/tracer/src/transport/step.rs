@@ -13,7 +13,7 @@ use super::paths::State;
 use super::{Follow, Scratch, Tracing, kernels};
 use crate::Scattering;
 use crate::bsdf::Weights;
-use crate::placed::PlacedSurface;
+use crate::placed::{PlacedSurface, SurfaceKind};
 use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
 use crate::surface::SurfaceInteraction;
@@ -30,7 +30,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 let Some(placed) = self.stage.placed.get(scratch.hits.placement[i]) else {
                     continue;
                 };
-                if placed.is_matte != is_matte {
+                if (placed.kind == SurfaceKind::Matte) != is_matte {
                     continue;
                 }
                 if is_matte {
@@ -206,7 +206,17 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             weigh(patch);
         }
         let Patch {
-            count, path, away, targets, colors, bsdfs, crossings, radiance, picked, ..
+            count,
+            path,
+            away,
+            targets,
+            colors,
+            bsdfs,
+            weights,
+            crossings,
+            radiance,
+            picked,
+            ..
         } = patch;
         picked.clear();
         picked.extend((0..*count).filter(|&lane| away.value[lane] > 0.0));
@@ -247,7 +257,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                         .extend(light.map(|(k, (l, t))| l * t * value * self.band(color, k)));
                 }
                 Some(bsdf) => {
-                    let (weights, _) = bsdf.evaluate(at(&away.toward, lane));
+                    let weights = weights[lane];
                     shadows.contribution.extend(
                         light.map(|(k, (l, t))| l * t * value * self.in_band(bsdf, weights, k)),
                     );
@@ -394,7 +404,8 @@ const UNLIMITED: [f64; LANES] = [f64::INFINITY; LANES];
 
 /// For surfaces that are not matte: the weight of what was aimed at over its density, which is 0 where
 /// the surface turns nothing of it to the viewer.
-fn weigh(patch: &mut Patch) {
+pub(super) fn weigh(patch: &mut Patch) {
+    patch.weights.clear();
     for lane in 0..patch.count {
         let toward: DVec3 = at(&patch.away.toward, lane);
         let pdf = patch.away.pdf[lane];
@@ -405,5 +416,6 @@ fn weigh(patch: &mut Patch) {
         let is_delta = patch.targets.is_delta[lane] > 0.0;
         let balance = if is_delta { 1.0 } else { power_heuristic(pdf, own) };
         patch.away.value[lane] = if value.is_zero() { 0.0 } else { balance / pdf };
+        patch.weights.push(value);
     }
 }

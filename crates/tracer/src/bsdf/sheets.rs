@@ -1,0 +1,493 @@
+//! Sheets of GGX facets over a matte base, many hits side by side: rough metal as [`super::metal`] has it, and
+//! glTF's surfaces as [`super::layered`] has them without a coat, a sheen, a grain and transmission. Their
+//! formulas are one: a metal is a sheet whose base is light that met several facets. Loops here vectorise: what is
+//! looked up in the table of albedos is gathered apart.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
+
+use std::f64::consts::PI;
+
+use etendue_geometry::disk;
+
+use super::albedo::{AlbedoTable, OBLIQUITIES, ROUGHNESSES, TABLE, lacking, obliquity};
+use super::metal::{mean_reflectance, multiple};
+use super::{Weights, fresnel};
+use crate::transport::{LANES, Row};
+
+const ZERO: Row = [0.0; LANES];
+
+/// The sheets of the hits of a patch.
+#[derive(Debug)]
+pub(crate) struct Sheets {
+    /// The square of the roughness, above 0, and the share of metal.
+    pub(crate) alpha: Row,
+    pub(crate) metallic: Row,
+    /// The dielectric's reflectance face on, before the highlights' colour, and at grazing incidence.
+    pub(crate) f0: Row,
+    pub(crate) f90: Row,
+    /// The largest bands of the surface's colour, and of the dielectric's reflectance face on.
+    pub(crate) base_peak: Row,
+    pub(crate) f0_peak: Row,
+    /// 1 for [`super::Model::Metal`], which chooses by what its facets return of white light.
+    pub(crate) is_metal: Row,
+    /// The x and y axes of the shading frames, and the viewer in them.
+    axes: [[Row; 3]; 2],
+    wo: [Row; 3],
+    /// Rows of the table and the shares of the next.
+    rows: [u32; LANES],
+    shares: Row,
+    /// What facets of reflectance 1, and the dielectric, return of light from the viewer; their means over
+    /// directions; the mean of what facets of reflectance 1 lack.
+    facets: Row,
+    dielectric: Row,
+    pub(crate) mean: Row,
+    dielectric_mean: Row,
+    lacking: Row,
+    /// Chances of the facets and of the base.
+    sheet: Row,
+    base: Row,
+    values: Values,
+}
+
+/// Values times cosine, as [`Weights`], and densities.
+#[derive(Debug)]
+struct Values {
+    white: Row,
+    base: Row,
+    highlight: Row,
+    dip: Row,
+    deep: Row,
+    pdf: Row,
+}
+
+impl Default for Sheets {
+    fn default() -> Self {
+        Self {
+            alpha: ZERO,
+            metallic: ZERO,
+            f0: ZERO,
+            f90: ZERO,
+            base_peak: ZERO,
+            f0_peak: ZERO,
+            is_metal: ZERO,
+            axes: [[ZERO; 3]; 2],
+            wo: [ZERO; 3],
+            rows: [0; LANES],
+            shares: ZERO,
+            facets: ZERO,
+            dielectric: ZERO,
+            mean: ZERO,
+            dielectric_mean: ZERO,
+            lacking: ZERO,
+            sheet: ZERO,
+            base: ZERO,
+            values: Values {
+                white: ZERO,
+                base: ZERO,
+                highlight: ZERO,
+                dip: ZERO,
+                deep: ZERO,
+                pdf: ZERO,
+            },
+        }
+    }
+}
+
+impl Sheets {
+    /// What was found last of a lane's value.
+    #[inline(always)]
+    pub(crate) fn weights(&self, lane: usize) -> Weights {
+        let Values { white, base, highlight, dip, deep, .. } = &self.values;
+        Weights {
+            white: white[lane],
+            base: base[lane],
+            highlight: highlight[lane],
+            dip: dip[lane],
+            deep: deep[lane],
+            sheen: 0.0,
+        }
+    }
+
+    /// As seen against `direction` (unit), with these shading normals on the viewer's side.
+    pub(crate) fn view(&mut self, shading: &[Row; 3], direction: &[Row; 3]) {
+        view(self, &TABLE, shading, direction);
+    }
+
+    /// What the surfaces turn to the viewer of light from `toward`, by the power heuristic against
+    /// [`Self::scatter`] and over the density `pdf` (1/sr), unless that light is of a single direction: to `share`,
+    /// which is 0 where there is none, times the weights.
+    pub(crate) fn reflect(
+        &mut self,
+        [normal, shading]: [&[Row; 3]; 2],
+        (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
+        share: &mut Row,
+    ) {
+        reflect(self, &TABLE, [normal, shading], (toward, pdf, is_delta), share);
+    }
+
+    /// Directions that light comes from, chosen in proportion to what it contributes by choices and squares, to
+    /// `along`; their density to `pdf`, 0 where the light is lost, and value over density to the weights.
+    pub(crate) fn scatter(
+        &mut self,
+        [normal, shading]: [&[Row; 3]; 2],
+        (choices, squares): (&Row, &[[f64; 2]; LANES]),
+        (along, pdf): (&mut [Row; 3], &mut Row),
+    ) {
+        scatter(self, &TABLE, [normal, shading], (choices, squares), (along, pdf));
+    }
+}
+
+/// The knot of `count` below `x` in 0..=1 and the share of the next, as [`super::albedo::place`] has them.
+#[inline(always)]
+fn place(x: f64, count: usize) -> (u32, f64) {
+    let x = if x > 0.0 { x } else { 0.0 };
+    let scaled = if x < 1.0 { x } else { 1.0 } * (count - 1) as f64;
+    let last = (count - 2) as f64;
+    #[expect(clippy::cast_possible_truncation, reason = "in range")]
+    let knot = if scaled < last { scaled } else { last } as i32;
+    (knot.cast_unsigned(), scaled - f64::from(knot))
+}
+
+/// A and B for the cosines of some directions.
+#[inline(always)]
+fn terms(sheets: &Sheets, table: &AlbedoTable, cosines: &Row) -> [Row; 2] {
+    let (mut knots, mut parts) = ([0_u32; LANES], ZERO);
+    for i in 0..LANES {
+        let mu = if cosines[i] > 0.0 { cosines[i] } else { 0.0 };
+        (knots[i], parts[i]) = place(obliquity(mu, sheets.alpha[i]), OBLIQUITIES);
+    }
+    let mut both = [ZERO; 2];
+    for i in 0..LANES {
+        let first = sheets.rows[i] as usize * OBLIQUITIES + knots[i] as usize;
+        let all = &table.entries[first..first + OBLIQUITIES + 2];
+        let (part, share) = (parts[i], sheets.shares[i]);
+        for term in 0..2 {
+            let along = |k: usize| all[k][term] * (1.0 - part) + all[k + 1][term] * part;
+            both[term][i] = along(0) * (1.0 - share) + along(OBLIQUITIES) * share;
+        }
+    }
+    both
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn view(sheets: &mut Sheets, table: &AlbedoTable, shading: &[Row; 3], direction: &[Row; 3]) {
+    for i in 0..LANES {
+        let (x, y, z) = (shading[0][i], shading[1][i], shading[2][i]);
+        // Duff et al., "Building an Orthonormal Basis, Revisited", 2017.
+        let sign = if z < 0.0 { -1.0 } else { 1.0 };
+        let f = -1.0 / (sign + z);
+        let g = x * y * f;
+        let [u, v] = [[1.0 + sign * x * x * f, sign * g, -sign * x], [g, sign + y * y * f, -y]];
+        for axis in 0..3 {
+            sheets.axes[0][axis][i] = u[axis];
+            sheets.axes[1][axis][i] = v[axis];
+        }
+        let along = |axis: [f64; 3]| {
+            -(direction[0][i] * axis[0] + direction[1][i] * axis[1] + direction[2][i] * axis[2])
+        };
+        sheets.wo[0][i] = along(u);
+        sheets.wo[1][i] = along(v);
+        sheets.wo[2][i] = along([x, y, z]);
+    }
+    for i in 0..LANES {
+        let root = sheets.alpha[i].sqrt().sqrt();
+        (sheets.rows[i], sheets.shares[i]) = place(root, ROUGHNESSES);
+    }
+    let mut means = [ZERO; 3];
+    for i in 0..LANES {
+        let row = sheets.rows[i] as usize;
+        let [own, next] = [table.means[row], table.means[row + 1]];
+        for term in 0..3 {
+            means[term][i] = own[term] * (1.0 - sheets.shares[i]) + next[term] * sheets.shares[i];
+        }
+    }
+    let [a, b] = terms(sheets, table, &sheets.wo[2]);
+    for i in 0..LANES {
+        let least = |x: f64| if x < 1.0 { x } else { 1.0 };
+        let [mean_a, mean_b] = [means[0][i], means[1][i]];
+        let (f0, f90) = (sheets.f0_peak[i], sheets.f90[i]);
+        sheets.mean[i] = least(mean_a + mean_b);
+        sheets.lacking[i] = means[2][i];
+        sheets.dielectric_mean[i] = f0 * mean_a + f90 * mean_b;
+        sheets.dielectric[i] = f0 * a[i] + f90 * b[i];
+        sheets.facets[i] = least(a[i] + b[i]);
+        // By what each part returns of a white light.
+        let (m, peak, dielectric) =
+            (sheets.metallic[i], sheets.base_peak[i], least(sheets.dielectric[i]));
+        let sheet = m * (peak * a[i] + b[i]) + (1.0 - m) * dielectric;
+        let deep = m * multiple(mean_reflectance(peak, 0.0), sheets.mean[i]);
+        let base = (1.0 - m) * (1.0 - dielectric) * peak + deep * (1.0 - sheets.facets[i]);
+        let is_metal = sheets.is_metal[i] > 0.0;
+        let (sheet, base) =
+            if is_metal { (sheets.facets[i], 1.0 - sheets.facets[i]) } else { (sheet, base) };
+        let sum = if is_metal { 1.0 } else { sheet + base };
+        let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+        sheets.sheet[i] = sheet * scale;
+        sheets.base[i] = base * scale;
+    }
+}
+
+/// Values and densities for light from directions in the shading frames, above the surfaces.
+#[inline(always)]
+fn evaluate(sheets: &mut Sheets, table: &AlbedoTable, wi: &[Row; 3]) {
+    let [a, b] = terms(sheets, table, &wi[2]);
+    let Sheets { alpha, metallic, f0, f90, f0_peak, is_metal, wo, values, .. } = sheets;
+    for i in 0..LANES {
+        let [vx, vy, vz] = [wo[0][i], wo[1][i], wo[2][i]];
+        let [lx, ly, lz] = [wi[0][i], wi[1][i], wi[2][i]];
+        // Facets (`super::ggx`).
+        let [hx, hy, hz] = [vx + lx, vy + ly, vz + lz];
+        let inverse = 1.0 / (hx * hx + hy * hy + hz * hz).sqrt();
+        let [hx, hy, hz] = [hx * inverse, hy * inverse, hz * inverse];
+        let squared = alpha[i] * alpha[i];
+        let e = (hx * hx + hy * hy) / squared + hz * hz;
+        let d = 1.0 / (PI * squared * e * e) / (4.0 * vz);
+        let lambda = |x: f64, y: f64, z: f64| {
+            0.5 * ((1.0 + squared * (x * x + y * y) / (z * z)).sqrt() - 1.0)
+        };
+        let [seen, lit] = [lambda(vx, vy, vz), lambda(lx, ly, lz)];
+        let value = d / (1.0 + seen + lit);
+        let density = d / (1.0 + seen);
+        let cosine = vx * hx + vy * hy + vz * hz;
+        let w = fresnel::schlick_weight(cosine);
+        let m = metallic[i];
+        values.white[i] = (m * w + (1.0 - m) * f90[i] * w) * value;
+        values.highlight[i] = (1.0 - m) * f0[i] * (1.0 - w) * value;
+        values.dip[i] = -is_metal[i] * cosine * (1.0 - cosine) * w * value;
+        // What is alike from all sides.
+        let shown = lz / PI;
+        let left = |returned: f64| if returned < 1.0 { 1.0 - returned } else { 0.0 };
+        let passed = left(sheets.dielectric[i]) * left(f0_peak[i] * a[i] + f90[i] * b[i]);
+        let below = 1.0 - sheets.dielectric_mean[i];
+        let base = if below > 0.0 { (1.0 - m) * passed / below * shown } else { 0.0 };
+        let several = lacking(sheets.facets[i]) * lacking(a[i] + b[i]) / sheets.lacking[i];
+        values.deep[i] = if sheets.lacking[i] > 0.0 { m * several * shown } else { 0.0 };
+        values.base[i] = m * (1.0 - w) * value + base;
+        values.pdf[i] = sheets.base[i] * shown + sheets.sheet[i] * density;
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn reflect(
+    sheets: &mut Sheets,
+    table: &AlbedoTable,
+    [normal, shading]: [&[Row; 3]; 2],
+    (toward, pdf, is_delta): (&[Row; 3], &Row, &Row),
+    share: &mut Row,
+) {
+    let mut wi = [ZERO; 3];
+    let mut above = ZERO;
+    for i in 0..LANES {
+        let along = |axes: &[Row; 3]| {
+            toward[0][i] * axes[0][i] + toward[1][i] * axes[1][i] + toward[2][i] * axes[2][i]
+        };
+        wi[0][i] = along(&sheets.axes[0]);
+        wi[1][i] = along(&sheets.axes[1]);
+        wi[2][i] = along(shading);
+        above[i] = along(normal);
+    }
+    evaluate(sheets, table, &wi);
+    for i in 0..LANES {
+        let Values { white, base, highlight, deep, pdf: own, .. } = &sheets.values;
+        let is_seen = white[i] + base[i] + highlight[i] + deep[i] > 0.0;
+        let faces = (sheets.wo[2][i] > 0.0) & (wi[2][i] > 0.0) & (above[i] >= 0.0);
+        let ratio = own[i] / pdf[i];
+        let balance = if is_delta[i] > 0.0 { 1.0 } else { 1.0 + ratio * ratio };
+        let counts = is_seen & faces & (pdf[i] < f64::INFINITY);
+        share[i] = if counts { 1.0 / (balance * pdf[i]) } else { 0.0 };
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn scatter(
+    sheets: &mut Sheets,
+    table: &AlbedoTable,
+    [normal, shading]: [&[Row; 3]; 2],
+    (choices, squares): (&Row, &[[f64; 2]; LANES]),
+    (along, pdf): (&mut [Row; 3], &mut Row),
+) {
+    let mut wi = [ZERO; 3];
+    for i in 0..LANES {
+        // A facet's normal by its visible area, and the direction that it mirrors (`super::ggx`).
+        let alpha = sheets.alpha[i];
+        let [vx, vy, vz] = [sheets.wo[0][i], sheets.wo[1][i], sheets.wo[2][i]];
+        let [sx, sy] = [alpha * vx, alpha * vy];
+        let inverse = 1.0 / (sx * sx + sy * sy + vz * vz).sqrt();
+        let [sx, sy, sz] = [sx * inverse, sy * inverse, vz * inverse];
+        let [u, v] = squares[i];
+        let (sine, cosine) = disk::turn(u);
+        let z = (1.0 - v) * (1.0 + sz) - sz;
+        let rest = 1.0 - z * z;
+        let r = if rest > 0.0 { rest } else { 0.0 }.sqrt();
+        let [hx, hy, hz] = [alpha * (r * cosine + sx), alpha * (r * sine + sy), z + sz];
+        let hz = if hz > 0.0 { hz } else { 0.0 };
+        let inverse = 1.0 / (hx * hx + hy * hy + hz * hz).sqrt();
+        let [hx, hy, hz] = [hx * inverse, hy * inverse, hz * inverse];
+        let twice = 2.0 * (vx * hx + vy * hy + vz * hz);
+        let mirrored = [twice * hx - vx, twice * hy - vy, twice * hz - vz];
+        // Or alike from all sides.
+        let [x, y] = disk::point(squares[i]);
+        let rest = 1.0 - x * x - y * y;
+        let matte = [x, y, if rest > 0.0 { rest } else { 0.0 }.sqrt()];
+        let is_mirrored = choices[i] < sheets.sheet[i];
+        for axis in 0..3 {
+            wi[axis][i] = if is_mirrored { mirrored[axis] } else { matte[axis] };
+        }
+    }
+    evaluate(sheets, table, &wi);
+    for i in 0..LANES {
+        let [x, y, z] = [wi[0][i], wi[1][i], wi[2][i]];
+        let world = |axis: usize| {
+            sheets.axes[0][axis][i] * x + sheets.axes[1][axis][i] * y + shading[axis][i] * z
+        };
+        let [dx, dy, dz] = [world(0), world(1), world(2)];
+        let inverse = 1.0 / (dx * dx + dy * dy + dz * dz).sqrt();
+        along[0][i] = dx * inverse;
+        along[1][i] = dy * inverse;
+        along[2][i] = dz * inverse;
+        let above = dx * normal[0][i] + dy * normal[1][i] + dz * normal[2][i];
+        let Values { white, base, highlight, dip, deep, pdf: own } = &mut sheets.values;
+        let is_seen = white[i] + base[i] + highlight[i] + deep[i] > 0.0;
+        let faces = (sheets.wo[2][i] > 0.0) & (z > 0.0) & (above >= 0.0);
+        let is_chosen =
+            (sheets.is_metal[i] > 0.0) | (choices[i] < sheets.sheet[i] + sheets.base[i]);
+        let density = if is_seen & faces & is_chosen { own[i] } else { 0.0 };
+        pdf[i] = density;
+        let scale = if density > 0.0 { 1.0 / density } else { 0.0 };
+        for value in [white, base, highlight, dip, deep] {
+            value[i] *= scale;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use etendue_geometry::glam::DVec3;
+
+    use super::*;
+    use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen};
+    use crate::sampling::{Frame, power_heuristic};
+
+    /// Unit vectors all over the upper half about z.
+    fn upward(k: usize, steps: [f64; 2]) -> DVec3 {
+        let [u, v] = steps.map(|step| (k as f64 * step).fract());
+        let z = 0.01 + 0.99 * u;
+        let (sin, cos) = (std::f64::consts::TAU * v).sin_cos();
+        DVec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+    }
+
+    fn put(rows: &mut [Row; 3], lane: usize, v: DVec3) {
+        (rows[0][lane], rows[1][lane], rows[2][lane]) = v.into();
+    }
+
+    /// Surfaces of the lanes, one by one, with what sets them side by side: their shading and geometric normals, and
+    /// the directions that they are seen along.
+    fn laid_out(sheets: &mut Sheets) -> (Vec<Bsdf>, [[Row; 3]; 3]) {
+        let [mut shading, mut normal, mut direction] = [[ZERO; 3]; 3];
+        let surface = |k: usize| {
+            let share = |step: f64| (0.3 + k as f64 * step).fract();
+            let alpha = [1e-4, 0.01, 0.2, 0.7, 1.0][k % 5];
+            let base = [share(0.37), share(0.73), share(0.19)];
+            let is_metal = k.is_multiple_of(3);
+            let metallic = if is_metal { 1.0 } else { [0.0, 0.3, 1.0][k / 3 % 3] };
+            let (f0, f90) = if is_metal { (0.0, 0.0) } else { (0.04, [1.0, 0.6][k % 2]) };
+            let highlight = if is_metal { [1.0; 3] } else { [1.0, 2.0, 0.5] };
+            let layered = Layered {
+                metallic,
+                alpha,
+                along: alpha,
+                f0,
+                f90,
+                ior: 1.5,
+                transmission: 0.0,
+                sheen: Sheen::default(),
+                coat: Coat::default(),
+            };
+            let model = match is_metal {
+                true => Model::Metal { alpha, named: None },
+                false => Model::Layered(layered),
+            };
+            let z = shading_normal(k);
+            let wo = Frame::around(z).world(upward(k, [0.41, 0.29]));
+            let geometric = (z + 0.2 * wo).normalize();
+            put(&mut shading, k, z);
+            put(&mut normal, k, geometric);
+            put(&mut direction, k, -wo);
+            let peak = |c: [f64; 3]| c[0].max(c[1]).max(c[2]);
+            (sheets.alpha[k], sheets.metallic[k]) = (alpha, metallic);
+            (sheets.f0[k], sheets.f90[k]) = (f0, f90);
+            sheets.base_peak[k] = peak(base);
+            sheets.f0_peak[k] = (f0 * peak(highlight)).min(1.0);
+            sheets.is_metal[k] = if is_metal { 1.0 } else { 0.0 };
+            Bsdf::new(model, [geometric, z], wo, [base, highlight])
+        };
+        let surfaces = (0..LANES).map(surface).collect();
+        (surfaces, [shading, normal, direction])
+    }
+
+    fn shading_normal(k: usize) -> DVec3 {
+        upward(k, [0.618, 0.755]) * if k.is_multiple_of(2) { 1.0 } else { -1.0 }
+    }
+
+    /// Side by side as one by one: values, densities and directions, of metals and glTF's surfaces of all
+    /// roughnesses, for directions on both sides.
+    #[test]
+    fn side_by_side_as_one_by_one() {
+        let mut sheets = Sheets::default();
+        let (surfaces, [shading, normal, direction]) = laid_out(&mut sheets);
+        let (mut toward, pdf, mut is_delta) = ([ZERO; 3], [0.7; LANES], ZERO);
+        let (mut choices, mut squares) = (ZERO, [[0.0; 2]; LANES]);
+        for k in 0..LANES {
+            let share = |step: f64| (0.3 + k as f64 * step).fract();
+            let side = if k.is_multiple_of(7) { -1.0 } else { 1.0 };
+            let frame = Frame::around(shading_normal(k));
+            put(&mut toward, k, frame.world(upward(k, [0.57, 0.83])) * side);
+            is_delta[k] = if k.is_multiple_of(4) { 1.0 } else { 0.0 };
+            (choices[k], squares[k]) = (share(0.07), [share(0.53), share(0.21)]);
+        }
+        // Some hundred roundings, magnified by what is lacking of 1 in highlights of α 10⁻⁴.
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-7 * (a.abs() + b.abs() + 1e-9);
+        let alike = |a: Weights, b: Weights| {
+            near(a.white, b.white)
+                && near(a.base, b.base)
+                && near(a.highlight, b.highlight)
+                && near(a.dip, b.dip)
+                && near(a.deep, b.deep)
+        };
+        sheets.view(&shading, &direction);
+        let mut found = ZERO;
+        sheets.reflect([&normal, &shading], (&toward, &pdf, &is_delta), &mut found);
+        let mut lit = 0;
+        for (k, surface) in surfaces.iter().enumerate() {
+            let wi = DVec3::new(toward[0][k], toward[1][k], toward[2][k]);
+            let (weights, own) = surface.evaluate(wi);
+            let balance = if is_delta[k] > 0.0 { 1.0 } else { power_heuristic(pdf[k], own) };
+            let expected = if weights.is_zero() { 0.0 } else { balance / pdf[k] };
+            assert!(near(found[k], expected), "{k}: {} {expected}", found[k]);
+            if expected > 0.0 {
+                lit += 1;
+                assert!(
+                    alike(sheets.weights(k), weights),
+                    "{k}: {:?} {weights:?}",
+                    sheets.weights(k)
+                );
+                assert!(near(surface.mean_albedo(), sheets.mean[k]) || surface.deep == [0.0; 3]);
+            }
+        }
+        assert!((40..LANES).contains(&lit), "{lit}");
+        let (mut along, mut density) = ([ZERO; 3], ZERO);
+        sheets.scatter([&normal, &shading], (&choices, &squares), (&mut along, &mut density));
+        let mut sent = 0;
+        for (k, surface) in surfaces.iter().enumerate() {
+            let Some(sample) = surface.sample(choices[k], squares[k]) else {
+                assert_eq!(density[k], 0.0, "{k}");
+                continue;
+            };
+            sent += 1;
+            let direction = DVec3::new(along[0][k], along[1][k], along[2][k]);
+            assert!((direction - sample.direction).length() < 1e-12, "{k}");
+            assert!(near(density[k], sample.pdf), "{k}: {} {}", density[k], sample.pdf);
+            assert!(alike(sheets.weights(k), sample.weights), "{k}");
+        }
+        assert!(sent > 50, "{sent}");
+    }
+}
