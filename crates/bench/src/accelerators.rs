@@ -10,12 +10,10 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 
+pub use crate::hits::RENDER_WIDTH;
 use crate::hits::{HitErrors, Hits, Rays, trace};
 use crate::timing::{Series, TimeSpread, order};
 use crate::{BenchError, Progress};
-
-/// The width of a batch in a render: the pixels of a tile.
-pub const RENDER_WIDTH: usize = 256;
 
 /// Timing goes on for at least so long (s), however few the rays.
 const LEAST: f64 = 0.01;

@@ -4,7 +4,6 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::accelerators::RENDER_WIDTH;
 use etendue_accel::Accel;
 use etendue_camera::{Camera, PixelBlock, Sampler};
 use etendue_geometry::glam::DVec3;
@@ -282,6 +281,9 @@ fn z_order(tile: PixelBlock) -> impl Iterator<Item = (u32, u32)> {
         .filter(move |&(x, y)| x < tile.width && y < tile.height)
         .map(move |(x, y)| (tile.x + x, tile.y + y))
 }
+
+/// The width of a batch in a render: the pixels of a tile.
+pub const RENDER_WIDTH: usize = 256;
 
 #[cfg(test)]
 mod tests {

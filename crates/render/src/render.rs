@@ -202,6 +202,28 @@ pub fn render(
     finish(scene, plan, film, header, Some(accel))
 }
 
+/// The rules and lights of the picture, with `notes` of them; `None` without a picture of light.
+fn light_of(
+    (scene, plan): (&Scene, &Plan),
+    images: &Images,
+    seen: (&dyn Accel, SceneView<'_>),
+    spectral: &Spectral,
+    notes: &mut Vec<String>,
+    watch: &dyn Watch,
+) -> Result<Option<(Rules, Lights)>, RenderError> {
+    let light = scene.tracer.and_then(|tracer| tracer.row().light);
+    let light = light.filter(|_| plan.layers.contains(&LayerSpec::Radiance));
+    let Some(LightRow { rules, .. }) = light else { return Ok(None) };
+    let roulette = rules.roulette.map(|_| scene.accuracy.roulette_after);
+    let rules = Rules { roulette, ..rules };
+    let map = images.environment.clone();
+    let found = lighting::settle(scene, map, rules, seen, &|share| watch.goes_on(share))?;
+    notes.extend(found.note);
+    let lights = Lights::new(&found.lights, found.map, &seen.1, spectral)
+        .map_err(|error| RenderError::Lights(error.to_string()))?;
+    Ok(Some((rules, lights)))
+}
+
 /// Traces what a `course` wants onto a film.
 ///
 /// # Errors
@@ -231,19 +253,8 @@ pub fn trace(
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
     let spectral = Spectral::new(&plan.bands);
     let mut notes = Vec::new();
-    let lit = match scene.tracer.and_then(|tracer| tracer.row().light) {
-        Some(LightRow { rules, .. }) if plan.layers.contains(&LayerSpec::Radiance) => {
-            let roulette = rules.roulette.map(|_| scene.accuracy.roulette_after);
-            let rules = Rules { roulette, ..rules };
-            let (map, seen) = (images.environment.clone(), (accel, surroundings));
-            let found = lighting::settle(scene, map, rules, seen, &|share| watch.goes_on(share))?;
-            notes.extend(found.note);
-            let lights = Lights::new(&found.lights, found.map, &surroundings, &spectral)
-                .map_err(|error| RenderError::Lights(error.to_string()))?;
-            Some((rules, lights))
-        }
-        _ => None,
-    };
+    let seen = (accel, surroundings);
+    let lit = light_of((scene, plan), images, seen, &spectral, &mut notes, watch)?;
     // What light passes ask of the scene.
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials);

@@ -18,7 +18,7 @@
 //! the scene may come from each of the leading wavelengths j by which it lands on the film and passes the lens:
 //! of `m` of them. The contribution to band b at the place where b lands is
 //!
-//! L(r) T_b(r) w H/m.
+//! `L(r) T_b(r) w H / m`.
 //!
 //! As the shares 1/m that the leading wavelengths take of r add up to 1 (the condition of E. Veach,
 //! *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, eq. 9.5), the mean is that of each band

@@ -51,7 +51,7 @@ impl fmt::Display for OpencvFit {
         };
         writeln!(f, "{}", Table::of_rows(residuals.rings.iter().map(ring).collect()))?;
         let mut list = Table::list(12);
-        list.put("holds", &self.holds);
+        list.put("holds", self.holds);
         let wander = self.holds.pupil_wander;
         list.put(
             "chief rays",

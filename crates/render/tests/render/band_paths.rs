@@ -8,6 +8,7 @@ use etendue_files::Transaction;
 use etendue_render::output::Outputs;
 use etendue_render::render::{Course, Prepared, finish, trace};
 use etendue_render::{BandPaths, Checkpoint, Film, FilmFile, Plan, Rendered, Shard};
+use etendue_report::DecisionKind;
 use etendue_scene::Scene;
 use etendue_spectrum::{Bands, Grid};
 use serde_json::{Value, json};
@@ -231,8 +232,8 @@ fn threads_passes_and_shares_make_one_picture() {
 fn the_plan_says_how_bands_travel() {
     let how = |camera: Value, more: &Value| {
         let plan = Plan::new(&scene(camera, true, 8, more), Outputs::ALL);
-        let found = plan.decisions.into_iter().find(|it| it.what == "paths of a band");
-        found.map(|it| (it.choice, it.because))
+        let found = plan.decisions.into_iter().find(|it| it.kind == DecisionKind::PathsOfBands);
+        found.map(|it| (it.value.to_string(), it.reason))
     };
     let choice = |found: Option<(String, String)>| found.unwrap().0;
     assert_eq!(choice(how(double_gauss(), &json!({}))), "shared");

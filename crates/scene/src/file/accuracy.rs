@@ -1,7 +1,7 @@
 //! Numbers that trade accuracy for speed: one table, from which the type, its limits, its page and the plan's
 //! rows are made.
 //!
-//! The manner is that of GalSim's `GSParams` (B. Rowe et al., "GALSIM: The modular galaxy image simulation
+//! The manner is that of `GalSim`'s `GSParams` (B. Rowe et al., "GALSIM: The modular galaxy image simulation
 //! toolkit", 2015, section 6): every such number has a name, and a scene may set it.
 
 use etendue_report::{Decision, DecisionKind};

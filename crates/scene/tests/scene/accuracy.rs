@@ -42,10 +42,7 @@ fn what_is_set_is_a_row_of_the_plan_and_nothing_else_is() {
     assert_eq!(AccuracySpec::default().decisions(), []);
     let spec = AccuracySpec { view_psnr: 40.0, ..AccuracySpec::default() };
     let [row] = &spec.decisions()[..] else { panic!("one row") };
-    assert_eq!(
-        (row.kind, row.key.as_deref()),
-        (DecisionKind::Accuracy, Some("accuracy.view_psnr"))
-    );
+    assert_eq!((row.kind, row.key), (DecisionKind::Accuracy, Some("accuracy.view_psnr")));
     assert!(row.is_forced && row.reason.ends_with("43 by itself"), "{}", row.reason);
 }
 

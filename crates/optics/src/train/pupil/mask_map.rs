@@ -481,9 +481,9 @@ fn fit(solved: &Solved, degree: usize) -> Option<Vec<DVec2>> {
     for &(place, slopes, weight) in &solved.points {
         let ([x, _], [y, _]) = (chebyshev(place.x, degree), chebyshev(place.y, degree));
         let mut k = 0;
-        for i in 0..=degree {
-            for j in 0..=degree - i {
-                row[k] = x[i] * y[j];
+        for (i, x) in x[..=degree].iter().enumerate() {
+            for y in &y[..=degree - i] {
+                row[k] = x * y;
                 k += 1;
             }
         }

@@ -153,10 +153,10 @@ impl Stream {
             (MeshoptFilter::Color, 4) => in_place::<u8, 4>(bytes, meshopt::decode_filter_color),
             (MeshoptFilter::Color, _) => in_place::<u16, 4>(bytes, meshopt::decode_filter_color),
             (MeshoptFilter::Quaternion, _) => {
-                in_place::<i16, 4>(bytes, meshopt::decode_filter_quat)
+                in_place::<i16, 4>(bytes, meshopt::decode_filter_quat);
             }
             (MeshoptFilter::Exponential, _) => {
-                in_place::<u32, 1>(bytes, meshopt::decode_filter_exp)
+                in_place::<u32, 1>(bytes, meshopt::decode_filter_exp);
             }
         }
     }
