@@ -345,7 +345,10 @@ fn patches_of_a_focused_camera_make_the_picture_of_its_main_lens() {
     for case in cases {
         let (geometry, psnr) = refocused_against_the_main_lens(&case);
         println!("{}: {psnr:.1} dB, {}", case.microlenses, geometry["patches"]);
-        assert!(psnr > 40.0, "{}: {psnr}", case.microlenses);
+        // 40 dB are promised. Without lenslets of two kinds, each of which sees half of the points, it is more, and a
+        // magnification that is off by 2 % leaves 45.
+        let least = if case.microlenses.contains("types") { 43.0 } else { 48.0 };
+        assert!(psnr > least, "{}: {psnr}", case.microlenses);
         // The formulas of thin lenses, where lenslets' focal length follows from them.
         if !case.microlenses.contains("focal_length") {
             let share =
