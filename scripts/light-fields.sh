@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Renders scenes/light-field.json, runs the Python of docs/light-fields.md on it in a venv, makes the page's
-# pictures, and asks plenopticam for its opinion where it installs (Python 3.11, numpy 1.26). ETENDUE names a
-# command that is built already, IMAGES another folder for the pictures than docs/images.
+# Renders scenes/light-field.json and light-field-focused.json, runs the Python of docs/light-fields.md on them in a
+# venv, makes the page's pictures, puts patches of a focused camera together by their published formula, and asks
+# plenopticam for its opinion where it installs (Python 3.11, numpy 1.26). ETENDUE names a command that is built
+# already, IMAGES another folder for the pictures than docs/images.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -17,6 +18,7 @@ if [ -z "${ETENDUE:-}" ]; then
     ETENDUE=target/release/etendue
 fi
 "$ETENDUE" render scenes/light-field.json -o "$out/out" "$@"
+"$ETENDUE" render scenes/light-field-focused.json -o "$out/focused" "$@"
 
 [ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
 pip=("$venv/bin/pip" install --quiet --disable-pip-version-check)
@@ -32,6 +34,7 @@ fi
 sed -n '/^```python$/,/^```$/{/^```/d;p}' docs/light-fields.md >"$out/page.py"
 (cd "$out" && "$venv/bin/python" page.py)
 "$venv/bin/python" scripts/light_field_pictures.py "$out" "$images"
+"$venv/bin/python" scripts/light_field_patches.py "$ETENDUE" "$out/patches"
 if "$venv/bin/python" -c "import plenopticam" 2>/dev/null || [ -d "$venv"/lib/python3*/site-packages/plenopticam ]; then
     "$venv/bin/python" scripts/light_field_opinion.py "$out/out"
 else

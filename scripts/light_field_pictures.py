@@ -20,3 +20,6 @@ for name, stem in [("raw", "picture"), ("white", "white")]:
     save(np.load(f"{folder}/out/{stem}.npy")[corner], 3, f"{images}/light-field-{name}.png")
 for name, picture in zip(["near", "focus", "far"], np.load(f"{folder}/refocused.npy")):
     save(picture, 6, f"{images}/light-field-{name}.png")
+save(np.load(f"{folder}/focused/picture.npy")[corner], 3, f"{images}/light-field-focused-raw.png")
+for name in ["near", "focus", "far"]:
+    save(np.load(f"{folder}/focused-{name}.npy"), 3, f"{images}/light-field-focused-{name}.png")

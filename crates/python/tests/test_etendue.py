@@ -323,6 +323,10 @@ def test_a_light_field_is_arrays():
     camera["microlenses"]["picture_distance"] = 0.5
     field = quad(camera=camera, layers=["depth"], tracer={"type": "flat"}).render(samples=1).light_field()
     assert field.views is None and "focused" in field.geometry["no_views"]
+    assert field.refocused is None and "gaps" in field.geometry["no_patches"]
+    camera["microlenses"]["picture_distance"] = 2
+    field = quad(camera=camera, layers=["depth"], tracer={"type": "flat"}).render(samples=1).light_field()
+    assert field.views is None and field.refocused.shape == (*field.geometry["patches"]["resolution"][::-1], 3)
     assert quad().render().light_field() is None
 
 

@@ -60,6 +60,8 @@ pub struct LightField {
     pub image_diameter: f64,
     /// How the rows of the picture are turned (radians): from right towards down.
     pub rotation: f64,
+    /// The distance that a refocused picture is asked for (m), from the entrance pupil.
+    pub refocus: Option<f64>,
     /// Why pixels at one offset behind the lenslets are no views, where they are none.
     pub no_views: Option<String>,
 }
@@ -267,6 +269,7 @@ impl LightField {
             image_pitch,
             image_diameter,
             rotation,
+            refocus: None,
             no_views,
         })
     }

@@ -47,6 +47,11 @@ pub struct LightFieldSpec {
     /// pupil; infinity when absent and the camera has a pose.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub focus_distance: Option<FocusDistance>,
+    /// The distance at which `refocused.*` is sharp (m, or "infinity"), along the axis from the entrance pupil: by
+    /// all views together, or of a focused camera by patches of the raw picture, where it is `focus_distance` when
+    /// absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refocus_distance: Option<FocusDistance>,
     /// The lenslets.
     pub microlenses: MicrolensesSpec,
     /// Views along each side of the light field; as many as the opening holds in a square when absent.
@@ -175,8 +180,13 @@ impl LightFieldSpec {
             sensor: &self.sensor,
         };
         let (pose, lens) = place(&train, &setup, subject)?;
-        let light_field =
+        let mut light_field =
             LightField::new(&lens, self.sensor.resolution, self.views, self.view_step)?;
+        light_field.refocus = self.refocus_distance.map(|distance| distance.0);
+        if let (Some(distance), Some(lenslets)) = (light_field.refocus, lens.lenslets()) {
+            let picture = lenslets.view().main.sensor_z(Focus::Distance(distance));
+            picture.map_err(|fault| CameraError::new("refocus_distance", fault.to_string()))?;
+        }
         Ok((pose, lens, light_field))
     }
 

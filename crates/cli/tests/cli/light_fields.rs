@@ -208,19 +208,21 @@ fn the_page_of_light_fields_runs() {
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let bench = Bench::new();
-    let scene = root.join("scenes/light-field.json");
-    let output = bench.run(&[
-        "render",
-        &scene.to_string_lossy(),
-        "-o",
-        "out",
-        "-q",
-        "--samples",
-        "8",
-        "--set",
-        "camera.sensor.resolution=[360,270]",
-    ]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    for (scene, folder) in [("light-field", "out"), ("light-field-focused", "focused")] {
+        let scene = root.join(format!("scenes/{scene}.json"));
+        let output = bench.run(&[
+            "render",
+            &scene.to_string_lossy(),
+            "-o",
+            folder,
+            "-q",
+            "--samples",
+            "8",
+            "--set",
+            "camera.sensor.resolution=[360,270]",
+        ]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    }
     let page = std::fs::read_to_string(root.join("docs/light-fields.md")).unwrap();
     let blocks = page.split("```python\n").skip(1).filter_map(|rest| rest.split("```").next());
     let program: String = blocks.collect();
@@ -228,5 +230,5 @@ fn the_page_of_light_fields_runs() {
     bench.write("page.py", program.as_bytes());
     let output = Command::new(&python).arg("page.py").current_dir(bench.path("")).output().unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(bench.path("refocused.npy").exists());
+    assert!(bench.path("refocused.npy").exists() && bench.path("focused-far.npy").exists());
 }

@@ -344,7 +344,7 @@ class Shot(Mapping[str, np.ndarray]):
             with open(path, encoding="utf-8") as file:
                 geometry = json.load(file)
             stems = ["picture", "white", "views", "reference", "central_depth", "central_disparity"]
-            return LightField(*map(array, stems), geometry)
+            return LightField(*map(array, stems), geometry, array("refocused"))
 
     def _repr_png_(self) -> Optional[bytes]:
         """The picture, or else the first layer, for notebooks; None where it was pickled."""
@@ -378,6 +378,9 @@ class LightField(NamedTuple):
     """(rows, columns): of the middle view, columns a view."""
     geometry: Dict[str, Any]
     """geometry.json: centres, and the formula of disparities."""
+    refocused: Optional[np.ndarray] = None
+    """(h, w, channels): sharp at refocus_distance; of a camera without views by its lenslets' patches, unless
+    geometry["no_patches"] says why not."""
 
 
 class Traced(NamedTuple):

@@ -6,6 +6,7 @@ use etendue_optics::element::Grid;
 use serde::Serialize;
 
 use super::centres::{Centres, Places};
+use super::patches::{PatchFacts, Patches};
 use super::response::ViewResponse;
 
 /// What a decoder needs, and what it may be scored against.
@@ -56,6 +57,12 @@ pub(super) struct LightFieldGeometry {
     psnr_by_rays: Option<f64>,
     /// Of each view, `[down][across]`: by which parabola over its columns and rows its light is multiplied.
     gains: Option<Vec<Vec<[f64; 6]>>>,
+    /// The plane of `refocused.*` (m), where it is written; `null` for infinity, too.
+    refocused_m: Option<f64>,
+    /// How a camera without views has its refocused picture from patches of the raw one.
+    patches: Option<PatchFacts>,
+    /// Why it has none.
+    no_patches: Option<String>,
     about: [&'static str; 6],
 }
 
@@ -183,6 +190,9 @@ impl LightFieldGeometry {
             views_by_color: false,
             psnr_by_rays: None,
             gains: None,
+            refocused_m: None,
+            patches: None,
+            no_patches: None,
             about: ABOUT,
         }
     }
@@ -215,6 +225,24 @@ impl LightFieldGeometry {
             factors.chunks(n).map(<[_]>::to_vec).collect()
         });
         self.no_views = no_views;
+    }
+}
+
+impl LightFieldGeometry {
+    /// Says which plane the refocused picture has, and how patches make it or why they do not.
+    pub(super) fn refocus(
+        &mut self,
+        patches: Option<&Result<Patches, String>>,
+        light_field: &LightField,
+    ) {
+        match patches {
+            Some(Ok(patches)) => {
+                self.refocused_m = patches.facts.distance_m;
+                self.patches = Some(patches.facts.clone());
+            }
+            Some(Err(why)) => self.no_patches = Some(why.clone()),
+            None => self.refocused_m = light_field.refocus.filter(|distance| distance.is_finite()),
+        }
     }
 }
 

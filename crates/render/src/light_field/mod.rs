@@ -12,6 +12,7 @@
 //! | `centres` | where they are sampled, and where light of other wavelengths has that |
 //! | `choice` | how many of them are those of an ideal lens |
 //! | `looking` | views one by one, and refocused together |
+//! | `patches` | refocused pictures of focused cameras, which have no views |
 //! | `hci` | the folder of the benchmark's layout |
 //!
 //! The layout: K. Honauer, O. Johannsen, D. Kondermann, B. Goldluecke, "A dataset and evaluation
@@ -23,6 +24,7 @@ mod gain;
 mod geometry;
 mod hci;
 mod looking;
+mod patches;
 mod response;
 mod views;
 mod white;
@@ -48,6 +50,7 @@ use centres::Centres;
 use choice::ChosenViews;
 use geometry::LightFieldGeometry;
 pub use looking::LightFieldViews;
+use patches::Patches;
 use views::Views;
 pub use white::white_rows;
 
@@ -100,7 +103,7 @@ pub struct Rendering<'a> {
 #[must_use]
 pub fn file_names(scene: &Scene) -> Vec<String> {
     let Some(light_field) = scene.camera.light_field() else { return Vec::new() };
-    let stems = ["white", "views", "reference", "central_depth", "central_disparity"];
+    let stems = ["white", "views", "reference", "refocused", "central_depth", "central_disparity"];
     let endings = ["png", "npy", "exr", "pfm"];
     let plain = stems.iter().flat_map(|stem| endings.map(|ending| format!("{stem}.{ending}")));
     let spectra = ["views_spectrum.npy", "reference_spectrum.npy", "geometry.json"];
@@ -151,13 +154,22 @@ pub fn write(
         let centres = Centres::new(lens, light_field, &Bands::Rgb, shift).map_err(fault)?;
         geometry.bands(&centres, light_field);
     }
+    // Without views a plane is put together from patches.
+    let patches = raw
+        .filter(|_| no_views.is_some())
+        .map(|lens| Patches::new(lens, light_field, light_field.refocus));
+    geometry.refocus(patches.as_ref(), light_field);
     sidecar::write_json(files, &set.place("geometry.json"), &geometry)?;
-    if raw.is_some() {
-        let white = white::picture(&camera, &scene.render)?;
-        set.picture("white", &white)?;
+    let white = match raw {
+        Some(_) => Some(white::picture(&camera, &scene.render)?),
+        None => None,
+    };
+    if let Some(white) = &white {
+        set.picture("white", white)?;
     }
     if let Some(why) = no_views {
         set.written.notes.push(format!("views, depth, disparity and hci are not written: {why}"));
+        set.patches(patches, picture, white.as_ref())?;
         return Ok(set.written);
     }
     set.written.notes.extend(chosen.notes(&scene.camera));
@@ -174,6 +186,7 @@ pub fn write(
             let centres = by_layer(scene, lens, light_field).map_err(fault)?;
             let views = Views::decoded(picture, &centres, light_field, (grid, response))?;
             set.views("views", &views, picture)?;
+            set.refocused((light_field, grid), &views, picture)?;
             let truth = reference_picture(rendering, reference, outputs, &|share| {
                 progress(0.1 + 0.9 * share)
             })?;
@@ -183,6 +196,9 @@ pub fn write(
     let truth = truth.as_ref().unwrap_or(picture);
     let views = Views::split(truth, grid);
     set.views(if raw.is_some() { "reference" } else { "views" }, &views, truth)?;
+    if raw.is_none() {
+        set.refocused((light_field, grid), &views, truth)?;
+    }
     match (outputs.png, grid.packing()) {
         (true, Grid::Square) => set.hci(scene, grid, &views, truth, &depth)?,
         (true, Grid::Hexagonal) => set.written.notes.push(HEXAGONAL.to_owned()),
@@ -330,6 +346,39 @@ impl SetWriter<'_> {
                 }
                 Ok(())
             })?;
+        }
+        Ok(())
+    }
+
+    /// The plane that is asked for, by all views together; nothing when none is.
+    fn refocused(
+        &mut self,
+        (light_field, grid): (&LightField, &ViewGrid),
+        views: &Views,
+        shown: &Picture,
+    ) -> Result<(), LightFieldError> {
+        let Some(distance) = light_field.refocus else { return Ok(()) };
+        let refocused = views.averaged(grid.disparity(distance), grid.row_height())?;
+        self.picture("refocused", &refocused.developed(*shown.development()))
+    }
+
+    /// A plane put together from the patches of lenslets, or why there is none.
+    fn patches(
+        &mut self,
+        patches: Option<Result<Patches, String>>,
+        picture: &Picture,
+        white: Option<&Picture>,
+    ) -> Result<(), LightFieldError> {
+        match (patches, white) {
+            (Some(Err(why)), _) => {
+                self.written.notes.push(format!("refocused is not written: {why}"));
+            }
+            (Some(Ok(patches)), Some(white)) if picture.layer("").is_some() => {
+                let refocused = patches.rendered(picture, white)?;
+                self.picture("refocused", &refocused.developed(*picture.development()))?;
+                self.written.notes.extend(patches.note());
+            }
+            _ => {}
         }
         Ok(())
     }

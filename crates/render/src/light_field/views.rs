@@ -107,7 +107,7 @@ impl Views {
         let [cols, rows] = self.size.map(|side| side as usize);
         let view = down * self.views + across;
         let value = |k, channel| self.color(view, k, channel);
-        picture([cols, rows], value)
+        picture([cols, rows], VIEWS, value)
     }
 
     /// The mean of all views, each moved by its number from the middle one times `disparity` (pixels of a
@@ -135,7 +135,7 @@ impl Views {
             let sum: f64 = moved.iter().map(|planes| f64::from(planes[channel][i])).sum();
             (sum / moved.len() as f64) as f32
         };
-        picture([cols, rows], mean)
+        picture([cols, rows], VIEWS, mean)
     }
 
     /// All views as one picture.
@@ -148,13 +148,17 @@ impl Views {
             let view = (y / rows * n + x / cols) as u32;
             self.color(view, y % rows * cols + x % cols, channel)
         };
-        picture([n * cols, n * rows], value)
+        picture([n * cols, n * rows], VIEWS, value)
     }
 }
 
-/// A picture of three colours.
-fn picture(
+/// What pictures of views are.
+const VIEWS: &str = "views of a light field";
+
+/// A picture of three colours, and what it is.
+pub(super) fn picture(
     [width, height]: [usize; 2],
+    definition: &str,
     value: impl Fn(usize, usize) -> f32,
 ) -> Result<Picture, PictureError> {
     let channel = |(k, name): (usize, &str)| {
@@ -162,7 +166,7 @@ fn picture(
         Channel { name: name.to_owned(), values: Values::F32(values) }
     };
     let channels = ["R", "G", "B"].into_iter().enumerate().map(channel).collect();
-    let meaning = vec![("definition".to_owned(), "views of a light field".to_owned())];
+    let meaning = vec![("definition".to_owned(), definition.to_owned())];
     let layer = Layer { name: String::new(), look: Look::Color, channels, meaning };
     Picture::new(width, height, vec![layer], Vec::new())
 }
@@ -175,7 +179,7 @@ pub(super) fn weights(t: f64) -> [f64; 4] {
 }
 
 /// A plane at a place (pixels from the corner).
-fn sampled(plane: &[f32], size: [usize; 2], at: [f64; 2]) -> f32 {
+pub(super) fn sampled(plane: &[f32], size: [usize; 2], at: [f64; 2]) -> f32 {
     sampled_rows(plane, size, at, 0.0)
 }
 
