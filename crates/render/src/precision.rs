@@ -207,8 +207,9 @@ mod tests {
         };
         assert_eq!(held("path_noise", 1e-6, 0.5), Double);
         assert_eq!(held("path_offset_of_edge", 1e-6, 0.5), Double);
-        assert_eq!(held("path_noise", 1e3, 1e-3), Single);
-        assert_eq!(decided(1e-4, 0.0, 64, &auto), Double);
+        let held_much =
+            held_to(&json!({ "path_noise": 1e3 }), pinhole(), (0.01, 0.0, 1 << 20), &auto);
+        assert_eq!(held_much, Single);
         // Pixels that f32 cannot tell apart: rows of some 10⁻⁵ and 10⁻¹⁰ m, and of 10⁻⁴ and 10⁻⁹ of a degree.
         let seen = |camera| held_to(&json!({}), camera, (0.5, 0.0, 64), &auto);
         let narrow = |fov: f64| json!({ "type": "pinhole", "fov": fov });

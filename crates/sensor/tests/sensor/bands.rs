@@ -196,7 +196,7 @@ fn one_light_on_grey_takes_one_band_whatever_the_sensor() {
 fn a_greater_tolerance_takes_fewer_bands_and_keeps_to_it() {
     let light = Illumination {
         spectra: vec![curve(Illuminant::D65)],
-        colored: 1,
+        colored: 2,
         ..Illumination::default()
     };
     let own = sensor(&json!({ "quantum_efficiency": [[400, 0.3], [550, 0.8], [700, 0.2]] }));
