@@ -271,7 +271,11 @@ impl<'a> Averaging<'a> {
                 let mut memory = spare().pop().unwrap_or_default();
                 let done = adding.fill_window(strip, &mut window, &mut memory);
                 let statuses = std::mem::take(&mut memory.rays.statuses);
-                RayCounts::add(traffic, std::mem::take(&mut memory.traffic), &statuses);
+                let own = std::mem::take(&mut memory.traffic);
+                // Rays from beside a share's rows are counted by the share that has those.
+                if sampling.shard.owns((strip[0] / TILE) as usize) {
+                    RayCounts::add(traffic, own, &statuses);
+                }
                 spare().push(memory);
                 done
             })?;

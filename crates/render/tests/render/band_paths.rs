@@ -224,7 +224,9 @@ fn threads_passes_and_shares_make_one_picture() {
         assert_eq!(bits(&one), bits(other));
         assert_eq!(one.samples, other.samples);
     }
-    assert_eq!(one.rays, others[0].rays);
+    for other in others.iter().chain([&of_rows, &of_samples]) {
+        assert_eq!(one.rays, other.rays);
+    }
 }
 
 /// What the plan says: bands share paths unless something parts them, and then it says what.

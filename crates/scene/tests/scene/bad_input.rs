@@ -86,7 +86,10 @@ fn a_missing_scene_names_the_nearest() {
 fn unknown_keys_name_the_nearest() {
     assert_says(
         "{\n\"etendue\": 1,\n  \"objcets\": []}",
-        &["line 3, column 3: objcets: unknown key; did you mean `objects`?", "known: `camera`"],
+        &[
+            "line 3, column 3: objcets: unknown key; did you mean `objects`?",
+            "known: `accuracy`, `camera`",
+        ],
     );
     assert_says(
         r#"{"etendue": 1, "camera": {"type": "pinhole", "fvo": 3}}"#,

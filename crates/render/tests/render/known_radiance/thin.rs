@@ -47,9 +47,11 @@ fn scene(kind: &str, d: f64, at: f64) -> String {
         "double" => format!("{}, {}", sheet("wall", d), sheet("wall", 0.0)),
         _ => panic!("{kind}"),
     };
+    // Pixels that f32 tells apart at any of these distances.
+    let height = 1e-3 * d.max(1.0);
     format!(
         r#"{{"etendue": 1, "tracer": {{"type": "path"}},
-        "camera": {{"type": "orthographic", "height": 1e-3,
+        "camera": {{"type": "orthographic", "height": {height},
             "pose": {{"from": [{at}, {at}, {}], "look_at": [{at}, {at}, {at}]}},
             "sensor": {{"resolution": [8, 8]}}}},
         "lights": [{{"type": "environment"}}],
