@@ -2,14 +2,16 @@
 //!
 //! An image is a latitude–longitude map: its middle looks along −Z, its left and right edges along
 //! +Z, its top to +Y, and +X is right of the middle.
+#![expect(clippy::needless_range_loop, reason = "a lane is an index into many arrays")]
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use std::path::Path;
 
 use etendue_geometry::glam::DVec3;
 use etendue_image::Limits;
 
 use crate::Color;
+use crate::angles;
 use crate::sampling::{GridCell, GridDistribution, ONE_BELOW, linear_place};
 use crate::spec::BRIGHTEST;
 use crate::spectral_sky::{self, Spectrum};
@@ -116,6 +118,26 @@ impl EnvironmentMap {
         self.interpolated(&self.texels, at)
     }
 
+    /// Radiance of each of some lanes.
+    #[inline(always)]
+    fn radiance_of_lanes(&self, about: &Corners) -> [Color; LANES] {
+        let mut taken = [[[0.0_f32; LANES]; 3]; 4];
+        for (taken, numbers) in taken.iter_mut().zip(&about.numbers) {
+            for i in 0..LANES {
+                let texel = self.texels[numbers[i] as usize];
+                (taken[0][i], taken[1][i], taken[2][i]) = (texel[0], texel[1], texel[2]);
+            }
+        }
+        let mut colors = [[0.0; 3]; LANES];
+        for k in 0..3 {
+            for i in 0..LANES {
+                let corners = [0, 1, 2, 3].map(|corner: usize| f64::from(taken[corner][k][i]));
+                colors[i][k] = between(corners, [about.across[i], about.down[i]]);
+            }
+        }
+        colors
+    }
+
     /// Radiance at a [`place`] and the wavelengths of a clear sky, where the map has them.
     pub(crate) fn spectrum_at(&self, at: [f64; 2]) -> Option<Spectrum> {
         (!self.spectra.is_empty()).then(|| self.interpolated(&self.spectra, at))
@@ -126,41 +148,83 @@ impl EnvironmentMap {
         if texels.is_empty() {
             return [0.0; N];
         }
-        let (x, y) = (u * self.width as f64 - 0.5, v * self.height as f64 - 0.5);
-        let (x0, y0) = (x.floor(), y.floor());
-        let (fx, fy) = (x - x0, y - y0);
-        let texel = |x: f64, y: f64| &texels[self.number(x, y)];
-        let [a, b] = [texel(x0, y0), texel(x0 + 1.0, y0)];
-        let [c, d] = [texel(x0, y0 + 1.0), texel(x0 + 1.0, y0 + 1.0)];
-        std::array::from_fn(|k| {
-            let top = f64::from(a[k]) * (1.0 - fx) + f64::from(b[k]) * fx;
-            let bottom = f64::from(c[k]) * (1.0 - fx) + f64::from(d[k]) * fx;
-            top * (1.0 - fy) + bottom * fy
-        })
+        let about = Corners::of([[u], [v]], self.size());
+        let corners = about.numbers.map(|[number]| &texels[number as usize]);
+        let at = [about.across[0], about.down[0]];
+        std::array::from_fn(|k| between(corners.map(|texel| f64::from(texel[k])), at))
     }
+}
 
-    /// The number of the texel of a column from −1 to the width, around, and of a row, of which there are no more
-    /// above the first and below the last.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "wrapped, clamped")]
-    fn number(&self, x: f64, y: f64) -> usize {
-        let width = self.width as f64;
-        let around = if x < 0.0 { x + width } else { x };
-        let column = if around >= width { around - width } else { around } as usize;
-        let row = y.clamp(0.0, (self.height - 1) as f64) as usize;
-        row * self.width + column.min(self.width - 1)
+/// Places worked on side by side.
+const LANES: usize = 16;
+
+/// What four corners have between them: left and right above, and below.
+#[inline(always)]
+fn between([a, b, c, d]: [f64; 4], [across, down]: [f64; 2]) -> f64 {
+    let [left, right] = [a + (c - a) * down, b + (d - b) * down];
+    left + (right - left) * across
+}
+
+/// The cells of a grid whose middles are about each of some places, and how far each place is from the first of
+/// them. Columns go around; there are no more rows above the first and below the last.
+#[derive(Debug)]
+struct Corners<const N: usize = LANES> {
+    /// Left and right above, and below.
+    numbers: [[u32; N]; 4],
+    across: [f64; N],
+    down: [f64; N],
+    /// The row below, from 0 to as many as there are.
+    row: [u32; N],
+}
+
+impl<const N: usize> Corners<N> {
+    /// Of a grid of `columns` and `rows`, neither of which is 0.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "sides of images have 32 bits")]
+    fn of([u, v]: [[f64; N]; 2], [columns, rows]: [usize; 2]) -> Self {
+        let (wide, high) = (columns as f64, rows as f64);
+        let [columns, rows] = [columns as u32, rows as u32];
+        let (mut numbers, mut row) = ([[0; N]; 4], [0; N]);
+        let [mut across, mut down] = [[0.0; N]; 2];
+        for i in 0..N {
+            let (x, right) = whole(u[i] * wide + 0.5);
+            let (y, below) = whole(v[i] * high + 0.5);
+            (across[i], down[i]) = (x, y);
+            let (right, below) = (right.min(columns), below.min(rows));
+            row[i] = below;
+            let left = if right == 0 { columns - 1 } else { right - 1 };
+            let right = if right == columns { 0 } else { right };
+            let above = below.saturating_sub(1) * columns;
+            let below = below.min(rows - 1) * columns;
+            numbers[0][i] = above + left;
+            numbers[1][i] = above + right;
+            numbers[2][i] = below + left;
+            numbers[3][i] = below + right;
+        }
+        Self { numbers, across, down, row }
     }
+}
+
+/// What a number of at least 0 has behind the point, and the whole number below 2³² before it.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the low half is wanted")]
+fn whole(x: f64) -> (f64, u32) {
+    // Adding it leaves the nearest whole number in the last bits.
+    const WHOLE: f64 = 4_503_599_627_370_496.0;
+    let nearest = (x + WHOLE) - WHOLE;
+    let below = if nearest > x { nearest - 1.0 } else { nearest };
+    (x - below, (below + WHOLE).to_bits() as u32)
 }
 
 /// Places (u, v) in 0..1 of a map for a unit direction.
 pub(crate) fn place(d: DVec3) -> [f64; 2] {
-    [0.5 + d.x.atan2(-d.z) / TAU, d.y.clamp(-1.0, 1.0).acos() / PI]
+    angles::places(&[[d.x], [d.y], [d.z]]).map(|[place]| place)
 }
 
 /// The direction of a place.
 fn direction([u, v]: [f64; 2]) -> DVec3 {
-    let (sin_theta, cos_theta) = (PI * v).sin_cos();
-    let (sin_phi, cos_phi) = (TAU * (u - 0.5)).sin_cos();
-    DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
+    let ([[x], [y], [z]], _) = angles::directions(&[[u], [v]]);
+    DVec3::new(x, y, z)
 }
 
 /// What cells get of their neighbours, along each axis 1/8 of both. Columns go around, rows end.
@@ -259,79 +323,161 @@ impl MapSampler {
         Self { cells, patches: GridDistribution::new(columns, &weights), scale, mean }
     }
 
-    /// A direction and its density (1/sr) for each of `squares`; their [`place`]s stay in `places`.
-    pub(crate) fn sample(
-        &self,
-        squares: impl Iterator<Item = [f64; 2]>,
-        places: &mut PlacesOnMap,
-        mut each: impl FnMut(usize, DVec3, f64),
-    ) {
-        let PlacesOnMap { cells, chosen } = places;
-        self.patches.cells(squares, cells);
-        chosen.clear();
-        chosen.extend(cells.iter().map(|cell| self.place_in(cell)));
-        for (k, &(at, density)) in chosen.iter().enumerate() {
-            let d = direction(at);
-            let sin_theta = (d.x * d.x + d.z * d.z).sqrt();
-            each(k, d, over_the_sphere(density, sin_theta));
+    /// A direction, its [`place`], and its density (1/sr) for each of `squares`, and the radiance of `map` there.
+    pub(crate) fn sample(&self, map: &EnvironmentMap, squares: &[[f64; 2]], out: &mut OnMap) {
+        out.directions.clear();
+        self.patches.cells(squares.iter().copied(), &mut out.cells);
+        out.resize(squares.len());
+        if !map.texels.is_empty() {
+            chosen(self, map, out);
         }
     }
 
-    /// The place in a patch that was chosen, and its density over the unit square.
-    #[inline]
-    fn place_in(&self, patch: &GridCell) -> ([f64; 2], f64) {
+    /// The [`place`]s of the unit directions in `asked`, their densities (1/sr), and the radiance of `map` there.
+    pub(crate) fn look_up(&self, map: &EnvironmentMap, asked: &mut OnMap) {
+        asked.resize(asked.directions.len());
+        if !map.texels.is_empty() {
+            looked_up(self, map, asked);
+        }
+    }
+
+    /// Places in the patches that were chosen, and their density over the unit square.
+    #[inline(always)]
+    fn places_in(&self, patches: &[GridCell; LANES]) -> ([Row; 2], Row) {
         let [columns, rows] = self.cells.size.map(|cells| cells as f64);
-        let ([x, y], [across, down]) = (patch.at, patch.rest);
-        let [[a, b], [c, d]] = self.cells.corners(patch.at);
-        let down = linear_place(down, [a + b, c + d]);
-        let [left, right] = [a + (c - a) * down, b + (d - b) * down];
-        let across = linear_place(across, [left, right]);
-        let bright = left + (right - left) * across;
-        let [start, end] = self.cells.ends(y);
-        let u = (x as f64 + 0.5 + across) / columns;
-        let v = (start + down * (end - start)) / rows;
-        ([if u < 1.0 { u } else { u - 1.0 }, v.min(ONE_BELOW)], bright * self.scale[y])
+        // What there is in memory of each.
+        let (mut corners, mut scale) = ([[0.0; LANES]; 4], [0.0; LANES]);
+        let [mut start, mut end, mut x] = [[0.0; LANES]; 3];
+        for (i, patch) in patches.iter().enumerate() {
+            let [[a, b], [c, d]] = self.cells.corners(patch.at);
+            (corners[0][i], corners[1][i], corners[2][i], corners[3][i]) = (a, b, c, d);
+            scale[i] = self.scale[patch.at[1]];
+            [start[i], end[i]] = self.cells.ends(patch.at[1]);
+            x[i] = patch.at[0] as f64;
+        }
+        let (mut places, mut density) = ([[0.0; LANES]; 2], [0.0; LANES]);
+        for i in 0..LANES {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|corner: usize| corners[corner][i]);
+            let [across, down] = patches[i].rest;
+            let down = linear_place(down, [a + b, c + d]);
+            let [left, right] = [a + (c - a) * down, b + (d - b) * down];
+            let across = linear_place(across, [left, right]);
+            density[i] = (left + (right - left) * across) * scale[i];
+            let u = (x[i] + 0.5 + across) / columns;
+            places[0][i] = if u < 1.0 { u } else { u - 1.0 };
+            places[1][i] = ((start[i] + down * (end[i] - start[i])) / rows).min(ONE_BELOW);
+        }
+        (places, density)
     }
 
     /// The density (1/sr) of a unit direction.
     #[must_use]
     pub fn pdf(&self, d: DVec3) -> f64 {
-        self.pdf_at(d, place(d))
+        let [u, v] = place(d);
+        let about = Corners::of([[u], [v]], self.cells.size);
+        let [pdf] = self.pdf_about(&about, [(d.x * d.x + d.z * d.z).sqrt()]);
+        pdf
     }
 
-    /// [`Self::pdf`] of a direction whose [`place`] is known.
-    pub(crate) fn pdf_at(&self, d: DVec3, [u, v]: [f64; 2]) -> f64 {
-        let [columns, rows] = self.cells.size;
-        let (x, y) = (u * columns as f64 - 0.5, v * rows as f64 - 0.5);
-        let x = if x < 0.0 { x + columns as f64 } else { x };
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "from 0 to the size of the grid; the cast saturates"
-        )]
-        let (column, row) = ((x as usize).min(columns - 1), ((y + 1.0) as usize).min(rows));
-        let [[a, b], [c, e]] = self.cells.corners([column, row]);
-        let (across, down) = (x - column as f64, y + 1.0 - row as f64);
-        let [left, right] = [a + (c - a) * down, b + (e - b) * down];
-        let bright = left + (right - left) * across;
-        over_the_sphere(bright * self.scale[row], (d.x * d.x + d.z * d.z).sqrt())
+    /// Densities (1/sr) of places about which the cells are known, with the sines of their polar angles.
+    #[inline(always)]
+    fn pdf_about<const N: usize>(&self, about: &Corners<N>, sines: [f64; N]) -> [f64; N] {
+        let (mut corners, mut scale) = ([[0.0_f32; N]; 4], [0.0; N]);
+        for i in 0..N {
+            for corner in 0..4 {
+                corners[corner][i] = self.cells.bright[about.numbers[corner][i] as usize];
+            }
+            scale[i] = self.scale[about.row[i] as usize];
+        }
+        let mut pdf = [0.0; N];
+        for i in 0..N {
+            let corners = [0, 1, 2, 3].map(|corner: usize| f64::from(corners[corner][i]));
+            let bright = between(corners, [about.across[i], about.down[i]]);
+            pdf[i] = over_the_sphere(bright * scale[i], sines[i]);
+        }
+        pdf
     }
 }
 
-/// Places on a map that are chosen together; kept for the next.
+type Row = [f64; LANES];
+
+/// Directions, and what a map has there; kept for the next.
 #[derive(Debug, Default)]
-pub(crate) struct PlacesOnMap {
+pub(crate) struct OnMap {
     cells: Vec<GridCell>,
-    /// Places (u, v) and their density over the unit square.
-    pub(crate) chosen: Vec<([f64; 2], f64)>,
+    /// Unit.
+    pub(crate) directions: Vec<DVec3>,
+    pub(crate) places: Vec<[f64; 2]>,
+    /// 1/sr.
+    pub(crate) densities: Vec<f64>,
+    pub(crate) colors: Vec<Color>,
+}
+
+impl OnMap {
+    /// Makes room for so many, which have nothing yet.
+    fn resize(&mut self, count: usize) {
+        self.directions.resize(count, DVec3::Y);
+        self.places.clear();
+        self.places.resize(count, [0.0; 2]);
+        self.densities.clear();
+        self.densities.resize(count, 0.0);
+        self.colors.clear();
+        self.colors.resize(count, [0.0; 3]);
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn chosen(sampler: &MapSampler, map: &EnvironmentMap, out: &mut OnMap) {
+    for start in (0..out.directions.len()).step_by(LANES) {
+        let count = LANES.min(out.directions.len() - start);
+        let mut patches = [GridCell::default(); LANES];
+        patches[..count].copy_from_slice(&out.cells[start..start + count]);
+        let (places, over_square) = sampler.places_in(&patches);
+        let ([x, y, z], sines) = angles::directions(&places);
+        let colors = map.radiance_of_lanes(&Corners::of(places, map.size()));
+        for i in 0..count {
+            out.directions[start + i] = DVec3::new(x[i], y[i], z[i]);
+            out.places[start + i] = [places[0][i], places[1][i]];
+            out.densities[start + i] = over_the_sphere(over_square[i], sines[i]);
+        }
+        out.colors[start..start + count].copy_from_slice(&colors[..count]);
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn looked_up(sampler: &MapSampler, map: &EnvironmentMap, asked: &mut OnMap) {
+    for start in (0..asked.directions.len()).step_by(LANES) {
+        let count = LANES.min(asked.directions.len() - start);
+        let mut directions = [[0.0; LANES]; 3];
+        for i in 0..count {
+            let d = asked.directions[start + i];
+            (directions[0][i], directions[1][i], directions[2][i]) = (d.x, d.y, d.z);
+        }
+        let mut sines = [0.0; LANES];
+        for i in 0..LANES {
+            let (x, z) = (directions[0][i], directions[2][i]);
+            sines[i] = (x * x + z * z).sqrt();
+        }
+        let places = angles::places(&directions);
+        let about = Corners::of(places, map.size());
+        let colors = map.radiance_of_lanes(&about);
+        let pdf = match map.size() == sampler.cells.size {
+            true => sampler.pdf_about(&about, sines),
+            false => sampler.pdf_about(&Corners::of(places, sampler.cells.size), sines),
+        };
+        for i in 0..count {
+            asked.places[start + i] = [places[0][i], places[1][i]];
+        }
+        asked.densities[start..start + count].copy_from_slice(&pdf[..count]);
+        asked.colors[start..start + count].copy_from_slice(&colors[..count]);
+    }
 }
 
 /// A density over the map's places as one over solid angles (1/sr), by the sine of the polar angle.
+#[inline(always)]
 fn over_the_sphere(density: f64, sin_theta: f64) -> f64 {
-    if sin_theta <= 0.0 {
-        return 0.0;
-    }
-    density / (2.0 * PI * PI * sin_theta)
+    let over = density / (2.0 * PI * PI * sin_theta);
+    if sin_theta > 0.0 { over } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -378,16 +524,18 @@ mod tests {
 
     #[test]
     fn places_have_the_density_that_is_stated() {
-        let sampler = MapSampler::new(&sunny());
+        let map = sunny();
+        let sampler = MapSampler::new(&map);
         let n = 1_000;
         let at = |k: i32| (f64::from(k) + 0.5) / f64::from(n);
-        let squares = (0..n * n).map(|k| [at(k % n), at(k / n)]);
-        let (mut places, mut sum) = (PlacesOnMap::default(), 0.0);
-        sampler.sample(squares, &mut places, |_, d, pdf| {
+        let squares: Vec<_> = (0..n * n).map(|k| [at(k % n), at(k / n)]).collect();
+        let (mut chosen, mut sum) = (OnMap::default(), 0.0);
+        sampler.sample(&map, &squares, &mut chosen);
+        for ((&d, &[u, _]), &pdf) in
+            chosen.directions.iter().zip(&chosen.places).zip(&chosen.densities)
+        {
             assert!((sampler.pdf(d) / pdf - 1.0).abs() < 1e-9);
-        });
-        for &([u, v], density) in &places.chosen {
-            sum += u * (PI * v).sin() / density / f64::from(n * n);
+            sum += u / pdf / (2.0 * PI * PI) / f64::from(n * n);
         }
         // The integral of u sin πv over the square is 1/π. Most places are in the sun; the others are some 300 by
         // 300, of 64 by 33 patches: the midpoint rule leaves about a thousandth.
@@ -399,14 +547,42 @@ mod tests {
     fn each_direction_is_worth_the_same() {
         let map = sunny();
         let sampler = MapSampler::new(&map);
-        let squares = (0..40_000).map(|k| [k % 200, k / 200].map(|i| (f64::from(i) + 0.5) / 200.0));
+        let at = |i: u32| (f64::from(i) + 0.5) / 200.0;
+        let squares: Vec<_> = (0..40_000).map(|k| [at(k % 200), at(k / 200)]).collect();
         let whole = 4.0 * PI * sampler.mean;
-        sampler.sample(squares, &mut PlacesOnMap::default(), |_, d, pdf| {
-            let worth = map.radiance(d)[0] / pdf;
+        let mut chosen = OnMap::default();
+        sampler.sample(&map, &squares, &mut chosen);
+        for ((&d, color), &pdf) in
+            chosen.directions.iter().zip(&chosen.colors).zip(&chosen.densities)
+        {
+            assert!((map.radiance(d)[0] / color[0] - 1.0).abs() < 1e-9);
+            let worth = color[0] / pdf;
             // Half a row of 32 is 0.05 radians, by which the sine changes by less than that over its tangent.
             let bound = 0.05 * d.y.abs() / (1.0 - d.y * d.y).sqrt() + 0.01;
             assert!((worth / whole - 1.0).abs() < bound, "{worth} of {whole} from {d}");
-        });
+        }
+    }
+
+    /// What is looked up in lanes is what is looked up alone, at the poles, the seam, and for maps of a texel's
+    /// width.
+    #[test]
+    fn lanes_are_lookups_one_by_one() {
+        let small = EnvironmentMap::new([1, 2], vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+        for map in [sunny(), small] {
+            let sampler = MapSampler::new(&map);
+            let mut asked = OnMap::default();
+            let axes = [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z, DVec3::X];
+            let seam = [1e-17, -1e-17, 0.0, -0.0].map(|x| DVec3::new(x, 0.0, 1.0));
+            let others =
+                (0..500).map(|k| direction([f64::from(k) / 499.0, f64::from(k % 23) / 22.0]));
+            asked.directions = axes.into_iter().chain(seam).chain(others).collect();
+            sampler.look_up(&map, &mut asked);
+            for (k, &d) in asked.directions.iter().enumerate() {
+                assert_eq!(asked.places[k], place(d));
+                assert_eq!(asked.colors[k], map.radiance(d), "{d}");
+                assert_eq!(asked.densities[k], sampler.pdf(d), "{d}");
+            }
+        }
     }
 
     #[test]

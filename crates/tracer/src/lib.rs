@@ -22,6 +22,7 @@
 //! | [`transport`] | batches of paths, and the rules of each tracer of light |
 //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
+mod angles;
 mod bodies;
 pub mod bsdf;
 pub mod clear_sky;

@@ -8,7 +8,7 @@ use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_spectrum::NoOverlap;
 
 use crate::Color;
-use crate::environment::{EnvironmentMap, MapSampler, PlacesOnMap, place};
+use crate::environment::{EnvironmentMap, MapSampler, OnMap, place};
 use crate::light::{EnvironmentImage, Light, LightKind};
 use crate::lights::Lights;
 use crate::spectral::Spectral;
@@ -34,9 +34,9 @@ pub(crate) struct Asked {
     /// Lanes and the chance of each.
     lanes: Vec<(usize, f64)>,
     squares: Vec<[f64; 2]>,
-    places: PlacesOnMap,
-    directions: Vec<(DVec3, f64)>,
-    colors: Vec<Color>,
+    /// With which the sky is chosen for each direction that was met.
+    chances: Vec<f64>,
+    there: OnMap,
 }
 
 impl Asked {
@@ -101,18 +101,14 @@ impl Sky {
         mut each: impl FnMut(usize, Option<Target>, ([f64; 2], &Color)),
     ) {
         let Some((map, sampler)) = &self.map else { return };
-        let Asked { lanes, squares, places, directions, colors } = asked;
-        directions.clear();
-        let take = |_, local: DVec3, pdf| directions.push((self.world_from_map * local, pdf));
-        sampler.sample(squares.iter().copied(), places, take);
-        colors.clear();
-        colors.extend(places.chosen.iter().map(|&(at, _)| map.radiance_at(at)));
-        let lit = places.chosen.iter().map(|&(at, _)| at).zip(&*colors);
-        for ((&(lane, chance), &(direction, pdf)), there) in lanes.iter().zip(&*directions).zip(lit)
-        {
-            let bare = Target::bare(TargetKind::Far, direction, pdf * chance);
+        let Asked { lanes, squares, there, .. } = asked;
+        sampler.sample(map, squares, there);
+        let lit = there.places.iter().copied().zip(&there.colors);
+        let chosen = there.directions.iter().zip(&there.densities);
+        for ((&(lane, chance), (&local, &pdf)), lit) in lanes.iter().zip(chosen).zip(lit) {
+            let bare = Target::bare(TargetKind::Far, self.world_from_map * local, pdf * chance);
             let target = Target { light: u32::try_from(self.index).unwrap_or(u32::MAX), ..bare };
-            each(lane, (pdf > 0.0).then_some(target), there);
+            each(lane, (pdf > 0.0).then_some(target), lit);
         }
     }
 }
@@ -131,7 +127,6 @@ impl Lights {
     ) {
         let Some(sky) = &self.sky else { return };
         let own = self.bands_of(sky.index, radiance.len());
-        let Asked { places, directions, colors, .. } = asked;
         let Some((map, sampler)) = &sky.map else {
             for (number, (from, _)) in wanted.enumerate() {
                 radiance.copy_from_slice(own);
@@ -139,21 +134,21 @@ impl Lights {
             }
             return;
         };
-        directions.clear();
-        directions.extend(wanted.map(|(from, world)| {
-            (sky.world_from_map.transpose() * world, self.chance(from, sky.index))
-        }));
-        places.chosen.clear();
-        places.chosen.extend(directions.iter().map(|&(local, _)| (place(local), 0.0)));
-        colors.clear();
-        colors.extend(places.chosen.iter().map(|&(at, _)| map.radiance_at(at)));
-        for ((local, chance), &(at, _)) in directions.iter_mut().zip(&places.chosen) {
-            *chance *= sampler.pdf_at(*local, at);
+        let Asked { chances, there, .. } = asked;
+        let map_from_world = sky.world_from_map.transpose();
+        chances.clear();
+        there.directions.clear();
+        for (from, world) in wanted {
+            chances.push(self.chance(from, sky.index));
+            there.directions.push(map_from_world * world);
         }
-        let lit = places.chosen.iter().map(|&(at, _)| at).zip(&*colors);
-        for (number, (there, &(_, pdf))) in lit.zip(&*directions).enumerate() {
-            self.spread_sky(spectral, there, radiance);
-            each(number, pdf, radiance);
+        sampler.look_up(map, there);
+        let lit = there.places.iter().copied().zip(&there.colors);
+        for (number, (lit, (chance, pdf))) in
+            lit.zip(chances.iter().zip(&there.densities)).enumerate()
+        {
+            self.spread_sky(spectral, lit, radiance);
+            each(number, chance * pdf, radiance);
         }
     }
 
