@@ -5,9 +5,13 @@ use etendue_camera::SharedPaths;
 use etendue_report::{Decision, DecisionKind, Size};
 use etendue_scene::Scene;
 use etendue_spectrum::Bands;
+use etendue_tracer::transport::Follow;
 
 use crate::samples::BYTES_OF_SUM;
 use crate::stopping::Stopping;
+
+/// So many bands of direct light are traced each by itself.
+const FEW_BANDS: usize = 8;
 
 /// The most memory that the sums of bands may take which share paths: they are kept for the whole film.
 const MOST_BYTES_OF_SUMS: u64 = 2 << 30;
@@ -32,6 +36,12 @@ impl BandPaths {
         };
         if scene.plan.shared_paths == Some(false) {
             return Self::Apart("the scene has each traced by itself".to_owned());
+        }
+        let light = scene.tracer.and_then(|tracer| tracer.row().light);
+        let is_direct = light.is_some_and(|light| light.rules.follow == Follow::Single);
+        if scene.plan.shared_paths.is_none() && is_direct && bands.count() <= FEW_BANDS {
+            let why = "direct light has less noise than how much of it lands on a pixel would, and bands are few";
+            return Self::Apart(why.to_owned());
         }
         if stopping.is_adaptive() {
             let why =

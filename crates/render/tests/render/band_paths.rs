@@ -25,6 +25,7 @@ fn scene(mut camera: Value, lamp: bool, samples: u32, more: &Value) -> Scene {
     let mut scene = json!({
         "camera": camera,
         "tracer": { "type": "direct" },
+        "plan": { "shared_paths": true },
         "materials": { "lamp": { "type": "emissive", "radiance": [3, 3, 3] } },
         "lights": [{ "type": "environment", "radiance": [1, 1, 1] }],
         "objects": [],
@@ -240,12 +241,15 @@ fn the_plan_says_how_bands_travel() {
     let choice = |found: Option<(String, String)>| found.unwrap().0;
     assert_eq!(choice(how(double_gauss(), &json!({}))), "shared");
     assert_eq!(choice(how(singlet(), &json!({}))), "shared");
+    let path = json!({ "plan": {}, "tracer": { "type": "path" } });
+    assert_eq!(choice(how(double_gauss(), &path)), "shared");
     let own = |camera: Value, more: Value, why: &str| {
         let (choice, because) = how(camera, &more).unwrap();
         assert_eq!(choice, "their own");
         assert!(because.contains(why), "{because}");
     };
     own(double_gauss(), json!({ "plan": { "shared_paths": false } }), "the scene has");
+    own(double_gauss(), json!({ "plan": {} }), "direct light has less noise");
     own(
         double_gauss(),
         json!({ "render": { "samples": { "relative_error": 0.05 } } }),

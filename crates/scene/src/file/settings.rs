@@ -165,8 +165,9 @@ pub struct PlanSpec {
     /// together, as at the design wavelength, so that the lens shows no colour errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dispersion: Option<bool>,
-    /// Whether the bands of a picture share the paths of the scene behind a lens that sends each its own way
-    /// (true, where they can), or the scene is traced for each band.
+    /// Whether the bands of a picture share the paths of the scene behind a lens that sends each its own way, where
+    /// they can, or the scene is traced for each band. When absent they share paths of several surfaces, and
+    /// direct light in more than eight bands.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shared_paths: Option<bool>,
     /// Whether images are averaged over what a sample covers; where the camera tells that when absent.
