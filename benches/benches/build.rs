@@ -4,8 +4,8 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use etendue_accel::limit::{BareScene, Mode};
 use etendue_accel::{Accel, BuildOptions, Bvh, Embree, Exact, Quality};
-use etendue_benches::limit::{BareScene, Mode};
 use etendue_benches::meshes;
 
 fn build(criterion: &mut Criterion) {

@@ -13,8 +13,8 @@ use etendue_accel::Accel;
 use etendue_geometry::{Detail, HitBatch, RayBatch};
 use rustix::time::{ClockId, clock_gettime};
 
-use crate::limit::{BareScene, Packet, Single, WIDTH};
 use crate::rays::BATCH;
+use etendue_accel::limit::{BareScene, Packet, Single, WIDTH};
 
 /// Batches a chunk: its rays stay in the second-level cache.
 const CHUNK: usize = 16;

@@ -6,8 +6,8 @@ use etendue_accel::{Accel, BuildOptions, Bvh, Embree, Exact};
 use etendue_geometry::{Geometry, RayBatch};
 
 use crate::contest::{Contestant, LimitPackets, LimitSingles, Ours, Query};
-use crate::limit::{BareScene, Mode, Packet, Single};
 use crate::rays::one_by_one;
+use etendue_accel::limit::{BareScene, Mode, Packet, Single};
 
 /// The structures of every contestant over one geometry.
 #[derive(Debug)]

@@ -1,7 +1,8 @@
+#![forbid(unsafe_code)]
 //! What the benchmarks share: meshes, rays, the contestants, and how they are timed.
 //!
 //! **The limit** is Embree called directly, a bare loop over prepared records with nothing of ours
-//! in between ([`limit`]). Everything else is given as a ratio to it, measured in the same run, the
+//! in between ([`etendue_accel::limit`]). Everything else is given as a ratio to it, measured in the same run, the
 //! contestants taking turns. Medians and the machine's description come from [`etendue_bench`].
 //!
 //! # Map
@@ -13,13 +14,11 @@
 //! | [`contest`] | who is timed, on which clock, and in which order |
 //! | [`field`] | all contestants on one scene |
 //! | [`effort`] | how heavy the meshes are, how often everything is timed |
-//! | [`limit`] | Embree's own speed |
 //! | [`files`] | the meshes as GLB, OBJ and PLY, and a scene around them |
 
 pub mod contest;
 pub mod effort;
 pub mod field;
 pub mod files;
-pub mod limit;
 pub mod meshes;
 pub mod rays;

@@ -12,6 +12,8 @@
 
 mod device;
 mod filter;
+#[cfg(feature = "limit")]
+pub mod limit;
 mod shape;
 mod trace;
 

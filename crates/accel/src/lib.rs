@@ -46,6 +46,8 @@ use etendue_geometry::{Geometry, HitBatch, RayBatch, RayBlock, RayBlocks};
 pub use bvh::Bvh;
 #[cfg(feature = "embree")]
 pub use checked::Embree;
+#[cfg(feature = "limit")]
+pub use embree::limit;
 #[cfg(feature = "embree")]
 pub use embree::{Version, version as embree_version};
 pub use exact::Exact;

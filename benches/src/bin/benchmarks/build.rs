@@ -3,10 +3,10 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
+use etendue_accel::limit::{BareScene, Mode};
 use etendue_accel::{Accel, BuildOptions, Bvh, Embree, Exact, Quality};
 use etendue_bench::timing::{Turn, take_turns, wall};
 use etendue_benches::effort::{Effort, in_short};
-use etendue_benches::limit::{BareScene, Mode};
 use etendue_benches::meshes;
 use etendue_geometry::Geometry;
 

@@ -4,10 +4,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use etendue_accel::limit::{BareScene, Mode, Packet};
 use etendue_accel::{Accel, BuildOptions};
 use etendue_bench::timing::{Turn, take_turns, wall};
 use etendue_benches::effort::Effort;
-use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_camera::{Camera, PixelBlock};
 use etendue_geometry::{
     Buffer, Geometry, Mesh, Placement, Positions, RayBatch, Transform, Vertices,

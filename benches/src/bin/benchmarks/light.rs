@@ -4,9 +4,9 @@
 use std::path::Path;
 
 use anyhow::Context;
+use etendue_accel::limit::{BareScene, Mode, Packet};
 use etendue_accel::{Accel, BuildOptions, Embree};
 use etendue_benches::contest::{LimitPackets, Query, thread_time, time};
-use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_benches::meshes::{self, Random};
 use etendue_benches::rays::BATCH;
 use etendue_camera::{Camera, CameraRays, FilmSamples};

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, ensure};
+use etendue_accel::limit::{BareScene, Mode, Packet};
 use etendue_accel::{BuildOptions, Quality};
 use etendue_bench::timing::ProcessMemory;
 use etendue_bench::timing::{Turn, take_turns, wall};
 use etendue_benches::contest::{LimitPackets, Query, time};
 use etendue_benches::effort::Effort;
-use etendue_benches::limit::{BareScene, Mode, Packet};
 use etendue_benches::meshes;
 use etendue_benches::rays::View;
 use etendue_render::output::Outputs;

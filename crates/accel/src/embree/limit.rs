@@ -1,6 +1,5 @@
 //! The limit: Embree's own speed. A loop that hands prepared records to Embree and does nothing else;
 //! robust mode, as `etendue` has it by default, and the same geometry, shared in the same way.
-#![allow(unsafe_code, reason = "calls Embree with nothing of ours in between")]
 
 use std::ffi::{CString, c_void};
 use std::fmt;
@@ -9,8 +8,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 
 use embree4_sys as sys;
-use etendue_accel::Quality;
 use etendue_geometry::{Geometry, Mesh, Positions, RayBatch};
+
+use crate::Quality;
 
 /// Rays in a packet. Where the processor has no packets of 16, Embree splits them itself.
 pub const WIDTH: usize = 16;
