@@ -6,9 +6,11 @@
 //! * The arc tangent of t up to tan π/8: t times a polynomial in t² through its values at the eleven Chebyshev
 //!   nodes, whose relative error is below 1.2 · 10⁻¹⁶ before rounding; from there to 1 by
 //!   arctan t = π/4 + arctan((t − 1)/(t + 1)) (Hart et al., *Computer Approximations*, 1968, section 6.5).
-//! * Sine and cosine to π/4: Taylor's series, whose first terms that are left out are below 5 · 10⁻¹⁷.
+//! * Sine and cosine to π/4: [`disk::small_sine_cosine`].
 
 use std::f64::consts::TAU;
+
+use etendue_geometry::disk;
 
 /// tan π/8.
 const EIGHTH: f64 = 0.414_213_562_373_095_03;
@@ -26,29 +28,6 @@ const ARC: [f64; 11] = [
     0.009_053_284_031_558_473,
     -0.006_920_125_450_799_899,
     0.003_363_780_726_340_955_5,
-];
-
-/// Of sin x / x and cos x, by powers of x².
-const SINE: [f64; 8] = [
-    1.0,
-    -1.0 / 6.0,
-    1.0 / 120.0,
-    -1.0 / 5_040.0,
-    1.0 / 362_880.0,
-    -1.0 / 39_916_800.0,
-    1.0 / 6_227_020_800.0,
-    -1.0 / 1_307_674_368_000.0,
-];
-const COSINE: [f64; 9] = [
-    1.0,
-    -1.0 / 2.0,
-    1.0 / 24.0,
-    -1.0 / 720.0,
-    1.0 / 40_320.0,
-    -1.0 / 3_628_800.0,
-    1.0 / 479_001_600.0,
-    -1.0 / 87_178_291_200.0,
-    1.0 / 20_922_789_888_000.0,
 ];
 
 #[inline(always)]
@@ -84,8 +63,7 @@ fn sine_and_cosine(turns: f64) -> [f64; 2] {
     let shifted = 4.0 * turns + WHOLE;
     let quarter = shifted.to_bits();
     let x = TAU * (turns - 0.25 * (shifted - WHOLE));
-    let squared = x * x;
-    let (sine, cosine) = (x * polynomial(&SINE, squared), polynomial(&COSINE, squared));
+    let (sine, cosine) = disk::small_sine_cosine(x);
     let (a, b) = if quarter & 1 == 0 { (sine, cosine) } else { (cosine, sine) };
     [if quarter & 2 == 0 { a } else { -a }, if quarter.wrapping_add(1) & 2 == 0 { b } else { -b }]
 }
