@@ -7,25 +7,26 @@
 //! side in new blocks. Where surfaces are of several kinds, hits of one kind are put side by side first. Those of
 //! other kinds than matte and sheets are worked out one by one, by [`crate::bsdf::Bsdf`], within the same stages.
 
+mod scatter;
+mod surfaces;
+
 use etendue_accel::BlockAccel;
 use etendue_geometry::block::LANES as BLOCK;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, HitPrecision, RayBatch, RayBlock, RayBlocks};
 
 use super::numbers::{DRAWS, Draw};
-use super::patch::{LANES, Patch, SheetColors, at, put};
+use super::patch::{LANES, Patch, SheetColors, at};
 use super::step::weigh;
 use super::{Follow, LightingContext, RaySamples, Scratch, Tracing, Traits, kernels, metal};
-use crate::bsdf::{Bsdf, Model, Weights};
+use crate::Scattering;
+use crate::bsdf::{Bsdf, Weights};
 use crate::footprint::{Cone, Footprint};
 use crate::placed::{PlacedSurface, SurfaceKind};
 use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
-use crate::scattering::SheetSurface;
 use crate::sky::Asked;
-use crate::surface::SurfaceInteraction;
 use crate::target::Chosen;
-use crate::{Color, Scattering};
 
 /// Paths under way that have met equally many surfaces.
 #[derive(Debug, Default)]
@@ -220,7 +221,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         out: &mut [f64],
     ) {
         let LaneScratch { now, kinds, alive, missed, .. } = lanes;
-        let LightingContext { lights, spectral, surroundings: around, .. } = self.stage;
+        let LightingContext { lights, spectral, surroundings: scene, .. } = self.stage;
         let (count, bounces) = (self.count(), stage.bounces);
         alive.clear();
         kinds.iter_mut().for_each(Vec::clear);
@@ -265,7 +266,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                     continue;
                 };
                 radiance.iter_mut().zip(carried(i)).for_each(|(r, t)| *r *= t * weight);
-                let group = || lights.group_of_placement(around, hit.id[0]);
+                let group = || lights.group_of_placement(scene, hit.id[0]);
                 self.add(radiance, self.parts.row(ray[i], bounces, group), out);
             }
         }
@@ -325,7 +326,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         footprint: impl Fn() -> Option<Footprint>,
         radiance: &mut [f64],
     ) -> Option<f64> {
-        let LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
+        let LightingContext { lights, surroundings: scene, spectral, .. } = self.stage;
         let weight = |pdf: f64| way.weight_against(if pdf.is_finite() { pdf } else { 0.0 });
         let index = lights.index_of(hit.id);
         if let Some(index) = index
@@ -342,21 +343,21 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let density = hit.t * hit.t / (cosine * lamp.shape.area);
             return Some(weight(lights.chance(hit.from, index) * density));
         }
-        let placement = around.geometry.placements.get(hit.id[0] as usize)?;
+        let placement = scene.geometry.placements.get(hit.id[0] as usize)?;
         let [u, v] = hit.weights;
-        let corner = SurfacePoint::corner(around.geometry, placement, hit.id[1] as usize);
+        let corner = SurfacePoint::corner(scene.geometry, placement, hit.id[1] as usize);
         let weights = [1.0 - u - v, u, v];
-        let spot = SurfacePoint { weights, footprint: footprint(), ..corner };
-        let material = around.material(&spot)?;
+        let surface_point = SurfacePoint { weights, footprint: footprint(), ..corner };
+        let material = scene.material(&surface_point)?;
         if material.scattering == Scattering::Unlit {
-            let [r, g, b, _] = around.base_color(material, &spot);
+            let [r, g, b, _] = scene.base_color(material, &surface_point);
             spectral.spread(&[r, g, b], radiance);
             return way.is_specular.then_some(1.0);
         }
-        if !lights.emitted(around, spectral, &spot, hit.is_front, radiance) {
+        if !lights.emitted(scene, spectral, &surface_point, hit.is_front, radiance) {
             return None;
         }
-        let pdf = lights.pdf_of_surface(around, hit.id[0], &spot, hit.from, hit.direction);
+        let pdf = lights.pdf_of_surface(scene, hit.id[0], &surface_point, hit.from, hit.direction);
         Some(weight(pdf))
     }
 
@@ -529,166 +530,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         self.scatter_blocks(stage, lanes, patch, kind);
     }
 
-    /// Where a hit is on its mesh, as path `i` sees it.
-    fn point_of(
-        &self,
-        stage: &Stage<'_>,
-        now: &Paths,
-        i: usize,
-    ) -> Option<(u32, SurfacePoint<'_>)> {
-        let geometry = self.stage.surroundings.geometry;
-        let (block, lane) = (&now.rays.blocks()[i / BLOCK], i % BLOCK);
-        let id = block.placement[lane];
-        let placement = geometry.placements.get(id as usize)?;
-        let corner = SurfacePoint::corner(geometry, placement, block.triangle[lane] as usize);
-        let [u, v] = [block.u[lane], block.v[lane]].map(|w| f64::from(w.clamp(0.0, 1.0)));
-        let footprint = self.footprint(stage, now, i);
-        Some((id, SurfacePoint { weights: [1.0 - u - v, u, v], footprint, ..corner }))
-    }
-
-    /// What is known of a hit on a matte surface: its colour, and its shading normal where that is not the
-    /// triangle's.
-    #[inline(always)]
-    fn look_up_matte(
-        &self,
-        stage: &Stage<'_>,
-        now: &Paths,
-        patch: &mut Patch,
-        (i, lane): (usize, usize),
-        placed: &PlacedSurface,
-    ) {
-        put(&mut patch.seen.magnitudes, lane, placed.magnitudes);
-        if let (Some(color), false) = (placed.color, placed.is_tilted) {
-            patch.colors[lane] = color;
-        } else if let Some((_, spot)) = self.point_of(stage, now, i) {
-            self.look_up(patch, lane, placed, &spot);
-        }
-    }
-
-    /// Colour and shading normal of a hit where they are not alike all over.
-    fn look_up(
-        &self,
-        patch: &mut Patch,
-        lane: usize,
-        placed: &PlacedSurface,
-        spot: &SurfacePoint<'_>,
-    ) {
-        let around = &self.stage.surroundings;
-        let Some(material) = around.material(spot) else { return };
-        if placed.is_tilted {
-            patch.is_tilted = true;
-            let front = at(&patch.seen.normal, lane);
-            let tilted = spot.tilted_normal(around, material, placed.turn.as_ref(), front);
-            put(&mut patch.seen.shading, lane, tilted);
-        }
-        patch.colors[lane] = placed.color.unwrap_or_else(|| {
-            let [r, g, b, _] = around.base_color(material, spot);
-            [r, g, b].map(|c| c.clamp(0.0, 1.0))
-        });
-    }
-
-    /// What is known of a hit on a sheet of facets; whether it is rough.
-    fn look_up_sheet(
-        &self,
-        stage: &Stage<'_>,
-        now: &Paths,
-        patch: &mut Patch,
-        (i, lane): (usize, usize),
-        placed: &PlacedSurface,
-    ) -> bool {
-        let around = &self.stage.surroundings;
-        let Some((_, spot)) = self.point_of(stage, now, i) else { return false };
-        let Some(material) = around.material(&spot) else { return false };
-        let (surface, named, is_metal) = match &material.scattering {
-            Scattering::Metal { roughness, named } => {
-                let (alpha, highlight) = (roughness * roughness, [1.0; 3]);
-                let metal = SheetSurface { metallic: 1.0, alpha, f0: 0.0, f90: 0.0, highlight };
-                (metal, *named, 1.0)
-            }
-            Scattering::Gltf(surface) => (surface.sheet(&spot, around), None, 0.0),
-            Scattering::Black
-            | Scattering::Matte
-            | Scattering::Unlit
-            | Scattering::Mirror
-            | Scattering::Dielectric(_) => return false,
-        };
-        if surface.alpha <= 0.0 {
-            return false;
-        }
-        put(&mut patch.seen.magnitudes, lane, placed.magnitudes);
-        self.look_up(patch, lane, placed, &spot);
-        let SheetSurface { metallic, alpha, f0, f90, highlight } = surface;
-        let peak = |color: &Color| color[0].max(color[1]).max(color[2]);
-        let sheets = &mut *patch.sheets;
-        (sheets.alpha[lane], sheets.metallic[lane]) = (alpha, metallic);
-        (sheets.f0[lane], sheets.f90[lane]) = (f0, f90);
-        sheets.base_peak[lane] = peak(&patch.colors[lane]);
-        sheets.f0_peak[lane] = (f0 * peak(&highlight)).min(1.0);
-        sheets.is_metal[lane] = is_metal;
-        patch.sheet_colors.resize(LANES, SheetColors::default());
-        patch.sheet_colors[lane] = SheetColors { highlight, deep: [0.0; 3], named };
-        true
-    }
-
-    /// What is known of a hit on a smooth surface.
-    fn look_up_smooth(
-        &self,
-        stage: &Stage<'_>,
-        now: &Paths,
-        patch: &mut Patch,
-        (i, lane): (usize, usize),
-        placed: &PlacedSurface,
-    ) {
-        self.look_up_matte(stage, now, patch, (i, lane), placed);
-        let around = &self.stage.surroundings;
-        let placement = now.rays.blocks()[i / BLOCK].placement[i % BLOCK];
-        let material = around.geometry.placements.get(placement as usize);
-        let material = material.and_then(|p| around.materials.get(p.material as usize));
-        let scattering = material.map_or(&Scattering::Black, |material| &material.scattering);
-        let named = if let Scattering::Metal { named, .. } = scattering { *named } else { None };
-        let smooth = &mut patch.smooth;
-        smooth.is_metal[lane] = f64::from(matches!(scattering, Scattering::Metal { .. }));
-        smooth.eta[lane] = 0.0;
-        if let Scattering::Dielectric(glass) = scattering {
-            // Rays that pass a surface leave it on the other side.
-            patch.seen.is_beside[lane] = 0.0;
-            let index = glass.ior.at(self.stage.spectral.wavelength(0));
-            let seen = &patch.seen;
-            let is_front = at(&seen.normal, lane).dot(at(&seen.direction, lane)) <= 0.0;
-            smooth.eta[lane] = if is_front { index } else { 1.0 / index };
-        }
-        patch.sheet_colors.resize(LANES, SheetColors::default());
-        patch.sheet_colors[lane] = SheetColors { named, ..SheetColors::default() };
-    }
-
-    /// How a surface of any other kind scatters light.
-    fn look_up_other(
-        &self,
-        stage: &Stage<'_>,
-        now: &Paths,
-        patch: &mut Patch,
-        (i, lane): (usize, usize),
-        placed: &PlacedSurface,
-    ) {
-        let around = &self.stage.surroundings;
-        put(&mut patch.seen.magnitudes, lane, placed.magnitudes);
-        if !placed.is_opaque {
-            // Rays that pass a surface leave it on the other side.
-            patch.seen.is_beside[lane] = 0.0;
-        }
-        let seen = &patch.seen;
-        let ray = (at(&seen.origin, lane), at(&seen.direction, lane));
-        let hit = (seen.t[lane], at(&seen.normal, lane));
-        let found = self.point_of(stage, now, i);
-        let found = found.and_then(|spot| SurfaceInteraction::at(self.stage, spot, ray, hit));
-        let black = || Bsdf::new(Model::Black, [hit.1; 2], -ray.1, [[0.0; 3]; 2]);
-        let bsdf = found.map(|met| met.bsdf(around, self.stage.spectral.wavelength(0)));
-        patch.bsdfs.push(bsdf.unwrap_or_else(black));
-    }
-
     /// Chooses a light for each hit, and a place on it.
     fn choose_for_blocks(&self, lanes: &LaneScratch, patch: &mut Patch, asked: &mut Asked) {
-        let LightingContext { lights, surroundings: around, spectral, .. } = self.stage;
+        let LightingContext { lights, surroundings: scene, spectral, .. } = self.stage;
         let count = self.count();
         patch.radiance.resize(LANES * count, 0.0);
         asked.clear();
@@ -736,7 +580,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             let one = ((index, chance), [squares[0][lane], squares[1][lane]]);
             let point = at(&patch.seen.point, lane);
-            match lights.place(around, spectral, point, one, radiance) {
+            match lights.place(scene, spectral, point, one, radiance) {
                 Chosen::Dark => patch.targets.set(lane, None),
                 Chosen::Place(target) => patch.targets.set(lane, Some(&target)),
                 Chosen::Sky { square, chance } => asked.push(lane, square, chance),
@@ -771,7 +615,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         let LaneScratch { now, shadows, picked, .. } = lanes;
         let count = self.count();
-        let (lights, around) = (self.stage.lights, &self.stage.surroundings);
+        let (lights, scene) = (self.stage.lights, &self.stage.surroundings);
         for (&lane, &(i, _)) in picked.iter().zip(patch.path.iter()) {
             let Patch { away, targets, radiance, .. } = &*patch;
             let value = away.value[lane];
@@ -781,7 +625,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 continue;
             }
             push(&mut shadows.rays, stage, [&away.start, &away.along], lane, away.reach[lane]);
-            let group = || lights.group_of(around, [targets.id[lane][0], targets.light[lane]]);
+            let group = || lights.group_of(scene, [targets.id[lane][0], targets.light[lane]]);
             let row = self.parts.row(now.carried.ray[i], stage.bounces + 1, group);
             shadows.carried.ray.push(row);
             let light = radiance[lane * count..(lane + 1) * count].iter();
@@ -820,168 +664,6 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             + value.deep * self.band(deep, k)
     }
 
-    /// Chooses a direction for each hit, and notes the path along it, but for those that carry nothing or end
-    /// by chance.
-    fn scatter_blocks(
-        &self,
-        stage: &Stage<'_>,
-        lanes: &mut LaneScratch,
-        patch: &mut Patch,
-        kind: SurfaceKind,
-    ) {
-        let hittable = self.stage.lights.is_hittable();
-        let ends = stage.ends_unless_specular;
-        if ends && !hittable && matches!(kind, SurfaceKind::Matte | SurfaceKind::Sheet) {
-            return;
-        }
-        let squares = || {
-            let mut squares = [[0.5; 2]; LANES];
-            for (&lane, &(_, k)) in lanes.picked.iter().zip(&patch.path) {
-                squares[lane] = lanes.number(Draw::Direction, k);
-            }
-            squares
-        };
-        let choices = || {
-            let mut choices = [0.5; LANES];
-            for (&lane, &(_, k)) in lanes.picked.iter().zip(&patch.path) {
-                choices[lane] = lanes.number(Draw::Choice, k)[1];
-            }
-            choices
-        };
-        match kind {
-            SurfaceKind::Black => return,
-            SurfaceKind::Matte => {
-                let squares = squares();
-                kernels::scatter(patch, &squares);
-            }
-            SurfaceKind::Sheet => {
-                let (squares, choices) = (squares(), choices());
-                let Patch { sheets, seen, away, .. } = patch;
-                let normals = [&seen.normal, &seen.shading];
-                let found = (&mut away.along, &mut away.value);
-                sheets.scatter(normals, (&choices, &squares), found);
-                kernels::leave(patch);
-            }
-            SurfaceKind::Smooth => {
-                let choices = choices();
-                kernels::mirror_or_refract(patch, &choices);
-            }
-            SurfaceKind::Other => return self.scatter_one_by_one(stage, lanes, patch),
-        }
-        let count = self.count();
-        for n in 0..lanes.picked.len() {
-            let (lane, (i, k)) = (lanes.picked[n], patch.path[n]);
-            let pdf = patch.away.value[lane];
-            let goes_on = pdf > 0.0;
-            if !goes_on {
-                continue;
-            }
-            let throughput = &mut lanes.now.carried.throughput[i * count..(i + 1) * count];
-            let bands = throughput.iter_mut().enumerate();
-            match kind {
-                SurfaceKind::Black | SurfaceKind::Other => {}
-                SurfaceKind::Matte => {
-                    bands.for_each(|(k, band)| *band *= self.band(&patch.colors[lane], k));
-                }
-                SurfaceKind::Sheet => {
-                    let weights = patch.sheets.weights(lane);
-                    bands.for_each(|(k, band)| {
-                        *band *= self.in_band_of_sheet(patch, lane, weights, k);
-                    });
-                }
-                SurfaceKind::Smooth => {
-                    let (white, base) = (patch.smooth.white[lane], patch.smooth.base[lane]);
-                    let weights =
-                        Weights { white, base, dip: patch.smooth.dip[lane], ..Weights::default() };
-                    bands.for_each(|(k, band)| {
-                        *band *= self.in_band_of_sheet(patch, lane, weights, k);
-                    });
-                }
-            }
-            let is_specular = kind == SurfaceKind::Smooth;
-            let is_last = if is_specular { stage.ends } else { ends };
-            let cone = if is_specular { self.cone_at_hit(stage, &lanes.now, i) } else { None };
-            let way = Way { pdf, is_specular, is_last };
-            self.follow_blocks(stage, lanes, patch, (lane, (i, k)), (way, cone));
-        }
-    }
-
-    /// The same of surfaces that are worked out one by one.
-    fn scatter_one_by_one(&self, stage: &Stage<'_>, lanes: &mut LaneScratch, patch: &mut Patch) {
-        let hittable = self.stage.lights.is_hittable();
-        let count = self.count();
-        for n in 0..lanes.picked.len() {
-            let (lane, (i, k)) = (lanes.picked[n], patch.path[n]);
-            let bsdf = &patch.bsdfs[lane];
-            if stage.ends_unless_specular && !hittable && !bsdf.has_single() {
-                continue;
-            }
-            let choice = lanes.number(Draw::Choice, k)[1];
-            let Some(scattered) = bsdf.sample(choice, lanes.number(Draw::Direction, k)) else {
-                continue;
-            };
-            let is_specular = scattered.pdf == f64::INFINITY;
-            let is_last = if is_specular { stage.ends } else { stage.ends_unless_specular };
-            if is_last && !is_specular && !hittable {
-                continue;
-            }
-            let throughput = &mut lanes.now.carried.throughput[i * count..(i + 1) * count];
-            for (k, band) in throughput.iter_mut().enumerate() {
-                *band *= self.in_band(bsdf, scattered.weights, k);
-            }
-            let start = patch.leave(lane, scattered.direction);
-            patch.send(lane, (start, scattered.direction));
-            let cone = if is_specular { self.cone_at_hit(stage, &lanes.now, i) } else { None };
-            let way = Way { pdf: scattered.pdf, is_specular, is_last };
-            self.follow_blocks(stage, lanes, patch, (lane, (i, k)), (way, cone));
-        }
-    }
-
-    /// Notes the path along the ray that leaves a lane, unless it carries nothing or ends by chance.
-    #[inline(always)]
-    fn follow_blocks(
-        &self,
-        stage: &Stage<'_>,
-        lanes: &mut LaneScratch,
-        patch: &Patch,
-        (lane, (i, k)): (usize, (usize, usize)),
-        (way, cone): (Way, Option<Cone>),
-    ) {
-        let count = self.count();
-        let [_, chance] = lanes.number(Draw::Chance, k);
-        let LaneScratch { now, onward, .. } = lanes;
-        let throughput = &mut now.carried.throughput[i * count..(i + 1) * count];
-        let most = throughput.iter().copied().fold(0.0, f64::max);
-        let ray = || (at(&patch.away.start, lane), at(&patch.away.along, lane));
-        let asks = way.is_last && !way.is_specular && stage.asks_emitters;
-        if most <= 0.0 || (asks && !self.may_shine(ray())) {
-            return;
-        }
-        if self.rules.roulette.is_some_and(|after| stage.bounces + 1 >= after) && !way.is_last {
-            // Its root: where few paths come this far, ending them saves little and leaves noise.
-            let survival = most.sqrt().min(1.0);
-            if chance >= survival {
-                return;
-            }
-            throughput.iter_mut().for_each(|band| *band /= survival);
-        }
-        let carried = if asks {
-            let (start, along) = ray();
-            onward.last.push(start, along);
-            &mut onward.of_last
-        } else {
-            let [start, along] = [&patch.away.start, &patch.away.along];
-            push(&mut onward.next.rays, stage, [start, along], lane, f64::INFINITY);
-            if stage.is_mixed {
-                onward.next.carried.cones.push(cone);
-            }
-            &mut onward.next.carried
-        };
-        carried.ray.push(now.carried.ray[i]);
-        carried.ways.push(way);
-        carried.throughput.extend_from_slice(throughput);
-    }
-
     /// Adds what lights bring along rays that nothing blocks.
     fn shadows_of_blocks(
         &mut self,
@@ -1014,7 +696,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     ) {
         let LaneScratch { onward: Onward { last, of_last, .. }, hits, shadows, missed, .. } = lanes;
         let Some(emitters) = self.stage.emitters.filter(|_| !last.is_empty()) else { return };
-        let LightingContext { lights, spectral, surroundings: around, .. } = self.stage;
+        let LightingContext { lights, spectral, surroundings: scene, .. } = self.stage;
         let (count, scatterings) = (self.count(), stage.bounces + 1);
         last.from_surface = true;
         last.coherent = false;
@@ -1054,7 +736,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             // Points that fall together see each other: a ray of no length meets nothing.
             let direction = if distance > 0.0 { offset / distance } else { DVec3::Z };
             push_ray(&mut shadows.rays, stage, [from, direction], distance);
-            let group = || lights.group_of_placement(around, hit.id[0]);
+            let group = || lights.group_of_placement(scene, hit.id[0]);
             note(shadows, self.parts.row(ray[i], scatterings, group), radiance, (i, weight));
         }
         let wanted = missed.iter().map(|&i| (last.origin(i as usize), last.direction(i as usize)));
