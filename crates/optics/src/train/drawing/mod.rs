@@ -4,13 +4,8 @@
 //! |---|---|
 //! | [`layout`] | the lens cut along y and z, with fans of rays |
 //! | [`Section`] | the same cut as lines in millimetres, for those who draw themselves |
-//! | [`drawing`] | relative illumination over the sensor; spot diagrams by field and wavelength |
-//!
-//! Relative illumination over the sensor, beside the cosine's fourth power.
-//!
-//! Spot diagrams: one box a field, one colour a wavelength, the same scale in all.
-//!
-//! The lens cut along y and z as lines, for those who draw themselves.
+//! | [`relative_illumination`] | illumination over the sensor, beside the cosine's fourth power |
+//! | [`spots`] | spot diagrams: one box a field, one colour a wavelength, the same scale in all |
 
 mod layout;
 #[cfg(test)]
