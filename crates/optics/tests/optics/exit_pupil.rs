@@ -76,6 +76,47 @@ fn a_thin_lens_with_its_stop_has_the_irradiance_of_a_disc() {
     }
 }
 
+/// Even in projected solid angle on the axis, to rounding; aside of it in the first order of the pupil's radius, so that
+/// what weights differ by goes with its square. One by one and in batches they are the same.
+#[test]
+fn samples_of_a_thin_lens_weigh_all_but_the_same() {
+    let f = 50.0;
+    for f_number in [0.55, 1.0, 2.8, 8.0, 32.0] {
+        let a = 0.5 * f / f_number;
+        let train = build(&format!(
+            r#"{{"elements": [{{"type": "thin_lens", "focal_length": {f}}},
+                {{"type": "aperture", "shape": "circular", "radius": {a}}}]}}"#
+        ));
+        let pupil = ExitPupil::new(&train, &[587.56], f, [40.0, 40.0]).unwrap();
+        for r in [0.0, 0.1, 5.0, 18.0, 36.0, 50.0] {
+            let film = DVec2::new(0.6 * r, -0.8 * r);
+            let root = ((f * f + r * r + a * a).powi(2) - 4.0 * r * r * a * a).sqrt();
+            // π sin² θ, aside of the axis too: 1 - (f² + r² - a²)/root without its cancellation.
+            let exact =
+                2.0 * PI * a * a * f * f / (root * (root + f * f + r * r - a * a));
+            let squares: Vec<[f64; 2]> = (0..4000).map(unit_square).collect();
+            let weights: Vec<f64> =
+                squares.iter().map(|&u| pupil.sample(film, u, 587.56).unwrap().weight).collect();
+            let most = weights.iter().map(|w| (w / exact - 1.0).abs()).fold(0.0, f64::max);
+            // Slopes of the pupil's centre and radius. On the rim the second order has a factor of 4/3, doubled for
+            // what is above it; of the third half is left, 2/3 c ρ³.
+            let (c, rho) = (r / f, a / f);
+            let allowed = 8.0 / 3.0 * (c * rho / (1.0 + c * c)).powi(2) + 2.0 / 3.0 * c * rho.powi(3);
+            assert!(most <= allowed + 1e-12, "f/{f_number} at {r} mm: {most} and {allowed}");
+            let mut rays = LensRays::default();
+            let (x, y) = (vec![film.x; squares.len()], vec![film.y; squares.len()]);
+            let frame = train.sensor_frame(f);
+            let samples =
+                DiskSamples { sensor: &frame, scale: 1.0, film: [&x, &y], squares: &squares };
+            pupil.disk().unwrap().fill(&samples, &mut rays);
+            for (i, weight) in weights.iter().enumerate() {
+                let own = rays.throughput(i);
+                assert!((own / weight - 1.0).abs() < 1e-12, "f/{f_number} at {r} mm: {own}");
+            }
+        }
+    }
+}
+
 #[test]
 fn thin_lenses_faster_than_half_an_f_number_have_bounded_weights_and_the_irradiance_of_a_disc() {
     // As above; and on the axis π sin² θ.

@@ -314,9 +314,10 @@ impl ExitPupil {
         {
             return aimed.map(|aimed| self.weigh(aimed.slopes, 1.0 / aimed.density));
         }
-        let wide =
-            self.disk.and_then(|disk| disk.draw_wide(&self.sensor, self.film_point(film), u));
-        let (slopes, area) = wide.or_else(|| bound.draw(u))?;
+        let (slopes, area) = match self.disk {
+            Some(disk) => disk.draw(&self.sensor, self.film_point(film), u),
+            None => bound.draw(u)?,
+        };
         Some(self.weigh(slopes, area))
     }
 
