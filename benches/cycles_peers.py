@@ -185,22 +185,22 @@ def page(results, arguments):
              f"(benchmarks-light.md), {SIDE} × {SIDE} pixels of {SAMPLES} samples, by Cycles of bpy "
              f"{program.version('bpy')} on processors, with its light tree, without adaptive sampling, clamping and "
              f"denoising. Tracing alone, processor seconds of all threads ({os.cpu_count()} cores), medians of "
-             f"{arguments.rounds} rounds in which the programs take turns. *Noise*, *typical* and *cost* are what "
+             f"{arguments.rounds} rounds in which the programs take turns. *Noise*, *median* and *cost* are what "
              "they are there.", ""]
     for job, taken in results.items():
         lines += [f"## {job[0].upper() + job[1:]}", "",
-                  "| | seconds | noise | typical | mean | etendue is faster by | cost at one error |",
+                  "| | seconds | noise | median | mean | etendue is faster by | cost at one error |",
                   "|---|---|---|---|---|---|---|"]
         middle = {title: statistics.median(seconds for seconds, _ in all) for title, all in taken.items()}
-        pairs = {title: [picture for _, picture in all[:2]] for title, all in taken.items()}
-        noise = {title: light_peers.noise(*pair) for title, pair in pairs.items()}
-        own = middle["etendue"] * noise["etendue"] ** 2
+        pictures = {title: [picture for _, picture in all] for title, all in taken.items()}
+        noise = {title: light_peers.noises(some) for title, some in pictures.items()}
+        own = middle["etendue"] * noise["etendue"][0] ** 2
         for title, all in taken.items():
             seconds = [one for one, _ in all]
             lines.append(
-                f"| {title} | {middle[title]:.2f} ({min(seconds):.2f} to {max(seconds):.2f}) | {100 * noise[title]:.2f} % "
-                f"| {100 * light_peers.typical_noise(*pairs[title]):.2f} % | {np.mean(pairs[title]):.4f} "
-                f"| {middle[title] / middle['etendue']:.2f} | {middle[title] * noise[title] ** 2 / own:.2f} |")
+                f"| {title} | {middle[title]:.2f} ({min(seconds):.2f} to {max(seconds):.2f}) | {100 * noise[title][0]:.2f} % "
+                f"| {100 * noise[title][1]:.2f} % | {np.mean(pictures[title]):.4f} "
+                f"| {middle[title] / middle['etendue']:.2f} | {middle[title] * noise[title][0] ** 2 / own:.2f} |")
         lines.append("")
     wrapped = [line if line.startswith(("|", "#")) else textwrap.fill(line, 120) for line in lines]
     return "\n".join(wrapped).rstrip() + "\n"

@@ -20,7 +20,8 @@ need_open3d() {
 }
 
 need_mitsuba() {
-    has_library libLLVM || need "Mitsuba's variant for processors compiles with it" libllvm19
+    # 15, which Debian 12 has by itself, aborts.
+    has_library libLLVM.so.19 || need "Mitsuba's variant for processors compiles with it" libllvm19
 }
 
 need_blender() {

@@ -1,168 +1,107 @@
-//! The least that light can take: Embree's bare loop over the rays of a camera with a lens, and over
-//! as many rays to a light.
+//! The least that a picture of light can take: what the accelerator takes for the very rays that were traced.
 
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
-use anyhow::Context;
-use etendue_accel::limit::{BareScene, Mode, Packet};
-use etendue_accel::{Accel, BuildOptions, Embree};
-use etendue_benches::contest::{LimitPackets, Query, thread_time, time};
-use etendue_benches::meshes::{self, Random};
-use etendue_benches::rays::BATCH;
-use etendue_camera::{Camera, CameraRays, FilmSamples};
+use etendue_accel::{Accel, BlockAccel, BuildOptions, BuildReport, Counts};
+use etendue_benches::contest::thread_time;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, HitBatch, RayBatch};
-use etendue_scene::import::Wanted;
+use etendue_geometry::{HitBatch, RayBatch, RayBlock, RayBlocks};
+use etendue_render::output::Outputs;
+use etendue_render::{Images, Plan, plan};
 use etendue_scene::{LoadOptions, SceneFile};
-use etendue_spectrum::Bands;
 use serde_json::json;
 
-/// Side of a tile of pixels.
-const TILE: u32 = 16;
-
-/// Of how many tiles one is traced; times are scaled up.
-const ONE_IN: u32 = 8;
-
-/// Prints as JSON what all cores take for the camera's rays of the scene at `path` over the blob of
-/// `triangles`, and for a ray from each hit to `light` (s).
-pub(crate) fn print_bound(path: &Path, triangles: u64, light: DVec3) -> anyhow::Result<()> {
+/// Prints as JSON what the accelerator takes of a render of the scene at `path`, all threads together (s), with
+/// watertight answers and without.
+pub(crate) fn print_bound(path: &Path) -> anyhow::Result<()> {
     let file = SceneFile::read(path, &[])?;
-    let scene = file.load(Wanted::NOTHING, &LoadOptions::default())?;
-    let camera = scene.camera.opened(&Bands::Rgb).context("the camera")?;
-    let primary = camera_rays(&camera, scene.render.samples.most(), &scene.render);
-    let geometry = meshes::blob(triangles)?;
-    let accel = Embree::build(geometry.clone(), &BuildOptions::default())?;
-    let shadow = rays_to(light, &accel, &primary);
-    let bounces = bounces(&accel, &primary);
-    let single: Vec<RayBatch> = bounces.iter().flat_map(one_a_batch).collect();
-    let [compacted, one_by_one] = [&bounces, &single].map(|rays| traced_in(&accel, rays));
-    drop((accel, single));
-    let bare = BareScene::build(geometry, Mode::default(), 0)?;
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let seconds = |rays: &[RayBatch], query: Query| {
-        let packets = Packet::of(rays);
-        let limit = LimitPackets { scene: &bare, packets: &packets, query };
-        let mut times: Vec<f64> = (0..5).map(|_| time(&limit, cores, 1)).collect();
-        times.sort_by(f64::total_cmp);
-        times[2] * f64::from(ONE_IN)
-    };
-    let count = |rays: &[RayBatch]| rays.len() * BATCH * ONE_IN as usize;
-    println!(
-        "{}",
-        json!({"camera": seconds(&primary, Query::Closest), "camera_rays": count(&primary),
-               "shadow": seconds(&shadow, Query::Occluded), "shadow_rays": count(&shadow),
-               "compacted": compacted, "one_by_one": one_by_one})
-    );
+    let scene = file.load(plan::wanted(&file.spec.all_layers()), &LoadOptions::default())?;
+    let plan = Plan::new(&scene, Outputs { npy: true, ..Outputs::NONE });
+    let images = Images::decode(&scene, &plan, None)?;
+    let mut bound = serde_json::Map::new();
+    for (name, robust) in [("robust", true), ("fast", false)] {
+        let options = BuildOptions { robust, ..BuildOptions::default() };
+        let timed = Timed::new(etendue_render::build(&scene, &plan, &options)?);
+        etendue_render::render(&scene, &plan, &timed, &images, Vec::new(), &|_: f64| true)?;
+        bound.insert(name.into(), json!(timed.seconds()));
+        bound.insert("rays".into(), json!(timed.rays.into_inner()));
+    }
+    println!("{}", serde_json::Value::from(bound));
     Ok(())
 }
 
-/// The rays of every eighth tile in batches, those of one pixel side by side.
-fn camera_rays(
-    camera: &Camera,
-    samples: u32,
-    settings: &etendue_scene::file::RenderSpec,
-) -> Vec<RayBatch> {
-    let [width, height] = camera.resolution();
-    let (mut film, mut rays) = (FilmSamples::default(), CameraRays::default());
-    let mut chopped = Chopped::default();
-    for (number, (left, top)) in (0_u32..)
-        .zip((0..height).step_by(16).flat_map(|y| (0..width).step_by(16).map(move |x| (x, y))))
-    {
-        // A diagonal pattern, so that all parts of the picture have their share.
-        if !(number + 3 * (top / TILE)).is_multiple_of(ONE_IN) {
-            continue;
-        }
-        film.clear();
-        for (x, y) in (0..TILE * TILE).map(|k| (left + k % TILE, top + k / TILE)) {
-            let numbers = settings.sampler.pixel(settings.seed, x, y, samples);
-            for index in 0..samples {
-                let [u, v] = numbers.square(index, 0);
-                film.push([f64::from(x) + u, f64::from(y) + v], numbers.square(index, 1), 0.5);
-            }
-        }
-        camera.sample_rays(&film, &mut rays);
-        for i in 0..rays.rays.len() {
-            chopped.push(rays.rays.origin(i), rays.rays.direction(i), f64::INFINITY);
-        }
+/// An accelerator with a clock: a call is a batch of hundreds of rays, beside which the clock's own time is nothing.
+#[derive(Debug)]
+struct Timed {
+    accel: Box<dyn Accel>,
+    /// Processor time of all threads within it (ns).
+    taken: AtomicU64,
+    rays: AtomicU64,
+}
+
+impl Timed {
+    fn new(accel: Box<dyn Accel>) -> Self {
+        Self { accel, taken: AtomicU64::new(0), rays: AtomicU64::new(0) }
     }
-    chopped.batches
-}
 
-/// From each hit of `primary` to `light`.
-fn rays_to(light: DVec3, accel: &dyn Accel, primary: &[RayBatch]) -> Vec<RayBatch> {
-    let mut hits = HitBatch::new(Detail::Distance);
-    let mut chopped = Chopped::default();
-    for rays in primary {
-        accel.closest(rays, &mut hits);
-        for i in (0..rays.len()).filter(|&i| hits.is_hit(i)) {
-            // A little before the surface, on the camera's side: Embree's f32 knows it no better.
-            let from = rays.origin(i) + rays.direction(i) * (hits.t[i] * (1.0 - 1e-5));
-            let way = light - from;
-            chopped.push(from, way.normalize(), way.length());
-        }
+    fn seconds(&self) -> f64 {
+        self.taken.load(Ordering::Relaxed) as f64 * 1e-9
     }
-    chopped.batches
-}
 
-/// From each hit of `primary` anywhere above the surface, as a path goes on.
-fn bounces(accel: &dyn Accel, primary: &[RayBatch]) -> Vec<RayBatch> {
-    let mut hits = HitBatch::new(Detail::Surface);
-    let mut random = Random::new(11);
-    let mut chopped = Chopped::default();
-    for rays in primary {
-        accel.closest(rays, &mut hits);
-        for i in (0..rays.len()).filter(|&i| hits.is_hit(i)) {
-            let direction = rays.direction(i);
-            let normal = hits.normal(i) * -hits.normal(i).dot(direction).signum();
-            let up = (normal + random.direction()).try_normalize().unwrap_or(normal);
-            // Clear of the surface by about what f64 knows of it.
-            let from = rays.origin(i) + direction * hits.t[i] + normal * (1e-12 * hits.t[i]);
-            chopped.push(from, up, f64::INFINITY);
-        }
+    fn time<T>(&self, rays: usize, query: impl FnOnce() -> T) -> T {
+        let start = thread_time();
+        let answer = query();
+        let taken = (thread_time() - start) * 1e9;
+        self.taken.fetch_add(taken as u64, Ordering::Relaxed);
+        self.rays.fetch_add(rays as u64, Ordering::Relaxed);
+        answer
     }
-    chopped.batches.iter_mut().for_each(|rays| rays.from_surface = true);
-    chopped.batches
+
+    /// The structure behind as one of blocks.
+    fn of_blocks(&self) -> &dyn BlockAccel {
+        self.accel.blocks().expect("asked only where it has blocks")
+    }
 }
 
-fn one_a_batch(rays: &RayBatch) -> impl Iterator<Item = RayBatch> + '_ {
-    // A quarter is enough.
-    (0..rays.len()).step_by(4).map(|i| {
-        let mut one = RayBatch::default().from_surfaces();
-        one.push(rays.origin(i), rays.direction(i));
-        one
-    })
+impl Accel for Timed {
+    fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
+        self.time(rays.len(), || self.accel.closest(rays, hits));
+    }
+
+    fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {
+        self.time(rays.len(), || self.accel.occluded(rays, blocked));
+    }
+
+    fn blocks(&self) -> Option<&dyn BlockAccel> {
+        self.accel.blocks().map(|_| self as &dyn BlockAccel)
+    }
+
+    fn report(&self) -> BuildReport {
+        self.accel.report()
+    }
+
+    fn counts(&self) -> Counts {
+        self.accel.counts()
+    }
 }
 
-/// Millions of rays a second that one thread traces for closest hits: the median of five.
-fn traced_in(accel: &dyn Accel, batches: &[RayBatch]) -> f64 {
-    let mut hits = HitBatch::new(Detail::Surface);
-    let count: usize = batches.iter().map(RayBatch::len).sum();
-    let mut times: Vec<f64> = (0..5)
-        .map(|_| {
-            let start = thread_time();
-            for rays in batches {
-                accel.closest(rays, &mut hits);
-                std::hint::black_box(&hits);
-            }
-            thread_time() - start
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    count as f64 / times[2] / 1e6
-}
+impl BlockAccel for Timed {
+    fn origin(&self) -> DVec3 {
+        self.of_blocks().origin()
+    }
 
-/// Rays in full batches; what does not fill one is left out.
-#[derive(Default)]
-struct Chopped {
-    open: RayBatch,
-    batches: Vec<RayBatch>,
-}
+    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
+        self.of_blocks().convert(rays, blocks);
+    }
 
-impl Chopped {
-    fn push(&mut self, origin: DVec3, direction: DVec3, length: f64) {
-        self.open.push_between(origin, direction, 0.0, length);
-        if self.open.len() == BATCH {
-            self.batches.push(std::mem::take(&mut self.open));
-        }
+    fn closest_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
+        let lanes = blocks.len() * etendue_geometry::block::LANES;
+        self.time(lanes, || self.of_blocks().closest_of_blocks(blocks, coherent));
+    }
+
+    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
+        let lanes = blocks.len() * etendue_geometry::block::LANES;
+        self.time(lanes, || self.of_blocks().occluded_of_blocks(blocks, coherent));
     }
 }

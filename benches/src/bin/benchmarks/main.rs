@@ -4,7 +4,7 @@
 //! benchmarks [--quick] [--rounds N] [--output docs/benchmarks.md]
 //! benchmarks models FOLDER [--triangles N]     the models and scenes that other programs are given
 //! benchmarks memory SCENE                      memory after each stage of a render, as JSON
-//! benchmarks light-rays SCENE --light X,Y,Z    the bare loop over a lens' rays and shadow rays
+//! benchmarks light-rays SCENE                  what the accelerator takes of a picture of light, as JSON
 //! ```
 
 mod build;
@@ -57,17 +57,10 @@ enum Command {
         #[arg(long, value_delimiter = ',')]
         formats: Vec<String>,
     },
-    /// Print as JSON what Embree's bare loop takes for a camera's rays over the blob, and for one
-    /// ray from each hit to a light
+    /// Print as JSON what the accelerator takes for the rays of a picture of light
     LightRays {
-        /// The scene that has the camera
+        /// The scene
         scene: PathBuf,
-        /// How heavy the blob is
-        #[arg(long, default_value_t = 1_000_000)]
-        triangles: u64,
-        /// Where the light is (m): X,Y,Z
-        #[arg(long, value_delimiter = ',', num_args = 3, default_values_t = [1.0, 2.0, 1.5])]
-        light: Vec<f64>,
     },
     /// Print the memory of this process after each stage of a render
     #[command(name = whole::MEMORY)]
@@ -92,10 +85,7 @@ fn main() -> anyhow::Result<()> {
         Some(Command::Models { folder, triangles, formats }) => {
             return write_models(folder, *triangles, formats);
         }
-        Some(Command::LightRays { scene, triangles, light }) => {
-            let light = etendue_geometry::glam::DVec3::from_slice(light);
-            return light::print_bound(scene, *triangles, light);
-        }
+        Some(Command::LightRays { scene }) => return light::print_bound(scene),
         Some(Command::ProcessMemory { scene }) => return whole::print_memory(scene),
         None => {}
     }
