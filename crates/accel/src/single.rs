@@ -1,6 +1,7 @@
 //! Rays in single precision, as fast backends trace them: relative to an origin near the scene, and
 //! started where they enter its box, so that f32's 24 bits are spent on the scene alone.
 
+use etendue_geometry::block::Floats;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Bounds, HitPrecision, RayBatch, RayBlocks};
 
@@ -169,13 +170,17 @@ impl Rays32 {
     ) {
         self.resize(rays.len());
         convert(self, rays, frame, 0.0);
-        blocks.clear();
-        for i in 0..self.len() {
-            let [origin, direction] =
-                [&self.origin, &self.direction].map(|axes| axes.each_ref().map(|axis| axis[i]));
-            blocks.push(origin, direction, self.t_far[i]);
-            blocks.start_at(self.t_near[i]);
-        }
+        blocks.refill(self.len(), |block, start, count| {
+            let put = |to: &mut Floats, from: &[f32]| {
+                to[..count].copy_from_slice(&from[start..start + count]);
+            };
+            for axis in 0..3 {
+                put(&mut block.origin[axis], &self.origin[axis]);
+                put(&mut block.direction[axis], &self.direction[axis]);
+            }
+            put(&mut block.t_min, &self.t_near);
+            put(&mut block.t_max, &self.t_far);
+        });
     }
 
     /// Appends ray `i` of `from`, moved sideways by `shift` (m).

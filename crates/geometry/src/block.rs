@@ -134,6 +134,22 @@ impl RayBlocks {
         &mut self.blocks[..self.len.div_ceil(LANES)]
     }
 
+    /// Makes them `len` rays, which `fill` sets: a block at a time, with the number of its first ray and how many
+    /// there are. Other lanes are not traced.
+    pub fn refill(&mut self, len: usize, mut fill: impl FnMut(&mut RayBlock, usize, usize)) {
+        let count = len.div_ceil(LANES);
+        if self.blocks.len() < count {
+            self.blocks.resize(count, RayBlock::EMPTY);
+        }
+        self.len = len;
+        for (number, block) in self.blocks[..count].iter_mut().enumerate() {
+            let start = number * LANES;
+            block.t_min = [0.0; LANES];
+            block.t_max = [-1.0; LANES];
+            fill(block, start, LANES.min(len - start));
+        }
+    }
+
     /// Appends a ray from `origin` (m) along the unit `direction` that counts hits from 0 to `t_max` (m).
     #[inline]
     pub fn push(&mut self, origin: [f32; 3], direction: [f32; 3], t_max: f32) {
@@ -155,12 +171,6 @@ impl RayBlocks {
         self.len += 1;
     }
 
-    /// The nearest distance that counts of the ray that was pushed last (m).
-    pub fn start_at(&mut self, t_min: f32) {
-        if let Some(last) = self.len.checked_sub(1) {
-            self.blocks[last / LANES].t_min[last % LANES] = t_min;
-        }
-    }
 }
 
 #[cfg(test)]
@@ -175,12 +185,19 @@ mod tests {
             for k in 0..LANES + 3 {
                 rays.push([0.5; 3], [0.0, 0.0, 1.0], 1.0 + k as f32);
             }
-            rays.start_at(0.25);
-            let [whole, rest] = rays.blocks() else { panic!("two blocks") };
-            assert!(whole.t_max.iter().all(|&t_max| t_max > 0.0));
-            assert_eq!(rest.t_max.iter().filter(|&&t_max| t_max > 0.0).count(), 3);
-            assert_eq!((rest.t_min[2], rest.t_max[2]), (0.25, 19.0));
-            assert_eq!(rays.len(), 19);
+            let mut refilled = rays.clone();
+            refilled.refill(LANES + 3, |block, start, count| {
+                for lane in 0..count {
+                    block.t_max[lane] = 1.0 + (start + lane) as f32;
+                }
+            });
+            for rays in [&rays, &refilled] {
+                let [whole, rest] = rays.blocks() else { panic!("two blocks") };
+                assert!(whole.t_max.iter().all(|&t_max| t_max > 0.0));
+                assert_eq!(rest.t_max.iter().filter(|&&t_max| t_max > 0.0).count(), 3);
+                assert_eq!((rest.t_min[2], rest.t_max[2]), (0.0, 19.0));
+                assert_eq!(rays.len(), 19);
+            }
         }
         assert!(!rays.is_empty() && !rays.blocks()[0].is_blocked(0));
     }
