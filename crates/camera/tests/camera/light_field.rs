@@ -150,6 +150,9 @@ fn only_cameras_whose_lenslets_image_the_opening_have_views() {
         // 0.15 mm x 5/20.83 are 3.6 pixels.
         (r#""focal_length": 0.15"#, "3.60 pixels"),
         (r#""focal_length": 0.7"#, "fewer than 5"),
+        // Images that overlap by more than a half, of an unfocused camera and of a focused one.
+        (r#""focal_length": 0.75"#, "f-number of the main lens"),
+        (r#""picture_distance": -3, "sensor_distance": 0.9"#, "fewer than 5"),
         // Images are 28 times as wide as they are apart.
         (r#""picture_distance": 0.41, "focal_length": 0.4"#, "fewer than 5"),
     ] {
@@ -310,6 +313,15 @@ fn what_is_no_light_field_is_refused_in_words() {
     let spread = r#""radii": [-0.3, null], "thickness": 0.1, "glass": "N-BK7""#;
     let spread = error(spread, "");
     assert!(spread.starts_with("microlenses.sensor_distance"), "{spread}");
+    // Nor has one behind which the picture is within the glass.
+    let within =
+        r#""radii": [0.1, null], "thickness": 0.33, "glass": "N-BK7", "picture_distance": 2"#;
+    assert!(error(within, "").contains("thinner"), "{}", error(within, ""));
+    for distance in ["0", "-1"] {
+        let error = error("\"fill\": 1", &format!("\"refocus_distance\": {distance},"));
+        assert!(error.starts_with("refocus_distance"), "{error}");
+    }
+    assert!(light_field("\"fill\": 1", "\"refocus_distance\": \"infinity\",").is_ok());
     assert!(error("\"fill\": 2", "").contains("fill is 2"), "{}", error("\"fill\": 2", ""));
     let views = error("\"fill\": 1", "\"views\": 20,");
     assert!(views.starts_with("views: 20 views") && views.contains("fewer"), "{views}");
@@ -322,6 +334,8 @@ fn what_is_no_light_field_is_refused_in_words() {
         (r#""picture_distance": 0.01"#, "half the pitch of 0.1 mm"),
         (r#""picture_distance": -0.01"#, "half the pitch of 0.1 mm"),
         (r#""picture_distance": -20.5"#, "smaller than a pixel"),
+        // A sensor so near sees an image of a pixel of the opening, or less.
+        (r#""picture_distance": 2, "sensor_distance": 0.02"#, "smaller than a pixel"),
         (r#""radii": [null, null], "thickness": 0.1, "glass": "N-BK7""#, "give one face a radius"),
         (r#""radii": [0.1, null], "thickness": 0.4, "glass": "N-BK7""#, "thinner"),
         (
