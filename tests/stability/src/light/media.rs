@@ -25,7 +25,7 @@ pub(super) const NESTED: Case = Case {
 
 pub(super) const WITHIN: Case = Case {
     name: "camera_within_a_body",
-    regime: "a camera in the middle of a body that absorbs, 10⁻³ to 10³ m from its faces and leaving half or a thousandth of \
+    regime: "a camera in the middle of a body that absorbs, 10⁻² to 10³ m from its faces and leaving half or a thousandth of \
         the light, and of one within another, at the origin and 100 m away",
     must: "Bouguer and Lambert's law from the camera on, to 10⁻⁵",
     limit: None,
@@ -35,7 +35,7 @@ pub(super) const WITHIN: Case = Case {
 fn within(_: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();
     let mut worst = 0.0_f64;
-    for way in [1e-3, 1.0, 1e3] {
+    for way in [1e-2, 1.0, 1e3] {
         for left in [0.5_f64, 1e-3] {
             for at in [0.0, 100.0] {
                 let body = |side: f64, material: &str| {
