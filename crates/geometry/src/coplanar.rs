@@ -37,12 +37,40 @@ pub struct Coplanar {
     last: Vec<u32>,
 }
 
-/// A triangle that may lie in one plane with one of another placement.
-#[derive(Debug, Clone, Copy)]
-struct Candidate {
-    /// The cell of the plane's distance from the middle of all.
-    cell: i64,
-    id: PlacedTriangle,
+/// A triangle that may lie in one plane with one of another placement, in one number, as there may be millions: the
+/// cell of the plane's distance from the middle of all, the placement and the triangle, from the high bits on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Candidate(u64);
+
+/// Bits of a placement and of a triangle.
+const PLACEMENT: u32 = MOST_PLACED.trailing_zeros();
+const TRIANGLE: u32 = MOST_VISITS.trailing_zeros();
+
+/// Cells before and behind the middle; planes beyond them, of triangles that reach far out of what is shared, are
+/// in the outermost ones, and compared.
+const MOST_CELLS: f64 = (1_u64 << (63 - PLACEMENT - TRIANGLE)) as f64;
+
+impl Candidate {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the cells"
+    )]
+    fn new(cell: f64, [placement, triangle]: PlacedTriangle) -> Self {
+        let cell = (cell.floor() + MOST_CELLS).clamp(0.0, 2.0 * MOST_CELLS - 1.0) as u64;
+        let place = u64::from(placement) << TRIANGLE;
+        Self(cell << (PLACEMENT + TRIANGLE) | place | u64::from(triangle))
+    }
+
+    fn cell(self) -> u64 {
+        self.0 >> (PLACEMENT + TRIANGLE)
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "the bits of a placement and a triangle")]
+    fn id(self) -> PlacedTriangle {
+        let bits = |from: u32, count: u32| (self.0 >> from & ((1 << count) - 1)) as u32;
+        [bits(TRIANGLE, PLACEMENT), bits(0, TRIANGLE)]
+    }
 }
 
 impl Coplanar {
@@ -83,23 +111,22 @@ impl Coplanar {
                     continue;
                 }
                 let Some(key) = key(corners, all.centre()) else { continue };
-                #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
-                let cell = (key / (KEYS * apart)).floor() as i64;
-                candidates.push(Candidate { cell, id: [placement, triangle] });
+                candidates.push(Candidate::new(key / (KEYS * apart), [placement, triangle]));
             }
         }
-        candidates.sort_unstable_by_key(|candidate| (candidate.cell, candidate.id));
+        candidates.sort_unstable();
         let mut left = MOST_TRIANGLES;
-        let mut planes = candidates.chunk_by(|a, b| a.cell == b.cell).peekable();
+        let mut planes = candidates.chunk_by(|a, b| a.cell() == b.cell()).peekable();
         while let Some(plane) = planes.next() {
-            let placed: Vec<&[Candidate]> = plane.chunk_by(|a, b| a.id[0] == b.id[0]).collect();
+            let placed: Vec<&[Candidate]> = plane.chunk_by(|a, b| a.id()[0] == b.id()[0]).collect();
             // One plane's triangles may fall into two cells.
-            let beyond = planes.peek().filter(|next| next[0].cell == plane[0].cell + 1);
-            let beyond: Vec<&[Candidate]> = beyond
-                .map_or_else(Vec::new, |next| next.chunk_by(|a, b| a.id[0] == b.id[0]).collect());
+            let beyond = planes.peek().filter(|next| next[0].cell() == plane[0].cell() + 1);
+            let beyond: Vec<&[Candidate]> = beyond.map_or_else(Vec::new, |next| {
+                next.chunk_by(|a, b| a.id()[0] == b.id()[0]).collect()
+            });
             for (i, one) in placed.iter().enumerate() {
                 for other in placed[i + 1..].iter().chain(&beyond) {
-                    if one[0].id[0] != other[0].id[0] {
+                    if one[0].id()[0] != other[0].id()[0] {
                         found.compare(geometry, [one, other], apart, &mut left);
                     }
                 }
@@ -112,6 +139,19 @@ impl Coplanar {
         found
     }
 
+    /// Bytes of the list of candidates that [`of`](Self::of) makes, at most: that of the triangles of all placements
+    /// whose boxes meet others'.
+    #[must_use]
+    pub fn bytes_at_most(geometry: &Geometry) -> u64 {
+        if geometry.placements.len() > MOST_PLACED {
+            return 0;
+        }
+        let shared = shared_boxes(geometry, &|_| true);
+        let meeting = geometry.placements.iter().zip(&shared).filter(|(_, own)| !own.is_empty());
+        let triangles = meeting.map(|(own, _)| geometry.mesh_of(own).triangles.len());
+        triangles.sum::<usize>().min(MOST_VISITS) as u64 * size_of::<Candidate>() as u64
+    }
+
     /// Notes which triangles of two placements in about one plane lie over one another.
     fn compare(
         &mut self,
@@ -121,7 +161,7 @@ impl Coplanar {
         left: &mut usize,
     ) {
         let (few, many) = if one.len() < other.len() { (one, other) } else { (other, one) };
-        let boxed = |own: &Candidate| (Bounds::of_points(corners(geometry, own.id)), own.id);
+        let boxed = |own: &Candidate| (Bounds::of_points(corners(geometry, own.id())), own.id());
         let mut few: Vec<(Bounds, PlacedTriangle)> = few.iter().map(boxed).collect();
         let whole = few.iter().fold(Bounds::EMPTY, |all, (own, _)| all.union(*own));
         let axis = (whole.max - whole.min).max_position();

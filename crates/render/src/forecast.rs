@@ -9,6 +9,7 @@ use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec, texture};
 
 use crate::film::bytes_of_plane;
 use crate::images::{environment, wanted_images};
+use crate::light_field::refocused_bytes;
 use crate::output::Outputs;
 use crate::samples::BYTES_OF_SUM;
 use crate::{Plan, denoise, expose};
@@ -54,13 +55,21 @@ pub(crate) fn forecast(scene: &Scene, plan: &Plan, outputs: Outputs) -> MemoryFo
     .summed()
 }
 
-/// Bytes of the views of a light field behind a raw picture: decoded from it, or rendered as an ideal lens
-/// has them and then taken apart and shown side by side, whichever is more.
+/// Bytes of what a light field leaves beside its raw picture: the white one, and views or a refocused picture. Views are
+/// decoded, or rendered as an ideal lens has them and then taken apart and shown side by side, whichever is more.
 fn views(scene: &Scene, plan: &Plan, outputs: Outputs) -> u64 {
-    let raw = scene.camera.lens().is_some() && scene.camera.no_views().is_none();
-    let (Some(light_field), true) = (scene.camera.light_field(), raw) else { return 0 };
-    let picture = plan.layers.iter().find(|layer| Some(**layer) == scene.picture);
-    let Some(&picture) = picture else { return 0 };
+    let (Some(light_field), Some(lens)) = (scene.camera.light_field(), scene.camera.lens()) else {
+        return 0;
+    };
+    let [width, height] = scene.camera.resolution().map(u64::from);
+    // Rows of it, and then planes of those.
+    let white = F32 * 3 * width * height;
+    let Some(&picture) = plan.layers.iter().find(|layer| Some(**layer) == scene.picture) else {
+        return 2 * white;
+    };
+    if scene.camera.no_views().is_some() {
+        return white + white.max(refocused_bytes(lens, light_field));
+    }
     let grid = &light_field.grid;
     let side = |count: u32| u64::from(count) * u64::from(light_field.views);
     let bands = if expose::has_spectrum(scene) { plan.bands.count() as u64 } else { 0 };
@@ -68,7 +77,8 @@ fn views(scene: &Scene, plan: &Plan, outputs: Outputs) -> u64 {
     let averaged = if picture == LayerSpec::Radiance { plan.bands.count() as u64 } else { 3 };
     let shown = F32 * 3 + if outputs.png { PNG } else { 0 };
     let reference = bytes_of_layer(picture, plan) + (BYTES_OF_SUM * averaged).max(arrays + shown);
-    side(grid.rows).saturating_mul(side(grid.cols)).saturating_mul(reference.max(2 * arrays))
+    let views = side(grid.rows).saturating_mul(side(grid.cols));
+    white + white.max(views.saturating_mul(reference.max(2 * arrays)))
 }
 
 /// Bytes a pixel of what is kept between passes.

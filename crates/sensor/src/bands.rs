@@ -10,7 +10,8 @@
 //!
 //! Electrons count as right within a tolerance ([`TOLERANCE`] by itself) of themselves; of colours darker than a tenth of
 //! white, within that of a tenth of white, and behind two pure colours within that of white. White is
-//! what bodies and metals on the way leave of it, where that is a two-hundredth at least.
+//! what bodies and metals on the way leave of it, where that is three thousandths at least; of less, those three
+//! thousandths are.
 
 mod division;
 mod factor;
@@ -36,7 +37,7 @@ const MOST_NUMBERS: usize = 2_000_000;
 const DARK: [f64; 4] = [1.0, 0.1, 1.0, 1.0];
 
 /// The part of white that bodies and metals leave of it, below which their light need not be better.
-const DIM: f64 = 0.004;
+const DIM: f64 = 0.003;
 
 /// The part of an error that bodies may show after the ways that are tried: it is largest between two of them.
 const BETWEEN: f64 = 0.94;

@@ -6,6 +6,7 @@ use etendue_render::output::Outputs;
 use etendue_render::{Images, Plan, build, plan, render};
 use etendue_scene::file::SceneFile;
 use etendue_scene::{LoadOptions, Scene};
+use serde_json::Value;
 use std::path::Path;
 
 /// A scene file's text in a folder of its own, or beside the images that it names.
@@ -75,4 +76,30 @@ pub(crate) fn patch(tracer: &str, samples: u32, [from, at]: [[f64; 3]; 2], rest:
             "sensor": {{"resolution": [8, 8]}}}},
         "render": {{"samples": {samples}}}, {rest}}}"#
     )
+}
+
+/// Mean electrons a second of each channel of the sensor of the scene in `text`.
+pub(crate) fn electrons_of_channels(text: &Value) -> Result<Vec<f64>> {
+    Ok(electrons_in_bands(text)?.0)
+}
+
+/// The same, and how many bands the plan takes for them.
+pub(crate) fn electrons_in_bands(text: &Value) -> Result<(Vec<f64>, usize)> {
+    let folder = tempfile::tempdir()?;
+    let scene = load(folder.path(), &text.to_string())?;
+    let plan = Plan::new(&scene, Outputs::from_list("exr").map_err(anyhow::Error::msg)?);
+    let accel = build(&scene, &plan, &BuildOptions::default())?;
+    let images = Images::decode(&scene, &plan, None)?;
+    ensure!(images.faults.is_empty(), "{:?}", images.faults);
+    let done = render(&scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true)?;
+    let count = plan.bands.count();
+    let sensor = scene.sensor.clone().context("a sensor")?.in_bands(plan.bands.clone())?;
+    let film = done.band_film.context("light in bands")?;
+    let pixels = film.values.len() / count;
+    let of_channel = |channel: usize| {
+        let worth = sensor.electrons_per_unit(channel);
+        let values = film.values.chunks(count).flat_map(|pixel| pixel.iter().zip(worth));
+        values.map(|(&value, worth)| f64::from(value) * worth).sum::<f64>() / pixels as f64
+    };
+    Ok(((0..sensor.channels().len()).map(of_channel).collect(), count))
 }

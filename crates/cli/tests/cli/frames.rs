@@ -453,6 +453,14 @@ fn bad_frames_are_refused_by_number() {
     assert!(error.contains("frames.count"), "{error}");
     let error = refused(&json!({"type": "orbit", "count": 3, "axis": [0, 0, 0]}), &[], &[]);
     assert!(error.contains("frames.axis"), "{error}");
+    // Intrinsics of no lens, before anything is rendered: 16 × 12 pixels of them took 6 s.
+    let pose = |z: f64| json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, z], [0, 0, 0, 1]]);
+    let odd = json!({"fl_x": 2e-5, "fl_y": 20, "k1": 0.01, "frames": [
+        {"file_path": "a", "transform_matrix": pose(4.0)}, {"file_path": "b", "transform_matrix": pose(5.0)}]});
+    let started = std::time::Instant::now();
+    let error = refused(&poses("odd.json"), &[("odd.json", odd.to_string().as_bytes())], &[]);
+    assert!(error.contains("frames[0]") && error.contains("check the focal lengths"), "{error}");
+    assert!(started.elapsed().as_secs_f64() < 5.0, "{:?}", started.elapsed());
     // Poses that are no rotation: which, and by how much.
     let bent = json!([[1, 0, 0, 0], [0, 1.01, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]);
     let good = json!({"from": [0, 0, 4], "look_at": [0, 0, 0]});

@@ -113,6 +113,13 @@ fn each_kind_of_light_field_leaves_what_it_has() {
                     );
                 }
                 assert_eq!(bench.array("central_disparity").len() as u64, rows * cols, "{kind}");
+                if has == Ok(true) {
+                    hci_by_its_own_definition(
+                        &bench,
+                        kind,
+                        if kind == "rotated" { 30.0 } else { 0.0 },
+                    );
+                }
             }
             Err(why) => {
                 let told = geometry["no_views"].as_str().unwrap();
@@ -121,6 +128,48 @@ fn each_kind_of_light_field_leaves_what_it_has() {
                 assert!(geometry["disparity"].is_null() && geometry["gains"].is_null(), "{kind}");
             }
         }
+    }
+}
+
+/// The values of a PFM of one channel, the bottom row first.
+fn pfm(bench: &Bench, name: &str) -> Vec<f64> {
+    let bytes = std::fs::read(bench.path(name)).unwrap();
+    let mut lines = bytes.splitn(4, |byte| *byte == b'\n');
+    let head: [&[u8]; 3] = std::array::from_fn(|_| lines.next().unwrap());
+    assert_eq!((head[0], head[2][0]), (&b"Pf"[..], b'-'), "{name}: grey, the low byte first");
+    let values = lines.next().unwrap().as_chunks::<4>().0;
+    values.iter().map(|value| f64::from(f32::from_le_bytes(*value))).collect()
+}
+
+/// The benchmark's ground truth by its own formula and parameters (Honauer et al. 2016): disparities are
+/// b f (1/z − 1/z₀) max(width, height)/s, of lengths in mm, and the views are numbered by rows.
+fn hci_by_its_own_definition(bench: &Bench, kind: &str, turned: f64) {
+    let text = std::fs::read_to_string(bench.path("out/hci/parameters.cfg")).unwrap();
+    let number = |key: &str| -> f64 {
+        let lines = text.lines().filter_map(|line| line.split_once(" = "));
+        lines.into_iter().find(|(name, _)| *name == key).unwrap().1.parse().unwrap()
+    };
+    let [width, height] = ["image_resolution_x_px", "image_resolution_y_px"].map(number);
+    let [depth, disparity] = ["gt_depth_lowres", "gt_disp_lowres"]
+        .map(|name| pfm(bench, &format!("out/hci/{name}.pfm")));
+    assert_eq!(depth.len() as f64, width * height, "{kind}");
+    let lengths = number("baseline_mm") * number("focal_length_mm") / number("sensor_size_mm");
+    let focus = 1e3 * number("focus_distance_m");
+    let mut hits = 0;
+    for (z, found) in depth.iter().zip(&disparity).filter(|(z, _)| z.is_finite()) {
+        let known = lengths * width.max(height) * (1.0 / (1e3 * z) - 1.0 / focus);
+        // Both are f32, and near the focus a difference of nearly equal numbers.
+        assert!((found - known).abs() < 1e-5, "{kind}: {found} at {z} m, not {known}");
+        let [least, most] = [number("disp_min") - 1e-6, number("disp_max") + 1e-6];
+        assert!((least..=most).contains(found), "{kind}: {found}");
+        hits += 1;
+    }
+    assert!(hits > 0, "{kind}: the wall is seen");
+    let rotation = number("center_cam_rz_rad").to_degrees().abs();
+    assert!((rotation - turned).abs() < 1e-6, "{kind}: turned by {rotation} degrees");
+    for view in 0..9 {
+        let name = format!("out/hci/input_Cam{view:03}.png");
+        assert!(bench.path(&name).exists(), "{kind}: {name}");
     }
 }
 

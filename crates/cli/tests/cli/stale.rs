@@ -15,15 +15,26 @@ enum Kind {
     Frames,
     FramesByLayer,
     LightField,
+    FocusedLightField,
     ReferenceViews,
     Exposures,
     Merged,
 }
 
-use Kind::{Exposures, Frames, FramesByLayer, LightField, Merged, Picture, ReferenceViews};
+use Kind::{
+    Exposures, FocusedLightField, Frames, FramesByLayer, LightField, Merged, Picture, ReferenceViews,
+};
 
-const KINDS: [Kind; 7] =
-    [Picture, Frames, FramesByLayer, LightField, ReferenceViews, Exposures, Merged];
+const KINDS: [Kind; 8] = [
+    Picture,
+    Frames,
+    FramesByLayer,
+    LightField,
+    FocusedLightField,
+    ReferenceViews,
+    Exposures,
+    Merged,
+];
 
 /// Files of the user's among those of a render.
 const MINE: [&str; 4] = ["mine.txt", "frames/mine.txt", "views/mine.txt", "frames/000000/mine.txt"];
@@ -42,6 +53,12 @@ impl Kind {
                 json!({"type": "pinhole", "sensor": sensor})
             }
             LightField => light_field("light_field"),
+            FocusedLightField => {
+                let mut camera = light_field("light_field");
+                camera["microlenses"]["picture_distance"] = json!(2);
+                camera.as_object_mut().unwrap().remove("views");
+                camera
+            }
             ReferenceViews => light_field("light_field_reference"),
             Exposures => json!({"type": "pinhole", "sensor":
                 {"type": "raw", "resolution": [8, 6], "frames": 3, "moments": true}}),
@@ -73,7 +90,7 @@ impl Kind {
                 run(&[&["merge", out][..], &shares].concat());
             }
             FramesByLayer => run(&[&into[..], &[out, "--pattern", "{layer}/{frame}"]].concat()),
-            Picture | Frames | LightField | ReferenceViews | Exposures => {
+            Picture | Frames | LightField | FocusedLightField | ReferenceViews | Exposures => {
                 run(&[&into[..], &[out]].concat());
             }
         }

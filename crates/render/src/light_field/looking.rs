@@ -5,59 +5,108 @@
 
 use std::sync::Arc;
 
-use etendue_camera::ViewGrid;
+use etendue_camera::{Camera, CameraError, ViewGrid};
 use etendue_scene::Scene;
+use etendue_spectrum::Bands;
 
-use super::LightFieldError;
-use super::by_layer;
 use super::choice::ChosenViews;
-use super::views::Views;
+use super::patches::{PatchPlane, Patches};
+use super::views::{Views, picture};
+use super::{LightFieldError, by_layer, planes, white};
 use crate::RenderError;
 use crate::output::{Development, Picture};
 
-/// The views in a light-field camera's picture.
+/// What a light-field camera's picture holds: views, or of a focused camera what its lenslets see of a plane.
 #[derive(Debug, Clone)]
 pub struct LightFieldViews {
-    views: Views,
-    grid: Arc<ViewGrid>,
+    source: Source,
     development: Development,
 }
 
+#[derive(Debug, Clone)]
+enum Source {
+    Views { views: Views, grid: Arc<ViewGrid> },
+    Patches { camera: Camera, raw: Arc<Picture>, white: Arc<Picture> },
+}
+
+/// The nearest and the farthest plane that is offered, as a share of the distance in focus, and the steps in which
+/// those are looked for that patches fill.
+const FARTHEST: f64 = 5.0;
+const STEP: f64 = 1.02;
+
 impl LightFieldViews {
-    /// The views in `picture` of `scene`; `None` of other cameras, of those that have
-    /// [no views](etendue_camera::Camera::no_views), and without a picture.
+    /// What `picture` of `scene` holds; `None` of other cameras, of those that have neither
+    /// [views](etendue_camera::Camera::no_views) nor patches without gaps, and without a picture.
     ///
     /// # Errors
     ///
-    /// When the views have no places.
+    /// When the views have no places, or the white picture cannot be made.
     pub fn of(scene: &Scene, picture: &Picture) -> Result<Option<Self>, LightFieldError> {
-        let (Some(_), None) = (picture.layer(""), scene.camera.no_views()) else { return Ok(None) };
-        let chosen = ChosenViews::of(&scene.camera, &scene.accuracy)
-            .map_err(|error| RenderError::Camera(error.to_string()))?;
-        let Some(ChosenViews { grid, response, no_views: None, light_field, .. }) = chosen else {
+        if picture.layer("").is_none() {
+            return Ok(None);
+        }
+        let fault = |error: CameraError| RenderError::Camera(error.to_string());
+        let chosen = ChosenViews::of(&scene.camera, &scene.accuracy).map_err(fault)?;
+        let Some(ChosenViews { grid, response, no_views, light_field, .. }) = chosen else {
             return Ok(None);
         };
-        let views = match scene.camera.lens().zip(response) {
-            Some((lens, response)) => {
-                let centres = by_layer(scene, lens, &light_field)
-                    .map_err(|error| RenderError::Camera(error.to_string()))?;
-                Views::decoded(picture, &centres, &light_field, (&grid, &response))?
+        let source = match (scene.camera.lens(), response, no_views) {
+            (Some(lens), Some(response), None) => {
+                let centres = by_layer(scene, lens, &light_field).map_err(fault)?;
+                let views = Views::decoded(picture, &centres, &light_field, (&grid, &response))?;
+                Some(Source::Views { views, grid })
             }
-            None => Views::split(picture, &grid),
+            (Some(lens), _, Some(_)) => {
+                let is_seen = PatchPlane::new(lens, &light_field, None).is_ok();
+                is_seen.then(|| Source::patches(scene, picture)).transpose()?.flatten()
+            }
+            (_, _, None) => Some(Source::Views { views: Views::split(picture, &grid), grid }),
+            (None, _, Some(_)) => None,
         };
-        Ok(Some(Self { views, grid, development: *picture.development() }))
+        let development = *picture.development();
+        Ok(source.map(|source| Self { source, development }))
     }
 
-    /// Views along each side.
+    /// Views along each side; 0 where there is only what lenslets see of planes.
     #[must_use]
     pub fn count(&self) -> u32 {
-        self.views.views
+        match &self.source {
+            Source::Views { views, .. } => views.views,
+            Source::Patches { .. } => 0,
+        }
     }
 
-    /// The distance at which disparities are 0 (m), along the axis from the entrance pupil.
+    /// The distance that is in focus (m), along the axis from the entrance pupil: there disparities are 0.
     #[must_use]
     pub fn focus(&self) -> f64 {
-        self.grid.focus()
+        match &self.source {
+            Source::Views { grid, .. } => grid.focus(),
+            Source::Patches { camera, .. } => {
+                camera.lens().map_or(f64::INFINITY, |lens| lens.focused().object_distance())
+            }
+        }
+    }
+
+    /// The nearest and the farthest distance (m) to [refocus](Self::refocused) at: a fifth of that in focus and five
+    /// times that, and no plane of which patches leave gaps.
+    #[must_use]
+    pub fn distances(&self) -> [f64; 2] {
+        let focus = self.focus();
+        let focus = if focus.is_finite() && focus > 0.0 { focus } else { 1.0 };
+        let Source::Patches { camera, .. } = &self.source else {
+            return [focus / FARTHEST, focus * FARTHEST];
+        };
+        let Some((lens, light_field)) = camera.lens().zip(camera.light_field()) else {
+            return [focus; 2];
+        };
+        [1.0 / STEP, STEP].map(|step| {
+            let is_offered = |at: &f64| {
+                (focus / FARTHEST..=focus * FARTHEST).contains(at)
+                    && PatchPlane::new(lens, light_field, Some(*at)).is_ok()
+            };
+            let planes = std::iter::successors(Some(focus), |at| Some(at * step));
+            planes.take_while(is_offered).last().unwrap_or(focus)
+        })
     }
 
     /// The view from column `across` and row `down` of the pupil, both from 0 and less than
@@ -65,10 +114,13 @@ impl LightFieldViews {
     ///
     /// # Errors
     ///
-    /// None that a caller can cause.
+    /// When there are none.
     pub fn view(&self, [across, down]: [u32; 2]) -> Result<Picture, LightFieldError> {
-        let last = self.views.views.saturating_sub(1);
-        let view = self.views.single(across.min(last), down.min(last))?;
+        let Source::Views { views, .. } = &self.source else {
+            return Err(RenderError::Camera("the camera has no views".to_owned()).into());
+        };
+        let last = views.views.saturating_sub(1);
+        let view = views.single(across.min(last), down.min(last))?;
         Ok(view.developed(self.development))
     }
 
@@ -76,9 +128,35 @@ impl LightFieldViews {
     ///
     /// # Errors
     ///
-    /// None that a caller can cause.
+    /// When the patches of the lenslets leave gaps there, see [`distances`](Self::distances).
     pub fn refocused(&self, depth: f64) -> Result<Picture, LightFieldError> {
-        let picture = self.views.averaged(self.grid.disparity(depth), self.grid.row_height())?;
+        let picture = match &self.source {
+            Source::Views { views, grid } => {
+                views.averaged(grid.disparity(depth), grid.row_height())?
+            }
+            Source::Patches { camera, raw, white } => {
+                let lenslets = camera.lens().zip(camera.light_field());
+                let (lens, light_field) =
+                    lenslets.ok_or_else(|| RenderError::Camera("there are no lenslets".to_owned()))?;
+                let patches = Patches::new(lens, light_field, Some(depth));
+                patches.map_err(RenderError::Camera)?.rendered(raw, white)?
+            }
+        };
         Ok(picture.developed(self.development))
+    }
+}
+
+impl Source {
+    /// A raw picture of lenslets, and the white one that goes with it.
+    fn patches(scene: &Scene, raw: &Picture) -> Result<Option<Self>, LightFieldError> {
+        let Some(planes) = planes(raw, "").filter(|planes| planes.len() == 3) else {
+            return Ok(None);
+        };
+        let opened = scene.camera.opened(&Bands::Rgb);
+        let opened = opened.map_err(|error| RenderError::Camera(error.to_string()))?;
+        let white = Arc::new(white::picture(&opened, &scene.render)?);
+        let size = [raw.width(), raw.height()];
+        let raw = picture(size, "the raw picture", |pixel, color| planes[color][pixel])?;
+        Ok(Some(Self::Patches { camera: scene.camera.clone(), raw: raw.into(), white }))
     }
 }

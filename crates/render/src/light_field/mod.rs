@@ -51,6 +51,7 @@ use choice::ChosenViews;
 use geometry::LightFieldGeometry;
 pub use looking::LightFieldViews;
 use patches::Patches;
+pub(crate) use patches::refocused_bytes;
 use views::Views;
 pub use white::white_rows;
 

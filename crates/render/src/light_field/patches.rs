@@ -313,6 +313,22 @@ impl Patches {
     }
 }
 
+/// Bytes that the refocused picture takes while it is put together; 0 where patches leave gaps.
+pub(crate) fn refocused_bytes(lens: &LensCamera, light_field: &LightField) -> u64 {
+    /// Of a pixel in each colour: its value and whether it is done, and the sums of light.
+    const EACH: u64 = 3 * (size_of::<f64>() + 1 + size_of::<[f64; 2]>()) as u64;
+    let Ok(plane) = PatchPlane::new(lens, light_field, light_field.refocus) else { return 0 };
+    let raw = 2.0 * DVec2::from(lens.focused().pixel_of(DVec2::ZERO));
+    let [columns, rows] = (raw * plane.facts.magnification.abs()).to_array();
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a forecast, of no more than the pixels of the sensor"
+    )]
+    let pixels = (columns * rows) as u64;
+    EACH.saturating_mul(pixels)
+}
+
 /// How many times larger than in a plane things are on the sensor, both at z (mm), and the other way round.
 fn magnification(view: &BehindLenslets, sensor_z: f64, plane: f64) -> f64 {
     let principal = view.principal_distance(0);

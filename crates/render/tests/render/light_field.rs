@@ -259,6 +259,8 @@ struct FocusedCase {
     picture: f64,
     pixel: f64,
     microlenses: &'static str,
+    /// Samples a pixel of the raw picture, and of the main lens' own.
+    samples: [u32; 2],
 }
 
 /// The picture that patches make of a wall with waves of 7 pixels along both sides, and that of the main lens alone
@@ -266,6 +268,12 @@ struct FocusedCase {
 /// are (dB).
 fn refocused_against_the_main_lens(case: &FocusedCase) -> (serde_json::Value, f64) {
     let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::fs::copy(
+        root.join("scenes/lenses/double-gauss.json"),
+        folder.path().join("double-gauss.json"),
+    )
+    .unwrap();
     save_wave(folder.path(), [64, 64]);
     let [focus, distance] = case.distances;
     let [kind, main] = case.main;
@@ -288,7 +296,7 @@ fn refocused_against_the_main_lens(case: &FocusedCase) -> (serde_json::Value, f6
         microlenses = case.microlenses
     );
     let period = 7.0 * case.pixel / case.picture * distance;
-    let geometry = write_scene(folder.path(), &scene(camera, wave, period, 16));
+    let geometry = write_scene(folder.path(), &scene(camera, wave, period, case.samples[0]));
     let pixel = geometry["patches"]["pixel_pitch_um"].as_f64();
     let pixel = pixel.unwrap_or_else(|| panic!("{}: {}", case.microlenses, geometry["no_patches"]));
     assert_eq!(geometry["refocused_m"], distance, "{}", case.microlenses);
@@ -298,7 +306,8 @@ fn refocused_against_the_main_lens(case: &FocusedCase) -> (serde_json::Value, f6
         geometry["patches"]["resolution"]
     );
     let of_reference = |color: &str| {
-        let scene = load_in(folder.path(), &scene(reference.clone(), color, period, 64));
+        let scene =
+            load_in(folder.path(), &scene(reference.clone(), color, period, case.samples[1]));
         let picture = rendered(&scene, &Plan::new(&scene, OUTPUTS)).picture;
         let green = &picture.layer("").unwrap().channels[1].values;
         (0..green.len()).map(|i| green.at(i)).collect::<Vec<f64>>()
@@ -330,7 +339,7 @@ fn patches_of_a_focused_camera_make_the_picture_of_its_main_lens() {
     };
     let thin = |distances, a, microlenses| {
         let (picture, pixel) = lengths([20.0, 5.0], distances, a);
-        FocusedCase { main: THIN, distances, picture, pixel, microlenses }
+        FocusedCase { main: THIN, distances, picture, pixel, microlenses, samples: [16, 64] }
     };
     let cases = [
         thin([0.5, 0.5], 2.0, r#", "picture_distance": 2"#),
@@ -358,6 +367,32 @@ fn patches_of_a_focused_camera_make_the_picture_of_its_main_lens() {
     }
 }
 
+/// The same of thick lenslets, and behind a real lens.
+#[test]
+fn patches_of_thick_lenslets_and_behind_a_real_lens_do_so_too() {
+    let thick = FocusedCase {
+        main: THIN,
+        distances: [0.5, 0.5],
+        picture: 20.83,
+        pixel: 0.04,
+        microlenses: r#", "picture_distance": 2.5, "glass": "N-BK7", "radii": [0.2, null], "thickness": 0.05"#,
+        samples: [32, 16],
+    };
+    let real = FocusedCase {
+        main: ["lens", r#""lens": "double-gauss.json", "f_number": 4"#],
+        distances: [1.5, 1.6],
+        picture: 51.6,
+        pixel: 0.037,
+        microlenses: r#", "picture_distance": 2"#,
+        samples: [8, 16],
+    };
+    for case in [thick, real] {
+        let (geometry, psnr) = refocused_against_the_main_lens(&case);
+        println!("{}: {psnr:.1} dB, {}", case.microlenses, geometry["patches"]);
+        assert!(psnr > 40.0, "{}: {psnr}", case.microlenses);
+    }
+}
+
 /// What there is instead of a refocused picture: patches that leave gaps, images that are too narrow, and a plane that
 /// the lenslets stand in.
 #[test]
@@ -378,6 +413,153 @@ fn patches_that_leave_gaps_make_no_picture() {
             "{microlenses}"
         );
         assert!(!folder.path().join("refocused.npy").exists(), "{microlenses}");
+    }
+}
+
+/// The amplitude of waves of 7 columns, in a Hann window over the columns.
+fn amplitude(rows: &[Vec<f64>]) -> f64 {
+    let sum = rows.iter().fold([0.0; 2], |sum, row| {
+        let n = row.len() as f64;
+        let window = |i: usize| 1.0 - (TAU * (i as f64 + 0.5) / n).cos();
+        let mean: f64 = row.iter().enumerate().map(|(i, v)| window(i) * v).sum::<f64>() / n;
+        row.iter().enumerate().fold(sum, |[re, im], (i, value)| {
+            let (sine, cosine) = (TAU * i as f64 / 7.0).sin_cos();
+            let value = window(i) * (value - mean);
+            [re + value * cosine, im - value * sine]
+        })
+    });
+    sum[0].hypot(sum[1])
+}
+
+/// The share of a wave of 7 columns that the mean of `n` views along a row has of it which are `disparity` apart and are
+/// moved by `moved` each, between pixels by cubic convolution (Keys 1981).
+fn share_left(n: usize, disparity: f64, moved: f64) -> f64 {
+    let keys = |t: f64| match t.abs() {
+        t if t <= 1.0 => (1.5 * t - 2.5) * t * t + 1.0,
+        t if t < 2.0 => ((-0.5 * t + 2.5) * t - 4.0) * t + 2.0,
+        _ => 0.0,
+    };
+    let sum = (0..n).fold([0.0; 2], |sum, k| {
+        let step = k as f64 - 0.5 * (n as f64 - 1.0);
+        let at = -moved * step;
+        (-3..=3).fold(sum, |[re, im], neighbour| {
+            let column = at.floor() + f64::from(neighbour);
+            let (sine, cosine) = (TAU / 7.0 * (column + disparity * step)).sin_cos();
+            let weight = keys(at - column) / n as f64;
+            [re + weight * cosine, im + weight * sine]
+        })
+    });
+    sum[0].hypot(sum[1])
+}
+
+/// With a distance of its own a camera that has views leaves their mean, in which a wall there is as sharp as in a view,
+/// and one elsewhere blurred by as many steps as there are views.
+#[test]
+fn views_together_are_sharp_at_the_distance_that_is_asked_for() {
+    let depth = 0.3;
+    for distance in [depth, 0.5, 2.0] {
+        let folder = tempfile::tempdir().unwrap();
+        let more = format!(r#""refocus_distance": {distance},"#);
+        let camera = camera("light_field", "", [640, 40], &more);
+        let geometry = write_waves(folder.path(), depth, &camera, 8);
+        assert_eq!(geometry["refocused_m"], distance);
+        let (shape, views) = array(&folder.path().join("views.npy"));
+        let (size, refocused) = array(&folder.path().join("refocused.npy"));
+        assert_eq!(size, shape[2..], "a picture as large as a view");
+        let green: Vec<f64> = refocused.iter().skip(1).step_by(3).copied().collect();
+        let refocused: Vec<Vec<f64>> = green.chunks(size[1]).map(<[f64]>::to_vec).collect();
+        let n = shape[0];
+        let found = amplitude(&refocused) / amplitude(&view(&shape, &views, n / 2, n / 2));
+        let [wall, asked] = {
+            let [baseline, focal] = ["baseline_m", "focal_length_px"]
+                .map(|key| geometry["disparity"][key].as_f64().unwrap());
+            [depth, distance].map(|z| baseline * focal * (1.0 / z - 2.0))
+        };
+        let known = share_left(n, wall, asked);
+        println!("{distance} m: {found:.4} of the waves, {known:.4} by the formula, {n} views");
+        // Noise, and what cos⁴ moves all views by (0.0016 columns).
+        assert!((found - known).abs() < 6e-3, "{distance}: {found}, not {known}");
+    }
+}
+
+/// Of the views of a wall with waves behind lenslets of N-SF11, by colour: how far the middle one stands beside the ideal
+/// lens' in the left third and in the right one, the disparity along the middle row (columns), and how far the centres of
+/// images in that colour are from those of the design wavelength in both thirds (pixels).
+fn by_color(accuracy: &str) -> (serde_json::Value, [[f64; 5]; 3]) {
+    let folder = tempfile::tempdir().unwrap();
+    save_wave(folder.path(), [128, 1]);
+    let depth = 0.25;
+    let (width, z) = (40.0 * on_the_wall(7.0, depth), 0.5 - depth);
+    let microlenses = r#", "glass": "N-SF11", "radii": [0.33, null], "thickness": 0.5"#;
+    let camera = camera("light_field", microlenses, [480, 30], r#""views": 5,"#);
+    let geometry = write_scene(
+        folder.path(),
+        &format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "flat"}}, "render": {{"samples": 8}},
+            "accuracy": {{"view_psnr": 40 {accuracy}}}, "camera": {camera},
+            "materials": {{"a": {{"type": "matte",
+                "color": {{"image": "wave.png", "encoding": "linear", "repeat": [40, 1]}}}}}},
+            "objects": [{{"shape": "rectangle", "width": {width}, "height": {width}, "material": "a",
+                "transform": {{"translate": [0.0003, 0, {z}]}}}}]}}"#
+        ),
+    );
+    let (shape, views) = array(&folder.path().join("views.npy"));
+    let (_, reference) = array(&folder.path().join("reference.npy"));
+    let [n, _, rows, cols, channels] = shape[..] else { panic!("{shape:?}") };
+    let thirds = [[0, cols / 3], [cols - cols / 3, cols]];
+    let place =
+        |key: &serde_json::Value, row: usize, col: usize| key[row][col][0].as_f64().unwrap();
+    let measured = std::array::from_fn(|color| {
+        let part = |values: &[f64], across: usize, [from, to]: [usize; 2]| -> Vec<Vec<f64>> {
+            let start = (n / 2 * n + across) * rows * cols;
+            let pixel =
+                |row: usize, col: usize| values[(start + row * cols + col) * channels + color];
+            (0..rows).map(|row| (from..to).map(|col| pixel(row, col)).collect()).collect()
+        };
+        let beside = |third| shift(&part(&reference, n / 2, third), &part(&views, n / 2, third));
+        let ends = [0, n - 1].map(|across| part(&views, across, [0, cols]));
+        let apart = |[from, to]: [usize; 2]| -> f64 {
+            let (own, design) = (&geometry["centres_by_color_px"][color], &geometry["centres_px"]);
+            let cells = (0..rows).flat_map(|row| (from..to).map(move |col| (row, col)));
+            let away = cells.map(|(row, col)| place(own, row, col) - place(design, row, col));
+            away.sum::<f64>() / (rows * (to - from)) as f64
+        };
+        let disparity = -shift(&ends[0], &ends[1]) / (n - 1) as f64;
+        let [left, right] = thirds;
+        [beside(left), beside(right), disparity, apart(left), apart(right)]
+    });
+    (geometry, measured)
+}
+
+/// Behind thick lenslets of a glass that disperses the images of red, green and blue have their own middles, at which
+/// views are sampled. By rays the worst view has 41.3 dB, which the scene's `accuracy` lets through. The same raw picture
+/// sampled at the middles of the design wavelength instead has waves that stand beside that by the disparity over a step
+/// times how far the middles are apart: of 0.04 pixels, 0.006 columns.
+#[test]
+fn views_of_each_colour_are_sampled_at_its_own_middles() {
+    let (geometry, own) = by_color("");
+    let (same, common) = by_color(r#", "view_color_shift": 9"#);
+    assert_eq!(geometry["views_by_color"], true, "{}", geometry["color_centres_apart_px"]);
+    assert_eq!(same["views_by_color"], false);
+    assert!(geometry["color_centres_apart_px"].as_f64().unwrap() > 0.04);
+    let number = |key: &str| geometry[key].as_f64().unwrap();
+    let expected = number("expected_disparity");
+    println!("{own:.5?} {common:.5?}, {expected:.5}");
+    for color in 0..3 {
+        for third in 0..2 {
+            let moved = common[color][third] - own[color][third];
+            let known = expected / number("step_px") * own[color][3 + third];
+            // The noise is that of the same raw picture.
+            assert!((moved - known).abs() < 3e-4, "{color}, {third}: {moved}, not {known}");
+        }
+    }
+    let fringe = |of: &[[f64; 5]; 3]| (of[2][0] - of[0][0]).abs();
+    assert!(fringe(&common) > 8e-3 && fringe(&own) < 0.5 * fringe(&common), "red against blue");
+    // Lenslets bend red less and blue more, so that a pixel is seen from less or more far beside the middle: the
+    // disparity of the design wavelength is that of green alone.
+    for (color, within) in [(0, 0.01), (1, 0.005), (2, 0.015)] {
+        let share = own[color][2] / expected;
+        assert!((share - 1.0).abs() < within, "{color}: {share} of the formula's disparity");
     }
 }
 

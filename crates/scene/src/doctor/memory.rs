@@ -1,5 +1,6 @@
 //! What a render will need, from counts alone.
 
+use etendue_geometry::Coplanar;
 use etendue_report::{Decision, DecisionKind, DecisionValue, Size, listed};
 use etendue_tracer::LayerSpec;
 use serde::Serialize;
@@ -33,7 +34,8 @@ pub struct MemoryForecast {
     pub geometry: u64,
     /// Vertices and indices that stay in mapped files: the system may drop and read them again.
     pub mapped: u64,
-    /// Embree's structure, estimated from the number of triangles.
+    /// Embree's structure, estimated from the number of triangles, and the list of those that may lie in one plane with
+    /// another copy's while it is made.
     pub structure: u64,
     /// Placements of meshes that are placed more than once, in the scene and in the structure.
     pub copies: u64,
@@ -58,7 +60,8 @@ impl MemoryForecast {
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
         let geometry: u64 = scene.geometry.meshes.iter().map(|mesh| mesh.heap_bytes() as u64).sum();
-        let structure = structure(scene.geometry.triangles_unique());
+        let structure = structure(scene.geometry.triangles_unique())
+            + Coplanar::bytes_at_most(&scene.geometry);
         let copies = copies(scene.placed_copies());
         let film = film(scene.camera.resolution(), &scene.layers);
         let mapped = scene.stats.bytes_mapped;

@@ -1,4 +1,5 @@
-//! The views of a light field: one from a place of the pupil, or all together, focused anew.
+//! The views of a light field: one from a place of the pupil, or all together, focused anew, as focused cameras
+//! are by what their lenslets see.
 
 use eframe::egui::{self, Pos2, Rect, Sense, Ui, Vec2};
 use etendue::{Error, LightFieldViews, Picture, Screen};
@@ -24,6 +25,17 @@ pub(crate) enum Shows {
 pub(crate) struct LightFieldPanel {
     pub(crate) shows: Shows,
     views: Option<LightFieldViews>,
+    offered: Option<Offered>,
+}
+
+/// What the views of the last whole picture offer: it stays while the next one is rendered.
+#[derive(Debug, Clone, Copy)]
+struct Offered {
+    /// Views along a side of the pupil; 0 of focused cameras.
+    count: u32,
+    /// The distance in focus, and the nearest and the farthest to focus at (m).
+    focus: f64,
+    distances: [f64; 2],
 }
 
 impl LightFieldPanel {
@@ -37,6 +49,11 @@ impl LightFieldPanel {
         // Lenslets are told apart at the picture's own size alone.
         if let (None, Some(preview)) = (&self.views, preview.filter(|of| of.factor() == 1)) {
             self.views = preview.light_field()?;
+            self.offered = self.views.as_ref().map(|views| Offered {
+                count: views.count(),
+                focus: views.focus(),
+                distances: views.distances(),
+            });
         }
         Ok(())
     }
@@ -51,7 +68,10 @@ impl LightFieldPanel {
         let picture: Picture = match self.shows {
             Shows::Raw => return Ok(None),
             Shows::View(at) => views.view(at)?,
-            Shows::Focused(depth) => views.refocused(depth)?,
+            Shows::Focused(depth) => {
+                let [nearest, farthest] = views.distances();
+                views.refocused(depth.clamp(nearest, farthest))?
+            }
         };
         Ok(Some(Screen::of_layer(&picture, "")?))
     }
@@ -61,7 +81,6 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
     let scene = app.inspector.as_ref().map(|inspector| inspector.scene());
     if let Some(why) = scene.and_then(|scene| scene.camera.no_views()) {
         ui.weak(format!("no views: {why}"));
-        return;
     }
     let preview = app.picture.as_ref().filter(|picture| picture.is_final);
     if let Err(error) = app.light_field.find(preview.and_then(|of| of.preview.as_deref())) {
@@ -69,7 +88,7 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
     }
     let before = app.light_field.shows;
     let mut shows = before;
-    let focus = app.light_field.views.as_ref().map_or(f64::INFINITY, LightFieldViews::focus);
+    let Some(Offered { count, focus, distances }) = app.light_field.offered else { return };
     let focus = if focus.is_finite() && focus > 0.0 { focus } else { 1.0 };
     ui.horizontal(|ui| {
         let mut choice = |title: &str, is_on: bool, kind: Shows| {
@@ -80,16 +99,16 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
             }
         };
         choice("raw", before == Shows::Raw, Shows::Raw);
-        choice("view", matches!(before, Shows::View(_)), Shows::View([0, 0]));
+        if count > 0 {
+            choice("view", matches!(before, Shows::View(_)), Shows::View([0, 0]));
+        }
         choice("refocus", matches!(before, Shows::Focused(_)), Shows::Focused(focus));
     });
-    let count = app.light_field.views.as_ref().map_or(1, LightFieldViews::count);
     match &mut shows {
         Shows::Raw => {}
         Shows::View(at) => pupil(ui, count, at),
         Shows::Focused(depth) => {
-            let range = focus * 0.2..=focus * 5.0;
-            let slider = egui::Slider::new(depth, range).logarithmic(true).suffix(" m");
+            let slider = egui::Slider::new(depth, distances[0]..=distances[1]).logarithmic(true).suffix(" m");
             let slider = ui.add(slider.custom_formatter(|depth, _| short(depth)));
             mark(ui.ctx(), "refocus", slider.rect);
         }

@@ -2,9 +2,12 @@
 
 use std::f64::consts::PI;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
+use etendue_geometry::glam::DVec3;
+use etendue_tracer::ClearSky;
+use serde_json::json;
 
-use crate::rendered::{Pixels, load, patch};
+use crate::rendered::{Pixels, electrons_of_channels, load, patch};
 use crate::sampling::SAMPLERS;
 use crate::{Case, Outcome, Scale};
 
@@ -52,12 +55,109 @@ pub(super) const SMALL_SUN: Case = Case {
     run: small_sun,
 };
 
+pub(super) const IN_A_FLOOR: Case = Case {
+    name: "lamp_in_a_floor",
+    regime: "a lamp in the very plane of a floor, named before it and after it, straight and turned, at the origin, 0.3 and \
+        100 m away",
+    must: "the later one is seen, and nothing of the other",
+    limit: None,
+    run: in_a_floor,
+};
+
+pub(super) const SKY_SPECTRUM: Case = Case {
+    name: "spectrum_of_a_clear_sky",
+    regime: "a multispectral sensor of eight bands from 400 to 720 nm that looks into a clear sky of turbidity 1 to 8, \
+        the sun at 10 to 80 degrees",
+    must: "the bands' electrons are as those of the authors' radiance at eleven wavelengths, summed in steps of 0.1 nm, \
+        to 2·10⁻³: bands may lose 10⁻³, and a texel of the map is 0.35 degrees",
+    limit: None,
+    run: sky_spectrum,
+};
+
 /// The form factor of a square of side 1 from a point under its middle, `h` below.
 fn form_factor(h: f64) -> f64 {
     let x = 0.5 / h;
     let root = (1.0 + x * x).sqrt();
     // Four corners, each X/√(1 + X²) · atan(X/√(1 + X²)) / π.
     4.0 / PI * (x / root) * (x / root).atan()
+}
+
+fn in_a_floor(_: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    let mut worst = 0.0_f64;
+    for (at, turn) in [(0.0, 0), (0.3, 37), (100.0, 37)] {
+        let sheet = |size: f64, material: &str| {
+            format!(
+                r#"{{"shape": "rectangle", "width": {size}, "height": {size}, "material": "{material}",
+                    "transform": {{"translate": [{at}, {at}, {at}], "rotate": [1, 0.2, 0.3, {turn}]}}}}"#
+            )
+        };
+        let (floor, lamp) = (sheet(4.0, "floor"), sheet(1.0, "lamp"));
+        for (name, objects, known) in [
+            ("the lamp is later", format!("{floor}, {lamp}"), 3.0),
+            ("the floor is later", format!("{lamp}, {floor}"), 0.0),
+        ] {
+            let rest = format!(
+                r#""lights": [], "objects": [{objects}],
+                "materials": {{"floor": {{"type": "matte", "color": [0.5, 0.5, 0.5]}},
+                    "lamp": {{"type": "emissive", "radiance": [3, 3, 3], "two_sided": true}}}}"#
+            );
+            for tracer in ["direct", "path"] {
+                let eye = [[at + 0.1, at + 0.2, at + 2.0], [at + 0.1, at + 0.13, at]];
+                let tracer = format!(r#"{{"type": "{tracer}"}}"#);
+                let seen = Pixels::read(&patch(&tracer, 4, eye, &rest))?;
+                let off = seen.values.iter().map(|v| (v - known).abs()).fold(0.0, f64::max);
+                // What shines along its own plane is a rounding of nothing.
+                outcome.must(off <= 1e-9, || format!("{name} at {at} m, {tracer}: {off}"));
+                worst = worst.max(off);
+            }
+        }
+    }
+    outcome.measured(format!("at most {worst:.1e} off"));
+    Ok(outcome)
+}
+
+fn sky_spectrum(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    let all = [(1.0, 80.0), (3.0, 45.0), (8.0, 45.0), (3.0, 10.0)];
+    let skies: &[(f64, f64)] = scale.pick(&all[1..2], &all);
+    for &(turbidity, elevation) in skies {
+        let sky = ClearSky::new(turbidity, elevation, 0.2, false).context("a sky")?;
+        let mut worst = 0.0_f64;
+        for toward in [[0.2, 0.9, 0.4], [0.5, 0.4, 0.7]] {
+            let text = json!({
+                "etendue": 1, "tracer": { "type": "direct" }, "render": { "samples": 1 },
+                "camera": {
+                    "type": "orthographic", "height": 0.5,
+                    "pose": { "from": [0, 0, 0], "look_at": toward },
+                    "sensor": {
+                        "type": "multispectral", "bands": { "from": 400, "to": 720, "count": 8 },
+                        "radiometry": "physical", "system_gain": 1.0, "noise": "none", "resolution": [4, 4]
+                    }
+                },
+                // What keeps the scene from being empty is not seen.
+                "objects": [{ "shape": "rectangle", "transform": { "translate": [0, -50, 0] } }],
+                "lights": [{ "type": "sky", "turbidity": turbidity,
+                             "sun": { "elevation": elevation, "shines": false } }]
+            });
+            let found = electrons_of_channels(&text)?;
+            let spectrum = sky.dome_spectrum(DVec3::from(toward).normalize());
+            let known: Vec<f64> = (0..8)
+                .map(|band| {
+                    let places = (0..400).map(|k| 0.1 * (f64::from(k) + 0.5));
+                    let photons = |nm: f64| spectrum.at(nm).unwrap_or(0.0) * nm;
+                    places.map(|nm| photons(400.0 + 40.0 * f64::from(band) + nm)).sum()
+                })
+                .collect();
+            let [all, sum] = [&found, &known].map(|of| of.iter().sum::<f64>());
+            for (found, known) in found.iter().zip(&known) {
+                worst = worst.max((found / all * sum / known - 1.0).abs());
+            }
+        }
+        outcome.must(worst <= 2e-3, || format!("{turbidity}, {elevation}°: {worst}"));
+        outcome.measured(format!("turbidity {turbidity}, {elevation}°: {worst:.1e} off"));
+    }
+    Ok(outcome)
 }
 
 fn on_a_surface(scale: Scale) -> Result<Outcome> {

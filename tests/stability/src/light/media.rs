@@ -23,6 +23,61 @@ pub(super) const NESTED: Case = Case {
     run: nested,
 };
 
+pub(super) const WITHIN: Case = Case {
+    name: "camera_within_a_body",
+    regime: "a camera in the middle of a body that absorbs, 10⁻² to 10³ m from its faces and leaving half or a thousandth of \
+        the light, and of one within another, at the origin and 100 m away",
+    must: "Bouguer and Lambert's law from the camera on, to 10⁻⁵",
+    limit: None,
+    run: within,
+};
+
+fn within(_: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    let mut worst = 0.0_f64;
+    for way in [1e-2, 1.0, 1e3] {
+        for left in [0.5_f64, 1e-3] {
+            for at in [0.0, 100.0] {
+                let body = |side: f64, material: &str| {
+                    format!(
+                        r#"{{"shape": "box", "size": [{side}, {side}, {side}], "material": "{material}",
+                            "transform": {{"translate": [{at}, {at}, {at}]}}}}"#
+                    )
+                };
+                let (outer, inner) = (body(2.0 * way, "outer"), body(way, "inner"));
+                let stacks = [
+                    (outer.clone(), left),
+                    (format!("{outer}, {inner}"), left.sqrt() * left),
+                    (format!("{inner}, {outer}"), left.sqrt() * left),
+                ];
+                for (objects, known) in stacks {
+                    let medium = |name: &str, left: f64| {
+                        format!(
+                            r#""{name}": {{"type": "dielectric", "ior": 1.0,
+                                "absorption": {{"color": [{left}, {left}, {left}], "distance": {way}}}}}"#
+                        )
+                    };
+                    // Half a way of the inner one leaves what a whole one of the outer does.
+                    let rest = format!(
+                        r#""lights": [{{"type": "environment"}}], "objects": [{objects}], "materials": {{{}, {}}}"#,
+                        medium("outer", left),
+                        medium("inner", left * left)
+                    );
+                    let eye = [[at; 3], [at, at, at - 3.0 * way]];
+                    let seen = Pixels::read(&patch(r#"{"type": "path"}"#, 1, eye, &rest))?.mean();
+                    let off = (seen / known - 1.0).abs();
+                    outcome.must(off <= 1e-5, || {
+                        format!("{way} m at {at} m, {left}: {seen}, not {known}")
+                    });
+                    worst = worst.max(off);
+                }
+            }
+        }
+    }
+    outcome.measured(format!("at most {worst:.1e} off"));
+    Ok(outcome)
+}
+
 fn thin(scale: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();
     let mut worst = 0.0_f64;

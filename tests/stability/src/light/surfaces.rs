@@ -23,6 +23,84 @@ pub(super) const SMOOTH: Case = Case {
     run: smooth,
 };
 
+pub(super) const WHITE_METAL: Case = Case {
+    name: "white_metal_in_a_furnace",
+    regime: "white metal of roughness 0.05 to 1, isotropic and brushed up to an anisotropy of 1, under a white sky, seen \
+        along and across the grain at 0 to 88 degrees from the normal",
+    must: "it returns what falls in, to 1.5·10⁻² and 4 standard errors: the table of brushed facets is as exact as a \
+        hundredth",
+    limit: None,
+    run: white_metal,
+};
+
+pub(super) const COLOURED_PANE: Case = Case {
+    name: "sun_through_a_coloured_pane",
+    regime: "the sun at 0 to 80 degrees through a coloured pane without thickness, of indices 1.1 to 2.5, onto a white wall",
+    must: "the wall shows E cos θ (1 − F) of the pane's colour over π by Fresnel's F, to 10⁻⁶",
+    limit: None,
+    run: coloured_pane,
+};
+
+fn white_metal(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    for anisotropy in [0.0, 0.5, 1.0] {
+        let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+        for roughness in [0.05, 0.1, 0.3, 0.6, 1.0] {
+            for (degrees, azimuth) in
+                [(0.0_f64, 0.0_f64), (60.0, 20.0), (80.0, 0.0), (80.0, 90.0), (88.0, 45.0)]
+            {
+                let rest = format!(
+                    r#""lights": [{{"type": "environment"}}],
+                    "objects": [{{"shape": "rectangle", "width": 900, "height": 900, "material": "m"}}],
+                    "materials": {{"m": {{"type": "gltf", "color": [1, 1, 1], "metallic": 1,
+                        "roughness": {roughness}, "anisotropy": {anisotropy}}}}}"#
+                );
+                let ((sin, cos), (y, x)) =
+                    (degrees.to_radians().sin_cos(), azimuth.to_radians().sin_cos());
+                let eye = [[3.0 * sin * x, 3.0 * sin * y, 3.0 * cos], [0.0; 3]];
+                let samples = scale.pick(64, 4_096);
+                let seen = Pixels::read(&patch(r#"{"type": "path"}"#, samples, eye, &rest))?;
+                let (mean, bound) = (seen.mean(), 1.5e-2 + 4.0 * seen.standard_error());
+                outcome.must((mean - 1.0).abs() <= bound, || {
+                    format!("roughness {roughness}, anisotropy {anisotropy} at {degrees}: {mean}")
+                });
+                (least, most) = (least.min(mean), most.max(mean));
+            }
+        }
+        outcome.measured(format!("anisotropy {anisotropy}: {least:.4} to {most:.4} returns"));
+    }
+    Ok(outcome)
+}
+
+fn coloured_pane(_: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    let mut worst = 0.0_f64;
+    for degrees in [0.0_f64, 30.0, 60.0, 75.0, 80.0] {
+        for index in [1.1, 1.5, 2.5] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let rest = format!(
+                r#""lights": [{{"type": "directional", "direction": [{sin}, 0, {}], "irradiance": [1, 1, 1]}}],
+                "objects": [{{"shape": "rectangle", "width": 1, "height": 1, "material": "wall"}},
+                    {{"shape": "rectangle", "width": 90, "height": 90, "material": "pane",
+                      "transform": {{"translate": [0, 0, 1]}}}}],
+                "materials": {{"wall": {{"type": "matte", "color": [1, 1, 1]}},
+                    "pane": {{"type": "gltf", "color": [0.4, 0.6, 0.8], "transmission": 1, "roughness": 0,
+                        "ior": {index}}}}}"#,
+                -cos
+            );
+            let (reflected, _) = etendue_tracer::bsdf::fresnel::dielectric(cos, index);
+            let known = 0.4 * (1.0 - reflected) * cos / std::f64::consts::PI;
+            let eye = [[0.0, 0.2, 0.5], [0.0; 3]];
+            let seen = Pixels::read(&patch(r#"{"type": "direct"}"#, 4, eye, &rest))?.mean();
+            let off = (seen / known - 1.0).abs();
+            outcome.must(off <= 1e-6, || format!("{degrees}°, {index}: {seen}, not {known}"));
+            worst = worst.max(off);
+        }
+    }
+    outcome.measured(format!("at most {worst:.1e} off"));
+    Ok(outcome)
+}
+
 fn materials() -> Vec<(String, String)> {
     let mut all = vec![("matte".to_owned(), r#""type": "matte", "color": [1, 1, 1]"#.to_owned())];
     for roughness in ["0", "0.01", "0.1", "0.5", "1"] {

@@ -3,6 +3,8 @@
 use anyhow::Result;
 use rayon::prelude::*;
 
+use crate::rendered::Pixels;
+
 use super::{SAMPLERS, correlation, mean, smooth};
 use crate::{Case, Outcome, Scale};
 
@@ -22,6 +24,51 @@ pub(super) const PAIRS: Case = Case {
     limit: None,
     run: pairs,
 };
+
+pub(super) const FRAMES: Case = Case {
+    name: "noise_of_frames",
+    regime: "a wall under an even sky, by a path a pixel, in frames 0, 1, 2, 1000 and 2³¹ of a still camera, and the same \
+        with `frozen_noise`",
+    must: "the noise of any two frames correlates by less than 4/√N, and that of frozen ones is the same to the bit",
+    limit: None,
+    run: frames,
+};
+
+fn frames(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    let side: u32 = scale.pick(100, 512);
+    let shown = |frame: u32, is_frozen: bool| {
+        let text = format!(
+            r#"{{"etendue": 1, "tracer": {{"type": "direct"}},
+            "camera": {{"type": "pinhole", "fov": 40, "pose": {{"from": [0, 0, 2], "look_at": [0, 0, 0]}},
+                "sensor": {{"resolution": [{side}, {side}]}}}},
+            "lights": [{{"type": "environment"}}],
+            "objects": [{{"shape": "rectangle", "width": 40, "height": 40, "material": "wall"}},
+                {{"shape": "sphere", "radius": 0.3, "transform": {{"translate": [0, 0, 4]}}}}],
+            "materials": {{"wall": {{"type": "matte", "color": [0.3, 0.3, 0.3]}}}},
+            "render": {{"samples": 1, "frame": {frame}, "frozen_noise": {is_frozen}}}}}"#
+        );
+        Pixels::read(&text).map(|pixels| pixels.values)
+    };
+    let numbers = [0, 1, 2, 1000, 1 << 31];
+    let pictures = numbers.map(|frame| shown(frame, false));
+    let pictures = pictures.into_iter().collect::<Result<Vec<_>>>()?;
+    let (mut most, bound) = (0.0_f64, 4.0 / f64::from(side));
+    for (i, one) in pictures.iter().enumerate() {
+        for (k, other) in pictures[..i].iter().enumerate() {
+            let pairs: Vec<[f64; 2]> = one.iter().zip(other).map(|(&a, &b)| [a, b]).collect();
+            let found = correlation(&pairs).abs();
+            outcome.must(found <= bound, || {
+                format!("frames {} and {}: correlated by {found}", numbers[k], numbers[i])
+            });
+            most = most.max(found);
+        }
+    }
+    let is_same = shown(7, true)? == shown(8, true)?;
+    outcome.must(is_same, || "frozen frames differ".to_owned());
+    outcome.measured(format!("at most {most:.4} of {bound:.4}; frozen frames are the same"));
+    Ok(outcome)
+}
 
 fn neighbours(scale: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();

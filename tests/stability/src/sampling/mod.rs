@@ -22,6 +22,7 @@ pub const METHOD: Method = Method {
         running_out::DIMENSIONS,
         correlation::NEIGHBOURS,
         correlation::PAIRS,
+        correlation::FRAMES,
     ],
 };
 
