@@ -36,14 +36,16 @@ use self::packet::Batch;
 use self::single::{AnyHit, Sink};
 use self::wide::{MOST_IN_LEAF, WideTree};
 use crate::few::FewTriangles;
-use crate::nearest::{Nearest, PlacementView, Triangle, settle};
+use crate::nearest::{Nearest, PlacementView, Triangle, settle, settle_blocks};
 use crate::parts::{Baking, Blas, Instance, Layout, Members, outward};
 use crate::tree::{LeafSize, Ref, Tree};
 use crate::{
     Accel, BlockAccel, BuildError, BuildOptions, BuildReport, BuildWatch, Quality, with_threads,
 };
-use etendue_geometry::glam::Vec3;
-use etendue_geometry::{Bounds, Coplanar, Geometry, HitBatch, MISS, Mesh, RayBatch};
+use etendue_geometry::glam::{DVec3, Vec3};
+use etendue_geometry::{
+    Bounds, Coplanar, Geometry, HitBatch, MISS, Mesh, RayBatch, RayBlock, RayBlocks,
+};
 use wide::{LeafNumbers, LeafUnits};
 
 /// The pure-Rust bounding volume hierarchy.
@@ -238,6 +240,30 @@ impl Bvh {
     }
 }
 
+impl BlockAccel for Bvh {
+    fn origin(&self) -> DVec3 {
+        self.few.as_ref().map_or(DVec3::ZERO, FewTriangles::origin)
+    }
+
+    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
+        if let Some(few) = &self.few {
+            few.convert(rays, blocks);
+        }
+    }
+
+    fn closest_of_blocks(&self, blocks: &mut [RayBlock], _coherent: bool) {
+        let Some(few) = &self.few else { return };
+        few.closest_of_blocks(blocks);
+        settle_blocks(&self.coplanar, &self.geometry, few.origin(), blocks);
+    }
+
+    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], _coherent: bool) {
+        if let Some(few) = &self.few {
+            few.occluded_of_blocks(blocks);
+        }
+    }
+}
+
 impl Accel for Bvh {
     fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
         hits.reset(rays.len());
@@ -246,8 +272,7 @@ impl Accel for Bvh {
     }
 
     fn blocks(&self) -> Option<&dyn BlockAccel> {
-        let few = self.few.as_ref().filter(|_| self.coplanar.is_empty())?;
-        Some(few)
+        self.few.is_some().then_some(self)
     }
 
     fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {

@@ -13,7 +13,7 @@ use etendue_geometry::{
 
 use crate::embree::{ExactFilter, FoundHits, NearestSearch, Scene, version};
 use crate::few::FewTriangles;
-use crate::nearest::{Nearest, Query, settle};
+use crate::nearest::{Nearest, Query, settle, settle_blocks};
 use crate::parts::check_scale;
 use crate::recheck::EndTriangles;
 use crate::single::{F32Frame, Rays32, round};
@@ -104,6 +104,20 @@ impl Embree {
             rechecked: AtomicU64::new(0),
             corrected: AtomicU64::new(0),
         })
+    }
+
+    /// Turns normals of blocks' hits to where the placements are.
+    fn turn_normals(&self, blocks: &mut [RayBlock]) {
+        let Some(turns) = self.scene.turns() else { return };
+        for block in blocks {
+            for lane in (0..LANES).filter(|&lane| block.placement[lane] != MISS) {
+                let own = DVec3::from(block.normal.map(|axis| f64::from(axis[lane])));
+                let turned = turns[block.placement[lane] as usize] * own;
+                for axis in 0..3 {
+                    block.normal[axis][lane] = round(turned[axis]);
+                }
+            }
+        }
     }
 
     /// Rays per packet of coherent batches, as the processor has them (1 without packets).
@@ -450,13 +464,7 @@ impl Accel for Embree {
     }
 
     fn blocks(&self) -> Option<&dyn BlockAccel> {
-        if !self.coplanar.is_empty() {
-            return None;
-        }
-        match &self.few {
-            Some(few) => Some(few),
-            None => self.scene.takes_blocks().then_some(self),
-        }
+        (self.few.is_some() || self.scene.takes_blocks()).then_some(self)
     }
 
     fn rebuilt(
@@ -492,20 +500,20 @@ impl BlockAccel for Embree {
     }
 
     fn closest_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
-        self.scene.closest_of_blocks(blocks, coherent);
-        let Some(turns) = self.scene.turns() else { return };
-        for block in blocks {
-            for lane in (0..LANES).filter(|&lane| block.placement[lane] != MISS) {
-                let own = DVec3::from(block.normal.map(|axis| f64::from(axis[lane])));
-                let turned = turns[block.placement[lane] as usize] * own;
-                for axis in 0..3 {
-                    block.normal[axis][lane] = round(turned[axis]);
-                }
+        match &self.few {
+            Some(few) => few.closest_of_blocks(blocks),
+            None => {
+                self.scene.closest_of_blocks(blocks, coherent);
+                self.turn_normals(blocks);
             }
         }
+        settle_blocks(&self.coplanar, self.scene.geometry(), self.frame.origin, blocks);
     }
 
     fn occluded_of_blocks(&self, blocks: &mut [RayBlock], coherent: bool) {
-        self.scene.occluded_of_blocks(blocks, coherent);
+        match &self.few {
+            Some(few) => few.occluded_of_blocks(blocks),
+            None => self.scene.occluded_of_blocks(blocks, coherent),
+        }
     }
 }

@@ -13,7 +13,6 @@ use etendue_geometry::block::{Floats, LANES};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, MISS, RayBatch, RayBlock, RayBlocks, is_degenerate};
 
-use crate::BlockAccel;
 use crate::single::{F32_EPSILON, F32Frame, Rays32, round};
 
 /// Scenes of more triangles are traced by trees.
@@ -48,7 +47,7 @@ struct FewTriangle {
 
 /// A scene of few triangles.
 #[derive(Debug)]
-pub struct FewTriangles {
+pub(crate) struct FewTriangles {
     frame: F32Frame,
     edges: Vec<PluckerEdge>,
     triangles: Vec<FewTriangle>,
@@ -56,8 +55,7 @@ pub struct FewTriangles {
 
 impl FewTriangles {
     /// Those of `geometry`; `None` where there are too many.
-    #[must_use]
-    pub fn of(geometry: &Geometry) -> Option<Self> {
+    pub(crate) fn of(geometry: &Geometry) -> Option<Self> {
         if geometry.triangles() > MOST_TRIANGLES as u64 {
             return None;
         }
@@ -97,6 +95,26 @@ impl FewTriangles {
             }
         }
         Some(few)
+    }
+
+    /// What origins of blocks are relative to (m, world).
+    pub(crate) fn origin(&self) -> DVec3 {
+        self.frame.origin
+    }
+
+    /// The rays of a batch as blocks.
+    pub(crate) fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
+        Rays32::default().convert_to_blocks(rays, &self.frame, blocks);
+    }
+
+    /// The closest hits of blocks, as [`BlockAccel`](crate::BlockAccel) has them; of triangles in one place the last.
+    pub(crate) fn closest_of_blocks(&self, blocks: &mut [RayBlock]) {
+        closest(self, blocks, &mut vec![Sides::NONE; self.edges.len()]);
+    }
+
+    /// Whether anything is between the ends of rays of blocks.
+    pub(crate) fn occluded_of_blocks(&self, blocks: &mut [RayBlock]) {
+        occluded(self, blocks, &mut vec![Sides::NONE; self.edges.len()]);
     }
 }
 
@@ -237,8 +255,7 @@ impl FewTriangle {
         let ([nx, ny, nz], [dx, dy, dz]) = (self.normal, &lines.along);
         let mut distances = [0.0; LANES];
         for i in 0..LANES {
-            let height =
-                self.offset - (origin[0][i] * nx + origin[1][i] * ny + origin[2][i] * nz);
+            let height = self.offset - (origin[0][i] * nx + origin[1][i] * ny + origin[2][i] * nz);
             let slope = dx[i] * nx + dy[i] * ny + dz[i] * nz;
             distances[i] = if slope == 0.0 { f64::NAN } else { height / slope };
         }
@@ -321,24 +338,6 @@ fn occluded(few: &FewTriangles, blocks: &mut [RayBlock], of_edges: &mut [Sides])
         for (t_max, &blocked) in block.t_max.iter_mut().zip(&blocked) {
             *t_max = if blocked != 0 { f32::NEG_INFINITY } else { *t_max };
         }
-    }
-}
-
-impl BlockAccel for FewTriangles {
-    fn origin(&self) -> DVec3 {
-        self.frame.origin
-    }
-
-    fn convert(&self, rays: &RayBatch, blocks: &mut RayBlocks) {
-        Rays32::default().convert_to_blocks(rays, &self.frame, blocks);
-    }
-
-    fn closest_of_blocks(&self, blocks: &mut [RayBlock], _coherent: bool) {
-        closest(self, blocks, &mut vec![Sides::NONE; self.edges.len()]);
-    }
-
-    fn occluded_of_blocks(&self, blocks: &mut [RayBlock], _coherent: bool) {
-        occluded(self, blocks, &mut vec![Sides::NONE; self.edges.len()]);
     }
 }
 
@@ -444,8 +443,8 @@ mod tests {
                 assert_eq!(block.direction, single.direction);
             }
             let mut shadows = blocks.clone();
-            few.closest_of_blocks(blocks.blocks_mut(), false);
-            few.occluded_of_blocks(shadows.blocks_mut(), false);
+            few.closest_of_blocks(blocks.blocks_mut());
+            few.occluded_of_blocks(shadows.blocks_mut());
             let mut apart = 0;
             for i in 0..rays.len() {
                 let (block, lane) = (&blocks.blocks()[i / LANES], i % LANES);
@@ -495,8 +494,8 @@ mod tests {
         let mut blocks = RayBlocks::default();
         few.convert(&rays, &mut blocks);
         let mut shadows = blocks.clone();
-        few.closest_of_blocks(blocks.blocks_mut(), false);
-        few.occluded_of_blocks(shadows.blocks_mut(), false);
+        few.closest_of_blocks(blocks.blocks_mut());
+        few.occluded_of_blocks(shadows.blocks_mut());
         let missed = blocks.blocks().iter().flat_map(|block| block.placement);
         assert_eq!(missed.filter(|&placement| placement == MISS).count(), 0);
         let whole = |block: &RayBlock| (0..LANES).all(|lane| block.is_blocked(lane));

@@ -51,7 +51,6 @@ pub use embree::limit;
 #[cfg(feature = "embree")]
 pub use embree::{Version, version as embree_version};
 pub use exact::Exact;
-pub use few::FewTriangles;
 
 /// Answers nearest-hit and visibility queries about one scene. Built once, then only read.
 pub trait Accel: Send + Sync + fmt::Debug {

@@ -2,10 +2,13 @@
 //!
 //! One rule for surfaces in one place: the later placement wins, whatever a backend's traversal met first.
 
+use crate::single::round;
 use crate::watertight;
+use etendue_geometry::block::{Floats, LANES};
 use etendue_geometry::glam::{DMat3, DVec3};
 use etendue_geometry::{
-    Coplanar, Detail, Geometry, HitBatch, MISS, Placement, RayBatch, Transform,
+    Coplanar, Detail, Geometry, HitBatch, MISS, PlacedTriangle, Placement, RayBatch, RayBlock,
+    Transform,
 };
 
 /// A ray and the distances that count.
@@ -207,6 +210,43 @@ fn unit(v: DVec3) -> DVec3 {
 /// one: 64 units in f64's last place, more than a hit's own roundings.
 const ONE_PLACE: f64 = 64.0 * f64::EPSILON;
 
+/// By how much (of the largest coordinate of a ray's origin and a distance) a hit of single precision may be beside
+/// its place: some of its roundings.
+const BESIDE: f64 = 16.0 * f32::EPSILON as f64;
+
+/// What [`crate::Accel`]'s rule puts in the place of a hit at `t` (m) on `own`, where other triangles of its plane are;
+/// `None` where it stays. Of `ends`, which the ray leaves or ends on, none counts.
+fn later(
+    coplanar: &Coplanar,
+    geometry: &Geometry,
+    query: &Query,
+    (own, t): (PlacedTriangle, f64),
+    ends: Option<[PlacedTriangle; 2]>,
+) -> Option<(watertight::Hit, Triangle)> {
+    let test = |[placement, number]: PlacedTriangle| {
+        let triangle = Triangle::of(geometry, placement, number);
+        let place = &geometry.placements[placement as usize].world_from_mesh;
+        Some((query.test(&PlacementView::new(place), triangle.corners)?, triangle))
+    };
+    let slack = BESIDE * t.abs().max(query.origin.abs().max_element());
+    let near = coplanar.others_near(own, query.origin + query.direction * t, slack);
+    let spared = |id: &PlacedTriangle| !ends.is_some_and(|ends| ends.contains(id));
+    let met: Vec<_> = near.filter(spared).filter_map(test).collect();
+    if met.is_empty() {
+        return None;
+    }
+    let found = test(own).map(|(hit, _)| hit.t);
+    let nearest = met.iter().map(|(hit, _)| hit.t).chain(found).reduce(f64::min)?;
+    let size = nearest.abs().max(query.origin.abs().max_element());
+    let is_near = |t: f64| t <= nearest + ONE_PLACE * size;
+    let near = met.into_iter().filter(|(hit, _)| is_near(hit.t));
+    let latest =
+        near.max_by(|(_, a), (_, b)| a.placement.cmp(&b.placement).then(b.number.cmp(&a.number)))?;
+    // What was found stays, where it is as near and later.
+    let stays = found.is_some_and(is_near) && own[0] >= latest.1.placement;
+    (!stays).then_some(latest)
+}
+
 /// Settles by [`crate::Accel`]'s rule what each ray hit whose triangle has others in its plane.
 pub(crate) fn settle(
     coplanar: &Coplanar,
@@ -222,37 +262,62 @@ pub(crate) fn settle(
             continue;
         }
         hits.placement[i] = coplanar.last(hits.placement[i]);
-        let own = [hits.placement[i], hits.triangle[i]];
-        let others = coplanar.others(own);
-        if others.is_empty() {
+        if !coplanar.has_others(hits.placement[i]) {
             continue;
         }
+        let own = [hits.placement[i], hits.triangle[i]];
         let Some(query) = Query::of(rays, i) else { continue };
         let ends = rays.endpoint_triangles().map(|ends| ends[i]);
-        let test = |[placement, number]: [u32; 2]| {
-            let triangle = Triangle::of(geometry, placement, number);
-            let place = &geometry.placements[placement as usize].world_from_mesh;
-            Some((query.test(&PlacementView::new(place), triangle.corners)?, triangle))
-        };
-        let spared = |id: &&[u32; 2]| !ends.is_some_and(|ends| ends.contains(id));
-        let met: Vec<_> = others.iter().filter(spared).copied().filter_map(test).collect();
-        let found = test(own).map(|(hit, _)| hit.t);
-        let Some(nearest) = met.iter().map(|(hit, _)| hit.t).chain(found).reduce(f64::min) else {
+        let found = (own, hits.t[i]);
+        let Some((hit, triangle)) = later(coplanar, geometry, &query, found, ends) else {
             continue;
         };
-        let size = nearest.abs().max(query.origin.abs().max_element());
-        let is_near = |t: f64| t <= nearest + ONE_PLACE * size;
-        let near = met.into_iter().filter(|(hit, _)| is_near(hit.t));
-        let latest = near
-            .max_by(|(_, a), (_, b)| a.placement.cmp(&b.placement).then(b.number.cmp(&a.number)));
-        let Some((hit, triangle)) = latest else { continue };
-        // What was found stays, where it is as near and later.
-        if found.is_some_and(is_near) && own[0] >= triangle.placement {
-            continue;
-        }
         let mut settled = Nearest::none(f64::INFINITY);
         settled.offer(hit, &triangle);
         settled.write(geometry, hits, i);
+    }
+}
+
+/// The same of the rays of blocks, which start from `origin` (m).
+pub(crate) fn settle_blocks(
+    coplanar: &Coplanar,
+    geometry: &Geometry,
+    origin: DVec3,
+    blocks: &mut [RayBlock],
+) {
+    if coplanar.is_empty() {
+        return;
+    }
+    for block in blocks {
+        for lane in 0..LANES {
+            if block.placement[lane] == MISS {
+                continue;
+            }
+            block.placement[lane] = coplanar.last(block.placement[lane]);
+            if !coplanar.has_others(block.placement[lane]) {
+                continue;
+            }
+            let vector = |axes: &[Floats; 3]| DVec3::from(axes.map(|a| f64::from(a[lane])));
+            let query = Query {
+                origin: origin + vector(&block.origin),
+                direction: vector(&block.direction),
+                t_min: f64::from(block.t_min[lane]),
+                t_max: f64::INFINITY,
+            };
+            let own = [block.placement[lane], block.triangle[lane]];
+            let found = (own, f64::from(block.t_max[lane]));
+            let Some((hit, triangle)) = later(coplanar, geometry, &query, found, None) else {
+                continue;
+            };
+            (block.placement[lane], block.triangle[lane]) = (triangle.placement, triangle.number);
+            [block.t_max[lane], block.u[lane], block.v[lane]] = [hit.t, hit.u, hit.v].map(round);
+            let place = &geometry.placements[triangle.placement as usize].world_from_mesh;
+            let [a, b, c] = triangle.corners.map(|corner| place.linear * corner);
+            let normal = (b - a).cross(c - a) * place.handedness();
+            for (axis, to) in block.normal.iter_mut().enumerate() {
+                to[lane] = round(normal[axis]);
+            }
+        }
     }
 }
 

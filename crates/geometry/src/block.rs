@@ -170,7 +170,6 @@ impl RayBlocks {
         block.t_max[lane] = t_max;
         self.len += 1;
     }
-
 }
 
 #[cfg(test)]

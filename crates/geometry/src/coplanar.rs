@@ -32,9 +32,40 @@ const MOST_VISITS: usize = 1 << 23;
 /// For each triangle the others in its plane that lie over it, of other placements.
 #[derive(Debug, Clone, Default)]
 pub struct Coplanar {
-    others: BTreeMap<PlacedTriangle, Vec<PlacedTriangle>>,
+    others: BTreeMap<PlacedTriangle, Overlapping>,
+    /// Whether any triangle of a placement has others over it.
+    has_others: Vec<bool>,
     /// The last placement of the same mesh in the very same place, by placement; empty where no two are.
     last: Vec<u32>,
+}
+
+/// The triangles over one.
+#[derive(Debug, Clone, Default)]
+struct Overlapping {
+    all: Vec<PlacedTriangle>,
+    /// Of each its extent (m) along the axis along which they reach farthest, by which they are in order; and that of
+    /// the widest.
+    extents: Vec<[f64; 2]>,
+    axis: usize,
+    widest: f64,
+}
+
+impl Overlapping {
+    /// Puts the triangles in order, each once.
+    fn settle(&mut self, geometry: &Geometry) {
+        self.all.sort_unstable();
+        self.all.dedup();
+        let boxes = |id: &PlacedTriangle| Bounds::of_points(corners(geometry, *id));
+        let whole = self.all.iter().map(boxes).fold(Bounds::EMPTY, Bounds::union);
+        self.axis = (whole.max - whole.min).max_position();
+        let extent = |id: &PlacedTriangle| {
+            let own = boxes(id);
+            [own.min[self.axis], own.max[self.axis]]
+        };
+        self.all.sort_by(|a, b| extent(a)[0].total_cmp(&extent(b)[0]));
+        self.extents = self.all.iter().map(extent).collect();
+        self.widest = self.extents.iter().map(|[from, to]| to - from).fold(0.0, f64::max);
+    }
 }
 
 /// A triangle that may lie in one plane with one of another placement, in one number, as there may be millions: the
@@ -132,9 +163,10 @@ impl Coplanar {
                 }
             }
         }
-        for others in found.others.values_mut() {
-            others.sort_unstable();
-            others.dedup();
+        found.others.values_mut().for_each(|others| others.settle(geometry));
+        if !found.others.is_empty() {
+            found.has_others = vec![false; geometry.placements.len()];
+            found.others.keys().for_each(|id| found.has_others[id[0] as usize] = true);
         }
         found
     }
@@ -179,8 +211,8 @@ impl Coplanar {
                 if meet(&grown, &bounds)
                     && overlap(corners(geometry, id), corners(geometry, other), apart)
                 {
-                    self.others.entry(id).or_default().push(other);
-                    self.others.entry(other).or_default().push(id);
+                    self.others.entry(id).or_default().all.push(other);
+                    self.others.entry(other).or_default().all.push(id);
                 }
             }
         }
@@ -198,10 +230,30 @@ impl Coplanar {
         self.last.get(placement as usize).copied().unwrap_or(placement)
     }
 
-    /// The triangles that lie over one.
+    /// Whether any triangle of a placement has others over it.
     #[must_use]
-    pub fn others(&self, id: PlacedTriangle) -> &[PlacedTriangle] {
-        self.others.get(&id).map_or(&[], Vec::as_slice)
+    #[inline]
+    pub fn has_others(&self, placement: u32) -> bool {
+        self.has_others.get(placement as usize).is_some_and(|&has| has)
+    }
+
+    /// The triangles that lie over one, and of them those that may come within `slack` of `point` (m).
+    pub fn others_near(
+        &self,
+        id: PlacedTriangle,
+        point: DVec3,
+        slack: f64,
+    ) -> impl Iterator<Item = PlacedTriangle> {
+        let others = Some(id[0]).filter(|&own| self.has_others(own));
+        let others = others.and_then(|_| self.others.get(&id));
+        others.into_iter().flat_map(move |others| {
+            let Overlapping { all, extents, axis, widest } = others;
+            let at = point[*axis];
+            let first = extents.partition_point(|[from, _]| from + widest + slack < at);
+            let near = extents[first..].iter().take_while(move |[from, _]| from - slack <= at);
+            let near = all[first..].iter().zip(near);
+            near.filter(move |(_, [_, to])| at <= to + slack).map(|(&other, _)| other)
+        })
     }
 
     /// The pairs of placements of which triangles that face the same side lie over one another, the earlier placement
@@ -215,7 +267,7 @@ impl Coplanar {
             (b - a).cross(c - a) * place.handedness()
         };
         for (id, others) in &self.others {
-            let facing = others.iter().filter(|other| normal(*id).dot(normal(**other)) > 0.0);
+            let facing = others.all.iter().filter(|other| normal(*id).dot(normal(**other)) > 0.0);
             let mut later: Vec<u32> = facing.map(|other| other[0]).collect();
             later.sort_unstable();
             later.dedup();

@@ -92,8 +92,7 @@ fn samples_of_a_thin_lens_weigh_all_but_the_same() {
             let film = DVec2::new(0.6 * r, -0.8 * r);
             let root = ((f * f + r * r + a * a).powi(2) - 4.0 * r * r * a * a).sqrt();
             // π sin² θ, aside of the axis too: 1 - (f² + r² - a²)/root without its cancellation.
-            let exact =
-                2.0 * PI * a * a * f * f / (root * (root + f * f + r * r - a * a));
+            let exact = 2.0 * PI * a * a * f * f / (root * (root + f * f + r * r - a * a));
             let squares: Vec<[f64; 2]> = (0..4000).map(unit_square).collect();
             let weights: Vec<f64> =
                 squares.iter().map(|&u| pupil.sample(film, u, 587.56).unwrap().weight).collect();
@@ -101,7 +100,8 @@ fn samples_of_a_thin_lens_weigh_all_but_the_same() {
             // Slopes of the pupil's centre and radius. On the rim the second order has a factor of 4/3, doubled for
             // what is above it; of the third half is left, 2/3 c ρ³.
             let (c, rho) = (r / f, a / f);
-            let allowed = 8.0 / 3.0 * (c * rho / (1.0 + c * c)).powi(2) + 2.0 / 3.0 * c * rho.powi(3);
+            let allowed =
+                8.0 / 3.0 * (c * rho / (1.0 + c * c)).powi(2) + 2.0 / 3.0 * c * rho.powi(3);
             assert!(most <= allowed + 1e-12, "f/{f_number} at {r} mm: {most} and {allowed}");
             let mut rays = LensRays::default();
             let (x, y) = (vec![film.x; squares.len()], vec![film.y; squares.len()]);

@@ -170,7 +170,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         /// Shares of a triangle beyond its edges, as the point is known to no more.
         const BEYOND: f64 = 1e-6;
         let geometry = self.stage.surroundings.geometry;
-        for &[placement, triangle] in self.stage.placed.touching.others(own) {
+        let touching = &self.stage.placed.touching;
+        for [placement, triangle] in touching.others_near(own, point, f64::INFINITY) {
             let placed = &geometry.placements[placement as usize];
             let corners = geometry.mesh_of(placed).corners(triangle as usize);
             let [a, b, c] = corners.map(|corner| placed.world_from_mesh.point(corner));

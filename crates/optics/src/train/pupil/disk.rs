@@ -145,11 +145,7 @@ impl Disk {
 fn even(centre: [f64; 2], radius: f64, [x, y]: [f64; 2]) -> ([f64; 2], f64) {
     let square = centre[0] * centre[0] + centre[1] * centre[1];
     let length = square.sqrt();
-    let axis = if length > 0.0 {
-        [centre[0] / length, centre[1] / length]
-    } else {
-        [1.0, 0.0]
-    };
+    let axis = if length > 0.0 { [centre[0] / length, centre[1] / length] } else { [1.0, 0.0] };
     let (along, across) = (x * axis[0] + y * axis[1], y * axis[0] - x * axis[1]);
     let bow = radius * radius / (1.0 + square);
     let shrink = 1.0 / (1.0 + bow - bow * (along * along + across * across));
