@@ -68,10 +68,7 @@ impl LayerFile {
             (Outputs { kitti: outputs.kitti, ..none }, ["kitti", "depth, disparity or flow"]),
             (Outputs { flo: outputs.flo, ..none }, ["flo", "flow"]),
             (Outputs { indexed: outputs.indexed, ..none }, ["indexed", "ids or material_id"]),
-            (
-                Outputs { envi: outputs.envi, ..none },
-                ["envi", "light in bands: a sensor of `\"type\": \"multispectral\"` with `bands`"],
-            ),
+            (Outputs { envi: outputs.envi, ..none }, ["envi", "light in bands"]),
         ];
         let lacks = |alone: Outputs| {
             alone != none && layers.iter().all(|name| Self::of(name, alone).next().is_none())
@@ -239,6 +236,8 @@ mod tests {
         assert_eq!(lacks("kitti,tum", &["Depth"]), None);
         assert_eq!(lacks("kitti,flo", &["Depth"]), Some("flo"));
         assert_eq!(lacks("indexed", &["Id.primitive"]), Some("indexed"));
+        assert_eq!(lacks("envi", &["Depth"]), Some("envi"));
+        assert_eq!(lacks("envi,npy", &["", "Spectrum"]), None);
         assert_eq!(lacks("exr,png,npy,dng", &[]), None);
     }
 
@@ -254,5 +253,7 @@ mod tests {
         assert_eq!(files("Id.object", "png,indexed"), of_ids);
         assert_eq!(files("Id.primitive", "png,indexed"), ["id_primitive.preview.png"]);
         assert_eq!(files(DENOISED, "png,npy"), ["denoised.npy"]);
+        assert_eq!(files("Spectrum", "npy,envi"), ["spectrum.npy", "spectrum.hdr", "spectrum.img"]);
+        assert_eq!(files("Depth", "envi").len(), 0);
     }
 }
