@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use etendue_files::{Ledger, MANIFEST, MappedFile};
+use etendue_files::MappedFile;
+use etendue_geometry::units::Micrometres;
 use etendue_image::{
     Cube, ExrChannels, Limits, MOST_BYTES, Plane, Quantity, Samples, cube, envi, npy,
 };
@@ -11,15 +12,14 @@ use etendue_render::expose::{
     self, BandFilm, KNOWN_UNITS, LightUnit, PictureLight, PixelLight, SensorLight,
     pupil_solid_angle,
 };
-use etendue_render::output::{LayerFile, Outputs};
+use etendue_render::output::LayerFile;
 use etendue_scene::file::{RenderSpec, SensorFile};
-use etendue_sensor::{Exposure, Radiometry, RawImage, Sensor, SensorSpec};
+use etendue_sensor::{Radiometry, Sensor, SensorSpec};
 use etendue_spectrum::{Bands, Grid};
 use serde_json::Value;
 
-use crate::progress::Phase;
-use crate::words::{LIGHT_UNIT, NOISE_SEED, PUPIL};
-use crate::{Error, FramePattern, Progress, Written, places};
+use crate::words::{LIGHT_UNIT, NOISE_SEED, PITCH, PUPIL};
+use crate::{Error, ExposedImage};
 
 /// A picture of light: an EXR file in red, green and blue or in the layout of spectral images, an NPY array, an ENVI
 /// cube, or a Radiance picture.
@@ -36,6 +36,8 @@ pub struct LightImage {
     noise_seed: Option<u64>,
     /// Of the camera's pupil (sr), likewise.
     solid_angle: Option<f64>,
+    /// Of the camera's pixels (µm), likewise.
+    pixel_pitch: Option<f64>,
     notes: Vec<String>,
 }
 
@@ -62,16 +64,22 @@ struct Sidecar {
     edges: Option<Vec<f64>>,
     noise_seed: Option<u64>,
     solid_angle: Option<f64>,
+    pixel_pitch: Option<f64>,
 }
 
 impl Sidecar {
     /// From a file's entries, by their names.
     fn of<'t>(entry: impl Fn(&str) -> Option<&'t str>) -> Self {
+        let positive = |key: &str| {
+            let number = entry(key).and_then(|number| number.parse::<f64>().ok());
+            number.filter(|number| *number > 0.0 && number.is_finite())
+        };
         Self {
             unit: entry(LIGHT_UNIT).map(str::to_owned),
             edges: None,
             noise_seed: entry(NOISE_SEED).and_then(|seed| seed.parse().ok()),
-            solid_angle: entry(PUPIL).and_then(|sr| sr.parse().ok()).filter(|sr: &f64| *sr > 0.0),
+            solid_angle: positive(PUPIL),
+            pixel_pitch: positive(PITCH),
         }
     }
 
@@ -150,10 +158,10 @@ impl LightImage {
     }
 
     fn new(path: &Path, inputs: Vec<PathBuf>, picture: PictureLight, sidecar: Sidecar) -> Self {
-        let Sidecar { unit, noise_seed, solid_angle, .. } = sidecar;
+        let Sidecar { unit, noise_seed, solid_angle, pixel_pitch, edges: _ } = sidecar;
         let (path, notes) = (path.to_owned(), Vec::new());
         let quantity = Quantity::Light;
-        Self { path, inputs, picture, quantity, unit, noise_seed, solid_angle, notes }
+        Self { path, inputs, picture, quantity, unit, noise_seed, solid_angle, pixel_pitch, notes }
     }
 
     fn of_cube(path: &Path, inputs: Vec<PathBuf>, cube: Cube) -> Result<Self, String> {
@@ -378,7 +386,7 @@ impl LightImage {
         let unit = self.resolved_unit(options)?;
         let factor = self.factor(unit, options)?;
         let mut notes: Vec<String> = self.notes.clone();
-        let sensor = for_unit(sensor, unit, &path)?;
+        let sensor = for_light(sensor, (unit, self.pixel_pitch), &path)?;
         notes.extend(self.judge_size(&sensor)?);
         let seed = match (options.seed, self.noise_seed) {
             (Some(seed), _) => frame_seed(seed, options.frame),
@@ -400,7 +408,7 @@ impl LightImage {
             }
             other => other.into(),
         })?;
-        Ok(ExposedImage { light, inputs: self.inputs, notes })
+        Ok(ExposedImage::new(light, self.inputs, notes))
     }
 
     fn resolved_unit(&self, options: &ExposeOptions) -> Result<LightUnit, Error> {
@@ -495,8 +503,13 @@ fn film(axis: &cube::BandAxis, values: Vec<f32>) -> Result<BandFilm, String> {
     Ok(BandFilm { bands: Bands::Spectral(grid), values })
 }
 
-/// The sensor of `file` with the radiometry that light in `unit` has.
-fn for_unit(file: &SensorFile, unit: LightUnit, path: &Path) -> Result<Sensor, Error> {
+/// The sensor of `file` with the radiometry that light in `unit` has, and with pixels of `pitch` (µm) where it says
+/// nothing of its own.
+fn for_light(
+    file: &SensorFile,
+    (unit, pitch): (LightUnit, Option<f64>),
+    path: &Path,
+) -> Result<Sensor, Error> {
     let wanted = match unit {
         LightUnit::FullScale => Radiometry::Digital,
         LightUnit::Radiance(_) | LightUnit::Irradiance(_) => Radiometry::Physical,
@@ -516,7 +529,10 @@ fn for_unit(file: &SensorFile, unit: LightUnit, path: &Path) -> Result<Sensor, E
             ))
         }
         _ => {
-            let spec = SensorSpec { radiometry: Some(wanted), ..file.spec.clone() };
+            let mut spec = SensorSpec { radiometry: Some(wanted), ..file.spec.clone() };
+            if spec.model.is_none() && spec.pixel_pitch.is_none() {
+                spec.pixel_pitch = pitch.map(Micrometres);
+            }
             Ok(Sensor::new(&spec).map_err(|error| file.fault(&error))?)
         }
     }
@@ -549,119 +565,4 @@ pub(crate) fn read_envi(path: &Path) -> Result<(Cube, Vec<PathBuf>), Error> {
 
 fn refused(path: &Path, why: impl std::fmt::Display) -> Error {
     Error::Refused(format!("{}: {why}", path.display()))
-}
-
-/// A picture of light on a sensor.
-#[derive(Debug, Clone)]
-pub struct ExposedImage {
-    light: SensorLight,
-    inputs: Vec<PathBuf>,
-    notes: Vec<String>,
-}
-
-impl ExposedImage {
-    /// The light on the sensor.
-    #[must_use]
-    pub fn sensor_light(&self) -> &SensorLight {
-        &self.light
-    }
-
-    /// What a user should know.
-    pub fn notes(&self) -> impl Iterator<Item = &str> {
-        self.notes.iter().chain(self.light.notes()).map(String::as_str)
-    }
-
-    /// The exposures that the sensor asks for: exposure times and frames.
-    pub fn exposures(&self) -> impl Iterator<Item = Exposure> + '_ {
-        self.light.sensor().shots()
-    }
-
-    /// The sensor's digital numbers for one exposure, rows from the top. The same whenever it is asked for.
-    ///
-    /// # Errors
-    ///
-    /// None that a caller can cause.
-    pub fn raw(&self, exposure: Exposure) -> Result<RawImage, Error> {
-        Ok(self.light.expose(exposure).map_err(expose::ExposeError::from)?)
-    }
-
-    /// Writes the files that a render leaves of its sensor into `folder`, which is made when it is missing. What an
-    /// earlier run left there and this one does not write again is removed.
-    ///
-    /// # Errors
-    ///
-    /// When the folder cannot be written to, the picture would be written over, or it is stopped.
-    pub fn write(
-        &self,
-        folder: &Path,
-        outputs: Outputs,
-        progress: &Progress,
-    ) -> Result<Written, Error> {
-        let one = std::iter::once(Ok((None, self.clone())));
-        write_frames(one, folder, outputs, progress)
-    }
-
-    fn write_into(
-        &self,
-        to: (&etendue_files::Transaction, &Path),
-        outputs: Outputs,
-        progress: &Progress,
-    ) -> Result<Written, Error> {
-        let names = expose::files_of(self.light.sensor()).into_iter().chain([MANIFEST.to_owned()]);
-        let results: Vec<PathBuf> = names.map(|name| to.1.join(name)).collect();
-        places::keep_apart(&self.inputs, &results)?;
-        let goes_on = |share| progress.goes_on(Phase::Expose, share);
-        let exposed = expose::write(&self.light, to, outputs, &goes_on)?;
-        let notes = self.notes.iter().cloned().chain(exposed.notes).collect();
-        Ok(Written { files: exposed.files, notes, time: std::time::Duration::ZERO })
-    }
-}
-
-/// Writes exposed pictures, each read when its turn comes, into `folder`: those with a number of a frame into
-/// `frames/NUMBER` there, as a render's frames.
-///
-/// # Errors
-///
-/// Those of the pictures, and of [`ExposedImage::write`]; then nothing is written.
-pub fn write_frames(
-    images: impl Iterator<Item = Result<(Option<u32>, ExposedImage), Error>>,
-    folder: &Path,
-    outputs: Outputs,
-    progress: &Progress,
-) -> Result<Written, Error> {
-    let start = std::time::Instant::now();
-    places::folder(folder)?;
-    let pattern = FramePattern::default();
-    let mut made = Vec::new();
-    let done = places::recorded(Ledger::open(folder, "expose"), &[], |to| {
-        let mut all = Written::default();
-        for image in images {
-            let (frame, image) = image?;
-            let own = match frame {
-                None => folder.to_owned(),
-                Some(number) => {
-                    let own = folder.join(pattern.folder(number as usize));
-                    places::folder(&own)?;
-                    made.push(own.clone());
-                    own
-                }
-            };
-            let written = image.write_into((to, &own), outputs, progress)?;
-            all.files.extend(written.files);
-            // Of many frames much is true.
-            all.notes.extend(written.notes);
-            all.notes.sort();
-            all.notes.dedup();
-        }
-        Ok::<_, Error>(all)
-    });
-    if done.is_err() {
-        // They go only when nothing was in them.
-        made.iter()
-            .for_each(|own| etendue_files::remove_empty_folders(folder, &own.join("raw.png")));
-    }
-    let mut written = done?;
-    written.notes.iter().for_each(|note| progress.note(note));
-    written.time = start.elapsed();
-    Ok(written)
 }

@@ -34,12 +34,16 @@ pub(crate) const LIGHT_UNIT: &str = "light_unit";
 /// The projected solid angle of the camera's pupil (sr).
 pub(crate) const PUPIL: &str = "pupil_solid_angle";
 
+/// From one pixel's centre to the next (µm).
+pub(crate) const PITCH: &str = "pixel_pitch";
+
 /// What another sensor needs of the picture to be exposed to it.
 fn light(scene: &Scene) -> Vec<(String, String)> {
     let Some(sensor) = &scene.sensor else { return Vec::new() };
     let mut entries = vec![(NOISE_SEED.to_owned(), expose::noise_seed(scene).to_string())];
     if sensor.radiometry() == Radiometry::Physical {
         entries.push((LIGHT_UNIT.to_owned(), LightUnit::of(scene).to_string()));
+        entries.push((PITCH.to_owned(), sensor.pixel_pitch().to_string()));
         let pupil = scene.camera.pupil_solid_angle();
         entries.extend(pupil.map(|pupil| (PUPIL.to_owned(), pupil.to_string())));
     }

@@ -16,7 +16,7 @@ SENSOR = {
     "radiometry": "physical",
     "pixel_pitch": 4,
     "system_gain": 0.5,
-    "exposures": [0.01, 0.02],
+    "exposures": [1e-5, 2e-5],
     "frames": 2,
 }
 
@@ -79,11 +79,11 @@ def test_arrays_are_counted_by_area_time_and_energy():
         "imx183",
         {"quantum_efficiency": 0.5, "system_gain": 0.05, "noise": "none", "black_level": 0, "exposure": 0.01},
     )
-    cube = np.full((2, 3, 1), 1e-3) * [[[1.0, 2.0]]]
+    cube = np.full((2, 3, 1), 2e-4) * [[[1.0, 2.0]]]
     light = etendue.Light(cube, wavelengths=[500, 600], unit="W/m2/nm")
     energy = 6.62607015e-34 * 299792458.0
     per_band = [0.5 * (b * b - a * a) * 1e-9 for a, b in [(450, 550), (550, 650)]]
-    expected = 1e-3 * 2.4e-6**2 * 0.01 * 0.5 / energy * (per_band[0] + 2 * per_band[1])
+    expected = 2e-4 * 2.4e-6**2 * 0.01 * 0.5 / energy * (per_band[0] + 2 * per_band[1])
     # Half a DN of 20 electrons.
     assert np.abs(light.expose(sensor).raw * 20.0 - expected).max() <= 10.1
     radiance = light.expose(sensor, unit="W/m2/sr/nm", f_number=4)

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 fn sensor() -> Value {
     json!({
         "type": "multispectral", "bands": [400, 450, 505, 700, 1500], "resolution": [6, 4],
-        "radiometry": "physical", "system_gain": 0.5, "exposure": 0.02
+        "radiometry": "physical", "system_gain": 0.5, "exposure": 2e-5
     })
 }
 
