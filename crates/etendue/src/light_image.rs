@@ -293,8 +293,8 @@ impl LightImage {
         Ok(Self::new(path, inputs, PictureLight { size: [columns, rows], light }, sidecar))
     }
 
-    /// The pictures of a folder: those in it of one kind by their names, or those of the frames of a render; with the
-    /// numbers of the frames. `None` where the folder is a render's of one picture, which is given by itself.
+    /// The pictures of a folder with the numbers of their frames: those in it of one kind, by their names; of a folder
+    /// that a render wrote, its picture or those of its frames.
     ///
     /// # Errors
     ///

@@ -435,6 +435,34 @@ mod tests {
         }
     }
 
+    fn channels(names: &[&str]) -> ExrChannels {
+        let plane = |k: usize| Plane::F32(vec![k as f32, 10.0 + k as f32]);
+        let planes = names.iter().enumerate().map(|(k, name)| ((*name).to_owned(), plane(k)));
+        let texts = [("emissiveUnits".to_owned(), "W.m^-2.sr^-1".to_owned())].into();
+        ExrChannels { size: [2, 1], planes: planes.collect(), texts }
+    }
+
+    #[test]
+    fn light_comes_before_reflectance_in_the_order_of_wavelengths() {
+        let light = ["B", "S0.1100,0nm", "S0.400,0nm", "S1.400,0nm", "T.400,0nm"];
+        let cube = Cube::from_exr(channels(&light)).unwrap().unwrap();
+        assert_eq!((cube.quantity, cube.unit.as_deref()), (Quantity::Light, Some("W.m^-2.sr^-1")));
+        assert_eq!(cube.axis.wavelengths(), [400.0, 1100.0]);
+        assert_eq!(cube.values, [2.0, 1.0, 12.0, 11.0]);
+        assert!(cube.notes[0].contains("polarised"), "{:?}", cube.notes);
+        let share = Cube::from_exr(channels(&["T.500,0nm", "T.400,0nm"])).unwrap().unwrap();
+        assert_eq!((share.quantity, share.unit), (Quantity::Reflectance, None));
+        assert_eq!(share.values, [1.0, 0.0, 11.0, 10.0]);
+        assert!(Cube::from_exr(channels(&["R", "G", "B"])).unwrap().is_none());
+        let twice = Cube::from_exr(channels(&["S0.0,4um", "S0.400,0nm"])).unwrap_err().to_string();
+        assert!(twice.contains("two bands at 400 nm"), "{twice}");
+        // What this program itself says of its bands counts, and not their names' middles.
+        let mut own = channels(&["S0.425,0nm", "S0.500,0nm"]);
+        let meaning = r#"{"definition":"light","band edges nm":"[400.0, 450.0, 550.0]"}"#;
+        own.texts.insert(OWN_BANDS.to_owned(), meaning.to_owned());
+        assert_eq!(Cube::from_exr(own).unwrap().unwrap().axis.edges(), [400.0, 450.0, 550.0]);
+    }
+
     #[test]
     fn micrometres_are_converted_or_asked_about() {
         let nm = |numbers: &[f64], unit| in_nanometres(numbers.to_vec(), unit);

@@ -84,13 +84,14 @@ pub(crate) struct LensArguments {
 }
 
 pub(super) const EXPOSE_HELP: &str = "\
-Writes what `etendue render` writes of a scene's sensor: raw.png, .npy, .dng, raw.preview.png, moments
-and sensor.json; of a folder of pictures, or of a render's frames, a folder frames/000000, … each.
+Writes what `etendue render` writes of a scene's sensor: raw.png, .npy, .dng, raw.preview.png,
+moments and sensor.json; of a folder of pictures, or of a render's frames, a folder
+frames/000000, … each.
 
-The unit of the values is the file's own: spectral EXR files, ENVI headers (`data units`) and renders
-of etendue say it; else --unit does. Of radiance L, a lens of f-number N, focused at the magnification
-m, brings E = pi L / (1 + 4 N^2 (1 + m)^2) onto the sensor: --f-number and --magnification, or the
-pupil of the camera of a render.
+The unit of the values is the file's own: spectral EXR files, ENVI headers (`data units`) and
+renders of etendue say it; else --unit does. Of radiance L, a lens of f-number N, focused at the
+magnification m, brings E = pi L / (1 + 4 N^2 (1 + m)^2) onto the sensor: --f-number and
+--magnification, or the pupil of the camera of a render.
 
 Examples:
   etendue expose photo.exr --sensor imx183 --unit 1 -o out/photo
