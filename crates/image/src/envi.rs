@@ -5,7 +5,7 @@
 //!
 //! # Sources
 //!
-//! L3Harris, *ENVI Header Files* (the format's own description): the keys, the codes of `data type`,
+//! NV5 Geospatial, *ENVI Header Files* (the format's own description): the keys, the codes of `data type`,
 //! `byte order`, `interleave`, `data gain values`, `data offset values` and `data ignore value`.
 
 use std::collections::BTreeMap;

@@ -12,7 +12,8 @@ fn npy(shape: &[usize], values: &[f32]) -> Vec<u8> {
     let shape: String = shape.iter().map(|side| format!("{side}, ")).collect();
     let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}\n");
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((header.len() as u16).to_le_bytes());
+    let length = u16::try_from(header.len()).expect("a short header");
+    bytes.extend(length.to_le_bytes());
     bytes.extend(header.as_bytes());
     bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     bytes
@@ -324,8 +325,8 @@ fn envi(bench: &Bench, name: &str, header: &str, bytes: usize) {
     bench.write(&format!("{name}.img"), &vec![0; bytes]);
 }
 
-#[test]
-fn pictures_that_make_no_sense_are_refused_by_file_place_and_remedy() {
+/// Pictures and sensors of which each has one fault.
+fn faulty() -> Bench {
     let bench = Bench::new();
     bench.write("sensor.json", counter().to_string().as_bytes());
     let cube = npy(&[1, 2, 2], &[1.0; 4]);
@@ -357,13 +358,37 @@ fn pictures_that_make_no_sense_are_refused_by_file_place_and_remedy() {
         "bands.json",
         br#"{"type": "multispectral", "system_gain": 1, "bands": [400, 450, 700]}"#,
     );
-    let unit = ["--unit", "W/m2/nm"];
-    let nm = ["--unit", "W/m2/nm", "--wavelengths", "500,600"];
-    for (image, sensor, more, words) in [
+    bench
+}
+
+/// What is refused: the picture, the sensor, more arguments, and two parts of the message.
+type Refusal<'a> = (&'a str, &'a str, &'a [&'a str], [&'a str; 2]);
+
+/// Asserts that each is refused with exit code 2 and its words, and that nothing is left behind.
+fn assert_refused(refusals: &[Refusal<'_>]) {
+    let bench = faulty();
+    for &(image, sensor, more, words) in refusals {
+        let arguments = [&["expose", image, "--sensor", sensor, "-o", "again"], more].concat();
+        let output = bench.run(&arguments);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        for word in words {
+            assert!(message.contains(word), "expected \"{word}\" in: {message}");
+        }
+        assert!(!bench.path("again").exists(), "{arguments:?}: something was left behind");
+    }
+}
+
+const IRRADIANCE: &[&str] = &["--unit", "W/m2/nm"];
+const WITH_BANDS: &[&str] = &["--unit", "W/m2/nm", "--wavelengths", "500,600"];
+
+#[test]
+fn light_units_and_sensors_that_do_not_go_together_are_refused_with_the_remedy() {
+    assert_refused(&[
         (
             "grey.npy",
             "sensor.json",
-            &[][..],
+            &[],
             ["grey.npy: does not say in which unit", "--unit, 1 (1 is full scale)"],
         ),
         ("grey.npy", "sensor.json", &["--unit", "lux"], ["--unit", "\"lux\" is no unit of light"]),
@@ -386,9 +411,14 @@ fn pictures_that_make_no_sense_are_refused_by_file_place_and_remedy() {
             ["--f-number", "above 0"],
         ),
         ("grey.npy", "sized.json", &["--unit", "1"], ["has 2 x 2 pixels", "`resolution` is 8 x 8"]),
-        ("grey.npy", "digital.json", &unit, ["for a sensor of physical radiometry", "is digital"]),
-        ("grey.npy", "imx999", &unit, ["imx999", "neither a file nor a preset"]),
-        ("cube.npy", "sensor.json", &unit, ["has 2 values a pixel", "--wavelengths"]),
+        (
+            "grey.npy",
+            "digital.json",
+            IRRADIANCE,
+            ["for a sensor of physical radiometry", "is digital"],
+        ),
+        ("grey.npy", "imx999", IRRADIANCE, ["imx999", "neither a file nor a preset"]),
+        ("cube.npy", "sensor.json", IRRADIANCE, ["has 2 values a pixel", "--wavelengths"]),
         (
             "cube.npy",
             "sensor.json",
@@ -413,51 +443,53 @@ fn pictures_that_make_no_sense_are_refused_by_file_place_and_remedy() {
             &["--unit", "1", "--wavelengths", "600,500"],
             ["out of order", "sort"],
         ),
-        ("cube.npy", "bands.json", &nm, ["cube.npy: its bands miss", "425nm"]),
-        ("line.npy", "sensor.json", &unit, ["line.npy", "instead of rows × columns"]),
-        ("cut.npy", "sensor.json", &unit, ["cut.npy", "ends before its last number"]),
-        ("words.exr", "sensor.json", &unit, ["words.exr", "EXR, NPY, ENVI and Radiance"]),
-        ("nothing.exr", "sensor.json", &unit, ["nothing.exr", "No such file"]),
+        ("cube.npy", "bands.json", WITH_BANDS, ["cube.npy: its bands miss", "425nm"]),
+        ("line.npy", "sensor.json", IRRADIANCE, ["line.npy", "instead of rows × columns"]),
+        ("cut.npy", "sensor.json", IRRADIANCE, ["cut.npy", "ends before its last number"]),
+        ("words.exr", "sensor.json", IRRADIANCE, ["words.exr", "EXR, NPY, ENVI and Radiance"]),
+        ("nothing.exr", "sensor.json", IRRADIANCE, ["nothing.exr", "No such file"]),
+    ]);
+}
+
+#[test]
+fn pictures_that_make_no_sense_are_refused_by_file_and_place() {
+    assert_refused(&[
         ("good.hdr", "sensor.json", &[], ["good.hdr: does not say in which unit", "--unit"]),
-        ("good.hdr", "sensor.json", &nm, ["wavelengths are given for NPY arrays", "says its own"]),
+        (
+            "good.hdr",
+            "sensor.json",
+            WITH_BANDS,
+            ["wavelengths are given for NPY arrays", "says its own"],
+        ),
         (
             "short.img",
             "sensor.json",
-            &unit,
+            IRRADIANCE,
             ["short.hdr: promises 4 samples x 2 lines x 2 bands", "has 60 bytes"],
         ),
-        ("far.hdr", "sensor.json", &unit, ["far.hdr: its bands miss", "1450..=1650 nm"]),
-        ("micro.hdr", "sensor.json", &unit, ["micro.hdr", "did you mean micrometres"]),
+        ("far.hdr", "sensor.json", IRRADIANCE, ["far.hdr: its bands miss", "1450..=1650 nm"]),
+        ("micro.hdr", "sensor.json", IRRADIANCE, ["micro.hdr", "did you mean micrometres"]),
         (
             "order.hdr",
             "sensor.json",
-            &unit,
+            IRRADIANCE,
             ["order.hdr", "band 1 is at 600 nm and band 2 at 500 nm"],
         ),
-        ("twice.hdr", "sensor.json", &unit, ["twice.hdr", "two bands at 500 nm"]),
-        ("nowhere.hdr", "sensor.json", &unit, ["nowhere.hdr", "`wavelength = {…}`"]),
-        ("share.hdr", "sensor.json", &unit, ["share.hdr", "what is reflected and no light"]),
+        ("twice.hdr", "sensor.json", IRRADIANCE, ["twice.hdr", "two bands at 500 nm"]),
+        ("nowhere.hdr", "sensor.json", IRRADIANCE, ["nowhere.hdr", "`wavelength = {…}`"]),
+        ("share.hdr", "sensor.json", IRRADIANCE, ["share.hdr", "what is reflected and no light"]),
         ("lux.hdr", "sensor.json", &[], ["gives its values in \"lux\"", "--unit"]),
-        ("alone.hdr", "sensor.json", &unit, ["alone.hdr", "without its numbers"]),
-        ("orphan.img", "sensor.json", &unit, ["orphan.img", "no ENVI header beside it"]),
-        ("empty", "sensor.json", &unit, ["empty", "no picture of light"]),
-        ("mixed", "sensor.json", &unit, ["several kinds", ".exr, .npy"]),
+        ("alone.hdr", "sensor.json", IRRADIANCE, ["alone.hdr", "without its numbers"]),
+        ("orphan.img", "sensor.json", IRRADIANCE, ["orphan.img", "no ENVI header beside it"]),
+        ("empty", "sensor.json", IRRADIANCE, ["empty", "no picture of light"]),
+        ("mixed", "sensor.json", IRRADIANCE, ["several kinds", ".exr, .npy"]),
         (
             "grey.npy",
             "sensor.json",
             &["--unit", "1", "--outputs", "exr"],
             ["--outputs", "png, npy or dng"],
         ),
-    ] {
-        let arguments = [&["expose", image, "--sensor", sensor, "-o", "again"], more].concat();
-        let output = bench.run(&arguments);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-        for word in words {
-            assert!(message.contains(word), "expected \"{word}\" in: {message}");
-        }
-        assert!(!bench.path("again").exists(), "{arguments:?}: something was left behind");
-    }
+    ]);
 }
 
 #[test]

@@ -1,13 +1,11 @@
 //! Light in bands as files: the layout of spectral EXR images and ENVI cubes, by others' readers and writers.
 
-#[path = "../../../sensor/tests/sensor/environment.rs"]
-mod environment;
-
 use std::path::Path;
 use std::process::Command;
 
 use serde_json::json;
 
+use crate::emva::environment;
 use crate::run::{Bench, text};
 
 /// A ball under a lamp before a sensor of these bands (nm), which looks through no lens.
@@ -55,7 +53,7 @@ fn bands_are_written_by_the_layout_of_spectral_images() {
     assert_eq!(names, expected);
     let attributes = &image.layer_data.attributes.other;
     let attribute = |name: &str| {
-        let found = attributes.iter().find(|(key, _)| key.to_string() == name);
+        let found = attributes.iter().find(|(key, _)| **key == *name);
         match found.map(|(_, value)| value) {
             Some(exr::prelude::AttributeValue::Text(text)) => text.to_string(),
             other => panic!("{name}: {other:?}"),

@@ -3,7 +3,7 @@
 //! 32-bit floats, the least significant byte first, band by band (`bsq`), row 0 at the top. Wavelengths are
 //! the middles of the bands, `fwhm` their widths.
 //!
-//! Source of the format: L3Harris, *ENVI Header Files*.
+//! Source of the format: NV5 Geospatial, *ENVI Header Files*.
 
 use std::fmt::Write as _;
 use std::io::{BufWriter, Write};
