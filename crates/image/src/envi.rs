@@ -414,6 +414,7 @@ fn entries(text: &str) -> Result<BTreeMap<String, String>, String> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_possible_truncation, reason = "small whole numbers in every kind")]
 mod tests {
     use super::*;
 

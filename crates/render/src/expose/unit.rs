@@ -126,7 +126,7 @@ struct Powers {
 fn plain(text: &str) -> String {
     let mut plain = String::new();
     let mut is_raised = false;
-    for c in text.chars() {
+    for c in text.replace("**", "^").chars() {
         let raised = match c {
             '⁻' => Some('-'),
             '¹' => Some('1'),
@@ -148,7 +148,7 @@ fn plain(text: &str) -> String {
         }
         is_raised = raised.is_some();
     }
-    plain.replace("**", "^")
+    plain
 }
 
 impl Powers {
