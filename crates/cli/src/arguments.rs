@@ -14,7 +14,7 @@ use etendue_scene::LoadOptions;
 use etendue_scene::import::Strictness;
 use etendue_tracer::LayerSpec;
 
-pub(crate) use tools::{BenchArguments, LensArguments, PartArgument};
+pub(crate) use tools::{BenchArguments, ExposeArguments, LensArguments, PartArgument};
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
 /// it.
@@ -52,6 +52,9 @@ pub(crate) enum Command {
     /// Show what a sensor makes of light, or make the images that EMVA 1288 characterises it by
     #[command(after_help = SENSOR_HELP)]
     Sensor(SensorArguments),
+    /// Expose a sensor to a picture from elsewhere: EXR (RGB or spectral), NPY, ENVI, or a folder of them
+    #[command(after_help = tools::EXPOSE_HELP)]
+    Expose(ExposeArguments),
     /// Open a window onto a scene, a lens or an image: look, change the camera, inspect pixels, save
     #[command(after_help = VIEW_HELP)]
     View(ViewArguments),
@@ -259,8 +262,8 @@ pub(crate) struct RenderArguments {
     /// The folder to write into; made when it is not there
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
-    /// Kinds of file to write; tum and kitti (16-bit PNG of depth, disparity, flow), flo and indexed
-    /// (masks with a palette) are there, too
+    /// Kinds of file to write; tum and kitti (16-bit PNG of depth, disparity, flow), flo, indexed
+    /// (masks with a palette) and envi (light in bands as an ENVI cube) are there, too
     #[arg(long, value_name = "LIST", default_value = "exr,png,npy,dng")]
     pub(crate) outputs: String,
     /// Denoise the picture of a tracer of light by Intel's Open Image Denoise, which is to be
@@ -323,7 +326,7 @@ pub(crate) struct RenderArguments {
 #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "read by the window alone"))]
 pub(crate) struct ViewArguments {
     /// A scene (.json), a model (.gltf, .glb, .obj, .ply), a lens to look through (.json, .zmx) or an image
-    /// (.exr, .hdr, .png, .jpg); a file can be dropped on the window, too
+    /// (.exr, .hdr, .png, .jpg; ENVI cubes by either of their files); a file can be dropped on the window, too
     #[arg(value_name = "SCENE|MODEL|LENS|IMAGE")]
     pub(crate) scene: Option<PathBuf>,
     // Not a comment of documentation, whose brackets would be a link.

@@ -5,6 +5,7 @@
 mod arguments;
 mod bench;
 mod check;
+mod expose;
 mod fault;
 mod lens;
 mod merge;
@@ -51,6 +52,7 @@ fn main() -> ExitCode {
         Some(Command::Plan(arguments)) => plan::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Sensor(arguments)) => sensor::run(&arguments),
+        Some(Command::Expose(arguments)) => expose::run(&arguments),
         Some(Command::View(arguments)) => view(&arguments),
         Some(Command::Lens(arguments)) => lens::run(&arguments),
         Some(Command::Schema { of }) => print_schema(of),

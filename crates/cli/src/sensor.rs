@@ -14,7 +14,6 @@ use etendue_sensor::photon_transfer::{self, PhotonTransfer};
 use etendue_sensor::preset::Origin;
 use etendue_sensor::{Model, Preset, SensorSpec};
 use serde::Serialize;
-use serde_json::json;
 
 use crate::arguments::SensorArguments;
 use crate::fault::{Fault, print_json, print_text};
@@ -28,7 +27,7 @@ pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
     };
     let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
     let opener = Opener::new(reach);
-    let file = find(&opener, name, &arguments.settings)?;
+    let file = SensorFile::named(&opener, Path::new(name), &arguments.settings)?;
     if !arguments.quiet {
         file.sensor.notes().iter().for_each(|note| say(&format!("note: {note}")));
     }
@@ -40,23 +39,6 @@ pub(crate) fn run(arguments: &SensorArguments) -> Result<(), Fault> {
         Some(folder) => series(arguments, &inputs, &file, folder),
         None => curves(arguments, &inputs, &file),
     }
-}
-
-/// A file when there is one, else a preset.
-fn find(opener: &Opener, name: &str, settings: &[(String, String)]) -> Result<SensorFile, Fault> {
-    let path = Path::new(name);
-    if path.exists() || path.extension().is_some_and(|ending| ending == "json") {
-        return Ok(SensorFile::read(opener, path, settings)?);
-    }
-    let Some(model) = Model::from_name(name) else {
-        let known: Vec<&str> = Model::ALL.iter().map(|model| model.preset().name).collect();
-        let known = known.join(", ");
-        return Err(Fault::refused(format!(
-            "{name}: neither a file nor a preset; name a scene, a sensor's JSON file, or one of {known}"
-        )));
-    };
-    let value = json!({ "type": "raw", "model": model });
-    Ok(SensorFile::of_value(path, value, settings)?)
 }
 
 /// A preset, for machines.

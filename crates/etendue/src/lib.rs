@@ -50,6 +50,7 @@
 //! | [`Session`] | a scene, opened once, changed and rendered often |
 //! | [`Rendering`] | layers as arrays, the sensor's images, files of them, the report |
 //! | [`Viewed`], [`Still`] | a file to look at, by what it is: a scene, a model, a lens, an image |
+//! | [`LightImage`], [`ExposedImage`] | a picture of light from elsewhere, and what a sensor makes of it |
 //! | [`Preview`], [`Screen`], [`Viewpoint`], [`Inspector`] | what a window needs: pictures soon, shown, moved about and asked |
 //! | [`Frame`], [`Dataset`] | the pictures of a scene that has `frames`, and what others read of them |
 //! | [`Shard`], [`Shares`], [`Checkpoint`] | renders that are divided over machines, or interrupted |
@@ -65,10 +66,12 @@
 mod changes;
 mod dataset;
 mod error;
+mod exposed_image;
 mod forecast;
 mod frame_files;
 mod inspector;
 mod lens_view;
+mod light_image;
 mod neighbours;
 mod options;
 pub mod places;
@@ -88,6 +91,7 @@ pub use dataset::Dataset;
 pub use error::Error;
 pub use etendue_files::Reach;
 pub use etendue_oidn::{Denoiser, OidnError};
+pub use etendue_render::expose::{KNOWN_UNITS, LightUnit, PixelLight};
 pub use etendue_render::light_field::LightFieldViews;
 pub use etendue_render::output::{
     Channel, DistanceScale, Layer, Look, Outputs, Picture, Screen, Values,
@@ -96,10 +100,12 @@ pub use etendue_render::{Checkpoint, Plan, Report, Shard, ShardBy, SoFar};
 pub use etendue_report::{Decision, DecisionKind, DecisionValue, Saving, Tabled};
 pub use etendue_scene::file::scene_schema;
 pub use etendue_scene::{Frame, RigCamera, Scene, Strictness};
+pub use exposed_image::{ExposedImage, write_frames};
 pub use forecast::{Calibration, Prospect, TimeForecast};
 pub use frame_files::FramePattern;
 pub use inspector::{Inspector, Probe};
 pub use lens_view::{LensView, lens_values};
+pub use light_image::{ExposeOptions, LightImage};
 pub use options::Options;
 pub use preview::{Preview, Roughness};
 pub use progress::{Phase, Progress};

@@ -13,6 +13,7 @@ use etendue_files::Opener;
 use etendue_geometry::Mesh;
 use etendue_oidn::Denoiser;
 use etendue_optics::glass::AgfCatalogue;
+use etendue_render::expose::SPECTRUM;
 use etendue_render::output::{LayerFile, Outputs};
 use etendue_render::{Checkpoint, Images, Plan, Seconds, denoise};
 use etendue_scene::file::{FramesSpec, SceneFile};
@@ -249,7 +250,7 @@ impl Session {
         for frame in frames.iter().filter(sets_layers) {
             layers.extend(self.file.at(frame)?.spec.all_layers());
         }
-        refuse_idle(self.options.outputs, &layers)
+        refuse_idle(self.options.outputs, &layers, self.file.value())
     }
 
     fn leave_frame(&mut self) {
@@ -397,7 +398,7 @@ impl Session {
         let (outputs, loaded) = (self.options.outputs, self.loaded()?);
         // A frame may lack what others of its scene have: the last one has no flow.
         if self.shown.is_none() {
-            refuse_idle(outputs, &self.file.spec.all_layers())?;
+            refuse_idle(outputs, &self.file.spec.all_layers(), self.file.value())?;
         }
         let names = file_names(&loaded.scene, &loaded.plan, outputs);
         let names = names.into_iter().chain(also.iter().map(|&name| name.to_owned()));
@@ -420,14 +421,24 @@ fn words_of(value: &Value) -> Vec<&str> {
     }
 }
 
-/// Refuses files that none of `layers` is written as.
-fn refuse_idle(outputs: Outputs, layers: &[LayerSpec]) -> Result<(), Error> {
-    let names: Vec<String> = layers.iter().flat_map(|layer| layer.row().names_in_files()).collect();
+/// Refuses files that none of `layers` is written as, nor the light of the `scene`'s sensor.
+fn refuse_idle(outputs: Outputs, layers: &[LayerSpec], scene: &Value) -> Result<(), Error> {
+    let mut names: Vec<String> =
+        layers.iter().flat_map(|layer| layer.row().names_in_files()).collect();
+    let sensor = |key: &str| scene.pointer("/camera/sensor")?.get(key);
+    let has_bands = sensor("type").is_some_and(|kind| kind == "multispectral");
+    names.extend((has_bands && sensor("bands").is_some()).then(|| SPECTRUM.to_owned()));
     match LayerFile::without_layer(outputs, &names) {
         None => Ok(()),
-        Some([output, wanted]) => Err(Error::Refused(format!(
-            "outputs: `{output}` is a file of {wanted}, and the scene has no such layer; add it to \
-             `layers`, or leave `{output}` out"
-        ))),
+        Some([output, wanted]) => {
+            let remedy = match output {
+                "envi" => "give `camera.sensor` the `type` `multispectral` and `bands`",
+                _ => "add it to `layers`",
+            };
+            Err(Error::Refused(format!(
+                "outputs: `{output}` is a file of {wanted}, and the scene has no such layer; {remedy}, or \
+                 leave `{output}` out"
+            )))
+        }
     }
 }

@@ -2,27 +2,34 @@
 
 use std::path::Path;
 
-use etendue_image::{ExrChannels, Limits, MOST_BYTES, Plane, Raster, Samples};
+use etendue_image::{Cube, ExrChannels, Limits, MOST_BYTES, Plane, Raster, Samples, cube, envi};
+use etendue_render::expose::{BandFilm, SPECTRUM};
 use etendue_render::output::{Channel, Layer, Look, Picture, Screen, Values};
+use etendue_spectrum::{Bands, Grid};
 use serde_json::Value;
 
 use crate::Error;
+use crate::light_image::read_envi;
 use crate::preview::layer_reading;
 
 /// Layers by the names that this program's EXR files give them, and how they are shown; others are told by
 /// their channels.
-const LOOKS: [(&str, Look); 8] = [
+const LOOKS: [(&str, Look); 9] = [
     ("Depth", Look::Distance),
     ("Distance", Look::Distance),
     ("Normal", Look::Direction),
     ("Id.", Look::Ids),
     ("MaterialId", Look::Ids),
-    ("Spectrum", Look::Cube),
+    (SPECTRUM, Look::Cube),
+    (REFLECTANCE, Look::Cube),
     ("Coverage", Look::Share),
     ("Alpha", Look::Share),
 ];
 
-/// An image file (EXR, Radiance, PNG, JPEG) with its layers.
+/// The layer of the bands of reflectance or transmittance of a spectral image.
+const REFLECTANCE: &str = "T";
+
+/// An image file (EXR, Radiance, PNG, JPEG, ENVI cubes) with its layers.
 #[derive(Debug)]
 pub struct Still {
     picture: Picture,
@@ -36,7 +43,8 @@ impl Still {
     #[must_use]
     pub fn is_named(path: &Path) -> bool {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        ["exr", "hdr", "png", "jpg", "jpeg"].iter().any(|known| ending.eq_ignore_ascii_case(known))
+        let known = ["exr", "hdr", "png", "jpg", "jpeg"];
+        known.iter().any(|known| ending.eq_ignore_ascii_case(known)) || envi::is_data(path)
     }
 
     /// Reads the image at `path`: of an EXR file all channels, in layers by what stands before their last
@@ -50,6 +58,10 @@ impl Still {
         let bytes =
             etendue_files::read(path, MOST_BYTES).map_err(|error| refused(error.to_string()))?;
         let limits = Limits::default();
+        if envi::is_header(&bytes) || envi::is_data(path) {
+            let (cube, _) = read_envi(path)?;
+            return Self::of_cube(cube).map_err(|error| refused(error.to_string()));
+        }
         if etendue_image::is_exr(&bytes) {
             let channels = etendue_image::exr_channels(&bytes, limits);
             return Self::of_channels(channels.map_err(|error| refused(error.to_string()))?)
@@ -65,13 +77,16 @@ impl Still {
         let (mut layers, mut missing) = (Vec::<Layer>::new(), 0);
         for (full_name, mut plane) in channels.planes {
             let (name, channel) = place_of(&full_name);
-            let (title, channel) = (fit(name), fit(channel));
+            let (title, channel) = match spectral_place(&full_name) {
+                Some((title, channel)) => (title.to_owned(), channel),
+                None => (fit(name), fit(channel)),
+            };
             missing += without_nan(&mut plane);
             let values = match plane {
                 Plane::F32(values) => Values::F32(values),
                 Plane::U32(values) => Values::U32(values),
             };
-            let meaning = meaning(channels.texts.get(&format!("etendue:{name}")));
+            let meaning = meaning(channels.texts.get(&format!("etendue:{title}")));
             let channel = Channel { name: channel, values };
             match layers.iter_mut().find(|layer| layer.name == title) {
                 Some(layer) => layer.channels.push(channel),
@@ -89,9 +104,39 @@ impl Still {
         let picture = Picture::new(width, height, layers, Vec::new()).map_err(in_words)?;
         let notes = match missing {
             0 => Vec::new(),
-            _ => vec![format!("{missing} values are no numbers (NaN); they count as infinite")],
+            _ => vec![missing_values(missing)],
         };
         Ok(Self { picture, codes: None, notes })
+    }
+
+    /// The bands, and what they look like in red, green and blue.
+    fn of_cube(cube: Cube) -> Result<Self, Error> {
+        let [width, height] = cube.size;
+        let grid = Grid::from_edges(cube.axis.edges().to_vec()).map_err(in_words)?;
+        let film = BandFilm { bands: Bands::Spectral(grid), values: cube.values };
+        let (count, mut missing) = (cube.axis.len(), 0);
+        let channel = |(k, nm): (usize, &f64)| {
+            let mut plane =
+                Plane::F32(film.values.iter().skip(k).step_by(count).copied().collect());
+            missing += without_nan(&mut plane);
+            let Plane::F32(values) = plane else { return Vec::new() };
+            vec![Channel { name: band_name(*nm), values: Values::F32(values) }]
+        };
+        let channels = cube.axis.wavelengths().iter().enumerate().flat_map(channel).collect();
+        let meaning = cube.unit.map(|unit| ("unit".to_owned(), unit)).into_iter().collect();
+        let bands = Layer { name: SPECTRUM.to_owned(), look: Look::Cube, channels, meaning };
+        let finite = |value: &f32| if value.is_finite() { *value } else { 0.0 };
+        let values = film.values.iter().map(finite).collect();
+        let colors = BandFilm { bands: film.bands.clone(), values }.colors().map_err(in_words)?;
+        let channels = ["R", "G", "B"].into_iter().zip(colors);
+        let channels = channels
+            .map(|(name, plane)| Channel { name: name.to_owned(), values: Values::F32(plane) })
+            .collect();
+        let light = Layer { name: String::new(), look: Look::Color, channels, meaning: Vec::new() };
+        let picture = Picture::new(width, height, vec![light, bands], Vec::new());
+        let mut notes = cube.notes;
+        notes.extend((missing > 0).then(|| missing_values(missing)));
+        Ok(Self { picture: picture.map_err(in_words)?, codes: None, notes })
     }
 
     fn of_raster(raster: Raster) -> Result<Self, Error> {
@@ -157,6 +202,32 @@ fn place_of(full_name: &str) -> (&str, &str) {
     }
 }
 
+/// The same of a channel of a spectral image, named as this program names its bands.
+fn spectral_place(full_name: &str) -> Option<(&'static str, String)> {
+    let (component, nm) = cube::spectral_channel(full_name)?;
+    let layer = match component {
+        cube::Component::Stokes(0) => SPECTRUM,
+        cube::Component::Reflectance => REFLECTANCE,
+        cube::Component::Stokes(_) => return None,
+    };
+    Some((layer, band_name(nm)))
+}
+
+/// `552_5nm`: to a thousandth of a nanometre, as [`Bands::names`] has it.
+fn band_name(nm: f64) -> String {
+    fit(&format!("{}nm", (nm * 1e3).round() / 1e3).replace('.', "_"))
+}
+
+/// The wavelength (nm) in such a name.
+fn wavelength(name: &str) -> f64 {
+    let number = name.strip_suffix("nm").map(|nm| nm.replace('_', "."));
+    number.and_then(|nm| nm.parse().ok()).unwrap_or(f64::INFINITY)
+}
+
+fn missing_values(count: usize) -> String {
+    format!("{count} values are no numbers (NaN); they count as infinite")
+}
+
 /// A name as layers may have it: letters, digits and `.`, `_`, `-`, at most 60.
 fn fit(name: &str) -> String {
     let is_fit = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
@@ -185,6 +256,10 @@ fn arrange(layer: &mut Layer) {
         layer.channels.sort_by_key(|channel| "RGBA".find(&*channel.name));
         // How much a pixel covers is no colour.
         layer.channels.truncate(3);
+    }
+    if [SPECTRUM, REFLECTANCE].contains(&&*layer.name) {
+        // An EXR file has them in the order of their names.
+        layer.channels.sort_by(|a, b| wavelength(&a.name).total_cmp(&wavelength(&b.name)));
     }
     let named = LOOKS.iter().find(|(name, _)| layer.name.starts_with(name)).map(|(_, look)| *look);
     let count = layer.channels.len();

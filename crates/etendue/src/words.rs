@@ -1,9 +1,11 @@
 //! What is said of a picture: in the headers of its files, and in notes.
 
 use etendue_render::Rendered;
+use etendue_render::expose::{self, LightUnit};
 use etendue_scene::Scene;
 use etendue_scene::escape::one_line;
 use etendue_scene::import::Note;
+use etendue_sensor::Radiometry;
 
 use crate::Error;
 use crate::neighbours::Neighbour;
@@ -20,7 +22,32 @@ pub(crate) fn header(scene: &Scene, fingerprints: &[(String, String)]) -> Vec<(S
         ("camera", serde_json::to_string(&scene.camera.opencv()).unwrap_or_default()),
     ]
     .map(|(key, value)| (key.to_owned(), value));
-    fingerprints.iter().cloned().chain(more).collect()
+    fingerprints.iter().cloned().chain(more).chain(light(scene)).collect()
+}
+
+/// The seed of the sensor's noise.
+pub(crate) const NOISE_SEED: &str = "noise_seed";
+
+/// The unit of the picture's values, where it is one.
+pub(crate) const LIGHT_UNIT: &str = "light_unit";
+
+/// The projected solid angle of the camera's pupil (sr).
+pub(crate) const PUPIL: &str = "pupil_solid_angle";
+
+/// From one pixel's centre to the next (µm).
+pub(crate) const PITCH: &str = "pixel_pitch";
+
+/// What another sensor needs of the picture to be exposed to it.
+fn light(scene: &Scene) -> Vec<(String, String)> {
+    let Some(sensor) = &scene.sensor else { return Vec::new() };
+    let mut entries = vec![(NOISE_SEED.to_owned(), expose::noise_seed(scene).to_string())];
+    if sensor.radiometry() == Radiometry::Physical {
+        entries.push((LIGHT_UNIT.to_owned(), LightUnit::of(scene).to_string()));
+        entries.push((PITCH.to_owned(), sensor.pixel_pitch().to_string()));
+        let pupil = scene.camera.pupil_solid_angle();
+        entries.extend(pupil.map(|pupil| (PUPIL.to_owned(), pupil.to_string())));
+    }
+    entries
 }
 
 /// What tells whether files show the same scene, compared with the same other frames.

@@ -8,6 +8,8 @@ mod frame_noise;
 mod glasses;
 #[path = "session/outputs.rs"]
 mod outputs;
+#[path = "session/spectra.rs"]
+mod spectra;
 
 use std::fs;
 use std::path::Path;

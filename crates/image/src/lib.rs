@@ -1,9 +1,13 @@
 #![forbid(unsafe_code)]
-//! Image files as arrays: textures, environments, masks and maps of filters.
+//! Image files as arrays: textures, environments, masks and maps of filters; cubes in bands of wavelengths.
 //!
 //! A few kilobytes can claim gigabytes, so a file's size is read and judged before anything is decoded
 //! ([`Limits`]), memory is asked for in a way that may be refused, and a decoder that panics is an
 //! error of its file. Values stay as the file has them: 8 or 16 bits, half or single precision.
+
+pub mod cube;
+pub mod envi;
+pub mod npy;
 
 mod formats;
 mod raster;
@@ -15,6 +19,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use bytemuck::Pod;
 use image::{ColorType, ImageDecoder, ImageReader};
 
+pub use cube::{BandAxis, Cube, Quantity};
 pub use raster::{Raster, Samples, linear_from_srgb};
 
 /// Side of the largest image that is decoded (texels).
@@ -154,6 +159,9 @@ pub enum DecodeError {
     /// It is coloured in a way that is not read.
     #[error("its texels are {0:?}, which is not read")]
     Texels(ColorType),
+    /// A cube whose header and numbers make no sense: the sentence goes on after the file's name.
+    #[error("{0}")]
+    Cube(String),
     /// A header that scales all values by no positive number.
     #[error("its header has {name} {value}, and a positive number is needed")]
     Header {

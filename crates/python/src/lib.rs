@@ -7,6 +7,7 @@
 mod accel;
 mod arrays;
 mod lens;
+mod light;
 mod scene;
 mod sensor;
 mod work;
@@ -20,6 +21,8 @@ mod _core {
     use super::accel::Accel;
     #[pymodule_export]
     use super::lens::Lens;
+    #[pymodule_export]
+    use super::light::{ExposedImage, LightImage};
     #[pymodule_export]
     use super::scene::{Rendering, Session};
     #[pymodule_export]

@@ -4,11 +4,10 @@ use std::path::Path;
 
 use etendue_files::Opener;
 use etendue_scene::file::SensorFile;
-use etendue_sensor::{Exposure, Model};
+use etendue_sensor::Exposure;
 use numpy::{IntoPyArray, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use serde_json::json;
 
 use crate::arrays::{raised, refused, shaped};
 use crate::work::{Stop, interruptible};
@@ -16,29 +15,19 @@ use crate::work::{Stop, interruptible};
 /// A sensor of the trade, or of a file.
 #[pyclass(frozen)]
 pub struct Sensor {
-    sensor: etendue_sensor::Sensor,
+    pub(crate) file: SensorFile,
 }
 
 #[pymethods]
 impl Sensor {
     #[new]
     fn new(name: &str, settings: Vec<(String, String)>) -> PyResult<Self> {
-        let path = Path::new(name);
-        let file = if path.exists() || name.ends_with(".json") {
-            SensorFile::read(&Opener::default(), path, &settings)
-        } else {
-            let model = Model::from_name(name).ok_or_else(|| {
-                let known: Vec<&str> = Model::ALL.iter().map(|m| m.preset().name).collect();
-                let known = known.join(", ");
-                refused(format!("{name}: neither a file nor a preset; presets: {known}"))
-            })?;
-            SensorFile::of_value(path, json!({ "type": "raw", "model": model }), &settings)
-        };
-        Ok(Self { sensor: file.map_err(|error| raised(error.into()))?.sensor })
+        let file = SensorFile::named(&Opener::default(), Path::new(name), &settings);
+        Ok(Self { file: file.map_err(|error| raised(error.into()))? })
     }
 
     fn facts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (s, facts) = (&self.sensor, PyDict::new(py));
+        let (s, facts) = (&self.file.sensor, PyDict::new(py));
         facts.set_item("resolution", s.resolution())?;
         facts.set_item("bit_depth", s.bit_depth())?;
         for (key, value) in [
@@ -68,8 +57,9 @@ impl Sensor {
         let array = electrons.as_array();
         let size = [array.ncols(), array.nrows()];
         let electrons: Vec<f64> = array.iter().copied().collect();
-        let expose =
-            || self.sensor.expose_electrons(&electrons, size, Exposure { exposure, frame }, seed);
+        let expose = || {
+            self.file.sensor.expose_electrons(&electrons, size, Exposure { exposure, frame }, seed)
+        };
         let image = interruptible(py, 0, &Stop::default(), expose)?.map_err(refused)?;
         shaped(image.values.into_pyarray(py).into_any(), [size[1], size[0], 1])
     }

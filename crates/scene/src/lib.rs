@@ -35,7 +35,6 @@ pub mod import;
 mod load;
 mod materials;
 pub mod memory;
-mod npy;
 mod parts;
 pub mod scene;
 pub mod shape;

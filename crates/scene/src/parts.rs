@@ -16,7 +16,6 @@ use crate::identity::Register;
 use crate::import::{self, Import, ImportedPlacement, Note, NoteKind};
 use crate::load::camera::SceneCamera;
 use crate::memory::has_room;
-use crate::npy;
 use crate::scene::LoadStats;
 use etendue_files::{InputFolder, MappedFile};
 use etendue_geometry::{Geometry, Placement, Transform};
@@ -312,7 +311,7 @@ impl Instances {
 /// The matrices of an NPY file; the error goes on after the file's name.
 fn read(path: &Path, fits: &dyn Fn(u64) -> Result<(), String>) -> Result<Vec<Transform>, String> {
     let map = MappedFile::open(path).map_err(|error| format!("cannot be read: {error}"))?;
-    let array = npy::read(map.bytes(), |shape| match shape {
+    let array = etendue_image::npy::read(map.bytes(), |shape| match shape {
         [_, 3 | 4, 4] => Ok(()),
         other => Err(format!("has the shape {other:?} instead of n × 4 × 4 or n × 3 × 4")),
     })?;

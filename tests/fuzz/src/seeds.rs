@@ -39,6 +39,7 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         }
         "environment_hdr" => vec![hdr()],
         "mask_exr" | "environment_exr" => vec![exr_file()],
+        "envi" => envis(),
         "doctor" => vec![GLTF.into(), glb(GLTF), MTL.into(), b"unused.png %20 \\ ".repeat(99)],
         _ => Vec::new(),
     };
@@ -176,6 +177,28 @@ fn plys() -> Vec<Vec<u8>> {
         all.push(file);
     }
     all
+}
+
+/// Cubes of two bands in each order of numbers.
+fn envis() -> Vec<Vec<u8>> {
+    let cube = |interleave: &str, more: &str| {
+        let mut bytes = format!(
+            "ENVI\nsamples = 3\nlines = 2\nbands = 2\ndata type = 4\ninterleave = {interleave}\nbyte order = 0\n\
+             wavelength units = Nanometers\nwavelength = {{450,\n 550}}\n{more}"
+        )
+        .into_bytes();
+        bytes.extend([0; 48]);
+        bytes
+    };
+    vec![
+        cube("bsq", "fwhm = {100, 100}\n"),
+        cube("bil", "data gain values = {2, 3}\nbbl = {1, 0}\n"),
+        cube("bip", "header offset = 18446744073709551615\n"),
+        cube(
+            "bsq",
+            "reflectance scale factor = 1\ndata ignore value = 0\nz plot titles = {a (nm), b (c)}\n",
+        ),
+    ]
 }
 
 fn npys() -> Vec<Vec<u8>> {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use etendue_files::{Opener, Reach};
 use etendue_geometry::Buffer;
-use etendue_image::Limits;
+use etendue_image::{Cube, Limits, envi};
 use etendue_optics::element::Picture;
 use etendue_optics::train::{Focus, Inquiry, LensFile, LensReport};
 use etendue_scene::file::{SensorFile, read_lens, trace_rays};
@@ -24,7 +24,7 @@ pub struct Target {
 }
 
 /// All readers.
-pub const TARGETS: [Target; 20] = [
+pub const TARGETS: [Target; 21] = [
     Target { name: "gltf", run: gltf },
     Target { name: "glb", run: glb },
     Target { name: "obj", run: obj },
@@ -44,6 +44,7 @@ pub const TARGETS: [Target; 20] = [
     Target { name: "texture", run: texture },
     Target { name: "environment_hdr", run: environment_hdr },
     Target { name: "environment_exr", run: environment_exr },
+    Target { name: "envi", run: envi },
     Target { name: "doctor", run: doctor },
 ];
 
@@ -207,7 +208,18 @@ fn environment_hdr(bytes: &[u8], folder: &Path) {
 
 fn environment_exr(bytes: &[u8], folder: &Path) {
     let _ = EnvironmentMap::read(&write(folder, "sky.exr", bytes), Limits::default());
-    let _ = etendue_image::exr_channels(bytes, Limits::default());
+    if let Ok(channels) = etendue_image::exr_channels(bytes, Limits::default()) {
+        let _ = Cube::from_exr(channels);
+    }
+}
+
+/// A header, and behind its first zero byte the numbers.
+fn envi(bytes: &[u8], _folder: &Path) {
+    let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+    let (header, numbers) = bytes.split_at(end);
+    if let Ok(header) = envi::Header::parse(header) {
+        let _ = header.decode(numbers, Limits::default());
+    }
 }
 
 /// The files beside a model, which are looked through for names.

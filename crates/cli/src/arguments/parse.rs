@@ -146,6 +146,11 @@ pub(super) fn pitch(text: &str) -> Result<f64, String> {
     }
 }
 
+/// `2.8`.
+pub(super) fn f_number(text: &str) -> Result<f64, String> {
+    positive(text).ok_or_else(|| "expected an f-number above 0, such as 2.8".to_owned())
+}
+
 fn positive(text: &str) -> Option<f64> {
     text.parse().ok().filter(|number| *number > 0.0 && f64::is_finite(*number))
 }

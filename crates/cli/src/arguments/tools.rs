@@ -1,10 +1,11 @@
-//! Arguments of `etendue lens` and `etendue bench`.
+//! Arguments of `etendue lens`, `etendue bench` and `etendue expose`.
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
 use super::{SceneArguments, parse};
+use etendue::LightUnit;
 use etendue_optics::train::Focus;
 
 pub(super) const LENS_HELP: &str = "\
@@ -78,6 +79,68 @@ pub(crate) struct LensArguments {
     #[arg(long)]
     pub(crate) allow_outside: bool,
     /// Say nothing on standard error but errors
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+pub(super) const EXPOSE_HELP: &str = "\
+Writes what `etendue render` writes of a scene's sensor: raw.png, .npy, .dng, raw.preview.png,
+moments and sensor.json; of a folder of pictures, or of a render's frames, a folder
+frames/000000, … each.
+
+The unit of the values is the file's own: spectral EXR files, ENVI headers (`data units`) and
+renders of etendue say it; else --unit does. Of radiance L, a lens of f-number N, focused at the
+magnification m, brings E = pi L / (1 + 4 N^2 (1 + m)^2) onto the sensor: --f-number and
+--magnification, or the pupil of the camera of a render.
+
+Examples:
+  etendue expose photo.exr --sensor imx183 --unit 1 -o out/photo
+  etendue expose cube.hdr --sensor imx183 --unit uW/cm2/sr/nm --f-number 2.8 -o out/cube
+  etendue expose cube.npy --sensor scene.json --unit W/m2/nm --wavelengths 450,550,650 -o out/cube
+  etendue expose out/orbit --sensor imx250 --set exposures=[0.001,0.01] --unit 1 -o out/orbit-imx250";
+
+#[derive(Debug, Args)]
+pub(crate) struct ExposeArguments {
+    /// A picture of light (.exr, .npy, ENVI .hdr or .img, Radiance .hdr), or a folder of them
+    #[arg(value_name = "IMAGE|FOLDER")]
+    pub(crate) image: PathBuf,
+    /// A preset's name, a scene, or a file with a scene's `sensor` object; its pixels are the picture's
+    #[arg(long, value_name = "NAME|SENSOR.json|SCENE")]
+    pub(crate) sensor: String,
+    /// The folder to write into; made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// The unit of the picture's values: 1 (1 is full scale), W/m2/sr/nm (spectral radiance) or W/m2/nm
+    /// (spectral irradiance on the sensor), with mW, uW, cm2, um and the like; the file's own when absent
+    #[arg(long, value_name = "UNIT", value_parser = LightUnit::parse)]
+    pub(crate) unit: Option<LightUnit>,
+    /// The f-number of the lens before the sensor, of pictures in radiance
+    #[arg(long, value_name = "N", value_parser = parse::f_number)]
+    pub(crate) f_number: Option<f64>,
+    /// The magnification of that lens, as a positive number: 0 of far scenes
+    #[arg(long, value_name = "M", default_value_t = 0.0, requires = "f_number")]
+    pub(crate) magnification: f64,
+    /// The middles of the bands of an array (nm), from the shortest on
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub(crate) wavelengths: Option<Vec<f64>>,
+    // Not a comment of documentation, whose brackets would be a link.
+    #[arg(
+        long = "set",
+        value_name = "PATH=VALUE",
+        value_parser = parse::setting,
+        help = "Set any value of the sensor's file, e.g. exposure=0.02, or camera.sensor.exposure=0.02 of a scene"
+    )]
+    pub(crate) settings: Vec<(String, String)>,
+    /// Seed of the noise; when absent the `noise_seed` of the render that left the picture, or else 0
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Kinds of file to write
+    #[arg(long, value_name = "LIST", default_value = "png,npy,dng")]
+    pub(crate) outputs: String,
+    /// Let a scene name a camera file outside its own folder
+    #[arg(long)]
+    pub(crate) allow_outside: bool,
+    /// Show no progress and no summary; the list of files and errors remain
     #[arg(short, long)]
     pub(crate) quiet: bool,
 }

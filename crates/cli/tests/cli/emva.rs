@@ -2,7 +2,7 @@
 //! skipped, and says so.
 
 #[path = "../../../sensor/tests/sensor/environment.rs"]
-mod environment;
+pub(crate) mod environment;
 #[path = "../../../sensor/tests/sensor/emva/python.rs"]
 mod python;
 

@@ -107,7 +107,7 @@ fn bands_are_channels_named_by_wavelength() {
     let cube = bench.array("spectrum");
     assert!(cube.len() == 32 && cube.iter().all(|v| (v - 1.0).abs() < 1e-6), "{cube:?}");
     let layers = bench.json("out/layers.json").to_string();
-    assert!(layers.contains("425nm") && layers.contains("477_5nm"), "{layers}");
+    assert!(layers.contains("S0.425,0nm") && layers.contains("S0.477,5nm"), "{layers}");
     assert!(exists(&bench, "raw.preview.png") && !exists(&bench, "raw.png"));
 }
 

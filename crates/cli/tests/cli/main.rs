@@ -6,6 +6,7 @@ mod bad_light; // materials, textures and lights that make no sense
 mod bench; // speed against accuracy on a tiny scene
 mod denoise; // pictures without their noise, where Open Image Denoise is there
 mod emva; // the characterisation of what the command writes
+mod expose; // pictures from elsewhere on a sensor
 mod exposures; // what a scene's sensor makes of a render
 mod figures; // models with skins, in the pose of their file
 mod files; // what is no file, what costs without end, what real programs write
@@ -41,6 +42,7 @@ mod run; // running the command and reading what it left
 mod schema; // the schema by another validator
 mod sensor; // presets, curves, series of a characterisation
 mod shards; // renders that are divided or killed, and their pictures
+mod spectral_files; // light in bands by others' readers and writers
 mod stale; // a render of one kind into the folder of another
 mod stopping; // Ctrl-C and what it leaves
 mod tools; // check, plan, schema, version

@@ -27,7 +27,19 @@ from . import _core
 from ._copies import StoredRendering, TemporaryFolder
 
 __version__ = _core.version()
-__all__ = ["load", "Scene", "Shot", "LightField", "Lens", "Traced", "Sensor", "Accel", "Hits"]
+__all__ = [
+    "load",
+    "Scene",
+    "Shot",
+    "LightField",
+    "Lens",
+    "Traced",
+    "Sensor",
+    "Light",
+    "Exposed",
+    "Accel",
+    "Hits",
+]
 
 _Path = Union[str, "os.PathLike[str]"]
 
@@ -493,6 +505,119 @@ class Sensor:
         if array.ndim != 2 or array.size == 0:
             raise ValueError(f"electrons has the shape {array.shape} instead of (h, w)")
         return self._core.expose(array, float(exposure), int(frame), int(seed))
+
+
+class Light:
+    """A picture of light from elsewhere: light = Light.read("cube.hdr"), or Light(values, wavelengths).
+
+    Files are EXR (red, green and blue, or spectral by the layout of Fichet et al.), NPY, ENVI cubes (either of
+    their two files) and Radiance pictures.
+    """
+
+    def __init__(
+        self, values: Any, wavelengths: Optional[Sequence[float]] = None, unit: Optional[str] = None
+    ) -> None:
+        """values: (h, w), (h, w, 3) linear sRGB or, with wavelengths (nm) of the bands' middles, (h, w, bands).
+        unit: "1" (1 is full scale), "W/m2/sr/nm" (spectral radiance) or "W/m2/nm" (spectral irradiance on the
+        sensor), with mW, uW, cm2, um and the like."""
+        array = np.ascontiguousarray(values, dtype=np.float64)
+        self._core, self._unit = _core.LightImage.from_array(array, _listed(wavelengths)), unit
+
+    @classmethod
+    def read(cls, path: _Path, wavelengths: Optional[Sequence[float]] = None) -> "Light":
+        """Reads a file. wavelengths: the middles of the bands (nm) of an array that does not say them."""
+        light = cls.__new__(cls)
+        light._core = _core.LightImage.open(os.fspath(path), _listed(wavelengths))
+        light._unit = None
+        return light
+
+    @property
+    def values(self) -> np.ndarray:
+        """float32 (h, w, bands), or (h, w, 3) of red, green and blue; rows from the top."""
+        return self._core.values()
+
+    @property
+    def edges(self) -> Optional[np.ndarray]:
+        """Edges of the bands (nm), one more than there are bands; None of red, green and blue."""
+        edges = self._core.edges()
+        return None if edges is None else np.array(edges)
+
+    @property
+    def wavelengths(self) -> Optional[np.ndarray]:
+        """Middles of the bands (nm); None of red, green and blue."""
+        edges = self.edges
+        return None if edges is None else 0.5 * (edges[1:] + edges[:-1])
+
+    @property
+    def unit(self) -> Optional[str]:
+        """The unit of the values, in the words of the file; None where nobody says it."""
+        return self._unit or self._core.unit()
+
+    @property
+    def notes(self) -> List[str]:
+        """What a user should know."""
+        return self._core.notes()
+
+    def expose(
+        self,
+        sensor: Union["Sensor", _Path],
+        *,
+        unit: Optional[str] = None,
+        f_number: Optional[float] = None,
+        magnification: float = 0.0,
+        seed: Optional[int] = None,
+        frame: int = 0,
+    ) -> "Exposed":
+        """What a sensor makes of it; the sensor's pixels are the picture's.
+
+        unit: that of the values, where the file does not say it. f_number, magnification: of the lens, where they
+        are radiance: E = pi L / (1 + 4 N^2 (1 + m)^2). seed: of the noise; None takes that of the render that left
+        the file, or else 0. frame: others have noise of their own.
+        """
+        sensor = sensor if isinstance(sensor, Sensor) else Sensor(sensor)
+        number = None if f_number is None else float(f_number)
+        return Exposed(
+            self._core.expose(sensor._core, unit or self._unit, number, float(magnification), seed, int(frame))
+        )
+
+    def __repr__(self) -> str:
+        shape, edges = self.values.shape, self.edges
+        bands = "" if edges is None else f", {edges[0]:g} to {edges[-1]:g} nm"
+        return f"<etendue.Light {shape}{bands}, unit {self.unit}>"
+
+
+def _listed(wavelengths: Optional[Sequence[float]]) -> Optional[List[float]]:
+    return None if wavelengths is None else [float(nm) for nm in wavelengths]
+
+
+class Exposed:
+    """A picture of light on a sensor."""
+
+    def __init__(self, core: Any) -> None:
+        self._core = core
+
+    @property
+    def raw(self) -> np.ndarray:
+        """Digital numbers of the first exposure, uint16 (h, w) or (h, w, channels)."""
+        return self._core.raw(0)
+
+    def raw_of(self, index: int) -> np.ndarray:
+        """Digital numbers of exposure `index`."""
+        return self._core.raw(index)
+
+    @property
+    def exposures(self) -> List[Tuple[float, int]]:
+        """Exposure times (s) and frames that the sensor asks for."""
+        return self._core.exposures()
+
+    @property
+    def notes(self) -> List[str]:
+        """What a user should know."""
+        return self._core.notes()
+
+    def write(self, folder: _Path, outputs: str = "png,npy,dng") -> List[str]:
+        """Writes the files that the command writes; gives their names."""
+        return self._core.write(os.fspath(folder), outputs)
 
 
 class Hits(NamedTuple):

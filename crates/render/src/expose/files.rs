@@ -263,13 +263,14 @@ pub(super) struct Sidecar<'a> {
     white_balance: Vec<f64>,
     bands: Vec<String>,
     seed: u64,
+    noise_seed: u64,
     pub(super) invalid: InvalidValues,
     pub(super) notes: Vec<String>,
     pub(super) shots: Vec<ShotFiles>,
 }
 
 impl<'a> Sidecar<'a> {
-    pub(super) fn new(sensor: &'a Sensor, seed: u64) -> Self {
+    pub(super) fn new(sensor: &'a Sensor, [seed, noise_seed]: [u64; 2]) -> Self {
         Self {
             software: SOFTWARE,
             sensor: sensor.spec(),
@@ -283,6 +284,7 @@ impl<'a> Sidecar<'a> {
             white_balance: sensor.white_balance(),
             bands: sensor.bands().names(),
             seed,
+            noise_seed,
             invalid: InvalidValues::default(),
             notes: Vec::new(),
             shots: Vec::new(),

@@ -5,6 +5,7 @@ use etendue_sensor::{Radiometry, Sensor, SensorKind};
 use etendue_spectrum::{Bands, Grid};
 use rayon::prelude::*;
 
+use super::LightUnit;
 use super::files::plain;
 use crate::film::{NoMemory, filled};
 use crate::output::{Channel, Layer, Look, Values};
@@ -75,8 +76,13 @@ impl BandFilm {
     /// (W·m⁻²·sr⁻¹·nm⁻¹), and the projected solid angle of its pupil makes irradiance
     /// (W·m⁻²·nm⁻¹) of it. Cameras without an aperture give irradiance as it is.
     #[must_use]
-    pub(super) fn on_sensor(mut self, scene: &Scene, sensor: &Sensor) -> Self {
-        let factor = light_factor(scene, sensor);
+    pub(super) fn on_sensor(self, scene: &Scene, sensor: &Sensor) -> Self {
+        self.times(light_factor(scene, sensor))
+    }
+
+    /// All values times `factor`.
+    #[must_use]
+    pub(super) fn times(mut self, factor: f64) -> Self {
         if factor != 1.0 {
             #[expect(clippy::cast_possible_truncation, reason = "films hold f32")]
             let factor = factor as f32;
@@ -134,7 +140,7 @@ pub(crate) fn three_planes(layer: &Layer) -> Option<[&[f32]; 3]> {
 }
 
 /// What the layer of a hyperspectral cube is called.
-pub(crate) const SPECTRUM: &str = "Spectrum";
+pub const SPECTRUM: &str = "Spectrum";
 
 /// Whether the picture has a hyperspectral cube.
 pub(crate) fn has_spectrum(scene: &Scene) -> bool {
@@ -163,21 +169,21 @@ pub(crate) fn spectrum(
         }
     };
     let Some(grid) = sensor.spec().bands.as_ref().or(film.bands.grid()) else { return Ok(None) };
-    Ok(Some(cube(grid, film.means_over(grid))))
+    Ok(Some(cube(grid, film.means_over(grid), LightUnit::of(scene))))
 }
 
 /// A layer of one plane a band.
-fn cube(grid: &Grid, planes: Vec<Vec<f32>>) -> Layer {
+fn cube(grid: &Grid, planes: Vec<Vec<f32>>, unit: LightUnit) -> Layer {
     let channels = Bands::Spectral(grid.clone())
         .names()
         .iter()
         .zip(planes)
         .map(|(name, plane)| Channel { name: plain(name), values: Values::F32(plane) })
         .collect();
-    let edges = format!("{:?}", grid.edges());
+    let (edges, unit) = (format!("{:?}", grid.edges()), unit.to_string());
     let meaning = [
         ("definition", "mean light of each band of wavelengths, over the pixel's samples"),
-        ("unit", "as the picture's"),
+        ("unit", unit.as_str()),
         ("band edges nm", edges.as_str()),
     ];
     let meaning = meaning.map(|(key, text)| (key.to_owned(), text.to_owned())).into();

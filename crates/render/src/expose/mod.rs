@@ -13,11 +13,13 @@
 //! Several exposures or frames are numbered: `raw_000.png`, `raw_001.png`, …
 
 mod bands;
+mod elsewhere;
 mod files;
 mod film;
 mod illumination;
 mod noise;
 mod remarks;
+mod unit;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -31,9 +33,12 @@ use etendue_sensor::{
 use etendue_spectrum::Bands;
 
 pub(crate) use bands::{bands, explain_bands};
+pub use elsewhere::{PictureLight, PixelLight};
 pub use film::BandFilm;
-pub(crate) use film::{SPECTRUM, has_spectrum, spectrum, three_planes};
+pub use film::SPECTRUM;
+pub(crate) use film::{has_spectrum, spectrum, three_planes};
 pub(crate) use noise::NoiseOfPixels;
+pub use unit::{KNOWN_UNITS, LightUnit, pupil_solid_angle};
 
 use crate::film::NoMemory;
 use crate::output::{OutputError, Outputs, Picture, PictureError, sidecar};
@@ -172,6 +177,12 @@ impl SensorLight {
         &self.sensor
     }
 
+    /// What a user should know of the light.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     /// One exposure: the same numbers whenever it is asked for.
     ///
     /// # Errors
@@ -213,7 +224,7 @@ pub fn write(
         told: None,
         exposed: Exposed { files: Vec::new(), notes: light.notes.clone() },
     };
-    let mut sidecar = Sidecar::new(sensor, light.seeds[0]);
+    let mut sidecar = Sidecar::new(sensor, light.seeds);
     // One shot after the other, each with its entry in the sidecar.
     for (done, shot) in shots.iter().enumerate() {
         if !progress(done as f64 / shots.len() as f64) {
@@ -231,7 +242,8 @@ pub fn write(
 
 /// The seed of temporal noise: two frames or cameras of a scene, and two places of one camera, draw noise
 /// of their own.
-fn noise_seed(scene: &Scene) -> u64 {
+#[must_use]
+pub fn noise_seed(scene: &Scene) -> u64 {
     // A camera is made of numbers and words only, which always serialise.
     let camera = serde_json::to_string(&scene.camera.opencv()).unwrap_or_default();
     etendue_sensor::mixed_seed(scene.render.frame_seed(), camera.as_bytes())
@@ -240,7 +252,12 @@ fn noise_seed(scene: &Scene) -> u64 {
 /// The names of all files that exposing `scene` may write.
 #[must_use]
 pub fn file_names(scene: &Scene) -> Vec<String> {
-    let Some(sensor) = &scene.sensor else { return Vec::new() };
+    scene.sensor.as_ref().map(files_of).unwrap_or_default()
+}
+
+/// The names of all files that exposures of `sensor` may leave.
+#[must_use]
+pub fn files_of(sensor: &Sensor) -> Vec<String> {
     let shots: Vec<Exposure> = sensor.shots().collect();
     let digits = digits(shots.len());
     let endings = ["png", "preview.png", "npy", "dng"];

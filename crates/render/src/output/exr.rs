@@ -8,7 +8,8 @@
 //!
 //! The header says what the numbers mean. Each layer has an attribute `etendue:LAYER` with its
 //! meaning as JSON, each header entry an attribute `etendue:ENTRY`; the picture's attribute goes by
-//! its channels, `etendue:RGB`. `etendue:names:LAYER` has what the numbers of a layer of ids name. `software` names the program.
+//! its channels, `etendue:RGB`. Light in bands has the names and attributes of spectral images
+//! ([`Layer::exr_name`](super::Layer::exr_name)). `etendue:names:LAYER` has what the numbers of a layer of ids name. `software` names the program.
 //!
 //! The crate `exr` knows the format's header and checks it. Blocks are packed here, because its own
 //! writer starts a thread pool beside the one that the render runs in, takes a slower deflate, and
@@ -35,6 +36,7 @@ use rayon::prelude::*;
 use super::picture::put;
 use super::sidecar::Entries;
 use super::{OutputError, Picture, Values};
+use crate::expose::SPECTRUM;
 use etendue_files::{SOFTWARE, Transaction};
 
 /// How the pixels are packed. Both keep every bit.
@@ -146,7 +148,7 @@ struct Blocks<'a> {
 impl<'a> Blocks<'a> {
     fn new(picture: &'a Picture, compression: Compression) -> Self {
         let (width, height) = (picture.width(), picture.height());
-        let channels = picture.sorted_channels().into_iter();
+        let channels = picture.exr_channels().into_iter();
         let channels = channels.map(|(name, values)| (name, values, sample_type(values)));
         Self { width, height, channels: channels.collect(), compression }
     }
@@ -212,7 +214,7 @@ fn sample_type(values: &Values) -> SampleType {
 /// The channels with numbers that floats do not hold exactly, which are written as integers.
 #[must_use]
 pub fn beyond_floats(picture: &Picture) -> Vec<String> {
-    let channels = picture.sorted_channels().into_iter();
+    let channels = picture.exr_channels().into_iter();
     let beyond = channels.filter(|(_, values)| sample_type(values) == SampleType::U32);
     beyond.map(|(name, _)| name).collect()
 }
@@ -299,6 +301,14 @@ fn header(path: &Path, picture: &Picture, blocks: &Blocks<'_>) -> Result<Header,
         let name = attribute_name(&format!("names:{layer}"));
         own.other.insert(name, AttributeValue::Text(text(&table.to_string())));
     }
+    if let Some(spectrum) = picture.layer(SPECTRUM) {
+        // The layout of Fichet et al. (2021): see `Layer::exr_name`.
+        let unit = spectrum.meaning.iter().find(|(key, _)| key == "unit");
+        let unit = unit.map_or("", |(_, unit)| unit);
+        for (name, value) in [("spectralLayoutVersion", "1.0"), ("emissiveUnits", unit)] {
+            own.other.insert(text(name), AttributeValue::Text(text(value)));
+        }
+    }
     for (key, value) in picture.header() {
         own.other.insert(attribute_name(key), AttributeValue::Text(text(value)));
     }
@@ -382,7 +392,7 @@ mod tests {
             let read = read_first_flat_layer_from_file(&path).unwrap().layer_data;
             assert_eq!((read.size.0, read.size.1), (37, 41));
             for (channel, (name, values)) in
-                read.channel_data.list.iter().zip(picture.sorted_channels())
+                read.channel_data.list.iter().zip(picture.exr_channels())
             {
                 assert_eq!(channel.name.to_string(), name);
                 match (&channel.sample_data, values) {

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use super::conventions::{self, KITTI_DEPTH, TUM_DEPTH};
 use super::png::Bits;
-use super::{Look, OutputError, Outputs, Picture, npy, png};
+use super::{Look, OutputError, Outputs, Picture, envi, npy, png};
 use crate::denoise::DENOISED;
+use crate::expose::SPECTRUM;
 use etendue_files::Transaction;
 
 /// A file of one layer.
@@ -29,6 +30,10 @@ pub enum LayerFile {
     Flo,
     /// Numbers of things as indices of a palette.
     Indexed,
+    /// What the numbers of an ENVI cube are.
+    EnviHeader,
+    /// The numbers of an ENVI cube.
+    EnviNumbers,
 }
 
 impl LayerFile {
@@ -48,6 +53,8 @@ impl LayerFile {
             (outputs.kitti && is("Flow"), Self::KittiFlow),
             (outputs.flo && is("Flow"), Self::Flo),
             (outputs.indexed && named, Self::Indexed),
+            (outputs.envi && layer == SPECTRUM, Self::EnviHeader),
+            (outputs.envi && layer == SPECTRUM, Self::EnviNumbers),
         ];
         all.into_iter().filter_map(|(wanted, file)| wanted.then_some(file))
     }
@@ -61,6 +68,7 @@ impl LayerFile {
             (Outputs { kitti: outputs.kitti, ..none }, ["kitti", "depth, disparity or flow"]),
             (Outputs { flo: outputs.flo, ..none }, ["flo", "flow"]),
             (Outputs { indexed: outputs.indexed, ..none }, ["indexed", "ids or material_id"]),
+            (Outputs { envi: outputs.envi, ..none }, ["envi", "light in bands"]),
         ];
         let lacks = |alone: Outputs| {
             alone != none && layers.iter().all(|name| Self::of(name, alone).next().is_none())
@@ -80,6 +88,8 @@ impl LayerFile {
             Self::KittiDepth | Self::KittiDisparity | Self::KittiFlow => "kitti.png",
             Self::Flo => "flo",
             Self::Indexed => "indexed.png",
+            Self::EnviHeader => "hdr",
+            Self::EnviNumbers => "img",
         };
         format!("{}.{ending}", stem(layer))
     }
@@ -95,7 +105,9 @@ impl LayerFile {
             | Self::KittiDepth
             | Self::KittiDisparity
             | Self::KittiFlow
-            | Self::Flo => true,
+            | Self::Flo
+            | Self::EnviHeader
+            | Self::EnviNumbers => true,
         }
     }
 
@@ -106,7 +118,13 @@ impl LayerFile {
         let layer = picture.layer(name)?;
         let (lost, range) = match self {
             // They show their range, or are exact.
-            Self::Preview | Self::Mask | Self::Array | Self::Flo | Self::Indexed => return None,
+            Self::Preview
+            | Self::Mask
+            | Self::Array
+            | Self::Flo
+            | Self::Indexed
+            | Self::EnviHeader
+            | Self::EnviNumbers => return None,
             Self::TumDepth => {
                 let most = 65535.0 / TUM_DEPTH;
                 let range = format!("0 to {most:.3} m, and are 0 in it");
@@ -174,6 +192,8 @@ impl LayerFile {
             Self::KittiFlow => conventions::write_flow(files, path, of)?,
             Self::Flo => conventions::write_flo(files, path, of)?,
             Self::Indexed => return conventions::write_indexed(files, path, of),
+            Self::EnviHeader => envi::write_header(files, path, picture, name)?,
+            Self::EnviNumbers => envi::write_numbers(files, path, picture, name)?,
         }
         Ok(true)
     }
@@ -216,6 +236,8 @@ mod tests {
         assert_eq!(lacks("kitti,tum", &["Depth"]), None);
         assert_eq!(lacks("kitti,flo", &["Depth"]), Some("flo"));
         assert_eq!(lacks("indexed", &["Id.primitive"]), Some("indexed"));
+        assert_eq!(lacks("envi", &["Depth"]), Some("envi"));
+        assert_eq!(lacks("envi,npy", &["", "Spectrum"]), None);
         assert_eq!(lacks("exr,png,npy,dng", &[]), None);
     }
 
@@ -231,5 +253,7 @@ mod tests {
         assert_eq!(files("Id.object", "png,indexed"), of_ids);
         assert_eq!(files("Id.primitive", "png,indexed"), ["id_primitive.preview.png"]);
         assert_eq!(files(DENOISED, "png,npy"), ["denoised.npy"]);
+        assert_eq!(files("Spectrum", "npy,envi"), ["spectrum.npy", "spectrum.hdr", "spectrum.img"]);
+        assert_eq!(files("Depth", "envi").len(), 0);
     }
 }

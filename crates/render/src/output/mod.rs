@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | EXR | the data | all layers in one part, `Layer.Channel`, 32-bit, lossless |
 //! | NPY | the data, for numpy | one layer, `[h, w]` or `[h, w, c]`, little-endian, f64 too |
+//! | HDR and IMG | the bands, for programs of remote sensing | one layer as an ENVI cube: [`envi`] |
 //! | PNG | looking, and a sensor's digital numbers | one layer, 8 or 16 bits |
 //! | PNG, FLO | what TUM's and KITTI's tools read | depth, disparity, flow, masks: [`conventions`] |
 //! | PFM | disparities, for light-field benchmarks | one plane, f32 |
@@ -34,6 +35,7 @@
 //! ```
 
 pub mod conventions;
+pub mod envi;
 pub mod exr;
 pub mod npy;
 pub mod pfm;

@@ -19,6 +19,8 @@ pub struct Outputs {
     pub flo: bool,
     /// Numbers of things as PNG with a palette.
     pub indexed: bool,
+    /// Light in bands as an ENVI cube.
+    pub envi: bool,
     /// The picture without its noise, as a layer beside it and as the picture's PNG: see
     /// [`crate::denoise`].
     pub denoised: bool,
@@ -35,6 +37,7 @@ impl Outputs {
         kitti: false,
         flo: false,
         indexed: false,
+        envi: false,
         denoised: false,
     };
 
@@ -58,9 +61,11 @@ impl Outputs {
                 "kitti" => &mut outputs.kitti,
                 "flo" => &mut outputs.flo,
                 "indexed" => &mut outputs.indexed,
+                "envi" => &mut outputs.envi,
                 other => {
                     return Err(format!(
-                        "unknown kind \"{other}\"; known: exr, png, npy, dng, tum, kitti, flo, indexed"
+                        "unknown kind \"{other}\"; known: exr, png, npy, dng, tum, kitti, flo, indexed, \
+                         envi"
                     ));
                 }
             };

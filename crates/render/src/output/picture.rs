@@ -7,8 +7,11 @@ use rayon::prelude::*;
 
 use serde_json::Value;
 
+use etendue_image::cube::emission_channel;
+
 use super::look::lacks;
 use super::{Development, Look, OutputError, PictureError};
+use crate::expose::SPECTRUM;
 
 /// Numbers of one channel, a pixel each: row-major, row 0 at the top.
 #[derive(Debug, Clone)]
@@ -188,6 +191,18 @@ impl Layer {
         }
     }
 
+    /// The full name of one of its channels in an EXR: the same, but for light in bands, whose channels
+    /// are called as the layout of spectral images has it, `S0.552,5nm` (Fichet, Pacanowski and Wilkie, *An OpenEXR
+    /// Layout for Spectral Images*, JCGT 10(3), 2021).
+    #[must_use]
+    pub fn exr_name(&self, channel: &Channel) -> String {
+        let nm = channel.name.strip_suffix("nm").and_then(|nm| nm.replace('_', ".").parse().ok());
+        match nm.filter(|_| self.name == SPECTRUM) {
+            Some(nm) => emission_channel(nm),
+            None => self.full_name(channel),
+        }
+    }
+
     /// The type of its channels, as numpy writes it.
     #[must_use]
     pub fn type_name(&self) -> &'static str {
@@ -325,10 +340,19 @@ impl Picture {
         self.layers
     }
 
-    /// Every channel with its full name, in byte order of those names: the order of an EXR.
+    /// Every channel with its full name, in byte order of those names.
     pub(super) fn sorted_channels(&self) -> Vec<(String, &Values)> {
+        self.sorted_by(Layer::full_name)
+    }
+
+    /// Every channel with its name in an EXR, in the order of an EXR: byte order of those names.
+    pub(super) fn exr_channels(&self) -> Vec<(String, &Values)> {
+        self.sorted_by(Layer::exr_name)
+    }
+
+    fn sorted_by(&self, name: fn(&Layer, &Channel) -> String) -> Vec<(String, &Values)> {
         let mut sorted: Vec<_> = channels(&self.layers)
-            .map(|(layer, channel)| (layer.full_name(channel), &channel.values))
+            .map(|(layer, channel)| (name(layer, channel), &channel.values))
             .collect();
         sorted.sort_by(|(a, _), (b, _)| a.cmp(b));
         sorted

@@ -50,7 +50,7 @@ struct LayerDescription<'a> {
 }
 
 /// Writes what `picture` holds to `path`: size, header entries, and of each layer the name, the
-/// channels (by their full names), numpy's type, the meaning, and what its numbers name.
+/// channels (by their names in an EXR), numpy's type, the meaning, and what its numbers name.
 ///
 /// # Errors
 ///
@@ -58,7 +58,7 @@ struct LayerDescription<'a> {
 pub fn write(files: &Transaction, path: &Path, picture: &Picture) -> Result<(), OutputError> {
     let layers = picture.layers().iter().map(|layer| LayerDescription {
         name: layer.title(),
-        channels: layer.channels.iter().map(|channel| layer.full_name(channel)).collect(),
+        channels: layer.channels.iter().map(|channel| layer.exr_name(channel)).collect(),
         type_name: layer.type_name(),
         meaning: Entries(&layer.meaning),
         names: picture.names(&layer.name),

@@ -17,7 +17,7 @@ use crate::words::plain;
 use etendue_camera::CameraSpec;
 use etendue_files::{InputFolder, Opener};
 use etendue_optics::train::remove_notes;
-use etendue_sensor::{Sensor, SensorError, SensorSpec};
+use etendue_sensor::{Model, Sensor, SensorError, SensorSpec};
 
 /// The schema of a scene's `camera`: the object, or the file that holds it, in whose place its values stand
 /// once it is read.
@@ -155,6 +155,31 @@ impl SensorFile {
     ) -> Result<Self, SceneError> {
         let (document, value) = read_document(path)?;
         Self::of(WrittenPlaces::new(opener, path, Some(document)), value, overrides)
+    }
+
+    /// The sensor of the file called `name` where there is one, else the preset of that name.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`], and when `name` is neither.
+    pub fn named(
+        opener: &Opener,
+        name: &Path,
+        overrides: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        if name.exists() || name.extension().is_some_and(|ending| ending == "json") {
+            return Self::read(opener, name, overrides);
+        }
+        let written = WrittenPlaces::new(opener, name, None);
+        let model = name.to_str().and_then(Model::from_name).ok_or_else(|| {
+            let known: Vec<&str> = Model::ALL.iter().map(|model| model.preset().name).collect();
+            let known = known.join(", ");
+            let why = format!(
+                "neither a file nor a preset; name a scene, a sensor's JSON file, or one of {known}"
+            );
+            written.fault("", why)
+        })?;
+        Self::of_value(name, json!({ "type": "raw", "model": model }), overrides)
     }
 
     /// A sensor given by its values, such as those of a preset; `name` stands for the file.

@@ -11,7 +11,6 @@ use super::{Station, colmap};
 use crate::error::not_found;
 use crate::file::TrajectoryFormat;
 use crate::import::{Note, NoteKind};
-use crate::npy;
 use etendue_camera::{Convention, Maps, PoseSpec};
 use etendue_files::InputFolder;
 
@@ -122,7 +121,7 @@ fn told_by_name(path: &Path) -> Result<TrajectoryFormat, String> {
 }
 
 fn read_npy(bytes: &[u8], axes: (Maps, Convention)) -> Result<Vec<Station>, String> {
-    let array = npy::read(bytes, |shape| match shape {
+    let array = etendue_image::npy::read(bytes, |shape| match shape {
         [_, 3 | 4, 4] => Ok(()),
         other => Err(format!("has the shape {other:?} instead of n × 4 × 4 or n × 3 × 4")),
     })?;

@@ -8,7 +8,7 @@
 //! Kern, *A Simple File Format for NumPy Arrays*, NEP 1 (2007), with versions 2 and 3 of the format
 //! as `numpy.lib.format` describes them.
 
-use crate::memory::has_room;
+use crate::room;
 
 /// The longest header (bytes), as NumPy's own reader has it.
 const LONGEST_HEADER: usize = 10_000;
@@ -18,11 +18,11 @@ const MOST_DIMENSIONS: usize = 64;
 
 /// An array of floating-point numbers, `[row][column]…`.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Array {
+pub struct Array {
     /// The lengths of the dimensions, the slowest first.
-    pub(crate) shape: Vec<usize>,
+    pub shape: Vec<usize>,
     /// As many numbers as the product of `shape`.
-    pub(crate) numbers: Vec<f64>,
+    pub numbers: Vec<f64>,
 }
 
 /// Kinds of numbers.
@@ -38,8 +38,12 @@ enum ByteOrder {
     Big,
 }
 
-/// Reads the bytes of an NPY file whose shape `fits`; the error goes on after the file's name.
-pub(crate) fn read(
+/// Reads the bytes of an NPY file whose shape `fits`.
+///
+/// # Errors
+///
+/// When it is none, is cut off, or its shape does not fit; the message goes on after the file's name.
+pub fn read(
     bytes: &[u8],
     fits: impl FnOnce(&[usize]) -> Result<(), String>,
 ) -> Result<Array, String> {
@@ -65,7 +69,7 @@ pub(crate) fn read(
         format!("ends before its last number: {has} bytes follow where its shape is {shape:?}")
     })?;
     let count = data.len() / size;
-    if !has_room((count * size_of::<f64>()) as u64) {
+    if room::<f64>(count).is_err() {
         return Err(format!("holds {count} numbers, and the system has no memory for them"));
     }
     // All as f64.

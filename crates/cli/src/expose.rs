@@ -1,0 +1,86 @@
+//! `etendue expose`: what a sensor makes of pictures from elsewhere.
+
+use std::path::{Path, PathBuf};
+
+use etendue::{ExposeOptions, ExposedImage, LightImage, Outputs, places, write_frames};
+use etendue_files::{Opener, Reach};
+use etendue_scene::file::SensorFile;
+
+use crate::arguments::ExposeArguments;
+use crate::fault::{Fault, print_text};
+use crate::progress::{Phases, say};
+use crate::stop;
+
+pub(crate) fn run(arguments: &ExposeArguments) -> Result<(), Fault> {
+    stop::listen();
+    let outputs = Outputs::from_list(&arguments.outputs)
+        .map_err(|message| Fault::refused(format!("--outputs: {message}")))?;
+    let of_layers = Outputs { png: false, npy: false, dng: false, ..outputs };
+    if of_layers != Outputs::NONE || outputs == Outputs::NONE {
+        return Err(Fault::refused("--outputs: a sensor's images are written as png, npy or dng"));
+    }
+    let reach = if arguments.allow_outside { Reach::Anywhere } else { Reach::OwnFolder };
+    let opener = Opener::new(reach);
+    let sensor = SensorFile::named(&opener, Path::new(&arguments.sensor), &arguments.settings)?;
+    opener.record(Path::new(&arguments.sensor).exists().then(|| (&arguments.sensor).into()));
+    // Each with the number of its frame, where there are several.
+    let images: Vec<(Option<u32>, PathBuf)> = match arguments.image.is_dir() {
+        false => vec![(None, arguments.image.clone())],
+        true => {
+            let found = LightImage::in_folder(&arguments.image)?;
+            let many = found.len() > 1;
+            found.into_iter().map(|(number, path)| (many.then_some(number), path)).collect()
+        }
+    };
+    keep_apart(&opener, &images, &sensor, &arguments.output)?;
+    let folder_is_new = !arguments.output.exists();
+    if folder_is_new {
+        stop::made(&arguments.output);
+    }
+    let open = |(frame, path): &(Option<u32>, PathBuf)| -> Result<_, etendue::Error> {
+        let image = LightImage::open(path, arguments.wavelengths.as_deref())?;
+        let options = ExposeOptions {
+            unit: arguments.unit,
+            f_number: arguments.f_number,
+            magnification: arguments.magnification,
+            seed: arguments.seed,
+            frame: frame.unwrap_or(0),
+        };
+        Ok((*frame, image.on(&sensor, &options)?)) as Result<(Option<u32>, ExposedImage), _>
+    };
+    let progress = Phases::new(arguments.quiet).progress(!arguments.quiet);
+    let written = write_frames(images.iter().map(open), &arguments.output, outputs, &progress);
+    drop(progress);
+    if written.is_err() && folder_is_new {
+        // Goes only when nothing was written into it.
+        let _ = std::fs::remove_dir(&arguments.output);
+    }
+    let written = written?;
+    if !arguments.quiet {
+        let count = images.len();
+        let what = if count == 1 { "1 picture".to_owned() } else { format!("{count} pictures") };
+        say(&format!("{what} exposed: {:.2} s", written.time.as_secs_f64()));
+    }
+    let lines: Vec<String> = written.files.iter().map(|path| path.display().to_string()).collect();
+    print_text(&lines.join("\n"))
+}
+
+/// Refuses a folder in which a result would take the place of a picture or of the sensor's file.
+fn keep_apart(
+    opener: &Opener,
+    images: &[(Option<u32>, PathBuf)],
+    sensor: &SensorFile,
+    output: &Path,
+) -> Result<(), Fault> {
+    let mut inputs = opener.found();
+    inputs.extend(images.iter().map(|(_, path)| path.clone()));
+    let names = etendue_render::expose::files_of(&sensor.sensor);
+    let pattern = etendue::FramePattern::default();
+    let folders = images.iter().map(|(frame, _)| match frame {
+        None => output.to_owned(),
+        Some(number) => output.join(pattern.folder(*number as usize)),
+    });
+    let results: Vec<PathBuf> =
+        folders.flat_map(|folder| names.iter().map(move |name| folder.join(name))).collect();
+    Ok(places::keep_apart(&inputs, &results)?)
+}

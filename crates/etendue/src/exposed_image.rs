@@ -1,0 +1,130 @@
+//! A picture of light on a sensor, and the files of it.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use etendue_files::{Ledger, MANIFEST, Transaction, remove_empty_folders};
+use etendue_render::expose::{self, SensorLight};
+use etendue_render::output::Outputs;
+use etendue_sensor::{Exposure, RawImage};
+
+use crate::progress::Phase;
+use crate::{Error, FramePattern, Progress, Written, places};
+
+/// A picture of light on a sensor.
+#[derive(Debug, Clone)]
+pub struct ExposedImage {
+    light: SensorLight,
+    inputs: Vec<PathBuf>,
+    notes: Vec<String>,
+}
+
+impl ExposedImage {
+    pub(crate) fn new(light: SensorLight, inputs: Vec<PathBuf>, notes: Vec<String>) -> Self {
+        Self { light, inputs, notes }
+    }
+
+    /// The light on the sensor.
+    #[must_use]
+    pub fn sensor_light(&self) -> &SensorLight {
+        &self.light
+    }
+
+    /// What a user should know.
+    pub fn notes(&self) -> impl Iterator<Item = &str> {
+        self.notes.iter().chain(self.light.notes()).map(String::as_str)
+    }
+
+    /// The exposures that the sensor asks for: exposure times and frames.
+    pub fn exposures(&self) -> impl Iterator<Item = Exposure> + '_ {
+        self.light.sensor().shots()
+    }
+
+    /// The sensor's digital numbers for one exposure, rows from the top. The same whenever it is asked for.
+    ///
+    /// # Errors
+    ///
+    /// None that a caller can cause.
+    pub fn raw(&self, exposure: Exposure) -> Result<RawImage, Error> {
+        Ok(self.light.expose(exposure).map_err(expose::ExposeError::from)?)
+    }
+
+    /// Writes the files that a render leaves of its sensor into `folder`, which is made when it is missing. What an
+    /// earlier run left there and this one does not write again is removed.
+    ///
+    /// # Errors
+    ///
+    /// When the folder cannot be written to, the picture would be written over, or it is stopped.
+    pub fn write(
+        &self,
+        folder: &Path,
+        outputs: Outputs,
+        progress: &Progress,
+    ) -> Result<Written, Error> {
+        let one = std::iter::once(Ok((None, self.clone())));
+        write_frames(one, folder, outputs, progress)
+    }
+
+    fn write_into(
+        &self,
+        to: (&Transaction, &Path),
+        outputs: Outputs,
+        progress: &Progress,
+    ) -> Result<Written, Error> {
+        let names = expose::files_of(self.light.sensor()).into_iter().chain([MANIFEST.to_owned()]);
+        let results: Vec<PathBuf> = names.map(|name| to.1.join(name)).collect();
+        places::keep_apart(&self.inputs, &results)?;
+        let goes_on = |share| progress.goes_on(Phase::Expose, share);
+        let exposed = expose::write(&self.light, to, outputs, &goes_on)?;
+        let notes = self.notes.iter().cloned().chain(exposed.notes).collect();
+        Ok(Written { files: exposed.files, notes, time: Duration::ZERO })
+    }
+}
+
+/// Writes exposed pictures, each read when its turn comes, into `folder`: those with a number of a frame into
+/// `frames/NUMBER` there, as a render's frames.
+///
+/// # Errors
+///
+/// Those of the pictures, and of [`ExposedImage::write`]; then nothing is written.
+pub fn write_frames(
+    images: impl Iterator<Item = Result<(Option<u32>, ExposedImage), Error>>,
+    folder: &Path,
+    outputs: Outputs,
+    progress: &Progress,
+) -> Result<Written, Error> {
+    let start = Instant::now();
+    places::folder(folder)?;
+    let pattern = FramePattern::default();
+    let mut made = Vec::new();
+    let done = places::recorded(Ledger::open(folder, "expose"), &[], |to| {
+        let mut all = Written::default();
+        for image in images {
+            let (frame, image) = image?;
+            let own = match frame {
+                None => folder.to_owned(),
+                Some(number) => {
+                    let own = folder.join(pattern.folder(number as usize));
+                    places::folder(&own)?;
+                    made.push(own.clone());
+                    own
+                }
+            };
+            let written = image.write_into((to, &own), outputs, progress)?;
+            all.files.extend(written.files);
+            // Of many frames much is true.
+            all.notes.extend(written.notes);
+            all.notes.sort();
+            all.notes.dedup();
+        }
+        Ok::<_, Error>(all)
+    });
+    if done.is_err() {
+        // They go only when nothing was in them.
+        made.iter().for_each(|own| remove_empty_folders(folder, &own.join("raw.png")));
+    }
+    let mut written = done?;
+    written.notes.iter().for_each(|note| progress.note(note));
+    written.time = start.elapsed();
+    Ok(written)
+}

@@ -1,0 +1,482 @@
+//! Pictures in bands of wavelengths: what a cube is, and the layout that spectral EXR files share.
+//!
+//! # Sources
+//!
+//! Fichet, Pacanowski and Wilkie, *An OpenEXR Layout for Spectral Images*, JCGT 10(3), 2021: channels
+//! `S0.550,5nm` of emission (`S1` to `S3` beside them are of polarised light) and `T.550,5nm` of reflectance or
+//! transmittance, numbers with a decimal comma; attributes `spectralLayoutVersion` and `emissiveUnits`.
+
+use std::collections::BTreeMap;
+
+use crate::{DecodeError, ExrChannels, Plane, room};
+
+/// Speed of light in vacuum (m/s): some files name bands by frequencies.
+const SPEED_OF_LIGHT: f64 = 299_792_458.0;
+
+/// The shortest and the longest wavelength of a band (nm): soft X-rays and thermal infrared.
+const WAVELENGTHS: [f64; 2] = [1.0, 1e6];
+
+/// Numbers below this are micrometres, where nobody says what they are.
+const SHORTEST_NM: f64 = 100.0;
+
+/// What the numbers of a cube are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Light, or what the file does not say.
+    Light,
+    /// Shares of light that are reflected or transmitted.
+    Reflectance,
+}
+
+/// A picture in bands of wavelengths.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cube {
+    /// Columns and rows.
+    pub size: [usize; 2],
+    /// Where the bands are.
+    pub axis: BandAxis,
+    /// `[row][column][band]`, row 0 at the top.
+    pub values: Vec<f32>,
+    /// What they are.
+    pub quantity: Quantity,
+    /// Their unit as the file has it.
+    pub unit: Option<String>,
+    /// Other entries of the file's header.
+    pub texts: BTreeMap<String, String>,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// The wavelengths of a cube's bands, from the shortest on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BandAxis {
+    /// The middles of the bands (nm).
+    wavelengths: Vec<f64>,
+    /// One more than there are bands (nm).
+    edges: Vec<f64>,
+}
+
+impl BandAxis {
+    /// Bands around `wavelengths` (nm), `widths` being their full widths at half maximum (nm). Bands that
+    /// meet by their widths end there; all others reach to the middle between them and their
+    /// neighbours, the outer ones as far beyond their middles as inside of them.
+    ///
+    /// # Errors
+    ///
+    /// When wavelengths are none, do not ascend, or there is one alone without a width; the message goes on after
+    /// the file's name.
+    pub fn new(wavelengths: Vec<f64>, widths: Option<&[f64]>) -> Result<Self, String> {
+        judge(&wavelengths)?;
+        let widths = widths.filter(|widths| {
+            widths.len() == wavelengths.len() && widths.iter().all(|w| *w > 0.0 && w.is_finite())
+        });
+        let met = widths.and_then(|widths| edges_that_meet(&wavelengths, widths));
+        let between = || {
+            let n = wavelengths.len();
+            let [first, second] = *wavelengths.first_chunk()?;
+            let mut edges = vec![first - 0.5 * (second - first)];
+            edges.extend(wavelengths.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])));
+            edges.push(wavelengths[n - 1] + 0.5 * (wavelengths[n - 1] - wavelengths[n - 2]));
+            Some(edges)
+        };
+        let edges = met.or_else(between).ok_or_else(|| {
+            "has one band, and nothing says how wide it is: give its width (`fwhm` of an ENVI \
+             header)"
+                .to_owned()
+        })?;
+        Self::from_edges(edges.into_iter().map(rounded).collect(), wavelengths)
+    }
+
+    /// Bands between `edges` (nm), one after the other.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::new`].
+    pub fn between(edges: Vec<f64>) -> Result<Self, String> {
+        let middles = edges.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        Self::from_edges(edges, middles)
+    }
+
+    fn from_edges(edges: Vec<f64>, wavelengths: Vec<f64>) -> Result<Self, String> {
+        judge(&wavelengths)?;
+        let ascends = |pair: &[f64]| pair[0] < pair[1];
+        if edges.first().is_none_or(|edge| *edge <= 0.0) || !edges.windows(2).all(ascends) {
+            return Err(format!("has bands whose edges do not ascend from above 0 nm: {edges:?}"));
+        }
+        Ok(Self { wavelengths, edges })
+    }
+
+    /// The number of bands.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.wavelengths.len()
+    }
+
+    /// Never: there is at least one band.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.wavelengths.is_empty()
+    }
+
+    /// The middles of the bands (nm).
+    #[must_use]
+    pub fn wavelengths(&self) -> &[f64] {
+        &self.wavelengths
+    }
+
+    /// The edges of the bands (nm), one more than there are bands.
+    #[must_use]
+    pub fn edges(&self) -> &[f64] {
+        &self.edges
+    }
+}
+
+/// Edges to a millionth of a nanometre, as people write them.
+fn rounded(nm: f64) -> f64 {
+    (nm * 1e6).round() / 1e6
+}
+
+/// The edges of bands each of which ends where the next begins, to a thousandth of its width.
+fn edges_that_meet(middles: &[f64], widths: &[f64]) -> Option<Vec<f64>> {
+    let ends = |i: usize| [middles[i] - 0.5 * widths[i], middles[i] + 0.5 * widths[i]];
+    let meet = |i: usize| (ends(i)[1] - ends(i + 1)[0]).abs() <= 1e-3 * widths[i];
+    let n = middles.len();
+    (0..n - 1).all(meet).then(|| (0..n).map(|i| ends(i)[0]).chain([ends(n - 1)[1]]).collect())
+}
+
+/// Refuses wavelengths (nm) that are none, or not in order.
+fn judge(wavelengths: &[f64]) -> Result<(), String> {
+    let [least, most] = WAVELENGTHS;
+    let bad = |nm: &f64| !(least..=most).contains(nm);
+    if let Some(i) = wavelengths.iter().position(bad) {
+        let (band, nm) = (i + 1, wavelengths[i]);
+        return Err(format!(
+            "has a band {band} at {nm} nm; wavelengths lie between {least} and {most} nm"
+        ));
+    }
+    if wavelengths.is_empty() {
+        return Err("has no band".to_owned());
+    }
+    match wavelengths.windows(2).position(|pair| pair[0] >= pair[1]) {
+        None => Ok(()),
+        Some(i) if wavelengths[i] == wavelengths[i + 1] => Err(format!(
+            "has two bands at {} nm, {} and {}: leave one of them out",
+            wavelengths[i],
+            i + 1,
+            i + 2
+        )),
+        Some(i) => Err(format!(
+            "has its bands out of order: band {} is at {} nm and band {} at {} nm; sort them by \
+             wavelength",
+            i + 1,
+            wavelengths[i],
+            i + 2,
+            wavelengths[i + 1]
+        )),
+    }
+}
+
+/// `numbers` in nanometres; `unit` is what the file calls theirs.
+///
+/// # Errors
+///
+/// When the unit is no length, or there is none and the numbers look like micrometres; the message goes on after
+/// the file's name.
+pub fn in_nanometres(mut numbers: Vec<f64>, unit: Option<&str>) -> Result<Vec<f64>, String> {
+    let known = unit.map(|unit| unit.trim().to_lowercase());
+    let factor = match known.as_deref() {
+        None | Some("" | "unknown") => {
+            let low = |number: &&f64| (0.0..SHORTEST_NM).contains(*number);
+            if let Some(number) = numbers.iter().find(low) {
+                return Err(format!(
+                    "has a wavelength of {number} and does not say of what: did you mean \
+                     micrometres? (`wavelength units = Micrometers` of an ENVI header)"
+                ));
+            }
+            1.0
+        }
+        Some("nanometers" | "nanometres" | "nanometer" | "nanometre" | "nm") => {
+            // Micrometres by mistake: no sensor sees all of its light below ten nanometres.
+            if let Some(most) = numbers.iter().copied().reduce(f64::max).filter(|most| *most < 10.0)
+            {
+                return Err(format!(
+                    "has wavelengths of at most {most} nm: did you mean micrometres?"
+                ));
+            }
+            1.0
+        }
+        Some(
+            "micrometers" | "micrometres" | "micrometer" | "micrometre" | "microns" | "um" | "µm"
+            | "μm",
+        ) => 1e3,
+        Some("millimeters" | "millimetres" | "mm") => 1e6,
+        Some("centimeters" | "centimetres" | "cm") => 1e7,
+        Some("meters" | "metres" | "m") => 1e9,
+        Some("angstroms" | "angstrom" | "å") => 0.1,
+        Some(other) => {
+            let other = other.escape_debug();
+            return Err(format!(
+                "gives its bands in {other}, which is not read: give them in nanometers"
+            ));
+        }
+    };
+    if factor != 1.0 {
+        numbers.iter_mut().for_each(|number| *number = rounded(*number * factor));
+    }
+    Ok(numbers)
+}
+
+/// What a channel of a spectral EXR file holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Component {
+    /// Emission, by its Stokes component: 0 is the light itself.
+    Stokes(u8),
+    /// Reflectance or transmittance.
+    Reflectance,
+}
+
+/// The component and the wavelength (nm) of a channel's full name by the layout: `S0.550,5nm`, `T.5,5e2nm`,
+/// `S0.545,07THz`. `None` for channels of other kinds.
+#[must_use]
+pub fn spectral_channel(name: &str) -> Option<(Component, f64)> {
+    let (layer, place) = name.split_once('.')?;
+    let component = match layer {
+        "S0" => Component::Stokes(0),
+        "S1" => Component::Stokes(1),
+        "S2" => Component::Stokes(2),
+        "S3" => Component::Stokes(3),
+        "T" => Component::Reflectance,
+        _ => return None,
+    };
+    let (rest, is_frequency) = match place.strip_suffix("Hz") {
+        Some(rest) => (rest, true),
+        None => (place.strip_suffix('m')?, false),
+    };
+    const PREFIXES: [(&str, f64); 13] = [
+        ("n", 1e-9),
+        ("u", 1e-6),
+        ("m", 1e-3),
+        ("c", 1e-2),
+        ("d", 1e-1),
+        ("p", 1e-12),
+        ("h", 1e2),
+        ("k", 1e3),
+        ("M", 1e6),
+        ("G", 1e9),
+        ("T", 1e12),
+        ("P", 1e15),
+        ("", 1.0),
+    ];
+    let found = PREFIXES.iter().find_map(|(prefix, factor)| {
+        let number = rest.strip_suffix(prefix)?;
+        let plain = |c: char| c.is_ascii_digit() || ",.eE+-".contains(c);
+        let number: f64 =
+            number.chars().all(plain).then(|| number.replace(',', ".").parse().ok())??;
+        // Nanometres stay the number that is written.
+        Some(match (is_frequency, *prefix) {
+            (true, _) => rounded(1e9 * SPEED_OF_LIGHT / (number * factor)),
+            (false, "n") => number,
+            (false, _) => rounded(number * factor * 1e9),
+        })
+    });
+    found.filter(|nm| nm.is_finite() && *nm > 0.0).map(|nm| (component, nm))
+}
+
+/// The name of the channel of emission around `nm` by the layout: `S0.550,5nm`.
+#[must_use]
+pub fn emission_channel(nm: f64) -> String {
+    let text = format!("{}", rounded(nm));
+    let text = if text.contains('.') { text.replace('.', ",") } else { text + ",0" };
+    format!("S0.{text}nm")
+}
+
+/// Whether an EXR file has spectral channels.
+#[must_use]
+pub fn is_spectral(channels: &ExrChannels) -> bool {
+    channels.planes.iter().any(|(name, _)| {
+        matches!(spectral_channel(name), Some((Component::Stokes(0) | Component::Reflectance, _)))
+    })
+}
+
+impl Cube {
+    /// The spectral channels of an EXR file: its light, or else what it reflects. `None` where it has none.
+    ///
+    /// # Errors
+    ///
+    /// When two are of one wavelength, or there is no memory for them.
+    pub fn from_exr(channels: ExrChannels) -> Result<Option<Self>, DecodeError> {
+        let mut light: Vec<(f64, Plane)> = Vec::new();
+        let mut reflectance = Vec::new();
+        let mut polarised = false;
+        for (name, plane) in channels.planes {
+            match spectral_channel(&name) {
+                Some((Component::Stokes(0), nm)) => light.push((nm, plane)),
+                Some((Component::Reflectance, nm)) => reflectance.push((nm, plane)),
+                Some((Component::Stokes(_), _)) => polarised = true,
+                None => {}
+            }
+        }
+        let (mut bands, quantity) = match (light.is_empty(), reflectance.is_empty()) {
+            (false, _) => (light, Quantity::Light),
+            (true, false) => (reflectance, Quantity::Reflectance),
+            (true, true) => return Ok(None),
+        };
+        // An EXR file has its channels in the order of their names.
+        bands.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (middles, planes): (Vec<f64>, Vec<Plane>) = bands.into_iter().unzip();
+        let own = channels.texts.get(OWN_BANDS).and_then(|text| own_edges(text));
+        let own = own.filter(|edges| edges.len() == middles.len() + 1);
+        let axis = match own {
+            Some(edges) => BandAxis::between(edges),
+            None => BandAxis::new(middles, None),
+        };
+        let axis = axis.map_err(DecodeError::Cube)?;
+        let [columns, rows] = channels.size;
+        let mut values = room::<f32>(columns * rows * planes.len())?;
+        for i in 0..columns * rows {
+            values.extend(planes.iter().map(|plane| plane.at(i)));
+        }
+        let mut notes = Vec::new();
+        if polarised {
+            notes.push(
+                "its light is polarised, of which sensors see nothing: S0 alone is read".to_owned(),
+            );
+        }
+        let unit = channels.texts.get("emissiveUnits").cloned();
+        let unit = unit.filter(|_| quantity == Quantity::Light);
+        Ok(Some(Self {
+            size: channels.size,
+            axis,
+            values,
+            quantity,
+            unit,
+            texts: channels.texts,
+            notes,
+        }))
+    }
+}
+
+/// The attribute in which this program's own files say what their bands are, as JSON.
+const OWN_BANDS: &str = "etendue:Spectrum";
+
+/// The edges of bands (nm) in the meaning of a layer of bands, which is JSON: the entry `band edges nm`,
+/// `[400.0, 410.0]`.
+#[must_use]
+pub fn own_edges(meaning: &str) -> Option<Vec<f64>> {
+    let (_, rest) = meaning.split_once("\"band edges nm\"")?;
+    let (_, list) = rest.split_once('[')?;
+    let (list, _) = list.split_once(']')?;
+    let edges: Option<Vec<f64>> = list.split(',').map(|edge| edge.trim().parse().ok()).collect();
+    edges.filter(|edges| edges.len() > 1)
+}
+
+impl Plane {
+    #[expect(clippy::cast_precision_loss, reason = "light is no number of things")]
+    fn at(&self, i: usize) -> f32 {
+        match self {
+            Self::F32(values) => values[i],
+            Self::U32(values) => values[i] as f32,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channels_are_named_as_in_the_paper() {
+        for (name, found) in [
+            ("S0.550,5nm", Some((Component::Stokes(0), 550.5))),
+            ("S0.400,000000nm", Some((Component::Stokes(0), 400.0))),
+            ("S3.5,5e2nm", Some((Component::Stokes(3), 550.0))),
+            ("T.0,55um", Some((Component::Reflectance, 550.0))),
+            ("S0.4e-7m", Some((Component::Stokes(0), 400.0))),
+            // c / 545.077196 THz = 550 nm.
+            ("S0.545,077196363THz", Some((Component::Stokes(0), 550.0))),
+            ("T.380,0nm.400,0nm", None),
+            ("S4.400nm", None),
+            ("S0.nm", None),
+            ("S0.-400nm", None),
+            ("Depth.Z", None),
+            ("R", None),
+        ] {
+            assert_eq!(spectral_channel(name), found, "{name}");
+        }
+        for nm in [400.0, 552.5, 1050.0, 487.123_456] {
+            assert_eq!(spectral_channel(&emission_channel(nm)), Some((Component::Stokes(0), nm)));
+        }
+        assert_eq!(emission_channel(552.5), "S0.552,5nm");
+    }
+
+    #[test]
+    fn bands_reach_to_their_neighbours_or_as_wide_as_they_are() {
+        let edges = |middles: &[f64], widths: Option<&[f64]>| {
+            BandAxis::new(middles.to_vec(), widths).map(|axis| axis.edges().to_vec())
+        };
+        assert_eq!(edges(&[405.0, 415.0, 430.0], None).unwrap(), [400.0, 410.0, 422.5, 437.5]);
+        // Bands of unequal widths that meet.
+        let met = edges(&[405.0, 420.0, 440.0], Some(&[10.0, 20.0, 20.0]));
+        assert_eq!(met.unwrap(), [400.0, 410.0, 430.0, 450.0]);
+        // Filters with gaps between them.
+        let apart = edges(&[450.0, 550.0], Some(&[10.0, 10.0]));
+        assert_eq!(apart.unwrap(), [400.0, 500.0, 600.0]);
+        assert_eq!(edges(&[550.0], Some(&[20.0])).unwrap(), [540.0, 560.0]);
+        for (middles, word) in [
+            (&[][..], "no band"),
+            (&[550.0], "one band"),
+            (&[400.0, 400.0], "two bands at 400 nm, 1 and 2"),
+            (&[400.0, 500.0, 450.0], "band 2 is at 500 nm and band 3 at 450 nm"),
+            (&[-400.0, 500.0], "band 1 at -400 nm"),
+            (&[400.0, f64::NAN], "band 2 at NaN nm"),
+        ] {
+            let why = edges(middles, None).unwrap_err();
+            assert!(why.contains(word), "{middles:?}: {why}");
+        }
+    }
+
+    fn channels(names: &[&str]) -> ExrChannels {
+        let plane = |k: usize| Plane::F32(vec![k as f32, 10.0 + k as f32]);
+        let planes = names.iter().enumerate().map(|(k, name)| ((*name).to_owned(), plane(k)));
+        let texts = [("emissiveUnits".to_owned(), "W.m^-2.sr^-1".to_owned())].into();
+        ExrChannels { size: [2, 1], planes: planes.collect(), texts }
+    }
+
+    #[test]
+    fn light_comes_before_reflectance_in_the_order_of_wavelengths() {
+        let light = ["B", "S0.1100,0nm", "S0.400,0nm", "S1.400,0nm", "T.400,0nm"];
+        let cube = Cube::from_exr(channels(&light)).unwrap().unwrap();
+        assert_eq!((cube.quantity, cube.unit.as_deref()), (Quantity::Light, Some("W.m^-2.sr^-1")));
+        assert_eq!(cube.axis.wavelengths(), [400.0, 1100.0]);
+        assert_eq!(cube.values, [2.0, 1.0, 12.0, 11.0]);
+        assert!(cube.notes[0].contains("polarised"), "{:?}", cube.notes);
+        let share = Cube::from_exr(channels(&["T.500,0nm", "T.400,0nm"])).unwrap().unwrap();
+        assert_eq!((share.quantity, share.unit), (Quantity::Reflectance, None));
+        assert_eq!(share.values, [1.0, 0.0, 11.0, 10.0]);
+        assert!(Cube::from_exr(channels(&["R", "G", "B"])).unwrap().is_none());
+        let twice = Cube::from_exr(channels(&["S0.0,4um", "S0.400,0nm"])).unwrap_err().to_string();
+        assert!(twice.contains("two bands at 400 nm"), "{twice}");
+        // What this program itself says of its bands counts, and not their names' middles.
+        let mut own = channels(&["S0.425,0nm", "S0.500,0nm"]);
+        let meaning = r#"{"definition":"light","band edges nm":"[400.0, 450.0, 550.0]"}"#;
+        own.texts.insert(OWN_BANDS.to_owned(), meaning.to_owned());
+        assert_eq!(Cube::from_exr(own).unwrap().unwrap().axis.edges(), [400.0, 450.0, 550.0]);
+    }
+
+    #[test]
+    fn micrometres_are_converted_or_asked_about() {
+        let nm = |numbers: &[f64], unit| in_nanometres(numbers.to_vec(), unit);
+        assert_eq!(nm(&[0.55, 0.6], Some("Micrometers")).unwrap(), [550.0, 600.0]);
+        assert_eq!(nm(&[5500.0], Some("Angstroms")).unwrap(), [550.0]);
+        assert_eq!(nm(&[550.0], None).unwrap(), [550.0]);
+        assert_eq!(nm(&[550.0], Some("Unknown")).unwrap(), [550.0]);
+        for (numbers, unit, word) in [
+            (0.55, None, "did you mean micrometres"),
+            (0.55, Some("nm"), "did you mean micrometres"),
+            (18_181.0, Some("Wavenumber"), "wavenumber, which is not read"),
+        ] {
+            let why = nm(&[numbers], unit).unwrap_err();
+            assert!(why.contains(word), "{numbers} {unit:?}: {why}");
+        }
+    }
+}
