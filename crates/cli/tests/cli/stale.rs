@@ -22,7 +22,8 @@ enum Kind {
 }
 
 use Kind::{
-    Exposures, FocusedLightField, Frames, FramesByLayer, LightField, Merged, Picture, ReferenceViews,
+    Exposures, FocusedLightField, Frames, FramesByLayer, LightField, Merged, Picture,
+    ReferenceViews,
 };
 
 const KINDS: [Kind; 8] = [

@@ -136,8 +136,8 @@ impl LightFieldViews {
             }
             Source::Patches { camera, raw, white } => {
                 let lenslets = camera.lens().zip(camera.light_field());
-                let (lens, light_field) =
-                    lenslets.ok_or_else(|| RenderError::Camera("there are no lenslets".to_owned()))?;
+                let (lens, light_field) = lenslets
+                    .ok_or_else(|| RenderError::Camera("there are no lenslets".to_owned()))?;
                 let patches = Patches::new(lens, light_field, Some(depth));
                 patches.map_err(RenderError::Camera)?.rendered(raw, white)?
             }

@@ -60,8 +60,8 @@ impl MemoryForecast {
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
         let geometry: u64 = scene.geometry.meshes.iter().map(|mesh| mesh.heap_bytes() as u64).sum();
-        let structure = structure(scene.geometry.triangles_unique())
-            + Coplanar::bytes_at_most(&scene.geometry);
+        let structure =
+            structure(scene.geometry.triangles_unique()) + Coplanar::bytes_at_most(&scene.geometry);
         let copies = copies(scene.placed_copies());
         let film = film(scene.camera.resolution(), &scene.layers);
         let mapped = scene.stats.bytes_mapped;

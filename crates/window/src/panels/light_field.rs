@@ -108,7 +108,9 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
         Shows::Raw => {}
         Shows::View(at) => pupil(ui, count, at),
         Shows::Focused(depth) => {
-            let slider = egui::Slider::new(depth, distances[0]..=distances[1]).logarithmic(true).suffix(" m");
+            let slider = egui::Slider::new(depth, distances[0]..=distances[1])
+                .logarithmic(true)
+                .suffix(" m");
             let slider = ui.add(slider.custom_formatter(|depth, _| short(depth)));
             mark(ui.ctx(), "refocus", slider.rect);
         }
