@@ -377,6 +377,10 @@ fn what_is_no_light_field_is_refused_in_words() {
         .collect();
     assert!(misses.is_empty(), "{misses:#?}");
     assert!(light_field("\"fill\": 1", "\"refocus_distance\": \"infinity\",").is_ok());
+}
+
+#[test]
+fn cameras_that_lack_what_a_light_field_needs_are_refused_in_words() {
     let base = |keys: &str| camera(&format!(r#"{{"type": "light_field", {keys}}}"#)).unwrap_err();
     let sensor = r#""sensor": {"resolution": [240, 200], "pixel_pitch": 10}"#;
     assert!(

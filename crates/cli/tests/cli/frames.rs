@@ -457,8 +457,14 @@ fn bad_frames_are_refused_by_number() {
     let pose = |z: f64| json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, z], [0, 0, 0, 1]]);
     let odd = json!({"fl_x": 2e-5, "fl_y": 20, "k1": 0.01, "frames": [
         {"file_path": "a", "transform_matrix": pose(4.0)}, {"file_path": "b", "transform_matrix": pose(5.0)}]});
+    let mut free: Value = serde_json::from_str(&scene(&poses("odd.json"))).unwrap();
+    free["camera"].as_object_mut().unwrap().remove("fov");
+    let bench = Bench::with_scene(&free.to_string());
+    bench.write("odd.json", odd.to_string().as_bytes());
     let started = std::time::Instant::now();
-    let error = refused(&poses("odd.json"), &[("odd.json", odd.to_string().as_bytes())], &[]);
+    let output = bench.run(&["render", "scene.json", "-o", "out", "-q"]);
+    let error = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{error}");
     assert!(error.contains("frames[0]") && error.contains("check the focal lengths"), "{error}");
     assert!(started.elapsed().as_secs_f64() < 5.0, "{:?}", started.elapsed());
     // Poses that are no rotation: which, and by how much.

@@ -26,7 +26,7 @@ pub struct LightFieldViews {
 #[derive(Debug, Clone)]
 enum Source {
     Views { views: Views, grid: Arc<ViewGrid> },
-    Patches { camera: Camera, raw: Arc<Picture>, white: Arc<Picture> },
+    Patches { camera: Box<Camera>, raw: Arc<Picture>, white: Arc<Picture> },
 }
 
 /// The nearest and the farthest plane that is offered, as a share of the distance in focus, and the steps in which
@@ -157,6 +157,6 @@ impl Source {
         let white = Arc::new(white::picture(&opened, &scene.render)?);
         let size = [raw.width(), raw.height()];
         let raw = picture(size, "the raw picture", |pixel, color| planes[color][pixel])?;
-        Ok(Some(Self::Patches { camera: scene.camera.clone(), raw: raw.into(), white }))
+        Ok(Some(Self::Patches { camera: Box::new(scene.camera.clone()), raw: raw.into(), white }))
     }
 }
