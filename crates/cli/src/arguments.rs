@@ -14,7 +14,7 @@ use etendue_scene::LoadOptions;
 use etendue_scene::import::Strictness;
 use etendue_tracer::LayerSpec;
 
-pub(crate) use tools::{BenchArguments, LensArguments, PartArgument};
+pub(crate) use tools::{BenchArguments, LensArguments, PartArgument, SpectrumArguments};
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
 /// it.
@@ -52,6 +52,9 @@ pub(crate) enum Command {
     /// Show what a sensor makes of light, or make the images that EMVA 1288 characterises it by
     #[command(after_help = SENSOR_HELP)]
     Sensor(SensorArguments),
+    /// Print what a curve over wavelengths is: XYZ, colour temperature, luminous efficacy, photons
+    #[command(after_help = tools::SPECTRUM_HELP)]
+    Spectrum(SpectrumArguments),
     /// Open a window onto a scene, a lens or an image: look, change the camera, inspect pixels, save
     #[command(after_help = VIEW_HELP)]
     View(ViewArguments),

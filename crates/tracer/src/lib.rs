@@ -20,6 +20,7 @@
 //! | [`placed`] | what there is to know of each placement before any ray meets it |
 //! | [`spawn`] | where a ray that leaves a surface starts |
 //! | [`transport`] | batches of paths, and the rules of each tracer of light |
+//! | [`tint`] | the colour of a surface where it was met, and its curve |
 //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
 mod angles;
@@ -52,6 +53,7 @@ mod spectral_sky;
 mod surface;
 mod target;
 pub mod texture;
+pub mod tint;
 pub mod transport;
 
 pub use clear_sky::ClearSky;
@@ -71,4 +73,5 @@ pub use scattering::{Absorption, Glass, Ior, Scattering};
 pub use spec::{LightSpec, MaterialSpec};
 pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
+pub use tint::{Conductor, ConductorId, SceneCurve, Tint, TintSpectrum};
 pub use transport::{LightingContext, RayStats, Rules, Samples, Scratch, Traits};
