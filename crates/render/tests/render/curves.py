@@ -38,6 +38,10 @@ def lamp(spec, nm):
     if isinstance(name, dict):
         kelvin = name["black_body"]
         return scale * planck(kelvin, nm) / planck(kelvin, 560.0)
+    if name == "a":
+        # CIE 015:2018, equation 4.1, which holds beyond the table's 830 nm as well.
+        a = lambda nm: nm**-5.0 / np.expm1(1.435e7 / (2848.0 * nm))
+        return scale * a(nm) / a(560.0)
     words = {"a": "A", "d50": "D50", "d65": "D65"}
     name = words.get(name, name.upper().replace("_", "-"))
     return scale * np.interp(nm, *table(name), left=0.0, right=0.0)

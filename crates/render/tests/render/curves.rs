@@ -9,7 +9,7 @@ use etendue_spectrum::colorchecker::PATCHES;
 use etendue_spectrum::{Bands, Grid};
 use serde_json::{Value, json};
 
-use crate::steps::{channels, load_json, picture, rendered};
+use crate::steps::{channels, load_json, rendered};
 
 pub(crate) fn scenes() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes")
@@ -69,17 +69,15 @@ fn thirty_one_bands_hold_the_reflectances_of_all_patches() {
     scene["lights"][0]["illuminant"] = json!("equal_energy");
     scene["camera"]["sensor"]["resolution"] = json!([96, 64]);
     let loaded = load_json(&scenes(), scene);
-    let plan = Plan::new(&loaded, Outputs::from_list("exr").unwrap());
-    assert_eq!(plan.bands.count(), 31);
-    let bands = channels(&picture(&loaded), "");
+    let (bands, light) = seen(&loaded, &middles([96, 64]));
+    assert_eq!(bands.count(), 31);
     let grid = Grid::equal(400.0, 700.0, 31).unwrap();
     let (mut sum, mut matrix) = (0.0, vec![Vec::new(); 24]);
-    for ((patch, row), pixel) in PATCHES.iter().zip(&mut matrix).zip(middles([96, 64])) {
-        for (band, values) in grid.bands().zip(&bands) {
+    for ((patch, row), light) in PATCHES.iter().zip(&mut matrix).zip(light) {
+        for (band, value) in grid.bands().zip(light) {
             // Irradiance π on a matte surface shows its reflectance.
-            let mean = patch.mean(band.from, band.to);
-            sum += (values[pixel] - mean).powi(2);
-            row.push(values[pixel]);
+            sum += (value - patch.mean(band.from, band.to)).powi(2);
+            row.push(value);
         }
     }
     let rms = (sum / (24.0 * 31.0)).sqrt();
