@@ -165,7 +165,8 @@ impl Sensor {
         let seen = |patch: &Curve| -> [f64; 3] {
             std::array::from_fn(|k| integral(&[&light, patch, &FINE_OBSERVER[k]], from, to))
         };
-        let (white, most) = (seen(&Curve::ONE)[1], raw(&Curve::ONE).into_iter().fold(0.0, f64::max));
+        let (white, most) =
+            (seen(&Curve::ONE)[1], raw(&Curve::ONE).into_iter().fold(0.0, f64::max));
         // The normal equations: M (Σ x xᵀ) = Σ c xᵀ.
         let (mut squares, mut products) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
         for patch in PATCHES.iter() {
@@ -180,9 +181,10 @@ impl Sensor {
             }
         }
         let inverse = inverse(&squares)?;
-        Some(products.map(|row| {
-            std::array::from_fn(|k| (0..3).map(|i| row[i] * inverse[i][k]).sum())
-        }))
+        Some(
+            products
+                .map(|row| std::array::from_fn(|k| (0..3).map(|i| row[i] * inverse[i][k]).sum())),
+        )
     }
 
     /// `AsShotNeutral`: white of each channel, the most of which is 1.

@@ -25,9 +25,8 @@ mod tests {
     #[test]
     fn there_are_twenty_four_patches_and_white_is_the_brightest() {
         assert_eq!(PATCHES.len(), 24);
-        let brightest = |nm: f64| {
-            (0..24).max_by(|&a, &b| PATCHES[a].held(nm).total_cmp(&PATCHES[b].held(nm)))
-        };
+        let brightest =
+            |nm: f64| (0..24).max_by(|&a, &b| PATCHES[a].held(nm).total_cmp(&PATCHES[b].held(nm)));
         assert!([450.0, 550.0].iter().all(|&nm| brightest(nm) == Some(18)));
     }
 }

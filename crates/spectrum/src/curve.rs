@@ -439,7 +439,9 @@ impl<'de> Visitor<'de> for CurveVisitor {
         }
         match sum {
             Some(sum) if samples.is_empty() => Ok(sum),
-            Some(_) => Err(de::Error::custom("samples and curves in one list: give one or the other")),
+            Some(_) => {
+                Err(de::Error::custom("samples and curves in one list: give one or the other"))
+            }
             None => Curve::sampled(samples).map_err(de::Error::custom),
         }
     }

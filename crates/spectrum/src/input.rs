@@ -210,7 +210,10 @@ mod tests {
 
     #[test]
     fn every_form_makes_its_curve() {
-        assert_eq!(resolved(r#"{"curve": [[400, 0.2], [600, 0.6]]}"#).unwrap().at(500.0), Some(0.4));
+        assert_eq!(
+            resolved(r#"{"curve": [[400, 0.2], [600, 0.6]]}"#).unwrap().at(500.0),
+            Some(0.4)
+        );
         let blue = resolved(r#"{"file": "patch.csv", "column": "blue"}"#).unwrap();
         let second = resolved(r#"{"file": "patch.csv", "column": 2}"#).unwrap();
         assert_eq!((blue.at(400.0), blue), (Some(0.9), second));

@@ -196,7 +196,8 @@ mod tests {
         let text = "REFERENCES: \"x\"\nDATA:\n  - type: tabulated nk\n    data: |\n        0.4 1.5 2.0\n        0.7 0.2 3.5\n";
         let [n, k] = refractive_index_info(text).unwrap();
         assert_eq!((n.at(400.0), k.at(700.0)), (Some(1.5), Some(3.5)));
-        let only = text.replace("tabulated nk", "tabulated n").replace(" 2.0", "").replace(" 3.5", "");
+        let only =
+            text.replace("tabulated nk", "tabulated n").replace(" 2.0", "").replace(" 3.5", "");
         assert!(refractive_index_info(&only).unwrap_err().contains("no table of k"));
         assert!(refractive_index_info("DATA:").unwrap_err().contains("no table of n"));
     }

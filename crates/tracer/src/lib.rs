@@ -13,7 +13,7 @@
 //! | [`layer`] | the table of layers, and what fills each |
 //! | [`reference`](mod@reference) | what a ray meets first, without light |
 //! | [`spec`] | materials and lights as scene files write them, and which surfaces they are |
-//! | [`material`], [`texture`] | surfaces, ready to be looked up |
+//! | [`material`], [`texture`], [`cube`] | surfaces, ready to be looked up |
 //! | [`footprint`] | how much of a surface a sample stands for |
 //! | [`scattering`], [`bsdf`] | how surfaces scatter light: by which model, and its formulas |
 //! | [`light`], [`group`], [`emitters`], [`environment`], [`clear_sky`] | where light comes from |
@@ -27,6 +27,7 @@ mod angles;
 mod bodies;
 pub mod bsdf;
 pub mod clear_sky;
+pub mod cube;
 pub mod emitters;
 pub mod environment;
 pub mod footprint;
@@ -57,6 +58,7 @@ pub mod tint;
 pub mod transport;
 
 pub use clear_sky::ClearSky;
+pub use cube::{Cube, SceneCube};
 pub use emitters::Emitters;
 pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};

@@ -7,7 +7,7 @@ use etendue_spectrum::Curve;
 
 use crate::scattering::{Absorption, GltfSurface, Scattering};
 use crate::texture::Encoding;
-use crate::{LightGroup, SceneCurve, TextureUse};
+use crate::{LightGroup, SceneCube, SceneCurve, TextureUse};
 
 /// Linear RGB with the sRGB primaries, 0..=1 for reflectances.
 pub type Color = [f64; 3];
@@ -232,6 +232,13 @@ pub enum Paint {
         /// Which image, over which coordinates.
         image: TextureUse,
     },
+    /// A reflectance by wavelength over texture coordinate set 0.
+    Cube {
+        /// The cube.
+        cube: SceneCube,
+        /// Copies along one unit of the texture coordinates, along u and v.
+        repeat: [f64; 2],
+    },
 }
 
 impl Paint {
@@ -241,11 +248,23 @@ impl Paint {
         !matches!(self, Self::Plain(_) | Self::Curve { .. })
     }
 
+    /// Whether it has more than the three numbers of a colour.
+    #[must_use]
+    pub fn has_spectrum(&self) -> bool {
+        matches!(self, Self::Cube { .. }) || !self.curves().is_empty()
+    }
+
+    /// Its cube.
+    #[must_use]
+    pub fn cube(&self) -> Option<&SceneCube> {
+        if let Self::Cube { cube, .. } = self { Some(cube) } else { None }
+    }
+
     /// Its curves.
     #[must_use]
     pub fn curves(&self) -> &[SceneCurve] {
         match self {
-            Self::Plain(_) | Self::Checker { curves: None, .. } => &[],
+            Self::Plain(_) | Self::Checker { curves: None, .. } | Self::Cube { .. } => &[],
             Self::Curve { curve, .. } => std::slice::from_ref(curve),
             Self::Checker { curves: Some(curves), .. } => &**curves,
             Self::Image { curve, .. } => curve.as_slice(),

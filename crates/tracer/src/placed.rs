@@ -88,10 +88,8 @@ fn plain_tint(paint: &Paint, spectral: &Spectral) -> Option<Tint> {
     match paint {
         Paint::Plain(color) => Some(Tint::from(*color).clamped()),
         Paint::Curve { look, .. } if spectral.is_rgb() => Some(Tint::from(*look).clamped()),
-        Paint::Curve { curve, .. } => {
-            Some(Tint { color: [1.0; 3], spectrum: curve.spectrum() })
-        }
-        Paint::Checker { .. } | Paint::Image { .. } => None,
+        Paint::Curve { curve, .. } => Some(Tint { color: [1.0; 3], spectrum: curve.spectrum() }),
+        Paint::Checker { .. } | Paint::Image { .. } | Paint::Cube { .. } => None,
     }
 }
 

@@ -9,8 +9,8 @@ use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vert
 use crate::footprint::mean_of_squares;
 use crate::material::Alpha;
 use crate::{
-    Color, Footprint, Image, Ior, Material, NormalKind, Paint, Pixel, SceneCurve, Scattering, Space,
-    Spectral, TextureUse, Tint, TintSpectrum,
+    Color, Footprint, Image, Ior, Material, NormalKind, Paint, Pixel, Scattering, SceneCurve,
+    Space, Spectral, TextureUse, Tint, TintSpectrum,
 };
 
 /// The frame that depths and camera-space vectors refer to.
@@ -219,7 +219,7 @@ impl SceneView<'_> {
         spot: &SurfacePoint<'_>,
     ) -> (Tint, f64) {
         let [r, g, b, alpha] = self.base_color(material, spot);
-        if spectral.is_rgb() || material.base_color.curves().is_empty() {
+        if spectral.is_rgb() || !material.base_color.has_spectrum() {
             return (Tint::from([r, g, b]), alpha);
         }
         let seen = match material.alpha {
@@ -229,18 +229,26 @@ impl SceneView<'_> {
         let mut tint = match &material.base_color {
             Paint::Plain(color) => Tint::from(*color),
             Paint::Curve { curve, .. } => Tint { color: [1.0; 3], spectrum: curve.spectrum() },
-            Paint::Checker { colors, curves, squares } => match (curves, squares_at(&seen, *squares)) {
-                (None, _) => Tint::from(colors[0]),
-                (Some(curves), Squares::One(number)) => {
-                    Tint { color: [1.0; 3], spectrum: curves[number].spectrum() }
+            Paint::Checker { colors, curves, squares } => {
+                match (curves, squares_at(&seen, *squares)) {
+                    (None, _) => Tint::from(colors[0]),
+                    (Some(curves), Squares::One(number)) => {
+                        Tint { color: [1.0; 3], spectrum: curves[number].spectrum() }
+                    }
+                    (Some(curves), Squares::Mean(wave)) => {
+                        let numbers = [curves[0].number, curves[1].number];
+                        let peak = curves[0].curve.extent()[1].max(curves[1].curve.extent()[1]);
+                        let spectrum = TintSpectrum::Mixed { numbers, share: 0.5 + wave, peak };
+                        Tint { color: [1.0; 3], spectrum }
+                    }
                 }
-                (Some(curves), Squares::Mean(wave)) => {
-                    let numbers = [curves[0].number, curves[1].number];
-                    let peak = curves[0].curve.extent()[1].max(curves[1].curve.extent()[1]);
-                    let spectrum = TintSpectrum::Mixed { numbers, share: 0.5 + wave, peak };
-                    Tint { color: [1.0; 3], spectrum }
-                }
-            },
+            }
+            Paint::Cube { cube, repeat } => {
+                let [u, v] = seen.uv(0);
+                let at = [u * repeat[0], v * repeat[1]];
+                let spectrum = TintSpectrum::Texel { number: cube.number, at };
+                Tint { color: [1.0; 3], spectrum }
+            }
             Paint::Image { curve, image, .. } => {
                 let [r, g, b, _] = self.tint(image, &seen);
                 let spectrum = curve.as_ref().map_or(TintSpectrum::White, SceneCurve::spectrum);
@@ -267,6 +275,11 @@ impl SceneView<'_> {
                     }),
                     Squares::One(number) => colors[number],
                 };
+                [r, g, b, 1.0]
+            }
+            Paint::Cube { cube, repeat } => {
+                let [u, v] = spot.uv(0);
+                let [r, g, b] = cube.cube.look([u * repeat[0], v * repeat[1]]);
                 [r, g, b, 1.0]
             }
             Paint::Image { factor, image, .. } => {
@@ -337,9 +350,8 @@ enum Squares {
 fn squares_at(spot: &SurfacePoint<'_>, squares: f64) -> Squares {
     let [u, v] = spot.uv(0);
     if let Some([a, b]) = spot.extent(0) {
-        let mean = |x: f64, k: usize| {
-            mean_of_squares(x * squares, (a[k].abs() + b[k].abs()) * squares)
-        };
+        let mean =
+            |x: f64, k: usize| mean_of_squares(x * squares, (a[k].abs() + b[k].abs()) * squares);
         return Squares::Mean(0.5 * mean(u, 0) * mean(v, 1));
     }
     // The last bit of the square numbers' sum alternates on both sides of 0. The cast saturates, so absurd

@@ -101,9 +101,10 @@ impl Scattering {
             Self::Black | Self::Unlit => Model::Black,
             Self::Matte => Model::Matte,
             Self::Mirror => Model::Mirror,
-            Self::Metal { roughness, named } => {
-                Model::Metal { alpha: roughness * roughness, named: named.as_ref().map(Conductor::id) }
-            }
+            Self::Metal { roughness, named } => Model::Metal {
+                alpha: roughness * roughness,
+                named: named.as_ref().map(Conductor::id),
+            },
             Self::Dielectric(glass) => Model::Dielectric {
                 alpha: glass.roughness * glass.roughness,
                 eta: met.eta(around, wavelength),
@@ -353,7 +354,8 @@ impl GltfSurface {
             Some(image) => around.texel(image, &met.spot),
             None => [1.0; 4],
         };
-        let SheetSurface { metallic, alpha, f0, f90, highlight } = self.sheet(&met.spot, around, spectral);
+        let SheetSurface { metallic, alpha, f0, f90, highlight } =
+            self.sheet(&met.spot, around, spectral);
         let (geometric, shading) = met.normals(around);
         let grain = self.grain(met, around, shading);
         let strength = grain.map_or(0.0, |(_, strength)| strength);

@@ -1,9 +1,11 @@
 //! From colours to the bands that a ray carries.
 
+use std::sync::Arc;
+
 use etendue_spectrum::{Bands, Curve, Metal, NoOverlap, Outside};
 
 use crate::bsdf::metal;
-use crate::{Color, ConductorId, Material, Tint, TintSpectrum};
+use crate::{Color, ConductorId, Cube, Material, SceneCube, Tint, TintSpectrum};
 
 /// Shares of a band's light between which a wavelength is interpolated.
 const SHARES: usize = 32;
@@ -23,6 +25,8 @@ pub struct Spectral {
     metals: Vec<[f64; 2]>,
     /// Of each curve of the scene by its number, and band: its mean.
     curves: Vec<f64>,
+    /// Each cube of the scene by its number, and its texels in these bands.
+    cubes: Vec<Option<(Arc<Cube>, Vec<f32>)>>,
 }
 
 impl Spectral {
@@ -40,6 +44,7 @@ impl Spectral {
             quantiles,
             metals,
             curves: Vec::new(),
+            cubes: Vec::new(),
             bands: bands.clone(),
         }
     }
@@ -56,6 +61,15 @@ impl Spectral {
                 spectral.curves.resize(start + count, 1.0);
             }
             spectral.curves[start..start + count].copy_from_slice(&means);
+        }
+        // Red, green and blue are the cubes' looks.
+        let cubes = materials.iter().filter(|_| !spectral.is_rgb);
+        for SceneCube { number, cube } in cubes.filter_map(|material| material.base_color.cube()) {
+            let number = *number as usize;
+            if spectral.cubes.len() <= number {
+                spectral.cubes.resize_with(number + 1, || None);
+            }
+            spectral.cubes[number] = Some((Arc::clone(cube), cube.in_bands(bands)));
         }
         spectral
     }
@@ -78,6 +92,14 @@ impl Spectral {
         self.curves.get(number as usize * self.count() + i).copied().unwrap_or(1.0)
     }
 
+    /// A cube of the scene at (u, v) in band `i`.
+    fn texel(&self, number: u32, at: [f64; 2], i: usize) -> f64 {
+        let Some(Some((cube, texels))) = self.cubes.get(number as usize) else { return 1.0 };
+        let value =
+            |(texel, share): (usize, f64)| share * f64::from(texels[texel * self.count() + i]);
+        cube.corners(at).into_iter().map(value).sum()
+    }
+
     /// A tint in band `i`.
     #[must_use]
     #[inline]
@@ -86,6 +108,7 @@ impl Spectral {
         match tint.spectrum {
             TintSpectrum::White => color,
             TintSpectrum::Curve { number, .. } => color * self.curve(number, i),
+            TintSpectrum::Texel { number, at } => color * self.texel(number, at, i),
             TintSpectrum::Mixed { numbers: [a, b], share, .. } => {
                 color * (share * self.curve(a, i) + (1.0 - share) * self.curve(b, i))
             }
@@ -164,9 +187,9 @@ impl Spectral {
 
 /// The means of a curve over bands, which goes on beyond its ends as it is there.
 fn held_in(bands: &Bands, curve: &Curve) -> Vec<f64> {
-    bands.from_curve(curve, Outside::Held).unwrap_or_else(|_| {
-        (0..bands.count()).map(|i| curve.held(bands.wavelength(i))).collect()
-    })
+    bands
+        .from_curve(curve, Outside::Held)
+        .unwrap_or_else(|_| (0..bands.count()).map(|i| curve.held(bands.wavelength(i))).collect())
 }
 
 /// What a metal reflects face on in each band, and the dip of its reflectance.

@@ -84,6 +84,13 @@ pub enum TintSpectrum {
         /// Its greatest value.
         peak: f64,
     },
+    /// A texel of a cube.
+    Texel {
+        /// The number of the cube.
+        number: u32,
+        /// Where: u and v.
+        at: [f64; 2],
+    },
     /// Two mixed, as squares of a checker within one sample are.
     Mixed {
         /// Their numbers.
@@ -108,7 +115,7 @@ impl Tint {
         let [r, g, b] = self.color;
         let color = r.max(g).max(b);
         match self.spectrum {
-            TintSpectrum::White => color,
+            TintSpectrum::White | TintSpectrum::Texel { .. } => color,
             TintSpectrum::Curve { peak, .. } | TintSpectrum::Mixed { peak, .. } => color * peak,
         }
     }

@@ -113,7 +113,10 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
         let Some(emission) = material.emission.as_ref().filter(|_| used(number)) else { continue };
         let color = match &emission.radiance {
             Paint::Plain(color) => *color,
-            Paint::Curve { .. } | Paint::Checker { .. } | Paint::Image { .. } => [1.0; 3],
+            Paint::Curve { .. }
+            | Paint::Checker { .. }
+            | Paint::Image { .. }
+            | Paint::Cube { .. } => [1.0; 3],
         };
         add(tinted(&color, &emission.illuminant), None);
     }
@@ -151,10 +154,13 @@ fn factors(material: &Material, most: u8) -> Vec<Factor> {
     let own = material.base_color.curves().iter();
     let layers = material.scattering.gltf();
     let layers = layers.into_iter().flat_map(|s| s.sheen_curve.iter().chain(&s.specular_curve));
-    factors.extend(own.chain(layers).map(|curve| Factor {
-        curve: Curve::clone(&curve.curve),
-        times: Times::UpTo(most),
-    }));
+    // Every texel of a cube is a sum of these.
+    let parts = material.base_color.cube().map(|cube| cube.cube.parts()).unwrap_or_default();
+    factors.extend(parts.into_iter().map(|curve| Factor { curve, times: Times::UpTo(1) }));
+    factors.extend(
+        own.chain(layers)
+            .map(|curve| Factor { curve: Curve::clone(&curve.curve), times: Times::UpTo(most) }),
+    );
     factors
 }
 
@@ -211,7 +217,7 @@ fn is_coloured(paint: &Paint) -> bool {
     match paint {
         Paint::Plain(color) => !is_grey(color),
         // Curves are tried as such.
-        Paint::Curve { .. } | Paint::Checker { curves: Some(_), .. } => false,
+        Paint::Curve { .. } | Paint::Checker { curves: Some(_), .. } | Paint::Cube { .. } => false,
         Paint::Checker { colors, curves: None, .. } => !colors.iter().all(is_grey),
         Paint::Image { .. } => true,
     }
@@ -219,7 +225,8 @@ fn is_coloured(paint: &Paint) -> bool {
 
 fn reflects_colour(material: &Material) -> bool {
     let layers = material.scattering.gltf().is_some_and(|surface| {
-        let colored = |color: &Color, curve: bool, image: bool| (!is_grey(color) && !curve) || image;
+        let colored =
+            |color: &Color, curve: bool, image: bool| (!is_grey(color) && !curve) || image;
         let sheen = colored(
             &surface.sheen_color,
             surface.sheen_curve.is_some(),

@@ -104,7 +104,8 @@ fn seen(scene: &Scene, pixels: &[usize]) -> (Bands, Vec<Vec<f64>>) {
 /// Electrons of each channel of the scene's sensor where it sees light in bands.
 fn counted(scene: &Scene, (bands, light): (&Bands, &[f64])) -> Vec<f64> {
     let sensor = scene.sensor.clone().unwrap().in_bands(bands.clone()).unwrap();
-    let channel = |c: usize| sensor.electrons_per_unit(c).iter().zip(light).map(|(e, l)| e * l).sum();
+    let channel =
+        |c: usize| sensor.electrons_per_unit(c).iter().zip(light).map(|(e, l)| e * l).sum();
     (0..sensor.channels().len()).map(channel).collect()
 }
 

@@ -572,8 +572,8 @@ fn every_view_of_a_chart_has_its_reflectances() {
     std::fs::create_dir(&spectra).unwrap();
     let table = crate::curves::scenes().join("spectra/colorchecker.csv");
     std::fs::copy(table, spectra.join("colorchecker.csv")).unwrap();
-    scene["camera"] = serde_json::from_str(&camera("light_field_reference", "", [300, 200], ""))
-        .unwrap();
+    scene["camera"] =
+        serde_json::from_str(&camera("light_field_reference", "", [300, 200], "")).unwrap();
     scene["camera"]["sensor"] = serde_json::json!({
         "type": "multispectral", "resolution": [300, 200], "pixel_pitch": 8,
         "bands": { "from": 400, "to": 700, "count": 31 }

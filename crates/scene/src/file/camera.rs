@@ -123,7 +123,8 @@ impl WrittenPlaces {
     fn curve_of(&self, value: &Value) -> Result<Curve, CurveFault> {
         let bad = |why: String| CurveFault { key: String::new(), why };
         let spec: CurveSpec = serde_json::from_value(value.clone()).map_err(|_| {
-            bad("is no curve: give { \"file\": \"x.csv\", \"column\": \"name\", \"scale\": 1 }".into())
+            bad("is no curve: give { \"file\": \"x.csv\", \"column\": \"name\", \"scale\": 1 }"
+                .into())
         })?;
         let folder = self.folder();
         let folder = self.opener.folder(folder).map_err(|error| bad(error.to_string()))?;

@@ -402,7 +402,11 @@ fn a_camera_that_is_not_there_lists_those_that_are() {
 fn curves_that_are_none_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("two.csv"), "nm,a,b\n400,0.1,0.2\n700,0.3,1.4\n").unwrap();
-    std::fs::write(folder.path().join("n.yml"), "DATA:\n - type: tabulated n\n   data: |\n 0.4 1.5\n 0.7 1.6\n").unwrap();
+    std::fs::write(
+        folder.path().join("n.yml"),
+        "DATA:\n - type: tabulated n\n   data: |\n 0.4 1.5\n 0.7 1.6\n",
+    )
+    .unwrap();
     let matte = |color: Value| json!({ "type": "matte", "color": color });
     for (material, place, word) in [
         (matte(json!({ "curve": [[500, 0.1], [400, 0.2]] })), "color.curve", "sort"),
@@ -415,11 +419,7 @@ fn curves_that_are_none_are_refused_by_name() {
         (matte(json!({ "file": "two.csv", "column": "c" })), "color.file", "\"a\", \"b\""),
         (matte(json!({ "file": "two.csv", "column": "b" })), "color", "1.4 at 700 nm"),
         (matte(json!({ "file": "none.csv" })), "color.file", "none.csv"),
-        (
-            json!({ "type": "metal", "metal": { "file": "n.yml" } }),
-            "metal.file",
-            "no table of k",
-        ),
+        (json!({ "type": "metal", "metal": { "file": "n.yml" } }), "metal.file", "no table of k"),
         (
             json!({ "type": "dielectric", "absorption": {
                 "color": { "curve": [[400, 0.5], [700, 1.5]] }, "distance": 1 } }),
@@ -441,9 +441,8 @@ fn curves_that_are_none_are_refused_by_name() {
             "objects": [{ "shape": "box", "material": "m" }], "materials": { "m": material }
         });
         let file = SceneFile::from_json(&Opener::default(), folder.path(), scene);
-        let error = file.and_then(|file| {
-            file.load(Wanted::NOTHING, &LoadOptions::default()).map(|_| ())
-        });
+        let error =
+            file.and_then(|file| file.load(Wanted::NOTHING, &LoadOptions::default()).map(|_| ()));
         let text = error.unwrap_err().to_string();
         let place = format!("materials.m.{place}");
         assert!(text.contains(&place) && text.contains(word), "{place} {word}: {text}");

@@ -25,8 +25,8 @@ use std::f64::consts::PI;
 
 use etendue_geometry::glam::DVec3;
 
-use crate::{Color, ConductorId, Tint};
 use crate::sampling::{Frame, cosine_direction};
+use crate::{Color, ConductorId, Tint};
 pub use coat::Coat;
 pub use layered::Layered;
 pub use metal::SECOND_COSINE;

@@ -8,7 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Bound, ColorSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, one, radiant_paint, white,
+    Bound, ColorSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, one, radiant_paint,
+    white,
 };
 use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
@@ -270,13 +271,7 @@ impl LightSpec {
                 LightKind::Environment { image, turn, visible: *visible }
             }
         };
-        Ok(vec![Light {
-            kind,
-            color,
-            illuminant: curve,
-            spectrum: None,
-            group: self.group(),
-        }])
+        Ok(vec![Light { kind, color, illuminant: curve, spectrum: None, group: self.group() }])
     }
 
     /// The group that it is of, if it names one.

@@ -7,13 +7,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ColorSpec, Fault, PaintSpec, Reflectance, Supply, checker, curve, default_checker_squares, look, one,
-    paint, radiant_paint, reflectance,
+    ColorSpec, Fault, PaintSpec, Reflectance, Supply, checker, curve, default_checker_squares,
+    look, one, paint, radiant_paint, reflectance,
 };
+use crate::bsdf::SECOND_COSINE;
 use crate::material::Alpha;
 use crate::scattering::{Absorption, Glass, GltfSurface};
-use crate::bsdf::SECOND_COSINE;
-use crate::{Conductor, Emission, LightGroup, Material, Paint, SceneCurve, Scattering};
+use crate::{Conductor, Emission, LightGroup, Material, Paint, Scattering, SceneCurve};
 
 /// A material as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -296,8 +296,8 @@ impl MaterialSpec {
             Paint::Plain(color) => (color, None, None),
             Paint::Curve { look, curve } => (look, Some(curve), None),
             Paint::Image { factor, curve, image } => (factor, curve, Some(image)),
-            Paint::Checker { .. } => {
-                let why = "is a checker; a sheen is of one colour, a curve or an image";
+            Paint::Checker { .. } | Paint::Cube { .. } => {
+                let why = "is a checker or a cube; a sheen is of one colour, a curve or an image";
                 return Err(Fault::new("sheen", why));
             }
         };

@@ -8,14 +8,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use etendue_image::linear_from_srgb;
-use etendue_spectrum::{Bands, Curve, CurveError, CurveFault, CurveSpec, Illuminant, Outside, rgb};
+use etendue_spectrum::{
+    Bands, Curve, CurveError, CurveFault, CurveSpec, Grid, Illuminant, Outside, rgb,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use self::light::{LightSpec, SunSpec};
 pub use self::material::{AbbeSpec, AbsorptionSpec, IorSpec, MaterialSpec};
 use crate::texture::{Filter, Wrap};
-use crate::{Color, Ior, Paint, SceneCurve};
+use crate::{Color, Cube, Ior, Paint, SceneCube, SceneCurve};
 
 /// The brightest that a light or a surface may be, in whichever unit: pictures hold no number above
 /// 3·10³⁸, and the powers of all lights are added up.
@@ -44,10 +46,31 @@ pub enum PaintSpec {
     Color(Color),
     /// An image over the surface's texture coordinates.
     Image(ImageSpec),
+    /// A reflectance by wavelength over the surface's texture coordinates.
+    Cube(CubeSpec),
     /// Squares over the surface's texture coordinates.
     Checker(CheckerSpec),
     /// A curve.
     Curve(CurveSpec),
+}
+
+/// A file of reflectances by wavelength over the surface's texture coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CubeSpec {
+    /// An NPY file, `[row][column][band]`, of reflectances of 0 to 1, relative to the scene file.
+    pub cube: String,
+    /// The wavelengths of its bands (nm).
+    pub bands: Grid,
+    /// What happens outside of 0..=1, along both axes.
+    #[serde(default)]
+    pub wrap: Wrap,
+    /// How texels are read.
+    #[serde(default)]
+    pub filter: Filter,
+    /// Copies of the cube along one unit of the texture coordinates, along u and v.
+    #[serde(default = "unit_scale")]
+    pub repeat: [f64; 2],
 }
 
 /// Squares of two colours over the surface's texture coordinates.
@@ -122,6 +145,13 @@ pub trait Supply {
     /// A sentence on why there is none.
     fn text(&mut self, written: &str) -> Result<String, String>;
 
+    /// A cube of reflectances.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such file, or it holds no such cube; keys are those of the cube.
+    fn cube(&mut self, spec: &CubeSpec) -> Result<Cube, Fault>;
+
     /// The next number for a curve of the scene.
     fn curve_number(&mut self) -> u32;
 
@@ -156,11 +186,7 @@ struct Reflectance {
 }
 
 /// A reflectance or transmittance.
-fn reflectance(
-    key: &str,
-    spec: &ColorSpec,
-    supply: &mut dyn Supply,
-) -> Result<Reflectance, Fault> {
+fn reflectance(key: &str, spec: &ColorSpec, supply: &mut dyn Supply) -> Result<Reflectance, Fault> {
     match spec {
         ColorSpec::Rgb(color) => {
             in_bounds(key, color, Bound::One)?;
@@ -233,7 +259,10 @@ fn emitted(
 fn emission(key: &str, curve: &Curve) -> Result<Emitted, Fault> {
     let [low, high] = curve.extent();
     if low < 0.0 {
-        return Err(Fault::new(key, format!("is {low} at its least; a light sends no less than 0")));
+        return Err(Fault::new(
+            key,
+            format!("is {low} at its least; a light sends no less than 0"),
+        ));
     }
     if high > BRIGHTEST {
         return Err(Fault::new(key, format!("is above {BRIGHTEST:e}; pictures hold no more")));
@@ -270,6 +299,12 @@ fn paint(key: &str, spec: &PaintSpec, supply: &mut dyn Supply) -> Result<Paint, 
                 Some(curve) => Paint::Curve { look, curve },
                 None => Paint::Plain(look),
             })
+        }
+        PaintSpec::Cube(cube) => {
+            let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
+            let (repeat, number) = (cube.repeat, supply.curve_number());
+            let cube = Arc::new(supply.cube(cube).map_err(below)?);
+            Ok(Paint::Cube { cube: SceneCube { number, cube }, repeat })
         }
         PaintSpec::Checker(CheckerSpec { checker, squares }) => {
             let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
@@ -339,6 +374,10 @@ fn radiant_paint(
             let spec = ColorSpec::Curve(spec.clone());
             let Emitted { color, curve } = emitted((key, &spec), illuminant, supply)?;
             (Paint::Plain(color), curve)
+        }
+        PaintSpec::Cube(_) => {
+            let why = "is a cube of reflectances, which gives off no light: give an image and an `illuminant`";
+            return Err(Fault::new(key, why));
         }
         PaintSpec::Checker(CheckerSpec { checker, squares }) => {
             let mut colors = [[0.0; 3]; 2];

@@ -19,7 +19,6 @@ use super::numbers::{DRAWS, Draw};
 use super::patch::{LANES, Patch, SheetColors, at};
 use super::step::weigh;
 use super::{Follow, LightingContext, RaySamples, Scratch, Tracing, Traits, kernels, metal};
-use crate::{Scattering, Tint};
 use crate::bsdf::{Bsdf, Weights};
 use crate::footprint::{Cone, Footprint};
 use crate::placed::{PlacedSurface, SurfaceKind};
@@ -27,6 +26,7 @@ use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
 use crate::sky::Asked;
 use crate::target::Chosen;
+use crate::{Scattering, Tint};
 
 /// Paths under way that have met equally many surfaces.
 #[derive(Debug, Default)]

@@ -11,13 +11,13 @@ use super::numbers::Draw;
 use super::patch::{LANES, Patch, at, put};
 use super::paths::State;
 use super::{Follow, Scratch, Tracing, kernels};
-use crate::{Scattering, Tint};
 use crate::bsdf::Weights;
 use crate::placed::{PlacedSurface, SurfaceKind};
 use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
 use crate::surface::SurfaceInteraction;
 use crate::target::Chosen;
+use crate::{Scattering, Tint};
 
 impl<const RGB: bool> Tracing<'_, RGB> {
     /// The step of all paths that go on.
@@ -94,9 +94,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let tilted = spot.tilted_normal(around, material, placed.turn.as_ref(), front);
             put(&mut patch.seen.shading, lane, tilted);
         }
-        patch.colors.push(placed.color.unwrap_or_else(|| {
-            around.base_tint(self.stage.spectral, material, &spot).0.clamped()
-        }));
+        patch.colors.push(
+            placed.color.unwrap_or_else(|| {
+                around.base_tint(self.stage.spectral, material, &spot).0.clamped()
+            }),
+        );
     }
 
     /// Adds a hit on a surface that may scatter light in any way, or not be there.

@@ -88,7 +88,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 let metal = SheetSurface { metallic: 1.0, alpha, f0: 0.0, f90: 0.0, highlight };
                 (metal, named.as_ref().map(Conductor::id), 1.0)
             }
-            Scattering::Gltf(surface) => (surface.sheet(&surface_point, scene, self.stage.spectral), None, 0.0),
+            Scattering::Gltf(surface) => {
+                (surface.sheet(&surface_point, scene, self.stage.spectral), None, 0.0)
+            }
             Scattering::Black
             | Scattering::Matte
             | Scattering::Unlit
@@ -168,11 +170,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let found = found
             .and_then(|surface_point| SurfaceInteraction::at(self.stage, surface_point, ray, hit));
         let black = || Bsdf::new(Model::Black, [hit.1; 2], -ray.1, [Tint::BLACK; 2]);
-        let bsdf =
-            found.map(|interaction| {
-                let spectral = self.stage.spectral;
-                interaction.bsdf(scene, spectral, spectral.wavelength(0))
-            });
+        let bsdf = found.map(|interaction| {
+            let spectral = self.stage.spectral;
+            interaction.bsdf(scene, spectral, spectral.wavelength(0))
+        });
         patch.bsdfs.push(bsdf.unwrap_or_else(black));
     }
 }
