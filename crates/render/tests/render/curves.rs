@@ -252,3 +252,110 @@ fn electrons_of_lines_and_notches_are_counted() {
         assert!(off.abs() < 1e-3, "{}: {off} in {} bands", case["name"], bands.count());
     }
 }
+
+/// An NPY file of little-endian f32.
+fn npy(shape: [usize; 3], values: &[f32]) -> Vec<u8> {
+    let [rows, columns, bands] = shape;
+    let mut header = format!(
+        "{{'descr': '<f4', 'fortran_order': False, 'shape': ({rows}, {columns}, {bands}), }}"
+    );
+    header.push_str(&" ".repeat((64 - (header.len() + 11) % 64) % 64));
+    header.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend(u16::try_from(header.len()).unwrap().to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    bytes
+}
+
+/// A surface of two texels by wavelength, and squares of two curves: each has its own numbers in every band.
+#[test]
+fn cubes_and_checkers_of_curves_are_seen_band_by_band() {
+    let folder = tempfile::tempdir().unwrap();
+    let (left, right) = ([0.1f32, 0.8, 0.2, 0.6], [0.9f32, 0.3, 0.5, 0.0]);
+    std::fs::write(folder.path().join("two.npy"), npy([1, 2, 4], &[left, right].concat())).unwrap();
+    let scene = |color: Value| {
+        json!({
+            "etendue": 1,
+            "camera": {
+                "type": "orthographic", "height": 1, "pose": { "from": [0, 0, 2], "look_at": [0, 0, 0] },
+                "sensor": { "type": "multispectral", "resolution": [4, 4], "bands": [400, 500, 600, 700, 800] }
+            },
+            "tracer": { "type": "path" }, "render": { "samples": 1 },
+            "objects": [{ "shape": "rectangle", "width": 1, "height": 1, "material": "a" }],
+            "materials": { "a": { "type": "matte", "color": color } },
+            "lights": [{ "type": "directional", "direction": [0, 0, -1],
+                         "irradiance": ([std::f64::consts::PI; 3]) }]
+        })
+    };
+    let bands = json!([400, 500, 600, 700, 800]);
+    let cube = json!({ "cube": "two.npy", "bands": bands, "filter": "nearest" });
+    let (_, light) = seen(&load_json(folder.path(), scene(cube)), &[4, 7]);
+    // The means over a band of straight lines between the bands' middles: half of a slope's step is outside.
+    let means = |v: [f32; 4]| -> Vec<f64> {
+        let v = v.map(f64::from);
+        let at = |i: usize, k: isize| v[(i as isize + k).clamp(0, 3) as usize];
+        (0..4).map(|i| 0.75 * v[i] + 0.125 * (at(i, -1) + at(i, 1))).collect()
+    };
+    for (found, expected) in light.iter().zip([means(left), means(right)]) {
+        for (found, expected) in found.iter().zip(expected) {
+            // Texels and films are f32.
+            assert!((found - expected).abs() < 1e-6, "{light:?}");
+        }
+    }
+    let square = |from: f64, to: f64| json!({ "curve": [[400, from], [800, to]] });
+    let checker = json!({ "checker": [square(0.0, 0.8), square(0.9, 0.5)], "squares": 2 });
+    let (_, light) = seen(&load_json(folder.path(), scene(checker)), &[0, 3]);
+    let mut found: Vec<Vec<f64>> = light;
+    found.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    for (band, [a, b]) in
+        [[0.1, 0.85], [0.3, 0.75], [0.5, 0.65], [0.7, 0.55]].into_iter().enumerate()
+    {
+        assert!(
+            (found[0][band] - a).abs() < 1e-6 && (found[1][band] - b).abs() < 1e-6,
+            "{found:?}"
+        );
+    }
+}
+
+/// A mirror, a metal and its n and k, and a body: curves have the closed form's numbers in every band.
+#[test]
+fn other_surfaces_have_their_curves_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let ramp = json!({ "curve": [[400, 0.2], [800, 0.6]] });
+    let scene = |material: Value, objects: Value| {
+        json!({
+            "etendue": 1,
+            "camera": {
+                "type": "orthographic", "height": 1, "pose": { "from": [0, 0, 2], "look_at": [0, 0, 0] },
+                "sensor": { "type": "multispectral", "resolution": [4, 4], "bands": [400, 500, 600, 700, 800] }
+            },
+            "tracer": { "type": "path" }, "render": { "samples": 1 },
+            "objects": objects, "materials": { "a": material },
+            "lights": [{ "type": "environment", "radiance": { "curve": [[300, 2], [900, 2]] } }]
+        })
+    };
+    let wall = json!([{ "shape": "rectangle", "width": 3, "height": 3, "material": "a" }]);
+    let slab = json!([{ "shape": "box", "size": [3, 3, 0.5], "material": "a" }]);
+    let n = json!({ "curve": [[400, 1.0], [800, 1.0]] });
+    let k = json!({ "curve": [[400, 2.0], [800, 2.0]] });
+    let cases = [
+        (json!({ "type": "mirror", "color": ramp }), &wall, [0.5, 0.7, 0.9, 1.1]),
+        (json!({ "type": "metal", "roughness": 0, "color": ramp }), &wall, [0.5, 0.7, 0.9, 1.1]),
+        // |n + ik − 1|² / |n + ik + 1|² of n = 1 and k = 2 is a half.
+        (json!({ "type": "metal", "roughness": 0, "metal": { "n": n, "k": k } }), &wall, [1.0; 4]),
+        // Through half a metre of what leaves the mean of a band after one: its root.
+        (
+            json!({ "type": "dielectric", "ior": 1, "absorption": { "color": ramp, "distance": 1 } }),
+            &slab,
+            [0.25f64, 0.35, 0.45, 0.55].map(|left| 2.0 * left.sqrt()),
+        ),
+    ];
+    for (material, objects, expected) in cases {
+        let scene = load_json(folder.path(), scene(material.clone(), objects.clone()));
+        let (_, light) = seen(&scene, &[5]);
+        for (found, expected) in light[0].iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-5, "{material}: {light:?}");
+        }
+    }
+}
