@@ -156,9 +156,7 @@ fn inputs() -> Vec<Input> {
     let lamp = json!({"lights": [{"type": "goniometric", "at": [0, 2, 0], "file": "lamp.ies"}]});
     add(&["LightSpec.file"], scene(&lamp), &[("lamp.ies", IES)], vec![longer(IES)]);
     // Curves of surfaces, metals, lights and sensors, and cubes of them.
-    let ball = |paint: Value| {
-        json!({"objects": [{"shape": "sphere", "material": "paint"}], "materials": {"paint": paint}})
-    };
+    let ball = |paint: Value| json!({"objects": [{"shape": "sphere", "material": "paint"}], "materials": {"paint": paint}});
     let matte = |color: Value| ball(json!({"type": "matte", "color": color}));
     let curve_keys: &[&str] = &["FileSpec.file"];
     let curve: [(&str, &[u8]); 1] = [("c.csv", b"400,0.5\n700,0.6\n")];

@@ -306,15 +306,17 @@ fn cubes_and_checkers_of_curves_are_seen_band_by_band() {
     let square = |from: f64, to: f64| json!({ "curve": [[400, from], [800, to]] });
     let checker = json!({ "checker": [square(0.0, 0.8), square(0.9, 0.5)], "squares": 2 });
     let (_, light) = seen(&load_json(folder.path(), scene(checker)), &[0, 3]);
-    let mut found: Vec<Vec<f64>> = light;
-    found.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    for (band, [a, b]) in
-        [[0.1, 0.85], [0.3, 0.75], [0.5, 0.65], [0.7, 0.55]].into_iter().enumerate()
-    {
-        assert!(
-            (found[0][band] - a).abs() < 1e-6 && (found[1][band] - b).abs() < 1e-6,
-            "{found:?}"
-        );
+    for found in light {
+        // A pixel sees both squares, mixed alike in every band.
+        let of = |share: f64, band: usize| {
+            let [a, b] = [[0.1, 0.85], [0.3, 0.75], [0.5, 0.65], [0.7, 0.55]][band];
+            share * a + (1.0 - share) * b
+        };
+        let share = (found[0] - 0.85) / (0.1 - 0.85);
+        assert!((share - 0.5).abs() > 0.1 && share > 0.0 && share < 1.0, "{share}: mostly one");
+        for (band, found) in found.iter().enumerate() {
+            assert!((found - of(share, band)).abs() < 1e-6, "{found} in band {band}");
+        }
     }
 }
 

@@ -128,8 +128,9 @@ fn a_raw_converter_develops_the_colours() {
             return;
         }
     };
-    // Top left, top right, bottom left, bottom right, in linear sRGB.
-    let colours = [[0.7, 0.05, 0.05], [0.05, 0.6, 0.05], [0.05, 0.05, 0.7], [0.8, 0.8, 0.8]];
+    // Top left, top right, bottom left, bottom right, in linear sRGB: as saturated as surfaces are, to which the
+    // matrix is fitted.
+    let colours = [[0.5, 0.2, 0.15], [0.15, 0.4, 0.15], [0.15, 0.15, 0.4], [0.8, 0.8, 0.8]];
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("raw.dng");
     let program = "import rawpy, sys, json
