@@ -2,7 +2,7 @@
 //!
 //! # Source
 //!
-//! The mean reflectances of 30 charts, measured by Danny Pascale (BabelColor, "The ColorChecker pages", 2012), as
+//! The mean reflectances of 30 charts, measured by Danny Pascale (BabelColor, 2012), as
 //! colour-science 0.4.7 publishes them (BSD 3-clause), 380 to 730 nm.
 
 use std::sync::LazyLock;

@@ -28,6 +28,7 @@ pub(crate) const C: [f64; 97] = [
 
 /// FL1 to FL12, each from 380 to 780 nm.
 #[rustfmt::skip]
+#[expect(clippy::approx_constant, reason = "measured, and no part of a circle")]
 pub(crate) const FLUORESCENT: [[f64; 81]; 12] = [
     // FL1
     [
@@ -177,6 +178,7 @@ pub(crate) const FLUORESCENT: [[f64; 81]; 12] = [
 
 /// LED-B1 to B5, BH1, RGB1, V1 and V2, each from 380 to 780 nm.
 #[rustfmt::skip]
+#[expect(clippy::approx_constant, reason = "measured, and no part of a circle")]
 pub(crate) const LED: [[f64; 81]; 9] = [
     // LED-B1
     [

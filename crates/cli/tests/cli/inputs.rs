@@ -125,6 +125,7 @@ fn longer(bytes: &[u8]) -> Vec<u8> {
     [bytes, b"\n"].concat()
 }
 
+#[expect(clippy::too_many_lines, reason = "one list of all keys that name files")]
 fn inputs() -> Vec<Input> {
     let mut inputs = Vec::new();
     let mut add = |keys, scene: Value, files: &[(&'static str, &[u8])], changed: Vec<Vec<u8>>| {

@@ -22,6 +22,7 @@ pub(crate) fn chart() -> Value {
 }
 
 /// The pixel in the middle of each patch of a chart in a picture of this width and height.
+#[expect(clippy::cast_possible_truncation, reason = "inside the picture")]
 fn middles([width, height]: [usize; 2]) -> Vec<usize> {
     let at = |k: usize| {
         // 4.2 m high, patches a metre apart.

@@ -555,6 +555,7 @@ fn spectrum_of(text: &str) -> Vec<f64> {
 
 /// A chart of measured patches in 31 bands: every view has the same numbers, those of the curves.
 #[test]
+#[expect(clippy::cast_possible_truncation, reason = "inside the view")]
 fn every_view_of_a_chart_has_its_reflectances() {
     let folder = tempfile::tempdir().unwrap();
     let mut scene = crate::curves::chart();
