@@ -14,7 +14,9 @@ use etendue_scene::LoadOptions;
 use etendue_scene::import::Strictness;
 use etendue_tracer::LayerSpec;
 
-pub(crate) use tools::{BenchArguments, ExposeArguments, LensArguments, PartArgument};
+pub(crate) use tools::{
+    BenchArguments, ExposeArguments, LensArguments, PartArgument, SpectrumArguments,
+};
 
 /// Simulates computational cameras: what a sensor records of a scene, with exact ground truth beside
 /// it.
@@ -55,6 +57,9 @@ pub(crate) enum Command {
     /// Expose a sensor to a picture from elsewhere: EXR (RGB or spectral), NPY, ENVI, or a folder of them
     #[command(after_help = tools::EXPOSE_HELP)]
     Expose(ExposeArguments),
+    /// Print what a curve over wavelengths is: XYZ, colour temperature, luminous efficacy, photons
+    #[command(after_help = tools::SPECTRUM_HELP)]
+    Spectrum(SpectrumArguments),
     /// Open a window onto a scene, a lens or an image: look, change the camera, inspect pixels, save
     #[command(after_help = VIEW_HELP)]
     View(ViewArguments),

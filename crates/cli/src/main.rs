@@ -16,6 +16,7 @@ mod render;
 mod room;
 mod sensor;
 mod sequence;
+mod spectrum;
 mod stop;
 
 use std::io::Write as _;
@@ -53,6 +54,7 @@ fn main() -> ExitCode {
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         Some(Command::Sensor(arguments)) => sensor::run(&arguments),
         Some(Command::Expose(arguments)) => expose::run(&arguments),
+        Some(Command::Spectrum(arguments)) => spectrum::run(&arguments),
         Some(Command::View(arguments)) => view(&arguments),
         Some(Command::Lens(arguments)) => lens::run(&arguments),
         Some(Command::Schema { of }) => print_schema(of),

@@ -74,11 +74,11 @@ pub(crate) fn settle(
     if !scene.studio_if_dark {
         return Ok(lighting);
     }
-    let spectral = Spectral::new(&Bands::Rgb);
+    let spectral = Spectral::of(&Bands::Rgb, &scene.materials);
     // The scene by its own lights alone.
     let lights = Lights::new(&lighting.lights, lighting.map.clone(), &surroundings, &spectral)
         .map_err(|error| RenderError::Lights(error.to_string()))?;
-    let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials);
+    let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials, &spectral);
     let stage = LightingContext {
         accel,
         surroundings,

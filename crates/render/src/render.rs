@@ -251,13 +251,13 @@ pub fn trace(
     let shared = shared.and_then(LensCamera::opened_paths);
     // Lights, the studio among them where all else leaves the scene dark.
     let surroundings = surroundings(scene, images, scene.render.samples.typical());
-    let spectral = Spectral::new(&plan.bands);
+    let spectral = Spectral::of(&plan.bands, &scene.materials);
     let mut notes = Vec::new();
     let seen = (accel, surroundings);
     let lit = light_of((scene, plan), images, seen, &spectral, &mut notes, watch)?;
     // What light passes ask of the scene.
     let emitters = lit.as_ref().and_then(|_| Emitters::of(&scene.geometry, &scene.materials));
-    let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials);
+    let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials, &spectral);
     let light = lit.as_ref().map(|(rules, lights)| LightPass {
         stage: LightingContext {
             accel,

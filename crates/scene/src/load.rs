@@ -42,7 +42,8 @@ impl SceneFile {
         let kept = options.cache.unwrap_or(&fresh);
         let folder = self.open_folder(&options.opener)?;
         let mut own = self.named_materials((&folder, options.glasses), wanted)?;
-        let lights = self.named_lights((&folder, options.glasses), wanted, &mut own.textures)?;
+        let (textures, files) = (&mut own.textures, &mut own.files);
+        let lights = self.named_lights((&folder, options.glasses), wanted, (textures, files))?;
         // What can be checked without the models is; a bad camera need not wait for them.
         let size = self.resolution(&folder, options, kept)?;
         let budget = Arc::new(Budget::new(options.memory_limit));
@@ -72,6 +73,7 @@ impl SceneFile {
         }
         parts.settle_backs(self.spec.cull_backfaces);
         parts.files = instance_files;
+        parts.files.extend(own.files);
         for (index, object) in objects.iter().enumerate() {
             self.check_overrides(&parts, object, index)?;
             // The copies are spoken for, as far as each places one mesh.

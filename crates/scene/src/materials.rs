@@ -1,13 +1,14 @@
 //! The scene file's own materials and lights, and the files and glasses that they name.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use etendue_files::InputFolder;
 use etendue_optics::glass::{AgfCatalogue, GlassSpec};
 use etendue_spectrum::Curve;
-use etendue_tracer::spec::{Fault, Supply};
-use etendue_tracer::spec::{ImageSpec, IorSpec};
-use etendue_tracer::{ImageSource, Ior, Light, LightKind, Material, Paint, Texture, TextureUse};
+use etendue_tracer::spec::{CubeSpec, Fault, ImageSpec, IorSpec, Supply};
+use etendue_tracer::{
+    Cube, ImageSource, Ior, Light, LightKind, Material, Paint, Texture, TextureUse,
+};
 use serde_json::Value;
 
 use crate::SceneError;
@@ -21,6 +22,8 @@ use crate::words::plain;
 pub(crate) struct OwnMaterials {
     pub(crate) materials: Vec<Material>,
     pub(crate) textures: Vec<Texture>,
+    /// Files of curves.
+    pub(crate) files: Vec<PathBuf>,
 }
 
 impl SceneFile {
@@ -30,8 +33,16 @@ impl SceneFile {
         wanted: Wanted,
     ) -> Result<OwnMaterials, SceneError> {
         let mut own = OwnMaterials::default();
+        let mut curves = 0;
         for (name, spec) in &self.spec.materials {
-            let mut supply = Named { folder, glasses, wanted, textures: &mut own.textures };
+            let mut supply = Named {
+                folder,
+                glasses,
+                wanted,
+                textures: &mut own.textures,
+                files: &mut own.files,
+                curves: &mut curves,
+            };
             let fault =
                 |Fault { key, why }| self.fault(&below(&join("materials", name), &key), why);
             own.materials.push(spec.build(name, &mut supply).map_err(fault)?);
@@ -45,13 +56,14 @@ impl SceneFile {
         &self,
         (folder, glasses): (&InputFolder, &[AgfCatalogue]),
         wanted: Wanted,
-        textures: &mut Vec<Texture>,
+        (textures, files): (&mut Vec<Texture>, &mut Vec<PathBuf>),
     ) -> Result<Option<Vec<Light>>, SceneError> {
         let Some(specs) = &self.spec.lights else { return Ok(None) };
         let mut lights: Vec<Light> = Vec::new();
         for (index, spec) in specs.iter().enumerate() {
             let at = join_index("lights", index);
-            let mut supply = Named { folder, glasses, wanted, textures };
+            let curves = &mut 0;
+            let mut supply = Named { folder, glasses, wanted, textures, files, curves };
             let fault = |Fault { key, why }| self.fault(&below(&at, &key), why);
             let built = spec.build(&mut supply).map_err(fault)?;
             let is_sky = |l: &Light| matches!(l.kind, LightKind::Environment { .. });
@@ -69,12 +81,21 @@ fn below(at: &str, key: &str) -> String {
     if key.is_empty() { at.to_owned() } else { format!("{at}.{key}") }
 }
 
+/// The longest cube that is read (bytes).
+const LONGEST_CUBE: u64 = 1 << 32;
+
+/// The longest table of a curve that is read (bytes).
+const LONGEST_TABLE: u64 = 1 << 26;
+
 /// The scene's folder and the catalogue of glasses.
 struct Named<'a> {
     folder: &'a InputFolder,
     glasses: &'a [AgfCatalogue],
     wanted: Wanted,
     textures: &'a mut Vec<Texture>,
+    files: &'a mut Vec<PathBuf>,
+    /// How many curves surfaces have so far.
+    curves: &'a mut u32,
 }
 
 impl Supply for Named<'_> {
@@ -84,7 +105,7 @@ impl Supply for Named<'_> {
             return Err(Fault::new("repeat", "is zero, which leaves no image"));
         }
         if !self.wanted.textures {
-            return Ok(Paint::Plain(spec.factor));
+            return Ok(Paint::Plain([1.0; 3]));
         }
         let same = |t: &Texture| {
             t.file() == Some(&path) && t.wrap == [spec.wrap; 2] && t.filter == spec.filter
@@ -103,7 +124,46 @@ impl Supply for Named<'_> {
         let [u, v] = spec.repeat;
         let transform = [[u, 0.0, 0.0], [0.0, v, 0.0]];
         let image = TextureUse { texture, uv_set: 0, transform, encoding: spec.encoding };
-        Ok(Paint::Image { factor: spec.factor, image })
+        Ok(Paint::Image { factor: [1.0; 3], curve: None, image })
+    }
+
+    fn text(&mut self, written: &str) -> Result<String, String> {
+        let path = self.file(written)?;
+        let bytes = etendue_files::read(&path, LONGEST_TABLE).map_err(|e| e.to_string())?;
+        self.files.push(path);
+        String::from_utf8(bytes).map_err(|_| "is no text".to_owned())
+    }
+
+    fn cube(&mut self, spec: &CubeSpec) -> Result<Cube, Fault> {
+        let count = spec.bands.len();
+        let read = |path: &Path| -> Result<Cube, String> {
+            let bytes = etendue_files::read(path, LONGEST_CUBE).map_err(|e| e.to_string())?;
+            let fits = |shape: &[usize]| match shape {
+                [_, _, bands] if *bands == count => Ok(()),
+                [_, _, bands] => Err(format!(
+                    "has {bands} bands a texel, and `bands` names {count}: their middles are the wavelengths"
+                )),
+                _ => Err(format!("has {} dimensions, not [row][column][band]", shape.len())),
+            };
+            let array = etendue_image::npy::read(&bytes, fits)?;
+            let size = [array.shape[1], array.shape[0]];
+            #[expect(clippy::cast_possible_truncation, reason = "reflectances keep seven digits")]
+            let values = array.numbers.into_iter().map(|v| v as f32).collect();
+            Cube::new(size, spec.bands.clone(), values, (spec.wrap, spec.filter))
+        };
+        let fault = |why: String| Fault::new("cube", format!("\"{}\" {why}", spec.cube));
+        if !spec.repeat.iter().all(|r| r.is_finite() && *r != 0.0) {
+            return Err(Fault::new("repeat", "is zero, which leaves no cube"));
+        }
+        let path = self.file(&spec.cube).map_err(fault)?;
+        let cube = read(&path).map_err(fault)?;
+        self.files.push(path);
+        Ok(cube)
+    }
+
+    fn curve_number(&mut self) -> u32 {
+        *self.curves += 1;
+        *self.curves - 1
     }
 
     fn file(&mut self, written: &str) -> Result<PathBuf, String> {

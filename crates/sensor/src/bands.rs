@@ -259,7 +259,9 @@ impl BandTable {
         };
         let times = factors.iter().map(|factor| factor.times).enumerate();
         let powers: Vec<Vec<f64>> = times.map(|(k, times)| times.powers(|p| left(k, p))).collect();
-        let Products { all: products, complete } = Products::of(light.colored, &powers, most)?;
+        let repeat: Vec<bool> = factors.iter().map(|factor| factor.times.may_repeat()).collect();
+        let Products { all: products, complete } =
+            Products::of(light.colored, &powers, &repeat, most)?;
         let mut table = Self {
             seen: nodes.sums(&[&seen]),
             lights: spectra.iter().map(|s| nodes.sums(&[&seen, s])).collect(),

@@ -7,10 +7,13 @@
 
 use std::io::{Seek, Write};
 
-use etendue_spectrum::colour::{Matrix3, SRGB_FROM_XYZ};
+use etendue_spectrum::colorchecker::PATCHES;
+use etendue_spectrum::colour::{FINE_OBSERVER, Matrix3, SRGB_FROM_XYZ, inverse};
+use etendue_spectrum::{Curve, Illuminant, integral};
 use tiff::encoder::{Rational, SRational, TiffEncoder};
 use tiff::tags::Tag;
 
+use crate::response::{Filter, filters};
 use crate::{RawImage, Sensor};
 
 /// Why there is no DNG.
@@ -127,14 +130,61 @@ impl Sensor {
         self.saturation_level() as u16
     }
 
-    /// `ColorMatrix1`: XYZ to channels, rows red, green, blue.
+    /// `ColorMatrix1`: XYZ to channels, rows red, green, blue: for filters with curves the matrix that fits the 24
+    /// patches of the ColorChecker under D65 best, for ideal ones that of their colours.
     fn colour_matrix(&self) -> Vec<SRational> {
+        if let Some(fitted) = self.fitted_matrix() {
+            return fitted.into_iter().flatten().map(signed).collect();
+        }
         let response = self.response_to_primaries();
         let camera: Matrix3 = self.of_rgb(|k| response[k]);
         let from_xyz = |row: [f64; 3]| -> [f64; 3] {
             std::array::from_fn(|k| (0..3).map(|i| row[i] * SRGB_FROM_XYZ[i][k]).sum())
         };
         camera.map(from_xyz).into_iter().flatten().map(signed).collect()
+    }
+
+    /// The matrix from XYZ to channels red, green and blue that is off the least squares from what they make of the 24
+    /// patches of the ColorChecker under D65; white has Y = 1, and 1 in the channel that sees the most of it. `None`
+    /// of filters without curves.
+    #[must_use]
+    pub fn fitted_matrix(&self) -> Option<Matrix3> {
+        let filters = filters(self.spec()).ok()?.filters;
+        if !filters.iter().all(|filter| matches!(filter, Filter::Curve(_))) {
+            return None;
+        }
+        let light = Illuminant::D65.curve().ok()?;
+        let [from, to] = light.range();
+        let ramp = Curve::sampled(vec![[from, from], [to, to]]).ok()?;
+        let curves = self.of_rgb(|k| filters.get(k).and_then(Filter::curve).cloned());
+        let [Some(r), Some(g), Some(b)] = curves else { return None };
+        let efficiency = &self.settings.efficiency;
+        let raw = |patch: &Curve| {
+            [&r, &g, &b].map(|f| integral(&[&light, patch, efficiency, f, &ramp], from, to))
+        };
+        let seen = |patch: &Curve| -> [f64; 3] {
+            std::array::from_fn(|k| integral(&[&light, patch, &FINE_OBSERVER[k]], from, to))
+        };
+        let (white, most) =
+            (seen(&Curve::ONE)[1], raw(&Curve::ONE).into_iter().fold(0.0, f64::max));
+        // The normal equations: M (Σ x xᵀ) = Σ c xᵀ.
+        let (mut squares, mut products) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
+        for patch in PATCHES.iter() {
+            let last = patch.range();
+            let patch = patch.held_over(from.min(last[0]), to.max(last[1]));
+            let (x, c) = (seen(&patch).map(|x| x / white), raw(&patch).map(|c| c / most));
+            for i in 0..3 {
+                for k in 0..3 {
+                    squares[i][k] += x[i] * x[k];
+                    products[i][k] += c[i] * x[k];
+                }
+            }
+        }
+        let inverse = inverse(&squares)?;
+        Some(
+            products
+                .map(|row| std::array::from_fn(|k| (0..3).map(|i| row[i] * inverse[i][k]).sum())),
+        )
     }
 
     /// `AsShotNeutral`: white of each channel, the most of which is 1.

@@ -75,4 +75,4 @@ pub use film::{Exposure, Film, InvalidValues, Moments, NoiseFloor, RawImage};
 pub use philox::mixed_seed;
 pub use preset::{Model, Preset};
 pub use sensor::Sensor;
-pub use spec::{NoiseModel, Radiometry, SensorKind, SensorSpec};
+pub use spec::{ChannelSet, ChannelSpec, Channels, NoiseModel, Radiometry, SensorKind, SensorSpec};

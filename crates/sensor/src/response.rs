@@ -16,7 +16,7 @@ use etendue_spectrum::{Band, Bands, Curve, Grid, PLANCK, SPEED_OF_LIGHT, VISIBLE
 use crate::philox::MOST_CHANNELS;
 use crate::preset::nikon_d5100;
 use crate::settings::SensorSettings;
-use crate::spec::{FilterSet, Filters, Radiometry, SensorKind, SensorSpec};
+use crate::spec::{Channels, FilterSet, Filters, Radiometry, SensorKind, SensorSpec};
 use crate::{CfaSpec, SensorError};
 
 /// The width of bands (nm) when nobody asks for any, curves have to be integrated and nothing is known
@@ -217,7 +217,7 @@ fn numbered(cfa: &CfaSpec, letters: &[char]) -> Vec<Vec<usize>> {
 
 fn multispectral(spec: &SensorSpec) -> Result<Filtered, SensorError> {
     // Channels with curves of their own.
-    if let Some(channels) = &spec.channels {
+    if let Some(channels) = spec.channels.as_ref().map(Channels::curves) {
         if channels.is_empty() {
             let why = "name one channel at least";
             return Err(SensorError::Missing { key: "channels", why });

@@ -1,9 +1,11 @@
 //! The sensor as a scene file writes it.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
 use etendue_geometry::units::{Micrometres, Seconds};
+use etendue_spectrum::colour::FINE_OBSERVER;
 use etendue_spectrum::{Curve, Grid};
 use schemars::JsonSchema;
 use serde::de::{self, MapAccess, Visitor};
@@ -104,9 +106,9 @@ pub struct SensorSpec {
     /// sensors divide the light.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bands: Option<Grid>,
-    /// Channels of a `multispectral` sensor by curves instead of bands.
+    /// Channels of a `multispectral` sensor by curves instead of bands, or the name of a set.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub channels: Option<Vec<ChannelSpec>>,
+    pub channels: Option<Channels>,
     /// How the preview of a `raw` sensor finds missing colours (default `malvar`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub demosaic: Option<Method>,
@@ -183,6 +185,50 @@ pub struct ChannelSpec {
     pub name: String,
     /// Its transmission (0..=1), which the quantum efficiency multiplies.
     pub curve: Curve,
+}
+
+/// Channels of a multispectral sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Channels {
+    /// A set by name.
+    Set(ChannelSet),
+    /// A curve for each.
+    Curves(Vec<ChannelSpec>),
+}
+
+/// Sets of channels that come with the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ChannelSet {
+    /// X, Y and Z of the CIE 1931 observer: a colorimeter. The curves are x̄, ȳ and z̄ over the wavelength, for
+    /// photons are counted, and alike in scale, so that light of equal energy has X = Y = Z.
+    #[serde(rename = "cie_1931")]
+    Cie1931,
+}
+
+impl Channels {
+    /// The curve of each channel.
+    #[must_use]
+    pub fn curves(&self) -> Cow<'_, [ChannelSpec]> {
+        let observer = match self {
+            Self::Curves(channels) => return Cow::Borrowed(channels),
+            Self::Set(ChannelSet::Cie1931) => &*FINE_OBSERVER,
+        };
+        let by_photon = |curve: &Curve| -> Vec<[f64; 2]> {
+            curve.samples().iter().map(|&[nm, value]| [nm, value / nm]).collect()
+        };
+        let all = observer.each_ref().map(by_photon);
+        let most = all.iter().flatten().map(|s| s[1]).fold(0.0, f64::max);
+        let scaled = |samples: &Vec<[f64; 2]>| {
+            Curve::sampled(samples.iter().map(|&[nm, value]| [nm, value / most]).collect())
+        };
+        let named = ["X", "Y", "Z"].into_iter().zip(&all);
+        let channels = named.filter_map(|(name, samples)| {
+            Some(ChannelSpec { name: name.to_owned(), curve: scaled(samples).ok()? })
+        });
+        Cow::Owned(channels.collect())
+    }
 }
 
 /// Transmissions of colour filters.

@@ -9,13 +9,21 @@ use std::sync::LazyLock;
 
 use crate::cie::{OBSERVER_1931, OBSERVER_START, STEP};
 use crate::curve::integral;
-use crate::{Curve, Illuminant};
+use crate::{Curve, Illuminant, cie_fine};
 
 /// x̄, ȳ, z̄ of the CIE 1931 standard observer (2°), 360..=830 nm.
 pub static OBSERVER: LazyLock<[Curve; 3]> = LazyLock::new(|| {
     std::array::from_fn(|k| {
         let row = |(i, row): (usize, &[f64; 3])| [OBSERVER_START + STEP * i as f64, row[k]];
         Curve::trusted(OBSERVER_1931.iter().enumerate().map(row).collect())
+    })
+});
+
+/// The same every nanometre: what measured and narrow spectra are weighted by.
+pub static FINE_OBSERVER: LazyLock<[Curve; 3]> = LazyLock::new(|| {
+    std::array::from_fn(|k| {
+        let row = |(i, row): (usize, &[f64; 3])| [cie_fine::START + i as f64, row[k]];
+        Curve::trusted(cie_fine::ROWS.iter().enumerate().map(row).collect())
     })
 });
 
@@ -93,12 +101,15 @@ pub fn apply(matrix: &Matrix3, column: [f64; 3]) -> [f64; 3] {
     matrix.map(|row| row[0] * column[0] + row[1] * column[1] + row[2] * column[2])
 }
 
-pub(crate) fn transpose(m: Matrix3) -> Matrix3 {
+/// The matrix with rows and columns exchanged.
+#[must_use]
+pub fn transpose(m: Matrix3) -> Matrix3 {
     std::array::from_fn(|i| std::array::from_fn(|k| m[k][i]))
 }
 
-/// `None` for a singular matrix.
-pub(crate) fn inverse(m: &Matrix3) -> Option<Matrix3> {
+/// The inverse; `None` for a singular matrix.
+#[must_use]
+pub fn inverse(m: &Matrix3) -> Option<Matrix3> {
     let cofactor = |i: usize, k: usize| {
         let (a, b, c, d) = ((i + 1) % 3, (i + 2) % 3, (k + 1) % 3, (k + 2) % 3);
         m[a][c] * m[b][d] - m[a][d] * m[b][c]

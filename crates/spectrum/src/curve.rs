@@ -3,8 +3,11 @@
 
 use std::fmt;
 
-use serde::de::{self, SeqAccess, Visitor};
+use serde::de::{self, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::CurveSpec;
+use crate::input::CurveSource;
 
 /// A function of wavelength (nm): one number for all of them, or samples joined by straight lines.
 ///
@@ -77,6 +80,17 @@ pub enum CurveError {
         /// Its value.
         value: f64,
     },
+    /// Wavelengths that are micrometres by mistake.
+    #[error(
+        "the curve's wavelengths are {first} to {last}: did you mean nm? Wavelengths are nanometres; \
+         multiply micrometres by 1000"
+    )]
+    Micrometres {
+        /// The first wavelength.
+        first: f64,
+        /// The last.
+        last: f64,
+    },
     /// A value outside of the bounds that its meaning sets.
     #[error("the curve is {value} at {}: it must lie in {low}..={high}", place(*wavelength))]
     OutOfBounds {
@@ -90,6 +104,9 @@ pub enum CurveError {
         high: f64,
     },
 }
+
+/// Wavelengths up to here are micrometres: nothing that a lens or a sensor is for lies below 20 nm.
+const MICROMETRES: f64 = 20.0;
 
 /// Where a value stands.
 fn place(wavelength: Option<f64>) -> String {
@@ -128,6 +145,11 @@ impl Curve {
             if wavelength <= previous {
                 return Err(CurveError::Unsorted { index: index + 1, wavelength, previous });
             }
+        }
+        if let [[first, _], .., [last, _]] = samples[..]
+            && last <= MICROMETRES
+        {
+            return Err(CurveError::Micrometres { first, last });
         }
         match samples.as_slice() {
             [] => Err(CurveError::Empty),
@@ -285,6 +307,30 @@ impl Curve {
         }
     }
 
+    /// The sum of two curves, each 0 outside of its range but for a flat one. Where one begins or ends with
+    /// another value than 0, a millionth of a nanometre is a slope.
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        const EDGE: f64 = 1e-6;
+        if let (CurveShape::Flat(a), CurveShape::Flat(b)) = (&self.shape, &other.shape) {
+            return Self { shape: CurveShape::Flat(a + b) };
+        }
+        let at = |curve: &Self, nm: f64| curve.at(nm).unwrap_or(0.0);
+        let mut knots: Vec<f64> = Vec::new();
+        for curve in [self, other] {
+            let samples = curve.samples();
+            knots.extend(samples.iter().map(|s| s[0]));
+            let ends = samples.first().zip(samples.last());
+            if let Some((first, last)) = ends {
+                knots.extend((first[1] != 0.0).then(|| (first[0] - EDGE).max(EDGE)));
+                knots.extend((last[1] != 0.0).then_some(last[0] + EDGE));
+            }
+        }
+        knots.sort_by(f64::total_cmp);
+        knots.dedup();
+        Self::trusted(knots.into_iter().map(|nm| [nm, at(self, nm) + at(other, nm)]).collect())
+    }
+
     /// ∫ curve dλ over `from..to` (nm), the curve being 0 outside of its range.
     #[must_use]
     pub fn integral(&self, from: f64, to: f64) -> f64 {
@@ -362,7 +408,10 @@ impl<'de> Visitor<'de> for CurveVisitor {
     type Value = Curve;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number, or a list of [nanometres, value] in ascending order")
+        f.write_str(
+            "a number, a list of [nanometres, value] in ascending order, or a curve such as \
+             {\"illuminant\": \"d65\"} or {\"line\": 532}",
+        )
     }
 
     fn visit_f64<E: de::Error>(self, value: f64) -> Result<Curve, E> {
@@ -378,12 +427,48 @@ impl<'de> Visitor<'de> for CurveVisitor {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Curve, A::Error> {
-        let mut samples = Vec::new();
-        while let Some(sample) = list.next_element::<[f64; 2]>()? {
-            samples.push(sample);
+        let (mut samples, mut sum) = (Vec::new(), None::<Curve>);
+        while let Some(element) = list.next_element::<Element>()? {
+            match element {
+                Element::Sample(sample) => samples.push(sample),
+                Element::Curve(source) => {
+                    let curve = of_source(CurveSpec::One(source))?;
+                    sum = Some(sum.map_or_else(|| curve.clone(), |sum| sum.plus(&curve)));
+                }
+            }
         }
-        Curve::sampled(samples).map_err(de::Error::custom)
+        match sum {
+            Some(sum) if samples.is_empty() => Ok(sum),
+            Some(_) => {
+                Err(de::Error::custom("samples and curves in one list: give one or the other"))
+            }
+            None => Curve::sampled(samples).map_err(de::Error::custom),
+        }
     }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Curve, A::Error> {
+        let source = CurveSource::deserialize(de::value::MapAccessDeserializer::new(map))?;
+        of_source(CurveSpec::One(source))
+    }
+}
+
+/// An element of a curve's list.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Element {
+    Sample([f64; 2]),
+    Curve(CurveSource),
+}
+
+/// A curve that names no file: those are read where it is known in which folder.
+fn of_source<E: de::Error>(spec: CurveSpec) -> Result<Curve, E> {
+    let mut none = |file: &str| {
+        Err(format!(
+            "\"{file}\" is not read here: give the curve in the scene's own camera, or as a list of \
+             [nm, value]"
+        ))
+    };
+    spec.resolve(&mut none).map_err(|fault| E::custom(fault.why))
 }
 
 impl schemars::JsonSchema for Curve {
@@ -393,10 +478,11 @@ impl schemars::JsonSchema for Curve {
 
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let samples = generator.subschema_for::<Vec<[f64; 2]>>();
+        let spec = generator.subschema_for::<CurveSpec>();
         schemars::json_schema!({
             "description": "A function of wavelength: a number, or a list of [nm, value] in \
-                ascending order, joined by straight lines.",
-            "anyOf": [{ "type": "number" }, samples],
+                ascending order, joined by straight lines, or a curve as colours may be.",
+            "anyOf": [{ "type": "number" }, samples, spec],
         })
     }
 }

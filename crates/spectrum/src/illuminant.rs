@@ -3,17 +3,19 @@
 //! # Sources
 //!
 //! * A, D50, D65 and daylight: CIE 15:2018, "Colorimetry", sections 4.1.1 to 4.1.3.
+//! * C, fluorescent lamps and LEDs: the tables of `lamps.rs`.
 //! * Black body: Planck's law with the exact constants of the SI (2019).
 
 use serde::{Deserialize, Serialize};
 
 use crate::cie::{DAYLIGHT, DAYLIGHT_START, STEP};
-use crate::{BOLTZMANN, Curve, PLANCK, SPEED_OF_LIGHT};
+use crate::{BOLTZMANN, Curve, PLANCK, SPEED_OF_LIGHT, lamps};
 
 /// A relative spectral power distribution, 1 at 560 nm.
 ///
-/// In JSON: `"equal_energy"`, `"a"`, `"d50"`, `"d65"`, `{ "daylight": 5600 }` or
-/// `{ "black_body": 3200 }` with temperatures in kelvin.
+/// In JSON: `"equal_energy"`, `"a"`, `"c"`, `"d50"`, `"d65"`, `"fl1"` to `"fl12"`, `"led_b1"` to `"led_b5"`,
+/// `"led_bh1"`, `"led_rgb1"`, `"led_v1"`, `"led_v2"`, `{ "daylight": 5600 }` or `{ "black_body": 3200 }` with
+/// temperatures in kelvin.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Illuminant {
@@ -21,6 +23,50 @@ pub enum Illuminant {
     EqualEnergy,
     /// A tungsten lamp (CIE standard illuminant A, a black body near 2856 K).
     A,
+    /// Average daylight as it was before D65 (CIE illuminant C).
+    C,
+    /// Fluorescent lamp: daylight, standard (CIE FL1).
+    Fl1,
+    /// Fluorescent lamp: cool white, standard (CIE FL2).
+    Fl2,
+    /// Fluorescent lamp: white, standard (CIE FL3).
+    Fl3,
+    /// Fluorescent lamp: warm white, standard (CIE FL4).
+    Fl4,
+    /// Fluorescent lamp: daylight, standard, 6350 K (CIE FL5).
+    Fl5,
+    /// Fluorescent lamp: light white, standard (CIE FL6).
+    Fl6,
+    /// Fluorescent lamp: daylight, broad-band, 6500 K (CIE FL7).
+    Fl7,
+    /// Fluorescent lamp: broad-band, 5000 K (CIE FL8).
+    Fl8,
+    /// Fluorescent lamp: cool white, broad-band (CIE FL9).
+    Fl9,
+    /// Fluorescent lamp: three-band, 5000 K (CIE FL10).
+    Fl10,
+    /// Fluorescent lamp: three-band, 4000 K (CIE FL11).
+    Fl11,
+    /// Fluorescent lamp: three-band, 3000 K (CIE FL12).
+    Fl12,
+    /// Phosphor-converted blue LED, 2733 K (CIE LED-B1).
+    LedB1,
+    /// Phosphor-converted blue LED, 2998 K (CIE LED-B2).
+    LedB2,
+    /// Phosphor-converted blue LED, 4103 K (CIE LED-B3).
+    LedB3,
+    /// Phosphor-converted blue LED, 5109 K (CIE LED-B4).
+    LedB4,
+    /// Phosphor-converted blue LED, 6598 K (CIE LED-B5).
+    LedB5,
+    /// Blue LED with phosphor, and a red one, 2851 K (CIE LED-BH1).
+    LedBh1,
+    /// Red, green and blue LEDs, 2840 K (CIE LED-RGB1).
+    LedRgb1,
+    /// Phosphor-converted violet LED, 2724 K (CIE LED-V1).
+    LedV1,
+    /// Phosphor-converted violet LED, 4070 K (CIE LED-V2).
+    LedV2,
     /// Daylight near the horizon (CIE illuminant D50).
     D50,
     /// Average daylight (CIE standard illuminant D65).
@@ -44,7 +90,7 @@ pub enum IlluminantError {
 }
 
 impl Illuminant {
-    /// The wavelengths at which all illuminants are known (nm): those of the CIE's daylight.
+    /// The wavelengths at which the CIE's daylight is known (nm).
     pub const RANGE: [f64; 2] = [300.0, 830.0];
 
     /// Passes the illuminant on when its temperature is possible.
@@ -64,13 +110,36 @@ impl Illuminant {
             | Self::A
             | Self::D50
             | Self::D65
+            | Self::C
+            | Self::Fl1
+            | Self::Fl2
+            | Self::Fl3
+            | Self::Fl4
+            | Self::Fl5
+            | Self::Fl6
+            | Self::Fl7
+            | Self::Fl8
+            | Self::Fl9
+            | Self::Fl10
+            | Self::Fl11
+            | Self::Fl12
+            | Self::LedB1
+            | Self::LedB2
+            | Self::LedB3
+            | Self::LedB4
+            | Self::LedB5
+            | Self::LedBh1
+            | Self::LedRgb1
+            | Self::LedV1
+            | Self::LedV2
             | Self::Daylight(_)
             | Self::BlackBody(_) => Ok(self),
         }
     }
 
     /// The power distribution, sampled every 5 nm: over [`Self::RANGE`] for daylight, over
-    /// 250..=2500 nm for those that a formula gives at any wavelength, flat for equal energy.
+    /// 250..=2500 nm for those that a formula gives at any wavelength, 380..=780 nm for lamps of a table (C from 300 nm),
+    /// flat for equal energy.
     ///
     /// # Errors
     ///
@@ -83,6 +152,28 @@ impl Illuminant {
         Ok(match self.checked()? {
             Self::EqualEnergy => Curve::ONE,
             Self::A => by_formula(&illuminant_a),
+            Self::C => tabulated(300.0, &lamps::C),
+            Self::Fl1 => tabulated(380.0, &lamps::FLUORESCENT[0]),
+            Self::Fl2 => tabulated(380.0, &lamps::FLUORESCENT[1]),
+            Self::Fl3 => tabulated(380.0, &lamps::FLUORESCENT[2]),
+            Self::Fl4 => tabulated(380.0, &lamps::FLUORESCENT[3]),
+            Self::Fl5 => tabulated(380.0, &lamps::FLUORESCENT[4]),
+            Self::Fl6 => tabulated(380.0, &lamps::FLUORESCENT[5]),
+            Self::Fl7 => tabulated(380.0, &lamps::FLUORESCENT[6]),
+            Self::Fl8 => tabulated(380.0, &lamps::FLUORESCENT[7]),
+            Self::Fl9 => tabulated(380.0, &lamps::FLUORESCENT[8]),
+            Self::Fl10 => tabulated(380.0, &lamps::FLUORESCENT[9]),
+            Self::Fl11 => tabulated(380.0, &lamps::FLUORESCENT[10]),
+            Self::Fl12 => tabulated(380.0, &lamps::FLUORESCENT[11]),
+            Self::LedB1 => tabulated(380.0, &lamps::LED[0]),
+            Self::LedB2 => tabulated(380.0, &lamps::LED[1]),
+            Self::LedB3 => tabulated(380.0, &lamps::LED[2]),
+            Self::LedB4 => tabulated(380.0, &lamps::LED[3]),
+            Self::LedB5 => tabulated(380.0, &lamps::LED[4]),
+            Self::LedBh1 => tabulated(380.0, &lamps::LED[5]),
+            Self::LedRgb1 => tabulated(380.0, &lamps::LED[6]),
+            Self::LedV1 => tabulated(380.0, &lamps::LED[7]),
+            Self::LedV2 => tabulated(380.0, &lamps::LED[8]),
             // The CIE corrects the nominal temperatures for today's value of Planck's second
             // constant: 1.4388 against 1.4380 cm·K (CIE 15:2018, section 4.1.3, note).
             Self::D50 => daylight(5000.0 * 1.4388 / 1.4380),
@@ -91,6 +182,14 @@ impl Illuminant {
             Self::BlackBody(kelvin) => by_formula(&|nm| planck(nm, kelvin)),
         })
     }
+}
+
+/// A table of values every 5 nm from `start` (nm), scaled to 1 at 560 nm.
+fn tabulated(start: f64, values: &[f64]) -> Curve {
+    let at = |(i, &value): (usize, &f64)| [start + STEP * i as f64, value];
+    let middle = values.iter().enumerate().map(at).find(|[nm, _]| *nm == 560.0);
+    let unit = middle.map_or(1.0, |[_, value]| value);
+    Curve::trusted(values.iter().enumerate().map(at).map(|[nm, v]| [nm, v / unit]).collect())
 }
 
 /// Spectral radiance of a black body (W·m⁻²·sr⁻¹·nm⁻¹) at `wavelength` (nm) and `kelvin`.

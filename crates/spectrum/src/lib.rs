@@ -30,9 +30,13 @@
 //! | module | idea |
 //! |---|---|
 //! | [`curve`] | a function of wavelength, given by samples |
+//! | [`input`] | curves as scene files write them |
+//! | [`table`] | measured curves in files |
 //! | [`grid`] | consecutive bands of wavelengths |
 //! | [`illuminant`] | lights by name, and Planck's law |
 //! | [`colour`] | the CIE 1931 observer and sRGB |
+//! | [`colorchecker`] | the 24 patches that cameras are calibrated by |
+//! | [`summary`] | what a curve is to the eye, as a colour and as photons |
 //! | [`metal`] | metals by name
 //! | [`rgb`] | from a colour to a spectrum and back |
 //! | [`bands`] | the numbers that a ray of a render carries |
@@ -40,19 +44,27 @@
 
 pub mod bands;
 mod cie;
+mod cie_fine;
+pub mod colorchecker;
 pub mod colour;
 pub mod curve;
 pub mod grid;
 pub mod illuminant;
+pub mod input;
+mod lamps;
 pub mod metal;
 pub mod rgb;
+pub mod summary;
+pub mod table;
 pub mod weighted;
 
 pub use bands::{Bands, NoOverlap, Outside, VISIBLE};
 pub use curve::{Curve, CurveError, integral};
 pub use grid::{Band, Grid, GridError};
 pub use illuminant::{Illuminant, IlluminantError};
+pub use input::{CurveFault, CurveSpec};
 pub use metal::Metal;
+pub use summary::Summary;
 pub use weighted::{Spread, WeightedBands};
 
 /// Planck's constant (J·s), exact in the SI.

@@ -60,6 +60,31 @@ impl Metal {
     }
 }
 
+/// What a smooth surface whose n and k are curves reflects at the cosine of incidence `cosine`, by wavelength: where
+/// either has a point, and between its points every 5 nm, for it is no straight line of theirs.
+///
+/// # Errors
+///
+/// When the curves have no wavelengths in common.
+pub fn reflectance_of([n, k]: [&Curve; 2], cosine: f64) -> Result<Curve, crate::CurveError> {
+    if let (Some(n), Some(k)) = (n.as_flat(), k.as_flat()) {
+        return Curve::flat(reflectance([n, k], cosine));
+    }
+    let range = [n.range(), k.range()];
+    let [from, to] = [range[0][0].max(range[1][0]), range[0][1].min(range[1][1])];
+    let mut knots: Vec<f64> = n.samples().iter().chain(k.samples()).map(|s| s[0]).collect();
+    let mut nm = (from / 5.0).ceil() * 5.0;
+    while nm < to {
+        knots.push(nm);
+        nm += 5.0;
+    }
+    knots.retain(|nm| (from..=to).contains(nm));
+    knots.sort_by(f64::total_cmp);
+    knots.dedup();
+    let at = |nm: f64| [nm, reflectance([n.held(nm), k.held(nm)], cosine)];
+    Curve::sampled(knots.into_iter().map(at).collect())
+}
+
 /// What a smooth surface of index `n + i k` reflects of unpolarised light at the cosine of incidence
 /// `cosine` (0..=1).
 #[must_use]

@@ -71,7 +71,7 @@ impl AreaLight {
             corner: [sum, lost + place.translation_low],
             shape: Shape::of(&spot)?,
             two_sided: emission.two_sided,
-            is_plain: matches!(emission.radiance, Paint::Plain(_)),
+            is_plain: matches!(emission.radiance, Paint::Plain(_) | Paint::Curve { .. }),
             magnitudes: magnitudes(placement, spot.mesh),
         })
     }
@@ -122,7 +122,7 @@ pub(crate) fn triangle_power(
     let sides = if emission.two_sided { 2.0 } else { 1.0 };
     // A texture may be dark at all four and shine between them: no triangle is passed over.
     let least = match &emission.radiance {
-        Paint::Plain(_) => 0.0,
+        Paint::Plain(_) | Paint::Curve { .. } | Paint::Cube { .. } => 0.0,
         Paint::Checker { colors, .. } => mean(&colors[0]).max(mean(&colors[1])),
         Paint::Image { factor, .. } => 0.05 * mean(factor),
     };

@@ -13,19 +13,21 @@
 //! | [`layer`] | the table of layers, and what fills each |
 //! | [`reference`](mod@reference) | what a ray meets first, without light |
 //! | [`spec`] | materials and lights as scene files write them, and which surfaces they are |
-//! | [`material`], [`texture`] | surfaces, ready to be looked up |
+//! | [`material`], [`texture`], [`cube`] | surfaces, ready to be looked up |
 //! | [`footprint`] | how much of a surface a sample stands for |
 //! | [`scattering`], [`bsdf`] | how surfaces scatter light: by which model, and its formulas |
 //! | [`light`], [`group`], [`emitters`], [`environment`], [`clear_sky`] | where light comes from |
 //! | [`placed`] | what there is to know of each placement before any ray meets it |
 //! | [`spawn`] | where a ray that leaves a surface starts |
 //! | [`transport`] | batches of paths, and the rules of each tracer of light |
+//! | [`tint`] | the colour of a surface where it was met, and its curve |
 //! | [`spectral`], [`sampling`] | colours to bands, numbers to directions |
 
 mod angles;
 mod bodies;
 pub mod bsdf;
 pub mod clear_sky;
+pub mod cube;
 pub mod emitters;
 pub mod environment;
 pub mod footprint;
@@ -52,9 +54,11 @@ mod spectral_sky;
 mod surface;
 mod target;
 pub mod texture;
+pub mod tint;
 pub mod transport;
 
 pub use clear_sky::ClearSky;
+pub use cube::{Cube, SceneCube};
 pub use emitters::Emitters;
 pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};
@@ -71,4 +75,5 @@ pub use scattering::{Absorption, Glass, Ior, Scattering};
 pub use spec::{LightSpec, MaterialSpec};
 pub use spectral::Spectral;
 pub use texture::{Image, ImageSource, Texture, TextureUse};
+pub use tint::{Conductor, ConductorId, SceneCurve, Tint, TintSpectrum};
 pub use transport::{LightingContext, RayStats, Rules, Samples, Scratch, Traits};

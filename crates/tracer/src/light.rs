@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use etendue_geometry::Bounds;
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_spectrum::{Curve, Illuminant};
+use etendue_spectrum::Curve;
 
 use crate::goniometric::Goniometric;
 use crate::light_tree::Cluster;
@@ -22,7 +22,7 @@ pub struct Light {
     /// Radiant intensity, irradiance or radiance, by the kind: linear RGB.
     pub color: Color,
     /// The spectrum that the colour multiplies; equal energy when absent.
-    pub illuminant: Option<Illuminant>,
+    pub illuminant: Option<Arc<Curve>>,
     /// What it sends as a curve, which takes the place of colour and illuminant in bands of wavelengths.
     pub spectrum: Option<Arc<Curve>>,
     /// The group that it is of, if it names one.

@@ -58,8 +58,8 @@ impl Lights {
         let mut bands = vec![0.0; lights.len() * count];
         for (light, bands) in lights.iter().zip(bands.chunks_mut(count)) {
             spectral.spread(&light.color, bands);
-            if let Some(illuminant) = light.illuminant {
-                let tint = spectral.illuminant(illuminant)?;
+            if let Some(illuminant) = &light.illuminant {
+                let tint = spectral.emission(illuminant)?;
                 bands.iter_mut().zip(&tint).for_each(|(band, tint)| *band *= tint);
             }
             if let Some(spectrum) = light.spectrum.as_ref().filter(|_| !spectral.is_rgb()) {
@@ -91,8 +91,8 @@ impl Lights {
             }
         }
         let tint = |material: &Material| -> Result<Option<Vec<f64>>, NoOverlap> {
-            match material.emission.as_ref().and_then(|e| e.illuminant) {
-                Some(illuminant) => spectral.illuminant(illuminant).map(Some),
+            match material.emission.as_ref().and_then(|e| e.illuminant.as_ref()) {
+                Some(illuminant) => spectral.emission(illuminant).map(Some),
                 None => Ok(None),
             }
         };

@@ -1,11 +1,13 @@
 //! Materials, ready to be looked up at a hit: what colour a surface has and what it gives off itself. How it
 //! scatters light is [`crate::scattering`].
 
-use etendue_spectrum::Illuminant;
+use std::sync::Arc;
+
+use etendue_spectrum::Curve;
 
 use crate::scattering::{Absorption, GltfSurface, Scattering};
 use crate::texture::Encoding;
-use crate::{LightGroup, TextureUse};
+use crate::{LightGroup, SceneCube, SceneCurve, TextureUse};
 
 /// Linear RGB with the sRGB primaries, 0..=1 for reflectances.
 pub type Color = [f64; 3];
@@ -52,7 +54,7 @@ pub struct Emission {
     /// Multiplies the radiance (`KHR_materials_emissive_strength`).
     pub strength: f64,
     /// The spectrum that the radiance multiplies; equal energy when absent.
-    pub illuminant: Option<Illuminant>,
+    pub illuminant: Option<Arc<Curve>>,
     /// The back shines too.
     pub two_sided: bool,
     /// The group of lights that it is of, if it names one.
@@ -143,6 +145,28 @@ impl Material {
         self.base_color.needs_uv() || shines || !self.textures(TextureScope::ALL).is_empty()
     }
 
+    /// The curves of what it reflects and lets pass.
+    #[must_use]
+    pub fn curves(&self) -> Vec<&SceneCurve> {
+        let mut curves: Vec<&SceneCurve> = self.base_color.curves().iter().collect();
+        match &self.scattering {
+            Scattering::Metal { named: Some(metal), .. } => curves.extend(metal.curves()),
+            Scattering::Dielectric(glass) => {
+                curves.extend(glass.absorption.as_ref().and_then(|a| a.curve.as_ref()));
+            }
+            Scattering::Gltf(surface) => {
+                curves.extend(&surface.sheen_curve);
+                curves.extend(&surface.specular_curve);
+            }
+            Scattering::Black
+            | Scattering::Matte
+            | Scattering::Unlit
+            | Scattering::Mirror
+            | Scattering::Metal { named: None, .. } => {}
+        }
+        curves
+    }
+
     /// Whether it may be a smooth pane without thickness, which light passes straight
     /// (`KHR_materials_transmission` without roughness).
     #[must_use]
@@ -183,10 +207,19 @@ impl TextureScope {
 pub enum Paint {
     /// One colour everywhere.
     Plain(Color),
+    /// One curve everywhere.
+    Curve {
+        /// What it looks like, as linear RGB: its colour where light is traced in no bands of wavelengths.
+        look: Color,
+        /// The curve.
+        curve: SceneCurve,
+    },
     /// Squares of two colours over texture coordinate set 0.
     Checker {
-        /// The two colours.
+        /// The two colours; of curves what they look like.
         colors: [Color; 2],
+        /// Their curves, if either is one.
+        curves: Option<Box<[SceneCurve; 2]>>,
         /// Squares along one unit of the texture coordinates.
         squares: f64,
     },
@@ -194,8 +227,17 @@ pub enum Paint {
     Image {
         /// Multiplies the image.
         factor: Color,
+        /// A curve of which the factor is the look, and which multiplies the image in its place in bands of wavelengths.
+        curve: Option<SceneCurve>,
         /// Which image, over which coordinates.
         image: TextureUse,
+    },
+    /// A reflectance by wavelength over texture coordinate set 0.
+    Cube {
+        /// The cube.
+        cube: SceneCube,
+        /// Copies along one unit of the texture coordinates, along u and v.
+        repeat: [f64; 2],
     },
 }
 
@@ -203,7 +245,30 @@ impl Paint {
     /// Whether a lookup needs texture coordinates.
     #[must_use]
     pub fn needs_uv(&self) -> bool {
-        !matches!(self, Self::Plain(_))
+        !matches!(self, Self::Plain(_) | Self::Curve { .. })
+    }
+
+    /// Whether it has more than the three numbers of a colour.
+    #[must_use]
+    pub fn has_spectrum(&self) -> bool {
+        matches!(self, Self::Cube { .. }) || !self.curves().is_empty()
+    }
+
+    /// Its cube.
+    #[must_use]
+    pub fn cube(&self) -> Option<&SceneCube> {
+        if let Self::Cube { cube, .. } = self { Some(cube) } else { None }
+    }
+
+    /// Its curves.
+    #[must_use]
+    pub fn curves(&self) -> &[SceneCurve] {
+        match self {
+            Self::Plain(_) | Self::Checker { curves: None, .. } | Self::Cube { .. } => &[],
+            Self::Curve { curve, .. } => std::slice::from_ref(curve),
+            Self::Checker { curves: Some(curves), .. } => &**curves,
+            Self::Image { curve, .. } => curve.as_slice(),
+        }
     }
 
     /// The use of an image, if there is one.

@@ -7,7 +7,7 @@ use etendue_geometry::{Coplanar, Geometry};
 use crate::bodies::{Body, bodies};
 use crate::scattering::Absorption;
 use crate::spawn::magnitudes;
-use crate::{Color, Material, Paint, Scattering};
+use crate::{Material, Paint, Scattering, Spectral, Tint};
 
 /// What light has to know of the placements of a scene, by their numbers.
 #[derive(Debug, Clone, Default)]
@@ -73,7 +73,7 @@ pub(crate) struct PlacedSurface {
     /// The body that it encloses, of glass that is closed.
     pub(crate) body: Option<Body>,
     /// Its colour, where that is alike all over.
-    pub(crate) color: Option<Color>,
+    pub(crate) color: Option<Tint>,
 }
 
 impl PlacedSurface {
@@ -83,10 +83,20 @@ impl PlacedSurface {
     }
 }
 
+/// The colour of a paint that is alike all over, 0..=1.
+fn plain_tint(paint: &Paint, spectral: &Spectral) -> Option<Tint> {
+    match paint {
+        Paint::Plain(color) => Some(Tint::from(*color).clamped()),
+        Paint::Curve { look, .. } if spectral.is_rgb() => Some(Tint::from(*look).clamped()),
+        Paint::Curve { curve, .. } => Some(Tint { color: [1.0; 3], spectrum: curve.spectrum() }),
+        Paint::Checker { .. } | Paint::Image { .. } | Paint::Cube { .. } => None,
+    }
+}
+
 impl PlacedSurfaces {
     /// Those of a scene.
     #[must_use]
-    pub fn of(geometry: &Geometry, materials: &[Material]) -> Self {
+    pub fn of(geometry: &Geometry, materials: &[Material], spectral: &Spectral) -> Self {
         let bodies = bodies(geometry, materials);
         let surface = |(placement, body): (&etendue_geometry::Placement, Option<Body>)| {
             let material = materials.get(placement.material as usize)?;
@@ -105,10 +115,7 @@ impl PlacedSurfaces {
                 absorption: material.absorption(),
                 body,
                 is_tilted: material.normal_map.is_some() || mesh.normals.is_some(),
-                color: match material.base_color {
-                    Paint::Plain(color) if !colored => Some(color.map(|c| c.clamp(0.0, 1.0))),
-                    Paint::Plain(_) | Paint::Checker { .. } | Paint::Image { .. } => None,
-                },
+                color: if colored { None } else { plain_tint(&material.base_color, spectral) },
             })
         };
         let may_touch = |i: usize| bodies[i].is_some_and(|body: Body| body.may_vanish);

@@ -44,12 +44,13 @@ impl Projector {
             return None;
         }
         let color = match &self.image {
-            Paint::Plain(color) => *color,
-            Paint::Checker { colors, squares } => {
+            Paint::Plain(color) | Paint::Curve { look: color, .. } => *color,
+            Paint::Checker { colors, squares, .. } => {
                 let index = [x, -y].map(|c| (0.5 * (c + 1.0) * squares).floor());
                 colors[usize::from((index[0] + index[1]).rem_euclid(2.0) != 0.0)]
             }
-            Paint::Image { factor, image } => {
+            Paint::Cube { .. } => [1.0; 3],
+            Paint::Image { factor, image, .. } => {
                 let [u, v] = [0.5 * (1.0 + x), 0.5 * (1.0 - y)];
                 let uv = image.transform.map(|[a, b, c]| a * u + b * v + c);
                 let thrown = decoded(image, around).map(|file| file.sample(uv, image.encoding));

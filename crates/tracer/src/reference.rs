@@ -9,7 +9,8 @@ use etendue_geometry::{Geometry, HitBatch, MISS, Mesh, Placement, RayBatch, Vert
 use crate::footprint::mean_of_squares;
 use crate::material::Alpha;
 use crate::{
-    Color, Footprint, Image, Ior, Material, NormalKind, Paint, Pixel, Scattering, Space, TextureUse,
+    Color, Footprint, Image, Ior, Material, NormalKind, Paint, Pixel, Scattering, SceneCurve,
+    Space, Spectral, TextureUse, Tint, TintSpectrum,
 };
 
 /// The frame that depths and camera-space vectors refer to.
@@ -210,31 +211,78 @@ impl SceneView<'_> {
         color
     }
 
+    /// Base colour with its curve, and alpha, vertex colours included: as [`Self::base_color`] where no curve is.
+    pub(crate) fn base_tint(
+        &self,
+        spectral: &Spectral,
+        material: &Material,
+        spot: &SurfacePoint<'_>,
+    ) -> (Tint, f64) {
+        let [r, g, b, alpha] = self.base_color(material, spot);
+        if spectral.is_rgb() || !material.base_color.has_spectrum() {
+            return (Tint::from([r, g, b]), alpha);
+        }
+        let seen = match material.alpha {
+            Alpha::Opaque => *spot,
+            Alpha::Mask { .. } | Alpha::Blend { .. } => SurfacePoint { footprint: None, ..*spot },
+        };
+        let mut tint = match &material.base_color {
+            Paint::Plain(color) => Tint::from(*color),
+            Paint::Curve { curve, .. } => Tint { color: [1.0; 3], spectrum: curve.spectrum() },
+            Paint::Checker { colors, curves, squares } => {
+                match (curves, squares_at(&seen, *squares)) {
+                    (None, _) => Tint::from(colors[0]),
+                    (Some(curves), Squares::One(number)) => {
+                        Tint { color: [1.0; 3], spectrum: curves[number].spectrum() }
+                    }
+                    (Some(curves), Squares::Mean(wave)) => {
+                        let numbers = [curves[0].number, curves[1].number];
+                        let peak = curves[0].curve.extent()[1].max(curves[1].curve.extent()[1]);
+                        let spectrum = TintSpectrum::Mixed { numbers, share: 0.5 + wave, peak };
+                        Tint { color: [1.0; 3], spectrum }
+                    }
+                }
+            }
+            Paint::Cube { cube, repeat } => {
+                let [u, v] = seen.uv(0);
+                let at = [u * repeat[0], v * repeat[1]];
+                let spectrum = TintSpectrum::Texel { number: cube.number, at };
+                Tint { color: [1.0; 3], spectrum }
+            }
+            Paint::Image { curve, image, .. } => {
+                let [r, g, b, _] = self.tint(image, &seen);
+                let spectrum = curve.as_ref().map_or(TintSpectrum::White, SceneCurve::spectrum);
+                Tint { color: [r, g, b], spectrum }
+            }
+        };
+        if material.vertex_colors
+            && let Some(vertex) = spot.vertex_color()
+        {
+            tint.color = std::array::from_fn(|k| tint.color[k] * vertex[k]);
+        }
+        (tint, alpha)
+    }
+
     /// A paint's colour and alpha.
     #[must_use]
     pub fn paint(&self, paint: &Paint, spot: &SurfacePoint<'_>) -> [f64; 4] {
         match paint {
-            Paint::Plain([r, g, b]) => [*r, *g, *b, 1.0],
-            Paint::Checker { colors, squares } => {
-                let [u, v] = spot.uv(0);
-                if let Some([a, b]) = spot.extent(0) {
-                    let mean = |x: f64, k: usize| {
-                        mean_of_squares(x * squares, (a[k].abs() + b[k].abs()) * squares)
-                    };
-                    let wave = 0.5 * mean(u, 0) * mean(v, 1);
-                    let [r, g, b] = std::array::from_fn(|k| {
+            Paint::Plain([r, g, b]) | Paint::Curve { look: [r, g, b], .. } => [*r, *g, *b, 1.0],
+            Paint::Checker { colors, squares, .. } => {
+                let [r, g, b] = match squares_at(spot, *squares) {
+                    Squares::Mean(wave) => std::array::from_fn(|k| {
                         colors[0][k] * (0.5 + wave) + colors[1][k] * (0.5 - wave)
-                    });
-                    return [r, g, b, 1.0];
-                }
-                // The last bit of the square numbers' sum alternates on both sides of 0. The cast
-                // saturates, so absurd coordinates give one colour and no fault.
-                #[expect(clippy::cast_possible_truncation, reason = "see above")]
-                let number = ((u * squares).floor() + (v * squares).floor()) as i64;
-                let [r, g, b] = colors[usize::from(number & 1 != 0)];
+                    }),
+                    Squares::One(number) => colors[number],
+                };
                 [r, g, b, 1.0]
             }
-            Paint::Image { factor, image } => {
+            Paint::Cube { cube, repeat } => {
+                let [u, v] = spot.uv(0);
+                let [r, g, b] = cube.cube.look([u * repeat[0], v * repeat[1]]);
+                [r, g, b, 1.0]
+            }
+            Paint::Image { factor, image, .. } => {
                 let [r, g, b, a] = self.tint(image, spot);
                 [factor[0] * r, factor[1] * g, factor[2] * b, a]
             }
@@ -288,6 +336,29 @@ impl SceneView<'_> {
         let [arrives, ..] = self.texel(&occlusion.image, &spot);
         1.0 + occlusion.strength.clamp(0.0, 1.0) * (arrives - 1.0)
     }
+}
+
+/// The squares of a checker that a place sees.
+enum Squares {
+    /// A mean of both, by how far the first is above a half.
+    Mean(f64),
+    /// One of them.
+    One(usize),
+}
+
+/// The squares of a checker, of so many along one unit of the texture coordinates, that a place sees.
+fn squares_at(spot: &SurfacePoint<'_>, squares: f64) -> Squares {
+    let [u, v] = spot.uv(0);
+    if let Some([a, b]) = spot.extent(0) {
+        let mean =
+            |x: f64, k: usize| mean_of_squares(x * squares, (a[k].abs() + b[k].abs()) * squares);
+        return Squares::Mean(0.5 * mean(u, 0) * mean(v, 1));
+    }
+    // The last bit of the square numbers' sum alternates on both sides of 0. The cast saturates, so absurd
+    // coordinates give one colour and no fault.
+    #[expect(clippy::cast_possible_truncation, reason = "see above")]
+    let number = ((u * squares).floor() + (v * squares).floor()) as i64;
+    Squares::One(usize::from(number & 1 != 0))
 }
 
 /// A place on a mesh.

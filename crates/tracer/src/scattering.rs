@@ -1,13 +1,13 @@
 //! How materials scatter light, and by which model of a surface.
 
 use etendue_geometry::glam::DVec3;
-use etendue_spectrum::{Curve, Metal};
+use etendue_spectrum::Curve;
 
 use crate::bsdf::{Bsdf, Coat, Layered, Model, Sheen, fresnel};
 use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::Frame;
 use crate::surface::SurfaceInteraction;
-use crate::{Color, TextureUse};
+use crate::{Color, Conductor, SceneCurve, Spectral, TextureUse, Tint, TintSpectrum};
 
 /// The least α across a grain.
 const SMOOTHEST_GRAIN: f64 = 1e-3;
@@ -28,7 +28,7 @@ pub enum Scattering {
         /// Roughness, 0..=1; its square is GGX's α.
         roughness: f64,
         /// The metal whose measured index it has, in place of the base colour.
-        named: Option<Metal>,
+        named: Option<Conductor>,
     },
     /// As a boundary of glass; the front is outside.
     Dielectric(Glass),
@@ -60,7 +60,7 @@ impl Scattering {
     #[must_use]
     pub fn absorption(&self) -> Option<Absorption> {
         match self {
-            Self::Dielectric(glass) => glass.absorption,
+            Self::Dielectric(glass) => glass.absorption.clone(),
             Self::Black
             | Self::Matte
             | Self::Unlit
@@ -95,23 +95,24 @@ impl Scattering {
         &self,
         met: &SurfaceInteraction<'_>,
         around: &SceneView<'_>,
-        wavelength: f64,
+        (spectral, wavelength): (&Spectral, f64),
     ) -> Bsdf {
         let model = match self {
             Self::Black | Self::Unlit => Model::Black,
             Self::Matte => Model::Matte,
             Self::Mirror => Model::Mirror,
-            Self::Metal { roughness, named } => {
-                Model::Metal { alpha: roughness * roughness, named: *named }
-            }
+            Self::Metal { roughness, named } => Model::Metal {
+                alpha: roughness * roughness,
+                named: named.as_ref().map(Conductor::id),
+            },
             Self::Dielectric(glass) => Model::Dielectric {
                 alpha: glass.roughness * glass.roughness,
                 eta: met.eta(around, wavelength),
             },
-            Self::Gltf(surface) => return surface.bsdf(met, around),
+            Self::Gltf(surface) => return surface.bsdf(met, around, spectral),
         };
         let (geometric, shading) = met.normals(around);
-        Bsdf::new(model, [geometric, shading], met.wo, [met.color(), [1.0; 3]])
+        Bsdf::new(model, [geometric, shading], met.wo, [met.color(), Tint::WHITE])
     }
 
     /// The glTF surface, of one.
@@ -150,12 +151,22 @@ impl Glass {
 
 /// Light that a body takes away on the way through it, by Beer and Lambert: after a way `s` there is
 /// `color` to the power `s` / `distance` left (`KHR_materials_volume`).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Absorption {
     /// What is left after `distance`.
     pub color: Color,
+    /// The same as a curve, of which the colour is the look.
+    pub curve: Option<SceneCurve>,
     /// m, above 0.
     pub distance: f64,
+}
+
+impl Absorption {
+    /// What is left after the distance.
+    pub(crate) fn tint(&self, spectral: &Spectral) -> Tint {
+        let (color, spectrum) = part(spectral, self.color, self.curve.as_ref());
+        Tint { color, spectrum }
+    }
 }
 
 /// A refractive index.
@@ -199,6 +210,8 @@ pub struct GltfSurface {
     pub specular_texture: Option<TextureUse>,
     /// Colour of the dielectric's reflection face on; may exceed 1.
     pub specular_color: Color,
+    /// The same as a curve, of which the colour is the look.
+    pub specular_curve: Option<SceneCurve>,
     /// Colour (sRGB).
     pub specular_color_texture: Option<TextureUse>,
     /// Share of light that passes a thin wall (`KHR_materials_transmission`), 0..=1.
@@ -215,6 +228,8 @@ pub struct GltfSurface {
     pub clearcoat_roughness_texture: Option<TextureUse>,
     /// Reflectance of a sheen (`KHR_materials_sheen`); black where there is none.
     pub sheen_color: Color,
+    /// The same as a curve, of which the colour is the look.
+    pub sheen_curve: Option<SceneCurve>,
     /// Colour (sRGB).
     pub sheen_color_texture: Option<TextureUse>,
     /// The sheen's roughness, 0..=1.
@@ -241,7 +256,15 @@ pub(crate) struct SheetSurface {
     pub(crate) f0: f64,
     pub(crate) f90: f64,
     /// The colour of its highlights.
-    pub(crate) highlight: Color,
+    pub(crate) highlight: Tint,
+}
+
+/// The factor of a part's image, and its spectrum: the look alone where light is traced as red, green and blue.
+fn part(spectral: &Spectral, look: Color, curve: Option<&SceneCurve>) -> (Color, TintSpectrum) {
+    match curve.filter(|_| !spectral.is_rgb()) {
+        Some(curve) => ([1.0; 3], curve.spectrum()),
+        None => (look, TintSpectrum::White),
+    }
 }
 
 impl Default for GltfSurface {
@@ -255,6 +278,7 @@ impl Default for GltfSurface {
             specular: 1.0,
             specular_texture: None,
             specular_color: [1.0; 3],
+            specular_curve: None,
             specular_color_texture: None,
             transmission: 0.0,
             transmission_texture: None,
@@ -263,6 +287,7 @@ impl Default for GltfSurface {
             clearcoat_roughness: 0.0,
             clearcoat_roughness_texture: None,
             sheen_color: [0.0; 3],
+            sheen_curve: None,
             sheen_color_texture: None,
             sheen_roughness: 0.0,
             sheen_roughness_texture: None,
@@ -283,7 +308,12 @@ impl GltfSurface {
     }
 
     /// Its sheet of facets at a point.
-    pub(crate) fn sheet(&self, spot: &SurfacePoint<'_>, around: &SceneView<'_>) -> SheetSurface {
+    pub(crate) fn sheet(
+        &self,
+        spot: &SurfacePoint<'_>,
+        around: &SceneView<'_>,
+        spectral: &Spectral,
+    ) -> SheetSurface {
         let texel = |image: &Option<_>| match image {
             Some(image) => around.texel(image, spot),
             None => [1.0; 4],
@@ -305,17 +335,27 @@ impl GltfSurface {
             alpha: roughness * roughness,
             f0: face_on * specular,
             f90: specular,
-            highlight: std::array::from_fn(|k| (self.specular_color[k] * tint[k]).min(most)),
+            highlight: {
+                let (color, spectrum) =
+                    part(spectral, self.specular_color, self.specular_curve.as_ref());
+                Tint { color: std::array::from_fn(|k| (color[k] * tint[k]).min(most)), spectrum }
+            },
         }
     }
 
     /// Its layers where it was met.
-    fn bsdf(&self, met: &SurfaceInteraction<'_>, around: &SceneView<'_>) -> Bsdf {
+    fn bsdf(
+        &self,
+        met: &SurfaceInteraction<'_>,
+        around: &SceneView<'_>,
+        spectral: &Spectral,
+    ) -> Bsdf {
         let texel = |image: &Option<_>| match image {
             Some(image) => around.texel(image, &met.spot),
             None => [1.0; 4],
         };
-        let SheetSurface { metallic, alpha, f0, f90, highlight } = self.sheet(&met.spot, around);
+        let SheetSurface { metallic, alpha, f0, f90, highlight } =
+            self.sheet(&met.spot, around, spectral);
         let (geometric, shading) = met.normals(around);
         let grain = self.grain(met, around, shading);
         let strength = grain.map_or(0.0, |(_, strength)| strength);
@@ -331,11 +371,15 @@ impl GltfSurface {
                 .clamp(0.0, 1.0),
             sheen: match self.sheen_color {
                 [0.0, 0.0, 0.0] => Sheen::default(),
-                color => {
+                look => {
+                    let (color, spectrum) = part(spectral, look, self.sheen_curve.as_ref());
                     let tint = self.sheen_color_texture.as_ref();
                     let tint = tint.map_or([1.0; 4], |image| around.tint(image, &met.spot));
                     Sheen {
-                        color: std::array::from_fn(|k| (color[k] * tint[k]).clamp(0.0, 1.0)),
+                        color: Tint {
+                            color: std::array::from_fn(|k| (color[k] * tint[k]).clamp(0.0, 1.0)),
+                            spectrum,
+                        },
                         roughness: self.sheen_roughness * texel(&self.sheen_roughness_texture)[3],
                     }
                 }

@@ -1,9 +1,11 @@
 //! From colours to the bands that a ray carries.
 
-use etendue_spectrum::{Bands, Curve, Illuminant, Metal, NoOverlap, Outside};
+use std::sync::Arc;
 
-use crate::Color;
+use etendue_spectrum::{Bands, Curve, Metal, NoOverlap, Outside};
+
 use crate::bsdf::metal;
+use crate::{Color, ConductorId, Cube, Material, SceneCube, Tint, TintSpectrum};
 
 /// Shares of a band's light between which a wavelength is interpolated.
 const SHARES: usize = 32;
@@ -21,6 +23,10 @@ pub struct Spectral {
     quantiles: Vec<Vec<f64>>,
     /// Of each metal by its number, and band: the reflectance face on, and the dip beside it.
     metals: Vec<[f64; 2]>,
+    /// Of each curve of the scene by its number, and band: its mean.
+    curves: Vec<f64>,
+    /// Each cube of the scene by its number, and its texels in these bands.
+    cubes: Vec<Option<(Arc<Cube>, Vec<f32>)>>,
 }
 
 impl Spectral {
@@ -37,14 +43,76 @@ impl Spectral {
             wavelengths,
             quantiles,
             metals,
+            curves: Vec::new(),
+            cubes: Vec::new(),
             bands: bands.clone(),
         }
     }
 
+    /// For these bands, and the curves of these materials.
+    #[must_use]
+    pub fn of(bands: &Bands, materials: &[Material]) -> Self {
+        let mut spectral = Self::new(bands);
+        let count = spectral.count();
+        for curve in materials.iter().flat_map(Material::curves) {
+            let start = curve.number as usize * count;
+            let means = held_in(bands, &curve.curve);
+            if spectral.curves.len() < start + count {
+                spectral.curves.resize(start + count, 1.0);
+            }
+            spectral.curves[start..start + count].copy_from_slice(&means);
+        }
+        // Red, green and blue are the cubes' looks.
+        let cubes = materials.iter().filter(|_| !spectral.is_rgb);
+        for SceneCube { number, cube } in cubes.filter_map(|material| material.base_color.cube()) {
+            let number = *number as usize;
+            if spectral.cubes.len() <= number {
+                spectral.cubes.resize_with(number + 1, || None);
+            }
+            spectral.cubes[number] = Some((Arc::clone(cube), cube.in_bands(bands)));
+        }
+        spectral
+    }
+
     /// What a metal reflects face on in band `i`, and the dip of its reflectance
     /// ([`crate::bsdf::Weights::dip`]).
-    pub(crate) fn metal(&self, metal: Metal, i: usize) -> [f64; 2] {
-        self.metals[metal as usize * self.count() + i]
+    pub(crate) fn metal(&self, metal: ConductorId, i: usize) -> [f64; 2] {
+        match metal {
+            ConductorId::Named(metal) => self.metals[metal as usize * self.count() + i],
+            ConductorId::Measured(numbers) => {
+                let [face_on, second] = numbers.map(|number| self.curve(number, i));
+                [face_on, metal::dip(face_on, second)]
+            }
+        }
+    }
+
+    /// The mean of a curve of the scene over band `i`.
+    #[inline]
+    fn curve(&self, number: u32, i: usize) -> f64 {
+        self.curves.get(number as usize * self.count() + i).copied().unwrap_or(1.0)
+    }
+
+    /// A cube of the scene at (u, v) in band `i`.
+    fn texel(&self, number: u32, at: [f64; 2], i: usize) -> f64 {
+        let Some(Some((cube, texels))) = self.cubes.get(number as usize) else { return 1.0 };
+        let value =
+            |(texel, share): (usize, f64)| share * f64::from(texels[texel * self.count() + i]);
+        cube.corners(at).into_iter().map(value).sum()
+    }
+
+    /// A tint in band `i`.
+    #[must_use]
+    #[inline]
+    pub fn tint(&self, tint: &Tint, i: usize) -> f64 {
+        let color = self.band(&tint.color, i);
+        match tint.spectrum {
+            TintSpectrum::White => color,
+            TintSpectrum::Curve { number, .. } => color * self.curve(number, i),
+            TintSpectrum::Texel { number, at } => color * self.texel(number, at, i),
+            TintSpectrum::Mixed { numbers: [a, b], share, .. } => {
+                color * (share * self.curve(a, i) + (1.0 - share) * self.curve(b, i))
+            }
+        }
     }
 
     /// The bands.
@@ -60,7 +128,8 @@ impl Spectral {
     }
 
     /// Whether the bands are linear red, green and blue.
-    pub(crate) fn is_rgb(&self) -> bool {
+    #[must_use]
+    pub fn is_rgb(&self) -> bool {
         self.is_rgb
     }
 
@@ -99,27 +168,33 @@ impl Spectral {
         }
     }
 
-    /// An illuminant, 1 at 560 nm, in all bands.
+    /// A tint in all bands.
+    pub fn spread_tint(&self, tint: &Tint, out: &mut [f64]) {
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = self.tint(tint, i);
+        }
+    }
+
+    /// What a light sends in all bands, nothing outside of the curve's range.
     ///
     /// # Errors
     ///
     /// When it is known at no wavelength of any band.
-    pub fn illuminant(&self, illuminant: Illuminant) -> Result<Vec<f64>, NoOverlap> {
-        // Checked when the scene was read; a flat spectrum stands in for what cannot be.
-        let curve = illuminant.curve().unwrap_or(Curve::ONE);
-        self.bands.from_curve(&curve, Outside::Zero)
+    pub fn emission(&self, curve: &Curve) -> Result<Vec<f64>, NoOverlap> {
+        self.bands.from_curve(curve, Outside::Zero)
     }
+}
+
+/// The means of a curve over bands, which goes on beyond its ends as it is there.
+fn held_in(bands: &Bands, curve: &Curve) -> Vec<f64> {
+    bands
+        .from_curve(curve, Outside::Held)
+        .unwrap_or_else(|_| (0..bands.count()).map(|i| curve.held(bands.wavelength(i))).collect())
 }
 
 /// What a metal reflects face on in each band, and the dip of its reflectance.
 fn reflectances(named: Metal, bands: &Bands) -> Vec<[f64; 2]> {
-    let at = |cosine| {
-        let curve = named.reflectance(cosine);
-        // Far from where it is measured a metal reflects as at the end of its table.
-        bands.from_curve(&curve, Outside::Held).unwrap_or_else(|_| {
-            (0..bands.count()).map(|i| curve.held(bands.wavelength(i))).collect()
-        })
-    };
+    let at = |cosine| held_in(bands, &named.reflectance(cosine));
     let (face_on, second) = (at(1.0), at(metal::SECOND_COSINE));
     face_on.iter().zip(&second).map(|(&f, &s)| [f, metal::dip(f, s)]).collect()
 }

@@ -8,7 +8,7 @@ use crate::material::{Alpha, NormalMap};
 use crate::placed::PlacedSurface;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::Anchor;
-use crate::{Color, Footprint, Ior, LightingContext, Material};
+use crate::{Footprint, Ior, LightingContext, Material, Spectral, Tint};
 
 /// A hit seen from its ray.
 #[derive(Debug, Clone, Copy)]
@@ -19,8 +19,9 @@ pub(crate) struct SurfaceInteraction<'a> {
     pub(crate) anchor: Anchor,
     /// The ray came from the triangle's front.
     pub(crate) front: bool,
-    /// Base colour and alpha.
-    pub(crate) base: [f64; 4],
+    /// Base colour, and alpha.
+    pub(crate) base: Tint,
+    pub(crate) alpha: f64,
     pub(crate) wo: DVec3,
     /// The placements whose media are on the ray's side and behind; [`MISS`] is air.
     pub(crate) media: [u32; 2],
@@ -53,9 +54,9 @@ impl<'a> SurfaceInteraction<'a> {
         let material = around.material(&spot)?;
         let anchor = stage.anchor(origin + direction * t, normal, origin, placed);
         let front = normal.dot(direction) <= 0.0;
-        let base = around.base_color(material, &spot);
+        let (base, alpha) = around.base_tint(stage.spectral, material, &spot);
         let media = if front { [MISS, own] } else { [own, MISS] };
-        Some(Self { spot, placed, material, anchor, front, base, wo: -direction, media })
+        Some(Self { spot, placed, material, anchor, front, base, alpha, wo: -direction, media })
     }
 
     /// Share of the surface that is there.
@@ -65,20 +66,24 @@ impl<'a> SurfaceInteraction<'a> {
         }
         match self.material.alpha {
             Alpha::Opaque => 1.0,
-            Alpha::Mask { factor, cutoff } => f64::from(u8::from(factor * self.base[3] >= cutoff)),
-            Alpha::Blend { factor } => (factor * self.base[3]).clamp(0.0, 1.0),
+            Alpha::Mask { factor, cutoff } => f64::from(u8::from(factor * self.alpha >= cutoff)),
+            Alpha::Blend { factor } => (factor * self.alpha).clamp(0.0, 1.0),
         }
     }
 
     /// How it scatters light of the wavelength (nm).
-    pub(crate) fn bsdf(&self, around: &SceneView<'_>, wavelength: f64) -> Bsdf {
-        self.material.scattering.bsdf(self, around, wavelength)
+    pub(crate) fn bsdf(
+        &self,
+        around: &SceneView<'_>,
+        spectral: &Spectral,
+        wavelength: f64,
+    ) -> Bsdf {
+        self.material.scattering.bsdf(self, around, (spectral, wavelength))
     }
 
     /// The base colour alone, the share of light that a surface can reflect.
-    pub(crate) fn color(&self) -> Color {
-        let [r, g, b, _] = self.base;
-        [r, g, b].map(|c| c.clamp(0.0, 1.0))
+    pub(crate) fn color(&self) -> Tint {
+        self.base.clamped()
     }
 
     /// Index behind the surface over the index in front, as seen from its ray, at a wavelength (nm).

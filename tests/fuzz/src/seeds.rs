@@ -22,6 +22,12 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         }
         "ply" => plys(),
         "npy" => npys(),
+        "curve" => {
+            let metal = b"DATA:\n  - type: tabulated nk\n    data: |\n        0.4 1.5 2.0\n        0.7 0.2 3.5\n";
+            let mut curves = files("scenes/spectra", "csv");
+            curves.extend([metal.to_vec(), b"# spd\n400:1\n700:2\n".to_vec()]);
+            curves
+        }
         "scene" => files("scenes", "json"),
         "set" => vec![
             b"camera.fov=30\nobjects[0].transform.scale=2\nlayers=[\"depth\", \"normal\"]".into(),

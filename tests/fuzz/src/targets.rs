@@ -24,13 +24,14 @@ pub struct Target {
 }
 
 /// All readers.
-pub const TARGETS: [Target; 21] = [
+pub const TARGETS: [Target; 22] = [
     Target { name: "gltf", run: gltf },
     Target { name: "glb", run: glb },
     Target { name: "obj", run: obj },
     Target { name: "mtl", run: mtl },
     Target { name: "ply", run: ply },
     Target { name: "npy", run: npy },
+    Target { name: "curve", run: curve },
     Target { name: "scene", run: scene },
     Target { name: "set", run: set },
     Target { name: "sensor", run: sensor },
@@ -111,6 +112,19 @@ fn npy(bytes: &[u8], folder: &Path) {
     write(folder, "m.npy", bytes);
     let scene = br#"{"etendue": 1, "objects": [{"shape": "rectangle", "instances": "m.npy"}]}"#;
     check(&write(folder, "s.json", scene));
+}
+
+/// As a reflectance and a lamp, and as the index of a metal.
+fn curve(bytes: &[u8], folder: &Path) {
+    for (name, material) in [
+        ("curve.csv", r#"{"type": "matte", "color": {"file": "curve.csv"}}"#),
+        ("curve.csv", r#"{"type": "emissive", "radiance": {"file": "curve.csv", "column": 2}}"#),
+        ("metal.yml", r#"{"type": "metal", "metal": {"file": "metal.yml"}}"#),
+    ] {
+        write(folder, name, bytes);
+        let text = format!(r#"{{"etendue": 1, "materials": {{"a": {material}}}, "objects": []}}"#);
+        scene(text.as_bytes(), folder);
+    }
 }
 
 /// A shape has as many triangles as a number says, each of which takes a microsecond: with this memory there

@@ -1,4 +1,4 @@
-//! Arguments of `etendue lens`, `etendue bench` and `etendue expose`.
+//! Arguments of `etendue lens`, `etendue expose`, `etendue spectrum` and `etendue bench`.
 
 use std::path::PathBuf;
 
@@ -143,6 +143,36 @@ pub(crate) struct ExposeArguments {
     /// Show no progress and no summary; the list of files and errors remain
     #[arg(short, long)]
     pub(crate) quiet: bool,
+}
+
+pub(super) const SPECTRUM_HELP: &str = "\
+X, Y and Z are integrals of the curve times the CIE 1931 observer, not normalised; the curve is taken for
+light and is 0 beyond its ends. With --under it is a reflectance, and what it leaves of a lamp's light is
+told.
+
+Examples:
+  etendue spectrum scenes/spectra/colorchecker.csv --under d65
+  etendue spectrum lamp.spd -o out/lamp
+  etendue spectrum led_b3 --json
+  etendue spectrum 3200";
+
+#[derive(Debug, Args)]
+pub(crate) struct SpectrumArguments {
+    /// A .csv, .spd or refractiveindex.info .yml file, the name of a lamp, or a black body's kelvin
+    #[arg(value_name = "FILE|LAMP|KELVIN")]
+    pub(crate) spectrum: String,
+    /// One column of a file, by the header's word or counted from 1; all when absent
+    #[arg(long, value_name = "COLUMN")]
+    pub(crate) column: Option<String>,
+    /// Take the curves for reflectances under this lamp, a name or a black body's kelvin
+    #[arg(long, value_name = "LAMP|KELVIN")]
+    pub(crate) under: Option<String>,
+    /// Draw spectrum.svg into this folder, made when it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Print JSON for machines
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 pub(super) const BENCH_HELP: &str = "\

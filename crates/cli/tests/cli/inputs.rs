@@ -125,6 +125,7 @@ fn longer(bytes: &[u8]) -> Vec<u8> {
     [bytes, b"\n"].concat()
 }
 
+#[expect(clippy::too_many_lines, reason = "one list of all keys that name files")]
 fn inputs() -> Vec<Input> {
     let mut inputs = Vec::new();
     let mut add = |keys, scene: Value, files: &[(&'static str, &[u8])], changed: Vec<Vec<u8>>| {
@@ -155,6 +156,33 @@ fn inputs() -> Vec<Input> {
     add(&["LightSpec.image"], scene(&sky), &paint, vec![longer(PAINT)]);
     let lamp = json!({"lights": [{"type": "goniometric", "at": [0, 2, 0], "file": "lamp.ies"}]});
     add(&["LightSpec.file"], scene(&lamp), &[("lamp.ies", IES)], vec![longer(IES)]);
+    // Curves of surfaces, metals, lights and sensors, and cubes of them.
+    let ball = |paint: Value| json!({"objects": [{"shape": "sphere", "material": "paint"}], "materials": {"paint": paint}});
+    let matte = |color: Value| ball(json!({"type": "matte", "color": color}));
+    let curve_keys: &[&str] = &["FileSpec.file"];
+    let curve: [(&str, &[u8]); 1] = [("c.csv", b"400,0.5\n700,0.6\n")];
+    let other = || vec![b"400,0.5\n700,0.7\n".to_vec()];
+    let named = || json!({"file": "c.csv"});
+    add(curve_keys, scene(&matte(named())), &curve, other());
+    let lamp = json!({"lights": [{"type": "point", "at": [0, 0, 3], "intensity": named()}]});
+    add(curve_keys, scene(&lamp), &curve, other());
+    let seen = json!({"camera": {"type": "pinhole", "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]},
+        "sensor": {"type": "raw", "resolution": [4, 4], "quantum_efficiency": named()}}});
+    add(curve_keys, scene(&seen), &curve, other());
+    let metal = ball(json!({"type": "metal", "metal": {"file": "m.yml"}}));
+    let yml = |n: f64| format!("- type: tabulated nk\n  data: |\n    0.4 {n} 2\n    0.7 {n} 3\n");
+    let (one, two) = (yml(1.0).into_bytes(), yml(2.0).into_bytes());
+    add(&["MetalFileSpec.file"], scene(&metal), &[("m.yml", &one)], vec![two]);
+    let cube = |value: f64| {
+        let mut bytes = npy(&[value]);
+        // One texel row of four columns and four bands, all of one value.
+        let start = bytes.len() - 128;
+        bytes[start..].copy_from_slice(&value.to_le_bytes().repeat(16));
+        bytes
+    };
+    let (one, two) = (cube(0.5), cube(0.25));
+    let bands = json!({"cube": "c.npy", "bands": [400, 500, 600, 700, 800]});
+    add(&["CubeSpec.cube"], scene(&matte(bands)), &[("c.npy", &one)], vec![two]);
     // Lenses with what they name.
     let plain = through(
         &json!({"type": "aperture", "shape": "circular", "radius": 2, "thickness": 1, "stop": true}),

@@ -2,9 +2,9 @@
 //! colours of the scene.
 
 use etendue_scene::Scene;
-use etendue_sensor::{BandChoice, Radiometry};
-use etendue_spectrum::{Bands, VISIBLE};
-use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec};
+use etendue_sensor::{BandChoice, Illumination, Radiometry};
+use etendue_spectrum::{Bands, Curve, VISIBLE, integral};
+use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec, Material, SceneCurve};
 
 use super::illumination::illumination;
 
@@ -85,6 +85,54 @@ fn beyond_visible(bands: &Bands) -> Option<[f64; 2]> {
     (from < VISIBLE[0] || to > VISIBLE[1]).then_some([from, to])
 }
 
+/// The curves of surfaces that end within the bands, and by how much each is held beyond.
+fn extended(scene: &Scene, bands: &Bands) -> Option<String> {
+    bands.grid()?;
+    let [from, to] = bands.range();
+    let beyond = |material: &Material| -> Option<String> {
+        let gap = |curve: &SceneCurve| {
+            let [low, high] = curve.curve.range();
+            (low.min(to) - from).max(0.0) + (to - high.max(from)).max(0.0)
+        };
+        let gap = material.curves().into_iter().map(gap).fold(0.0, f64::max);
+        let share = 100.0 * gap / (to - from);
+        (gap > 0.0).then(|| format!("\"{}\" over {gap:.0} nm ({share:.0} %)", material.name))
+    };
+    let short: Vec<String> = scene.materials.iter().filter_map(beyond).collect();
+    let more = match short.len() {
+        0 => return None,
+        1..=3 => String::new(),
+        count => format!(" and {} more", count - 3),
+    };
+    let named = short.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
+    Some(format!(
+        "light of {from} to {to} nm is rendered, and curves of materials end before: they are held as they end, of \
+         {named}{more}; give points as far as the sensor sees, or narrow its range"
+    ))
+}
+
+/// Light that is nearly all within so many nanometres is narrow.
+const NARROW: f64 = 60.0;
+
+/// That colours of three numbers are a guess under lines.
+fn upsampled(scene: &Scene) -> Option<String> {
+    let Illumination { spectra, colored, .. } = illumination(scene);
+    // The width of an even band that is as uneven: (∫ S)² over ∫ S².
+    let width = |curve: &Curve| {
+        let [from, to] = curve.range();
+        let sum = curve.integral(from, to);
+        sum * sum / integral(&[curve, curve], from, to)
+    };
+    let narrow = |curve: &&Curve| curve.as_flat().is_none() && width(curve) < NARROW;
+    let line = spectra.iter().find(narrow).filter(|_| colored > 0)?;
+    let at = line.peak().unwrap_or_default();
+    Some(format!(
+        "light near {at:.0} nm is a line {:.1} nm wide, and colours of three numbers are known as smooth mixtures of red, \
+         green and blue: what they reflect of it is a guess; give those materials measured curves",
+        width(line)
+    ))
+}
+
 /// What materials and glasses do not know of the wavelengths that are rendered.
 pub(super) fn unknown(scene: &Scene, bands: &Bands) -> Vec<String> {
     let mut notes = Vec::new();
@@ -95,6 +143,8 @@ pub(super) fn unknown(scene: &Scene, bands: &Bands) -> Vec<String> {
             VISIBLE[0], VISIBLE[1]
         ));
     }
+    notes.extend(extended(scene, bands));
+    notes.extend(upsampled(scene));
     let sky = scene
         .lights
         .iter()

@@ -1,11 +1,12 @@
 //! What light is multiplied by on its way to the sensor: the curves that bands have to tell apart.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use etendue_geometry::glam::DVec3;
 use etendue_scene::Scene;
 use etendue_sensor::{Factor, Illumination, Times};
-use etendue_spectrum::{Bands, Curve, Illuminant, Outside, rgb};
+use etendue_spectrum::{Bands, Curve, Outside, rgb};
 use etendue_tracer::transport::Follow;
 use etendue_tracer::{Color, EnvironmentImage, LightKind, Material, Paint, Scattering, Spectral};
 
@@ -17,9 +18,7 @@ pub(super) fn illumination(scene: &Scene) -> Illumination {
             spectra.push(curve);
         }
     };
-    let of = |illuminant: Option<Illuminant>| {
-        illuminant.and_then(|i| i.curve().ok()).unwrap_or(Curve::ONE)
-    };
+    let of = |spectrum: &Option<Arc<Curve>>| spectrum.as_deref().cloned().unwrap_or(Curve::ONE);
     // The lights' spectra, and whether any of them is coloured.
     let mut coloured_light = false;
     for light in scene.lights.iter().filter(|light| light.color != [0.0; 3]) {
@@ -29,7 +28,7 @@ pub(super) fn illumination(scene: &Scene) -> Illumination {
             (None, Some(EnvironmentImage::ClearSky(sky))) => {
                 sky.typical_spectra().into_iter().for_each(&mut add);
             }
-            (None, _) => add(of(light.illuminant)),
+            (None, _) => add(of(&light.illuminant)),
         }
         let image = match &light.kind {
             LightKind::Environment { image, .. } => match image {
@@ -55,16 +54,20 @@ pub(super) fn illumination(scene: &Scene) -> Illumination {
         }
     }
     let mut factors: Vec<Factor> = Vec::new();
+    let most = most_scattered(scene);
     for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
         if let Some(emission) = &material.emission {
-            add(of(emission.illuminant));
+            add(of(&emission.illuminant));
             coloured_light |= is_coloured(&emission.radiance);
         }
         if reflects_colour(material) {
             colours.note(material);
         }
-        let factor = factor(material);
-        factors.extend(factor.filter(|factor| !factors.contains(factor)));
+        for factor in self::factors(material, most) {
+            if !factors.contains(&factor) {
+                factors.push(factor);
+            }
+        }
     }
     let filters = scene.camera.lens().map(|lens| lens.filter_curves()).unwrap_or_default();
     let colored = usize::from(coloured_light) + colours.in_turn(scene);
@@ -74,7 +77,7 @@ pub(super) fn illumination(scene: &Scene) -> Illumination {
 /// The light of a scene in bands, as a white surface has it that all lights reach alike: a sky and its sun as they
 /// are, all else as strong as each other. Behind a filter of the lens that all light passes it is what passes.
 pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
-    let spectral = Spectral::new(bands);
+    let spectral = Spectral::of(bands, &scene.materials);
     let mut sum = vec![0.0; bands.count()];
     let mut add = |mut light: Vec<f64>, weight: Option<f64>| {
         let all = light.iter().sum::<f64>();
@@ -83,10 +86,10 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
             light.iter_mut().zip(&mut sum).for_each(|(value, sum)| *sum += weight * *value);
         }
     };
-    let tinted = |color: &Color, illuminant: Option<Illuminant>| {
+    let tinted = |color: &Color, illuminant: &Option<Arc<Curve>>| {
         let mut light = vec![0.0; bands.count()];
         spectral.spread(color, &mut light);
-        if let Some(tint) = illuminant.and_then(|known| spectral.illuminant(known).ok()) {
+        if let Some(tint) = illuminant.as_ref().and_then(|known| spectral.emission(known).ok()) {
             light.iter_mut().zip(tint).for_each(|(value, tint)| *value *= tint);
         }
         light
@@ -100,7 +103,7 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
                 let zenith = sky.dome_spectrum(DVec3::Y);
                 add(of_curve(&zenith), Some(PI * light.color[0]));
             }
-            (None, _) => add(tinted(&light.color, light.illuminant), None),
+            (None, _) => add(tinted(&light.color, &light.illuminant), None),
         }
     }
     let used = |number: usize| {
@@ -110,9 +113,12 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
         let Some(emission) = material.emission.as_ref().filter(|_| used(number)) else { continue };
         let color = match &emission.radiance {
             Paint::Plain(color) => *color,
-            Paint::Checker { .. } | Paint::Image { .. } => [1.0; 3],
+            Paint::Curve { .. }
+            | Paint::Checker { .. }
+            | Paint::Image { .. }
+            | Paint::Cube { .. } => [1.0; 3],
         };
-        add(tinted(&color, emission.illuminant), None);
+        add(tinted(&color, &emission.illuminant), None);
     }
     if let Some([filter]) = scene.camera.lens().map(|lens| lens.filter_curves()).as_deref() {
         let passed = bands.from_curve(filter, Outside::Held).unwrap_or_default();
@@ -122,15 +128,20 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
 }
 
 /// What a material multiplies light by that is no mixture of red, green and blue: what its body leaves of it,
-/// or what a measured metal reflects.
-fn factor(material: &Material) -> Option<Factor> {
-    if let Some(absorption) = material.absorption() {
-        let curve = rgb::spectrum(absorption.color);
-        return (!is_grey(&absorption.color)).then_some(Factor { curve, times: Times::AnyPower });
+/// what a measured metal reflects, and curves, up to `most` times one after the other.
+fn factors(material: &Material, most: u8) -> Vec<Factor> {
+    let mut factors = Vec::new();
+    let absorption = material.absorption();
+    if let Some(absorption) = &absorption {
+        let curve = match &absorption.curve {
+            Some(curve) => Some(Curve::clone(&curve.curve)),
+            None => (!is_grey(&absorption.color)).then(|| rgb::spectrum(absorption.color)),
+        };
+        factors.extend(curve.map(|curve| Factor { curve, times: Times::AnyPower }));
     }
     match &material.scattering {
         Scattering::Metal { named: Some(metal), .. } => {
-            Some(Factor { curve: metal.reflectance(1.0), times: Times::UpTo(2) })
+            factors.push(Factor { curve: metal.face_on(), times: Times::UpTo(2) });
         }
         Scattering::Metal { named: None, .. }
         | Scattering::Black
@@ -138,8 +149,26 @@ fn factor(material: &Material) -> Option<Factor> {
         | Scattering::Unlit
         | Scattering::Mirror
         | Scattering::Dielectric(_)
-        | Scattering::Gltf(_) => None,
+        | Scattering::Gltf(_) => {}
     }
+    let own = material.base_color.curves().iter();
+    let layers = material.scattering.gltf();
+    let layers = layers.into_iter().flat_map(|s| s.sheen_curve.iter().chain(&s.specular_curve));
+    // Every texel of a cube is a sum of these.
+    let parts = material.base_color.cube().map(|cube| cube.cube.parts()).unwrap_or_default();
+    factors.extend(parts.into_iter().map(|curve| Factor { curve, times: Times::UpTo(1) }));
+    factors.extend(
+        own.chain(layers)
+            .map(|curve| Factor { curve: Curve::clone(&curve.curve), times: Times::UpTo(most) }),
+    );
+    factors
+}
+
+/// How often light may be scattered on its way, and 2 at most: what is darker than two surfaces leave counts little.
+fn most_scattered(scene: &Scene) -> u8 {
+    let light = scene.tracer.and_then(|tracer| tracer.row().light);
+    let bounces = light.map_or(1, |light| light.rules.bounces);
+    if bounces > 1 { 2 } else { 1 }
 }
 
 /// Coloured surfaces.
@@ -187,16 +216,27 @@ fn is_grey([r, g, b]: &Color) -> bool {
 fn is_coloured(paint: &Paint) -> bool {
     match paint {
         Paint::Plain(color) => !is_grey(color),
-        Paint::Checker { colors, .. } => !colors.iter().all(is_grey),
+        // Curves are tried as such.
+        Paint::Curve { .. } | Paint::Checker { curves: Some(_), .. } | Paint::Cube { .. } => false,
+        Paint::Checker { colors, curves: None, .. } => !colors.iter().all(is_grey),
         Paint::Image { .. } => true,
     }
 }
 
 fn reflects_colour(material: &Material) -> bool {
     let layers = material.scattering.gltf().is_some_and(|surface| {
-        let sheen = !is_grey(&surface.sheen_color) || surface.sheen_color_texture.is_some();
-        let specular =
-            !is_grey(&surface.specular_color) || surface.specular_color_texture.is_some();
+        let colored =
+            |color: &Color, curve: bool, image: bool| (!is_grey(color) && !curve) || image;
+        let sheen = colored(
+            &surface.sheen_color,
+            surface.sheen_curve.is_some(),
+            surface.sheen_color_texture.is_some(),
+        );
+        let specular = colored(
+            &surface.specular_color,
+            surface.specular_curve.is_some(),
+            surface.specular_color_texture.is_some(),
+        );
         sheen || specular
     });
     // The colour of a measured metal is for looking.

@@ -736,3 +736,61 @@ fn spectrum_of(text: &str) -> Vec<f64> {
     let middle = picture.height() / 2 * picture.width() + picture.width() / 2;
     layer.channels.iter().map(|channel| channel.values.at(middle)).collect()
 }
+
+/// A chart of measured patches in 31 bands: every view has the same numbers, those of the curves.
+#[test]
+#[expect(clippy::cast_possible_truncation, reason = "inside the view")]
+fn every_view_of_a_chart_has_its_reflectances() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = crate::curves::chart();
+    // Patches 9 mm apart, in views that are 57.6 mm wide at the plane in focus.
+    for object in scene["objects"].as_array_mut().unwrap() {
+        for key in ["width", "height"] {
+            object[key] = 8.6e-3.into();
+        }
+        for axis in 0..2 {
+            let at = object["transform"]["translate"][axis].as_f64().unwrap();
+            object["transform"]["translate"][axis] = (9e-3 * at).into();
+        }
+    }
+    let spectra = folder.path().join("spectra");
+    std::fs::create_dir(&spectra).unwrap();
+    let table = crate::curves::scenes().join("spectra/colorchecker.csv");
+    std::fs::copy(table, spectra.join("colorchecker.csv")).unwrap();
+    scene["camera"] =
+        serde_json::from_str(&camera("light_field_reference", "", [300, 200], "")).unwrap();
+    scene["camera"]["sensor"] = serde_json::json!({
+        "type": "multispectral", "resolution": [300, 200], "pixel_pitch": 8,
+        "bands": { "from": 400, "to": 700, "count": 31 }
+    });
+    scene["render"] = serde_json::json!({ "samples": 4 });
+    let geometry = write_scene(folder.path(), &scene.to_string());
+    let [n, rows, cols] = ["views", "rows", "cols"]
+        .map(|key| usize::try_from(geometry[key].as_u64().unwrap()).unwrap());
+    let (shape, views) = array(&folder.path().join("views_spectrum.npy"));
+    assert_eq!(shape, [n, n, rows, cols, 31]);
+    let grid = etendue_spectrum::Grid::equal(400.0, 700.0, 31).unwrap();
+    let lamp = etendue_spectrum::Illuminant::D65.curve().unwrap();
+    for view in 0..n * n {
+        let pixel = |k: usize| {
+            let (x, y) = ((k % 6) as f64 - 2.5, 1.5 - (k / 6) as f64);
+            let column = (cols as f64 * (0.5 + 9e-3 * x / on_the_wall(cols as f64, 0.5))) as usize;
+            let row = (rows as f64 * (0.5 - 9e-3 * y / on_the_wall(rows as f64, 0.5))) as usize;
+            ((view * rows + row) * cols + column) * 31
+        };
+        for (k, patch) in etendue_spectrum::colorchecker::PATCHES.iter().enumerate() {
+            // Away from the axis all bands of a pixel are dimmed alike.
+            let found = &views[pixel(k)..pixel(k) + 31];
+            let known: Vec<f64> = (grid.bands())
+                .map(|b| patch.mean(b.from, b.to) * lamp.mean(b.from, b.to))
+                .collect();
+            let dimmed = found.iter().sum::<f64>() / known.iter().sum::<f64>();
+            for (found, known) in found.iter().zip(&known) {
+                // f32, and sums of a few samples.
+                let off = (found - dimmed * known).abs();
+                assert!(off < 1e-5 * dimmed, "view {view}, patch {k}: {off} of {known}");
+            }
+            assert!(dimmed > 0.9 && dimmed < 1.001, "view {view}, patch {k}: {dimmed}");
+        }
+    }
+}

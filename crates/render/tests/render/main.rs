@@ -3,6 +3,7 @@
 mod adaptive;
 mod band_paths;
 mod blocks;
+mod curves;
 mod dispersion;
 mod known_radiance;
 mod layers;

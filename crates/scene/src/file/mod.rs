@@ -185,6 +185,7 @@ impl SceneFile {
             members.retain(|key, value| !(value.is_null() && is_unset(key)));
         }
         remove_notes(&mut value);
+        written.read_curves(&mut value)?;
         spec::read_resolution(&mut value, "camera.sensor.resolution")
             .map_err(|why| written.fault("camera.sensor.resolution", why))?;
         let mut file = Self { written, kind, value, spec: SceneSpec::default(), sensor: None };

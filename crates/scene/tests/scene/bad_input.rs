@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use etendue_files::{Opener, Reach};
 use etendue_scene::{LoadOptions, SceneError, SceneFile, Wanted};
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
 /// A folder with `scene.json` in it.
@@ -394,4 +395,56 @@ fn a_camera_that_is_not_there_lists_those_that_are() {
     let options = LoadOptions { camera: Some("front"), ..LoadOptions::default() };
     let error = SceneFile::read(&path, &[]).unwrap().load(Wanted::NOTHING, &options).unwrap_err();
     assert_eq!(error.to_string(), "--camera front: no model of the scene has a camera");
+}
+
+/// Curves that are none, each with its place and what would mend it.
+#[test]
+fn curves_that_are_none_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("two.csv"), "nm,a,b\n400,0.1,0.2\n700,0.3,1.4\n").unwrap();
+    std::fs::write(
+        folder.path().join("n.yml"),
+        "DATA:\n - type: tabulated n\n   data: |\n 0.4 1.5\n 0.7 1.6\n",
+    )
+    .unwrap();
+    let matte = |color: Value| json!({ "type": "matte", "color": color });
+    for (material, place, word) in [
+        (matte(json!({ "curve": [[500, 0.1], [400, 0.2]] })), "color.curve", "sort"),
+        (matte(json!({ "curve": [[500, 0.1], [500, 0.2]] })), "color.curve", "once"),
+        (matte(json!({ "curve": [[-5, 0.1], [500, 0.2]] })), "color.curve", "positive"),
+        (matte(json!({ "curve": [[0.4, 0.1], [0.7, 0.2]] })), "color.curve", "did you mean nm"),
+        (matte(json!({ "curve": [[400, 0.1], [700, 1.2]] })), "color", "fluorescence"),
+        (matte(json!({ "curve": [[400, -0.1], [700, 0.2]] })), "color", "below zero"),
+        (matte(json!({ "file": "two.csv" })), "color.file", "`column`"),
+        (matte(json!({ "file": "two.csv", "column": "c" })), "color.file", "\"a\", \"b\""),
+        (matte(json!({ "file": "two.csv", "column": "b" })), "color", "1.4 at 700 nm"),
+        (matte(json!({ "file": "none.csv" })), "color.file", "none.csv"),
+        (json!({ "type": "metal", "metal": { "file": "n.yml" } }), "metal.file", "no table of k"),
+        (
+            json!({ "type": "dielectric", "absorption": {
+                "color": { "curve": [[400, 0.5], [700, 1.5]] }, "distance": 1 } }),
+            "absorption.color",
+            "1.5 at 700 nm",
+        ),
+        (
+            json!({ "type": "emissive", "radiance": { "curve": [[400, -1], [700, 1]] } }),
+            "radiance",
+            "no less than 0",
+        ),
+        (
+            json!({ "type": "emissive", "radiance": { "line": 532 }, "illuminant": "d65" }),
+            "illuminant",
+            "leave one of them out",
+        ),
+    ] {
+        let scene = json!({
+            "objects": [{ "shape": "box", "material": "m" }], "materials": { "m": material }
+        });
+        let file = SceneFile::from_json(&Opener::default(), folder.path(), scene);
+        let error =
+            file.and_then(|file| file.load(Wanted::NOTHING, &LoadOptions::default()).map(|_| ()));
+        let text = error.unwrap_err().to_string();
+        let place = format!("materials.m.{place}");
+        assert!(text.contains(&place) && text.contains(word), "{place} {word}: {text}");
+    }
 }

@@ -32,6 +32,11 @@ pub enum Times {
 }
 
 impl Times {
+    /// Whether light may meet a second curve after it.
+    pub(super) fn may_repeat(self) -> bool {
+        self != Self::UpTo(1)
+    }
+
     /// The powers that are tried; `left` tells what one leaves of white light in the channels that it leaves least
     /// and most of.
     pub(super) fn powers(self, left: impl Fn(f64) -> [f64; 2]) -> Vec<f64> {
@@ -88,7 +93,12 @@ impl Products {
     /// All products of up to `colored` colours with no factor, each factor to each of its `powers`, and two
     /// of them half way; `most` at most, those of many curves left out first. `None` where there is no room
     /// for those of colours alone.
-    pub(super) fn of(colored: usize, powers: &[Vec<f64>], most: usize) -> Option<Self> {
+    pub(super) fn of(
+        colored: usize,
+        powers: &[Vec<f64>],
+        may_repeat: &[bool],
+        most: usize,
+    ) -> Option<Self> {
         let colors = of_colors(colored);
         if colors.len() > most {
             return None;
@@ -100,7 +110,8 @@ impl Products {
         // Two bodies one behind the other, each of which leaves about half.
         let middle = |k: usize| powers[k].get(powers[k].len() / 2).map(|&power| (k, power));
         for i in 0..powers.len() {
-            factors.extend((0..i).filter_map(|k| Some(vec![middle(k)?, middle(i)?])));
+            let pairs = (0..i).filter(|&k| may_repeat[k] || may_repeat[i]);
+            factors.extend(pairs.filter_map(|k| Some(vec![middle(k)?, middle(i)?])));
         }
         let mut all: Vec<Product> = factors
             .iter()
@@ -144,13 +155,15 @@ mod tests {
     fn products_are_all_there_is_room_for_and_the_simple_ones_first() {
         assert_eq!([0, 1, 2, 3, 9].map(|n| of_colors(n).len()), [1, 4, 10, 20, 20]);
         let powers = [vec![1.0, 2.0], vec![0.5]];
-        let all = Products::of(1, &powers, 1000).unwrap();
+        let all = Products::of(1, &powers, &[true; 2], 1000).unwrap();
         // Four colours with nothing, three powers and one pair.
         assert_eq!((all.all.len(), all.complete), (4 * 5, true));
-        let few = Products::of(1, &powers, 7).unwrap();
+        let few = Products::of(1, &powers, &[true; 2], 7).unwrap();
         assert_eq!((few.all.len(), few.complete), (7, false));
+        let once = Products::of(0, &[vec![1.0], vec![1.0]], &[false; 2], 1000).unwrap();
+        assert_eq!(once.all.len(), 3, "no pair where light is scattered once");
         assert!(few.all[4..].iter().all(|p| p.colors.is_empty() && p.factors.len() == 1));
-        assert_eq!(Products::of(3, &powers, 19), None);
+        assert_eq!(Products::of(3, &powers, &[true; 2], 19), None);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::process::Command;
 
 use etendue_sensor::dng::DngError;
-use etendue_sensor::{Exposure, Film, RawImage, Sensor, SensorSpec};
+use etendue_sensor::{ChannelSet, Channels, Exposure, Film, RawImage, Sensor, SensorSpec};
 use serde_json::{Value, json};
 
 use crate::environment;
@@ -128,8 +128,9 @@ fn a_raw_converter_develops_the_colours() {
             return;
         }
     };
-    // Top left, top right, bottom left, bottom right, in linear sRGB.
-    let colours = [[0.7, 0.05, 0.05], [0.05, 0.6, 0.05], [0.05, 0.05, 0.7], [0.8, 0.8, 0.8]];
+    // Top left, top right, bottom left, bottom right, in linear sRGB: as saturated as surfaces are, to which the
+    // matrix is fitted.
+    let colours = [[0.5, 0.2, 0.15], [0.15, 0.4, 0.15], [0.15, 0.15, 0.4], [0.8, 0.8, 0.8]];
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("raw.dng");
     let program = "import rawpy, sys, json
@@ -176,4 +177,29 @@ print(json.dumps({
             }
         }
     }
+}
+
+/// A camera that sees as the CIE's observer does: its matrix only scales, and a real one nearly fits.
+#[test]
+fn the_matrix_fits_the_patches() {
+    let observer = Channels::Set(ChannelSet::Cie1931);
+    let [x, y, z] = [0, 1, 2].map(|k| observer.curves()[k].curve.clone());
+    let of = |filters: Value| {
+        let spec =
+            json!({ "type": "raw", "cfa": "rggb", "resolution": [4, 4], "filters": filters });
+        Sensor::new(&serde_json::from_value(spec).unwrap()).unwrap().fitted_matrix()
+    };
+    let matrix = of(json!({ "r": x, "g": y, "b": z })).unwrap();
+    // D65 has Y = 1 and Z = 1.0888, the most of the three: that is 1 in its channel.
+    for (i, row) in matrix.iter().enumerate() {
+        for (k, value) in row.iter().enumerate() {
+            let expected = if i == k { 1.0 / 1.0888 } else { 0.0 };
+            // The published white has four figures; the fit's curves are joined by straight lines.
+            assert!((value - expected).abs() < 2e-4, "{matrix:?}");
+        }
+    }
+    assert_eq!(of(json!("ideal")), None);
+    let real = of(json!("nikon_d5100")).unwrap();
+    // Each channel sees most of its own third of the light.
+    assert!((0..3).all(|i| (0..3).all(|k| real[i][i] >= real[i][k])), "{real:?}");
 }

@@ -94,7 +94,7 @@ impl Layered {
 
     /// Whether neither a sheen nor a coat lies over it.
     fn is_bare(&self) -> bool {
-        self.coat.share == 0.0 && self.sheen.color == [0.0; 3]
+        self.coat.share == 0.0 && self.sheen.color.peak() <= 0.0
     }
 
     fn facets(&self) -> Facets {

@@ -23,7 +23,7 @@ use super::albedo::{Albedo, lacking};
 use super::{Weights, fresnel, ggx};
 
 /// The cosine at which a metal's reflectance is met beside that face on.
-pub(crate) const SECOND_COSINE: f64 = 1.0 / 7.0;
+pub const SECOND_COSINE: f64 = 1.0 / 7.0;
 
 /// The factor `d` of the fit to reflectances `face_on` and `second` at [`SECOND_COSINE`].
 pub(crate) fn dip(face_on: f64, second: f64) -> f64 {

@@ -24,12 +24,12 @@ pub(crate) mod sheets;
 use std::f64::consts::PI;
 
 use etendue_geometry::glam::DVec3;
-use etendue_spectrum::Metal;
 
-use crate::Color;
 use crate::sampling::{Frame, cosine_direction};
+use crate::{Color, ConductorId, Tint};
 pub use coat::Coat;
 pub use layered::Layered;
+pub use metal::SECOND_COSINE;
 pub use sheen::Sheen;
 
 /// A value as multiples of white, the surface's colour and others that follow from it.
@@ -105,7 +105,7 @@ pub enum Model {
         /// The square of the roughness, 0..=1; at 0 a mirror.
         alpha: f64,
         /// Its reflectance by its measured index, in place of the colour.
-        named: Option<Metal>,
+        named: Option<ConductorId>,
     },
     /// A boundary of glass.
     Dielectric {
@@ -126,10 +126,10 @@ pub struct Bsdf {
     geometric: DVec3,
     wo: DVec3,
     /// The surface's colour.
-    pub base: Color,
+    pub base: Tint,
     /// The colour of its highlights.
-    pub highlight: Color,
-    /// The colour of light that met several facets.
+    pub highlight: Tint,
+    /// The colour of light that met several facets, where the surface's has no curve.
     pub(crate) deep: Color,
     /// What of the model follows from the viewer's direction alone.
     seen: Seen,
@@ -162,9 +162,9 @@ impl Bsdf {
         model: Model,
         [geometric, shading]: [DVec3; 2],
         wo: DVec3,
-        colors: [Color; 2],
+        colors: [impl Into<Tint>; 2],
     ) -> Self {
-        Self::turned(model, (geometric, Frame::around(shading)), wo, colors)
+        Self::turned(model, (geometric, Frame::around(shading)), wo, colors.map(Into::into))
     }
 
     /// As [`Self::new`], with a frame around the shading normal whose x axis goes along the surface's grain.
@@ -172,7 +172,7 @@ impl Bsdf {
         model: Model,
         (geometric, frame): (DVec3, Frame),
         wo: DVec3,
-        [base, highlight]: [Color; 2],
+        [base, highlight]: [Tint; 2],
     ) -> Self {
         let local = frame.local(wo);
         let (seen, mean) = match model {
@@ -194,13 +194,13 @@ impl Bsdf {
             | Model::Dielectric { .. } => (Seen::Plain, None),
         };
         let deep = mean.map_or([0.0; 3], |mean| {
-            base.map(|c| metal::multiple(metal::mean_reflectance(c, 0.0), mean))
+            base.color.map(|c| metal::multiple(metal::mean_reflectance(c, 0.0), mean))
         });
         Self { model, frame, geometric, wo: local, base, highlight, deep, seen }
     }
 
     /// The metal by whose measured index it reflects.
-    pub(crate) fn named(&self) -> Option<Metal> {
+    pub(crate) fn named(&self) -> Option<ConductorId> {
         match self.model {
             Model::Metal { named, .. } => named,
             Model::Black
@@ -221,14 +221,14 @@ impl Bsdf {
     }
 
     /// The colour of its sheen.
-    pub(crate) fn sheen(&self) -> Color {
+    pub(crate) fn sheen(&self) -> Tint {
         match self.model {
             Model::Layered(layered) => layered.sheen.color,
             Model::Black
             | Model::Matte
             | Model::Mirror
             | Model::Metal { .. }
-            | Model::Dielectric { .. } => [0.0; 3],
+            | Model::Dielectric { .. } => Tint::BLACK,
         }
     }
 
@@ -380,8 +380,8 @@ fn mirrored(w: DVec3) -> DVec3 {
 }
 
 /// The largest bands of the two colours, for choosing among parts.
-fn peaks(colors: [&Color; 2]) -> layered::Peaks {
-    let [base, highlight] = colors.map(|c| c[0].max(c[1]).max(c[2]));
+fn peaks(colors: [&Tint; 2]) -> layered::Peaks {
+    let [base, highlight] = colors.map(Tint::peak);
     layered::Peaks { base, highlight }
 }
 

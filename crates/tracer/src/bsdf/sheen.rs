@@ -18,7 +18,7 @@ use std::sync::LazyLock;
 use etendue_geometry::glam::DVec3;
 
 use super::Weights;
-use crate::Color;
+use crate::Tint;
 
 /// The least roughness: below, fibres are a rim finer than anything shows.
 const SMOOTHEST: f64 = 0.07;
@@ -37,7 +37,7 @@ const EXACT: f64 = 5e-3;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sheen {
     /// Its reflectance; black where there is none.
-    pub color: Color,
+    pub color: Tint,
     /// Its roughness, 0..=1; the square is α.
     pub roughness: f64,
 }
@@ -59,7 +59,7 @@ pub(super) struct Seen {
 impl Sheen {
     /// As seen from `wo`; `None` where there is none.
     pub(super) fn seen(&self, wo: DVec3) -> Option<Seen> {
-        let peak = self.color[0].max(self.color[1]).max(self.color[2]).min(1.0);
+        let peak = self.color.peak().min(1.0);
         if peak <= 0.0 {
             return None;
         }

@@ -1,5 +1,7 @@
 use std::f64::consts::TAU;
 
+use etendue_spectrum::Metal;
+
 use super::*;
 
 const WHITE: Color = [1.0; 3];
@@ -37,7 +39,7 @@ fn all() -> Vec<(&'static str, Model)> {
     let Model::Layered(below) = layered(0.0, 0.3, 0.3) else { return models };
     models.push(("shiny", Model::Layered(Layered { f0: 0.8, ..below })));
     for roughness in [0.1, 0.3, 0.6, 1.0] {
-        let sheen = Sheen { color: WHITE, roughness };
+        let sheen = Sheen { color: WHITE.into(), roughness };
         for (metallic, transmission, coat) in [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.6, 0.7)] {
             let Model::Layered(below) = layered(metallic, 0.7, transmission) else { continue };
             if transmission > 0.0 && roughness < 0.25 {
@@ -333,7 +335,7 @@ fn sheen_returns_what_its_formula_says() {
     ];
     for (roughness, cosine, albedo) in known {
         let Model::Layered(below) = layered(0.0, 0.5, 0.0) else { continue };
-        let sheen = Sheen { color: WHITE, roughness };
+        let sheen = Sheen { color: WHITE.into(), roughness };
         let surface = bsdf(Model::Layered(Layered { sheen, ..below }), cosine);
         let (mut sum, n) = (0.0, 500);
         for [u, v] in grid(n) {

@@ -177,8 +177,12 @@ impl SceneView<'_> {
         };
         let colored = material.vertex_colors && self.geometry.mesh_of(placement).colors.is_some();
         match material.base_color {
-            Paint::Plain(color) if !colored => Some(color),
-            Paint::Plain(_) | Paint::Checker { .. } | Paint::Image { .. } => None,
+            Paint::Plain(color) | Paint::Curve { look: color, .. } if !colored => Some(color),
+            Paint::Plain(_)
+            | Paint::Curve { .. }
+            | Paint::Checker { .. }
+            | Paint::Image { .. }
+            | Paint::Cube { .. } => None,
         }
     }
 

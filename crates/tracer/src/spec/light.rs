@@ -7,10 +7,13 @@ use etendue_spectrum::Illuminant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Bound, Fault, PaintSpec, Supply, checked, in_bounds, one, paint, white};
+use super::{
+    Bound, ColorSpec, Emitted, Fault, PaintSpec, Supply, emitted, in_bounds, one, radiant_paint,
+    white,
+};
 use crate::clear_sky::SUN_DIAMETER;
 use crate::goniometric::{Goniometric, Photometry};
-use crate::{ClearSky, Color, EnvironmentImage, Light, LightGroup, LightKind, Paint, Projector};
+use crate::{ClearSky, EnvironmentImage, Light, LightGroup, LightKind, Paint, Projector};
 
 /// A light as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -21,7 +24,7 @@ pub enum LightSpec {
         /// Where it is (m).
         at: [f64; 3],
         /// Radiant intensity, linear RGB: at 1 m it gives this irradiance.
-        intensity: Color,
+        intensity: ColorSpec,
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
@@ -36,7 +39,7 @@ pub enum LightSpec {
         /// A point that it is aimed at (m).
         look_at: [f64; 3],
         /// Radiant intensity within the inner cone, linear RGB.
-        intensity: Color,
+        intensity: ColorSpec,
         /// Half-angle of the cone (degrees, at most 90).
         #[serde(default = "default_cone")]
         #[schemars(range(min = 0.0, max = 90.0))]
@@ -57,7 +60,7 @@ pub enum LightSpec {
         /// Where the light goes.
         direction: [f64; 3],
         /// Irradiance on a surface that faces it, linear RGB.
-        irradiance: Color,
+        irradiance: ColorSpec,
         /// Diameter of the disk that it comes from, as seen from the scene (degrees; the sun's is 0.53).
         /// Shadows have soft edges by it; no ray of the camera meets the disk.
         #[serde(default)]
@@ -85,7 +88,7 @@ pub enum LightSpec {
         rotate: f64,
         /// Multiplies the file's candela: linear RGB.
         #[serde(default = "white")]
-        intensity: Color,
+        intensity: ColorSpec,
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
@@ -114,7 +117,7 @@ pub enum LightSpec {
         image: PaintSpec,
         /// Radiant intensity along the axis where the image is white, linear RGB: on a screen that faces it at
         /// 1 m the image has this irradiance all over.
-        intensity: Color,
+        intensity: ColorSpec,
         /// The spectrum that the intensity multiplies; equal energy when absent.
         #[serde(default)]
         illuminant: Option<Illuminant>,
@@ -126,7 +129,7 @@ pub enum LightSpec {
     Environment {
         /// Radiance, linear RGB; multiplies the image.
         #[serde(default = "white")]
-        radiance: Color,
+        radiance: ColorSpec,
         /// A latitude-longitude image (HDR, EXR, PNG or JPEG), relative to the scene file. Its middle
         /// is at −Z, its top at +Y.
         #[serde(default)]
@@ -220,7 +223,7 @@ impl LightSpec {
             }
             Self::Environment { radiance, illuminant, .. } => ("radiance", radiance, illuminant),
         };
-        in_bounds(key, color, Bound::None)?;
+        let Emitted { color, curve } = emitted((key, color), *illuminant, supply)?;
         let kind = match self {
             Self::Sky { .. } => return Ok(Vec::new()),
             Self::Point { at, .. } => LightKind::Point(DVec3::from(*at)),
@@ -248,7 +251,11 @@ impl LightSpec {
             }
             Self::Projector { at, look_at, up, fov, aspect, image, .. } => {
                 let ends = [*at, *look_at].map(DVec3::from);
-                let image = paint("image", image, Bound::None, supply)?;
+                let (image, spectrum) = radiant_paint(("image", image), None, supply)?;
+                if spectrum.is_some() {
+                    let why = "is a curve; a projector's spectrum is that of its `intensity`";
+                    return Err(Fault::new("image", why));
+                }
                 let shape = (*fov, *aspect, image);
                 LightKind::Projector(Box::new(projector(ends, DVec3::from(*up), shape)?))
             }
@@ -264,13 +271,7 @@ impl LightSpec {
                 LightKind::Environment { image, turn, visible: *visible }
             }
         };
-        Ok(vec![Light {
-            kind,
-            color: *color,
-            illuminant: checked(*illuminant)?,
-            spectrum: None,
-            group: self.group(),
-        }])
+        Ok(vec![Light { kind, color, illuminant: curve, spectrum: None, group: self.group() }])
     }
 
     /// The group that it is of, if it names one.

@@ -1,13 +1,19 @@
 //! Materials as the scene file writes them, and the surfaces that they are.
 
-use etendue_spectrum::{Illuminant, Metal, rgb};
+use std::sync::Arc;
+
+use etendue_spectrum::{CurveSpec, Illuminant, Metal, table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Bound, Fault, PaintSpec, Supply, checked, in_bounds, one, paint};
+use super::{
+    ColorSpec, Fault, PaintSpec, Reflectance, Supply, checker, curve, default_checker_squares,
+    look, one, paint, radiant_paint, reflectance,
+};
+use crate::bsdf::SECOND_COSINE;
 use crate::material::Alpha;
 use crate::scattering::{Absorption, Glass, GltfSurface};
-use crate::{Color, Emission, LightGroup, Material, Paint, Scattering};
+use crate::{Conductor, Emission, LightGroup, Material, Paint, Scattering, SceneCurve};
 
 /// A material as the scene file writes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -29,9 +35,10 @@ pub enum MaterialSpec {
         /// Reflectance face on: linear RGB, each 0..=1, or an image. Either this or `metal`.
         #[serde(default)]
         color: Option<PaintSpec>,
-        /// The metal whose measured index decides what is reflected at which wavelength.
+        /// The metal whose measured index decides what is reflected at which wavelength: a name, curves of `n` and
+        /// `k`, or a `.yml` file of refractiveindex.info.
         #[serde(default)]
-        metal: Option<Metal>,
+        metal: Option<MetalSpec>,
         /// Roughness, 0 (a mirror) to 1.
         #[serde(default = "default_roughness")]
         #[schemars(range(min = 0.0, max = 1.0))]
@@ -89,6 +96,9 @@ pub enum MaterialSpec {
         #[serde(default = "default_gltf_roughness")]
         #[schemars(range(min = 0.0, max = 1.0))]
         sheen_roughness: f64,
+        /// Colour of the reflection of what is no metal, face on: linear RGB, each 0..=1, or a curve.
+        #[serde(default = "super::white")]
+        specular_color: ColorSpec,
         /// How much rougher highlights are along the surface's grain than across it, 0 to 1.
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 1.0))]
@@ -118,13 +128,43 @@ pub enum MaterialSpec {
     },
     /// Matte squares of two colours over the surface's texture coordinates.
     Checker {
-        /// The two reflectances, linear RGB.
+        /// The two reflectances: linear RGB, or curves.
         #[serde(default = "default_checker_colors")]
-        colors: [Color; 2],
+        colors: [ColorSpec; 2],
         /// Squares along one unit of the texture coordinates (> 0).
         #[serde(default = "default_checker_squares")]
         squares: f64,
     },
+}
+
+/// A metal as the scene file writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum MetalSpec {
+    /// One of the tables.
+    Named(Metal),
+    /// Curves of its index.
+    Index(MetalIndexSpec),
+    /// A measured file.
+    File(MetalFileSpec),
+}
+
+/// The index n + i k of a metal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MetalIndexSpec {
+    /// n by wavelength.
+    pub n: CurveSpec,
+    /// k by wavelength.
+    pub k: CurveSpec,
+}
+
+/// The index of a metal in a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MetalFileSpec {
+    /// A `.yml` file of refractiveindex.info with n and k, relative to the scene file.
+    pub file: String,
 }
 
 /// A refractive index as the scene file writes it.
@@ -156,11 +196,11 @@ pub struct AbbeSpec {
 }
 
 /// Absorption of a body, by Beer and Lambert.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AbsorptionSpec {
-    /// What is left of light after `distance`: linear RGB, each 0..=1.
-    pub color: Color,
+    /// What is left of light after `distance`: linear RGB, each 0..=1, or a curve.
+    pub color: ColorSpec,
     /// m (> 0).
     pub distance: f64,
 }
@@ -174,16 +214,18 @@ impl MaterialSpec {
     pub fn build(&self, name: &str, supply: &mut dyn Supply) -> Result<Material, Fault> {
         Ok(match self {
             Self::Matte { color } => {
-                Material::new(name, paint("color", color, Bound::One, supply)?, Scattering::Matte)
+                Material::new(name, paint("color", color, supply)?, Scattering::Matte)
             }
             Self::Mirror { color } => {
-                Material::new(name, paint("color", color, Bound::One, supply)?, Scattering::Mirror)
+                Material::new(name, paint("color", color, supply)?, Scattering::Mirror)
             }
             Self::Metal { color, metal, roughness } => {
-                let scattering = Scattering::Metal { roughness: *roughness, named: *metal };
-                let paint = match (color, metal) {
-                    (Some(color), None) => paint("color", color, Bound::One, supply)?,
-                    (None, Some(metal)) => Paint::Plain(look(*metal)),
+                let (paint, named) = match (color, metal) {
+                    (Some(color), None) => (paint("color", color, supply)?, None),
+                    (None, Some(metal)) => {
+                        let conductor = conductor(metal, supply)?;
+                        (Paint::Plain(look(&conductor.face_on())), Some(conductor))
+                    }
                     (None, None) => {
                         let why = "is missing: give it, or a `metal` (\"gold\", \"silver\", …)";
                         return Err(Fault::new("color", why));
@@ -193,24 +235,28 @@ impl MaterialSpec {
                         return Err(Fault::new("color", why));
                     }
                 };
-                Material::new(name, paint, scattering)
+                Material::new(name, paint, Scattering::Metal { roughness: *roughness, named })
             }
             Self::Dielectric { ior, color, roughness, absorption } => {
                 let glass = Glass {
                     ior: supply.index(ior).map_err(|why| Fault::new("ior", why))?,
                     roughness: *roughness,
-                    absorption: absorption.as_ref().map(absorbing).transpose()?,
+                    absorption: match absorption {
+                        Some(spec) => Some(absorbing(spec, supply)?),
+                        None => None,
+                    },
                 };
                 let scattering = Scattering::Dielectric(glass);
-                Material::new(name, paint("color", color, Bound::One, supply)?, scattering)
+                Material::new(name, paint("color", color, supply)?, scattering)
             }
             Self::Gltf { .. } => self.gltf(name, supply)?,
             Self::Emissive { radiance, illuminant, two_sided, group } => {
-                let radiance = paint("radiance", radiance, Bound::None, supply)?;
+                let (radiance, illuminant) =
+                    radiant_paint(("radiance", radiance), *illuminant, supply)?;
                 let emission = Emission {
                     radiance: radiance.clone(),
                     strength: 1.0,
-                    illuminant: checked(*illuminant)?,
+                    illuminant,
                     two_sided: *two_sided,
                     group: *group,
                 };
@@ -218,13 +264,7 @@ impl MaterialSpec {
                 Material { emission: Some(emission), ..plain }
             }
             Self::Checker { colors, squares } => {
-                for color in colors {
-                    in_bounds("colors", color, Bound::One)?;
-                }
-                if squares.is_nan() || *squares <= 0.0 {
-                    return Err(Fault::new("squares", format!("{squares} is not above zero")));
-                }
-                let paint = Paint::Checker { colors: *colors, squares: *squares };
+                let paint = checker("colors", (colors, *squares), supply)?;
                 Material::new(name, paint, Scattering::Matte)
             }
         })
@@ -242,6 +282,7 @@ impl MaterialSpec {
             clearcoat_roughness,
             sheen,
             sheen_roughness,
+            specular_color,
             anisotropy,
             anisotropy_rotation,
             opacity,
@@ -250,12 +291,17 @@ impl MaterialSpec {
             return Ok(Material::unnamed());
         };
         // Sheen has one colour or an image, and no checker.
-        let sheen = paint("sheen", sheen, Bound::One, supply)?;
-        let (sheen_color, sheen_color_texture) = match sheen {
-            Paint::Plain(color) => (color, None),
-            Paint::Image { factor, image } => (factor, Some(image)),
-            Paint::Checker { colors, .. } => (colors[0], None),
+        let sheen = paint("sheen", sheen, supply)?;
+        let (sheen_color, sheen_curve, sheen_color_texture) = match sheen {
+            Paint::Plain(color) => (color, None, None),
+            Paint::Curve { look, curve } => (look, Some(curve), None),
+            Paint::Image { factor, curve, image } => (factor, curve, Some(image)),
+            Paint::Checker { .. } | Paint::Cube { .. } => {
+                let why = "is a checker or a cube; a sheen is of one colour, a curve or an image";
+                return Err(Fault::new("sheen", why));
+            }
         };
+        let highlights = reflectance("specular_color", specular_color, supply)?;
         // The surface below its colour, and what shows through both.
         let surface = GltfSurface {
             metallic: *metallic,
@@ -265,13 +311,16 @@ impl MaterialSpec {
             clearcoat: *clearcoat,
             clearcoat_roughness: *clearcoat_roughness,
             sheen_color,
+            sheen_curve,
             sheen_color_texture,
+            specular_color: highlights.look,
+            specular_curve: highlights.curve,
             sheen_roughness: *sheen_roughness,
             anisotropy: *anisotropy,
             anisotropy_rotation: anisotropy_rotation.to_radians(),
             ..GltfSurface::default()
         };
-        let paint = paint("color", color, Bound::One, supply)?;
+        let paint = paint("color", color, supply)?;
         let plain = Material::new(name, paint, Scattering::Gltf(Box::new(surface)));
         let alpha = if *opacity < 1.0 { Alpha::Blend { factor: *opacity } } else { Alpha::Opaque };
         Ok(Material { alpha, ..plain })
@@ -292,27 +341,42 @@ impl MaterialSpec {
     }
 }
 
-/// What a metal looks like face on: linear RGB in 0..=1.
-fn look(metal: Metal) -> Color {
-    rgb::colour(&metal.reflectance(1.0)).map(|part| part.clamp(0.0, 1.0))
+/// A metal by its name, curves or file.
+fn conductor(spec: &MetalSpec, supply: &mut dyn Supply) -> Result<Conductor, Fault> {
+    let [n, k] = match spec {
+        MetalSpec::Named(metal) => return Ok(Conductor::Named(*metal)),
+        MetalSpec::Index(MetalIndexSpec { n, k }) => {
+            [curve("metal.n", n, supply)?, curve("metal.k", k, supply)?]
+        }
+        MetalSpec::File(MetalFileSpec { file }) => supply
+            .text(file)
+            .and_then(|text| table::refractive_index_info(&text))
+            .map_err(|why| Fault::new("metal.file", format!("\"{file}\": {why}")))?,
+    };
+    if n.extent()[0] < 0.0 || k.extent()[0] < 0.0 {
+        let why = "has n or k below zero, where no light is reflected by any formula";
+        return Err(Fault::new("metal", why));
+    }
+    let mut at = |cosine: f64| {
+        let curve = etendue_spectrum::metal::reflectance_of([&n, &k], cosine);
+        let curve = curve.map_err(|error| Fault::new("metal", error.to_string()))?;
+        Ok(SceneCurve { number: supply.curve_number(), curve: Arc::new(curve) })
+    };
+    Ok(Conductor::Measured([at(1.0)?, at(SECOND_COSINE)?]))
 }
 
-fn absorbing(spec: &AbsorptionSpec) -> Result<Absorption, Fault> {
-    let AbsorptionSpec { color, distance } = *spec;
-    in_bounds("absorption.color", &color, Bound::One)?;
-    if distance.is_nan() || distance <= 0.0 {
+fn absorbing(spec: &AbsorptionSpec, supply: &mut dyn Supply) -> Result<Absorption, Fault> {
+    let AbsorptionSpec { color, distance } = spec;
+    let Reflectance { look, curve } = reflectance("absorption.color", color, supply)?;
+    if distance.is_nan() || *distance <= 0.0 {
         let why = format!("{distance} is not above zero");
         return Err(Fault::new("absorption.distance", why));
     }
-    Ok(Absorption { color, distance })
+    Ok(Absorption { color: look, curve, distance: *distance })
 }
 
-fn default_checker_colors() -> [Color; 2] {
-    [[0.8; 3], [0.2; 3]]
-}
-
-fn default_checker_squares() -> f64 {
-    8.0
+fn default_checker_colors() -> [ColorSpec; 2] {
+    [ColorSpec::Rgb([0.8; 3]), ColorSpec::Rgb([0.2; 3])]
 }
 
 fn default_roughness() -> f64 {

@@ -5,22 +5,40 @@ mod light;
 mod material;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use etendue_image::linear_from_srgb;
-use etendue_spectrum::Illuminant;
+use etendue_spectrum::{
+    Bands, Curve, CurveError, CurveFault, CurveSpec, Grid, Illuminant, Outside, rgb,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use self::light::{LightSpec, SunSpec};
 pub use self::material::{AbbeSpec, AbsorptionSpec, IorSpec, MaterialSpec};
 use crate::texture::{Filter, Wrap};
-use crate::{Color, Ior, Paint};
+use crate::{Color, Cube, Ior, Paint, SceneCube, SceneCurve};
 
 /// The brightest that a light or a surface may be, in whichever unit: pictures hold no number above
 /// 3·10³⁸, and the powers of all lights are added up.
 pub const BRIGHTEST: f64 = 1e30;
 
-/// A colour, or an image of colours.
+/// A colour, or a curve over wavelengths.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ColorSpec {
+    /// Linear RGB.
+    Rgb(Color),
+    /// A curve.
+    Curve(CurveSpec),
+}
+
+impl ColorSpec {
+    /// White.
+    pub const WHITE: Self = Self::Rgb([1.0; 3]);
+}
+
+/// A colour, a curve over wavelengths, an image or squares of two colours.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum PaintSpec {
@@ -28,6 +46,42 @@ pub enum PaintSpec {
     Color(Color),
     /// An image over the surface's texture coordinates.
     Image(ImageSpec),
+    /// A reflectance by wavelength over the surface's texture coordinates.
+    Cube(CubeSpec),
+    /// Squares over the surface's texture coordinates.
+    Checker(CheckerSpec),
+    /// A curve.
+    Curve(CurveSpec),
+}
+
+/// A file of reflectances by wavelength over the surface's texture coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CubeSpec {
+    /// An NPY file, `[row][column][band]`, of reflectances of 0 to 1, relative to the scene file.
+    pub cube: String,
+    /// The wavelengths of its bands (nm).
+    pub bands: Grid,
+    /// What happens outside of 0..=1, along both axes.
+    #[serde(default)]
+    pub wrap: Wrap,
+    /// How texels are read.
+    #[serde(default)]
+    pub filter: Filter,
+    /// Copies of the cube along one unit of the texture coordinates, along u and v.
+    #[serde(default = "unit_scale")]
+    pub repeat: [f64; 2],
+}
+
+/// Squares of two colours over the surface's texture coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CheckerSpec {
+    /// The two colours.
+    pub checker: [ColorSpec; 2],
+    /// Squares along one unit of the texture coordinates (> 0).
+    #[serde(default = "default_checker_squares")]
+    pub squares: f64,
 }
 
 impl Default for PaintSpec {
@@ -42,9 +96,9 @@ impl Default for PaintSpec {
 pub struct ImageSpec {
     /// A PNG, JPEG, Radiance or EXR file, relative to the scene file.
     pub image: String,
-    /// Multiplies the image: linear RGB.
+    /// Multiplies the image: linear RGB, or a curve.
     #[serde(default = "white")]
-    pub factor: Color,
+    pub factor: ColorSpec,
     /// What the file's numbers are: colours by the sRGB curve, or plain.
     #[serde(default)]
     pub encoding: crate::texture::Encoding,
@@ -77,12 +131,29 @@ impl Fault {
 
 /// What specifications name that stands elsewhere: files, and glasses of a catalogue.
 pub trait Supply {
-    /// An image as a paint.
+    /// An image as a paint, white times what it is multiplied by.
     ///
     /// # Errors
     ///
     /// When there is no such file; keys are those of the image.
     fn image(&mut self, spec: &ImageSpec) -> Result<Paint, Fault>;
+
+    /// The text of a file by the name that the scene gives it.
+    ///
+    /// # Errors
+    ///
+    /// A sentence on why there is none.
+    fn text(&mut self, written: &str) -> Result<String, String>;
+
+    /// A cube of reflectances.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such file, or it holds no such cube; keys are those of the cube.
+    fn cube(&mut self, spec: &CubeSpec) -> Result<Cube, Fault>;
+
+    /// The next number for a curve of the scene.
+    fn curve_number(&mut self) -> u32;
 
     /// A file by the name that the scene gives it.
     ///
@@ -108,23 +179,229 @@ enum Bound {
     None,
 }
 
-fn paint(
-    key: &str,
-    spec: &PaintSpec,
-    bound: Bound,
-    supply: &mut dyn Supply,
-) -> Result<Paint, Fault> {
+/// A colour of a surface: its look, and its curve where it has one.
+struct Reflectance {
+    look: Color,
+    curve: Option<SceneCurve>,
+}
+
+/// A reflectance or transmittance.
+fn reflectance(key: &str, spec: &ColorSpec, supply: &mut dyn Supply) -> Result<Reflectance, Fault> {
     match spec {
-        PaintSpec::Color(color) => {
-            in_bounds(key, color, bound)?;
-            Ok(Paint::Plain(*color))
+        ColorSpec::Rgb(color) => {
+            in_bounds(key, color, Bound::One)?;
+            Ok(Reflectance { look: *color, curve: None })
         }
-        PaintSpec::Image(image) => {
-            in_bounds(&format!("{key}.factor"), &image.factor, bound)?;
-            let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
-            supply.image(image).map_err(below)
+        ColorSpec::Curve(spec) => {
+            let curve = curve(key, spec, supply)?;
+            let curve = share(curve).map_err(|why| Fault::new(key, why))?;
+            let look = look(&curve);
+            let curve = SceneCurve { number: supply.curve_number(), curve: Arc::new(curve) };
+            Ok(Reflectance { look, curve: Some(curve) })
         }
     }
+}
+
+/// What a surface reflects or lets pass: 0 to 1.
+fn share(curve: Curve) -> Result<Curve, String> {
+    curve.within(0.0, 1.0).map_err(|error| match error {
+        CurveError::OutOfBounds { wavelength: Some(nm), value, .. } if value > 1.0 => format!(
+            "is {value} at {nm} nm, more light than falls in: a reflectance is 0 to 1 (percent are \
+             scaled by `\"scale\": 0.01`), and fluorescence, which gives back other wavelengths than \
+             it takes, is not modelled"
+        ),
+        CurveError::OutOfBounds { wavelength: Some(nm), value, .. } => format!(
+            "is {value} at {nm} nm, below zero: a surface reflects and a body lets pass 0 to 1; clip \
+             what the noise of the measurement leaves there"
+        ),
+        other => other.to_string(),
+    })
+}
+
+/// What a reflectance looks like: linear RGB in 0..=1, of its colour under daylight.
+fn look(curve: &Curve) -> Color {
+    let color = match Bands::Rgb.from_curve(curve, Outside::Held) {
+        Ok(color) => std::array::from_fn(|k| color[k]),
+        // Known in no visible light: what it is at its nearer end.
+        Err(_) => [curve.held(555.0); 3],
+    };
+    color.map(|part: f64| part.clamp(0.0, 1.0))
+}
+
+/// What a light sends: a colour and the curve that it multiplies, where it has one. The colour is then grey, by what
+/// the curve is to the eye, and the curve that much less: lights are chosen by their colours.
+struct Emitted {
+    color: Color,
+    curve: Option<Arc<Curve>>,
+}
+
+fn emitted(
+    (key, spec): (&str, &ColorSpec),
+    illuminant: Option<Illuminant>,
+    supply: &mut dyn Supply,
+) -> Result<Emitted, Fault> {
+    match spec {
+        ColorSpec::Rgb(color) => {
+            in_bounds(key, color, Bound::None)?;
+            Ok(Emitted { color: *color, curve: checked(illuminant)? })
+        }
+        ColorSpec::Curve(spec) => {
+            if illuminant.is_some() {
+                let why = format!("is given beside a curve of `{key}`, which has its own spectrum");
+                return Err(Fault::new("illuminant", format!("{why}: leave one of them out")));
+            }
+            emission(key, &curve(key, spec, supply)?)
+        }
+    }
+}
+
+/// A curve of a light.
+fn emission(key: &str, curve: &Curve) -> Result<Emitted, Fault> {
+    let [low, high] = curve.extent();
+    if low < 0.0 {
+        return Err(Fault::new(
+            key,
+            format!("is {low} at its least; a light sends no less than 0"),
+        ));
+    }
+    if high > BRIGHTEST {
+        return Err(Fault::new(key, format!("is above {BRIGHTEST:e}; pictures hold no more")));
+    }
+    let color = Bands::Rgb.from_curve(curve, Outside::Zero).unwrap_or_default();
+    let seen = color.iter().sum::<f64>() / 3.0;
+    let grey = if seen > 0.0 { seen } else { high };
+    if grey <= 0.0 {
+        return Ok(Emitted { color: [0.0; 3], curve: None });
+    }
+    let unit = curve.scaled(1.0 / grey).map_err(|e| Fault::new(key, e.to_string()))?;
+    Ok(Emitted { color: [grey; 3], curve: Some(Arc::new(unit)) })
+}
+
+/// A curve as the scene gives it.
+fn curve(key: &str, spec: &CurveSpec, supply: &mut dyn Supply) -> Result<Curve, Fault> {
+    spec.resolve(&mut |file| supply.text(file)).map_err(|CurveFault { key: below, why }| {
+        let dot = if below.is_empty() { "" } else { "." };
+        Fault::new(format!("{key}{dot}{below}"), why)
+    })
+}
+
+/// The colours of a surface.
+fn paint(key: &str, spec: &PaintSpec, supply: &mut dyn Supply) -> Result<Paint, Fault> {
+    match spec {
+        PaintSpec::Color(color) => {
+            in_bounds(key, color, Bound::One)?;
+            Ok(Paint::Plain(*color))
+        }
+        PaintSpec::Curve(spec) => {
+            let spec = ColorSpec::Curve(spec.clone());
+            let Reflectance { look, curve } = reflectance(key, &spec, supply)?;
+            Ok(match curve {
+                Some(curve) => Paint::Curve { look, curve },
+                None => Paint::Plain(look),
+            })
+        }
+        PaintSpec::Cube(cube) => {
+            let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
+            let (repeat, number) = (cube.repeat, supply.curve_number());
+            let cube = Arc::new(supply.cube(cube).map_err(below)?);
+            Ok(Paint::Cube { cube: SceneCube { number, cube }, repeat })
+        }
+        PaintSpec::Checker(CheckerSpec { checker, squares }) => {
+            let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
+            self::checker("checker", (checker, *squares), supply).map_err(below)
+        }
+        PaintSpec::Image(image) => {
+            let Reflectance { look, curve } =
+                reflectance(&format!("{key}.factor"), &image.factor, supply)?;
+            image_paint(key, image, (look, curve), supply)
+        }
+    }
+}
+
+/// An image times a factor, and times a curve of which that is the look.
+fn image_paint(
+    key: &str,
+    image: &ImageSpec,
+    (own, own_curve): (Color, Option<SceneCurve>),
+    supply: &mut dyn Supply,
+) -> Result<Paint, Fault> {
+    let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
+    Ok(match (supply.image(image).map_err(below)?, own_curve) {
+        (Paint::Image { image, .. }, curve) => Paint::Image { factor: own, curve, image },
+        (_, Some(curve)) => Paint::Curve { look: own, curve },
+        (_, None) => Paint::Plain(own),
+    })
+}
+
+/// Squares of two colours.
+fn checker(
+    key: &str,
+    (colors, squares): (&[ColorSpec; 2], f64),
+    supply: &mut dyn Supply,
+) -> Result<Paint, Fault> {
+    let [a, b] = [reflectance(key, &colors[0], supply)?, reflectance(key, &colors[1], supply)?];
+    if squares.is_nan() || squares <= 0.0 {
+        return Err(Fault::new("squares", format!("{squares} is not above zero")));
+    }
+    let looks = [a.look, b.look];
+    let curves = match [a, b] {
+        [Reflectance { curve: None, .. }, Reflectance { curve: None, .. }] => None,
+        // A colour beside a curve is the curve that colours become.
+        both => Some(Box::new(both.map(|one| match one.curve {
+            Some(curve) => curve,
+            None => SceneCurve {
+                number: supply.curve_number(),
+                curve: Arc::new(rgb::spectrum(one.look)),
+            },
+        }))),
+    };
+    Ok(Paint::Checker { colors: looks, curves, squares })
+}
+
+/// What a surface gives off: a paint, and the curve that multiplies it.
+fn radiant_paint(
+    (key, spec): (&str, &PaintSpec),
+    illuminant: Option<Illuminant>,
+    supply: &mut dyn Supply,
+) -> Result<(Paint, Option<Arc<Curve>>), Fault> {
+    Ok(match spec {
+        PaintSpec::Color(color) => {
+            let Emitted { color, curve } =
+                emitted((key, &ColorSpec::Rgb(*color)), illuminant, supply)?;
+            (Paint::Plain(color), curve)
+        }
+        PaintSpec::Curve(spec) => {
+            let spec = ColorSpec::Curve(spec.clone());
+            let Emitted { color, curve } = emitted((key, &spec), illuminant, supply)?;
+            (Paint::Plain(color), curve)
+        }
+        PaintSpec::Cube(_) => {
+            let why = "is a cube of reflectances, which gives off no light: give an image and an `illuminant`";
+            return Err(Fault::new(key, why));
+        }
+        PaintSpec::Checker(CheckerSpec { checker, squares }) => {
+            let mut colors = [[0.0; 3]; 2];
+            for (color, spec) in colors.iter_mut().zip(checker) {
+                let ColorSpec::Rgb(given) = spec else {
+                    let why = "has a curve, where light has one spectrum: give colours, and the \
+                               spectrum by `illuminant`";
+                    return Err(Fault::new(format!("{key}.checker"), why));
+                };
+                in_bounds(&format!("{key}.checker"), given, Bound::None)?;
+                *color = *given;
+            }
+            if squares.is_nan() || *squares <= 0.0 {
+                let why = format!("{squares} is not above zero");
+                return Err(Fault::new(format!("{key}.squares"), why));
+            }
+            (Paint::Checker { colors, curves: None, squares: *squares }, checked(illuminant)?)
+        }
+        PaintSpec::Image(image) => {
+            let factor = format!("{key}.factor");
+            let Emitted { color, curve } = emitted((&factor, &image.factor), illuminant, supply)?;
+            (image_paint(key, image, (color, None), supply)?, curve)
+        }
+    })
 }
 
 fn in_bounds(key: &str, color: &Color, bound: Bound) -> Result<(), Fault> {
@@ -150,17 +427,22 @@ fn in_bounds(key: &str, color: &Color, bound: Bound) -> Result<(), Fault> {
     Ok(())
 }
 
-fn checked(illuminant: Option<Illuminant>) -> Result<Option<Illuminant>, Fault> {
-    let checked = illuminant.map(Illuminant::checked).transpose();
-    checked.map_err(|error| Fault::new("illuminant", error.to_string()))
+fn checked(illuminant: Option<Illuminant>) -> Result<Option<Arc<Curve>>, Fault> {
+    let curve = illuminant.map(Illuminant::curve).transpose();
+    let curve = curve.map_err(|error| Fault::new("illuminant", error.to_string()))?;
+    Ok(curve.map(Arc::new))
 }
 
 fn unit_scale() -> [f64; 2] {
     [1.0; 2]
 }
 
-fn white() -> Color {
-    [1.0; 3]
+fn white() -> ColorSpec {
+    ColorSpec::WHITE
+}
+
+fn default_checker_squares() -> f64 {
+    8.0
 }
 
 fn one() -> f64 {

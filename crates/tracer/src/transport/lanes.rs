@@ -19,7 +19,6 @@ use super::numbers::{DRAWS, Draw};
 use super::patch::{LANES, Patch, SheetColors, at};
 use super::step::weigh;
 use super::{Follow, LightingContext, RaySamples, Scratch, Tracing, Traits, kernels, metal};
-use crate::Scattering;
 use crate::bsdf::{Bsdf, Weights};
 use crate::footprint::{Cone, Footprint};
 use crate::placed::{PlacedSurface, SurfaceKind};
@@ -27,6 +26,7 @@ use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
 use crate::sky::Asked;
 use crate::target::Chosen;
+use crate::{Scattering, Tint};
 
 /// Paths under way that have met equally many surfaces.
 #[derive(Debug, Default)]
@@ -350,8 +350,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let surface_point = SurfacePoint { weights, footprint: footprint(), ..corner };
         let material = scene.material(&surface_point)?;
         if material.scattering == Scattering::Unlit {
-            let [r, g, b, _] = scene.base_color(material, &surface_point);
-            spectral.spread(&[r, g, b], radiance);
+            let (tint, _) = scene.base_tint(spectral, material, &surface_point);
+            spectral.spread_tint(&tint, radiance);
             return way.is_specular.then_some(1.0);
         }
         if !lights.emitted(scene, spectral, &surface_point, hit.is_front, radiance) {
@@ -485,7 +485,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         patch.clear();
         patch.count = count;
         kernels::unpack(patch, &blocks[..count.div_ceil(BLOCK)], stage.origin.to_array());
-        patch.colors.resize(count, [0.0; 3]);
+        patch.colors.resize(count, Tint::BLACK);
     }
 
     /// The step of the hits that were picked of a patch, all of one kind.
@@ -511,7 +511,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 let mean = patch.sheets.mean[lane];
                 let deep = |c| metal::multiple(metal::mean_reflectance(c, 0.0), mean);
                 if patch.sheets.metallic[lane] > 0.0 {
-                    patch.sheet_colors[lane].deep = patch.colors[lane].map(deep);
+                    patch.sheet_colors[lane].deep = patch.colors[lane].color.map(deep);
                 }
             }
         }
@@ -661,7 +661,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         value.white
             + value.base * self.band(&patch.colors[lane], k)
             + value.highlight * self.band(highlight, k)
-            + value.deep * self.band(deep, k)
+            + value.deep * self.deep_band((&patch.colors[lane], deep), patch.sheets.mean[lane], k)
     }
 
     /// Adds what lights bring along rays that nothing blocks.

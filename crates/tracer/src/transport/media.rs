@@ -208,11 +208,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// Takes from light what a medium absorbs over a way (m); nothing over one without end.
     pub(super) fn dim_along(&self, media: &Media, length: f64, light: &mut [f64]) {
         let (placed, spectral) = (self.stage.placed, self.stage.spectral);
-        let medium = placed.get(media.medium(placed)).and_then(|placed| placed.absorption);
+        let medium = placed.get(media.medium(placed)).and_then(|placed| placed.absorption.as_ref());
         let Some(absorption) = medium.filter(|_| length.is_finite()) else { return };
         let ways = length / absorption.distance;
+        let tint = absorption.tint(spectral);
         for (k, band) in light.iter_mut().enumerate() {
-            *band *= spectral.band(&absorption.color, k).max(0.0).powf(ways);
+            *band *= spectral.tint(&tint, k).max(0.0).powf(ways);
         }
     }
 

@@ -78,8 +78,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             if state.pdf != f64::INFINITY {
                 return None;
             }
-            let [r, g, b, _] = around.base_color(material, &spot);
-            spectral.spread(&[r, g, b], radiance);
+            let (tint, _) = around.base_tint(spectral, material, &spot);
+            spectral.spread_tint(&tint, radiance);
             return Some(there());
         }
         if !lights.emitted(around, spectral, &spot, front, radiance) {

@@ -30,7 +30,6 @@ use std::ops::{AddAssign, Range};
 use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, RayBatch};
-use etendue_spectrum::Metal;
 
 use self::lanes::LaneScratch;
 use self::media::{Coincident, Media};
@@ -48,7 +47,7 @@ use crate::reference::SceneView;
 use crate::sky::Asked;
 use crate::spawn::{self, Anchor};
 use crate::spectral::Spectral;
-use crate::{Color, Glass, Ior, Material, Scattering};
+use crate::{Color, ConductorId, Glass, Ior, Material, Scattering, Tint};
 
 /// The scene as light sees it.
 #[derive(Debug, Clone, Copy)]
@@ -317,8 +316,24 @@ impl<const RGB: bool> Tracing<'_, RGB> {
 
     /// A linear sRGB colour in band `k`.
     #[inline(always)]
-    fn band(&self, color: &Color, k: usize) -> f64 {
+    fn color_band(&self, color: &Color, k: usize) -> f64 {
         if RGB { color[k] } else { self.stage.spectral.band(color, k) }
+    }
+
+    /// A colour, with its curve, in band `k`.
+    #[inline(always)]
+    fn band(&self, tint: &Tint, k: usize) -> f64 {
+        if RGB { tint.color[k] } else { self.stage.spectral.tint(tint, k) }
+    }
+
+    /// The light of band `k` that met several facets, which return `mean` of all light where they reflect all of it:
+    /// `deep` of colours, and of a curve what its own mean in the band makes.
+    #[inline(always)]
+    fn deep_band(&self, (base, deep): (&Tint, &Color), mean: f64, k: usize) -> f64 {
+        if !RGB && base.has_curve() {
+            return metal::multiple(metal::mean_reflectance(self.band(base, k), 0.0), mean);
+        }
+        self.color_band(deep, k)
     }
 
     fn start(&self, beam: &RaySamples<'_>, paths: &mut Paths) {
@@ -393,7 +408,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             sum += value.highlight * self.band(&bsdf.highlight, k);
         }
         if value.deep != 0.0 {
-            sum += value.deep * self.band(&bsdf.deep, k);
+            sum += value.deep * self.deep_band((&bsdf.base, &bsdf.deep), bsdf.mean_albedo(), k);
         }
         if value.sheen != 0.0 {
             sum += value.sheen * self.band(&bsdf.sheen(), k);
@@ -402,7 +417,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     }
 
     /// The same of a metal of measured index, whose facets of reflectance 1 return `mean` of all light.
-    fn in_band_of_metal(&self, named: Metal, mean: f64, value: Weights, k: usize) -> f64 {
+    fn in_band_of_metal(&self, named: ConductorId, mean: f64, value: Weights, k: usize) -> f64 {
         let [face_on, dip] = self.stage.spectral.metal(named, k);
         let deep = metal::multiple(metal::mean_reflectance(face_on, dip), mean);
         let sum = value.white + value.base * face_on + value.dip * dip + value.deep * deep;

@@ -2,17 +2,16 @@
 
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{HitBatch, HitPrecision, MISS};
-use etendue_spectrum::Metal;
 
 use super::media::Crossing;
 use super::paths::Paths;
-use crate::Color;
 use crate::bsdf::sheets::Sheets;
 use crate::bsdf::{Bsdf, Weights};
 use crate::lamps::AreaLight;
 use crate::placed::PlacedSurface;
 use crate::spawn::Anchor;
 use crate::target::{Target, TargetKind};
+use crate::{Color, ConductorId, Tint};
 
 /// Hits worked on side by side.
 pub(crate) const LANES: usize = 64;
@@ -37,7 +36,7 @@ pub(super) struct Patch {
     pub(super) picks: Picks,
     pub(super) targets: Targets,
     /// The colours of matte surfaces.
-    pub(super) colors: Vec<Color>,
+    pub(super) colors: Vec<Tint>,
     /// The surfaces that are not matte, and what each turns to the viewer of the light that it asks.
     pub(super) bsdfs: Vec<Bsdf>,
     pub(super) weights: Vec<Weights>,
@@ -57,11 +56,11 @@ pub(super) struct Patch {
 /// The colours of a sheet of facets over a matte base.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct SheetColors {
-    pub(super) highlight: Color,
+    pub(super) highlight: Tint,
     /// Of light that met several facets.
     pub(super) deep: Color,
     /// The metal by whose measured index it reflects.
-    pub(super) named: Option<Metal>,
+    pub(super) named: Option<ConductorId>,
 }
 
 /// The hits.

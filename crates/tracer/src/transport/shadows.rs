@@ -272,8 +272,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             return light.iter().any(|band| *band > 0.0);
         }
-        let pane =
-            (pass.is_delta && traits.has_panes).then(|| met.bsdf(around, spectral.wavelength(0)));
+        let pane = (pass.is_delta && traits.has_panes)
+            .then(|| met.bsdf(around, spectral, spectral.wavelength(0)));
         let passed = pane.as_ref().and_then(|pane| Some((pane, pane.straight_through()?)));
         for (k, band) in light.iter_mut().enumerate() {
             let pane = passed.map_or(0.0, |(pane, weights)| self.in_band(pane, weights, k));

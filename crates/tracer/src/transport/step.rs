@@ -11,13 +11,13 @@ use super::numbers::Draw;
 use super::patch::{LANES, Patch, at, put};
 use super::paths::State;
 use super::{Follow, Scratch, Tracing, kernels};
-use crate::Scattering;
 use crate::bsdf::Weights;
 use crate::placed::{PlacedSurface, SurfaceKind};
 use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
 use crate::surface::SurfaceInteraction;
 use crate::target::Chosen;
+use crate::{Scattering, Tint};
 
 impl<const RGB: bool> Tracing<'_, RGB> {
     /// The step of all paths that go on.
@@ -88,16 +88,17 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let footprint = now.footprint(hits, i);
         let surface = around.spot(hits, i).map(|spot| SurfacePoint { footprint, ..spot });
         let surface = surface.and_then(|spot| Some((spot, around.material(&spot)?)));
-        let Some((spot, material)) = surface else { return patch.colors.push([0.0; 3]) };
+        let Some((spot, material)) = surface else { return patch.colors.push(Tint::BLACK) };
         if placed.is_tilted {
             let front = hits.normal(i);
             let tilted = spot.tilted_normal(around, material, placed.turn.as_ref(), front);
             put(&mut patch.seen.shading, lane, tilted);
         }
-        patch.colors.push(placed.color.unwrap_or_else(|| {
-            let [r, g, b, _] = around.base_color(material, &spot);
-            [r, g, b].map(|c| c.clamp(0.0, 1.0))
-        }));
+        patch.colors.push(
+            placed.color.unwrap_or_else(|| {
+                around.base_tint(self.stage.spectral, material, &spot).0.clamped()
+            }),
+        );
     }
 
     /// Adds a hit on a surface that may scatter light in any way, or not be there.
@@ -148,7 +149,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             return;
         }
         let middle = || self.stage.spectral.wavelength(0);
-        let mut bsdf = met.bsdf(&self.stage.surroundings, state.wavelength.unwrap_or_else(middle));
+        let spectral = self.stage.spectral;
+        let around = &self.stage.surroundings;
+        let mut bsdf = met.bsdf(around, spectral, state.wavelength.unwrap_or_else(middle));
         if let Scattering::Dielectric(glass) = &met.material.scattering
             && state.wavelength.is_none()
             && met.disperses(&self.stage.surroundings)
@@ -160,7 +163,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let throughput = &mut now.throughput[bands];
             keep_one(throughput, state, self.stage.spectral, numbers.of(Draw::Choice, k)[0]);
             let wavelength = state.wavelength.unwrap_or_else(middle);
-            bsdf = met.bsdf(&self.stage.surroundings, wavelength);
+            bsdf = met.bsdf(around, spectral, wavelength);
         }
         patch.push((now, hits), (i, k), placed);
         patch.bsdfs.push(bsdf);

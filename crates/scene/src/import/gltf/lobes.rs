@@ -164,7 +164,9 @@ pub(super) fn body(
     }
     let distance = judge.number(material, VOLUME, "attenuationDistance", import)?;
     let absorption = match distance.filter(|d| *d > 0.0 && d.is_finite()) {
-        Some(distance) => Some(Absorption { color: left(judge, extension, import)?, distance }),
+        Some(distance) => {
+            Some(Absorption { color: left(judge, extension, import)?, curve: None, distance })
+        }
         None => None,
     };
     let ior = Ior::Constant(read.ior);

@@ -141,7 +141,7 @@ fn read(
         _ => None,
     };
     let base_color = match image {
-        Some(image) => Paint::Image { factor, image },
+        Some(image) => Paint::Image { factor, curve: None, image },
         None => Paint::Plain(factor),
     };
     let plain = Material::new(name, base_color, Scattering::Matte);
@@ -340,7 +340,7 @@ fn emission(
         None => None,
     };
     let radiance = match image {
-        Some(image) => Paint::Image { factor, image },
+        Some(image) => Paint::Image { factor, curve: None, image },
         None => Paint::Plain(factor),
     };
     Ok(Some(Emission { radiance, strength, illuminant: None, two_sided: true, group: None }))

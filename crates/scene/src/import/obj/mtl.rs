@@ -221,7 +221,7 @@ fn resolve(
     let diffuse = material.diffuse.filter(|color| !color.iter().any(|value| value.is_nan()));
     let diffuse = diffuse.map(|color| color.map(|value| value.clamp(0.0, 1.0)));
     let base_color = match image {
-        Some(image) => Paint::Image { factor: diffuse.unwrap_or([1.0; 3]), image },
+        Some(image) => Paint::Image { factor: diffuse.unwrap_or([1.0; 3]), curve: None, image },
         None => diffuse.map_or(Material::unnamed().base_color, Paint::Plain),
     };
     let plain = Material { name: material.name.clone(), base_color, ..Material::unnamed() };

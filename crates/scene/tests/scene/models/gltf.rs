@@ -279,7 +279,7 @@ fn materials_have_colour_texture_and_transform() {
     let path = write(&folder, "material.glb", file);
     let import = load(&path);
     let material = &import.materials[import.placements[0].material as usize];
-    let Paint::Image { factor, image } = &material.base_color else { panic!("{material:?}") };
+    let Paint::Image { factor, image, .. } = &material.base_color else { panic!("{material:?}") };
     assert_eq!((material.name.as_str(), factor), ("tiles", &[0.25, 0.5, 0.75]));
     assert_eq!(image.uv_set, 1);
     // The registry's example: the lower left quarter of the image, turned.
@@ -328,7 +328,7 @@ fn volumes_are_bodies_of_glass() {
     let path = write(&folder, "volume.glb", square_glb(json!({"material": 0}), rest, |_| ()));
     let materials = load(&path).materials;
     let glass = |absorption| Glass { ior: Ior::Constant(1.4), roughness: 0.25, absorption };
-    let absorption = Absorption { color: [0.1, 0.2, 0.9], distance: 0.02 };
+    let absorption = Absorption { color: [0.1, 0.2, 0.9], curve: None, distance: 0.02 };
     assert_eq!(materials[0].scattering, Scattering::Dielectric(glass(Some(absorption))));
     assert_eq!(materials[1].scattering, Scattering::Dielectric(glass(None)));
     for thin in &materials[2..4] {

@@ -32,7 +32,9 @@ fn obj_groups_materials_and_attributes() {
         .collect();
     assert_eq!(summary, [("", "red", 1, 0), ("side", "photo", 2, 1), ("side", "nobody", 1, 0)]);
     assert_eq!(import.materials[0].base_color, Paint::Plain([1.0, 0.0, 0.0]));
-    let Paint::Image { factor, image } = &import.materials[1].base_color else { panic!("image") };
+    let Paint::Image { factor, image, .. } = &import.materials[1].base_color else {
+        panic!("image")
+    };
     assert_eq!((*factor, image.transform), ([0.5; 3], [[2.0, 0.0, 0.0], [0.0, 1.0, 0.0]]));
     let side = &import.meshes[1];
     assert_eq!(side.uvs[0].get(1), [1.0, 0.75], "v runs down");

@@ -10,7 +10,7 @@ use crate::placed::PlacedSurface;
 use crate::reference::SurfacePoint;
 use crate::scattering::SheetSurface;
 use crate::surface::SurfaceInteraction;
-use crate::{Color, Scattering};
+use crate::{Conductor, Scattering, Tint};
 
 impl<const RGB: bool> Tracing<'_, RGB> {
     /// Where a hit is on its mesh, as path `i` sees it.
@@ -66,8 +66,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             put(&mut patch.seen.shading, lane, tilted);
         }
         patch.colors[lane] = placed.color.unwrap_or_else(|| {
-            let [r, g, b, _] = scene.base_color(material, surface_point);
-            [r, g, b].map(|c| c.clamp(0.0, 1.0))
+            scene.base_tint(self.stage.spectral, material, surface_point).0.clamped()
         });
     }
 
@@ -85,11 +84,13 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let Some(material) = scene.material(&surface_point) else { return false };
         let (surface, named, is_metal) = match &material.scattering {
             Scattering::Metal { roughness, named } => {
-                let (alpha, highlight) = (roughness * roughness, [1.0; 3]);
+                let (alpha, highlight) = (roughness * roughness, Tint::WHITE);
                 let metal = SheetSurface { metallic: 1.0, alpha, f0: 0.0, f90: 0.0, highlight };
-                (metal, *named, 1.0)
+                (metal, named.as_ref().map(Conductor::id), 1.0)
             }
-            Scattering::Gltf(surface) => (surface.sheet(&surface_point, scene), None, 0.0),
+            Scattering::Gltf(surface) => {
+                (surface.sheet(&surface_point, scene, self.stage.spectral), None, 0.0)
+            }
             Scattering::Black
             | Scattering::Matte
             | Scattering::Unlit
@@ -102,12 +103,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         put(&mut patch.seen.magnitudes, lane, placed.magnitudes);
         self.look_up(patch, lane, placed, &surface_point);
         let SheetSurface { metallic, alpha, f0, f90, highlight } = surface;
-        let peak = |color: &Color| color[0].max(color[1]).max(color[2]);
         let sheets = &mut *patch.sheets;
         (sheets.alpha[lane], sheets.metallic[lane]) = (alpha, metallic);
         (sheets.f0[lane], sheets.f90[lane]) = (f0, f90);
-        sheets.base_peak[lane] = peak(&patch.colors[lane]);
-        sheets.f0_peak[lane] = (f0 * peak(&highlight)).min(1.0);
+        sheets.base_peak[lane] = patch.colors[lane].peak();
+        sheets.f0_peak[lane] = (f0 * highlight.peak()).min(1.0);
         sheets.is_metal[lane] = is_metal;
         patch.sheet_colors.resize(LANES, SheetColors::default());
         patch.sheet_colors[lane] = SheetColors { highlight, deep: [0.0; 3], named };
@@ -129,7 +129,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let material = scene.geometry.placements.get(placement as usize);
         let material = material.and_then(|p| scene.materials.get(p.material as usize));
         let scattering = material.map_or(&Scattering::Black, |material| &material.scattering);
-        let named = if let Scattering::Metal { named, .. } = scattering { *named } else { None };
+        let named = match scattering {
+            Scattering::Metal { named, .. } => named.as_ref().map(Conductor::id),
+            _ => None,
+        };
         let smooth = &mut patch.smooth;
         smooth.is_metal[lane] = f64::from(matches!(scattering, Scattering::Metal { .. }));
         smooth.eta[lane] = 0.0;
@@ -166,9 +169,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let found = self.point_of(stage, now, i);
         let found = found
             .and_then(|surface_point| SurfaceInteraction::at(self.stage, surface_point, ray, hit));
-        let black = || Bsdf::new(Model::Black, [hit.1; 2], -ray.1, [[0.0; 3]; 2]);
-        let bsdf =
-            found.map(|interaction| interaction.bsdf(scene, self.stage.spectral.wavelength(0)));
+        let black = || Bsdf::new(Model::Black, [hit.1; 2], -ray.1, [Tint::BLACK; 2]);
+        let bsdf = found.map(|interaction| {
+            let spectral = self.stage.spectral;
+            interaction.bsdf(scene, spectral, spectral.wavelength(0))
+        });
         patch.bsdfs.push(bsdf.unwrap_or_else(black));
     }
 }
