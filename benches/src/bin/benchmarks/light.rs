@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use etendue_accel::{Accel, BlockAccel, BuildOptions, BuildReport, Counts};
 use etendue_benches::contest::thread_time;
@@ -52,8 +53,9 @@ impl Timed {
     fn time<T>(&self, rays: usize, query: impl FnOnce() -> T) -> T {
         let start = thread_time();
         let answer = query();
-        let taken = (thread_time() - start) * 1e9;
-        self.taken.fetch_add(taken as u64, Ordering::Relaxed);
+        let taken = Duration::from_secs_f64((thread_time() - start).max(0.0));
+        let nanoseconds = u64::try_from(taken.as_nanos()).unwrap_or(u64::MAX);
+        self.taken.fetch_add(nanoseconds, Ordering::Relaxed);
         self.rays.fetch_add(rays as u64, Ordering::Relaxed);
         answer
     }
