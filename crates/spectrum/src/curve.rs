@@ -453,11 +453,34 @@ impl<'de> Visitor<'de> for CurveVisitor {
 }
 
 /// An element of a curve's list.
-#[derive(Deserialize)]
-#[serde(untagged)]
 enum Element {
     Sample([f64; 2]),
     Curve(CurveSource),
+}
+
+impl<'de> Deserialize<'de> for Element {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ElementVisitor)
+    }
+}
+
+/// Reads either form, so that an error speaks of the sample.
+struct ElementVisitor;
+
+impl<'de> Visitor<'de> for ElementVisitor {
+    type Value = Element;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an array of length 2")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Element, A::Error> {
+        <[f64; 2]>::deserialize(de::value::SeqAccessDeserializer::new(list)).map(Element::Sample)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Element, A::Error> {
+        CurveSource::deserialize(de::value::MapAccessDeserializer::new(map)).map(Element::Curve)
+    }
 }
 
 /// A curve that names no file: those are read where it is known in which folder.
