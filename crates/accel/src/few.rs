@@ -1,19 +1,18 @@
 //! Scenes of few triangles: each ray against each of their edges, sixteen rays at a time. Below some dozens of
 //! triangles that takes less time than going down a tree.
 //!
-//! Rays are those of single precision. On which side of an edge they pass is told in single precision where that is
-//! sure of it, else in double precision, as are distances and weights: what is found is that of double precision.
+//! Rays are those of single precision, and what they meet is worked out in double precision.
 //!
 //! A ray passes an edge on the side that the sign of their Plücker product tells. Triangles that share an edge
 //! share its sign, whatever rounding did to it, so no ray slips between them along the edge (R. Jones, "Intersecting
 //! a ray and a triangle with Plücker coordinates", Ray Tracing News 13.1, 2000; K. Shoemake, "Plücker coordinate
 //! tutorial", Ray Tracing News 11.1, 1998).
 
-use etendue_geometry::block::{Floats, LANES};
+use etendue_geometry::block::LANES;
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::{Geometry, MISS, RayBatch, RayBlock, RayBlocks, is_degenerate};
 
-use crate::single::{F32_EPSILON, F32Frame, Rays32, round};
+use crate::single::{F32Frame, Rays32, round};
 
 /// Scenes of more triangles are traced by trees.
 const MOST_TRIANGLES: usize = 64;
@@ -23,11 +22,6 @@ const MOST_TRIANGLES: usize = 64;
 struct PluckerEdge {
     along: [f64; 3],
     moment: [f64; 3],
-    along_32: [f32; 3],
-    moment_32: [f32; 3],
-    /// By how much single precision may be off in products with a line's direction, and per coordinate of its
-    /// moment.
-    doubt: [f32; 2],
 }
 
 /// A triangle in the frame.
@@ -109,234 +103,154 @@ impl FewTriangles {
 
     /// The closest hits of blocks, as [`BlockAccel`](crate::BlockAccel) has them; of triangles in one place the last.
     pub(crate) fn closest_of_blocks(&self, blocks: &mut [RayBlock]) {
-        closest(self, blocks, &mut vec![Sides::NONE; self.edges.len()]);
+        let mut of_edges = vec![[0.0; LANES]; self.edges.len()];
+        for block in blocks {
+            let mut best = Best {
+                t: block.t_max.map(f64::from),
+                u: [0.0; LANES],
+                v: [0.0; LANES],
+                number: [MISS; LANES],
+            };
+            closest(self, block, &mut of_edges, &mut best);
+            block.clear_hits();
+            [block.t_max, block.u, block.v] = [best.t, best.u, best.v].map(|row| row.map(round));
+            for (lane, &number) in best.number.iter().enumerate() {
+                let Some(hit) = self.triangles.get(number as usize) else { continue };
+                (block.placement[lane], block.triangle[lane]) = (hit.placement, hit.triangle);
+                for axis in 0..3 {
+                    block.normal[axis][lane] = hit.front[axis];
+                }
+            }
+        }
     }
 
     /// Whether anything is between the ends of rays of blocks.
     pub(crate) fn occluded_of_blocks(&self, blocks: &mut [RayBlock]) {
-        occluded(self, blocks, &mut vec![Sides::NONE; self.edges.len()]);
+        let mut of_edges = vec![[0.0; LANES]; self.edges.len()];
+        for block in blocks {
+            let mut blocked = [0; LANES];
+            occluded(self, block, &mut of_edges, &mut blocked);
+            for (t_max, &blocked) in block.t_max.iter_mut().zip(&blocked) {
+                *t_max = if blocked != 0 { f32::NEG_INFINITY } else { *t_max };
+            }
+        }
+    }
+}
+
+impl PluckerEdge {
+    fn between(a: [f64; 3], b: [f64; 3]) -> Self {
+        let [from, to] = [a, b].map(DVec3::from);
+        Self { along: (to - from).to_array(), moment: from.cross(to).to_array() }
     }
 }
 
 /// One number of each ray of a block.
 type Doubles = [f64; LANES];
 
-/// Of each ray of a block all bits or none.
-type Mask = [u8; LANES];
-
-/// The lines of a block's rays by their Plücker coordinates, in both precisions.
-struct Lines {
-    along: [Doubles; 3],
-    moment: [Doubles; 3],
-    along_32: [Floats; 3],
-    moment_32: [Floats; 3],
-    /// At least the greatest coordinate of all moments.
-    reach: f32,
+/// What of a block's rays is nearest so far.
+struct Best {
+    t: Doubles,
+    u: Doubles,
+    v: Doubles,
+    /// Number of the triangle in the list, or [`MISS`].
+    number: [u32; LANES],
 }
 
-/// Which rays pass an edge on one side, and which on the other: on neither those that meet it.
-#[derive(Debug, Clone, Copy)]
-struct Sides {
-    below: Mask,
-    above: Mask,
-}
-
-impl Sides {
-    const NONE: Self = Self { below: [0; LANES], above: [0; LANES] };
-}
-
-/// Below this single precision is not sure of a sign, whatever the sizes of what was multiplied: what underflows
-/// is smaller.
-const TINY: f32 = 1e-36;
-
-impl PluckerEdge {
-    fn between(a: [f64; 3], b: [f64; 3]) -> Self {
-        let [from, to] = [a, b].map(DVec3::from);
-        let (along, moment) = (to - from, from.cross(to));
-        // Six products, of which each factor and each product is rounded once and sums five times: nine roundings
-        // of half a unit at most, of which sixteen are allowed.
-        let allowed = |v: DVec3| round(8.0 * F32_EPSILON * v.abs().element_sum());
-        Self {
-            along: along.to_array(),
-            moment: moment.to_array(),
-            along_32: along.to_array().map(round),
-            moment_32: moment.to_array().map(round),
-            doubt: [allowed(moment), allowed(along)],
-        }
+/// On which side each ray passes each edge: the sign of what is found here.
+#[inline(always)]
+fn sides(edges: &[PluckerEdge], block: &RayBlock, sides: &mut [Doubles]) {
+    let [ox, oy, oz] = block.origin.map(|axis| axis.map(f64::from));
+    let [dx, dy, dz] = block.direction.map(|axis| axis.map(f64::from));
+    let (mut mx, mut my, mut mz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for i in 0..LANES {
+        mx[i] = oy[i] * dz[i] - oz[i] * dy[i];
+        my[i] = oz[i] * dx[i] - ox[i] * dz[i];
+        mz[i] = ox[i] * dy[i] - oy[i] * dx[i];
     }
-
-    /// On which side the ray of each lane passes: the sign of what is found here.
-    #[inline(always)]
-    fn side(&self, lines: &Lines) -> Doubles {
-        let Self { along, moment, .. } = self;
-        let ([dx, dy, dz], [mx, my, mz]) = (&lines.along, &lines.moment);
-        let mut side = [0.0; LANES];
+    for (PluckerEdge { along, moment }, side) in edges.iter().zip(sides) {
         for i in 0..LANES {
             let of_moment = dx[i] * moment[0] + dy[i] * moment[1] + dz[i] * moment[2];
             side[i] = of_moment + (mx[i] * along[0] + my[i] * along[1] + mz[i] * along[2]);
         }
-        side
-    }
-
-    /// The signs of [`side`](Self::side): by single precision where that is sure of all of them.
-    #[inline(always)]
-    fn sides(&self, lines: &Lines) -> Sides {
-        let Self { along_32: along, moment_32: moment, doubt, .. } = self;
-        let ([dx, dy, dz], [mx, my, mz]) = (&lines.along_32, &lines.moment_32);
-        let doubt = (doubt[0] + lines.reach * doubt[1]).max(TINY);
-        let (mut below, mut above) = ([0; LANES], [0; LANES]);
-        let mut sure = [0_u8; LANES];
-        for i in 0..LANES {
-            let of_moment = dx[i] * moment[0] + dy[i] * moment[1] + dz[i] * moment[2];
-            let side = of_moment + (mx[i] * along[0] + my[i] * along[1] + mz[i] * along[2]);
-            below[i] = mask(side < -doubt);
-            above[i] = mask(side > doubt);
-            sure[i] = below[i] | above[i];
-        }
-        if u128::from_ne_bytes(sure) == u128::MAX {
-            return Sides { below, above };
-        }
-        let side = self.side(lines);
-        for i in 0..LANES {
-            below[i] = mask(side[i] < 0.0);
-            above[i] = mask(side[i] > 0.0);
-        }
-        Sides { below, above }
     }
 }
 
+/// Whether any ray passes all three edges on one side.
 #[inline(always)]
-fn mask(is_set: bool) -> u8 {
-    if is_set { u8::MAX } else { 0 }
+fn is_inside(lowest: &Doubles, highest: &Doubles) -> bool {
+    let mut any = 0_u32;
+    for i in 0..LANES {
+        any |= u32::from((lowest[i] >= 0.0) | (highest[i] <= 0.0));
+    }
+    any != 0
 }
 
-impl Lines {
-    #[inline(always)]
-    fn of(block: &RayBlock) -> Self {
-        let [ox, oy, oz] = block.origin.map(|axis| axis.map(f64::from));
-        let [dx, dy, dz] = block.direction.map(|axis| axis.map(f64::from));
-        let mut moment = [[0.0; LANES]; 3];
-        for i in 0..LANES {
-            moment[0][i] = oy[i] * dz[i] - oz[i] * dy[i];
-            moment[1][i] = oz[i] * dx[i] - ox[i] * dz[i];
-            moment[2][i] = ox[i] * dy[i] - oy[i] * dx[i];
-        }
-        let moment_32 = moment.map(|axis| axis.map(round));
-        let mut reach = [0.0_f32; LANES];
-        for axis in &moment_32 {
-            for i in 0..LANES {
-                reach[i] = reach[i].max(axis[i].abs());
-            }
-        }
-        let reach = reach.into_iter().fold(0.0, f32::max);
-        Self { along: [dx, dy, dz], moment, along_32: block.direction, moment_32, reach }
-    }
-}
-
-impl FewTriangle {
-    /// Which rays pass within all three edges.
-    #[inline(always)]
-    fn within(&self, of_edges: &[Sides]) -> Mask {
-        let [first, second, third] = self.edges.map(|(edge, sign)| {
-            let Sides { below, above } = &of_edges[edge];
-            if sign > 0.0 { [below, above] } else { [above, below] }
-        });
-        let mut within = [0; LANES];
-        for i in 0..LANES {
-            let [below, above] = [0, 1].map(|k| first[k][i] | second[k][i] | third[k][i]);
-            within[i] = !below | !above;
-        }
-        within
-    }
-
-    /// Distances along rays from `origin` to its plane: not a number along it.
-    #[inline(always)]
-    fn distances(&self, origin: &[Doubles; 3], lines: &Lines) -> Doubles {
-        let ([nx, ny, nz], [dx, dy, dz]) = (self.normal, &lines.along);
-        let mut distances = [0.0; LANES];
-        for i in 0..LANES {
-            let height = self.offset - (origin[0][i] * nx + origin[1][i] * ny + origin[2][i] * nz);
-            let slope = dx[i] * nx + dy[i] * ny + dz[i] * nz;
-            distances[i] = if slope == 0.0 { f64::NAN } else { height / slope };
-        }
-        distances
-    }
-
-    /// Weights of the second and the third corner where the ray of a lane meets it.
-    fn weights(&self, edges: &[PluckerEdge], lines: &Lines, lane: usize) -> [f64; 2] {
-        let [a, b, c] = self.edges.map(|(edge, sign)| {
-            let PluckerEdge { along, moment, .. } = &edges[edge];
-            let dot = |v: &[Doubles; 3], w: &[f64; 3]| {
-                v[0][lane] * w[0] + v[1][lane] * w[1] + v[2][lane] * w[2]
-            };
-            sign * (dot(&lines.along, moment) + dot(&lines.moment, along))
-        });
-        let sum = a + b + c;
-        if sum == 0.0 { [0.0; 2] } else { [b / sum, c / sum] }
-    }
-}
-
-/// Closest hits of all blocks; `of_edges` is as long as there are edges.
 #[multiversion::multiversion(targets = "simd")]
-fn closest(few: &FewTriangles, blocks: &mut [RayBlock], of_edges: &mut [Sides]) {
-    for block in blocks {
-        let lines = Lines::of(block);
-        let origin = block.origin.map(|axis| axis.map(f64::from));
-        let t_min = block.t_min.map(f64::from);
-        let mut best = block.t_max.map(f64::from);
-        let mut numbers = [MISS; LANES];
-        for (edge, sides) in few.edges.iter().zip(of_edges.iter_mut()) {
-            *sides = edge.sides(&lines);
+fn closest(few: &FewTriangles, block: &RayBlock, of_edges: &mut [Doubles], best: &mut Best) {
+    let origin = block.origin.map(|axis| axis.map(f64::from));
+    let t_min = block.t_min.map(f64::from);
+    sides(&few.edges, block, of_edges);
+    for (number, triangle) in (0_u32..).zip(&few.triangles) {
+        let [first, second, third] = triangle.edges.map(|(edge, _)| &of_edges[edge]);
+        let [sa, sb, sc] = triangle.edges.map(|(_, sign)| sign);
+        let (mut lowest, mut highest) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
+            lowest[i] = a.min(b).min(c);
+            highest[i] = a.max(b).max(c);
         }
-        for (number, triangle) in (0_u32..).zip(&few.triangles) {
-            let within = triangle.within(of_edges);
-            if u128::from_ne_bytes(within) == 0 {
-                continue;
-            }
-            let t = triangle.distances(&origin, &lines);
-            for i in 0..LANES {
-                let counts = (within[i] != 0) & (t[i] > t_min[i]) & (t[i] <= best[i]);
-                best[i] = if counts { t[i] } else { best[i] };
-                numbers[i] = if counts { number } else { numbers[i] };
-            }
+        if !is_inside(&lowest, &highest) {
+            continue;
         }
-        block.clear_hits();
-        block.t_max = best.map(round);
-        for (lane, &number) in numbers.iter().enumerate() {
-            let Some(hit) = few.triangles.get(number as usize) else { continue };
-            (block.placement[lane], block.triangle[lane]) = (hit.placement, hit.triangle);
-            [block.u[lane], block.v[lane]] = hit.weights(&few.edges, &lines, lane).map(round);
-            for axis in 0..3 {
-                block.normal[axis][lane] = hit.front[axis];
-            }
+        let [nx, ny, nz] = triangle.normal;
+        for i in 0..LANES {
+            let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
+            let sum = a + b + c;
+            let over = 1.0 / sum;
+            let height =
+                triangle.offset - (origin[0][i] * nx + origin[1][i] * ny + origin[2][i] * nz);
+            let t = height * over;
+            let is_inside = (lowest[i] >= 0.0) | (highest[i] <= 0.0);
+            let counts = is_inside & (sum != 0.0) & (t > t_min[i]) & (t <= best.t[i]);
+            best.t[i] = if counts { t } else { best.t[i] };
+            best.u[i] = if counts { b * over } else { best.u[i] };
+            best.v[i] = if counts { c * over } else { best.v[i] };
+            best.number[i] = if counts { number } else { best.number[i] };
         }
     }
 }
 
-/// Whether anything is between the ends of the rays of all blocks.
 #[multiversion::multiversion(targets = "simd")]
-fn occluded(few: &FewTriangles, blocks: &mut [RayBlock], of_edges: &mut [Sides]) {
-    for block in blocks {
-        let lines = Lines::of(block);
-        let origin = block.origin.map(|axis| axis.map(f64::from));
-        let [t_min, t_max] = [block.t_min, block.t_max].map(|limits| limits.map(f64::from));
-        let mut blocked = [0; LANES];
-        for (edge, sides) in few.edges.iter().zip(of_edges.iter_mut()) {
-            *sides = edge.sides(&lines);
+fn occluded(
+    few: &FewTriangles,
+    block: &RayBlock,
+    of_edges: &mut [Doubles],
+    blocked: &mut [u32; LANES],
+) {
+    let origin = block.origin.map(|axis| axis.map(f64::from));
+    let [t_min, t_max] = [block.t_min, block.t_max].map(|limits| limits.map(f64::from));
+    sides(&few.edges, block, of_edges);
+    for triangle in &few.triangles {
+        let [first, second, third] = triangle.edges.map(|(edge, _)| &of_edges[edge]);
+        let [sa, sb, sc] = triangle.edges.map(|(_, sign)| sign);
+        let (mut lowest, mut highest, mut sums) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let (a, b, c) = (first[i] * sa, second[i] * sb, third[i] * sc);
+            lowest[i] = a.min(b).min(c);
+            highest[i] = a.max(b).max(c);
+            sums[i] = a + b + c;
         }
-        for triangle in &few.triangles {
-            let within = triangle.within(of_edges);
-            if u128::from_ne_bytes(within) == 0 {
-                continue;
-            }
-            let t = triangle.distances(&origin, &lines);
-            for i in 0..LANES {
-                let counts = (within[i] != 0) & (t[i] > t_min[i]) & (t[i] <= t_max[i]);
-                blocked[i] |= mask(counts);
-            }
+        if !is_inside(&lowest, &highest) {
+            continue;
         }
-        for (t_max, &blocked) in block.t_max.iter_mut().zip(&blocked) {
-            *t_max = if blocked != 0 { f32::NEG_INFINITY } else { *t_max };
+        let [nx, ny, nz] = triangle.normal;
+        for i in 0..LANES {
+            let height =
+                triangle.offset - (origin[0][i] * nx + origin[1][i] * ny + origin[2][i] * nz);
+            let t = height / sums[i];
+            let is_inside = (lowest[i] >= 0.0) | (highest[i] <= 0.0);
+            let counts = is_inside & (sums[i] != 0.0) & (t > t_min[i]) & (t <= t_max[i]);
+            blocked[i] |= u32::from(counts);
         }
     }
 }
