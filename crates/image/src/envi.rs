@@ -365,7 +365,8 @@ struct Scale {
 impl Scale {
     fn of(&self, band: usize, number: f64) -> f64 {
         let gain = self.gains.as_ref().map_or(1.0, |gains| gains[band]);
-        gain * number + self.offsets.as_ref().map_or(0.0, |offsets| offsets[band])
+        // Without offsets as it is: adding 0 would take the sign of a zero.
+        self.offsets.as_ref().map_or(gain * number, |offsets| gain * number + offsets[band])
     }
 }
 
