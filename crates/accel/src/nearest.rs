@@ -231,15 +231,15 @@ fn later(
     let slack = BESIDE * t.abs().max(query.origin.abs().max_element());
     let near = coplanar.others_near(own, query.origin + query.direction * t, slack);
     let spared = |id: &PlacedTriangle| !ends.is_some_and(|ends| ends.contains(id));
-    let met: Vec<_> = near.filter(spared).filter_map(test).collect();
-    if met.is_empty() {
+    let hits: Vec<_> = near.filter(spared).filter_map(test).collect();
+    if hits.is_empty() {
         return None;
     }
     let found = test(own).map(|(hit, _)| hit.t);
-    let nearest = met.iter().map(|(hit, _)| hit.t).chain(found).reduce(f64::min)?;
+    let nearest = hits.iter().map(|(hit, _)| hit.t).chain(found).reduce(f64::min)?;
     let size = nearest.abs().max(query.origin.abs().max_element());
     let is_near = |t: f64| t <= nearest + ONE_PLACE * size;
-    let near = met.into_iter().filter(|(hit, _)| is_near(hit.t));
+    let near = hits.into_iter().filter(|(hit, _)| is_near(hit.t));
     let latest =
         near.max_by(|(_, a), (_, b)| a.placement.cmp(&b.placement).then(b.number.cmp(&a.number)))?;
     // What was found stays, where it is as near and later.

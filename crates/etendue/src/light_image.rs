@@ -84,7 +84,7 @@ impl Sidecar {
     }
 
     /// What `layers.json` beside the array at `path` says of it.
-    fn beside(path: &Path) -> Option<(Self, PathBuf)> {
+    fn of_array(path: &Path) -> Option<(Self, PathBuf)> {
         let json = path.with_file_name("layers.json");
         let bytes = etendue_files::read(&json, 1 << 28).ok()?;
         let value: Value = serde_json::from_slice(&bytes).ok()?;
@@ -226,7 +226,7 @@ impl LightImage {
                  side"
             )),
         })?;
-        let (sidecar, json) = Sidecar::beside(path).unzip();
+        let (sidecar, json) = Sidecar::of_array(path).unzip();
         let sidecar = sidecar.unwrap_or_default();
         let inputs = [path.to_owned()].into_iter().chain(json).collect();
         Self::of_numbers((path, inputs), array, wavelengths, sidecar)

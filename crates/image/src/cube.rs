@@ -70,7 +70,7 @@ impl BandAxis {
         let widths = widths.filter(|widths| {
             widths.len() == wavelengths.len() && widths.iter().all(|w| *w > 0.0 && w.is_finite())
         });
-        let met = widths.and_then(|widths| edges_that_meet(&wavelengths, widths));
+        let from_widths = widths.and_then(|widths| edges_that_meet(&wavelengths, widths));
         let between = || {
             let n = wavelengths.len();
             let [first, second] = *wavelengths.first_chunk()?;
@@ -79,7 +79,7 @@ impl BandAxis {
             edges.push(wavelengths[n - 1] + 0.5 * (wavelengths[n - 1] - wavelengths[n - 2]));
             Some(edges)
         };
-        let edges = met.or_else(between).ok_or_else(|| {
+        let edges = from_widths.or_else(between).ok_or_else(|| {
             "has one band, and nothing says how wide it is: give its width (`fwhm` of an ENVI \
              header)"
                 .to_owned()

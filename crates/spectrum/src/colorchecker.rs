@@ -29,4 +29,11 @@ mod tests {
             |nm: f64| (0..24).max_by(|&a, &b| PATCHES[a].held(nm).total_cmp(&PATCHES[b].held(nm)));
         assert!([450.0, 550.0].iter().all(|&nm| brightest(nm) == Some(18)));
     }
+
+    /// The crate has its own copy, as it is published without the scenes.
+    #[test]
+    fn the_scenes_have_the_same_table() {
+        let scenes = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/spectra/colorchecker.csv");
+        assert_eq!(std::fs::read_to_string(scenes).unwrap(), include_str!("colorchecker.csv"));
+    }
 }

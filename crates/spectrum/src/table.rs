@@ -125,8 +125,8 @@ pub fn refractive_index_info(text: &str) -> Result<[Curve; 2], String> {
     let mut kind = None;
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();
-        let told = line.trim_start_matches('-').trim();
-        if let Some(word) = told.strip_prefix("type:") {
+        let entry = line.trim_start_matches('-').trim();
+        if let Some(word) = entry.strip_prefix("type:") {
             kind = Some(word.trim().trim_matches(['"', '\'']).to_owned());
             continue;
         }
