@@ -3,8 +3,8 @@
 //! Most pairs of numbers are points of the first two dimensions of Sobol's sequence, which are the best
 //! stratified that there are (of any 2ᵐ points from a multiple of 2ᵐ on, one lies in each elementary
 //! interval of area 2⁻ᵐ), scrambled and shuffled for itself (Burley, "Practical hash-based Owen
-//! scrambling", 2020, section 3: shuffling pads such pairs to any number of dimensions). The few pairs on
-//! which a picture depends together are pairs of further dimensions with one shuffling, by a table.
+//! scrambling", 2020, section 3: shuffling pads such pairs to any number of dimensions). The places
+//! in the pixel and in the pupil are the first four dimensions with one shuffling, by a table.
 //!
 //! The first dimension is the reversed index. The second multiplies it by Pascal's triangle modulo 2,
 //! which is 1 where the bits of a row's number are among those of the column's (Lucas 1878): a sum over
@@ -26,12 +26,12 @@ const LANES: usize = 16;
 const BITS: usize = 16;
 
 /// Dimensions that share a shuffling.
-const DIMENSIONS: usize = 8;
+const DIMENSIONS: usize = 4;
 
 /// For each dimension, what each bit of the index adds (exclusive or) to the reversed number.
 static DIRECTIONS: LazyLock<[[u32; BITS]; DIMENSIONS]> = LazyLock::new(|| {
-    // In range: there are eight.
-    #[expect(clippy::cast_possible_truncation, reason = "below eight")]
+    // In range: there are four.
+    #[expect(clippy::cast_possible_truncation, reason = "below four")]
     array::from_fn(|d| array::from_fn(|bit| sobol_rev(1_u32 << (31 - bit), d as u32)))
 });
 
@@ -44,7 +44,7 @@ pub(crate) struct SobolKey {
     pub(crate) seed: u32,
 }
 
-/// The point of each of `keys` in dimensions `first` and `first + 1`; `first` is even and below eight.
+/// The point of each of `keys` in dimensions `first` and `first + 1`; `first` is 0 or 2.
 /// `out` is as long as `keys`.
 pub(crate) fn points(keys: &[SobolKey], first: usize, out: &mut [[f64; 2]]) {
     scrambled(keys, first, &DIRECTIONS, out);
@@ -187,7 +187,7 @@ mod tests {
         let keys: Vec<SobolKey> =
             (0..77).map(|i: u32| SobolKey { index: i * 7919, seed: i / 5 }).collect();
         let mut out = vec![[0.0; 2]; keys.len()];
-        for first in [0, 2, 4, 6] {
+        for first in [0, 2] {
             points(&keys, first, &mut out);
             assert_eq!(out, keys.iter().map(|&key| point(key, first)).collect::<Vec<_>>());
         }
@@ -205,7 +205,7 @@ mod tests {
         }
         let keys: Vec<SobolKey> = (192..256).map(|index| SobolKey { index, seed: 11 }).collect();
         let mut out = vec![[0.0; 2]; keys.len()];
-        for first in [0, 2, 4, 6] {
+        for first in [0, 2] {
             points(&keys, first, &mut out);
             for k in 0..2 {
                 let mut met =

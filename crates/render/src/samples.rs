@@ -136,6 +136,28 @@ pub(crate) struct Memory {
     order: Vec<u32>,
 }
 
+/// The sums that the samples of a batch are added to: a pixel's, or those of its sets.
+#[derive(Debug, Clone, Copy)]
+struct Slots {
+    /// Samples that each pixel has in the batch, and those of them that are of the first set.
+    a_pixel: u32,
+    of_first: u32,
+    sets: usize,
+}
+
+impl Slots {
+    /// Which sum a sample is added to, and the first sample behind it that is added to another.
+    #[inline]
+    fn of(self, sample: u32) -> (usize, u32) {
+        let pixel = sample / self.a_pixel;
+        let (slot, start) = (pixel as usize * self.sets, pixel * self.a_pixel);
+        match sample - start < self.of_first {
+            true => (slot, start + self.of_first.min(self.a_pixel)),
+            false => (slot + 1, start + self.a_pixel),
+        }
+    }
+}
+
 /// A sum and what rounding took from it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sum {
@@ -441,18 +463,14 @@ impl Adding<'_> {
             for first in self.pass.clone().step_by(at_once as usize) {
                 let range = first..self.pass.end.min(first + at_once);
                 let a_pixel = range.end - range.start;
-                // The sum of each sample of the batch: the pixel's, or that of its set.
-                let slot = |sample: u32| {
-                    let pixel = sample / a_pixel;
-                    let index = first + (sample - pixel * a_pixel);
-                    pixel as usize * sets + usize::from(sets > 1 && index >= of_first)
-                };
+                let of_first = if sets > 1 { of_first.saturating_sub(first) } else { a_pixel };
+                let slots = Slots { a_pixel, sets, of_first };
                 self.place(tile, (pixels, range), memory);
                 for (number, group) in self.what.groups().iter().enumerate() {
                     memory.film.group = number;
                     self.what.camera().sample_rays(&memory.film, &mut memory.rays);
                     self.what.trace(&group.bands, memory);
-                    memory.add(start, slot, shape, &group.bands);
+                    memory.add(start, slots, shape, &group.bands);
                 }
                 self.watcher.did(pixels.len() as u64 * u64::from(a_pixel))?;
             }
@@ -541,14 +559,27 @@ impl Memory {
     fn add(
         &mut self,
         start: usize,
-        slot: impl Fn(u32) -> usize,
+        slots: Slots,
         [layers, bands]: [usize; 2],
         group: &Range<usize>,
     ) {
         let Self { rays: CameraRays { sample, weight, .. }, values, sums, order, .. } = self;
         let count = layers * bands;
+        if group.len() == count && sample.is_sorted() {
+            // Samples of one sum lie side by side.
+            let mut first = 0;
+            while let Some(&of_first) = sample.get(first) {
+                let (slot, behind) = slots.of(of_first);
+                let of_sum = sample[first..].iter().take_while(|&&other| other < behind).count();
+                let (at, end) = (start + slot * count, first + of_sum);
+                let values = &values[first * count..end * count];
+                add_run(&mut sums[at..at + count], values, &weight[first..end]);
+                first = end;
+            }
+            return;
+        }
         let mut add = |ray: usize| {
-            let (at, weight) = (start + slot(sample[ray]) * count, weight[ray]);
+            let (at, weight) = (start + slots.of(sample[ray]).0 * count, weight[ray]);
             let sums = sums[at..at + count].chunks_exact_mut(bands.max(1));
             let values = values[ray * count..(ray + 1) * count].chunks_exact(bands.max(1));
             for (sums, values) in sums.zip(values) {
@@ -595,6 +626,31 @@ impl Memory {
         };
         in_order(&rays.sample, order, &mut add);
     }
+}
+
+/// Adds the values of rays side by side, as many each as there are sums, times the weight of each.
+fn add_run(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
+    match sums.len() {
+        1 => add_run_of::<1>(sums, values, weights),
+        3 => add_run_of::<3>(sums, values, weights),
+        count => {
+            for (values, weight) in values.chunks_exact(count.max(1)).zip(weights) {
+                sums.iter_mut().zip(values).for_each(|(sum, value)| sum.add(value * weight));
+            }
+        }
+    }
+}
+
+/// The same of a number of sums that is known, which stay in registers.
+fn add_run_of<const N: usize>(sums: &mut [Sum], values: &[f64], weights: &[f64]) {
+    let Some(sums) = sums.first_chunk_mut::<N>() else { return };
+    let mut own = *sums;
+    for (values, weight) in values.as_chunks::<N>().0.iter().zip(weights) {
+        for (sum, value) in own.iter_mut().zip(values) {
+            sum.add(value * weight);
+        }
+    }
+    *sums = own;
 }
 
 /// Adds rays in the order of their samples.

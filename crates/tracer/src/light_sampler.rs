@@ -21,6 +21,29 @@ const LEAST_SHARE: f64 = 0.25;
 /// So many lights are few.
 const FEW: usize = 8;
 
+/// A point that asks for light.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Receiver {
+    /// m.
+    pub(crate) point: DVec3,
+    /// The unit normal of the one side that it gets light from, by which that is weighed; zero where light comes
+    /// from both.
+    pub(crate) normal: DVec3,
+}
+
+impl Receiver {
+    /// A point (m) that gets light from all sides.
+    pub(crate) fn open(point: DVec3) -> Self {
+        Self { point, normal: DVec3::ZERO }
+    }
+
+    /// Whether it gets light from one side alone.
+    #[inline(always)]
+    pub(crate) fn is_one_sided(&self) -> bool {
+        self.normal != DVec3::ZERO
+    }
+}
+
 /// A light that may be chosen.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Candidate {
@@ -109,13 +132,13 @@ impl LightSampler {
         }
     }
 
-    /// A light for the point `from` (m) by `u` in 0..1: its number, what is left of `u`, and its chance.
+    /// A light for a point by `u` in 0..1: its number, what is left of `u`, and its chance.
     #[inline]
-    pub(crate) fn pick(&self, from: DVec3, u: f64) -> Option<(usize, f64, f64)> {
+    pub(crate) fn pick(&self, receiver: &Receiver, u: f64) -> Option<(usize, f64, f64)> {
         let Some(tree) = &self.tree else { return self.pick_other(u) };
-        let share = self.share_of_tree(tree, from);
+        let share = self.share_of_tree(tree, receiver.point);
         if u < share {
-            let (index, rest, chance) = tree.pick(from, u / share)?;
+            let (index, rest, chance) = tree.pick(receiver, u / share)?;
             return Some((index, rest, share * chance));
         }
         let rest = ((u - share) / (1.0 - share)).min(ONE_BELOW);
@@ -135,15 +158,15 @@ impl LightSampler {
         }
     }
 
-    /// The chance with which [`Self::pick`] picks light `index` for the point `from` (m).
-    pub(crate) fn chance(&self, from: DVec3, index: usize) -> f64 {
+    /// The chance with which [`Self::pick`] picks light `index` for a point.
+    pub(crate) fn chance(&self, receiver: &Receiver, index: usize) -> f64 {
         let other = || if self.others.is_empty() { 0.0 } else { self.others.probability(index) };
         match &self.tree {
             None => other(),
             Some(tree) => {
-                let share = self.share_of_tree(tree, from);
+                let share = self.share_of_tree(tree, receiver.point);
                 match tree.holds(index) {
-                    true => share * tree.chance(from, index),
+                    true => share * tree.chance(receiver, index),
                     false => (1.0 - share) * other(),
                 }
             }
@@ -192,17 +215,17 @@ mod tests {
         let expected =
             [(1.0, 0.25), (0.5, 4.0 / 7.0), (0.4, 6.25 / 9.25), (0.1, 0.75), (-1.0, 0.0)];
         for (height, share) in expected {
-            let from = DVec3::Y * height;
+            let from = Receiver::open(DVec3::Y * height);
             let mut counts = [0_u32; 5];
             let n = 10_000_u32;
             for k in 0..n {
                 let u = (f64::from(k) + 0.5) / f64::from(n);
-                let (index, rest, chance) = sampler.pick(from, u).unwrap();
+                let (index, rest, chance) = sampler.pick(&from, u).unwrap();
                 assert!((0.0..1.0).contains(&rest));
-                assert!((chance - sampler.chance(from, index)).abs() < 1e-12);
+                assert!((chance - sampler.chance(&from, index)).abs() < 1e-12);
                 counts[index] += 1;
             }
-            let chances = [0, 1, 2, 3, 4].map(|k| sampler.chance(from, k));
+            let chances = [0, 1, 2, 3, 4].map(|k| sampler.chance(&from, k));
             assert!((chances[1] - share).abs() < 1e-12, "{height}: {chances:?}");
             assert!(
                 (chances[0] - (1.0 - share) * 2.0 / 3.0).abs() < 1e-12,
@@ -219,9 +242,9 @@ mod tests {
     #[test]
     fn a_few_lamps_alone_are_chosen_by_power_and_none_is_dark() {
         let sampler = LightSampler::new(&[lamp(), lamp()], scene());
-        assert_eq!(sampler.chance(DVec3::NEG_Y, 0), 0.5);
+        assert_eq!(sampler.chance(&Receiver::open(DVec3::NEG_Y), 0), 0.5);
         assert!(sampler.are_several() && !sampler.is_empty());
         assert!(LightSampler::new(&[Candidate::Dark], scene()).is_empty());
-        assert!(LightSampler::new(&[], scene()).pick(DVec3::ZERO, 0.5).is_none());
+        assert!(LightSampler::new(&[], scene()).pick(&Receiver::open(DVec3::ZERO), 0.5).is_none());
     }
 }

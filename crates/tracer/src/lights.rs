@@ -1,7 +1,6 @@
 //! The lights of a scene: what each gives off, and a place on one that is chosen for a point.
 
 use std::borrow::Cow;
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 use etendue_geometry::MISS;
@@ -12,10 +11,10 @@ use crate::environment::EnvironmentMap;
 use crate::group::Groups;
 use crate::lamps::{self, AreaLight, triangle_power};
 use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
-use crate::light_sampler::{Candidate, LightSampler};
+use crate::light_sampler::{Candidate, LightSampler, Receiver};
 use crate::reference::{SceneView, SurfacePoint};
-use crate::sampling::{Frame, cone_direction, sphere_direction, triangle_point};
-use crate::sky::Sky;
+use crate::sampling::{Frame, cone_direction, triangle_point};
+use crate::sky::{Sky, uniform_direction};
 use crate::spectral::Spectral;
 use crate::target::{Chosen, Target, TargetKind};
 use crate::{LightGroup, Material};
@@ -121,10 +120,10 @@ impl Lights {
         Ok(all)
     }
 
-    /// A light for the point `from` (m) by `u` in 0..1: its number, what is left of `u`, and its chance.
+    /// A light for a point by `u` in 0..1: its number, what is left of `u`, and its chance.
     #[inline(always)]
-    pub(crate) fn pick(&self, from: DVec3, u: f64) -> Option<(usize, f64, f64)> {
-        self.sampler.pick(from, u)
+    pub(crate) fn pick(&self, receiver: &Receiver, u: f64) -> Option<(usize, f64, f64)> {
+        self.sampler.pick(receiver, u)
     }
 
     /// What [`Self::pick`] picks by, where that is a short list: the sum of the chances of all lights before
@@ -152,9 +151,9 @@ impl Lights {
         Some(first as usize + triangle as usize)
     }
 
-    /// The chance with which [`Self::choose`] chooses light `index` for the point `from` (m).
-    pub(crate) fn chance(&self, from: DVec3, index: usize) -> f64 {
-        self.sampler.chance(from, index)
+    /// The chance with which [`Self::choose`] chooses light `index` for a point.
+    pub(crate) fn chance(&self, receiver: &Receiver, index: usize) -> f64 {
+        self.sampler.chance(receiver, index)
     }
 
     /// Keeps emissive triangles ready.
@@ -253,21 +252,21 @@ impl Lights {
         &self.bands[light * count..(light + 1) * count]
     }
 
-    /// Chooses a light for the point `from` (m) and a place on it by `square` (in 0..1); its radiance (of
-    /// a point its intensity) goes to `radiance`.
+    /// Chooses a light for a point and a place on it by `square` (in 0..1); its radiance (of a point its intensity)
+    /// goes to `radiance`.
     // Called for every hit from one place, with a large answer that is not to be copied.
     #[inline(always)]
     pub(crate) fn choose(
         &self,
         around: &SceneView<'_>,
         spectral: &Spectral,
-        from: DVec3,
+        receiver: &Receiver,
         [choice, v]: [f64; 2],
         radiance: &mut [f64],
     ) -> Chosen {
         // What is left of the number that chose the light chooses the place: both stay even.
-        let Some((index, rest, chance)) = self.pick(from, choice) else { return Chosen::Dark };
-        self.place(around, spectral, from, ((index, chance), [rest, v]), radiance)
+        let Some((index, rest, chance)) = self.pick(receiver, choice) else { return Chosen::Dark };
+        self.place(around, spectral, receiver, ((index, chance), [rest, v]), radiance)
     }
 
     /// A place on a light that was picked with a chance, by a square; its radiance (of a point its
@@ -277,11 +276,11 @@ impl Lights {
         &self,
         around: &SceneView<'_>,
         spectral: &Spectral,
-        from: DVec3,
+        receiver: &Receiver,
         (one, square): ((usize, f64), [f64; 2]),
         radiance: &mut [f64],
     ) -> Chosen {
-        let mut chosen = self.place_on(around, spectral, from, one, square, radiance);
+        let mut chosen = self.place_on(around, spectral, receiver, one, square, radiance);
         if let Chosen::Place(target) = &mut chosen {
             target.light = u32::try_from(one.0).unwrap_or(MISS);
         }
@@ -294,7 +293,7 @@ impl Lights {
         &self,
         around: &SceneView<'_>,
         spectral: &Spectral,
-        from: DVec3,
+        receiver: &Receiver,
         (index, chance): (usize, f64),
         square: [f64; 2],
         radiance: &mut [f64],
@@ -307,20 +306,22 @@ impl Lights {
         match &light.kind {
             LightKind::Point(at) => Target::bare(TargetKind::Point, *at, chance).into(),
             &LightKind::Spot { at, axis, cos_outer, cos_inner } => {
-                let cosine = (from - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
+                let cosine = (receiver.point - at).try_normalize().map_or(-1.0, |d| d.dot(axis));
                 let factor = spot_falloff(cosine, cos_outer, cos_inner);
                 radiance.iter_mut().for_each(|band| *band *= factor);
                 (factor > 0.0).then(|| Target::bare(TargetKind::Point, at, chance)).into()
             }
             LightKind::Projector(projector) => {
-                let Some(color) = projector.toward(around, from) else { return Chosen::Dark };
+                let Some(color) = projector.toward(around, receiver.point) else {
+                    return Chosen::Dark;
+                };
                 for (k, band) in radiance.iter_mut().enumerate() {
                     *band *= spectral.band(&color, k);
                 }
                 Target::bare(TargetKind::Point, projector.at, chance).into()
             }
             LightKind::Goniometric(measured) => {
-                let intensity = measured.toward(from);
+                let intensity = measured.toward(receiver.point);
                 radiance.iter_mut().for_each(|band| *band *= intensity);
                 let place = Target::bare(TargetKind::Point, measured.at, chance);
                 (intensity > 0.0).then_some(place).into()
@@ -330,8 +331,8 @@ impl Lights {
                 Target::bare(TargetKind::Parallel, toward, chance).into()
             }
             LightKind::Environment { image: EnvironmentImage::Constant, .. } => {
-                let density = 0.25 / PI * chance;
-                Target::bare(TargetKind::Far, sphere_direction(square), density).into()
+                let (toward, density) = uniform_direction(receiver, square);
+                Target::bare(TargetKind::Far, toward, chance * density).into()
             }
             LightKind::Environment { .. } => Chosen::Sky { square, chance },
         }
@@ -393,14 +394,14 @@ impl Lights {
         true
     }
 
-    /// The density (1/sr), chance included, with which [`Self::choose`] gives the direction from
-    /// `from` to `spot`, where it was met by a ray along `direction`.
+    /// The density (1/sr), chance included, with which [`Self::choose`] gives a point the direction to `spot`,
+    /// which was met by a ray along `direction` from the point.
     pub(crate) fn pdf_of_surface(
         &self,
         around: &SceneView<'_>,
         placement: u32,
         spot: &SurfacePoint<'_>,
-        from: DVec3,
+        receiver: &Receiver,
         direction: DVec3,
     ) -> f64 {
         let Some(Some(first)) = self.first.get(placement as usize) else { return 0.0 };
@@ -410,9 +411,9 @@ impl Lights {
         let index = *first as usize + spot.triangle;
         let Some(lamp) = self.lamp(around, index - self.lights.len()) else { return 0.0 };
         let [_, u, v] = spot.weights;
-        let squared = lamp.offset(from, [u, v]).length_squared();
+        let squared = lamp.offset(receiver.point, [u, v]).length_squared();
         let cosine = direction.dot(lamp.shape.normal).abs();
-        let pdf = self.chance(from, index) * squared / (cosine * lamp.shape.area);
+        let pdf = self.chance(receiver, index) * squared / (cosine * lamp.shape.area);
         if pdf.is_finite() { pdf } else { 0.0 }
     }
 }

@@ -10,7 +10,9 @@ use etendue_spectrum::NoOverlap;
 use crate::Color;
 use crate::environment::{EnvironmentMap, MapSampler, OnMap, place};
 use crate::light::{EnvironmentImage, Light, LightKind};
+use crate::light_sampler::Receiver;
 use crate::lights::Lights;
+use crate::sampling::{Frame, cosine_direction, sphere_direction};
 use crate::spectral::Spectral;
 use crate::spectral_sky::{self, Spectrum};
 use crate::target::{Target, TargetKind};
@@ -113,14 +115,32 @@ impl Sky {
     }
 }
 
+/// A direction to a sky that is alike all over, for a point, and its density (1/sr): by the cosine where the point
+/// gets light from one side alone, else any.
+pub(crate) fn uniform_direction(receiver: &Receiver, square: [f64; 2]) -> (DVec3, f64) {
+    if !receiver.is_one_sided() {
+        return (sphere_direction(square), 0.25 / PI);
+    }
+    let local = cosine_direction(square);
+    (Frame::around(receiver.normal).world(local), local.z / PI)
+}
+
+/// The density (1/sr) with which [`uniform_direction`] gives a unit direction.
+fn uniform_density(receiver: &Receiver, direction: DVec3) -> f64 {
+    match receiver.is_one_sided() {
+        true => receiver.normal.dot(direction).max(0.0) / PI,
+        false => 0.25 / PI,
+    }
+}
+
 impl Lights {
-    /// Radiance that comes to a point (m) from each unit direction without meeting anything, and the density
+    /// Radiance that comes to a point from each unit direction without meeting anything, and the density
     /// (1/sr), chance included, with which [`Self::choose`] gives that direction for that point. Both go to
     /// `each`, with the number of the pair.
     pub(crate) fn environment(
         &self,
         spectral: &Spectral,
-        wanted: impl Iterator<Item = (DVec3, DVec3)>,
+        wanted: impl Iterator<Item = (Receiver, DVec3)>,
         asked: &mut Asked,
         radiance: &mut [f64],
         mut each: impl FnMut(usize, f64, &mut [f64]),
@@ -128,9 +148,10 @@ impl Lights {
         let Some(sky) = &self.sky else { return };
         let own = self.bands_of(sky.index, radiance.len());
         let Some((map, sampler)) = &sky.map else {
-            for (number, (from, _)) in wanted.enumerate() {
+            for (number, (receiver, direction)) in wanted.enumerate() {
                 radiance.copy_from_slice(own);
-                each(number, 0.25 / PI * self.chance(from, sky.index), radiance);
+                let density = uniform_density(&receiver, direction);
+                each(number, density * self.chance(&receiver, sky.index), radiance);
             }
             return;
         };
@@ -138,8 +159,8 @@ impl Lights {
         let map_from_world = sky.world_from_map.transpose();
         chances.clear();
         there.directions.clear();
-        for (from, world) in wanted {
-            chances.push(self.chance(from, sky.index));
+        for (receiver, world) in wanted {
+            chances.push(self.chance(&receiver, sky.index));
             there.directions.push(map_from_world * world);
         }
         sampler.look_up(map, there);

@@ -21,8 +21,12 @@ pub(crate) fn load(folder: &Path, text: &str) -> Result<Scene> {
 #[derive(Debug)]
 pub(crate) struct Pixels {
     pub(crate) values: Vec<f64>,
+    /// The variance that the program tells of each, where the scene asks for that layer.
+    pub(crate) variances: Vec<f64>,
     /// Contributions that were not finite, and were left out.
     pub(crate) not_finite: u64,
+    /// What is said of them.
+    pub(crate) notes: Vec<String>,
 }
 
 impl Pixels {
@@ -33,10 +37,15 @@ impl Pixels {
         let images = Images::decode(scene, &plan, None)?;
         ensure!(images.faults.is_empty(), "{:?}", images.faults);
         let done = render(scene, &plan, &*accel, &images, Vec::new(), &|_: f64| true)?;
-        let layer = done.picture.layers().first().context("a picture has a layer")?;
-        let channel = layer.channels.first().context("a layer has a channel")?;
-        let values = (0..channel.values.len()).map(|i| channel.values.at(i)).collect();
-        Ok(Self { values, not_finite: done.light.not_finite })
+        let layers = done.picture.layers();
+        let first_channel = |layer: &etendue_render::output::Layer| -> Result<Vec<f64>> {
+            let channel = layer.channels.first().context("a layer has a channel")?;
+            Ok((0..channel.values.len()).map(|i| channel.values.at(i)).collect())
+        };
+        let values = first_channel(layers.first().context("a picture has a layer")?)?;
+        let variance = layers.iter().find(|layer| layer.name == "Variance");
+        let variances = variance.map(first_channel).transpose()?.unwrap_or_default();
+        Ok(Self { values, variances, not_finite: done.light.not_finite, notes: done.notes })
     }
 
     /// Of the scene in `text`.

@@ -2,6 +2,7 @@
 
 mod absorbing;
 mod moments;
+mod neutral;
 mod spectral;
 
 use anyhow::Result;
@@ -107,6 +108,7 @@ pub const METHOD: Method = Method {
         },
         moments::MOMENTS,
         absorbing::ABSORBING,
+        neutral::NEUTRAL,
     ],
 };
 

@@ -126,7 +126,8 @@ fn compare(name: &str, scene: &Scene, plan: &Plan) -> usize {
             // Hits within f32's rounding of an edge or of a shadow's: one sample in some thousands.
             assert!(differ * 50 <= own.len(), "{name}: {differ} of {} in {layer:?}", own.len());
             let sum: f64 = own.iter().sum();
-            assert!((sum - total).abs() <= 1e-3 * total.abs(), "{name}: {sum} {total}");
+            // One of those may come upon a light and bring as much as five thousandths of all.
+            assert!((sum - total).abs() <= 6e-3 * total.abs(), "{name}: {sum} {total}");
         }
         let rays = [&blocks, &batches].map(|done| done.light.rays as f64);
         assert!((rays[0] / rays[1] - 1.0).abs() < 1e-3, "{name}: {rays:?}");

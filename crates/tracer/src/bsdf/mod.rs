@@ -243,6 +243,16 @@ impl Bsdf {
         }
     }
 
+    /// The shading normal of the one side that light comes from; zero where it comes from both.
+    pub(crate) fn receiving_normal(&self) -> DVec3 {
+        let is_one_sided = match self.model {
+            Model::Black | Model::Matte | Model::Mirror | Model::Metal { .. } => true,
+            Model::Dielectric { .. } => false,
+            Model::Layered(layered) => layered.transmission == 0.0,
+        };
+        if is_one_sided { self.frame.z } else { DVec3::ZERO }
+    }
+
     /// Whether [`Self::sample`] may give a direction that only this model can give.
     #[must_use]
     pub fn has_single(&self) -> bool {

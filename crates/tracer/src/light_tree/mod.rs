@@ -1,25 +1,30 @@
-//! A tree over lights of a place: from a point, one of them is chosen by its distance, its power and where
-//! it shines, in a time that grows as the logarithm of their number.
+//! A tree over lights of a place: for a point, one of them is chosen by its distance, its power, where it shines
+//! and where the point faces, in a time that grows as the logarithm of their number.
 //!
 //! Each branch of a node knows of its lights a box, a cone of directions about which they shine, and the sum of
 //! their intensities. From the top down one of a node's branches is chosen by what it may send to the point,
 //!
 //! ```text
-//! I cos θ' / max(d², r²),  θ' = max(0, θ − θₒ − θᵤ), and nothing where θ' ≥ θₑ
+//! I cos θ' cos θᵢ' / max(d², r²),  θ' = max(0, θ − θₒ − θᵤ),  θᵢ' = max(0, θᵢ − θᵤ),
+//! and nothing where θ' ≥ θₑ or θᵢ' ≥ π/2
 //! ```
 //!
 //! with `d` to the box's centre, `r` half its diagonal, `θ` between the cone's axis and the point, `θₒ` the
-//! cone's half-angle, `θₑ` how far beyond it a light shines, and `θᵤ` the half-angle of the box's sphere.
+//! cone's half-angle, `θₑ` how far beyond it a light shines, `θᵢ` between the point's normal and the box's centre,
+//! and `θᵤ` the half-angle of the box's sphere. Where light may come through a surface the normal is not asked.
 //! Nodes have eight branches, which are asked side by side: what bounds the time is how long one answer takes,
 //! and a choice among eight knows more of the lights than three among two.
+//!
+//! All that is compared is single: lengths in the extent of all lights, intensities in their sum. Chances are those
+//! of the very numbers that were drawn by, in double, so what rounding does to them changes no mean.
 //!
 //! # Sources
 //!
 //! A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG
 //! 2018 (cones, the cost of a split); Pharr, Jakob and Humphreys, *Physically Based Rendering*, 4th
-//! edition, section 12.6.3 (the bound of `cos θ'`). The point's own normal is not asked: light may come through
-//! a surface. Where all lights of a branch shine the same way and the point is far from it, one is chosen by its
-//! intensity at once: going down would change little and costs time.
+//! edition, section 12.6.3 (the bounds of `cos θ'` and `cos θᵢ'`). Where all lights of a branch shine the same way
+//! and the point is far from it, one is chosen by its intensity at once: going down would change little and costs
+//! time.
 
 mod cluster;
 mod split;
@@ -29,10 +34,11 @@ mod tests;
 use std::f64::consts::PI;
 
 use etendue_geometry::MISS;
-use etendue_geometry::glam::DVec3;
+use etendue_geometry::glam::{DVec3, Vec3};
 
 pub(crate) use self::cluster::Cluster;
 use self::split::split;
+use crate::light_sampler::Receiver;
 use crate::sampling::ONE_BELOW;
 
 /// Fewer lights are chosen by their power where none is far away.
@@ -49,7 +55,7 @@ const WIDTH: usize = 8;
 const DEEP: u32 = 12;
 
 /// Squared distance over squared radius from which on a branch's lights are as good as in one place.
-const FAR: f64 = 16.0;
+const FAR: f32 = 256.0;
 
 /// The node whose one branch has all lights.
 const ALL: usize = 0;
@@ -57,8 +63,17 @@ const ALL: usize = 0;
 /// Half-angle (radians) of a cone within which lights shine the same way.
 const ALIKE: f64 = 0.3;
 
+/// Sums of eight of these are finite, and so are their squares in double.
+const MOST_IMPORTANCE: f32 = 1e30;
+
+/// Points are looked at no farther out than so many extents of all lights: squares and their inverses stay numbers.
+const FARTHEST: f64 = 1e6;
+
+/// What rounding may take from a cosine in single precision, with room.
+const ROOM: f32 = 1e-5;
+
 /// A number of each branch.
-type Lanes = [f64; WIDTH];
+type Lanes = [f32; WIDTH];
 
 /// Clusters of lights, as they are asked; what is not there has no intensity.
 #[derive(Debug, Clone, Default)]
@@ -89,33 +104,92 @@ struct Branch {
     lights: [u32; 2],
 }
 
+/// The extent of all lights, in which lengths are told, and the sum of their intensities.
+#[derive(Debug, Clone, Copy)]
+struct Extent {
+    /// m.
+    centre: DVec3,
+    /// Per metre.
+    scale: f64,
+    /// W/sr.
+    intensity: f64,
+}
+
+/// A point that asks for light, as nodes see it.
+#[derive(Debug, Clone, Copy)]
+struct Viewer {
+    point: [f32; 3],
+    normal: [f32; 3],
+    is_one_sided: bool,
+}
+
+impl Default for Extent {
+    fn default() -> Self {
+        Self { centre: DVec3::ZERO, scale: 1.0, intensity: 1.0 }
+    }
+}
+
+impl Extent {
+    fn of(all: &Cluster) -> Self {
+        let diagonal = all.bounds.diagonal();
+        let scale = if diagonal > 0.0 { 1.0 / diagonal } else { 1.0 };
+        Self { centre: all.bounds.centre(), scale, intensity: all.intensity }
+    }
+
+    fn local(&self, point: DVec3) -> Vec3 {
+        let limit = DVec3::splat(FARTHEST);
+        ((point - self.centre) * self.scale).clamp(-limit, limit).as_vec3()
+    }
+
+    #[inline(always)]
+    fn viewer(&self, receiver: &Receiver) -> Viewer {
+        Viewer {
+            point: self.local(receiver.point).to_array(),
+            normal: receiver.normal.as_vec3().to_array(),
+            is_one_sided: receiver.is_one_sided(),
+        }
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rounding to single precision is the purpose")]
+fn single(x: f64) -> f32 {
+    x as f32
+}
+
 impl Node {
-    fn set(&mut self, lane: usize, cluster: &Cluster, branch: Branch) {
+    fn set(&mut self, lane: usize, extent: &Extent, cluster: &Cluster, branch: Branch) {
         let (sin, cos) = cluster.cone.sin_cos();
-        let radius = 0.5 * cluster.bounds.diagonal();
-        for (axis, (centre, along)) in self.centre.iter_mut().zip(&mut self.axis).enumerate() {
-            centre[lane] = cluster.bounds.centre()[axis];
-            along[lane] = cluster.axis[axis];
+        let radius = single(0.5 * cluster.bounds.diagonal() * extent.scale);
+        let centre = extent.local(cluster.bounds.centre());
+        for axis in 0..3 {
+            self.centre[axis][lane] = centre[axis];
+            self.axis[axis][lane] = single(cluster.axis[axis]);
         }
         self.radius[lane] = radius;
-        (self.cone[0][lane], self.cone[1][lane]) = (cos, sin);
-        self.cos_reach[lane] = cluster.reach.cos();
-        self.intensity[lane] = cluster.intensity;
-        let within = cluster.intensity / (radius * radius).max(f64::MIN_POSITIVE);
+        (self.cone[0][lane], self.cone[1][lane]) = (single(cos), single(sin));
+        self.cos_reach[lane] = single(cluster.reach.cos());
+        self.intensity[lane] = single(cluster.intensity / extent.intensity);
+        let within = self.intensity[lane] / (radius * radius).max(f32::MIN_POSITIVE);
         self.within[lane] = within.min(MOST_IMPORTANCE);
         self.is_around = cluster.cone >= PI && (lane == 0 || self.is_around);
         self.branches[lane] = branch;
     }
 
-    /// The centre of the first branch (m).
-    #[inline]
-    fn first_centre(&self) -> DVec3 {
-        self.centre.map(|axis| axis[0]).into()
+    /// The squared distance to the centre of a branch, and its height above the viewer's horizon.
+    #[inline(always)]
+    fn way(&self, k: usize, viewer: &Viewer) -> [f32; 2] {
+        let (mut squared, mut above) = (0.0, 0.0);
+        for axis in 0..3 {
+            let way = self.centre[axis][k] - viewer.point[axis];
+            squared += way * way;
+            above += way * viewer.normal[axis];
+        }
+        [squared, above]
     }
 
-    /// What a branch may send to a point at a squared distance (m²), where all shine to all sides.
+    /// What a branch may send to a point at a squared distance, where all shine to all sides.
     #[inline(always)]
-    fn around(&self, k: usize, squared: f64) -> f64 {
+    fn around(&self, k: usize, squared: f32) -> f32 {
         let near = self.intensity[k] / squared;
         let near = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
         let is_within = squared <= self.radius[k] * self.radius[k];
@@ -124,7 +198,7 @@ impl Node {
 
     /// The same where they shine ahead.
     #[inline(always)]
-    fn ahead(&self, k: usize, from: [f64; 3], squared: f64) -> f64 {
+    fn ahead(&self, k: usize, from: [f32; 3], squared: f32) -> f32 {
         let inverse = 1.0 / squared.sqrt();
         let near = self.intensity[k] * inverse * inverse;
         let near = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
@@ -132,96 +206,123 @@ impl Node {
         let along = |axis: usize| (from[axis] - self.centre[axis][k]) * self.axis[axis][k];
         let along = along(0) + along(1) + along(2);
         let cosine = (along * inverse).clamp(-1.0, 1.0);
-        let angle =
-            less([cosine, (1.0 - cosine * cosine).sqrt()], [self.cone[0][k], self.cone[1][k]]);
+        let angle = less([cosine, other(cosine)], [self.cone[0][k], self.cone[1][k]]);
         let sine = self.radius[k] * inverse;
-        let rest = 1.0 - sine * sine;
-        let ball = if rest > 0.0 { rest } else { 0.0 };
-        let [cosine, _] = less(angle, [ball.sqrt(), sine]);
+        let [cosine, _] = less(angle, [other(sine), sine]);
         // A light at the very end of its reach is met by a bound with room for rounding.
-        let reaches = cosine + 1e-9 > self.cos_reach[k];
-        let facing = if cosine > 1e-9 { cosine } else { 1e-9 };
+        let reaches = cosine + ROOM > self.cos_reach[k];
+        let facing = if cosine > ROOM { cosine } else { ROOM };
         let outside = if reaches { near * facing } else { 0.0 };
         let is_within = squared <= self.radius[k] * self.radius[k];
         if is_within { self.within[k] } else { outside }
     }
 
-    /// Whether one of the lights of a branch at this squared distance (m²) is chosen by intensity.
-    fn is_end(&self, lane: usize, squared: f64) -> bool {
+    /// The most that the cosine is under which a point gets the light of a branch: at this height of its centre
+    /// above the point's horizon and this squared distance.
+    #[inline(always)]
+    fn received(&self, k: usize, above: f32, squared: f32) -> f32 {
+        let inverse = 1.0 / squared.sqrt();
+        let (sine, along) = (self.radius[k] * inverse, (above * inverse).clamp(-1.0, 1.0));
+        let [cosine, _] = less([along, other(along)], [other(sine), sine]);
+        let facing = if cosine > ROOM { cosine } else { ROOM };
+        let facing = if cosine > -ROOM { facing } else { 0.0 };
+        let is_within = squared <= self.radius[k] * self.radius[k];
+        if is_within { 1.0 } else { facing }
+    }
+
+    /// Whether one of the lights of a branch at this squared distance is chosen by intensity.
+    #[inline(always)]
+    fn is_end(&self, lane: usize, squared: f32) -> bool {
         let Branch { node, alike, .. } = self.branches[lane];
         node == MISS || (alike && squared > FAR * self.radius[lane] * self.radius[lane])
     }
+
+    /// What the viewer has of each branch: what the branch may send, to a factor, and the squared distance.
+    #[inline(always)]
+    fn view(&self, viewer: &Viewer) -> View {
+        let (mut squared, mut above, mut importance) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
+        for k in 0..WIDTH {
+            [squared[k], above[k]] = self.way(k, viewer);
+        }
+        if self.is_around {
+            for k in 0..WIDTH {
+                importance[k] = self.around(k, squared[k]);
+            }
+        } else {
+            for k in 0..WIDTH {
+                importance[k] = self.ahead(k, viewer.point, squared[k]);
+            }
+        }
+        if viewer.is_one_sided {
+            for k in 0..WIDTH {
+                importance[k] *= self.received(k, above[k], squared[k]);
+            }
+        }
+        View { importance: importance.map(f64::from), squared }
+    }
 }
 
-/// What a point has of each branch of a node.
-#[derive(Debug, Default)]
-struct View {
-    /// What the branch may send, to a factor.
-    importance: Lanes,
-    /// The squared distance to its centre (m²).
-    squared: Lanes,
-}
-
-/// Sums of eight of these are finite.
-const MOST_IMPORTANCE: f64 = 1e290;
-
-/// What a point (m) has of each branch.
-#[multiversion::multiversion(targets = "simd")]
-fn view(node: &Node, from: DVec3, view: &mut View) {
-    let from = [from.x, from.y, from.z];
-    view.squared = [0.0; WIDTH];
-    for (axis, from) in from.into_iter().enumerate() {
-        for k in 0..WIDTH {
-            let way = from - node.centre[axis][k];
-            view.squared[k] += way * way;
-        }
-    }
-    if node.is_around {
-        for k in 0..WIDTH {
-            view.importance[k] = node.around(k, view.squared[k]);
-        }
-        return;
-    }
-    for k in 0..WIDTH {
-        view.importance[k] = node.ahead(k, from, view.squared[k]);
-    }
+/// The sine to a cosine, or the other way round; 0 where rounding went beyond 1.
+#[inline(always)]
+fn other(cosine: f32) -> f32 {
+    let rest = 1.0 - cosine * cosine;
+    if rest > 0.0 { rest.sqrt() } else { 0.0 }
 }
 
 /// Cosine and sine of the first angle less the second, 0 at least.
 #[inline(always)]
-fn less([cos_a, sin_a]: [f64; 2], [cos_b, sin_b]: [f64; 2]) -> [f64; 2] {
+fn less([cos_a, sin_a]: [f32; 2], [cos_b, sin_b]: [f32; 2]) -> [f32; 2] {
     let is_more = cos_a < cos_b;
     let (cos, sin) = (cos_a * cos_b + sin_a * sin_b, sin_a * cos_b - cos_a * sin_b);
     [if is_more { cos } else { 1.0 }, if is_more { sin } else { 0.0 }]
 }
 
+/// What a point has of each branch of a node.
+#[derive(Debug)]
+struct View {
+    /// What the branch may send, to a factor.
+    importance: [f64; WIDTH],
+    /// The squared distance to its centre.
+    squared: Lanes,
+}
+
 impl View {
     /// The sums of what the branches up to each send.
-    fn sums(&self) -> Lanes {
-        let mut sum = 0.0;
-        self.importance.map(|importance| {
-            sum += importance;
-            sum
-        })
+    #[inline(always)]
+    fn sums(&self) -> [f64; WIDTH] {
+        let mut sums = self.importance;
+        // By halves: three steps one after the other in place of seven.
+        for step in [1, 2, 4] {
+            let before = sums;
+            for k in step..WIDTH {
+                sums[k] = before[k] + before[k - step];
+            }
+        }
+        sums
     }
 
     /// A branch by `u` in 0..1, what is left of `u`, and its share; `None` where none sends anything.
+    #[inline(always)]
     fn pick(&self, u: f64) -> Option<(usize, f64, f64)> {
         let sums = self.sums();
         let place = u * sums[WIDTH - 1];
-        let lane = sums.iter().filter(|&&sum| sum <= place).count();
+        let mut lane = 0;
+        for sum in sums {
+            lane += usize::from(sum <= place);
+        }
         // Rounding may put the place at the very end.
-        let lane = match lane {
-            WIDTH => self.importance.iter().rposition(|&importance| importance > 0.0)?,
-            lane => lane,
-        };
+        if lane == WIDTH {
+            lane = self.importance.iter().rposition(|&importance| importance > 0.0)?;
+        }
         let before = if lane == 0 { 0.0 } else { sums[lane - 1] };
         let own = self.importance[lane];
         let rest = ((place - before) / own).clamp(0.0, ONE_BELOW);
-        Some((lane, rest, own / sums[WIDTH - 1]))
+        // Sums by halves may be out of order by their last bit.
+        (own > 0.0).then_some((lane, rest, own / sums[WIDTH - 1]))
     }
 
     /// The share of a branch.
+    #[inline(always)]
     fn share(&self, lane: usize) -> f64 {
         match self.importance[lane] {
             own if own > 0.0 => own / self.sums()[WIDTH - 1],
@@ -230,11 +331,53 @@ impl View {
     }
 }
 
+/// Goes down from a node by `u` in 0..1 to a branch of which one light is chosen by intensity: that, what is left
+/// of `u`, and its chance.
+#[multiversion::multiversion(targets = "simd")]
+fn descend(
+    nodes: &[Node],
+    mut at: usize,
+    viewer: &Viewer,
+    mut u: f64,
+) -> Option<(Branch, f64, f64)> {
+    let mut chance = 1.0;
+    loop {
+        let node = nodes.get(at)?;
+        let view = node.view(viewer);
+        let (lane, rest, share) = view.pick(u)?;
+        (u, chance) = (rest, chance * share);
+        let branch = node.branches[lane];
+        if node.is_end(lane, view.squared[lane]) {
+            return Some((branch, u, chance));
+        }
+        at = branch.node as usize;
+    }
+}
+
+/// The branch with a light at a place of the tree's order that [`descend`] may come to from a node, and its chance.
+#[multiversion::multiversion(targets = "simd")]
+fn descend_to(nodes: &[Node], mut at: usize, viewer: &Viewer, place: u32) -> Option<(Branch, f64)> {
+    let mut chance = 1.0;
+    loop {
+        let node = nodes.get(at)?;
+        let holds = |branch: &Branch| (branch.lights[0]..branch.lights[1]).contains(&place);
+        let lane = node.branches.iter().position(holds)?;
+        let view = node.view(viewer);
+        chance *= view.share(lane);
+        let branch = node.branches[lane];
+        if chance == 0.0 || node.is_end(lane, view.squared[lane]) {
+            return Some((branch, chance));
+        }
+        at = branch.node as usize;
+    }
+}
+
 /// The tree.
 #[derive(Debug, Default)]
 pub(crate) struct LightTree {
     /// The first has one branch, of all lights.
     nodes: Vec<Node>,
+    extent: Extent,
     /// Numbers of the lights in the tree's order, and the sum of all intensities before each and at the end.
     order: Vec<u32>,
     below: Vec<f64>,
@@ -255,10 +398,13 @@ impl LightTree {
     pub(crate) fn new(mut lights: Vec<(u32, Cluster)>, count: usize) -> Self {
         lights.retain(|(_, cluster)| cluster.intensity > 0.0);
         let mut tree = Self { below: vec![0.0], places: vec![MISS; count], ..Self::default() };
-        if !lights.is_empty() {
+        let all = lights.iter().map(|light| light.1).reduce(|a, b| a.union(&b));
+        if let Some(all) = all {
+            tree.extent = Extent::of(&all);
             tree.nodes.push(Node::default());
             let Grown { cluster, branch, .. } = tree.grow(&mut lights, 0);
-            tree.nodes[0].set(0, &cluster, branch);
+            let extent = tree.extent;
+            tree.nodes[ALL].set(0, &extent, &cluster, branch);
         }
         tree
     }
@@ -283,7 +429,7 @@ impl LightTree {
             let (part, after) = rest.split_at_mut(size);
             rest = after;
             let grown = self.grow(part, depth + 1);
-            node.set(lane, &grown.cluster, grown.branch);
+            node.set(lane, &self.extent, &grown.cluster, grown.branch);
             all = all.union(&grown.cluster);
             is_points &= grown.is_points;
         }
@@ -297,33 +443,20 @@ impl LightTree {
         Grown { cluster: all, is_points, branch }
     }
 
-    /// Where a point (m) begins to ask: what parts all lights, unless it need not ([`ALL`]).
-    fn start(&self, from: DVec3) -> usize {
-        let goes_on = |whole: &Node| !whole.is_end(0, from.distance_squared(whole.first_centre()));
+    /// Where a point begins to ask: what parts all lights, unless it need not ([`ALL`]).
+    fn start(&self, viewer: &Viewer) -> usize {
+        let goes_on = |whole: &Node| !whole.is_end(0, whole.way(0, viewer)[0]);
         usize::from(self.nodes.first().is_some_and(goes_on))
     }
 
-    /// A light for a point (m) by `u` in 0..1: its number, what is left of `u`, and its chance. `None` where
-    /// none shines.
-    pub(crate) fn pick(&self, from: DVec3, mut u: f64) -> Option<(usize, f64, f64)> {
-        let mut chance = 1.0;
-        let branch = match self.start(from) {
-            ALL if self.importance(from) > 0.0 => self.nodes[ALL].branches[0],
+    /// A light for a point by `u` in 0..1: its number, what is left of `u`, and its chance. `None` where none
+    /// shines.
+    pub(crate) fn pick(&self, receiver: &Receiver, u: f64) -> Option<(usize, f64, f64)> {
+        let viewer = self.extent.viewer(receiver);
+        let (branch, u, chance) = match self.start(&viewer) {
+            ALL if self.sent(&viewer) > 0.0 => (self.nodes[ALL].branches[0], u, 1.0),
             ALL => return None,
-            mut at => {
-                let mut seen = View::default();
-                loop {
-                    let node = self.nodes.get(at)?;
-                    view(node, from, &mut seen);
-                    let (lane, rest, share) = seen.pick(u)?;
-                    (u, chance) = (rest, chance * share);
-                    let branch = node.branches[lane];
-                    if node.is_end(lane, seen.squared[lane]) {
-                        break branch;
-                    }
-                    at = branch.node as usize;
-                }
-            }
+            at => descend(&self.nodes, at, &viewer, u)?,
         };
         let [begin, end] = branch.lights.map(|k| k as usize);
         if end - begin == 1 {
@@ -345,14 +478,21 @@ impl LightTree {
         (self.below[k + 1] - self.below[k]) / (self.below[end] - self.below[begin])
     }
 
-    /// What its lights may send to a point (m) that faces them all (W/m²).
-    pub(crate) fn importance(&self, from: DVec3) -> f64 {
+    /// What all lights may send to a point that faces them, in units of the tree.
+    fn sent(&self, viewer: &Viewer) -> f32 {
         let Some(whole) = self.nodes.first() else { return 0.0 };
-        let squared = from.distance_squared(whole.first_centre());
+        let [squared, _] = whole.way(0, viewer);
         match whole.is_around {
             true => whole.around(0, squared),
-            false => whole.ahead(0, from.to_array(), squared),
+            false => whole.ahead(0, viewer.point, squared),
         }
+    }
+
+    /// What its lights may send to a point (m) that faces them all (W/m²).
+    pub(crate) fn importance(&self, from: DVec3) -> f64 {
+        let Extent { scale, intensity, .. } = self.extent;
+        let sent = f64::from(self.sent(&self.extent.viewer(&Receiver::open(from))));
+        (sent * intensity * scale * scale).min(f64::MAX.sqrt())
     }
 
     /// Whether a light is in it.
@@ -360,30 +500,21 @@ impl LightTree {
         self.places.get(number).is_some_and(|&place| place != MISS)
     }
 
-    /// The chance with which [`Self::pick`] picks a light for a point (m).
-    pub(crate) fn chance(&self, from: DVec3, number: usize) -> f64 {
+    /// The chance with which [`Self::pick`] picks a light for a point.
+    pub(crate) fn chance(&self, receiver: &Receiver, number: usize) -> f64 {
         let Some(&place) = self.places.get(number).filter(|&&place| place != MISS) else {
             return 0.0;
         };
-        let (mut at, mut chance) = (self.start(from), 1.0);
-        if at == ALL {
-            let lights = self.nodes[ALL].branches[0].lights.map(|k| k as usize);
-            let is_seen = self.importance(from) > 0.0;
-            return if is_seen { self.share(place as usize, lights) } else { 0.0 };
-        }
-        let mut seen = View::default();
-        while let Some(node) = self.nodes.get(at) {
-            let holds = |branch: &Branch| (branch.lights[0]..branch.lights[1]).contains(&place);
-            let Some(lane) = node.branches.iter().position(holds) else { return 0.0 };
-            view(node, from, &mut seen);
-            chance *= seen.share(lane);
-            let branch = node.branches[lane];
-            if chance == 0.0 || node.is_end(lane, seen.squared[lane]) {
-                return chance * self.share(place as usize, branch.lights.map(|k| k as usize));
-            }
-            at = branch.node as usize;
-        }
-        0.0
+        let viewer = self.extent.viewer(receiver);
+        let (branch, chance) = match self.start(&viewer) {
+            ALL if self.sent(&viewer) > 0.0 => (self.nodes[ALL].branches[0], 1.0),
+            ALL => return 0.0,
+            at => match descend_to(&self.nodes, at, &viewer, place) {
+                Some(found) => found,
+                None => return 0.0,
+            },
+        };
+        chance * self.share(place as usize, branch.lights.map(|k| k as usize))
     }
 }
 

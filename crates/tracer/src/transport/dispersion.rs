@@ -12,6 +12,7 @@ use super::numbers::Draw;
 use super::paths::State;
 use super::{Scratch, Tracing};
 use crate::bsdf::{Bsdf, BsdfSample};
+use crate::light_sampler::Receiver;
 use crate::spectral::Spectral;
 use crate::surface::SurfaceInteraction;
 
@@ -119,7 +120,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             steps: state.steps + 1,
             bounces,
             pdf: f64::INFINITY,
-            vertex: anchor.point,
+            receiver: Receiver::open(anchor.point),
             wavelength: wavelength.or(state.wavelength),
             media: boundary
                 .crossing

@@ -21,6 +21,7 @@ use super::step::weigh;
 use super::{Follow, LightingContext, RaySamples, Scratch, Tracing, Traits, kernels, metal};
 use crate::bsdf::{Bsdf, Weights};
 use crate::footprint::{Cone, Footprint};
+use crate::light_sampler::Receiver;
 use crate::placed::{PlacedSurface, SurfaceKind};
 use crate::reference::SurfacePoint;
 use crate::sampling::power_heuristic;
@@ -58,10 +59,17 @@ struct Way {
     is_specular: bool,
     /// It looks for light and goes no farther.
     is_last: bool,
+    /// Of the surface that it left, by which lights were chosen for it ([`Receiver::normal`]).
+    normal: [f32; 3],
 }
 
 impl Way {
-    const CAMERA: Self = Self { pdf: 0.0, is_specular: true, is_last: false };
+    const CAMERA: Self = Self { pdf: 0.0, is_specular: true, is_last: false, normal: [0.0; 3] };
+
+    /// The point (m) that it left, as lights were chosen for it.
+    fn receiver(self, point: DVec3) -> Receiver {
+        Receiver { point, normal: self.normal.map(f64::from).into() }
+    }
 
     /// The weight of light that was met against having asked for it with density `pdf` (1/sr).
     fn weight_against(self, pdf: f64) -> f64 {
@@ -275,10 +283,12 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let (i, block, lane) = (i as usize, &blocks[i as usize / BLOCK], i as usize % BLOCK);
             // The camera's rays are not all traced: those that cannot hit anything are other ones in blocks.
             if bounces == 0 {
-                return (stage.beam.rays.origin(i), stage.beam.rays.direction(i));
+                let origin = Receiver::open(stage.beam.rays.origin(i));
+                return (origin, stage.beam.rays.direction(i));
             }
             let vector = |axes: &[[f32; BLOCK]; 3]| DVec3::from(axes.map(|a| f64::from(a[lane])));
-            (stage.origin + vector(&block.origin), vector(&block.direction))
+            let origin = stage.origin + vector(&block.origin);
+            (ways[i].receiver(origin), vector(&block.direction))
         });
         lights.environment(spectral, wanted, asked, radiance, |number, of_sky, light| {
             let i = missed[number] as usize;
@@ -341,7 +351,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             let cosine = hit.direction.dot(lamp.shape.normal).abs();
             let density = hit.t * hit.t / (cosine * lamp.shape.area);
-            return Some(weight(lights.chance(hit.from, index) * density));
+            return Some(weight(lights.chance(&way.receiver(hit.from), index) * density));
         }
         let placement = scene.geometry.placements.get(hit.id[0] as usize)?;
         let [u, v] = hit.weights;
@@ -357,7 +367,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         if !lights.emitted(scene, spectral, &surface_point, hit.is_front, radiance) {
             return None;
         }
-        let pdf = lights.pdf_of_surface(scene, hit.id[0], &surface_point, hit.from, hit.direction);
+        let receiver = way.receiver(hit.from);
+        let pdf = lights.pdf_of_surface(scene, hit.id[0], &surface_point, &receiver, hit.direction);
         Some(weight(pdf))
     }
 
@@ -534,10 +545,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     fn choose_for_blocks(&self, lanes: &LaneScratch, patch: &mut Patch, asked: &mut Asked) {
         let LightingContext { lights, surroundings: scene, spectral, .. } = self.stage;
         let count = self.count();
-        patch.radiance.resize(LANES * count, 0.0);
+        let Patch { picks, seen, bsdfs, targets, radiance, path, .. } = patch;
+        radiance.resize(LANES * count, 0.0);
         asked.clear();
-        let picks = &mut patch.picks;
-        for (&lane, &(_, k)) in lanes.picked.iter().zip(&patch.path) {
+        for (&lane, &(_, k)) in lanes.picked.iter().zip(&*path) {
             [picks.square[0][lane], picks.square[1][lane]] = lanes.number(Draw::Light, k);
         }
         // Which light.
@@ -545,10 +556,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             kernels::pick(picks, below);
         } else {
             // What scatters light of single directions asks none.
-            let asks = |lane: &&usize| patch.bsdfs.get(**lane).is_none_or(|b| !b.is_delta());
+            let asks = |lane: &&usize| bsdfs.get(**lane).is_none_or(|bsdf| !bsdf.is_delta());
             for &lane in lanes.picked.iter().filter(asks) {
                 let u = &mut picks.square[0][lane];
-                match lights.pick(at(&patch.seen.point, lane), *u) {
+                match lights.pick(&seen.receiver(lane, bsdfs.get(lane)), *u) {
                     Some((index, rest, chance)) => {
                         picks.index[lane] = u32::try_from(index).unwrap_or(u32::MAX);
                         (*u, picks.chance[lane]) = (rest, chance);
@@ -557,7 +568,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 }
             }
         }
-        for (lane, bsdf) in patch.bsdfs.iter().enumerate() {
+        for (lane, bsdf) in bsdfs.iter().enumerate() {
             if bsdf.is_delta() {
                 picks.chance[lane] = 0.0;
             }
@@ -567,29 +578,29 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         // A place on it.
         for &lane in &lanes.picked {
             let (index, chance) = (picks.index[lane] as usize, picks.chance[lane]);
-            let radiance = &mut patch.radiance[lane * count..(lane + 1) * count];
+            let radiance = &mut radiance[lane * count..(lane + 1) * count];
             if chance == 0.0 {
-                patch.targets.set(lane, None);
+                targets.set(lane, None);
                 continue;
             }
             if let Some((lamp, bands)) = lights.plain_triangle(index, count) {
                 radiance.copy_from_slice(bands);
                 let weights = [picks.square[0][lane], picks.square[1][lane]];
-                patch.targets.set_triangle(lane, lamp, weights, chance);
+                targets.set_triangle(lane, lamp, weights, chance);
                 continue;
             }
             let one = ((index, chance), [squares[0][lane], squares[1][lane]]);
-            let point = at(&patch.seen.point, lane);
-            match lights.place(scene, spectral, point, one, radiance) {
-                Chosen::Dark => patch.targets.set(lane, None),
-                Chosen::Place(target) => patch.targets.set(lane, Some(&target)),
+            let receiver = seen.receiver(lane, bsdfs.get(lane));
+            match lights.place(scene, spectral, &receiver, one, radiance) {
+                Chosen::Dark => targets.set(lane, None),
+                Chosen::Place(target) => targets.set(lane, Some(&target)),
                 Chosen::Sky { square, chance } => asked.push(lane, square, chance),
             }
         }
         let Some(sky) = &lights.sky else { return };
         sky.choose(asked, |lane, target, there| {
-            patch.targets.set(lane, target.as_ref());
-            let radiance = &mut patch.radiance[lane * count..(lane + 1) * count];
+            targets.set(lane, target.as_ref());
+            let radiance = &mut radiance[lane * count..(lane + 1) * count];
             lights.spread_sky(spectral, there, radiance);
         });
     }
@@ -739,7 +750,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let group = || lights.group_of_placement(scene, hit.id[0]);
             note(shadows, self.parts.row(ray[i], scatterings, group), radiance, (i, weight));
         }
-        let wanted = missed.iter().map(|&i| (last.origin(i as usize), last.direction(i as usize)));
+        let wanted = missed.iter().map(|&i| {
+            let i = i as usize;
+            (ways[i].receiver(last.origin(i)), last.direction(i))
+        });
         lights.environment(spectral, wanted, asked, radiance, |number, of_sky, light| {
             let i = missed[number] as usize;
             let ends = [last.origin(i), last.direction(i)];

@@ -41,7 +41,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         let (lights, spectral) = (self.stage.lights, self.stage.spectral);
         let wanted = missed.iter().map(|&i| i as usize);
-        let wanted = wanted.map(|i| (now.states[i].vertex, now.rays.direction(i)));
+        let wanted = wanted.map(|i| (now.states[i].receiver, now.rays.direction(i)));
         lights.environment(spectral, wanted, asked, radiance, |number, pdf, light| {
             let i = missed[number] as usize;
             let weight = now.states[i].weight_against(pdf);
@@ -85,7 +85,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         if !lights.emitted(around, spectral, &spot, front, radiance) {
             return None;
         }
-        let pdf = lights.pdf_of_surface(around, hits.placement[i], &spot, state.vertex, direction);
+        let pdf =
+            lights.pdf_of_surface(around, hits.placement[i], &spot, &state.receiver, direction);
         Some(state.weight_against(pdf) * there())
     }
 }

@@ -41,6 +41,7 @@ pub use self::rules::{Follow, Rules};
 use self::shadows::Shadows;
 use crate::bsdf::{Bsdf, Weights, metal};
 use crate::emitters::Emitters;
+use crate::light_sampler::Receiver;
 use crate::lights::Lights;
 use crate::placed::{PlacedSurface, PlacedSurfaces};
 use crate::reference::SceneView;
@@ -348,7 +349,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                 steps: 0,
                 bounces: 0,
                 pdf: f64::INFINITY,
-                vertex: beam.rays.origin(i),
+                receiver: Receiver::open(beam.rays.origin(i)),
                 wavelength: None,
                 media: media.get(i).copied().unwrap_or(Media::NONE),
                 is_last: false,

@@ -8,6 +8,7 @@ use super::paths::Paths;
 use crate::bsdf::sheets::Sheets;
 use crate::bsdf::{Bsdf, Weights};
 use crate::lamps::AreaLight;
+use crate::light_sampler::Receiver;
 use crate::placed::PlacedSurface;
 use crate::spawn::Anchor;
 use crate::target::{Target, TargetKind};
@@ -247,6 +248,12 @@ impl Patch {
         at(&self.seen.point, lane)
     }
 
+    /// The hit of a lane as lights are chosen for it.
+    #[inline(always)]
+    pub(super) fn receiver(&self, lane: usize) -> Receiver {
+        self.seen.receiver(lane, self.bsdfs.get(lane))
+    }
+
     /// Where a ray starts that leaves the hit of a lane along `towards`.
     pub(super) fn leave(&self, lane: usize, towards: DVec3) -> DVec3 {
         let normal = at(&self.seen.normal, lane);
@@ -259,6 +266,15 @@ impl Patch {
         put(&mut self.away.start, lane, start);
         put(&mut self.away.along, lane, along);
         self.away.reach[lane] = f64::INFINITY;
+    }
+}
+
+impl Seen {
+    /// The hit of a lane as lights are chosen for it: a matte surface or a sheet, unless it has another model.
+    #[inline(always)]
+    pub(super) fn receiver(&self, lane: usize, bsdf: Option<&Bsdf>) -> Receiver {
+        let normal = bsdf.map_or_else(|| at(&self.shading, lane), Bsdf::receiving_normal);
+        Receiver { point: at(&self.point, lane), normal }
     }
 }
 

@@ -5,6 +5,7 @@ use etendue_geometry::{HitBatch, HitPrecision, MISS, RayBatch};
 
 use super::media::Media;
 use crate::footprint::{Cone, Footprint};
+use crate::light_sampler::Receiver;
 use crate::sampling::power_heuristic;
 
 /// Paths under way.
@@ -29,8 +30,8 @@ pub(super) struct State {
     pub(super) bounces: u32,
     /// Density (1/sr) of the direction; `+inf` when no light can be asked instead.
     pub(super) pdf: f64,
-    /// The surface that it left (m).
-    pub(super) vertex: DVec3,
+    /// The surface that it left, as lights were chosen for it.
+    pub(super) receiver: Receiver,
     /// The wavelength (nm) of the one band left, after a glass has parted them.
     pub(super) wavelength: Option<f64>,
     /// The media that it is in, where they count.

@@ -133,7 +133,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         }
         let (lights, spectral) = (self.stage.lights, self.stage.spectral);
         let wanted = missed.iter().map(|&i| i as usize);
-        let wanted = wanted.map(|i| (last.states[i].vertex, last.rays.direction(i)));
+        let wanted = wanted.map(|i| (last.states[i].receiver, last.rays.direction(i)));
         lights.environment(spectral, wanted, asked, radiance, |number, pdf, light| {
             let i = missed[number] as usize;
             let (origin, direction) = (last.rays.origin(i), last.rays.direction(i));

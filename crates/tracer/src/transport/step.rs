@@ -180,10 +180,10 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let (_, k) = patch.path[lane];
             let square = numbers.of(Draw::Light, k);
             let asks = patch.bsdfs.get(lane).is_none_or(|bsdf| !bsdf.is_delta());
-            let from = patch.point(lane);
+            let receiver = patch.receiver(lane);
             let radiance = &mut patch.radiance[lane * count..(lane + 1) * count];
             let chosen = match asks {
-                true => lights.choose(around, spectral, from, square, radiance),
+                true => lights.choose(around, spectral, &receiver, square, radiance),
                 false => Chosen::Dark,
             };
             match chosen {
@@ -384,8 +384,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                     throughput.iter_mut().for_each(|band| *band /= survival);
                 }
                 kept.push(lane);
-                let (steps, vertex) = (state.steps + 1, patch.point(lane));
-                paths.states.push(State { steps, bounces, vertex, ..*state });
+                let (steps, receiver) = (state.steps + 1, patch.receiver(lane));
+                paths.states.push(State { steps, bounces, receiver, ..*state });
                 paths.throughput.extend_from_slice(throughput);
             }
             let away = &patch.away;

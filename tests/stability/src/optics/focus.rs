@@ -1,9 +1,9 @@
 //! Focus where there is none, and wavelengths that no glass knows.
 
 use anyhow::Result;
-use etendue_optics::train::{Focus, FocusError};
+use etendue_optics::train::{Focus, FocusError, ZemaxLens};
 
-use super::bench::lens;
+use super::bench::{YELLOW, lens};
 use crate::{Case, Outcome, Scale};
 
 pub(super) const FOCUS: Case = Case {
@@ -16,6 +16,16 @@ pub(super) const FOCUS: Case = Case {
     run: focus,
 };
 
+pub(super) const ZOOM: Case = Case {
+    name: "configurations_of_a_zoom_lens",
+    regime: "a Zemax file of two singlets with 2 to 50 configurations, each with curvatures, thicknesses and a stop of its \
+        own",
+    must: "each has the focal length of a paraxial ray through its own four surfaces, to 10⁻⁶, and the f-number of its own stop, whichever \
+        others the file has; one beyond the last is refused",
+    limit: None,
+    run: zoom,
+};
+
 pub(super) const WAVELENGTH: Case = Case {
     name: "wavelength_outside_of_a_glass",
     regime: "an achromat at 2600 nm, where its glasses are not measured, and at 10 170 nm, where a formula \
@@ -24,6 +34,97 @@ pub(super) const WAVELENGTH: Case = Case {
     limit: None,
     run: wavelength,
 };
+
+/// The numbers of a configuration: curvatures (1/mm), thicknesses (mm) behind all surfaces but the last, and the
+/// diameter of the entrance pupil (mm).
+struct Configuration {
+    curvatures: [f64; 4],
+    thicknesses: [f64; 3],
+    pupil: f64,
+}
+
+impl Configuration {
+    /// The `k`-th: every number goes its own way.
+    fn of(k: u32) -> Self {
+        let k = f64::from(k);
+        Self {
+            curvatures: [0.02 + 1e-4 * k, -0.01 - 2e-4 * k, 0.005 - 1e-4 * k, -0.015 + 5e-5 * k],
+            thicknesses: [4.0 + 0.02 * k, 10.0 + 0.5 * k, 3.0 + 0.01 * k],
+            pupil: 4.0 + 0.05 * k,
+        }
+    }
+
+    /// The focal length (mm) of two glasses: a paraxial ray is refracted by `n' u' = n u − y (n' − n) c`, and is
+    /// lower by `t u` at the next surface.
+    fn focal_length(&self, indices: [f64; 2]) -> f64 {
+        let [first, second] = indices;
+        let (mut y, mut bent) = (1.0, 0.0);
+        let behind = [first, 1.0, second, 1.0];
+        let mut before = 1.0;
+        for k in 0..4 {
+            bent -= y * (behind[k] - before) * self.curvatures[k];
+            y += self.thicknesses.get(k).unwrap_or(&0.0) * bent / behind[k];
+            before = behind[k];
+        }
+        -1.0 / bent
+    }
+}
+
+fn zoom(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    let indices = [1.6, 1.7];
+    let mut worst = 0.0_f64;
+    let counts: &[u32] = scale.pick(&[2, 7], &[2, 3, 7, 20, 50]);
+    for &count in counts {
+        // A file stands at its first configuration.
+        let own = Configuration::of(1);
+        let mut text = format!(
+            "MODE SEQ\nENPD {}\nFTYP 0 0 1 1\nYFLN 0\nWAVL 0.58756\nSURF 0\n  TYPE STANDARD\n  DISZ INFINITY\n",
+            own.pupil
+        );
+        for (k, curvature) in own.curvatures.iter().enumerate() {
+            let stop = if k == 0 { "  STOP\n" } else { "" };
+            let glass = [Some(indices[0]), None, Some(indices[1]), None][k]
+                .map_or_else(String::new, |n| format!("  GLAS ___BLANK 1 0 {n} 50\n"));
+            let thickness = own.thicknesses.get(k).unwrap_or(&40.0);
+            text += &format!(
+                "SURF {}\n  TYPE STANDARD\n{stop}  CURV {curvature}\n  DISZ {thickness}\n{glass}  DIAM 8\n",
+                k + 1
+            );
+        }
+        text += &format!("SURF 5\n  TYPE STANDARD\n  DISZ 0\nMNUM {count} 1\n");
+        // The last operand first: what belongs together does not stand together.
+        for k in (1..=count).rev() {
+            let of = Configuration::of(k);
+            text += &format!("APER 0 {k} {} 0\n", of.pupil);
+            for (surface, curvature) in of.curvatures.iter().enumerate() {
+                text += &format!("CRVT {} {k} {curvature} 0\n", surface + 1);
+            }
+            for (surface, thickness) in of.thicknesses.iter().enumerate() {
+                text += &format!("THIC {} {k} {thickness} 0 0\n", surface + 1);
+            }
+        }
+        for k in 1..=count {
+            let read = ZemaxLens::read_configuration(text.as_bytes(), Some(k as usize), &[])?;
+            let train = read.file.build(&|name: &str| Err(format!("{name}: no files")))?;
+            let paraxial = train.paraxial(YELLOW)?;
+            let of = Configuration::of(k);
+            let exact = of.focal_length(indices);
+            let found = [paraxial.efl.unwrap_or(0.0), paraxial.f_number.unwrap_or(0.0)];
+            for (found, exact) in found.into_iter().zip([exact, exact.abs() / of.pupil]) {
+                let off = (found / exact - 1.0).abs();
+                // The wavelength is the d line to five digits.
+                outcome.must(off <= 1e-6, || format!("{k} of {count}: {found}, not {exact}"));
+                worst = worst.max(off);
+            }
+        }
+        let beyond = ZemaxLens::read_configuration(text.as_bytes(), Some(count as usize + 1), &[]);
+        let message = beyond.err().map(|error| error.to_string()).unwrap_or_default();
+        outcome.must(message.contains(&format!("has {count}")), || message.clone());
+    }
+    outcome.measured(format!("at most {worst:.1e} off"));
+    Ok(outcome)
+}
 
 fn focus(_: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();

@@ -31,6 +31,15 @@ pub(super) const F_0_5: Case = Case {
     run: f_0_5,
 };
 
+pub(super) const F_0_01: Case = Case {
+    name: "f_0_01",
+    regime: "thin lenses at f/2 to f/0.01, from the axis to three radii of the rim beside it",
+    must: "no sample weighs more than π; their mean is the irradiance of a disc, π/2 (1 − (f² + r² − a²)/√((f² + r² + \
+        a²)² − 4 r² a²)), to 10⁻³; on the axis all weigh the same",
+    limit: None,
+    run: f_0_01,
+};
+
 pub(super) const ONE_PIXEL: Case = Case {
     name: "mask_of_one_pixel",
     regime: "an aperture that is an image of one pixel: white, grey, black",
@@ -98,6 +107,47 @@ fn f_0_5(scale: Scale) -> Result<Outcome> {
     }
     outcome.measured(format!("{lost} of 120 rays across the thick lens end in it, by name"));
     outcome.must(lost > 0, || "no ray is lost".to_owned());
+    Ok(outcome)
+}
+
+fn f_0_01(scale: Scale) -> Result<Outcome> {
+    let mut outcome = Outcome::default();
+    let side = scale.pick(141_u32, 1_000);
+    let place = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
+    let f = 50.0;
+    let (mut most, mut worst, mut uneven) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for f_number in [2.0, 1.0, 0.5, 0.2, 0.05, 0.01] {
+        let a = 0.5 * f / f_number;
+        let thin = lens(&format!(
+            r#"{{"type": "thin_lens", "focal_length": {f}}},
+               {{"type": "aperture", "shape": "circular", "radius": {a}}}"#
+        ))?;
+        let pupil = ExitPupil::new(&thin, &[YELLOW], f, [2.5 * a, 2.0 * a])?;
+        for r in [0.0, 0.3 * a, 0.99 * a, 1.01 * a, 3.0 * a] {
+            let film = DVec2::new(0.6 * r, -0.8 * r);
+            let root = ((f * f + r * r + a * a).powi(2) - 4.0 * r * r * a * a).sqrt();
+            let exact = 0.5 * PI * (1.0 - (f * f + r * r - a * a) / root);
+            let squares = (0..side * side).map(|i| [place(i % side), place(i / side)]);
+            let weights: Vec<f64> = squares
+                .filter_map(|square| pupil.sample(film, square, YELLOW))
+                .map(|sample| sample.weight)
+                .collect();
+            let greatest = weights.iter().copied().fold(0.0, f64::max);
+            let off = weights.iter().sum::<f64>() / f64::from(side * side) / exact - 1.0;
+            let lens = format!("f/{f_number}, {r} mm beside the axis");
+            outcome.must(greatest <= PI * (1.0 + 1e-12), || format!("{lens}: a weight {greatest}"));
+            outcome.must(off.abs() <= 1e-3, || format!("{lens}: {off} off"));
+            (most, worst) = (most.max(greatest), worst.max(off.abs()));
+            if r == 0.0 {
+                let apart = weights.iter().map(|weight| (weight / exact - 1.0).abs());
+                uneven = uneven.max(apart.fold(0.0, f64::max));
+            }
+        }
+    }
+    outcome.must(uneven <= 1e-12, || format!("on the axis weights differ by {uneven}"));
+    outcome.measured(format!(
+        "weights up to {most:.4}, means at most {worst:.1e} off; on the axis weights differ by {uneven:.1e}"
+    ));
     Ok(outcome)
 }
 

@@ -3,6 +3,7 @@
 mod convergence;
 mod correlation;
 mod running_out;
+mod stopping;
 
 use etendue_camera::{PixelSamples, Sampler};
 
@@ -23,6 +24,8 @@ pub const METHOD: Method = Method {
         correlation::NEIGHBOURS,
         correlation::PAIRS,
         correlation::FRAMES,
+        stopping::BEHIND_GLASS,
+        stopping::SPARKLES,
     ],
 };
 

@@ -90,7 +90,8 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let is_specular = kind == SurfaceKind::Smooth;
             let is_last = if is_specular { stage.ends } else { ends };
             let cone = if is_specular { self.cone_at_hit(stage, &lanes.now, i) } else { None };
-            let way = Way { pdf, is_specular, is_last };
+            let normal = at(&patch.seen.shading, lane).as_vec3().into();
+            let way = Way { pdf, is_specular, is_last, normal };
             self.follow_blocks(stage, lanes, patch, (lane, (i, k)), (way, cone));
         }
     }
@@ -101,7 +102,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         let count = self.count();
         for n in 0..lanes.picked.len() {
             let (lane, (i, k)) = (lanes.picked[n], patch.path[n]);
-            let bsdf = &patch.bsdfs[lane];
+            let bsdf = patch.bsdfs[lane];
             if stage.ends_unless_specular && !hittable && !bsdf.has_single() {
                 continue;
             }
@@ -116,12 +117,13 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             }
             let throughput = &mut lanes.now.carried.throughput[i * count..(i + 1) * count];
             for (k, band) in throughput.iter_mut().enumerate() {
-                *band *= self.in_band(bsdf, scattered.weights, k);
+                *band *= self.in_band(&bsdf, scattered.weights, k);
             }
             let start = patch.leave(lane, scattered.direction);
             patch.send(lane, (start, scattered.direction));
             let cone = if is_specular { self.cone_at_hit(stage, &lanes.now, i) } else { None };
-            let way = Way { pdf: scattered.pdf, is_specular, is_last };
+            let (pdf, normal) = (scattered.pdf, bsdf.receiving_normal().as_vec3().into());
+            let way = Way { pdf, is_specular, is_last, normal };
             self.follow_blocks(stage, lanes, patch, (lane, (i, k)), (way, cone));
         }
     }
