@@ -1,4 +1,4 @@
-//! Bindings to Intel's Embree, speaking **Embree 4's API**.
+#![doc = include_str!("../README.md")]
 //!
 //! The bindings are generated from the installed header. On Embree 4 every name here is Embree's
 //! own. On Embree 3 (Debian 12) a shim of inlined functions gives the queries, their arguments and

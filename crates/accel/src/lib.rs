@@ -1,4 +1,4 @@
-//! Closest hit and occlusion over a scene, a batch of rays at a time.
+#![doc = include_str!("../README.md")]
 //!
 //! Three backends answer to one trait, [`Accel`]:
 //!

@@ -1,8 +1,5 @@
 #![forbid(unsafe_code)]
-//! Speed against accuracy, measured on any scene and machine.
-//!
-//! Everything is measured the same way: contestants take turns, times are medians over the rounds,
-//! and what each gets wrong is told beside what it costs.
+#![doc = include_str!("../README.md")]
 //!
 //! # Map
 //!

@@ -1,4 +1,4 @@
-//! The camera kit: from a place on the sensor to a ray in the world.
+#![doc = include_str!("../README.md")]
 //!
 //! # Conventions
 //!

@@ -1,7 +1,5 @@
 #![forbid(unsafe_code)]
-//! Charts as SVG: every series is named beside its own points, a value of exactly zero has a place
-//! below a logarithmic axis, and the Pareto front may be drawn. Drawings that are no charts share their
-//! paper, ink and colours.
+#![doc = include_str!("../README.md")]
 //!
 //! # Map
 //!

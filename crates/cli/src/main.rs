@@ -1,5 +1,4 @@
-//! The `etendue` command; here also what is short: its version, man pages for `man`, completions for
-//! shells, and the window.
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 mod arguments;

@@ -1,47 +1,5 @@
 #![forbid(unsafe_code)]
-//! A simulator of computational cameras: a scene and a camera made of optical parts go in, what that
-//! camera's sensor records comes out, with exact ground truth beside it.
-//!
-//! This is the library that a program calls; the `etendue` command stands on it.
-//!
-//! ```
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let folder = tempfile::tempdir()?;
-//! # let scene = folder.path().join("scene.json");
-//! # std::fs::write(&scene, r#"{"etendue": 1, "tracer": {"type": "facing"}, "layers": ["depth"],
-//! #     "render": {"samples": 4}, "objects": [{"shape": "sphere"}],
-//! #     "camera": {"type": "thin_lens", "focal_length": "50 mm", "fov": 40, "f_number": 8,
-//! #                "sensor": {"resolution": [32, 24]}}}"#)?;
-//! let mut session = etendue::Session::open(&scene)?; // checked; built when first needed
-//! session.set("camera.f_number", 2.8)?; // any path of the scene: only what it touches is made anew
-//! let picture = session.render(&etendue::Progress::none())?; // layers as arrays, sensor images, report
-//! let depth = picture.layer("Depth").ok_or("no depth")?;
-//! println!("{} m in the middle", depth.channels[0].values.at(12 * 32 + 16));
-//! # let out = folder.path().join("out");
-//! picture.write(&out, etendue::Outputs::ALL)?;
-//! # assert!(out.join("layers.exr").exists());
-//! # Ok(())
-//! # }
-//! ```
-//!
-//! Scenes can be made without any file, of arrays:
-//!
-//! ```
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let scene = serde_json::json!({
-//!     "layers": ["depth"],
-//!     "objects": [{"file": "tile"}],
-//!     "camera": {"type": "pinhole", "pose": {"from": [0, 0, 3], "look_at": [0, 0, 0]},
-//!                "sensor": {"resolution": [8, 8]}},
-//! });
-//! let mut session = etendue::Session::from_json(".", scene)?;
-//! let vertices = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
-//! session.insert_mesh("tile", &vertices, &[[0, 1, 2]])?;
-//! let picture = session.render(&etendue::Progress::none())?;
-//! assert_eq!(picture.layer("Depth").ok_or("no depth")?.channels[0].values.at(0), 3.0);
-//! # Ok(())
-//! # }
-//! ```
+#![doc = include_str!("../README.md")]
 //!
 //! # Map
 //!

@@ -1,4 +1,4 @@
-//! Every file that is read or written.
+#![doc = include_str!("../README.md")]
 //!
 //! Nothing here is of the whole process but the list of part files that a signal handler removes: where files
 //! may be read, and what must not be written over, are values that are handed down.

@@ -1,5 +1,4 @@
-//! What every other crate of etendue speaks: rays and hits in batches, bounds, transforms,
-//! triangle meshes and where they stand in the world.
+#![doc = include_str!("../README.md")]
 //!
 //! # Conventions
 //!

@@ -1,9 +1,5 @@
 #![forbid(unsafe_code)]
-//! Image files as arrays: textures, environments, masks and maps of filters; cubes in bands of wavelengths.
-//!
-//! A few kilobytes can claim gigabytes, so a file's size is read and judged before anything is decoded
-//! ([`Limits`]), memory is asked for in a way that may be refused, and a decoder that panics is an
-//! error of its file. Values stay as the file has them: 8 or 16 bits, half or single precision.
+#![doc = include_str!("../README.md")]
 
 pub mod cube;
 pub mod envi;

@@ -1,18 +1,5 @@
 #![forbid(unsafe_code)]
-//! Lens design: optical elements, glasses and the trains that they make, traced and analysed. The
-//! library knows no scene, no camera and no pixels.
-//!
-//! ```
-//! use etendue_optics::train::LensFile;
-//!
-//! let file: LensFile = serde_json::from_str(
-//!     r#"{ "elements": [
-//!         { "type": "surface", "radius": 100, "thickness": 4, "glass": "N-BK7", "semi_diameter": 10 },
-//!         { "type": "surface", "radius": -100, "semi_diameter": 10 } ] }"#,
-//! )?;
-//! assert_eq!(file.elements.len(), 2);
-//! # Ok::<(), serde_json::Error>(())
-//! ```
+#![doc = include_str!("../README.md")]
 //!
 //! # Conventions
 //!

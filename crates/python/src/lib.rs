@@ -1,5 +1,4 @@
-//! The core of the Python package `etendue`: what Python cannot do itself. The package's own Python, in
-//! `python/etendue`, checks and converts arrays and has the documentation.
+#![doc = include_str!("../README.md")]
 // PyO3's macros expand to code with casts and names of their own.
 #![allow(missing_docs, missing_debug_implementations, reason = "items are seen from Python alone")]
 #![allow(unreachable_pub, reason = "PyO3 exports what is public here")]

@@ -1,5 +1,5 @@
 #![forbid(unsafe_code)]
-//! From a scene to files: what a render needs, how it is carried out, and the images it leaves.
+#![doc = include_str!("../README.md")]
 //!
 //! # Map
 //!

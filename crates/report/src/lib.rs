@@ -1,9 +1,5 @@
 #![forbid(unsafe_code)]
-//! Rows of what was decided, found or measured, and their forms: text for a terminal, Markdown, CSV and JSON.
-//!
-//! Whoever decides or measures fills rows with values. Words are made of them here, and nowhere are they read
-//! back. The alternative, sentences from the start, was rejected: what a decision is overruled by, or how many
-//! bytes a forecast has, was then found again by looking for parts of them.
+#![doc = include_str!("../README.md")]
 //!
 //! # Map
 //!

@@ -1,6 +1,5 @@
 #![forbid(unsafe_code)]
-//! Scenes from files: the JSON format, glTF, OBJ and PLY meshes, procedural shapes; a validated
-//! [`Scene`] out.
+#![doc = include_str!("../README.md")]
 //!
 //! Two steps, so that a plan can be made between them:
 //!

@@ -1,6 +1,5 @@
 #![forbid(unsafe_code)]
-//! Image sensors after EMVA 1288 (Release 4.0, linear model), in electrons: from the light of a
-//! render to the digital numbers that a real camera would have written.
+#![doc = include_str!("../README.md")]
 //!
 //! # Conventions
 //!
@@ -11,25 +10,6 @@
 //! * Fixed patterns follow from the serial number and the pixel, temporal noise from the seed, the
 //!   serial number, the frame and the pixel: the same image for any number of threads, and a crop is
 //!   a crop.
-//!
-//! # Example
-//!
-//! ```
-//! use etendue_sensor::{Film, Sensor, SensorSpec};
-//!
-//! let spec: SensorSpec = serde_json::from_str(
-//!     r#"{ "type": "raw", "model": "imx183", "quantum_efficiency": 0.8, "resolution": [64, 48] }"#,
-//! )?;
-//! let sensor = Sensor::new(&spec)?;
-//! let grey = vec![0.18; 64 * 48 * sensor.bands().count()];
-//! for shot in sensor.shots() {
-//!     let image = sensor.expose(Film { values: &grey }, shot, 0)?;
-//!     let mean = image.values.iter().map(|&y| f64::from(y)).sum::<f64>() / (64.0 * 48.0);
-//!     // 18 % of the way from black (38 DN) to white (4095 DN), to within its noise.
-//!     assert!((mean - (38.0 + 0.18 * 4057.0)).abs() < 4.0);
-//! }
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 //!
 //! # Map
 //!

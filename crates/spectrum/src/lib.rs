@@ -1,6 +1,5 @@
 #![forbid(unsafe_code)]
-//! Light as a function of wavelength: curves, bands, illuminants, and the way from RGB to spectra
-//! and back.
+#![doc = include_str!("../README.md")]
 //!
 //! # Conventions
 //!
@@ -9,21 +8,6 @@
 //!   it is nothing, or held at the curve's end.
 //! * RGB is linear sRGB. Its white, (1, 1, 1), is the flat spectrum, for lights and surfaces alike:
 //!   radiance 1 in every wavelength is radiance 1 in every band of every sensor.
-//!
-//! # Example
-//!
-//! ```
-//! use etendue_spectrum::{Grid, Illuminant, Bands, Outside};
-//!
-//! let bands = Bands::Spectral(Grid::equal(400.0, 700.0, 30)?);
-//! let lamp = bands.from_curve(&Illuminant::A.curve()?, Outside::Zero)?;
-//! let brick = [0.5, 0.2, 0.1];
-//! let paint: Vec<f64> =
-//!     bands.from_rgb().iter().map(|w| w[0] * brick[0] + w[1] * brick[1] + w[2] * brick[2]).collect();
-//! assert_eq!(bands.names()[0], "405nm");
-//! assert!(lamp[29] * paint[29] > 10.0 * lamp[0] * paint[0]);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 //!
 //! # Map
 //!

@@ -1,6 +1,5 @@
 #![forbid(unsafe_code)]
-//! What becomes of a ray in the scene: materials and textures, and the reference tracers that write
-//! ground truth (distance, normal, position, ids) beside the picture.
+#![doc = include_str!("../README.md")]
 //!
 //! Colours are linear light with the sRGB primaries (ITU-R BT.709), 1 being full scale; only files
 //! and pictures to look at carry the sRGB transfer curve.

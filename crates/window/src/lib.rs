@@ -1,9 +1,5 @@
 #![forbid(unsafe_code)]
-//! A window onto a scene: look at it, move about, change its camera, ask its pixels, save it. Or onto a lens,
-//! by a scene that looks through it, or onto an image.
-//!
-//! Everything that is shown is worked out by the library `etendue`; here are widgets, and a thread that
-//! renders.
+#![doc = include_str!("../README.md")]
 //!
 //! | module | idea |
 //! |---|---|

@@ -1,6 +1,5 @@
 #![expect(unsafe_code, reason = "Open Image Denoise's C interface, found at run time")]
-//! Intel's Open Image Denoise, where its library is found at run time: nothing of it is needed to build,
-//! and nothing is downloaded.
+#![doc = include_str!("../README.md")]
 //!
 //! The library is what the environment variable `ETENDUE_OIDN` names (a path), or else what the dynamic
 //! loader finds as `libOpenImageDenoise.so.2`, `.so.1` or `.so`. Versions from 1.4 on are understood.
