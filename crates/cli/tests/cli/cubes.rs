@@ -1,5 +1,8 @@
 //! Surfaces and lamps by wavelength from files: NPY, ENVI and spectral EXR, and what of them is refused.
 
+use std::path::Path;
+use std::process::Command;
+
 use exr::prelude::{
     AnyChannel, AnyChannels, FlatSamples, Image, WritableImage, read_first_flat_layer_from_file,
 };
@@ -47,7 +50,7 @@ fn exr(bench: &Bench, name: &str, channels: &[(&str, Vec<f32>)]) {
 }
 
 /// The four bands of [`TEXELS`] as channels of these names.
-fn planes<'n>(names: [&'n str; 4]) -> Vec<(&'n str, Vec<f32>)> {
+fn planes(names: [&str; 4]) -> Vec<(&str, Vec<f32>)> {
     (0..4).map(|k| (names[k], TEXELS.map(|texel| texel[k]).to_vec())).collect()
 }
 
@@ -155,8 +158,7 @@ fn lamps_of_cubes_light_what_is_around_them() {
             scene["materials"]["lamp"] = json!({ "type": "emissive", "radiance": radiance });
             scene["objects"].as_array_mut().unwrap().push(json!({
                 "shape": "rectangle", "width": 1, "height": 1, "material": "lamp",
-                "transform": [{ "rotate": { "axis": [1, 0, 0], "degrees": 90 } },
-                              { "translate": [0, 0.9, 0.6] }]
+                "transform": { "rotate": [1, 0, 0, 90], "translate": [0, 0.9, 0.6] }
             }));
             scene["render"]["samples"] = json!(256);
             scene["lights"] = json!([]);
@@ -269,4 +271,88 @@ fn what_is_no_cube_is_refused_with_its_place() {
     bench.write("scene.json", thrown.to_string().as_bytes());
     let message = text(&bench.run(&["render", "scene.json", "-o", "out"]).stderr);
     assert!(message.contains("a projector does not throw"), "{message}");
+}
+
+/// Curves that a lens file names are those beside it, and what is none is told with its place in that file.
+#[test]
+fn lens_files_name_curves_from_their_own_folder() {
+    let bench = Bench::new();
+    std::fs::create_dir(bench.path("lenses")).unwrap();
+    bench.write("lenses/coating.csv", b"nm,red,blue\n400,0.1,0.9\n800,0.9,0.1\n");
+    // Not this one.
+    bench.write("coating.csv", b"nm,red,blue\n400,0,0\n800,0,0\n");
+    let lens = |transmission: Value| {
+        let elements = json!([
+            { "type": "filter", "transmission": transmission, "thickness": 1 },
+            { "type": "aperture", "shape": "circular", "radius": 2, "thickness": 1, "stop": true },
+            { "type": "surface", "radius": 50, "thickness": 5, "glass": "N-BK7", "semi_diameter": 4 },
+            { "type": "surface", "radius": -50, "semi_diameter": 4 }
+        ]);
+        json!({ "elements": elements })
+    };
+    let through = |transmission: Value| {
+        bench.write("lenses/lens.json", lens(transmission).to_string().as_bytes());
+        let mut scene = wall(&json!({ "type": "matte", "color": [0.5, 0.5, 0.5] }), &BANDS);
+        let sensor = scene["camera"]["sensor"].clone();
+        scene["camera"] = json!({
+            "type": "lens", "lens": "lenses/lens.json", "focus_distance": 2, "sensor_height": 4,
+            "pose": { "from": [0, 0, 2], "look_at": [0, 0, 0] }, "sensor": sensor
+        });
+        scene
+    };
+    let listed = seen(&bench, &through(json!([[400, 0.9], [800, 0.1]])));
+    let named = seen(&bench, &through(json!({ "file": "coating.csv", "column": "blue" })));
+    let lit = listed.iter().filter(|value| **value > 0.0).count();
+    assert!(lit > 48, "no light, no test: {listed:?}");
+    assert_eq!(named, listed);
+    for (curve, words) in [
+        (json!({ "file": "none.csv" }), "none.csv"),
+        (json!({ "file": "coating.csv" }), "red"),
+        (json!({ "file": "coating.csv", "column": "green" }), "green"),
+    ] {
+        bench.write("scene.json", through(curve.clone()).to_string().as_bytes());
+        let output = bench.run(&["render", "scene.json", "-o", "refused"]);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{curve}: {message}");
+        for words in [words, "lenses/lens.json, elements[0].transmission"] {
+            assert!(message.contains(words), "expected \"{words}\" in: {message}");
+        }
+    }
+}
+
+/// The table and the Python of docs/spectra.md, on what its command leaves. Takes the interpreter that
+/// `ETENDUE_PYTHON` names, else `python3`, where it has numpy.
+#[test]
+#[cfg(unix)]
+fn the_page_of_spectra_runs() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let page = std::fs::read_to_string(root.join("docs/spectra.md")).unwrap();
+    let block = |kind: &str| {
+        let rest = page.split(&format!("```{kind}\n")).nth(1).expect("a block");
+        rest.split("```").next().expect("its end").to_owned()
+    };
+    let bench = Bench::new();
+    bench.write("measured.csv", block("csv").as_bytes());
+    let leaf = json!({ "type": "matte", "color": { "file": "measured.csv", "column": "leaf" } });
+    let light = seen(&bench, &wall(&leaf, &[400.0, 500.0, 600.0, 700.0]));
+    // From 500 to 600 nm: the mean of two trapezoids, 0.08 to 0.18 and 0.18 to 0.09.
+    assert!((light[1] - 0.1325).abs() < 1e-6, "{light:?}");
+    let python = std::env::var("ETENDUE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let has_numpy = Command::new(&python).args(["-c", "import numpy"]).output();
+    if !has_numpy.is_ok_and(|output| output.status.success()) {
+        println!("passed over: {python} has no numpy");
+        return;
+    }
+    assert!(page.contains("etendue render scenes/color-checker.json -o out/spectra/bands\n"));
+    let scene = root.join("scenes/color-checker.json");
+    let render = ["render", &scene.to_string_lossy(), "-o", "out/spectra/bands", "-q"];
+    let output = bench.run(&[&render[..], &["--outputs", "npy"]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    std::os::unix::fs::symlink(root.join("scenes"), bench.path("scenes")).unwrap();
+    bench.write("page.py", block("python").as_bytes());
+    let output = Command::new(&python).arg("page.py").current_dir(bench.path("")).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found: f64 = text(&output.stdout).trim().parse().expect("a number");
+    // "It prints 0.003", in as many digits.
+    assert!((0.0025..0.0035).contains(&found), "{found}");
 }

@@ -209,6 +209,11 @@ fn inputs() -> Vec<Input> {
                 "stop": true}),
         &json!({}),
     );
+    let coated =
+        through(&json!({"type": "filter", "transmission": named(), "thickness": 1}), &json!({}));
+    let written = coated.to_string().into_bytes();
+    let files = [curve[0], ("lens.json", &written)];
+    add(curve_keys, scene(&camera(&json!("lens.json"))), &files, other());
     let mask_keys: &[&str] = &["ApertureSpec.file", "ElementSpec.file", "PlacedSpec.file"];
     add(mask_keys, scene(&camera(&masked)), &mask, vec![longer(&grey)]);
     let filtered = through(
