@@ -473,7 +473,8 @@ mod tests {
         assert_eq!(Cube::from_exr(both()).unwrap().unwrap().axis.wavelengths(), [400.0, 500.0]);
         let share = Cube::reflectance_from_exr(both()).unwrap().unwrap();
         assert_eq!((share.axis.wavelengths(), share.values[0]), (&[450.0, 550.0][..], 2.0));
-        assert!(Cube::reflectance_from_exr(channels(&light)).unwrap().is_none());
+        let alone = channels(&["S0.400,0nm", "S0.500,0nm"]);
+        assert!(Cube::reflectance_from_exr(alone).unwrap().is_none());
         assert!(Cube::from_exr(channels(&["R", "G", "B"])).unwrap().is_none());
         let twice = Cube::from_exr(channels(&["S0.0,4um", "S0.400,0nm"])).unwrap_err().to_string();
         assert!(twice.contains("two bands at 400 nm"), "{twice}");
