@@ -12,6 +12,7 @@
 
 pub mod camera;
 pub mod camera_file;
+pub mod curve_files;
 pub mod distortion;
 pub mod framing;
 pub mod intrinsics;

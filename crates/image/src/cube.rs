@@ -305,11 +305,27 @@ impl Cube {
     ///
     /// When two are of one wavelength, or there is no memory for them.
     pub fn from_exr(channels: ExrChannels) -> Result<Option<Self>, DecodeError> {
+        Self::of_channels(channels, |_| true)
+    }
+
+    /// What an EXR file reflects or lets pass, whatever light it has beside it. `None` where it has no such channels.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::from_exr`].
+    pub fn reflectance_from_exr(channels: ExrChannels) -> Result<Option<Self>, DecodeError> {
+        Self::of_channels(channels, |component| component == Component::Reflectance)
+    }
+
+    fn of_channels(
+        channels: ExrChannels,
+        is_wanted: impl Fn(Component) -> bool,
+    ) -> Result<Option<Self>, DecodeError> {
         let mut light: Vec<(f64, Plane)> = Vec::new();
         let mut reflectance = Vec::new();
         let mut polarised = false;
         for (name, plane) in channels.planes {
-            match spectral_channel(&name) {
+            match spectral_channel(&name).filter(|(component, _)| is_wanted(*component)) {
                 Some((Component::Stokes(0), nm)) => light.push((nm, plane)),
                 Some((Component::Reflectance, nm)) => reflectance.push((nm, plane)),
                 Some((Component::Stokes(_), _)) => polarised = true,
@@ -453,6 +469,12 @@ mod tests {
         let share = Cube::from_exr(channels(&["T.500,0nm", "T.400,0nm"])).unwrap().unwrap();
         assert_eq!((share.quantity, share.unit), (Quantity::Reflectance, None));
         assert_eq!(share.values, [1.0, 0.0, 11.0, 10.0]);
+        let both = || channels(&["S0.400,0nm", "S0.500,0nm", "T.450,0nm", "T.550,0nm"]);
+        assert_eq!(Cube::from_exr(both()).unwrap().unwrap().axis.wavelengths(), [400.0, 500.0]);
+        let share = Cube::reflectance_from_exr(both()).unwrap().unwrap();
+        assert_eq!((share.axis.wavelengths(), share.values[0]), (&[450.0, 550.0][..], 2.0));
+        let alone = channels(&["S0.400,0nm", "S0.500,0nm"]);
+        assert!(Cube::reflectance_from_exr(alone).unwrap().is_none());
         assert!(Cube::from_exr(channels(&["R", "G", "B"])).unwrap().is_none());
         let twice = Cube::from_exr(channels(&["S0.0,4um", "S0.400,0nm"])).unwrap_err().to_string();
         assert!(twice.contains("two bands at 400 nm"), "{twice}");

@@ -6,7 +6,8 @@
 //! # Sources
 //!
 //! NV5 Geospatial, *ENVI Header Files* (the format's own description): the keys, the codes of `data type`,
-//! `byte order`, `interleave`, `data gain values`, `data offset values` and `data ignore value`.
+//! `byte order`, `interleave`, `data gain values`, `data offset values`, `data ignore value` and
+//! `reflectance scale factor`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -319,7 +320,15 @@ impl Header {
     }
 
     fn scale(&self) -> Result<Scale, String> {
+        const OF_REFLECTANCE: &str = "reflectance scale factor";
+        let white = self.one(OF_REFLECTANCE)?;
+        if let Some(white) = white.filter(|white| !(*white > 0.0 && white.is_finite())) {
+            return Err(format!(
+                "has a `{OF_REFLECTANCE}` of {white}: it is the number of white, above 0"
+            ));
+        }
         Ok(Scale {
+            white,
             gains: self.list("data gain values")?,
             offsets: self.list("data offset values")?,
         })
@@ -358,6 +367,8 @@ impl Header {
 
 /// What numbers are multiplied by, and what is added to them, a band each.
 struct Scale {
+    /// The number of a reflectance of 1.
+    white: Option<f64>,
     gains: Option<Vec<f64>>,
     offsets: Option<Vec<f64>>,
 }
@@ -366,7 +377,9 @@ impl Scale {
     fn of(&self, band: usize, number: f64) -> f64 {
         let gain = self.gains.as_ref().map_or(1.0, |gains| gains[band]);
         // Without offsets as it is: adding 0 would take the sign of a zero.
-        self.offsets.as_ref().map_or(gain * number, |offsets| gain * number + offsets[band])
+        let scaled =
+            self.offsets.as_ref().map_or(gain * number, |offsets| gain * number + offsets[band]);
+        self.white.map_or(scaled, |white| scaled / white)
     }
 }
 
@@ -505,6 +518,11 @@ mod tests {
         let share =
             decode(&(HEADER.to_owned() + "reflectance scale factor = 10000\n"), &data).unwrap();
         assert_eq!(share.quantity, Quantity::Reflectance);
+        assert_eq!(share.values[11], 121.0 / 1e4, "{:?}", share.values);
+        for bad in ["0", "-1", "nan", "white"] {
+            let why = decode(&format!("{HEADER}reflectance scale factor = {bad}\n"), &data);
+            assert!(why.unwrap_err().contains("`reflectance scale factor`"), "{bad}");
+        }
         let micro = HEADER
             .replace("Nanometers", "Micrometers")
             .replace("450", "0.45")

@@ -47,6 +47,28 @@ pub fn read(
     bytes: &[u8],
     fits: impl FnOnce(&[usize]) -> Result<(), String>,
 ) -> Result<Array, String> {
+    let (shape, numbers) = read_as(bytes, fits, |number| number)?;
+    Ok(Array { shape, numbers })
+}
+
+/// As [`read`], with the numbers rounded to f32: the shape and the numbers.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn read_f32(
+    bytes: &[u8],
+    fits: impl FnOnce(&[usize]) -> Result<(), String>,
+) -> Result<(Vec<usize>, Vec<f32>), String> {
+    #[expect(clippy::cast_possible_truncation, reason = "what is asked for")]
+    read_as(bytes, fits, |number| number as f32)
+}
+
+fn read_as<T>(
+    bytes: &[u8],
+    fits: impl FnOnce(&[usize]) -> Result<(), String>,
+    rounded: impl Fn(f64) -> T,
+) -> Result<(Vec<usize>, Vec<T>), String> {
     let (text, data) = split(bytes)?;
     let broken = |why: String| format!("has a broken header: {why}; write it with numpy.save");
     let text = std::str::from_utf8(text).map_err(|_| broken("it is not UTF-8".to_owned()))?;
@@ -69,27 +91,26 @@ pub fn read(
         format!("ends before its last number: {has} bytes follow where its shape is {shape:?}")
     })?;
     let count = data.len() / size;
-    if room::<f64>(count).is_err() {
+    if room::<T>(count).is_err() {
         return Err(format!("holds {count} numbers, and the system has no memory for them"));
     }
-    // All as f64.
     let numbers = match kind {
         Number::F32 => {
             let of = match order {
                 ByteOrder::Little => f32::from_le_bytes,
                 ByteOrder::Big => f32::from_be_bytes,
             };
-            data.as_chunks().0.iter().map(|&bytes| f64::from(of(bytes))).collect()
+            data.as_chunks().0.iter().map(|&bytes| rounded(f64::from(of(bytes)))).collect()
         }
         Number::F64 => {
             let of = match order {
                 ByteOrder::Little => f64::from_le_bytes,
                 ByteOrder::Big => f64::from_be_bytes,
             };
-            data.as_chunks().0.iter().map(|&bytes| of(bytes)).collect()
+            data.as_chunks().0.iter().map(|&bytes| rounded(of(bytes))).collect()
         }
     };
-    Ok(Array { shape: header.shape, numbers })
+    Ok((header.shape, numbers))
 }
 
 /// The header's text and the bytes behind it.

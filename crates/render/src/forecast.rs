@@ -5,7 +5,7 @@ use etendue_scene::file::SETS;
 use etendue_scene::{MemoryForecast, Scene};
 use etendue_sensor::{Sensor, SensorKind};
 use etendue_spectrum::Bands;
-use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec, texture};
+use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec, Material, texture};
 
 use crate::film::bytes_of_plane;
 use crate::images::{environment, wanted_images};
@@ -142,7 +142,9 @@ fn images(scene: &Scene, plan: &Plan) -> u64 {
         // The pyramid of means, of 16 bits a channel.
         if plan.footprint { bytes.saturating_add(bytes / 3 * 2) } else { bytes }
     });
-    let textures = textures.fold(0, u64::saturating_add);
+    let cubes = scene.materials.iter().flat_map(Material::cubes);
+    let cubes = cubes.map(|cube| cube.cube.bytes_in(&plan.bands));
+    let textures = textures.chain(cubes).fold(0, u64::saturating_add);
     match environment(scene) {
         Some(EnvironmentImage::File(path)) if plan.layers.contains(&LayerSpec::Radiance) => {
             #[expect(

@@ -23,6 +23,7 @@
 //! | [`doctor`] | what a scene holds and what is wrong with it, without rendering |
 
 mod cache;
+mod cubes;
 pub mod doctor;
 pub mod error;
 pub mod escape;

@@ -1,17 +1,18 @@
 //! The scene file's own materials and lights, and the files and glasses that they name.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use etendue_files::InputFolder;
 use etendue_optics::glass::{AgfCatalogue, GlassSpec};
 use etendue_spectrum::Curve;
 use etendue_tracer::spec::{CubeSpec, Fault, ImageSpec, IorSpec, Supply};
 use etendue_tracer::{
-    Cube, ImageSource, Ior, Light, LightKind, Material, Paint, Texture, TextureUse,
+    Cube, CubeKind, ImageSource, Ior, Light, LightKind, Material, Paint, Texture, TextureUse,
 };
 use serde_json::Value;
 
 use crate::SceneError;
+use crate::cubes;
 use crate::error::not_found;
 use crate::file::{SceneFile, join, join_index};
 use crate::import::Wanted;
@@ -81,9 +82,6 @@ fn below(at: &str, key: &str) -> String {
     if key.is_empty() { at.to_owned() } else { format!("{at}.{key}") }
 }
 
-/// The longest cube that is read (bytes).
-const LONGEST_CUBE: u64 = 1 << 32;
-
 /// The longest table of a curve that is read (bytes).
 const LONGEST_TABLE: u64 = 1 << 26;
 
@@ -134,30 +132,13 @@ impl Supply for Named<'_> {
         String::from_utf8(bytes).map_err(|_| "is no text".to_owned())
     }
 
-    fn cube(&mut self, spec: &CubeSpec) -> Result<Cube, Fault> {
-        let count = spec.bands.len();
-        let read = |path: &Path| -> Result<Cube, String> {
-            let bytes = etendue_files::read(path, LONGEST_CUBE).map_err(|e| e.to_string())?;
-            let fits = |shape: &[usize]| match shape {
-                [_, _, bands] if *bands == count => Ok(()),
-                [_, _, bands] => Err(format!(
-                    "has {bands} bands a texel, and `bands` names {count}: their middles are the wavelengths"
-                )),
-                _ => Err(format!("has {} dimensions, not [row][column][band]", shape.len())),
-            };
-            let array = etendue_image::npy::read(&bytes, fits)?;
-            let size = [array.shape[1], array.shape[0]];
-            #[expect(clippy::cast_possible_truncation, reason = "reflectances keep seven digits")]
-            let values = array.numbers.into_iter().map(|v| v as f32).collect();
-            Cube::new(size, spec.bands.clone(), values, (spec.wrap, spec.filter))
-        };
+    fn cube(&mut self, spec: &CubeSpec, kind: CubeKind) -> Result<Cube, Fault> {
         let fault = |why: String| Fault::new("cube", format!("\"{}\" {why}", spec.cube));
         if !spec.repeat.iter().all(|r| r.is_finite() && *r != 0.0) {
             return Err(Fault::new("repeat", "is zero, which leaves no cube"));
         }
-        let path = self.file(&spec.cube).map_err(fault)?;
-        let cube = read(&path).map_err(fault)?;
-        self.files.push(path);
+        let (cube, files) = cubes::read((spec, kind), self.folder).map_err(fault)?;
+        self.files.extend(files);
         Ok(cube)
     }
 

@@ -1,19 +1,31 @@
-//! Textures by wavelength: a reflectance at each texel, in bands.
+//! Textures by wavelength: a reflectance or a radiance at each texel, in bands.
 
 use std::sync::Arc;
 
-use etendue_spectrum::{Bands, Curve, Grid, Outside, rgb};
+use etendue_image::BandAxis;
+use etendue_spectrum::{Bands, Curve, Outside, rgb};
 
 use crate::Color;
+use crate::spec::BRIGHTEST;
 use crate::texture::{Filter, Wrap};
 
-/// Reflectances over texture coordinates: straight lines join the bands' middles.
+/// What the numbers of a [`Cube`] are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CubeKind {
+    /// Shares of light, 0 to 1, held beyond the outer bands.
+    Reflectance,
+    /// Light, 0 or more: none beyond the outer edges.
+    Light,
+}
+
+/// Reflectances or light over texture coordinates: straight lines join the bands' middles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cube {
+    kind: CubeKind,
     /// Columns and rows.
     size: [usize; 2],
-    grid: Grid,
-    /// `[row][column][band]`, 0..=1.
+    axis: BandAxis,
+    /// `[row][column][band]`.
     values: Vec<f32>,
     /// What each texel looks like: linear RGB.
     looks: Vec<[f32; 3]>,
@@ -34,18 +46,19 @@ pub struct SceneCube {
 pub(crate) type Corners = [(usize, f64); 4];
 
 impl Cube {
-    /// A cube of so many columns and rows, whose `values` are `[row][column][band of the grid]`.
+    /// A cube of so many columns and rows, whose `values` are `[row][column][band of the axis]`.
     ///
     /// # Errors
     ///
-    /// A sentence when there are not as many values, or one is no reflectance.
+    /// A sentence when there are not as many values, or one is none of this kind.
     pub fn new(
+        kind: CubeKind,
         size: [usize; 2],
-        grid: Grid,
+        axis: BandAxis,
         values: Vec<f32>,
         (wrap, filter): (Wrap, Filter),
     ) -> Result<Self, String> {
-        let count = grid.len();
+        let count = axis.len();
         if size.contains(&0) || values.len() != size[0] * size[1] * count {
             return Err(format!(
                 "has {} numbers, which are not {} x {} texels of {count} bands",
@@ -54,24 +67,48 @@ impl Cube {
                 size[1]
             ));
         }
-        if let Some(bad) = values.iter().position(|v| !(0.0..=1.0).contains(v)) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a round number below the greatest f32"
+        )]
+        let most = match kind {
+            CubeKind::Reflectance => 1.0,
+            CubeKind::Light => BRIGHTEST as f32,
+        };
+        if let Some(bad) = values.iter().position(|v| !(0.0..=most).contains(v)) {
             let (texel, band) = (bad / count, bad % count);
+            let why = match (values[bad].is_nan(), kind) {
+                (true, _) => "nothing was measured there; fill it, or cut the cube".to_owned(),
+                (_, CubeKind::Reflectance) => {
+                    "a reflectance is 0 to 1; scale it, and clip what noise leaves beyond"
+                        .to_owned()
+                }
+                (_, CubeKind::Light) => {
+                    format!("light is 0 to {BRIGHTEST:e}; clip what noise leaves below")
+                }
+            };
             return Err(format!(
-                "is {} in band {band} of row {}, column {}: a reflectance is 0 to 1; scale it, and clip what noise \
-                 leaves beyond",
+                "is {} in band {band} of row {}, column {}: {why}",
                 values[bad],
                 texel / size[0],
                 texel % size[0]
             ));
         }
-        let mut cube = Self { size, grid, values, looks: Vec::new(), wrap, filter };
-        let colors: Vec<Color> =
-            cube.parts().iter().map(|part| rgb::colour(&part.held_over(360.0, 830.0))).collect();
+        let mut cube = Self { kind, size, axis, values, looks: Vec::new(), wrap, filter };
+        let color = |part: &Curve| match kind {
+            CubeKind::Reflectance => rgb::colour(&part.held_over(360.0, 830.0)),
+            // As of any lamp, before equal energy; none where it is invisible.
+            CubeKind::Light => match Bands::Rgb.from_curve(part, Outside::Zero) {
+                Ok(color) => std::array::from_fn(|k| color[k]),
+                Err(_) => [0.0; 3],
+            },
+        };
+        let colors: Vec<Color> = cube.parts().iter().map(color).collect();
         let look = |texel: &[f32]| {
             std::array::from_fn(|k| {
                 let sum: f64 = texel.iter().zip(&colors).map(|(v, c)| f64::from(*v) * c[k]).sum();
                 #[expect(clippy::cast_possible_truncation, reason = "to look at")]
-                let sum = sum.clamp(0.0, 1.0) as f32;
+                let sum = sum.clamp(0.0, f64::from(most)) as f32;
                 sum
             })
         };
@@ -79,40 +116,86 @@ impl Cube {
         Ok(cube)
     }
 
-    /// The curve that 1 in each band and 0 in all others is: their sum is 1.
+    /// The curve that 1 in each band and 0 in all others is: their sum is 1, of light between the outer edges.
     #[must_use]
     pub fn parts(&self) -> Vec<Curve> {
-        let middles: Vec<f64> = self.grid.centres().collect();
+        let (middles, [from, to]) = (self.axis.wavelengths(), self.range());
         let part = |i: usize| {
-            let before = (i > 0).then(|| [middles[i - 1], 0.0]);
-            let after = middles.get(i + 1).map(|&nm| [nm, 0.0]);
+            let of_light = |nm: f64| (self.kind == CubeKind::Light).then_some([nm, 1.0]);
+            let before = match i {
+                0 => of_light(from),
+                _ => Some([middles[i - 1], 0.0]),
+            };
+            let after = match middles.get(i + 1) {
+                None => of_light(to),
+                Some(&nm) => Some([nm, 0.0]),
+            };
             let points = before.into_iter().chain([[middles[i], 1.0]]).chain(after).collect();
             Curve::sampled(points).unwrap_or(Curve::ONE)
         };
         (0..middles.len()).map(part).collect()
     }
 
-    /// The wavelengths of its bands (nm).
+    /// The mean of all texels in each band, as a curve; `None` where all is dark.
+    #[must_use]
+    pub fn mean(&self) -> Option<Curve> {
+        let mut sums = vec![0.0; self.axis.len()];
+        for texel in self.values.chunks_exact(sums.len()) {
+            sums.iter_mut().zip(texel).for_each(|(sum, value)| *sum += f64::from(*value));
+        }
+        let means = sums.iter().map(|sum| sum / self.looks.len() as f64);
+        let [from, to] = self.range();
+        let mut points: Vec<[f64; 2]> =
+            self.axis.wavelengths().iter().zip(means).map(|(nm, mean)| [*nm, mean]).collect();
+        let [first, last] = [points.first()?[1], points.last()?[1]];
+        points.insert(0, [from, first]);
+        points.push([to, last]);
+        Curve::sampled(points).ok().filter(|curve| curve.extent()[1] > 0.0)
+    }
+
+    /// The greatest mean over bands of a texel: also of light that nobody sees.
+    #[must_use]
+    pub fn brightest(&self) -> f64 {
+        let count = self.axis.len();
+        let mean = |texel: &[f32]| texel.iter().map(|v| f64::from(*v)).sum::<f64>() / count as f64;
+        self.values.chunks_exact(count).map(mean).fold(0.0, f64::max)
+    }
+
+    /// The outer edges of its bands (nm).
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
-        self.grid.range()
+        let edges = self.axis.edges();
+        [edges[0], edges[edges.len() - 1]]
+    }
+
+    /// Bytes of a render in `bands`: the cube, its looks and, beside it, its file while it is read or its texels in
+    /// those bands, whichever is more.
+    #[must_use]
+    pub fn bytes_in(&self, bands: &Bands) -> u64 {
+        let again = if *bands == Bands::Rgb { 0 } else { bands.count() };
+        let again = again.max(self.axis.len());
+        (self.looks.len() * (4 * (self.axis.len() + again) + size_of::<[f32; 3]>())) as u64
     }
 
     /// The texels in other bands: `[row][column][band]`.
     pub(crate) fn in_bands(&self, bands: &Bands) -> Vec<f32> {
-        let held = |curve: &Curve| {
-            bands.from_curve(curve, Outside::Held).unwrap_or_else(|_| {
+        let of = |curve: &Curve| match self.kind {
+            CubeKind::Reflectance => bands.from_curve(curve, Outside::Held).unwrap_or_else(|_| {
                 (0..bands.count()).map(|i| curve.held(bands.wavelength(i))).collect()
-            })
+            }),
+            CubeKind::Light => {
+                bands.from_curve(curve, Outside::Zero).unwrap_or_else(|_| vec![0.0; bands.count()])
+            }
         };
-        let rows: Vec<Vec<f64>> = self.parts().iter().map(held).collect();
+        let rows: Vec<Vec<f64>> = self.parts().iter().map(of).collect();
+        let most = if self.kind == CubeKind::Reflectance { 1.0 } else { BRIGHTEST };
         let mut all = Vec::with_capacity(self.looks.len() * bands.count());
-        for texel in self.values.chunks_exact(self.grid.len()) {
+        for texel in self.values.chunks_exact(self.axis.len()) {
             for band in 0..bands.count() {
                 let value: f64 =
                     texel.iter().zip(&rows).map(|(v, row)| f64::from(*v) * row[band]).sum();
                 #[expect(clippy::cast_possible_truncation, reason = "as the file has them")]
-                all.push(value.clamp(0.0, 1.0) as f32);
+                all.push(value.clamp(0.0, most) as f32);
             }
         }
         all
@@ -153,14 +236,27 @@ impl Cube {
 
 #[cfg(test)]
 mod tests {
+    use etendue_spectrum::Grid;
+
     use super::*;
+
+    fn axis(from: f64, to: f64, count: usize) -> BandAxis {
+        let grid = Grid::equal(from, to, count).unwrap();
+        BandAxis::between(grid.edges().to_vec()).unwrap()
+    }
 
     #[test]
     fn texels_come_back_in_their_own_bands_and_between_them() {
-        let grid = Grid::equal(400.0, 700.0, 3).unwrap();
+        let axis = axis(400.0, 700.0, 3);
         let values = vec![0.1, 0.5, 0.9, 0.3, 0.3, 0.3];
-        let cube =
-            Cube::new([2, 1], grid.clone(), values, (Wrap::ClampToEdge, Filter::Bilinear)).unwrap();
+        let cube = Cube::new(
+            CubeKind::Reflectance,
+            [2, 1],
+            axis.clone(),
+            values,
+            (Wrap::ClampToEdge, Filter::Bilinear),
+        )
+        .unwrap();
         // Flat stays flat in any bands, and means of straight lines are theirs.
         let fine = cube.in_bands(&Bands::Spectral(Grid::equal(450.0, 650.0, 2).unwrap()));
         for (found, expected) in fine.iter().zip([0.3, 0.7, 0.3, 0.3]) {
@@ -175,10 +271,16 @@ mod tests {
 
     #[test]
     fn what_is_no_reflectance_is_refused_with_its_place() {
-        let grid = Grid::equal(400.0, 700.0, 2).unwrap();
+        let axis = axis(400.0, 700.0, 2);
         let look = (Wrap::Repeat, Filter::Nearest);
-        let above = Cube::new([1, 2], grid.clone(), vec![0.5, 0.5, 0.5, 1.5], look).unwrap_err();
+        let above =
+            Cube::new(CubeKind::Reflectance, [1, 2], axis.clone(), vec![0.5, 0.5, 0.5, 1.5], look)
+                .unwrap_err();
         assert!(above.contains("band 1 of row 1, column 0"), "{above}");
-        assert!(Cube::new([1, 2], grid, vec![0.5; 3], look).unwrap_err().contains("3 numbers"));
+        assert!(
+            Cube::new(CubeKind::Reflectance, [1, 2], axis, vec![0.5; 3], look)
+                .unwrap_err()
+                .contains("3 numbers")
+        );
     }
 }

@@ -122,7 +122,9 @@ pub(crate) fn triangle_power(
     let sides = if emission.two_sided { 2.0 } else { 1.0 };
     // A texture may be dark at all four and shine between them: no triangle is passed over.
     let least = match &emission.radiance {
-        Paint::Plain(_) | Paint::Curve { .. } | Paint::Cube { .. } => 0.0,
+        Paint::Plain(_) | Paint::Curve { .. } => 0.0,
+        // Light that nobody sees, too.
+        Paint::Cube { cube, .. } => cube.cube.brightest(),
         Paint::Checker { colors, .. } => mean(&colors[0]).max(mean(&colors[1])),
         Paint::Image { factor, .. } => 0.05 * mean(factor),
     };

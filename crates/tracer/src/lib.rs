@@ -57,7 +57,7 @@ pub mod tint;
 pub mod transport;
 
 pub use clear_sky::ClearSky;
-pub use cube::{Cube, SceneCube};
+pub use cube::{Cube, CubeKind, SceneCube};
 pub use emitters::Emitters;
 pub use environment::EnvironmentMap;
 pub use footprint::{Cone, Footprint, Pixel};

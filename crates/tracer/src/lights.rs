@@ -17,7 +17,7 @@ use crate::sampling::{Frame, cone_direction, triangle_point};
 use crate::sky::{Sky, uniform_direction};
 use crate::spectral::Spectral;
 use crate::target::{Chosen, Target, TargetKind};
-use crate::{LightGroup, Material};
+use crate::{LightGroup, Material, Paint};
 
 /// All lights of a scene, ready to be chosen from.
 #[derive(Debug)]
@@ -386,6 +386,16 @@ impl Lights {
         let number = spot.placement.material as usize;
         let emission = around.materials.get(number).and_then(|m| m.emission.as_ref());
         let Some(emission) = emission.filter(|e| front || e.two_sided) else { return false };
+        if let Paint::Cube { cube, repeat } = &emission.radiance
+            && !spectral.is_rgb()
+        {
+            let [u, v] = spot.uv(0);
+            let at = [u * repeat[0], v * repeat[1]];
+            for (i, band) in radiance.iter_mut().enumerate() {
+                *band = emission.strength * spectral.texel(cube.number, at, i);
+            }
+            return true;
+        }
         let [r, g, b, _] = around.paint(&emission.radiance, spot);
         spectral.spread(&[r, g, b].map(|c| c * emission.strength), radiance);
         if let Some(tint) = &self.tints[number] {

@@ -167,6 +167,23 @@ impl Material {
         curves
     }
 
+    /// The cube of what it reflects, if it has one.
+    #[must_use]
+    pub fn reflected_cube(&self) -> Option<&SceneCube> {
+        self.base_color.cube().filter(|_| self.scattering != Scattering::Black)
+    }
+
+    /// The cube of what it gives off, if it has one.
+    #[must_use]
+    pub fn emitted_cube(&self) -> Option<&SceneCube> {
+        self.emission.as_ref().and_then(|emission| emission.radiance.cube())
+    }
+
+    /// Its cubes.
+    pub fn cubes(&self) -> impl Iterator<Item = &SceneCube> {
+        self.reflected_cube().into_iter().chain(self.emitted_cube())
+    }
+
     /// Whether it may be a smooth pane without thickness, which light passes straight
     /// (`KHR_materials_transmission` without roughness).
     #[must_use]
@@ -232,7 +249,7 @@ pub enum Paint {
         /// Which image, over which coordinates.
         image: TextureUse,
     },
-    /// A reflectance by wavelength over texture coordinate set 0.
+    /// A reflectance, or of light a radiance, by wavelength over texture coordinate set 0.
     Cube {
         /// The cube.
         cube: SceneCube,

@@ -64,7 +64,7 @@ impl Spectral {
         }
         // Red, green and blue are the cubes' looks.
         let cubes = materials.iter().filter(|_| !spectral.is_rgb);
-        for SceneCube { number, cube } in cubes.filter_map(|material| material.base_color.cube()) {
+        for SceneCube { number, cube } in cubes.flat_map(Material::cubes) {
             let number = *number as usize;
             if spectral.cubes.len() <= number {
                 spectral.cubes.resize_with(number + 1, || None);
@@ -93,7 +93,7 @@ impl Spectral {
     }
 
     /// A cube of the scene at (u, v) in band `i`.
-    fn texel(&self, number: u32, at: [f64; 2], i: usize) -> f64 {
+    pub(crate) fn texel(&self, number: u32, at: [f64; 2], i: usize) -> f64 {
         let Some(Some((cube, texels))) = self.cubes.get(number as usize) else { return 1.0 };
         let value =
             |(texel, share): (usize, f64)| share * f64::from(texels[texel * self.count() + i]);

@@ -9,11 +9,13 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use crate::curve_files::{LONGEST_TABLE, read_curves};
 use crate::{CameraError, PoseSpec, SensorSpec};
 use etendue_geometry::units::{Degrees, Metres, Millimetres};
 use etendue_optics::element::{ElementSpec, LensResources, LossesSpec, Resolve, element_schema};
 use etendue_optics::glass::AgfCatalogue;
 use etendue_optics::train::{Focus, LensError, LensFile, OpticalTrain, ZemaxLens};
+use etendue_spectrum::CurveFault;
 
 /// The longest text that is read as a lens (bytes).
 const LONGEST: u64 = 16 << 20;
@@ -52,8 +54,12 @@ impl LensSource {
                     .map_err(|_| error(format!("{written}: is not UTF-8 text")))?;
                 let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
                 let folder = Path::new(written).parent().unwrap_or(Path::new(""));
-                LensFile::from_json(text)
-                    .and_then(|file| file.build(&LensFolder { folder, scene: resolve }))
+                let files = LensFolder { folder, scene: resolve };
+                let text = files
+                    .with_curves(text)
+                    .map_err(|CurveFault { key, why }| error(format!("{written}, {key}: {why}")))?;
+                LensFile::from_json(&text)
+                    .and_then(|file| file.build(&files))
                     .map_err(|fault| error(format!("{written}: {fault}")))
             }
         }
@@ -64,6 +70,22 @@ impl LensSource {
 struct LensFolder<'a> {
     folder: &'a Path,
     scene: Resolve<'a>,
+}
+
+impl LensFolder<'_> {
+    /// The text of a lens file with curves in the place of the files that it names; as it stands, with its lines, where
+    /// it names none.
+    fn with_curves<'t>(&self, text: &'t str) -> Result<Cow<'t, str>, CurveFault> {
+        // What is no JSON is told by who reads the lens.
+        let Ok(mut value) = serde_json::from_str::<Value>(text) else { return Ok(text.into()) };
+        let read = &mut |written: &str| {
+            let path = self.path(written)?;
+            let bytes = etendue_files::read(&path, LONGEST_TABLE).map_err(|e| e.to_string())?;
+            String::from_utf8(bytes).map_err(|_| "is no text".to_owned())
+        };
+        let any = read_curves(&mut value, read)?;
+        Ok(if any { value.to_string().into() } else { text.into() })
+    }
 }
 
 impl LensResources for LensFolder<'_> {

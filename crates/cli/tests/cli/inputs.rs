@@ -183,6 +183,14 @@ fn inputs() -> Vec<Input> {
     let (one, two) = (cube(0.5), cube(0.25));
     let bands = json!({"cube": "c.npy", "bands": [400, 500, 600, 700, 800]});
     add(&["CubeSpec.cube"], scene(&matte(bands)), &[("c.npy", &one)], vec![two]);
+    let header: &[u8] = b"ENVI\nsamples = 1\nlines = 1\nbands = 2\ndata type = 1\ninterleave = bsq\nheader offset = 0\n\
+        reflectance scale factor = 255\nwavelength units = nm\nwavelength = {450, 550}\n";
+    let texel: &[u8] = &[50, 90];
+    let pair = [("c.img", texel), ("c.hdr", header)];
+    for name in ["c.img", "c.hdr"] {
+        let scene = scene(&matte(json!({"cube": name})));
+        add(&["CubeSpec.cube"], scene, &pair, vec![vec![50, 91], longer(header)]);
+    }
     // Lenses with what they name.
     let plain = through(
         &json!({"type": "aperture", "shape": "circular", "radius": 2, "thickness": 1, "stop": true}),
@@ -201,6 +209,11 @@ fn inputs() -> Vec<Input> {
                 "stop": true}),
         &json!({}),
     );
+    let coated =
+        through(&json!({"type": "filter", "transmission": named(), "thickness": 1}), &json!({}));
+    let written = coated.to_string().into_bytes();
+    let files = [curve[0], ("lens.json", &written)];
+    add(curve_keys, scene(&camera(&json!("lens.json"))), &files, other());
     let mask_keys: &[&str] = &["ApertureSpec.file", "ElementSpec.file", "PlacedSpec.file"];
     add(mask_keys, scene(&camera(&masked)), &mask, vec![longer(&grey)]);
     let filtered = through(

@@ -4,6 +4,7 @@ mod assets; // real models from outside the repository
 mod bad_input; // refused with exit code 2, one message, and nothing written
 mod bad_light; // materials, textures and lights that make no sense
 mod bench; // speed against accuracy on a tiny scene
+mod cubes; // surfaces and lamps by wavelength, from files of every form
 mod denoise; // pictures without their noise, where Open Image Denoise is there
 mod emva; // the characterisation of what the command writes
 mod expose; // pictures from elsewhere on a sensor
@@ -43,6 +44,7 @@ mod schema; // the schema by another validator
 mod sensor; // presets, curves, series of a characterisation
 mod shards; // renders that are divided or killed, and their pictures
 mod spectral_files; // light in bands by others' readers and writers
+mod spectrum_command; // curves in numbers and drawings
 mod stale; // a render of one kind into the folder of another
 mod stopping; // Ctrl-C and what it leaves
 mod tools; // check, plan, schema, version

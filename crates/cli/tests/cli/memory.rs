@@ -251,6 +251,33 @@ fn copies_are_in_the_forecast_and_no_render_passes_its_limit() {
     }
 }
 
+/// The law of [`forecasts_are_within_half_as_much_again_of_the_peak`] for a surface by wavelength, which is held as it
+/// is and once more in the sensor's bands.
+#[test]
+fn cubes_are_in_the_forecast() {
+    let bench = Bench::new();
+    let values = vec![0.25; 512 * 512 * 24];
+    bench.write("cube.npy", &crate::expose::npy(&[512, 512, 24], &values));
+    for sensor in [
+        json!({"resolution": [64, 64]}),
+        json!({"type": "multispectral", "resolution": [64, 64], "bands": {"from": 400, "to": 700, "count": 24}}),
+    ] {
+        let scene = json!({"etendue": 1, "tracer": {"type": "direct"},
+            "camera": {"type": "pinhole", "sensor": sensor}, "objects": [{"shape": "rectangle", "material": "a"}],
+            "materials": {"a": {"type": "matte", "color":
+                {"cube": "cube.npy", "bands": {"from": 400, "to": 700, "count": 24}}}}});
+        bench.write("scene.json", scene.to_string().as_bytes());
+        let check = bench.run(&["check", "scene.json", "--json"]);
+        let check: serde_json::Value = serde_json::from_slice(&check.stdout).expect("JSON");
+        let total = check["memory"]["total"].as_f64().expect("a number");
+        bench.render(&["--report", "report.json"]);
+        let peak = bench.json("report.json")["peak_memory_bytes"].as_f64().expect("a number");
+        println!("forecast {total}, peak {peak}: {:.2}", total / peak);
+        assert!((1.0 / 1.5..=1.5).contains(&(total / peak)), "{total} for {peak}");
+        assert!(total > 4.0 * 512.0 * 512.0 * 24.0, "the cube is in it: {total}");
+    }
+}
+
 #[test]
 fn plans_and_checks_tell_what_memory_a_render_takes() {
     let bench = Bench::with_scene(BOX);

@@ -4,7 +4,7 @@
 use etendue_scene::Scene;
 use etendue_sensor::{BandChoice, Illumination, Radiometry};
 use etendue_spectrum::{Bands, Curve, VISIBLE, integral};
-use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec, Material, SceneCurve};
+use etendue_tracer::{ClearSky, EnvironmentImage, LayerSpec, Material};
 
 use super::illumination::illumination;
 
@@ -90,11 +90,11 @@ fn extended(scene: &Scene, bands: &Bands) -> Option<String> {
     bands.grid()?;
     let [from, to] = bands.range();
     let beyond = |material: &Material| -> Option<String> {
-        let gap = |curve: &SceneCurve| {
-            let [low, high] = curve.curve.range();
-            (low.min(to) - from).max(0.0) + (to - high.max(from)).max(0.0)
-        };
-        let gap = material.curves().into_iter().map(gap).fold(0.0, f64::max);
+        let gap =
+            |[low, high]: [f64; 2]| (low.min(to) - from).max(0.0) + (to - high.max(from)).max(0.0);
+        let curves = material.curves().into_iter().map(|curve| curve.curve.range());
+        let cube = material.reflected_cube().map(|cube| cube.cube.range());
+        let gap = curves.chain(cube).map(gap).fold(0.0, f64::max);
         let share = 100.0 * gap / (to - from);
         (gap > 0.0).then(|| format!("\"{}\" over {gap:.0} nm ({share:.0} %)", material.name))
     };
@@ -106,7 +106,7 @@ fn extended(scene: &Scene, bands: &Bands) -> Option<String> {
     };
     let named = short.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
     Some(format!(
-        "light of {from} to {to} nm is rendered, and curves of materials end before: they are held as they end, of \
+        "light of {from} to {to} nm is rendered, and curves and cubes of materials end before: they are held as they end, of \
          {named}{more}; give points as far as the sensor sees, or narrow its range"
     ))
 }

@@ -57,7 +57,11 @@ pub(super) fn illumination(scene: &Scene) -> Illumination {
     let most = most_scattered(scene);
     for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
         if let Some(emission) = &material.emission {
-            add(of(&emission.illuminant));
+            match material.emitted_cube() {
+                // Every texel is a sum of these.
+                Some(cube) => cube.cube.parts().into_iter().for_each(&mut add),
+                None => add(of(&emission.illuminant)),
+            }
             coloured_light |= is_coloured(&emission.radiance);
         }
         if reflects_colour(material) {
@@ -112,11 +116,12 @@ pub(super) fn light(scene: &Scene, bands: &Bands) -> Vec<f64> {
     for (number, material) in scene.materials.iter().enumerate() {
         let Some(emission) = material.emission.as_ref().filter(|_| used(number)) else { continue };
         let color = match &emission.radiance {
+            Paint::Cube { cube, .. } => {
+                add(cube.cube.mean().map(|mean| of_curve(&mean)).unwrap_or_default(), None);
+                continue;
+            }
             Paint::Plain(color) => *color,
-            Paint::Curve { .. }
-            | Paint::Checker { .. }
-            | Paint::Image { .. }
-            | Paint::Cube { .. } => [1.0; 3],
+            Paint::Curve { .. } | Paint::Checker { .. } | Paint::Image { .. } => [1.0; 3],
         };
         add(tinted(&color, &emission.illuminant), None);
     }
@@ -155,7 +160,7 @@ fn factors(material: &Material, most: u8) -> Vec<Factor> {
     let layers = material.scattering.gltf();
     let layers = layers.into_iter().flat_map(|s| s.sheen_curve.iter().chain(&s.specular_curve));
     // Every texel of a cube is a sum of these.
-    let parts = material.base_color.cube().map(|cube| cube.cube.parts()).unwrap_or_default();
+    let parts = material.reflected_cube().map(|cube| cube.cube.parts()).unwrap_or_default();
     factors.extend(parts.into_iter().map(|curve| Factor { curve, times: Times::UpTo(1) }));
     factors.extend(
         own.chain(layers)

@@ -10,15 +10,16 @@ use serde_json::{Value, json};
 
 use super::document::Document;
 use super::lens::SCENE_KEYS;
-use super::{WrittenPlaces, check, join, join_index, kind_of, read_document, spec};
+use super::{WrittenPlaces, check, join, kind_of, read_document, spec};
 use crate::SceneError;
 use crate::error::not_found;
 use crate::words::plain;
 use etendue_camera::CameraSpec;
+use etendue_camera::curve_files::{self, LONGEST_TABLE};
 use etendue_files::{InputFolder, Opener};
 use etendue_optics::train::remove_notes;
 use etendue_sensor::{Model, Sensor, SensorError, SensorSpec};
-use etendue_spectrum::{Curve, CurveFault, CurveSpec};
+use etendue_spectrum::CurveFault;
 
 /// The schema of a scene's `camera`: the object, or the file that holds it, in whose place its values stand
 /// once it is read.
@@ -96,58 +97,17 @@ impl WrittenPlaces {
     /// Puts curves in the place of the files that filters and sensors of the camera name: `{"file": "x.csv"}`.
     pub(super) fn read_curves(&self, scene: &mut Value) -> Result<(), SceneError> {
         let Some(camera) = scene.get_mut("camera") else { return Ok(()) };
-        self.read_curves_below(camera, "camera")
-    }
-
-    fn read_curves_below(&self, value: &mut Value, path: &str) -> Result<(), SceneError> {
-        match value {
-            Value::Object(members) if is_curve_file(members) => {
-                let curve = self.curve_of(value).map_err(|CurveFault { key, why }| {
-                    let dot = if key.is_empty() { "" } else { "." };
-                    self.fault(&format!("{path}{dot}{key}"), why)
-                })?;
-                *value = json!(curve);
-                Ok(())
-            }
-            Value::Object(members) => members
-                .iter_mut()
-                .try_for_each(|(key, below)| self.read_curves_below(below, &join(path, key))),
-            Value::Array(all) => {
-                let mut all = all.iter_mut().enumerate();
-                all.try_for_each(|(k, below)| self.read_curves_below(below, &join_index(path, k)))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn curve_of(&self, value: &Value) -> Result<Curve, CurveFault> {
-        let bad = |why: String| CurveFault { key: String::new(), why };
-        let spec: CurveSpec = serde_json::from_value(value.clone()).map_err(|_| {
-            bad("is no curve: give { \"file\": \"x.csv\", \"column\": \"name\", \"scale\": 1 }"
-                .into())
-        })?;
-        let folder = self.folder();
-        let folder = self.opener.folder(folder).map_err(|error| bad(error.to_string()))?;
-        spec.resolve(&mut |written| {
+        let read = &mut |written: &str| {
+            let folder = self.opener.folder(self.folder()).map_err(|error| error.to_string())?;
             let path = folder.find(written).map_err(not_found)?.path;
             let bytes = etendue_files::read(&path, LONGEST_TABLE).map_err(|e| e.to_string())?;
             self.opener.record([path]);
             String::from_utf8(bytes).map_err(|_| "is no text".to_owned())
-        })
+        };
+        let read = curve_files::read_curves(camera, read);
+        read.map_err(|CurveFault { key, why }| self.fault(&join("camera", &key), why))?;
+        Ok(())
     }
-}
-
-/// The longest table of a curve that is read (bytes).
-const LONGEST_TABLE: u64 = 1 << 26;
-
-/// Whether a value is a curve in a file, and no lens or image.
-fn is_curve_file(members: &serde_json::Map<String, Value>) -> bool {
-    let is_table = |file: &str| {
-        let ending = Path::new(file).extension().map(|e| e.to_ascii_lowercase());
-        ending.is_some_and(|ending| ending == "csv" || ending == "spd")
-    };
-    members.get("file").and_then(Value::as_str).is_some_and(is_table)
-        && members.keys().all(|key| matches!(key.as_str(), "file" | "column" | "scale"))
 }
 
 fn remedy() -> &'static str {

@@ -251,6 +251,11 @@ impl LightSpec {
             }
             Self::Projector { at, look_at, up, fov, aspect, image, .. } => {
                 let ends = [*at, *look_at].map(DVec3::from);
+                if matches!(image, PaintSpec::Cube(_)) {
+                    let why = "is a cube, which a projector does not throw: it throws images and checkers, and their \
+                               spectrum is that of its `intensity`";
+                    return Err(Fault::new("image", why));
+                }
                 let (image, spectrum) = radiant_paint(("image", image), None, supply)?;
                 if spectrum.is_some() {
                     let why = "is a curve; a projector's spectrum is that of its `intensity`";

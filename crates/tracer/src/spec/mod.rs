@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 pub use self::light::{LightSpec, SunSpec};
 pub use self::material::{AbbeSpec, AbsorptionSpec, IorSpec, MaterialSpec};
 use crate::texture::{Filter, Wrap};
-use crate::{Color, Cube, Ior, Paint, SceneCube, SceneCurve};
+use crate::{Color, Cube, CubeKind, Ior, Paint, SceneCube, SceneCurve};
 
 /// The brightest that a light or a surface may be, in whichever unit: pictures hold no number above
 /// 3·10³⁸, and the powers of all lights are added up.
@@ -46,7 +46,7 @@ pub enum PaintSpec {
     Color(Color),
     /// An image over the surface's texture coordinates.
     Image(ImageSpec),
-    /// A reflectance by wavelength over the surface's texture coordinates.
+    /// A reflectance, or of a lamp its light, by wavelength over the surface's texture coordinates.
     Cube(CubeSpec),
     /// Squares over the surface's texture coordinates.
     Checker(CheckerSpec),
@@ -54,14 +54,16 @@ pub enum PaintSpec {
     Curve(CurveSpec),
 }
 
-/// A file of reflectances by wavelength over the surface's texture coordinates.
+/// A file of reflectances, or of a lamp's light, by wavelength over the surface's texture coordinates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CubeSpec {
-    /// An NPY file, `[row][column][band]`, of reflectances of 0 to 1, relative to the scene file.
+    /// A file of reflectances of 0 to 1, or of light, relative to the scene file: NPY, `[row][column][band]`; ENVI, by its
+    /// header or its numbers; or EXR with channels `T.550,0nm`, of light `S0.550,0nm` (Fichet et al. 2021).
     pub cube: String,
-    /// The wavelengths of its bands (nm).
-    pub bands: Grid,
+    /// The wavelengths of the bands (nm) of an NPY file; the others say their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bands: Option<Grid>,
     /// What happens outside of 0..=1, along both axes.
     #[serde(default)]
     pub wrap: Wrap,
@@ -145,12 +147,12 @@ pub trait Supply {
     /// A sentence on why there is none.
     fn text(&mut self, written: &str) -> Result<String, String>;
 
-    /// A cube of reflectances.
+    /// A cube of this kind.
     ///
     /// # Errors
     ///
     /// When there is no such file, or it holds no such cube; keys are those of the cube.
-    fn cube(&mut self, spec: &CubeSpec) -> Result<Cube, Fault>;
+    fn cube(&mut self, spec: &CubeSpec, kind: CubeKind) -> Result<Cube, Fault>;
 
     /// The next number for a curve of the scene.
     fn curve_number(&mut self) -> u32;
@@ -300,12 +302,7 @@ fn paint(key: &str, spec: &PaintSpec, supply: &mut dyn Supply) -> Result<Paint, 
                 None => Paint::Plain(look),
             })
         }
-        PaintSpec::Cube(cube) => {
-            let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
-            let (repeat, number) = (cube.repeat, supply.curve_number());
-            let cube = Arc::new(supply.cube(cube).map_err(below)?);
-            Ok(Paint::Cube { cube: SceneCube { number, cube }, repeat })
-        }
+        PaintSpec::Cube(cube) => cube_paint((key, cube), CubeKind::Reflectance, supply),
         PaintSpec::Checker(CheckerSpec { checker, squares }) => {
             let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
             self::checker("checker", (checker, *squares), supply).map_err(below)
@@ -316,6 +313,18 @@ fn paint(key: &str, spec: &PaintSpec, supply: &mut dyn Supply) -> Result<Paint, 
             image_paint(key, image, (look, curve), supply)
         }
     }
+}
+
+/// A cube over a surface.
+fn cube_paint(
+    (key, spec): (&str, &CubeSpec),
+    kind: CubeKind,
+    supply: &mut dyn Supply,
+) -> Result<Paint, Fault> {
+    let below = |fault: Fault| Fault::new(format!("{key}.{}", fault.key), fault.why);
+    let number = supply.curve_number();
+    let cube = Arc::new(supply.cube(spec, kind).map_err(below)?);
+    Ok(Paint::Cube { cube: SceneCube { number, cube }, repeat: spec.repeat })
 }
 
 /// An image times a factor, and times a curve of which that is the look.
@@ -375,9 +384,13 @@ fn radiant_paint(
             let Emitted { color, curve } = emitted((key, &spec), illuminant, supply)?;
             (Paint::Plain(color), curve)
         }
-        PaintSpec::Cube(_) => {
-            let why = "is a cube of reflectances, which gives off no light: give an image and an `illuminant`";
-            return Err(Fault::new(key, why));
+        PaintSpec::Cube(cube) => {
+            if illuminant.is_some() {
+                let why =
+                    format!("is given beside a cube of `{key}`, which has spectra of its own");
+                return Err(Fault::new("illuminant", format!("{why}: leave one of them out")));
+            }
+            (cube_paint((key, cube), CubeKind::Light, supply)?, None)
         }
         PaintSpec::Checker(CheckerSpec { checker, squares }) => {
             let mut colors = [[0.0; 3]; 2];
