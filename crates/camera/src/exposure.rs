@@ -89,14 +89,19 @@ impl Camera {
                 _ => last.insert((time, motion.at(time))).1,
             }
         });
+        rays.set_times(rows[..rays.len()].iter().map(|row| shutter.truth(row.floor() + 0.5)));
     }
 
     /// Carries the rays of samples that have times to where the camera is then, and weighs them by how long their rows
     /// are open.
     pub(crate) fn carry_samples(&self, samples: &FilmSamples, out: &mut CameraRays) {
-        if let (Some(motion), false) = (self.motion(), samples.times.is_empty()) {
+        if !samples.times.is_empty() {
             let CameraRays { rays, sample, .. } = &mut *out;
-            self.carry(rays, |i| motion.at(samples.times[sample[i] as usize]));
+            let time = |sample: &u32| samples.times[*sample as usize];
+            if let Some(motion) = self.motion() {
+                self.carry(rays, |i| motion.at(time(&sample[i])));
+            }
+            rays.set_times(sample.iter().map(time));
         }
         if !samples.open_shares.is_empty() {
             let shares = out.sample.iter().map(|&sample| samples.open_shares[sample as usize]);
