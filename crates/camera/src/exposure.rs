@@ -1,5 +1,7 @@
 //! A camera's time: its shutter and its motion, and rays that are carried to where the camera is at their time.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::{Camera, CameraRays, FilmSamples, Pose, Shutter, Trajectory};
@@ -19,6 +21,8 @@ pub struct CameraTime {
     pub shutter: Shutter,
     /// The camera's motion, where it moves while the shutter is open.
     pub motion: Option<Trajectory>,
+    /// Whether anything of the scene moves while the shutter is open.
+    pub things_move: bool,
 }
 
 impl CameraTime {
@@ -41,10 +45,31 @@ impl Camera {
         self.time.as_deref()?.motion.as_ref()
     }
 
-    /// Whether pixels of different rows are seen from different places.
+    /// The same camera in a scene of which something moves while its shutter is open, or nothing.
+    #[must_use]
+    pub fn among_moving_things(mut self, things_move: bool) -> Self {
+        if let Some(time) = &mut self.time {
+            Arc::make_mut(time).things_move = things_move;
+        }
+        self
+    }
+
+    /// When the first row opens and the last one closes (s); no time without a shutter.
+    #[must_use]
+    pub fn exposure_span(&self) -> [f64; 2] {
+        self.shutter().map_or([0.0; 2], Shutter::whole_span)
+    }
+
+    /// Whether rays have times: the camera or something in the scene moves while the shutter is open.
+    #[must_use]
+    pub fn is_timed(&self) -> bool {
+        self.time.as_deref().is_some_and(|time| time.motion.is_some() || time.things_move)
+    }
+
+    /// Whether pixels of different rows see different moments.
     #[must_use]
     pub fn rows_differ(&self) -> bool {
-        self.motion().is_some() && self.shutter().is_some_and(Shutter::rows_differ)
+        self.is_timed() && self.shutter().is_some_and(Shutter::rows_differ)
     }
 
     /// The pose at a time of the frame's clock (s).
@@ -79,16 +104,18 @@ impl Camera {
     /// Carries chief rays, which stand as the frame's pose has them, to where the camera is when data layers see their
     /// rows.
     pub(crate) fn carry_chief(&self, rows: &[f64], rays: &mut RayBatch) {
-        let (Some(motion), Some(shutter)) = (self.motion(), self.shutter()) else { return };
+        let Some(shutter) = self.shutter().filter(|_| self.is_timed()) else { return };
         let mut last = None;
-        self.carry(rays, |i| {
-            // Of one row, all pixels have the pose.
-            let time = shutter.truth(rows[i].floor() + 0.5);
-            match last {
-                Some((at, pose)) if at == time => pose,
-                _ => last.insert((time, motion.at(time))).1,
-            }
-        });
+        if let Some(motion) = self.motion() {
+            self.carry(rays, |i| {
+                // Of one row, all pixels have the pose.
+                let time = shutter.truth(rows[i].floor() + 0.5);
+                match last {
+                    Some((at, pose)) if at == time => pose,
+                    _ => last.insert((time, motion.at(time))).1,
+                }
+            });
+        }
         rays.set_times(rows[..rays.len()].iter().map(|row| shutter.truth(row.floor() + 0.5)));
     }
 

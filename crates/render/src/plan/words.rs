@@ -33,14 +33,17 @@ pub(super) struct Grounds<'a> {
 /// Whether samples have times.
 fn explain_shutter(scene: &Scene) -> Option<Decision> {
     let shutter = scene.camera.shutter()?;
-    let why = match (scene.camera.motion(), shutter.is_fully_open()) {
-        (Some(_), _) => "the camera moves: samples of light have times of their row's exposure".to_owned(),
-        (None, true) => "nothing moves: rays have no times, and nothing is paid".to_owned(),
-        (None, false) => {
-            "nothing moves: rays have no times, and light is multiplied by what the shutter lets through".to_owned()
+    let why = match (scene.camera.is_timed(), shutter.is_fully_open()) {
+        (true, _) if scene.camera.motion().is_some() => {
+            "the camera moves: samples of light have times of their row's exposure"
+        }
+        (true, _) => "something moves: samples of light have times of their row's exposure",
+        (false, true) => "nothing moves: rays have no times, and nothing is paid",
+        (false, false) => {
+            "nothing moves: rays have no times, and light is multiplied by what the shutter lets through"
         }
     };
-    Some(Decision::new(Kind::Shutter, shutter.words(), why))
+    Some(Decision::new(Kind::Shutter, shutter.words(), why.to_owned()))
 }
 
 impl Plan {

@@ -15,7 +15,7 @@ mod overruled;
 mod overruled_camera;
 mod passes;
 mod second_readers;
-mod spectra;
 mod shutter;
+mod spectra;
 mod steps;
 mod textures;
