@@ -42,10 +42,10 @@ fn a_rolling_shutter_bends_an_edge_by_the_closed_form_of_each_motion() {
     let (line, exposure, edge, f) = (40e-6, 1e-3, 0.1, 300.0);
     let speed = 20_f64;
     let turn = 400_f64;
-    type Column = dyn Fn(f64, f64) -> f64;
+    type Case = (&'static str, [f64; 3], [f64; 3], Box<dyn Fn(f64, f64) -> f64>);
     // By time and the slope of the row upwards: the column's slope to the right.
     let [v, w] = [speed, turn.to_radians()];
-    let cases: [(&str, [f64; 3], [f64; 3], Box<Column>); 5] = [
+    let cases: [Case; 5] = [
         ("aside", [speed, 0.0, 0.0], [0.0; 3], Box::new(move |t, _| (edge - v * t) / 2.0)),
         ("forward", [0.0, 0.0, -speed], [0.0; 3], Box::new(move |t, _| edge / (2.0 - v * t))),
         (
@@ -170,7 +170,7 @@ fn moments_fill_the_open_time_evenly() {
         let mut chips = [0; 8];
         for k in 0..4000 {
             let time = shutter.moment(7.5, (f64::from(k) + 0.5) / 4000.0);
-            chips[(time / 0.001) as usize] += 1;
+            chips[(1..8).filter(|&k| time >= 0.001 * f64::from(k)).count()] += 1;
         }
         assert_eq!(chips, [1000, 1000, 0, 1000, 0, 0, 0, 1000]);
     }
@@ -234,7 +234,7 @@ fn a_cubic_is_exact_for_parabolas_and_whole_turns_are_made() {
     for (turns, rate) in [(2, 810.0_f64), (-1, -270.0)] {
         let poses = [
             quaternion(DVec3::Z, 0.0, [0.0; 3]),
-            quaternion(DVec3::Z, 1.570_796_326_794_896_6, [0.0; 3]),
+            quaternion(DVec3::Z, std::f64::consts::FRAC_PI_2, [0.0; 3]),
         ];
         let motion = trajectory(
             json!({ "type": "poses", "times": [0, 1], "poses": poses, "revolutions": [turns] }),
