@@ -20,6 +20,8 @@ pub struct RayBatch {
     t_max: Vec<f64>,
     /// Empty as long as no ray has any.
     endpoint_triangles: Vec<[PlacedTriangle; 2]>,
+    /// Empty as long as all rays are at time 0.
+    times: Vec<f64>,
     /// Neighbours in the batch run close together (pixels of one block, samples of one pixel), so
     /// they are worth tracing as packets. Scattered rays are traced one by one.
     pub coherent: bool,
@@ -126,6 +128,37 @@ impl RayBatch {
         (!self.endpoint_triangles.is_empty()).then_some(&*self.endpoint_triangles)
     }
 
+    /// When each ray is (s from the frame's time); empty when all are at 0.
+    #[must_use]
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// When ray `i` is (s from the frame's time).
+    #[must_use]
+    #[inline]
+    pub fn time(&self, i: usize) -> f64 {
+        self.times.get(i).copied().unwrap_or(0.0)
+    }
+
+    /// Says when the rays are (s from the frame's time): one time a ray, or none when all are at 0.
+    ///
+    /// # Panics
+    ///
+    /// When there are other than as many times as rays, or none.
+    pub fn set_times(&mut self, times: impl IntoIterator<Item = f64>) {
+        self.times.clear();
+        self.times.extend(times);
+        assert!(self.times.is_empty() || self.times.len() == self.len(), "a time for each ray");
+    }
+
+    /// Says when the last rays are, as many as there are `times` (s from the frame's time).
+    pub fn end_at_times(&mut self, times: impl ExactSizeIterator<Item = f64>) {
+        let first = self.len() - times.len();
+        self.times.resize(first, 0.0);
+        self.times.extend(times);
+    }
+
     /// The origin of ray `i` (m).
     #[must_use]
     pub fn origin(&self, i: usize) -> DVec3 {
@@ -153,10 +186,11 @@ impl RayBatch {
     pub fn clear(&mut self) {
         self.arrays().for_each(Vec::clear);
         self.endpoint_triangles.clear();
+        self.times.clear();
     }
 
     /// Makes room for `len` rays without limits and without triangles at their ends, whose origins and
-    /// directions are to be set; memory is kept.
+    /// directions are to be set, at time 0; memory is kept.
     pub fn reset(&mut self, len: usize) {
         for array in self.origins.iter_mut().chain(&mut self.directions) {
             array.resize(len, 0.0);
@@ -164,12 +198,14 @@ impl RayBatch {
         refill(&mut self.t_min, len, 0.0);
         refill(&mut self.t_max, len, f64::INFINITY);
         self.endpoint_triangles.clear();
+        self.times.clear();
     }
 
     /// Takes the rays of `other`; memory is kept.
     pub fn copy_from(&mut self, other: &Self) {
         self.arrays().zip(other.shared_arrays()).for_each(|(own, other)| own.clone_from(other));
         self.endpoint_triangles.clone_from(&other.endpoint_triangles);
+        self.times.clone_from(&other.times);
         self.coherent = other.coherent;
         self.from_surface = other.from_surface;
         self.precision = other.precision;
@@ -183,7 +219,11 @@ impl RayBatch {
         }
         self.endpoint_triangles.clear();
         if let Some(triangles) = other.endpoint_triangles() {
-            self.endpoint_triangles.extend(order.map(|i| triangles[i]));
+            self.endpoint_triangles.extend(order.clone().map(|i| triangles[i]));
+        }
+        self.times.clear();
+        if !other.times.is_empty() {
+            self.times.extend(order.map(|i| other.times[i]));
         }
         self.coherent = other.coherent;
         self.from_surface = other.from_surface;
@@ -203,6 +243,10 @@ impl RayBatch {
             kept()
                 .for_each(|(to, from)| self.endpoint_triangles[to] = self.endpoint_triangles[from]);
             self.endpoint_triangles.truncate(count);
+        }
+        if !self.times.is_empty() {
+            kept().for_each(|(to, from)| self.times[to] = self.times[from]);
+            self.times.truncate(count);
         }
     }
 
@@ -251,6 +295,7 @@ impl RayBatch {
         if !self.endpoint_triangles.is_empty() {
             self.endpoint_triangles.resize(len, [[MISS; 2]; 2]);
         }
+        self.extend_times();
     }
 
     /// Appends the `picked` rays of a block, one array an axis, which count hits from their origins as
@@ -272,6 +317,7 @@ impl RayBatch {
         if !self.endpoint_triangles.is_empty() {
             self.endpoint_triangles.resize(len, [[MISS; 2]; 2]);
         }
+        self.extend_times();
     }
 
     /// Says of the last rays, as many as `triangles` there are, which triangles are at their ends.
@@ -291,6 +337,15 @@ impl RayBatch {
         }
         self.t_min.push(t_min);
         self.t_max.push(t_max);
+        self.extend_times();
+    }
+
+    /// Puts new rays at time 0, when others are not.
+    #[inline]
+    fn extend_times(&mut self) {
+        if !self.times.is_empty() {
+            self.times.resize(self.t_min.len(), 0.0);
+        }
     }
 
     fn arrays(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
@@ -422,6 +477,7 @@ mod tests {
         let len = rays.len();
         assert!(rays.shared_arrays().all(|array| array.len() == len), "{rays:?}");
         assert!(rays.endpoint_triangles().is_none_or(|all| all.len() == len), "{rays:?}");
+        assert!(rays.times().is_empty() || rays.times().len() == len, "{rays:?}");
     }
 
     #[test]
@@ -440,14 +496,20 @@ mod tests {
         assert_eq!(rays.t_max(), [f64::INFINITY, 2.0, 1.0, f64::INFINITY, f64::INFINITY]);
 
         let mut picked = RayBatch::default();
+        assert_eq!((rays.times(), rays.time(3)), (&[][..], 0.0));
+        rays.set_times((0..5).map(f64::from));
         picked.gather(&rays, [1, 4, 0].into_iter());
+        assert_eq!(picked.times(), [1.0, 4.0, 0.0]);
+        picked.push(origin, direction);
+        assert_eq!(picked.times(), [1.0, 4.0, 0.0, 0.0]);
         assert_sound(&picked);
-        assert_eq!(picked.endpoint_triangles(), Some(&[[[3, 4], [5, 6]], none, none][..]));
+        assert_eq!(picked.endpoint_triangles(), Some(&[[[3, 4], [5, 6]], none, none, none][..]));
         assert_eq!(picked.origin(1), DVec3::splat(7.0));
 
         rays.retain(|i| i % 2 == 1);
         assert_sound(&rays);
         assert_eq!((rays.len(), rays.t_max()[0]), (2, 2.0));
+        assert_eq!(rays.times(), [1.0, 3.0]);
 
         rays.reset(3);
         assert_sound(&rays);

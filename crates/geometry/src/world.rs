@@ -4,9 +4,11 @@
 //! Triangles without an area are points or lines: no ray hits them, and builders of trees need not bear
 //! them, so accelerators leave them out ([`AreaTest`]).
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 
-use crate::{Mesh, Transform};
+use crate::{Mesh, Motion, Transform};
 
 /// One mesh at one place. A mesh placed twice is stored once.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,15 +24,27 @@ pub struct Placement {
     pub node: u32,
     /// Index into the scene's materials.
     pub material: u32,
-    /// From the mesh's frame to the world (m).
+    /// From the mesh's frame to the world (m), at the frame's time.
     pub world_from_mesh: Transform,
+    /// The same at other times; `None` for what stands still.
+    pub motion: Option<Arc<Motion>>,
 }
 
 impl Placement {
     /// A mesh at a place: of the first object, node and material.
     #[must_use]
     pub fn of(mesh: u32, world_from_mesh: Transform) -> Self {
-        Self { mesh, object: 0, instance: 0, node: 0, material: 0, world_from_mesh }
+        Self { mesh, object: 0, instance: 0, node: 0, material: 0, world_from_mesh, motion: None }
+    }
+
+    /// From the mesh's frame to the world (m) at `time` (s from the frame's time).
+    #[must_use]
+    #[inline]
+    pub fn world_from_mesh_at(&self, time: f64) -> Transform {
+        match &self.motion {
+            None => self.world_from_mesh,
+            Some(motion) => motion.at(time),
+        }
     }
 }
 
@@ -55,9 +69,11 @@ impl Geometry {
     #[must_use]
     pub fn has_surfaces_of(&self, other: &Self) -> bool {
         let stands = |p: &Placement| (p.mesh, p.world_from_mesh);
+        let moves = |p: &Placement| p.motion.clone();
         self.meshes.len() == other.meshes.len()
             && self.meshes.iter().zip(&other.meshes).all(|(own, other)| own.has_surface_of(other))
             && self.placements.iter().map(stands).eq(other.placements.iter().map(stands))
+            && self.placements.iter().map(moves).eq(other.placements.iter().map(moves))
     }
 
     /// Whether all is as in `other`, whose meshes are the same in memory.
@@ -84,6 +100,12 @@ impl Geometry {
     #[must_use]
     pub fn mesh_of(&self, placement: &Placement) -> &Mesh {
         &self.meshes[placement.mesh as usize]
+    }
+
+    /// Whether any placement has a motion.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.placements.iter().any(|placement| placement.motion.is_some())
     }
 
     /// How often each mesh is placed.

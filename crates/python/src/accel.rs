@@ -37,8 +37,15 @@ impl Accel {
         let (vertices, faces) = (triples("vertices", &vertices)?, triples("faces", &faces)?);
         let mesh = Mesh::from_arrays("mesh", &vertices, &faces).map_err(refused)?;
         let world_from_mesh = Transform::IDENTITY;
-        let placement =
-            Placement { mesh: 0, object: 0, instance: 0, node: 0, material: 0, world_from_mesh };
+        let placement = Placement {
+            mesh: 0,
+            object: 0,
+            instance: 0,
+            node: 0,
+            material: 0,
+            world_from_mesh,
+            motion: None,
+        };
         let geometry = Arc::new(Geometry { meshes: vec![mesh], placements: vec![placement] });
         let stop = Stop::default();
         let build = || {

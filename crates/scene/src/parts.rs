@@ -142,6 +142,7 @@ impl Parts {
                     node,
                     material,
                     world_from_mesh: copy.then_inner(&placement.model_from_mesh),
+                    motion: None,
                 });
             self.geometry.placements.extend(copies);
         }

@@ -148,7 +148,7 @@ fn baked(geometry: &Geometry) -> Arc<Geometry> {
         baked.placements.push(Placement {
             mesh: index,
             world_from_mesh: Transform::IDENTITY,
-            ..*placement
+            ..placement.clone()
         });
     }
     Arc::new(baked)

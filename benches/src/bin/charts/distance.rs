@@ -92,6 +92,7 @@ fn errors(
         node: mesh,
         material: 0,
         world_from_mesh,
+        motion: None,
     };
     geometry.placements.push(place(0, moved));
     if is_wide {

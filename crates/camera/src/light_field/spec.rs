@@ -14,6 +14,7 @@ use crate::lens::source::{FocusDistance, PlacedSpec, Setup, in_camera};
 use crate::lens::spec::{ThinLensCameraSpec, place};
 use crate::lens::{LensCamera, LensSource};
 use crate::{CameraError, Pose, PoseSpec, SensorSpec};
+use crate::{CameraMotionSpec, ShutterSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_optics::element::{
     ApertureSpec, ElementSpec, Gaps, Grid, LensletShape, LensletSpec, LossesSpec,
@@ -70,6 +71,12 @@ pub struct LightFieldSpec {
     /// is in focus.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseSpec>,
+    /// When rows are open to light; all together, for as long as the sensor exposes, when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shutter: Option<ShutterSpec>,
+    /// How the camera moves; it stands still when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<CameraMotionSpec>,
     /// The grid of pixels of the sensor behind the lenslets.
     #[serde(default)]
     pub sensor: SensorSpec,
@@ -208,6 +215,8 @@ impl LightFieldSpec {
                     sensor_decentre: Default::default(),
                     losses: LossesSpec::default(),
                     pose: None,
+                    shutter: None,
+                    motion: None,
                     sensor: SensorSpec::default(),
                 };
                 thin.train(*focal_length, resolve)?

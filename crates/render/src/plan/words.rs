@@ -30,6 +30,22 @@ pub(super) struct Grounds<'a> {
     pub(super) why_precision: String,
 }
 
+/// Whether samples have times.
+fn explain_shutter(scene: &Scene) -> Option<Decision> {
+    let shutter = scene.camera.shutter()?;
+    let why = match (scene.camera.is_timed(), shutter.is_fully_open()) {
+        (true, _) if scene.camera.motion().is_some() => {
+            "the camera moves: samples of light have times of their row's exposure"
+        }
+        (true, _) => "something moves: samples of light have times of their row's exposure",
+        (false, true) => "nothing moves: rays have no times, and nothing is paid",
+        (false, false) => {
+            "nothing moves: rays have no times, and light is multiplied by what the shutter lets through"
+        }
+    };
+    Some(Decision::new(Kind::Shutter, shutter.words(), why.to_owned()))
+}
+
 impl Plan {
     /// The decisions: rays, samples, wavelengths, sensor and lens; surfaces and lights; how exactly, and in how
     /// much memory.
@@ -49,6 +65,7 @@ impl Plan {
         let (bands, because) = expose::explain_bands(scene, grounds.bands);
         decisions.push(Decision::new(Kind::Wavelengths, bands, because));
         decisions.extend(expose::explain_sensor(scene));
+        decisions.extend(explain_shutter(scene));
         decisions.extend(self.explain_denoising());
         decisions.extend(self.explain_lens(scene));
         decisions.extend(self.band_paths.decision(scene));

@@ -15,6 +15,7 @@ mod overruled;
 mod overruled_camera;
 mod passes;
 mod second_readers;
+mod shutter;
 mod spectra;
 mod steps;
 mod textures;

@@ -16,6 +16,7 @@ fn geometry(import: &Import) -> Geometry {
         node: 0,
         material: p.material,
         world_from_mesh: p.model_from_mesh,
+        motion: None,
     };
     Geometry {
         meshes: import.meshes.clone(),

@@ -9,6 +9,7 @@ mod documents;
 mod models;
 mod rigs;
 mod scenes;
+mod shutter_faults;
 mod specs;
 mod trajectories;
 

@@ -1,0 +1,510 @@
+//! Rigid and stretching motion within an exposure: where a body is at any time, exactly in f64.
+//!
+//! Between keys the translation is linear or a cubic (Catmull & Rom, *A class of local interpolating
+//! splines*, 1974, with the three-point tangents of uneven times), the rotation goes the shorter way at
+//! constant speed (Shoemake, *Animating rotation with quaternion curves*, 1985) and the scale is linear.
+//! A steady motion has a velocity and a spin, of any number of revolutions, about an axis through a point.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use crate::{Bounds, Transform};
+
+/// How a body moves: times are in s from the frame's time.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Motion {
+    keys: Vec<Key>,
+    interpolation: Interpolation,
+    steady: Option<Steady>,
+    /// What is applied first.
+    inner: Transform,
+}
+
+/// A pose at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Key {
+    time: f64,
+    translation: DVec3,
+    /// What rounding took from the translation (m).
+    low: DVec3,
+    rotation: DQuat,
+    scale: DVec3,
+}
+
+/// How translations go between keys.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Interpolation {
+    /// Along straight lines.
+    #[default]
+    Linear,
+    /// Along a Catmull–Rom spline.
+    Cubic,
+}
+
+/// A constant velocity and a constant spin, which are those of the body at all times; at time 0 it is
+/// where it would stand without them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Steady {
+    /// Metres a second; carries the axis along.
+    pub velocity: DVec3,
+    /// The axis, counter-clockwise as it points at the viewer; of any length but 0.
+    pub axis: DVec3,
+    /// Radians a second.
+    pub rate: f64,
+    /// A point on the axis at time 0 (m).
+    pub about: DVec3,
+}
+
+/// Why keys or a steady motion make no motion.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// No key, or not one time for each transform.
+    #[error(
+        "there are {times} times and {transforms} transforms; give as many times as transforms, at least one"
+    )]
+    Count {
+        /// Times that were given.
+        times: usize,
+        /// Transforms that were given.
+        transforms: usize,
+    },
+    /// A number is infinite or none.
+    #[error("{0} is not finite; give finite numbers")]
+    NotFinite(String),
+    /// Times that do not increase.
+    #[error(
+        "time {index} ({time} s) is not after the one before it; sort the times and leave out equal ones"
+    )]
+    Order {
+        /// Which time, counted from 0.
+        index: usize,
+        /// That time (s).
+        time: f64,
+    },
+    /// A transform that is no rotation and scale along the axes.
+    #[error("transform {0} shears; give a translation, a rotation and a scale")]
+    Shear(usize),
+    /// A scale that is 0 at a key or on the way to the next one.
+    #[error("the scale passes through 0 at or after transform {0}; keep its sign from key to key")]
+    Scale(usize),
+    /// A spin about no axis.
+    #[error("the spin has an axis of length 0; give a direction")]
+    Axis,
+}
+
+/// Cosines between axes below which a matrix does not shear: ten times what f32 matrices of files have.
+const ORTHOGONAL: f64 = 1e-6;
+
+/// Steps of a sweep between two keys.
+const STEPS: u32 = 64;
+
+impl Motion {
+    /// A motion through `transforms` at `times` (s): held before the first and after the last one.
+    ///
+    /// # Errors
+    ///
+    /// [`MotionError`], when times do not increase, a number is not finite, or a transform shears or passes
+    /// through a scale of 0.
+    pub fn through(
+        times: &[f64],
+        transforms: &[Transform],
+        interpolation: Interpolation,
+    ) -> Result<Self, MotionError> {
+        if times.is_empty() || times.len() != transforms.len() {
+            let (times, transforms) = (times.len(), transforms.len());
+            return Err(MotionError::Count { times, transforms });
+        }
+        let mut keys: Vec<Key> = Vec::with_capacity(times.len());
+        for (i, (&time, transform)) in times.iter().zip(transforms).enumerate() {
+            if !time.is_finite() {
+                return Err(MotionError::NotFinite(format!("time {i}")));
+            }
+            if !transform.is_finite() {
+                return Err(MotionError::NotFinite(format!("transform {i}")));
+            }
+            let mut key = Key::new(i, time, transform)?;
+            if let Some(last) = keys.last() {
+                if time <= last.time {
+                    return Err(MotionError::Order { index: i, time });
+                }
+                // Of both quaternions of a rotation the nearer one; of mirrors, whose axis may be any, the first key's.
+                if last.rotation.dot(key.rotation) < 0.0 {
+                    key.rotation = -key.rotation;
+                }
+                if (last.scale * key.scale).min_element() <= 0.0 {
+                    return Err(MotionError::Scale(i - 1));
+                }
+            }
+            keys.push(key);
+        }
+        Ok(Self { keys, interpolation, ..Self::default() })
+    }
+
+    /// A steady motion.
+    ///
+    /// # Errors
+    ///
+    /// [`MotionError`], when a number is not finite or the axis of a spin has no length.
+    pub fn steady(steady: Steady) -> Result<Self, MotionError> {
+        Self::default().with_steady(steady)
+    }
+
+    /// The same motion of a body that moves steadily in the frame that is moved.
+    ///
+    /// # Errors
+    ///
+    /// As those of [`Self::steady`].
+    pub fn with_steady(mut self, mut steady: Steady) -> Result<Self, MotionError> {
+        let Steady { velocity, axis, rate, about } = steady;
+        let vectors = [("the velocity", velocity), ("the axis", axis), ("the point", about)];
+        for (what, vector) in vectors {
+            if !vector.is_finite() {
+                return Err(MotionError::NotFinite(what.to_owned()));
+            }
+        }
+        if !rate.is_finite() {
+            return Err(MotionError::NotFinite("the spin's rate".to_owned()));
+        }
+        if rate != 0.0 {
+            steady.axis = axis.try_normalize().ok_or(MotionError::Axis)?;
+        }
+        self.steady = Some(steady);
+        Ok(self)
+    }
+
+    /// The motion of what `inner` places in the frame that moves.
+    #[must_use]
+    pub fn then_inner(&self, inner: &Transform) -> Self {
+        Self { inner: self.inner.then_inner(inner), ..self.clone() }
+    }
+
+    /// The transform at `time` (s).
+    #[must_use]
+    pub fn at(&self, time: f64) -> Transform {
+        let inner = match &self.steady {
+            Some(steady) => steady.at(time).then_inner(&self.inner),
+            None => self.inner,
+        };
+        if self.keys.is_empty() { inner } else { self.key_at(time).transform().then_inner(&inner) }
+    }
+
+    /// From when to when it moves (s): infinite for a steady motion.
+    #[must_use]
+    pub fn span(&self) -> [f64; 2] {
+        let is_steady = self.steady.is_some_and(|steady| steady.moves());
+        match (self.keys.first(), self.keys.last()) {
+            (Some(first), Some(last)) if !is_steady => [first.time, last.time],
+            _ => [f64::NEG_INFINITY, f64::INFINITY],
+        }
+    }
+
+    /// Whether anything differs at two times of `exposure` (s, first and last).
+    #[must_use]
+    pub fn moves_within(&self, [open, close]: [f64; 2]) -> bool {
+        let overlaps = |a: &Key, b: &Key| a.time < close && b.time > open;
+        open < close
+            && (self.steady.is_some_and(|steady| steady.moves())
+                || self.keys.windows(2).any(|k| overlaps(&k[0], &k[1]) && !k[0].is_at(&k[1]))
+                || (self.interpolation == Interpolation::Cubic && self.keys.len() > 2))
+    }
+
+    /// A box (m) around all places of the box `local` between the times of `exposure` (s, first and last).
+    #[must_use]
+    pub fn swept(&self, local: Bounds, [open, close]: [f64; 2]) -> Bounds {
+        let mut swept = Bounds::EMPTY;
+        if local.is_empty() {
+            return swept;
+        }
+        let mut times = vec![open];
+        times.extend(self.keys.iter().map(|key| key.time).filter(|&t| open < t && t < close));
+        times.push(close);
+        let reach =
+            local.corners().iter().fold(0.0f64, |r, &p| r.max(self.inner.point(p).length()));
+        for span in times.windows(2) {
+            let step = (span[1] - span[0]) / f64::from(STEPS);
+            // Each point is within half a step of one of the places looked at.
+            let pad = DVec3::splat(self.speed(reach, [span[0], span[1]]) * step * 0.5);
+            for i in 0..=STEPS {
+                let place = self.at(span[0] + step * f64::from(i));
+                for corner in local.corners().map(|p| place.point(p)) {
+                    let size = corner.abs() * (4.0 * f64::EPSILON);
+                    swept.include(corner - pad - size);
+                    swept.include(corner + pad + size);
+                }
+            }
+        }
+        swept
+    }
+
+    /// At most how fast (m/s) any point moves that `inner` brings within `reach` (m) of its frame's origin.
+    fn speed(&self, reach: f64, [open, close]: [f64; 2]) -> f64 {
+        let (mut reach, mut speed) = (reach, 0.0);
+        if let Some(steady) = &self.steady {
+            let radius = reach + steady.about.length();
+            speed = steady.velocity.length() + steady.rate.abs() * radius;
+            let time = open.abs().max(close.abs());
+            reach += 2.0 * steady.about.length() + steady.velocity.length() * time;
+        }
+        let mut fastest: f64 = speed * self.keys.first().map_or(1.0, Key::stretch);
+        for (i, pair) in self.keys.windows(2).enumerate() {
+            let [a, b] = [pair[0], pair[1]];
+            if a.time > close || b.time < open {
+                continue;
+            }
+            let seconds = b.time - a.time;
+            let [m, n] = self.tangents(i);
+            let chord = (b.translation - a.translation) / seconds;
+            // The derivative's control points (Farin, *Curves and Surfaces for CAGD*, 4.3).
+            let middle = chord * 3.0 - m - n;
+            let along = m.length().max(n.length()).max(middle.length());
+            let stretch = a.stretch().max(b.stretch());
+            let turn = a.rotation.angle_between(b.rotation) / seconds;
+            let stretching = (b.scale - a.scale).abs().max_element() / seconds;
+            fastest =
+                fastest.max(along + turn * stretch * reach + stretching * reach + stretch * speed);
+        }
+        // Roundings of the above.
+        fastest * (1.0 + 1e-9)
+    }
+
+    /// The velocities (m/s) at both ends of the way from key `i` to the next one.
+    fn tangents(&self, i: usize) -> [DVec3; 2] {
+        let place = |k: usize| self.keys[k].translation;
+        let slope =
+            |k: usize| (place(k + 1) - place(k)) / (self.keys[k + 1].time - self.keys[k].time);
+        if self.interpolation == Interpolation::Linear {
+            return [slope(i); 2];
+        }
+        let last = self.keys.len() - 1;
+        let tangent = |k: usize| {
+            if k == 0 || k == last {
+                return slope(k.min(last - 1));
+            }
+            let (before, after) = (
+                self.keys[k].time - self.keys[k - 1].time,
+                self.keys[k + 1].time - self.keys[k].time,
+            );
+            (slope(k - 1) * after + slope(k) * before) / (before + after)
+        };
+        [tangent(i), tangent(i + 1)]
+    }
+
+    fn key_at(&self, time: f64) -> Key {
+        let next = self.keys.partition_point(|key| key.time <= time);
+        let Some(i) = next.checked_sub(1) else { return self.keys[0] };
+        let a = self.keys[i];
+        let Some(&b) = self.keys.get(next) else { return a };
+        let seconds = b.time - a.time;
+        let s = (time - a.time) / seconds;
+        let way = b.translation - a.translation;
+        let straight = way * s;
+        let moved = match self.interpolation {
+            Interpolation::Linear => straight,
+            Interpolation::Cubic => {
+                // Hermite's cubic as the chord and what the tangents add to it.
+                let [m, n] = self.tangents(i).map(|tangent| tangent * seconds - way);
+                straight + (m * (1.0 - s) - n * s) * (s * (1.0 - s))
+            }
+        };
+        Key {
+            time,
+            translation: a.translation,
+            low: a.low.lerp(b.low, s) + moved,
+            rotation: turned(a.rotation, b.rotation, s),
+            scale: a.scale.lerp(b.scale, s),
+        }
+    }
+}
+
+impl Key {
+    fn new(i: usize, time: f64, transform: &Transform) -> Result<Self, MotionError> {
+        let axes = transform.linear;
+        let lengths = DVec3::new(axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length());
+        if lengths.min_element() == 0.0 {
+            return Err(MotionError::Scale(i));
+        }
+        let [x, y, z] = [axes.x_axis / lengths.x, axes.y_axis / lengths.y, axes.z_axis / lengths.z];
+        if x.dot(y).abs().max(y.dot(z).abs()).max(z.dot(x).abs()) > ORTHOGONAL {
+            return Err(MotionError::Shear(i));
+        }
+        // A mirror is one of the first axis.
+        let sign = transform.handedness();
+        let rotation = DQuat::from_mat3(&DMat3::from_cols(x * sign, y, z)).normalize();
+        let scale = lengths * DVec3::new(sign, 1.0, 1.0);
+        let (translation, low) = (transform.translation, transform.translation_low);
+        Ok(Self { time, translation, low, rotation, scale })
+    }
+
+    fn transform(&self) -> Transform {
+        let place = Transform::from_trs(self.translation, self.rotation, self.scale);
+        let low = Transform::new(DMat3::IDENTITY, self.low);
+        // The sum keeps what rounding takes from it.
+        low.then_inner(&place)
+    }
+
+    fn stretch(&self) -> f64 {
+        self.scale.abs().max_element()
+    }
+
+    fn is_at(&self, other: &Self) -> bool {
+        Self { time: other.time, ..*self } == *other
+    }
+}
+
+impl Steady {
+    fn moves(&self) -> bool {
+        self.velocity != DVec3::ZERO || self.rate != 0.0
+    }
+
+    fn at(&self, time: f64) -> Transform {
+        let moved = self.velocity * time;
+        if self.rate == 0.0 {
+            return Transform::new(DMat3::IDENTITY, moved);
+        }
+        let turn = DMat3::from_axis_angle(self.axis, self.rate * time);
+        Transform::new(turn, self.about - turn * self.about + moved)
+    }
+}
+
+/// The rotation a share `s` of the way from `a` to `b`, which are in one half of the sphere: as `a` and a
+/// turn about one axis, which is exact for the least angles, too.
+fn turned(a: DQuat, b: DQuat, s: f64) -> DQuat {
+    let way = a.conjugate() * b;
+    let sine = way.xyz().length();
+    if sine == 0.0 {
+        return a;
+    }
+    let half = sine.atan2(way.w) * s;
+    let axis = way.xyz() / sine;
+    let turn = DQuat::from_vec4((axis * half.sin()).extend(half.cos()));
+    (a * turn).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trs(translation: [f64; 3], axis: DVec3, angle: f64, scale: [f64; 3]) -> Transform {
+        let rotation = DQuat::from_axis_angle(axis.normalize(), angle);
+        Transform::from_trs(translation.into(), rotation, scale.into())
+    }
+
+    fn distance(a: &Transform, b: &Transform) -> f64 {
+        let points = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        points.iter().map(|&p| a.point(p).distance(b.point(p))).fold(0.0, f64::max)
+    }
+
+    /// A few roundings of numbers of size 1 to 10.
+    const ROUNDING: f64 = 1e-14;
+
+    #[test]
+    fn a_spin_turns_by_any_number_of_revolutions() {
+        let (axis, about) = (DVec3::new(1.0, 2.0, -1.0), DVec3::new(0.5, -2.0, 3.0));
+        let unit = axis.normalize();
+        for revolutions in [0.0, 0.25, 1.0, 2.0, -3.5, 10.1] {
+            let rate = std::f64::consts::TAU * revolutions;
+            let velocity = DVec3::new(1.0, 0.0, -2.0);
+            let motion = Motion::steady(Steady { velocity, axis, rate, about }).expect("sound");
+            for time in [-1.0, 0.0, 0.3, 0.5, 1.0] {
+                for p in [DVec3::ZERO, DVec3::X, DVec3::new(3.0, 1.0, 2.0)] {
+                    // Rodrigues's formula.
+                    let (r, angle) = (p - about, rate * time);
+                    let expected = about
+                        + velocity * time
+                        + r * angle.cos()
+                        + unit.cross(r) * angle.sin()
+                        + unit * unit.dot(r) * (1.0 - angle.cos());
+                    assert!(motion.at(time).point(p).distance(expected) < 1e-13);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn keys_are_met_held_and_joined_as_the_formulas_say() {
+        let times = [-0.5, 0.25, 1.0, 3.0];
+        let poses = [
+            trs([0.0; 3], DVec3::Z, 0.1, [1.0, 2.0, 3.0]),
+            trs([1.0, 2.0, 0.0], DVec3::Z, 1.1, [1.0, 2.0, 4.0]),
+            trs([2.0, 2.0, 5.0], DVec3::Z, 3.1, [1.0, 2.0, 4.0]),
+            trs([-2.0, 2.0, 5.0], DVec3::Z, 5.1, [1.0; 3]),
+        ];
+        for interpolation in [Interpolation::Linear, Interpolation::Cubic] {
+            let motion = Motion::through(&times, &poses, interpolation).expect("sound");
+            assert_eq!(motion.span(), [-0.5, 3.0]);
+            for (time, pose) in times.iter().zip(&poses) {
+                assert!(distance(&motion.at(*time), pose) < ROUNDING);
+            }
+            assert_eq!(motion.at(-7.0), motion.at(-0.5));
+            assert_eq!(motion.at(9.0), motion.at(3.0));
+            // The turn is about one axis all the time: 1 rad, then 2 rad in 0.75 s.
+            for (time, angle) in [(-0.125, 0.6), (0.625, 2.1), (0.8125, 2.6), (2.0, 4.1)] {
+                let place = motion.at(time).linear;
+                let x = place.x_axis.normalize();
+                assert!(x.distance(DVec3::new(f64::cos(angle), f64::sin(angle), 0.0)) < ROUNDING);
+            }
+        }
+        let linear = Motion::through(&times, &poses, Interpolation::Linear).expect("sound");
+        assert!(linear.at(0.625).translation.distance(DVec3::new(1.5, 2.0, 2.5)) < ROUNDING);
+    }
+
+    #[test]
+    fn a_cubic_gives_back_parabolas_at_uneven_times() {
+        let path = |t: f64| DVec3::new(1.0 + t, 2.0 * t - 3.0 * t * t, 0.5 * t * t);
+        let times = [0.0, 0.3, 0.5, 1.1, 1.2];
+        let poses = times.map(|t| Transform::new(DMat3::IDENTITY, path(t)));
+        let motion = Motion::through(&times, &poses, Interpolation::Cubic).expect("sound");
+        // Three-point tangents are exact for parabolas; the outermost spans have one-sided ones.
+        for time in [0.31, 0.4, 0.499, 0.7, 1.0, 1.1] {
+            assert!(motion.at(time).translation.distance(path(time)) < ROUNDING, "at {time}");
+        }
+    }
+
+    #[test]
+    fn a_sweep_holds_every_place_and_little_more() {
+        let local = Bounds { min: DVec3::new(-1.0, -0.1, 0.0), max: DVec3::new(2.0, 0.1, 0.3) };
+        let poses = [
+            trs([0.0; 3], DVec3::Z, 0.1, [1.0, 2.0, 3.0]),
+            trs([10.0, 2.0, 0.0], DVec3::X, 2.1, [1.0, 2.0, 4.0]),
+            trs([2.0, 9.0, 5.0], DVec3::Y, 3.1, [2.0, 2.0, 4.0]),
+        ];
+        let steady = Steady { velocity: DVec3::X, axis: DVec3::Y, rate: 20.0, about: DVec3::Z };
+        let keys = |kind| Motion::through(&[0.0, 0.4, 1.0], &poses, kind).expect("sound");
+        let motions = [
+            keys(Interpolation::Linear),
+            keys(Interpolation::Cubic),
+            Motion::steady(steady).expect("sound"),
+            keys(Interpolation::Cubic).with_steady(steady).expect("sound"),
+        ];
+        for motion in &motions {
+            let exposure = [-0.2, 0.9];
+            let swept = motion.swept(local, exposure);
+            let mut tight = Bounds::EMPTY;
+            for i in 0..=5000 {
+                let place = motion.at(-0.2 + 1.1 * f64::from(i) / 5000.0);
+                local.corners().iter().for_each(|&corner| tight.include(place.point(corner)));
+            }
+            assert_eq!(swept.union(tight), swept, "{motion:?}");
+            assert!(swept.diagonal() < 2.0 * tight.diagonal(), "{swept:?} around {tight:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_motion_is_refused() {
+        let one = Transform::IDENTITY;
+        let through = |times: &[f64], poses: &[Transform]| {
+            Motion::through(times, poses, Interpolation::Linear).expect_err("refused")
+        };
+        assert!(matches!(through(&[], &[]), MotionError::Count { .. }));
+        assert!(matches!(through(&[0.0, f64::NAN], &[one; 2]), MotionError::NotFinite(_)));
+        assert!(matches!(through(&[0.0, 0.0], &[one; 2]), MotionError::Order { index: 1, .. }));
+        assert!(matches!(through(&[1.0, 0.0], &[one; 2]), MotionError::Order { index: 1, .. }));
+        let scaled = |s| Transform::new(DMat3::from_diagonal(s), DVec3::ZERO);
+        let mirrored = scaled(DVec3::new(-1.0, 1.0, 1.0));
+        assert_eq!(through(&[0.0, 1.0], &[one, mirrored]), MotionError::Scale(0));
+        assert_eq!(through(&[0.0], &[scaled(DVec3::X)]), MotionError::Scale(0));
+        let shear = DMat3::from_cols(DVec3::X, DVec3::ONE, DVec3::Z);
+        assert_eq!(through(&[0.0], &[Transform::new(shear, DVec3::ZERO)]), MotionError::Shear(0));
+        let spin = Steady { rate: 1.0, ..Steady::default() };
+        assert_eq!(Motion::steady(spin), Err(MotionError::Axis));
+    }
+}
