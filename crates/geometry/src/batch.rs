@@ -386,6 +386,8 @@ pub struct HitBatch {
     /// Unit geometric normal in world space on the triangle's front (0 on a miss), one array an
     /// axis. It does not face the ray: the sign of its product with the direction tells the side.
     pub normal: [Vec<f64>; 3],
+    /// When the rays are, where something moves; else empty.
+    times: Vec<f64>,
 }
 
 impl HitBatch {
@@ -400,6 +402,7 @@ impl HitBatch {
         refill(&mut self.t, len, f64::INFINITY);
         refill(&mut self.placement, len, MISS);
         refill(&mut self.triangle, len, MISS);
+        self.times.clear();
         if self.detail == Detail::Surface {
             for array in [&mut self.u, &mut self.v].into_iter().chain(&mut self.normal) {
                 refill(array, len, 0.0);
@@ -412,11 +415,25 @@ impl HitBatch {
         self.t.resize(len, f64::INFINITY);
         self.placement.resize(len, MISS);
         self.triangle.resize(len, MISS);
+        self.times.clear();
         if self.detail == Detail::Surface {
             for array in [&mut self.u, &mut self.v].into_iter().chain(&mut self.normal) {
                 array.resize(len, 0.0);
             }
         }
+    }
+
+    /// Says when the rays are (s from the frame's time), each or, by no times, all at 0; memory is kept.
+    pub fn set_times(&mut self, times: &[f64]) {
+        self.times.clear();
+        self.times.extend_from_slice(times);
+    }
+
+    /// When ray `i` is (s from the frame's time), as far as that counts: 0 where nothing moves.
+    #[must_use]
+    #[inline]
+    pub fn time(&self, i: usize) -> f64 {
+        self.times.get(i).copied().unwrap_or(0.0)
     }
 
     /// Turns hit `i` into a miss.

@@ -207,6 +207,15 @@ impl Motion {
                 || (self.interpolation == Interpolation::Cubic && self.keys.len() > 2))
     }
 
+    /// A bound of the factor by which any length is stretched at any time.
+    #[must_use]
+    pub fn stretch(&self) -> f64 {
+        let [x, y, z] =
+            [self.inner.linear.x_axis, self.inner.linear.y_axis, self.inner.linear.z_axis];
+        let inner = DVec3::new(x.length(), y.length(), z.length()).length();
+        inner * self.keys.iter().map(Key::stretch).reduce(f64::max).unwrap_or(1.0)
+    }
+
     /// A box (m) around all places of the box `local` between the times of `exposure` (s, first and last).
     #[must_use]
     pub fn swept(&self, local: Bounds, [open, close]: [f64; 2]) -> Bounds {
