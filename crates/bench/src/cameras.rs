@@ -256,6 +256,8 @@ impl Gauss {
             sensor_decentre: [Millimetres(sensor_decentre[0]), Millimetres(-sensor_decentre[1])],
             losses: Default::default(),
             pose: Some(self.pose.clone()),
+            shutter: None,
+            motion: None,
             sensor: SensorSpec {
                 resolution: self.resolution,
                 pixel_pitch: Some(Micrometres(1e3 * pitch)),

@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 use crate::framing::Subject;
 use crate::lens::{self, focused::View};
 use crate::{
-    BandGroup, BandLandings, CameraError, CameraRays, ChromaticRealLensCameraSpec, Distortion,
+    BandGroup, BandLandings, CameraError, CameraMotionSpec, CameraRays, CameraTime,
+    ChromaticRealLensCameraSpec, Distortion, Shutter, ShutterSpec, Trajectory,
     DistortionSpec, FilmSamples, Intrinsics, LensCamera, LensCameraSpec, LightField,
     LightFieldSpec, Orthographic, OrthographicSpec, Pinhole, PinholeSpec, PixelBlock, Pose,
     PoseSpec, RealLensCameraSpec, SensorSpec, ThinLensCameraSpec, ViewGrid,
@@ -62,10 +63,12 @@ macro_rules! for_each_kind {
 /// A camera ready to send rays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    pose: Pose,
+    pub(crate) pose: Pose,
     sensor: SensorSpec,
     projection: Projection,
     light_field: Option<Arc<LightField>>,
+    /// Its shutter and motion; `None` of a camera that stands still and is open all the time.
+    pub(crate) time: Option<Arc<CameraTime>>,
 }
 
 /// How a camera's rays run in its own frame.
@@ -107,6 +110,8 @@ impl CameraSpec {
             intrinsics: None,
             distortion: None,
             pose: Some(PoseSpec::from(pose)),
+            shutter: None,
+            motion: None,
             sensor: SensorSpec::new(resolution_of(aspect)),
         })
     }
@@ -118,6 +123,8 @@ impl CameraSpec {
         Self::Orthographic(OrthographicSpec {
             height: Some(Metres(height)),
             pose: Some(PoseSpec::from(pose)),
+            shutter: None,
+            motion: None,
             sensor: SensorSpec::new(resolution_of(aspect)),
         })
     }
@@ -140,7 +147,57 @@ impl CameraSpec {
     /// Whether the file says where the camera stands.
     #[must_use]
     pub fn has_pose(&self) -> bool {
-        for_each_kind!(self, spec => spec.pose.is_some())
+        for_each_kind!(self, spec => spec.pose.is_some()) || self.moves_through_poses()
+    }
+
+    /// When rows are open, as the file says.
+    #[must_use]
+    pub fn shutter(&self) -> Option<&ShutterSpec> {
+        for_each_kind!(self, spec => spec.shutter.as_ref())
+    }
+
+    /// The same, to be changed.
+    pub fn shutter_mut(&mut self) -> &mut Option<ShutterSpec> {
+        for_each_kind!(self, spec => &mut spec.shutter)
+    }
+
+    /// How the camera moves, as the file says.
+    #[must_use]
+    pub fn motion(&self) -> Option<&CameraMotionSpec> {
+        for_each_kind!(self, spec => spec.motion.as_ref())
+    }
+
+    /// The same, to be changed.
+    pub fn motion_mut(&mut self) -> &mut Option<CameraMotionSpec> {
+        for_each_kind!(self, spec => &mut spec.motion)
+    }
+
+    fn pose_mut(&mut self) -> &mut Option<PoseSpec> {
+        for_each_kind!(self, spec => &mut spec.pose)
+    }
+
+    fn moves_through_poses(&self) -> bool {
+        matches!(self.motion(), Some(CameraMotionSpec::Poses { .. }))
+    }
+
+    /// The shutter, and the trajectory of a camera whose pose is its poses'.
+    fn built_time(&self) -> Result<(Shutter, Option<Trajectory>), CameraError> {
+        let shutter = self.shutter().cloned().unwrap_or_default();
+        let shutter = shutter.build(self.sensor().resolution[1])?;
+        if shutter.rows_differ() && matches!(self, Self::LightFieldReference(_)) {
+            let why = "rows of a reference's views are no rows of a sensor, which are read one after another; \
+                       set \"global\"";
+            return Err(CameraError::new("shutter.type", why));
+        }
+        if !self.moves_through_poses() {
+            return Ok((shutter, None));
+        }
+        if for_each_kind!(self, spec => spec.pose.is_some()) {
+            let why = "is given beside `motion`, whose poses already say where the camera is; remove one";
+            return Err(CameraError::new("pose", why));
+        }
+        let trajectory = self.motion().map(|motion| motion.build(None)).transpose()?;
+        Ok((shutter, trajectory))
     }
 
     /// The sensor.
@@ -167,6 +224,39 @@ impl CameraSpec {
         resolve: Resolve<'_>,
     ) -> Result<Camera, CameraError> {
         self.sensor().check()?;
+        if self.shutter().is_none() && self.motion().is_none() {
+            return self.build_still(subject, resolve);
+        }
+        // The frame's pose is that at which data layers see the middle of the picture.
+        let (shutter, trajectory) = self.built_time()?;
+        let mut time = CameraTime { shutter, motion: None };
+        let middle = time.middle(self.sensor().resolution[1]);
+        let mut still = self.clone();
+        if let Some(trajectory) = &trajectory {
+            *still.pose_mut() =
+                Some(PoseSpec::from(trajectory.at(middle)));
+        }
+        let mut camera = still.build_still(subject, resolve)?;
+        let trajectory = match (trajectory, self.motion()) {
+            (None, Some(motion)) => Some(motion.build(Some(camera.pose))?),
+            (trajectory, _) => trajectory,
+        };
+        if let Some(trajectory) = trajectory {
+            camera.pose = trajectory.at(middle);
+            time.motion = Some(trajectory).filter(|it| !it.is_still(time.shutter.whole_span()));
+        }
+        if !camera.pose.is_finite() {
+            return Err(CameraError::new("motion", "leads to where numbers end"));
+        }
+        camera.time = Some(Arc::new(time));
+        Ok(camera)
+    }
+
+    fn build_still<'a, S: Into<Subject<'a>>>(
+        &self,
+        subject: impl FnOnce() -> S,
+        resolve: Resolve<'_>,
+    ) -> Result<Camera, CameraError> {
         let subject = || subject().into();
         let (mut sensor, mut light_field) = (self.sensor().clone(), None);
         let lens = |(pose, lens)| (pose, Projection::Lens(Arc::new(lens)));
@@ -201,7 +291,7 @@ impl CameraSpec {
         if !pose.is_finite() {
             return Err(CameraError::new("pose", "no finite place frames a scene of this size"));
         }
-        Ok(Camera { pose, sensor, projection, light_field })
+        Ok(Camera { pose, sensor, projection, light_field, time: None })
     }
 }
 
@@ -229,7 +319,8 @@ impl Camera {
     ) -> Result<Self, CameraError> {
         sensor.check()?;
         let (pose, lens) = lens::alone(train, focus, &sensor)?;
-        Ok(Self { pose, sensor, projection: Projection::Lens(Arc::new(lens)), light_field: None })
+        let projection = Projection::Lens(Arc::new(lens));
+        Ok(Self { pose, sensor, projection, light_field: None, time: None })
     }
 
     /// Columns and rows of the picture.
@@ -419,7 +510,11 @@ impl Camera {
             resolution: self.sensor.resolution.map(|side| (side / factor).max(1)),
             pixel_pitch: self.sensor.pixel_pitch.map(|pitch| Micrometres(pitch.0 * times)),
         };
-        Self { pose: self.pose, sensor, projection, light_field: self.light_field.clone() }
+        let time = self.time.as_ref().map(|time| {
+            let CameraTime { shutter, motion } = &**time;
+            Arc::new(CameraTime { shutter: shutter.coarser(times), motion: motion.clone() })
+        });
+        Self { pose: self.pose, sensor, projection, light_field: self.light_field.clone(), time }
     }
 
     /// Place and axes. `z` depths are measured from its position along its forward axis.
@@ -447,12 +542,22 @@ impl Camera {
             *v = f64::from(row) + 0.5;
         }
         self.aim(rays);
+        if self.motion().is_some() {
+            let rows: Vec<f64> = block.pixels().map(|(_, row)| f64::from(row) + 0.5).collect();
+            self.carry_chief(&rows, rays);
+        }
     }
 
     /// The chief rays of given places on the sensor: column and row coordinates (pixels) counted
     /// from the outer corner of the top left pixel, whose centre is (0.5, 0.5). `rays` is refilled;
     /// a longer array's surplus is left out.
     pub fn rays_through(&self, columns: &[f64], rows: &[f64], rays: &mut RayBatch) {
+        self.rays_at(columns, rows, rays);
+        self.carry_chief(rows, rays);
+    }
+
+    /// The same of a camera that stands in the frame's pose.
+    fn rays_at(&self, columns: &[f64], rows: &[f64], rays: &mut RayBatch) {
         let len = columns.len().min(rows.len());
         rays.reset(len);
         rays.coherent = true;
@@ -471,13 +576,18 @@ impl Camera {
     /// When a camera with a lens was not [opened](Self::opened), or has no such
     /// [group](FilmSamples::group) of the bands that it was opened for.
     pub fn sample_rays(&self, samples: &FilmSamples, out: &mut CameraRays) {
+        self.sample_still(samples, out);
+        self.carry_samples(samples, out);
+    }
+
+    fn sample_still(&self, samples: &FilmSamples, out: &mut CameraRays) {
         if let Projection::Lens(lens) = &self.projection {
             return lens.sample_rays(&self.pose, samples, out);
         }
         if let Projection::Views(views) = &self.projection {
             return views.sample_rays(&self.pose, samples, out);
         }
-        self.rays_through(&samples.columns, &samples.rows, &mut out.rays);
+        self.rays_at(&samples.columns, &samples.rows, &mut out.rays);
         out.sample.clear();
         out.sample.extend(0..u32::try_from(samples.len()).unwrap_or(u32::MAX));
         out.drop_unseen();
@@ -500,6 +610,7 @@ impl Camera {
     ) {
         let lens = self.lens().expect("bands share rays behind lenses");
         lens.sample_band_rays((&self.pose, self.resolution()), samples, out, landings);
+        self.carry_samples(samples, out);
     }
 
     fn aim(&self, rays: &mut RayBatch) {

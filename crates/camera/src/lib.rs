@@ -13,10 +13,12 @@
 pub mod camera;
 pub mod camera_file;
 pub mod distortion;
+pub mod exposure;
 pub mod framing;
 pub mod intrinsics;
 pub mod lens;
 pub mod light_field;
+pub mod motion;
 pub mod opencv_fit;
 pub mod pinhole;
 pub mod pixel_block;
@@ -24,11 +26,13 @@ mod place;
 pub mod pose;
 pub mod sampler;
 pub mod samples;
+pub mod shutter;
 mod sobol;
 
 pub use camera::{Camera, CameraSpec, PixelExtent, Projection};
 pub use camera_file::{CameraFile, ProjectionName};
 pub use distortion::{Distortion, DistortionSpec};
+pub use exposure::CameraTime;
 pub use framing::{Subject, SupportFunction, Viewpoint};
 pub use intrinsics::{Intrinsics, IntrinsicsSpec, PixelOrigin, SensorSpec};
 pub use lens::{
@@ -36,12 +40,14 @@ pub use lens::{
     RealLensCameraSpec, SharedPaths, ThinLensCameraSpec,
 };
 pub use light_field::{LightField, LightFieldSpec, ViewGrid};
+pub use motion::{CameraMotionSpec, Interpolation, Kinematics, MotionAxes, Trajectory};
 pub use opencv_fit::OpencvFit;
 pub use pinhole::{Orthographic, OrthographicSpec, Pinhole, PinholeSpec};
 pub use pixel_block::PixelBlock;
 pub use pose::{Convention, Maps, Pose, PoseSpec};
 pub use sampler::{PixelSamples, Sampler, squares, squares_of_pair};
 pub use samples::{CameraRays, FilmSamples};
+pub use shutter::{Readout, Shutter, ShutterKind, ShutterSpec, TruthAt};
 
 /// A camera's description that makes no camera: where in it, and why.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -7,7 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::distortion::{Distortion, DistortionSpec};
 use crate::framing::{self, FieldExtent, Subject};
-use crate::{CameraError, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec, SensorSpec};
+use crate::{
+    CameraError, CameraMotionSpec, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec, SensorSpec,
+    ShutterSpec,
+};
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::units::{Degrees, Metres};
 use etendue_geometry::{RayBatch, RaysMut};
@@ -35,6 +38,12 @@ pub struct PinholeSpec {
     /// Where the camera stands; when absent, the whole scene is framed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseSpec>,
+    /// When rows are open to light; all together, for as long as the sensor exposes, when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shutter: Option<ShutterSpec>,
+    /// How the camera moves; it stands still when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<CameraMotionSpec>,
     /// The grid of pixels.
     #[serde(default)]
     pub sensor: SensorSpec,
@@ -223,6 +232,12 @@ pub struct OrthographicSpec {
     /// the whole scene is framed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseSpec>,
+    /// When rows are open to light; all together, for as long as the sensor exposes, when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shutter: Option<ShutterSpec>,
+    /// How the camera moves; it stands still when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<CameraMotionSpec>,
     /// The grid of pixels.
     #[serde(default)]
     pub sensor: SensorSpec,

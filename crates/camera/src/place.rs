@@ -25,6 +25,9 @@ impl Camera {
     /// for a camera of many views, which has no one place.
     #[must_use]
     pub fn place_of(&self, offset: DVec3) -> Option<[f64; 2]> {
+        if self.motion().is_some() {
+            return self.moving_place_of(offset);
+        }
         let pose = self.pose();
         let [x, y, z] = [pose.right(), -pose.up(), pose.forward()].map(|axis| axis.dot(offset));
         // Closed forms where there are any; through a lens, by rays from the paraxial place on.

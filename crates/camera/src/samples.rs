@@ -20,6 +20,10 @@ pub struct FilmSamples {
     /// Places in 0..1 by which the wavelength is chosen at which a ray that all bands share is traced into
     /// the scene; rays of single bands do not look.
     pub leading: Vec<f64>,
+    /// Times of the frame's clock (s); empty as long as nothing moves.
+    pub times: Vec<f64>,
+    /// What each counts by the time for which its row is open; empty when all rows are open all the time.
+    pub open_shares: Vec<f64>,
     /// Which of the camera's [`band_groups`](crate::Camera::band_groups), for the bands that it was
     /// opened for, the rays are for.
     pub group: usize,
@@ -67,6 +71,8 @@ impl FilmSamples {
         self.pupil.clear();
         self.spectrum.clear();
         self.leading.clear();
+        self.times.clear();
+        self.open_shares.clear();
     }
 
     /// Appends a sample of single bands: column and row, place in the pupil, place in the spectrum.

@@ -48,6 +48,10 @@ impl BandPaths {
                 "pixels differ in their samples, and light lands beside the pixel it starts from";
             return Self::Apart(why.to_owned());
         }
+        if scene.camera.rows_differ() {
+            let why = "rows are seen at different times, and light lands on other rows than it starts from";
+            return Self::Apart(why.to_owned());
+        }
         let [width, height] = scene.camera.resolution().map(u64::from);
         let lit = scene.layers.iter().filter(|layer| layer.is_light()).count();
         let values = (width * height).saturating_mul((lit * bands.count()) as u64);

@@ -128,6 +128,10 @@ impl Averaged for LightPass<'_> {
         self.rows
     }
 
+    fn is_light(&self) -> bool {
+        true
+    }
+
     fn shape(&self) -> [usize; 2] {
         [self.layers.len(), self.stage.spectral.count()]
     }

@@ -42,6 +42,9 @@ const SHARE_OF_PASS: u32 = 8;
 /// pupil, and of the third one number for the wavelength.
 pub(crate) const CAMERA_PAIRS: u32 = 3;
 
+/// The pair of random numbers whose first is a sample's time: the last that there is, which light never gets to.
+const TIME_PAIR: u32 = u32::MAX;
+
 /// Bytes that sums take a value of the film when there are several passes.
 pub(crate) const BYTES_OF_SUM: u64 = size_of::<Sum>() as u64;
 
@@ -108,6 +111,8 @@ pub(crate) trait Averaged: Sync {
     fn shared_rows(&self) -> Option<u32> {
         None
     }
+    /// Whether it is light, of which a row gets as much as its shutter lets through.
+    fn is_light(&self) -> bool;
     /// Layers, and the bands of each.
     fn shape(&self) -> [usize; 2];
     /// Samples that are traced together.
@@ -532,6 +537,18 @@ impl Adding<'_> {
         } else {
             film.spectrum.resize(count, 0.5);
             film.leading.resize(count, 0.5);
+        }
+        // Their times, where something moves, and what comes through the shutter.
+        let camera = self.what.camera();
+        let Some(shutter) = camera.shutter() else { return };
+        let rows = film.rows.iter().map(|row| row.floor() + 0.5);
+        if camera.motion().is_some() {
+            squares_of_pair(numbers.iter().copied(), TIME_PAIR, &mut places);
+            let moments = rows.clone().zip(&places).map(|(row, place)| shutter.moment(row, place[0]));
+            film.times.extend(moments);
+        }
+        if self.what.is_light() && !shutter.is_fully_open() {
+            film.open_shares.extend(rows.map(|row| shutter.open_share(row)));
         }
     }
 }

@@ -227,12 +227,21 @@ impl Job<'_> {
         batch: &mut RayBuffers,
         watcher: &Watcher<'_>,
     ) -> Result<(), Stopped> {
-        for tile in Tile::across(width, [strip.top, strip.height]) {
-            batch.aim_at_centres(self.camera, tile);
+        // Rows that are seen from different places are batches of their own.
+        let height = if self.camera.rows_differ() { 1 } else { strip.height };
+        let tops = (strip.top..strip.top + strip.height).step_by(height.max(1) as usize);
+        for tile in tops.flat_map(|top| Tile::across(width, [top, height])) {
+            batch.aim_at_centres(self.camera, tile, strip.top);
             self.accel.closest(&batch.rays, &mut batch.hits);
             batch.traced += batch.rays.len() as u64;
             let RayBuffers { rays, hits, columns, rows, places, values, .. } = &mut *batch;
-            let seen = Seen { places: [columns, rows], ..self.seen(Traced { rays, hits }) };
+            let mut seen = Seen { places: [columns, rows], ..self.seen(Traced { rays, hits }) };
+            if self.camera.rows_differ() {
+                let time = self.camera.truth_time(f64::from(tile.top) + 0.5);
+                let pose = self.camera.pose_at(time);
+                seen.scene.view.origin = pose.position;
+                seen.scene.view.axes = pose.rotation;
+            }
             for layer in &mut strip.layers {
                 layer.spec.fill(&seen, values);
                 for (plane, values) in layer.planes.iter_mut().zip(&*values) {
@@ -264,6 +273,10 @@ impl Averaged for Colors<'_> {
 
     fn groups(&self) -> &[BandGroup] {
         &self.job.groups
+    }
+
+    fn is_light(&self) -> bool {
+        false
     }
 
     fn shape(&self) -> [usize; 2] {
@@ -358,7 +371,8 @@ impl RayBuffers {
         }
     }
 
-    fn aim_at_centres(&mut self, camera: &Camera, tile: Tile) {
+    /// Aims at the centres of a tile's pixels in a strip whose first row is `top`.
+    fn aim_at_centres(&mut self, camera: &Camera, tile: Tile, top: u32) {
         // Most tiles of a strip are of one size, and their pixels stand in the same order.
         if self.tile.is_none_or(|last| (last.width, last.height) != (tile.width, tile.height)) {
             self.pixels.clear();
@@ -367,7 +381,8 @@ impl RayBuffers {
         self.tile = Some(tile);
         let [width, _] = camera.resolution();
         self.places.clear();
-        self.places.extend(self.pixels.iter().map(|&(x, y)| y * width + tile.left + x));
+        let below = tile.top - top;
+        self.places.extend(self.pixels.iter().map(|&(x, y)| (below + y) * width + tile.left + x));
         self.columns.clear();
         self.columns.extend(self.pixels.iter().map(|&(x, _)| f64::from(tile.left + x) + 0.5));
         self.rows.clear();

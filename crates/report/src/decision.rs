@@ -21,6 +21,8 @@ pub enum DecisionKind {
     Wavelengths,
     /// Exposure by a sensor.
     Sensor,
+    /// The shutter, and whether rays have times.
+    Shutter,
     /// Denoising of the picture.
     Denoising,
     /// Rays of each band's own.
@@ -70,6 +72,7 @@ impl DecisionKind {
             Self::Passes => ("passes", None),
             Self::Wavelengths => ("wavelengths", None),
             Self::Sensor => ("sensor", None),
+            Self::Shutter => ("shutter", Some("camera.shutter")),
             Self::Denoising => ("denoising", None),
             Self::RaysOfBands => ("rays of a wavelength", Some("plan.dispersion")),
             Self::PathsOfBands => ("paths of a band", Some("plan.shared_paths")),

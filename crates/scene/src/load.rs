@@ -2,6 +2,7 @@
 
 pub(crate) mod camera;
 mod objects;
+mod shutter;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -270,6 +271,7 @@ impl SceneFile {
         }
         let sensor = self.sensor_behind(&camera)?;
         notes.extend(self.lens_notes(&camera, options.strictness)?);
+        notes.extend(shutter::notes(&camera));
         Ok(Scene {
             path: self.path().to_owned(),
             geometry,

@@ -7,7 +7,7 @@ use super::focused::{Focused, View, positive};
 use super::lens_camera::LensCamera;
 use super::source::{FocusDistance, LensSource, PlacedSpec, Setup, in_camera};
 use crate::framing::{self, FieldExtent, Subject};
-use crate::{CameraError, Pose, PoseSpec, SensorSpec};
+use crate::{CameraError, CameraMotionSpec, Pose, PoseSpec, SensorSpec, ShutterSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_optics::element::{
     ApertureSpec, ElementSpec, LossesSpec, PartSpec, Resolve, SurfaceSpec, ThinLensSpec,
@@ -59,6 +59,12 @@ macro_rules! camera_with_a_lens {
             /// in its middle is in focus.
             #[serde(default, skip_serializing_if = "Option::is_none")]
             pub pose: Option<PoseSpec>,
+            /// When rows are open to light; all together, for as long as the sensor exposes, when absent.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub shutter: Option<ShutterSpec>,
+            /// How the camera moves; it stands still when absent.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            pub motion: Option<CameraMotionSpec>,
             /// The grid of pixels.
             #[serde(default)]
             pub sensor: SensorSpec,

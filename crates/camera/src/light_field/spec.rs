@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::LightField;
+use crate::{CameraMotionSpec, ShutterSpec};
 use crate::framing::Subject;
 use crate::lens::source::{FocusDistance, PlacedSpec, Setup, in_camera};
 use crate::lens::spec::{ThinLensCameraSpec, place};
@@ -70,6 +71,12 @@ pub struct LightFieldSpec {
     /// is in focus.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<PoseSpec>,
+    /// When rows are open to light; all together, for as long as the sensor exposes, when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shutter: Option<ShutterSpec>,
+    /// How the camera moves; it stands still when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<CameraMotionSpec>,
     /// The grid of pixels of the sensor behind the lenslets.
     #[serde(default)]
     pub sensor: SensorSpec,
@@ -208,6 +215,8 @@ impl LightFieldSpec {
                     sensor_decentre: Default::default(),
                     losses: LossesSpec::default(),
                     pose: None,
+                    shutter: None,
+                    motion: None,
                     sensor: SensorSpec::default(),
                 };
                 thin.train(*focal_length, resolve)?

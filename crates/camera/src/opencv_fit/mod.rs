@@ -194,6 +194,8 @@ fn as_spec(camera: &Camera, (intrinsics, distortion): &OpencvModel) -> CameraSpe
         intrinsics: Some(IntrinsicsSpec { fx, fy, cx, cy, skew: 0.0, pixel_origin: origin }),
         distortion: Some(distortion.clone()),
         pose: Some(PoseSpec::from(*camera.pose())),
+        shutter: None,
+        motion: None,
         sensor: SensorSpec {
             resolution: camera.resolution(),
             pixel_pitch: camera.pixel_pitch().map(Micrometres),

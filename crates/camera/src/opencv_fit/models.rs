@@ -222,6 +222,7 @@ pub(super) fn sights(camera: &Camera) -> Vec<PixelSight> {
     }
     // The chief ray of each.
     let mut rays = RayBatch::default();
+    let camera = camera.standing();
     camera.rays_through(&columns, &rows, &mut rays);
     // In OpenCV's frame, from the point that is nearest to the camera.
     let pose = camera.pose();

@@ -4,4 +4,5 @@ mod coarser;
 mod lens_camera;
 mod light_field;
 mod opencv_fit;
+mod shutter;
 mod unprojection;

@@ -30,6 +30,19 @@ pub(super) struct Grounds<'a> {
     pub(super) why_precision: String,
 }
 
+/// Whether samples have times.
+fn explain_shutter(scene: &Scene) -> Option<Decision> {
+    let shutter = scene.camera.shutter()?;
+    let why = match (scene.camera.motion(), shutter.is_fully_open()) {
+        (Some(_), _) => "the camera moves: samples of light have times of their row's exposure".to_owned(),
+        (None, true) => "nothing moves: rays have no times, and nothing is paid".to_owned(),
+        (None, false) => {
+            "nothing moves: rays have no times, and light is multiplied by what the shutter lets through".to_owned()
+        }
+    };
+    Some(Decision::new(Kind::Shutter, shutter.words(), why))
+}
+
 impl Plan {
     /// The decisions: rays, samples, wavelengths, sensor and lens; surfaces and lights; how exactly, and in how
     /// much memory.
@@ -49,6 +62,7 @@ impl Plan {
         let (bands, because) = expose::explain_bands(scene, grounds.bands);
         decisions.push(Decision::new(Kind::Wavelengths, bands, because));
         decisions.extend(expose::explain_sensor(scene));
+        decisions.extend(explain_shutter(scene));
         decisions.extend(self.explain_denoising());
         decisions.extend(self.explain_lens(scene));
         decisions.extend(self.band_paths.decision(scene));

@@ -16,5 +16,6 @@ mod overruled_camera;
 mod passes;
 mod second_readers;
 mod spectra;
+mod shutter;
 mod steps;
 mod textures;

@@ -204,7 +204,10 @@ impl SceneFile {
             });
         match fault {
             Some((path, why)) => Err(file.fault(&path, why)),
-            None => Ok(file),
+            None => {
+                file.check_times()?;
+                Ok(file)
+            }
         }
     }
 

@@ -1,6 +1,7 @@
 //! What is made of a scene: the picture, and how it is rendered.
 
 use etendue_camera::sampler::Sampler;
+use etendue_geometry::units::Seconds;
 use etendue_tracer::{LayerSpec, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -127,6 +128,13 @@ pub struct RenderSpec {
     /// Whether all frames have the random numbers of frame 0, so that noise stands still while things move.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub frozen_noise: bool,
+    /// When the frame is taken (s, in the scene's clock): the moment at which its shutter opens. When absent, its
+    /// number over `rate`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<Seconds>,
+    /// Frames a second, by which frames without a time of their own are taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<f64>,
     /// What finds the hits; the best that was built in when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accel: Option<AccelName>,
@@ -272,6 +280,16 @@ pub enum ToneMap {
 }
 
 impl RenderSpec {
+    /// When the frame is taken (s, in the scene's clock); 0 where nothing says so.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        match (self.time, self.rate) {
+            (Some(Seconds(time)), _) => time,
+            (None, Some(rate)) => f64::from(self.frame) / rate,
+            (None, None) => 0.0,
+        }
+    }
+
     /// The seed of all random numbers of this frame: the seed itself for frame 0 and for frozen noise.
     #[must_use]
     pub fn frame_seed(&self) -> u64 {
@@ -303,6 +321,8 @@ impl Default for RenderSpec {
             seed,
             frame,
             frozen_noise,
+            time: None,
+            rate: None,
             accel,
             exposure,
             tone_map,

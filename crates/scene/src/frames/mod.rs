@@ -153,6 +153,7 @@ impl SceneFile {
                 self.fault("frames", "there is no frame; leave `frames` out for one picture")
             );
         }
+        self.check_frame_times(&frames)?;
         if let FramesSpec::List(_) | FramesSpec::Path(CameraPath::Rig { .. }) = spec {
             // Known now, and not when it is that frame's turn; but for lenses, which take some milliseconds each.
             let folder = self.open_folder(opener)?;
@@ -177,8 +178,11 @@ impl SceneFile {
     pub fn at(&self, frame: &Frame) -> Result<Self, SceneError> {
         let number = Some(("render.frame".to_owned(), frame.number.to_string()));
         let own = frame.settings.iter().map(|(path, value)| (path.clone(), value.to_string()));
+        // When a moving camera's frame is taken.
+        let time = frame.time.filter(|_| self.has_clock());
+        let time = time.map(|time| ("render.time".to_owned(), time.to_string()));
         let settings: Vec<(String, String)> =
-            number.filter(|_| frame.number > 0).into_iter().chain(own).collect();
+            number.filter(|_| frame.number > 0).into_iter().chain(time).chain(own).collect();
         let in_frame = |error: SceneError| {
             let why = match error {
                 // Its place is the frame, which is told here.

@@ -22,7 +22,7 @@ use etendue_spectrum::Bands;
 
 impl SceneFile {
     pub(super) fn camera_spec(&self) -> CameraSpec {
-        self.spec.camera.clone().unwrap_or_default()
+        self.timed_camera(self.spec.camera.clone().unwrap_or_default())
     }
 
     pub(super) fn camera_fault(&self, error: &CameraError) -> SceneError {
@@ -46,7 +46,9 @@ impl SceneFile {
     /// All that makes the camera but the geometry.
     pub(super) fn camera_words(&self, options: &LoadOptions<'_>) -> String {
         let camera = self.value().get("camera").unwrap_or_default();
-        format!("{:?} {:?} {camera}", options.camera, self.spec.plan.dispersion)
+        let timed = self.has_clock().then(|| self.spec.render.time());
+        let clock = timed.map(|time| format!("{time} s ")).unwrap_or_default();
+        format!("{clock}{:?} {:?} {camera}", options.camera, self.spec.plan.dispersion)
     }
 
     /// The camera over `geometry`; the one before when nothing has changed that it depends on.

@@ -10,6 +10,7 @@ mod models;
 mod rigs;
 mod scenes;
 mod specs;
+mod shutter_faults;
 mod trajectories;
 
 use std::path::{Path, PathBuf};

@@ -1,0 +1,146 @@
+//! A camera's time: its shutter and its motion, and rays that are carried to where the camera is at their time.
+
+use glam::DVec3;
+
+use crate::{Camera, CameraRays, FilmSamples, Pose, Shutter, Trajectory};
+use etendue_geometry::{RayBatch, RaysMut};
+
+/// Steps in which the row of a point is found that a moving camera sees; each is nearer by the ratio of the picture's
+/// speed to the shutter's.
+const STEPS: usize = 60;
+
+/// Moments (s) so near that they are the same.
+const SAME_MOMENT: f64 = 1e-15;
+
+/// When a camera's rows are open, and how it moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraTime {
+    /// The shutter.
+    pub shutter: Shutter,
+    /// The camera's motion, where it moves while the shutter is open.
+    pub motion: Option<Trajectory>,
+}
+
+impl CameraTime {
+    /// The moment (s) of the frame's pose: that at which data layers see the middle of a picture of so many rows.
+    pub(crate) fn middle(&self, rows: u32) -> f64 {
+        self.shutter.truth(0.5 * f64::from(rows))
+    }
+}
+
+impl Camera {
+    /// The shutter, where the scene gives one or the camera moves.
+    #[must_use]
+    pub fn shutter(&self) -> Option<&Shutter> {
+        self.time.as_deref().map(|time| &time.shutter)
+    }
+
+    /// The camera's motion, where it moves while its shutter is open.
+    #[must_use]
+    pub fn motion(&self) -> Option<&Trajectory> {
+        self.time.as_deref()?.motion.as_ref()
+    }
+
+    /// Whether pixels of different rows are seen from different places.
+    #[must_use]
+    pub fn rows_differ(&self) -> bool {
+        self.motion().is_some() && self.shutter().is_some_and(Shutter::rows_differ)
+    }
+
+    /// The pose at a time of the frame's clock (s).
+    #[must_use]
+    pub fn pose_at(&self, time: f64) -> Pose {
+        self.motion().map_or(*self.pose(), |motion| motion.at(time))
+    }
+
+    /// The moment (s) at which data layers see what is at a place (rows from the top edge).
+    #[must_use]
+    pub fn truth_time(&self, row: f64) -> f64 {
+        self.shutter().map_or(0.0, |shutter| shutter.truth(row))
+    }
+
+    /// The camera as it stands at a time (s): without motion.
+    #[must_use]
+    pub fn standing_at(&self, time: f64) -> Self {
+        let mut still = self.clone();
+        still.pose = self.pose_at(time);
+        still.time = None;
+        still
+    }
+
+    /// The camera as it stands in the frame's pose: without motion.
+    #[must_use]
+    pub fn standing(&self) -> Self {
+        let mut still = self.clone();
+        still.time = None;
+        still
+    }
+
+    /// Carries chief rays, which stand as the frame's pose has them, to where the camera is when data layers see their
+    /// rows.
+    pub(crate) fn carry_chief(&self, rows: &[f64], rays: &mut RayBatch) {
+        let (Some(motion), Some(shutter)) = (self.motion(), self.shutter()) else { return };
+        let mut last = None;
+        self.carry(rays, |i| {
+            // Of one row, all pixels have the pose.
+            let time = shutter.truth(rows[i].floor() + 0.5);
+            match last {
+                Some((at, pose)) if at == time => pose,
+                _ => last.insert((time, motion.at(time))).1,
+            }
+        });
+    }
+
+    /// Carries the rays of samples that have times to where the camera is then, and weighs them by how long their rows
+    /// are open.
+    pub(crate) fn carry_samples(&self, samples: &FilmSamples, out: &mut CameraRays) {
+        if let (Some(motion), false) = (self.motion(), samples.times.is_empty()) {
+            let CameraRays { rays, sample, .. } = &mut *out;
+            self.carry(rays, |i| motion.at(samples.times[sample[i] as usize]));
+        }
+        if !samples.open_shares.is_empty() {
+            let shares = out.sample.iter().map(|&sample| samples.open_shares[sample as usize]);
+            out.weight.iter_mut().zip(shares).for_each(|(weight, share)| *weight *= share);
+        }
+    }
+
+    fn carry(&self, rays: &mut RayBatch, mut pose_of: impl FnMut(usize) -> Pose) {
+        let start = *self.pose();
+        let back = start.rotation.transpose();
+        let RaysMut { origins, directions, t_max, .. } = rays.arrays_mut();
+        for i in 0..t_max.len() {
+            let pose = pose_of(i);
+            if pose == start {
+                continue;
+            }
+            let at = |arrays: &[&mut [f64]; 3]| DVec3::from_array([0, 1, 2].map(|k| arrays[k][i]));
+            let origin = at(&origins) - start.position;
+            let direction = at(&directions);
+            let origin = pose.position + pose.rotation * (back * origin);
+            let direction = pose.rotation * (back * direction);
+            for axis in 0..3 {
+                origins[axis][i] = origin[axis];
+                directions[axis][i] = direction[axis];
+            }
+        }
+    }
+
+    /// The place on the sensor of a moving camera, as [`Camera::place_of`]: the row says when the point is seen, and
+    /// that where.
+    pub(crate) fn moving_place_of(&self, offset: DVec3) -> Option<[f64; 2]> {
+        let shutter = self.shutter()?;
+        let mut time = shutter.truth(0.5 * f64::from(self.resolution()[1]));
+        let mut place = None;
+        for _ in 0..STEPS {
+            let still = self.standing_at(time);
+            let found = still.place_of(offset + (self.pose().position - still.pose().position))?;
+            place = Some(found);
+            let seen = shutter.truth(found[1]);
+            if (seen - time).abs() < SAME_MOMENT {
+                break;
+            }
+            time = seen;
+        }
+        place
+    }
+}

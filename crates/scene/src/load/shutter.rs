@@ -1,0 +1,139 @@
+//! When a scene's picture is taken: the frame's time, the shutter, and the camera's motion in the frame's clock.
+
+use crate::SceneError;
+use crate::file::SceneFile;
+use crate::frames::Frame;
+use crate::import::{Note, NoteKind};
+use etendue_camera::{Camera, CameraMotionSpec, CameraSpec, ShutterKind};
+use etendue_geometry::units::Seconds;
+use etendue_sensor::Sensor;
+
+impl SceneFile {
+    /// The camera as the file has it, with its exposure from the sensor and its motion in the frame's clock.
+    pub(crate) fn timed_camera(&self, mut spec: CameraSpec) -> CameraSpec {
+        if spec.shutter().is_none() && spec.motion().is_none() {
+            return spec;
+        }
+        let shutter = spec.shutter_mut().get_or_insert_default();
+        if shutter.exposure.is_none() {
+            let shot = self.sensor.as_ref().and_then(|sensor| sensor.shots().next());
+            shutter.exposure = shot.map(|shot| Seconds(shot.exposure));
+        }
+        let time = self.spec.render.time();
+        if let Some(motion) = spec.motion_mut() {
+            *motion = motion.from_time(time);
+        }
+        spec
+    }
+
+    /// Refuses times that contradict each other.
+    pub(crate) fn check_times(&self) -> Result<(), SceneError> {
+        let render = &self.spec.render;
+        if let Some(Seconds(time)) = render.time
+            && !time.is_finite()
+        {
+            return Err(self.fault("render.time", format!("{time} s is not finite")));
+        }
+        if let Some(rate) = render.rate
+            && !(rate > 0.0 && rate.is_finite())
+        {
+            let why = format!("{rate} frames a second; give a number above 0");
+            return Err(self.fault("render.rate", why));
+        }
+        let camera = self.spec.camera.as_ref();
+        let Some(camera) = camera.filter(|it| it.shutter().is_some() || it.motion().is_some())
+        else {
+            return Ok(());
+        };
+        let given = camera.shutter().and_then(|shutter| shutter.exposure);
+        if let Some(sensor) = &self.sensor {
+            self.check_exposures(camera, sensor, given)?;
+        }
+        let timed = self.timed_camera(camera.clone());
+        let Some((shutter, rate)) = timed.shutter().zip(render.rate) else { return Ok(()) };
+        let [_, rows] = timed.sensor().resolution;
+        let line_time = shutter.line_time.map_or(0.0, |time| time.0);
+        let readout = f64::from(rows) * line_time;
+        if shutter.kind != ShutterKind::Global && readout > 1.0 / rate {
+            let why = format!(
+                "{rows} rows of {line_time} s are read in {readout} s, longer than the {} s from frame to frame of \
+                 `render.rate`; shorten it, or lower the rate",
+                1.0 / rate
+            );
+            return Err(self.fault("camera.shutter.line_time", why));
+        }
+        Ok(())
+    }
+
+    fn check_exposures(
+        &self,
+        camera: &CameraSpec,
+        sensor: &Sensor,
+        given: Option<Seconds>,
+    ) -> Result<(), SceneError> {
+        let first = sensor.shots().next().map(|shot| shot.exposure);
+        let differ = sensor.shots().any(|shot| Some(shot.exposure) != first);
+        if differ && given.is_none() && camera.motion().is_some() {
+            let why = "the light is rendered once for all of them, and what moves is blurred otherwise in each; give \
+                       the exposures to `frames`, such as [{\"camera.sensor.exposure\": 0.01}], or the shutter one \
+                       `exposure`";
+            return Err(self.fault("camera.sensor.exposures", why));
+        }
+        let is_written = self.value().pointer("/camera/sensor/exposure").is_some();
+        match (given, first) {
+            (Some(Seconds(given)), Some(exposure)) if is_written && given != exposure => {
+                let why = format!(
+                    "{given} s, and `camera.sensor.exposure` {exposure} s; leave one of them out"
+                );
+                Err(self.fault("camera.shutter.exposure", why))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses frames without times of a camera that moves through poses, which have them.
+    pub(crate) fn check_frame_times(&self, frames: &[Frame]) -> Result<(), SceneError> {
+        let has_time = |frame: &Frame| {
+            frame.time.is_some() || frame.settings.iter().any(|(path, _)| path == "render.time")
+        };
+        let motion = self.spec.camera.as_ref().and_then(CameraSpec::motion);
+        let needs = matches!(motion, Some(CameraMotionSpec::Poses { .. }));
+        let is_timed = self.spec.render.rate.is_some() || frames.iter().all(has_time);
+        if !needs || is_timed {
+            return Ok(());
+        }
+        let why = "the camera moves, and nobody says when each frame is taken; give `render.rate` (frames a second), \
+                   or each frame its `render.time`";
+        Err(self.fault("frames", why))
+    }
+
+    /// Whether frames are taken at their times.
+    pub(crate) fn has_clock(&self) -> bool {
+        self.spec.camera.as_ref().is_some_and(|camera| camera.motion().is_some())
+    }
+}
+
+/// What a user should know of the camera's shutter and motion.
+pub(crate) fn notes(camera: &Camera) -> Vec<Note> {
+    let note = |message: String| Note {
+        kind: NoteKind::Irregular,
+        subject: "the camera's shutter".to_owned(),
+        message,
+        count: 1,
+    };
+    let Some(shutter) = camera.shutter() else { return Vec::new() };
+    let Some(motion) = camera.motion() else {
+        return match shutter.is_fully_open() {
+            true => vec![note("nothing moves while it is open, so that it changes nothing".into())],
+            false => Vec::new(),
+        };
+    };
+    let ([open, close], [first, last]) = (shutter.whole_span(), motion.span());
+    if open < first || close > last {
+        return vec![note(format!(
+            "it is open from {open} s to {close} s, and the poses of the motion last from {first} s to {last} s: before \
+             and after them the camera stands still"
+        ))];
+    }
+    Vec::new()
+}
