@@ -11,10 +11,10 @@ use crate::framing::Subject;
 use crate::lens::{self, focused::View};
 use crate::{
     BandGroup, BandLandings, CameraError, CameraMotionSpec, CameraRays, CameraTime,
-    ChromaticRealLensCameraSpec, Distortion, Shutter, ShutterSpec, Trajectory,
-    DistortionSpec, FilmSamples, Intrinsics, LensCamera, LensCameraSpec, LightField,
-    LightFieldSpec, Orthographic, OrthographicSpec, Pinhole, PinholeSpec, PixelBlock, Pose,
-    PoseSpec, RealLensCameraSpec, SensorSpec, ThinLensCameraSpec, ViewGrid,
+    ChromaticRealLensCameraSpec, Distortion, DistortionSpec, FilmSamples, Intrinsics, LensCamera,
+    LensCameraSpec, LightField, LightFieldSpec, Orthographic, OrthographicSpec, Pinhole,
+    PinholeSpec, PixelBlock, Pose, PoseSpec, RealLensCameraSpec, SensorSpec, Shutter, ShutterSpec,
+    ThinLensCameraSpec, Trajectory, ViewGrid,
 };
 use etendue_geometry::units::{Degrees, Metres, Micrometres};
 use etendue_optics::element::Resolve;
@@ -193,7 +193,8 @@ impl CameraSpec {
             return Ok((shutter, None));
         }
         if for_each_kind!(self, spec => spec.pose.is_some()) {
-            let why = "is given beside `motion`, whose poses already say where the camera is; remove one";
+            let why =
+                "is given beside `motion`, whose poses already say where the camera is; remove one";
             return Err(CameraError::new("pose", why));
         }
         let trajectory = self.motion().map(|motion| motion.build(None)).transpose()?;
@@ -229,12 +230,11 @@ impl CameraSpec {
         }
         // The frame's pose is that at which data layers see the middle of the picture.
         let (shutter, trajectory) = self.built_time()?;
-        let mut time = CameraTime { shutter, motion: None };
+        let mut time = CameraTime { shutter, motion: None, scene_moves: false };
         let middle = time.middle(self.sensor().resolution[1]);
         let mut still = self.clone();
         if let Some(trajectory) = &trajectory {
-            *still.pose_mut() =
-                Some(PoseSpec::from(trajectory.at(middle)));
+            *still.pose_mut() = Some(PoseSpec::from(trajectory.at(middle)));
         }
         let mut camera = still.build_still(subject, resolve)?;
         let trajectory = match (trajectory, self.motion()) {
@@ -511,8 +511,7 @@ impl Camera {
             pixel_pitch: self.sensor.pixel_pitch.map(|pitch| Micrometres(pitch.0 * times)),
         };
         let time = self.time.as_ref().map(|time| {
-            let CameraTime { shutter, motion } = &**time;
-            Arc::new(CameraTime { shutter: shutter.coarser(times), motion: motion.clone() })
+            Arc::new(CameraTime { shutter: time.shutter.coarser(times), ..(**time).clone() })
         });
         Self { pose: self.pose, sensor, projection, light_field: self.light_field.clone(), time }
     }
@@ -542,7 +541,7 @@ impl Camera {
             *v = f64::from(row) + 0.5;
         }
         self.aim(rays);
-        if self.motion().is_some() {
+        if self.has_times() {
             let rows: Vec<f64> = block.pixels().map(|(_, row)| f64::from(row) + 0.5).collect();
             self.carry_chief(&rows, rays);
         }

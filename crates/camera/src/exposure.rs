@@ -1,5 +1,7 @@
 //! A camera's time: its shutter and its motion, and rays that are carried to where the camera is at their time.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::{Camera, CameraRays, FilmSamples, Pose, Shutter, Trajectory};
@@ -19,6 +21,8 @@ pub struct CameraTime {
     pub shutter: Shutter,
     /// The camera's motion, where it moves while the shutter is open.
     pub motion: Option<Trajectory>,
+    /// Things before it move while the shutter is open.
+    pub scene_moves: bool,
 }
 
 impl CameraTime {
@@ -39,6 +43,19 @@ impl Camera {
     #[must_use]
     pub fn motion(&self) -> Option<&Trajectory> {
         self.time.as_deref()?.motion.as_ref()
+    }
+
+    /// Whether rays have times: the camera moves while its shutter is open, or what it sees does.
+    #[must_use]
+    pub fn has_times(&self) -> bool {
+        self.time.as_deref().is_some_and(|time| time.motion.is_some() || time.scene_moves)
+    }
+
+    /// Gives rays times because things move before the camera; without a shutter nothing changes.
+    pub fn see_motion(&mut self) {
+        if let Some(time) = &mut self.time {
+            Arc::make_mut(time).scene_moves = true;
+        }
     }
 
     /// Whether pixels of different rows are seen from different places.
@@ -79,16 +96,18 @@ impl Camera {
     /// Carries chief rays, which stand as the frame's pose has them, to where the camera is when data layers see their
     /// rows.
     pub(crate) fn carry_chief(&self, rows: &[f64], rays: &mut RayBatch) {
-        let (Some(motion), Some(shutter)) = (self.motion(), self.shutter()) else { return };
-        let mut last = None;
-        self.carry(rays, |i| {
-            // Of one row, all pixels have the pose.
-            let time = shutter.truth(rows[i].floor() + 0.5);
-            match last {
-                Some((at, pose)) if at == time => pose,
-                _ => last.insert((time, motion.at(time))).1,
-            }
-        });
+        let Some(shutter) = self.shutter().filter(|_| self.has_times()) else { return };
+        if let Some(motion) = self.motion() {
+            let mut last = None;
+            self.carry(rays, |i| {
+                // Of one row, all pixels have the pose.
+                let time = shutter.truth(rows[i].floor() + 0.5);
+                match last {
+                    Some((at, pose)) if at == time => pose,
+                    _ => last.insert((time, motion.at(time))).1,
+                }
+            });
+        }
     }
 
     /// Carries the rays of samples that have times to where the camera is then, and weighs them by how long their rows

@@ -150,11 +150,17 @@ impl CameraMotionSpec {
             }
             Self::Poses { poses, times, translation, revolutions } => {
                 if poses.len() < 2 {
-                    let why = format!("{} do not move; give two or more, or leave `motion` out", poses.len());
+                    let why = format!(
+                        "{} do not move; give two or more, or leave `motion` out",
+                        poses.len()
+                    );
                     return fault("poses", why);
                 }
                 if times.len() != poses.len() {
-                    return fault("times", format!("{} times for {} poses", times.len(), poses.len()));
+                    return fault(
+                        "times",
+                        format!("{} times for {} poses", times.len(), poses.len()),
+                    );
                 }
                 let times: Vec<f64> = times.iter().map(|time| time.0).collect();
                 if let Some(i) = times.iter().position(|time| !time.is_finite()) {
@@ -170,7 +176,8 @@ impl CameraMotionSpec {
                 }
                 let ways = poses.len() - 1;
                 if let Some(turns) = revolutions.as_ref().filter(|turns| turns.len() != ways) {
-                    let why = format!("{} numbers for the {ways} ways between the poses", turns.len());
+                    let why =
+                        format!("{} numbers for the {ways} ways between the poses", turns.len());
                     return fault("revolutions", why);
                 }
                 let build = |(i, pose): (usize, &PoseSpec)| {
@@ -214,12 +221,8 @@ fn keys(
         }
     };
     let way = |i: usize| -> Result<PoseKey, CameraError> {
-        let key = PoseKey {
-            time: times[i],
-            pose: poses[i],
-            slopes: [DVec3::ZERO; 2],
-            turn: DVec3::ZERO,
-        };
+        let key =
+            PoseKey { time: times[i], pose: poses[i], slopes: [DVec3::ZERO; 2], turn: DVec3::ZERO };
         if i == last {
             return Ok(key);
         }

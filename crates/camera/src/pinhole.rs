@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use crate::distortion::{Distortion, DistortionSpec};
 use crate::framing::{self, FieldExtent, Subject};
 use crate::{
-    CameraError, CameraMotionSpec, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec, SensorSpec,
-    ShutterSpec,
+    CameraError, CameraMotionSpec, Intrinsics, IntrinsicsSpec, PixelOrigin, Pose, PoseSpec,
+    SensorSpec, ShutterSpec,
 };
 use etendue_geometry::glam::DVec3;
 use etendue_geometry::units::{Degrees, Metres};

@@ -130,7 +130,10 @@ impl ShutterSpec {
             }
         };
         if !(line_time * f64::from(rows)).is_finite() {
-            return fault("line_time", format!("{line_time} s for each of {rows} rows is too long"));
+            return fault(
+                "line_time",
+                format!("{line_time} s for each of {rows} rows is too long"),
+            );
         }
         let open = self.intervals(exposure)?;
         let mut total = 0.0;
@@ -166,18 +169,23 @@ impl ShutterSpec {
                 fault("chip", "is the time of a `code`, and there is none".to_owned())
             }
             (None, None) => Ok(Vec::new()),
-            (Some(_), Some(_)) => {
-                fault("code", "is given beside `open`, which already says when it is open; remove one".to_owned())
-            }
+            (Some(_), Some(_)) => fault(
+                "code",
+                "is given beside `open`, which already says when it is open; remove one".to_owned(),
+            ),
             (Some(_), None) if self.chip.is_some() => {
                 fault("chip", "is the time of a `code`, and there is none".to_owned())
             }
             (Some(list), None) => {
                 if list.is_empty() {
-                    return fault("open", "lists no interval: the shutter has no open moment".to_owned());
+                    return fault(
+                        "open",
+                        "lists no interval: the shutter has no open moment".to_owned(),
+                    );
                 }
                 if list.len() > MOST_INTERVALS {
-                    let why = format!("lists {} intervals; {MOST_INTERVALS} are the most", list.len());
+                    let why =
+                        format!("lists {} intervals; {MOST_INTERVALS} are the most", list.len());
                     return fault("open", why);
                 }
                 let mut end = 0.0;
@@ -193,7 +201,8 @@ impl ShutterSpec {
                     end = *to;
                 }
                 if end > exposure * (1.0 + ROUNDING) {
-                    let why = format!("ends {end} s after the start of an exposure of {exposure} s");
+                    let why =
+                        format!("ends {end} s after the start of an exposure of {exposure} s");
                     return fault(&format!("open[{}]", list.len() - 1), why);
                 }
                 Ok(list.iter().map(|interval| interval.map(|time| time.0)).collect())
@@ -208,11 +217,16 @@ impl ShutterSpec {
                     })
                     .collect();
                 let Some(chips) = chips.filter(|chips| chips.len() <= MOST_INTERVALS) else {
-                    let why = format!("is no text of at most {MOST_INTERVALS} digits 1 (open) and 0 (closed)");
+                    let why = format!(
+                        "is no text of at most {MOST_INTERVALS} digits 1 (open) and 0 (closed)"
+                    );
                     return fault("code", why);
                 };
                 if !chips.contains(&true) {
-                    return fault("code", format!("\"{code}\" has no 1: the shutter has no open moment"));
+                    return fault(
+                        "code",
+                        format!("\"{code}\" has no 1: the shutter has no open moment"),
+                    );
                 }
                 let count = chips.len() as f64;
                 let chip = self.chip.map_or(exposure / count, |time| time.0);

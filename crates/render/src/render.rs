@@ -71,6 +71,17 @@ pub fn accelerators() -> &'static [AccelName] {
     }
 }
 
+/// What a build of the structure over `scene` is told.
+fn options_for(scene: &Scene, plan: &Plan, options: &BuildOptions) -> BuildOptions {
+    let exposure = exposure(scene);
+    BuildOptions { quality: plan.quality, refine: plan.refine, exposure, ..options.clone() }
+}
+
+/// From when to when any row of the scene's camera is open (s from the frame's time).
+pub(crate) fn exposure(scene: &Scene) -> [f64; 2] {
+    scene.camera.shutter().map_or([0.0; 2], |shutter| shutter.whole_span())
+}
+
 /// Builds `scene`'s acceleration structure with the backend that it names, or else the best.
 ///
 /// # Errors
@@ -83,7 +94,7 @@ pub fn build(
     options: &BuildOptions,
 ) -> Result<Box<dyn Accel>, RenderError> {
     let geometry = Arc::clone(&scene.geometry);
-    let options = BuildOptions { quality: plan.quality, refine: plan.refine, ..options.clone() };
+    let options = options_for(scene, plan, options);
     let name = scene.render.accel.unwrap_or(accelerators()[0]);
     if options.isa.is_some() && name != AccelName::Embree {
         return Err(RenderError::NotEmbree);
@@ -114,10 +125,9 @@ pub fn rebuild(
     options: &BuildOptions,
     before: Option<&dyn Accel>,
 ) -> Result<Box<dyn Accel>, RenderError> {
-    let with_quality =
-        BuildOptions { quality: plan.quality, refine: plan.refine, ..options.clone() };
+    let with_quality = options_for(scene, plan, options);
     let again = |before: &dyn Accel| before.rebuilt(Arc::clone(&scene.geometry), &with_quality);
-    let stands = moving_placements(&scene.geometry, options.exposure).next().is_none();
+    let stands = moving_placements(&scene.geometry, with_quality.exposure).next().is_none();
     match before.filter(|_| stands).and_then(again) {
         Some(rebuilt) => Ok(rebuilt?),
         None => build(scene, plan, options),

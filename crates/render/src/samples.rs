@@ -542,9 +542,10 @@ impl Adding<'_> {
         let camera = self.what.camera();
         let Some(shutter) = camera.shutter() else { return };
         let rows = film.rows.iter().map(|row| row.floor() + 0.5);
-        if camera.motion().is_some() {
+        if camera.has_times() {
             squares_of_pair(numbers.iter().copied(), TIME_PAIR, &mut places);
-            let moments = rows.clone().zip(&places).map(|(row, place)| shutter.moment(row, place[0]));
+            let moments =
+                rows.clone().zip(&places).map(|(row, place)| shutter.moment(row, place[0]));
             film.times.extend(moments);
         }
         if self.what.is_light() && !shutter.is_fully_open() {

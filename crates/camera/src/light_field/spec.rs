@@ -9,12 +9,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::LightField;
-use crate::{CameraMotionSpec, ShutterSpec};
 use crate::framing::Subject;
 use crate::lens::source::{FocusDistance, PlacedSpec, Setup, in_camera};
 use crate::lens::spec::{ThinLensCameraSpec, place};
 use crate::lens::{LensCamera, LensSource};
 use crate::{CameraError, Pose, PoseSpec, SensorSpec};
+use crate::{CameraMotionSpec, ShutterSpec};
 use etendue_geometry::units::{Degrees, Millimetres};
 use etendue_optics::element::{
     ApertureSpec, ElementSpec, Gaps, Grid, LensletShape, LensletSpec, LossesSpec,

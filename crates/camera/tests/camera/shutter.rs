@@ -48,13 +48,24 @@ fn a_rolling_shutter_bends_an_edge_by_the_closed_form_of_each_motion() {
     let cases: [(&str, [f64; 3], [f64; 3], Box<Column>); 5] = [
         ("aside", [speed, 0.0, 0.0], [0.0; 3], Box::new(move |t, _| (edge - v * t) / 2.0)),
         ("forward", [0.0, 0.0, -speed], [0.0; 3], Box::new(move |t, _| edge / (2.0 - v * t))),
-        ("pan", [0.0; 3], [0.0, turn, 0.0], Box::new(move |t, _| ((edge / 2.0).atan() + w * t).tan())),
-        ("tilt", [0.0; 3], [turn, 0.0, 0.0], Box::new(move |t, y| {
-            edge / 2.0 * ((w * t).cos() - y * (w * t).sin())
-        })),
-        ("roll", [0.0; 3], [0.0, 0.0, turn], Box::new(move |t, y| {
-            (edge / 2.0 + y * (w * t).sin()) / (w * t).cos()
-        })),
+        (
+            "pan",
+            [0.0; 3],
+            [0.0, turn, 0.0],
+            Box::new(move |t, _| ((edge / 2.0).atan() + w * t).tan()),
+        ),
+        (
+            "tilt",
+            [0.0; 3],
+            [turn, 0.0, 0.0],
+            Box::new(move |t, y| edge / 2.0 * ((w * t).cos() - y * (w * t).sin())),
+        ),
+        (
+            "roll",
+            [0.0; 3],
+            [0.0, 0.0, turn],
+            Box::new(move |t, y| (edge / 2.0 + y * (w * t).sin()) / (w * t).cos()),
+        ),
     ];
     for (name, velocity, angular_velocity, slope) in cases {
         for readout in ["down", "up"] {
@@ -69,7 +80,10 @@ fn a_rolling_shutter_bends_an_edge_by_the_closed_form_of_each_motion() {
                 let expected = 80.0 + f * slope(time, y);
                 let found = edge_column(&camera, row, edge);
                 // Roundings of the bisection and of f · 10⁻¹⁶.
-                assert!((found - expected).abs() < 1e-9, "{name} {readout} {row}: {found} {expected}");
+                assert!(
+                    (found - expected).abs() < 1e-9,
+                    "{name} {readout} {row}: {found} {expected}"
+                );
             }
         }
     }
@@ -146,9 +160,11 @@ fn points_are_found_in_the_rows_that_see_them() {
 
 #[test]
 fn moments_fill_the_open_time_evenly() {
-    let build = |value: Value| serde_json::from_value::<ShutterSpec>(value).unwrap().build(100).unwrap();
+    let build =
+        |value: Value| serde_json::from_value::<ShutterSpec>(value).unwrap().build(100).unwrap();
     let code = build(json!({ "exposure": 0.008, "code": "11010001" }));
-    let list = build(json!({ "exposure": 0.008, "open": [[0, 0.002], [0.003, 0.004], [0.007, 0.008]] }));
+    let list =
+        build(json!({ "exposure": 0.008, "open": [[0, 0.002], [0.003, 0.004], [0.007, 0.008]] }));
     for shutter in [&code, &list] {
         assert!((shutter.open_share(0.5) - 0.5).abs() < 1e-15);
         let mut chips = [0; 8];
@@ -182,7 +198,8 @@ fn derivatives_are_those_of_the_pose() {
     let keys = json!({ "type": "poses", "translation": "cubic", "times": [0, 0.3, 0.4, 1.1], "poses": [
         quaternion(axis, 0.0, [0.0, 0.0, 0.0]), quaternion(axis, 1.0, [1.0, 2.0, 0.5]),
         quaternion(DVec3::Y, -0.7, [1.5, 1.0, 0.0]), quaternion(DVec3::X, 0.2, [2.0, 0.0, -1.0])] });
-    let steady = json!({ "type": "velocity", "velocity": [1, 2, 3], "angular_velocity": [40, -100, 700] });
+    let steady =
+        json!({ "type": "velocity", "velocity": [1, 2, 3], "angular_velocity": [40, -100, 700] });
     for motion in [trajectory(keys), trajectory(steady)] {
         for time in [0.01, 0.2, 0.35, 0.41, 0.8, 1.05] {
             let h = 1e-4;
@@ -205,7 +222,9 @@ fn a_cubic_is_exact_for_parabolas_and_whole_turns_are_made() {
     let times = [0.0, 0.2, 0.7, 1.5];
     let place = |t: f64| [t * t, 3.0 - t, 2.0 * t * t - t];
     let poses = times.map(|t| quaternion(DVec3::Y, 0.0, place(t)));
-    let motion = trajectory(json!({ "type": "poses", "translation": "cubic", "times": times, "poses": poses }));
+    let motion = trajectory(
+        json!({ "type": "poses", "translation": "cubic", "times": times, "poses": poses }),
+    );
     for k in 0..=30 {
         let t = 1.5 * f64::from(k) / 30.0;
         let apart = (motion.at(t).position - DVec3::from_array(place(t))).length();
@@ -213,8 +232,13 @@ fn a_cubic_is_exact_for_parabolas_and_whole_turns_are_made() {
     }
     // 90° and two turns more in a second are 810°/s, forwards and backwards.
     for (turns, rate) in [(2, 810.0_f64), (-1, -270.0)] {
-        let poses = [quaternion(DVec3::Z, 0.0, [0.0; 3]), quaternion(DVec3::Z, 1.570_796_326_794_896_6, [0.0; 3])];
-        let motion = trajectory(json!({ "type": "poses", "times": [0, 1], "poses": poses, "revolutions": [turns] }));
+        let poses = [
+            quaternion(DVec3::Z, 0.0, [0.0; 3]),
+            quaternion(DVec3::Z, 1.570_796_326_794_896_6, [0.0; 3]),
+        ];
+        let motion = trajectory(
+            json!({ "type": "poses", "times": [0, 1], "poses": poses, "revolutions": [turns] }),
+        );
         let steady = trajectory(json!({ "type": "velocity", "angular_velocity": [0, 0, rate] }));
         for k in 0..=20 {
             let t = f64::from(k) / 20.0;

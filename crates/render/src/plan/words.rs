@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use etendue_accel::Quality;
+use etendue_accel::{Quality, moving_placements};
 use etendue_camera::{LensCamera, Projection};
 use etendue_geometry::{HitPrecision, Placement};
 use etendue_report::{Decision, DecisionKind as Kind, DecisionValue, Saving, Tabled};
@@ -11,6 +11,8 @@ use etendue_scene::file::{LightPrecision, TracerRow, TracerSpec};
 use etendue_sensor::BandChoice;
 use etendue_tracer::layer::Kept;
 use etendue_tracer::{LayerSpec, Needs};
+
+use crate::render::exposure;
 
 use super::{
     MOST_BYTES_OF_SUMS, Passes, Plan, RAYS_A_SAMPLE_OF_LIGHT, RAYS_PER_TRIANGLE, quality_for,
@@ -33,7 +35,14 @@ pub(super) struct Grounds<'a> {
 /// Whether samples have times.
 fn explain_shutter(scene: &Scene) -> Option<Decision> {
     let shutter = scene.camera.shutter()?;
+    let moving = moving_placements(&scene.geometry, exposure(scene)).count();
     let why = match (scene.camera.motion(), shutter.is_fully_open()) {
+        (own, _) if moving > 0 => format!(
+            "{moving} of {} placed meshes move{}: samples of light have times of their row's exposure, and rays \
+             that meet the box in which a mesh moves are traced in its own frame, too",
+            scene.geometry.placements.len(),
+            if own.is_some() { ", and so does the camera" } else { "" }
+        ),
         (Some(_), _) => "the camera moves: samples of light have times of their row's exposure".to_owned(),
         (None, true) => "nothing moves: rays have no times, and nothing is paid".to_owned(),
         (None, false) => {

@@ -49,7 +49,13 @@ fn seen(column: usize, pixels: f64, open: &[[f64; 2]]) -> f64 {
     // Integral over time of clamp(x, 0, 1), where x is how much of the pixel is right of the edge.
     let integral = |time: f64| {
         let x = column as f64 + 1.0 - 32.0 + pixels * time;
-        let area = if x <= 0.0 { 0.0 } else if x < 1.0 { 0.5 * x * x } else { x - 0.5 };
+        let area = if x <= 0.0 {
+            0.0
+        } else if x < 1.0 {
+            0.5 * x * x
+        } else {
+            x - 0.5
+        };
         area / pixels
     };
     open.iter().map(|[from, to]| integral(*to) - integral(*from)).sum()
@@ -59,13 +65,17 @@ fn seen(column: usize, pixels: f64, open: &[[f64; 2]]) -> f64 {
 fn a_blurred_edge_is_the_ramp_of_its_speed() {
     for pixels in [3.0, 17.5] {
         let speed = pixels / 16.0 / 0.01;
-        let blurred = scene(json!({ "shutter": { "exposure": 0.01 }, "motion": aside(speed) }), json!({}));
+        let blurred =
+            scene(json!({ "shutter": { "exposure": 0.01 }, "motion": aside(speed) }), json!({}));
         let profile = profile(&blurred);
         let mut bias = 0.0;
         for (column, value) in profile.iter().enumerate() {
             let expected = seen(column, pixels, &[[0.0, 1.0]]);
             // 16 rows of 256 stratified samples: far below the 1/√4096 · ½ of random ones.
-            assert!((value - expected).abs() < 4.0 * 0.5 / 64.0 * 0.2, "{pixels} {column}: {value} {expected}");
+            assert!(
+                (value - expected).abs() < 4.0 * 0.5 / 64.0 * 0.2,
+                "{pixels} {column}: {value} {expected}"
+            );
             bias += value - expected;
         }
         let light: f64 = profile.iter().sum();
@@ -88,7 +98,8 @@ fn a_flutter_shutter_leaves_its_code_in_the_picture() {
     let profile = profile(&coded);
     // The line spread is the code itself: each column is lit by the next half chip.
     let spread: Vec<f64> = profile.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let ideal: Vec<f64> = (1..COLUMNS).map(|x| seen(x, pixels, &open) - seen(x - 1, pixels, &open)).collect();
+    let ideal: Vec<f64> =
+        (1..COLUMNS).map(|x| seen(x, pixels, &open) - seen(x - 1, pixels, &open)).collect();
     let transfer = |spread: &[f64], k: usize| {
         let turn = |x: usize| std::f64::consts::TAU * (k * x) as f64 / 64.0;
         let real: f64 = spread.iter().enumerate().map(|(x, v)| v * turn(x).cos()).sum();
@@ -123,7 +134,10 @@ fn a_shutter_changes_no_bit_when_nothing_moves_and_says_so() {
     };
     for (shutter, motion) in [
         (json!({ "exposure": 0.01 }), json!({ "type": "velocity" })),
-        (json!({ "type": "rolling", "line_time": 1e-5, "exposure": 0.01 }), json!({ "type": "velocity" })),
+        (
+            json!({ "type": "rolling", "line_time": 1e-5, "exposure": 0.01 }),
+            json!({ "type": "velocity" }),
+        ),
         // The motion leaves the shutter closed.
         (json!({ "exposure": 0 }), aside(5.0)),
     ] {
@@ -132,7 +146,10 @@ fn a_shutter_changes_no_bit_when_nothing_moves_and_says_so() {
             json!({ "layers": ["depth", "position"] }),
         );
         assert_eq!(bits(&timed), bits(&still), "{shutter}");
-        assert!(timed.notes.iter().any(|note| note.message.contains("changes nothing")), "{shutter}");
+        assert!(
+            timed.notes.iter().any(|note| note.message.contains("changes nothing")),
+            "{shutter}"
+        );
         let plan = Plan::new(&timed, Outputs::ALL);
         let row = plan.decisions.iter().find(|row| row.kind == DecisionKind::Shutter).unwrap();
         assert!(row.reason.contains("nothing is paid"), "{}", row.reason);
@@ -142,9 +159,11 @@ fn a_shutter_changes_no_bit_when_nothing_moves_and_says_so() {
 
 #[test]
 fn data_layers_of_a_rolling_shutter_are_those_of_their_rows() {
-    let shutter = json!({ "type": "rolling", "line_time": 0.01, "exposure": 0.004, "truth_at": "open" });
+    let shutter =
+        json!({ "type": "rolling", "line_time": 0.01, "exposure": 0.004, "truth_at": "open" });
     let motion = json!({ "type": "velocity", "velocity": [0, 0, -3] });
-    let moving = scene(json!({ "shutter": shutter, "motion": motion }), json!({ "layers": ["depth"] }));
+    let moving =
+        scene(json!({ "shutter": shutter, "motion": motion }), json!({ "layers": ["depth"] }));
     let done = rendered(&moving, &Plan::new(&moving, Outputs::ALL));
     let depth = layer(&done.picture, "Depth");
     for row in 0..16 {
@@ -166,7 +185,9 @@ fn pictures_of_moving_cameras_do_not_depend_on_threads() {
     };
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| layer(&picture(&moving()), "").iter().map(|x| x.to_bits()).collect::<Vec<_>>())
+        pool.install(|| {
+            layer(&picture(&moving()), "").iter().map(|x| x.to_bits()).collect::<Vec<_>>()
+        })
     };
     assert_eq!(on(1), on(3));
 }

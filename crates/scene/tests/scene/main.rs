@@ -9,8 +9,8 @@ mod documents;
 mod models;
 mod rigs;
 mod scenes;
-mod specs;
 mod shutter_faults;
+mod specs;
 mod trajectories;
 
 use std::path::{Path, PathBuf};

@@ -31,28 +31,75 @@ fn wrong_shutters_and_motions_are_refused_by_place_and_remedy() {
     let poses = |times: Value| json!({ "motion": { "type": "poses", "poses": [pose(0.0), pose(1.0)], "times": times } });
     let turned = json!({ "motion": { "type": "poses", "poses": [pose(0.0), pose(1.0)], "times": [0, 1], "revolutions": [1] } });
     let cases: [(Value, Value, [&str; 2]); 17] = [
-        (json!({ "shutter": { "exposure": -1 } }), json!({}), ["camera.shutter.exposure", "0 or more"]),
-        (json!({ "shutter": { "type": "rolling" } }), json!({}), ["camera.shutter.line_time", "15 us"]),
-        (json!({ "shutter": { "line_time": 1e-5 } }), json!({}), ["camera.shutter.line_time", "rolling"]),
-        (json!({ "shutter": { "type": "rolling", "line_time": -1 } }), json!({}), ["camera.shutter.line_time", "0 or more"]),
-        (json!({ "shutter": { "type": "rolling", "line_time": 0.001 } }), json!({ "render": { "rate": 30 } }),
-            ["camera.shutter.line_time", "longer than"]),
-        (json!({ "shutter": { "exposure": 0.01, "open": [] } }), json!({}), ["camera.shutter.open", "no open moment"]),
-        (json!({ "shutter": { "exposure": 0.01, "open": [[0.002, 0.004], [0.003, 0.005]] } }), json!({}),
-            ["camera.shutter.open[1]", "in order"]),
-        (json!({ "shutter": { "exposure": 0.01, "open": [[0.002, 0.014]] } }), json!({}),
-            ["camera.shutter.open[0]", "an exposure of 0.01 s"]),
-        (json!({ "shutter": { "exposure": 0.01, "code": "0000" } }), json!({}), ["camera.shutter.code", "no open moment"]),
-        (json!({ "shutter": { "exposure": 0.01, "code": "1012" } }), json!({}), ["camera.shutter.code", "digits"]),
-        (json!({ "shutter": { "exposure": 0.01, "code": "1011", "chip": 0.003 } }), json!({}),
-            ["camera.shutter.code", "longer than the exposure"]),
-        (json!({ "shutter": { "type": "global_reset", "line_time": 1e-5, "exposure": 0.01, "code": "10" } }), json!({}),
-            ["camera.shutter.code", "rolling"]),
+        (
+            json!({ "shutter": { "exposure": -1 } }),
+            json!({}),
+            ["camera.shutter.exposure", "0 or more"],
+        ),
+        (
+            json!({ "shutter": { "type": "rolling" } }),
+            json!({}),
+            ["camera.shutter.line_time", "15 us"],
+        ),
+        (
+            json!({ "shutter": { "line_time": 1e-5 } }),
+            json!({}),
+            ["camera.shutter.line_time", "rolling"],
+        ),
+        (
+            json!({ "shutter": { "type": "rolling", "line_time": -1 } }),
+            json!({}),
+            ["camera.shutter.line_time", "0 or more"],
+        ),
+        (
+            json!({ "shutter": { "type": "rolling", "line_time": 0.001 } }),
+            json!({ "render": { "rate": 30 } }),
+            ["camera.shutter.line_time", "longer than"],
+        ),
+        (
+            json!({ "shutter": { "exposure": 0.01, "open": [] } }),
+            json!({}),
+            ["camera.shutter.open", "no open moment"],
+        ),
+        (
+            json!({ "shutter": { "exposure": 0.01, "open": [[0.002, 0.004], [0.003, 0.005]] } }),
+            json!({}),
+            ["camera.shutter.open[1]", "in order"],
+        ),
+        (
+            json!({ "shutter": { "exposure": 0.01, "open": [[0.002, 0.014]] } }),
+            json!({}),
+            ["camera.shutter.open[0]", "an exposure of 0.01 s"],
+        ),
+        (
+            json!({ "shutter": { "exposure": 0.01, "code": "0000" } }),
+            json!({}),
+            ["camera.shutter.code", "no open moment"],
+        ),
+        (
+            json!({ "shutter": { "exposure": 0.01, "code": "1012" } }),
+            json!({}),
+            ["camera.shutter.code", "digits"],
+        ),
+        (
+            json!({ "shutter": { "exposure": 0.01, "code": "1011", "chip": 0.003 } }),
+            json!({}),
+            ["camera.shutter.code", "longer than the exposure"],
+        ),
+        (
+            json!({ "shutter": { "type": "global_reset", "line_time": 1e-5, "exposure": 0.01, "code": "10" } }),
+            json!({}),
+            ["camera.shutter.code", "rolling"],
+        ),
         (poses(json!([0, 0])), json!({}), ["camera.motion.times[1]", "increase"]),
         (poses(json!([1, 0])), json!({}), ["camera.motion.times[1]", "increase"]),
         (poses(json!([0])), json!({}), ["camera.motion.times", "1 times for 2 poses"]),
         (turned, json!({}), ["camera.motion.revolutions[0]", "in between"]),
-        (json!({ "motion": { "type": "velocity" } }), json!({ "render": { "rate": 0 } }), ["render.rate", "above 0"]),
+        (
+            json!({ "motion": { "type": "velocity" } }),
+            json!({ "render": { "rate": 0 } }),
+            ["render.rate", "above 0"],
+        ),
     ];
     for (camera, more, words) in cases {
         let Err(error) = load(&camera, &more) else { panic!("{camera} {more} must be refused") };
@@ -86,7 +133,8 @@ fn exposures_of_the_sensor_and_the_shutter_must_agree() {
 
 #[test]
 fn frames_of_a_moving_camera_are_taken_at_their_times() {
-    let motion = json!({ "motion": { "type": "poses", "poses": [pose(0.0), pose(4.0)], "times": [0, 2] } });
+    let motion =
+        json!({ "motion": { "type": "poses", "poses": [pose(0.0), pose(4.0)], "times": [0, 2] } });
     let frames = |more: Value| {
         let file = file(&motion, &more)?;
         let all = file.frames(&Opener::default(), || unreachable!("a list"))?.unwrap();
@@ -96,7 +144,8 @@ fn frames_of_a_moving_camera_are_taken_at_their_times() {
         };
         all.frames.iter().map(place).collect::<Result<Vec<f64>, SceneError>>()
     };
-    let by_rate = frames(json!({ "render": { "rate": 4 }, "frames": [{}, {}, { "render.time": 1.75 }] }));
+    let by_rate =
+        frames(json!({ "render": { "rate": 4 }, "frames": [{}, {}, { "render.time": 1.75 }] }));
     assert_eq!(by_rate.unwrap(), [0.0, 0.5, 3.5]);
     let untimed = frames(json!({ "frames": [{}, {}] })).unwrap_err().to_string();
     assert!(untimed.contains("frames") && untimed.contains("render.rate"), "{untimed}");
