@@ -230,7 +230,7 @@ impl CameraSpec {
         }
         // The frame's pose is that at which data layers see the middle of the picture.
         let (shutter, trajectory) = self.built_time()?;
-        let mut time = CameraTime { shutter, motion: None, scene_moves: false };
+        let mut time = CameraTime { shutter, motion: None, things_move: false };
         let middle = time.middle(self.sensor().resolution[1]);
         let mut still = self.clone();
         if let Some(trajectory) = &trajectory {
@@ -511,7 +511,7 @@ impl Camera {
             pixel_pitch: self.sensor.pixel_pitch.map(|pitch| Micrometres(pitch.0 * times)),
         };
         let time = self.time.as_ref().map(|time| {
-            Arc::new(CameraTime { shutter: time.shutter.coarser(times), ..(**time).clone() })
+            Arc::new(CameraTime { shutter: time.shutter.coarser(times), ..CameraTime::clone(time) })
         });
         Self { pose: self.pose, sensor, projection, light_field: self.light_field.clone(), time }
     }
@@ -541,7 +541,7 @@ impl Camera {
             *v = f64::from(row) + 0.5;
         }
         self.aim(rays);
-        if self.has_times() {
+        if self.is_timed() {
             let rows: Vec<f64> = block.pixels().map(|(_, row)| f64::from(row) + 0.5).collect();
             self.carry_chief(&rows, rays);
         }

@@ -21,8 +21,8 @@ pub struct CameraTime {
     pub shutter: Shutter,
     /// The camera's motion, where it moves while the shutter is open.
     pub motion: Option<Trajectory>,
-    /// Things before it move while the shutter is open.
-    pub scene_moves: bool,
+    /// Whether anything of the scene moves while the shutter is open.
+    pub things_move: bool,
 }
 
 impl CameraTime {
@@ -45,23 +45,31 @@ impl Camera {
         self.time.as_deref()?.motion.as_ref()
     }
 
-    /// Whether rays have times: the camera moves while its shutter is open, or what it sees does.
+    /// The same camera in a scene of which something moves while its shutter is open, or nothing.
     #[must_use]
-    pub fn has_times(&self) -> bool {
-        self.time.as_deref().is_some_and(|time| time.motion.is_some() || time.scene_moves)
-    }
-
-    /// Gives rays times because things move before the camera; without a shutter nothing changes.
-    pub fn see_motion(&mut self) {
+    pub fn among_moving_things(mut self, things_move: bool) -> Self {
         if let Some(time) = &mut self.time {
-            Arc::make_mut(time).scene_moves = true;
+            Arc::make_mut(time).things_move = things_move;
         }
+        self
     }
 
-    /// Whether pixels of different rows are seen from different places.
+    /// When the first row opens and the last one closes (s); no time without a shutter.
+    #[must_use]
+    pub fn exposure_span(&self) -> [f64; 2] {
+        self.shutter().map_or([0.0; 2], Shutter::whole_span)
+    }
+
+    /// Whether rays have times: the camera or something in the scene moves while the shutter is open.
+    #[must_use]
+    pub fn is_timed(&self) -> bool {
+        self.time.as_deref().is_some_and(|time| time.motion.is_some() || time.things_move)
+    }
+
+    /// Whether pixels of different rows see different moments.
     #[must_use]
     pub fn rows_differ(&self) -> bool {
-        self.motion().is_some() && self.shutter().is_some_and(Shutter::rows_differ)
+        self.is_timed() && self.shutter().is_some_and(Shutter::rows_differ)
     }
 
     /// The pose at a time of the frame's clock (s).
@@ -96,9 +104,9 @@ impl Camera {
     /// Carries chief rays, which stand as the frame's pose has them, to where the camera is when data layers see their
     /// rows.
     pub(crate) fn carry_chief(&self, rows: &[f64], rays: &mut RayBatch) {
-        let Some(shutter) = self.shutter().filter(|_| self.has_times()) else { return };
+        let Some(shutter) = self.shutter().filter(|_| self.is_timed()) else { return };
+        let mut last = None;
         if let Some(motion) = self.motion() {
-            let mut last = None;
             self.carry(rays, |i| {
                 // Of one row, all pixels have the pose.
                 let time = shutter.truth(rows[i].floor() + 0.5);
@@ -108,14 +116,19 @@ impl Camera {
                 }
             });
         }
+        rays.set_times(rows[..rays.len()].iter().map(|row| shutter.truth(row.floor() + 0.5)));
     }
 
     /// Carries the rays of samples that have times to where the camera is then, and weighs them by how long their rows
     /// are open.
     pub(crate) fn carry_samples(&self, samples: &FilmSamples, out: &mut CameraRays) {
-        if let (Some(motion), false) = (self.motion(), samples.times.is_empty()) {
+        if !samples.times.is_empty() {
             let CameraRays { rays, sample, .. } = &mut *out;
-            self.carry(rays, |i| motion.at(samples.times[sample[i] as usize]));
+            let time = |sample: &u32| samples.times[*sample as usize];
+            if let Some(motion) = self.motion() {
+                self.carry(rays, |i| motion.at(time(&sample[i])));
+            }
+            rays.set_times(sample.iter().map(time));
         }
         if !samples.open_shares.is_empty() {
             let shares = out.sample.iter().map(|&sample| samples.open_shares[sample as usize]);

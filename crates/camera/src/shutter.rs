@@ -107,7 +107,6 @@ impl ShutterSpec {
     /// When times are negative or not finite, keys do not belong together, or there is no open moment; the error
     /// names the key.
     pub fn build(&self, rows: u32) -> Result<Shutter, CameraError> {
-        let fault = |key: &str, why: String| Err(CameraError::new(format!("shutter.{key}"), why));
         let exposure = self.exposure.map_or(0.0, |time| time.0);
         if !(exposure >= 0.0 && exposure.is_finite()) {
             return fault("exposure", format!("{exposure} s is no duration; give 0 or more"));
@@ -163,97 +162,92 @@ impl ShutterSpec {
 
     /// The open intervals of an exposure (s); none when all of it is open.
     fn intervals(&self, exposure: f64) -> Result<Vec<[f64; 2]>, CameraError> {
-        let fault = |key: &str, why: String| Err(CameraError::new(format!("shutter.{key}"), why));
         match (&self.open, &self.code) {
-            (None, None) if self.chip.is_some() => {
+            (_, None) if self.chip.is_some() => {
                 fault("chip", "is the time of a `code`, and there is none".to_owned())
             }
             (None, None) => Ok(Vec::new()),
-            (Some(_), Some(_)) => fault(
-                "code",
-                "is given beside `open`, which already says when it is open; remove one".to_owned(),
-            ),
-            (Some(_), None) if self.chip.is_some() => {
-                fault("chip", "is the time of a `code`, and there is none".to_owned())
+            (Some(_), Some(_)) => {
+                let why = "is given beside `open`, which already says when it is open; remove one";
+                fault("code", why.to_owned())
             }
-            (Some(list), None) => {
-                if list.is_empty() {
-                    return fault(
-                        "open",
-                        "lists no interval: the shutter has no open moment".to_owned(),
-                    );
-                }
-                if list.len() > MOST_INTERVALS {
-                    let why =
-                        format!("lists {} intervals; {MOST_INTERVALS} are the most", list.len());
-                    return fault("open", why);
-                }
-                let mut end = 0.0;
-                for (i, [Seconds(from), Seconds(to)]) in list.iter().enumerate() {
-                    let is_after = *from >= end && to > from && to.is_finite();
-                    if !is_after {
-                        let why = format!(
-                            "[{from}, {to}] s does not follow {end} s; intervals are in order, apart, and last longer \
-                             than 0"
-                        );
-                        return fault(&format!("open[{i}]"), why);
-                    }
-                    end = *to;
-                }
-                if end > exposure * (1.0 + ROUNDING) {
-                    let why =
-                        format!("ends {end} s after the start of an exposure of {exposure} s");
-                    return fault(&format!("open[{}]", list.len() - 1), why);
-                }
-                Ok(list.iter().map(|interval| interval.map(|time| time.0)).collect())
-            }
-            (None, Some(code)) => {
-                let chips: Option<Vec<bool>> = code
-                    .chars()
-                    .map(|chip| match chip {
-                        '0' => Some(false),
-                        '1' => Some(true),
-                        _ => None,
-                    })
-                    .collect();
-                let Some(chips) = chips.filter(|chips| chips.len() <= MOST_INTERVALS) else {
-                    let why = format!(
-                        "is no text of at most {MOST_INTERVALS} digits 1 (open) and 0 (closed)"
-                    );
-                    return fault("code", why);
-                };
-                if !chips.contains(&true) {
-                    return fault(
-                        "code",
-                        format!("\"{code}\" has no 1: the shutter has no open moment"),
-                    );
-                }
-                let count = chips.len() as f64;
-                let chip = self.chip.map_or(exposure / count, |time| time.0);
-                if !(chip > 0.0 && chip.is_finite()) {
-                    let why = format!(
-                        "a chip lasts {chip} s; give `chip` a time above 0, or the shutter an `exposure`"
-                    );
-                    return fault(if self.chip.is_some() { "chip" } else { "code" }, why);
-                }
-                if chip * count > exposure * (1.0 + ROUNDING) {
-                    let why = format!(
-                        "{count} chips of {chip} s are longer than the exposure of {exposure} s; shorten `chip`"
-                    );
-                    return fault("code", why);
-                }
-                let mut open: Vec<[f64; 2]> = Vec::new();
-                for (i, _) in chips.iter().enumerate().filter(|(_, is_open)| **is_open) {
-                    let (from, to) = (i as f64 * chip, (i as f64 + 1.0) * chip);
-                    match open.last_mut() {
-                        Some(last) if i > 0 && chips[i - 1] => last[1] = to,
-                        _ => open.push([from, to]),
-                    }
-                }
-                Ok(open)
-            }
+            (Some(list), None) => listed(list, exposure),
+            (None, Some(code)) => coded(code, self.chip, exposure),
         }
     }
+}
+
+fn fault<T>(key: &str, why: String) -> Result<T, CameraError> {
+    Err(CameraError::new(format!("shutter.{key}"), why))
+}
+
+/// The intervals of a list, held to be in order and within the exposure (s).
+fn listed(list: &[[Seconds; 2]], exposure: f64) -> Result<Vec<[f64; 2]>, CameraError> {
+    if list.is_empty() {
+        return fault("open", "lists no interval: the shutter has no open moment".to_owned());
+    }
+    if list.len() > MOST_INTERVALS {
+        return fault(
+            "open",
+            format!("lists {} intervals; {MOST_INTERVALS} are the most", list.len()),
+        );
+    }
+    let mut end = 0.0;
+    for (i, [Seconds(from), Seconds(to)]) in list.iter().enumerate() {
+        let is_after = *from >= end && to > from && to.is_finite();
+        if !is_after {
+            let why = format!(
+                "[{from}, {to}] s does not follow {end} s; intervals are in order, apart, and last longer than 0"
+            );
+            return fault(&format!("open[{i}]"), why);
+        }
+        end = *to;
+    }
+    if end > exposure * (1.0 + ROUNDING) {
+        let why = format!("ends {end} s after the start of an exposure of {exposure} s");
+        return fault(&format!("open[{}]", list.len() - 1), why);
+    }
+    Ok(list.iter().map(|interval| interval.map(|time| time.0)).collect())
+}
+
+/// The intervals of a code within an exposure (s).
+fn coded(code: &str, chip: Option<Seconds>, exposure: f64) -> Result<Vec<[f64; 2]>, CameraError> {
+    let is_open = |digit: char| match digit {
+        '0' => Some(false),
+        '1' => Some(true),
+        _ => None,
+    };
+    let chips: Option<Vec<bool>> = code.chars().map(is_open).collect();
+    let Some(chips) = chips.filter(|chips| chips.len() <= MOST_INTERVALS) else {
+        let why = format!("is no text of at most {MOST_INTERVALS} digits 1 (open) and 0 (closed)");
+        return fault("code", why);
+    };
+    if !chips.contains(&true) {
+        return fault("code", format!("\"{code}\" has no 1: the shutter has no open moment"));
+    }
+    let count = chips.len() as f64;
+    let length = chip.map_or(exposure / count, |time| time.0);
+    if !(length > 0.0 && length.is_finite()) {
+        let why = format!(
+            "a chip lasts {length} s; give `chip` a time above 0, or the shutter an `exposure`"
+        );
+        return fault(if chip.is_some() { "chip" } else { "code" }, why);
+    }
+    if length * count > exposure * (1.0 + ROUNDING) {
+        let why = format!(
+            "{count} chips of {length} s are longer than the exposure of {exposure} s; shorten `chip`"
+        );
+        return fault("code", why);
+    }
+    let mut open: Vec<[f64; 2]> = Vec::new();
+    for (i, _) in chips.iter().enumerate().filter(|(_, is_open)| **is_open) {
+        let (from, to) = (i as f64 * length, (i as f64 + 1.0) * length);
+        match open.last_mut() {
+            Some(last) if i > 0 && chips[i - 1] => last[1] = to,
+            _ => open.push([from, to]),
+        }
+    }
+    Ok(open)
 }
 
 impl Shutter {

@@ -73,13 +73,8 @@ pub fn accelerators() -> &'static [AccelName] {
 
 /// What a build of the structure over `scene` is told.
 fn options_for(scene: &Scene, plan: &Plan, options: &BuildOptions) -> BuildOptions {
-    let exposure = exposure(scene);
+    let exposure = scene.camera.exposure_span();
     BuildOptions { quality: plan.quality, refine: plan.refine, exposure, ..options.clone() }
-}
-
-/// From when to when any row of the scene's camera is open (s from the frame's time).
-pub(crate) fn exposure(scene: &Scene) -> [f64; 2] {
-    scene.camera.shutter().map_or([0.0; 2], |shutter| shutter.whole_span())
 }
 
 /// Builds `scene`'s acceleration structure with the backend that it names, or else the best.

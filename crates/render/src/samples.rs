@@ -542,7 +542,7 @@ impl Adding<'_> {
         let camera = self.what.camera();
         let Some(shutter) = camera.shutter() else { return };
         let rows = film.rows.iter().map(|row| row.floor() + 0.5);
-        if camera.has_times() {
+        if camera.is_timed() {
             squares_of_pair(numbers.iter().copied(), TIME_PAIR, &mut places);
             let moments =
                 rows.clone().zip(&places).map(|(row, place)| shutter.moment(row, place[0]));

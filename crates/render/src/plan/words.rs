@@ -12,8 +12,6 @@ use etendue_sensor::BandChoice;
 use etendue_tracer::layer::Kept;
 use etendue_tracer::{LayerSpec, Needs};
 
-use crate::render::exposure;
-
 use super::{
     MOST_BYTES_OF_SUMS, Passes, Plan, RAYS_A_SAMPLE_OF_LIGHT, RAYS_PER_TRIANGLE, quality_for,
 };
@@ -35,21 +33,27 @@ pub(super) struct Grounds<'a> {
 /// Whether samples have times.
 fn explain_shutter(scene: &Scene) -> Option<Decision> {
     let shutter = scene.camera.shutter()?;
-    let moving = moving_placements(&scene.geometry, exposure(scene)).count();
-    let why = match (scene.camera.motion(), shutter.is_fully_open()) {
-        (own, _) if moving > 0 => format!(
-            "{moving} of {} placed meshes move{}: samples of light have times of their row's exposure, and rays \
-             that meet the box in which a mesh moves are traced in its own frame, too",
-            scene.geometry.placements.len(),
-            if own.is_some() { ", and so does the camera" } else { "" }
+    let placed = &scene.geometry.placements;
+    let moving = moving_placements(&scene.geometry, scene.camera.exposure_span()).count();
+    let bodies = match moving {
+        0 => String::new(),
+        _ => format!(
+            "; {moving} of {} placed meshes move, and rays that meet the box in which one moves are traced in its own \
+             frame, too",
+            placed.len()
         ),
-        (Some(_), _) => "the camera moves: samples of light have times of their row's exposure".to_owned(),
-        (None, true) => "nothing moves: rays have no times, and nothing is paid".to_owned(),
-        (None, false) => {
-            "nothing moves: rays have no times, and light is multiplied by what the shutter lets through".to_owned()
+    };
+    let why = match (scene.camera.is_timed(), shutter.is_fully_open()) {
+        (true, _) if scene.camera.motion().is_some() => {
+            "the camera moves: samples of light have times of their row's exposure"
+        }
+        (true, _) => "something moves: samples of light have times of their row's exposure",
+        (false, true) => "nothing moves: rays have no times, and nothing is paid",
+        (false, false) => {
+            "nothing moves: rays have no times, and light is multiplied by what the shutter lets through"
         }
     };
-    Some(Decision::new(Kind::Shutter, shutter.words(), why))
+    Some(Decision::new(Kind::Shutter, shutter.words(), format!("{why}{bodies}")))
 }
 
 impl Plan {

@@ -40,7 +40,7 @@ fn push(scene: &mut Scene, object: u32, velocity: DVec3) {
             placement.motion = Some(Arc::new(steady.then_inner(&placement.world_from_mesh)));
         }
     }
-    scene.camera.see_motion();
+    scene.camera = scene.camera.clone().among_moving_things(true);
 }
 
 /// The red of each column, a mean over its rows.

@@ -90,7 +90,7 @@ fn a_flutter_shutter_leaves_its_code_in_the_picture() {
         .filter(|&i| code.as_bytes()[i] == b'1')
         .map(|i| [i as f64 / 16.0, (i as f64 + 1.0) / 16.0])
         .collect();
-    let pixels = 32.0;
+    let pixels = 28.0;
     let coded = scene(
         json!({ "shutter": { "exposure": 0.02, "code": code }, "motion": aside(pixels / 16.0 / 0.02) }),
         json!({ "render": { "samples": 4096 } }),

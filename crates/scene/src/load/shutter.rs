@@ -123,7 +123,7 @@ pub(crate) fn notes(camera: &Camera) -> Vec<Note> {
     };
     let Some(shutter) = camera.shutter() else { return Vec::new() };
     let Some(motion) = camera.motion() else {
-        return match shutter.is_fully_open() {
+        return match shutter.is_fully_open() && !camera.is_timed() {
             true => vec![note("nothing moves while it is open, so that it changes nothing".into())],
             false => Vec::new(),
         };

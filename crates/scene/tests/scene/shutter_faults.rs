@@ -30,7 +30,7 @@ fn pose(x: f64) -> Value {
 fn wrong_shutters_and_motions_are_refused_by_place_and_remedy() {
     let poses = |times: Value| json!({ "motion": { "type": "poses", "poses": [pose(0.0), pose(1.0)], "times": times } });
     let turned = json!({ "motion": { "type": "poses", "poses": [pose(0.0), pose(1.0)], "times": [0, 1], "revolutions": [1] } });
-    let cases: [(Value, Value, [&str; 2]); 17] = [
+    let cases: [(Value, Value, [&str; 2]); 16] = [
         (
             json!({ "shutter": { "exposure": -1 } }),
             json!({}),
@@ -95,11 +95,6 @@ fn wrong_shutters_and_motions_are_refused_by_place_and_remedy() {
         (poses(json!([1, 0])), json!({}), ["camera.motion.times[1]", "increase"]),
         (poses(json!([0])), json!({}), ["camera.motion.times", "1 times for 2 poses"]),
         (turned, json!({}), ["camera.motion.revolutions[0]", "in between"]),
-        (
-            json!({ "motion": { "type": "velocity" } }),
-            json!({ "render": { "rate": 0 } }),
-            ["render.rate", "above 0"],
-        ),
     ];
     for (camera, more, words) in cases {
         let Err(error) = load(&camera, &more) else { panic!("{camera} {more} must be refused") };
@@ -108,10 +103,17 @@ fn wrong_shutters_and_motions_are_refused_by_place_and_remedy() {
             assert!(message.contains(word), "expected `{word}` in: {message}");
         }
     }
-    let mut both = poses(json!([0, 1]));
+}
+
+#[test]
+fn a_pose_beside_poses_is_refused() {
+    let mut both =
+        json!({ "motion": { "type": "poses", "poses": [pose(0.0), pose(1.0)], "times": [0, 1] } });
     both["pose"] = pose(0.0);
     let message = load(&both, &json!({})).unwrap_err().to_string();
     assert!(message.contains("camera.pose") && message.contains("remove one"), "{message}");
+    let rate = load(&json!({}), &json!({ "render": { "rate": 0 } })).unwrap_err().to_string();
+    assert!(rate.contains("render.rate") && rate.contains("above 0"), "{rate}");
 }
 
 #[test]
