@@ -100,7 +100,7 @@ fn moving_bodies_are_still_ones_at_each_time() {
                 let hits = closest(&**accel, &batch);
                 let mut blocked = Vec::new();
                 accel.occluded(&batch, &mut blocked);
-                for i in 0..batch.len() {
+                for (i, &is_blocked) in blocked.iter().enumerate() {
                     count += 1;
                     let (ours, theirs) = (
                         (hits.placement[i], hits.triangle[i]),
@@ -111,7 +111,7 @@ fn moving_bodies_are_still_ones_at_each_time() {
                         met += 1;
                         continue;
                     }
-                    assert_eq!(blocked[i], truth.is_hit(i), "{name} at {time}: ray {i}");
+                    assert_eq!(is_blocked, truth.is_hit(i), "{name} at {time}: ray {i}");
                     if ours.0 == MISS {
                         continue;
                     }
