@@ -20,6 +20,7 @@ mod checked;
 mod embree;
 mod exact;
 mod few;
+mod moving;
 mod nearest;
 mod parts;
 #[cfg(feature = "embree")]
@@ -51,6 +52,7 @@ pub use embree::limit;
 #[cfg(feature = "embree")]
 pub use embree::{Version, version as embree_version};
 pub use exact::Exact;
+pub use moving::{Build, build_moving, moving_placements};
 
 /// Answers nearest-hit and visibility queries about one scene. Built once, then only read.
 pub trait Accel: Send + Sync + fmt::Debug {
@@ -155,6 +157,9 @@ pub struct BuildOptions {
     pub robust: bool,
     /// Solve each hit again in f64. Off gives f32's distances.
     pub refine: bool,
+    /// Between which times rays are (s from the frame's time, first and last): what moves then is kept apart
+    /// by [`build_moving`].
+    pub exposure: [f64; 2],
     /// Force one of Embree's instruction sets (`sse2`, `sse4.2`, `avx`, `avx2`, `avx512`).
     pub isa: Option<String>,
     /// Give up when the structure would need more bytes than this.
@@ -171,6 +176,7 @@ impl Default for BuildOptions {
             compact: false,
             robust: true,
             refine: true,
+            exposure: [0.0; 2],
             isa: None,
             memory_limit: None,
             progress: None,

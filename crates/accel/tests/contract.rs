@@ -8,6 +8,8 @@ mod accuracy;
 mod degenerate;
 #[path = "contract/meshes.rs"]
 mod meshes;
+#[path = "contract/moving.rs"]
+mod moving;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

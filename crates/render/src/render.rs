@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use etendue_accel::{Accel, BuildOptions};
+use etendue_accel::{Accel, BuildError, BuildOptions, build_moving, moving_placements};
 use etendue_camera::{Camera, LensCamera, PixelExtent};
 use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
@@ -71,6 +71,12 @@ pub fn accelerators() -> &'static [AccelName] {
     }
 }
 
+/// What a build of the structure over `scene` is told.
+fn options_for(scene: &Scene, plan: &Plan, options: &BuildOptions) -> BuildOptions {
+    let exposure = scene.camera.exposure_span();
+    BuildOptions { quality: plan.quality, refine: plan.refine, exposure, ..options.clone() }
+}
+
 /// Builds `scene`'s acceleration structure with the backend that it names, or else the best.
 ///
 /// # Errors
@@ -83,19 +89,23 @@ pub fn build(
     options: &BuildOptions,
 ) -> Result<Box<dyn Accel>, RenderError> {
     let geometry = Arc::clone(&scene.geometry);
-    let options = BuildOptions { quality: plan.quality, refine: plan.refine, ..options.clone() };
+    let options = options_for(scene, plan, options);
     let name = scene.render.accel.unwrap_or(accelerators()[0]);
     if options.isa.is_some() && name != AccelName::Embree {
         return Err(RenderError::NotEmbree);
     }
-    Ok(match name {
-        #[cfg(feature = "embree")]
-        AccelName::Embree => Box::new(etendue_accel::Embree::build(geometry, &options)?),
-        #[cfg(not(feature = "embree"))]
-        AccelName::Embree => return Err(RenderError::Absent("Embree")),
-        AccelName::Bvh => Box::new(etendue_accel::Bvh::build(geometry, &options)?),
-        AccelName::Exact => Box::new(etendue_accel::Exact::build(geometry, &options)?),
-    })
+    if cfg!(not(feature = "embree")) && name == AccelName::Embree {
+        return Err(RenderError::Absent("Embree"));
+    }
+    let one = |geometry, options: &BuildOptions| -> Result<Box<dyn Accel>, BuildError> {
+        Ok(match name {
+            #[cfg(feature = "embree")]
+            AccelName::Embree => Box::new(etendue_accel::Embree::build(geometry, options)?),
+            AccelName::Exact => Box::new(etendue_accel::Exact::build(geometry, options)?),
+            _ => Box::new(etendue_accel::Bvh::build(geometry, options)?),
+        })
+    };
+    Ok(build_moving(geometry, &options, &one)?)
 }
 
 /// As [`build`], after `before` was built for the same scene, of which parts have changed since: what of
@@ -110,10 +120,10 @@ pub fn rebuild(
     options: &BuildOptions,
     before: Option<&dyn Accel>,
 ) -> Result<Box<dyn Accel>, RenderError> {
-    let with_quality =
-        BuildOptions { quality: plan.quality, refine: plan.refine, ..options.clone() };
+    let with_quality = options_for(scene, plan, options);
     let again = |before: &dyn Accel| before.rebuilt(Arc::clone(&scene.geometry), &with_quality);
-    match before.and_then(again) {
+    let stands = moving_placements(&scene.geometry, with_quality.exposure).next().is_none();
+    match before.filter(|_| stands).and_then(again) {
         Some(rebuilt) => Ok(rebuilt?),
         None => build(scene, plan, options),
     }

@@ -29,7 +29,7 @@ pub struct Emitters {
 
 impl Emitters {
     /// The emissive surfaces among the placements of `geometry`; `None` when there are too many for
-    /// this to be of use.
+    /// this to be of use, or one of them moves.
     #[must_use]
     pub fn of(geometry: &Geometry, materials: &[Material]) -> Option<Self> {
         let mut own = Geometry { meshes: geometry.meshes.clone(), placements: Vec::new() };
@@ -37,6 +37,10 @@ impl Emitters {
         for (number, placement) in (0_u32..).zip(&geometry.placements) {
             let material = materials.get(placement.material as usize);
             if material.is_some_and(|material| material.emission.is_some()) {
+                // Where it is, only the whole scene's structure knows.
+                if placement.motion.is_some() {
+                    return None;
+                }
                 own.placements.push(placement.clone());
                 numbers.push(number);
             }

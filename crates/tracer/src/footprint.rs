@@ -76,7 +76,7 @@ impl SurfacePoint<'_> {
     pub fn extent(&self, set: usize) -> Option<[[f64; 2]; 2]> {
         let Footprint { direction, width } = self.footprint?;
         let uvs = self.mesh.uvs.get(set)?;
-        let linear = &self.placement.world_from_mesh.linear;
+        let linear = &self.linear();
         let [p0, p1, p2] = self.mesh.corners(self.triangle);
         let (e1, e2) = (*linear * (p1 - p0), *linear * (p2 - p0));
         let cross = e1.cross(e2);

@@ -30,7 +30,9 @@ pub struct Lights {
     tints: Vec<Option<Vec<f64>>>,
     /// For each placement, where its triangles start among the choices.
     first: Vec<Option<u32>>,
-    /// Placement and triangle of each emissive triangle, behind the lights.
+    /// Some emissive surface moves: no place on it is chosen, and paths come upon it by themselves.
+    has_moving: bool,
+    /// Placement and triangle of each emissive triangle that stands still, behind the lights.
     triangles: Vec<[u32; 2]>,
     sampler: LightSampler,
     /// The emissive triangles where they are at most [`lamps::MOST`] (`None` without area), and what those
@@ -73,9 +75,12 @@ impl Lights {
         let mut candidates: Vec<Candidate> = lights.iter().map(candidate).collect();
         let mut first = Vec::with_capacity(around.geometry.placements.len());
         let mut triangles = Vec::new();
+        let mut has_moving = false;
         for (number, placement) in (0_u32..).zip(&around.geometry.placements) {
             let material = around.materials.get(placement.material as usize);
             let emits = material.is_some_and(|m| m.emission.is_some());
+            has_moving |= emits && placement.motion.is_some();
+            let emits = emits && placement.motion.is_none();
             first.push(if emits { u32::try_from(candidates.len()).ok() } else { None });
             let Some(material) = material.filter(|_| emits) else { continue };
             let mesh = around.geometry.mesh_of(placement);
@@ -110,6 +115,7 @@ impl Lights {
             sky,
             tints,
             first,
+            has_moving,
             triangles,
             sampler,
             lamps,
@@ -189,7 +195,7 @@ impl Lights {
     /// Whether a ray that nobody aimed may come upon a light: not upon points and parallel light.
     #[must_use]
     pub fn is_hittable(&self) -> bool {
-        self.sky.is_some() || !self.triangles.is_empty()
+        self.sky.is_some() || !self.triangles.is_empty() || self.has_moving
     }
 
     /// Whether a place on one of them is chosen: not on points and parallel light.

@@ -118,7 +118,9 @@ impl PlacedSurfaces {
                 color: if colored { None } else { plain_tint(&material.base_color, spectral) },
             })
         };
-        let may_touch = |i: usize| bodies[i].is_some_and(|body: Body| body.may_vanish);
+        // Bodies that move touch others for no time at all.
+        let stands = |i: usize| geometry.placements[i].motion.is_none();
+        let may_touch = |i: usize| stands(i) && bodies[i].is_some_and(|body: Body| body.may_vanish);
         let touching = match bodies.iter().flatten().any(|body| body.may_vanish) {
             true => Coplanar::among(geometry, &may_touch),
             false => Coplanar::default(),

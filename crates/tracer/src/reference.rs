@@ -113,7 +113,7 @@ impl SceneView<'_> {
         let (u, v) = (hits.u[i], hits.v[i]);
         let weights = [1.0 - u - v, u, v];
         let spot = SurfacePoint::corner(self.geometry, placement, hits.triangle[i] as usize);
-        Some(SurfacePoint { weights, ..spot })
+        Some(SurfacePoint { weights, time: hits.time(i), ..spot })
     }
 
     /// The material of a spot.
@@ -372,6 +372,8 @@ pub struct SurfacePoint<'a> {
     pub triangle: usize,
     /// Barycentric weights of its corners.
     pub weights: [f64; 3],
+    /// When it is looked at (s from the frame's time), as far as that counts: 0 where nothing moves.
+    pub time: f64,
     /// How much around it is seen at once; a point when absent.
     pub footprint: Option<Footprint>,
 }
@@ -381,7 +383,7 @@ impl<'a> SurfacePoint<'a> {
     #[must_use]
     pub fn corner(geometry: &'a Geometry, placement: &'a Placement, triangle: usize) -> Self {
         let mesh = geometry.mesh_of(placement);
-        Self { placement, mesh, triangle, weights: [1.0, 0.0, 0.0], footprint: None }
+        Self { placement, mesh, triangle, weights: [1.0, 0.0, 0.0], time: 0.0, footprint: None }
     }
 
     /// Values at the three corners, weighted.
@@ -415,11 +417,23 @@ impl<'a> SurfacePoint<'a> {
         self.turned_normal(turn.as_ref(), geometric)
     }
 
+    /// What turns and stretches the mesh, at its time.
+    pub(crate) fn linear(&self) -> DMat3 {
+        match &self.placement.motion {
+            None => self.placement.world_from_mesh.linear,
+            Some(motion) => motion.at(self.time).linear,
+        }
+    }
+
     /// [`Self::shading_normal`] with the placement's matrix for normals, or none where it turns
-    /// nothing.
+    /// nothing; of a placement that moves its own is taken, at its time.
     pub(crate) fn turned_normal(&self, turn: Option<&DMat3>, geometric: DVec3) -> Option<DVec3> {
         let local = DVec3::from(self.mix(self.mesh.normals.as_ref()?));
-        let world = turn.map_or(local, |turn| *turn * local).try_normalize()?;
+        let world = match &self.placement.motion {
+            None => turn.map_or(local, |turn| *turn * local),
+            Some(motion) => motion.at(self.time).normal_matrix() * local,
+        };
+        let world = world.try_normalize()?;
         // Some files' normals point inwards; the triangle's winding decides.
         Some(if world.dot(geometric) < 0.0 { -world } else { world })
     }
@@ -429,7 +443,7 @@ impl<'a> SurfacePoint<'a> {
     #[must_use]
     pub fn texture_axes(&self, set: usize) -> Option<[DVec3; 2]> {
         let uvs = self.mesh.uvs.get(set)?;
-        let linear = &self.placement.world_from_mesh.linear;
+        let linear = &self.linear();
         let [p0, p1, p2] = self.mesh.corners(self.triangle);
         let (e1, e2) = (*linear * (p1 - p0), *linear * (p2 - p0));
         let [a, b, c] =

@@ -68,11 +68,15 @@ impl Anchor {
     }
 }
 
-/// `|T| + |L p₀|`: what a placement's own numbers add to the rounding of a hit (m).
+/// `|T| + |L p₀|`: what a placement's own numbers add to the rounding of a hit (m). Of one that moves it is
+/// `2 |L p₀|`, however it is turned: `|T|` is at most `|p| + |L p₀|`.
 #[must_use]
 pub fn magnitudes(placement: &Placement, mesh: &Mesh) -> DVec3 {
     let place = &placement.world_from_mesh;
     let corner = mesh.bounds.min.abs().max(mesh.bounds.max.abs());
+    if let Some(motion) = &placement.motion {
+        return DVec3::splat(2.0 * motion.stretch() * corner.length());
+    }
     let linear = &place.linear;
     let turned = linear.x_axis.abs() * corner.x
         + linear.y_axis.abs() * corner.y

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use etendue_accel::Quality;
+use etendue_accel::{Quality, moving_placements};
 use etendue_camera::{LensCamera, Projection};
 use etendue_geometry::{HitPrecision, Placement};
 use etendue_report::{Decision, DecisionKind as Kind, DecisionValue, Saving, Tabled};
@@ -33,6 +33,16 @@ pub(super) struct Grounds<'a> {
 /// Whether samples have times.
 fn explain_shutter(scene: &Scene) -> Option<Decision> {
     let shutter = scene.camera.shutter()?;
+    let placed = &scene.geometry.placements;
+    let moving = moving_placements(&scene.geometry, scene.camera.exposure_span()).count();
+    let bodies = match moving {
+        0 => String::new(),
+        _ => format!(
+            "; {moving} of {} placed meshes move, and rays that meet the box in which one moves are traced in its own \
+             frame, too",
+            placed.len()
+        ),
+    };
     let why = match (scene.camera.is_timed(), shutter.is_fully_open()) {
         (true, _) if scene.camera.motion().is_some() => {
             "the camera moves: samples of light have times of their row's exposure"
@@ -43,7 +53,7 @@ fn explain_shutter(scene: &Scene) -> Option<Decision> {
             "nothing moves: rays have no times, and light is multiplied by what the shutter lets through"
         }
     };
-    Some(Decision::new(Kind::Shutter, shutter.words(), why.to_owned()))
+    Some(Decision::new(Kind::Shutter, shutter.words(), format!("{why}{bodies}")))
 }
 
 impl Plan {

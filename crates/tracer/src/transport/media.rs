@@ -224,37 +224,39 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         if !self.stage.traits.has_media || placed.bodies().next().is_none() {
             return Vec::new();
         }
+        let moves = self.stage.surroundings.geometry.moves();
         let holds = |i: usize| {
             let origin = rays.origin(i);
-            placed.bodies().any(|body| {
-                body.bounds.min.cmple(origin).all() && origin.cmple(body.bounds.max).all()
-            })
+            moves
+                || placed.bodies().any(|body| {
+                    body.bounds.min.cmple(origin).all() && origin.cmple(body.bounds.max).all()
+                })
         };
         let mut media: Vec<Media> = Vec::with_capacity(rays.len());
-        let mut last: Option<DVec3> = None;
+        let mut last: Option<(DVec3, f64)> = None;
         for i in 0..rays.len() {
-            let origin = rays.origin(i);
+            let place = (rays.origin(i), rays.time(i));
             media.push(match (last, media.last()) {
-                (Some(same), Some(&media)) if same == origin => media,
-                _ if holds(i) => self.media_at(origin),
+                (Some(same), Some(&media)) if same == place => media,
+                _ if holds(i) => self.media_at(place),
                 _ => Media::NONE,
             });
-            last = Some(origin);
+            last = Some(place);
         }
         media
     }
 
-    fn media_at(&self, origin: DVec3) -> Media {
+    /// The media at a place (m) at a time (s from the frame's time).
+    fn media_at(&self, place: (DVec3, f64)) -> Media {
         /// A line that no model is likely to have a face or an edge along.
         const LINE: DVec3 = DVec3::new(0.529_1, 0.694_7, 0.487_3);
-        let [one, other] =
-            [1.0, -1.0].map(|sign| self.backs_along(origin, LINE.normalize() * sign));
+        let [one, other] = [1.0, -1.0].map(|sign| self.backs_along(place, LINE.normalize() * sign));
         let both = one.iter().filter(|body| other.contains(body));
         both.fold(Media::NONE, |media, &body| media.with(body))
     }
 
     /// The bodies of which a ray meets the back more often than the front.
-    fn backs_along(&self, origin: DVec3, direction: DVec3) -> Vec<u32> {
+    fn backs_along(&self, (origin, time): (DVec3, f64), direction: DVec3) -> Vec<u32> {
         /// By how much of its distance the next surface lies behind one.
         const BEHIND: f64 = 1e-13;
         /// The most surfaces on the way.
@@ -266,6 +268,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             rays.clear();
             rays.precision = HitPrecision::Double;
             rays.push_between(origin, direction, start, f64::INFINITY);
+            rays.end_at_times([time].into_iter());
             self.stage.accel.closest(&rays, &mut hits);
             if !hits.is_hit(0) {
                 break;

@@ -260,8 +260,13 @@ fn trace_bands<const RGB: bool>(
     let count = stage.spectral.count();
     out.clear();
     out.resize(beam.rays.len() * beam.parts.count() * count, 0.0);
-    let mut tracing =
-        Tracing::<RGB> { rules, stage, parts: beam.parts, tally: RayStats::default() };
+    let mut tracing = Tracing::<RGB> {
+        rules,
+        stage,
+        parts: beam.parts,
+        times: beam.rays.times(),
+        tally: RayStats::default(),
+    };
     scratch.hits.detail = Detail::Surface;
     scratch.shadows.hits.detail = Detail::Surface;
     scratch.radiance.resize(count, 0.0);
@@ -289,6 +294,8 @@ fn trace_bands<const RGB: bool>(
         // From neighbouring places to lights: as coherent as what they start from.
         scratch.shadows.rays.coherent = scratch.now.rays.coherent;
         tracing.step_all(scratch);
+        scratch.next.take_times(tracing.times);
+        scratch.last.take_times(tracing.times);
         if stage.lights.is_hittable() && precision == HitPrecision::Double {
             scratch.shadows.sort(count);
         }
@@ -305,6 +312,8 @@ struct Tracing<'a, const RGB: bool> {
     rules: Rules,
     stage: &'a LightingContext<'a>,
     parts: Parts,
+    /// When the camera's rays are (s from the frame's time); empty when all are at 0.
+    times: &'a [f64],
     tally: RayStats,
 }
 

@@ -69,6 +69,13 @@ impl Paths {
         self.rays.precision = precision;
     }
 
+    /// Puts each path at the time of the camera's ray that it goes on from.
+    pub(super) fn take_times(&mut self, times: &[f64]) {
+        if !times.is_empty() {
+            self.rays.set_times(self.states.iter().map(|state| times[state.ray as usize]));
+        }
+    }
+
     /// What path `i` carries in its `count` bands.
     pub(super) fn throughput_of(&self, i: usize, count: usize) -> &[f64] {
         &self.throughput[i * count..(i + 1) * count]

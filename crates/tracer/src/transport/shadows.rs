@@ -162,6 +162,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             return;
         }
         shadows.rays.from_surface = true;
+        if !self.times.is_empty() {
+            let rows = self.parts.count();
+            let Shadows { rays, row, .. } = &mut *shadows;
+            rays.set_times(row.iter().map(|&row| self.times[row as usize / rows]));
+        }
         self.tally.shadow_rays += shadows.rays.len() as u64;
         let Traits { has_alpha, has_nested, has_panes, .. } = self.stage.traits;
         if has_alpha || has_nested || (has_panes && shadows.is_delta.contains(&true)) {
@@ -252,6 +257,9 @@ impl<const RGB: bool> Tracing<'_, RGB> {
                     );
                     still.push(i);
                 }
+            }
+            if !rays.times().is_empty() {
+                onward.set_times(still.iter().map(|&i| rays.time(i as usize)));
             }
             *again = onward;
             *open = still;

@@ -1,0 +1,307 @@
+//! Bodies that move while the shutter is open, over any backend: each is traced in its own frame, into
+//! which a ray is carried at its time in f64.
+//!
+//! What stands still is in one structure of the backend, which is as it would be without the others. The
+//! mesh of each moving placement has a structure in the mesh's frame, shared by all that place it. A ray
+//! asks it when it meets the box that the body sweeps while the shutter is open. All backends agree, and
+//! hits are as exact as those of a body that stands at the place where it is at the ray's time.
+
+use std::borrow::Cow;
+use std::fmt;
+use std::sync::Arc;
+use std::time::Instant;
+
+use etendue_geometry::glam::{DMat3, DVec3};
+use etendue_geometry::{
+    Bounds, Detail, Geometry, HitBatch, HitPrecision, MISS, Mesh, Motion, PlacedTriangle,
+    Positions, RayBatch, Transform, Vertices,
+};
+
+use crate::{Accel, BuildError, BuildOptions, BuildReport, Counts};
+
+/// Builds a structure of one backend.
+pub type Build<'a> = &'a dyn Fn(Arc<Geometry>, &BuildOptions) -> Result<Box<dyn Accel>, BuildError>;
+
+/// The structure over `geometry` of the backend that `build` builds, with all that moves within the
+/// [exposure](BuildOptions::exposure): the backend's own where nothing does.
+///
+/// # Errors
+///
+/// Those of the backend.
+pub fn build_moving(
+    geometry: Arc<Geometry>,
+    options: &BuildOptions,
+    build: Build<'_>,
+) -> Result<Box<dyn Accel>, BuildError> {
+    let moves = moving_placements(&geometry, options.exposure).next().is_some();
+    match moves {
+        false => build(geometry, options),
+        true => Ok(Box::new(Moving::build(&geometry, options, build)?)),
+    }
+}
+
+/// The placements that move between the times of `exposure` (s from the frame's time, first and last).
+pub fn moving_placements(
+    geometry: &Geometry,
+    exposure: [f64; 2],
+) -> impl Iterator<Item = (usize, &Arc<Motion>)> {
+    let all = geometry.placements.iter().enumerate();
+    let motions = all.filter_map(|(i, placement)| Some((i, placement.motion.as_ref()?)));
+    motions.filter(move |(_, motion)| motion.moves_within(exposure))
+}
+
+/// A structure whose bodies move.
+struct Moving {
+    still: Box<dyn Accel>,
+    /// One for each mesh that moves.
+    shapes: Vec<Box<dyn Accel>>,
+    bodies: Vec<Body>,
+    /// Of each placement, whether it moves.
+    moves: Vec<bool>,
+    exposure: [f64; 2],
+    report: BuildReport,
+}
+
+/// A placement that moves.
+#[derive(Debug)]
+struct Body {
+    placement: u32,
+    shape: usize,
+    motion: Arc<Motion>,
+    /// Where it is while the shutter is open (m, world).
+    swept: Bounds,
+}
+
+/// Rays of a body, in its frame.
+#[derive(Default)]
+struct Carried {
+    rays: RayBatch,
+    hits: HitBatch,
+    blocked: Vec<bool>,
+    /// Of each, which of the batch it is, how long its unit is in the body's frame, and what carries normals back.
+    from: Vec<(usize, f64, DMat3)>,
+}
+
+/// Distances that differ by no more than this, of the largest coordinate of the ray's origin and of the
+/// distance, are one: as in the rule of surfaces in one plane.
+const ONE_PLACE: f64 = 64.0 * f64::EPSILON;
+
+impl Moving {
+    fn build(
+        geometry: &Arc<Geometry>,
+        options: &BuildOptions,
+        build: Build<'_>,
+    ) -> Result<Self, BuildError> {
+        let start = Instant::now();
+        // Placements keep their numbers: those that move have nothing that stands still.
+        let mut still = (**geometry).clone();
+        let nothing = u32::try_from(still.meshes.len()).unwrap_or(MISS);
+        let none: &[[f32; 3]] = &[];
+        let positions = Positions::F32(Vertices::from_arrays(none));
+        still.meshes.push(Mesh::new("nothing", positions, Vec::new().into()));
+        let mut moves = vec![false; still.placements.len()];
+        let mut of_mesh = vec![None; geometry.meshes.len()];
+        let (mut shapes, mut bodies) = (Vec::<Box<dyn Accel>>::new(), Vec::new());
+        for (i, motion) in moving_placements(geometry, options.exposure) {
+            still.placements[i].mesh = nothing;
+            moves[i] = true;
+            let placement = &geometry.placements[i];
+            let mesh = geometry.mesh_of(placement);
+            let bounds = mesh.bounds;
+            if bounds.is_empty() {
+                continue;
+            }
+            let shape = match of_mesh[placement.mesh as usize] {
+                Some(shape) => shape,
+                None => {
+                    let alone = Geometry::alone(mesh.clone(), Transform::IDENTITY);
+                    shapes.push(build(Arc::new(alone), options)?);
+                    shapes.len() - 1
+                }
+            };
+            of_mesh[placement.mesh as usize] = Some(shape);
+            let swept = motion.swept(bounds, options.exposure);
+            let placement = u32::try_from(i).unwrap_or(MISS);
+            bodies.push(Body { placement, shape, motion: Arc::clone(motion), swept });
+        }
+        let still = build(Arc::new(still), options)?;
+        let mut report = still.report();
+        for shape in &shapes {
+            let BuildReport { bytes, copied_bytes, .. } = shape.report();
+            report.bytes += bytes;
+            report.copied_bytes += copied_bytes;
+        }
+        report.bytes += (bodies.capacity() * size_of::<Body>()) as u64;
+        report.backend = format!("{}, {} moving", report.backend, bodies.len());
+        report.time = start.elapsed();
+        Ok(Self { still, shapes, bodies, moves, exposure: options.exposure, report })
+    }
+
+    /// The rays with those triangles at their ends that stand still.
+    fn with_still_ends<'r>(&self, rays: &'r RayBatch) -> Cow<'r, RayBatch> {
+        let Some(ends) = rays.endpoint_triangles() else { return Cow::Borrowed(rays) };
+        let moves = |end: &PlacedTriangle| self.moves.get(end[0] as usize) == Some(&true);
+        if !ends.iter().flatten().any(moves) {
+            return Cow::Borrowed(rays);
+        }
+        let still = |end: PlacedTriangle| if moves(&end) { [MISS; 2] } else { end };
+        let mut own = rays.clone();
+        own.end_on_triangles(ends.iter().map(|ends| ends.map(still)));
+        Cow::Owned(own)
+    }
+
+    /// Carries those `rays` into the frame of `body` that meet it no farther than `t_max` says.
+    fn carry(
+        &self,
+        body: &Body,
+        rays: &RayBatch,
+        t_max: impl Fn(usize) -> Option<f64>,
+        carried: &mut Carried,
+    ) {
+        carried.rays.clear();
+        carried.rays.coherent = rays.coherent;
+        carried.rays.from_surface = rays.from_surface;
+        // Offsets by which rays leave surfaces are bounds in the world: f64 has them in every frame.
+        carried.rays.precision = HitPrecision::Double;
+        carried.from.clear();
+        let [open, close] = self.exposure;
+        for i in 0..rays.len() {
+            let Some(t_max) = t_max(i) else { continue };
+            let (origin, direction, time) = (rays.origin(i), rays.direction(i), rays.time(i));
+            let limits = [rays.t_min()[i], t_max];
+            // At other times the body may be anywhere.
+            let is_swept = time >= open && time <= close;
+            if is_swept && !meets(body.swept, origin, direction, limits) {
+                continue;
+            }
+            let place = body.motion.at(time);
+            let inverse = place.linear.inverse();
+            let turned = inverse * direction;
+            let stretch = turned.length();
+            if !(stretch > 0.0 && stretch.is_finite()) {
+                continue;
+            }
+            let start = inverse * -place.offset_from(origin);
+            let limits = limits.map(|t| t * stretch);
+            match rays.endpoint_triangles() {
+                None => {
+                    carried.rays.push_between(start, turned / stretch, limits[0], limits[1]);
+                }
+                Some(ends) => {
+                    let own = |[placement, triangle]: [u32; 2]| match placement == body.placement {
+                        true => [0, triangle],
+                        false => [MISS; 2],
+                    };
+                    let ends = ends[i].map(own);
+                    carried.rays.push_between_triangles(start, turned / stretch, limits, ends);
+                }
+            }
+            carried.from.push((i, stretch, place.normal_matrix()));
+        }
+    }
+}
+
+/// Whether a ray meets a box at distances (m) within `limits`, rounding in favour of yes.
+fn meets(bounds: Bounds, origin: DVec3, direction: DVec3, [t_min, t_max]: [f64; 2]) -> bool {
+    let size = origin.abs().max(bounds.min.abs()).max(bounds.max.abs()).max_element();
+    let pad = DVec3::splat(8.0 * f64::EPSILON * size);
+    let (low, high) = (bounds.min - pad - origin, bounds.max + pad - origin);
+    let (mut near, mut far) = (t_min, t_max);
+    for axis in 0..3 {
+        if direction[axis] == 0.0 {
+            if low[axis] > 0.0 || high[axis] < 0.0 {
+                return false;
+            }
+            continue;
+        }
+        let [a, b] = [low[axis] / direction[axis], high[axis] / direction[axis]];
+        near = near.max(a.min(b));
+        far = far.min(a.max(b));
+    }
+    near <= far + ONE_PLACE * (size + far.abs())
+}
+
+impl Accel for Moving {
+    fn closest(&self, rays: &RayBatch, hits: &mut HitBatch) {
+        self.still.closest(&self.with_still_ends(rays), hits);
+        hits.set_times(rays.times());
+        let mut carried = Carried::default();
+        carried.hits.detail = hits.detail;
+        for body in &self.bodies {
+            let reach = |i: usize| {
+                let t = hits.t[i].min(rays.t_max()[i]);
+                // As far as what is in the same place.
+                let t = t + ONE_PLACE * t.abs().max(rays.origin(i).abs().max_element());
+                Some(if t.is_nan() { f64::INFINITY } else { t.min(rays.t_max()[i]) })
+            };
+            self.carry(body, rays, reach, &mut carried);
+            if carried.from.is_empty() {
+                continue;
+            }
+            self.shapes[body.shape].closest(&carried.rays, &mut carried.hits);
+            for (k, &(i, stretch, turn)) in carried.from.iter().enumerate() {
+                let found = &carried.hits;
+                if !found.is_hit(k) {
+                    continue;
+                }
+                let t = found.t[k] / stretch;
+                let size = t.abs().max(rays.origin(i).abs().max_element());
+                let is_nearer = match hits.is_hit(i) {
+                    false => true,
+                    true if body.placement > hits.placement[i] => t <= hits.t[i] + ONE_PLACE * size,
+                    true => t < hits.t[i] - ONE_PLACE * size,
+                };
+                if !is_nearer {
+                    continue;
+                }
+                hits.t[i] = t;
+                hits.placement[i] = body.placement;
+                hits.triangle[i] = found.triangle[k];
+                if hits.detail == Detail::Surface {
+                    (hits.u[i], hits.v[i]) = (found.u[k], found.v[k]);
+                    let normal = (turn * found.normal(k)).normalize_or_zero();
+                    for axis in 0..3 {
+                        hits.normal[axis][i] = normal[axis];
+                    }
+                }
+            }
+        }
+    }
+
+    fn occluded(&self, rays: &RayBatch, blocked: &mut Vec<bool>) {
+        self.still.occluded(&self.with_still_ends(rays), blocked);
+        let mut carried = Carried::default();
+        for body in &self.bodies {
+            let reach = |i: usize| (!blocked[i]).then(|| rays.t_max()[i]);
+            self.carry(body, rays, reach, &mut carried);
+            if carried.from.is_empty() {
+                continue;
+            }
+            self.shapes[body.shape].occluded(&carried.rays, &mut carried.blocked);
+            for (&(i, ..), &is_blocked) in carried.from.iter().zip(&carried.blocked) {
+                blocked[i] |= is_blocked;
+            }
+        }
+    }
+
+    fn report(&self) -> BuildReport {
+        self.report.clone()
+    }
+
+    fn counts(&self) -> Counts {
+        let all = self.shapes.iter().chain([&self.still]).map(|accel| accel.counts());
+        all.fold(Counts::default(), |sum, counts| Counts {
+            rechecked: sum.rechecked + counts.rechecked,
+            corrected: sum.corrected + counts.corrected,
+        })
+    }
+}
+
+impl fmt::Debug for Moving {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Moving")
+            .field("still", &self.still)
+            .field("bodies", &self.bodies)
+            .finish_non_exhaustive()
+    }
+}
