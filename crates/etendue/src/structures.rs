@@ -27,6 +27,8 @@ struct Built {
     name: Option<AccelName>,
     /// Whether its hits are solved again in f64.
     refine: bool,
+    /// Between which times (s) what moves is in it.
+    exposure: [f64; 2],
     /// Nothing of it is of one before.
     is_new: bool,
 }
@@ -62,10 +64,9 @@ impl Structures {
         let accel = etendue_render::rebuild(scene, plan, options, before.map(|b| &*b.accel))?;
         let accel: Arc<dyn Accel> = Arc::from(accel);
         let geometry = Arc::clone(&scene.geometry);
-        self.built.insert(
-            0,
-            Built { accel: Arc::clone(&accel), geometry, name, refine: plan.refine, is_new },
-        );
+        let (refine, exposure) = (plan.refine, scene.camera.exposure_span());
+        let built = Built { accel: Arc::clone(&accel), geometry, name, refine, exposure, is_new };
+        self.built.insert(0, built);
         Ok(accel)
     }
 
@@ -77,7 +78,9 @@ impl Structures {
 
 impl Built {
     fn is_over(&self, scene: &Scene) -> bool {
+        let moves = || scene.geometry.placements.iter().any(|placed| placed.motion.is_some());
         self.name == scene.render.accel
+            && (self.exposure == scene.camera.exposure_span() || !moves())
             && (Arc::ptr_eq(&self.geometry, &scene.geometry)
                 || self.geometry.has_surfaces_of(&scene.geometry))
     }

@@ -7,6 +7,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -18,15 +19,17 @@ use crate::load::camera::SceneCamera;
 use crate::memory::has_room;
 use crate::scene::LoadStats;
 use etendue_files::{InputFolder, MappedFile};
-use etendue_geometry::{Geometry, Placement, Transform};
+use etendue_geometry::{Geometry, Motion, Placement, Transform};
 use etendue_tracer::{Light, Material, Texture, TextureScope};
 
 /// An object, checked; its triangles are still to come.
 pub(crate) struct Object {
     pub(crate) title: String,
     pub(crate) origin: usize,
-    /// Where each of its copies stands.
+    /// Where each of its copies stands at the frame's time.
     pub(crate) world_from_object: Vec<Transform>,
+    /// How each of its copies moves; empty where it stands still.
+    pub(crate) motions: Vec<Motion>,
     /// The scene's material that replaces the model's.
     pub(crate) material: Option<u32>,
     /// The scene's materials that replace those of the model, by their names there.
@@ -142,7 +145,10 @@ impl Parts {
                     node,
                     material,
                     world_from_mesh: copy.then_inner(&placement.model_from_mesh),
-                    motion: None,
+                    motion: object
+                        .motions
+                        .get(k as usize)
+                        .map(|motion| Arc::new(motion.then_inner(&placement.model_from_mesh))),
                 });
             self.geometry.placements.extend(copies);
         }

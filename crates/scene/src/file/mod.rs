@@ -26,7 +26,9 @@ pub use camera::SensorFile;
 pub use document::{OverrideError, Place};
 pub use frames::{CameraPath, FramesSpec, RigCameraSpec, TrajectoryFormat};
 pub use lens::{ReadLens, is_lens, lens_schema, rays_schema, read_lens, read_lens_at, trace_rays};
-pub use object::{AnimationSpec, InstancesSpec, ObjectSpec, Scale, Source, TransformSpec, Up};
+pub use object::{
+    AnimationSpec, InstancesSpec, ObjectMotionSpec, ObjectSpec, Scale, Source, TransformSpec, Up,
+};
 pub use samples::{
     LEAST_SAMPLES, RelativeErrorSpec, SETS, SamplesSpec, SensorNoiseSpec, TimeSpec, Until,
 };

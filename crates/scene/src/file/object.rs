@@ -3,8 +3,9 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use etendue_geometry::Transform;
+use etendue_camera::Interpolation;
 use etendue_geometry::units::Seconds;
+use etendue_geometry::{Motion, MotionError, Steady, Transform};
 use glam::{DMat3, DQuat, DVec3};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::Error as _;
@@ -34,6 +35,102 @@ pub struct ObjectSpec {
     pub transform: TransformSpec,
     /// Where copies of it stand before `transform` moves them all; one, unmoved, when absent.
     pub instances: Option<InstancesSpec>,
+    /// How it moves while the shutter is open, with all copies; it stands still when absent.
+    pub motion: Option<ObjectMotionSpec>,
+}
+
+/// How an object moves, as the scene file writes it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum ObjectMotionSpec {
+    /// At constant speed along a line, turning at constant speed about an axis that goes along: from `transform`, where
+    /// the object stands at the frame's time.
+    Velocity {
+        /// The velocity (m/s), along the world's axes.
+        #[serde(default)]
+        velocity: [f64; 3],
+        /// The angular velocity (degrees/s): its direction is the axis, right-handed, along the world's axes.
+        #[serde(default)]
+        angular_velocity: [f64; 3],
+        /// A point on the axis at the frame's time (m); where `transform` puts the object's origin when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        about: Option<[f64; 3]>,
+    },
+    /// Through transforms, instead of `transform`: between two of them the rotation goes the shorter way at constant
+    /// speed, and the scale is linear.
+    Transforms {
+        /// Two or more, which do not shear.
+        transforms: Vec<TransformSpec>,
+        /// When the object is there (s, in the scene's clock), increasing.
+        times: Vec<Seconds>,
+        /// How its place runs between two transforms.
+        #[serde(default)]
+        translation: Interpolation,
+    },
+}
+
+impl ObjectMotionSpec {
+    /// The motion of the object's frame in the clock of a frame of this time (s); `transform` is where it stands then.
+    /// The error has the key and the reason.
+    pub(crate) fn build(
+        &self,
+        transform: &TransformSpec,
+        time: f64,
+    ) -> Result<Motion, (String, String)> {
+        match self {
+            Self::Velocity { velocity, angular_velocity, about } => {
+                let stands = transform.build().map_err(|(key, why)| (key.to_owned(), why))?;
+                let angular = DVec3::from(*angular_velocity);
+                let steady = Steady {
+                    velocity: (*velocity).into(),
+                    axis: angular,
+                    rate: angular.length().to_radians(),
+                    about: about.map_or(stands.translation, DVec3::from),
+                };
+                let motion = Motion::default().with_steady(steady).map_err(|error| match error {
+                    MotionError::NotFinite(ref what) if what.contains("velocity") => {
+                        ("velocity", error)
+                    }
+                    MotionError::NotFinite(ref what) if what.contains("point") => ("about", error),
+                    _ => ("angular_velocity", error),
+                });
+                let motion = motion.map_err(|(key, error)| (key.to_owned(), error.to_string()))?;
+                Ok(motion.then_inner(&stands))
+            }
+            Self::Transforms { transforms, times, translation } => {
+                if *transform != TransformSpec::default() {
+                    let why = "is given beside `transform`, whose place it takes; leave that out";
+                    return Err(("transforms".to_owned(), why.to_owned()));
+                }
+                if transforms.len() < 2 {
+                    let why = "do not move; give two or more, or `transform` without `motion`";
+                    return Err(("transforms".to_owned(), why.to_owned()));
+                }
+                let mut built = Vec::with_capacity(transforms.len());
+                for (i, one) in transforms.iter().enumerate() {
+                    built.push(one.build().map_err(|(key, why)| {
+                        let dot = if key.is_empty() { "" } else { "." };
+                        (format!("transforms[{i}]{dot}{key}"), why)
+                    })?);
+                }
+                let times: Vec<f64> = times.iter().map(|at| at.0 - time).collect();
+                let interpolation = match translation {
+                    Interpolation::Linear => etendue_geometry::Interpolation::Linear,
+                    Interpolation::Cubic => etendue_geometry::Interpolation::Cubic,
+                };
+                let fault = |error: MotionError| {
+                    let key = match &error {
+                        MotionError::Count { .. } | MotionError::Order { .. } => "times".to_owned(),
+                        MotionError::NotFinite(_) => "times".to_owned(),
+                        MotionError::Shear(k) | MotionError::Scale(k) => format!("transforms[{k}]"),
+                        MotionError::Axis => "transforms".to_owned(),
+                    };
+                    (key, error.to_string())
+                };
+                Motion::through(&times, &built, interpolation).map_err(fault)
+            }
+        }
+    }
 }
 
 /// A moment of a glTF file's animation: nodes, skins, morph targets, cameras and lights are as they are then.
@@ -117,6 +214,9 @@ struct Common {
     /// n × 4 × 4 or n × 3 × 4 matrices by rows.
     #[serde(default)]
     instances: Option<InstancesSpec>,
+    /// How it moves while the shutter is open; it stands still when absent.
+    #[serde(default)]
+    motion: Option<ObjectMotionSpec>,
 }
 
 /// A model.
@@ -144,12 +244,14 @@ impl<'de> Deserialize<'de> for ObjectSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let mut own = Map::<String, Value>::deserialize(deserializer)?;
         let mut common = Map::new();
-        for key in ["name", "material", "materials", "up", "animation", "transform", "instances"] {
+        for key in
+            ["name", "material", "materials", "up", "animation", "transform", "instances", "motion"]
+        {
             if let Some(value) = own.remove(key) {
                 common.insert(key.to_owned(), value);
             }
         }
-        let Common { name, material, materials, up, animation, transform, instances } =
+        let Common { name, material, materials, up, animation, transform, instances, motion } =
             serde_json::from_value(Value::Object(common)).map_err(D::Error::custom)?;
         let source = match own.remove("file") {
             Some(Value::String(path)) if own.is_empty() => Source::File(path),
@@ -162,7 +264,7 @@ impl<'de> Deserialize<'de> for ObjectSpec {
                 Source::Shape(shape.map_err(D::Error::custom)?)
             }
         };
-        Ok(Self { source, name, material, materials, up, animation, transform, instances })
+        Ok(Self { source, name, material, materials, up, animation, transform, instances, motion })
     }
 }
 
@@ -172,9 +274,10 @@ impl Serialize for ObjectSpec {
             Source::File(path) => Ok(json!({ "file": path })),
             Source::Shape(shape) => serde_json::to_value(shape),
         };
-        let Self { name, material, materials, up, animation, transform, instances, .. } =
+        let Self { name, material, materials, up, animation, transform, instances, motion, .. } =
             self.clone();
-        let common = Common { name, material, materials, up, animation, transform, instances };
+        let common =
+            Common { name, material, materials, up, animation, transform, instances, motion };
         let mut keys = Map::new();
         for part in [source, serde_json::to_value(common)] {
             if let Value::Object(part) = part.map_err(S::Error::custom)? {

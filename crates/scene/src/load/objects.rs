@@ -133,6 +133,13 @@ impl SceneFile {
             let at = join(at, "transform");
             self.fault(&if key.is_empty() { at } else { join(&at, key) }, why)
         })?;
+        let motion = spec.motion.as_ref().map(|motion| {
+            let built = motion.build(&spec.transform, self.spec.render.time());
+            built.map_err(|(key, why)| self.fault(&format!("{at}.motion.{key}"), why))
+        });
+        let motion = motion.transpose()?;
+        // Where it stands at the frame's time.
+        let world_from_object = motion.as_ref().map_or(world_from_object, |motion| motion.at(0.0));
         // The scene's own materials, for all of the object or by the model's names.
         let named = |name: &str, at: &str| {
             let position = own.materials.iter().position(|material| material.name == name);
@@ -160,11 +167,17 @@ impl SceneFile {
         own.files.extend(instances.file);
         let turn = self.up_of(spec).turn();
         let copies = instances.transforms.iter();
-        let copies = copies.map(|copy| world_from_object.then_inner(&copy.then_inner(&turn)));
+        let copies = copies.map(|copy| copy.then_inner(&turn));
+        let (mut stand, mut motions) = (Vec::new(), Vec::new());
+        for copy in copies {
+            stand.push(world_from_object.then_inner(&copy));
+            motions.extend(motion.as_ref().map(|motion| motion.then_inner(&copy)));
+        }
         Ok(Object {
             title: spec.title(),
             origin,
-            world_from_object: copies.collect(),
+            world_from_object: stand,
+            motions,
             material,
             overrides,
         })

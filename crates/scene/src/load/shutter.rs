@@ -1,7 +1,7 @@
 //! When a scene's picture is taken: the frame's time, the shutter, and the camera's motion in the frame's clock.
 
 use crate::SceneError;
-use crate::file::SceneFile;
+use crate::file::{ObjectMotionSpec, ObjectSpec, SceneFile};
 use crate::frames::Frame;
 use crate::import::{Note, NoteKind};
 use etendue_camera::{Camera, CameraMotionSpec, CameraSpec, ShutterKind};
@@ -11,7 +11,7 @@ use etendue_sensor::Sensor;
 impl SceneFile {
     /// The camera as the file has it, with its exposure from the sensor and its motion in the frame's clock.
     pub(crate) fn timed_camera(&self, mut spec: CameraSpec) -> CameraSpec {
-        if spec.shutter().is_none() && spec.motion().is_none() {
+        if spec.shutter().is_none() && spec.motion().is_none() && !self.objects_move() {
             return spec;
         }
         let shutter = spec.shutter_mut().get_or_insert_default();
@@ -41,8 +41,8 @@ impl SceneFile {
             return Err(self.fault("render.rate", why));
         }
         let camera = self.spec.camera.as_ref();
-        let Some(camera) = camera.filter(|it| it.shutter().is_some() || it.motion().is_some())
-        else {
+        let is_timed = |it: &&CameraSpec| it.shutter().is_some() || it.motion().is_some();
+        let Some(camera) = camera.filter(|it| is_timed(it) || self.objects_move()) else {
             return Ok(());
         };
         let given = camera.shutter().and_then(|shutter| shutter.exposure);
@@ -73,7 +73,7 @@ impl SceneFile {
     ) -> Result<(), SceneError> {
         let first = sensor.shots().next().map(|shot| shot.exposure);
         let differ = sensor.shots().any(|shot| Some(shot.exposure) != first);
-        if differ && given.is_none() && camera.motion().is_some() {
+        if differ && given.is_none() && (camera.motion().is_some() || self.objects_move()) {
             let why = "the light is rendered once for all of them, and what moves is blurred otherwise in each; give \
                        the exposures to `frames`, such as [{\"camera.sensor.exposure\": 0.01}], or the shutter one \
                        `exposure`";
@@ -91,25 +91,35 @@ impl SceneFile {
         }
     }
 
-    /// Refuses frames without times of a camera that moves through poses, which have them.
+    /// Whether some object has a motion.
+    fn objects_move(&self) -> bool {
+        self.spec.objects.iter().any(|object| object.motion.is_some())
+    }
+
+    /// Refuses frames without times of what moves through poses or transforms, which have them.
     pub(crate) fn check_frame_times(&self, frames: &[Frame]) -> Result<(), SceneError> {
         let has_time = |frame: &Frame| {
             frame.time.is_some() || frame.settings.iter().any(|(path, _)| path == "render.time")
         };
         let motion = self.spec.camera.as_ref().and_then(CameraSpec::motion);
-        let needs = matches!(motion, Some(CameraMotionSpec::Poses { .. }));
+        let through = |object: &ObjectSpec| {
+            matches!(object.motion, Some(ObjectMotionSpec::Transforms { .. }))
+        };
+        let needs = matches!(motion, Some(CameraMotionSpec::Poses { .. }))
+            || self.spec.objects.iter().any(through);
         let is_timed = self.spec.render.rate.is_some() || frames.iter().all(has_time);
         if !needs || is_timed {
             return Ok(());
         }
-        let why = "the camera moves, and nobody says when each frame is taken; give `render.rate` (frames a second), \
+        let why = "something moves, and nobody says when each frame is taken; give `render.rate` (frames a second), \
                    or each frame its `render.time`";
         Err(self.fault("frames", why))
     }
 
     /// Whether frames are taken at their times.
     pub(crate) fn has_clock(&self) -> bool {
-        self.spec.camera.as_ref().is_some_and(|camera| camera.motion().is_some())
+        let camera = self.spec.camera.as_ref();
+        camera.is_some_and(|camera| camera.motion().is_some()) || self.objects_move()
     }
 }
 

@@ -152,3 +152,59 @@ fn frames_of_a_moving_camera_are_taken_at_their_times() {
     let untimed = frames(json!({ "frames": [{}, {}] })).unwrap_err().to_string();
     assert!(untimed.contains("frames") && untimed.contains("render.rate"), "{untimed}");
 }
+
+#[test]
+fn wrong_motions_of_objects_are_refused_by_place_and_remedy() {
+    let place = |x: f64| json!({ "translate": [x, 0, 0] });
+    let through = |transforms: Value, times: Value| json!({ "type": "transforms", "transforms": transforms, "times": times });
+    let two = json!([place(0.0), place(1.0)]);
+    let flat = json!([[1, 0, 0, 0], [0.5, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]);
+    let cases = [
+        (json!({}), through(two.clone(), json!([0, 0])), ["motion.times", "after the one before"]),
+        (json!({}), through(two.clone(), json!([1, 0])), ["motion.times", "sort the times"]),
+        (json!({}), through(two.clone(), json!([1])), ["motion.times", "as many times"]),
+        (json!({}), through(json!([place(0.0)]), json!([1])), ["motion.transforms", "two or more"]),
+        (
+            json!({}),
+            through(json!([place(0.0), { "rotate": [0, 0, 0, 5] }]), json!([0, 1])),
+            ["motion.transforms[1].rotate", "no length"],
+        ),
+        (
+            json!({}),
+            through(json!([place(0.0), { "matrix": flat }]), json!([0, 1])),
+            ["motion.transforms[1]", "shears"],
+        ),
+        (
+            json!({}),
+            through(json!([{ "scale": 1 }, { "scale": -1 }]), json!([0, 1])),
+            ["motion.transforms[0]", "passes through 0"],
+        ),
+        (
+            json!({ "transform": place(1.0) }),
+            through(two, json!([0, 1])),
+            ["motion.transforms", "beside `transform`"],
+        ),
+        (json!({}), json!({ "type": "velocity", "speed": 1 }), ["objects[0]", "speed"]),
+        (json!({}), json!({ "type": "spin" }), ["objects[0]", "spin"]),
+    ];
+    for (keys, motion, words) in cases {
+        let mut object = json!({ "shape": "sphere", "motion": motion });
+        for (key, value) in keys.as_object().unwrap() {
+            object[key] = value.clone();
+        }
+        let Err(error) = load(&json!({}), &json!({ "objects": [object] })) else {
+            panic!("{object} must be refused")
+        };
+        let message = error.to_string();
+        for word in words {
+            assert!(message.contains(word), "expected `{word}` in: {message}");
+        }
+    }
+    // Frames of what moves through transforms have their times.
+    let moving = json!([{ "shape": "sphere",
+        "motion": through(json!([place(0.0), place(1.0)]), json!([0, 1])) }]);
+    let untimed = file(&json!({}), &json!({ "objects": moving, "frames": [{}, {}] })).unwrap();
+    let all = untimed.frames(&Opener::default(), || unreachable!("a list"));
+    let message = all.unwrap_err().to_string();
+    assert!(message.contains("frames") && message.contains("render.rate"), "{message}");
+}
