@@ -61,10 +61,10 @@ impl Configuration {
         let (mut y, mut bent) = (1.0, 0.0);
         let behind = [first, 1.0, second, 1.0];
         let mut before = 1.0;
-        for k in 0..4 {
-            bent -= y * (behind[k] - before) * self.curvatures[k];
-            y += self.thicknesses.get(k).unwrap_or(&0.0) * bent / behind[k];
-            before = behind[k];
+        for (k, (behind, curvature)) in behind.into_iter().zip(self.curvatures).enumerate() {
+            bent -= y * (behind - before) * curvature;
+            y += self.thicknesses.get(k).unwrap_or(&0.0) * bent / behind;
+            before = behind;
         }
         -1.0 / bent
     }
