@@ -16,14 +16,14 @@ pub(super) const MOTION: Case = Case {
     run: motion,
 };
 
-const COLUMNS: usize = 48;
+const COLUMNS: usize = 24;
 
 /// A bar before a camera of parallel rays.
 fn scene(accel: &str, rows: usize, shutter: &Value, transform: &Value, motion: &Value) -> Value {
-    let mut bar = json!({ "shape": "box", "size": [2.1, 0.3, 0.5], "transform": transform });
+    let mut bar = json!({ "shape": "box", "size": [2.1, 1.3, 0.5], "transform": transform });
     let mut camera = json!({
-        "type": "orthographic", "height": 4,
-        "pose": { "from": [0, 0, 5], "look_at": [0.01, 0.02, 0] },
+        "type": "orthographic", "height": 3,
+        "pose": { "from": [0.01, 0.02, 5], "look_at": [0.01, 0.02, 0] },
         "sensor": { "resolution": [COLUMNS, rows] },
     });
     if motion.is_object() {
@@ -35,7 +35,7 @@ fn scene(accel: &str, rows: usize, shutter: &Value, transform: &Value, motion: &
 
 fn motion(scale: Scale) -> Result<Outcome> {
     let mut outcome = Outcome::default();
-    let rows = scale.pick(6, 24);
+    let rows = scale.pick(16, 32);
     let all: [(f64, f64); 5] =
         [(0.0, 30.0), (150.0, 0.0), (360.0, 1000.0), (720.0, -3.0), (3600.0, 1.0)];
     let motions = scale.pick(&all[1..4], &all);
