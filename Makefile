@@ -180,6 +180,11 @@ docs-figures: setup docs-charts docs-stability light-fields gallery
 	install -D -m 644 out/docs-figures/sampling/raw.preview.png docs/images/sampling/sensor-noise.png
 	install -D -m 644 out/docs-figures/sampling/sample_count.preview.png docs/images/sampling/sensor-noise-map.png
 	cargo run --release -p etendue-sensor --example approximation -- docs/images/normal-approximation.svg
+	for scene in moving rolling; do \
+		cargo run --release -p etendue-cli -- render scenes/time/$$scene.json -o out/docs-figures/time \
+			--samples 256 --outputs png && \
+		install -D -m 644 out/docs-figures/time/picture.png docs/images/time/$$scene.png || exit 1; \
+	done
 
 # What the program writes into the repository, which the tests hold against it: schema/, docs/keys.md,
 # docs/command-line.md.

@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::distortion::{Distortion, DistortionSpec};
 use crate::lens::focused::View;
-use crate::{Camera, Convention, LensCamera, PixelOrigin, Projection};
+use crate::{
+    Camera, Convention, LensCamera, PixelOrigin, Pose, Projection, Readout, ShutterKind, TruthAt,
+};
 
 /// A camera's projection and pose in OpenCV's convention: x right, y down, z forward, metres.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,6 +42,31 @@ pub struct CameraFile {
     /// The lens, when there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens: Option<LensFacts>,
+    /// When the rows are seen, when the scene names a shutter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shutter: Option<ShutterFile>,
+}
+
+/// When the rows of a picture are seen, and from where: times are in s since the frame's shutter opened.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShutterFile {
+    /// Which rows are open when.
+    #[serde(rename = "type")]
+    pub kind: ShutterKind,
+    /// Which way rows are read out.
+    pub readout: Readout,
+    /// From one row's readout to the next one's (s).
+    pub line_time_s: f64,
+    /// How long the row that is read out first is open (s).
+    pub exposure_s: f64,
+    /// The moment of a row's exposure at which data layers see it.
+    pub truth_at: TruthAt,
+    /// That moment of the picture's top row and of its bottom one (s).
+    pub top_and_bottom_s: [f64; 2],
+    /// The pose of each row at that moment, from the top: world-to-camera by rows (m). Where all rows have the pose of
+    /// the frame it is empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub camera_from_world_of_rows: Vec<[[f64; 4]; 4]>,
 }
 
 /// What is known of a camera's lens.
@@ -119,6 +146,7 @@ impl Camera {
             pixel_pitch_um: self.pixel_pitch(),
             focal_length_mm: None,
             lens: self.lens().map(LensFacts::of),
+            shutter: ShutterFile::of(self),
         };
         // What its projection adds.
         match self.projection() {
@@ -165,6 +193,26 @@ impl Camera {
             }
         }
         file
+    }
+}
+
+impl ShutterFile {
+    fn of(camera: &Camera) -> Option<Self> {
+        let shutter = camera.shutter()?;
+        let [_, rows] = camera.resolution();
+        let time = |row: u32| shutter.truth(f64::from(row) + 0.5);
+        let pose =
+            |row| by_rows(Pose::camera_from_world(&camera.pose_at(time(row)), Convention::Opencv));
+        let differ = camera.rows_differ() && camera.motion().is_some();
+        Some(Self {
+            kind: shutter.kind(),
+            readout: shutter.readout(),
+            line_time_s: shutter.line_time(),
+            exposure_s: shutter.exposure(),
+            truth_at: shutter.truth_at(),
+            top_and_bottom_s: [time(0), time(rows - 1)],
+            camera_from_world_of_rows: if differ { (0..rows).map(pose).collect() } else { vec![] },
+        })
     }
 }
 

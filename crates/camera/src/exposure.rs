@@ -101,12 +101,12 @@ impl Camera {
         still
     }
 
-    /// Carries chief rays, which stand as the frame's pose has them, to where the camera is when data layers see their
-    /// rows.
+    /// Gives chief rays the times at which data layers see their rows, and carries them, which stand as the frame's pose
+    /// has them, to where the camera is then.
     pub(crate) fn carry_chief(&self, rows: &[f64], rays: &mut RayBatch) {
-        let Some(shutter) = self.shutter().filter(|_| self.is_timed()) else { return };
+        let Some(shutter) = self.shutter() else { return };
         let mut last = None;
-        if let Some(motion) = self.motion() {
+        if let Some(motion) = self.motion().filter(|_| self.is_timed()) {
             self.carry(rays, |i| {
                 // Of one row, all pixels have the pose.
                 let time = shutter.truth(rows[i].floor() + 0.5);

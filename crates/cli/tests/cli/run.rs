@@ -69,7 +69,7 @@ pub(crate) fn text(bytes: &[u8]) -> String {
 }
 
 /// The format of numpy's NEP 1, as far as the command writes it.
-fn read_npy(path: &Path) -> Vec<f64> {
+pub(crate) fn read_npy(path: &Path) -> Vec<f64> {
     let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     assert_eq!(&bytes[..6], b"\x93NUMPY");
     let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));

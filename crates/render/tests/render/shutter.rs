@@ -191,3 +191,75 @@ fn pictures_of_moving_cameras_do_not_depend_on_threads() {
     };
     assert_eq!(on(1), on(3));
 }
+
+/// The layer `time` and `camera.json` say when each row is seen, and from where: with the pose of its row each pixel's
+/// point is projected back onto the pixel.
+#[test]
+fn points_are_projected_onto_their_pixels_by_the_pose_of_their_row() {
+    let [width, height] = [24_usize, 18];
+    let motion =
+        json!({ "type": "velocity", "velocity": [3, -2, 4], "angular_velocity": [20, 400, -300] });
+    for (kind, readout, truth_at, moves) in [
+        ("rolling", "down", "middle", true),
+        ("rolling", "up", "open", true),
+        ("global_reset", "down", "close", true),
+        ("rolling", "down", "middle", false),
+    ] {
+        let (line_time, exposure) = (2e-3, 7e-3);
+        let mut camera = json!({
+            "type": "pinhole", "fov": 50, "sensor": { "resolution": [width, height] },
+            "pose": { "from": [0.3, 0.2, 4], "look_at": [0, 0, 0] },
+            "shutter": { "type": kind, "line_time": line_time, "exposure": exposure, "readout": readout,
+                         "truth_at": truth_at },
+        });
+        if moves {
+            camera["motion"] = motion.clone();
+        }
+        let scene = load_json(
+            std::path::Path::new("."),
+            json!({
+                "etendue": 1, "camera": camera, "layers": ["time", { "type": "position", "space": "world" }],
+                "objects": [{ "shape": "sphere", "radius": 30 }],
+            }),
+        );
+        let picture = picture(&scene);
+        let times = layer(&picture, "Time");
+        let points = layer(&picture, "Position");
+        let file = scene.camera.opencv();
+        let told = file.shutter.as_ref().expect("a shutter");
+        assert_eq!(told.camera_from_world_of_rows.len(), if moves { height } else { 0 });
+        let k = file.k.expect("a matrix");
+        let mut first_and_last = [f64::NAN; 2];
+        for row in 0..height {
+            let read = if readout == "down" { row } else { height - 1 - row } as f64;
+            let lag = read * line_time;
+            let [open, close] = match kind {
+                "rolling" => [lag, lag + exposure],
+                _ => [0.0, lag + exposure],
+            };
+            let due = match truth_at {
+                "open" => open,
+                "middle" => 0.5 * (open + close),
+                _ => close,
+            };
+            first_and_last[usize::from(row > 0)] = due;
+            let pose = told.camera_from_world_of_rows.get(row).unwrap_or(&file.camera_from_world);
+            for column in 0..width {
+                let i = row * width + column;
+                // Kept in f32: steps of 4 ns below 63 ms.
+                assert!((times[i] - due).abs() < 4e-9, "{kind} {row}: {} s, not {due}", times[i]);
+                let world = [0, 1, 2].map(|axis| points[axis * width * height + i]);
+                let [x, y, z] = [0, 1, 2]
+                    .map(|r| pose[r][3] + (0..3).map(|c| pose[r][c] * world[c]).sum::<f64>());
+                let place = [k[0][0] * x / z + k[0][2], k[1][1] * y / z + k[1][2]];
+                // Positions are kept in f32: 30 m to 2 µm, 10⁻⁵ px here at most.
+                let off = (place[0] - column as f64).hypot(place[1] - row as f64);
+                assert!(off < 1e-4, "{kind} {readout} {row} {column}: {place:?}");
+            }
+        }
+        let [top, bottom] = told.top_and_bottom_s;
+        assert!(
+            (top - first_and_last[0]).abs() < 1e-15 && (bottom - first_and_last[1]).abs() < 1e-15
+        );
+    }
+}

@@ -107,6 +107,19 @@ layers! {
             seen.each(out, |i| seen.scene.ids(seen.traced.hits, i).map(f64::from));
         };
 
+        /// `Time.S`: when the pixel is seen, in the frame's clock (s).
+        Time = "time": Layer {
+            meaning: vec![
+                (
+                    "definition",
+                    "when data layers see the pixel, since the frame's shutter opened; 0 without a shutter",
+                ),
+                ("unit", "s"),
+                CHIEF_RAY,
+            ],
+            ..measured("Time", &["S"], Look::Extent)
+        }, |seen, out| seen.each(out, |i| [seen.traced.rays.time(i)]);
+
         /// `Coverage.A`: 1 where the pixel's chief ray hits, else 0.
         Coverage = "coverage": Layer {
             kept: Kept::Shown,

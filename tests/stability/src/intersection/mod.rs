@@ -4,6 +4,7 @@ mod directions;
 mod field;
 mod leaks;
 mod limits;
+mod motion;
 mod places;
 mod triangles;
 
@@ -36,5 +37,6 @@ pub const METHOD: Method = Method {
         limits::SCATTERED,
         limits::BESIDE_A_WALL,
         limits::INSTRUCTION_SETS,
+        motion::MOTION,
     ],
 };

@@ -1,0 +1,114 @@
+//! A rolling shutter, a camera that moves and turns, objects that do, and a sensor: crossed with all that divides a
+//! render, decides how it is traced, or exposes it.
+
+use serde_json::{Value, json};
+
+use crate::run::{Bench, read_npy, text};
+
+fn scene(samples: &Value) -> Bench {
+    let spin = json!({ "type": "velocity", "angular_velocity": [0, 0, 14_400] });
+    let key = |x: f64, turn: f64| json!({ "translate": [x, 0.35, 0], "rotate": [0, 1, 0, turn] });
+    Bench::with_scene(
+        &json!({
+            "etendue": 1,
+            "tracer": { "type": "direct" },
+            "layers": ["depth", "ids", "time"],
+            "camera": {
+                "type": "pinhole", "fov": 40, "pose": { "from": [0, 0.6, 3], "look_at": [0, 0.3, 0] },
+                "shutter": { "type": "rolling", "line_time": "60 us" },
+                "motion": { "type": "velocity", "velocity": [0.5, 0, 0], "angular_velocity": [0, 20, 0] },
+                "sensor": { "type": "raw", "cfa": "rggb", "resolution": [40, 70], "read_noise": 2, "system_gain": 0.5,
+                    "exposure": "1 ms" }
+            },
+            "lights": [{ "type": "environment", "radiance": [0.5, 0.6, 0.7] }],
+            "objects": [
+                { "shape": "rectangle", "width": 8, "height": 8, "transform": { "rotate": [1, 0, 0, -90] } },
+                { "shape": "box", "size": [0.12, 1.3, 0.05], "transform": { "translate": [-0.3, 0.75, 0] }, "motion": spin },
+                { "shape": "box", "size": [0.5, 0.5, 0.5], "material": "lamp",
+                  "motion": { "type": "transforms", "transforms": [key(0.1, 0.0), key(0.4, 40.0)], "times": [0, 0.005] } }
+            ],
+            "materials": { "lamp": { "type": "emissive", "radiance": [0.4, 0.3, 0.2] } },
+            "render": { "samples": samples, "seed": 5 }
+        })
+        .to_string(),
+    )
+}
+
+fn run(bench: &Bench, arguments: &[&str]) {
+    let output = bench.run(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+}
+
+fn bytes(bench: &Bench, folder: &str, file: &str) -> Vec<u8> {
+    std::fs::read(bench.path(folder).join(file)).unwrap_or_else(|e| panic!("{folder}/{file}: {e}"))
+}
+
+#[test]
+fn what_moves_is_the_same_for_all_threads_shares_and_exposures() {
+    let bench = scene(&json!(16));
+    run(&bench, &["render", "scene.json", "-o", "whole", "--threads", "1"]);
+    run(&bench, &["render", "scene.json", "-o", "threads", "--threads", "3"]);
+    for (folder, by) in [("rows", "rows"), ("samples", "samples")] {
+        for share in ["1/2", "2/2"] {
+            run(
+                &bench,
+                &["render", "scene.json", "-o", folder, "--shard", share, "--shard-by", by],
+            );
+        }
+        let film = |k: u32| {
+            let name = if by == "rows" { "shard" } else { "samples" };
+            format!("{folder}/{name}-{k}-of-2.film")
+        };
+        run(&bench, &["merge", &format!("{folder}-merged"), &film(1), &film(2)]);
+    }
+    for file in ["picture.npy", "raw.npy", "depth.npy", "time.npy", "camera.json"] {
+        let whole = bytes(&bench, "whole", file);
+        for folder in ["threads", "rows-merged", "samples-merged"] {
+            assert!(bytes(&bench, folder, file) == whole, "{folder}/{file}");
+        }
+    }
+    run(&bench, &["expose", "whole/layers.exr", "--sensor", "scene.json", "-o", "exposed"]);
+    assert!(bytes(&bench, "exposed", "raw.npy") == bytes(&bench, "whole", "raw.npy"));
+}
+
+/// Data to 10⁻¹², light to the rounding of f32 where rays leave surfaces.
+#[test]
+fn what_moves_is_the_same_for_all_accelerators_and_precisions() {
+    let bench = scene(&json!(16));
+    run(&bench, &["render", "scene.json", "-o", "whole", "--accel", "embree"]);
+    let mean = |folder: &str| {
+        let pixels = read_npy(&bench.path(folder).join("picture.npy"));
+        pixels.iter().sum::<f64>() / pixels.len() as f64
+    };
+    let whole = mean("whole");
+    for (folder, arguments) in [
+        ("bvh", ["--accel", "bvh"]),
+        ("exact", ["--accel", "exact"]),
+        ("double", ["--set", "plan.light_precision=\"double\""]),
+    ] {
+        run(&bench, &[&["render", "scene.json", "-o", folder][..], &arguments].concat());
+        for file in ["depth.npy", "time.npy"] {
+            let [found, due] = [folder, "whole"].map(|of| read_npy(&bench.path(of).join(file)));
+            // The last bits of what is solved in the frame of a body.
+            let same = |(a, b): (&f64, &f64)| a == b || (a - b).abs() <= 1e-12 * b.abs();
+            assert!(found.iter().zip(&due).all(same), "{folder}/{file}");
+        }
+        let found = mean(folder);
+        assert!((found / whole - 1.0).abs() < 1e-4, "{folder}: {found}, not {whole}");
+    }
+}
+
+/// Samples that stop see the same light.
+#[test]
+fn samples_that_stop_see_what_moves() {
+    let mean = |samples: Value| {
+        let bench = scene(&samples);
+        run(&bench, &["render", "scene.json", "-o", "out"]);
+        let pixels = bench.array("picture");
+        pixels.iter().sum::<f64>() / pixels.len() as f64
+    };
+    let [even, stopped] =
+        [json!(64), json!({ "relative_error": 0.05, "min": 8, "max": 512 })].map(mean);
+    // 2800 pixels of an error of a twentieth at most: 0.1 % of the mean, and four times that.
+    assert!((stopped / even - 1.0).abs() < 4e-3, "{stopped}, not {even}");
+}
