@@ -75,7 +75,7 @@ fn what_moves_is_the_same_for_all_threads_shares_and_exposures() {
 #[test]
 fn what_moves_is_the_same_for_all_accelerators_and_precisions() {
     let bench = scene(&json!(16));
-    run(&bench, &["render", "scene.json", "-o", "whole", "--accel", "embree"]);
+    run(&bench, &["render", "scene.json", "-o", "whole"]);
     let mean = |folder: &str| {
         let pixels = read_npy(&bench.path(folder).join("picture.npy"));
         pixels.iter().sum::<f64>() / pixels.len() as f64
