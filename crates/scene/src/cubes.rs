@@ -86,7 +86,7 @@ fn envi_pair(
     (written, path, head): (&str, PathBuf, &[u8]),
     folder: &InputFolder,
 ) -> Result<(Picture, Vec<PathBuf>), String> {
-    let beside = |names: Vec<PathBuf>| -> Result<Option<PathBuf>, String> {
+    let partner = |names: Vec<PathBuf>| -> Result<Option<PathBuf>, String> {
         for name in names.iter().filter_map(|name| name.to_str()) {
             match folder.find(name) {
                 Ok(found) => return Ok(Some(found.path)),
@@ -98,8 +98,8 @@ fn envi_pair(
     };
     let written = Path::new(written);
     let (header, data) = match envi::is_header(head) {
-        true => (Some(path), beside(envi::data_names(written).collect())?),
-        false => (beside(envi::header_names(written).collect())?, Some(path)),
+        true => (Some(path), partner(envi::data_names(written).collect())?),
+        false => (partner(envi::header_names(written).collect())?, Some(path)),
     };
     let header = header.ok_or("has no ENVI header beside it, of the same name and `.hdr`")?;
     let data = data.ok_or(

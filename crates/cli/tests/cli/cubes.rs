@@ -231,7 +231,7 @@ fn what_is_no_cube_is_refused_with_its_place() {
     let of = |name: &str| color(json!({ "cube": name }));
     let light = |name: &str| json!({ "type": "emissive", "radiance": { "cube": name } });
     let array = json!({ "cube": "a.npy", "bands": [400, 500, 600] });
-    let beside =
+    let with_illuminant =
         json!({ "type": "emissive", "radiance": { "cube": "good.hdr" }, "illuminant": "d65" });
     let cases = [
         (of("a.npy"), "give `bands`"),
@@ -254,7 +254,7 @@ fn what_is_no_cube_is_refused_with_its_place() {
         (light("share.hdr"), "gives off no light"),
         (light("below.hdr"), "is -0.5 in band 1 of row 0, column 1: light is 0 to"),
         (light("rgb.exr"), "no spectral channels"),
-        (beside, "spectra of its own"),
+        (with_illuminant, "spectra of its own"),
     ];
     for (material, words) in cases {
         bench.write("scene.json", wall(&material, &BANDS).to_string().as_bytes());

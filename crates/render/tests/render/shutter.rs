@@ -226,8 +226,8 @@ fn points_are_projected_onto_their_pixels_by_the_pose_of_their_row() {
         let times = layer(&picture, "Time");
         let points = layer(&picture, "Position");
         let file = scene.camera.opencv();
-        let told = file.shutter.as_ref().expect("a shutter");
-        assert_eq!(told.camera_from_world_of_rows.len(), if moves { height } else { 0 });
+        let shutter = file.shutter.as_ref().expect("a shutter");
+        assert_eq!(shutter.camera_from_world_of_rows.len(), if moves { height } else { 0 });
         let k = file.k.expect("a matrix");
         let mut first_and_last = [f64::NAN; 2];
         for row in 0..height {
@@ -243,7 +243,8 @@ fn points_are_projected_onto_their_pixels_by_the_pose_of_their_row() {
                 _ => close,
             };
             first_and_last[usize::from(row > 0)] = due;
-            let pose = told.camera_from_world_of_rows.get(row).unwrap_or(&file.camera_from_world);
+            let pose =
+                shutter.camera_from_world_of_rows.get(row).unwrap_or(&file.camera_from_world);
             for column in 0..width {
                 let i = row * width + column;
                 // Kept in f32: steps of 4 ns below 63 ms.
@@ -257,7 +258,7 @@ fn points_are_projected_onto_their_pixels_by_the_pose_of_their_row() {
                 assert!(off < 1e-4, "{kind} {readout} {row} {column}: {place:?}");
             }
         }
-        let [top, bottom] = told.top_and_bottom_s;
+        let [top, bottom] = shutter.top_and_bottom_s;
         assert!(
             (top - first_and_last[0]).abs() < 1e-15 && (bottom - first_and_last[1]).abs() < 1e-15
         );

@@ -80,22 +80,20 @@ impl ObjectMotionSpec {
         match self {
             Self::Velocity { velocity, angular_velocity, about } => {
                 let stands = transform.build().map_err(|(key, why)| (key.to_owned(), why))?;
-                let angular = DVec3::from(*angular_velocity);
-                let steady = Steady {
-                    velocity: (*velocity).into(),
-                    axis: angular,
-                    rate: angular.length().to_radians(),
-                    about: about.map_or(stands.translation, DVec3::from),
-                };
-                let motion = Motion::default().with_steady(steady).map_err(|error| match error {
-                    MotionError::NotFinite(ref what) if what.contains("velocity") => {
-                        ("velocity", error)
-                    }
-                    MotionError::NotFinite(ref what) if what.contains("point") => ("about", error),
-                    _ => ("angular_velocity", error),
-                });
-                let motion = motion.map_err(|(key, error)| (key.to_owned(), error.to_string()))?;
-                Ok(motion.then_inner(&stands))
+                let [velocity, angular] = [*velocity, *angular_velocity].map(DVec3::from);
+                let about = about.map_or(stands.translation, DVec3::from);
+                let given =
+                    [("velocity", velocity), ("angular_velocity", angular), ("about", about)];
+                // A length that is finite has numbers that are.
+                if let Some((key, _)) = given.iter().find(|(_, v)| !v.length().is_finite()) {
+                    let why = "a number is too large or not finite".to_owned();
+                    return Err(((*key).to_owned(), why));
+                }
+                let rate = angular.length().to_radians();
+                let motion =
+                    Motion::default().with_steady(Steady { velocity, axis: angular, rate, about });
+                let fault = |error: MotionError| ("angular_velocity".to_owned(), error.to_string());
+                Ok(motion.map_err(fault)?.then_inner(&stands))
             }
             Self::Transforms { transforms, times, translation } => {
                 if *transform != TransformSpec::default() {
@@ -120,8 +118,9 @@ impl ObjectMotionSpec {
                 };
                 let fault = |error: MotionError| {
                     let key = match &error {
-                        MotionError::Count { .. } | MotionError::Order { .. } => "times".to_owned(),
-                        MotionError::NotFinite(_) => "times".to_owned(),
+                        MotionError::Count { .. }
+                        | MotionError::Order { .. }
+                        | MotionError::NotFinite(_) => "times".to_owned(),
                         MotionError::Shear(k) | MotionError::Scale(k) => format!("transforms[{k}]"),
                         MotionError::Axis => "transforms".to_owned(),
                     };

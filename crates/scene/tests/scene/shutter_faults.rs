@@ -184,6 +184,21 @@ fn wrong_motions_of_objects_are_refused_by_place_and_remedy() {
             through(two, json!([0, 1])),
             ["motion.transforms", "beside `transform`"],
         ),
+        (
+            json!({}),
+            json!({ "type": "velocity", "velocity": [1e200, 0, 0] }),
+            ["motion.velocity", "too large"],
+        ),
+        (
+            json!({}),
+            json!({ "type": "velocity", "angular_velocity": [0, 1e300, 0] }),
+            ["motion.angular_velocity", "too large"],
+        ),
+        (
+            json!({}),
+            json!({ "type": "velocity", "about": [0, 0, -1e200] }),
+            ["motion.about", "too large"],
+        ),
         (json!({}), json!({ "type": "velocity", "speed": 1 }), ["objects[0]", "speed"]),
         (json!({}), json!({ "type": "spin" }), ["objects[0]", "spin"]),
     ];

@@ -208,9 +208,9 @@ impl LightTree {
     fn sent(&self, viewer: &Viewer) -> f32 {
         let Some(whole) = self.nodes.first() else { return 0.0 };
         let [squared, _] = whole.way(0, viewer);
-        match whole.is_around {
-            true => whole.around(0, squared),
-            false => whole.ahead(0, viewer.point, squared),
+        match whole.is_isotropic {
+            true => whole.isotropic(0, squared),
+            false => whole.directed(0, viewer.point, squared),
         }
     }
 

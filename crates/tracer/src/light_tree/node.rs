@@ -41,7 +41,7 @@ pub(super) struct Node {
     /// What it may send to points between its lights.
     pub(super) within: Lanes,
     /// All shine to all sides.
-    pub(super) is_around: bool,
+    pub(super) is_isotropic: bool,
     pub(super) branches: [Branch; WIDTH],
 }
 
@@ -123,7 +123,7 @@ impl Node {
         self.intensity[lane] = single(cluster.intensity / extent.intensity);
         let within = self.intensity[lane] / (radius * radius).max(f32::MIN_POSITIVE);
         self.within[lane] = within.min(MOST_IMPORTANCE);
-        self.is_around = cluster.cone >= PI && (lane == 0 || self.is_around);
+        self.is_isotropic = cluster.cone >= PI && (lane == 0 || self.is_isotropic);
         self.branches[lane] = branch;
     }
 
@@ -141,7 +141,7 @@ impl Node {
 
     /// What a branch may send to a point at a squared distance, where all shine to all sides.
     #[inline(always)]
-    pub(super) fn around(&self, k: usize, squared: f32) -> f32 {
+    pub(super) fn isotropic(&self, k: usize, squared: f32) -> f32 {
         let near = self.intensity[k] / squared;
         let near = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
         let is_within = squared <= self.radius[k] * self.radius[k];
@@ -150,7 +150,7 @@ impl Node {
 
     /// The same where they shine ahead.
     #[inline(always)]
-    pub(super) fn ahead(&self, k: usize, from: [f32; 3], squared: f32) -> f32 {
+    pub(super) fn directed(&self, k: usize, from: [f32; 3], squared: f32) -> f32 {
         let inverse = 1.0 / squared.sqrt();
         let near = self.intensity[k] * inverse * inverse;
         let near = if near < MOST_IMPORTANCE { near } else { MOST_IMPORTANCE };
@@ -196,13 +196,13 @@ impl Node {
         for k in 0..WIDTH {
             [squared[k], above[k]] = self.way(k, viewer);
         }
-        if self.is_around {
+        if self.is_isotropic {
             for k in 0..WIDTH {
-                importance[k] = self.around(k, squared[k]);
+                importance[k] = self.isotropic(k, squared[k]);
             }
         } else {
             for k in 0..WIDTH {
-                importance[k] = self.ahead(k, viewer.point, squared[k]);
+                importance[k] = self.directed(k, viewer.point, squared[k]);
             }
         }
         if viewer.is_one_sided {
