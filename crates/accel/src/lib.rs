@@ -52,7 +52,7 @@ pub use embree::limit;
 #[cfg(feature = "embree")]
 pub use embree::{Version, version as embree_version};
 pub use exact::Exact;
-pub use moving::{Build, build_moving, moving_placements};
+pub use moving::{Build, build_moving};
 
 /// Answers nearest-hit and visibility queries about one scene. Built once, then only read.
 pub trait Accel: Send + Sync + fmt::Debug {

@@ -33,21 +33,11 @@ pub fn build_moving(
     options: &BuildOptions,
     build: Build<'_>,
 ) -> Result<Box<dyn Accel>, BuildError> {
-    let moves = moving_placements(&geometry, options.exposure).next().is_some();
+    let moves = geometry.moving_within(options.exposure).next().is_some();
     match moves {
         false => build(geometry, options),
         true => Ok(Box::new(Moving::build(&geometry, options, build)?)),
     }
-}
-
-/// The placements that move between the times of `exposure` (s from the frame's time, first and last).
-pub fn moving_placements(
-    geometry: &Geometry,
-    exposure: [f64; 2],
-) -> impl Iterator<Item = (usize, &Arc<Motion>)> {
-    let all = geometry.placements.iter().enumerate();
-    let motions = all.filter_map(|(i, placement)| Some((i, placement.motion.as_ref()?)));
-    motions.filter(move |(_, motion)| motion.moves_within(exposure))
 }
 
 /// A structure whose bodies move.
@@ -102,7 +92,7 @@ impl Moving {
         let mut moves = vec![false; still.placements.len()];
         let mut of_mesh = vec![None; geometry.meshes.len()];
         let (mut shapes, mut bodies) = (Vec::<Box<dyn Accel>>::new(), Vec::new());
-        for (i, motion) in moving_placements(geometry, options.exposure) {
+        for (i, motion) in geometry.moving_within(options.exposure) {
             still.placements[i].mesh = nothing;
             moves[i] = true;
             let placement = &geometry.placements[i];

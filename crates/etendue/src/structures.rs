@@ -78,9 +78,8 @@ impl Structures {
 
 impl Built {
     fn is_over(&self, scene: &Scene) -> bool {
-        let moves = || scene.geometry.placements.iter().any(|placed| placed.motion.is_some());
         self.name == scene.render.accel
-            && (self.exposure == scene.camera.exposure_span() || !moves())
+            && (self.exposure == scene.camera.exposure_span() || !scene.geometry.moves())
             && (Arc::ptr_eq(&self.geometry, &scene.geometry)
                 || self.geometry.has_surfaces_of(&scene.geometry))
     }

@@ -108,6 +108,14 @@ impl Geometry {
         self.placements.iter().any(|placement| placement.motion.is_some())
     }
 
+    /// The placements that move between the times of `exposure` (s from the frame's time, first and last), by their
+    /// numbers.
+    pub fn moving_within(&self, exposure: [f64; 2]) -> impl Iterator<Item = (usize, &Arc<Motion>)> {
+        let all = self.placements.iter().enumerate();
+        let motions = all.filter_map(|(i, placement)| Some((i, placement.motion.as_ref()?)));
+        motions.filter(move |(_, motion)| motion.moves_within(exposure))
+    }
+
     /// How often each mesh is placed.
     #[must_use]
     pub fn uses(&self) -> Vec<u32> {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use etendue_accel::{Accel, BuildError, BuildOptions, build_moving, moving_placements};
+use etendue_accel::{Accel, BuildError, BuildOptions, build_moving};
 use etendue_camera::{Camera, LensCamera, PixelExtent};
 use etendue_optics::element::StatusCounts;
 use etendue_scene::Scene;
@@ -122,7 +122,7 @@ pub fn rebuild(
 ) -> Result<Box<dyn Accel>, RenderError> {
     let with_quality = options_for(scene, plan, options);
     let again = |before: &dyn Accel| before.rebuilt(Arc::clone(&scene.geometry), &with_quality);
-    let stands = moving_placements(&scene.geometry, with_quality.exposure).next().is_none();
+    let stands = scene.geometry.moving_within(with_quality.exposure).next().is_none();
     match before.filter(|_| stands).and_then(again) {
         Some(rebuilt) => Ok(rebuilt?),
         None => build(scene, plan, options),

@@ -11,7 +11,7 @@ use std::time::SystemTime;
 
 use etendue_camera::Camera;
 use etendue_files::{InputFolder, Opener};
-use etendue_geometry::{Bounds, Geometry, Placement};
+use etendue_geometry::{Bounds, Geometry};
 use etendue_optics::glass::AgfCatalogue;
 use etendue_tracer::{LayerSpec, Light, Material, Texture};
 use rayon::prelude::*;
@@ -247,11 +247,8 @@ impl SceneFile {
     ) -> Result<Scene, SceneError> {
         let built = self.kept_camera(parts.geometry, &parts.cameras, (folder, options), kept)?;
         let KeptCamera { geometry, camera, origin: camera_origin, files: camera_files, .. } = built;
-        let span = camera.exposure_span();
-        let moves = |placement: &Placement| {
-            placement.motion.as_ref().is_some_and(|motion| motion.moves_within(span))
-        };
-        let camera = camera.among_moving_things(geometry.placements.iter().any(moves));
+        let things_move = geometry.moving_within(camera.exposure_span()).next().is_some();
+        let camera = camera.among_moving_things(things_move);
         // Every file that the scene is made of.
         let opened = parts.stats.files.iter().map(|(path, _)| path.clone());
         let images = parts.textures.iter().filter_map(Texture::file);

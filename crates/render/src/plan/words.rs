@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use etendue_accel::{Quality, moving_placements};
+use etendue_accel::Quality;
 use etendue_camera::{LensCamera, Projection};
 use etendue_geometry::{HitPrecision, Placement};
 use etendue_report::{Decision, DecisionKind as Kind, DecisionValue, Saving, Tabled};
@@ -34,7 +34,7 @@ pub(super) struct Grounds<'a> {
 fn explain_shutter(scene: &Scene) -> Option<Decision> {
     let shutter = scene.camera.shutter()?;
     let placed = &scene.geometry.placements;
-    let moving = moving_placements(&scene.geometry, scene.camera.exposure_span()).count();
+    let moving = scene.geometry.moving_within(scene.camera.exposure_span()).count();
     let bodies = match moving {
         0 => String::new(),
         _ => format!(
