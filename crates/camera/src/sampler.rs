@@ -173,27 +173,6 @@ pub fn squares_of_pair(
     sobol::points(&keys, dimensions, out);
 }
 
-/// [`PixelSamples::square`] for each of `wanted`, which are a pixel's samples, an index and a pair of
-/// dimensions, in one go: `out` is refilled.
-pub fn squares(wanted: &[(PixelSamples, u32, u32)], out: &mut Vec<[f64; 2]>) {
-    out.clear();
-    if wanted.iter().any(|(pixel, ..)| !pixel.sampler.is_sobol()) {
-        out.extend(wanted.iter().map(|(pixel, index, pair)| pixel.square(*index, *pair)));
-        return;
-    }
-    let mut sequence = Sequence::default();
-    let key = |&(pixel, index, pair): &(PixelSamples, u32, u32)| {
-        pixel.sobol_key(index, pair, &mut sequence)
-    };
-    let keys: Vec<(SobolKey, usize)> = wanted.iter().map(key).collect();
-    if keys.iter().all(|&(_, first)| first == 0) {
-        let keys: Vec<SobolKey> = keys.into_iter().map(|(key, _)| key).collect();
-        out.resize(keys.len(), [0.0; 2]);
-        return sobol::points(&keys, 0, out);
-    }
-    out.extend(wanted.iter().map(|&(pixel, index, pair)| pixel.square(index, pair)));
-}
-
 /// The scrambling of the sequence that was asked for last: that of nearly all samples of a batch.
 #[derive(Debug, Default)]
 struct Sequence {
@@ -330,19 +309,14 @@ mod tests {
     #[test]
     fn many_at_once_are_those_one_by_one() {
         for sampler in ALL {
-            let wanted: Vec<_> = (0..200)
-                .map(|i| {
-                    (sampler.pixel(5, i % 7, i / 7, 80_000), i * 381, [0, 3, 200][i as usize % 3])
-                })
-                .collect();
+            let pixel = |i: u32| sampler.pixel(5, i % 7, i / 7, 80_000);
+            let samples = (0..200).map(|i| (pixel(i), i * 381));
             let mut out = Vec::new();
-            squares(&wanted, &mut out);
-            let one_by_one = wanted.iter().map(|(pixel, i, pair)| pixel.square(*i, *pair));
-            assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?}");
-            let samples = wanted.iter().map(|&(pixel, i, _)| (pixel, i));
-            squares_of_pair(samples.clone(), 3, &mut out);
-            let one_by_one = samples.map(|(pixel, i)| pixel.square(i, 3));
-            assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?}");
+            for pair in [0, 3, 200] {
+                squares_of_pair(samples.clone(), pair, &mut out);
+                let one_by_one = samples.clone().map(|(pixel, i)| pixel.square(i, pair));
+                assert_eq!(out, one_by_one.collect::<Vec<_>>(), "{sampler:?} pair {pair}");
+            }
         }
     }
 

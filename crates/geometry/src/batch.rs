@@ -298,28 +298,6 @@ impl RayBatch {
         self.extend_times();
     }
 
-    /// Appends the `picked` rays of a block, one array an axis, which count hits from their origins as
-    /// far as `t_max` says (m); without triangles at their ends.
-    pub fn extend_picked<const N: usize>(
-        &mut self,
-        origins: &[[f64; N]; 3],
-        directions: &[[f64; N]; 3],
-        t_max: &[f64; N],
-        picked: &[usize],
-    ) {
-        let from = origins.iter().chain(directions);
-        for (own, from) in self.origins.iter_mut().chain(&mut self.directions).zip(from) {
-            own.extend(picked.iter().map(|&i| from[i]));
-        }
-        self.t_max.extend(picked.iter().map(|&i| t_max[i]));
-        let len = self.t_max.len();
-        self.t_min.resize(len, 0.0);
-        if !self.endpoint_triangles.is_empty() {
-            self.endpoint_triangles.resize(len, [[MISS; 2]; 2]);
-        }
-        self.extend_times();
-    }
-
     /// Says of the last rays, as many as `triangles` there are, which triangles are at their ends.
     pub fn end_on_triangles(
         &mut self,

@@ -81,7 +81,7 @@ pub(crate) fn settle(
     let placed = PlacedSurfaces::of(&scene.geometry, &scene.materials, &spectral);
     let stage = LightingContext {
         accel,
-        surroundings,
+        scene: surroundings,
         lights: &lights,
         spectral: &spectral,
         traits: Traits::of(&scene.geometry, &scene.materials, &placed),
@@ -128,7 +128,7 @@ fn dark_share(
         others: &[],
         camera: &camera,
         groups: groups.clone(),
-        surroundings: stage.surroundings,
+        surroundings: stage.scene,
         detail: Detail::Distance,
         precision: stage.precision,
         sampling: Sampling {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use etendue_camera::{BandGroup, Camera, PixelSamples, squares, squares_of_pair};
+use etendue_camera::{BandGroup, Camera, PixelSamples, squares_of_pair};
 use etendue_tracer::transport::{Parts, RaySamples};
 use etendue_tracer::{LayerSpec, LightingContext, Rules, Samples};
 
@@ -95,20 +95,6 @@ pub(crate) struct SampleNumbers {
 }
 
 impl Samples for SampleNumbers {
-    fn squares(&self, wanted: &[(u32, u32)], out: &mut Vec<[f64; 2]>) {
-        let sample_of = |ray: u32| self.samples[self.of_ray[ray as usize] as usize];
-        let Some(&(_, pair)) = wanted.first() else { return out.clear() };
-        if wanted.iter().all(|&(_, other)| other == pair) {
-            let samples = wanted.iter().map(|&(ray, _)| sample_of(ray));
-            return squares_of_pair(samples, CAMERA_PAIRS + pair, out);
-        }
-        let numbered = wanted.iter().map(|&(ray, pair)| {
-            let (pixel, index) = sample_of(ray);
-            (pixel, index, CAMERA_PAIRS + pair)
-        });
-        squares(&numbered.collect::<Vec<_>>(), out);
-    }
-
     fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
         let samples = rays.iter().map(|&ray| self.samples[self.of_ray[ray as usize] as usize]);
         squares_of_pair(samples, CAMERA_PAIRS + pair, out);

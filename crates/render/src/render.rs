@@ -271,7 +271,7 @@ pub fn trace(
     let light = lit.as_ref().map(|(rules, lights)| LightPass {
         stage: LightingContext {
             accel,
-            surroundings,
+            scene: surroundings,
             lights,
             spectral: &spectral,
             traits: Traits::of(&scene.geometry, &scene.materials, &placed),

@@ -7,6 +7,7 @@ use etendue_geometry::{Bounds, Placement};
 
 use crate::light::mean;
 use crate::light_tree::Cluster;
+use crate::material::Alpha;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::magnitudes;
 use crate::{Material, Paint};
@@ -58,7 +59,8 @@ impl AreaLight {
     pub(crate) fn new(around: &SceneView<'_>, id: [u32; 2]) -> Option<Self> {
         let placement = around.geometry.placements.get(id[0] as usize)?;
         let spot = SurfacePoint::corner(around.geometry, placement, id[1] as usize);
-        let emission = around.material(&spot)?.emission.as_ref()?;
+        let material = around.material(&spot)?;
+        let emission = material.emission.as_ref()?;
         let place = &placement.world_from_mesh;
         let [corner, ..] = spot.mesh.corners(spot.triangle);
         let (turned, far) = (place.linear * corner, place.translation);
@@ -71,7 +73,8 @@ impl AreaLight {
             corner: [sum, lost + place.translation_low],
             shape: Shape::of(&spot)?,
             two_sided: emission.two_sided,
-            is_plain: matches!(emission.radiance, Paint::Plain(_) | Paint::Curve { .. }),
+            is_plain: matches!(emission.radiance, Paint::Plain(_) | Paint::Curve { .. })
+                && material.alpha == Alpha::Opaque,
             magnitudes: magnitudes(placement, spot.mesh),
         })
     }

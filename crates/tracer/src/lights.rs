@@ -12,6 +12,7 @@ use crate::group::Groups;
 use crate::lamps::{self, AreaLight, triangle_power};
 use crate::light::{EnvironmentImage, Light, LightKind, irradiance, power, spot_falloff};
 use crate::light_sampler::{Candidate, LightSampler, Receiver};
+use crate::material::Alpha;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::sampling::{Frame, cone_direction, triangle_point};
 use crate::sky::{Sky, uniform_direction};
@@ -258,24 +259,7 @@ impl Lights {
         &self.bands[light * count..(light + 1) * count]
     }
 
-    /// Chooses a light for a point and a place on it by `square` (in 0..1); its radiance (of a point its intensity)
-    /// goes to `radiance`.
-    // Called for every hit from one place, with a large answer that is not to be copied.
-    #[inline(always)]
-    pub(crate) fn choose(
-        &self,
-        around: &SceneView<'_>,
-        spectral: &Spectral,
-        receiver: &Receiver,
-        [choice, v]: [f64; 2],
-        radiance: &mut [f64],
-    ) -> Chosen {
-        // What is left of the number that chose the light chooses the place: both stay even.
-        let Some((index, rest, chance)) = self.pick(receiver, choice) else { return Chosen::Dark };
-        self.place(around, spectral, receiver, ((index, chance), [rest, v]), radiance)
-    }
-
-    /// A place on a light that was picked with a chance, by a square; its radiance (of a point its
+    /// A place on a light that was [picked](Self::pick) with a chance, by a square; its radiance (of a point its
     /// intensity) goes to `radiance`.
     #[inline(always)]
     pub(crate) fn place(
@@ -380,7 +364,7 @@ impl Lights {
         })
     }
 
-    /// Radiance that a surface gives off to its front or back; `false` when it is dark.
+    /// Radiance that a surface gives off to its front or back, as much as of it is there; `false` when it is dark.
     pub fn emitted(
         &self,
         around: &SceneView<'_>,
@@ -390,27 +374,37 @@ impl Lights {
         radiance: &mut [f64],
     ) -> bool {
         let number = spot.placement.material as usize;
-        let emission = around.materials.get(number).and_then(|m| m.emission.as_ref());
-        let Some(emission) = emission.filter(|e| front || e.two_sided) else { return false };
+        let material = around.materials.get(number);
+        let Some((material, emission)) = material.and_then(|m| Some((m, m.emission.as_ref()?)))
+        else {
+            return false;
+        };
+        if !front && !emission.two_sided {
+            return false;
+        }
+        let there = match material.alpha {
+            Alpha::Opaque => 1.0,
+            alpha => alpha.opacity(around.base_tint(spectral, material, spot).1),
+        };
         if let Paint::Cube { cube, repeat } = &emission.radiance
             && !spectral.is_rgb()
         {
             let [u, v] = spot.uv(0);
             let at = [u * repeat[0], v * repeat[1]];
             for (i, band) in radiance.iter_mut().enumerate() {
-                *band = emission.strength * spectral.texel(cube.number, at, i);
+                *band = there * emission.strength * spectral.texel(cube.number, at, i);
             }
             return true;
         }
         let [r, g, b, _] = around.paint(&emission.radiance, spot);
-        spectral.spread(&[r, g, b].map(|c| c * emission.strength), radiance);
+        spectral.spread(&[r, g, b].map(|c| c * emission.strength * there), radiance);
         if let Some(tint) = &self.tints[number] {
             radiance.iter_mut().zip(tint).for_each(|(band, tint)| *band *= tint);
         }
         true
     }
 
-    /// The density (1/sr), chance included, with which [`Self::choose`] gives a point the direction to `spot`,
+    /// The density (1/sr), chance included, with which [`Self::pick`] and [`Self::place`] give a point the direction to `spot`,
     /// which was met by a ray along `direction` from the point.
     pub(crate) fn pdf_of_surface(
         &self,

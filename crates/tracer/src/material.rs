@@ -81,6 +81,17 @@ pub enum Alpha {
     },
 }
 
+impl Alpha {
+    /// The share that is there, where the base colour has this alpha.
+    pub(crate) fn opacity(self, alpha: f64) -> f64 {
+        match self {
+            Self::Opaque => 1.0,
+            Self::Mask { factor, cutoff } => f64::from(u8::from(factor * alpha >= cutoff)),
+            Self::Blend { factor } => (factor * alpha).clamp(0.0, 1.0),
+        }
+    }
+}
+
 /// Tilts of the normal by an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NormalMap {

@@ -1,14 +1,14 @@
 //! From a hit to a surface that light can be scattered by.
 
+use etendue_geometry::MISS;
 use etendue_geometry::glam::{DMat3, DVec3};
-use etendue_geometry::{HitBatch, MISS, RayBatch};
 
 use crate::bsdf::Bsdf;
-use crate::material::{Alpha, NormalMap};
+use crate::material::NormalMap;
 use crate::placed::PlacedSurface;
 use crate::reference::{SceneView, SurfacePoint};
 use crate::spawn::Anchor;
-use crate::{Footprint, Ior, LightingContext, Material, Spectral, Tint};
+use crate::{Ior, LightingContext, Material, Spectral, Tint};
 
 /// A hit seen from its ray.
 #[derive(Debug, Clone, Copy)]
@@ -28,33 +28,20 @@ pub(crate) struct SurfaceInteraction<'a> {
 }
 
 impl<'a> SurfaceInteraction<'a> {
-    /// Hit `i`; `None` for a miss.
-    pub(crate) fn new(
-        stage: &'a LightingContext<'a>,
-        rays: &RayBatch,
-        hits: &HitBatch,
-        i: usize,
-        footprint: Option<Footprint>,
-    ) -> Option<Self> {
-        let spot = SurfacePoint { footprint, ..stage.surroundings.spot(hits, i)? };
-        let ray = (rays.origin(i), rays.direction(i));
-        Self::at(stage, (hits.placement[i], spot), ray, (hits.t[i], hits.normal(i)))
-    }
-
     /// The hit on a placement at a point, of a ray from `origin` (m) after the way `t` (m), where the triangle has
     /// this unit normal on its front.
     pub(crate) fn at(
-        stage: &'a LightingContext<'a>,
+        ctx: &'a LightingContext<'a>,
         (own, spot): (u32, SurfacePoint<'a>),
         (origin, direction): (DVec3, DVec3),
         (t, normal): (f64, DVec3),
     ) -> Option<Self> {
-        let around = &stage.surroundings;
-        let placed = stage.placed.get(own)?;
+        let around = &ctx.scene;
+        let placed = ctx.placed.get(own)?;
         let material = around.material(&spot)?;
-        let anchor = stage.anchor(origin + direction * t, normal, origin, placed);
+        let anchor = ctx.anchor(origin + direction * t, normal, origin, placed);
         let front = normal.dot(direction) <= 0.0;
-        let (base, alpha) = around.base_tint(stage.spectral, material, &spot);
+        let (base, alpha) = around.base_tint(ctx.spectral, material, &spot);
         let media = if front { [MISS, own] } else { [own, MISS] };
         Some(Self { spot, placed, material, anchor, front, base, alpha, wo: -direction, media })
     }
@@ -64,11 +51,7 @@ impl<'a> SurfaceInteraction<'a> {
         if self.material.one_sided && !self.front {
             return 0.0;
         }
-        match self.material.alpha {
-            Alpha::Opaque => 1.0,
-            Alpha::Mask { factor, cutoff } => f64::from(u8::from(factor * self.alpha >= cutoff)),
-            Alpha::Blend { factor } => (factor * self.alpha).clamp(0.0, 1.0),
-        }
+        self.material.alpha.opacity(self.alpha)
     }
 
     /// How it scatters light of the wavelength (nm).

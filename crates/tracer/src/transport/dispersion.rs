@@ -5,15 +5,12 @@
 //! smooth boundaries), makes a relative variance of `n − 1` of each band by itself; going on with all
 //! costs `n` paths and has none. All draw the same random numbers, so that bands do not part by noise.
 
-use etendue_geometry::glam::DVec3;
-
-use super::media::{Coincident, Crossing};
-use super::numbers::Draw;
-use super::paths::State;
-use super::{Scratch, Tracing};
+use super::Tracing;
+use super::media::Crossing;
+use super::paths::{Draw, Step, Way, Workspace};
+use super::rays::Rays;
+use super::scatter::Departure;
 use crate::bsdf::{Bsdf, BsdfSample};
-use crate::light_sampler::Receiver;
-use crate::spectral::Spectral;
 use crate::surface::SurfaceInteraction;
 
 /// The most paths that one is parted into. Of more bands each path keeps one of a few neighbours.
@@ -32,7 +29,7 @@ struct TransmittedBand {
 /// A path at a boundary: its hit, which of those that go on it is, and how its surface scatters.
 pub(super) struct Boundary<'a> {
     pub(super) path: (usize, usize),
-    pub(super) met: &'a SurfaceInteraction<'a>,
+    pub(super) interaction: &'a SurfaceInteraction<'a>,
     /// The media on its sides, where they count.
     pub(super) crossing: Option<Crossing>,
     pub(super) bsdf: Bsdf,
@@ -40,21 +37,27 @@ pub(super) struct Boundary<'a> {
 
 impl<const RGB: bool> Tracing<'_, RGB> {
     /// The step of a path that still carries several bands at a boundary whose index is each one's own.
-    pub(super) fn disperse(&self, boundary: &Boundary<'_>, scratch: &mut Scratch) {
+    pub(super) fn disperse<R: Rays>(
+        &self,
+        step: &Step<'_>,
+        boundary: &Boundary<'_>,
+        workspace: &mut Workspace<R>,
+    ) {
         let (i, k) = boundary.path;
-        let [pick, place] = scratch.numbers.of(Draw::Light, k);
-        let passages = self.passages(boundary, scratch, [pick, place]);
+        let [pick, place] = workspace.number(Draw::Light, k);
+        let count = self.count();
+        let throughput = workspace.now.carried.throughput[i * count..(i + 1) * count].to_vec();
+        let passages = self.passages(boundary, &throughput, place);
         let live = passages.len() as f64;
         let mean = passages.iter().map(|passage| passage.reflectance).sum::<f64>() / live;
-        let throughput = scratch.now.throughput[i * self.count()..(i + 1) * self.count()].to_vec();
-        let choice = scratch.numbers.of(Draw::Choice, k)[1];
-        let mut sent = vec![0.0; self.count()];
+        let choice = workspace.number(Draw::Choice, k)[1];
+        let mut sent = vec![0.0; count];
         if choice < mean {
             let Some(mirrored) = boundary.bsdf.mirrored() else { return };
             for passage in &passages {
                 sent[passage.band] = throughput[passage.band] * passage.reflectance / mean;
             }
-            return self.send_single(boundary, (&mirrored, None), &mut sent, scratch);
+            return self.send_single(step, boundary, (&mirrored, None), &mut sent, workspace);
         }
         let parts = passages.len().min(MOST_PARTS);
         for part in 0..parts {
@@ -67,22 +70,21 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             sent.fill(0.0);
             sent[passage.band] = throughput[passage.band] * passed * tint;
             let way = (&refracted, Some(passage.wavelength));
-            self.send_single(boundary, way, &mut sent, scratch);
+            self.send_single(step, boundary, way, &mut sent, workspace);
         }
     }
 
-    /// The boundary as each band meets it that carries anything.
+    /// The boundary as each band meets it that carries anything, at a place (0..1) of its light.
     fn passages(
         &self,
         boundary: &Boundary<'_>,
-        scratch: &Scratch,
-        [_, place]: [f64; 2],
+        throughput: &[f64],
+        place: f64,
     ) -> Vec<TransmittedBand> {
-        let start = boundary.path.0 * self.count();
-        let live = |&band: &usize| scratch.now.throughput[start + band] > 0.0;
+        let live = |&band: &usize| throughput[band] > 0.0;
         let passage = |band| {
-            let wavelength = self.stage.spectral.wavelength_at(band, place);
-            let eta = boundary.met.eta(&self.stage.surroundings, wavelength);
+            let wavelength = self.ctx.spectral.wavelength_at(band, place);
+            let eta = boundary.interaction.eta(&self.ctx.scene, wavelength);
             TransmittedBand { band, wavelength, eta, reflectance: boundary.bsdf.reflectance(eta) }
         };
         (0..self.count()).filter(live).map(passage).collect()
@@ -90,69 +92,59 @@ impl<const RGB: bool> Tracing<'_, RGB> {
 
     /// Notes a path along a direction that only the boundary can give, unless it carries nothing, ends
     /// by chance, or nothing is left for it to find.
-    fn send_single(
+    fn send_single<R: Rays>(
         &self,
+        step: &Step<'_>,
         boundary: &Boundary<'_>,
         (way, wavelength): (&BsdfSample, Option<f64>),
         throughput: &mut [f64],
-        scratch: &mut Scratch,
+        workspace: &mut Workspace<R>,
     ) {
-        let (i, k) = boundary.path;
-        let Scratch { now, next, hits, coincident, numbers, .. } = scratch;
-        let state = now.states[i];
-        let bounces = state.bounces + 1;
-        let most = throughput.iter().copied().fold(0.0, f64::max);
-        if most <= 0.0 {
+        let ((i, k), count) = (boundary.path, self.count());
+        let bounces = workspace.now.bounces(step.number, i) + 1;
+        if throughput.iter().copied().fold(0.0, f64::max) <= 0.0 {
             return;
         }
         let is_last = bounces >= self.rules.bounces;
         if self.rules.roulette.is_some_and(|after| bounces >= after) && !is_last {
             // As likely for all parts of a path, or those of its dim bands would be noise.
-            let survival = most_before(now.throughput_of(i, self.count())).min(0.95);
-            if numbers.of(Draw::Chance, k)[1] >= survival {
+            let before = &workspace.now.carried.throughput[i * count..(i + 1) * count];
+            let survival = before.iter().copied().fold(0.0, f64::max).min(0.95);
+            if workspace.number(Draw::Chance, k)[1] >= survival {
                 return;
             }
             throughput.iter_mut().for_each(|band| *band /= survival);
         }
-        let anchor = &boundary.met.anchor;
-        let start: DVec3 = anchor.leave(way.direction);
-        let state = State {
-            steps: state.steps + 1,
-            bounces,
-            pdf: f64::INFINITY,
-            receiver: Receiver::open(anchor.point),
-            wavelength: wavelength.or(state.wavelength),
-            media: boundary
-                .crossing
-                .map_or(state.media, |crossing| crossing.after(way.direction, hits.normal(i))),
-            is_last,
-            cone: state.cone.map(|cone| cone.after(hits.t[i])),
-            ..state
+        let normal = workspace.now.rays.hit(i).normal;
+        let departure = Departure {
+            ray: [boundary.interaction.anchor.leave(way.direction), way.direction],
+            way: Way { is_last, ..Way::CAMERA },
+            cone: self.cone_at_hit(step, &workspace.now, i),
+            media: boundary.crossing.map(|crossing| crossing.after(way.direction, normal)),
         };
-        let left = [hits.placement[i], hits.triangle[i]];
-        let coplanar = coincident.get(i).copied().unwrap_or(Coincident::NONE);
-        next.push_beside(
-            (start, way.direction),
-            [left, [coplanar.placement, coplanar.triangle]],
-            state,
-        );
-        next.throughput.extend_from_slice(throughput);
+        self.send(workspace, i, (departure, wavelength), throughput);
     }
-}
 
-fn most_before(throughput: &[f64]) -> f64 {
-    throughput.iter().copied().fold(0.0, f64::max)
-}
-
-/// Keeps one band, chosen by `u` among those that carry anything, at as many times its throughput: at
-/// rough boundaries, which scatter every wavelength into all directions.
-pub(super) fn keep_one(throughput: &mut [f64], state: &mut State, spectral: &Spectral, u: f64) {
-    let live: Vec<usize> = (0..throughput.len()).filter(|&k| throughput[k] > 0.0).collect();
-    let scaled = u * live.len() as f64;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "u is in 0..1")]
-    let Some(&kept) = live.get(scaled as usize) else { return };
-    for (k, band) in throughput.iter_mut().enumerate() {
-        *band = if k == kept { *band * live.len() as f64 } else { 0.0 };
+    /// Keeps one band of a path, chosen among those that carry anything, at as many times its throughput: at rough
+    /// boundaries, which scatter every wavelength into all directions. Its wavelength (nm), unless nothing is left.
+    pub(super) fn keep_one<R: Rays>(
+        &self,
+        workspace: &mut Workspace<R>,
+        (i, k): (usize, usize),
+    ) -> Option<f64> {
+        let (u, count) = (workspace.number(Draw::Choice, k)[0], self.count());
+        let carried = &mut workspace.now.carried;
+        let throughput = &mut carried.throughput[i * count..(i + 1) * count];
+        let live: Vec<usize> = (0..count).filter(|&k| throughput[k] > 0.0).collect();
+        let scaled = u * live.len() as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "u is in 0..1")]
+        let kept = *live.get(scaled as usize)?;
+        for (k, band) in throughput.iter_mut().enumerate() {
+            *band = if k == kept { *band * live.len() as f64 } else { 0.0 };
+        }
+        let wavelength = self.ctx.spectral.wavelength_at(kept, scaled.fract());
+        carried.wavelengths.resize(carried.ray.len(), None);
+        carried.wavelengths[i] = Some(wavelength);
+        Some(wavelength)
     }
-    state.wavelength = Some(spectral.wavelength_at(kept, scaled.fract()));
 }

@@ -2,9 +2,11 @@
 //! (`KHR_materials_volume`).
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, HitBatch, HitPrecision, MISS, RayBatch};
+use etendue_geometry::{Detail, HitBatch, HitPrecision, MISS, PlacedTriangle, RayBatch};
 
-use super::{Scratch, Tracing};
+use super::Tracing;
+use super::paths::Paths;
+use super::rays::Rays;
 use crate::placed::PlacedSurfaces;
 use crate::surface::SurfaceInteraction;
 use crate::{Ior, Scattering};
@@ -65,6 +67,11 @@ pub(super) struct Coincident {
 
 impl Coincident {
     pub(super) const NONE: Self = Self { placement: MISS, triangle: MISS, front: false };
+
+    /// The placement's triangle.
+    pub(super) fn id(self) -> PlacedTriangle {
+        [self.placement, self.triangle]
+    }
 }
 
 /// The media on both sides of a surface.
@@ -115,16 +122,16 @@ impl<const RGB: bool> Tracing<'_, RGB> {
         &self,
         media: Media,
         hit: (u32, Coincident),
-        met: &mut SurfaceInteraction<'_>,
+        interaction: &mut SurfaceInteraction<'_>,
     ) -> Option<Crossing> {
-        let Scattering::Dielectric(_) = met.material.scattering else { return None };
-        if !self.stage.traits.has_media {
+        let Scattering::Dielectric(_) = interaction.material.scattering else { return None };
+        if !self.ctx.traits.has_media {
             return None;
         }
-        let placed = self.stage.placed;
-        let crossing = Crossing::of(media, hit, met.front, placed);
+        let placed = self.ctx.placed;
+        let crossing = Crossing::of(media, hit, interaction.front, placed);
         let [outside, inside] = [crossing.outside, crossing.inside].map(|m| m.medium(placed));
-        met.media = if met.front { [outside, inside] } else { [inside, outside] };
+        interaction.media = if interaction.front { [outside, inside] } else { [inside, outside] };
         Some(crossing)
     }
 
@@ -132,53 +139,53 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     pub(super) fn vanishes(
         &self,
         placement: u32,
-        met: &SurfaceInteraction<'_>,
+        interaction: &SurfaceInteraction<'_>,
     ) -> Option<Vanished> {
-        let body = self.stage.placed.get(placement)?.body?;
-        let [here, behind] = met.media;
+        let body = self.ctx.placed.get(placement)?.body?;
+        let [here, behind] = interaction.media;
         if !body.may_vanish {
             return None;
         }
         if here == behind {
             return Some(Vanished { is_tinted: false });
         }
-        let around = &self.stage.surroundings;
-        let index = |medium| around.index(medium);
+        let scene = &self.ctx.scene;
+        let index = |medium| scene.index(medium);
         let air = Ior::Constant(1.0);
         let [here, behind] = [here, behind].map(|medium| index(medium).unwrap_or(&air));
         (here == behind).then_some(Vanished { is_tinted: true })
     }
 
-    /// The boundaries of other bodies in the place of each hit of one: `found` is refilled, or emptied where bodies do not
-    /// touch.
-    pub(super) fn coincident(&self, rays: &RayBatch, hits: &HitBatch, found: &mut Vec<Coincident>) {
+    /// The boundaries of other bodies in the place of each hit of one: `found` is refilled, or emptied where bodies do
+    /// not touch.
+    pub(super) fn find_coincident<R: Rays>(&self, rays: &R, found: &mut Vec<Coincident>) {
         found.clear();
-        if self.stage.placed.touching.is_empty() {
+        if self.ctx.placed.touching.is_empty() {
             return;
         }
         found.extend((0..rays.len()).map(|i| {
-            let (direction, own) = (rays.direction(i), [hits.placement[i], hits.triangle[i]]);
+            let (direction, own) = (rays.direction(i), rays.triangle(i));
             if own[0] == MISS {
                 return Coincident::NONE;
             }
-            self.coincident_at(rays.origin(i) + direction * hits.t[i], direction, own)
+            self.coincident_at(rays.origin(i) + direction * rays.t(i), direction, own)
         }));
     }
 
-    /// The other boundary at a point of one that a ray along `direction` met.
+    /// The other boundary at a point of one that a ray along `direction` interaction.
     fn coincident_at(&self, point: DVec3, direction: DVec3, own: [u32; 2]) -> Coincident {
         /// Shares of a triangle beyond its edges, as the point is known to no more.
         const BEYOND: f64 = 1e-6;
-        let geometry = self.stage.surroundings.geometry;
-        let touching = &self.stage.placed.touching;
+        let geometry = self.ctx.scene.geometry;
+        let touching = &self.ctx.placed.touching;
         for [placement, triangle] in touching.others_near(own, point, f64::INFINITY) {
             let placed = &geometry.placements[placement as usize];
             let corners = geometry.mesh_of(placed).corners(triangle as usize);
             let [a, b, c] = corners.map(|corner| placed.world_from_mesh.point(corner));
             let normal = (b - a).cross(c - a);
             // Planes that single precision cannot tell apart may be.
-            let other = self.stage.placed.get(placement).map_or(DVec3::ZERO, |p| p.magnitudes);
-            let error = self.stage.roundings() * (point.abs() + other).element_sum();
+            let other = self.ctx.placed.get(placement).map_or(DVec3::ZERO, |p| p.magnitudes);
+            let error = self.ctx.roundings() * (point.abs() + other).element_sum();
             if normal.dot(point - a).abs() > error * normal.length() {
                 continue;
             }
@@ -195,19 +202,20 @@ impl<const RGB: bool> Tracing<'_, RGB> {
 
     /// Takes from each path what the medium that it went through absorbs. A path that leaves into the open
     /// without having met the body's other side (a surface that is not closed) loses nothing.
-    pub(super) fn absorb(&self, scratch: &mut Scratch) {
-        let Scratch { now, hits, .. } = scratch;
-        for (i, state) in now.states.iter().enumerate() {
-            if hits.is_hit(i) {
-                let throughput = &mut now.throughput[i * self.count()..(i + 1) * self.count()];
-                self.dim_along(&state.media, hits.t[i], throughput);
+    pub(super) fn absorb<R: Rays>(&self, now: &mut Paths<R>) {
+        let count = self.count();
+        for i in 0..now.rays.len() {
+            if now.rays.placement(i) != MISS {
+                let media = now.carried.media_of(i);
+                let throughput = &mut now.carried.throughput[i * count..(i + 1) * count];
+                self.dim_along(&media, now.rays.t(i), throughput);
             }
         }
     }
 
     /// Takes from light what a medium absorbs over a way (m); nothing over one without end.
     pub(super) fn dim_along(&self, media: &Media, length: f64, light: &mut [f64]) {
-        let (placed, spectral) = (self.stage.placed, self.stage.spectral);
+        let (placed, spectral) = (self.ctx.placed, self.ctx.spectral);
         let medium = placed.get(media.medium(placed)).and_then(|placed| placed.absorption.as_ref());
         let Some(absorption) = medium.filter(|_| length.is_finite()) else { return };
         let ways = length / absorption.distance;
@@ -220,11 +228,11 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// The bodies that hold the origin of each ray: those whose back is the side that is met along a line, both ways.
     /// Empty where none can.
     pub(super) fn media_at_origins(&self, rays: &RayBatch) -> Vec<Media> {
-        let placed = self.stage.placed;
-        if !self.stage.traits.has_media || placed.bodies().next().is_none() {
+        let placed = self.ctx.placed;
+        if !self.ctx.traits.has_media || placed.bodies().next().is_none() {
             return Vec::new();
         }
-        let moves = self.stage.surroundings.geometry.moves();
+        let moves = self.ctx.scene.geometry.moves();
         let holds = |i: usize| {
             let origin = rays.origin(i);
             moves
@@ -269,7 +277,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             rays.precision = HitPrecision::Double;
             rays.push_between(origin, direction, start, f64::INFINITY);
             rays.end_at_times([time].into_iter());
-            self.stage.accel.closest(&rays, &mut hits);
+            self.ctx.accel.closest(&rays, &mut hits);
             if !hits.is_hit(0) {
                 break;
             }
@@ -277,7 +285,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             let coplanar = self.coincident_at(origin + direction * hits.t[0], direction, own);
             let front = hits.normal(0).dot(direction) <= 0.0;
             for (body, front) in [(own[0], front), (coplanar.placement, coplanar.front)] {
-                if self.stage.placed.get(body).is_none_or(|placed| placed.body.is_none()) {
+                if self.ctx.placed.get(body).is_none_or(|placed| placed.body.is_none()) {
                     continue;
                 }
                 let turn = if front { -1 } else { 1 };

@@ -1,8 +1,9 @@
-//! Light transport in batches: what the tracers of light share.
+//! Light transport: one tracer, whatever the surfaces, the accelerator and the precision.
 //!
-//! All paths of a batch take their next step together: closest hits of all, emission that they meet,
-//! then for each that goes on one light to ask (a shadow ray) and one direction to follow. Rays that
-//! ended are left out, so each batch that reaches the accelerator is full.
+//! All paths of a batch take their next step together ([`trace`](self::trace)): closest hits of all, emission that they
+//! meet, then for each that goes on one light to ask (a shadow ray) and one direction to follow. Rays that ended are
+//! left out, so each batch that reaches the accelerator is full. The rays are in [`rays`] as the accelerator takes
+//! them: in blocks of sixteen of single precision, or in batches of either precision.
 //!
 //! # Sources
 //!
@@ -12,40 +13,36 @@
 //! * Many wavelengths on one path: Wilkie et al., "Hero Wavelength Spectral Sampling", 2014. Theirs keeps
 //!   one of them where a smooth boundary parts them; here all go on, each its way.
 
+mod ask;
 mod dispersion;
 mod kernels;
-mod lanes;
 mod media;
-mod meet;
-mod numbers;
 mod patch;
 mod paths;
+mod rays;
 mod rules;
+mod scatter;
 mod shadows;
-mod step;
+mod surfaces;
+mod trace;
 
 use std::fmt::Debug;
 use std::ops::{AddAssign, Range};
 
 use etendue_accel::Accel;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{Detail, Geometry, HitBatch, HitPrecision, RayBatch};
+use etendue_geometry::{Geometry, HitPrecision, RayBatch};
 
-use self::lanes::LaneScratch;
-use self::media::{Coincident, Media};
-use self::numbers::{Draw, Numbers};
 use self::patch::Patch;
 pub(crate) use self::patch::{LANES, Row};
-use self::paths::{Paths, State};
+use self::paths::Workspace;
+use self::rays::{Batch, Blocks};
 pub use self::rules::{Follow, Rules};
-use self::shadows::Shadows;
 use crate::bsdf::{Bsdf, Weights, metal};
 use crate::emitters::Emitters;
-use crate::light_sampler::Receiver;
 use crate::lights::Lights;
 use crate::placed::{PlacedSurface, PlacedSurfaces};
 use crate::reference::SceneView;
-use crate::sky::Asked;
 use crate::spawn::{self, Anchor};
 use crate::spectral::Spectral;
 use crate::{Color, ConductorId, Glass, Ior, Material, Scattering, Tint};
@@ -56,7 +53,7 @@ pub struct LightingContext<'a> {
     /// What finds the hits.
     pub accel: &'a dyn Accel,
     /// Meshes, materials and images.
-    pub surroundings: SceneView<'a>,
+    pub scene: SceneView<'a>,
     /// Where light comes from.
     pub lights: &'a Lights,
     /// The bands.
@@ -109,6 +106,11 @@ pub struct Traits {
 }
 
 impl Traits {
+    /// Whether paths may pass surfaces as if they were not there.
+    pub(crate) fn may_pass(&self) -> bool {
+        self.has_alpha || self.has_nested
+    }
+
     /// Those of all placed surfaces.
     #[must_use]
     pub fn of(geometry: &Geometry, materials: &[Material], surfaces: &PlacedSurfaces) -> Self {
@@ -185,15 +187,9 @@ impl Parts {
 
 /// Random numbers by ray and pair of dimensions, many at a time.
 pub trait Samples: Debug {
-    /// A point of the unit square for each of `wanted`, ray and pair: `out` is refilled. Pairs are
-    /// counted from 0, which no ray has used before.
-    fn squares(&self, wanted: &[(u32, u32)], out: &mut Vec<[f64; 2]>);
-
-    /// The same of one pair for each of `rays`.
-    fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>) {
-        let wanted: Vec<(u32, u32)> = rays.iter().map(|&ray| (ray, pair)).collect();
-        self.squares(&wanted, out);
-    }
+    /// A point of the unit square of one pair for each of `rays`: `out` is refilled. Pairs are counted from 0, which
+    /// no ray has used before.
+    fn squares_of_pair(&self, rays: &[u32], pair: u32, out: &mut Vec<[f64; 2]>);
 }
 
 /// What became of a batch.
@@ -218,90 +214,46 @@ impl AddAssign for RayStats {
 /// Memory of one thread, kept between batches.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    now: Paths,
-    next: Paths,
-    /// Paths that only look for light.
-    last: Paths,
-    hits: HitBatch,
-    /// Of each hit; empty where bodies do not touch.
-    coincident: Vec<Coincident>,
-    alive: Vec<u32>,
-    numbers: Numbers,
-    shadows: Shadows,
-    radiance: Vec<f64>,
-    /// Paths that met nothing, and what is asked of the sky together.
-    missed: Vec<u32>,
-    asked: Asked,
+    blocks: Workspace<Blocks>,
+    batches: Workspace<Batch>,
     patch: Box<Patch>,
-    lanes: LaneScratch,
 }
 
-/// Traces `beam` by `rules`.
+/// Traces the camera's rays by `rules`.
 fn trace(
     rules: Rules,
-    stage: &LightingContext<'_>,
-    beam: &RaySamples<'_>,
+    ctx: &LightingContext<'_>,
+    camera: &RaySamples<'_>,
     scratch: &mut Scratch,
     out: &mut Vec<f64>,
 ) -> RayStats {
-    match stage.spectral.is_rgb() {
-        true => trace_bands::<true>(rules, stage, beam, scratch, out),
-        false => trace_bands::<false>(rules, stage, beam, scratch, out),
+    match ctx.spectral.is_rgb() {
+        true => trace_bands::<true>(rules, ctx, camera, scratch, out),
+        false => trace_bands::<false>(rules, ctx, camera, scratch, out),
     }
 }
 
 fn trace_bands<const RGB: bool>(
     rules: Rules,
-    stage: &LightingContext<'_>,
-    beam: &RaySamples<'_>,
-    scratch: &mut Scratch,
+    ctx: &LightingContext<'_>,
+    camera: &RaySamples<'_>,
+    Scratch { blocks, batches, patch }: &mut Scratch,
     out: &mut Vec<f64>,
 ) -> RayStats {
-    let count = stage.spectral.count();
     out.clear();
-    out.resize(beam.rays.len() * beam.parts.count() * count, 0.0);
+    out.resize(camera.rays.len() * camera.parts.count() * ctx.spectral.count(), 0.0);
     let mut tracing = Tracing::<RGB> {
         rules,
-        stage,
-        parts: beam.parts,
-        times: beam.rays.times(),
+        ctx,
+        parts: camera.parts,
+        times: camera.rays.times(),
         tally: RayStats::default(),
     };
-    scratch.hits.detail = Detail::Surface;
-    scratch.shadows.hits.detail = Detail::Surface;
-    scratch.radiance.resize(count, 0.0);
-    if let Some(blocks) = lanes::block_accel(stage) {
-        tracing.trace_blocks(blocks, beam, scratch, out);
-        return tracing.tally;
-    }
-    let precision = stage.precision;
-    tracing.start(beam, &mut scratch.now);
-    while !scratch.now.states.is_empty() {
-        stage.accel.closest(&scratch.now.rays, &mut scratch.hits);
-        tracing.tally.rays += scratch.now.states.len() as u64;
-        if stage.traits.has_media {
-            tracing.absorb(scratch);
+    match ctx.precision {
+        HitPrecision::Single if ctx.accel.blocks().is_some() => {
+            tracing.trace(camera, blocks, patch, out);
         }
-        tracing.coincident(&scratch.now.rays, &scratch.hits, &mut scratch.coincident);
-        tracing.meet(scratch, out);
-        let needs = tracing.needs(&scratch.now.states);
-        let paths = (&scratch.now.states[..], &scratch.alive[..]);
-        scratch.numbers.draw(beam.samples, needs, paths);
-        scratch.next.restart(precision);
-        scratch.last.restart(precision);
-        scratch.shadows.clear();
-        scratch.shadows.rays.precision = precision;
-        // From neighbouring places to lights: as coherent as what they start from.
-        scratch.shadows.rays.coherent = scratch.now.rays.coherent;
-        tracing.step_all(scratch);
-        scratch.next.take_times(tracing.times);
-        scratch.last.take_times(tracing.times);
-        if stage.lights.is_hittable() && precision == HitPrecision::Double {
-            scratch.shadows.sort(count);
-        }
-        tracing.light(&mut scratch.shadows, out);
-        tracing.trace_emitters(scratch, out);
-        std::mem::swap(&mut scratch.now, &mut scratch.next);
+        HitPrecision::Single | HitPrecision::Double => tracing.trace(camera, batches, patch, out),
     }
     tracing.tally
 }
@@ -310,7 +262,7 @@ fn trace_bands<const RGB: bool>(
 /// that colours are what they carry, is then known when the program is compiled.
 struct Tracing<'a, const RGB: bool> {
     rules: Rules,
-    stage: &'a LightingContext<'a>,
+    ctx: &'a LightingContext<'a>,
     parts: Parts,
     /// When the camera's rays are (s from the frame's time); empty when all are at 0.
     times: &'a [f64],
@@ -321,19 +273,19 @@ impl<const RGB: bool> Tracing<'_, RGB> {
     /// How many bands there are.
     #[inline(always)]
     fn count(&self) -> usize {
-        if RGB { 3 } else { self.stage.spectral.count() }
+        if RGB { 3 } else { self.ctx.spectral.count() }
     }
 
     /// A linear sRGB colour in band `k`.
     #[inline(always)]
     fn color_band(&self, color: &Color, k: usize) -> f64 {
-        if RGB { color[k] } else { self.stage.spectral.band(color, k) }
+        if RGB { color[k] } else { self.ctx.spectral.band(color, k) }
     }
 
     /// A colour, with its curve, in band `k`.
     #[inline(always)]
     fn band(&self, tint: &Tint, k: usize) -> f64 {
-        if RGB { tint.color[k] } else { self.stage.spectral.tint(tint, k) }
+        if RGB { tint.color[k] } else { self.ctx.spectral.tint(tint, k) }
     }
 
     /// The light of band `k` that met several facets, which return `mean` of all light where they reflect all of it:
@@ -344,46 +296,6 @@ impl<const RGB: bool> Tracing<'_, RGB> {
             return metal::multiple(metal::mean_reflectance(self.band(base, k), 0.0), mean);
         }
         self.color_band(deep, k)
-    }
-
-    fn start(&self, beam: &RaySamples<'_>, paths: &mut Paths) {
-        paths.clear();
-        paths.rays.copy_from(beam.rays);
-        paths.rays.from_surface = false;
-        paths.rays.precision = self.stage.precision;
-        let media = self.media_at_origins(beam.rays);
-        for i in 0..beam.rays.len() {
-            paths.states.push(State {
-                ray: u32::try_from(i).unwrap_or(u32::MAX),
-                steps: 0,
-                bounces: 0,
-                pdf: f64::INFINITY,
-                receiver: Receiver::open(beam.rays.origin(i)),
-                wavelength: None,
-                media: media.get(i).copied().unwrap_or(Media::NONE),
-                is_last: false,
-                cone: self.stage.surroundings.view.cone(beam.rays.direction(i)),
-            });
-            let bands = 0..self.count();
-            paths.throughput.extend(bands.map(|k| f64::from(u8::from(beam.bands.contains(&k)))));
-        }
-    }
-
-    /// What the next step of any of `states` may draw.
-    fn needs(&self, states: &[State]) -> impl Fn(Draw) -> bool {
-        let LightingContext { lights, traits, .. } = self.stage;
-        let most = states.iter().map(|state| state.bounces + 1).max().unwrap_or(0);
-        let least = states.iter().map(|state| state.bounces + 1).min().unwrap_or(0);
-        let goes_on = self.rules.follow == Follow::All && least < self.rules.bounces;
-        let follows = goes_on || lights.is_hittable() || traits.has_choice;
-        let roulette = self.rules.roulette.is_some_and(|after| most >= after);
-        let [several, extended] = [lights.are_several(), lights.are_extended()];
-        move |draw| match draw {
-            Draw::Choice => traits.has_choice,
-            Draw::Light => several || extended || traits.has_choice,
-            Draw::Direction => follows,
-            Draw::Chance => roulette || traits.has_alpha,
-        }
     }
 
     /// Adds light to one of the [rows](Parts::row), and to the whole of its ray.
@@ -428,7 +340,7 @@ impl<const RGB: bool> Tracing<'_, RGB> {
 
     /// The same of a metal of measured index, whose facets of reflectance 1 return `mean` of all light.
     fn in_band_of_metal(&self, named: ConductorId, mean: f64, value: Weights, k: usize) -> f64 {
-        let [face_on, dip] = self.stage.spectral.metal(named, k);
+        let [face_on, dip] = self.ctx.spectral.metal(named, k);
         let deep = metal::multiple(metal::mean_reflectance(face_on, dip), mean);
         let sum = value.white + value.base * face_on + value.dip * dip + value.deep * deep;
         sum.max(0.0)

@@ -1,15 +1,13 @@
 //! Hits worked on side by side: one array a number, of so many lanes.
 
+use etendue_geometry::MISS;
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, HitPrecision, MISS};
 
 use super::media::Crossing;
-use super::paths::Paths;
 use crate::bsdf::sheets::Sheets;
 use crate::bsdf::{Bsdf, Weights};
 use crate::lamps::AreaLight;
 use crate::light_sampler::Receiver;
-use crate::placed::PlacedSurface;
 use crate::spawn::Anchor;
 use crate::target::{Target, TargetKind};
 use crate::{Color, ConductorId, Tint};
@@ -50,8 +48,6 @@ pub(super) struct Patch {
     pub(super) crossings: Vec<Option<Crossing>>,
     /// What each light that was chosen gives off: `[lane][band]`.
     pub(super) radiance: Vec<f64>,
-    /// Lanes of which something goes on.
-    pub(super) picked: Vec<usize>,
 }
 
 /// The colours of a sheet of facets over a matte base.
@@ -215,43 +211,8 @@ impl Patch {
         self.crossings.clear();
     }
 
-    /// Adds hit `i` of the `k`-th path that goes on, on a placement, and returns its lane.
-    #[inline]
-    pub(super) fn push(
-        &mut self,
-        (now, hits): (&Paths, &HitBatch),
-        (i, k): (usize, usize),
-        placed: &PlacedSurface,
-    ) -> usize {
-        let lane = self.count;
-        let Seen { origin, direction, t, normal, shading, magnitudes, is_beside, .. } =
-            &mut self.seen;
-        // Rays that pass a surface leave it on the other side.
-        let is_single = now.rays.precision == HitPrecision::Single && placed.is_opaque;
-        let least = hits.u[i].min(hits.v[i]).min(1.0 - hits.u[i] - hits.v[i]);
-        is_beside[lane] = f64::from(u8::from(is_single && least < BESIDE));
-        self.path.push((i, k));
-        t[lane] = hits.t[i];
-        let (origins, directions) = (now.rays.origins(), now.rays.directions());
-        for axis in 0..3 {
-            origin[axis][lane] = origins[axis][i];
-            direction[axis][lane] = directions[axis][i];
-            normal[axis][lane] = hits.normal[axis][i];
-            shading[axis][lane] = hits.normal[axis][i];
-            magnitudes[axis][lane] = placed.magnitudes[axis];
-        }
-        self.count += 1;
-        lane
-    }
-
-    pub(super) fn point(&self, lane: usize) -> DVec3 {
+    fn point(&self, lane: usize) -> DVec3 {
         at(&self.seen.point, lane)
-    }
-
-    /// The hit of a lane as lights are chosen for it.
-    #[inline(always)]
-    pub(super) fn receiver(&self, lane: usize) -> Receiver {
-        self.seen.receiver(lane, self.bsdfs.get(lane))
     }
 
     /// Where a ray starts that leaves the hit of a lane along `towards`.
@@ -259,13 +220,6 @@ impl Patch {
         let normal = at(&self.seen.normal, lane);
         let anchor = Anchor { point: self.point(lane), normal, error: self.seen.error[lane] };
         anchor.leave(towards) + at(&self.seen.back, lane)
-    }
-
-    /// Sets the ray that leaves the hit of a lane.
-    pub(super) fn send(&mut self, lane: usize, (start, along): (DVec3, DVec3)) {
-        put(&mut self.away.start, lane, start);
-        put(&mut self.away.along, lane, along);
-        self.away.reach[lane] = f64::INFINITY;
     }
 }
 

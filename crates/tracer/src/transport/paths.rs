@@ -1,101 +1,212 @@
-//! Paths under way, in arrays, and what each remembers.
+//! Paths under way and what each remembers; the workspace of a thread.
+//!
+//! All paths of a batch have taken equally many steps, so what a path remembers is little. What no surface of the
+//! scene asks for is not remembered: those columns stay empty.
 
 use etendue_geometry::glam::DVec3;
-use etendue_geometry::{HitBatch, HitPrecision, MISS, RayBatch};
+use etendue_geometry::{HitBatch, PlacedTriangle, RayBatch, RayBlock};
 
-use super::media::Media;
-use crate::footprint::{Cone, Footprint};
+use super::media::{Coincident, Media};
+use super::rays::Rays;
+use super::{LightingContext, RaySamples};
+use crate::footprint::Cone;
 use crate::light_sampler::Receiver;
+use crate::placed::SurfaceKind;
 use crate::sampling::power_heuristic;
+use crate::sky::Asked;
 
-/// Paths under way.
+/// What a path uses random numbers for at each step.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Draw {
+    /// Choosing among the ways in which a surface scatters.
+    Choice,
+    /// Choosing a light and a place on it; or the band that stays where glass splits them.
+    Light,
+    /// The direction to follow.
+    Direction,
+    /// Whether a surface is there, and whether a path goes on.
+    Chance,
+}
+
+/// How many uses there are.
+pub(super) const DRAWS: u32 = 4;
+
+impl Draw {
+    pub(super) const ALL: [Self; DRAWS as usize] =
+        [Self::Choice, Self::Light, Self::Direction, Self::Chance];
+}
+
+/// Paths under way that have taken equally many steps.
 #[derive(Debug, Default)]
-pub(super) struct Paths {
-    pub(super) rays: RayBatch,
-    pub(super) states: Vec<State>,
+pub(super) struct Paths<R> {
+    pub(super) rays: R,
+    pub(super) carried: Carried,
+}
+
+/// What each path, or each ray to a light, brings.
+#[derive(Debug, Default)]
+pub(super) struct Carried {
+    /// The camera's ray; or the [row](super::Parts::row) that its light is added to.
+    pub(super) ray: Vec<u32>,
+    /// Of paths alone.
+    pub(super) ways: Vec<Way>,
+    /// What each path stands for, as long as it only met mirrors and clear boundaries; as wide as where its ray
+    /// starts. Empty before the first surface, and where all surfaces are matte.
+    pub(super) cones: Vec<Option<Cone>>,
+    /// The surfaces that were not there; empty where all are.
+    pub(super) passages: Vec<Passage>,
+    /// The media that each is in; empty where they do not count.
+    pub(super) media: Vec<Media>,
+    /// The wavelength (nm) of the one band left, after a glass has parted them; empty where none does.
+    pub(super) wavelengths: Vec<Option<f64>>,
+    /// The triangle that each leaves, of last directions alone.
+    pub(super) left: Vec<PlacedTriangle>,
+    /// No path can meet the light of this ray; empty of paths, and where there are no panes.
+    pub(super) is_delta: Vec<bool>,
     /// `[path][band]`.
     pub(super) throughput: Vec<f64>,
-    /// Lanes of a patch whose paths are added.
-    pub(super) kept: Vec<usize>,
 }
 
-/// What a path remembers.
+/// How a path came to its direction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct State {
-    /// The camera's ray.
-    pub(super) ray: u32,
-    /// Steps taken, for numbers not to be used twice.
-    pub(super) steps: u32,
-    /// Surfaces that have scattered light.
-    pub(super) bounces: u32,
-    /// Density (1/sr) of the direction; `+inf` when no light can be asked instead.
+pub(super) struct Way {
+    /// Density (1/sr) of the direction; unused where it is specular.
     pub(super) pdf: f64,
-    /// The surface that it left, as lights were chosen for it.
-    pub(super) receiver: Receiver,
-    /// The wavelength (nm) of the one band left, after a glass has parted them.
-    pub(super) wavelength: Option<f64>,
-    /// The media that it is in, where they count.
-    pub(super) media: Media,
-    /// Looks for light and goes no farther.
+    /// No light was asked in its stead: it is the camera's, a mirror's or a smooth boundary's.
+    pub(super) is_specular: bool,
+    /// It looks for light and goes no farther.
     pub(super) is_last: bool,
-    /// What the path stands for, as long as it only met mirrors and clear boundaries; as wide as at
-    /// its vertex.
-    pub(super) cone: Option<Cone>,
+    /// Of the surface that it left, by which lights were chosen for it ([`Receiver::normal`]).
+    pub(super) normal: [f32; 3],
 }
 
-impl State {
-    /// The weight of light that the path met by itself against having asked for it with density `pdf`
-    /// (1/sr).
-    pub(super) fn weight_against(&self, pdf: f64) -> f64 {
-        match self.pdf {
-            f64::INFINITY => 1.0,
-            own => power_heuristic(own, pdf),
-        }
+impl Way {
+    pub(super) const CAMERA: Self =
+        Self { pdf: 0.0, is_specular: true, is_last: false, normal: [0.0; 3] };
+
+    /// The point (m) that it left, as lights were chosen for it.
+    pub(super) fn receiver(self, point: DVec3) -> Receiver {
+        Receiver { point, normal: self.normal.map(f64::from).into() }
+    }
+
+    /// The weight of light that was met against having asked for it with density `pdf` (1/sr).
+    pub(super) fn weight_against(self, pdf: f64) -> f64 {
+        if self.is_specular { 1.0 } else { power_heuristic(self.pdf, pdf) }
     }
 }
 
-impl Paths {
+/// The surfaces that a path passed since they were not there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Passage {
+    /// On the whole path.
+    pub(super) surfaces: u32,
+    /// The place (m) from which it came, if the last surface that it met was one.
+    pub(super) from: Option<DVec3>,
+}
+
+impl Carried {
     pub(super) fn clear(&mut self) {
-        self.rays.clear();
-        self.states.clear();
+        self.ray.clear();
+        self.ways.clear();
+        self.cones.clear();
+        self.passages.clear();
+        self.media.clear();
+        self.wavelengths.clear();
+        self.left.clear();
+        self.is_delta.clear();
         self.throughput.clear();
     }
 
-    /// Empties it for paths that leave surfaces.
-    pub(super) fn restart(&mut self, precision: HitPrecision) {
-        self.clear();
-        self.rays.from_surface = true;
-        self.rays.coherent = false;
-        self.rays.precision = precision;
+    /// The media that a path is in.
+    pub(super) fn media_of(&self, i: usize) -> Media {
+        self.media.get(i).copied().unwrap_or(Media::NONE)
     }
 
-    /// Puts each path at the time of the camera's ray that it goes on from.
-    pub(super) fn take_times(&mut self, times: &[f64]) {
-        if !times.is_empty() {
-            self.rays.set_times(self.states.iter().map(|state| times[state.ray as usize]));
-        }
+    /// The wavelength (nm) of a path that has but one band.
+    pub(super) fn wavelength_of(&self, i: usize) -> Option<f64> {
+        self.wavelengths.get(i).copied().flatten()
+    }
+}
+
+impl<R: Rays> Paths<R> {
+    pub(super) fn restart(&mut self, ctx: &LightingContext<'_>) {
+        self.rays.restart(ctx);
+        self.carried.clear();
     }
 
-    /// What path `i` carries in its `count` bands.
-    pub(super) fn throughput_of(&self, i: usize, count: usize) -> &[f64] {
-        &self.throughput[i * count..(i + 1) * count]
+    /// Surfaces that have scattered a path, which has taken so many steps.
+    #[inline(always)]
+    pub(super) fn bounces(&self, steps: u32, i: usize) -> u32 {
+        steps - self.carried.passages.get(i).map_or(0, |passage| passage.surfaces)
     }
 
-    /// What path `i` covers of what it hit.
-    pub(super) fn footprint(&self, hits: &HitBatch, i: usize) -> Option<Footprint> {
-        let width = self.states[i].cone?.after(hits.t[i]).width;
-        Some(Footprint { direction: self.rays.direction(i), width })
+    /// Where the direction of a path begins (m).
+    #[inline(always)]
+    pub(super) fn from(&self, i: usize) -> DVec3 {
+        let from = self.carried.passages.get(i).and_then(|passage| passage.from);
+        from.unwrap_or_else(|| self.rays.origin(i))
     }
+}
 
-    /// Adds a path that leaves a placement's triangle: where it starts, and its direction.
-    pub(super) fn push(&mut self, ray: (DVec3, DVec3), left: [u32; 2], state: State) {
-        self.push_beside(ray, [left, [MISS; 2]], state);
-    }
+/// The kinds of surfaces that paths go on from, in the order in which they are worked on.
+pub(super) const KINDS: [SurfaceKind; 4] =
+    [SurfaceKind::Matte, SurfaceKind::Sheet, SurfaceKind::Smooth, SurfaceKind::Other];
 
-    /// Adds a path that leaves two triangles in one place.
-    pub(super) fn push_beside(&mut self, ray: (DVec3, DVec3), left: [[u32; 2]; 2], state: State) {
-        let limits = [0.0, f64::INFINITY];
-        self.rays.push_between_triangles(ray.0, ray.1, limits, left);
-        self.states.push(state);
+/// Where paths go on.
+#[derive(Debug, Default)]
+pub(super) struct Onward<R> {
+    pub(super) next: Paths<R>,
+    /// Last directions, which ask only what shines.
+    pub(super) last: RayBatch,
+    pub(super) of_last: Carried,
+}
+
+/// Memory of one thread, kept between batches.
+#[derive(Debug, Default)]
+pub(super) struct Workspace<R> {
+    pub(super) now: Paths<R>,
+    pub(super) onward: Onward<R>,
+    pub(super) shadows: Paths<R>,
+    /// Shadow rays behind surfaces that let light pass, and which those are.
+    pub(super) behind: R,
+    pub(super) open: Vec<u32>,
+    /// Hits of last directions.
+    pub(super) hits: HitBatch,
+    /// Boundaries of other bodies in the place of each hit; empty where bodies do not touch.
+    pub(super) coincident: Vec<Coincident>,
+    /// Paths that go on by the kind of surface that they met, in the order of [`KINDS`]; of them one after the
+    /// other the camera's rays, and their random numbers by use.
+    pub(super) kinds: [Vec<u32>; KINDS.len()],
+    pub(super) alive: Vec<u32>,
+    pub(super) drawn: [Vec<[f64; 2]>; DRAWS as usize],
+    /// Hits of one kind put side by side, and those of sheets that turned out to be smooth: their paths, and which
+    /// of those that go on they are.
+    pub(super) side_by_side: Vec<RayBlock>,
+    pub(super) smooth: Vec<(usize, usize)>,
+    /// Paths that met nothing, and what is asked of the sky together.
+    pub(super) missed: Vec<u32>,
+    pub(super) asked: Asked,
+    /// Lanes of a patch that are worked on.
+    pub(super) picked: Vec<usize>,
+    /// Light of one hit by band.
+    pub(super) radiance: Vec<f64>,
+}
+
+impl<R> Workspace<R> {
+    /// The numbers of the `k`-th path that goes on, for one use.
+    #[inline(always)]
+    pub(super) fn number(&self, draw: Draw, k: usize) -> [f64; 2] {
+        self.drawn[draw as usize].get(k).copied().unwrap_or([0.5; 2])
     }
+}
+
+/// What all paths of a batch have in common at one step.
+pub(super) struct Step<'a> {
+    pub(super) camera: &'a RaySamples<'a>,
+    /// Surfaces that the paths have met.
+    pub(super) number: u32,
+    /// Last directions ask only what shines, but for specular ones.
+    pub(super) asks_emitters: bool,
+    /// Hits may be of several kinds.
+    pub(super) is_mixed: bool,
 }

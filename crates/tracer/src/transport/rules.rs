@@ -49,15 +49,15 @@ impl Rules {
         Self { bounces, follow: Follow::All, roulette: Some(Self::ROULETTE_AFTER) }
     }
 
-    /// The radiance that arrives along each ray against its direction, in `beam.bands`: `out` is
-    /// `[ray][part][band]` with `beam.parts` and all bands of the stage, and is refilled; other bands are 0.
+    /// The radiance that arrives along each ray against its direction, in `camera.bands`: `out` is
+    /// `[ray][part][band]` with `camera.parts` and all bands of the context, and is refilled; other bands are 0.
     pub fn radiance(
         self,
-        stage: &LightingContext<'_>,
-        beam: &RaySamples<'_>,
+        ctx: &LightingContext<'_>,
+        camera: &RaySamples<'_>,
         scratch: &mut Scratch,
         out: &mut Vec<f64>,
     ) -> RayStats {
-        trace(self, stage, beam, scratch, out)
+        trace(self, ctx, camera, scratch, out)
     }
 }
